@@ -1,0 +1,84 @@
+"""One description of a GPU record, from which both sides are generated.
+
+A struct written twice drifts apart silently; here the numpy dtype and the GLSL text come
+from the same fields, and any padding std430 would slip in is an error instead of a surprise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+# type -> (numpy base, components, std430 alignment in bytes, size in bytes)
+_TYPES = {
+    "float": ("f4", 1, 4, 4),
+    "uint": ("u4", 1, 4, 4),
+    "int": ("i4", 1, 4, 4),
+    "vec2": ("f4", 2, 8, 8),
+    "uvec2": ("u4", 2, 8, 8),
+    "vec3": ("f4", 3, 16, 12),
+    "vec4": ("f4", 4, 16, 16),
+    "uvec4": ("u4", 4, 16, 16),
+}
+
+
+@dataclass(frozen=True)
+class Field:
+    """One member; `comment` states its unit and frame."""
+
+    name: str
+    type: str
+    comment: str = ""
+    count: int = 1
+    """Array length; 1 is a plain member."""
+
+
+@dataclass(frozen=True)
+class Struct:
+    """A std430 struct without implicit padding."""
+
+    name: str
+    fields: tuple[Field, ...]
+
+    def __post_init__(self) -> None:
+        offset, widest = 0, 4
+        for field in self.fields:
+            _, _, align, size = _TYPES[field.type]
+            if offset % align:
+                raise ValueError(f"{self.name}.{field.name} would be padded: offset {offset}, alignment {align}")
+            if field.count > 1 and size % align:
+                raise ValueError(f"{self.name}.{field.name}: an array of {field.type} is padded")
+            offset += size * field.count
+            widest = max(widest, align)
+        if offset % widest:
+            raise ValueError(f"{self.name} is {offset} bytes, which std430 pads to a multiple of {widest}")
+
+    @cached_property
+    def dtype(self) -> np.dtype:
+        """Packed numpy dtype of one record."""
+        members = []
+        for field in self.fields:
+            base, components, _, _ = _TYPES[field.type]
+            shape = tuple(n for n in (field.count, components) if n > 1)
+            members.append((field.name, base, shape) if shape else (field.name, base))
+        return np.dtype(members)
+
+    @property
+    def stride(self) -> int:
+        """Bytes of one record."""
+        return self.dtype.itemsize
+
+    def glsl(self) -> str:
+        """GLSL declaration of the struct."""
+        lines = [f"struct {self.name} {{"]
+        for field in self.fields:
+            suffix = f"[{field.count}]" if field.count > 1 else ""
+            comment = f"  // {field.comment}" if field.comment else ""
+            lines.append(f"    {field.type} {field.name}{suffix};{comment}")
+        return "\n".join(lines) + "\n};\n"
+
+    def zeros(self, count: int) -> np.ndarray:
+        """`count` records of zero bytes."""
+        return np.zeros(count, self.dtype)

@@ -1,0 +1,123 @@
+"""From a shader's file name to a compiled program, with errors that name file and line.
+
+moderngl's own includes go one level deep and lose line numbers, so sources are flattened
+here: `#include "lib/x.glsl"` (relative to the shaders folder, each file once), then
+`#version`, the defines of the scene's `Features`, and the structs of `records` on top. A table
+from flattened line to (file, line) turns a compiler message back into something to click on.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app import paths
+from app.gpu.schema import Struct
+
+if TYPE_CHECKING:
+    import moderngl
+
+_INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
+_MESA_LINE = re.compile(r"\b\d+:(\d+)\(")
+_NVIDIA_LINE = re.compile(r"\b\d+\((\d+)\)")
+
+
+class ShaderError(RuntimeError):
+    """A shader that does not exist, compile or link; the message names file and line."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Flattened GLSL and where each of its lines came from."""
+
+    text: str
+    origin: tuple[tuple[str, int], ...]
+
+    def explain(self, compiler_log: str) -> str:
+        """The compiler's log with flattened line numbers replaced by file:line."""
+
+        def locate(match: re.Match[str]) -> str:
+            line = int(match.group(1))
+            if 1 <= line <= len(self.origin):
+                return "{}:{} ".format(*self.origin[line - 1])
+            return match.group(0)
+
+        return _NVIDIA_LINE.sub(locate, _MESA_LINE.sub(locate, compiler_log))
+
+
+def load_source(
+    name: str,
+    defines: Mapping[str, int | float | str] | None = None,
+    structs: Sequence[Struct] = (),
+    root: Path | None = None,
+) -> Source:
+    """Flatten the shader `name` (path under the shaders folder).
+
+    Raises `ShaderError` naming the including file and line when an include is missing.
+    """
+    root = root or paths.shaders_dir()
+    lines: list[str] = []
+    origin: list[tuple[str, int]] = []
+
+    def emit(text: str, file: str, line: int) -> None:
+        lines.append(text)
+        origin.append((file, line))
+
+    emit("#version 430 core", "<generated>", 1)
+    for key, value in (defines or {}).items():
+        emit(f"#define {key} {value}", "<features>", 1)
+    for struct in structs:
+        for text in struct.glsl().splitlines():
+            emit(text, f"<struct {struct.name}>", 1)
+
+    seen: set[str] = set()
+
+    def flatten(file: str, asked_by: str) -> None:
+        if file in seen:
+            return
+        seen.add(file)
+        try:
+            text = (root / file).read_text(encoding="utf-8")
+        except OSError as error:
+            raise ShaderError(f"shader {file} asked for by {asked_by} cannot be read: {error.strerror}") from error
+        for number, line in enumerate(text.splitlines(), start=1):
+            include = _INCLUDE.match(line)
+            if include:
+                flatten(include.group(1), f"{file}:{number}")
+            else:
+                emit(line, file, number)
+
+    flatten(name, "the program")
+    return Source("\n".join(lines) + "\n", tuple(origin))
+
+
+def compute(
+    ctx: moderngl.Context, name: str, defines: Mapping[str, int | float | str] | None = None, structs: Sequence[Struct] = ()
+) -> moderngl.ComputeShader:
+    """Compile the compute shader `name`; raises `ShaderError` with file and line."""
+    source = load_source(name, defines, structs)
+    try:
+        return ctx.compute_shader(source.text)
+    except Exception as error:  # moderngl raises its own Error type with the driver's log
+        raise ShaderError(f"{name} does not compile:\n{source.explain(str(error))}") from error
+
+
+def program(
+    ctx: moderngl.Context,
+    vertex: str,
+    fragment: str,
+    defines: Mapping[str, int | float | str] | None = None,
+    structs: Sequence[Struct] = (),
+) -> moderngl.Program:
+    """Compile and link a vertex and a fragment shader; raises `ShaderError` with file and line."""
+    vertex_source = load_source(vertex, defines, structs)
+    fragment_source = load_source(fragment, defines, structs)
+    try:
+        return ctx.program(vertex_shader=vertex_source.text, fragment_shader=fragment_source.text)
+    except Exception as error:
+        log = str(error)
+        source = fragment_source if "fragment" in log.lower() else vertex_source
+        raise ShaderError(f"{vertex} with {fragment} does not compile:\n{source.explain(log)}") from error
