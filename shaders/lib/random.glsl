@@ -1,0 +1,31 @@
+// Random numbers as a function of counters: the same (seed, pass, photon, branch, dimension) gives
+// the same number in any batch, on any machine. PCG output permutation as a hash
+// [Jarzynski and Olano 2020].
+#ifndef RANDOM_GLSL
+#define RANDOM_GLSL
+
+uint hash_pcg(uint value)
+{
+    uint state = value * 747796405u + 2891336453u;
+    uint word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
+    return (word >> 22u) ^ word;
+}
+
+uint hash_combine(uint a, uint b)
+{
+    return hash_pcg(a ^ (hash_pcg(b) + 0x9e3779b9u));
+}
+
+// Uniform in [0, 1) with 24 bits.
+float unit_float(uint bits)
+{
+    return float(bits >> 8) * (1.0 / 16777216.0);
+}
+
+// Fraction of i * alpha + shift, alpha = generator / 2^32: a Kronecker sequence, exact in integers.
+float kronecker(uint i, uint generator, uint shift)
+{
+    return unit_float(i * generator + shift);
+}
+
+#endif
