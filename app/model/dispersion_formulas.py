@@ -1,0 +1,180 @@
+"""The dispersion formulas themselves: n(λ) and dn/dλ together, in float64 and analytic.
+
+Kinds "formula 1" … "formula 6" are those of refractiveindex.info (M. N. Polyanskiy,
+"Refractiveindex.info database of optical constants", Sci. Data 11, 94 (2024), file
+"Dispersion formulas.pdf"), with its coefficient order, so that a database entry is stored
+as it was published. Wavelengths here are vacuum or air wavelengths in micrometres, as the
+source of the coefficients has them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+
+Kind = Literal[
+    "formula 1", "formula 2", "formula 3", "formula 4", "formula 5", "formula 6",
+    "abbe", "constant", "table",
+]  # fmt: skip
+Coefficients = tuple[float, ...]
+IndexAndSlope = tuple[np.ndarray, np.ndarray]
+
+KHR_A = 523655.0 * 1e-6
+KHR_B = 1.5168
+"""KHR_materials_dispersion (Khronos, ratified 2024): n_d + (n_d−1)/V_d (523655/λ² − 1.5168), λ in nm."""
+
+
+def evaluate(kind: Kind, coefficients: Coefficients, wavelength_um: np.ndarray) -> IndexAndSlope:
+    """n and dn/dλ (1/µm) at `wavelength_um`, both float64 of its shape; NaN where n² < 0.
+
+    Nothing is clamped or checked here: `Dispersion` does both.
+    """
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return _FORMULAS[kind](coefficients, wavelength_um)
+
+
+def _root(n_squared: np.ndarray, slope_of_square: np.ndarray) -> IndexAndSlope:
+    n = np.sqrt(n_squared)
+    return n, slope_of_square / (2.0 * n)
+
+
+def _sellmeier(poles: list[tuple[float, float]], offset: float, um: np.ndarray) -> IndexAndSlope:
+    """n² = 1 + offset + Σ B λ²/(λ² − C), C in µm²."""
+    square = um * um
+    n_squared = np.full_like(um, 1.0 + offset)
+    slope = np.zeros_like(um)
+    for b, c in poles:
+        distance = square - c
+        n_squared += b * square / distance
+        slope -= 2.0 * b * c * um / (distance * distance)
+    return _root(n_squared, slope)
+
+
+def sellmeier_poles(kind: Kind, coefficients: Coefficients) -> list[tuple[float, float]]:
+    """(B, C) pairs with C in µm², for formula 1 (which stores √C) and formula 2; else empty."""
+    pairs = zip(coefficients[1::2], coefficients[2::2], strict=True)
+    if kind == "formula 1":
+        return [(b, c * c) for b, c in pairs]
+    return list(pairs) if kind == "formula 2" else []
+
+
+def _formula_1(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
+    return _sellmeier(sellmeier_poles("formula 1", c), c[0], um)
+
+
+def _formula_2(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
+    return _sellmeier(sellmeier_poles("formula 2", c), c[0], um)
+
+
+def _power_series(terms: Coefficients, um: np.ndarray) -> IndexAndSlope:
+    """Σ c λ^p and its derivative; `terms` is c, p, c, p, …"""
+    value, slope = np.zeros_like(um), np.zeros_like(um)
+    for c, p in zip(terms[::2], terms[1::2], strict=True):
+        value += c * um**p
+        slope += c * p * um ** (p - 1.0)
+    return value, slope
+
+
+def _formula_3(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
+    value, slope = _power_series(c[1:], um)
+    return _root(c[0] + value, slope)
+
+
+def _formula_4(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
+    """n² = c0 + Σ(two) c1 λ^c2/(λ² − c3^c4) + Σ c λ^p."""
+    value, slope = _power_series(c[9:], um)
+    square = um * um
+    for a, p, base, power in (c[1:5], c[5:9]):
+        if a == 0.0:
+            continue
+        distance = square - base**power
+        value = value + a * um**p / distance
+        slope = slope + a * um ** (p - 1.0) * (p * distance - 2.0 * square) / (distance * distance)
+    return _root(c[0] + value, slope)
+
+
+def _formula_5(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
+    value, slope = _power_series(c[1:], um)
+    return c[0] + value, slope
+
+
+def _formula_6(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
+    """Gases: n − 1 = c0 + Σ b/(d − λ⁻²)."""
+    n, slope = np.full_like(um, 1.0 + c[0]), np.zeros_like(um)
+    for b, d in zip(c[1::2], c[2::2], strict=True):
+        distance = d - um**-2.0
+        n += b / distance
+        slope -= 2.0 * b * um**-3.0 / (distance * distance)
+    return n, slope
+
+
+def _abbe(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
+    """The KHR model; its floor n ≥ 1 holds only where n_d itself is at least 1."""
+    n_d, v_d = c
+    strength = (n_d - 1.0) / v_d
+    n = n_d + strength * (KHR_A / (um * um) - KHR_B)
+    slope = -2.0 * strength * KHR_A / um**3
+    if n_d < 1.0:
+        return n, slope
+    return np.maximum(n, 1.0), np.where(n > 1.0, slope, 0.0)
+
+
+def _constant(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
+    return np.full_like(um, c[0]), np.zeros_like(um)
+
+
+def _table(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
+    """Monotone piecewise cubic (PCHIP) in u = λ⁻², where every glass is nearly a straight line."""
+    knots, values, tangents = _pchip(c)
+    u = um**-2.0
+    i = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(knots) - 2)
+    h = knots[i + 1] - knots[i]
+    t = (u - knots[i]) / h
+    y0, y1, m0, m1 = values[i], values[i + 1], h * tangents[i], h * tangents[i + 1]
+    n = y0 + t * (m0 + t * (3.0 * (y1 - y0) - 2.0 * m0 - m1 + t * (2.0 * (y0 - y1) + m0 + m1)))
+    dn_dt = m0 + t * (2.0 * (3.0 * (y1 - y0) - 2.0 * m0 - m1) + 3.0 * t * (2.0 * (y0 - y1) + m0 + m1))
+    return n, dn_dt / h * -2.0 * um**-3.0
+
+
+@lru_cache(maxsize=256)
+def _pchip(c: Coefficients) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Knots in u ascending, values, tangents after F. N. Fritsch and J. Butland, SIAM J. Sci.
+    Stat. Comput. 5, 300 (1984): weighted harmonic means, zero at a turning point."""
+    u = np.asarray(c[::2])[::-1] ** -2.0
+    y = np.asarray(c[1::2])[::-1]
+    h, secant = np.diff(u), np.diff(y) / np.diff(u)
+    if len(u) == 2:
+        return u, y, np.array([secant[0], secant[0]])
+    w1, w2 = 2.0 * h[1:] + h[:-1], h[1:] + 2.0 * h[:-1]
+    same_sign = secant[:-1] * secant[1:] > 0.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inner = np.where(same_sign, (w1 + w2) / (w1 / secant[:-1] + w2 / secant[1:]), 0.0)
+    first = _end_tangent(h[0], h[1], secant[0], secant[1])
+    last = _end_tangent(h[-1], h[-2], secant[-1], secant[-2])
+    return u, y, np.concatenate([[first], inner, [last]])
+
+
+def _end_tangent(h0: float, h1: float, s0: float, s1: float) -> float:
+    """One-sided three-point tangent, limited so that the end piece stays monotone."""
+    tangent = ((2.0 * h0 + h1) * s0 - h0 * s1) / (h0 + h1)
+    if tangent * s0 <= 0.0:
+        return 0.0
+    if s0 * s1 <= 0.0 and abs(tangent) > 3.0 * abs(s0):
+        return 3.0 * s0
+    return tangent
+
+
+_FORMULAS: dict[str, Callable[[Coefficients, np.ndarray], IndexAndSlope]] = {
+    "formula 1": _formula_1,
+    "formula 2": _formula_2,
+    "formula 3": _formula_3,
+    "formula 4": _formula_4,
+    "formula 5": _formula_5,
+    "formula 6": _formula_6,
+    "abbe": _abbe,
+    "constant": _constant,
+    "table": _table,
+}
