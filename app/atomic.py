@@ -10,7 +10,7 @@ import errno
 import os
 import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from app.errors import UserError
@@ -41,7 +41,7 @@ def atomic_output(path: str | os.PathLike[str]) -> Iterator[Path]:
     temporary = _reserve(target)
     try:
         yield temporary
-        if target.is_dir():  # it may have appeared meanwhile
+        if os.path.isdir(target):  # it may have appeared meanwhile
             raise _refusal(target, IsADirectoryError(errno.EISDIR, "Is a directory"))
         os.replace(temporary, target)
     except OSError as error:
@@ -54,16 +54,18 @@ def atomic_output(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 def _reserve(target: Path) -> Path:
     """Create an empty temporary file beside `target`, with the permissions umask gives."""
-    if target.is_dir():
+    if os.path.isdir(target):  # unlike Path.is_dir, silent about a name that is too long
         raise _refusal(target, IsADirectoryError(errno.EISDIR, "Is a directory"))
     # Bounded, so that a target name near the file system's 255 bytes still has a neighbour.
     stem = target.stem.encode()[:100].decode(errors="ignore")
     temporary = target.with_name(f".{stem}.{secrets.token_hex(4)}.part{target.suffix}")
     try:
+        with suppress(FileNotFoundError):
+            os.stat(target)  # a name that is too long is told now, not after the work
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     except OSError as error:
         raise _refusal(target, error) from error
-    if target.exists() and not os.access(target, os.W_OK):
+    if os.path.exists(target) and not os.access(target, os.W_OK):
         # A rename would replace a write-protected file; the user protected it on purpose.
         temporary.unlink(missing_ok=True)
         raise _refusal(target, PermissionError(errno.EACCES, "Permission denied"))
@@ -86,13 +88,13 @@ def _refusal(target: Path, error: OSError) -> UserError:
     match error.errno:
         case errno.EISDIR:
             return UserError(f"cannot write {target}: it is a folder; give a file name inside it")
-        case errno.ENOENT:
+        case errno.ENOENT if not os.path.isdir(folder):
             return UserError(
                 f"cannot write {target}: the folder {folder} does not exist; create it or choose another"
             )
         case errno.ENOTDIR:
             return UserError(f"cannot write {target}: {folder} is not a folder; choose another")
-        case errno.EACCES | errno.EPERM | errno.EROFS:
+        case errno.EACCES | errno.EPERM | errno.EROFS | errno.ENOENT:  # ENOENT: /proc and the like
             return UserError(
                 f"cannot write {target}: no permission; choose another place or make it writable"
             )

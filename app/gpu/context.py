@@ -1,0 +1,174 @@
+"""One OpenGL 4.3 core context without a window, and its failures in plain words.
+
+EGL is tried first (every GPU driver and llvmpipe have it), on each device in turn, then
+OSMesa. `SPECTRASPLAT_BACKEND=egl` or `=osmesa` chooses one and forbids the other.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from typing import TYPE_CHECKING, Literal
+
+from app.errors import UserError, suggestion
+from app.gpu.limits import Limits
+
+if TYPE_CHECKING:
+    import moderngl
+
+Backend = Literal["egl", "osmesa"]
+BACKENDS: tuple[Backend, ...] = ("egl", "osmesa")
+ENVIRONMENT_VARIABLE = "SPECTRASPLAT_BACKEND"
+GL_VERSION = (4, 3)
+GL_VERSION_CODE = 100 * GL_VERSION[0] + 10 * GL_VERSION[1]
+
+APT_LINE = "apt-get install libegl1 libgl1 libgl1-mesa-dri"
+APT_LINE_OSMESA = "apt-get install libosmesa6"
+_SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader")
+_MAX_EGL_DEVICES = 16
+
+
+class Context:
+    """A current moderngl context with what the passes ask of it.
+
+    `ctx` is the `moderngl.Context`; `backend` says how it was made.
+    """
+
+    def __init__(self, ctx: moderngl.Context, backend: Backend) -> None:
+        self.ctx = ctx
+        self.backend = backend
+        info = ctx.info
+        self.renderer: str = info["GL_RENDERER"]
+        self.vendor: str = info["GL_VENDOR"]
+        self.version: str = info["GL_VERSION"]
+        self.limits = Limits.read(info)
+        self.check("reading the OpenGL limits")
+
+    @property
+    def is_software(self) -> bool:
+        """Whether the processor draws, not a GPU (timer queries are then meaningless)."""
+        return any(name in self.renderer.casefold() for name in _SOFTWARE_RENDERERS)
+
+    def finish(self) -> None:
+        """Wait until everything sent so far is done."""
+        self.ctx.finish()
+
+    def check(self, where: str) -> None:
+        """Raise RuntimeError if OpenGL has reported an error since the last check.
+
+        moderngl does not look by itself: a dispatch past the limits silently does nothing.
+        """
+        error = self.ctx.error
+        if error != "GL_NO_ERROR":
+            raise RuntimeError(f"{error} in {where} ({self.renderer}, OpenGL {self.version})")
+
+    def release(self) -> None:
+        """Destroy the context; its buffers, textures and programs are gone with it."""
+        self.ctx.release()
+
+    def __enter__(self) -> Context:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self.release()
+
+
+def create_context(backend: Backend | None = None) -> Context:
+    """A current OpenGL 4.3 core context, by `backend`, else the environment, else the first that works.
+
+    Raises `UserError` with the exact remedy when there is none.
+    """
+    if sys.platform == "darwin":
+        raise UserError(
+            "macOS stops at OpenGL 4.1 and compute shaders need 4.3, "
+            "so run SpectraSplat on Linux (a virtual machine or a container will do)"
+        )
+    chosen = backend or _from_environment()
+    if chosen == "osmesa":
+        return _create_osmesa()
+    try:
+        return _create_egl()
+    except UserError:
+        if chosen == "egl":
+            raise
+        try:
+            return _create_osmesa()
+        except UserError:
+            pass  # EGL is the ordinary way: its remedy is the one to give
+        raise
+
+
+def _from_environment() -> Backend | None:
+    name = os.environ.get(ENVIRONMENT_VARIABLE, "").strip().casefold()
+    if not name:
+        return None
+    for backend in BACKENDS:
+        if name == backend:
+            return backend
+    hint = suggestion(name, BACKENDS) or ", use 'egl' or 'osmesa'"
+    raise UserError(f"{ENVIRONMENT_VARIABLE} is '{name}', which is no known backend{hint}")
+
+
+def _create_egl() -> Context:
+    import moderngl
+
+    egl = _first_loadable(("libEGL.so.1", "libEGL.so"))
+    gl = _first_loadable(("libGL.so.1", "libOpenGL.so.0", "libGL.so"))
+    if egl is None or gl is None:
+        missing = "libEGL.so.1" if egl is None else "libGL.so.1"
+        raise UserError(f"OpenGL is missing ({missing} is not installed): run '{APT_LINE}' as root")
+    problem = ""
+    # The first device may be a card without rights or too old, and a software one follow it.
+    for index in range(_MAX_EGL_DEVICES):
+        try:
+            ctx = moderngl.create_standalone_context(
+                backend="egl", require=GL_VERSION_CODE, device_index=index, libegl=egl, libgl=gl
+            )
+        except Exception as error:  # glcontext raises bare Exception
+            if index > 0 and "requested device index" in str(error):
+                break
+            problem = problem or str(error)
+            if "GLCONTEXT_DEVICE_INDEX" in os.environ:  # the user's choice overrides ours
+                break
+            continue
+        return Context(ctx, "egl")
+    raise UserError(_explain_egl(problem))
+
+
+def _create_osmesa() -> Context:
+    import moderngl
+
+    from app.gpu.osmesa import OSMesaLoader
+
+    try:
+        loader = OSMesaLoader(*GL_VERSION)
+    except OSError as error:
+        raise UserError(
+            f"OpenGL through OSMesa failed ({error}): run '{APT_LINE_OSMESA}' as root, or use EGL"
+        ) from error
+    ctx = moderngl.create_context(require=GL_VERSION_CODE, standalone=True, context=loader)
+    return Context(ctx, "osmesa")
+
+
+def _explain_egl(problem: str) -> str:
+    """glcontext's terse message as a sentence with a remedy."""
+    wanted = f"{GL_VERSION[0]}.{GL_VERSION[1]}"
+    too_old = ("eglCreateContext failed", "eglChooseConfig failed", "Requested OpenGL version")
+    if any(part in problem for part in too_old):
+        return (
+            f"OpenGL {wanted} is needed and this driver has less ({problem}): update the graphics "
+            f"driver, or run '{APT_LINE}' as root for the software renderer"
+        )
+    return f"OpenGL {wanted} could not be started through EGL ({problem}): run '{APT_LINE}' as root"
+
+
+def _first_loadable(names: tuple[str, ...]) -> str | None:
+    """The first library the dynamic linker finds (far quicker than ctypes.util.find_library)."""
+    for name in names:
+        try:
+            ctypes.CDLL(name)
+        except OSError:
+            continue
+        return name
+    return None

@@ -1,0 +1,67 @@
+"""What the OpenGL device allows, and the least of it that the programs were written for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of one OpenGL context, read once."""
+
+    storage_block_bytes: int
+    """Largest shader storage block; photon batches are cut to it."""
+    storage_blocks: int
+    """Storage blocks one compute shader may see."""
+    storage_bindings: int
+    work_group_count: tuple[int, int, int]
+    """Work groups a dispatch may have; past it nothing runs and only the error flag tells."""
+    work_group_size: tuple[int, int, int]
+    work_group_invocations: int
+    draw_buffers: int
+    color_attachments: int
+    texture_px: int
+    """Largest side of a 2D texture."""
+    uniform_block_bytes: int
+
+    @classmethod
+    def read(cls, info: Mapping[str, Any]) -> Limits:
+        """From `moderngl.Context.info`; a limit the driver does not tell counts as 0."""
+
+        def one(name: str) -> int:
+            return int(info.get(name, 0))
+
+        def three(name: str) -> tuple[int, int, int]:
+            x, y, z = info.get(name, (0, 0, 0))
+            return int(x), int(y), int(z)
+
+        return cls(
+            storage_block_bytes=one("GL_MAX_SHADER_STORAGE_BLOCK_SIZE"),
+            storage_blocks=one("GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS"),
+            storage_bindings=one("GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS"),
+            work_group_count=three("GL_MAX_COMPUTE_WORK_GROUP_COUNT"),
+            work_group_size=three("GL_MAX_COMPUTE_WORK_GROUP_SIZE"),
+            work_group_invocations=one("GL_MAX_COMPUTE_WORK_GROUP_INVOCATIONS"),
+            draw_buffers=one("GL_MAX_DRAW_BUFFERS"),
+            color_attachments=one("GL_MAX_COLOR_ATTACHMENTS"),
+            texture_px=one("GL_MAX_TEXTURE_SIZE"),
+            uniform_block_bytes=one("GL_MAX_UNIFORM_BLOCK_SIZE"),
+        )
+
+
+# OpenGL 4.3 promises these (core specification, tables 23.55–23.74); a driver that has less
+# is not a 4.3 driver in fact, whatever it says.
+NEEDED = Limits(
+    storage_block_bytes=1 << 24,
+    storage_blocks=8,
+    storage_bindings=8,
+    work_group_count=(65535, 65535, 65535),
+    work_group_size=(1024, 1024, 64),
+    work_group_invocations=1024,
+    draw_buffers=8,
+    color_attachments=8,
+    texture_px=16384,
+    uniform_block_bytes=16384,
+)
