@@ -1,0 +1,29 @@
+"""Storage buffer binding points, one name for both sides."""
+
+from __future__ import annotations
+
+TRIANGLES, NODES, NORMALS, SOLIDS, PLANES, OBJECTS, SPECTRA, PARAMETERS = range(8)
+RAYS_IN, RAYS_OUT, OUTCOMES, PHOTON_SLOTS, INDICES, COUNTS, STATE, PHOTONS = range(8, 16)
+
+SCENE_DEFINES = {
+    "BIND_TRIANGLES": TRIANGLES,
+    "BIND_NODES": NODES,
+    "BIND_NORMALS": NORMALS,
+    "BIND_SOLIDS": SOLIDS,
+    "BIND_PLANES": PLANES,
+    "BIND_OBJECTS": OBJECTS,
+    "BIND_SPECTRA": SPECTRA,
+    "BIND_PARAMETERS": PARAMETERS,
+}
+"""Bindings 0-7 hold the scene; a pass is free to use 8-15 as it likes."""
+
+LIGHT_HALF_DEFINES = SCENE_DEFINES | {
+    "BIND_RAYS_IN": RAYS_IN,
+    "BIND_RAYS_OUT": RAYS_OUT,
+    "BIND_OUTCOMES": OUTCOMES,
+    "BIND_PHOTON_SLOTS": PHOTON_SLOTS,
+    "BIND_INDICES": INDICES,
+    "BIND_COUNTS": COUNTS,
+    "BIND_STATE": STATE,
+    "BIND_PHOTONS": PHOTONS,
+}

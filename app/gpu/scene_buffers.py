@@ -1,0 +1,340 @@
+"""The scene as the GPU sees it: triangles with their tree, half-space solids, objects, spectra.
+
+Everything is moved and scaled into "GPU space" first (`GpuSpace`), so that float32 resolves the
+glass equally well in a scene of micrometres and in one that stands ten kilometres off the origin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from app.errors import UserError
+from app.gpu import bindings
+from app.gpu.records import NONE
+from app.gpu.schema import Field, Struct
+from app.model.bvh import build_bvh
+from app.model.features import MAX_GROUPS, Features, dispersive_materials, is_convex_solid, overlapping_solids, world_bounds
+from app.model.glass import Dispersion
+from app.model.scene import Black, Dielectric, Diffuse, Mirror, Scene
+from app.model.spectral_tables import SpectralAxis, index_table
+from app.model.spectrum import VISIBLE_NM
+
+SAMPLES = 1025
+"""Equally spaced samples of every spectral table over x in [0, 1]; linear interpolation errs below 2e-7 in n."""
+
+KIND_BLACK, KIND_DIFFUSE, KIND_MIRROR, KIND_DIELECTRIC = range(4)
+
+TRIANGLE = Struct(
+    "Triangle",
+    (
+        Field("vertex", "vec3", "first corner, GPU space"),
+        Field("object", "uint", "scene object index"),
+        Field("edge1", "vec3", "second corner minus first"),
+        Field("normals", "uint", "first of three corner normals, or NONE for a flat facet"),
+        Field("edge2", "vec3", "third corner minus first"),
+        Field("source", "uint", "global index before the tree reordered them: objects in scene order"),
+    ),
+)
+NODE = Struct(
+    "Node",
+    (
+        Field("bounds_min", "vec3"),
+        Field("left_or_first", "uint", "inner: left child (right is the next); leaf: first triangle"),
+        Field("bounds_max", "vec3"),
+        Field("count", "uint", "triangles of a leaf, 0 for an inner node"),
+    ),
+)
+SOLID = Struct(
+    "Solid",
+    (Field("first_plane", "uint"), Field("plane_count", "uint"), Field("object", "uint"), Field("reserved", "uint")),
+)
+OBJECT = Struct(
+    "Object",
+    (
+        Field("kind", "uint", "0 black, 1 diffuse, 2 mirror, 3 dielectric"),
+        Field("medium", "uint", "row of the index table (dielectric)"),
+        Field("weight_row", "uint", "row of absorption (1/GPU unit) or reflectance over x, or NONE"),
+        Field("stack_bit", "uint", "bit of this solid in a ray's inside mask, by priority; NONE where it overlaps nothing"),
+        Field("receiver", "uint", "receiver index, or NONE"),
+        Field("group", "uint", "spectral group of the glass, or NONE"),
+        Field("first_triangle", "uint", "global source index of its first triangle"),
+        Field("reserved", "uint", ""),
+        Field("colour", "vec4", "linear Rec.709 reflectance (diffuse, mirror) or n_d in w (dielectric)"),
+    ),
+)
+SCENE_STRUCTS = (TRIANGLE, NODE, SOLID, OBJECT)
+
+
+@dataclass(frozen=True)
+class GpuSpace:
+    """p_gpu = (p_world - centre) * scale, scale a power of two."""
+
+    centre: np.ndarray
+    scale: float
+
+    @staticmethod
+    def of(scene: Scene) -> GpuSpace:
+        """The space in which the specular objects (else everything) have about unit radius."""
+        chosen = [o for o in scene.objects if isinstance(o.material, Dielectric | Mirror)] or list(scene.objects)
+        bounds = np.stack([world_bounds(o) for o in chosen])
+        low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
+        radius = 0.5 * float(np.linalg.norm(high - low))
+        return GpuSpace(0.5 * (low + high), 2.0 ** -np.round(np.log2(radius)) if radius > 0 else 1.0)
+
+    def to_gpu(self, points: np.ndarray) -> np.ndarray:
+        """World positions (..., 3) → GPU space, float64."""
+        return (np.asarray(points, float) - self.centre) * self.scale
+
+    def to_world(self, points: np.ndarray) -> np.ndarray:
+        """GPU space positions (..., 3) → world, float64."""
+        return np.asarray(points, float) / self.scale + self.centre
+
+
+@dataclass(frozen=True)
+class Groups:
+    """How dispersive glasses share the spectral columns of a photon."""
+
+    glasses: tuple[Dispersion, ...]
+    """Distinct dispersive glasses."""
+    group: tuple[int, ...]
+    """Group of each glass."""
+    count: int
+    by_wavelength: bool
+    """The single group's variable is the wavelength (the paper's λ-column)."""
+
+    @staticmethod
+    def of(scene: Scene, features: Features) -> Groups:
+        glasses = tuple(scene.objects[i].material.dispersion for i in dispersive_materials(scene))  # type: ignore[union-attr]
+        count = features.spectral_groups
+        group = tuple(min(i, count - 1) for i in range(len(glasses))) if count else ()
+        return Groups(glasses, group, count, features.merged_groups and len(glasses) <= MAX_GROUPS)
+
+    def variables(self, axis: SpectralAxis) -> np.ndarray:
+        """var_g over x, float64 (count, SAMPLES): n of the glass, or a shared variable."""
+        x = np.linspace(0.0, 1.0, SAMPLES)
+        nm = axis.nm_of_x(x)
+        rows = []
+        for g in range(self.count):
+            members = [glass for glass, owner in zip(self.glasses, self.group, strict=True) if owner == g]
+            if self.by_wavelength:
+                rows.append(nm / 1000.0)
+            elif len(members) == 1:
+                rows.append(members[0].index(nm))
+            else:
+                rows.append(x)
+        return np.array(rows).reshape(self.count, SAMPLES)
+
+
+@dataclass(frozen=True)
+class SpectraLayout:
+    """Row offsets in the one float buffer of spectral tables (each row SAMPLES long)."""
+
+    index_row: int
+    slope_row: int
+    variable_row: int
+    weight_row: int
+    rows: int
+
+
+class SceneBuffers:
+    """Owns the scene's storage buffers at bindings 0-6; `bind()` before every dispatch that reads them."""
+
+    def __init__(self, ctx: moderngl.Context, scene: Scene, features: Features, axis: SpectralAxis) -> None:
+        self.ctx = ctx
+        self.scene = scene
+        self.features = features
+        self.axis = axis
+        self.space = GpuSpace.of(scene)
+        self.groups = Groups.of(scene, features)
+        self.receivers = [i for i, o in enumerate(scene.objects) if isinstance(o.material, Diffuse)]
+        self.first_triangle = np.cumsum([0] + [len(o.mesh.triangles) for o in scene.objects])
+        self.world_meshes = [o.mesh.transformed(o.object_to_world) for o in scene.objects]
+        self._buffers: dict[int, moderngl.Buffer] = {}
+        self.defines = bindings.SCENE_DEFINES | {"SPECTRAL_SAMPLES": SAMPLES}
+        self._pack_geometry()
+        self._pack_objects()
+
+    def bind(self) -> None:
+        """Bind every scene buffer to its binding point."""
+        for binding, buffer in self._buffers.items():
+            buffer.bind_to_storage_buffer(binding)
+
+    def release(self) -> None:
+        """Free the buffers."""
+        for buffer in self._buffers.values():
+            buffer.release()
+        self._buffers.clear()
+
+    @property
+    def bytes(self) -> int:
+        """GPU memory held."""
+        return sum(buffer.size for buffer in self._buffers.values())
+
+    def _store(self, binding: int, data: np.ndarray) -> None:
+        raw = np.ascontiguousarray(data)
+        self._buffers[binding] = self.ctx.buffer(raw.tobytes()) if raw.nbytes else self.ctx.buffer(reserve=64)
+
+    def _pack_geometry(self) -> None:
+        corners, owner, source, normals = [], [], [], []
+        solids, planes = [], []
+        for index, item in enumerate(self.scene.objects):
+            mesh = self.world_meshes[index]
+            if is_convex_solid(item):
+                own = mesh.convex_planes
+                if own is None:  # a transform may push a borderline solid over the tolerance
+                    own = _transformed_planes(item.mesh.convex_planes, item.object_to_world)
+                solids.append((sum(len(p) for p in planes), len(own), index, 0))
+                offset = own[:, 3] - own[:, :3] @ self.space.centre
+                planes.append(np.column_stack([own[:, :3], offset * self.space.scale]))
+                continue
+            corners.append(self.space.to_gpu(mesh.corners()))
+            owner.append(np.full(len(mesh.triangles), index))
+            source.append(self.first_triangle[index] + np.arange(len(mesh.triangles)))
+            specular = isinstance(item.material, Dielectric | Mirror)
+            smooth = mesh.corner_normals is not None and specular
+            normals.append(mesh.corner_normals if smooth else np.full((len(mesh.triangles), 3, 3), np.nan))
+
+        solid_records = SOLID.zeros(len(solids))
+        for record, values in zip(solid_records, solids, strict=True):
+            record["first_plane"], record["plane_count"], record["object"], _ = values
+        self.solid_count = len(solids)
+        self._store(bindings.SOLIDS, solid_records)
+        self._store(bindings.PLANES, np.concatenate(planes).astype("f4") if planes else np.zeros((1, 4), "f4"))
+
+        self.triangle_count = sum(len(c) for c in corners)
+        if not corners:
+            for binding in (bindings.TRIANGLES, bindings.NODES, bindings.NORMALS):
+                self._store(binding, np.zeros(16, "f4"))
+            self.defines |= {"TRIANGLE_COUNT": 0, "SOLID_COUNT": self.solid_count}
+            return
+        all_corners = np.concatenate(corners).astype("f4")
+        order = np.arange(len(all_corners))
+        if self.features.tree:
+            bvh = build_bvh(all_corners)
+            order = bvh.order
+            nodes = NODE.zeros(len(bvh.nodes))
+            for name in nodes.dtype.names:
+                nodes[name] = bvh.nodes[name]
+            self._store(bindings.NODES, nodes)
+            self.tree_depth = bvh.depth
+            self.defines |= {"TREE_STACK": max(bvh.depth, 1)}
+        else:
+            self._store(bindings.NODES, np.zeros(16, "f4"))
+            self.tree_depth = 0
+        all_corners = all_corners[order]
+        records = TRIANGLE.zeros(len(order))
+        records["vertex"] = all_corners[:, 0]
+        records["edge1"] = all_corners[:, 1] - all_corners[:, 0]
+        records["edge2"] = all_corners[:, 2] - all_corners[:, 0]
+        records["object"] = np.concatenate(owner)[order]
+        records["source"] = np.concatenate(source)[order]
+        all_normals = np.concatenate(normals)[order]
+        smooth = np.isfinite(all_normals).all(axis=(1, 2)) & (np.abs(all_normals).sum(axis=2) > 0).all(axis=1)
+        # A facet whose three corner normals agree is flat: its normal has no derivative to compute.
+        records["normals"] = NONE
+        records["normals"][smooth] = 3 * np.arange(np.count_nonzero(smooth))
+        packed = np.zeros((max(1, 3 * np.count_nonzero(smooth)), 4), "f4")
+        packed[: 3 * np.count_nonzero(smooth), :3] = all_normals[smooth].reshape(-1, 3)
+        self._store(bindings.TRIANGLES, records)
+        self._store(bindings.NORMALS, packed)
+        self.defines |= {"TRIANGLE_COUNT": self.triangle_count, "SOLID_COUNT": self.solid_count}
+
+    def _pack_objects(self) -> None:
+        media: list[Dispersion] = []
+        weights: list[np.ndarray] = []
+        x = np.linspace(0.0, 1.0, SAMPLES)
+        nm = self.axis.nm_of_x(x)
+        stack_bits = _stack_bits(self.scene) if self.features.medium_stack else {}
+        records = OBJECT.zeros(len(self.scene.objects))
+        for name in ("medium", "weight_row", "stack_bit", "receiver", "group"):
+            records[name] = NONE
+        for index, (record, item) in enumerate(zip(records, self.scene.objects, strict=True)):
+            record["first_triangle"] = self.first_triangle[index]
+            material = item.material
+            match material:
+                case Black():
+                    record["kind"] = KIND_BLACK
+                case Diffuse():
+                    record["kind"] = KIND_DIFFUSE
+                    record["receiver"] = self.receivers.index(index)
+                    record["colour"][:3] = material.reflectance_rgb
+                case Mirror():
+                    record["kind"] = KIND_MIRROR
+                    record["colour"][:3] = material.reflectance_rgb
+                    record["weight_row"] = len(weights)
+                    weights.append(mirror_reflectance(material.reflectance_rgb, nm))
+                case Dielectric():
+                    record["kind"] = KIND_DIELECTRIC
+                    if material.dispersion not in media:
+                        media.append(material.dispersion)
+                    record["medium"] = media.index(material.dispersion)
+                    record["colour"][3] = material.dispersion.n_d
+                    if index in stack_bits:
+                        record["stack_bit"] = stack_bits[index]
+                    if material.dispersion in self.groups.glasses and self.groups.count:
+                        record["group"] = self.groups.group[self.groups.glasses.index(material.dispersion)]
+                    if material.absorption is not None:
+                        record["weight_row"] = len(weights)
+                        coefficient = np.interp(nm, VISIBLE_NM, material.absorption.coefficient)
+                        weights.append(coefficient / self.space.scale)
+        self._store(bindings.OBJECTS, records)
+        # bit -> (medium, weight row) for the medium stack.
+        by_bit = {bit: index for index, bit in stack_bits.items()}
+        self.stack_objects = [by_bit[bit] for bit in range(len(by_bit))]
+
+        index_rows = index_table(self.axis, media, SAMPLES) if media else np.ones((0, SAMPLES))
+        variables = self.groups.variables(self.axis)
+        slopes = [self._slope(glass, variables, x) for glass in media]
+        rows = [np.asarray(index_rows, float), np.array(slopes).reshape(-1, SAMPLES), variables, np.array(weights).reshape(-1, SAMPLES)]
+        counts = np.cumsum([0] + [len(r) for r in rows])
+        self.layout = SpectraLayout(*counts[:4].tolist(), rows=int(counts[4]))
+        self.variable_table = variables.astype("f4")
+        self.media = media
+        self._store(bindings.SPECTRA, np.concatenate(rows).astype("f4") if counts[4] else np.ones(SAMPLES, "f4"))
+        self.defines |= {
+            "INDEX_ROW": self.layout.index_row,
+            "SLOPE_ROW": self.layout.slope_row,
+            "VARIABLE_ROW": self.layout.variable_row,
+            "WEIGHT_ROW": self.layout.weight_row,
+            "STACK_SIZE": max(1, len(self.stack_objects)),
+            "STACK_OBJECTS": "uint[](" + ", ".join(f"{o}u" for o in (self.stack_objects or [0])) + ")",
+        }
+
+    def _slope(self, glass: Dispersion, variables: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """dn/dvar of a glass with respect to its group's variable, over x: 1 where n is the variable."""
+        if not self.groups.count or glass not in self.groups.glasses:
+            return np.zeros(SAMPLES)
+        variable = variables[self.groups.group[self.groups.glasses.index(glass)]]
+        n = glass.index(self.axis.nm_of_x(x))
+        if np.array_equal(n, variable):
+            return np.ones(SAMPLES)
+        return np.gradient(n, variable, edge_order=2)
+
+
+def mirror_reflectance(rgb: tuple[float, float, float], nm: np.ndarray) -> np.ndarray:
+    """Smooth spectral reflectance whose bands average to the linear RGB."""
+    from app.model.spectrum import rgb_basis
+
+    return np.stack([np.interp(nm, VISIBLE_NM, row) for row in rgb_basis()], axis=-1) @ np.asarray(rgb, float)
+
+
+def _transformed_planes(planes: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Half-spaces n·x <= d under an affine map."""
+    covectors = np.linalg.inv(matrix).T @ np.column_stack([planes[:, :3], -planes[:, 3]]).T
+    covectors = covectors.T / np.linalg.norm(covectors[:3], axis=0)[:, None]
+    return np.column_stack([covectors[:, :3], -covectors[:, 3]])
+
+
+def _stack_bits(scene: Scene) -> dict[int, int]:
+    """Object → bit in a ray's inside mask; a higher bit wins. Raises UserError beyond 32 solids."""
+    overlapping = overlapping_solids(scene)
+    if len(overlapping) > 32:
+        raise UserError(
+            f"scene '{scene.name}': {len(overlapping)} transparent solids nest or touch and at most 32 may; "
+            "move some apart or join their meshes"
+        )
+    ranked = sorted(overlapping, key=lambda i: (scene.objects[i].material.priority, i))  # type: ignore[union-attr]
+    return {index: bit for bit, index in enumerate(ranked)}

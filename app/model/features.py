@@ -1,0 +1,193 @@
+"""What a scene needs, as one frozen value from which every program is built.
+
+Nothing else chooses a shader variant: (Scene, RenderSettings) → Features → defines. What is
+False or 0 here is absent from the program that runs, not skipped by it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.model.scene import Black, Dielectric, Diffuse, Mirror, Scene, SceneObject
+from app.model.settings import RenderSettings
+
+MAX_GROUPS = 4
+"""Spectral columns a photon may carry; further dispersive materials share the last one."""
+
+MAX_LOOSE_TRIANGLES = 24
+"""Up to so many triangles a plain loop beats a tree."""
+
+MAX_SOLID_PLANES = 96
+"""A convex solid of more faces goes to the tree."""
+
+
+@dataclass(frozen=True)
+class Features:
+    """The compile-time choices of one rendering."""
+
+    spectral_groups: int
+    """Spectral columns carried by every photon (0: nothing disperses, or the method needs none)."""
+    merged_groups: bool
+    """More dispersive materials than columns (or the paper's λ-column): some columns are by a shared variable."""
+    spectral_weights: bool
+    """Throughput differs within a band and is carried at three wavelengths."""
+    footprints: bool
+    """Photons carry spatial columns."""
+    point_spectrum: bool
+    """Each photon has one wavelength instead of a band."""
+    band_cuts: bool
+    """Total internal reflection may cut a band."""
+    dielectrics: bool
+    mirrors: bool
+    smooth_normals: bool
+    """Some specular surface has interpolated normals."""
+    absorption: bool
+    medium_stack: bool
+    """Transparent solids nest or touch, so priorities decide the medium."""
+    tree: bool
+    """Triangles are found through a tree; otherwise by a loop."""
+    loose_triangles: bool
+    """There are triangles besides the convex solids."""
+    convex_solids: bool
+    """Convex faceted solids are intersected as half-spaces."""
+    charts: bool
+    """A receiver is curved and carries charts."""
+    nested_windows: bool
+    """Flat receivers carry a fine window inside a coarse one."""
+    targets: int
+    """RGBA32F accumulation targets."""
+
+    def defines(self) -> dict[str, int]:
+        """Preprocessor symbols; a feature that is out is not defined at all (use #ifdef) — counts are numbers."""
+        numbers = {"SPECTRAL_GROUPS": self.spectral_groups, "TARGETS": self.targets, "COLUMNS": (2 if self.footprints else 0) + self.spectral_groups}
+        switches = {
+            "MERGED_GROUPS": self.merged_groups,
+            "SPECTRAL_WEIGHTS": self.spectral_weights,
+            "FOOTPRINTS": self.footprints,
+            "POINT_SPECTRUM": self.point_spectrum,
+            "BAND_CUTS": self.band_cuts,
+            "HAS_DIELECTRIC": self.dielectrics,
+            "HAS_MIRROR": self.mirrors,
+            "SMOOTH_NORMALS": self.smooth_normals,
+            "ABSORPTION": self.absorption,
+            "MEDIUM_STACK": self.medium_stack,
+            "HAS_TREE": self.tree,
+            "LOOSE_TRIANGLES": self.loose_triangles,
+            "CONVEX_SOLIDS": self.convex_solids,
+            "CHARTS": self.charts,
+            "NESTED_WINDOWS": self.nested_windows,
+        }
+        return numbers | {name: 1 for name, on in switches.items() if on}
+
+    @staticmethod
+    def of(scene: Scene, settings: RenderSettings) -> Features:
+        """The features that `scene` needs under `settings`."""
+        dielectrics = [o for o in scene.objects if isinstance(o.material, Dielectric)]
+        dispersive = dispersive_materials(scene)
+        single = settings.method.startswith(("stochastic", "regular"))
+        groups = 0 if single else min(len(dispersive), 1 if settings.method == "srd-lambda" else MAX_GROUPS)
+        loose = [o for o in scene.objects if not is_convex_solid(o)]
+        loose_triangles = sum(len(o.mesh.triangles) for o in loose)
+        absorbing = any(o.material.absorption is not None for o in dielectrics)
+        coloured_mirror = any(isinstance(o.material, Mirror) and len(set(o.material.reflectance_rgb)) > 1 for o in scene.objects)
+        return Features(
+            spectral_groups=groups,
+            merged_groups=groups > 0 and (settings.method == "srd-lambda" or len(dispersive) > MAX_GROUPS),
+            spectral_weights=not single and (groups > 0 or absorbing or coloured_mirror),
+            footprints=settings.method != "stochastic-point",
+            point_spectrum=single,
+            band_cuts=groups > 0,
+            dielectrics=bool(dielectrics),
+            mirrors=any(isinstance(o.material, Mirror) for o in scene.objects),
+            smooth_normals=any(o.mesh.corner_normals is not None for o in scene.objects if isinstance(o.material, Dielectric | Mirror)),
+            absorption=absorbing,
+            medium_stack=bool(overlapping_solids(scene)),
+            tree=loose_triangles > MAX_LOOSE_TRIANGLES,
+            loose_triangles=loose_triangles > 0,
+            convex_solids=len(loose) < len(scene.objects),
+            charts=any(isinstance(o.material, Diffuse) and not is_flat(o) for o in scene.objects),
+            nested_windows=any(isinstance(o.material, Diffuse) and is_flat(o) for o in scene.objects),
+            targets=-(-settings.bins // 4) if settings.bins else 1,
+        )
+
+
+def dispersive_materials(scene: Scene) -> list[int]:
+    """Object indices that first show each distinct dispersive glass, in order."""
+    seen, first = set(), []
+    for index, item in enumerate(scene.objects):
+        if isinstance(item.material, Dielectric) and item.material.dispersion.is_dispersive:
+            if item.material.dispersion not in seen:
+                seen.add(item.material.dispersion)
+                first.append(index)
+    return first
+
+
+def is_convex_solid(item: SceneObject) -> bool:
+    """Whether the object is intersected as an intersection of half-spaces."""
+    if not isinstance(item.material, Dielectric):
+        return False
+    planes = item.mesh.convex_planes
+    return planes is not None and len(planes) <= MAX_SOLID_PLANES
+
+
+def is_flat(item: SceneObject) -> bool:
+    """Whether all the object's triangles lie in one plane (relative tolerance 1e-5)."""
+    points = item.mesh.vertices
+    centred = points - points.mean(axis=0)
+    singular = np.linalg.svd(centred, compute_uv=False)
+    return bool(singular[-1] <= 1e-5 * max(singular[0], np.finfo(float).tiny))
+
+
+def world_bounds(item: SceneObject) -> np.ndarray:
+    """World axis-aligned bounds, float64 (2, 3)."""
+    points = item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]
+    return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
+def overlapping_solids(scene: Scene) -> list[int]:
+    """Indices of dielectric objects whose bounds overlap or touch those of another one."""
+    indices = [i for i, o in enumerate(scene.objects) if isinstance(o.material, Dielectric)]
+    if len(indices) < 2:
+        return []
+    bounds = np.stack([world_bounds(scene.objects[i]) for i in indices])
+    slack = 1e-5 * np.ptp(bounds, axis=(0, 1)).max()
+    low, high = bounds[:, 0] - slack, bounds[:, 1] + slack
+    overlap = np.all((low[:, None] <= high[None]) & (low[None] <= high[:, None]), axis=-1)
+    np.fill_diagonal(overlap, False)
+    return [indices[i] for i in np.flatnonzero(overlap.any(axis=1))]
+
+
+def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
+    """(feature, compiled in, reason) for every choice, for people."""
+    glasses = [o.material.dispersion.name for i, o in enumerate(scene.objects) if i in dispersive_materials(scene)]
+    loose = sum(len(o.mesh.triangles) for o in scene.objects if not is_convex_solid(o))
+    solids = [o.name for o in scene.objects if is_convex_solid(o)]
+    touching = [scene.objects[i].name for i in overlapping_solids(scene)]
+    diffuse = [o for o in scene.objects if isinstance(o.material, Diffuse)]
+    black = sum(isinstance(o.material, Black) for o in scene.objects)
+
+    def names(items: list[str]) -> str:
+        return ", ".join(items[:4]) + (f" and {len(items) - 4} more" if len(items) > 4 else "")
+
+    return [
+        ("spectral columns", features.spectral_groups > 0,
+         f"{features.spectral_groups} column(s): {names(glasses)}" if features.spectral_groups else
+         ("one wavelength a photon" if features.point_spectrum else "nothing disperses")),
+        ("shared spectral variable", features.merged_groups, "more glasses than columns, or the λ-column was asked for" if features.merged_groups else "each glass has a column of its own"),
+        ("weights over the band", features.spectral_weights, "Fresnel, absorption or mirrors differ over a band" if features.spectral_weights else "nothing differs over a band"),
+        ("band cuts", features.band_cuts, "total internal reflection may cut a band" if features.band_cuts else "no band to cut"),
+        ("spatial columns", features.footprints, "footprints are anisotropic" if features.footprints else "the method splats single texels"),
+        ("refraction", features.dielectrics, "there is glass" if features.dielectrics else "there is no glass"),
+        ("mirrors", features.mirrors, "there are mirrors" if features.mirrors else "there are no mirrors"),
+        ("normal derivatives", features.smooth_normals, "some specular surface is smooth" if features.smooth_normals else "all specular facets are flat"),
+        ("absorption", features.absorption, "some glass absorbs" if features.absorption else "all glass is clear"),
+        ("medium stack", features.medium_stack, f"{names(touching)} nest or touch" if features.medium_stack else "no two solids nest or touch"),
+        ("triangle tree", features.tree, f"{loose} triangles" if features.tree else f"{loose} loose triangle(s) are looped over"),
+        ("half-space solids", features.convex_solids, names(solids) if features.convex_solids else "no convex faceted solid"),
+        ("charts", features.charts, f"{sum(not is_flat(o) for o in diffuse)} curved receiver(s)" if features.charts else "all receivers are flat"),
+        ("nested windows", features.nested_windows, "flat receivers get a fine window inside a coarse one" if features.nested_windows else "no flat receiver"),
+        ("spectral bins", features.targets > 1, f"{features.targets} targets" if features.targets > 1 else "XYZ in one target"),
+        ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
+    ]

@@ -1,0 +1,31 @@
+"""What a user asks of one rendering, apart from the scene: plain values, validated by the command line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+METHODS = ("srd", "srd-lambda", "stochastic", "stochastic-point", "regular-7", "regular-16")
+"""Sampling methods that every comparison holds (README, "Methods")."""
+
+
+@dataclass(frozen=True)
+class RenderSettings:
+    """One rendering. `photons` and `seconds` exclude each other; both None means the scene's own photon count."""
+
+    width: int = 960
+    height: int = 540
+    photons: int | None = None
+    seconds: float | None = None
+    seed: int = 1
+    method: str = "srd"
+    layer: str = "beauty"
+    """"beauty", "caustic" or "map:RECEIVER"."""
+    bins: int | None = None
+    exposure_ev: float | None = None
+    max_depth: int = 64
+    spp: int | None = None
+    """Camera samples a pixel; None chooses by the scene."""
+    batch: int | None = None
+    """Photons in flight at once; None lets the device's limits decide. Never changes the picture."""
+    smoothing: float = 0.6
+    """Standard deviation of a footprint in lattice spacings; 0.5 is where a square lattice of Gaussians turns flat."""

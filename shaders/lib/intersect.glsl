@@ -1,0 +1,196 @@
+// Nearest hit of a ray with the scene. Three ways to hold geometry, each compiled in only where
+// the scene has it: convex faceted solids as half-spaces, few loose triangles in a loop, many in
+// a tree. Nothing is offset: a ray starts exactly on the surface it left, that facet is excluded
+// by its number, and the neighbours of a curved surface by the side the ray is on.
+#ifndef INTERSECT_GLSL
+#define INTERSECT_GLSL
+
+#include "lib/scene.glsl"
+
+// Set on `Hit.primitive` where it numbers a plane of a half-space solid, not a triangle.
+#define PLANE_BIT 0x80000000u
+// Distances below this (GPU units) are suspect: the same surface met again, or two that touch.
+#define NEAR_DISTANCE 3e-5
+#define FAR_DISTANCE 1e30
+
+struct Hit {
+    float distance;
+    uint primitive;   // slot in `triangles`, or PLANE_BIT | plane; NONE: nothing was hit
+    uint object;
+    vec3 normal_g;    // unit, outward
+    vec2 bary;        // weights of edge1 and edge2 (triangles only)
+};
+
+// Where a ray comes from, so that it does not meet the surface it just left.
+struct RayOrigin {
+    uint primitive;   // facet it starts on, or NONE
+    uint object;      // object of that facet
+    bool inside;      // it travels on that object's inner side
+};
+
+bool accept_hit(float distance, float facing, uint object, RayOrigin origin)
+{
+    // facing = dot(direction, outward normal): < 0 enters. On the surface just left only the
+    // opposite crossing can be true; another object may touch at distance 0.
+    bool same = object == origin.object;
+    bool repeated = same && distance < NEAR_DISTANCE && (origin.inside == (facing < 0.0));
+    return !repeated && distance > (same ? 0.0 : -NEAR_DISTANCE);
+}
+
+// Touching solids: of two crossings at one place the entering one comes first, so that no film of
+// air appears between them.
+float crossing_key(float distance, float facing)
+{
+#ifdef MEDIUM_STACK
+    return facing > 0.0 ? distance + NEAR_DISTANCE : distance;
+#else
+    return distance;
+#endif
+}
+
+void try_triangle(uint slot, vec3 origin_p, vec3 direction, RayOrigin origin, inout float best_key, inout Hit hit)
+{
+    vec3 edge1 = triangles[slot].edge1, edge2 = triangles[slot].edge2;
+    vec3 to_origin = origin_p - triangles[slot].vertex;
+    vec3 normal = cross(edge1, edge2);
+    float facing = dot(direction, normal);
+    vec3 q = cross(to_origin, direction);
+    float inverse = 1.0 / facing;
+    float u = -dot(edge2, q) * inverse;
+    float v = dot(edge1, q) * inverse;
+    float distance = -dot(to_origin, normal) * inverse;
+    float key = crossing_key(distance, facing);
+    // Comparisons are written so that NaN (an edge-on or degenerate triangle) fails them.
+    bool inside = u >= -1e-6 && v >= -1e-6 && u + v <= 1.000001 && key < best_key && slot != origin.primitive;
+    if (inside && accept_hit(distance, facing, triangles[slot].object, origin)) {
+        best_key = key;
+        hit.distance = distance;
+        hit.primitive = slot;
+        hit.bary = vec2(u, v);
+    }
+}
+
+#ifdef HAS_TREE
+float box_entry(vec3 low, vec3 high, vec3 origin_p, vec3 inverse_direction, float far)
+{
+    vec3 t0 = (low - origin_p) * inverse_direction, t1 = (high - origin_p) * inverse_direction;
+    vec3 tmin = min(t0, t1), tmax = max(t0, t1);
+    float enter = max(max(tmin.x, tmin.y), max(tmin.z, -NEAR_DISTANCE));
+    // The factor makes the slab test conservative in float32 [Ize 2013].
+    float leave = min(min(tmax.x, tmax.y), min(tmax.z, far)) * 1.0000004 + 1e-7;
+    return enter <= leave ? enter : FAR_DISTANCE;
+}
+
+void intersect_tree(vec3 origin_p, vec3 direction, RayOrigin origin, inout float best_key, inout Hit hit)
+{
+    // A zero component would make 0 * inf = NaN on a slab's plane.
+    vec3 safe = mix(direction, vec3(1e-20), lessThan(abs(direction), vec3(1e-20)));
+    vec3 inverse_direction = 1.0 / safe;
+    uint stack[TREE_STACK];
+    int top = 0;
+    uint current = 0u;
+    bool more = box_entry(nodes[0].bounds_min, nodes[0].bounds_max, origin_p, inverse_direction, best_key) < FAR_DISTANCE;
+    while (more) {
+        uint first = nodes[current].left_or_first, count = nodes[current].count;
+        if (count > 0u) {
+            for (uint i = 0u; i < count; ++i)
+                try_triangle(first + i, origin_p, direction, origin, best_key, hit);
+            more = top > 0;
+            if (more) current = stack[--top];
+        } else {
+            float enter0 = box_entry(nodes[first].bounds_min, nodes[first].bounds_max, origin_p, inverse_direction, best_key + NEAR_DISTANCE);
+            float enter1 = box_entry(nodes[first + 1u].bounds_min, nodes[first + 1u].bounds_max, origin_p, inverse_direction, best_key + NEAR_DISTANCE);
+            bool hit0 = enter0 < FAR_DISTANCE, hit1 = enter1 < FAR_DISTANCE;
+            bool swap = enter1 < enter0;
+            if (hit0 && hit1) stack[top++] = first + (swap ? 0u : 1u);
+            if (hit0 || hit1) {
+                current = first + (swap ? 1u : 0u);
+            } else {
+                more = top > 0;
+                if (more) current = stack[--top];
+            }
+        }
+    }
+}
+#endif
+
+#ifdef CONVEX_SOLIDS
+// A convex solid is where all half-spaces overlap: enter at the last front plane, leave at the
+// first back plane.
+void intersect_solid(uint solid, vec3 origin_p, vec3 direction, RayOrigin origin, inout float best_key, inout Hit hit)
+{
+    float enter = -FAR_DISTANCE, leave = FAR_DISTANCE;
+    uint enter_plane = NONE, leave_plane = NONE;
+    uint first = solids[solid].first_plane, end = first + solids[solid].plane_count;
+    for (uint i = first; i < end; ++i) {
+        vec4 plane = planes[i];
+        float facing = dot(direction, plane.xyz);
+        float gap = plane.w - dot(origin_p, plane.xyz);
+        // A ray that starts on this very plane is at distance 0 from it, whatever rounding says.
+        float distance = (PLANE_BIT | i) == origin.primitive ? 0.0 : gap / facing;
+        bool front = facing < 0.0 && distance > enter, back = facing > 0.0 && distance < leave;
+        enter = front ? distance : enter;
+        enter_plane = front ? i : enter_plane;
+        leave = back ? distance : leave;
+        leave_plane = back ? i : leave_plane;
+        leave = facing == 0.0 && gap < 0.0 ? -FAR_DISTANCE : leave;
+    }
+    uint object = solids[solid].object;
+    if (enter <= leave) {
+        float key = crossing_key(enter, -1.0);
+        if (enter_plane != NONE && (PLANE_BIT | enter_plane) != origin.primitive && key < best_key && accept_hit(enter, -1.0, object, origin)) {
+            best_key = key;
+            hit.distance = enter;
+            hit.primitive = PLANE_BIT | enter_plane;
+            hit.object = object;
+        }
+        key = crossing_key(leave, 1.0);
+        if (leave_plane != NONE && (PLANE_BIT | leave_plane) != origin.primitive && key < best_key && accept_hit(leave, 1.0, object, origin)) {
+            best_key = key;
+            hit.distance = leave;
+            hit.primitive = PLANE_BIT | leave_plane;
+            hit.object = object;
+        }
+    }
+}
+#endif
+
+// Nearest hit within `far`; `hit.primitive` is NONE where there is none.
+bool intersect_closest(vec3 origin_p, vec3 direction, float far, RayOrigin origin, out Hit hit)
+{
+    hit.distance = far;
+    hit.primitive = NONE;
+    hit.object = NONE;
+    hit.normal_g = vec3(0.0);
+    hit.bary = vec2(0.0);
+    float best_key = far;
+#ifdef CONVEX_SOLIDS
+    for (uint i = 0u; i < uint(SOLID_COUNT); ++i)
+        intersect_solid(i, origin_p, direction, origin, best_key, hit);
+#endif
+#ifdef HAS_TREE
+    intersect_tree(origin_p, direction, origin, best_key, hit);
+#elif defined(LOOSE_TRIANGLES)
+    for (uint i = 0u; i < uint(TRIANGLE_COUNT); ++i)
+        try_triangle(i, origin_p, direction, origin, best_key, hit);
+#endif
+    if (hit.primitive == NONE) return false;
+#ifdef CONVEX_SOLIDS
+    if ((hit.primitive & PLANE_BIT) != 0u) {
+        hit.normal_g = planes[hit.primitive & ~PLANE_BIT].xyz;
+        return true;
+    }
+#endif
+    hit.object = triangles[hit.primitive].object;
+    hit.normal_g = normalize(cross(triangles[hit.primitive].edge1, triangles[hit.primitive].edge2));
+    return true;
+}
+
+// Whether anything lies within `far`.
+bool intersect_any(vec3 origin_p, vec3 direction, float far, RayOrigin origin)
+{
+    Hit hit;
+    return intersect_closest(origin_p, direction, far, origin, hit);
+}
+
+#endif
