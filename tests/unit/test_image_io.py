@@ -1,0 +1,128 @@
+"""Picture files: what is written comes back, in the layout other programs expect."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.errors import UserError
+from app.image_io import channel_name, check_suffix, read_image, write_image
+
+
+@pytest.fixture
+def picture() -> np.ndarray:
+    rng = np.random.default_rng(7)
+    return rng.normal(0.5, 0.8, (7, 5, 3)).astype(np.float32)
+
+
+@pytest.mark.parametrize("suffix", [".exr", ".npy", ".EXR"])
+def test_linear_formats_keep_every_bit_and_negatives(tmp_path, picture, suffix):
+    assert picture.min() < 0
+    write_image(tmp_path / f"a{suffix}", picture)
+    back = read_image(tmp_path / f"a{suffix}")
+    assert back.rgb.dtype == np.float32
+    assert np.array_equal(back.rgb, picture)
+    assert back.spectral is None
+
+
+def test_spectral_exr_has_the_published_layout(tmp_path, picture):
+    import OpenEXR
+
+    edges = np.array([400.0, 500.0, 555.0, 700.0])
+    spectral = np.random.default_rng(1).random((7, 5, 3)).astype(np.float32)
+    path = tmp_path / "a.exr"
+    write_image(path, picture, spectral=spectral, bin_edges_nm=edges, metadata={"Scene": "prism"})
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        assert set(file.channels()) == {"R", "G", "B", "S0.450,000000nm", "S0.527,500000nm", "S0.627,500000nm"}
+        assert np.array_equal(file.channels()["S0.527,500000nm"].pixels, spectral[:, :, 1])
+        assert file.header()["spectralLayoutVersion"] == "1.0"
+        assert file.header()["emissiveUnits"] == "W.m^-2.sr^-1"
+    back = read_image(path)
+    assert np.array_equal(back.spectral, spectral)
+    assert np.array_equal(back.wavelengths_nm, [450.0, 527.5, 627.5])
+    assert np.array_equal(back.rgb, picture)
+    assert back.metadata["Scene"] == "prism"
+
+
+def test_channel_names_use_a_decimal_comma_after_the_stokes_index():
+    assert channel_name(550) == "S0.550,000000nm"
+    assert channel_name(1234.5678) == "S0.1234,567800nm"
+
+
+def test_spectral_channels_must_match_the_picture(tmp_path, picture):
+    with pytest.raises(ValueError, match="spectral"):
+        write_image(tmp_path / "a.exr", picture, spectral=np.zeros((7, 5, 3)), bin_edges_nm=np.array([400.0, 500.0]))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_png_row_order_exposure_and_metadata(tmp_path):
+    from PIL import Image
+
+    rgb = np.full((4, 3, 3), 0.18, np.float32)
+    rgb[0] = 0.0  # the top row
+    write_image(tmp_path / "a.png", rgb, metadata={"Scene": "prism"})
+    pixels = np.asarray(Image.open(tmp_path / "a.png"))
+    assert pixels.shape == (4, 3, 3)
+    assert np.all(pixels[0] == 0)
+    assert np.all(pixels[1:] == 118)  # sRGB of middle grey 0.18: 0.4613 x 255
+    assert read_image(tmp_path / "a.png").metadata["Scene"] == "prism"
+    write_image(tmp_path / "b.png", rgb, exposure_ev=1.0)
+    assert np.allclose(read_image(tmp_path / "b.png").rgb[1:], 0.36, atol=0.004)
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "a", "a.png.txt"])
+def test_unknown_suffix_names_the_known_ones(tmp_path, picture, name):
+    with pytest.raises(UserError, match=r"\.png, \.exr, \.npy"):
+        write_image(tmp_path / name, picture)
+    with pytest.raises(UserError, match=r"a"):
+        check_suffix(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", [".png", ".exr", ".npy"])
+def test_failures_leave_the_old_file_and_nothing_else(tmp_path, picture, suffix, monkeypatch):
+    path = tmp_path / f"a{suffix}"
+    write_image(path, picture)
+    before = path.read_bytes()
+
+    def full_disk(*_args, **_kwargs):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.replace", full_disk)
+    with pytest.raises(UserError, match="disk is full"):
+        write_image(path, picture * 2)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize("suffix", [".png", ".exr", ".npy"])
+def test_missing_folder_is_one_sentence(tmp_path, picture, suffix):
+    with pytest.raises(UserError, match="does not exist"):
+        write_image(tmp_path / "none" / f"a{suffix}", picture)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".exr", ".npy"])
+def test_reading_what_is_not_a_picture(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    with pytest.raises(UserError, match="no such file"):
+        read_image(path)
+    path.write_bytes(b"not a picture at all")
+    with pytest.raises(UserError, match="not a whole"):
+        read_image(path)
+
+
+def test_an_exr_that_cannot_be_written_is_a_user_error(tmp_path, picture, monkeypatch):
+    import OpenEXR
+
+    def refuse(self, name):
+        raise RuntimeError(f'Cannot open image file "{name}". No space left on device.')
+
+    monkeypatch.setattr(OpenEXR.File, "write", refuse)
+    with pytest.raises(UserError, match="cannot write"):
+        write_image(tmp_path / "a.exr", picture)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_empty_pictures_are_refused(tmp_path):
+    with pytest.raises(ValueError, match="not empty"):
+        write_image(tmp_path / "a.png", np.zeros((0, 4, 3)))
