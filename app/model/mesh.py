@@ -15,7 +15,8 @@ import numpy as np
 
 from app.errors import UserError
 
-MAX_CONVEX_PLANES = 64
+MAX_CONVEX_PLANES = 96
+"""Enough for a brilliant with a faceted girdle (73)."""
 # Files hold float32 coordinates (1.2e-7 relative); a plane through them is known to a few times that.
 _COPLANAR_TOLERANCE = 2e-6
 _COPLANAR_COSINE = 0.9999
