@@ -1,0 +1,125 @@
+"""The command line: what the commands are called and which options they take.
+
+Options arrive as text and are checked in `cli_options`; the work is in the modules that each
+command imports when it runs, so that `--help` and small commands start at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app import cli_options as options
+from app.errors import UserError
+from app.model.settings import METHODS
+
+app = typer.Typer(
+    name="spectrasplat",
+    help="Dispersive caustics: light through glass, split into its colours.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    no_args_is_help=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+SceneArgument = Annotated[
+    str, typer.Argument(metavar="SCENE", help="A scene file (.toml, .glb, .gltf, a bare mesh), or a shipped scene's name.")
+]
+Text = str | None
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line; returns the exit code. Raises `UserError` for wrong usage."""
+    try:
+        code = app(args=list(arguments) or ["--help"], prog_name="spectrasplat", standalone_mode=False)
+    except typer.Abort:
+        return 130
+    except Exception as error:
+        # click's usage errors; typer has moved click inside itself, so there is no one class to name.
+        if not hasattr(error, "format_message"):
+            raise
+        raise UserError(_usage_sentence(error.format_message())) from error
+    return code if isinstance(code, int) else 0
+
+
+def _usage_sentence(message: str) -> str:
+    sentence = message.strip().rstrip(".").replace(". Did you", ", did you")
+    return f"{sentence[:1].lower()}{sentence[1:]}; 'spectrasplat --help' shows the usage"
+
+
+@app.command()
+def render(
+    scene: SceneArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="The picture: .png (to look at), .exr or .npy (linear, to work on).")],
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels, for example 1920x1080; default: the scene's.")] = None,
+    photons: Annotated[Text, typer.Option(metavar="N", help="Photons to emit, for example 4M; default: the scene's.")] = None,
+    seconds: Annotated[Text, typer.Option(metavar="S", help="Emit photons for this long instead.")] = None,
+    seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
+    method: Annotated[Text, typer.Option(metavar="NAME", help=f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.")] = None,
+    layer: Annotated[Text, typer.Option(metavar="LAYER", help="beauty (default), caustic, or map:RECEIVER.")] = None,
+    bins: Annotated[Text, typer.Option(metavar="N", help=f"Keep {options.MIN_BINS} to {options.MAX_BINS} spectral bins (written to .exr).")] = None,
+    exposure: Annotated[Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than automatic; .png only.")] = None,
+    max_depth: Annotated[Text, typer.Option("--max-depth", metavar="N", help="Most specular events on a light path; default: 64.")] = None,
+    spp: Annotated[Text, typer.Option(metavar="N", help="Camera samples a pixel.")] = None,
+    batch: Annotated[Text, typer.Option(metavar="N", help="Photons in flight at once (never changes the picture).")] = None,
+    stats: Annotated[bool, typer.Option("--stats", help="Print the energy balance and the times of all stages.")] = False,
+) -> None:
+    """Render a scene to a picture file."""
+    from app.cli_render import RenderRequest, render_command
+
+    request = RenderRequest(
+        scene, output, size, photons, seconds, seed, method, layer, bins, exposure, max_depth, spp, batch, stats
+    )
+    raise typer.Exit(render_command(request))
+
+
+@app.command()
+def inspect(scene: SceneArgument) -> None:
+    """Show what a scene holds, its glasses and mesh health, and which features its programs need."""
+    from app.inspect_report import inspect_text
+    from app.model.scene_file import load_scene
+
+    _print(inspect_text(load_scene(options.find_scene(scene))))
+
+
+@app.command()
+def glass(
+    query: Annotated[Text, typer.Argument(metavar="[QUERY]", help="Part of a name or maker; nothing lists all.")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Plot n over the wavelength and the place in the Abbe diagram.")] = None,
+) -> None:
+    """Search the glass catalogue; show one glass in full."""
+    from app.cli_glass import glass_command
+
+    glass_command(query, plot, _print)
+
+
+@app.command()
+def doctor() -> None:
+    """Check OpenGL, its limits and the packages, and tell the remedy for what is missing."""
+    from app.doctor import examine, report
+
+    checks = examine()
+    print(report(checks))
+    raise typer.Exit(0 if all(check.usable for check in checks) else 2)
+
+
+@app.command("bench-speed")
+def bench_speed() -> None:
+    """Measure tracing, splatting, tree building, memory and the warm start on this machine."""
+    from app.bench import speed
+
+    for line in speed.run():
+        print(line, flush=True)
+
+
+def _print(content: object) -> None:
+    """Print text as it is, and rich's tables in colour where the terminal has it."""
+    if isinstance(content, str):
+        print(content)
+        return
+    from rich.console import Console
+
+    Console(highlight=False).print(content)
