@@ -77,3 +77,132 @@ RECEIVER = Struct(
         Field("object", "uint", "scene object index"),
     ),
 )
+
+
+def ray_record(columns: int) -> Struct:
+    """State of one ray between two surfaces; `columns` derivative columns, spatial ones first."""
+    fields = [
+        Field("position", "vec3", "GPU space"),
+        Field("flux_w", "float", "accounted radiant flux of the band, W"),
+        Field("direction", "vec3", "unit, propagation"),
+        Field("footprint_scale", "float", "grows as 1/sqrt(survival) where roulette thinned the lattice"),
+        Field("throughput", "vec3", "weight of the light's spectral power at x_lo, x_anchor, x_hi"),
+        Field("x_anchor", "float", "spectral coordinate of the traced path"),
+        Field("x_lo", "float", "band start"),
+        Field("x_hi", "float", "band end"),
+        Field("survival", "float", "share of the emitted weight still carried, before roulette's boost"),
+        Field("photon_id", "uint", "index on the emission lattice of the pass"),
+        Field("light_and_source", "uint", "as in PhotonRecord"),
+        Field("branch_key", "uint", "hash of the choices so far"),
+        Field("flags", "uint", "FLAG_*"),
+        Field("depth", "uint", "specular events so far"),
+        Field("last_primitive", "uint", "facet the ray left, or NONE"),
+        Field("last_object", "uint", "its object, or NONE"),
+        Field("inside_mask", "uint", "medium stack: one bit a solid the ray is inside of"),
+        Field("inside_object", "uint", "without a medium stack: the solid the ray is inside of, or NONE"),
+    ]
+    if columns:
+        fields += [
+            Field("dposition", "vec4", "xyz: GPU space per lattice spacing, or per unit of a group's variable", columns),
+            Field("ddirection", "vec4", "xyz: per the same", columns),
+        ]
+    return Struct("RayRecord", tuple(fields))
+
+
+OUTCOME = Struct(
+    "Outcome",
+    (
+        Field("what", "uint", "bit 0, 1: child rays; bit 2: photon; bits 8-15: fall-backs"),
+        Field("category", "uint", "where `flux_w` went: OUTCOME_*"),
+        Field("flux_w", "float", "flux that ended here, W"),
+        Field("absorbed_w", "float", "flux absorbed on the way here, W"),
+        Field("roulette_w", "float", "flux that roulette took (> 0) or gave (< 0), W"),
+        Field("emitted_w", "float", "flux that started here, W"),
+    ),
+)
+
+CATEGORIES = ("deposited", "absorbed", "escaped", "direct", "lost_depth", "lost_numeric")
+"""Where flux may end. `direct`: met a receiver without any specular event (the eye half draws it)."""
+
+FALLBACKS = ("footprint_dropped", "shading_normal", "band_cut", "queue_overflow")
+"""Counted fall-backs, in the order of `Outcome.what`'s bits from 8."""
+
+CHUNK_COUNT = Struct(
+    "ChunkCount",
+    (
+        Field("rays", "uint"),
+        Field("photons", "uint"),
+        Field("ray_base", "uint", "exclusive prefix sum"),
+        Field("photon_base", "uint", "exclusive prefix sum"),
+        Field("flux_w", "float", "ended flux by CATEGORIES, W; sums over the whole batch", len(CATEGORIES)),
+        Field("absorbed_w", "float", "absorbed in glass, W"),
+        Field("roulette_w", "float", "balance of roulette, W"),
+        Field("emitted_w", "float", "flux emitted, W"),
+        Field("fallbacks", "uint", "by FALLBACKS", len(FALLBACKS)),
+    ),
+)
+QUEUE_STATE = Struct(
+    "QueueState",
+    (
+        Field("alive", "uint", "rays of the running step"),
+        Field("next_alive", "uint"),
+        Field("dispatched", "uint", "rays of the step whose outcomes are being listed"),
+        Field("ray_capacity", "uint"),
+        Field("photon_first", "uint", "photons of earlier steps of the batch"),
+        Field("photons_new", "uint", "photons of this step"),
+        Field("photon_capacity", "uint"),
+        Field("overflow", "uint", "rays and photons that found no room"),
+        Field("trace_groups", "uvec4", "indirect dispatch sizes"),
+        Field("chunk_groups", "uvec4", "over the outcomes of this step"),
+        Field("next_chunk_groups", "uvec4", "over the outcomes of the next step"),
+        Field("gather_groups", "uvec4"),
+        Field("iterations", "uint", "steps that had a ray"),
+        Field("reserved", "uint", "", 3),
+    ),
+)
+MASK_SIZE = 64
+"""Side of the emission mask in cells."""
+
+EMIT_PARAMETERS = Struct(
+    "EmitParameters",
+    (
+        Field("origin", "vec3", "point, spot, area: light centre; plane: centre of the domain; GPU space"),
+        Field("weight", "float", "domain measure per lattice point: sr, unit², or sr·unit²"),
+        Field("axis", "vec3", "axis of the azimuthal plane, or the beam's direction"),
+        Field("spacing", "float", "lattice spacing in domain coordinates"),
+        Field("tangent", "vec3", "domain's first axis"),
+        Field("back", "float", "plane: how far before the plane rays start, GPU space"),
+        Field("bitangent", "vec3", "domain's second axis"),
+        Field("band_power_w", "float", "spectral power of the band per unit weight"),
+        Field("light_axis", "vec3", "spot axis, or area light's normal"),
+        Field("x_lo", "float", "band of the pass"),
+        Field("light_u", "vec3", "area: half extent; aperture: 1 / half extent; GPU space"),
+        Field("x_hi", "float"),
+        Field("light_v", "vec3", "likewise"),
+        Field("x_anchor", "float"),
+        Field("aperture_centre", "vec3", "GPU space"),
+        Field("is_disc", "uint", "shape of light or aperture"),
+        Field("rect", "vec4", "domain corner and size"),
+        Field("cone", "vec2", "spot: inner, outer half angle; directional: tangent of the angular radius in x; rad"),
+        Field("shift", "uvec2", "lattice shift modulo 2^32"),
+        Field("shift_extra", "uvec2", "shift of the light's own two dimensions"),
+        Field("shift_spectral", "uint"),
+        Field("seed", "uint"),
+        Field("first", "uint", "first lattice point of the batch"),
+        Field("count", "uint", "lattice points of the batch"),
+        Field("lattice_count", "uint", "lattice points of the band's whole pass"),
+        Field("light", "uint"),
+        Field("band", "uint"),
+        Field("reserved", "uint", "", 3),
+        Field("mask", "uint", "one bit a cell of the domain: may a ray from it meet a specular object?", MASK_SIZE * MASK_SIZE // 32),
+    ),
+)
+TRACE_PARAMETERS = Struct(
+    "TraceParameters",
+    (
+        Field("max_depth", "uint", "specular events"),
+        Field("split_threshold", "float", "survival below which a child plays roulette"),
+        Field("power_row", "uint", "row of the light's cumulative power over x"),
+        Field("reserved", "uint"),
+    ),
+)

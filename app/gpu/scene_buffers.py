@@ -19,8 +19,8 @@ from app.model.bvh import build_bvh
 from app.model.features import MAX_GROUPS, Features, dispersive_materials, is_convex_solid, overlapping_solids, world_bounds
 from app.model.glass import Dispersion
 from app.model.scene import Black, Dielectric, Diffuse, Mirror, Scene
-from app.model.spectral_tables import SpectralAxis, index_table
-from app.model.spectrum import VISIBLE_NM
+from app.model.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative, index_table
+from app.model.colorimetry import VISIBLE_NM, rgb_partition
 
 SAMPLES = 1025
 """Equally spaced samples of every spectral table over x in [0, 1]; linear interpolation errs below 2e-7 in n."""
@@ -136,6 +136,8 @@ class SpectraLayout:
     slope_row: int
     variable_row: int
     weight_row: int
+    power_row: int
+    """First of one row per light: cumulative radiant power over x, W per unit weight."""
     rows: int
 
 
@@ -289,11 +291,13 @@ class SceneBuffers:
         variables = self.groups.variables(self.axis)
         slopes = [self._slope(glass, variables, x) for glass in media]
         rows = [np.asarray(index_rows, float), np.array(slopes).reshape(-1, SAMPLES), variables, np.array(weights).reshape(-1, SAMPLES)]
+        self.light_power: list[CumulativeSpectrum] = [cumulative(self.axis, light.spectral_power) for light in self.scene.lights]
+        rows.append(np.array([power.at(x)[:, 3] for power in self.light_power]).reshape(-1, SAMPLES))
         counts = np.cumsum([0] + [len(r) for r in rows])
-        self.layout = SpectraLayout(*counts[:4].tolist(), rows=int(counts[4]))
+        self.layout = SpectraLayout(*counts[:5].tolist(), rows=int(counts[5]))
         self.variable_table = variables.astype("f4")
         self.media = media
-        self._store(bindings.SPECTRA, np.concatenate(rows).astype("f4") if counts[4] else np.ones(SAMPLES, "f4"))
+        self._store(bindings.SPECTRA, np.concatenate(rows).astype("f4") if counts[5] else np.ones(SAMPLES, "f4"))
         self.defines |= {
             "INDEX_ROW": self.layout.index_row,
             "SLOPE_ROW": self.layout.slope_row,
@@ -316,9 +320,8 @@ class SceneBuffers:
 
 def mirror_reflectance(rgb: tuple[float, float, float], nm: np.ndarray) -> np.ndarray:
     """Smooth spectral reflectance whose bands average to the linear RGB."""
-    from app.model.spectrum import rgb_basis
-
-    return np.stack([np.interp(nm, VISIBLE_NM, row) for row in rgb_basis()], axis=-1) @ np.asarray(rgb, float)
+    partition = rgb_partition() @ np.asarray(rgb, float)
+    return np.interp(nm, VISIBLE_NM, partition)
 
 
 def _transformed_planes(planes: np.ndarray, matrix: np.ndarray) -> np.ndarray:

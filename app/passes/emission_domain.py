@@ -1,0 +1,226 @@
+"""Where a light must shine: the rectangle of its emission domain that holds the specular objects.
+
+Photons that cannot meet glass or a mirror make no caustic, so each light's lattice covers only
+the rectangle (on Lambert's azimuthal equal-area plane for light that diverges, on a plane across
+the beam for light that does not) round the projected objects, with a bit mask of the cells that
+some triangle touches. The restriction is exact: a lattice point's weight is the true measure of
+its share of the rectangle, and what the mask leaves out meets no specular object.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.gpu.records import MASK_SIZE
+from app.gpu.scene_buffers import GpuSpace
+from app.model.scene import Light, Scene
+
+_COARSE_ANGLE = 0.15
+"""Triangles that look larger than this from the light (rad, or of the unit sphere) are subdivided before projection."""
+_MAX_SUBDIVIDED = 400_000
+
+
+@dataclass(frozen=True)
+class EmissionDomain:
+    """One light's domain; positions in GPU space."""
+
+    kind: str
+    """"point", "plane" or "area": which variant of emit.comp runs."""
+    origin: np.ndarray
+    axis: np.ndarray
+    tangent: np.ndarray
+    bitangent: np.ndarray
+    rect: np.ndarray
+    """Corner and size (4,): plane coordinates, or GPU units."""
+    mask: np.ndarray
+    """bool (MASK_SIZE, MASK_SIZE), rows along the second axis."""
+    measure: float
+    """Measure of the whole rectangle (times the light's area): sr, unit² or sr·unit²."""
+    back: float
+    light_u: np.ndarray
+    light_v: np.ndarray
+    aperture_centre: np.ndarray
+    is_disc: bool
+    cone: tuple[float, float]
+
+    @property
+    def active_share(self) -> float:
+        """Share of the rectangle that the mask keeps."""
+        return float(self.mask.mean())
+
+    def spacing(self, count: int) -> float:
+        """Distance between neighbours of a lattice of `count` points over the rectangle."""
+        return float(np.sqrt(self.rect[2] * self.rect[3] / count))
+
+
+def orthonormal_frame(axis: np.ndarray, tangent: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors that make a right-handed frame with the unit `axis`."""
+    guide = np.asarray(tangent, float) if tangent is not None else np.eye(3)[np.argmin(np.abs(axis))]
+    first = guide - axis * (guide @ axis)
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
+
+
+def azimuthal_plane(directions: np.ndarray) -> np.ndarray:
+    """Lambert azimuthal equal-area coordinates (..., 2) of unit directions in a frame with z the axis."""
+    k = np.sqrt(np.maximum(0.5 * (1.0 + directions[..., 2]), 1e-12))
+    return directions[..., :2] / k[..., None]
+
+
+def emission_domain(light: Light, scene: Scene, space: GpuSpace, specular_triangles: np.ndarray) -> EmissionDomain | None:
+    """The domain of `light`, or None where it cannot reach a specular object.
+
+    `specular_triangles`: float64 (T, 3, 3) in GPU space.
+    """
+    if len(specular_triangles) == 0:
+        return None
+    position = space.to_gpu(np.array(light.position))
+    direction = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
+    corners = specular_triangles.reshape(-1, 3)
+    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    if light.kind in ("directional", "collimated"):
+        return _plane_domain(light, scene, space, specular_triangles, position, direction, middle)
+    return _diverging_domain(light, space, specular_triangles, position, direction, middle)
+
+
+def _plane_domain(
+    light: Light, scene: Scene, space: GpuSpace, triangles: np.ndarray, position: np.ndarray, direction: np.ndarray, middle: np.ndarray
+) -> EmissionDomain | None:
+    tangent, bitangent = orthonormal_frame(direction, light.tangent)
+    frame = np.stack([tangent, bitangent])
+    relative = triangles - middle
+    flat = relative @ frame.T
+    tilt = np.tan(np.radians(0.5 * light.angular_diameter_deg)) if light.kind == "directional" else 0.0
+    grow = tilt * np.abs(relative @ direction).max(axis=1)[:, None]
+    low, high = flat.min(axis=1) - grow, flat.max(axis=1) + grow
+    box_low, box_high = low.min(axis=0), high.max(axis=0)
+    centre, light_u, light_v, is_disc = middle, np.zeros(3), np.zeros(3), False
+    if light.kind == "collimated":
+        half = _half_extent(light) * space.scale
+        light_u, light_v, is_disc = tangent / half[0], bitangent / half[1], light.shape == "disc"
+        at = (position - middle) @ frame.T
+        box_low, box_high = np.maximum(box_low, at - half), np.minimum(box_high, at + half)
+        back = float((middle - position) @ direction)
+    else:
+        ends = np.concatenate([space.to_gpu(_world_corners(item)) for item in scene.objects])
+        back = float(np.max((middle - ends) @ direction)) + 1.0
+    if np.any(box_high <= box_low):
+        return None
+    rect, mask = _rect_and_mask(low, high, box_low, box_high)
+    area = rect[2] * rect[3] / space.scale**2
+    return EmissionDomain("plane", centre, direction, tangent, bitangent, rect, mask, area, back, light_u, light_v, position, is_disc, (float(tilt), 0.0))
+
+
+def _diverging_domain(
+    light: Light, space: GpuSpace, triangles: np.ndarray, position: np.ndarray, direction: np.ndarray, middle: np.ndarray
+) -> EmissionDomain | None:
+    to_middle = middle - position
+    distance = np.linalg.norm(to_middle)
+    axis = to_middle / distance if distance > 1e-9 else direction
+    tangent, bitangent = orthonormal_frame(axis)
+    frame = np.stack([tangent, bitangent, axis])
+    triangles = _subdivided(triangles, position)
+    relative = (triangles - position) @ frame.T
+    lengths = np.linalg.norm(relative, axis=-1)
+    flat = azimuthal_plane(relative / np.maximum(lengths, 1e-12)[..., None])
+    light_u = light_v = np.zeros(3)
+    grow = np.zeros((len(triangles), 1))
+    area = 1.0
+    if light.kind == "area":
+        half = _half_extent(light)
+        edge_u, edge_v = orthonormal_frame(direction, None if light.tangent is None else np.asarray(light.tangent))
+        light_u, light_v = edge_u * half[0] * space.scale, edge_v * half[1] * space.scale
+        area = float(half[0] * half[1]) * (np.pi if light.shape == "disc" else 4.0)
+        reach = np.linalg.norm(half) * space.scale if light.shape == "rectangle" else half[0] * space.scale
+        # Seen from the light's rim the object shifts by at most this angle; 1.5 covers the plane's stretch.
+        grow = 1.5 * np.arcsin(np.clip(reach / np.maximum(lengths.min(axis=1), 1e-12), 0.0, 1.0))[:, None]
+    low, high = np.maximum(flat.min(axis=1) - grow, -2.0), np.minimum(flat.max(axis=1) + grow, 2.0)
+    box_low, box_high = low.min(axis=0), high.max(axis=0)
+    outer = np.radians(light.outer_half_angle_deg) if light.kind == "spot" else 4.0
+    inner = np.radians(light.inner_half_angle_deg) if light.kind == "spot" else 4.0
+    cone_limit = None
+    if light.kind == "spot":
+        cone_limit = (frame @ direction, outer)
+        cone_low, cone_high = _cone_box(frame @ direction, outer)
+        box_low, box_high = np.maximum(box_low, cone_low), np.minimum(box_high, cone_high)
+        if np.any(box_high <= box_low):
+            return None
+    rect, mask = _rect_and_mask(low, high, box_low, box_high)
+    if cone_limit is not None:
+        mask &= _cone_mask(rect, *cone_limit)
+    if not mask.any():
+        return None
+    measure = float(rect[2] * rect[3]) * area
+    kind = "area" if light.kind == "area" else "point"
+    return EmissionDomain(
+        kind, position, axis, tangent, bitangent, rect, mask, measure, 0.0, light_u, light_v, position, light.shape == "disc", (float(inner), float(outer))
+    )
+
+
+def _half_extent(light: Light) -> np.ndarray:
+    """Half extents of a disc or rectangle, scene units (2,)."""
+    return np.array([light.radius, light.radius] if light.shape == "disc" else [0.5 * light.width, 0.5 * light.height])
+
+
+def _world_corners(item) -> np.ndarray:
+    return item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]
+
+
+def _rect_and_mask(low: np.ndarray, high: np.ndarray, box_low: np.ndarray, box_high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The rectangle with a small margin, and the cells that boxes [low, high] (T, 2) touch, grown by one."""
+    margin = 1e-3 * (box_high - box_low)
+    corner, size = box_low - margin, (box_high - box_low) + 2 * margin
+    first = np.clip(np.floor((low - corner) / size * MASK_SIZE).astype(int) - 1, 0, MASK_SIZE)
+    last = np.clip(np.floor((high - corner) / size * MASK_SIZE).astype(int) + 2, 0, MASK_SIZE)
+    # Box counts by corner differences and running sums: one pass, however many triangles.
+    steps = np.zeros((MASK_SIZE + 1, MASK_SIZE + 1), int)
+    for y, x, sign in ((first, first, 1), (last, first, -1), (first, last, -1), (last, last, 1)):
+        np.add.at(steps, (y[:, 1], x[:, 0]), sign)
+    mask = steps.cumsum(axis=0).cumsum(axis=1)[:MASK_SIZE, :MASK_SIZE] > 0
+    return np.concatenate([corner, size]), mask
+
+
+def _subdivided(triangles: np.ndarray, eye: np.ndarray) -> np.ndarray:
+    """Triangles split until each looks small from `eye`: straight edges bend on the azimuthal plane."""
+    done = []
+    while len(triangles):
+        edges = triangles - np.roll(triangles, 1, axis=1)
+        distance = np.linalg.norm(triangles.mean(axis=1) - eye, axis=1)
+        large = np.linalg.norm(edges, axis=-1).max(axis=1) > _COARSE_ANGLE * np.maximum(distance, 1e-3)
+        done.append(triangles[~large])
+        big = triangles[large]
+        if sum(map(len, done)) + 4 * len(big) > _MAX_SUBDIVIDED:
+            done.append(big)
+            break
+        a, b, c = big[:, 0], big[:, 1], big[:, 2]
+        ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+        triangles = np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    return np.concatenate(done)
+
+
+def _cone_box(axis_local: np.ndarray, outer: float) -> tuple[np.ndarray, np.ndarray]:
+    """Bounding box of a cone of directions on the azimuthal plane."""
+    if outer > np.pi / 2:
+        return np.full(2, -2.0), np.full(2, 2.0)
+    first, second = orthonormal_frame(axis_local)
+    turn = np.linspace(0.0, 2 * np.pi, 257)[:-1, None, None]
+    angle = np.linspace(0.0, outer, 9)[None, :, None]
+    directions = np.cos(angle) * axis_local + np.sin(angle) * (np.cos(turn) * first + np.sin(turn) * second)
+    flat = azimuthal_plane(directions).reshape(-1, 2)
+    slack = 0.01 * np.ptp(flat, axis=0)
+    return flat.min(axis=0) - slack, flat.max(axis=0) + slack
+
+
+def _cone_mask(rect: np.ndarray, axis_local: np.ndarray, outer: float) -> np.ndarray:
+    """Cells of the rectangle that a cone of directions may touch."""
+    centres = (np.arange(MASK_SIZE) + 0.5) / MASK_SIZE
+    qx, qy = np.meshgrid(rect[0] + centres * rect[2], rect[1] + centres * rect[3])
+    r2 = np.minimum(qx**2 + qy**2, 4.0)
+    k = np.sqrt(np.maximum(1.0 - 0.25 * r2, 0.0))
+    directions = np.stack([qx * k, qy * k, 1.0 - 0.5 * r2], axis=-1)
+    # The plane stretches angles by at most 1/k on its way out.
+    diagonal = np.hypot(rect[2], rect[3]) / MASK_SIZE / np.maximum(k, 0.05)
+    angle = np.arctan2(np.linalg.norm(np.cross(directions, axis_local), axis=-1), directions @ axis_local)
+    return angle <= outer + diagonal

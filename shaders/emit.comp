@@ -1,0 +1,99 @@
+// Emission: one thread a lattice point. Compiled once per kind of light (LIGHT_POINT covers spots,
+// LIGHT_PLANE directional and collimated light, LIGHT_AREA area lights).
+layout(local_size_x = 64) in;
+
+#include "lib/emission.glsl"
+#include "lib/spot.glsl"
+
+layout(std430, binding = BIND_PARAMETERS) readonly restrict buffer Parameters { EmitParameters p; };
+layout(std430, binding = BIND_RAYS_OUT) writeonly restrict buffer RaysOut { RayRecord rays[]; };
+layout(std430, binding = BIND_OUTCOMES) writeonly restrict buffer Outcomes { Outcome outcomes[]; };
+
+vec3 to_world(vec3 local) { return local.x * p.tangent + local.y * p.bitangent + local.z * p.axis; }
+
+void main()
+{
+    uint k = gl_GlobalInvocationID.x;
+    if (k >= p.count) return;
+    uint id = p.first + k;
+    Outcome outcome = Outcome(0u, 0u, 0.0, 0.0, 0.0, 0.0);
+
+    vec2 unit = lattice_point(id, p.lattice_count, p.shift);
+    uvec2 cell = uvec2(unit * float(MASK_SIZE));
+    uint bit = min(cell.y, uint(MASK_SIZE - 1)) * uint(MASK_SIZE) + min(cell.x, uint(MASK_SIZE - 1));
+    bool alive = (p.mask[bit >> 5u] & (1u << (bit & 31u))) != 0u;
+    vec2 q = p.rect.xy + unit * p.rect.zw;
+    // Area lights and the sun's disc: two more dimensions of the same Kronecker sequence.
+    vec2 extra = vec2(kronecker(id, PLASTIC_1, p.shift_extra.x), kronecker(id, PLASTIC_2, p.shift_extra.y));
+
+    vec3 position, direction, dposition_ds = vec3(0.0), dposition_dt = vec3(0.0), ddirection_ds = vec3(0.0), ddirection_dt = vec3(0.0);
+    float weight = p.weight;
+#if defined(LIGHT_POINT) || defined(LIGHT_AREA)
+    alive = alive && dot(q, q) < 4.0;
+    vec3 dx, dy;
+    direction = to_world(azimuthal_direction(q, dx, dy));
+    ddirection_ds = p.spacing * to_world(dx);
+    ddirection_dt = p.spacing * to_world(dy);
+    position = p.origin;
+#ifdef LIGHT_POINT
+    weight *= spot_falloff(direction, p.light_axis, p.cone);
+#else
+    vec2 on_light = p.is_disc != 0u ? concentric_disc(extra) : 2.0 * extra - 1.0;
+    position += on_light.x * p.light_u + on_light.y * p.light_v;
+    weight *= max(dot(direction, p.light_axis), 0.0);
+#endif
+#else
+    vec2 tilt = concentric_disc(extra) * p.cone.x;
+    direction = normalize(p.axis + tilt.x * p.tangent + tilt.y * p.bitangent);
+    vec3 on_plane = p.origin + q.x * p.tangent + q.y * p.bitangent;
+    position = on_plane - p.back * direction;
+    dposition_ds = p.spacing * p.tangent;
+    dposition_dt = p.spacing * p.bitangent;
+    // A collimated beam ends at its aperture.
+    vec2 at = vec2(dot(on_plane - p.aperture_centre, p.light_u), dot(on_plane - p.aperture_centre, p.light_v));
+    alive = alive && (p.is_disc != 0u ? dot(at, at) <= 1.0 : max(abs(at.x), abs(at.y)) <= 1.0);
+#endif
+    alive = alive && weight > 0.0;
+    if (alive) {
+        RayRecord ray;
+        ray.position = position;
+        ray.direction = direction;
+        ray.flux_w = weight * p.band_power_w;
+        ray.footprint_scale = 1.0;
+        ray.throughput = vec3(weight);
+        ray.x_anchor = p.x_anchor;
+        ray.x_lo = p.x_lo;
+        ray.x_hi = p.x_hi;
+#ifdef RANDOM_WAVELENGTH
+        ray.x_anchor = kronecker(id, 3774877043u, p.shift_spectral);
+        ray.x_lo = ray.x_anchor;
+        ray.x_hi = ray.x_anchor;
+#endif
+        ray.survival = 1.0;
+        ray.photon_id = id;
+        ray.light_and_source = p.light | (p.band << 8u) | 0xffff0000u;
+        ray.branch_key = hash_combine(p.seed, p.light * 4096u + p.band);
+        ray.flags = 0u;
+        ray.depth = 0u;
+        ray.last_primitive = 0xffffffffu;
+        ray.last_object = 0xffffffffu;
+        ray.inside_mask = 0u;
+        ray.inside_object = 0xffffffffu;
+#if COLUMNS > 0
+        for (int c = 0; c < COLUMNS; ++c) {
+            ray.dposition[c] = vec4(0.0);
+            ray.ddirection[c] = vec4(0.0);
+        }
+#endif
+#ifdef FOOTPRINTS
+        ray.dposition[0].xyz = dposition_ds;
+        ray.dposition[1].xyz = dposition_dt;
+        ray.ddirection[0].xyz = ddirection_ds;
+        ray.ddirection[1].xyz = ddirection_dt;
+#endif
+        rays[2u * k] = ray;
+        outcome.what = 1u;
+        outcome.emitted_w = ray.flux_w;
+    }
+    outcomes[k] = outcome;
+}

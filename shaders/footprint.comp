@@ -1,0 +1,180 @@
+// One thread a photon: its Gaussian footprint and spectral sweep, in texels of the map it lands on.
+// The sweep follows the chord between the landing points of the band's two ends (exact where one material
+// disperses: the spectral coordinate is then affine in its index). Elek et al. 2014; Schjoth et al. 2007.
+#include "lib/gaussian.glsl"
+
+layout(local_size_x = WORKGROUP) in;
+
+layout(std140, binding = 0) uniform Parameters {
+    uint first_photon;
+    uint photon_count;
+    uint classes;
+    uint bands;
+    uint var_samples;
+    uint table_rows;
+    float smoothing;
+    float extent_limit;
+};
+layout(std430, binding = 0) readonly buffer Photons { PhotonRecord photons[]; };
+layout(std430, binding = 1) writeonly buffer Splats { SplatRecord splats[]; };
+layout(std430, binding = 2) readonly buffer Placements { Placement placements[]; };
+layout(std430, binding = 3) readonly buffer Receivers { Receiver receivers[]; };
+layout(std430, binding = 4) readonly buffer VarTables { float var_table[]; };
+layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };  // x_lo, x_hi, mean place of the light in it (0..1), unused
+layout(std430, binding = 6) buffer Outside { float outside_w[]; };
+layout(std430, binding = 7) buffer Counters { uint count_dropped; uint count_small; uint count_swept; uint count_unused; };
+
+const float TEXEL_VARIANCE = 1.0 / 12.0;
+// Standard deviations. Below the first two a splat is smaller than what a map can show: SMALL.
+const float SMALL_STD = 0.4;
+const float SMALL_SWEEP = 0.75;
+const float ACROSS_FLOOR = 0.1;
+// Sampling at texel centres needs this much blur where no box average does the work.
+const float SAMPLED_VARIANCE = 0.2;
+const float CUT = 3.0;
+const float MIN_SIGMA_TO_SWEEP = 1.0 / 256.0;
+const float MAX_SIGMA_TO_SWEEP = 64.0;
+const float ROWS_PER_OCTAVE = 4.0;
+
+struct Footprint {
+    vec2 centre;  // texels, at the middle of the chord
+    vec2 axis_s;
+    vec2 axis_t;
+    vec2 chord;
+};
+
+float spectral_variable(uint group, float x) {
+    float at = clamp(x, 0.0, 1.0) * float(var_samples - 1u);
+    uint i = min(uint(at), var_samples - 2u);
+    uint base = group * var_samples + i;
+    return mix(var_table[base], var_table[base + 1u], at - float(i));
+}
+
+vec2 to_texels(Placement place, vec3 direction) {
+    return vec2(dot(place.row_u.xyz, direction), dot(place.row_v.xyz, direction));
+}
+
+// Sum over texel centres of the splat to be drawn, by Poisson's formula: 1 plus the harmonics that the texel grid sees.
+float grid_sum(vec2 centre, vec2 e, vec2 m, float shear, float box, float s2, float along2, float sweep) {
+    float total = 1.0;
+    vec2 phase = centre - 0.5;
+    for (int i = 0; i < 4; ++i) {
+        vec2 k = i == 0 ? vec2(1.0, 0.0) : i == 1 ? vec2(0.0, 1.0) : i == 2 ? vec2(1.0, 1.0) : vec2(1.0, -1.0);
+        float ke = dot(k, e);
+        float km = dot(k, m) + shear * ke;
+        float damping = exp(-0.5 * TWO_PI * TWO_PI * (s2 * km * km + along2 * ke * ke));
+        total += 2.0 * damping * sinc_pi(box * km) * sinc_pi(sweep * ke) * cos(TWO_PI * dot(k, phase));
+    }
+    return clamp(total, 0.7, 1.4);
+}
+
+// Throughput averaged over the band (piecewise linear through low end, anchor, high end).
+float mean_throughput(PhotonRecord photon) {
+    float width = photon.x_hi - photon.x_lo;
+    if (width <= 0.0) {
+        return photon.throughput.y;
+    }
+    float below = (photon.throughput.x + photon.throughput.y) * (photon.x_anchor - photon.x_lo);
+    float above = (photon.throughput.y + photon.throughput.z) * (photon.x_hi - photon.x_anchor);
+    return 0.5 * (below + above) / width;
+}
+
+SplatRecord small_splat(PhotonRecord photon, Footprint f, vec2 sweep_variance, float mean_place) {
+    SplatRecord splat;
+    vec2 variance = f.axis_s * f.axis_s + f.axis_t * f.axis_t + f.chord * f.chord * TEXEL_VARIANCE;
+    vec2 sigma = sqrt(max(variance, vec2(1e-4)));
+    splat.centre = f.centre + f.chord * (mean_place - 0.5);
+    splat.along = 0.5 + CUT * sigma;
+    splat.across = SQRT_HALF / sigma;
+    splat.amplitude = mean_throughput(photon);
+    splat.table_row = 0.0;
+    splat.y_edge = 0.0;
+    splat.y_box = 0.0;
+    splat.throughput = vec4(photon.x_anchor, photon.throughput.y, 0.0, 0.0);
+    splat.xi_range = vec2(photon.x_lo, photon.x_hi);
+    splat.xi_half = 0.0;
+    splat.inverse_sigma_xi = 0.0;
+    splat.kind = 1u;
+    return splat;
+}
+
+SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
+    SplatRecord splat;
+    vec3 cov = vec3(f.axis_s.x * f.axis_s.x + f.axis_t.x * f.axis_t.x, f.axis_s.x * f.axis_s.y + f.axis_t.x * f.axis_t.y,
+                    f.axis_s.y * f.axis_s.y + f.axis_t.y * f.axis_t.y);  // xx, xy, yy
+
+    // Along the chord; along the footprint's long axis where there is none to speak of.
+    float sweep = length(f.chord);
+    vec2 e;
+    if (sweep > 1e-3 * sqrt(cov.x + cov.z) && sweep > 1e-4) {
+        e = f.chord / sweep;
+    } else {
+        float d = 0.5 * (cov.x - cov.z);
+        float r = sqrt(d * d + cov.y * cov.y);
+        e = d >= 0.0 ? vec2(r + d, cov.y) : vec2(cov.y, r - d);
+        e = dot(e, e) > 0.0 ? normalize(e) : vec2(1.0, 0.0);
+        sweep = 0.0;
+    }
+    vec2 m = vec2(-e.y, e.x);
+    float a = cov.x * e.x * e.x + 2.0 * cov.y * e.x * e.y + cov.z * e.y * e.y;
+    float b = cov.x * e.x * m.x + cov.y * (e.x * m.y + e.y * m.x) + cov.z * e.y * m.y;
+    float c = cov.x * m.x * m.x + 2.0 * cov.y * m.x * m.y + cov.z * m.y * m.y;
+
+    // A texel seen along its m direction is a trapezoid: a box as wide as its longer side and, for the shorter, a
+    // Gaussian of the same variance. The box is kept exactly (no ripple over the grid), the rest is Gaussian.
+    vec2 side = abs(m);
+    float box = max(side.x, side.y);
+    float narrow = min(side.x, side.y);
+    float s2 = max(c, ACROSS_FLOOR * ACROSS_FLOOR) + narrow * narrow * TEXEL_VARIANCE;
+    float c_total = s2 + box * box * TEXEL_VARIANCE;
+    float shear = b / c_total;
+    float along2 = max(a + TEXEL_VARIANCE - b * shear, SAMPLED_VARIANCE * (1.0 + shear * shear));
+    float sigma = sqrt(along2);
+
+    // The whole band of the table, of which a cut photon has a part.
+    float part_lo = 0.0;
+    float part_hi = 1.0;
+    float whole = sweep;
+#ifdef BAND_CUTS
+    if (photon.x_hi > photon.x_lo) {
+        float band_width = max(band.y - band.x, 1e-9);
+        part_lo = (photon.x_lo - band.x) / band_width;
+        part_hi = (photon.x_hi - band.x) / band_width;
+        whole = sweep / max(part_hi - part_lo, 1e-6);
+    }
+#endif
+    sigma = max(sigma, whole * MIN_SIGMA_TO_SWEEP);
+    whole = max(whole, sigma / MAX_SIGMA_TO_SWEEP);
+    float reach = 0.5 * whole + CUT * sigma;
+    float xi_half = 0.5 * whole / reach;
+    float xi_lo = mix(-xi_half, xi_half, part_lo);
+    float xi_hi = mix(-xi_half, xi_half, part_hi);
+
+    float s = sqrt(s2);
+    float y_edge = CUT * sqrt(c_total);
+    float kept = 1.0 - 2.0 * s / box * (normal_excess((y_edge - 0.5 * box) / s) - normal_excess((y_edge + 0.5 * box) / s));
+    float on_grid = grid_sum(f.centre, e, m, shear, box, s2, sigma * sigma, sweep);
+
+    splat.centre = f.centre;
+    splat.along = e * reach;
+    splat.across = (m + shear * e) * y_edge;
+    splat.amplitude = 1.0 / (reach * box * kept * on_grid);
+    splat.table_row = ((log2(sigma / whole) - log2(MIN_SIGMA_TO_SWEEP)) * ROWS_PER_OCTAVE + 0.5) / float(table_rows);
+    splat.y_edge = y_edge * SQRT_HALF / s;
+    splat.y_box = 0.5 * box * SQRT_HALF / s;
+#ifdef POINT_SPECTRUM
+    splat.throughput = vec4(photon.x_anchor, photon.throughput.y, 0.0, 0.0);
+#else
+    float width = photon.x_hi - photon.x_lo;
+    float anchor = width > 0.0 ? clamp((photon.x_anchor - photon.x_lo) / width, 0.0, 1.0) : 0.5;
+    float xi_anchor = mix(xi_lo, xi_hi, anchor);
+    splat.throughput = vec4(xi_anchor, photon.throughput.y,
+                            anchor > 1e-3 && width > 0.0 ? (photon.throughput.y - photon.throughput.x) / (xi_anchor - xi_lo) : 0.0,
+                            anchor < 0.999 && width > 0.0 ? (photon.throughput.z - photon.throughput.y) / (xi_hi - xi_anchor) : 0.0);
+#endif
+    splat.xi_range = vec2(xi_lo, xi_hi);
+    splat.xi_half = xi_half;
+    splat.inverse_sigma_xi = SQRT_HALF * reach / sigma;
+    splat.kind = 2u;
+    return splat;
+}

@@ -1,0 +1,33 @@
+// Gaussians, their integrals and their averages over a texel. Pure functions, no bindings.
+// Twin: tests/reference/splat_reference.py.
+
+const float SQRT_HALF = 0.70710678;
+const float TWO_PI = 6.2831853;
+
+// erf to 3e-7 without an exponential (Abramowitz and Stegun 1964, 7.1.28).
+float erf_approx(float x) {
+    float a = abs(x);
+    float p = 1.0 + a * (0.0705230784 + a * (0.0422820123 + a * (0.0092705272 + a * (0.0001520143
+              + a * (0.0002765672 + a * 0.0000430638)))));
+    p *= p;
+    p *= p;
+    p *= p;
+    p *= p;
+    return sign(x) * (1.0 - 1.0 / p);
+}
+
+// Integral of a normal density over [y - half_width, y + half_width]; arguments in units of sqrt(2) standard deviations.
+float gaussian_box(float y, float half_width) {
+    return 0.5 * (erf_approx(y + half_width) - erf_approx(y - half_width));
+}
+
+// Mean excess E[max(Z - z, 0)] of a standard normal variable.
+float normal_excess(float z) {
+    return 0.39894228 * exp(-0.5 * z * z) - z * 0.5 * (1.0 - erf_approx(z * SQRT_HALF));
+}
+
+// sin(pi x) / (pi x)
+float sinc_pi(float x) {
+    float a = 3.14159265 * x;
+    return abs(a) < 1e-2 ? 1.0 - a * a * (1.0 / 6.0) : sin(a) / a;
+}
