@@ -1,0 +1,75 @@
+"""What must hold for a whole scene, whichever file it came from: something to land on, light outside glass, data in range."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.errors import UserError
+from app.model.scene import Dielectric, Diffuse, Light, Scene, SceneObject
+
+
+def check_scene(scene: Scene, file_name: str) -> list[str]:
+    """Notes about `scene`; raises UserError for one that cannot give a picture.
+
+    Errors: no objects, no light, no receiver, a light inside glass, a laser line outside a
+    glass's data. Notes: glasses whose data are clamped, or unusual.
+    """
+    if not scene.objects:
+        raise UserError(f"{file_name}: the scene holds no objects; add one with [[objects]]")
+    if not scene.lights:
+        raise UserError(f"{file_name}: the scene holds no light; add one with [[lights]]")
+    if not any(isinstance(o.material, Diffuse) for o in scene.objects):
+        raise UserError(
+            f"{file_name}: nothing receives the light; add a diffuse object, "
+            'such as [[objects]] shape = "plane", material = "diffuse"'
+        )
+    glasses = [o for o in scene.objects if isinstance(o.material, Dielectric)]
+    for light in scene.lights:
+        if light.kind != "directional":
+            _check_outside(light, glasses, file_name)
+        _check_lines(light, glasses, file_name)
+    return _glass_notes(glasses)
+
+
+def contains(item: SceneObject, point: np.ndarray) -> bool:
+    """Whether `point` (3,) lies inside the object's closed surface.
+
+    By the winding number, the sum of signed solid angles (van Oosterom and Strackee, IEEE
+    Trans. Biomed. Eng. 30, 1983, eq. 8) over 4π, which also judges slightly open meshes.
+    """
+    corners = item.mesh.vertices @ item.object_to_world[:3, :3].T + (item.object_to_world[:3, 3] - point)
+    if np.any(corners.min(axis=0) > 0.0) or np.any(corners.max(axis=0) < 0.0):
+        return False
+    a, b, c = np.moveaxis(corners[item.mesh.triangles], 1, 0)
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    triple = np.einsum("ij,ij->i", a, np.cross(b, c))
+    dot = np.einsum
+    denominator = (
+        la * lb * lc + dot("ij,ij->i", a, b) * lc + dot("ij,ij->i", b, c) * la + dot("ij,ij->i", c, a) * lb
+    )
+    winding = np.arctan2(triple, denominator).sum() / (2.0 * np.pi)
+    return bool(abs(winding) > 0.5)
+
+
+def _check_outside(light: Light, glasses: list[SceneObject], file_name: str) -> None:
+    for item in glasses:
+        if contains(item, np.array(light.position)):
+            raise UserError(
+                f"{file_name}: light '{light.name}' stands inside the glass of '{item.name}'; move its position out of it"
+            )
+
+
+def _check_lines(light: Light, glasses: list[SceneObject], file_name: str) -> None:
+    for wavelength_nm, power in light.spectral_power.lines:
+        for item in glasses:
+            low, high = item.material.dispersion.range_nm  # type: ignore[union-attr]
+            if power > 0.0 and not low <= wavelength_nm <= high:
+                raise UserError(
+                    f"{file_name}: the line at {wavelength_nm:g} nm of light '{light.name}' lies outside the data of "
+                    f"'{item.name}' ({low:g} to {high:g} nm); choose another wavelength or glass"
+                )
+
+
+def _glass_notes(glasses: list[SceneObject]) -> list[str]:
+    dispersions = dict.fromkeys(o.material.dispersion for o in glasses)  # type: ignore[union-attr]
+    return [note for dispersion in dispersions for note in dispersion.notes()]

@@ -1,0 +1,166 @@
+"""Opens a scene: our own TOML, a glTF file, or a bare mesh, always ending in one checked `Scene`.
+
+The TOML format is described in `assets/scenes/README.md`. It is read strictly: a key that
+is not understood is an error, and what the file leaves out is filled in and said in
+`Scene.notes`.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.errors import UserError
+from app.model.scene import Camera, Dielectric, Diffuse, Light, RenderDefaults, Scene, SceneObject
+from app.model.scene_checks import check_scene
+from app.model.scene_defaults import default_camera, default_light, default_table, surroundings_of
+from app.model.scene_lights import Surroundings, read_light
+from app.model.scene_materials import DEFAULT_GLASS, read_materials
+from app.model.scene_objects import MESH_SUFFIXES, ObjectReader, load_checked_mesh
+from app.model.scene_table import SceneTable
+
+GLTF_SUFFIXES = (".glb", ".gltf")
+MAX_PICTURE_SIDE = 16384
+MAX_DEPTH = 4096
+
+
+def load_scene(path: str | os.PathLike[str]) -> Scene:
+    """The scene in `path` (.toml, .glb, .gltf, or a mesh: .ply, .obj, .stl).
+
+    Raises UserError, in one sentence with file, key and remedy, for anything that cannot be
+    rendered as it stands.
+    """
+    path = Path(path)
+    if not path.is_file():
+        problem = "is a folder, not a scene file" if path.is_dir() else "does not exist"
+        raise UserError(f"{path} {problem}; give a .toml, .glb or .gltf scene or a .ply, .obj or .stl mesh")
+    suffix = path.suffix.lower()
+    if suffix == ".toml":
+        scene = _scene_from_table(SceneTable(_read_toml(path), path))
+    elif suffix in GLTF_SUFFIXES:
+        from app.model.gltf import load_gltf
+
+        scene = load_gltf(path)
+    elif suffix in MESH_SUFFIXES:
+        scene = _scene_around_mesh(path)
+    else:
+        raise UserError(
+            f"{path}: '{path.suffix}' is not a kind of scene; use .toml, {', '.join(GLTF_SUFFIXES + MESH_SUFFIXES)}"
+        )
+    notes = [note for note in check_scene(scene, path.name) if note not in scene.notes]
+    return replace(scene, notes=scene.notes + tuple(notes))
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except tomllib.TOMLDecodeError as error:
+        raise UserError(f"{path.name} is not valid TOML: {error}; texts need quotes and keys one line each") from error
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8") from error
+    except OSError as error:
+        raise UserError(f"{path} cannot be read: {error.strerror}") from error
+
+
+def _scene_from_table(table: SceneTable) -> Scene:
+    name = table.string("name", table.file.stem)
+    table.string("units", "units")  # a label for people; every length is in it
+    background = table.numbers("background", (0.0, 0.0, 0.0), count=3)
+    if min(background) < 0.0:
+        table.fail("background", "must be three radiances of 0 or more")
+    render = _read_render(table.table("render"))
+    materials = read_materials(table)
+    reader = ObjectReader(materials)
+    objects = [item for entry in table.tables("objects") for item in reader.read(entry)]
+    if not objects:
+        table.finish("a scene")
+        table.fail("objects", "is missing or empty; add at least one [[objects]]")
+    notes = list(reader.notes)
+    around = surroundings_of(objects)
+    lights = _read_lights(table, around, notes)
+    camera = _read_camera(table, around, notes)
+    table.finish("a scene")
+    if not (table.has("camera") or table.has("lights")):
+        _add_table(objects, notes)
+    return Scene(name, camera, lights, tuple(objects), background, render, tuple(notes))  # type: ignore[arg-type]
+
+
+def _read_lights(table: SceneTable, around: Surroundings, notes: list[str]) -> tuple[Light, ...]:
+    if not table.has("lights"):
+        notes.append("No lights given: a white sun from behind on the left was added.")
+        return (default_light(),)
+    lights = tuple(read_light(entry, i, around) for i, entry in enumerate(table.tables("lights")))
+    for i, light in enumerate(lights):
+        if light.name in [other.name for other in lights[:i]]:
+            table.fail(f"lights[{i}].name", f"is '{light.name}', which another light has already; give each its own")
+    return lights
+
+
+def _read_camera(table: SceneTable, around: Surroundings, notes: list[str]) -> Camera:
+    inner = table.table("camera")
+    if inner is None:
+        notes.append("No camera given: one that sees the objects and what falls beside them was added.")
+        return default_camera(around)
+    kind = inner.choice("kind", ("pinhole", "orthographic"), "pinhole")
+    position = inner.vector("position")
+    x, y, z = (float(v) for v in around.centre)
+    target = inner.vector("target", (x, y, z))
+    up = inner.vector("up", (0.0, 0.0, 1.0), nonzero=True)
+    forward = np.subtract(target, position)
+    if np.linalg.norm(forward) < 1e-150:
+        inner.fail("target", "lies at the camera's own position and so gives no direction")
+    sine = np.linalg.norm(np.cross(forward, up)) / (np.linalg.norm(forward) * np.linalg.norm(up))
+    if sine < 1e-9:
+        inner.fail("up", "is parallel to the viewing direction; give a direction across it")
+    camera = Camera(position, target, up, kind)  # type: ignore[arg-type]
+    if kind == "pinhole":
+        camera = replace(camera, vertical_fov_deg=inner.number("vertical_fov_deg", 35.0, above=0.0, below=180.0))
+    else:
+        extent = inner.number("vertical_extent", 4.0 * around.radius, above=0.0)
+        camera = replace(camera, vertical_extent=extent)
+    inner.finish(f"a camera of kind '{kind}'")
+    return camera
+
+
+def _read_render(table: SceneTable | None) -> RenderDefaults:
+    defaults = RenderDefaults()
+    if table is None:
+        return defaults
+    width, height = table.numbers("size", (defaults.width, defaults.height), count=2)
+    for side in (width, height):
+        if side != int(side) or not 1 <= side <= MAX_PICTURE_SIDE:
+            table.fail("size", f"is {width:g} × {height:g} but each side must be 1 to {MAX_PICTURE_SIDE} whole pixels")
+    render = RenderDefaults(
+        width=int(width),
+        height=int(height),
+        photons=table.integer("photons", defaults.photons, at_least=1, at_most=10**12),
+        exposure_ev=table.number("exposure_ev", defaults.exposure_ev, at_least=-64.0, at_most=64.0),
+        max_depth=table.integer("max_depth", defaults.max_depth, at_least=1, at_most=MAX_DEPTH),
+    )
+    table.finish("[render]")
+    return render
+
+
+def _add_table(objects: list[SceneObject], notes: list[str]) -> None:
+    """A receiver for a file that gives neither camera nor lights nor anything diffuse."""
+    if not any(isinstance(o.material, Diffuse) for o in objects):
+        objects.append(default_table(objects))
+        notes.append("Nothing diffuse given: a light-grey table was put below the objects.")
+
+
+def _scene_around_mesh(path: Path) -> Scene:
+    """A bare mesh as a piece of glass on a table in the sun."""
+    from app.model import catalogue
+
+    notes = [f"{path.name} is a bare mesh: it was made of {DEFAULT_GLASS}."]
+    mesh = load_checked_mesh(path, None, notes)
+    objects = [SceneObject(path.stem, mesh, Dielectric(catalogue.find(DEFAULT_GLASS)))]
+    camera = default_camera(surroundings_of(objects))
+    _add_table(objects, notes)
+    notes.append("A white sun and a camera were added.")
+    return Scene(path.stem, camera, (default_light(),), tuple(objects), notes=tuple(notes))

@@ -1,0 +1,232 @@
+"""Objects of a scene file: which mesh, which material, where, and how often."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.errors import UserError
+from app.model.mesh import Mesh
+from app.model.mesh_recipes import note_recipe
+from app.model.placement import read_placement
+from app.model.scene import Material, SceneObject
+from app.model.scene_materials import read_object_material
+from app.model.scene_table import SceneTable
+
+MESH_SUFFIXES = (".ply", ".obj", ".stl")
+INLINE = "inline"
+"""Shape of triangles that stand in the scene file itself."""
+
+
+class ObjectReader:
+    """Reads [[objects]] one by one; equal descriptions share one `Mesh`."""
+
+    def __init__(self, materials: dict[str, Material]) -> None:
+        self._materials = materials
+        self._meshes: dict[str, Mesh] = {}
+        self._names: set[str] = set()
+        self.notes: list[str] = []
+
+    def read(self, table: SceneTable) -> list[SceneObject]:
+        """The object of one table, or its instances."""
+        mesh = self._read_mesh(table)
+        material = read_object_material(table, self._materials)
+        name = self._unique_name(table, mesh.name)
+        base = read_placement(table)
+        rest = table.number("rests_at_z", None)
+        placed: list[SceneObject] = []
+        if not table.has("instances"):
+            placed.append(SceneObject(name, mesh, material, _rested(mesh, base, rest)))
+        else:
+            entries = table.tables("instances")
+            if not entries:
+                table.fail("instances", "is empty; leave it out to place the object once")
+            for i, entry in enumerate(entries):
+                label = self._unique_name(entry, f"{name} {i + 1}")
+                matrix = _rested(mesh, read_placement(entry) @ base, rest)
+                entry.finish("an instance")
+                placed.append(SceneObject(label, mesh, material, matrix))
+        table.finish("this object")
+        return placed
+
+    def _unique_name(self, table: SceneTable, fallback: str) -> str:
+        if table.has("name"):
+            name = table.string("name")
+            if name in self._names:
+                table.fail("name", f"is '{name}', which another object has already; give each its own")
+        else:
+            name, number = fallback, 1
+            while name in self._names:
+                number += 1
+                name = f"{fallback} {number}"
+        self._names.add(name)
+        return name
+
+    def _read_mesh(self, table: SceneTable) -> Mesh:
+        key = table.one_of(("mesh", "shape"), "the geometry")
+        if key is None:
+            table.raw("shape")  # blames a misspelt key, or says that this one is missing
+        recipe = _file_recipe(table) if key == "mesh" else _shape_recipe(table)
+        identity = json.dumps(recipe, sort_keys=True)
+        if identity not in self._meshes:
+            self._meshes[identity] = self._make(table, recipe)
+        return self._meshes[identity]
+
+    def _make(self, table: SceneTable, recipe: dict[str, Any]) -> Mesh:
+        if "mesh" in recipe:
+            mesh = load_checked_mesh(Path(recipe["mesh"]), recipe.get("smooth"), self.notes)
+        else:
+            try:
+                mesh = _make_shape(recipe)
+            except UserError as error:
+                table.fail("shape", f"cannot be made: {error}")
+            if recipe["shape"] == INLINE:
+                mesh = _checked(mesh, self.notes)
+        note_recipe(mesh, recipe)
+        return mesh
+
+
+def load_checked_mesh(path: Path, smooth: bool | float | None, notes: list[str]) -> Mesh:
+    """A mesh file, repaired where that is safe; what was found goes to `notes`."""
+    from app.model.mesh_io import load_mesh
+
+    return _checked(load_mesh(path, smooth), notes)
+
+
+def _checked(mesh: Mesh, notes: list[str]) -> Mesh:
+    from app.model.mesh_health import examine, repair
+
+    mesh, found = repair(mesh, examine(mesh))
+    notes.extend(found)
+    return mesh
+
+
+def _rested(mesh: Mesh, matrix: np.ndarray, rest: float | None) -> np.ndarray:
+    """`matrix`, lifted along z so that the mesh's lowest point lies at z = `rest`."""
+    if rest is not None:
+        lowest = float((mesh.vertices @ matrix[2, :3]).min()) + matrix[2, 3]
+        matrix = matrix.copy()
+        matrix[2, 3] += rest - lowest
+    matrix.setflags(write=False)
+    return matrix
+
+
+def _file_recipe(table: SceneTable) -> dict[str, Any]:
+    path = table.existing_file("mesh").resolve()
+    if path.suffix.lower() not in MESH_SUFFIXES:
+        table.fail("mesh", f"must be one of {', '.join(MESH_SUFFIXES)}; open a .glb or .gltf as the scene itself")
+    recipe: dict[str, Any] = {"mesh": str(path)}
+    if table.has("smooth"):
+        smooth = table.raw("smooth")
+        if not isinstance(smooth, bool):
+            smooth = table.number("smooth", at_least=0.0, at_most=180.0)
+        recipe["smooth"] = smooth
+    return recipe
+
+
+# -- shapes: the keys are the parameters of the functions in `primitives` --------------------
+
+_SHAPES = (
+    "sphere", "ellipsoid", "box", "slab", "prism", "polygon_prism", "lens", "doublet", "brilliant",
+    "torus", "revolution", "height_field", "rippled_water", "plane", "disc", INLINE,
+)  # fmt: skip
+_FUNCTION = {"revolution": "solid_of_revolution"}
+_HIDDEN = {"name", "names", "gradient"}
+
+
+@cache
+def _parameters(shape: str) -> dict[str, tuple[str, bool]]:
+    """Key -> (annotation, required) of a shape, in the order of its function."""
+    if shape == INLINE:
+        return {"vertices": ("rows3", True), "triangles": ("rows3", True)}
+    signature = inspect.signature(_function(shape))
+    keys = {
+        key: (str(parameter.annotation), parameter.default is inspect.Parameter.empty)
+        for key, parameter in signature.parameters.items()
+        if key not in _HIDDEN
+    }
+    return keys | ({"part": ("part", True)} if shape == "doublet" else {})
+
+
+def _function(shape: str) -> Callable[..., Any]:
+    from app.model import primitives
+
+    return getattr(primitives, _FUNCTION.get(shape, shape))
+
+
+def _shape_recipe(table: SceneTable) -> dict[str, Any]:
+    shape = table.choice("shape", _SHAPES)
+    recipe: dict[str, Any] = {"shape": shape}
+    for key, (annotation, required) in _parameters(shape).items():
+        if required or table.has(key):
+            recipe[key] = _read_parameter(table, key, annotation)
+    return recipe
+
+
+def _read_parameter(table: SceneTable, key: str, annotation: str) -> Any:
+    if annotation == "part":
+        return table.choice(key, ("front", "back"))
+    if annotation == "rows3":
+        return [list(row) for row in table.rows(key, 3, at_least=1)]
+    if key == "profile":
+        return [list(row) for row in table.rows(key, 2, at_least=3)]
+    if key == "heights":
+        return _read_heights(table, key)
+    if annotation == "int":
+        return table.integer(key, at_least=0, at_most=100_000_000)
+    if annotation == "float":
+        return table.number(key, infinite=True)
+    return list(table.numbers(key, count=annotation.count("float")))
+
+
+def _read_heights(table: SceneTable, key: str) -> Any:
+    """Rows of heights in the file itself, or the absolute name of a .npy or .csv that holds them."""
+    value = table.raw(key)
+    if isinstance(value, str):
+        path = table.existing_file(key).resolve()
+        if path.suffix.lower() not in (".npy", ".csv"):
+            table.fail(key, "must name a .npy or .csv file, or list rows of numbers")
+        return str(path)
+    if not isinstance(value, list) or not value or not isinstance(value[0], list):
+        table.fail(key, "must list rows of numbers, or name a .npy or .csv file")
+    return [list(row) for row in table.rows(key, len(value[0]))]
+
+
+def _make_shape(recipe: dict[str, Any]) -> Mesh:
+    arguments = {key: value for key, value in recipe.items() if key not in ("shape", "part")}
+    shape = recipe["shape"]
+    if shape == INLINE:
+        return _inline_mesh(**arguments)
+    if "heights" in arguments:
+        arguments["heights"] = _load_heights(arguments["heights"])
+    made = _function(shape)(**arguments)
+    if shape == "doublet":
+        return made[("front", "back").index(recipe["part"])]
+    return made
+
+
+def _inline_mesh(vertices: list[list[float]], triangles: list[list[float]]) -> Mesh:
+    from app.model.mesh import make_mesh
+
+    indices = np.array(triangles)
+    if np.any(indices != np.floor(indices)):
+        raise UserError("triangles must hold whole numbers, counted from 0")
+    return make_mesh("mesh", np.array(vertices), indices.astype(np.int64))
+
+
+def _load_heights(heights: Any) -> np.ndarray:
+    if not isinstance(heights, str):
+        return np.array(heights, dtype=np.float64)
+    try:
+        if heights.endswith(".npy"):
+            loaded = np.load(heights, allow_pickle=False)
+            return np.asarray(loaded, dtype=np.float64)
+        return np.loadtxt(heights, delimiter=",", ndmin=2)
+    except (OSError, ValueError, EOFError) as error:
+        raise UserError(f"the heights in {heights} cannot be read ({error}); give a plain array of numbers") from error
