@@ -3,17 +3,21 @@
 Caustics are the hardest pictures there are for a tone curve: spectral colours far outside
 Rec.709 (strongly negative channels) next to highlights many stops above the paper. Clipping
 each channel on its own turns both into flat patches of the wrong hue. Here a colour only ever
-moves along the straight line between itself and the grey of the same luminance, which keeps its
-dominant wavelength, and along the line through black, which keeps its chromaticity:
+moves along straight lines to black or to grey, so its dominant wavelength stays:
 
-1. exposure, 2. into the gamut from below (no negative channel), 3. a shoulder for luminance,
-4. into the gamut from above (no channel over one): bright colours bleach towards white.
+1. exposure: stops;
+2. into the gamut: towards the grey of the same luminance, until no channel is negative;
+3. a shoulder on the colour's norm, which keeps its chromaticity and cannot reach white;
+4. bleaching: far above display white colours fade towards white, as film does.
 
-Both gamut steps have a soft knee: colours well inside stay as they are, colours outside keep
-their order instead of piling up on the border.
+The gamut's border is rounded (p-norms in place of minimum and maximum): with its sharp corners
+every sweep through the spectrum shows dark lines at the hues of the primaries and bright ones
+between. Colours well inside the gamut and below the shoulder come out exactly as they are.
 """
 
 from __future__ import annotations
+
+from functools import cache
 
 import numpy as np
 
@@ -21,9 +25,13 @@ LUMINANCE_709 = np.array([0.2126390, 0.7151687, 0.0721923], np.float32)
 """Y of linear Rec.709 (ITU-R BT.709-6, primaries and D65 white to seven digits)."""
 
 SHOULDER_START = 0.5
-"""Display luminance up to which the tone curve is the identity."""
-GAMUT_KNEE = 0.9
+"""Norm of a colour up to which the tone curve is the identity (the norm of a grey is its value)."""
+BLEACH = 12.0
+"""Excess over the shoulder's start, in units of its length, at which a colour has faded by 0.35."""
+GAMUT_KNEE = 0.8
 """Share of the distance from grey to the gamut's border up to which colours stay as they are."""
+CORNER_POWER = 5
+"""Roundness of the gamut's corners: large is sharp."""
 NOT_FINITE_RGB = (1.0, 0.0, 1.0)
 """Magenta: a broken pixel must be seen, not hidden."""
 
@@ -45,7 +53,7 @@ def auto_exposure(rgb: np.ndarray) -> float:
     lit = lit[np.isfinite(lit) & (lit > 0)]
     if lit.size == 0:
         return 0.0
-    lit = lit[lit > 1e-3 * np.percentile(lit, 99.0)].astype(np.float64)
+    lit = lit[lit > 1e-4 * np.percentile(lit, 99.0)].astype(np.float64)
     key_ev = np.log2(0.18) - np.mean(np.log2(lit))
     highlight_ev = np.log2(8.0) - np.log2(np.percentile(lit, 99.5))
     return float(min(key_ev, highlight_ev))
@@ -64,11 +72,7 @@ def to_display(rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
     exposed = np.where(finite[..., None], np.clip(scene, -limit, limit), np.float32(0))
     gain = np.float32(np.clip(2.0**float(np.clip(exposure_ev, -60, 60)), 1e-18, 1e18))
     exposed = np.clip(exposed * gain, -limit, limit)
-    inside = _desaturate_to_positive(exposed)
-    grey = luminance(inside)
-    shown = _shoulder(grey)
-    scale = np.divide(shown, grey, out=np.zeros_like(grey), where=grey > 0)
-    display = _desaturate_to_white(inside * scale[..., None], shown)
+    display = _roll_off(_into_gamut(exposed))
     display[~finite] = NOT_FINITE_RGB
     return display
 
@@ -84,40 +88,44 @@ def srgb_eotf(encoded: np.ndarray) -> np.ndarray:
     return np.where(encoded <= 0.04045, encoded / 12.92, ((np.maximum(encoded, 0.04045) + 0.055) / 1.055) ** 2.4)
 
 
+@cache
+def _encoding_table() -> np.ndarray:
+    """8-bit sRGB code of i / 65535: twenty entries a code where the curve is steepest."""
+    return np.rint(255 * srgb_oetf(np.linspace(0.0, 1.0, 65536))).astype(np.uint8)
+
+
 def tone_map_8bit(rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
     """Display picture uint8 (…, 3) of linear Rec.709 scene colours; `exposure_ev` as in `to_display`."""
-    return np.rint(srgb_oetf(to_display(rgb, exposure_ev)) * np.float32(255)).astype(np.uint8)
+    return _encoding_table()[np.rint(to_display(rgb, exposure_ev) * np.float32(65535)).astype(np.uint16)]
 
 
-def _soft_limit(ratio: np.ndarray) -> np.ndarray:
-    """Identity up to `GAMUT_KNEE`, then smoothly towards 1 (once differentiable, strictly monotone)."""
-    room = np.float32(1 - GAMUT_KNEE)
-    over = np.maximum(ratio - np.float32(GAMUT_KNEE), 0) / room
-    return np.minimum(ratio, np.float32(GAMUT_KNEE)) + room * (over / (1 + over))
+def _p_norm(channels: np.ndarray) -> np.ndarray:
+    """(Σ c^p)^(1/p) over the last axis of non-negative values, kept as an axis of length 1."""
+    largest = np.maximum(channels.max(axis=-1, keepdims=True), np.float32(1e-30))
+    share = channels / largest
+    return largest * (share**CORNER_POWER).sum(axis=-1, keepdims=True) ** np.float32(1 / CORNER_POWER)
 
 
-def _desaturate_to_positive(rgb: np.ndarray) -> np.ndarray:
+def _into_gamut(rgb: np.ndarray) -> np.ndarray:
     """Move colours towards the grey of their luminance until no channel is negative."""
-    grey = np.maximum(luminance(rgb), 0)[..., None]
-    # How far the lowest channel lies below grey; 1 is the gamut's border.
-    depth = np.divide(grey - rgb.min(axis=-1, keepdims=True), grey, out=np.zeros_like(grey), where=grey > 0)
-    depth = np.maximum(depth, 0)
-    keep = np.divide(_soft_limit(depth), depth, out=np.ones_like(depth), where=depth > 0)
-    # The last maximum only removes rounding.
-    return np.where(grey > 0, np.maximum(grey + keep * (rgb - grey), 0), 0).astype(np.float32)
+    grey = np.maximum(luminance(rgb), np.float32(1e-30))[..., None]
+    # How far the colour lies from grey; the gamut's border is at 1, its corners just beyond.
+    depth = _p_norm(np.maximum(1 - rgb / grey, 0))
+    over = np.maximum(depth - np.float32(GAMUT_KNEE), 0) / np.float32(1 - GAMUT_KNEE)
+    limited = np.minimum(depth, np.float32(GAMUT_KNEE)) + np.float32(1 - GAMUT_KNEE) * (over / (1 + over))
+    # The last maximum only removes rounding and negative light.
+    return np.maximum(grey + limited / np.maximum(depth, np.float32(1e-30)) * (rgb - grey), 0)
 
 
-def _shoulder(grey: np.ndarray) -> np.ndarray:
-    """Tone curve for luminance: identity to `SHOULDER_START`, then a hyperbola that tends to 1."""
+def _roll_off(rgb: np.ndarray) -> np.ndarray:
+    """Non-negative colours into [0, 1]: a hyperbolic shoulder on the norm, then bleaching."""
     start = np.float32(SHOULDER_START)
-    over = np.maximum(grey - start, 0) / (1 - start)
-    return np.minimum(grey, start) + (1 - start) * (over / (1 + over))
-
-
-def _desaturate_to_white(rgb: np.ndarray, grey: np.ndarray) -> np.ndarray:
-    """Move colours (luminance `grey`, below 1) towards grey until no channel exceeds one."""
-    grey = grey[..., None]
-    room = np.maximum(1 - grey, np.float32(1e-7))
-    height = np.maximum(rgb.max(axis=-1, keepdims=True) - grey, 0) / room
-    keep = np.divide(_soft_limit(height), height, out=np.ones_like(height), where=height > 0)
-    return np.clip(grey + keep * (rgb - grey), 0, 1)
+    # Scaled so that the norm of a grey is its value.
+    norm = _p_norm(rgb) * np.float32(3 ** (-1 / CORNER_POWER))
+    over = np.maximum(norm - start, 0) / (1 - start)
+    shown = np.minimum(norm, start) + (1 - start) * (over / (1 + over))
+    faded = (over / (over + np.float32(BLEACH))) ** np.float32(1.5)
+    chroma = rgb * (shown / np.maximum(norm, np.float32(1e-30)))
+    display = chroma + faded * (shown - chroma)
+    # A pure primary's largest channel exceeds its norm by up to 3^(1/p).
+    return display / np.maximum(display.max(axis=-1, keepdims=True), 1)
