@@ -1,6 +1,7 @@
 """Start of the program, and the one place where mistakes become a sentence and an exit code.
 
-0: done; 2: the user can mend it (one line on stderr); 130: interrupted by Ctrl-C.
+0: done; 2: the user can mend it (one line on stderr); 130: interrupted by Ctrl-C; 1: a closed
+pipe, or a bug with its traceback.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from app.errors import UserError
 
 USER_ERROR = 2
 INTERRUPTED = 130
+CLOSED_PIPE = 1  # as typer has it
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -34,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         # The reader (head, less) has seen enough; the interpreter's own flush must not complain.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return CLOSED_PIPE
 
 
 def _run(arguments: Sequence[str] | None) -> int:

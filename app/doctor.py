@@ -22,6 +22,8 @@ PYTHON = (3, 11)
 REINSTALL = "python -m pip install --upgrade"
 _NATIVE_MODULES = ("numpy", "moderngl", "imgui_bundle", "glfw", "numba", "OpenEXR")
 """Modules with compiled parts, which can be installed and still not load; imgui_bundle must precede glfw."""
+_WINDOW_MODULES = ("imgui_bundle", "glfw")
+"""Rendering to files does without them."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,8 @@ def _modules() -> Iterator[Check]:
             reason = " ".join(str(error).split())
             library = re.search(r"lib[\w.+-]*\.so[.\d]*", reason)
             remedy = f"run '{gpu.APT_LINE}' as root" if library else f"{REINSTALL} --force-reinstall {name}"
-            yield Check(f"module {name}", reason, "missing", remedy)
+            state = "optional" if name in _WINDOW_MODULES else "missing"
+            yield Check(f"module {name}", reason, state, remedy)
         else:
             loaded.append(name)
     yield Check("modules load", ", ".join(loaded), "ok")

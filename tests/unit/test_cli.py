@@ -1,0 +1,404 @@
+"""The command line: every mistake ends in one sentence and exit code 2, every success in a file."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app import cli_options
+from app.__main__ import main
+from app.errors import UserError
+from app.model.mesh import make_mesh
+from app.model.scene import Black, Camera, Diffuse, RenderDefaults, Scene, SceneObject
+from app.model.settings import RenderSettings
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@dataclass
+class FakeStats:
+    photons: int = 1234567
+    splats: int = 7654321
+    seconds: float = 1.5
+    renderer: str = "llvmpipe (LLVM 15)"
+
+    def lines(self) -> list[str]:
+        return ["deposited 40.0 %", "escaped 60.0 %"]
+
+
+@dataclass
+class FakeResult:
+    rgb: np.ndarray
+    spectral: np.ndarray | None = None
+    bin_edges_nm: np.ndarray | None = None
+    stats: FakeStats = field(default_factory=FakeStats)
+
+
+class FakeRenderer:
+    """Stands where `app.renderer` stands and remembers what it was asked."""
+
+    def __init__(self) -> None:
+        self.settings: RenderSettings | None = None
+        self.press_ctrl_c = False
+        self.saw_cancelled: bool | None = None
+
+    def render(self, scene: Scene, settings: RenderSettings, *, progress: Any, cancelled: Any) -> FakeResult:
+        self.settings = settings
+        progress(0.5, "half")
+        if self.press_ctrl_c:
+            assert not cancelled()
+            os.kill(os.getpid(), signal.SIGINT)
+            self.saw_cancelled = cancelled()
+        return FakeResult(np.full((settings.height, settings.width, 3), 0.25, np.float32))
+
+
+def small_scene() -> Scene:
+    triangle = make_mesh("t", np.eye(3), np.array([[0, 1, 2]]))
+    return Scene(
+        name="small",
+        camera=Camera((0, 0, 5), (0, 0, 0), (0, 1, 0)),
+        lights=(),
+        objects=(
+            SceneObject("floor", triangle, Diffuse()),
+            SceneObject("wall", triangle, Diffuse()),
+            SceneObject("stop", triangle, Black()),
+        ),
+        render=RenderDefaults(width=32, height=16, photons=5000, exposure_ev=0.5, max_depth=20),
+        notes=("a table was added",),
+    )
+
+
+@pytest.fixture
+def renderer(monkeypatch: pytest.MonkeyPatch) -> FakeRenderer:
+    """A renderer and a scene reader that need neither OpenGL nor files."""
+    fake = FakeRenderer()
+    render_module, scene_module = ModuleType("app.renderer"), ModuleType("app.model.scene_file")
+    render_module.render = fake.render  # type: ignore[attr-defined]
+    scene_module.load_scene = lambda path: small_scene()  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "app.renderer", render_module)
+    monkeypatch.setitem(sys.modules, "app.model.scene_file", scene_module)
+    return fake
+
+
+@pytest.fixture
+def scene_path(tmp_path: Path) -> Path:
+    path = tmp_path / "small.toml"
+    path.write_text("")
+    return path
+
+
+def complaint(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """The one line that a mistaken command line leads to."""
+    assert main([str(argument) for argument in arguments]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1 and captured.err.startswith("spectrasplat: ")
+    assert "Traceback" not in captured.err and "╭" not in captured.err
+    return captured.err
+
+
+class TestRender:
+    def test_scene_decides_where_the_user_does_not(
+        self, renderer: FakeRenderer, scene_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        output = tmp_path / "out.npy"
+        assert main(["render", str(scene_path), "-o", str(output)]) == 0
+        assert renderer.settings == RenderSettings(
+            width=32, height=16, photons=5000, exposure_ev=0.5, max_depth=20
+        )
+        assert np.load(output).shape == (16, 32, 3)
+        captured = capsys.readouterr()
+        assert str(output) in captured.out
+        assert "1,234,567 photons, 7,654,321 splats in 1.5 s (software renderer: llvmpipe (LLVM 15))" in captured.out
+        assert "deposited" not in captured.out
+        assert captured.err == "note: a table was added\n"
+
+    def test_every_option_arrives(
+        self, renderer: FakeRenderer, scene_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        options = (
+            "--size 64x48 --photons 2M --seed 7 --method srd-lambda --layer map:wall --bins 8 "
+            "--exposure -1.5 --max-depth 9 --spp 4 --batch 1000 --stats"
+        )
+        assert main(["render", str(scene_path), "-o", str(tmp_path / "out.npy"), *options.split()]) == 0
+        assert renderer.settings == RenderSettings(
+            width=64,
+            height=48,
+            photons=2_000_000,
+            seed=7,
+            method="srd-lambda",
+            layer="map:wall",
+            bins=8,
+            exposure_ev=-1.5,
+            max_depth=9,
+            spp=4,
+            batch=1000,
+        )
+        assert "deposited 40.0 %\nescaped 60.0 %\n" in capsys.readouterr().out
+
+    def test_seconds_replace_the_scenes_photons(
+        self, renderer: FakeRenderer, scene_path: Path, tmp_path: Path
+    ) -> None:
+        assert main(["render", str(scene_path), "-o", str(tmp_path / "out.npy"), "--seconds", "2.5"]) == 0
+        assert renderer.settings is not None
+        assert (renderer.settings.photons, renderer.settings.seconds) == (None, 2.5)
+
+    def test_ctrl_c_keeps_what_was_done(
+        self, renderer: FakeRenderer, scene_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        renderer.press_ctrl_c = True
+        before = signal.getsignal(signal.SIGINT)
+        assert main(["render", str(scene_path), "-o", str(tmp_path / "out.npy")]) == 130
+        assert renderer.saw_cancelled is True
+        assert (tmp_path / "out.npy").is_file()
+        assert "stopped early" in capsys.readouterr().out
+        assert signal.getsignal(signal.SIGINT) is before
+
+    @pytest.mark.parametrize(
+        ("options", "sentence"),
+        [
+            ("--size 0x4", "--size 0x4 holds no pixel"),
+            ("--size -3x4", "--size -3x4 holds no pixel"),
+            ("--size 4", "--size '4' is not WIDTHxHEIGHT"),
+            ("--size 4x4x4", "is not WIDTHxHEIGHT"),
+            ("--size 20000x4", "no side may exceed 16384"),
+            ("--photons 0", "--photons 0 is too few"),
+            ("--photons -5", "--photons -5 is too few"),
+            ("--photons 1.5", "--photons '1.5' is not a whole number"),
+            ("--photons many", "--photons 'many' is not a whole number"),
+            ("--photons nan", "is not a whole number"),
+            ("--photons inf", "beyond what memory can hold"),
+            ("--photons 1e30", "beyond what memory can hold"),
+            ("--photons 2e12", "beyond what can be counted"),
+            ("--batch 1e15", "--batch 1e15 is beyond this machine's memory"),
+            ("--seconds 0", "--seconds 0 is out of range"),
+            ("--seconds nan", "--seconds 'nan' is not a number"),
+            ("--seconds inf", "--seconds inf is out of range"),
+            ("--photons 5 --seconds 5", "exclude each other"),
+            ("--method srd-lamda", "--method 'srd-lamda' is unknown, did you mean 'srd-lambda'"),
+            ("--method zzz", "known are srd, srd-lambda, stochastic"),
+            ("--layer beuty", "did you mean 'beauty'"),
+            ("--layer map:flor", "it has 'map:floor', 'map:wall'"),
+            ("--layer map:stop", "names no receiver"),
+            ("--bins 3", "--bins 3 is out of range: give between 4 and 32"),
+            ("--bins 33", "between 4 and 32"),
+            ("--bins four", "--bins 'four' is not a whole number"),
+            ("--exposure bright", "--exposure 'bright' is not a number"),
+            ("--exposure inf", "--exposure inf is out of range"),
+            ("--max-depth 0", "--max-depth 0 is out of range"),
+            ("--spp 0", "--spp 0 is out of range"),
+            ("--seed -1", "--seed -1 is out of range"),
+            ("--sise 4x4", "no such option: --sise"),
+        ],
+    )
+    def test_bad_option(
+        self,
+        renderer: FakeRenderer,
+        scene_path: Path,
+        tmp_path: Path,
+        capsys: pytest.CaptureFixture[str],
+        options: str,
+        sentence: str,
+    ) -> None:
+        output = tmp_path / "out.png"
+        assert sentence in complaint(capsys, "render", scene_path, "-o", output, *options.split())
+        assert renderer.settings is None
+        assert sorted(tmp_path.iterdir()) == [scene_path]  # nothing half-written
+
+    def test_a_picture_beyond_memory(
+        self,
+        renderer: FakeRenderer,
+        scene_path: Path,
+        tmp_path: Path,
+        capsys: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        monkeypatch.setattr(cli_options, "memory_bytes", lambda: 1 << 30)
+        told = complaint(
+            capsys, "render", scene_path, "-o", tmp_path / "o.exr", "--size", "4096x4096", "--bins", "32"
+        )
+        assert "--size 4096x4096 with --bins 32 needs about 6.8 GiB and this machine has 1.0 GiB" in told
+
+    @pytest.mark.parametrize(
+        ("output", "sentence"),
+        [
+            ("out.jpg", "'.jpg' is not a picture format"),
+            ("out", "no suffix"),
+            ("nowhere/out.png", "does not exist"),
+            ("folder.png", "is a folder"),
+            ("small.toml/out.png", "is not a folder"),
+        ],
+    )
+    def test_bad_output(
+        self,
+        renderer: FakeRenderer,
+        scene_path: Path,
+        tmp_path: Path,
+        capsys: pytest.CaptureFixture[str],
+        output: str,
+        sentence: str,
+    ) -> None:
+        (tmp_path / "folder.png").mkdir()
+        assert sentence in complaint(capsys, "render", scene_path, "-o", tmp_path / output)
+        assert renderer.settings is None
+
+    def test_the_scene_is_not_overwritten(
+        self, renderer: FakeRenderer, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        path = tmp_path / "scene.npy"
+        path.write_text("precious")
+        assert "it is the scene itself" in complaint(capsys, "render", path, "-o", path)
+        assert path.read_text() == "precious"
+
+    def test_a_failing_renderer_leaves_the_old_picture(
+        self, renderer: FakeRenderer, scene_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        def fail(*_: object, **__: object) -> None:
+            raise UserError("light 'sun' lies\ninside glass")
+
+        monkeypatch.setattr(sys.modules["app.renderer"], "render", fail)
+        output = tmp_path / "out.npy"
+        output.write_text("old")
+        told = complaint(capsys, "render", scene_path, "-o", output)
+        assert told == "spectrasplat: light 'sun' lies inside glass\n"
+        assert output.read_text() == "old"
+        assert sorted(tmp_path.iterdir()) == sorted([output, scene_path])
+
+
+class TestFindScene:
+    @pytest.fixture(autouse=True)
+    def shipped(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+        folder = tmp_path / "assets" / "scenes"
+        folder.mkdir(parents=True)
+        for name in ("prism.toml", "ball.glb", "README.md"):
+            (folder / name).write_text("")
+        monkeypatch.setattr(cli_options, "assets_dir", lambda: folder.parent)
+        return folder
+
+    def test_by_name(self, shipped: Path) -> None:
+        assert cli_options.find_scene("prism") == shipped / "prism.toml"
+        assert cli_options.find_scene("ball") == shipped / "ball.glb"
+
+    def test_a_file_wins_over_a_name(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.chdir(tmp_path)
+        Path("prism").write_text("")
+        assert cli_options.find_scene("prism") == Path("prism")
+
+    @pytest.mark.parametrize(
+        ("text", "sentence"),
+        [
+            ("prsm", "did you mean 'prism'"),
+            ("prsm", "shipped are ball, prism"),
+            ("prism.toml", "did you mean the shipped scene 'prism'"),
+            ("assets/scenes/prismm.toml", "did you mean 'assets/scenes/prism.toml'"),
+            ("assets", "is a folder"),
+            ("zzz/zzz.toml", "scene file zzz/zzz.toml does not exist: check the path"),
+        ],
+    )
+    def test_unknown(self, text: str, sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.chdir(tmp_path)
+        with pytest.raises(UserError) as caught:
+            cli_options.find_scene(text)
+        assert sentence in str(caught.value)
+
+
+class TestProgram:
+    def test_help_without_arguments(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main([]) == 0
+        out = capsys.readouterr().out
+        for command in ("render", "inspect", "glass", "doctor", "bench-speed"):
+            assert command in out
+
+    @pytest.mark.parametrize(
+        ("arguments", "sentence"),
+        [
+            (["rendr"], "no such command 'rendr', did you mean 'render'"),
+            (["render"], "missing argument 'SCENE'"),
+            (["render", "prism"], "missing option '-o' / '--output'"),
+            (["doctor", "now"], "unexpected extra argument"),
+        ],
+    )
+    def test_wrong_usage(self, arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str]) -> None:
+        told = complaint(capsys, *arguments)
+        assert sentence in told.replace("(s)", "")
+        assert "spectrasplat --help" in told
+
+    @pytest.mark.parametrize(
+        ("error", "code", "told"),
+        [
+            (UserError("scene x: no"), 2, "spectrasplat: scene x: no\n"),
+            (MemoryError(), 2, "spectrasplat: out of memory: use fewer photons, a smaller picture or a simpler mesh\n"),
+            (KeyboardInterrupt(), 130, "spectrasplat: interrupted\n"),
+        ],
+    )
+    def test_exit_codes(
+        self,
+        error: BaseException,
+        code: int,
+        told: str,
+        monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str],
+    ) -> None:
+        def fail(_arguments: object) -> int:
+            raise error
+
+        monkeypatch.setattr("app.cli.run", fail)
+        assert main(["doctor"]) == code
+        assert capsys.readouterr().err == told
+
+    def test_a_bug_is_not_hidden(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        def fail(_arguments: object) -> int:
+            raise ZeroDivisionError
+
+        monkeypatch.setattr("app.cli.run", fail)
+        with pytest.raises(ZeroDivisionError):
+            main(["doctor"])
+
+    @pytest.mark.parametrize("arguments", [["render", "--help"], ["doctor"]])
+    def test_a_closed_pipe_is_quiet(self, arguments: list[str]) -> None:
+        reader, writer = os.pipe()
+        os.close(reader)
+        try:
+            done = subprocess.run(
+                [sys.executable, "-m", "app", *arguments],
+                cwd=ROOT,
+                stdout=writer,
+                stderr=subprocess.PIPE,
+                timeout=60,
+                check=False,
+            )
+        finally:
+            os.close(writer)
+        assert (done.returncode, done.stderr) == (1, b"")
+
+    def test_start_imports_nothing_heavy(self) -> None:
+        # The warm start to the first picture has a budget of 3 s.
+        code = (
+            "import sys; from app.__main__ import main; main(['render', 'x', '-o', 'x.jpg']);"
+            "heavy = {'colour', 'scipy', 'matplotlib', 'numba', 'trimesh', 'OpenEXR', 'imgui_bundle', 'glfw'};"
+            "print(sorted(heavy & set(sys.modules)))"
+        )
+        done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=30, check=True)
+        assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("text", "count"), [("1", 1), ("1000000", 10**6), ("1e6", 10**6), ("2M", 2 * 10**6), ("1.5k", 1500), ("1_000", 1000)]
+)
+def test_photons_are_read(text: str, count: int) -> None:
+    assert cli_options.parse_photons(text) == count
+
+
+@pytest.mark.parametrize("text", ["960x540", "960X540", " 960×540"])
+def test_sizes_are_read(text: str) -> None:
+    assert cli_options.parse_size(text) == (960, 540)
