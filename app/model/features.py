@@ -37,6 +37,8 @@ class Features:
     """Photons carry spatial columns."""
     point_spectrum: bool
     """Each photon has one wavelength instead of a band."""
+    random_wavelength: bool
+    """That wavelength is drawn at random."""
     band_cuts: bool
     """Total internal reflection may cut a band."""
     dielectrics: bool
@@ -98,6 +100,7 @@ class Features:
             spectral_weights=not single and (groups > 0 or absorbing or coloured_mirror),
             footprints=settings.method != "stochastic-point",
             point_spectrum=single,
+            random_wavelength=settings.method.startswith("stochastic"),
             band_cuts=groups > 0,
             dielectrics=bool(dielectrics),
             mirrors=any(isinstance(o.material, Mirror) for o in scene.objects),

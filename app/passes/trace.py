@@ -1,0 +1,282 @@
+"""The light half's first two stages: a batch of lattice points becomes photon records.
+
+`emit` fills the queue, then every step sends all rays in flight to their next surface. The
+queue between steps is listed by count, scan and scatter without atomics, so the order of the
+photons is a function of the lattice alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import moderngl
+import numpy as np
+
+from app.gpu import bindings, records, shader
+from app.gpu.context import Context
+from app.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
+from app.model.features import Features
+from app.passes.emission_domain import EmissionDomain
+
+RAY_ROOM = 3
+"""Rays in flight per lattice point of a batch: splitting rarely passes 1.5."""
+PHOTON_ROOM = 4
+_CHUNK = 64
+_GROUP = 64
+
+
+@dataclass(frozen=True)
+class Band:
+    """One light's part of the spectral axis in a pass."""
+
+    x_lo: float
+    x_hi: float
+    x_anchor: float
+    power_w: float
+    """Radiant power of the band per unit weight."""
+
+
+@dataclass
+class FluxTally:
+    """Where flux went, W, in float64; `merge` adds batches."""
+
+    emitted: float = 0.0
+    ended: dict[str, float] = field(default_factory=lambda: dict.fromkeys(records.CATEGORIES, 0.0))
+    roulette: float = 0.0
+    fallbacks: dict[str, int] = field(default_factory=lambda: dict.fromkeys(records.FALLBACKS, 0))
+    traced_rays: int = 0
+
+    def merge(self, other: FluxTally) -> None:
+        """Add another batch."""
+        self.emitted += other.emitted
+        self.roulette += other.roulette
+        self.traced_rays += other.traced_rays
+        for name in self.ended:
+            self.ended[name] += other.ended[name]
+        for name in self.fallbacks:
+            self.fallbacks[name] += other.fallbacks[name]
+
+    @property
+    def imbalance(self) -> float:
+        """|emitted − all that ended − roulette's balance| / emitted."""
+        if self.emitted == 0.0:
+            return 0.0
+        return abs(self.emitted - sum(self.ended.values()) - self.roulette) / self.emitted
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What one batch left in the photon buffer."""
+
+    photons: int
+    emitted_photons: int
+    tally: FluxTally
+    steps: int
+
+
+@dataclass(frozen=True)
+class LatticeSlice:
+    """Lattice points [first, first + count) of a band's pass."""
+
+    light: int
+    band_index: int
+    band: Band
+    lattice_count: int
+    first: int
+    count: int
+    shift: tuple[int, int]
+    shift_extra: tuple[int, int]
+    shift_spectral: int
+    seed: int
+
+
+class TracePass:
+    """Owns the programs and queue buffers of emission and tracing; `photons` is the output buffer."""
+
+    def __init__(self, context: Context, features: Features, scene: SceneBuffers, batch: int, max_depth: int, split_threshold: float = 0.2) -> None:
+        self.context = context
+        self.scene = scene
+        self.batch = batch
+        self.max_depth = max_depth
+        self.split_threshold = split_threshold
+        self._ray = records.ray_record(features.defines()["COLUMNS"])
+        self.photon = records.photon_record(features.spectral_groups)
+        ctx = context.ctx
+        structs = (*SCENE_STRUCTS, self._ray, self.photon, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE)
+        copies = " ".join(f"photon.dposition_dvar{g} = ray.dposition[SPATIAL + {g}];" for g in range(features.spectral_groups))
+        defines = features.defines() | bindings.LIGHT_HALF_DEFINES | scene.defines | {
+            "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",
+            "FLAG_BAND_FINAL": f"{records.FLAG_BAND_FINAL}u",
+            "FLAG_INSIDE": f"{records.FLAG_INSIDE}u",
+            "MASK_SIZE": records.MASK_SIZE,
+            "CATEGORY_COUNT": f"{len(records.CATEGORIES)}u",
+            "FALLBACK_COUNT": f"{len(records.FALLBACKS)}u",
+            "SPECTRAL_COPY": copies,
+        }
+        self._features = features
+        self._defines = defines
+        self._structs = structs
+        self._emit: dict[str, moderngl.ComputeShader] = {}
+        self._trace = shader.compute(ctx, "trace.comp", defines, (*structs, records.TRACE_PARAMETERS))
+        queue = {name: shader.compute(ctx, f"queue_{name}.comp", defines, structs) for name in ("count", "scan", "scatter", "gather", "advance")}
+        self._count, self._scan, self._scatter, self._gather, self._advance = queue.values()
+
+        ray_capacity = RAY_ROOM * batch
+        chunks = -(-ray_capacity // _CHUNK)
+        self._state_zero = records.QUEUE_STATE.zeros(1)
+        self._state_zero["ray_capacity"] = ray_capacity
+        self._state_zero["photon_capacity"] = PHOTON_ROOM * batch
+        self._rays = [ctx.buffer(reserve=2 * ray_capacity * self._ray.stride) for _ in range(2)]
+        self._outcomes = ctx.buffer(reserve=ray_capacity * records.OUTCOME.stride)
+        self._slots = ctx.buffer(reserve=ray_capacity * self.photon.stride)
+        self._indices = ctx.buffer(reserve=2 * ray_capacity * 4)
+        self._counts = ctx.buffer(reserve=chunks * records.CHUNK_COUNT.stride)
+        self._counts_zero = bytes(chunks * records.CHUNK_COUNT.stride)
+        self._state = ctx.buffer(self._state_zero.tobytes())
+        self.photons = ctx.buffer(reserve=PHOTON_ROOM * batch * self.photon.stride)
+        self._emit_parameters = ctx.buffer(reserve=records.EMIT_PARAMETERS.stride)
+        self._trace_parameters = ctx.buffer(reserve=records.TRACE_PARAMETERS.stride)
+
+    def release(self) -> None:
+        """Free every buffer and program."""
+        for owned in (
+            *self._rays, self._outcomes, self._slots, self._indices, self._counts, self._state, self.photons,
+            self._emit_parameters, self._trace_parameters, self._trace, self._count, self._scan, self._scatter,
+            self._gather, self._advance, *self._emit.values(),
+        ):
+            owned.release()
+
+    @property
+    def bytes(self) -> int:
+        """GPU memory held."""
+        return sum(b.size for b in (*self._rays, self._outcomes, self._slots, self._indices, self._counts, self.photons))
+
+    @property
+    def programs(self) -> dict[str, str]:
+        """Flattened source of the programs that run (for `inspect` and tests)."""
+        return {"trace.comp": shader.load_source("trace.comp", self._defines, (*self._structs, records.TRACE_PARAMETERS)).text}
+
+    def run(self, piece: LatticeSlice, domain: EmissionDomain) -> Batch:
+        """Trace `piece.count` ≤ batch lattice points; their photons replace the buffer's content."""
+        if piece.count > self.batch:
+            raise ValueError(f"{piece.count} lattice points in a batch of {self.batch}")
+        self._start(piece, domain)
+        ctx = self.context.ctx
+        self.scene.bind()
+        self._bind_queue(0)
+        self._emit_parameters.bind_to_storage_buffer(bindings.PARAMETERS)
+        self._emit_program(domain.kind).run(-(-piece.count // _GROUP))
+        self._list_children(first=True, chunks=-(-piece.count // _CHUNK))
+        emitted = int(self._read_state()["alive"])
+        self._trace_parameters.bind_to_storage_buffer(bindings.PARAMETERS)
+
+        # Walking through covered surfaces and cutting bands take steps without being events.
+        limit = 2 * self.max_depth + 32
+        step, alive = 0, emitted
+        while alive and step < limit:
+            if step == limit - 1:
+                self._write_trace_parameters(piece, max_depth=0)
+            self._bind_queue(step + 1)
+            self._trace.run_indirect(self._state, records.QUEUE_STATE.dtype.fields["trace_groups"][1])
+            self._list_children(first=False)
+            step += 1
+            # Reading the count waits for the device: rarely on a GPU, where empty steps cost less.
+            if self.context.is_software or step % 8 == 0:
+                alive = int(self._read_state()["alive"])
+        self.context.check("tracing photons")
+        state = self._read_state()
+        ctx.memory_barrier()
+        photons = int(state["photon_first"]) + int(state["photons_new"])
+        return Batch(photons, emitted, self._tally(int(state["overflow"])), step)
+
+    def _start(self, piece: LatticeSlice, domain: EmissionDomain) -> None:
+        state = self._state_zero.copy()
+        state["alive"] = piece.count
+        state["dispatched"] = piece.count
+        self._state.write(state.tobytes())
+        self._counts.write(self._counts_zero)
+        band = piece.band
+        p = records.EMIT_PARAMETERS.zeros(1)
+        p["origin"], p["axis"], p["tangent"], p["bitangent"] = domain.origin, domain.axis, domain.tangent, domain.bitangent
+        p["weight"] = domain.measure / piece.lattice_count
+        p["spacing"] = domain.spacing(piece.lattice_count)
+        p["back"] = domain.back
+        p["band_power_w"] = band.power_w
+        p["light_axis"] = np.asarray(self.scene.scene.lights[piece.light].direction, float)
+        p["light_u"], p["light_v"], p["aperture_centre"] = domain.light_u, domain.light_v, domain.aperture_centre
+        p["is_disc"] = domain.is_disc
+        p["rect"] = domain.rect
+        p["cone"] = domain.cone
+        p["x_lo"], p["x_hi"], p["x_anchor"] = band.x_lo, band.x_hi, band.x_anchor
+        p["shift"], p["shift_extra"], p["shift_spectral"] = piece.shift, piece.shift_extra, piece.shift_spectral
+        p["seed"], p["first"], p["count"], p["lattice_count"] = piece.seed, piece.first, piece.count, piece.lattice_count
+        p["light"], p["band"] = piece.light, piece.band_index
+        p["mask"] = np.packbits(domain.mask.ravel(), bitorder="little").view("<u4")
+        self._emit_parameters.write(p.tobytes())
+        self._write_trace_parameters(piece, self.max_depth)
+
+    def _write_trace_parameters(self, piece: LatticeSlice, max_depth: int) -> None:
+        p = records.TRACE_PARAMETERS.zeros(1)
+        p["max_depth"], p["split_threshold"] = max_depth, self.split_threshold
+        p["power_row"] = self.scene.layout.power_row + piece.light
+        self._trace_parameters.write(p.tobytes())
+
+    def _bind_queue(self, step: int) -> None:
+        # Step 0 (emission) writes rays[0]; step k reads rays[(k-1) % 2].
+        self._rays[step % 2].bind_to_storage_buffer(bindings.RAYS_OUT)
+        self._rays[(step + 1) % 2].bind_to_storage_buffer(bindings.RAYS_IN)
+        self._outcomes.bind_to_storage_buffer(bindings.OUTCOMES)
+        self._slots.bind_to_storage_buffer(bindings.PHOTON_SLOTS)
+        self._indices.bind_to_storage_buffer(bindings.INDICES)
+        self._counts.bind_to_storage_buffer(bindings.COUNTS)
+        self._state.bind_to_storage_buffer(bindings.STATE)
+        self.photons.bind_to_storage_buffer(bindings.PHOTONS)
+
+    def _list_children(self, *, first: bool, chunks: int = 0) -> None:
+        ctx = self.context.ctx
+        offsets = {name: records.QUEUE_STATE.dtype.fields[name][1] for name in ("chunk_groups", "next_chunk_groups", "gather_groups")}
+        ctx.memory_barrier()
+        if first:
+            self._count.run(-(-chunks // _GROUP))
+        else:
+            self._count.run_indirect(self._state, offsets["next_chunk_groups"])
+        ctx.memory_barrier()
+        self._scan.run(1)
+        ctx.memory_barrier()
+        self._scatter.run_indirect(self._state, offsets["chunk_groups"])
+        ctx.memory_barrier()
+        if not first:
+            self._gather.run_indirect(self._state, offsets["gather_groups"])
+            ctx.memory_barrier()
+        self._advance.run(1)
+        ctx.memory_barrier()
+
+    def _emit_program(self, kind: str) -> moderngl.ComputeShader:
+        if kind not in self._emit:
+            defines = self._defines | {f"LIGHT_{kind.upper()}": 1}
+            if self._features.point_spectrum and self._features.random_wavelength:
+                defines["RANDOM_WAVELENGTH"] = 1
+            self._emit[kind] = shader.compute(self.context.ctx, "emit.comp", defines, (*self._structs, records.EMIT_PARAMETERS))
+        return self._emit[kind]
+
+    def _read_state(self) -> np.void:
+        return np.frombuffer(self._state.read(), records.QUEUE_STATE.dtype)[0]
+
+    def _tally(self, overflow: int) -> FluxTally:
+        counts = np.frombuffer(self._counts.read(), records.CHUNK_COUNT.dtype)
+        tally = FluxTally(
+            emitted=float(counts["emitted_w"].sum(dtype=float)),
+            roulette=float(counts["roulette_w"].sum(dtype=float)),
+        )
+        flux = counts["flux_w"].sum(axis=0, dtype=float)
+        tally.ended = dict(zip(records.CATEGORIES, flux.tolist(), strict=True))
+        tally.ended["absorbed"] += float(counts["absorbed_w"].sum(dtype=float))
+        tally.fallbacks = dict(zip(records.FALLBACKS, counts["fallbacks"].sum(axis=0, dtype=int).tolist(), strict=True))
+        tally.fallbacks["queue_overflow"] += overflow
+        return tally
+
+
+def bands_of(power_w: np.ndarray, edges: Sequence[float]) -> list[Band]:
+    """Bands between neighbouring `edges`, anchored in the middle; `power_w` (len(edges) - 1,)."""
+    return [Band(lo, hi, 0.5 * (lo + hi), float(power)) for lo, hi, power in zip(edges[:-1], edges[1:], power_w, strict=True)]
