@@ -41,7 +41,6 @@ MAKER_ALIASES = {"Schott": {"N-BK7": ["BK7"]}}
 POLYMERS = "organic/(C5H8O2)n - poly(methyl methacrylate)", "organic/(C16H14O3)n - polycarbonate", "organic/(C8H8)n - polystyrene"
 # name: (file below data/, other names)
 MATERIALS: dict[str, tuple[str, list[str]]] = {
-    "acetone": ("organic/C3H6O - acetone/nk/Chang.yml", []),
     "air": ("other/mixed gases/air/nk/Ciddor.yml", []),
     "barium fluoride": ("main/BaF2/nk/Li.yml", ["BaF2"]),
     "benzene": ("organic/C6H6 - benzene/nk/Chang.yml", []),
@@ -55,7 +54,7 @@ MATERIALS: dict[str, tuple[str, list[str]]] = {
     "cyclohexane": ("organic/C6H12 - cyclohexane/nk/Chang.yml", []),
     "diamond": ("main/C/nk/Peter.yml", []),
     "ethanol": ("organic/C2H6O - ethanol/nk/Chang.yml", ["alcohol"]),
-    "ethylene glycol": ("organic/C2H6O2 - ethylene glycol/nk/El-Kashef.yml", []),
+    "ethylene glycol": ("organic/C2H6O2 - ethylene glycol/nk/Sani-formula.yml", []),
     "fused silica": ("main/SiO2/nk/Malitson.yml", ["silica", "SiO2", "quartz glass"]),
     "germania": ("main/GeO2/nk/Fleming.yml", ["GeO2"]),
     "glycerol": ("organic/C3H8O3 - glycerol/nk/Gupta.yml", ["glycerin", "glycerine"]),
