@@ -32,7 +32,7 @@ def atomic_output(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     The temporary name keeps the suffix, because libraries choose a format by it. It exists
     as an empty file when the block starts. If the block fails or is interrupted, it is
-    removed and whatever was at `path` stays as it was.
+    removed and whatever was at `path` stays as it was. A symbolic link is followed, not replaced.
 
     Raises `UserError` naming the path where the folder is missing or not writable, the
     path is a folder, or the disk is full; other errors of the block pass unchanged.
@@ -41,9 +41,7 @@ def atomic_output(path: str | os.PathLike[str]) -> Iterator[Path]:
     temporary = _reserve(target)
     try:
         yield temporary
-        if os.path.isdir(target):  # it may have appeared meanwhile
-            raise _refusal(target, IsADirectoryError(errno.EISDIR, "Is a directory"))
-        os.replace(temporary, target)
+        os.replace(temporary, _real(target))
     except OSError as error:
         if _concerns_output(error, temporary, target):
             raise _refusal(target, error) from error
@@ -58,7 +56,7 @@ def _reserve(target: Path) -> Path:
         raise _refusal(target, IsADirectoryError(errno.EISDIR, "Is a directory"))
     # Bounded, so that a target name near the file system's 255 bytes still has a neighbour.
     stem = target.stem.encode()[:100].decode(errors="ignore")
-    temporary = target.with_name(f".{stem}.{secrets.token_hex(4)}.part{target.suffix}")
+    temporary = _real(target).with_name(f".{stem}.{secrets.token_hex(4)}.part{target.suffix}")
     try:
         with suppress(FileNotFoundError):
             os.stat(target)  # a name that is too long is told now, not after the work
@@ -70,6 +68,11 @@ def _reserve(target: Path) -> Path:
         temporary.unlink(missing_ok=True)
         raise _refusal(target, PermissionError(errno.EACCES, "Permission denied"))
     return temporary
+
+
+def _real(target: Path) -> Path:
+    """Where the file itself lies, symbolic links followed."""
+    return Path(os.path.realpath(target))
 
 
 def _concerns_output(error: OSError, temporary: Path, target: Path) -> bool:

@@ -29,6 +29,8 @@ SceneArgument = Annotated[
     str, typer.Argument(metavar="SCENE", help="A scene file (.toml, .glb, .gltf, a bare mesh), or a shipped scene's name.")
 ]
 Text = str | None
+PIPE_WIDTH = 200
+"""Columns where no terminal sets a limit: tables are then not cut."""
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -122,4 +124,7 @@ def _print(content: object) -> None:
         return
     from rich.console import Console
 
-    Console(highlight=False).print(content)
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = PIPE_WIDTH
+    console.print(content)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import importlib.metadata
 import os
 import re
@@ -10,6 +9,8 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from importlib import import_module as load_module
+from importlib.metadata import version as installed_version
 from typing import Literal
 
 from app.errors import UserError
@@ -97,7 +98,7 @@ def _packages() -> Iterator[Check]:
     for name, least in requirements():
         wanted = f"'{name}>={least}'"
         try:
-            version = importlib.metadata.version(name)
+            version = installed_version(name)
         except importlib.metadata.PackageNotFoundError:
             yield Check(f"package {name}", "not installed", "missing", f"{REINSTALL} {wanted}")
             continue
@@ -113,7 +114,7 @@ def _modules() -> Iterator[Check]:
     loaded = []
     for name in _NATIVE_MODULES:
         try:
-            importlib.import_module(name)
+            load_module(name)
         except ImportError as error:
             reason = " ".join(str(error).split())
             library = re.search(r"lib[\w.+-]*\.so[.\d]*", reason)

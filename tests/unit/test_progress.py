@@ -1,0 +1,68 @@
+"""Progress: silent when quick, a line every ten seconds in a log, a bar in a terminal."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+
+from app.progress import ProgressReporter
+
+
+class Clock:
+    now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+def drive(reporter: ProgressReporter, clock: Clock, seconds: int) -> None:
+    for second in range(1, seconds + 1):
+        clock.now = 100.0 + second
+        reporter(second / seconds, f"{second} photons")
+
+
+def test_log_gets_a_line_every_ten_seconds(clock: Clock) -> None:
+    stream = io.StringIO()
+    with ProgressReporter("ball", stream, clock) as reporter:
+        drive(reporter, clock, 40)
+    assert stream.getvalue().splitlines() == [
+        "ball: 25 % after 10 s, 10 photons",
+        "ball: 50 % after 20 s, 20 photons",
+        "ball: 75 % after 30 s, 30 photons",
+        "ball: 100 % after 40 s, 40 photons",
+    ]
+
+
+def test_quick_jobs_are_silent(clock: Clock) -> None:
+    for stream in (io.StringIO(), Terminal()):
+        with ProgressReporter("ball", stream, clock) as reporter:
+            drive(reporter, clock, 1)
+        assert stream.getvalue() == ""
+
+
+def test_terminal_gets_a_bar(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    stream = Terminal()
+    with ProgressReporter("ball [1]", stream, clock) as reporter:
+        drive(reporter, clock, 4)
+    assert "ball [1]" in stream.getvalue()
+    assert "100%" in stream.getvalue()
+
+
+def test_fractions_outside_are_clamped(clock: Clock) -> None:
+    stream = io.StringIO()
+    reporter = ProgressReporter("ball", stream, clock)
+    clock.now += 10.0
+    reporter(1.7)
+    assert stream.getvalue() == "ball: 100 % after 10 s\n"
