@@ -105,9 +105,11 @@ def search(query: str = "", limit: int | None = None) -> list[Entry]:
     An exact name comes first, then names that begin with the query, then the rest in catalogue
     order. Where nothing contains the words, entries with similar names. "" gives all.
     """
+    if not query.strip():
+        return list(entries())[:limit]
     words = [key for key in (search_key(w) for w in query.replace(":", " ").split()) if key]
     if not words:
-        return list(entries())[:limit]
+        return []
     whole = search_key(query)
     exact = _by_key().get(whole)
     ranked: list[tuple[int, int, Entry]] = []

@@ -1,0 +1,221 @@
+"""Refractive indices against published values, and that impossible data are refused by name."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from app import glass_report
+from app.errors import UserError
+from app.model import catalogue, glass
+from app.model.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
+
+VISIBLE = np.arange(380.0, 780.5, 1.0)
+
+# name, n_F, n_d, n_C, V_d, dn/dλ at d (1/µm); computed from the makers' coefficients in double precision
+KNOWN = [
+    ("N-BK7", 1.522376, 1.516800, 1.514322, 64.167, -0.041799),
+    ("F2", 1.632081, 1.620040, 1.615032, 36.366, -0.086493),
+    ("N-SF11", 1.806513, 1.784720, 1.775955, 25.680, -0.152878),
+    ("diamond", 2.435538, 2.417486, 2.409906, 55.301, -0.131002),
+    ("water", 1.337492, 1.333403, 1.331513, 55.760, -0.031340),
+    ("fused silica", 1.463126, 1.458464, 1.456367, 67.821, -0.035215),
+]
+
+
+@pytest.mark.parametrize(("name", "n_f", "n_d", "n_c", "v_d", "slope"), KNOWN)
+def test_known_glasses(name: str, n_f: float, n_d: float, n_c: float, v_d: float, slope: float) -> None:
+    found = catalogue.find(name)
+    assert found.index([LINE_F_NM, LINE_D_NM, LINE_C_NM]) == pytest.approx([n_f, n_d, n_c], abs=1e-6)
+    assert found.n_d == pytest.approx(n_d, abs=1e-6)
+    assert found.V_d == pytest.approx(v_d, abs=1e-3)
+    assert found.derivative(LINE_D_NM) == pytest.approx(slope, abs=1e-6)
+    assert found.is_dispersive
+
+
+def _one_of_each_kind() -> list[glass.Dispersion]:
+    kinds: dict[str, glass.Dispersion] = {}
+    for entry in catalogue.entries():
+        kinds.setdefault(entry.dispersion.kind, entry.dispersion)
+    kinds["abbe"] = glass.from_abbe(1.6, 30.0)
+    return list(kinds.values())
+
+
+def test_derivative_is_that_of_index_for_every_kind() -> None:
+    """Central differences; their own error is h²n‴/6 ~ 1e-9, a wrong term is off by 1e-3."""
+    kinds = _one_of_each_kind()
+    assert {d.kind for d in kinds} == {*(f"formula {i}" for i in range(1, 7)), "abbe", "constant", "table"}
+    wavelength = np.linspace(452.1, 628.7, 57)  # between the table's knots, inside every range
+    for dispersion in kinds:
+        h = 1e-3 if dispersion.kind == "table" else 0.02
+        numeric = (dispersion.index(wavelength + h) - dispersion.index(wavelength - h)) / (2e-3 * h)
+        assert dispersion.derivative(wavelength) == pytest.approx(numeric, abs=3e-7), dispersion.name
+
+
+def test_every_catalogue_entry_is_sound() -> None:
+    """n is positive, finite and falls with wavelength; n_d is what optics can hold."""
+    assert len(catalogue.entries()) > 1600
+    for entry in catalogue.entries():
+        dispersion = entry.dispersion
+        n = dispersion.index(VISIBLE)
+        assert np.all(np.isfinite(n)) and n.min() >= 1.0, entry.qualified_name
+        assert np.all(np.diff(n) <= 0.0), entry.qualified_name
+        assert 1.0 <= dispersion.n_d < 3.0, entry.qualified_name
+        assert catalogue.find_entry(entry.qualified_name) is entry
+
+
+def test_catalogue_agrees_with_makers_data_sheets() -> None:
+    """n_d and V_d as the makers print them (five and two decimals)."""
+    sheets = {
+        "Schott N-SF66": (1.92286, 20.88), "Ohara S-BSL7": (1.51633, 64.14), "Hoya TAF1": (1.77250, 49.62),
+        "CDGM H-K9L": (1.51680, 64.20), "Sumita K-BK7": (1.51633, 64.06), "Hikari J-BK7A": (1.51680, 64.13),
+    }  # fmt: skip
+    for name, (n_d, v_d) in sheets.items():
+        found = catalogue.find(name)
+        assert (found.n_d, found.V_d) == (pytest.approx(n_d, abs=1e-5), pytest.approx(v_d, abs=0.02)), name
+
+
+def test_lookup_spellings_and_maker_order() -> None:
+    same = ["N-BK7", "nbk7", "Schott N-BK7", "SCHOTT:N-BK7", "n bk7", "BK7"]
+    assert {catalogue.find_entry(name).qualified_name for name in same} == {"Schott N-BK7"}
+    assert catalogue.find_entry("F2").maker == "Schott"
+    assert catalogue.find_entry("hikari:F2").maker == "Hikari"
+    assert catalogue.find_entry("sapphire").name == "sapphire (ordinary)"
+    with pytest.raises(UserError, match=r"scene.toml: material: unknown glass 'N-BK8', did you mean .*'Schott N-BK7'"):
+        catalogue.find("N-BK8", "scene.toml: material")
+    with pytest.raises(UserError, match="unknown glass '§§§'"):
+        catalogue.find("§§§")
+
+
+def test_search_ranks_exact_then_prefix() -> None:
+    found = catalogue.search("n-sf6")
+    assert found[0].qualified_name == "Schott N-SF6"
+    assert found[1].name.startswith("N-SF6")
+    assert all("sf6" in catalogue.search_key(e.maker + e.name) for e in found)
+    assert [e.name for e in catalogue.search("diamnod")][0] == "diamond"
+    assert {e.maker for e in catalogue.search("hoya fcd")} == {"Hoya"}
+    assert len(catalogue.search()) == len(catalogue.entries())
+
+
+def test_clamping_to_the_fit_range() -> None:
+    diamond = catalogue.find("diamond")
+    assert diamond.index(775.0) == diamond.index(760.0)
+    assert diamond.derivative(775.0) == 0.0 and diamond.derivative(759.0) < -0.01
+    assert "above 760 nm" in (diamond.clamps_visible() or "")
+    assert catalogue.find("N-BK7").clamps_visible() is None
+    assert catalogue.find("ice").clamps_visible() is not None
+
+
+def test_shapes_follow_the_input() -> None:
+    for dispersion in _one_of_each_kind():
+        assert dispersion.index(550.0).shape == () and dispersion.index(np.full((2, 3), 550.0)).shape == (2, 3)
+        assert dispersion.index(np.float32(550.0)).dtype == np.float64
+        assert dispersion.derivative(np.full((2, 3), 550.0)).shape == (2, 3)
+
+
+def test_abbe_model_is_khr_dispersion() -> None:
+    model = glass.from_abbe(1.5168, 64.17)
+    expected = 1.5168 + 0.5168 / 64.17 * (523655.0 / 450.0**2 - 1.5168)
+    assert model.index(450.0) == pytest.approx(expected, abs=1e-12)
+    assert model.V_d == pytest.approx(64.17, abs=2e-3)
+    assert glass.from_abbe(1.5).V_d == math.inf and not glass.from_abbe(1.5).is_dispersive
+    assert glass.from_abbe(1.2, 0.5).index(780.0) == 1.0  # the extension's floor
+    anomalous = glass.from_abbe(1.5, -40.0)
+    assert anomalous.derivative(550.0) > 0.0 and any("anomalous" in note for note in anomalous.notes())
+
+
+def test_named_glass_differs_from_the_khr_model_as_known() -> None:
+    for name, gap in (("N-SF11", -0.0070), ("N-SF66", -0.0136)):
+        real = catalogue.find(name)
+        model = glass.from_abbe(real.n_d, real.V_d)
+        assert model.index(400.0) - real.index(400.0) == pytest.approx(gap, abs=1e-4)
+
+
+def test_gltf_dispersion_both_ways() -> None:
+    assert glass.abbe_to_gltf_dispersion(40.0) == 0.5 and glass.gltf_dispersion_to_abbe(0.5) == 40.0
+    assert glass.abbe_to_gltf_dispersion(math.inf) == 0.0 and glass.gltf_dispersion_to_abbe(0.0) == math.inf
+
+
+def test_coefficients_tables_and_cauchy_agree() -> None:
+    """N-BK7 from its coefficients, and from a table of it every 20 nm, is N-BK7."""
+    real = catalogue.find("N-BK7")
+    own = glass.sellmeier([1.03961212, 0.231792344, 1.01046945], [0.00600069867, 0.0200179144, 103.560653])
+    assert own.index(VISIBLE) == pytest.approx(real.index(VISIBLE), abs=1e-15)
+    knots = np.arange(380.0, 781.0, 20.0)
+    tabled = glass.table(knots, real.index(knots))
+    assert tabled.index(VISIBLE) == pytest.approx(real.index(VISIBLE), abs=1e-6)
+    assert tabled.derivative(VISIBLE) == pytest.approx(real.derivative(VISIBLE), abs=2e-4)
+    cauchy = glass.cauchy([1.5, 0.004, 1e-5])
+    assert cauchy.index(500.0) == pytest.approx(1.5 + 0.004 / 0.25 + 1e-5 / 0.0625, abs=1e-15)
+    two = glass.table([400.0, 700.0], [1.53, 1.51])
+    assert two.index(390.0) == 1.53 and 1.51 < two.index(550.0) < 1.53
+
+
+def test_table_is_monotone_where_the_data_are() -> None:
+    steep = glass.table([380, 400, 410, 600, 780], [1.9, 1.89, 1.6, 1.599, 1.5])
+    assert np.all(np.diff(steep.index(np.linspace(380, 780, 4001))) <= 0.0)
+
+
+def test_notes_say_index_below_one() -> None:
+    assert any("below 1" in note for note in glass.constant(0.9, "bubble").notes())
+    assert catalogue.find("N-BK7").notes() == []
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda w: glass.constant(0.0, where=w), "index is 0 at 380 nm"),
+        (lambda w: glass.constant(-1.5, where=w), "index is -1.5"),
+        (lambda w: glass.constant(math.nan, where=w), "not a finite number"),
+        (lambda w: glass.from_abbe(1.5, 0.0, where=w), "V_d is 0"),
+        (lambda w: glass.from_abbe(1.5, math.nan, where=w), "V_d is nan"),
+        (lambda w: glass.from_abbe(math.inf, 50.0, where=w), "not a finite number"),
+        (lambda w: glass.sellmeier([1.0, math.inf], [0.01, 0.02], where=w), "not a finite number"),
+        (lambda w: glass.sellmeier([1.0], [0.01, 0.02], where=w), "as many C as B"),
+        (lambda w: glass.sellmeier([], [], where=w), "at least one"),
+        (lambda w: glass.sellmeier([1.0], [0.25], where=w), "pole at 500 nm"),
+        (lambda w: glass.sellmeier([-3.0], [0.01], where=w), "imaginary or infinite at 380 nm"),
+        (lambda w: glass.sellmeier([1.0], [0.01], range_nm=(900.0, 2000.0), where=w), "outside the visible range"),
+        (lambda w: glass.sellmeier([1.0], [0.01], range_nm=(700.0, 400.0), where=w), "range 700 to 400 nm is empty"),
+        (lambda w: glass.cauchy([], where=w), "at least the coefficient A"),
+        (lambda w: glass.cauchy([1.2, -0.5], where=w), "at 380 nm; it must be a positive number"),
+        (lambda w: glass.table([], [], where=w), "two or more wavelengths"),
+        (lambda w: glass.table([400.0, 500.0], [1.5], where=w), "got 2 and 1"),
+        (lambda w: glass.table([500.0, 400.0], [1.5, 1.6], where=w), "400 follows 500"),
+        (lambda w: glass.table([400.0, 400.0], [1.5, 1.6], where=w), "must ascend"),
+        (lambda w: glass.table([400.0, 500.0], [1.5, math.nan], where=w), "n = nan at 500 nm"),
+        (lambda w: glass.table([400.0, 500.0], [1.5, 0.0], where=w), "n = 0 at 500 nm"),
+        (lambda w: glass.table([0.0, 500.0], [1.5, 1.5], where=w), "not a positive number"),
+        (lambda w: glass.from_formula("formula 3", [2.0, 1.0], where=w), "does not take 2 coefficients"),
+        (lambda w: glass.from_formula("formula 9", [2.0], where=w), "unknown dispersion formula"),  # type: ignore[arg-type]
+    ],
+)
+def test_impossible_data_are_refused_by_key(make, message: str) -> None:  # noqa: ANN001
+    with pytest.raises(UserError) as caught:
+        make("s.toml: materials.prism")
+    assert str(caught.value).startswith("s.toml: materials.prism: ") and message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_description_holds_the_facts() -> None:
+    text = glass_report.describe(catalogue.find_entry("N-SF11"))
+    for fact in ("Schott N-SF11", "1.784720", "25.680", "-0.152878", "1.73759695", "CC0", "370-2500"):
+        assert fact in text
+    table = glass_report.list_glasses("n-sf11")
+    assert table.row_count >= 1 and next(iter(table.columns[0].cells)) == "N-SF11"
+    with pytest.raises(UserError, match="no glass resembles"):
+        glass_report.list_glasses("§§§")
+
+
+def test_plot_is_a_picture_and_refuses_other_names(tmp_path) -> None:  # noqa: ANN001
+    from PIL import Image
+
+    target = tmp_path / "plot.png"
+    glass_report.plot([catalogue.find_entry("N-BK7"), catalogue.find_entry("diamond")], target)
+    with Image.open(target) as picture:
+        assert picture.width > 1000 and len(picture.convert("RGB").getcolors(1 << 20)) > 500
+    with pytest.raises(UserError, match="must end in .png"):
+        glass_report.plot(catalogue.find_entry("N-BK7"), tmp_path / "plot.jpg")
+    assert [p.name for p in tmp_path.iterdir()] == ["plot.png"]
