@@ -98,16 +98,20 @@ def flux_factor(light: Light) -> float:
 
 
 def spot_solid_angle_sr(inner_half_angle_deg: float, outer_half_angle_deg: float) -> float:
-    """∫ fall-off dω of a spot, steradian.
+    """∫ fall-off dω of a spot, steradian, in closed form.
 
-    The fall-off is 1 inside the inner cone, 0 outside the outer one, and the smoothstep
-    t²(3 − 2t) of t = (cos θ − cos outer)/(cos inner − cos outer) between, whose mean is 1/2.
+    The fall-off (`shaders/lib/spot.glsl`) is 1 inside the inner cone, 0 outside the outer one,
+    and a smoothstep of the angle between. Integrated by parts, 2π (1 − cos m · g) remains with
+    the middle angle m, half the soft width h, and g = 3 (sin h − h cos h)/h³.
     """
-    # 1 - cos by the half angle: a narrow hard spot would lose its digits otherwise.
-    inner, outer = (
-        2.0 * math.sin(math.radians(angle) / 2.0) ** 2 for angle in (inner_half_angle_deg, outer_half_angle_deg)
-    )
-    return math.pi * (inner + outer)
+    inner, outer = math.radians(inner_half_angle_deg), math.radians(outer_half_angle_deg)
+    middle, h = 0.5 * (inner + outer), 0.5 * (outer - inner)
+    # 1 − g by its series where the closed form would cancel; the next term is below 1e-14.
+    if h < 0.02:
+        lack = h * h / 10.0 - h**4 / 280.0 + h**6 / 15120.0
+    else:
+        lack = 1.0 - 3.0 * (math.sin(h) - h * math.cos(h)) / h**3
+    return 2.0 * math.pi * (2.0 * math.sin(0.5 * middle) ** 2 + math.cos(middle) * lack)
 
 
 def _read_shape(table: SceneTable, kind: str) -> dict[str, object]:
@@ -193,7 +197,7 @@ def _read_power(table: SceneTable, light: Light, distance: float) -> Spectrum:
     if key is None:
         return _scaled(table, "spectrum", spectrum, PHOTOMETRIC, _default_power(light, distance))
     measure, quantity = keys[key]
-    value = table.number(key, above=0.0)
+    value = table.number(key, at_least=0.0)
     if quantity == FLUX:
         value /= flux_factor(light)
     return _scaled(table, key, spectrum, measure, value)

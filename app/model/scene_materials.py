@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.errors import UserError, suggestion
+from app.errors import suggestion
 from app.model import glass
 from app.model.colorimetry import VISIBLE_NM, attenuation_from_colour
 from app.model.glass import Dispersion
@@ -152,10 +152,7 @@ def _read_range(table: SceneTable) -> tuple[float, float] | None:
 def _catalogue(table: SceneTable, key: str, name: str) -> Dispersion:
     from app.model import catalogue
 
-    try:
-        return catalogue.find(name)
-    except UserError as error:
-        table.fail(key, f"is not in the catalogue: {error}")
+    return catalogue.find(name, table.where(key))
 
 
 # -- absorption ---------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from app.errors import UserError
 from app.model.mesh import Mesh
 from app.model.mesh_recipes import note_recipe
 from app.model.placement import read_placement
-from app.model.scene import Material, SceneObject
+from app.model.scene import Dielectric, Material, SceneObject
 from app.model.scene_materials import read_object_material
 from app.model.scene_table import SceneTable
 
@@ -35,18 +35,19 @@ class ObjectReader:
 
     def read(self, table: SceneTable) -> list[SceneObject]:
         """The object of one table, or its instances."""
-        mesh = self._read_mesh(table)
         material = read_object_material(table, self._materials)
-        name = self._unique_name(table, mesh.name)
+        mesh = self._read_mesh(table, solid=isinstance(material, Dielectric))
         base = read_placement(table)
         rest = table.number("rests_at_z", None)
         placed: list[SceneObject] = []
         if not table.has("instances"):
+            name = self._unique_name(table, mesh.name)
             placed.append(SceneObject(name, mesh, material, _rested(mesh, base, rest)))
         else:
             entries = table.tables("instances")
             if not entries:
                 table.fail("instances", "is empty; leave it out to place the object once")
+            name = table.string("name", mesh.name)
             for i, entry in enumerate(entries):
                 label = self._unique_name(entry, f"{name} {i + 1}")
                 matrix = _rested(mesh, read_placement(entry) @ base, rest)
@@ -68,26 +69,29 @@ class ObjectReader:
         self._names.add(name)
         return name
 
-    def _read_mesh(self, table: SceneTable) -> Mesh:
+    def _read_mesh(self, table: SceneTable, solid: bool) -> Mesh:
         key = table.one_of(("mesh", "shape"), "the geometry")
         if key is None:
             table.raw("shape")  # blames a misspelt key, or says that this one is missing
         recipe = _file_recipe(table) if key == "mesh" else _shape_recipe(table)
         identity = json.dumps(recipe, sort_keys=True)
         if identity not in self._meshes:
-            self._meshes[identity] = self._make(table, recipe)
+            found: list[str] = []
+            self._meshes[identity] = self._make(table, recipe, found)
+            # An open sheet is a fault in glass only: tables and blockers are open by nature.
+            self.notes += [note for note in found if solid or not note.startswith("open mesh")]
         return self._meshes[identity]
 
-    def _make(self, table: SceneTable, recipe: dict[str, Any]) -> Mesh:
+    def _make(self, table: SceneTable, recipe: dict[str, Any], notes: list[str]) -> Mesh:
         if "mesh" in recipe:
-            mesh = load_checked_mesh(Path(recipe["mesh"]), recipe.get("smooth"), self.notes)
+            mesh = load_checked_mesh(Path(recipe["mesh"]), recipe.get("smooth"), notes)
         else:
             try:
                 mesh = _make_shape(recipe)
             except UserError as error:
                 table.fail("shape", f"cannot be made: {error}")
             if recipe["shape"] == INLINE:
-                mesh = _checked(mesh, self.notes)
+                mesh = _checked(mesh, notes)
         note_recipe(mesh, recipe)
         return mesh
 

@@ -50,6 +50,8 @@ class SceneTable:
 
     def _fail_unknown(self, key: str, noun: str) -> NoReturn:
         near = nearest_names(key, self._asked, count=1)
+        if not near and len(key) > 2:  # "fov" for "vertical_fov_deg"
+            near = [known for known in sorted(self._asked) if key.casefold() in known.casefold()]
         if near:
             remedy = f"did you mean '{near[0]}'?"
         else:

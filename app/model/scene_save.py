@@ -1,0 +1,220 @@
+"""Writes a `Scene` as TOML, by description where there is one: loading it gives the same values.
+
+Everything is told from the scene's values alone: a spectrum that is D65 is written "D65", an
+absorption that a colour explains is written as that colour, a mesh that came from a shape or
+a file is written as that. Only meshes nobody can name are stored as triangles. Comments and
+defaults of a file that was read are not kept.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.model.mesh import Mesh
+from app.model.mesh_recipes import recipe_of
+from app.model.scene import Camera, Light, Scene, SceneObject
+from app.model.scene_describe import describe_material, describe_spectrum
+from app.model.scene_objects import INLINE
+
+INLINE_TRIANGLES = 64
+"""Flat meshes of no more triangles than this go into the scene file itself."""
+
+_POWER_KEY = {
+    "point": "intensity_w_sr",
+    "spot": "intensity_w_sr",
+    "directional": "irradiance_w_m2",
+    "collimated": "irradiance_w_m2",
+    "area": "radiance_w_sr_m2",
+}
+
+
+def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Write `scene` to the TOML file `path`, whole or not at all.
+
+    Meshes without a description go to PLY files in the folder `<stem>_meshes` beside it.
+    Raises UserError when something cannot be written.
+    """
+    from app.atomic import atomic_output
+
+    path = Path(path)
+    text = scene_text(scene, path)
+    with atomic_output(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def scene_text(scene: Scene, path: Path) -> str:
+    """The TOML text of `scene` as it would stand in `path`; writes PLY files where it must."""
+    parts = [_block("", {"name": scene.name, "background": list(scene.background_rgb)})]
+    parts.append(_block("[camera]", _camera(scene.camera)))
+    render = scene.render
+    parts.append(
+        _block(
+            "[render]",
+            {
+                "size": [render.width, render.height],
+                "photons": render.photons,
+                "exposure_ev": render.exposure_ev,
+                "max_depth": render.max_depth,
+            },
+        )
+    )
+    parts += [_block("[[lights]]", _light(light)) for light in scene.lights]
+    materials: dict[str, dict[str, Any]] = {}
+    objects = [
+        _block("[[objects]]", _objects(group, materials, path)) for group in _groups(scene.objects)
+    ]
+    parts += [_block(f"[materials.{_key(name)}]", values) for name, values in materials.items()]
+    return "\n".join(parts + objects)
+
+
+# -- parts of a scene ---------------------------------------------------------------------
+
+
+def _camera(camera: Camera) -> dict[str, Any]:
+    values: dict[str, Any] = {
+        "kind": camera.kind,
+        "position": list(camera.position),
+        "target": list(camera.target),
+        "up": list(camera.up),
+    }
+    if camera.kind == "pinhole":
+        return values | {"vertical_fov_deg": camera.vertical_fov_deg}
+    return values | {"vertical_extent": camera.vertical_extent}
+
+
+def _light(light: Light) -> dict[str, Any]:
+    values: dict[str, Any] = {"name": light.name, "kind": light.kind}
+    if light.kind != "directional":
+        values["position"] = list(light.position)
+    if light.kind != "point":
+        values["direction"] = list(light.direction)
+    if light.kind == "spot":
+        values["half_angle_deg"] = light.outer_half_angle_deg
+        values["inner_half_angle_deg"] = light.inner_half_angle_deg
+    if light.kind == "directional":
+        values["angular_diameter_deg"] = light.angular_diameter_deg
+    if light.kind in ("collimated", "area"):
+        values["shape"] = light.shape
+        if light.shape == "disc":
+            values["radius"] = light.radius
+        else:
+            values["size"] = [light.width, light.height]
+            if light.tangent is not None:
+                values["tangent"] = list(light.tangent)
+    values["spectrum"] = describe_spectrum(light.spectral_power)
+    values[_POWER_KEY[light.kind]] = light.spectral_power.power_w()
+    return values
+
+
+def _groups(objects: tuple[SceneObject, ...]) -> list[list[SceneObject]]:
+    """Neighbours that share mesh and material: written once, with instances."""
+    groups: list[list[SceneObject]] = []
+    for item in objects:
+        if groups and groups[-1][0].mesh is item.mesh and groups[-1][0].material is item.material:
+            groups[-1].append(item)
+        else:
+            groups.append([item])
+    return groups
+
+
+def _objects(group: list[SceneObject], materials: dict[str, dict[str, Any]], path: Path) -> dict[str, Any]:
+    first = group[0]
+    values: dict[str, Any] = {"name": first.name} if len(group) == 1 else {}
+    values |= _mesh(first.mesh, path) | _material(first, materials)
+    if len(group) > 1:
+        values["instances"] = [{"name": item.name, "matrix": _matrix(item)} for item in group]
+    elif not np.array_equal(first.object_to_world, np.eye(4)):
+        values["matrix"] = _matrix(first)
+    return values
+
+
+def _matrix(item: SceneObject) -> list[float]:
+    return [float(v) for v in item.object_to_world.ravel()]
+
+
+def _material(item: SceneObject, materials: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """`glass = …` where that says it all, else `material = …` naming an entry of `materials`."""
+    values = describe_material(item.material)
+    if set(values) == {"glass"}:
+        return values
+    for name, known in materials.items():
+        if known == values:
+            return {"material": name}
+    stem = str(values.get("name") or values.get("glass") or values.get("kind") or "glass")
+    name, number = stem, 1
+    while name in materials:
+        number += 1
+        name = f"{stem} {number}"
+    materials[name] = values
+    return {"material": name}
+
+
+def _mesh(mesh: Mesh, path: Path) -> dict[str, Any]:
+    recipe = recipe_of(mesh)
+    if recipe is not None:
+        values = dict(recipe)
+        for key in ("mesh", "heights"):
+            if isinstance(values.get(key), str):
+                values[key] = _relative(values[key], path.parent)
+        return values
+    if mesh.corner_normals is None and mesh.uv is None and len(mesh.triangles) <= INLINE_TRIANGLES:
+        return {"shape": INLINE, "vertices": mesh.vertices.tolist(), "triangles": mesh.triangles.tolist()}
+    from app.model.mesh_io import save_ply
+
+    folder = path.parent / f"{path.stem}_meshes"
+    folder.mkdir(exist_ok=True)
+    target = folder / f"{_file_stem(mesh)}.ply"
+    save_ply(mesh, target)
+    return {"mesh": _relative(str(target), path.parent)}
+
+
+def _file_stem(mesh: Mesh) -> str:
+    """A file name that holds the mesh's name and is the same only for the same triangles."""
+    import hashlib
+
+    digest = hashlib.sha256(mesh.vertices.tobytes() + mesh.triangles.tobytes())
+    if mesh.corner_normals is not None:
+        digest.update(mesh.corner_normals.tobytes())
+    plain = "".join(c if c.isalnum() else "_" for c in mesh.name)[:40]
+    return f"{plain}_{digest.hexdigest()[:12]}"
+
+
+def _relative(target: str, folder: Path) -> str:
+    try:
+        return Path(os.path.relpath(target, folder.resolve())).as_posix()
+    except ValueError:  # another drive
+        return Path(target).as_posix()
+
+
+# -- TOML ---------------------------------------------------------------------------------
+
+
+def _block(header: str, values: dict[str, Any]) -> str:
+    lines = [header] if header else []
+    return "\n".join(lines + [f"{_key(key)} = {_value(value)}" for key, value in values.items()]) + "\n"
+
+
+def _key(key: str) -> str:
+    bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
+    return key if bare else _value(key)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        # JSON's escapes are TOML's, but for DEL.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        return repr(float(value)) if math.isfinite(value) else ("inf" if value > 0 else "-inf")
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
+    return "[" + ", ".join(_value(entry) for entry in value) + "]"
