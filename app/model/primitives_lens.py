@@ -20,7 +20,7 @@ from app.model.primitives_check import count, positive
 def lens(
     radius1: float = 1.0,
     radius2: float = -1.0,
-    thickness: float = 0.2,
+    thickness: float = 0.3,
     diameter: float = 1.0,
     triangles: int = 20_000,
     conic1: float = 0.0,
