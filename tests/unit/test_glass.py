@@ -153,6 +153,15 @@ def test_coefficients_tables_and_cauchy_agree() -> None:
     assert two.index(390.0) == 1.53 and 1.51 < two.index(550.0) < 1.53
 
 
+def test_table_is_pchip_in_inverse_square_wavelength() -> None:
+    from scipy.interpolate import PchipInterpolator
+
+    wavelength = np.array([380.0, 395.0, 450.0, 452.0, 560.0, 700.0, 780.0])
+    n = np.array([1.56, 1.55, 1.53, 1.531, 1.52, 1.519, 1.515])
+    reference = PchipInterpolator(wavelength[::-1] ** -2.0, n[::-1])
+    assert glass.table(wavelength, n).index(VISIBLE) == pytest.approx(reference(VISIBLE**-2.0), abs=1e-13)
+
+
 def test_table_is_monotone_where_the_data_are() -> None:
     steep = glass.table([380, 400, 410, 600, 780], [1.9, 1.89, 1.6, 1.599, 1.5])
     assert np.all(np.diff(steep.index(np.linspace(380, 780, 4001))) <= 0.0)

@@ -256,6 +256,7 @@ def test_cumulative_keeps_all_energy(names: list[str]) -> None:
     light = sp.illuminant("D65") + sp.laser(380.0, 5e3) + sp.laser(780.0, 7e3) + sp.laser(550.5, 2e3) + sp.laser(601.23, 1e3)
     running = cumulative(axis, light)
     expected = np.array([*light.xyz(), light.power_w()])
+    assert np.all(np.diff(running.x) >= 0.0) and np.all(np.diff(running.values, axis=0) >= 0.0)
     assert running.at(0.0) == pytest.approx(np.zeros(4), abs=0.0)
     assert running.at(1.0) == pytest.approx(expected, rel=1e-13)
     edges = np.concatenate([[0.0], np.sort(np.random.default_rng(5).random(40)), [1.0]])
