@@ -45,7 +45,7 @@ class Mesh:
     def area_vectors(self) -> np.ndarray:
         """Half cross products, float64 (T, 3): the face normal times the area."""
         a, b, c = np.moveaxis(self.corners(), 1, 0)
-        return 0.5 * np.cross(b - a, c - a)
+        return 0.5 * cross(b - a, c - a)
 
     def areas(self) -> np.ndarray:
         """Triangle areas, float64 (T,), square units."""
@@ -65,7 +65,7 @@ class Mesh:
         corners = self.corners()
         # About the middle, so that a mesh far from the origin does not cancel.
         corners = corners - 0.5 * (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1)))
-        return float(np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0)
+        return float(np.einsum("ij,ij->", corners[:, 0], cross(corners[:, 1], corners[:, 2])) / 6.0)
 
     def flipped(self) -> Mesh:
         """The same surface facing the other way."""
@@ -173,6 +173,14 @@ def make_mesh(
         uv=None if coordinates is None else _frozen(coordinates),
         source=source,
     )
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross products of rows, (N, 3); several times faster than `np.cross` on large arrays."""
+    out = np.empty_like(a)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        out[:, i] = a[:, j] * b[:, k] - a[:, k] * b[:, j]
+    return out
 
 
 def normalised(vectors: np.ndarray) -> np.ndarray:

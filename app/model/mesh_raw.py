@@ -1,0 +1,31 @@
+"""What a mesh reader hands over before anything is checked, and the fan that cuts polygons."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class RawMesh:
+    """Arrays as a file holds them; shapes as in `Mesh`."""
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    corner_normals: np.ndarray | None = None
+    uv: np.ndarray | None = None
+
+
+def fan_corners(sizes: np.ndarray) -> np.ndarray:
+    """Corner numbers of the triangles of consecutive polygons with `sizes` corners, int64 (T, 3).
+
+    Polygon k of n corners becomes n - 2 triangles round its first corner; polygons of
+    fewer than three corners vanish.
+    """
+    sizes = np.asarray(sizes, dtype=np.int64)
+    first = np.cumsum(sizes) - sizes
+    cuts = np.maximum(sizes - 2, 0)
+    root = np.repeat(first, cuts)
+    step = np.arange(cuts.sum()) - np.repeat(np.cumsum(cuts) - cuts, cuts)
+    return np.stack([root, root + step + 1, root + step + 2], axis=1)
