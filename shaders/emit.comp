@@ -15,7 +15,7 @@ void main()
 {
     uint k = gl_GlobalInvocationID.x;
     if (k >= p.count) return;
-    uint id = p.first + k;
+    uint id = p.first + k * p.stride;
     Outcome outcome = Outcome(0u, 0u, 0.0, 0.0, 0.0, 0.0);
 
     vec2 unit = lattice_point(id, p.lattice_count, p.shift);

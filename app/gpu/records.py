@@ -193,7 +193,8 @@ EMIT_PARAMETERS = Struct(
         Field("lattice_count", "uint", "lattice points of the band's whole pass"),
         Field("light", "uint"),
         Field("band", "uint"),
-        Field("reserved", "uint", "", 3),
+        Field("stride", "uint", "step between the batch's lattice points"),
+        Field("reserved", "uint", "", 2),
         Field("mask", "uint", "one bit a cell of the domain: may a ray from it meet a specular object?", MASK_SIZE * MASK_SIZE // 32),
     ),
 )

@@ -77,7 +77,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class LatticeSlice:
-    """Lattice points [first, first + count) of a band's pass."""
+    """`count` lattice points of a band's pass."""
 
     light: int
     band_index: int
@@ -89,6 +89,10 @@ class LatticeSlice:
     shift_extra: tuple[int, int]
     shift_spectral: int
     seed: int
+    stride: int = 1
+    """Every stride-th lattice point from `first` on."""
+    weight: float = 1.0
+    """Factor on every weight; a pass uses its photon count, so that passes add up by size."""
 
 
 class TracePass:
@@ -199,7 +203,7 @@ class TracePass:
         band = piece.band
         p = records.EMIT_PARAMETERS.zeros(1)
         p["origin"], p["axis"], p["tangent"], p["bitangent"] = domain.origin, domain.axis, domain.tangent, domain.bitangent
-        p["weight"] = domain.measure / piece.lattice_count
+        p["weight"] = domain.measure * piece.weight / piece.lattice_count
         p["spacing"] = domain.spacing(piece.lattice_count)
         p["back"] = domain.back
         p["band_power_w"] = band.power_w
@@ -211,7 +215,7 @@ class TracePass:
         p["x_lo"], p["x_hi"], p["x_anchor"] = band.x_lo, band.x_hi, band.x_anchor
         p["shift"], p["shift_extra"], p["shift_spectral"] = piece.shift, piece.shift_extra, piece.shift_spectral
         p["seed"], p["first"], p["count"], p["lattice_count"] = piece.seed, piece.first, piece.count, piece.lattice_count
-        p["light"], p["band"] = piece.light, piece.band_index
+        p["light"], p["band"], p["stride"] = piece.light, piece.band_index, piece.stride
         p["mask"] = np.packbits(domain.mask.ravel(), bitorder="little").view("<u4")
         self._emit_parameters.write(p.tobytes())
         self._write_trace_parameters(piece, self.max_depth)

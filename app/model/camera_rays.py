@@ -1,0 +1,32 @@
+"""Camera rays in float64, for fitting maps and for tests; the eye pass has its own in GLSL."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.model.scene import Camera
+
+
+def camera_frame(camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Unit right, up and forward vectors."""
+    forward = np.asarray(camera.target, float) - np.asarray(camera.position, float)
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, camera.up)
+    right /= np.linalg.norm(right)
+    return right, np.cross(right, forward), forward
+
+
+def camera_rays(camera: Camera, picture: tuple[int, int], grid: int) -> tuple[np.ndarray, np.ndarray]:
+    """Origins and unit directions (grid, grid, 3), world, of rays spread over the whole picture to its edges."""
+    right, up, forward = camera_frame(camera)
+    x, y = np.meshgrid(np.linspace(-1, 1, grid), np.linspace(-1, 1, grid))
+    aspect = picture[0] / picture[1]
+    position = np.asarray(camera.position, float)
+    if camera.kind == "orthographic":
+        half = 0.5 * camera.vertical_extent
+        origins = position + half * (aspect * x[..., None] * right + y[..., None] * up)
+        return origins, np.broadcast_to(forward, origins.shape).copy()
+    half = np.tan(np.radians(0.5 * camera.vertical_fov_deg))
+    directions = forward + half * (aspect * x[..., None] * right + y[..., None] * up)
+    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+    return np.broadcast_to(position, directions.shape).copy(), directions

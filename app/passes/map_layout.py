@@ -1,0 +1,271 @@
+"""Where on the receivers the caustic maps lie, fitted to where pilot photons landed.
+
+A flat receiver gets a coarse window over everything that lands on it and, where most of the light
+falls on (or the camera sees) a small part of that, a fine window inside. A curved receiver gets
+charts. All of them are tiles of one atlas.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.errors import UserError
+from app.gpu.map_atlas import Tile, pack, placement_rows
+from app.gpu.records import NONE, RECEIVER
+from app.gpu.scene_buffers import SceneBuffers
+from app.model.camera_rays import camera_rays
+from app.model.charts import ChartAtlas, build_charts
+from app.model.features import is_flat
+from app.model.scene import Camera, Diffuse, Scene
+
+FINE_TILE_MAX = 2048
+COARSE_TILE_MAX = 768
+MIN_TILE = 32
+TEXELS_PER_PIXEL = 2.0
+"""Texels along a pixel's side in a fine window: a splat is blurred by half a texel, a picture by its pixel."""
+_QUANTILE = 0.01
+_MARGIN = 0.06
+
+
+@dataclass(frozen=True)
+class Landings:
+    """Pilot photons on one receiver: every place where some wavelength of theirs arrives."""
+
+    positions: np.ndarray
+    """float64 (n, 3), GPU space."""
+    flux_w: np.ndarray
+    """float64 (n,)."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """A rectangle on a flat receiver, coordinates along `axes` in GPU space."""
+
+    low: np.ndarray
+    high: np.ndarray
+
+    @property
+    def size(self) -> np.ndarray:
+        return self.high - self.low
+
+
+@dataclass(frozen=True)
+class PlaneFrame:
+    """A flat receiver's plane: p = origin + u axes[0] + v axes[1]."""
+
+    origin: np.ndarray
+    axes: np.ndarray
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """Plane coordinates (..., 2) of GPU-space points."""
+        return (points - self.origin) @ self.axes.T
+
+
+@dataclass(frozen=True)
+class MapLayout:
+    """Everything the atlas and the look-ups need; `tiles[receiver]` lists fine first."""
+
+    size: tuple[int, int]
+    placements: np.ndarray
+    receivers: np.ndarray
+    tiles: dict[int, list[Tile]]
+    windows: dict[int, list[Window]]
+    charts: dict[int, ChartAtlas]
+
+
+def plane_frame(points: np.ndarray) -> PlaneFrame:
+    """The frame of coplanar `points`; its axes follow the coordinate axes where they can."""
+    centre = points.mean(axis=0)
+    normal = np.linalg.svd(points - centre, full_matrices=False)[2][2]
+    guide = np.eye(3)[0] if abs(normal[0]) < 0.9 else np.eye(3)[1]
+    first = guide - normal * (guide @ normal)
+    first /= np.linalg.norm(first)
+    return PlaneFrame(centre, np.stack([first, np.cross(normal, first)]))
+
+
+def layout_maps(
+    scene: Scene,
+    buffers: SceneBuffers,
+    landings: dict[int, Landings],
+    picture: tuple[int, int] | None,
+    reflectance_class: dict[int, int],
+    map_receiver: int | None = None,
+    max_side: int = 4096,
+) -> MapLayout:
+    """Fit windows and charts.
+
+    `picture`: (width, height) whose camera decides resolution and what is in view; with `map_receiver`
+    that receiver's one window has exactly this size instead and the camera is ignored.
+    """
+    sizes: list[tuple[int, int]] = []
+    plans: list[tuple[int, PlaneFrame | None, list[Window], ChartAtlas | None]] = []
+    for receiver, object_index in enumerate(buffers.receivers):
+        item = scene.objects[object_index]
+        points = buffers.space.to_gpu(buffers.world_meshes[object_index].vertices)
+        landed = landings.get(receiver)
+        if is_flat(item):
+            frame = plane_frame(points)
+            extent = _extent(frame.project(points))
+            windows = _flat_windows(scene.camera, buffers, frame, extent, landed, picture if map_receiver is None else None)
+            if receiver == map_receiver and picture is not None:
+                windows = [_with_aspect(windows[-1] if landed is None else _extent_of_light(frame, extent, landed), picture)]
+            for level, window in enumerate(windows):
+                fine = level == 0 and len(windows) > 1
+                sizes.append(
+                    picture if receiver == map_receiver and picture is not None
+                    else _tile_size(scene.camera, buffers, frame, window, picture, FINE_TILE_MAX if fine or len(windows) == 1 else COARSE_TILE_MAX)
+                )
+            plans.append((receiver, frame, windows, None))
+        else:
+            lit = landed is not None or receiver == map_receiver
+            side = int(np.clip((picture or (512, 512))[0], 256, 1024)) if lit else 64
+            atlas = build_charts(buffers.world_meshes[object_index], total_texels=side * side)
+            sizes.append((atlas.width, atlas.height))
+            plans.append((receiver, None, [], atlas))
+    tiles, size = pack(sizes, max_side)
+    return _place(scene, buffers, plans, tiles, size, reflectance_class)
+
+
+def _place(scene: Scene, buffers: SceneBuffers, plans, tiles: list[Tile], size: tuple[int, int], reflectance_class: dict[int, int]) -> MapLayout:
+    placements: list[np.ndarray] = []
+    receivers = RECEIVER.zeros(len(plans))
+    tile_of: dict[int, list[Tile]] = {}
+    charts: dict[int, ChartAtlas] = {}
+    count, next_tile = 0, 0
+    for receiver, frame, windows, atlas in plans:
+        object_index = buffers.receivers[receiver]
+        material = scene.objects[object_index].material
+        record = receivers[receiver]
+        record["object"], record["placement"] = object_index, count
+        record["first_triangle"] = buffers.first_triangle[object_index]
+        record["reflectance_class"] = reflectance_class[receiver]
+        assert isinstance(material, Diffuse)
+        record["reflectance_rgb"] = 1.0 if material.reflectance is not None else material.reflectance_rgb
+        own = [tiles[next_tile + i] for i in range(max(1, len(windows)))]
+        next_tile += len(own)
+        tile_of[receiver] = own
+        if atlas is None:
+            assert frame is not None
+            for level, (window, tile) in enumerate(zip(windows, own, strict=True)):
+                scale = np.array([tile.width, tile.height]) / window.size
+                rows = np.concatenate([frame.axes, (-(frame.axes @ frame.origin) - window.low)[:, None]], axis=1) * scale[:, None]
+                texel_area = float(np.prod(window.size / (tile.width, tile.height))) / buffers.space.scale**2
+                placed = placement_rows(tile, rows, texel_area)
+                placed["next"] = count + level + 1 if level + 1 < len(windows) else NONE
+                placements.append(placed)
+            count += len(windows)
+        else:
+            record["kind"] = 1
+            # The charts' rows act on world positions; the records hold GPU-space ones.
+            rows = atlas.rows.copy()
+            rows[..., 3] += rows[..., :3] @ buffers.space.centre
+            rows[..., :3] /= buffers.space.scale
+            placements.append(placement_rows(own[0], rows, atlas.texel_area))
+            count += len(atlas.rows)
+            charts[receiver] = atlas
+    return MapLayout(size, np.concatenate(placements), receivers, tile_of, {r: w for r, _, w, _ in plans}, charts)
+
+
+def _extent(points: np.ndarray) -> Window:
+    return Window(points.min(axis=0), points.max(axis=0))
+
+
+def _grown(window: Window, share: float) -> Window:
+    margin = share * window.size + 1e-9
+    return Window(window.low - margin, window.high + margin)
+
+
+def _meet(a: Window, b: Window) -> Window | None:
+    low, high = np.maximum(a.low, b.low), np.minimum(a.high, b.high)
+    return Window(low, high) if np.all(high - low > 1e-12) else None
+
+
+def _extent_of_light(frame: PlaneFrame, extent: Window, landed: Landings) -> Window:
+    flat = frame.project(landed.positions)
+    return _meet(_grown(_quantile_box(flat, landed.flux_w, _QUANTILE), _MARGIN), extent) or extent
+
+
+def _with_aspect(window: Window, picture: tuple[int, int]) -> Window:
+    """The smallest window round `window` with the picture's aspect."""
+    centre, size = 0.5 * (window.low + window.high), window.size
+    aspect = picture[0] / picture[1]
+    half = 0.5 * np.maximum(size, np.array([size[1] * aspect, size[0] / aspect]))
+    return Window(centre - half, centre + half)
+
+
+def _quantile_box(points: np.ndarray, weights: np.ndarray, share: float) -> Window:
+    """Box that leaves out `share` of the weight at each end of each axis."""
+    low, high = np.empty(2), np.empty(2)
+    for axis in range(2):
+        order = np.argsort(points[:, axis])
+        running = np.cumsum(weights[order])
+        at = np.searchsorted(running, np.array([share, 1.0 - share]) * running[-1])
+        low[axis], high[axis] = points[order[np.minimum(at, len(order) - 1)], axis]
+    return Window(low, high)
+
+
+def _flat_windows(
+    camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, extent: Window, landed: Landings | None, picture: tuple[int, int] | None
+) -> list[Window]:
+    """Fine (where it pays) and coarse window, finest first."""
+    if landed is None or len(landed.positions) == 0:
+        return [extent]
+    flat = frame.project(landed.positions)
+    everything = _meet(_grown(_extent(flat), 0.02), extent) or extent
+    light = _meet(_grown(_quantile_box(flat, landed.flux_w, _QUANTILE), _MARGIN), extent) or everything
+    seen = _visible(camera, buffers, frame, picture) if picture is not None else None
+    fine = light if seen is None else _meet(light, _grown(seen, 0.02))
+    if fine is None:
+        return [everything]
+    if np.prod(fine.size) > 0.6 * np.prod(everything.size):
+        return [everything if seen is None else everything]
+    return [fine, everything]
+
+
+def _visible(camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, picture: tuple[int, int]) -> Window | None:
+    """Box of the plane's points that camera rays meet, or None where none does or the horizon is in view."""
+    origins, directions = camera_rays(camera, picture, grid=33)
+    origins = buffers.space.to_gpu(origins).reshape(-1, 3)
+    directions = directions.reshape(-1, 3)
+    normal = np.cross(frame.axes[0], frame.axes[1])
+    along = directions @ normal
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = ((frame.origin - origins) @ normal) / along
+    ahead = np.isfinite(distance) & (distance > 0)
+    if not ahead.any():
+        return None
+    points = origins[ahead] + distance[ahead, None] * directions[ahead]
+    return _extent(frame.project(points))
+
+
+def _tile_size(
+    camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, window: Window, picture: tuple[int, int] | None, largest: int
+) -> tuple[int, int]:
+    """Texels of a window: `TEXELS_PER_PIXEL` where the camera sees it, within `largest`."""
+    size = window.size
+    texel = np.max(size) / (512 if picture is None else largest)
+    if picture is not None:
+        # Pixels are smallest where the window comes nearest to the camera.
+        u, v = np.meshgrid(np.linspace(window.low[0], window.high[0], 9), np.linspace(window.low[1], window.high[1], 9))
+        points = frame.origin + np.stack([u.ravel(), v.ravel()], axis=-1) @ frame.axes
+        position = buffers.space.to_gpu(np.array(camera.position))
+        if camera.kind == "pinhole":
+            distance = np.linalg.norm(points - position, axis=1)
+            pixel = np.quantile(distance, 0.25) * 2 * np.tan(np.radians(0.5 * camera.vertical_fov_deg)) / picture[1]
+        else:
+            pixel = camera.vertical_extent * buffers.space.scale / picture[1]
+        texel = pixel / TEXELS_PER_PIXEL
+    count = np.ceil(size / texel)
+    count *= min(1.0, largest / count.max())
+    width, height = np.clip(count, MIN_TILE, largest).astype(int)
+    return int(width), int(height)
+
+
+def check_map_receiver(scene: Scene, buffers: SceneBuffers, name: str) -> int:
+    """Receiver index of the object called `name`; raises UserError naming the receivers there are."""
+    names = [scene.objects[i].name for i in buffers.receivers]
+    if name in names:
+        return names.index(name)
+    raise UserError(f"--layer map:{name}: no receiver has this name; there are: " + ", ".join(names))
