@@ -22,7 +22,7 @@ layout(std430, binding = 3) readonly buffer Receivers { Receiver receivers[]; };
 layout(std430, binding = 4) readonly buffer VarTables { float var_table[]; };
 layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };  // x_lo, x_hi, mean place of the light in it (0..1), unused
 layout(std430, binding = 6) buffer Outside { float outside_w[]; };
-layout(std430, binding = 7) buffer Counters { uint count_dropped; uint count_small; uint count_swept; uint count_unused; };
+layout(std430, binding = 7) buffer Counters { uint count_dropped; };
 
 const float TEXEL_VARIANCE = 1.0 / 12.0;
 // Standard deviations. Below the first two a splat is smaller than what a map can show: SMALL.
@@ -31,6 +31,7 @@ const float SMALL_SWEEP = 0.75;
 const float ACROSS_FLOOR = 0.1;
 // Sampling at texel centres needs this much blur where no box average does the work.
 const float SAMPLED_VARIANCE = 0.2;
+const float THIN_VARIANCE = 0.15;
 const float CUT = 3.0;
 const float MIN_SIGMA_TO_SWEEP = 1.0 / 256.0;
 const float MAX_SIGMA_TO_SWEEP = 64.0;
@@ -70,6 +71,9 @@ float grid_sum(vec2 centre, vec2 e, vec2 m, float shear, float box, float s2, fl
 
 // Throughput averaged over the band (piecewise linear through low end, anchor, high end).
 float mean_throughput(PhotonRecord photon) {
+#ifdef POINT_SPECTRUM
+    return photon.throughput.y;
+#else
     float width = photon.x_hi - photon.x_lo;
     if (width <= 0.0) {
         return photon.throughput.y;
@@ -77,13 +81,18 @@ float mean_throughput(PhotonRecord photon) {
     float below = (photon.throughput.x + photon.throughput.y) * (photon.x_anchor - photon.x_lo);
     float above = (photon.throughput.y + photon.throughput.z) * (photon.x_hi - photon.x_anchor);
     return 0.5 * (below + above) / width;
+#endif
 }
 
-SplatRecord small_splat(PhotonRecord photon, Footprint f, vec2 sweep_variance, float mean_place) {
+SplatRecord small_splat(PhotonRecord photon, Footprint f, vec4 band) {
     SplatRecord splat;
+    float cut = 0.0;
+#ifdef BAND_CUTS
+    cut = photon.x_hi > photon.x_lo && photon.x_hi - photon.x_lo < band.y - band.x - 1e-5 ? 1.0 : 0.0;
+#endif
     vec2 variance = f.axis_s * f.axis_s + f.axis_t * f.axis_t + f.chord * f.chord * TEXEL_VARIANCE;
     vec2 sigma = sqrt(max(variance, vec2(1e-4)));
-    splat.centre = f.centre + f.chord * (mean_place - 0.5);
+    splat.centre = f.centre + f.chord * (cut > 0.0 ? 0.0 : band.z - 0.5);
     splat.along = 0.5 + CUT * sigma;
     splat.across = SQRT_HALF / sigma;
     splat.amplitude = mean_throughput(photon);
@@ -92,7 +101,7 @@ SplatRecord small_splat(PhotonRecord photon, Footprint f, vec2 sweep_variance, f
     splat.y_box = 0.0;
     splat.throughput = vec4(photon.x_anchor, photon.throughput.y, 0.0, 0.0);
     splat.xi_range = vec2(photon.x_lo, photon.x_hi);
-    splat.xi_half = 0.0;
+    splat.xi_half = cut;
     splat.inverse_sigma_xi = 0.0;
     splat.kind = 1u;
     return splat;
@@ -103,22 +112,27 @@ SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
     vec3 cov = vec3(f.axis_s.x * f.axis_s.x + f.axis_t.x * f.axis_t.x, f.axis_s.x * f.axis_s.y + f.axis_t.x * f.axis_t.y,
                     f.axis_s.y * f.axis_s.y + f.axis_t.y * f.axis_t.y);  // xx, xy, yy
 
-    // Along the chord; along the footprint's long axis where there is none to speak of.
+    // The frame: along the chord. But a thin footprint must have its thin side across, where the texel's box is exact:
+    // along its long axis then, if the chord leaves that by less than half a texel (blurred, its colours as one).
     float sweep = length(f.chord);
-    vec2 e;
-    if (sweep > 1e-3 * sqrt(cov.x + cov.z) && sweep > 1e-4) {
-        e = f.chord / sweep;
+    float difference = 0.5 * (cov.x - cov.z);
+    float radius = sqrt(difference * difference + cov.y * cov.y);
+    vec2 e = difference >= 0.0 ? vec2(radius + difference, cov.y) : vec2(cov.y, radius - difference);
+    e = dot(e, e) > 0.0 ? normalize(e) : vec2(1.0, 0.0);
+    e *= dot(e, f.chord) < 0.0 ? -1.0 : 1.0;
+    float aside = abs(e.x * f.chord.y - e.y * f.chord.x);
+    float thin = 0.5 * (cov.x + cov.z) - radius;
+    float blur = 0.0;
+    if (sweep < 1e-4 || (thin < THIN_VARIANCE && aside < 0.5 && radius > aside * aside * TEXEL_VARIANCE)) {
+        sweep = dot(e, f.chord);
+        blur = aside * aside * TEXEL_VARIANCE;
     } else {
-        float d = 0.5 * (cov.x - cov.z);
-        float r = sqrt(d * d + cov.y * cov.y);
-        e = d >= 0.0 ? vec2(r + d, cov.y) : vec2(cov.y, r - d);
-        e = dot(e, e) > 0.0 ? normalize(e) : vec2(1.0, 0.0);
-        sweep = 0.0;
+        e = f.chord / sweep;
     }
     vec2 m = vec2(-e.y, e.x);
     float a = cov.x * e.x * e.x + 2.0 * cov.y * e.x * e.y + cov.z * e.y * e.y;
     float b = cov.x * e.x * m.x + cov.y * (e.x * m.y + e.y * m.x) + cov.z * e.y * m.y;
-    float c = cov.x * m.x * m.x + 2.0 * cov.y * m.x * m.y + cov.z * m.y * m.y;
+    float c = cov.x * m.x * m.x + 2.0 * cov.y * m.x * m.y + cov.z * m.y * m.y + blur;
 
     // A texel seen along its m direction is a trapezoid: a box as wide as its longer side and, for the shorter, a
     // Gaussian of the same variance. The box is kept exactly (no ripple over the grid), the rest is Gaussian.
@@ -177,4 +191,132 @@ SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
     splat.inverse_sigma_xi = SQRT_HALF * reach / sigma;
     splat.kind = 2u;
     return splat;
+}
+
+SplatRecord empty_splat() {
+    return SplatRecord(vec2(0.0), vec2(0.0), vec2(0.0), 0.0, 0.0, 0.0, 0.0, 0u, 0u, vec4(0.0), vec2(0.0), 0.0, 0.0, vec4(0.0));
+}
+
+Footprint footprint_in(Placement place, PhotonRecord photon, vec3 sweep_middle, vec3 sweep) {
+    Footprint f;
+    f.centre = to_texels(place, photon.position + sweep_middle) + vec2(place.row_u.w, place.row_v.w);
+    f.axis_s = smoothing * to_texels(place, photon.dposition_ds);
+    f.axis_t = smoothing * to_texels(place, photon.dposition_dt);
+    f.chord = to_texels(place, sweep);
+    return f;
+}
+
+SplatRecord splat_of(PhotonRecord photon, Footprint f, uint layer, vec4 band) {
+    vec2 d = vec2(dot(f.axis_s, f.axis_s), dot(f.axis_t, f.axis_t));
+    float cross_st = dot(f.axis_s, f.axis_t);
+    float major = 0.5 * (d.x + d.y) + sqrt(0.25 * (d.x - d.y) * (d.x - d.y) + cross_st * cross_st);
+    SplatRecord splat;
+    if (major < SMALL_STD * SMALL_STD && dot(f.chord, f.chord) < SMALL_SWEEP * SMALL_SWEEP) {
+        splat = small_splat(photon, f, band);
+    } else {
+        splat = swept_splat(photon, f, band);
+    }
+    splat.layer = layer;
+    return splat;
+}
+
+vec2 half_extent(SplatRecord splat) {
+    return splat.kind == 1u ? splat.along : abs(splat.along) + abs(splat.across);
+}
+
+bool touches(vec4 rect, vec2 centre, vec2 extent) {
+    return all(greaterThan(centre + extent, rect.xy)) && all(lessThan(centre - extent, rect.zw));
+}
+
+bool contains(vec4 rect, vec2 centre, float margin) {
+    return all(greaterThanEqual(centre, rect.xy + margin)) && all(lessThan(centre, rect.zw - margin));
+}
+
+bool bounded(vec2 v) {
+    // False for NaN and infinity too.
+    return abs(v.x) < extent_limit && abs(v.y) < extent_limit;
+}
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= photon_count) {
+        return;
+    }
+    PhotonRecord photon = photons[first_photon + i];
+    Receiver receiver = receivers[photon.receiver];
+    uint at = receiver.placement + (receiver.kind == 1u ? photon.triangle - receiver.first_triangle : 0u);
+    Placement place = placements[at];
+
+    vec3 to_lo = vec3(0.0);
+    vec3 to_hi = vec3(0.0);
+#if GROUPS > 0
+#define ADD_GROUP(g) { \
+        float anchor = spectral_variable(uint(g), photon.x_anchor); \
+        to_lo += photon.dposition_dvar##g.xyz * (spectral_variable(uint(g), photon.x_lo) - anchor); \
+        to_hi += photon.dposition_dvar##g.xyz * (spectral_variable(uint(g), photon.x_hi) - anchor); \
+    }
+    ADD_GROUP(0)
+#if GROUPS > 1
+    ADD_GROUP(1)
+#endif
+#if GROUPS > 2
+    ADD_GROUP(2)
+#endif
+#if GROUPS > 3
+    ADD_GROUP(3)
+#endif
+#endif
+    vec3 middle = 0.5 * (to_lo + to_hi);
+    vec3 sweep = to_hi - to_lo;
+    Footprint f = footprint_in(place, photon, middle, sweep);
+    bool accident = !(bounded(f.axis_s) && bounded(f.axis_t) && bounded(f.chord) && bounded(f.centre - to_texels(place, photon.position) - vec2(place.row_u.w, place.row_v.w)));
+    if (accident || (photon.flags & FLAG_FOOTPRINT_DROPPED) != 0u) {
+        photon.dposition_ds = vec3(0.0);
+        photon.dposition_dt = vec3(0.0);
+        middle = vec3(0.0);
+        sweep = vec3(0.0);
+        f = footprint_in(place, photon, middle, sweep);
+        atomicAdd(count_dropped, 1u);
+    }
+
+    uint light = photon.light_and_source & 255u;
+    uint band = (photon.light_and_source >> 8u) & 255u;
+    uint table = (light * classes + receiver.reflectance_class) * bands + band;
+    uint layer = table * uint(TARGETS);
+    vec4 table_band = table_bands[table];
+
+    SplatRecord fine = splat_of(photon, f, layer, table_band);
+    fine.rect = place.rect;
+    bool inside = contains(place.rect, f.centre, 0.0);
+    bool drawn = touches(place.rect, fine.centre, half_extent(fine));
+    if (!drawn) {
+        fine.kind = 0u;
+    }
+    uint slot = i * uint(SLOTS);
+    splats[slot] = fine;
+
+#if SLOTS == 2
+    SplatRecord coarse = empty_splat();
+    if (place.next != NONE) {
+        // The coarse map is read outside the fine window: up to its border, plus what a bilinear look-up there reaches.
+        Placement outer = placements[place.next];
+        float margin = 3.0 * sqrt(outer.texel_area / place.texel_area);
+        vec2 extent = half_extent(fine) + margin;
+        bool only_fine = all(greaterThan(fine.centre - extent, place.rect.xy)) && all(lessThan(fine.centre + extent, place.rect.zw));
+        Footprint g = footprint_in(outer, photon, middle, sweep);
+        inside = inside || contains(outer.rect, g.centre, 0.0);
+        if (!only_fine) {
+            coarse = splat_of(photon, g, layer, table_band);
+            coarse.rect = outer.rect;
+            if (!touches(outer.rect, coarse.centre, half_extent(coarse))) {
+                coarse.kind = 0u;
+            }
+        }
+    }
+    splats[slot + 1u] = coarse;
+#endif
+
+    if (!inside) {
+        outside_w[i] += photon.flux_w;
+    }
 }

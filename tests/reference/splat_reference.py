@@ -16,20 +16,19 @@ def splat_image(
     chord: np.ndarray,
     places: np.ndarray,
     energies: np.ndarray,
-    subtexels: int = 6,
-    pixel: bool = True,
 ) -> np.ndarray:
     """Energy per texel (height, width, channels), float64.
 
     `centre` (2,) of the chord and `chord` (2,) in texels; `covariance` (2, 2) texel²; `places` (n,) from -½ to ½ along the
-    chord with `energies` (n, channels). Each texel holds the mean of subtexels² samples.
+    chord with `energies` (n, channels). A texel is the sum of samples no further apart than the Gaussian's narrow
+    standard deviation, where the midpoint rule errs by 2 exp(-2 pi²) = 5e-9.
     """
+    narrow = np.sqrt(np.linalg.eigvalsh(covariance)[0])
+    subtexels = max(2, int(np.ceil(1.0 / narrow)))
     width, height = size
     step = 1.0 / subtexels
-    # A sample stands for a small square: its variance is added so that the narrowest Gaussians stay resolved.
-    blurred = np.asarray(covariance, np.float64) + np.eye(2) * step**2 / 3.0
-    inverse = np.linalg.inv(blurred)
-    norm = step**2 / (2.0 * np.pi * np.sqrt(np.linalg.det(blurred)))
+    inverse = np.linalg.inv(covariance)
+    norm = step**2 / (2.0 * np.pi * np.sqrt(np.linalg.det(covariance)))
     x = (np.arange(width * subtexels) + 0.5) * step
     y = (np.arange(height * subtexels) + 0.5) * step
     grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)

@@ -1,0 +1,238 @@
+"""Spectra as splats see them: a band of light, weighted per channel, blurred by the splat's width.
+
+Along its sweep a splat is its band's spectrum convolved with a Gaussian, so a fragment's
+colour is one look-up by (place xi, Gaussian's standard deviation / sweep length). The tables are exact in
+float64: the integral of every small cell of the spectrum comes from its running integral, lines keep their
+wavelength, and what the cut at three standard deviations leaves out is given back to each cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from app.model.colorimetry import K_M, VISIBLE_NM, cmf_xyz
+from app.model.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative
+from app.model.spectrum import Spectrum, cmf_at
+
+if TYPE_CHECKING:
+    import moderngl
+
+CUT = 3.0
+"""Standard deviations that a splat reaches beyond its sweep (as in footprint.comp)."""
+ROWS_PER_OCTAVE = 4
+SIGMAS = 2.0 ** (np.arange(14 * ROWS_PER_OCTAVE + 1) / ROWS_PER_OCTAVE - 8.0)
+"""Standard deviation / sweep length of each row, 2^-8 to 2^6 (as in footprint.comp)."""
+WIDTH, WIDTH_WITH_LINES = 256, 1024
+"""Samples along xi; a line needs more, since nothing but the splat's width blurs it."""
+DENSITY_CELLS, CUMULATIVE_SAMPLES = 1024, 2049
+
+Channels = Literal["xyz"] | Sequence[float]
+
+
+@dataclass(frozen=True)
+class SplatTables:
+    """GPU tables of every (light, reflectance class, band). Layers: ((light · classes + class) · bands + band) · targets + g."""
+
+    texture: moderngl.TextureArray
+    """RGBA32F (layers, rows, width): T(xi), whose integral over xi in [-1, 1] is the band's energy."""
+    band_buffer: moderngl.Buffer
+    """vec4 per (light, class, band): x_lo, x_hi, mean place of the energy in the band (0–1), 0."""
+    integral_buffer: moderngl.Buffer
+    """vec4 per layer: energy of the band."""
+    density_buffer: moderngl.Buffer
+    """vec4 per (light, class, target) and cell of x: mean energy density over x."""
+    cumulative_buffer: moderngl.Buffer
+    """vec4 per (light, class, target) and sample of x: energy below x."""
+    classes: int
+    bands: int
+    targets: int
+    rows: int
+    width: int
+
+    @classmethod
+    def build(
+        cls,
+        ctx: moderngl.Context,
+        axis: SpectralAxis,
+        lights: Sequence[Spectrum],
+        reflectances: Sequence[np.ndarray | None],
+        bands: Sequence[Sequence[tuple[float, float]]],
+        channels: Channels = "xyz",
+    ) -> SplatTables:
+        """Tables for the lights' spectra under each reflectance (401,) or None.
+
+        `bands[light]`: (x_lo, x_hi) of its bands; a band of no width stands for a line. Lights with fewer
+        bands than others are padded with empty ones. `channels`: "xyz" stores X, Y, Z (lm) and radiant W;
+        else ascending wavelengths in nm, the edges of the bins, and each bin's W, four bins a target.
+        """
+        import moderngl
+
+        band_count = max(len(of_light) for of_light in bands)
+        columns = 4 if channels == "xyz" else 4 * -(-(len(channels) - 1) // 4)
+        targets = columns // 4
+        width = WIDTH_WITH_LINES if any(light.lines for light in lights) else WIDTH
+        shape = (len(lights), len(reflectances), band_count)
+        texels = np.zeros((*shape, targets, len(SIGMAS), width, 4), np.float32)
+        integrals = np.zeros((*shape, targets, 4), np.float32)
+        spans = np.zeros((*shape, 4), np.float32)
+        density = np.zeros((*shape[:2], targets, DENSITY_CELLS, 4), np.float32)
+        running = np.zeros((*shape[:2], targets, CUMULATIVE_SAMPLES, 4), np.float32)
+        for i, light in enumerate(lights):
+            for j, reflectance in enumerate(reflectances):
+                source = _Source.of(axis, light, reflectance, channels, columns)
+                density[i, j] = _by_target(source.density(), targets)
+                running[i, j] = _by_target(source.cumulative(np.linspace(0.0, 1.0, CUMULATIVE_SAMPLES)), targets)
+                edges = np.array(bands[i], np.float64)
+                count = len(edges)
+                table, energy, place = source.blurred(edges, width)
+                texels[i, j, :count] = table.reshape(len(SIGMAS), width, count, targets, 4).transpose(2, 3, 0, 1, 4)
+                integrals[i, j, :count] = energy.reshape(count, targets, 4)
+                spans[i, j, :count] = np.column_stack([edges, place, np.zeros(count)])
+        texture = ctx.texture_array((width, len(SIGMAS), texels[..., 0, 0, 0].size), 4, texels, dtype="f4")
+        texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        texture.repeat_x = texture.repeat_y = False
+        buffers = (ctx.buffer(np.ascontiguousarray(a)) for a in (spans, integrals, density, running))
+        return cls(texture, *buffers, classes=shape[1], bands=band_count, targets=targets, rows=len(SIGMAS), width=width)
+
+    def release(self) -> None:
+        for resource in (self.texture, self.band_buffer, self.integral_buffer, self.density_buffer, self.cumulative_buffer):
+            resource.release()
+
+
+def _by_target(values: np.ndarray, targets: int) -> np.ndarray:
+    """(n, 4 targets) -> (targets, n, 4)."""
+    return values.reshape(len(values), targets, 4).transpose(1, 0, 2)
+
+
+@dataclass(frozen=True)
+class _Source:
+    """One light under one reflectance: a running integral without its lines, and the lines."""
+
+    smooth: CumulativeSpectrum
+    line_x: np.ndarray
+    line_energy: np.ndarray
+    """float64 (lines, columns)."""
+
+    @classmethod
+    def of(cls, axis: SpectralAxis, light: Spectrum, reflectance: np.ndarray | None, channels: Channels, columns: int) -> _Source:
+        folded = np.ones(401) if reflectance is None else np.asarray(reflectance, np.float64)
+        smooth = cumulative(axis, Spectrum(light.density * folded), _cell_weights(channels, columns))
+        line_nm, power = np.array(light.lines, np.float64).reshape(-1, 2).T
+        weights = _line_weights(line_nm, channels, columns)
+        energy = (power * np.interp(line_nm, VISIBLE_NM, folded))[:, None] * weights
+        return cls(smooth, np.atleast_1d(axis.x_of_nm(line_nm)), energy)
+
+    def cumulative(self, x: np.ndarray) -> np.ndarray:
+        """Energy up to and with each x: (n, columns)."""
+        steps = (self.line_x[None, :] <= x[:, None]).astype(np.float64) @ self.line_energy
+        return self.smooth.at(x) + steps
+
+    def density(self) -> np.ndarray:
+        """Mean energy per unit of x in each cell: (cells, columns)."""
+        edges = np.linspace(0.0, 1.0, DENSITY_CELLS + 1)
+        cell = np.minimum((self.line_x * DENSITY_CELLS).astype(int), DENSITY_CELLS - 1)
+        energy = np.diff(self.smooth.at(edges), axis=0)
+        np.add.at(energy, cell, self.line_energy)
+        return energy * DENSITY_CELLS
+
+    def blurred(self, edges: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """T for each row: (rows, width, bands · columns); energies (bands, columns); mean places (bands,)."""
+        columns = self.line_energy.shape[1]
+        lo, hi = edges[:, :1], edges[:, 1:]
+        lines = self._lines_of_bands(edges)
+        masses: dict[int, np.ndarray] = {}
+        rows = []
+        for sigma in SIGMAS:
+            cells = _cells(sigma)
+            if cells not in masses:
+                x = lo + (hi - lo) * np.linspace(0.0, 1.0, cells + 1)
+                masses[cells] = np.diff(self.smooth.at(x), axis=1).transpose(1, 0, 2).reshape(cells, -1)
+            row = _kernels(width)[cells, float(sigma)] @ masses[cells]
+            for band, place, energy in lines:
+                row[:, band * columns : (band + 1) * columns] += _kernel(width, sigma, np.array([place]), sigma) * energy
+            rows.append(row)
+        finest = masses[max(masses)].reshape(-1, len(edges), columns)
+        energies = finest.sum(axis=0)
+        places = (np.arange(len(finest)) + 0.5) / len(finest)
+        weight_channel = 1 if columns == 4 else slice(None)
+        weights = finest[..., weight_channel].reshape(len(finest), len(edges), -1).sum(axis=-1)
+        moments, totals = places @ weights, weights.sum(axis=0)
+        for band, place, energy in lines:
+            energies[band] += energy
+            moments[band] += place * np.sum(energy[weight_channel])
+            totals[band] += np.sum(energy[weight_channel])
+        lit = totals > 0.0
+        mean = np.where(lit, moments / np.where(lit, totals, 1.0), 0.5)
+        return np.array(rows), energies, mean
+
+    def _lines_of_bands(self, edges: np.ndarray) -> list[tuple[int, float, np.ndarray]]:
+        """(band, place in it, energy) of each line in each band, ends (lo, hi] so that none counts twice."""
+        found = []
+        for band, (lo, hi) in enumerate(edges):
+            for x, energy in zip(self.line_x, self.line_energy, strict=True):
+                if hi - lo < 1e-9:
+                    if abs(x - lo) < 1e-6:
+                        found.append((band, 0.5, energy))
+                elif lo < x <= hi or (x == 0.0 and lo == 0.0):
+                    found.append((band, (x - lo) / (hi - lo), energy))
+        return found
+
+
+def _cell_weights(channels: Channels, columns: int) -> np.ndarray:
+    """Channel weights of each 1 nm cell: (401, columns)."""
+    if channels == "xyz":
+        return np.column_stack([K_M * cmf_xyz(), np.ones(401)])
+    cell_lo = np.maximum(VISIBLE_NM - 0.5, VISIBLE_NM[0])
+    cell_hi = np.minimum(VISIBLE_NM + 0.5, VISIBLE_NM[-1])
+    edges = np.asarray(channels, np.float64)
+    overlap = np.minimum(cell_hi[:, None], edges[1:]) - np.maximum(cell_lo[:, None], edges[:-1])
+    weights = np.zeros((401, columns))
+    weights[:, : len(edges) - 1] = np.clip(overlap, 0.0, None) / (cell_hi - cell_lo)[:, None]
+    return weights
+
+
+def _line_weights(line_nm: np.ndarray, channels: Channels, columns: int) -> np.ndarray:
+    """Channel weights at exact wavelengths: (lines, columns)."""
+    if channels == "xyz":
+        return np.column_stack([K_M * cmf_at(line_nm), np.ones(len(line_nm))])
+    edges = np.asarray(channels, np.float64)
+    weights = np.zeros((len(line_nm), columns))
+    at = np.searchsorted(edges, line_nm, side="right") - 1
+    at = np.where(line_nm == edges[-1], len(edges) - 2, at)
+    inside = (at >= 0) & (at < len(edges) - 1)
+    weights[np.flatnonzero(inside), at[inside]] = 1.0
+    return weights
+
+
+def _cells(sigma: float) -> int:
+    """Cells of a band, each at most half a standard deviation wide."""
+    return max(4, int(np.ceil(2.0 / sigma)))
+
+
+@lru_cache(maxsize=2)
+def _kernels(width: int) -> dict[tuple[int, float], np.ndarray]:
+    """(cells, sigma) -> (width, cells): what a unit of energy in each cell of a band gives at each xi.
+
+    A cell stands for a uniform density over it: a Gaussian at its middle with the cell's variance added, which
+    is right to fourth order. The same for all spectra.
+    """
+    kernels = {}
+    for sigma in SIGMAS:
+        cells = _cells(sigma)
+        places = (np.arange(cells) + 0.5) / cells
+        kernels[cells, float(sigma)] = _kernel(width, sigma, places, np.sqrt(sigma**2 + 1.0 / (12.0 * cells**2)))
+    return kernels
+
+
+def _kernel(width: int, sigma: float, places: np.ndarray, blur: float) -> np.ndarray:
+    """Gaussians of standard deviation `blur` about `places`, over xi of the row `sigma`, each of unit integral."""
+    xi = np.linspace(-1.0, 1.0, width)
+    distance = (0.5 + (0.5 + CUT * sigma) * xi[:, None] - places) / blur
+    kernel = np.exp(-0.5 * distance * distance)
+    integral = (kernel.sum(axis=0) - 0.5 * (kernel[0] + kernel[-1])) * (xi[1] - xi[0])
+    return kernel / integral

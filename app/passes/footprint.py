@@ -1,0 +1,146 @@
+"""From photon records to splat records: where each photon's light lies in the caustic maps.
+
+One thread a photon, slots in photon order (never compacted with atomics), so that the sum of
+floating-point splats, and with it the picture, depends on nothing but the photons. What the
+vertex and the fragment shaders need is worked out here once a splat, not once a vertex.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from app.gpu import shader
+from app.gpu.records import FLAG_FOOTPRINT_DROPPED, NONE, PLACEMENT, RECEIVER, photon_record
+from app.gpu.schema import Field, Struct
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from app.gpu.map_atlas import MapAtlas
+    from app.gpu.splat_tables import SplatTables
+
+KIND_NONE, KIND_SMALL, KIND_SWEPT = 0, 1, 2
+WORKGROUP = 64
+
+SPLAT = Struct(
+    "SplatRecord",
+    (
+        Field("centre", "vec2", "middle of the swept chord, atlas texels"),
+        Field("along", "vec2", "swept: texels per unit of xi; small: half extents in texels"),
+        Field("across", "vec2", "swept: texels per unit of eta (edge at 1); small: 1 / (sqrt(2) sigma) along x, y, 1/texel"),
+        Field("amplitude", "float", "swept: 1/texel², all normalisation; small: mean throughput"),
+        Field("table_row", "float", "swept: texture coordinate of sigma over sweep length"),
+        Field("y_edge", "float", "swept: across half extent, units of sqrt(2) standard deviations"),
+        Field("y_box", "float", "swept: half width of the texel across, same units"),
+        Field("layer", "uint", "first layer of the spectral tables"),
+        Field("kind", "uint", "0 nothing, 1 small, 2 swept"),
+        Field("throughput", "vec4", "xi (point spectrum: x) of the anchor, value there, slope below and above it per unit of xi"),
+        Field("xi_range", "vec2", "the photon's band in xi (small: in x)"),
+        Field("xi_half", "float", "half of the table's band in xi (small: 1 where the band was cut, else 0)"),
+        Field("inverse_sigma_xi", "float", "1 / (sqrt(2) standard deviation along, in xi)"),
+        Field("rect", "vec4", "x0, y0, x1, y1: nothing is drawn outside, atlas texels"),
+    ),
+)
+"""A splat, ready to be drawn. xi runs over [-1, 1] from end to end of the whole band's smeared sweep."""
+
+PARAMETERS = Struct(
+    "FootprintParameters",
+    (
+        Field("first_photon", "uint", "index in the photon buffer of the group's first record"),
+        Field("photon_count", "uint", "records in the group"),
+        Field("classes", "uint", "reflectance classes of the tables"),
+        Field("bands", "uint", "bands per light of the tables"),
+        Field("var_samples", "uint", "samples per spectral group"),
+        Field("table_rows", "uint", "rows of the spectral tables"),
+        Field("smoothing", "float", "standard deviation of a footprint in lattice spacings"),
+        Field("extent_limit", "float", "texels; anything larger is a numerical accident"),
+    ),
+)
+
+
+class SplatFeatures(Protocol):
+    """What decides the programs' variant (a part of `app.model.features.Features`)."""
+
+    @property
+    def spectral_groups(self) -> int: ...
+    @property
+    def band_cuts(self) -> bool: ...
+    @property
+    def nested_windows(self) -> bool: ...
+    @property
+    def targets(self) -> int: ...
+    @property
+    def point_spectrum(self) -> bool: ...
+
+
+def splat_defines(features: SplatFeatures) -> dict[str, int]:
+    """Defines common to every program of the splat half."""
+    defines = {"TARGETS": features.targets, "SLOTS": 2 if features.nested_windows else 1}
+    if features.band_cuts:
+        defines["BAND_CUTS"] = 1
+    if features.point_spectrum:
+        defines["POINT_SPECTRUM"] = 1
+    return defines
+
+
+class Footprints:
+    """Owns the splat record buffer and the counts of what could not be drawn as asked."""
+
+    def __init__(self, ctx: moderngl.Context, features: SplatFeatures, group: int) -> None:
+        """`group`: the most photons one dispatch covers."""
+        groups = features.spectral_groups
+        defines = splat_defines(features) | {
+            "WORKGROUP": WORKGROUP,
+            "GROUPS": groups,
+            "NONE": f"{NONE}u",
+            "FLAG_FOOTPRINT_DROPPED": f"{FLAG_FOOTPRINT_DROPPED}u",
+        }
+        structs = (photon_record(groups), PLACEMENT, RECEIVER, SPLAT)
+        self._program = shader.compute(ctx, "footprint.comp", defines, structs)
+        self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
+        self._outside = ctx.buffer(np.zeros(group, np.float32))
+        self._counters = ctx.buffer(np.zeros(1, np.uint32))
+        self._group = group
+        self.slots_per_photon = defines["SLOTS"]
+        self.splats = ctx.buffer(reserve=group * self.slots_per_photon * SPLAT.stride)
+
+    def run(
+        self,
+        photons: moderngl.Buffer,
+        first: int,
+        count: int,
+        var_table: moderngl.Buffer,
+        tables: SplatTables,
+        atlas: MapAtlas,
+        receivers: moderngl.Buffer,
+        smoothing: float,
+        extent_limit: float,
+        var_samples: int,
+    ) -> None:
+        """Fill slots [0, count * slots_per_photon) from photons [first, first + count)."""
+        values = PARAMETERS.zeros(1)
+        values[0] = (first, count, tables.classes, tables.bands, var_samples, tables.rows, smoothing, extent_limit)
+        self._parameters.write(values.tobytes())
+        self._parameters.bind_to_uniform_block(0)
+        for binding, buffer in enumerate(
+            (photons, self.splats, atlas.placements, receivers, var_table, tables.band_buffer, self._outside, self._counters)
+        ):
+            buffer.bind_to_storage_buffer(binding)
+        self._program.run(group_x=-(-count // WORKGROUP))
+
+    def counts(self) -> dict[str, float]:
+        """Since the last reset: `outside_map_w` (flux of photons whose centre no window holds, W),
+        `footprints_dropped` (numbers of photons)."""
+        outside = np.frombuffer(self._outside.read(), np.float32).sum(dtype=np.float64)
+        dropped = int(np.frombuffer(self._counters.read(), np.uint32)[0])
+        return {"outside_map_w": float(outside), "footprints_dropped": dropped}
+
+    def reset_counts(self) -> None:
+        self._outside.clear()
+        self._counters.clear()
+
+    def release(self) -> None:
+        for resource in (self._program, self._parameters, self._outside, self._counters, self.splats):
+            resource.release()

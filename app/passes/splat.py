@@ -1,0 +1,133 @@
+"""Draws splat records into the caustic maps: additive blending, two programs, fixed order.
+
+Small splats and swept ones have a program each because a software renderer runs both sides of a branch. A group of
+photons is made into splats and drawn before the next, so the splat records of a few ten thousand photons are all
+that exists at a time, and the order of all sums is the photons' own order.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.gpu import shader
+from app.gpu.schema import Field, Struct
+from app.passes.footprint import SPLAT, Footprints, SplatFeatures, splat_defines
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from app.gpu.map_atlas import MapAtlas
+    from app.gpu.splat_tables import SplatTables
+
+GROUP = 1 << 15
+"""Photons turned to splats and drawn at a time."""
+CHUNK = 1 << 18
+"""Photons between two flushes of the scratch textures; a multiple of GROUP."""
+EXTENT_LIMIT = 8192.0
+"""Texels. A footprint axis or a sweep beyond twice the largest map is a numerical accident."""
+
+PARAMETERS = Struct(
+    "DrawParameters",
+    (
+        Field("atlas_size", "vec2", "texels"),
+        Field("table_u", "vec2", "texture u = x * xi + y"),
+        Field("bands", "uint", ""),
+        Field("density_cells", "uint", ""),
+        Field("cumulative_samples", "uint", ""),
+        Field("reserved", "uint", ""),
+    ),
+)
+
+
+class Splatter:
+    """The splat pass of one scene's features."""
+
+    def __init__(self, ctx: moderngl.Context, features: SplatFeatures) -> None:
+        self._ctx = ctx
+        self._features = features
+        self._footprints = Footprints(ctx, features, GROUP)
+        defines = splat_defines(features)
+        self._small = shader.program(ctx, "splat.vert", "splat_small.frag", defines | {"SMALL": 1}, (SPLAT,))
+        self._swept = shader.program(ctx, "splat.vert", "splat_swept.frag", defines | {"SWEPT": 1}, (SPLAT,))
+        slots = GROUP * self._footprints.slots_per_photon
+        corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(slots, dtype=np.uint32)[:, None]
+        self._indices = ctx.buffer(corners)
+        self._draw_small = ctx.vertex_array(self._small, [], index_buffer=self._indices)
+        self._draw_swept = ctx.vertex_array(self._swept, [], index_buffer=self._indices)
+        self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
+
+    def run(
+        self,
+        photons: moderngl.Buffer,
+        count: int,
+        var_table: moderngl.Buffer,
+        tables: SplatTables,
+        atlas: MapAtlas,
+        receivers: moderngl.Buffer,
+        smoothing: float = 0.6,
+    ) -> None:
+        """Deposit photons [0, count) of `photons` (photon_record(groups)).
+
+        `var_table`: float32 (groups, samples) of each group's variable at equally spaced x; `receivers`: RECEIVER
+        records; `smoothing`: standard deviation of a footprint in lattice spacings.
+        """
+        groups = max(self._features.spectral_groups, 1)
+        samples = var_table.size // 4 // groups
+        for first in range(0, count, GROUP):
+            part = min(GROUP, count - first)
+            self._ctx.memory_barrier()
+            self._footprints.run(photons, first, part, var_table, tables, atlas, receivers, smoothing, EXTENT_LIMIT, samples)
+            self._ctx.memory_barrier()
+            self._draw(part, tables, atlas)
+            atlas.pending += part
+            if atlas.pending >= CHUNK:
+                atlas.flush()
+        error = self._ctx.error
+        if error != "GL_NO_ERROR":
+            raise RuntimeError(f"{error} while splatting {count} photons into a {atlas.size[0]} x {atlas.size[1]} atlas")
+
+    def _draw(self, photons: int, tables: SplatTables, atlas: MapAtlas) -> None:
+        import moderngl
+
+        from app.gpu.splat_tables import CUMULATIVE_SAMPLES, DENSITY_CELLS
+
+        ctx = self._ctx
+        values = PARAMETERS.zeros(1)
+        scale = 0.5 * (tables.width - 1) / tables.width
+        values[0] = (atlas.size, (scale, 0.5), tables.bands, DENSITY_CELLS, CUMULATIVE_SAMPLES, 0)
+        self._parameters.write(values.tobytes())
+        self._parameters.bind_to_uniform_block(0)
+        curve = tables.density_buffer if self._features.point_spectrum else tables.cumulative_buffer
+        for binding, buffer in ((1, self._footprints.splats), (5, tables.band_buffer), (6, tables.integral_buffer), (7, curve)):
+            buffer.bind_to_storage_buffer(binding)
+        tables.texture.use(0)
+        atlas.framebuffer.use()
+        ctx.enable_only(moderngl.BLEND)
+        ctx.blend_equation = moderngl.FUNC_ADD
+        ctx.blend_func = moderngl.ONE, moderngl.ONE
+        vertices = 6 * photons * self._footprints.slots_per_photon
+        self._draw_small.render(moderngl.TRIANGLES, vertices=vertices)
+        for plane in range(4):
+            ctx.enable_direct(_CLIP_DISTANCE0 + plane)
+        self._draw_swept.render(moderngl.TRIANGLES, vertices=vertices)
+        for plane in range(4):
+            ctx.disable_direct(_CLIP_DISTANCE0 + plane)
+        ctx.enable_only(moderngl.NOTHING)
+
+    def counts(self) -> dict[str, float]:
+        """Since the last reset: `outside_map_w` (flux of photons whose centre no map holds, W) and
+        `footprints_dropped` (photons splatted as one texel for want of a usable footprint)."""
+        return self._footprints.counts()
+
+    def reset_counts(self) -> None:
+        self._footprints.reset_counts()
+
+    def release(self) -> None:
+        for resource in (self._draw_small, self._draw_swept, self._small, self._swept, self._indices, self._parameters):
+            resource.release()
+        self._footprints.release()
+
+
+_CLIP_DISTANCE0 = 0x3000
