@@ -16,7 +16,7 @@ import numpy as np
 
 from app.gpu import records
 from app.gpu.context import Context
-from app.gpu.map_atlas import MapAtlas
+from app.gpu.map_atlas import MapAtlas, Tile
 from app.gpu.scene_buffers import SceneBuffers
 from app.gpu.splat_tables import SplatTables
 from app.model.features import Features
@@ -274,6 +274,10 @@ class LightHalf:
             area = self.layout.placements["texel_area"][record["placement"]]
             sides.append(np.sqrt(area) * self.buffers.space.scale)
         return np.array(sides)
+
+    def resolved_tile(self, tile: Tile) -> np.ndarray:
+        """A tile of the summed maps: float32 (height, width, channels), row 0 at texel y = 0."""
+        return self.atlas.read_tile(tile)
 
     def finish(self) -> None:
         """Sum what is pending and fetch the counters."""

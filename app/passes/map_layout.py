@@ -8,6 +8,7 @@ charts. All of them are tiles of one atlas.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,9 +17,11 @@ from app.gpu.map_atlas import Tile, pack, placement_rows
 from app.gpu.records import NONE, RECEIVER
 from app.gpu.scene_buffers import SceneBuffers
 from app.model.camera_rays import camera_rays
-from app.model.charts import ChartAtlas, build_charts
 from app.model.features import is_flat
 from app.model.scene import Camera, Diffuse, Scene
+
+if TYPE_CHECKING:
+    from app.model.charts import ChartAtlas
 
 FINE_TILE_MAX = 2048
 COARSE_TILE_MAX = 768
@@ -121,6 +124,8 @@ def layout_maps(
         else:
             lit = landed is not None or receiver == map_receiver
             side = int(np.clip((picture or (512, 512))[0], 256, 1024)) if lit else 64
+            from app.model.charts import build_charts
+
             atlas = build_charts(buffers.world_meshes[object_index], total_texels=side * side)
             sizes.append((atlas.width, atlas.height))
             plans.append((receiver, None, [], atlas))

@@ -1,0 +1,184 @@
+"""One rendering, top to bottom: file's Scene → Features → buffers → light half → eye half → picture."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from app.gpu.context import Context, create_context
+from app.gpu.scene_buffers import SceneBuffers
+from app.light_half import LightHalf, LightStats, spectral_axis
+from app.model.colorimetry import xyz_to_rgb709
+from app.model.features import Features
+from app.model.scene import Scene
+from app.model.settings import RenderSettings
+
+FIRST_PASS_PHOTONS = 1 << 17
+"""Lattice of a timed rendering's first pass; each next one is twice as fine, up to the last."""
+LAST_PASS_PHOTONS = 1 << 22
+
+Progress = Callable[[float, str], None]
+Cancelled = Callable[[], bool]
+
+
+@dataclass
+class RenderStats:
+    """What was done, for the summary line and `--stats`."""
+
+    renderer: str
+    is_software: bool
+    light: LightStats
+    seconds: float = 0.0
+    prepare_seconds: float = 0.0
+    eye_seconds: float = 0.0
+    passes: int = 0
+    atlas_size: tuple[int, int] = (0, 0)
+    bytes: int = 0
+    map_flux_w: float = 0.0
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def photons(self) -> int:
+        """Photons emitted."""
+        return self.light.photons
+
+    @property
+    def splats(self) -> int:
+        """Photons that landed and were splatted."""
+        return self.light.splats
+
+    def lines(self) -> list[str]:
+        """The energy balance and the times, one line each."""
+        tally = self.light.tally
+        total = tally.emitted or 1.0
+        text = [f"emitted             {tally.emitted:.6e} W of scene flux per pass weight"]
+        text += [f"  {name:<17} {flux / total:10.6f}" for name, flux in tally.ended.items()]
+        text += [
+            f"  {'roulette':<17} {tally.roulette / total:10.6f}",
+            f"  {'unaccounted':<17} {tally.imbalance:10.2e}   (emitted − all of the above)",
+            f"map holds           {self.map_flux_w / max(tally.ended['deposited'], 1e-300):10.6f} of what was deposited; "
+            f"outside every map {self.light.outside_map_w / max(tally.ended['deposited'], 1e-300):.6f}",
+            "fall-backs          " + ", ".join(f"{name} {count}" for name, count in tally.fallbacks.items())
+            + f", splat_footprint_dropped {self.light.footprints_dropped}",
+            "bands               " + ", ".join(f"{name} {count}" for name, count in self.light.bands.items()),
+            f"maps                {self.atlas_size[0]}×{self.atlas_size[1]} texels, buffers {self.bytes / 2**20:.0f} MiB",
+            f"seconds             prepare {self.prepare_seconds:.2f}, emit and trace {self.light.trace_seconds:.2f}, "
+            f"splat {self.light.splat_seconds:.2f}, eye {self.eye_seconds:.2f}, all {self.seconds:.2f}",
+        ]
+        return text + self.notes
+
+
+@dataclass(frozen=True)
+class RenderResult:
+    """A finished picture."""
+
+    rgb: np.ndarray
+    """float32 (H, W, 3), linear Rec.709, lm/(sr unit²) for white; top row first."""
+    spectral: np.ndarray | None
+    """float32 (H, W, bins), W/(sr unit²) per bin, or None."""
+    bin_edges_nm: np.ndarray | None
+    stats: RenderStats
+
+
+def render(
+    scene: Scene,
+    settings: RenderSettings,
+    progress: Progress = lambda fraction, text: None,
+    cancelled: Cancelled = lambda: False,
+    context: Context | None = None,
+) -> RenderResult:
+    """Render `scene`. What was done when `cancelled()` turned true is kept and shown."""
+    started = time.perf_counter()
+    own = context is None
+    context = context or create_context()
+    try:
+        return _render(context, scene, settings, progress, cancelled, started)
+    finally:
+        if own:
+            context.release()
+
+
+def _render(context: Context, scene: Scene, settings: RenderSettings, progress: Progress, cancelled: Cancelled, started: float) -> RenderResult:
+    progress(0.0, "preparing")
+    features = Features.of(scene, settings)
+    buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+    light = LightHalf(context, scene, settings, features, buffers)
+    stats = RenderStats(context.renderer, context.is_software, light.stats)
+    try:
+        light.prepare()
+        stats.prepare_seconds = time.perf_counter() - started
+        stats.passes = _trace_and_splat(light, scene, settings, progress, cancelled)
+        light.finish()
+        stats.atlas_size = light.layout.size
+        stats.bytes = buffers.bytes + light.trace.bytes
+        eye_started = time.perf_counter()
+        if settings.layer.startswith("map:"):
+            channels = _map_layer(light)
+        else:
+            channels = _eye_layer(context, scene, settings, features, buffers, light, progress, cancelled)
+        stats.eye_seconds = time.perf_counter() - eye_started
+        stats.seconds = time.perf_counter() - started
+        total = light.atlas.read_total()
+        stats.map_flux_w = float(total[..., 3].sum(dtype=float)) if settings.bins is None else float(total.sum(dtype=float))
+        rgb, spectral = _to_picture(channels, light)
+        return RenderResult(rgb, spectral, light.bin_edges_nm, stats)
+    finally:
+        light.release()
+        buffers.release()
+
+
+def _trace_and_splat(light: LightHalf, scene: Scene, settings: RenderSettings, progress: Progress, cancelled: Cancelled) -> int:
+    """Passes of shifted lattices until the photons or the seconds are spent; returns their number."""
+    if settings.seconds is None:
+        def proceed(fraction: float) -> bool:
+            progress(0.9 * fraction, "tracing photons")
+            return not cancelled()
+
+        light.run_pass(0, settings.photons or scene.render.photons, proceed)
+        return 1
+    begun = time.perf_counter()
+    budget = settings.seconds
+
+    def in_time(_: float) -> bool:
+        spent = (time.perf_counter() - begun) / budget
+        progress(0.9 * min(spent, 1.0), "tracing photons")
+        return spent < 1.0 and not cancelled()
+
+    number, photons = 0, FIRST_PASS_PHOTONS
+    while light.run_pass(number, photons, in_time) and in_time(0.0):
+        number += 1
+        photons = min(2 * photons, LAST_PASS_PHOTONS)
+    return number + 1
+
+
+def _map_layer(light: LightHalf) -> np.ndarray:
+    """The caustic map itself as a picture: irradiance on the receiver, channels (H, W, C)."""
+    receiver = light.map_receiver
+    assert receiver is not None
+    tile = light.layout.tiles[receiver][0]
+    record = light.layout.receivers[receiver]
+    area = light.layout.placements["texel_area"][record["placement"]]
+    return light.resolved_tile(tile)[::-1] * (light.map_scale / area)
+
+
+def _eye_layer(
+    context: Context, scene: Scene, settings: RenderSettings, features: Features, buffers: SceneBuffers, light: LightHalf, progress: Progress, cancelled: Cancelled
+) -> np.ndarray:
+    from app.passes.eye import EyePass
+
+    eye = EyePass(context, scene, settings, features, buffers, light)
+    try:
+        return eye.run(lambda fraction: progress(0.9 + 0.1 * fraction, "looking"), cancelled)
+    finally:
+        eye.release()
+
+
+def _to_picture(channels: np.ndarray, light: LightHalf) -> tuple[np.ndarray, np.ndarray | None]:
+    """Linear Rec.709 and, where asked for, the spectral bins."""
+    if light.bin_edges_nm is None:
+        return xyz_to_rgb709(channels[..., :3].astype(float)).astype(np.float32), None
+    bins = channels[..., : len(light.bin_edges_nm) - 1]
+    return xyz_to_rgb709(bins.astype(float) @ light.bin_xyz()).astype(np.float32), bins.astype(np.float32)
