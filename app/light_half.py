@@ -275,6 +275,11 @@ class LightHalf:
             sides.append(np.sqrt(area) * self.buffers.space.scale)
         return np.array(sides)
 
+    def resolved_textures(self) -> list[moderngl.Texture]:
+        """The summed maps for look-ups."""
+        self.atlas.flush()
+        return self.atlas.total_textures
+
     def resolved_tile(self, tile: Tile) -> np.ndarray:
         """A tile of the summed maps: float32 (height, width, channels), row 0 at texel y = 0."""
         return self.atlas.read_tile(tile)

@@ -15,10 +15,14 @@ from app.model.colorimetry import xyz_to_rgb709
 from app.model.features import Features
 from app.model.scene import Scene
 from app.model.settings import RenderSettings
+from app.passes.eye import CausticMaps, EyePass
+from app.passes.present import Channels
 
 FIRST_PASS_PHOTONS = 1 << 17
 """Lattice of a timed rendering's first pass; each next one is twice as fine, up to the last."""
 LAST_PASS_PHOTONS = 1 << 22
+DEFAULT_SAMPLES = 16
+"""Camera samples a pixel."""
 
 Progress = Callable[[float, str], None]
 Cancelled = Callable[[], bool]
@@ -116,14 +120,13 @@ def _render(context: Context, scene: Scene, settings: RenderSettings, progress: 
         stats.bytes = buffers.bytes + light.trace.bytes
         eye_started = time.perf_counter()
         if settings.layer.startswith("map:"):
-            channels = _map_layer(light)
+            rgb, spectral = _map_layer(light)
         else:
-            channels = _eye_layer(context, scene, settings, features, buffers, light, progress, cancelled)
+            rgb, spectral = _eye_layer(context, scene, settings, buffers, light, progress, cancelled)
         stats.eye_seconds = time.perf_counter() - eye_started
         stats.seconds = time.perf_counter() - started
         total = light.atlas.read_total()
         stats.map_flux_w = float(total[..., 3].sum(dtype=float)) if settings.bins is None else float(total.sum(dtype=float))
-        rgb, spectral = _to_picture(channels, light)
         return RenderResult(rgb, spectral, light.bin_edges_nm, stats)
     finally:
         light.release()
@@ -154,31 +157,34 @@ def _trace_and_splat(light: LightHalf, scene: Scene, settings: RenderSettings, p
     return number + 1
 
 
-def _map_layer(light: LightHalf) -> np.ndarray:
-    """The caustic map itself as a picture: irradiance on the receiver, channels (H, W, C)."""
+def _map_layer(light: LightHalf) -> tuple[np.ndarray, np.ndarray | None]:
+    """The caustic map itself as a picture: irradiance (or reflected light) on the receiver, lm/unit²."""
     receiver = light.map_receiver
     assert receiver is not None
     tile = light.layout.tiles[receiver][0]
     record = light.layout.receivers[receiver]
     area = light.layout.placements["texel_area"][record["placement"]]
-    return light.resolved_tile(tile)[::-1] * (light.map_scale / area)
+    texels = light.resolved_tile(tile)[::-1] * np.float32(light.map_scale / area)
+    if light.bin_edges_nm is None:
+        return xyz_to_rgb709(texels[..., :3].astype(float)).astype(np.float32), None
+    channels = Channels(tuple(light.bin_edges_nm.tolist()))
+    return channels.to_rgb709(texels), channels.to_spectral(texels)
 
 
 def _eye_layer(
-    context: Context, scene: Scene, settings: RenderSettings, features: Features, buffers: SceneBuffers, light: LightHalf, progress: Progress, cancelled: Cancelled
-) -> np.ndarray:
-    from app.passes.eye import EyePass
-
-    eye = EyePass(context, scene, settings, features, buffers, light)
+    context: Context, scene: Scene, settings: RenderSettings, buffers: SceneBuffers, light: LightHalf, progress: Progress, cancelled: Cancelled
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """The camera's picture and, where asked for, its spectral bins."""
+    eye = EyePass(context, buffers, settings.layer, light.reflectances, light.bin_edges_nm)
+    maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
     try:
-        return eye.run(lambda fraction: progress(0.9 + 0.1 * fraction, "looking"), cancelled)
+        # A stop asked for while tracing still wants a picture: only the first sample is owed then.
+        samples = settings.spp or DEFAULT_SAMPLES
+        stop_at_once = cancelled()
+        eye.run(
+            scene.camera, settings.width, settings.height, 1 if stop_at_once else samples, 0, maps, settings.seed,
+            lambda fraction: progress(0.9 + 0.1 * fraction, "looking"), None if stop_at_once else cancelled,
+        )
+        return eye.read_rgb(), eye.read_spectral() if light.bin_edges_nm is not None else None
     finally:
         eye.release()
-
-
-def _to_picture(channels: np.ndarray, light: LightHalf) -> tuple[np.ndarray, np.ndarray | None]:
-    """Linear Rec.709 and, where asked for, the spectral bins."""
-    if light.bin_edges_nm is None:
-        return xyz_to_rgb709(channels[..., :3].astype(float)).astype(np.float32), None
-    bins = channels[..., : len(light.bin_edges_nm) - 1]
-    return xyz_to_rgb709(bins.astype(float) @ light.bin_xyz()).astype(np.float32), bins.astype(np.float32)
