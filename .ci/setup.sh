@@ -2,11 +2,12 @@
 #
 #   prepare EXTRAS    EXTRAS is "" or "[test]"; afterwards $venv_python runs the program
 #
-# A second run costs one checksum and one comparison. The caller has set $root, the checkout.
+# A second run costs one comparison, a few milliseconds. The caller has set $root, the checkout.
 # shellcheck shell=bash disable=SC2154
 
 venv="$root/.venv"
 venv_python="$venv/bin/python"
+opengl_stamp="$venv/.spectrasplat-opengl"
 gl_packages="libegl1 libgl1 libgl1-mesa-dri"
 
 say() { printf '%s\n' "spectrasplat: $*" >&2; }
@@ -59,16 +60,20 @@ install_packages() {
     }
 }
 
-# The program's own words for what OpenGL lacks are printed when it cannot be mended here.
+# Without OpenGL the program still starts, tells what is missing, and can search glasses.
 check_opengl() {
     local try='from app.gpu.context import create_context; create_context().release()'
-    (cd "$root" && "$venv_python" -c "$try") >/dev/null 2>&1 && return 0
     # Word splitting of the package list is meant.
     # shellcheck disable=SC2086
-    apt_install $gl_packages || true
-    (cd "$root" && "$venv_python" -c "$try") >/dev/null 2>&1 && return 0
-    say "OpenGL 4.3 is missing: run 'sudo apt-get install $gl_packages' and try again ('./run doctor' tells more)"
-    return 1
+    if "$venv_python" -P -c "$try" >/dev/null 2>&1 ||
+        { apt_install $gl_packages && "$venv_python" -P -c "$try" >/dev/null 2>&1; }; then
+        : >"$opengl_stamp"
+    fi
+}
+
+require_opengl() {
+    [ -f "$opengl_stamp" ] ||
+        fail "OpenGL 4.3 is missing: run 'sudo apt-get install $gl_packages' and try again ('./run doctor' tells more)"
 }
 
 # One test draws through OSMesa and is skipped without it; newer distributions have dropped it.
@@ -79,42 +84,49 @@ offer_osmesa() {
 
 # Compile the tree builder ahead of time, so that the first picture does not wait for it.
 warm_caches() {
-    (cd "$root" && "$venv_python" -m app.model.bvh --warm) >/dev/null 2>&1 || true
+    "$venv_python" -P -m app.model.bvh --warm >/dev/null 2>&1 || true
+}
+
+is_installed() {
+    [ -x "$venv_python" ] && [ -f "$1" ] && [ "$(<"$1")" = "$key" ]
 }
 
 is_ready() {
-    [ -x "$venv_python" ] && [ -f "$1" ] && [ "$(cat "$1")" = "$key" ]
+    { is_installed "$stamp" || is_installed "$venv/.spectrasplat-test"; } && [ -f "$opengl_stamp" ]
 }
 
 prepare() {
     local extras="$1" key stamp setup_log
-    # Cheap on purpose: the checksum of one file. The path counts because a moved .venv is broken.
-    key="$(cksum <"$root/pyproject.toml") $root"
+    # Cheap on purpose: no program is started. The path counts because a moved .venv is broken.
+    key="$root"$'\n'"$(<"$root/pyproject.toml")"
     stamp="$venv/.spectrasplat${extras:+-test}"
-    is_ready "$stamp" || is_ready "$venv/.spectrasplat-test" && return 0
+    is_ready && return 0
 
     # Two first runs at once: the second waits, then finds the work done.
     if command -v flock >/dev/null 2>&1; then
         { exec 9>"$root/.setup.lock"; } 2>/dev/null ||
             fail "cannot write in $root: make the folder writable or copy the project elsewhere"
         flock 9
-        is_ready "$stamp" && { exec 9>&-; return 0; }
     fi
+    is_ready || set_up
+    { exec 9>&-; } 2>/dev/null
+}
+
+set_up() {
     setup_log="$(mktemp "${TMPDIR:-/tmp}/spectrasplat-setup.XXXXXX")" || exit 2
     # shellcheck disable=SC2064
     trap "rm -f '$setup_log'" EXIT
-
-    if ! "$venv_python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 ||
-        ! grep -qsF "$venv" "$venv/bin/activate"; then
-        make_venv
+    if ! is_installed "$stamp"; then
+        if ! "$venv_python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 ||
+            ! grep -qsF "$venv" "$venv/bin/activate"; then
+            make_venv
+        fi
+        install_packages "$extras"
+        [ -z "$extras" ] || offer_osmesa
+        warm_caches
+        printf '%s' "$key" >"$stamp"
     fi
-    install_packages "$extras"
-    check_opengl || exit 2
-    [ -z "$extras" ] || offer_osmesa
-    warm_caches
-    printf '%s' "$key" >"$stamp"
+    check_opengl
     rm -f "$setup_log"
     trap - EXIT
-    { exec 9>&-; } 2>/dev/null
-    say "ready"
 }

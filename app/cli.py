@@ -12,13 +12,13 @@ from typing import Annotated
 
 import typer
 
+from app import __version__
 from app import cli_options as options
 from app.errors import UserError
 from app.model.settings import METHODS
 
 app = typer.Typer(
     name="spectrasplat",
-    help="Dispersive caustics: light through glass, split into its colours.",
     add_completion=False,
     pretty_exceptions_enable=False,
     no_args_is_help=False,
@@ -50,6 +50,19 @@ def run(arguments: Sequence[str]) -> int:
 def _usage_sentence(message: str) -> str:
     sentence = message.strip().rstrip(".").replace(". Did you", ", did you")
     return f"{sentence[:1].lower()}{sentence[1:]}; 'spectrasplat --help' shows the usage"
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        print(f"spectrasplat {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def program(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)] = False,
+) -> None:
+    """Dispersive caustics: light through glass, split into its colours."""
 
 
 @app.command()

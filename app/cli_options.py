@@ -168,7 +168,8 @@ def find_scene(text: str) -> Path:
             hint = f", did you mean the shipped scene '{path.stem}'?"
         raise UserError(f"scene file {text} does not exist{hint or ': check the path'}")
     hint = suggestion(text, shipped)
-    raise UserError(f"scene '{text}' is neither a file nor shipped{hint or ','} shipped are {', '.join(shipped)}")
+    names = ", ".join(shipped) or "none"
+    raise UserError(f"scene '{text}' is neither a file nor shipped{hint or ','} shipped are {names}")
 
 
 def shipped_scenes() -> dict[str, Path]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app import cli_options
+from app import __version__, cli_options
 from app.__main__ import main
 from app.errors import UserError
 from app.model.mesh import make_mesh
@@ -355,6 +355,10 @@ class TestProgram:
         out = capsys.readouterr().out
         for command in ("render", "inspect", "glass", "doctor", "bench-speed"):
             assert command in out
+
+    def test_version(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(["--version"]) == 0
+        assert capsys.readouterr().out == f"spectrasplat {__version__}\n"
 
     @pytest.mark.parametrize(
         ("arguments", "sentence"),
