@@ -1,0 +1,102 @@
+"""What the channels of a picture mean: linear Rec.709, or watts in spectral bins.
+
+The eye's shader multiplies and adds channels and knows nothing else about them. Here lights,
+reflectances, absorption and the background become numbers per channel, and the sums that come
+back become linear Rec.709.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.model.colorimetry import K_M, VISIBLE_NM, cmf_xyz, illuminant_table, rgb_partition, xyz_to_rgb709
+from app.model.spectrum import Spectrum
+
+
+@dataclass(frozen=True)
+class Channels:
+    """Linear Rec.709 (`edges_nm` None, radiance in lm/(sr unit²)), or bins (W/(sr unit²) in each)."""
+
+    edges_nm: tuple[float, ...] | None = None
+    """Ascending edges of the bins."""
+
+    @property
+    def count(self) -> int:
+        """Channels in use."""
+        return 3 if self.edges_nm is None else len(self.edges_nm) - 1
+
+    @property
+    def targets(self) -> int:
+        """Groups of four channels, as the caustic map has them."""
+        return -(-self.count // 4)
+
+    def of_light(self, spectrum: Spectrum, reflectance: np.ndarray | None) -> np.ndarray:
+        """Channels (4·targets,) of a light reflected by `reflectance` (401,), None for white."""
+        reflected = spectrum
+        if reflectance is not None:
+            lines = tuple((nm, power * float(np.interp(nm, VISIBLE_NM, reflectance))) for nm, power in spectrum.lines)
+            reflected = Spectrum(spectrum.density * reflectance, lines)
+        if self.edges_nm is None:
+            return self._padded(xyz_to_rgb709(reflected.xyz()))
+        bins = reflected.density @ self._cell_shares()
+        for nm, power in reflected.lines:
+            index = int(np.searchsorted(self.edges_nm, nm, side="right")) - 1
+            index = self.count - 1 if nm == self.edges_nm[-1] else index
+            if 0 <= index < self.count:
+                bins[index] += power
+        return self._padded(bins)
+
+    def of_reflectance(self, rgb: tuple[float, float, float]) -> np.ndarray:
+        """Factors (4·targets,) of a surface with linear Rec.709 reflectance `rgb`."""
+        return self._padded(np.asarray(rgb, float) if self.edges_nm is None else self._mean(rgb_partition() @ np.asarray(rgb, float)))
+
+    def of_absorption(self, coefficient: np.ndarray) -> np.ndarray:
+        """Absorption coefficients (4·targets,) that stand for α(λ) (401,), in the same unit."""
+        if self.edges_nm is not None:
+            return self._padded(self._mean(coefficient))
+        # Inverse of `attenuation_from_colour`: exact for glass given by a colour up to the blend of the basis.
+        basis = rgb_partition()
+        return self._padded(np.linalg.lstsq(basis, coefficient, rcond=None)[0].clip(min=0.0))
+
+    def of_background(self, rgb: tuple[float, float, float]) -> np.ndarray:
+        """Radiance (4·targets,) of a background: in bins, D65 tinted by `rgb`."""
+        if self.edges_nm is None:
+            return self._padded(np.asarray(rgb, float))
+        daylight = illuminant_table()["D65"]
+        per_lumen = daylight / (K_M * (daylight @ cmf_xyz()[:, 1]))
+        return self._padded((per_lumen * (rgb_partition() @ np.asarray(rgb, float))) @ self._cell_shares())
+
+    def to_rgb709(self, values: np.ndarray) -> np.ndarray:
+        """(…, ≥ count) channel sums → linear Rec.709 float32 (…, 3), negatives kept."""
+        used = values[..., : self.count]
+        if self.edges_nm is None:
+            return np.ascontiguousarray(used, np.float32)
+        return self.to_spectral(values) @ self._rgb_of_bins()
+
+    def to_spectral(self, values: np.ndarray) -> np.ndarray:
+        """(…, ≥ count) channel sums → float32 (…, bins)."""
+        return np.ascontiguousarray(values[..., : self.count], np.float32)
+
+    def _rgb_of_bins(self) -> np.ndarray:
+        """Linear Rec.709 of a watt spread evenly over each bin: float32 (bins, 3)."""
+        xyz = np.stack([self._mean(column) for column in K_M * cmf_xyz().T], axis=-1)
+        return xyz_to_rgb709(xyz).astype(np.float32)
+
+    def _cell_shares(self) -> np.ndarray:
+        """Share of each nanometre cell in each bin, (401, bins); the end cells are cut to 380–780 nm."""
+        low, high = np.maximum(VISIBLE_NM - 0.5, VISIBLE_NM[0]), np.minimum(VISIBLE_NM + 0.5, VISIBLE_NM[-1])
+        edges = np.asarray(self.edges_nm, float)
+        overlap = np.minimum(high[:, None], edges[1:]) - np.maximum(low[:, None], edges[:-1])
+        return np.clip(overlap, 0.0, None) / (high - low)[:, None]
+
+    def _mean(self, spectral: np.ndarray) -> np.ndarray:
+        """Mean over each bin of a function on `VISIBLE_NM`."""
+        shares = self._cell_shares()
+        return (spectral @ shares) / np.maximum(shares.sum(axis=0), 1e-12)
+
+    def _padded(self, values: np.ndarray) -> np.ndarray:
+        padded = np.zeros(4 * self.targets)
+        padded[: len(values)] = values
+        return padded

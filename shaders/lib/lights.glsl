@@ -1,0 +1,74 @@
+// Lights as a surface point sees them: where they are, how bright, and how they look when a ray
+// runs into one. Pure functions; emission.glsl holds the way from the light outwards, spot.glsl
+// the edge that both share.
+#ifndef LIGHTS_GLSL
+#define LIGHTS_GLSL
+
+#include "lib/emission.glsl"
+#include "lib/spot.glsl"
+
+#define LIGHT_KIND_POINT 0u
+#define LIGHT_KIND_DIRECTIONAL 1u
+#define LIGHT_KIND_COLLIMATED 2u
+#define LIGHT_KIND_AREA 3u
+
+// What one point of a light sends to a receiving point.
+struct LightSample {
+    vec3 toward;      // unit, from the receiving point to the light
+    float distance;   // GPU units; FAR_DISTANCE for the sun
+    float gain;       // irradiance across `toward` per unit of the light's own quantity
+};
+
+// `unit`: uniform in the unit square, used by lights of some extent.
+LightSample sample_light(EyeLight light, vec3 position, vec2 unit)
+{
+    LightSample s = LightSample(-light.axis, 1e30, 1.0);
+    if (light.kind == LIGHT_KIND_DIRECTIONAL) {
+        vec2 tilt = concentric_disc(unit);
+        s.toward = -normalize(light.axis + tilt.x * light.half_u + tilt.y * light.half_v);
+        return s;
+    }
+    vec3 target = light.position;
+    if (light.kind == LIGHT_KIND_COLLIMATED) {
+        vec3 from_aperture = position - light.position;
+        float along = dot(from_aperture, light.axis);
+        vec2 at = vec2(dot(from_aperture, light.half_u) / dot(light.half_u, light.half_u),
+                       dot(from_aperture, light.half_v) / dot(light.half_v, light.half_v));
+        bool within = light.is_disc != 0u ? dot(at, at) <= 1.0 : max(abs(at.x), abs(at.y)) <= 1.0;
+        s.distance = along;
+        s.gain = within && along > 0.0 ? 1.0 : 0.0;
+        return s;
+    }
+    if (light.kind == LIGHT_KIND_AREA) {
+        vec2 on_light = light.is_disc != 0u ? concentric_disc(unit) : 2.0 * unit - 1.0;
+        target += on_light.x * light.half_u + on_light.y * light.half_v;
+    }
+    vec3 way = target - position;
+    s.distance = length(way);
+    s.toward = way / max(s.distance, 1e-20);
+    s.gain = 1.0 / max(s.distance * s.distance, 1e-20);
+    s.gain *= light.kind == LIGHT_KIND_AREA ? light.measure * max(-dot(s.toward, light.axis), 0.0)
+                                            : spot_falloff(-s.toward, light.axis, light.cone);
+    return s;
+}
+
+// Radiance per unit of the light's own quantity that a ray meets within `far`: discs and
+// rectangles from their front, the sun's disc where nothing else is met (far = 1e30).
+float light_seen(EyeLight light, vec3 position, vec3 direction, float far)
+{
+    if (light.kind == LIGHT_KIND_DIRECTIONAL) {
+        float along = -dot(direction, light.axis);
+        vec3 off = direction + along * light.axis;
+        // half_u is as long as the tangent of the disc's angular radius.
+        bool within = along > 0.0 && dot(off, off) < along * along * dot(light.half_u, light.half_u);
+        return within && far >= 1e30 ? light.measure : 0.0;
+    }
+    float facing = dot(direction, light.axis);
+    float distance = dot(light.position - position, light.axis) / facing;
+    vec3 off = position + distance * direction - light.position;
+    vec2 at = vec2(dot(off, light.half_u) / dot(light.half_u, light.half_u), dot(off, light.half_v) / dot(light.half_v, light.half_v));
+    bool within = light.is_disc != 0u ? dot(at, at) <= 1.0 : max(abs(at.x), abs(at.y)) <= 1.0;
+    return light.kind == LIGHT_KIND_AREA && facing < 0.0 && distance > 0.0 && distance < far && within ? 1.0 : 0.0;
+}
+
+#endif
