@@ -1,0 +1,160 @@
+"""The shipped scenes: each loads, says why it is there, and holds the geometry its comment promises."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.model.features import Features, dispersive_materials
+from app.model.scene import Black, Dielectric, Diffuse, Scene
+from app.model.scene_file import load_scene
+from app.model.settings import RenderSettings
+from app.paths import assets_dir
+
+SCENES = sorted((assets_dir() / "scenes").glob("*.toml"))
+LINES_NM = {"F": 486.1327, "d": 587.5618, "C": 656.2725}
+
+
+def shipped(name: str) -> Scene:
+    return load_scene(assets_dir() / "scenes" / f"{name}.toml")
+
+
+def test_the_collection_is_complete() -> None:
+    names = {path.stem for path in SCENES}
+    wanted = {"default", "prism", "prism_case", "ball", "ball_plain", "brilliant", "lens", "achromat", "amici", "water", "wine_glass"}
+    assert wanted <= names
+
+
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+def test_a_scene_loads_and_can_be_rendered(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert text.startswith("# ") and "\n\nname = " in text, "a scene opens with why it is there"
+    assert not {"lights", "camera"} - set(tomllib.loads(text)), "shipped scenes leave nothing to defaults"
+    scene = load_scene(path)
+    solids = [o for o in scene.objects if isinstance(o.material, Dielectric)]
+    assert solids and all(o.mesh.is_closed and o.mesh.volume() > 0.0 for o in solids)
+    assert any(isinstance(o.material, Diffuse) for o in scene.objects)
+    # Every glass stands in the picture.
+    forward = np.subtract(scene.camera.target, scene.camera.position)
+    forward /= np.linalg.norm(forward)
+    aspect = scene.render.width / scene.render.height
+    if path.stem == "prism_case":
+        return  # its prism stands outside the picture on purpose
+    for item in solids:
+        middle = (item.object_to_world @ np.append(np.mean(item.mesh.bounds(), axis=0), 1.0))[:3]
+        ray = middle - scene.camera.position
+        depth = ray @ forward
+        assert depth > 0.0
+        half = math.tan(math.radians(scene.camera.vertical_fov_deg / 2.0))
+        assert np.linalg.norm(ray - depth * forward) < depth * half * aspect
+
+
+def test_prism_case_sends_seven_wavelengths_where_the_reference_found_them() -> None:
+    """Straight lines and Snell's law through the scene's own prism, float64, against the reference's list (cm)."""
+    expected = {400: 14.507781, 450: 18.587992, 500: 20.922858, 550: 22.456213, 600: 23.542016, 650: 24.350626, 700: 24.975810}
+    scene = shipped("prism_case")
+    prism, slit, floor = scene.objects
+    assert isinstance(slit.material, Black) and floor.material.reflectance_rgb == (0.18, 0.18, 0.18)
+    light = scene.lights[0]
+    assert light.spectral_power.luminous() == pytest.approx(1e7, rel=1e-12)
+    assert light.inner_half_angle_deg == light.outer_half_angle_deg == 0.65
+    planes = prism.mesh.convex_planes
+    for wavelength, x in expected.items():
+        n = float(prism.material.dispersion.index(wavelength))
+        point, direction = np.array(light.position), np.array(light.direction)
+        for ratio in (1.0 / n, n):
+            facing = planes[:, :3] @ direction
+            distance = (planes[:, 3] - planes[:, :3] @ point) / np.where(facing == 0.0, np.nan, facing)
+            enters = ratio < 1.0
+            candidates = np.where((facing < 0.0) == enters, distance, -np.inf if enters else np.inf)
+            face = int(np.nanargmax(candidates) if enters else np.nanargmin(candidates))
+            point = point + distance[face] * direction
+            normal = planes[face, :3] * -np.sign(facing[face])
+            cosine = direction @ normal
+            direction = ratio * direction - (ratio * cosine + math.sqrt(1.0 - ratio**2 * (1.0 - cosine**2))) * normal
+        landing = point - direction * (point[2] / direction[2])
+        # The PLY's coordinates hold six decimals, half a metre above the floor.
+        assert landing[0] == pytest.approx(x, abs=3e-4) and landing[1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_plain_ball_is_the_balls_twin_without_dispersion() -> None:
+    ball, plain = shipped("ball"), shipped("ball_plain")
+    assert (ball.camera, ball.render) == (plain.camera, plain.render)
+    np.testing.assert_array_equal(ball.objects[0].mesh.vertices, plain.objects[0].mesh.vertices)
+    one, two = (scene.objects[0].material.dispersion for scene in (ball, plain))
+    assert two.n_d == pytest.approx(one.n_d, abs=1e-6)
+    assert one.is_dispersive and not two.is_dispersive
+    assert Features.of(plain, RenderSettings()).spectral_groups == 0
+
+
+def power_of_lens(surfaces: list[tuple[float, float, float, float]]) -> float:
+    """Back vertex power -c' of a paraxial ray (y = 1, u = 0) through (radius, n before, n after, thickness after)."""
+    y, nu = 1.0, 0.0
+    for radius, before, after, thickness in surfaces:
+        nu -= y * (after - before) / radius
+        y += thickness * nu / after
+    return -nu
+
+
+def test_the_achromat_corrects_what_its_singlet_does_not() -> None:
+    scene = shipped("achromat")
+    crown, flint = (o.material.dispersion for o in scene.objects[:2])
+    powers, single = {}, {}
+    for line, wavelength in LINES_NM.items():
+        n1, n2 = float(crown.index(wavelength)), float(flint.index(wavelength))
+        powers[line] = power_of_lens([(1.4330, 1.0, n1, 0.20), (-1.4330, n1, n2, 0.08), (-25.93, n2, 1.0, 0.0)])
+        single[line] = (n2 - 1.0) / 1.98413
+    assert 1.0 / powers["d"] == pytest.approx(3.2, rel=0.03) and 1.0 / single["d"] == pytest.approx(3.2, rel=1e-4)
+    assert abs(powers["F"] / powers["C"] - 1.0) < 2e-3
+    assert single["F"] / single["C"] - 1.0 == pytest.approx(1.0 / 36.366, rel=0.02)
+    # The cemented faces share their vertices to the last bit.
+    front, back = (set(map(tuple, o.mesh.vertices)) for o in scene.objects[:2])
+    assert len(front & back) > 1000
+    np.testing.assert_array_equal(scene.objects[0].object_to_world, scene.objects[1].object_to_world)
+
+
+def test_the_amici_prism_lets_yellow_through_straight() -> None:
+    """T12 of the known answers, from the scene's own faces."""
+    scene = shipped("amici")
+    parts = [o for o in scene.objects if isinstance(o.material, Dielectric)]
+    # x of the four faces at y = ±1/2, from the vertices.
+    faces = [parts[0].mesh.vertices[[0, 3]]] + [p.mesh.vertices[[1, 2]] for p in parts]
+    tilts = [math.atan2(f[1, 0] - f[0, 0], 1.0) for f in faces]
+    np.testing.assert_allclose(np.degrees(tilts), [31.388079, -45.0, 45.0, -31.388079], atol=1e-6)
+    deviation = {}
+    for line, wavelength in LINES_NM.items():
+        indices = [1.0] + [float(p.material.dispersion.index(wavelength)) for p in parts] + [1.0]
+        angle = 0.0
+        for tilt, before, after in zip(tilts, indices, indices[1:], strict=False):
+            # The face x = y tan(tilt) has its normal turned by -tilt.
+            angle = math.asin(before / after * math.sin(angle + tilt)) - tilt
+        deviation[line] = math.degrees(angle)
+    assert deviation["d"] == pytest.approx(0.0, abs=1e-5)
+    assert abs(deviation["F"]) == pytest.approx(2.21096, abs=1e-4)
+    assert abs(deviation["C"]) == pytest.approx(0.82305, abs=1e-4)
+    # Neighbours share the vertices of their common face.
+    for left, right in zip(parts, parts[1:], strict=False):
+        assert len(set(map(tuple, left.mesh.vertices)) & set(map(tuple, right.mesh.vertices))) == 4
+
+
+def test_the_slit_of_the_prism_scene_meets_it_near_minimum_deviation() -> None:
+    scene = shipped("prism")
+    glass = scene.objects[0].material.dispersion
+    x, y, _ = scene.lights[0].direction
+    plan = math.atan2(y, x)
+    # Apex towards +y: minimum deviation enters at half the deviation above the x axis.
+    half_deviation = math.asin(glass.n_d * 0.5) - math.radians(30.0)
+    assert plan == pytest.approx(half_deviation, abs=math.radians(2.0))
+    assert len(dispersive_materials(scene)) == 1
+
+
+def test_the_wine_reaches_into_the_wall_and_the_glass_has_priority() -> None:
+    glass, wine = shipped("wine_glass").objects[:2]
+    assert glass.material.priority > wine.material.priority
+    assert wine.material.absorption is not None
+    inner = glass.mesh.vertices[np.hypot(*glass.mesh.vertices[:, :2].T) > 0.5]
+    assert np.ptp(wine.mesh.vertices[:, 2]) < np.ptp(inner[:, 2])
