@@ -13,7 +13,6 @@ from typing import Any
 
 from app import cli_options as options
 from app.errors import UserError
-from app.gpu.context import is_software_renderer
 from app.model.scene import Scene
 from app.model.settings import RenderSettings
 
@@ -149,7 +148,7 @@ def _interrupt_flag() -> Iterator[Callable[[], bool]]:
 
 def _summary(request: RenderRequest, settings: RenderSettings, stats: Any, stopped: bool) -> str:
     """Where the picture is and what was done in what time."""
-    device = "software renderer" if is_software_renderer(stats.renderer) else "GPU"
+    device = "software renderer" if stats.is_software else "GPU"
     early = ", stopped early" if stopped else ""
     return (
         f"{request.output.resolve()}: {settings.width}×{settings.height}, {stats.photons:,} photons, "

@@ -48,7 +48,7 @@ class Context:
     @property
     def is_software(self) -> bool:
         """Whether the processor draws, not a GPU (timer queries are then meaningless)."""
-        return is_software_renderer(self.renderer)
+        return any(name in self.renderer.casefold() for name in _SOFTWARE_RENDERERS)
 
     def finish(self) -> None:
         """Wait until everything sent so far is done."""
@@ -72,11 +72,6 @@ class Context:
 
     def __exit__(self, *_exception: object) -> None:
         self.release()
-
-
-def is_software_renderer(renderer: str) -> bool:
-    """Whether the GL_RENDERER string `renderer` names a renderer on the processor."""
-    return any(name in renderer.casefold() for name in _SOFTWARE_RENDERERS)
 
 
 def create_context(backend: Backend | None = None) -> Context:

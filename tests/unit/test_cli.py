@@ -30,6 +30,7 @@ class FakeStats:
     splats: int = 7654321
     seconds: float = 1.5
     renderer: str = "llvmpipe (LLVM 15)"
+    is_software: bool = True
 
     def lines(self) -> list[str]:
         return ["deposited 40.0 %", "escaped 60.0 %"]
