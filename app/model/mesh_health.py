@@ -220,7 +220,12 @@ def _without_degenerate(mesh: Mesh, health: MeshHealth) -> tuple[Mesh, int]:
 
 def _components(triangles: np.ndarray, size: int) -> np.ndarray:
     """Number of the connected part of each triangle, int (T,), from 0."""
-    a, b = triangles[:, [0, 1]].ravel(), triangles[:, [1, 2]].ravel()
+    root = connected_roots(triangles[:, [0, 1]].ravel(), triangles[:, [1, 2]].ravel(), size)
+    return np.unique(root[triangles[:, 0]], return_inverse=True)[1].reshape(-1)
+
+
+def connected_roots(a: np.ndarray, b: np.ndarray, size: int) -> np.ndarray:
+    """The lowest number in each node's connected part, int (size,), of the graph with edges (a, b)."""
     # Hook the higher root under the lower and shorten all paths, until both ends of every
     # edge agree; a few rounds, and no import of scipy for a small job.
     root = np.arange(size)
@@ -228,9 +233,8 @@ def _components(triangles: np.ndarray, size: int) -> np.ndarray:
         at_a, at_b = root[a], root[b]
         apart = at_a != at_b
         if not apart.any():
-            break
+            return root
         a, b, at_a, at_b = a[apart], b[apart], at_a[apart], at_b[apart]
         np.minimum.at(root, np.maximum(at_a, at_b), np.minimum(at_a, at_b))
         while not np.array_equal(shorter := root[root], root):
             root = shorter
-    return np.unique(root[triangles[:, 0]], return_inverse=True)[1].reshape(-1)
