@@ -185,7 +185,7 @@ def spectrum_words(light: Light) -> str:
     if "nm" not in said:
         return "lines at " + ", ".join(f"{wavelength:g}" for wavelength, _ in lines) + " nm"
     low, high = light.spectral_power.support_nm()
-    return f"table {low:g}–{high:g} nm" + (f" and {len(lines)} line(s)" if lines else "")
+    return f"table {math.ceil(low)}–{math.floor(high)} nm" + (f" and {len(lines)} line(s)" if lines else "")
 
 
 def _light_kind(light: Light) -> str:

@@ -1,0 +1,103 @@
+"""`inspect` says what a scene holds in true numbers."""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from app.inspect_report import inspect_text, light_flux
+from app.model.scene import Scene
+from app.model.scene_file import load_scene
+
+SCENE = """
+[[objects]]
+name = "gem"
+shape = "brilliant"
+glass = "diamond"
+rests_at_z = 0.5
+[[objects]]
+name = "ball"
+shape = "sphere"
+triangles = 320
+material = {{ n_d = 1.7, V_d = 30.0, absorption = {{ colour = [0.5, 0.9, 0.9], distance = 1.0 }}, priority = 4 }}
+position = [3, 0, 0]
+[[objects]]
+name = "floor"
+shape = "plane"
+width = 20
+height = 10
+position = [0, 0, -3]
+material = {{ kind = "diffuse", colour = 0.18 }}
+[[lights]]
+{light}
+"""
+LAMP = 'name = "lamp"\nkind = "spot"\nposition = [0, 0, 9]\nhalf_angle_deg = 60\nspectrum = {blackbody = 3200}\nflux_lm = 900'
+
+
+def scene(tmp_path: Path, light: str = LAMP) -> Scene:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE.format(light=light))
+    return load_scene(path)
+
+
+def said(value: Scene) -> str:
+    page = io.StringIO()
+    Console(file=page, width=200).print(inspect_text(value))
+    return page.getvalue()
+
+
+def row(text: str, name: str) -> str:
+    """The table row that begins with `name`."""
+    return next(line for line in text.splitlines() if line.startswith(f"│ {name} "))
+
+
+def test_objects_glasses_and_lights_are_listed_with_their_numbers(tmp_path: Path) -> None:
+    text = said(scene(tmp_path))
+    assert "bounds 20 × 10 × " in text
+    gem = row(text, "gem")
+    assert "110" in gem and "diamond" in gem and "flat" in gem and "watertight" in gem
+    ball = row(text, "ball")
+    assert "320" in ball and "1 × 1 × 1 about (3, 0, 0)" in ball and "absorbing, priority 4" in ball and "smooth" in ball
+    assert "4 boundary edges" in row(text, "floor") and "diffuse 0.18" in row(text, "floor")
+    assert "2.417486" in text and "55.30" in text and "226–760 nm" in text
+    lamp = row(text, "lamp")
+    assert "spot, half angle 60°, hard edge" in lamp and "black body 3200 K" in lamp
+    # 900 lm over 2π (1 - cos 60°) = π steradian
+    assert f"{900 / math.pi:.5g} cd" in lamp and "900 lm" in lamp
+
+
+def test_features_come_with_their_reasons(tmp_path: Path) -> None:
+    text = said(scene(tmp_path))
+    assert " in " in row(text, "spectral columns") and "2 column(s)" in row(text, "spectral columns")
+    assert " in " in row(text, "absorption") and " out " in row(text, "mirrors")
+    assert "gem" in row(text, "half-space solids")
+
+
+def test_notes_of_the_loader_are_shown(tmp_path: Path) -> None:
+    value = scene(tmp_path)
+    text = " ".join(said(value).split())
+    assert "Note: No camera given" in text and "226 to 760 nm" in text
+    assert len(value.notes) == text.count("Note: ")
+
+
+@pytest.mark.parametrize(
+    ("light", "words", "lumen"),
+    [
+        ('kind = "point"\nposition = [0, 0, 9]\nspectrum = {laser = 532}\nflux_lm = 5', "laser 532 nm", 5.0),
+        ('kind = "area"\nposition = [0, 0, 9]\nsize = [2, 3]\nluminance_nt = 7', "D65", 7.0 * 6.0 * math.pi),
+        ('kind = "collimated"\nposition = [0, 0, 9]\nradius = 2\nspectrum = "A"\nilluminance_lx = 7', "A", 28.0 * math.pi),
+        ('kind = "directional"\ndirection = [0, 0, -1]\nspectrum = {lines = [[450, 1], [650, 1]]}', "lines at 450, 650 nm", None),
+        ('kind = "directional"\ndirection = [0, 0, -1]\nspectrum = {nm = [400, 700], values = [0, 1]}', "table 401–700 nm", None),
+    ],
+)
+def test_spectra_and_fluxes_in_words(tmp_path: Path, light: str, words: str, lumen: float | None) -> None:
+    value = scene(tmp_path, f'name = "lamp"\n{light}')
+    assert f" {words} " in row(said(value), "lamp")
+    flux = light_flux(value.lights[0])
+    assert (flux is None) == (lumen is None)
+    if flux is not None:
+        assert flux[0] == pytest.approx(lumen, rel=1e-12)
