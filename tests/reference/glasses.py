@@ -24,6 +24,11 @@ _SELLMEIER = {
 NAMES = tuple(_SELLMEIER)
 
 
+def sellmeier_terms(glass: str) -> tuple[list[float], list[float]]:
+    """(B, C in µm²) of a glass."""
+    return _SELLMEIER[glass]
+
+
 def index(glass: str, wavelength_nm: float | np.ndarray) -> np.ndarray:
     """n(λ): n² = 1 + Σ B λ²/(λ² - C)."""
     b, c = (np.array(x) for x in _SELLMEIER[glass])

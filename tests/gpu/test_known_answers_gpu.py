@@ -1,0 +1,241 @@
+"""The known answers T2, T3, T4, T13, T14, T15, and whole paths, through the real emit and trace shaders.
+
+Directions and their derivatives come from the same photons on two screens at different
+distances. Float32: 1e-4 relative, mostly much better.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from app.gpu.context import Context
+from app.model.mesh import Mesh
+from app.model.primitives import slab
+from app.model.primitives_round import sphere as sphere_mesh
+from app.passes.emission_domain import orthonormal_frame
+from tests.gpu.light_paths import Photons, extruded, glass, screen, trace_beam
+from tests.reference import glasses
+from tests.reference.glasses import C_NM, D_NM, F_NM
+from tests.reference.optics import dot, unit
+from tests.reference.surfaces import Plane, sphere
+from tests.reference.tracer import AIR, RECEIVER, Index, TriangleList, make_ray, onto, through, trace
+
+APEX = np.pi / 3
+
+
+@cache
+def ball_mesh(triangles: int) -> Mesh:
+    return sphere_mesh(1.0, triangles)
+
+
+def tilted_section(apex_rad: float) -> np.ndarray:
+    """An isosceles triangle with its apex up, sides of length 1."""
+    return np.array([[-np.sin(apex_rad / 2), 0], [np.sin(apex_rad / 2), 0], [0, np.cos(apex_rad / 2)]])
+
+
+def in_plane(angle_rad: float) -> np.ndarray:
+    """Unit vector at an angle from +x in the x-y plane."""
+    return np.array([np.cos(angle_rad), np.sin(angle_rad), 0.0])
+
+
+def by_start(photons: Photons) -> Photons:
+    return photons.where(np.argsort(photons.records["photon_id"]))
+
+
+def across_prism(gl: Context, name: str, incidence: float, nm: float, around: float) -> tuple[np.ndarray, np.ndarray]:
+    """(headings, d(heading)/dn) of all photons that go straight through the prism of T2; screens face `around`."""
+    middle = np.array([-np.sin(APEX / 2) / 2, np.cos(APEX / 2) / 2, 0])
+    direction = in_plane(incidence - APEX / 2)
+    near, far = (
+        by_start(
+            trace_beam(
+                gl, extruded("prism", tilted_section(APEX)), glass(name), screen(distance * in_plane(around), in_plane(around)),
+                middle - direction, direction, 0.04, nm,
+            ).of_depth(2)
+        )
+        for distance in (1.5, 5.5)
+    )  # fmt: skip
+    assert len(near.records) > 100
+    assert np.array_equal(near.records["photon_id"], far.records["photon_id"])
+    way, dway = far.position - near.position, far.dposition_dn - near.dposition_dn
+    heading = np.arctan2(way[:, 1], way[:, 0])
+    return heading, (way[:, 0] * dway[:, 1] - way[:, 1] * dway[:, 0]) / (way[:, 0] ** 2 + way[:, 1] ** 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "deviations_deg", "slope_rad_um"),
+    [
+        ("N-BK7", (39.13905, 38.64670, 38.42932), -0.064130),
+        ("F2", (49.38809, 48.19578, 47.70902), -0.147498),
+        ("N-SF11", (69.25084, 66.34263, 65.24956), -0.338731),
+    ],
+)
+def test_t2_prism_at_minimum_deviation(gl, name: str, deviations_deg: tuple[float, ...], slope_rad_um: float) -> None:
+    incidence = float(np.arcsin(glasses.index(name, D_NM) / 2))
+    start = incidence - APEX / 2
+    for nm, expected_deg in zip((F_NM, D_NM, C_NM), deviations_deg, strict=True):
+        heading, dheading_dn = across_prism(gl, name, incidence, nm, around=start - np.radians(deviations_deg[1]))
+        assert np.degrees(start - heading) == pytest.approx(expected_deg, rel=1e-5)
+        if nm == D_NM:
+            assert -dheading_dn * glasses.slope(name, nm) == pytest.approx(slope_rad_um, rel=1e-4)
+
+
+@pytest.mark.parametrize(("name", "x", "dx_dum"), [("N-BK7", 0.526946, 0.018554), ("N-SF11", 0.431514, 0.043846)])
+def test_t3_slab_leaves_direction_without_dispersion(gl, name: str, x: float, dx_dum: float) -> None:
+    block = slab(8.0, 8.0, 1.0)  # thickness along z
+    bottom = float(block.bounds()[0][2])
+    columns = []
+    for gap in (1.0, 21.0):
+        below = screen(np.array([0, 0, bottom - gap]), [0, 0, 1])
+        photons = trace_beam(gl, block, glass(name), below, [-2, 0, bottom + 3], [1, 0, -1], 0.3, D_NM).of_depth(2)
+        assert len(photons.records) > 100
+        # Straight at 45° but for the unit of thickness, which is crossed at a steeper angle.
+        drop = photons.start[:, 2] - bottom - 1 + gap
+        inside = photons.position[:, 0] - photons.start[:, 0] - drop
+        assert inside == pytest.approx(x, abs=1e-4 * x + 1e-6 * gap)
+        columns.append(photons.dposition_dn * glasses.slope(name, D_NM))
+        assert columns[-1][:, 0] == pytest.approx(dx_dum, rel=1e-4)
+    # Twenty units further down the column is the same: the direction does not disperse.
+    assert np.abs(columns[1].mean(0) - columns[0].mean(0)).max() / 20 < 1e-6
+
+
+def through_ball(height: float, index: Index) -> np.ndarray:
+    """Exact ball: (position, ∂/∂n, ∂/∂h) on the plane x = 1.2, as rows."""
+    ball = sphere((0, 0, 0), 1)
+    index = Index(index.n, np.array([1.0, 0.0]))
+    inside = through(make_ray([-2, height, 0], [1, 0, 0], [[0, 0, 0], [0, 1, 0]]), ball, AIR, index)
+    landed = onto(through(inside, ball, index, AIR, root=1), Plane((1.2, 0, 0), (1, 0, 0)))
+    return np.array([landed.position, *landed.dposition])
+
+
+@pytest.mark.parametrize("nm", [F_NM, D_NM, C_NM])
+def test_t4_ball_lens(gl, nm: float) -> None:
+    ball = ball_mesh(81_920)
+    photons = trace_beam(gl, ball, glass("N-BK7"), screen([1.2, 0, 0], [1, 0, 0]), [-3, 0, 0], [1, 0, 0], 0.85, nm, count=600).of_depth(2)
+    index = Index(float(glasses.index("N-BK7", nm)))
+    height = np.linalg.norm(photons.start[:, 1:], axis=1)
+    radial = photons.start / height[:, None]
+    radial[:, 0] = 0
+    exact = np.array([through_ball(h, index) for h in height])
+    assert len(height) > 400 and height.max() > 0.84
+    # The facets of 80k triangles are 0.01 wide: second order leaves 1e-4.
+    assert np.abs(dot(photons.position, radial) - exact[:, 0, 1]).max() < 1.5e-4
+    assert np.median(np.abs(dot(photons.position, radial) - exact[:, 0, 1])) < 5e-5
+    spectral = np.abs(dot(photons.dposition_dn, radial) - exact[:, 1, 1])
+    assert np.median(spectral / np.abs(exact[:, 1, 1])) < 2e-3 and spectral.max() < 0.02
+    # Effective focal length from the innermost rays: y = h (1 - (x - principal plane)/f), principal plane in the centre.
+    inner = height < 0.12
+    focal_length = 1.2 / (1 - dot(photons.position, radial) / height)[inner]
+    assert np.median(focal_length) == pytest.approx(index.n / (2 * (index.n - 1)), rel=1e-2)
+
+
+def test_t4_convergence_in_tessellation(gl) -> None:
+    index = Index(float(glasses.index("N-BK7", D_NM)))
+    errors = []
+    for triangles in (320, 1280, 5120):
+        photons = trace_beam(
+            gl, ball_mesh(triangles), glass("N-BK7"), screen([1.2, 0, 0], [1, 0, 0]), [-3, 0, 0], [1, 0, 0], 0.8, D_NM, count=200
+        ).of_depth(2)
+        height = np.linalg.norm(photons.start[:, 1:], axis=1)
+        exact = np.array([through_ball(h, index) for h in height])
+        errors.append([
+            np.median(np.abs(np.linalg.norm(photons.position[:, 1:], axis=1) - np.abs(exact[:, 0, 1]))),
+            np.median(np.abs(np.linalg.norm(photons.dposition_dn[:, 1:], axis=1) - np.abs(exact[:, 1, 1]))),
+        ])  # fmt: skip
+    position, column = np.array(errors).T
+    assert (position[:-1] > 2.5 * position[1:]).all()  # four times as many triangles: a quarter of the error
+    assert (column[:-1] > 1.4 * column[1:]).all()  # columns see the facets' own slope: half
+
+
+def test_t13_band_split_by_total_reflection(gl) -> None:
+    # Straight into one face of a prism, so that the other is met at the apex angle.
+    apex = np.radians(41.10)
+    solid = extruded("splitter", tilted_section(apex))
+    direction = in_plane(-apex / 2)
+    entry = np.array([-np.sin(apex / 2) * 0.6, np.cos(apex / 2) * 0.4, 0])
+    photons = trace_beam(
+        gl, solid, glass("N-BK7"), screen([2, 0, 0], [1, 0, 0]), entry - direction, direction, 0.03, (400.0, 700.0)
+    ).of_depth(2)
+    passed = photons.where(photons.records["x_hi"] > photons.axis.x_of_nm(699.0))
+    assert len(passed.records) > 50
+    split_nm = photons.axis.nm_of_x(passed.records["x_lo"])
+    # x is stored in 24 bits and n in 1e-7: dλ = dn/n' is about 2e-3 nm.
+    assert split_nm == pytest.approx(503.239, abs=0.05)
+    assert photons.tally.fallbacks["band_cut"] >= len(passed.records)
+    assert (photons.axis.nm_of_x(photons.records["x_lo"]) > 503.1).all()  # nothing shorter got out here
+    assert photons.tally.imbalance < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("name", "x_mm", "dnm_dmm"),
+    [
+        ("N-BK7", (19.1320, 4.4542, -3.4169, -8.3520), (4.788, 9.743, 16.545, 24.675)),
+        ("N-SF11", (143.1368, 26.3026, -18.2710, -41.9603), None),
+    ],
+)
+def test_t14_prism_spectrum_on_a_screen(gl, name: str, x_mm: tuple[float, ...], dnm_dmm: tuple[float, ...] | None) -> None:
+    incidence = float(np.arcsin(glasses.index(name, 550.0) / 2))
+    straight = incidence - APEX / 2 - (2 * incidence - APEX)
+    for i, nm in enumerate((400.0, 500.0, 600.0, 700.0)):
+        heading, dheading_dn = across_prism(gl, name, incidence, nm, around=straight)
+        off = straight - heading
+        assert 1000 * np.median(np.tan(off)) == pytest.approx(x_mm[i], rel=1e-4)
+        assert np.abs(1000 * np.tan(off) - x_mm[i]).max() < 5e-3  # each photon's angle to 5e-6 rad
+        if dnm_dmm:
+            dmm_dnm = -dheading_dn * glasses.slope(name, nm) / np.cos(off) ** 2
+            assert -1 / dmm_dnm == pytest.approx(dnm_dmm[i], rel=1e-4)
+
+
+def test_t15_energy_near_the_fold_of_a_ball(gl) -> None:
+    # One photon a lattice point, all of the same weight before Fresnel: counting them leaves Fresnel out.
+    photons = trace_beam(
+        gl, ball_mesh(81_920), glass("N-BK7"), screen([1.2, 0, 0], [1, 0, 0]), [-3, 0, 0], [1, 0, 0], 1.0, D_NM, count=60_000
+    )
+    emitted = photons.lattice_in_disc
+    straight = photons.of_depth(2)
+    radius = np.linalg.norm(straight.position[:, 1:], axis=1)
+    assert len(radius) / emitted == pytest.approx(0.99505, abs=1e-3)  # above h = 0.99752 the ball turns light back
+    fold = 0.06458174
+    rings = [np.count_nonzero((radius >= s * fold) & (radius <= fold)) / emitted for s in (0.9, 0.99)]
+    assert rings[0] == pytest.approx(0.237054, rel=2e-3)
+    # The narrow ring is 6e-4 wide and the facets blur it by a tenth of that: it loses at the outer edge what sqrt says.
+    assert rings[1] == pytest.approx(0.0740836, rel=3e-2)
+    assert np.count_nonzero(radius <= fold) / emitted == pytest.approx(0.717808, rel=1e-3)
+    # On the fold itself the footprint collapses: dr/dh changes sign with h.
+    height = np.linalg.norm(straight.start[:, 1:], axis=1)
+    near = np.abs(height - 0.5028279) < 0.004
+    assert radius[near].max() == pytest.approx(fold, rel=2e-3)
+
+
+@pytest.mark.parametrize("kind", ["ball", "prism"])
+def test_whole_paths_against_the_reference_over_the_same_triangles(gl, kind: str) -> None:
+    """Position, every column and the flux with exact Fresnel of each photon on the transmitted path."""
+    ball = kind == "ball"
+    solid = ball_mesh(320) if ball else extruded("prism", tilted_section(APEX))
+    direction = unit(np.array([1.0, 0.1, -0.2])) if ball else in_plane(0.4)
+    middle = solid.corners().reshape(-1, 3).mean(0)
+    target = screen(middle + 3 * direction, direction)
+    photons = trace_beam(gl, solid, glass("F2"), target, middle - 3 * direction, direction, 0.7 if ball else 0.25, D_NM, count=120).of_depth(2)
+    scene = TriangleList(
+        np.concatenate([solid.corners(), target.corners()]),
+        np.array([0] * len(solid.triangles) + [RECEIVER] * 2),
+        np.concatenate([solid.corner_normals, np.zeros((2, 3, 3))]) if ball else None,
+    )
+    seeds = [*orthonormal_frame(direction), np.zeros(3)]
+    index = Index(float(glasses.index("F2", D_NM)), np.array([0.0, 0.0, 1.0]))
+    flux_w = photons.tally.emitted / photons.lattice_in_disc
+    agreeing = 0
+    for i, record in enumerate(photons.records):
+        path = trace(make_ray(photons.start[i], direction, seeds), scene, [index])
+        assert path.landed
+        if len(path.triangles) != 3 or np.abs(photons.position[i] - path.ray.position).max() > 2e-5:
+            continue  # float32 chose the neighbouring triangle at an edge
+        agreeing += 1
+        got = np.array([photons.dposition_ds[i], photons.dposition_dt[i], photons.dposition_dn[i]])
+        np.testing.assert_allclose(got, path.ray.dposition, atol=1e-4 * np.abs(path.ray.dposition).max())
+        assert record["flux_w"] == pytest.approx(flux_w * path.transmittance, rel=1e-4)
+    assert len(photons.records) > 60
+    assert agreeing >= 0.97 * len(photons.records)
