@@ -71,9 +71,7 @@ void add_direct(vec3 position, vec3 normal, RayOrigin origin, uint reflectance_c
         float gain = s.gain * max(dot(s.toward, normal), 0.0);
         if (gain > 0.0) {
             // Up to the light, less a hair so that a surface the light lies on does not hide it.
-            Hit blocker;
-            bool hidden = intersect_closest(position, s.toward, s.distance * 0.99999, origin, blocker);
-            gain = hidden ? 0.0 : gain;
+            gain = intersect_any(position, s.toward, s.distance * 0.99999, origin) ? 0.0 : gain;
             for (int t = 0; t < TARGETS; ++t)
                 irradiance[t] += gain * light_of(i, reflectance_class, t);
         }
@@ -101,7 +99,7 @@ void add_diffuse(EyePath path, Hit hit, vec3 position, uint pixel_key, inout vec
     }
 #ifdef LAYER_BEAUTY
     vec3 normal = facing < 0.0 ? hit.normal_g : -hit.normal_g;
-    add_direct(position, normal, RayOrigin(hit.primitive, hit.object, facing > 0.0), reflectance_class, pixel_key, irradiance);
+    add_direct(position, normal, RayOrigin(hit.primitive, hit.object, facing > 0.0, 0u), reflectance_class, pixel_key, irradiance);
 #endif
     for (int t = 0; t < TARGETS; ++t) {
         // Other classes than 0 are folded into the map and into `light_of` already.
@@ -180,8 +178,8 @@ void cross_glass(inout EyePath path, Hit hit, vec3 position, out EyePath mirrore
     path.position = position;
     path.travelled += hit.distance;
     mirrored = path;
-    mirrored.origin = RayOrigin(hit.primitive, hit.object, !entering);
-    path.origin = RayOrigin(hit.primitive, hit.object, entering);
+    mirrored.origin = RayOrigin(hit.primitive, hit.object, !entering, path.medium.inside_mask);
+    path.origin = RayOrigin(hit.primitive, hit.object, entering, crossing.mask_after);
     RayRecord beyond = RayRecord(crossing.mask_after, crossing.object_after);
     if (!crossing.changes) {
         path.medium = beyond;
@@ -216,7 +214,7 @@ void main()
     EyePath path;
     path.position = ray.position;
     path.direction = ray.direction;
-    path.origin = RayOrigin(NONE, NONE, false);
+    path.origin = RayOrigin(NONE, NONE, false, 0u);
     path.travelled = 0.0;
     vec4 radiance[TARGETS];
     for (int t = 0; t < TARGETS; ++t) {
@@ -224,7 +222,8 @@ void main()
         radiance[t] = vec4(0.0);
     }
 #ifdef HAS_DIELECTRIC
-    path.medium = RayRecord(0u, NONE);
+    path.medium = RayRecord(p.inside_mask, p.inside_object);
+    path.origin.inside_mask = p.inside_mask;
     EyePath waiting;
     bool waits = false, branched = false;
 #endif
@@ -244,7 +243,7 @@ void main()
         if (kind == KIND_MIRROR) {
             vec3 normal = facing_normal(hit, path.direction);
             path.direction = normalize(reflect_direction(path.direction, normal, dot(path.direction, normal)));
-            path.origin = RayOrigin(hit.primitive, hit.object, dot(path.direction, hit.normal_g) < 0.0);
+            path.origin = RayOrigin(hit.primitive, hit.object, dot(path.direction, hit.normal_g) < 0.0, path.origin.inside_mask);
             path.position = position;
             path.travelled += hit.distance;
             for (int t = 0; t < TARGETS; ++t) path.weight[t] *= material_channels[hit.object * uint(TARGETS) + uint(t)];

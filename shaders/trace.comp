@@ -96,7 +96,7 @@ void main()
     RayRecord ray = rays_in[indices[k]];
     Outcome outcome = Outcome(0u, ESCAPED, 0.0, 0.0, 0.0, 0.0);
 
-    RayOrigin origin = RayOrigin(ray.last_primitive, ray.last_object, (ray.flags & FLAG_INSIDE) != 0u);
+    RayOrigin origin = RayOrigin(ray.last_primitive, ray.last_object, (ray.flags & FLAG_INSIDE) != 0u, ray.inside_mask);
     Hit hit;
     bool met = intersect_closest(ray.position, ray.direction, FAR_DISTANCE, origin, hit);
     float theta_g = dot(ray.direction, hit.normal_g);

@@ -21,6 +21,7 @@ from app.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
 from app.gpu.schema import Field, Struct
 from app.model.colorimetry import xyz_to_rgb709_matrix
 from app.model.scene import Camera, Dielectric, Diffuse, Light, Mirror
+from app.model.scene_checks import contains
 from app.passes.emission_domain import orthonormal_frame
 from app.passes.present import Channels
 
@@ -71,6 +72,9 @@ EYE_PARAMETERS = Struct(
         Field("pixel_angle", "float", "and how that grows with distance (pinhole)"),
         Field("map_scale", "float", "factor on the caustic maps: one over the passes in them"),
         Field("x_eye", "float", "spectral coordinate of the eye's rays"),
+        Field("inside_mask", "uint", "solids the camera stands in, bits of the medium stack"),
+        Field("inside_object", "uint", "solid outside the stack it stands in, or NONE"),
+        Field("reserved", "uvec2", ""),
     ),
 )
 _LIGHT_KINDS = {"point": 0, "spot": 0, "directional": 1, "collimated": 2, "area": 3}
@@ -249,6 +253,13 @@ class EyePass:
         parameters["pixel_size" if orthographic else "pixel_angle"] = 2.0 * half_height / height
         parameters["map_scale"] = map_scale
         parameters["x_eye"] = self.scene.axis.x_of_nm(D_LINE_NM)
+        parameters["inside_object"] = NONE
+        for index, item in enumerate(self.scene.scene.objects):
+            if isinstance(item.material, Dielectric) and contains(item, np.array(camera.position)):
+                if index in self.scene.stack_objects:
+                    parameters["inside_mask"] |= np.uint32(1 << self.scene.stack_objects.index(index))
+                else:
+                    parameters["inside_object"] = index
         return parameters
 
     def _clear(self, width: int, height: int) -> None:

@@ -26,6 +26,7 @@ struct RayOrigin {
     uint primitive;   // facet it starts on, or NONE
     uint object;      // object of that facet
     bool inside;      // it travels on that object's inner side
+    uint inside_mask; // solids of the medium stack it is inside of (see medium.glsl)
 };
 
 bool accept_hit(float distance, float facing, uint object, RayOrigin origin)
@@ -34,6 +35,14 @@ bool accept_hit(float distance, float facing, uint object, RayOrigin origin)
     // opposite crossing can be true; another object may touch at distance 0.
     bool same = object == origin.object;
     bool repeated = same && distance < NEAR_DISTANCE && (origin.inside == (facing < 0.0));
+#ifdef MEDIUM_STACK
+    // Of two surfaces at one place both lie near for ever; the mask knows which was crossed already.
+    if (!same && distance < NEAR_DISTANCE) {
+        uint bit = objects[object].stack_bit;
+        bool is_inside = bit != NONE && (origin.inside_mask & (1u << (bit & 31u))) != 0u;
+        repeated = bit != NONE && is_inside == (facing < 0.0);
+    }
+#endif
     return !repeated && distance > (same ? 0.0 : -NEAR_DISTANCE);
 }
 

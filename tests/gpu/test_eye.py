@@ -259,6 +259,24 @@ def test_absorption_follows_beers_law(gl):
     assert rgb[5, 5] == pytest.approx(0.96**2 * np.exp(-1.3 * 0.5) + 0.04, rel=1e-4)
 
 
+def test_a_camera_may_stand_in_glass(gl):
+    alpha = Absorption(np.full(401, 1.3))
+    slab = SceneObject("slab", primitives.box((8, 8, 0.5)), Dielectric(glass.constant(1.5), alpha))
+    camera = replace(ABOVE, position=(0.3, 0.1, 0), target=(0.3, 0.1, 1))
+    rgb = render(gl, [slab], background=(1, 1, 1), camera=camera)
+    near, across = np.exp(-1.3 * 0.25), np.exp(-1.3 * 0.5)
+    assert rgb[5, 5] == pytest.approx(0.96 * near + 0.04 * near * across * 0.96, rel=1e-4)
+
+
+def test_cemented_solids_have_no_film_of_air(gl):
+    """Two touching slabs of n 1.5 and 1.6: the middle surface reflects (0.1/3.1)², not 4 + 5 %."""
+    first = SceneObject("low", primitives.box((8, 8, 0.5)), Dielectric(glass.constant(1.5)))
+    second = SceneObject("high", primitives.box((8, 8, 0.5)), Dielectric(glass.constant(1.6)), _at(0, 0, 0.5))
+    rgb = render(gl, [first, second], background=(1, 1, 1))
+    top, middle, bottom = (0.6 / 2.6) ** 2, (0.1 / 3.1) ** 2, 0.04
+    assert rgb[5, 5] == pytest.approx((1 - top) * (1 - middle) * (1 - bottom) + top, rel=1e-4)
+
+
 def test_refraction_shifts_what_lies_behind(gl):
     """A point light's floor through a slab seen at 45°: parallel shift by the slab's displacement."""
     slab = SceneObject("slab", primitives.box((30, 30, 1.0)), Dielectric(glass.constant(1.5168)), _at(0, 0, 2.0))
