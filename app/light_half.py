@@ -24,15 +24,11 @@ from app.model.scene import Dielectric, Diffuse, Mirror, Scene
 from app.model.settings import RenderSettings
 from app.model.spectral_tables import SpectralAxis
 from app.passes.emission_domain import EmissionDomain, emission_domain
-from app.passes.map_layout import Landings, MapLayout, check_map_receiver, layout_maps
+from app.passes.map_layout import MapLayout, check_map_receiver, layout_maps
+from app.passes.pilot import Pilot, PilotFit, landings_of, run_pilot
 from app.passes.splat import Splatter
 from app.passes.trace import Band, Batch, FluxTally, LatticeSlice, TracePass
 
-PILOT_PHOTONS = 4096
-PILOT_PLACES = (0.02, 0.25, 0.5, 0.75, 0.98)
-MAX_BANDS = 32
-BAND_TOLERANCE_TEXELS = 0.35
-"""Chord and true path may differ by this much (or by the same share of a footprint) in a band."""
 DEFAULT_BATCH = 1 << 16
 _SHIFT_GENERATORS = (3242174889, 2447445414, 3141592653, 1640531527, 2246822519)
 
@@ -45,6 +41,7 @@ class LightStats:
     photons: int = 0
     splats: int = 0
     bands: dict[str, int] = field(default_factory=dict)
+    light_points: dict[str, int] = field(default_factory=dict)
     trace_seconds: float = 0.0
     splat_seconds: float = 0.0
     outside_map_w: float = 0.0
@@ -58,8 +55,14 @@ class LightPlan:
     index: int
     domain: EmissionDomain
     bands: tuple[Band, ...]
+    light_points: int
     share: float
     """Share of the photons."""
+
+    @property
+    def lattices(self) -> int:
+        """Sub-lattices: one a band and point on the light."""
+        return len(self.bands) * self.light_points
 
 
 class LightHalf:
@@ -85,13 +88,13 @@ class LightHalf:
         triangles = np.concatenate(specular) if specular else np.zeros((0, 3, 3))
         domains = {i: emission_domain(light, self.scene, self.buffers.space, triangles) for i, light in enumerate(self.scene.lights)}
         domains = {i: d for i, d in domains.items() if d is not None}
-        pilots = {i: self._pilot(i, domain) for i, domain in domains.items()}
+        pilots = {i: run_pilot(self.trace, self.scene, i, domain, self._full_power(i), self._needs_spectral_pilot) for i, domain in domains.items()}
         picture: tuple[int, int] | None = (self.settings.width, self.settings.height)
         map_receiver = None
         if self.settings.layer.startswith("map:"):
             map_receiver = check_map_receiver(self.scene, self.buffers, self.settings.layer[4:])
         self.map_receiver = map_receiver
-        landings = _landings([p for pilot in pilots.values() for p in pilot])
+        landings = landings_of(pilots.values())
         self.layout: MapLayout = layout_maps(self.scene, self.buffers, landings, picture, self.reflectance_class, map_receiver)
         self.plans = self._plan(domains, pilots)
         limits = [[(b.x_lo, b.x_hi) for b in plan.bands] for plan in self.plans]
@@ -106,105 +109,88 @@ class LightHalf:
         self.splatter.reset_counts()
 
     @property
+    def _needs_spectral_pilot(self) -> bool:
+        return bool(self.features.spectral_groups) or self.features.point_spectrum
+
+    def _full_power(self, light: int) -> float:
+        """Radiant power of a light's whole spectrum per unit weight, W."""
+        return float(self.buffers.light_power[light].band(0.0, 1.0)[3])
+
+    @property
     def map_scale(self) -> float:
         """Factor from what the atlas has summed to energy per texel."""
         return 1.0 / self._weight_sum if self._weight_sum else 0.0
 
     def run_pass(self, number: int, photons: int, proceed: Callable[[float], bool]) -> bool:
-        """One shifted lattice of about `photons` points over all lights and bands.
+        """One shifted set of lattices with about `photons` points over all lights.
 
-        The lattice is traced in rounds, each an even sub-lattice of the whole, so that a pass that
-        is stopped between rounds is still complete everywhere, only coarser. `proceed(fraction)`
-        is asked between slices; returns False when it said stop.
+        It is traced in rounds, each an even sub-lattice of the whole, so that a pass that is stopped
+        between rounds is complete everywhere, only coarser. `proceed(fraction)` is asked after
+        every slice; returns False when it said stop.
         """
         if not self.plans:
             return True
-        counts = {(plan.index, b): self._lattice_count(plan, photons) for plan in self.plans for b in range(len(plan.bands))}
-        rounds = max(1, max(-(-n // self.trace.batch) for n in counts.values()))
-        slices = rounds * len(counts)
-        done = 0
+        counts = [self._lattice_count(plan, photons) for plan in self.plans]
+        rounds = max(1, *(-(-n * plan.lattices // self.trace.batch) for n, plan in zip(counts, self.plans, strict=True)))
         for j in range(rounds):
-            for plan in self.plans:
-                for b, band in enumerate(plan.bands):
-                    lattice = counts[plan.index, b]
-                    count = len(range(j, lattice, rounds))
-                    if count:
-                        self._slice(plan, b, band, number, lattice, j, rounds, count, photons)
-                    done += 1
-                    if not proceed(done / slices) and done < slices:
-                        if j == 0:
-                            continue  # a first round is needed for a picture at all
-                        if (done % len(counts)) == 0:
-                            self._weight_sum += photons / rounds
-                            return False
+            go_on = True
+            for i, (plan, lattice) in enumerate(zip(self.plans, counts, strict=True)):
+                points = len(range(j, lattice, rounds))
+                if points:
+                    self._slice(self._lattice_slice(plan, number, lattice, j, rounds, points, float(photons)), plan.domain)
+                go_on = proceed((j * len(counts) + i + 1) / (rounds * len(counts)))
             self._weight_sum += photons / rounds
+            if not go_on and j + 1 < rounds:
+                return False
         return True
 
-    def _slice(self, plan: LightPlan, b: int, band: Band, number: int, lattice: int, first: int, stride: int, count: int, photons: int) -> None:
+    def _slice(self, piece: LatticeSlice, domain: EmissionDomain) -> None:
         started = time.perf_counter()
-        piece = self._lattice_slice(plan.index, b, band, number, lattice, first, stride, count, weight=float(photons))
-        batch = self.trace.run(piece, plan.domain)
+        batch = self.trace.run(piece, domain)
         traced = time.perf_counter()
         self.splatter.run(self.trace.photons, batch.photons, self.variables, self.tables, self.atlas, self.receivers, self.settings.smoothing)
         if self.context.is_software:
             self.context.finish()
         self.stats.trace_seconds += traced - started
         self.stats.splat_seconds += time.perf_counter() - traced
-        self._account(batch, photons)
+        self._account(batch)
 
-    def _account(self, batch: Batch, photons: int) -> None:
+    def _account(self, batch: Batch) -> None:
         self.stats.photons += batch.emitted_photons
         self.stats.splats += batch.photons
         self.stats.tally.merge(batch.tally)
 
-    def _lattice_slice(
-        self, light: int, b: int, band: Band, number: int, lattice: int, first: int, stride: int, count: int, weight: float
-    ) -> LatticeSlice:
-        # Every band of every pass has its own shift; successive passes follow a Kronecker sequence,
-        # so their union is again even.
-        step = number * MAX_BANDS * 2 + b + 97 * light + 1
-        seed = self.settings.seed & 0xFFFFFFFF
-        start = (seed * 0x9E3779B1) & 0xFFFFFFFF
-        shifts = [int((start + step * g) & 0xFFFFFFFF) for g in _SHIFT_GENERATORS]
-        return LatticeSlice(light, b, band, lattice, first, count, (shifts[0], shifts[1]), (shifts[2], shifts[3]), shifts[4], (seed + 7919 * number) & 0xFFFFFFFF, stride, weight)
+    def _lattice_slice(self, plan: LightPlan, number: int, lattice: int, first: int, stride: int, points: int, weight: float) -> LatticeSlice:
+        # Successive passes follow a Kronecker sequence, so their union is again even.
+        start = (self.settings.seed * 0x9E3779B1 + plan.index * 0x85EBCA6B) & 0xFFFFFFFF
+        shifts = [(start + (number + 1) * g) & 0xFFFFFFFF for g in _SHIFT_GENERATORS]
+        seed = (self.settings.seed + 7919 * number) & 0xFFFFFFFF
+        return LatticeSlice(
+            plan.index, plan.bands, lattice, first, stride, points, (shifts[0], shifts[1]), (shifts[2], shifts[3]), shifts[4], seed, plan.light_points, weight=weight
+        )
 
     def _lattice_count(self, plan: LightPlan, photons: int) -> int:
-        """Lattice points over the whole rectangle, so that about the band's share of photons starts."""
-        wanted = photons * plan.share / len(plan.bands)
-        return max(1, int(round(wanted / plan.domain.active_share)))
+        """Points of each sub-lattice over the whole rectangle, so that about the light's share of photons starts."""
+        return max(1, int(round(photons * plan.share / plan.lattices / plan.domain.active_share)))
 
-    def _pilot(self, light: int, domain: EmissionDomain) -> list[np.ndarray]:
-        """Photon records of the same lattice traced as one band and at `PILOT_PLACES` (the list's later entries)."""
-        power = self.buffers.light_power[light]
-        count = max(1, int(PILOT_PHOTONS / domain.active_share))
-        count = min(count, self.trace.batch)
-        bands = [Band(0.0, 1.0, 0.5, float(power.band(0.0, 1.0)[3]))]
-        bands += [Band(x, x, x, bands[0].power_w) for x in PILOT_PLACES]
-        if not self.features.spectral_groups and not self.features.point_spectrum:
-            bands = bands[:1]
-        found = []
-        for band in bands:
-            piece = self._lattice_slice(light, 0, band, 0, count, 0, 1, count, weight=1.0)
-            batch = self.trace.run(piece, domain)
-            raw = self.trace.photons.read(size=batch.photons * self.trace.photon.stride) if batch.photons else b""
-            found.append(np.frombuffer(raw, self.trace.photon.dtype))
-        return found
-
-    def _plan(self, domains: dict[int, EmissionDomain], pilots: dict[int, list[np.ndarray]]) -> list[LightPlan]:
-        power = {i: max(float(self.buffers.light_power[i].band(0.0, 1.0)[1]) * domains[i].measure * domains[i].active_share, 0.0) for i in domains}
-        total = sum(power.values())
+    def _plan(self, domains: dict[int, EmissionDomain], pilots: dict[int, Pilot]) -> list[LightPlan]:
+        """Photons, bands and points of each light that reaches a receiver."""
+        power = {i: max(float(self.buffers.light_power[i].band(0.0, 1.0)[1]) * d.measure * d.active_share, 0.0) for i, d in domains.items()}
+        lit = [i for i in domains if power[i] > 0.0 and len(pilots[i].whole)]
+        total = sum(power[i] for i in lit)
         plans = []
-        for i, domain in domains.items():
-            if power[i] <= 0.0 or not any(len(p) for p in pilots[i]):
-                continue
-            share = 0.5 * power[i] / total + 0.5 / len(domains)
-            plans.append((i, domain, self._bands(i, pilots[i], share), share))
-        scale = sum(p[3] for p in plans)
-        for i, _, bands, _ in plans:
+        for i in lit:
+            # Half by power, half evenly: a dim light must not be left coarse.
+            share = 0.5 * power[i] / total + 0.5 / len(lit)
+            budget = int((self.settings.photons or self.scene.render.photons) * share)
+            fit = PilotFit(pilots[i], self._texel_size(), self.buffers.variable_table, self.settings.smoothing, budget)
+            bands = self._bands(i, fit)
+            plans.append(LightPlan(i, domains[i], bands, fit.light_points(len(bands)), share))
             self.stats.bands[self.scene.lights[i].name] = len(bands)
-        return [LightPlan(i, domain, bands, share / scale) for i, domain, bands, share in plans]
+            self.stats.light_points[self.scene.lights[i].name] = plans[-1].light_points
+        return plans
 
-    def _bands(self, light: int, pilot: list[np.ndarray], share: float) -> tuple[Band, ...]:
+    def _bands(self, light: int, fit: PilotFit) -> tuple[Band, ...]:
         power = self.buffers.light_power[light]
         axis = self.buffers.axis
         lo_nm, hi_nm = self.scene.lights[light].spectral_power.support_nm()
@@ -217,55 +203,12 @@ class LightHalf:
             edges = axis.x_of_nm(edges_nm)
             middles = axis.x_of_nm(0.5 * (edges_nm[:-1] + edges_nm[1:]))
         else:
-            count = 1 if method != "srd" or not self.features.spectral_groups else self._band_count(pilot, share)
+            count = fit.band_count() if method == "srd" and self.features.spectral_groups else 1
             edges = np.linspace(float(axis.x_of_nm(max(lo_nm - 0.5, 380.0))), float(axis.x_of_nm(min(hi_nm + 0.5, 780.0))), count + 1)
             middles = 0.5 * (edges[:-1] + edges[1:])
         return tuple(
             Band(float(lo), float(hi), float(mid), float(power.band(lo, hi)[3])) for lo, hi, mid in zip(edges[:-1], edges[1:], middles, strict=True)
         )
-
-    def _band_count(self, pilot: list[np.ndarray], share: float) -> int:
-        """Bands needed so that the chord's error stays below the tolerance for nine tenths of the flux."""
-        whole = pilot[0]
-        if len(whole) == 0:
-            return 1
-        texel = self._texel_size()
-        errors, weights = [], []
-        for place, record in zip(PILOT_PLACES, pilot[1:], strict=True):
-            mine, theirs = _same_paths(whole, record)
-            if len(mine) == 0 or abs(place - 0.5) < 0.2:
-                continue
-            predicted = mine["position"] + self._sweep(mine, place)
-            miss = np.linalg.norm(predicted - theirs["position"], axis=1)
-            spread = np.linalg.norm(theirs["position"] - mine["position"], axis=1)
-            # A pilot pair that lands in another world altogether says nothing about curvature.
-            same = miss < np.maximum(spread, 1e-12) * 2.0
-            errors.append(miss[same] / ((place - 0.5) / 0.5) ** 2 / texel[mine["receiver"][same]])
-            weights.append(mine["flux_w"][same])
-        if not errors or not sum(map(len, errors)):
-            return 1
-        error, weight = np.concatenate(errors), np.concatenate(weights)
-        order = np.argsort(error)
-        running = np.cumsum(weight[order])
-        typical = error[order][np.searchsorted(running, 0.9 * running[-1])]
-        # Footprints grow with the square root of the bands: no need for a chord much truer than those.
-        footprint = np.median(np.linalg.norm(whole["dposition_ds"], axis=1) / texel[whole["receiver"]])
-        budget = (self.settings.photons or self.scene.render.photons) * share
-        for count in range(1, MAX_BANDS + 1):
-            blur = self.settings.smoothing * footprint * np.sqrt(PILOT_PHOTONS * count / budget)
-            if typical / count**2 <= BAND_TOLERANCE_TEXELS * max(1.0, blur):
-                return count
-        return MAX_BANDS
-
-    def _sweep(self, photons: np.ndarray, x: float) -> np.ndarray:
-        """Displacement of photons from their anchor to x by their spectral columns, GPU space (n, 3)."""
-        table = self.buffers.variable_table
-        samples = np.linspace(0.0, 1.0, table.shape[1])
-        moved = np.zeros((len(photons), 3))
-        for g, row in enumerate(table):
-            step = np.interp(x, samples, row) - np.interp(photons["x_anchor"], samples, row)
-            moved += photons[f"dposition_dvar{g}"][:, :3] * step[:, None]
-        return moved
 
     def _texel_size(self) -> np.ndarray:
         """Texel side of each receiver's finest window, GPU units."""
@@ -330,25 +273,3 @@ def _largest_batch(context: Context, features: Features) -> int:
     ray = records.ray_record(features.defines()["COLUMNS"]).stride
     limit = context.limits.storage_block_bytes
     return max(64, int(limit // (2 * RAY_ROOM * ray)) // 64 * 64)
-
-
-def _landings(pilots: list[np.ndarray]) -> dict[int, Landings]:
-    """Where pilot photons landed, per receiver; flux averaged over the wavelengths traced."""
-    found: dict[int, Landings] = {}
-    photons = np.concatenate(pilots) if pilots else None
-    if photons is None or not len(photons):
-        return found
-    for receiver in np.unique(photons["receiver"]):
-        mine = photons[photons["receiver"] == receiver]
-        found[int(receiver)] = Landings(mine["position"].astype(float), mine["flux_w"].astype(float))
-    return found
-
-
-def _same_paths(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Records of both traces that took the same branches to the same receiver."""
-    def keys(records_: np.ndarray) -> np.ndarray:
-        return (records_["photon_id"].astype(np.uint64) << np.uint64(32)) | records_["branch_key"].astype(np.uint64)
-
-    _, in_a, in_b = np.intersect1d(keys(a), keys(b), return_indices=True)
-    same = a["receiver"][in_a] == b["receiver"][in_b]
-    return a[in_a[same]], b[in_b[same]]

@@ -67,7 +67,7 @@ class RenderStats:
             f"outside every map {self.light.outside_map_w / max(tally.ended['deposited'], 1e-300):.6f}",
             "fall-backs          " + ", ".join(f"{name} {count}" for name, count in tally.fallbacks.items())
             + f", splat_footprint_dropped {self.light.footprints_dropped}",
-            "bands               " + ", ".join(f"{name} {count}" for name, count in self.light.bands.items()),
+            "bands × points      " + ", ".join(f"{name} {count} × {self.light.light_points[name]}" for name, count in self.light.bands.items()),
             f"maps                {self.atlas_size[0]}×{self.atlas_size[1]} texels, buffers {self.bytes / 2**20:.0f} MiB",
             f"seconds             prepare {self.prepare_seconds:.2f}, emit and trace {self.light.trace_seconds:.2f}, "
             f"splat {self.light.splat_seconds:.2f}, eye {self.eye_seconds:.2f}, all {self.seconds:.2f}",

@@ -15,16 +15,23 @@ void main()
 {
     uint k = gl_GlobalInvocationID.x;
     if (k >= p.count) return;
-    uint id = p.first + k * p.stride;
+    // Every band, and every point on an extended light, has a regular lattice of its own, shifted
+    // against the others: a lattice whose points jittered over the light would be noise.
+    uint lattices = p.band_count * p.light_points;
+    uint sub = k % lattices;
+    uint point = p.first + (k / lattices) * p.stride;
+    uint id = point * lattices + sub;
+    uint band_index = sub % p.band_count;
+    vec4 band = p.bands[band_index];
     Outcome outcome = Outcome(0u, 0u, 0.0, 0.0, 0.0, 0.0);
 
-    vec2 unit = lattice_point(id, p.lattice_count, p.shift);
+    vec2 unit = lattice_point(point, p.lattice_count, p.shift + sub * uvec2(PLASTIC_1, PLASTIC_2));
     uvec2 cell = uvec2(unit * float(MASK_SIZE));
     uint bit = min(cell.y, uint(MASK_SIZE - 1)) * uint(MASK_SIZE) + min(cell.x, uint(MASK_SIZE - 1));
     bool alive = (p.mask[bit >> 5u] & (1u << (bit & 31u))) != 0u;
     vec2 q = p.rect.xy + unit * p.rect.zw;
-    // Area lights and the sun's disc: two more dimensions of the same Kronecker sequence.
-    vec2 extra = vec2(kronecker(id, PLASTIC_1, p.shift_extra.x), kronecker(id, PLASTIC_2, p.shift_extra.y));
+    uint place = sub / p.band_count;
+    vec2 on_disc = p.light_points > 1u ? lattice_point(place, p.light_points, p.shift_light) : p.light_place;
 
     vec3 position, direction, dposition_ds = vec3(0.0), dposition_dt = vec3(0.0), ddirection_ds = vec3(0.0), ddirection_dt = vec3(0.0);
     float weight = p.weight;
@@ -38,12 +45,12 @@ void main()
 #ifdef LIGHT_POINT
     weight *= spot_falloff(direction, p.light_axis, p.cone);
 #else
-    vec2 on_light = p.is_disc != 0u ? concentric_disc(extra) : 2.0 * extra - 1.0;
+    vec2 on_light = p.is_disc != 0u ? concentric_disc(on_disc) : 2.0 * on_disc - 1.0;
     position += on_light.x * p.light_u + on_light.y * p.light_v;
     weight *= max(dot(direction, p.light_axis), 0.0);
 #endif
 #else
-    vec2 tilt = concentric_disc(extra) * p.cone.x;
+    vec2 tilt = concentric_disc(on_disc) * p.cone.x;
     direction = normalize(p.axis + tilt.x * p.tangent + tilt.y * p.bitangent);
     vec3 on_plane = p.origin + q.x * p.tangent + q.y * p.bitangent;
     position = on_plane - p.back * direction;
@@ -58,12 +65,12 @@ void main()
         RayRecord ray;
         ray.position = position;
         ray.direction = direction;
-        ray.flux_w = weight * p.band_power_w;
+        ray.flux_w = weight * band.w;
         ray.footprint_scale = 1.0;
         ray.throughput = vec3(weight);
-        ray.x_anchor = p.x_anchor;
-        ray.x_lo = p.x_lo;
-        ray.x_hi = p.x_hi;
+        ray.x_lo = band.x;
+        ray.x_hi = band.y;
+        ray.x_anchor = band.z;
 #ifdef RANDOM_WAVELENGTH
         ray.x_anchor = kronecker(id, 3774877043u, p.shift_spectral);
         ray.x_lo = ray.x_anchor;
@@ -71,8 +78,8 @@ void main()
 #endif
         ray.survival = 1.0;
         ray.photon_id = id;
-        ray.light_and_source = p.light | (p.band << 8u) | 0xffff0000u;
-        ray.branch_key = hash_combine(p.seed, p.light * 4096u + p.band);
+        ray.light_and_source = p.light | (band_index << 8u) | 0xffff0000u;
+        ray.branch_key = hash_combine(p.seed, p.light * 4096u + band_index);
         ray.flags = 0u;
         ray.depth = 0u;
         ray.last_primitive = 0xffffffffu;

@@ -34,6 +34,9 @@ layout(std430, binding = BIND_STATE) readonly restrict buffer StateBlock { Queue
 #define SPATIAL 0
 #endif
 
+// Narrower bands are not cut at total internal reflection.
+#define MIN_CUT_BAND 1e-4
+
 // A column longer than this (GPU units, the glass is about 1) has left the linear regime for good.
 #define COLUMN_LIMIT 1e6
 
@@ -292,7 +295,8 @@ void main()
             bool cut = false;
 #ifdef BAND_CUTS
             bvec3 passes = greaterThan(cosine2, vec3(0.0));
-            cut = any(passes) && !all(passes) && (ray.flags & FLAG_BAND_FINAL) == 0u && ray.x_hi - ray.x_lo > 1e-4;
+            cut = any(passes) && !all(passes) && (ray.flags & FLAG_BAND_FINAL) == 0u && ray.x_hi - ray.x_lo > MIN_CUT_BAND;
+            float at = 0.0;
             if (cut) {
                 // Total internal reflection sets in inside the band: find where, and let both parts
                 // meet this surface again, each anchored in its own middle.
@@ -309,7 +313,11 @@ void main()
                     a = passes_x == passes_a ? x : a;
                     b = passes_x == passes_a ? b : x;
                 }
-                float at = 0.5 * (a + b);
+                at = 0.5 * (a + b);
+                // A sliver of a band is not worth a path of its own.
+                cut = min(at - ray.x_lo, ray.x_hi - at) > 0.01 * MIN_CUT_BAND;
+            }
+            if (cut) {
                 float power_lo = spectral_row(uint(p.power_row), ray.x_lo), power_at = spectral_row(uint(p.power_row), at), power_hi = spectral_row(uint(p.power_row), ray.x_hi);
                 float share = clamp((power_at - power_lo) / max(power_hi - power_lo, 1e-30), 0.0, 1.0);
                 // Back to the start of the flight: the surface is met again next time.

@@ -7,7 +7,6 @@ photons is a function of the lattice alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import moderngl
@@ -77,22 +76,30 @@ class Batch:
 
 @dataclass(frozen=True)
 class LatticeSlice:
-    """`count` lattice points of a band's pass."""
+    """Part of a light's pass: `points` points of each of its sub-lattices (one a band and point on the light)."""
 
     light: int
-    band_index: int
-    band: Band
+    bands: tuple[Band, ...]
     lattice_count: int
+    """Points of one whole sub-lattice."""
     first: int
-    count: int
+    stride: int
+    points: int
+    """Lattice points first, first + stride, … of this slice."""
     shift: tuple[int, int]
-    shift_extra: tuple[int, int]
+    shift_light: tuple[int, int]
     shift_spectral: int
     seed: int
-    stride: int = 1
-    """Every stride-th lattice point from `first` on."""
+    light_points: int = 1
+    light_place: tuple[float, float] = (0.5, 0.5)
+    """Place on an extended light when `light_points` is 1."""
     weight: float = 1.0
     """Factor on every weight; a pass uses its photon count, so that passes add up by size."""
+
+    @property
+    def count(self) -> int:
+        """Rays emitted at most."""
+        return self.points * len(self.bands) * self.light_points
 
 
 class TracePass:
@@ -200,22 +207,22 @@ class TracePass:
         state["dispatched"] = piece.count
         self._state.write(state.tobytes())
         self._counts.write(self._counts_zero)
-        band = piece.band
         p = records.EMIT_PARAMETERS.zeros(1)
         p["origin"], p["axis"], p["tangent"], p["bitangent"] = domain.origin, domain.axis, domain.tangent, domain.bitangent
-        p["weight"] = domain.measure * piece.weight / piece.lattice_count
+        p["weight"] = domain.measure * piece.weight / (piece.lattice_count * piece.light_points)
         p["spacing"] = domain.spacing(piece.lattice_count)
         p["back"] = domain.back
-        p["band_power_w"] = band.power_w
         p["light_axis"] = np.asarray(self.scene.scene.lights[piece.light].direction, float)
         p["light_u"], p["light_v"], p["aperture_centre"] = domain.light_u, domain.light_v, domain.aperture_centre
         p["is_disc"] = domain.is_disc
         p["rect"] = domain.rect
         p["cone"] = domain.cone
-        p["x_lo"], p["x_hi"], p["x_anchor"] = band.x_lo, band.x_hi, band.x_anchor
-        p["shift"], p["shift_extra"], p["shift_spectral"] = piece.shift, piece.shift_extra, piece.shift_spectral
+        p["bands"][0, : len(piece.bands)] = [(b.x_lo, b.x_hi, b.x_anchor, b.power_w) for b in piece.bands]
+        p["band_count"], p["light_points"] = len(piece.bands), piece.light_points
+        p["shift"], p["shift_light"], p["shift_spectral"] = piece.shift, piece.shift_light, piece.shift_spectral
         p["seed"], p["first"], p["count"], p["lattice_count"] = piece.seed, piece.first, piece.count, piece.lattice_count
-        p["light"], p["band"], p["stride"] = piece.light, piece.band_index, piece.stride
+        p["light_place"] = piece.light_place
+        p["light"], p["stride"] = piece.light, piece.stride
         p["mask"] = np.packbits(domain.mask.ravel(), bitorder="little").view("<u4")
         self._emit_parameters.write(p.tobytes())
         self._write_trace_parameters(piece, self.max_depth)
@@ -280,7 +287,3 @@ class TracePass:
         tally.fallbacks["queue_overflow"] += overflow
         return tally
 
-
-def bands_of(power_w: np.ndarray, edges: Sequence[float]) -> list[Band]:
-    """Bands between neighbouring `edges`, anchored in the middle; `power_w` (len(edges) - 1,)."""
-    return [Band(lo, hi, 0.5 * (lo + hi), float(power)) for lo, hi, power in zip(edges[:-1], edges[1:], power_w, strict=True)]

@@ -1,0 +1,173 @@
+"""A few thousand photons ahead of everything else, to learn what a pass needs.
+
+The same lattice points are traced as one band, at several single wavelengths, and from the rim
+of an extended light. That tells where light lands (the maps are fitted to it), how far a chord
+in the spectral coordinate is from the true path (the number of bands), and how far an extended
+light smears what it throws (the number of points on it).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.gpu.records import MAX_BANDS
+from app.model.scene import Light, Scene
+from app.passes.emission_domain import EmissionDomain
+from app.passes.map_layout import Landings
+from app.passes.trace import Band, LatticeSlice, TracePass
+
+PHOTONS = 4096
+PLACES = (0.02, 0.25, 0.5, 0.75, 0.98)
+"""Spectral coordinates traced one by one."""
+RIM = ((1.0, 0.5), (0.5, 1.0))
+"""Places on an extended light, its middle being (0.5, 0.5)."""
+BAND_TOLERANCE_TEXELS = 0.35
+"""A chord may miss the true path by so many texels, or by this share of a footprint where that is larger."""
+MAX_LIGHT_POINTS = 256
+MIN_LATTICE = 256
+"""Points a sub-lattice keeps, however many an extended light would like."""
+
+
+@dataclass(frozen=True)
+class Pilot:
+    """Photon records of one light's pilot traces."""
+
+    lattice_count: int
+    whole: np.ndarray
+    """All wavelengths as one band, anchored at x = 0.5."""
+    spectral: list[np.ndarray]
+    """One at each of `PLACES` (empty where nothing disperses)."""
+    rim: list[np.ndarray]
+    """One from each of `RIM` (empty for a light without extent)."""
+
+
+def has_extent(light: Light) -> bool:
+    """Whether the light is more than a point or a strictly parallel beam."""
+    return light.kind == "area" or (light.kind == "directional" and light.angular_diameter_deg > 0.0)
+
+
+def run_pilot(trace: TracePass, scene: Scene, light: int, domain: EmissionDomain, power_w: float, spectral: bool) -> Pilot:
+    """Trace the pilots of one light; `power_w`: its whole power per unit weight."""
+    count = min(max(1, int(PHOTONS / domain.active_share)), trace.batch)
+
+    def traced(band: Band, place: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
+        piece = LatticeSlice(light, (band,), count, 0, 1, count, (0, 0), (0, 0), 0, 1, light_place=place)
+        batch = trace.run(piece, domain)
+        raw = trace.photons.read(size=batch.photons * trace.photon.stride) if batch.photons else b""
+        return np.frombuffer(raw, trace.photon.dtype)
+
+    return Pilot(
+        count,
+        traced(Band(0.0, 1.0, 0.5, power_w)),
+        [traced(Band(x, x, x, power_w)) for x in PLACES] if spectral else [],
+        [traced(Band(0.0, 1.0, 0.5, power_w), place) for place in RIM] if has_extent(scene.lights[light]) else [],
+    )
+
+
+def landings_of(pilots: Iterable[Pilot]) -> dict[int, Landings]:
+    """Where pilot photons landed, by receiver."""
+    records = [photons for pilot in pilots for photons in (pilot.whole, *pilot.spectral, *pilot.rim) if len(photons)]
+    if not records:
+        return {}
+    photons = np.concatenate(records)
+    found = {}
+    for receiver in np.unique(photons["receiver"]):
+        mine = photons[photons["receiver"] == receiver]
+        found[int(receiver)] = Landings(mine["position"].astype(float), mine["flux_w"].astype(float))
+    return found
+
+
+@dataclass(frozen=True)
+class PilotFit:
+    """What a pilot says about the lattices a light needs."""
+
+    pilot: Pilot
+    texel: np.ndarray
+    """Texel side of each receiver's finest map, GPU units."""
+    variables: np.ndarray
+    """Spectral variables over x, (groups, samples)."""
+    smoothing: float
+    budget: int
+    """Photons of the light in a pass."""
+
+    def band_count(self) -> int:
+        """Bands needed so that nine tenths of the flux keep the chord's error below the tolerance."""
+        whole = self.pilot.whole
+        errors, weights = [], []
+        for place, record in zip(PLACES, self.pilot.spectral, strict=True):
+            mine, theirs = same_paths(whole, record)
+            if abs(place - 0.5) < 0.2 or not len(mine):
+                continue
+            predicted = mine["position"] + self._sweep(mine, place)
+            miss = np.linalg.norm(predicted - theirs["position"], axis=1)
+            spread = np.linalg.norm(theirs["position"] - mine["position"], axis=1)
+            # A pair that went separate ways (over an edge, round a facet) says nothing about curvature.
+            together = miss < 2.0 * np.maximum(spread, 1e-12)
+            errors.append(miss[together] / (2.0 * place - 1.0) ** 2 / self.texel[mine["receiver"][together]])
+            weights.append(mine["flux_w"][together])
+        if not sum(map(len, errors)):
+            return 1
+        typical = _weighted_quantile(np.concatenate(errors), np.concatenate(weights), 0.9)
+        for count in range(1, MAX_BANDS):
+            # The miss shrinks with the square of the bands, while footprints grow with their root.
+            if typical / count**2 <= BAND_TOLERANCE_TEXELS * max(1.0, self._footprint_texels(count)):
+                return count
+        return MAX_BANDS
+
+    def light_points(self, bands: int) -> int:
+        """Points on an extended light so that footprints just bridge the copies they make."""
+        whole = self.pilot.whole
+        shifts, weights = [], []
+        for record in self.pilot.rim:
+            mine, theirs = same_paths(whole, record)
+            shift = np.linalg.norm(theirs["position"] - mine["position"], axis=1)
+            footprint = np.linalg.norm(mine["dposition_ds"], axis=1) * self._coarsening(bands)
+            usable = footprint > 0.0
+            shifts.append(shift[usable] / footprint[usable])
+            weights.append(mine["flux_w"][usable])
+        if not sum(map(len, shifts)):
+            return 1
+        ratio = _weighted_quantile(np.concatenate(shifts), np.concatenate(weights), 0.5)
+        # M copies over a disc of radius r lie r sqrt(pi / M) apart, and a footprint's standard
+        # deviation is smoothing * h sqrt(M): equal to 0.45 of the distance at M = 0.8 r / (smoothing h).
+        wanted = int(np.ceil(0.8 * ratio / self.smoothing))
+        return int(np.clip(wanted, 1, max(1, min(MAX_LIGHT_POINTS, self.budget // (bands * MIN_LATTICE)))))
+
+    def _coarsening(self, lattices: int) -> float:
+        """Spacing of a sub-lattice of the pass over that of the pilot."""
+        return float(np.sqrt(PHOTONS * lattices / max(self.budget, 1)))
+
+    def _footprint_texels(self, lattices: int) -> float:
+        """Typical standard deviation of a footprint, texels."""
+        whole = self.pilot.whole
+        axis = np.median(np.linalg.norm(whole["dposition_ds"], axis=1) / self.texel[whole["receiver"]])
+        return float(self.smoothing * axis * self._coarsening(lattices))
+
+    def _sweep(self, photons: np.ndarray, x: float) -> np.ndarray:
+        """Displacement of photons from their anchor to x by their spectral columns, GPU space (n, 3)."""
+        samples = np.linspace(0.0, 1.0, self.variables.shape[1])
+        moved = np.zeros((len(photons), 3))
+        for g, row in enumerate(self.variables):
+            step = np.interp(x, samples, row) - np.interp(photons["x_anchor"], samples, row)
+            moved += photons[f"dposition_dvar{g}"][:, :3] * step[:, None]
+        return moved
+
+
+def same_paths(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Records of two traces that took the same branches to the same receiver, pairwise."""
+
+    def keys(records: np.ndarray) -> np.ndarray:
+        return (records["photon_id"].astype(np.uint64) << np.uint64(32)) | records["branch_key"].astype(np.uint64)
+
+    _, in_a, in_b = np.intersect1d(keys(a), keys(b), return_indices=True)
+    same = a["receiver"][in_a] == b["receiver"][in_b]
+    return a[in_a[same]], b[in_b[same]]
+
+
+def _weighted_quantile(values: np.ndarray, weights: np.ndarray, share: float) -> float:
+    order = np.argsort(values)
+    running = np.cumsum(weights[order])
+    return float(values[order][min(np.searchsorted(running, share * running[-1]), len(order) - 1)])
