@@ -47,13 +47,14 @@ def auto_exposure(rgb: np.ndarray) -> float:
     The logarithmic mean of the lit pixels becomes middle grey (0.18), unless the brightest
     caustics (99.5th percentile) would then lie more than three stops above display white: those
     must keep their drawing. Percentiles make it indifferent to single fireflies and to how much
-    of the frame is black.
+    of the frame is black, the median to how deep the shadows are.
     """
     lit = luminance(np.asarray(rgb, np.float32)).ravel()
-    lit = lit[np.isfinite(lit) & (lit > 0)]
+    lit = lit[np.isfinite(lit) & (lit > 0)].astype(np.float64)
     if lit.size == 0:
         return 0.0
-    lit = lit[lit > 1e-4 * np.percentile(lit, 99.0)].astype(np.float64)
+    lit = lit[lit >= 1e-4 * np.percentile(lit, 99.0)]
+    lit = lit[lit >= 0.05 * np.median(lit)]
     key_ev = np.log2(0.18) - np.mean(np.log2(lit))
     highlight_ev = np.log2(8.0) - np.log2(np.percentile(lit, 99.5))
     return float(min(key_ev, highlight_ev))

@@ -120,6 +120,11 @@ class TestAutoExposure:
         rgb[50, 50] = 1e6
         assert auto_exposure(rgb) == pytest.approx(alone, abs=0.1)
 
+    def test_deep_shadows_do_not_open_the_aperture(self):
+        rgb = np.ones((100, 100, 3))
+        rgb[:30] = 1e-3
+        assert auto_exposure(rgb) == pytest.approx(np.log2(0.18), abs=1e-3)
+
     def test_bright_caustics_are_held_within_three_stops(self):
         rgb = np.ones((100, 100, 3))
         rgb[:10] = 1000.0
