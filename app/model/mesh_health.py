@@ -133,13 +133,15 @@ def examine(mesh: Mesh) -> MeshHealth:
     )
 
 
-def repair(mesh: Mesh, health: MeshHealth | None = None) -> tuple[Mesh, tuple[str, ...]]:
+def repair(
+    mesh: Mesh, health: MeshHealth | None = None, solid: bool = True
+) -> tuple[Mesh, tuple[str, ...]]:
     """Mend what can be mended without a guess, and say in one sentence each what was done or assumed.
 
     Welds vertices at equal positions, drops triangles without area, turns an inside-out
     solid, and replaces zero shading normals by the face's. Open, non-manifold and
-    inconsistently wound meshes are kept, with a warning. Raises UserError when nothing but
-    degenerate triangles is left.
+    inconsistently wound meshes are kept, with a warning where the mesh is to be `solid` (a
+    table may well be open). Raises UserError when nothing but degenerate triangles is left.
     """
     health = health or examine(mesh)
     notes: list[str] = []
@@ -164,7 +166,7 @@ def repair(mesh: Mesh, health: MeshHealth | None = None) -> tuple[Mesh, tuple[st
     elif health.inward_components:
         parts = f"{health.inward_components} of {health.components} parts"
         notes.append(f"{label}: {parts} face inward; they are taken as cavities")
-    notes += _warnings(label, health)
+    notes += _warnings(label, health) if solid else []
     return make_mesh(mesh.name, mesh.vertices, mesh.triangles, mesh.corner_normals, mesh.uv, mesh.source), tuple(notes)
 
 

@@ -64,7 +64,7 @@ def scene_text(scene: Scene, path: Path) -> str:
             },
         )
     )
-    parts += [_block("[[lights]]", _light(light)) for light in scene.lights]
+    parts += [_block("[[lights]]", light_values(light)) for light in scene.lights]
     materials: dict[str, dict[str, Any]] = {}
     objects = [
         _block("[[objects]]", _objects(group, materials, path)) for group in _groups(scene.objects)
@@ -88,7 +88,7 @@ def _camera(camera: Camera) -> dict[str, Any]:
     return values | {"vertical_extent": camera.vertical_extent}
 
 
-def _light(light: Light) -> dict[str, Any]:
+def light_values(light: Light) -> dict[str, Any]:
     values: dict[str, Any] = {"name": light.name, "kind": light.kind}
     if light.kind != "directional":
         values["position"] = list(light.position)
