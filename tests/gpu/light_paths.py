@@ -107,7 +107,7 @@ def trace_beam(
         assert domain is not None
         lo, hi = buffers.axis.x_of_nm(np.array(nm if isinstance(nm, tuple) else (nm, nm)))
         band = Band(float(lo), float(hi), float(0.5 * (lo + hi)), 1.0)
-        piece = LatticeSlice(0, 0, band, count, 0, count, SHIFT, (0, 0), 0, seed=1)
+        piece = LatticeSlice(0, (band,), count, 0, 1, count, SHIFT, (0, 0), 0, seed=1)
         batch = trace.run(piece, domain)
         assert batch.tally.fallbacks["queue_overflow"] == 0
         assert batch.tally.imbalance < 1e-4

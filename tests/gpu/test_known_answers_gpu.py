@@ -210,15 +210,20 @@ def test_t15_energy_near_the_fold_of_a_ball(gl) -> None:
     assert radius[near].max() == pytest.approx(fold, rel=2e-3)
 
 
-@pytest.mark.parametrize("kind", ["ball", "prism"])
-def test_whole_paths_against_the_reference_over_the_same_triangles(gl, kind: str) -> None:
-    """Position, every column and the flux with exact Fresnel of each photon on the transmitted path."""
+@pytest.mark.parametrize(
+    ("kind", "mirrored_at"), [("ball", ()), ("prism", ()), ("ball", (1,)), ("ball", (0,))], ids=["ball", "prism", "rainbow", "gloss"]
+)
+def test_whole_paths_against_the_reference_over_the_same_triangles(gl, kind: str, mirrored_at: tuple[int, ...]) -> None:
+    """Position, every column and the flux with exact Fresnel of each photon on one kind of path."""
     ball = kind == "ball"
     solid = ball_mesh(320) if ball else extruded("prism", tilted_section(APEX))
     direction = unit(np.array([1.0, 0.1, -0.2])) if ball else in_plane(0.4)
     middle = solid.corners().reshape(-1, 3).mean(0)
-    target = screen(middle + 3 * direction, direction)
-    photons = trace_beam(gl, solid, glass("F2"), target, middle - 3 * direction, direction, 0.7 if ball else 0.25, D_NM, count=120).of_depth(2)
+    target = screen(middle + (-4 if mirrored_at else 3) * direction, direction)
+    # Gloss goes back from the front of the ball, a rainbow from its middle heights.
+    radius = 0.25 if not ball else 0.4 if mirrored_at == (0,) else 0.7
+    events = 1 if mirrored_at == (0,) else 2 + len(mirrored_at)
+    photons = trace_beam(gl, solid, glass("F2"), target, middle - 3 * direction, direction, radius, D_NM, count=120).of_depth(events)
     scene = TriangleList(
         np.concatenate([solid.corners(), target.corners()]),
         np.array([0] * len(solid.triangles) + [RECEIVER] * 2),
@@ -229,13 +234,13 @@ def test_whole_paths_against_the_reference_over_the_same_triangles(gl, kind: str
     flux_w = photons.tally.emitted / photons.lattice_in_disc
     agreeing = 0
     for i, record in enumerate(photons.records):
-        path = trace(make_ray(photons.start[i], direction, seeds), scene, [index])
-        assert path.landed
-        if len(path.triangles) != 3 or np.abs(photons.position[i] - path.ray.position).max() > 2e-5:
+        path = trace(make_ray(photons.start[i], direction, seeds), scene, [index], mirrored_at)
+        scale = np.abs(path.ray.dposition).max()
+        if len(path.triangles) != events + 1 or np.abs(photons.position[i] - path.ray.position).max() > 2e-5 * scale:
             continue  # float32 chose the neighbouring triangle at an edge
         agreeing += 1
         got = np.array([photons.dposition_ds[i], photons.dposition_dt[i], photons.dposition_dn[i]])
-        np.testing.assert_allclose(got, path.ray.dposition, atol=1e-4 * np.abs(path.ray.dposition).max())
+        np.testing.assert_allclose(got, path.ray.dposition, atol=1e-4 * scale)
         assert record["flux_w"] == pytest.approx(flux_w * path.transmittance, rel=1e-4)
     assert len(photons.records) > 60
     assert agreeing >= 0.97 * len(photons.records)
