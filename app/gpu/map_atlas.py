@@ -140,6 +140,7 @@ class MapAtlas:
         for texture in self.total_textures:
             frame = self.ctx.framebuffer([texture])
             frame.clear()
+            _park(self.ctx)
             frame.release()
         self.framebuffer.clear()
         self.pending = 0
@@ -162,7 +163,19 @@ class MapAtlas:
         return self.read_total()[y0:y1, x0:x1]
 
     def release(self) -> None:
+        _park(self.ctx)
         self.framebuffer.release()
         self._accumulate.release()
         for resource in (*self.scratch_textures, *self.total_textures, self.placements):
             resource.release()
+
+
+def _park(ctx: moderngl.Context) -> None:
+    """Bind a framebuffer that lives as long as the context.
+
+    moderngl binds the last used framebuffer again after every clear; were it released meanwhile,
+    that is GL_INVALID_OPERATION, and a context without a window has no screen to fall back on.
+    """
+    if ctx.extra is None:
+        ctx.extra = ctx.simple_framebuffer((1, 1))
+    ctx.extra.use()
