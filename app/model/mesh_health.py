@@ -162,10 +162,14 @@ def repair(
         notes.append(f"{label}: {count_of(health.zero_normals, 'zero normal')} replaced by the face normal")
     if health.inside_out:
         mesh = mesh.flipped()
+        mesh, _ = _with_agreeing_normals(mesh)
         notes.append(f"{label} was inside out (volume {health.signed_volume:.4g}); it was turned to face outward")
     elif health.inward_components:
         parts = f"{health.inward_components} of {health.components} parts"
         notes.append(f"{label}: {parts} face inward; they are taken as cavities")
+    mesh, turned = _with_agreeing_normals(mesh)
+    if turned:
+        notes.append(f"{label}: its normals pointed away from its faces' outside; they were turned")
     notes += _warnings(label, health) if solid else []
     return make_mesh(mesh.name, mesh.vertices, mesh.triangles, mesh.corner_normals, mesh.uv, mesh.source), tuple(notes)
 
@@ -182,6 +186,16 @@ def _warnings(label: str, health: MeshHealth) -> list[str]:
         count = count_of(health.inconsistent_edges, "edge")
         warnings.append(f"inconsistently wound {label}: {count} where neighbours face opposite ways; {assumed}")
     return warnings
+
+
+def _with_agreeing_normals(mesh: Mesh) -> tuple[Mesh, bool]:
+    """Turn all shading normals when most oppose their face: the winding is the judge of sides."""
+    if mesh.corner_normals is None:
+        return mesh, False
+    agreement = np.einsum("tcj,tj->t", mesh.corner_normals, mesh.area_vectors())
+    if agreement.sum() >= 0.0:
+        return mesh, False
+    return replace(mesh, corner_normals=-mesh.corner_normals), True
 
 
 def _degenerate(mesh: Mesh) -> np.ndarray:

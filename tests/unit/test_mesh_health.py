@@ -66,6 +66,18 @@ def test_inside_out_solid_is_turned() -> None:
     assert len(notes) == 1 and "inside out" in notes[0]
 
 
+def test_winding_and_normals_are_turned_each_for_itself() -> None:
+    ball = primitives.sphere(1.0, 320)
+    for triangles, normals, said in (
+        (ball.triangles[:, ::-1], ball.corner_normals[:, ::-1], "inside out"),
+        (ball.triangles, -ball.corner_normals, "its normals pointed away"),
+    ):
+        mesh, notes = repair(make_mesh("ball", ball.vertices, triangles, normals))
+        assert len(notes) == 1 and said in notes[0]
+        assert mesh.volume() > 4.0
+        assert np.einsum("tcj,tj->tc", mesh.corner_normals, mesh.face_normals()).min() > 0.9
+
+
 def test_cavity_is_kept_and_told() -> None:
     hollow = _joined(BOX, _scaled(BOX, 0.5).flipped())
     health = examine(hollow)
