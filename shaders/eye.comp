@@ -81,8 +81,8 @@ void add_direct(vec3 position, vec3 normal, RayOrigin origin, uint reflectance_c
 // Radiance a diffuse surface sends back along the path.
 void add_diffuse(EyePath path, Hit hit, vec3 position, uint pixel_key, inout vec4 radiance[TARGETS])
 {
-    uint receiver = objects[hit.object].receiver;
-    uint source = triangles[hit.primitive].source;
+    uint receiver = object_at(hit.object).receiver;
+    uint source = triangle_at(hit.primitive).source;
     uint reflectance_class = receivers[receiver].reflectance_class;
     float facing = dot(path.direction, hit.normal_g);
     vec4 irradiance[TARGETS];
@@ -124,24 +124,38 @@ void add_emission(EyePath path, float far, bool met, inout vec4 radiance[TARGETS
 #endif
 }
 
+// The geometric normal, turned against the ray.
+vec3 facing_geometric(Hit hit, vec3 direction)
+{
+    return dot(direction, hit.normal_g) < 0.0 ? hit.normal_g : -hit.normal_g;
+}
+
 // Unit normal a specular surface shades with, turned against the ray.
 vec3 facing_normal(Hit hit, vec3 direction)
 {
-    vec3 normal_g = dot(direction, hit.normal_g) < 0.0 ? hit.normal_g : -hit.normal_g;
+    vec3 normal_g = facing_geometric(hit, direction);
 #if defined(SMOOTH_NORMALS) && defined(LOOSE_TRIANGLES)
 #ifdef CONVEX_SOLIDS
     if ((hit.primitive & PLANE_BIT) != 0u) return normal_g;
 #endif
-    uint first = triangles[hit.primitive].normals;
+    uint first = triangle_at(hit.primitive).normals;
     if (first == NONE) return normal_g;
-    vec3 normal = normalize((1.0 - hit.bary.x - hit.bary.y) * corner_normals[first].xyz
-                            + hit.bary.x * corner_normals[first + 1u].xyz + hit.bary.y * corner_normals[first + 2u].xyz);
+    vec3 normal = normalize((1.0 - hit.bary.x - hit.bary.y) * corner_normal(first)
+                            + hit.bary.x * corner_normal(first + 1u) + hit.bary.y * corner_normal(first + 2u));
     normal = dot(normal, normal_g) < 0.0 ? -normal : normal;
     // Where the interpolated normal turns away from the ray the geometric one is the judge.
     return dot(direction, normal) < -1e-4 ? normal : normal_g;
 #else
     return normal_g;
 #endif
+}
+
+// Reflected by the shading normal, or by the geometric one where that would lead into the surface.
+vec3 reflected_direction(Hit hit, vec3 direction, vec3 normal)
+{
+    vec3 normal_g = facing_geometric(hit, direction);
+    vec3 turned = reflect_direction(direction, normal, dot(direction, normal));
+    return normalize(dot(turned, normal_g) > 0.0 ? turned : reflect_direction(direction, normal_g, dot(direction, normal_g)));
 }
 
 // On the surface as exactly as its own coordinates can say.
@@ -156,7 +170,7 @@ vec3 hit_position(EyePath path, Hit hit)
     }
 #endif
 #ifdef LOOSE_TRIANGLES
-    position = triangles[hit.primitive].vertex + hit.bary.x * triangles[hit.primitive].edge1 + hit.bary.y * triangles[hit.primitive].edge2;
+    position = triangle_at(hit.primitive).vertex + hit.bary.x * triangle_at(hit.primitive).edge1 + hit.bary.y * triangle_at(hit.primitive).edge2;
 #endif
     return position;
 }
@@ -191,14 +205,21 @@ void cross_glass(inout EyePath path, Hit hit, vec3 position, out EyePath mirrore
     float eta_it = medium_index(crossing.before, p.x_eye) / medium_index(crossing.after, p.x_eye);
     float cosine2 = transmitted_cosine2(theta, eta_it);
     float reflectance = fresnel_reflectance(theta, eta_it, cosine2);
-    mirrored.direction = normalize(reflect_direction(path.direction, normal, theta));
+    mirrored.direction = reflected_direction(hit, path.direction, normal);
     for (int t = 0; t < TARGETS; ++t) mirrored.weight[t] *= reflectance;
     if (cosine2 <= 0.0) {
         path = mirrored;
         for (int t = 0; t < TARGETS; ++t) mirrored.weight[t] = vec4(0.0);
         return;
     }
-    path.direction = normalize(refract_direction(path.direction, normal, theta, eta_it, sqrt(cosine2)));
+    vec3 normal_g = facing_geometric(hit, path.direction);
+    vec3 refracted = refract_direction(path.direction, normal, theta, eta_it, sqrt(cosine2));
+    if (dot(refracted, normal_g) >= 0.0) {
+        // Bent back out of the surface: the geometric normal is the judge.
+        float theta_g = dot(path.direction, normal_g);
+        refracted = refract_direction(path.direction, normal_g, theta_g, eta_it, sqrt(max(transmitted_cosine2(theta_g, eta_it), 1e-12)));
+    }
+    path.direction = normalize(refracted);
     path.medium = beyond;
     for (int t = 0; t < TARGETS; ++t) path.weight[t] *= 1.0 - reflectance;
 }
@@ -230,7 +251,7 @@ void main()
     for (int event = 0; event < MAX_EVENTS; ++event) {
         Hit hit;
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
-        uint kind = met ? objects[hit.object].kind : NONE;
+        uint kind = met ? object_at(hit.object).kind : NONE;
         bool goes_on = false;
 #ifdef LAYER_BEAUTY
         add_emission(path, hit.distance, met, radiance);
@@ -242,7 +263,7 @@ void main()
 #if defined(LAYER_BEAUTY) && defined(HAS_MIRROR)
         if (kind == KIND_MIRROR) {
             vec3 normal = facing_normal(hit, path.direction);
-            path.direction = normalize(reflect_direction(path.direction, normal, dot(path.direction, normal)));
+            path.direction = reflected_direction(hit, path.direction, normal);
             path.origin = RayOrigin(hit.primitive, hit.object, dot(path.direction, hit.normal_g) < 0.0, path.origin.inside_mask);
             path.position = position;
             path.travelled += hit.distance;

@@ -8,7 +8,7 @@ Samples form a lattice inside the pixel that later launches refine (box filter).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import moderngl
@@ -273,7 +273,7 @@ class EyePass:
             picture.write(zeros)
         self._samples_of_row = np.zeros(height, int)
 
-    def _add_sample(self, parameters: np.ndarray, width: int, height: int):
+    def _add_sample(self, parameters: np.ndarray, width: int, height: int) -> Iterator[float]:
         """Dispatch one sample, yielding the share of rows done after each band of rows."""
         row = 0
         while row < height:

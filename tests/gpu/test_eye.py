@@ -277,6 +277,32 @@ def test_cemented_solids_have_no_film_of_air(gl):
     assert rgb[5, 5] == pytest.approx((1 - top) * (1 - middle) * (1 - bottom) + top, rel=1e-4)
 
 
+def test_a_smooth_glass_ball_is_a_lens(gl):
+    """Through a smooth ball the ray at height h leaves by δ = 2 (i − r) and lands where optics says."""
+    n, height = 1.5168, 2.0
+    ball = SceneObject("ball", primitives.sphere(1.0, 20_480), Dielectric(glass.constant(n)), _at(0, 0, height))
+    camera = replace(ABOVE, vertical_extent=1.1)
+    lamp = Light("lamp", "point", WHITE, position=(2.5, 0, 0.6))
+    rgb = render(gl, [floor(), ball], [lamp], size=(24, 24), camera=camera)[..., 1]
+    points = floor_points((24, 24), camera)
+    h = np.linalg.norm(points[..., :2], axis=-1)
+    outward = points[..., :2] / h[..., None]
+    i, r = np.arcsin(h), np.arcsin(h / n)
+    turn = 2 * (i - r)  # towards the axis
+    exit_angle = i - turn  # polar angle of the exit point, on the lower side
+    exit_h, exit_z = np.sin(exit_angle), height - np.cos(exit_angle)
+    landing = exit_h - exit_z * np.tan(turn)
+    lit = np.concatenate([outward * landing[..., None], np.zeros((24, 24, 1))], axis=-1)
+    rs, rp = np.sin(i - r) / np.sin(i + r), np.tan(i - r) / np.tan(i + r)
+    through = (1 - 0.5 * (rs**2 + rp**2)) ** 2
+    visible = h < 0.7
+    expected = through * point_light_radiance(lit, lamp.position)
+    # 20 480 facets bend the exit point by up to 1e-3 of the radius; what the lamp's shadow ray meets is glass or not.
+    unshadowed = visible & (rgb > 0)
+    assert unshadowed.sum() > 0.9 * visible.sum()
+    assert rgb[unshadowed] == pytest.approx(expected[unshadowed], rel=0.01)
+
+
 def test_refraction_shifts_what_lies_behind(gl):
     """A point light's floor through a slab seen at 45°: parallel shift by the slab's displacement."""
     slab = SceneObject("slab", primitives.box((30, 30, 1.0)), Dielectric(glass.constant(1.5168)), _at(0, 0, 2.0))
@@ -381,6 +407,28 @@ def test_nested_windows_show_the_finest_map_that_covers_a_place(gl, layer):
     expected = 0.5 * REFLECTANCE / np.pi * np.where(inside_fine, fine, np.where(inside, coarse, 0.0))
     # Clamping the coordinate or the texels is the same thing at the border; 1e-3 is for half-texel rounding.
     assert rgb[..., 1] == pytest.approx(expected, rel=1e-3)
+
+
+def test_charts_have_a_placement_a_triangle(gl):
+    """A receiver of two triangles whose charts lie apart in the atlas, after another object's triangles."""
+    blocker = horizontal(50, 51, 50, 51, 1, Diffuse((0, 0, 0)), "elsewhere")
+    eye = eye_pass(gl, [blocker, horizontal(-2, 2, -2, 2, 0, Diffuse((REFLECTANCE,) * 3))])
+    lumens = np.zeros((16, 40))
+    lumens[2:10, 2:10], lumens[5:13, 20:28] = 1.0, 3.0
+    maps = flat_maps(gl, eye.scene, [(-2, -2, 4.0, 2, 2, 8), (-2, -2, 4.0, 20, 5, 8)], white_texels(lumens))
+    placements = np.frombuffer(maps.placements.read(), PLACEMENT.dtype).copy()
+    placements["kind"], placements["next"] = 1, NONE
+    maps.placements.write(placements.tobytes())
+    receivers = RECEIVER.zeros(2)
+    receivers["placement"] = NONE, 0
+    receivers["kind"] = 0, 1
+    receivers["first_triangle"] = 0, 2
+    maps = replace(maps, receivers=gl.ctx.buffer(receivers.tobytes()))
+    eye.run(ABOVE, 32, 32, 1, maps=maps)
+    x, y = np.moveaxis(floor_points((32, 32), ABOVE)[..., :2], -1, 0)
+    expected = REFLECTANCE / np.pi * np.where(y < x, 1.0, 3.0) * 4
+    off_diagonal = np.abs(x - y) > 1e-6
+    assert eye.read_rgb()[..., 1][off_diagonal] == pytest.approx(expected[off_diagonal], rel=1e-5)
 
 
 def test_small_texels_are_averaged_by_the_pixel_and_keep_their_energy(gl):
