@@ -67,6 +67,20 @@ class ChartAtlas:
         np.add.at(folded, (dy[kept], dx[kept]), moved[kept])
         return folded
 
+    def gather_lists(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The fold turned round, for a shader without float atomics: one invocation for each destination.
+
+        Returns destinations int32 (D, 2), offsets int32 (D + 1,) and sources int32 (S, 2):
+        destination k also gets the energy of sources[offsets[k]:offsets[k + 1]].
+        """
+        kept = self.destination_xy[:, 0] >= 0
+        flat = self.destination_xy[kept, 1].astype(np.int64) * self.width + self.destination_xy[kept, 0]
+        order = np.argsort(flat, kind="stable")
+        places, counts = np.unique(flat, return_counts=True)
+        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+        destinations = np.stack([places % self.width, places // self.width], axis=1).astype(np.int32)
+        return destinations, offsets, self.gutter_texel_xy[kept][order]
+
     def fill(self, folded: np.ndarray) -> np.ndarray:
         """Copy energies back into the gutters after `fold`, so that interpolated look-ups see no seam.
 

@@ -154,6 +154,17 @@ def test_uniform_energy_stays_uniform_and_gutters_are_filled() -> None:
     np.testing.assert_allclose(two[..., 1], 2.0 * filled)
 
 
+def test_gather_lists_are_the_fold() -> None:
+    atlas = ATLASES["sphere"]
+    energy = np.random.default_rng(2).random((atlas.height, atlas.width))
+    destinations, offsets, sources = atlas.gather_lists()
+    gathered = energy.copy()
+    gathered[atlas.gutter_texel_xy[:, 1], atlas.gutter_texel_xy[:, 0]] = 0.0
+    sums = np.add.reduceat(energy[sources[:, 1], sources[:, 0]], offsets[:-1])
+    gathered[destinations[:, 1], destinations[:, 0]] += sums
+    np.testing.assert_allclose(gathered, atlas.fold(energy), rtol=1e-12)
+
+
 def test_energy_beyond_an_open_border_is_lost() -> None:
     ball = primitives.sphere(1.0, 2_000)
     upper = ball.corners().mean(axis=1)[:, 2] > 0.0
