@@ -42,7 +42,7 @@ NODE = np.dtype(
 """32 bytes, std430-compatible. count > 0: a leaf with the triangles [first, first + count) of the
 reordered list; count = 0: an inner node with children at left and left + 1."""
 
-_CACHE_VERSION = b"spectrasplat bvh 1\n"
+_CACHE_VERSION = b"spectrasplat bvh 2\n"
 _CACHE_FILES = 32
 _CACHE_BYTES = 256 << 20
 _DIGEST_BYTES = 16
