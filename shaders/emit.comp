@@ -6,8 +6,9 @@ layout(local_size_x = 64) in;
 #include "lib/spot.glsl"
 
 layout(std430, binding = BIND_PARAMETERS) readonly restrict buffer Parameters { EmitParameters p; };
-layout(std430, binding = BIND_RAYS_OUT) writeonly restrict buffer RaysOut { RayRecord rays[]; };
-layout(std430, binding = BIND_OUTCOMES) writeonly restrict buffer Outcomes { Outcome outcomes[]; };
+layout(std430, binding = BIND_RAYS_OUT) writeonly restrict buffer RaysOut { uvec4 rays[]; };
+layout(std430, binding = BIND_INDICES) readonly restrict buffer Order { uint order[]; };
+layout(std430, binding = BIND_OUTCOMES) writeonly restrict buffer Outcomes { uvec4 outcomes[]; };
 
 vec3 to_world(vec3 local) { return local.x * p.tangent + local.y * p.bitangent + local.z * p.axis; }
 
@@ -18,12 +19,14 @@ void main()
     // Every band, and every point on an extended light, has a regular lattice of its own, shifted
     // against the others: a lattice whose points jittered over the light would be noise.
     uint lattices = p.band_count * p.light_points;
-    uint sub = k % lattices;
-    uint point = p.first + (k / lattices) * p.stride;
+    // One sub-lattice after the other, its points along a curve that keeps neighbours together.
+    uint points = p.count / lattices;
+    uint sub = k / points;
+    uint point = p.first + order[k % points] * p.stride;
     uint id = point * lattices + sub;
     uint band_index = sub % p.band_count;
     vec4 band = p.bands[band_index];
-    Outcome outcome = Outcome(0u, 0u, 0.0, 0.0, 0.0, 0.0);
+    Outcome outcome = Outcome(0u, 0.0, 0.0, 0.0);
 
     vec2 unit = lattice_point(point, p.lattice_count, p.shift + sub * uvec2(PLASTIC_1, PLASTIC_2));
     uvec2 cell = uvec2(unit * float(MASK_SIZE));
@@ -98,9 +101,13 @@ void main()
         ray.ddirection[0].xyz = ddirection_ds;
         ray.ddirection[1].xyz = ddirection_dt;
 #endif
-        rays[2u * k] = ray;
-        outcome.what = 1u;
-        outcome.emitted_w = ray.flux_w;
+        uvec4 texels[RayRecord_TEXELS];
+        to_texels(ray, texels);
+        for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) rays[2u * k * uint(RayRecord_TEXELS) + i] = texels[i];
+        outcome.what = 1u | 8u;
+        outcome.flux_w = ray.flux_w;
     }
-    outcomes[k] = outcome;
+    uvec4 texels[Outcome_TEXELS];
+    to_texels(outcome, texels);
+    outcomes[k] = texels[0];
 }

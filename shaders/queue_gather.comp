@@ -3,11 +3,13 @@ layout(local_size_x = 64) in;
 
 #include "lib/queue.glsl"
 
-layout(std430, binding = BIND_PHOTON_SLOTS) readonly restrict buffer PhotonSlots { PhotonRecord photon_slots[]; };
-layout(std430, binding = BIND_PHOTONS) writeonly restrict buffer Photons { PhotonRecord photons[]; };
+layout(std430, binding = BIND_PHOTON_SLOTS) readonly restrict buffer PhotonSlots { uvec4 photon_slots[]; };
+layout(std430, binding = BIND_PHOTONS) writeonly restrict buffer Photons { uvec4 photons[]; };
 
 void main()
 {
     uint j = gl_GlobalInvocationID.x;
-    if (j < state.photons_new) photons[state.photon_first + j] = photon_slots[indices[state.ray_capacity + j]];
+    if (j >= state.photons_new) return;
+    uint to = (state.photon_first + j) * uint(PhotonRecord_TEXELS), from = indices[state.ray_capacity + j] * uint(PhotonRecord_TEXELS);
+    for (uint i = 0u; i < uint(PhotonRecord_TEXELS); ++i) photons[to + i] = photon_slots[from + i];
 }

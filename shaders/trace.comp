@@ -9,20 +9,20 @@ layout(local_size_x = 64) in;
 #include "lib/random.glsl"
 #include "lib/medium.glsl"
 
-layout(std430, binding = BIND_PARAMETERS) readonly restrict buffer Parameters { TraceParameters p; };
-layout(std430, binding = BIND_RAYS_IN) readonly restrict buffer RaysIn { RayRecord rays_in[]; };
-layout(std430, binding = BIND_RAYS_OUT) writeonly restrict buffer RaysOut { RayRecord rays_out[]; };
-layout(std430, binding = BIND_OUTCOMES) writeonly restrict buffer Outcomes { Outcome outcomes[]; };
-layout(std430, binding = BIND_PHOTON_SLOTS) writeonly restrict buffer PhotonSlots { PhotonRecord photon_slots[]; };
+layout(std140, binding = BIND_PARAMETERS) uniform Parameters { TraceParameters p; };
+layout(std430, binding = BIND_RAYS_IN) readonly restrict buffer RaysIn { uvec4 rays_in[]; };
+layout(std430, binding = BIND_RAYS_OUT) writeonly restrict buffer RaysOut { uvec4 rays_out[]; };
+layout(std430, binding = BIND_OUTCOMES) writeonly restrict buffer Outcomes { uvec4 outcomes[]; };
+layout(std430, binding = BIND_PHOTON_SLOTS) writeonly restrict buffer PhotonSlots { uvec4 photon_slots[]; };
 layout(std430, binding = BIND_INDICES) readonly restrict buffer Indices { uint indices[]; };
 layout(std430, binding = BIND_STATE) readonly restrict buffer StateBlock { QueueState state; };
 
-#define DEPOSITED 0u
-#define ABSORBED 1u
-#define ESCAPED 2u
-#define DIRECT 3u
-#define LOST_DEPTH 4u
-#define LOST_NUMERIC 5u
+#define DEPOSITED (0u << 16)
+#define ABSORBED (1u << 16)
+#define ESCAPED (2u << 16)
+#define DIRECT (3u << 16)
+#define LOST_DEPTH (4u << 16)
+#define LOST_NUMERIC (5u << 16)
 
 #define FELL_FOOTPRINT (1u << 8)
 #define FELL_NORMAL (1u << 9)
@@ -92,18 +92,48 @@ void anchor_at(inout RayRecord ray, float lo, float hi)
 }
 #endif
 
+RayRecord load_ray(uint slot)
+{
+    uvec4 texels[RayRecord_TEXELS];
+    for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) texels[i] = rays_in[slot * uint(RayRecord_TEXELS) + i];
+    return RayRecord_of(texels);
+}
+
+void store_ray(uint slot, RayRecord ray)
+{
+    uvec4 texels[RayRecord_TEXELS];
+    to_texels(ray, texels);
+    for (uint i = 0u; i < uint(RayRecord_TEXELS); ++i) rays_out[slot * uint(RayRecord_TEXELS) + i] = texels[i];
+}
+
+void store_photon(uint slot, PhotonRecord photon)
+{
+    uvec4 texels[PhotonRecord_TEXELS];
+    to_texels(photon, texels);
+    for (uint i = 0u; i < uint(PhotonRecord_TEXELS); ++i) photon_slots[slot * uint(PhotonRecord_TEXELS) + i] = texels[i];
+}
+
 void main()
 {
     uint k = gl_GlobalInvocationID.x;
     if (k >= state.alive) return;
-    RayRecord ray = rays_in[indices[k]];
-    Outcome outcome = Outcome(0u, ESCAPED, 0.0, 0.0, 0.0, 0.0);
+    RayRecord ray = load_ray(indices[k]);
+#ifdef BAND_CUTS
+    RayRecord whole = ray;
+#endif
+    Outcome outcome = Outcome(0u, 0.0, 0.0, 0.0);
 
     RayOrigin origin = RayOrigin(ray.last_primitive, ray.last_object, (ray.flags & FLAG_INSIDE) != 0u, ray.inside_mask);
     Hit hit;
     bool met = intersect_closest(ray.position, ray.direction, FAR_DISTANCE, origin, hit);
     float theta_g = dot(ray.direction, hit.normal_g);
-    uint kind = met ? objects[hit.object].kind : NONE;
+    // Looked up once for all branches; some object and facet where nothing was met.
+    uint object = met ? hit.object : 0u;
+    Object thing = object_at(object);
+    uint kind = met ? thing.kind : NONE;
+#ifdef LOOSE_TRIANGLES
+    Triangle facet = hit_triangle(hit);
+#endif
 
 #ifdef ABSORPTION
     {
@@ -134,13 +164,12 @@ void main()
 #endif
         {
 #ifdef LOOSE_TRIANGLES
-            Triangle facet = triangles[hit.primitive];
             ray.position = facet.vertex + hit.bary.x * facet.edge1 + hit.bary.y * facet.edge2;
 #ifdef SMOOTH_NORMALS
             if (facet.normals != NONE) {
                 smooth_facet = true;
-                summed = (1.0 - hit.bary.x - hit.bary.y) * corner_normals[facet.normals].xyz
-                       + hit.bary.x * corner_normals[facet.normals + 1u].xyz + hit.bary.y * corner_normals[facet.normals + 2u].xyz;
+                summed = (1.0 - hit.bary.x - hit.bary.y) * corner_normal(facet.normals)
+                       + hit.bary.x * corner_normal(facet.normals + 1u) + hit.bary.y * corner_normal(facet.normals + 2u);
                 normal = normalize(summed);
             }
 #endif
@@ -153,7 +182,7 @@ void main()
 #endif
 
     if (kind == KIND_DIFFUSE) {
-        outcome.category = ray.depth == 0u ? DIRECT : DEPOSITED;
+        outcome.what |= ray.depth == 0u ? DIRECT : DEPOSITED;
         outcome.flux_w = ray.flux_w;
         if (ray.depth > 0u) {
             PhotonRecord photon;
@@ -169,8 +198,8 @@ void main()
             photon.x_hi = ray.x_hi;
             photon.throughput = ray.throughput;
             photon.x_anchor = ray.x_anchor;
-            photon.triangle = triangles[hit.primitive].source;
-            photon.receiver = objects[hit.object].receiver;
+            photon.triangle = facet.source;
+            photon.receiver = thing.receiver;
             photon.photon_id = ray.photon_id;
             photon.light_and_source = ray.light_and_source;
             photon.branch_key = ray.branch_key;
@@ -190,18 +219,18 @@ void main()
                 outcome.what |= FELL_FOOTPRINT;
             }
             photon.flags = ray.flags & FLAG_FOOTPRINT_DROPPED;
-            photon_slots[k] = photon;
+            store_photon(k, photon);
             outcome.what |= 4u;
         }
     } else if (kind == KIND_BLACK) {
-        outcome.category = ABSORBED;
+        outcome.what |= ABSORBED;
         outcome.flux_w = ray.flux_w;
     } else if (kind == NONE) {
         // A ray that leaves the scene from inside a solid slipped through a crack.
-        outcome.category = ray_is_inside(ray) ? LOST_NUMERIC : ESCAPED;
+        outcome.what |= ray_is_inside(ray) ? LOST_NUMERIC : ESCAPED;
         outcome.flux_w = ray.flux_w;
     } else if (ray.depth >= p.max_depth) {
-        outcome.category = LOST_DEPTH;
+        outcome.what |= LOST_DEPTH;
         outcome.flux_w = ray.flux_w;
     } else {
         bool entering = theta_g < 0.0;
@@ -217,17 +246,16 @@ void main()
             outcome.what |= FELL_NORMAL;
         }
         if ((ray.light_and_source >> 16) == 0xffffu)
-            ray.light_and_source = (ray.light_and_source & 0xffffu) | (hit.object << 16);
+            ray.light_and_source = (ray.light_and_source & 0xffffu) | (object << 16);
 
 #if COLUMNS > 0
         vec3 dnormal[COLUMNS];
         for (int c = 0; c < COLUMNS; ++c) dnormal[c] = vec3(0.0);
 #ifdef SMOOTH_NORMALS
         if (smooth_facet) {
-            Triangle facet = triangles[hit.primitive];
             vec3 gradient_u, gradient_v;
             barycentric_gradients(facet.edge1, facet.edge2, gradient_u, gradient_v);
-            vec3 n0 = corner_normals[facet.normals].xyz, n1 = corner_normals[facet.normals + 1u].xyz, n2 = corner_normals[facet.normals + 2u].xyz;
+            vec3 n0 = corner_normal(facet.normals), n1 = corner_normal(facet.normals + 1u), n2 = corner_normal(facet.normals + 2u);
             float sign_n = entering ? 1.0 : -1.0;
             for (int c = 0; c < COLUMNS; ++c) {
                 vec3 dp = ray.dposition[c].xyz;
@@ -237,168 +265,173 @@ void main()
         }
 #endif
 #endif
-        Crossing crossing = cross_boundary(ray, hit.object, entering);
-        RayRecord reflected = ray;
-        reflected.last_primitive = hit.primitive;
-        reflected.last_object = hit.object;
-        reflected.flags = (ray.flags & FLAG_FOOTPRINT_DROPPED) | (entering ? 0u : FLAG_INSIDE);
-        reflected.depth = ray.depth + 1u;
+        Crossing crossing = cross_boundary(ray, object, entering);
+        uint kept_flags = ray.flags & FLAG_FOOTPRINT_DROPPED;
+        // Each child is stored in one place, whichever event made it: where every branch is executed, every
+        // store costs even when no ray takes it.
+        RayRecord child = ray;
+        bool lives = false;
+        child.last_primitive = hit.primitive;
+        child.last_object = object;
+        child.flags = kept_flags | (entering ? 0u : FLAG_INSIDE);
+        child.depth = ray.depth + 1u;
 
 #ifdef HAS_MIRROR
         if (kind == KIND_MIRROR) {
-            uint row = uint(WEIGHT_ROW) + objects[hit.object].weight_row;
+            uint row = uint(WEIGHT_ROW) + thing.weight_row;
             vec3 kept = vec3(spectral_row(row, ray.x_lo), spectral_row(row, ray.x_anchor), spectral_row(row, ray.x_hi));
-            outcome.category = ABSORBED;
+            outcome.what |= ABSORBED;
             outcome.flux_w = ray.flux_w * (1.0 - kept.y);
-            reflected.flux_w *= kept.y;
-            reflected.throughput *= kept;
-            reflected.direction = normalize(reflect_direction(ray.direction, normal, theta));
+            child.flux_w *= kept.y;
+            child.throughput *= kept;
+            child.direction = normalize(reflect_direction(ray.direction, normal, theta));
 #if COLUMNS > 0
             for (int c = 0; c < COLUMNS; ++c)
-                reflected.ddirection[c].xyz = reflect_column(ray.direction, ray.ddirection[c].xyz, normal, dnormal[c], theta);
+                child.ddirection[c].xyz = reflect_column(ray.direction, ray.ddirection[c].xyz, normal, dnormal[c], theta);
 #endif
-            if (survives(reflected, outcome.roulette_w, kept.y, 3u)) {
-                rays_out[2u * k] = reflected;
-                outcome.what |= 1u;
-            }
+            lives = survives(child, outcome.roulette_w, kept.y, 3u);
         }
 #endif
 #ifdef HAS_DIELECTRIC
+        bool splits = kind == KIND_DIELECTRIC && crossing.changes, cut = false;
+        vec3 theta3 = vec3(theta), n_i, n_t;
+#ifdef SPECTRAL_WEIGHTS
+        vec3 x3 = vec3(ray.x_lo, ray.x_anchor, ray.x_hi);
+#if SPECTRAL_GROUPS > 0
+        for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+            float dtheta = dot(ray.ddirection[SPATIAL + g].xyz, normal) + dot(ray.direction, dnormal[SPATIAL + g]);
+            theta3.x += dtheta * variable_step(uint(g), x3.x, x3.y);
+            theta3.z += dtheta * variable_step(uint(g), x3.z, x3.y);
+        }
+        theta3.xz = clamp(theta3.xz, -1.0, -1e-6);
+#endif
+        crossing_indices(crossing, x3, n_i, n_t);
+#else
+        n_i = vec3(medium_index(crossing.before, ray.x_anchor));
+        n_t = vec3(medium_index(crossing.after, ray.x_anchor));
+#endif
+        vec3 eta3 = n_i / n_t;
+        vec3 cosine2 = transmitted_cosine2(theta3, eta3);
+        vec3 reflectance = fresnel_reflectance(theta3, eta3, cosine2);
+        float eta_it = eta3.y, through = 1.0 - reflectance.y;
+#ifdef BAND_CUTS
+        bvec3 passes = greaterThan(cosine2, vec3(0.0));
+        cut = splits && any(passes) && !all(passes) && (ray.flags & FLAG_BAND_FINAL) == 0u && ray.x_hi - ray.x_lo > MIN_CUT_BAND;
+        float at = 0.0, share = 0.0;
+        if (cut) {
+            // Total internal reflection sets in inside the band: find where, and let both parts
+            // meet this surface again, each anchored in its own middle.
+            bool low_side = passes.x != passes.y;
+            float a = low_side ? x3.x : x3.y, b = low_side ? x3.y : x3.z;
+            bool passes_a = low_side ? passes.x : passes.y;
+            for (int i = 0; i < 22; ++i) {
+                float x = 0.5 * (a + b);
+                float theta_x = theta;
+                for (int g = 0; g < SPECTRAL_GROUPS; ++g)
+                    theta_x += (dot(ray.ddirection[SPATIAL + g].xyz, normal) + dot(ray.direction, dnormal[SPATIAL + g])) * variable_step(uint(g), x, ray.x_anchor);
+                float eta_x = medium_index(crossing.before, x) / medium_index(crossing.after, x);
+                bool passes_x = transmitted_cosine2(clamp(theta_x, -1.0, -1e-6), eta_x) > 0.0;
+                a = passes_x == passes_a ? x : a;
+                b = passes_x == passes_a ? b : x;
+            }
+            at = 0.5 * (a + b);
+            // A sliver of a band is not worth a path of its own.
+            cut = min(at - ray.x_lo, ray.x_hi - at) > 0.01 * MIN_CUT_BAND;
+        }
+        if (cut) {
+            float power_lo = spectral_row(uint(p.power_row), ray.x_lo), power_at = spectral_row(uint(p.power_row), at), power_hi = spectral_row(uint(p.power_row), ray.x_hi);
+            share = clamp((power_at - power_lo) / max(power_hi - power_lo, 1e-30), 0.0, 1.0);
+            // Back to the start of the flight: the surface is met again next time.
+            whole.flags |= FLAG_BAND_FINAL;
+            outcome.absorbed_w = 0.0;
+            outcome.what |= FELL_BAND;
+            child = whole;
+            anchor_at(child, whole.x_lo, at);
+            child.flux_w = whole.flux_w * share;
+            child.branch_key = hash_combine(whole.branch_key, 5u);
+            lives = true;
+        }
+#endif
+        if (splits && !cut) {
+            bool geometric = dot(reflect_direction(ray.direction, normal, theta), normal_g) <= 0.0;
+            vec3 facing_n = geometric ? normal_g : normal;
+            float facing_theta = geometric ? theta_g : theta;
+            child.flux_w = ray.flux_w * reflectance.y;
+            child.throughput = ray.throughput * reflectance;
+            child.direction = normalize(reflect_direction(ray.direction, facing_n, facing_theta));
+#if COLUMNS > 0
+            for (int c = 0; c < COLUMNS; ++c)
+                child.ddirection[c].xyz = reflect_column(ray.direction, ray.ddirection[c].xyz, facing_n, geometric ? vec3(0.0) : dnormal[c], facing_theta);
+#endif
+            outcome.what |= geometric ? FELL_NORMAL : 0u;
+            lives = child.flux_w > 0.0 && survives(child, outcome.roulette_w, reflectance.y, 1u);
+        }
         if (kind == KIND_DIELECTRIC && !crossing.changes) {
             // Another solid decides here: walk through, only remember where we are.
-            ray.last_primitive = hit.primitive;
-            ray.last_object = hit.object;
-            ray.flags = (ray.flags & FLAG_FOOTPRINT_DROPPED) | (entering ? FLAG_INSIDE : 0u);
-            ray.inside_mask = crossing.mask_after;
-            rays_out[2u * k] = ray;
+            child.flags = kept_flags | (entering ? FLAG_INSIDE : 0u);
+            child.depth = ray.depth;
+            child.inside_mask = crossing.mask_after;
+            lives = true;
+        }
+#endif
+        if (lives) {
+            store_ray(2u * k, child);
             outcome.what |= 1u;
-        } else if (kind == KIND_DIELECTRIC) {
-            vec3 theta3 = vec3(theta);
-#ifdef SPECTRAL_WEIGHTS
-            vec3 x3 = vec3(ray.x_lo, ray.x_anchor, ray.x_hi);
-            vec3 n_i = vec3(medium_index(crossing.before, x3.x), medium_index(crossing.before, x3.y), medium_index(crossing.before, x3.z));
-            vec3 n_t = vec3(medium_index(crossing.after, x3.x), medium_index(crossing.after, x3.y), medium_index(crossing.after, x3.z));
-#if SPECTRAL_GROUPS > 0
-            for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-                float dtheta = dot(ray.ddirection[SPATIAL + g].xyz, normal) + dot(ray.direction, dnormal[SPATIAL + g]);
-                theta3.x += dtheta * variable_step(uint(g), x3.x, x3.y);
-                theta3.z += dtheta * variable_step(uint(g), x3.z, x3.y);
-            }
-            theta3.xz = clamp(theta3.xz, -1.0, -1e-6);
-#endif
-#else
-            vec3 n_i = vec3(medium_index(crossing.before, ray.x_anchor));
-            vec3 n_t = vec3(medium_index(crossing.after, ray.x_anchor));
-#endif
-            vec3 eta3 = n_i / n_t;
-            vec3 cosine2 = transmitted_cosine2(theta3, eta3);
-            bool cut = false;
+        }
+
+#ifdef HAS_DIELECTRIC
+        child = ray;
+        lives = false;
 #ifdef BAND_CUTS
-            bvec3 passes = greaterThan(cosine2, vec3(0.0));
-            cut = any(passes) && !all(passes) && (ray.flags & FLAG_BAND_FINAL) == 0u && ray.x_hi - ray.x_lo > MIN_CUT_BAND;
-            float at = 0.0;
-            if (cut) {
-                // Total internal reflection sets in inside the band: find where, and let both parts
-                // meet this surface again, each anchored in its own middle.
-                bool low_side = passes.x != passes.y;
-                float a = low_side ? x3.x : x3.y, b = low_side ? x3.y : x3.z;
-                bool passes_a = low_side ? passes.x : passes.y;
-                for (int i = 0; i < 22; ++i) {
-                    float x = 0.5 * (a + b);
-                    float theta_x = theta;
-                    for (int g = 0; g < SPECTRAL_GROUPS; ++g)
-                        theta_x += (dot(ray.ddirection[SPATIAL + g].xyz, normal) + dot(ray.direction, dnormal[SPATIAL + g])) * variable_step(uint(g), x, ray.x_anchor);
-                    float eta_x = medium_index(crossing.before, x) / medium_index(crossing.after, x);
-                    bool passes_x = transmitted_cosine2(clamp(theta_x, -1.0, -1e-6), eta_x) > 0.0;
-                    a = passes_x == passes_a ? x : a;
-                    b = passes_x == passes_a ? b : x;
-                }
-                at = 0.5 * (a + b);
-                // A sliver of a band is not worth a path of its own.
-                cut = min(at - ray.x_lo, ray.x_hi - at) > 0.01 * MIN_CUT_BAND;
-            }
-            if (cut) {
-                float power_lo = spectral_row(uint(p.power_row), ray.x_lo), power_at = spectral_row(uint(p.power_row), at), power_hi = spectral_row(uint(p.power_row), ray.x_hi);
-                float share = clamp((power_at - power_lo) / max(power_hi - power_lo, 1e-30), 0.0, 1.0);
-                // Back to the start of the flight: the surface is met again next time.
-                RayRecord whole = rays_in[indices[k]];
-                whole.flux_w = ray.flux_w + outcome.absorbed_w;
-                outcome.absorbed_w = 0.0;
-                whole.flags |= FLAG_BAND_FINAL;
-                RayRecord low = whole, high = whole;
-                anchor_at(low, whole.x_lo, at);
-                anchor_at(high, at, whole.x_hi);
-                low.flux_w = whole.flux_w * share;
-                high.flux_w = whole.flux_w * (1.0 - share);
-                low.branch_key = hash_combine(whole.branch_key, 5u);
-                high.branch_key = hash_combine(whole.branch_key, 6u);
-                rays_out[2u * k] = low;
-                rays_out[2u * k + 1u] = high;
-                outcome.what |= 3u | FELL_BAND;
-            }
+        if (cut) {
+            child = whole;
+            anchor_at(child, at, whole.x_hi);
+            child.flux_w = whole.flux_w * (1.0 - share);
+            child.branch_key = hash_combine(whole.branch_key, 6u);
+            lives = true;
+        }
 #endif
-            if (!cut) {
-                vec3 reflectance = fresnel_reflectance(theta3, eta3, cosine2);
-                float omega2 = cosine2.y, eta_it = eta3.y;
-                float through = 1.0 - reflectance.y;
-                vec3 direction_r = reflect_direction(ray.direction, normal, theta);
-                bool geometric_r = dot(direction_r, normal_g) <= 0.0;
-                vec3 reflect_n = geometric_r ? normal_g : normal;
-                float reflect_theta = geometric_r ? theta_g : theta;
-                reflected.flux_w = ray.flux_w * reflectance.y;
-                reflected.throughput = ray.throughput * reflectance;
-                reflected.direction = normalize(reflect_direction(ray.direction, reflect_n, reflect_theta));
+        if (splits && !cut && cosine2.y > 0.0) {
+            float omega = sqrt(cosine2.y);
+            vec3 direction_t = refract_direction(ray.direction, normal, theta, eta_it, omega);
+            vec3 facing_n = normal;
+            float facing_theta = theta;
+            bool geometric = dot(direction_t, normal_g) >= 0.0;
+            if (geometric) {
+                facing_n = normal_g;
+                facing_theta = theta_g;
+                omega = sqrt(max(transmitted_cosine2(theta_g, eta_it), 1e-12));
+                direction_t = refract_direction(ray.direction, normal_g, theta_g, eta_it, omega);
+                outcome.what |= FELL_NORMAL;
+            }
+            child.direction = normalize(direction_t);
+            child.flux_w = ray.flux_w * through;
+            child.throughput = ray.throughput * (1.0 - reflectance);
+            child.last_primitive = hit.primitive;
+            child.last_object = object;
+            child.flags = kept_flags | (entering ? FLAG_INSIDE : 0u);
+            child.depth = ray.depth + 1u;
+            child.inside_mask = crossing.mask_after;
+            child.inside_object = crossing.object_after;
 #if COLUMNS > 0
-                for (int c = 0; c < COLUMNS; ++c)
-                    reflected.ddirection[c].xyz = reflect_column(ray.direction, ray.ddirection[c].xyz, reflect_n, geometric_r ? vec3(0.0) : dnormal[c], reflect_theta);
-#endif
-                outcome.what |= geometric_r ? FELL_NORMAL : 0u;
-                if (reflected.flux_w > 0.0 && survives(reflected, outcome.roulette_w, reflectance.y, 1u)) {
-                    rays_out[2u * k] = reflected;
-                    outcome.what |= 1u;
-                }
-                if (omega2 > 0.0) {
-                    RayRecord refracted = ray;
-                    float omega = sqrt(omega2);
-                    vec3 direction_t = refract_direction(ray.direction, normal, theta, eta_it, omega);
-                    vec3 refract_n = normal;
-                    float refract_theta = theta;
-                    bool geometric_t = dot(direction_t, normal_g) >= 0.0;
-                    if (geometric_t) {
-                        float g2 = transmitted_cosine2(theta_g, eta_it);
-                        refract_n = normal_g;
-                        refract_theta = theta_g;
-                        omega = sqrt(max(g2, 1e-12));
-                        direction_t = refract_direction(ray.direction, normal_g, theta_g, eta_it, omega);
-                        outcome.what |= FELL_NORMAL;
-                    }
-                    refracted.direction = normalize(direction_t);
-                    refracted.flux_w = ray.flux_w * through;
-                    refracted.throughput = ray.throughput * (1.0 - reflectance);
-                    refracted.last_primitive = hit.primitive;
-                    refracted.last_object = hit.object;
-                    refracted.flags = (ray.flags & FLAG_FOOTPRINT_DROPPED) | (entering ? FLAG_INSIDE : 0u);
-                    refracted.depth = ray.depth + 1u;
-                    refracted.inside_mask = crossing.mask_after;
-                    refracted.inside_object = crossing.object_after;
-#if COLUMNS > 0
-                    for (int c = 0; c < COLUMNS; ++c) {
-                        float deta_it = 0.0;
+            for (int c = 0; c < COLUMNS; ++c) {
+                float deta_it = 0.0;
 #if SPECTRAL_GROUPS > 0
-                        if (c >= SPATIAL)
-                            deta_it = index_ratio_derivative(crossing, uint(c - SPATIAL), ray.x_anchor, n_i.y, n_t.y);
+                if (c >= SPATIAL)
+                    deta_it = index_ratio_derivative(crossing, uint(c - SPATIAL), ray.x_anchor, n_i.y, n_t.y);
 #endif
-                        refracted.ddirection[c].xyz = refract_column(ray.direction, ray.ddirection[c].xyz, refract_n, geometric_t ? vec3(0.0) : dnormal[c], refract_theta, eta_it, omega, deta_it);
-                    }
-#endif
-                    if (survives(refracted, outcome.roulette_w, through, 2u)) {
-                        rays_out[2u * k + 1u] = refracted;
-                        outcome.what |= 2u;
-                    }
-                }
+                child.ddirection[c].xyz = refract_column(ray.direction, ray.ddirection[c].xyz, facing_n, geometric ? vec3(0.0) : dnormal[c], facing_theta, eta_it, omega, deta_it);
             }
+#endif
+            lives = survives(child, outcome.roulette_w, through, 2u);
+        }
+        if (lives) {
+            store_ray(2u * k + 1u, child);
+            outcome.what |= 2u;
         }
 #endif
     }
-    outcomes[k] = outcome;
+    uvec4 texels[Outcome_TEXELS];
+    to_texels(outcome, texels);
+    outcomes[k] = texels[0];
 }

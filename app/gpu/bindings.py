@@ -1,18 +1,19 @@
-"""Storage buffer binding points, one name for both sides."""
+"""Binding points of storage buffers and textures, one name for both sides."""
 
 from __future__ import annotations
 
-TRIANGLES, NODES, NORMALS, SOLIDS, PLANES, OBJECTS, SPECTRA, PARAMETERS = range(8)
+SOLIDS, PLANES = 3, 4
+PARAMETERS = 7
 RAYS_IN, RAYS_OUT, OUTCOMES, PHOTON_SLOTS, INDICES, COUNTS, STATE, PHOTONS = range(8, 16)
 
+UNIT_SCENE, UNIT_SPECTRA = 14, 15
+"""Texture units of the scene; a pass is free to use 0-13 as it likes."""
+
 SCENE_DEFINES = {
-    "BIND_TRIANGLES": TRIANGLES,
-    "BIND_NODES": NODES,
-    "BIND_NORMALS": NORMALS,
     "BIND_SOLIDS": SOLIDS,
     "BIND_PLANES": PLANES,
-    "BIND_OBJECTS": OBJECTS,
-    "BIND_SPECTRA": SPECTRA,
+    "UNIT_SCENE": UNIT_SCENE,
+    "UNIT_SPECTRA": UNIT_SPECTRA,
     "BIND_PARAMETERS": PARAMETERS,
 }
 """Bindings 0-7 hold the scene; a pass is free to use 8-15 as it likes."""

@@ -50,6 +50,7 @@ def photon_record(groups: int) -> Struct:
             Field("cosine", "float", "|cos| of incidence on the receiver"),
             *spectral,
         ),
+        texels=True,
     )
 
 
@@ -106,19 +107,18 @@ def ray_record(columns: int) -> Struct:
             Field("dposition", "vec4", "xyz: GPU space per lattice spacing, or per unit of a group's variable", columns),
             Field("ddirection", "vec4", "xyz: per the same", columns),
         ]
-    return Struct("RayRecord", tuple(fields))
+    return Struct("RayRecord", tuple(fields), texels=True)
 
 
 OUTCOME = Struct(
     "Outcome",
     (
-        Field("what", "uint", "bit 0, 1: child rays; bit 2: photon; bits 8-15: fall-backs"),
-        Field("category", "uint", "where `flux_w` went: OUTCOME_*"),
-        Field("flux_w", "float", "flux that ended here, W"),
+        Field("what", "uint", "bits 0, 1: child rays; 2: photon; 3: `flux_w` starts here; 8-15: fall-backs; 16-23: where `flux_w` went"),
+        Field("flux_w", "float", "flux that ended (emission: started) here, W"),
         Field("absorbed_w", "float", "flux absorbed on the way here, W"),
         Field("roulette_w", "float", "flux that roulette took (> 0) or gave (< 0), W"),
-        Field("emitted_w", "float", "flux that started here, W"),
     ),
+    texels=True,
 )
 
 CATEGORIES = ("deposited", "absorbed", "escaped", "direct", "lost_depth", "lost_numeric")

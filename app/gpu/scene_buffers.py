@@ -14,6 +14,7 @@ import numpy as np
 from app.errors import UserError
 from app.gpu import bindings
 from app.gpu.records import NONE
+from app.gpu.scene_texels import SceneTexels, spectra_texture, tree_texels
 from app.gpu.schema import Field, Struct
 from app.model.bvh import build_bvh
 from app.model.features import MAX_GROUPS, Features, dispersive_materials, is_convex_solid, overlapping_solids, world_bounds
@@ -37,15 +38,7 @@ TRIANGLE = Struct(
         Field("edge2", "vec3", "third corner minus first"),
         Field("source", "uint", "global index before the tree reordered them: objects in scene order"),
     ),
-)
-NODE = Struct(
-    "Node",
-    (
-        Field("bounds_min", "vec3"),
-        Field("left_or_first", "uint", "inner: left child (right is the next); leaf: first triangle"),
-        Field("bounds_max", "vec3"),
-        Field("count", "uint", "triangles of a leaf, 0 for an inner node"),
-    ),
+    texels=True,
 )
 SOLID = Struct(
     "Solid",
@@ -64,8 +57,9 @@ OBJECT = Struct(
         Field("reserved", "uint", ""),
         Field("colour", "vec4", "linear Rec.709 reflectance (diffuse, mirror) or n_d in w (dielectric)"),
     ),
+    texels=True,
 )
-SCENE_STRUCTS = (TRIANGLE, NODE, SOLID, OBJECT)
+SCENE_STRUCTS = (TRIANGLE, SOLID, OBJECT)
 
 
 @dataclass(frozen=True)
@@ -142,7 +136,7 @@ class SpectraLayout:
 
 
 class SceneBuffers:
-    """Owns the scene's storage buffers at bindings 0-6; `bind()` before every dispatch that reads them."""
+    """Owns the scene's textures and storage buffers; `bind()` before every dispatch that reads them."""
 
     def __init__(self, ctx: moderngl.Context, scene: Scene, features: Features, axis: SpectralAxis) -> None:
         self.ctx = ctx
@@ -155,17 +149,25 @@ class SceneBuffers:
         self.first_triangle = np.cumsum([0] + [len(o.mesh.triangles) for o in scene.objects])
         self.world_meshes = [o.mesh.transformed(o.object_to_world) for o in scene.objects]
         self._buffers: dict[int, moderngl.Buffer] = {}
+        self._sections: dict[str, np.ndarray] = {}
         self.defines = bindings.SCENE_DEFINES | {"SPECTRAL_SAMPLES": SAMPLES}
         self._pack_geometry()
         self._pack_objects()
+        self._texels = SceneTexels(ctx, self._sections)
+        self._sections.clear()
+        self.defines |= self._texels.defines
 
     def bind(self) -> None:
-        """Bind every scene buffer to its binding point."""
+        """Bind every scene texture and buffer to its place."""
+        self._texels.bind()
+        self._spectra.use(bindings.UNIT_SPECTRA)
         for binding, buffer in self._buffers.items():
             buffer.bind_to_storage_buffer(binding)
 
     def release(self) -> None:
-        """Free the buffers."""
+        """Free buffers and textures."""
+        self._texels.release()
+        self._spectra.release()
         for buffer in self._buffers.values():
             buffer.release()
         self._buffers.clear()
@@ -173,7 +175,8 @@ class SceneBuffers:
     @property
     def bytes(self) -> int:
         """GPU memory held."""
-        return sum(buffer.size for buffer in self._buffers.values())
+        pixels = (self._texels.texture, 16), (self._spectra, 8)
+        return sum(buffer.size for buffer in self._buffers.values()) + sum(t.width * t.height * size for t, size in pixels)
 
     def _store(self, binding: int, data: np.ndarray) -> None:
         raw = np.ascontiguousarray(data)
@@ -208,8 +211,6 @@ class SceneBuffers:
 
         self.triangle_count = sum(len(c) for c in corners)
         if not corners:
-            for binding in (bindings.TRIANGLES, bindings.NODES, bindings.NORMALS):
-                self._store(binding, np.zeros(16, "f4"))
             self.defines |= {"TRIANGLE_COUNT": 0, "SOLID_COUNT": self.solid_count}
             return
         all_corners = np.concatenate(corners).astype("f4")
@@ -217,14 +218,10 @@ class SceneBuffers:
         if self.features.tree:
             bvh = build_bvh(all_corners)
             order = bvh.order
-            nodes = NODE.zeros(len(bvh.nodes))
-            for name in nodes.dtype.names:
-                nodes[name] = bvh.nodes[name]
-            self._store(bindings.NODES, nodes)
+            self._sections["TREE"] = tree_texels(bvh.nodes)
             self.tree_depth = bvh.depth
             self.defines |= {"TREE_STACK": max(bvh.depth, 1)}
         else:
-            self._store(bindings.NODES, np.zeros(16, "f4"))
             self.tree_depth = 0
         all_corners = all_corners[order]
         records = TRIANGLE.zeros(len(order))
@@ -238,10 +235,9 @@ class SceneBuffers:
         # A facet whose three corner normals agree is flat: its normal has no derivative to compute.
         records["normals"] = NONE
         records["normals"][smooth] = 3 * np.arange(np.count_nonzero(smooth))
-        packed = np.zeros((max(1, 3 * np.count_nonzero(smooth)), 4), "f4")
-        packed[: 3 * np.count_nonzero(smooth), :3] = all_normals[smooth].reshape(-1, 3)
-        self._store(bindings.TRIANGLES, records)
-        self._store(bindings.NORMALS, packed)
+        packed = np.zeros((3 * np.count_nonzero(smooth), 4), "f4")
+        packed[:, :3] = all_normals[smooth].reshape(-1, 3)
+        self._sections |= {"TRIANGLES": records, "NORMALS": packed}
         self.defines |= {"TRIANGLE_COUNT": self.triangle_count, "SOLID_COUNT": self.solid_count}
 
     def _pack_objects(self) -> None:
@@ -282,7 +278,7 @@ class SceneBuffers:
                         record["weight_row"] = len(weights)
                         coefficient = np.interp(nm, VISIBLE_NM, material.absorption.coefficient)
                         weights.append(coefficient / self.space.scale)
-        self._store(bindings.OBJECTS, records)
+        self._sections["OBJECTS"] = records
         # bit -> (medium, weight row) for the medium stack.
         by_bit = {bit: index for index, bit in stack_bits.items()}
         self.stack_objects = [by_bit[bit] for bit in range(len(by_bit))]
@@ -297,7 +293,7 @@ class SceneBuffers:
         self.layout = SpectraLayout(*counts[:5].tolist(), rows=int(counts[5]))
         self.variable_table = variables.astype("f4")
         self.media = media
-        self._store(bindings.SPECTRA, np.concatenate(rows).astype("f4") if counts[5] else np.ones(SAMPLES, "f4"))
+        self._spectra = spectra_texture(self.ctx, np.concatenate(rows) if counts[5] else np.ones((1, SAMPLES)))
         self.defines |= {
             "INDEX_ROW": self.layout.index_row,
             "SLOPE_ROW": self.layout.slope_row,

@@ -24,6 +24,10 @@ _TYPES = {
 }
 
 
+# numpy base -> GLSL to and from its bits
+_BITS = {"f4": ("floatBitsToUint", "uintBitsToFloat"), "u4": ("uint", "uint"), "i4": ("uint", "int")}
+
+
 @dataclass(frozen=True)
 class Field:
     """One member; `comment` states its unit and frame."""
@@ -41,6 +45,9 @@ class Struct:
 
     name: str
     fields: tuple[Field, ...]
+    texels: bool = False
+    """Moved as groups of four words: GLSL also gets `NAME_TEXELS`, `to_texels` and `NAME_of`. A software
+    renderer pays per access, not per byte, and a texel is one access."""
 
     def __post_init__(self) -> None:
         offset, widest = 0, 4
@@ -54,6 +61,8 @@ class Struct:
             widest = max(widest, align)
         if offset % widest:
             raise ValueError(f"{self.name} is {offset} bytes, which std430 pads to a multiple of {widest}")
+        if self.texels and offset % 16:
+            raise ValueError(f"{self.name} is {offset} bytes, which does not fill whole texels of 16")
 
     @cached_property
     def dtype(self) -> np.dtype:
@@ -77,7 +86,38 @@ class Struct:
             suffix = f"[{field.count}]" if field.count > 1 else ""
             comment = f"  // {field.comment}" if field.comment else ""
             lines.append(f"    {field.type} {field.name}{suffix};{comment}")
-        return "\n".join(lines) + "\n};\n"
+        return "\n".join(lines) + "\n};\n" + (self._texel_functions() if self.texels else "")
+
+    def _texel_functions(self) -> str:
+        """GLSL that turns the struct into `uvec4`s and back, bit for bit."""
+        pack: list[str] = []
+        unpack: list[str] = []
+        word = 0
+        for field in self.fields:
+            base, components, _, _ = _TYPES[field.type]
+            for item in range(field.count):
+                member = f"value.{field.name}" + (f"[{item}]" if field.count > 1 else "")
+                for component in range(components):
+                    part = member + (f"[{component}]" if components > 1 else "")
+                    texel = f"texels[{word // 4}][{word % 4}]"
+                    to_bits, from_bits = _BITS[base]
+                    pack.append(f"    {texel} = {to_bits}({part});")
+                    unpack.append(f"    {part} = {from_bits}({texel});")
+                    word += 1
+        count = f"{self.name}_TEXELS"
+        return "\n".join(
+            [
+                f"#define {count} {word // 4}",
+                f"void to_texels({self.name} value, out uvec4 texels[{count}]) {{",
+                *pack,
+                "}",
+                f"{self.name} {self.name}_of(uvec4 texels[{count}]) {{",
+                f"    {self.name} value;",
+                *unpack,
+                "    return value;",
+                "}\n",
+            ]
+        )
 
     def zeros(self, count: int) -> np.ndarray:
         """`count` records of zero bytes."""

@@ -17,12 +17,15 @@ from app.gpu.context import Context
 from app.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
 from app.model.features import Features
 from app.passes.emission_domain import EmissionDomain
+from app.passes.lattice_order import morton_order
 
 RAY_ROOM = 3
 """Rays in flight per lattice point of a batch: splitting rarely passes 1.5."""
 PHOTON_ROOM = 4
 _CHUNK = 64
 _GROUP = 64
+_MAX_ORDERS = 8
+"""Emission orders kept: a pass has one for its batches and one for its last, shorter one."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +132,7 @@ class TracePass:
         self._defines = defines
         self._structs = structs
         self._emit: dict[str, moderngl.ComputeShader] = {}
+        self._orders: dict[tuple[int, int, int], moderngl.Buffer] = {}
         self._trace = shader.compute(ctx, "trace.comp", defines, (*structs, records.TRACE_PARAMETERS))
         queue = {name: shader.compute(ctx, f"queue_{name}.comp", defines, structs) for name in ("count", "scan", "scatter", "gather", "advance")}
         self._count, self._scan, self._scatter, self._gather, self._advance = queue.values()
@@ -154,7 +158,7 @@ class TracePass:
         for owned in (
             *self._rays, self._outcomes, self._slots, self._indices, self._counts, self._state, self.photons,
             self._emit_parameters, self._trace_parameters, self._trace, self._count, self._scan, self._scatter,
-            self._gather, self._advance, *self._emit.values(),
+            self._gather, self._advance, *self._emit.values(), *self._orders.values(),
         ):
             owned.release()
 
@@ -177,10 +181,12 @@ class TracePass:
         self.scene.bind()
         self._bind_queue(0)
         self._emit_parameters.bind_to_storage_buffer(bindings.PARAMETERS)
+        self._order(piece).bind_to_storage_buffer(bindings.INDICES)
         self._emit_program(domain.kind).run(-(-piece.count // _GROUP))
+        self._indices.bind_to_storage_buffer(bindings.INDICES)
         self._list_children(first=True, chunks=-(-piece.count // _CHUNK))
         emitted = int(self._read_state()["alive"])
-        self._trace_parameters.bind_to_storage_buffer(bindings.PARAMETERS)
+        self._trace_parameters.bind_to_uniform_block(bindings.PARAMETERS)
 
         # Walking through covered surfaces and cutting bands take steps without being events.
         limit = 2 * self.max_depth + 32
@@ -262,6 +268,14 @@ class TracePass:
             ctx.memory_barrier()
         self._advance.run(1)
         ctx.memory_barrier()
+
+    def _order(self, piece: LatticeSlice) -> moderngl.Buffer:
+        key = (piece.points, piece.stride, piece.lattice_count)
+        if key not in self._orders:
+            if len(self._orders) >= _MAX_ORDERS:
+                self._orders.pop(next(iter(self._orders))).release()
+            self._orders[key] = self.context.ctx.buffer(morton_order(*key).tobytes())
+        return self._orders[key]
 
     def _emit_program(self, kind: str) -> moderngl.ComputeShader:
         if kind not in self._emit:

@@ -38,7 +38,7 @@ bool accept_hit(float distance, float facing, uint object, RayOrigin origin)
 #ifdef MEDIUM_STACK
     // Of two surfaces at one place both lie near for ever; the mask knows which was crossed already.
     if (!same && distance < NEAR_DISTANCE) {
-        uint bit = objects[object].stack_bit;
+        uint bit = object_at(object).stack_bit;
         bool is_inside = bit != NONE && (origin.inside_mask & (1u << (bit & 31u))) != 0u;
         repeated = bit != NONE && is_inside == (facing < 0.0);
     }
@@ -59,19 +59,19 @@ float crossing_key(float distance, float facing)
 
 void try_triangle(uint slot, vec3 origin_p, vec3 direction, RayOrigin origin, inout float best_key, inout Hit hit)
 {
-    vec3 edge1 = triangles[slot].edge1, edge2 = triangles[slot].edge2;
-    vec3 to_origin = origin_p - triangles[slot].vertex;
-    vec3 normal = cross(edge1, edge2);
+    Triangle facet = triangle_at(slot);
+    vec3 to_origin = origin_p - facet.vertex;
+    vec3 normal = cross(facet.edge1, facet.edge2);
     float facing = dot(direction, normal);
     vec3 q = cross(to_origin, direction);
     float inverse = 1.0 / facing;
-    float u = -dot(edge2, q) * inverse;
-    float v = dot(edge1, q) * inverse;
+    float u = -dot(facet.edge2, q) * inverse;
+    float v = dot(facet.edge1, q) * inverse;
     float distance = -dot(to_origin, normal) * inverse;
     float key = crossing_key(distance, facing);
     // Comparisons are written so that NaN (an edge-on or degenerate triangle) fails them.
     bool inside = u >= -1e-6 && v >= -1e-6 && u + v <= 1.000001 && key < best_key && slot != origin.primitive;
-    if (inside && accept_hit(distance, facing, triangles[slot].object, origin)) {
+    if (inside && accept_hit(distance, facing, facet.object, origin)) {
         best_key = key;
         hit.distance = distance;
         hit.primitive = slot;
@@ -80,6 +80,8 @@ void try_triangle(uint slot, vec3 origin_p, vec3 direction, RayOrigin origin, in
 }
 
 #ifdef HAS_TREE
+#define LEAF_BIT 0x80000000u
+
 float box_entry(vec3 low, vec3 high, vec3 origin_p, vec3 inverse_direction, float far)
 {
     vec3 t0 = (low - origin_p) * inverse_direction, t1 = (high - origin_p) * inverse_direction;
@@ -90,35 +92,38 @@ float box_entry(vec3 low, vec3 high, vec3 origin_p, vec3 inverse_direction, floa
     return enter <= leave ? enter : FAR_DISTANCE;
 }
 
-void intersect_tree(vec3 origin_p, vec3 direction, RayOrigin origin, inout float best_key, inout Hit hit)
+// A node is four texels: both children's boxes, then their links. A link is the number of an inner
+// node, or LEAF_BIT | triangles << 28 | first triangle; NONE ends the stack. All rays of a group
+// first go down to a leaf each, then test triangles together: where both sides of a branch
+// are executed, neither kind of step then pays for the other [Aila and Laine 2009].
+void intersect_tree(vec3 origin_p, vec3 direction, RayOrigin origin, bool any_hit, inout float best_key, inout Hit hit)
 {
     // A zero component would make 0 * inf = NaN on a slab's plane.
     vec3 safe = mix(direction, vec3(1e-20), lessThan(abs(direction), vec3(1e-20)));
     vec3 inverse_direction = 1.0 / safe;
-    uint stack[TREE_STACK];
-    int top = 0;
+    uint stack[TREE_STACK + 1];
+    stack[0] = NONE;
+    int top = 1;
     uint current = 0u;
-    bool more = box_entry(nodes[0].bounds_min, nodes[0].bounds_max, origin_p, inverse_direction, best_key) < FAR_DISTANCE;
-    while (more) {
-        uint first = nodes[current].left_or_first, count = nodes[current].count;
-        if (count > 0u) {
-            for (uint i = 0u; i < count; ++i)
-                try_triangle(first + i, origin_p, direction, origin, best_key, hit);
-            more = top > 0;
-            if (more) current = stack[--top];
-        } else {
-            float enter0 = box_entry(nodes[first].bounds_min, nodes[first].bounds_max, origin_p, inverse_direction, best_key + NEAR_DISTANCE);
-            float enter1 = box_entry(nodes[first + 1u].bounds_min, nodes[first + 1u].bounds_max, origin_p, inverse_direction, best_key + NEAR_DISTANCE);
+    while (true) {
+        while (current < LEAF_BIT) {
+            uint at = uint(TREE_AT) + 4u * current;
+            uvec4 a = scene_texel(at), b = scene_texel(at + 1u), c = scene_texel(at + 2u), links = scene_texel(at + 3u);
+            float far = best_key + NEAR_DISTANCE;
+            float enter0 = box_entry(uintBitsToFloat(a.xyz), uintBitsToFloat(uvec3(a.w, b.xy)), origin_p, inverse_direction, far);
+            float enter1 = box_entry(uintBitsToFloat(uvec3(b.zw, c.x)), uintBitsToFloat(c.yzw), origin_p, inverse_direction, far);
             bool hit0 = enter0 < FAR_DISTANCE, hit1 = enter1 < FAR_DISTANCE;
             bool swap = enter1 < enter0;
-            if (hit0 && hit1) stack[top++] = first + (swap ? 0u : 1u);
-            if (hit0 || hit1) {
-                current = first + (swap ? 1u : 0u);
-            } else {
-                more = top > 0;
-                if (more) current = stack[--top];
-            }
+            if (hit0 && hit1) stack[top++] = swap ? links.x : links.y;
+            current = swap ? links.y : links.x;
+            if (!(hit0 || hit1)) current = stack[--top];
         }
+        if (current == NONE) break;
+        uint first = current & 0x0fffffffu, end = first + ((current >> 28u) & 7u);
+        for (; first < end; ++first)
+            try_triangle(first, origin_p, direction, origin, best_key, hit);
+        if (any_hit && hit.primitive != NONE) break;
+        current = stack[--top];
     }
 }
 #endif
@@ -164,8 +169,7 @@ void intersect_solid(uint solid, vec3 origin_p, vec3 direction, RayOrigin origin
 }
 #endif
 
-// Nearest hit within `far`; `hit.primitive` is NONE where there is none.
-bool intersect_closest(vec3 origin_p, vec3 direction, float far, RayOrigin origin, out Hit hit)
+bool intersect(vec3 origin_p, vec3 direction, float far, RayOrigin origin, bool any_hit, out Hit hit)
 {
     hit.distance = far;
     hit.primitive = NONE;
@@ -178,28 +182,43 @@ bool intersect_closest(vec3 origin_p, vec3 direction, float far, RayOrigin origi
         intersect_solid(i, origin_p, direction, origin, best_key, hit);
 #endif
 #ifdef HAS_TREE
-    intersect_tree(origin_p, direction, origin, best_key, hit);
+    intersect_tree(origin_p, direction, origin, any_hit, best_key, hit);
 #elif defined(LOOSE_TRIANGLES)
     for (uint i = 0u; i < uint(TRIANGLE_COUNT); ++i)
         try_triangle(i, origin_p, direction, origin, best_key, hit);
 #endif
-    if (hit.primitive == NONE) return false;
-#ifdef CONVEX_SOLIDS
-    if ((hit.primitive & PLANE_BIT) != 0u) {
-        hit.normal_g = planes[hit.primitive & ~PLANE_BIT].xyz;
-        return true;
+    return hit.primitive != NONE;
+}
+
+// The facet of a triangle hit; some triangle where there was none, so that the fetch needs no branch.
+Triangle hit_triangle(Hit hit)
+{
+    return triangle_at(min(hit.primitive, uint(max(TRIANGLE_COUNT, 1)) - 1u));
+}
+
+// Nearest hit within `far`; `hit.primitive` is NONE where there is none.
+bool intersect_closest(vec3 origin_p, vec3 direction, float far, RayOrigin origin, out Hit hit)
+{
+    bool met = intersect(origin_p, direction, far, origin, false, hit);
+#ifdef LOOSE_TRIANGLES
+    if (met && (hit.primitive & PLANE_BIT) == 0u) {
+        Triangle facet = hit_triangle(hit);
+        hit.object = facet.object;
+        hit.normal_g = normalize(cross(facet.edge1, facet.edge2));
     }
 #endif
-    hit.object = triangles[hit.primitive].object;
-    hit.normal_g = normalize(cross(triangles[hit.primitive].edge1, triangles[hit.primitive].edge2));
-    return true;
+#ifdef CONVEX_SOLIDS
+    if (met && (hit.primitive & PLANE_BIT) != 0u)
+        hit.normal_g = planes[hit.primitive & ~PLANE_BIT].xyz;
+#endif
+    return met;
 }
 
 // Whether anything lies within `far`.
 bool intersect_any(vec3 origin_p, vec3 direction, float far, RayOrigin origin)
 {
     Hit hit;
-    return intersect_closest(origin_p, direction, far, origin, hit);
+    return intersect(origin_p, direction, far, origin, true, hit);
 }
 
 #endif

@@ -43,7 +43,7 @@ uint ray_medium(RayRecord ray)
 uint medium_weight_row(RayRecord ray)
 {
     uint object = ray_medium(ray);
-    return object == NONE ? NONE : objects[object].weight_row;
+    return object == NONE ? NONE : object_at(object).weight_row;
 }
 
 Crossing cross_boundary(RayRecord ray, uint object, bool entering)
@@ -55,7 +55,7 @@ Crossing cross_boundary(RayRecord ray, uint object, bool entering)
     crossing.after = entering ? object : NONE;
     crossing.changes = true;
 #ifdef MEDIUM_STACK
-    uint bit_index = objects[object].stack_bit;
+    uint bit_index = object_at(object).stack_bit;
     if (bit_index != NONE) {
         uint bit = 1u << bit_index;
         uint mask_before = entering ? ray.inside_mask & ~bit : ray.inside_mask | bit;
@@ -72,8 +72,24 @@ Crossing cross_boundary(RayRecord ray, uint object, bool entering)
 // Refractive index at x of an object's medium (NONE: air, 1).
 float medium_index(uint object, float x)
 {
-    uint row = uint(INDEX_ROW) + (object == NONE ? 0u : objects[object].medium);
-    return object == NONE ? 1.0 : spectral_row(row, x);
+    uint medium = object_at(object == NONE ? 0u : object).medium;
+    return object == NONE ? 1.0 : spectral_row(uint(INDEX_ROW) + (object == NONE ? 0u : medium), x);
+}
+
+// Indices before and behind a surface at three places of the spectrum.
+void crossing_indices(Crossing crossing, vec3 x, out vec3 n_i, out vec3 n_t)
+{
+#ifdef MEDIUM_STACK
+    n_i = vec3(medium_index(crossing.before, x.x), medium_index(crossing.before, x.y), medium_index(crossing.before, x.z));
+    n_t = vec3(medium_index(crossing.after, x.x), medium_index(crossing.after, x.y), medium_index(crossing.after, x.z));
+#else
+    // One side is air.
+    bool entering = crossing.before == NONE;
+    uint glass = entering ? crossing.after : crossing.before;
+    vec3 n = vec3(medium_index(glass, x.x), medium_index(glass, x.y), medium_index(glass, x.z));
+    n_i = entering ? vec3(1.0) : n;
+    n_t = entering ? n : vec3(1.0);
+#endif
 }
 
 #if SPECTRAL_GROUPS > 0
@@ -81,7 +97,7 @@ float medium_index(uint object, float x)
 float medium_slope(uint object, float x)
 {
 #ifdef MERGED_GROUPS
-    return spectral_row(uint(SLOPE_ROW) + objects[object].medium, x);
+    return spectral_row(uint(SLOPE_ROW) + object_at(object).medium, x);
 #else
     return 1.0;
 #endif
@@ -92,9 +108,9 @@ float medium_slope(uint object, float x)
 float index_ratio_derivative(Crossing crossing, uint g, float x, float n_i, float n_t)
 {
     float derivative = 0.0;
-    if (crossing.after != NONE && objects[crossing.after].group == g)
+    if (crossing.after != NONE && object_at(crossing.after).group == g)
         derivative -= n_i / (n_t * n_t) * medium_slope(crossing.after, x);
-    if (crossing.before != NONE && objects[crossing.before].group == g)
+    if (crossing.before != NONE && object_at(crossing.before).group == g)
         derivative += medium_slope(crossing.before, x) / n_t;
     return derivative;
 }

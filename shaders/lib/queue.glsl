@@ -6,7 +6,7 @@
 
 #define CHUNK 64u
 
-layout(std430, binding = BIND_OUTCOMES) readonly restrict buffer Outcomes { Outcome outcomes[]; };
+layout(std430, binding = BIND_OUTCOMES) readonly restrict buffer Outcomes { uvec4 outcomes[]; };
 layout(std430, binding = BIND_COUNTS) restrict buffer Counts { ChunkCount counts[]; };
 layout(std430, binding = BIND_STATE) restrict buffer StateBlock { QueueState state; };
 layout(std430, binding = BIND_INDICES) restrict buffer Indices { uint indices[]; };

@@ -7,7 +7,8 @@ import pytest
 
 from app.gpu import bindings
 from app.gpu.records import NONE
-from app.gpu.scene_buffers import NODE, OBJECT, SCENE_STRUCTS, SOLID, TRIANGLE
+from app.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, SOLID, TRIANGLE
+from app.gpu.scene_texels import SceneTexels, tree_texels
 from app.model import bvh
 from tests.gpu.glsl_harness import as_f32, evaluate
 from tests.reference import optics
@@ -71,17 +72,12 @@ class Shaders:
         records["vertex"] = ordered[:, 0]
         records["edge1"], records["edge2"] = ordered[:, 1] - ordered[:, 0], ordered[:, 2] - ordered[:, 0]
         records["normals"], records["source"] = NONE, self.order
-        self.buffers = {
-            bindings.TRIANGLES: records,
-            bindings.NODES: built.nodes.view(NODE.dtype),
-            bindings.OBJECTS: OBJECT.zeros(1),
-            bindings.SPECTRA: np.zeros(4, np.float32),
-            **(buffers or {}),
-        }
+        self.texels = SceneTexels(gl.ctx, {"TREE": tree_texels(built.nodes), "TRIANGLES": records, "OBJECTS": OBJECT.zeros(1)})
+        self.buffers = buffers or {}
         chosen = {"HAS_TREE": 1, "LOOSE_TRIANGLES": 1, "TREE_STACK": bvh.MAX_DEPTH} if tree else {"LOOSE_TRIANGLES": 1}
         if defines is not None:
             chosen = defines
-        self.defines = {**bindings.SCENE_DEFINES, "TRIANGLE_COUNT": len(triangles), "SPECTRAL_SAMPLES": 2, **chosen}
+        self.defines = {**bindings.SCENE_DEFINES, **self.texels.defines, "TRIANGLE_COUNT": len(triangles), "SPECTRAL_SAMPLES": 2, **chosen}
 
     def closest(self, origins: np.ndarray, directions: np.ndarray, slots: np.ndarray | None = None, inside: int = 0) -> dict[str, np.ndarray]:
         """Per ray: distance (-1 where nothing was met), slot in the tree's order, normal, weights."""
@@ -93,7 +89,7 @@ class Shaders:
             "from_object": np.full(count, NONE if slots is None else 0, np.uint32),
             "inside": np.full(count, inside, np.uint32),
         }
-        return evaluate(self.ctx, ["lib/intersect.glsl"], BODY, inputs, OUTPUTS, self.defines, SCENE_STRUCTS, self.buffers)
+        return evaluate(self.ctx, ["lib/intersect.glsl"], BODY, inputs, OUTPUTS, self.defines, SCENE_STRUCTS, self.buffers, {bindings.UNIT_SCENE: self.texels.texture})
 
 
 def rays(count: int, seed: int, spread: float = 2.0) -> tuple[np.ndarray, np.ndarray]:

@@ -7,6 +7,7 @@ import pytest
 
 from app.gpu import bindings
 from app.gpu.scene_buffers import SCENE_STRUCTS
+from app.gpu.scene_texels import spectra_texture
 from tests.gpu.glsl_harness import as_f32, evaluate
 from tests.reference import optics
 
@@ -131,16 +132,18 @@ def test_spectral_rows_are_linear_between_samples(gl) -> None:
     samples, rows = 33, 3
     table = np.random.default_rng(7).random((rows, samples)).astype(np.float32)
     x = as_f32(np.concatenate([np.random.default_rng(8).uniform(-0.1, 1.1, 500), [0, 1, 0.5, 1 / 32]]))
+    texture = spectra_texture(gl.ctx, table)
     got = evaluate(
         gl.ctx,
         ["lib/scene.glsl"],
         "a = spectral_row(0u, x); c = spectral_row(2u, x);",
         {"x": x},
         {"a": "float", "c": "float"},
-        {**bindings.SCENE_DEFINES, "SPECTRAL_SAMPLES": samples},
+        {**bindings.SCENE_DEFINES, **dict.fromkeys(("TRIANGLES_AT", "NORMALS_AT", "OBJECTS_AT"), 0), "SPECTRAL_SAMPLES": samples},
         SCENE_STRUCTS,
-        {bindings.SPECTRA: table},
+        textures={bindings.UNIT_SPECTRA: texture},
     )
+    texture.release()
     at = np.linspace(0, 1, samples)
     np.testing.assert_allclose(got["a"], np.interp(x, at, table[0]), atol=3e-6)
     np.testing.assert_allclose(got["c"], np.interp(x, at, table[2]), atol=3e-6)

@@ -1,0 +1,33 @@
+"""The order in which a batch's lattice points are emitted: along a Morton curve over the domain.
+
+Neighbours of a Kronecker lattice by number lie far apart in space. Rays of one work group that
+start side by side meet the same nodes and triangles and take the same branches: on a software
+renderer, which runs eight rays in step, that is worth a third of the tracing time, and on a GPU
+it is cache hits. Shifting the lattice only turns the torus it lies on, so one order serves every
+pass and every shift; what a photon is does not depend on it, only where it lies in the buffer.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+GOLDEN = 2654435769
+"""2^32 / golden ratio: the lattice's second coordinate (shaders/lib/emission.glsl)."""
+_BITS = 12
+"""Bits of each coordinate: 4096² cells tell more points apart than a batch has."""
+
+
+def morton_order(points: int, stride: int, lattice_count: int) -> np.ndarray:
+    """Permutation uint32 (points,) of 0..points-1: j-th emitted is lattice point `first` + stride · order[j]."""
+    index = np.arange(points, dtype=np.uint64) * np.uint64(stride)
+    along = (index % np.uint64(lattice_count)) * np.uint64(1 << _BITS) // np.uint64(lattice_count)
+    across = (index * np.uint64(GOLDEN) & np.uint64(0xFFFFFFFF)) >> np.uint64(32 - _BITS)
+    key = _spread(along.astype(np.uint32)) | _spread(across.astype(np.uint32)) << np.uint32(1)
+    return np.argsort(key, kind="stable").astype(np.uint32)
+
+
+def _spread(value: np.ndarray) -> np.ndarray:
+    """Bits of `value` (uint32, at most 16 of them) moved to the even places."""
+    for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
+        value = (value | value << np.uint32(shift)) & np.uint32(mask)
+    return value
