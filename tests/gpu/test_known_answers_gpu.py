@@ -244,3 +244,26 @@ def test_whole_paths_against_the_reference_over_the_same_triangles(gl, kind: str
         assert record["flux_w"] == pytest.approx(flux_w * path.transmittance, rel=1e-4)
     assert len(photons.records) > 60
     assert agreeing >= 0.97 * len(photons.records)
+
+
+@pytest.mark.parametrize(("scale", "offset"), [(1e-4, 0.0), (1e4, 0.0), (1.0, 1e4), (1e-2, -300.0)])
+def test_the_same_scene_elsewhere_and_in_other_units(gl, scale: float, offset: float) -> None:
+    """A ball's photons do not depend on the unit of length or on where the origin lies."""
+    centre = np.array([offset, -0.7 * offset, 0.3 * offset])
+    matrix = np.diag([scale, scale, scale, 1.0])
+    matrix[:3, 3] = centre
+    plain, moved = (
+        trace_beam(
+            gl, ball_mesh(1280).transformed(m), glass("N-BK7"), screen([1.2, 0, 0], [1, 0, 0]).transformed(m),
+            m[:3] @ [-3, 0, 0, 1], [1, 0, 0], 0.8 * m[0, 0], D_NM, count=300,
+        ).of_depth(2)
+        for m in (np.eye(4), matrix)
+    )  # fmt: skip
+    plain, moved = by_start(plain), by_start(moved)
+    assert np.array_equal(plain.records["photon_id"], moved.records["photon_id"])
+    assert len(plain.records) > 200
+    assert np.abs((moved.start - centre) / scale - plain.start).max() < 1e-10
+    # Corners rounded elsewhere turn facets of width 0.05 by 1e-6.
+    assert np.abs((moved.position - centre) / scale - plain.position).max() < 4e-5
+    assert np.abs(moved.dposition_dn / scale - plain.dposition_dn).max() < 4e-6
+    assert moved.records["flux_w"] / scale**2 == pytest.approx(plain.records["flux_w"], rel=2e-6)
