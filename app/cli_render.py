@@ -57,7 +57,7 @@ def render_command(request: RenderRequest) -> int:
     from app.model.scene_file import load_scene
 
     scene = load_scene(scene_file)
-    settings = _complete(asked, scene)
+    settings = _complete(asked, scene, request.stats)
 
     from app.renderer import render
 
@@ -101,7 +101,7 @@ def _parse(request: RenderRequest) -> dict[str, Any]:
     return asked
 
 
-def _complete(asked: dict[str, Any], scene: Scene) -> RenderSettings:
+def _complete(asked: dict[str, Any], scene: Scene, stats: bool) -> RenderSettings:
     """Settings with the scene's own wishes where the user said nothing."""
     wishes = scene.render
     settings = RenderSettings(
@@ -111,6 +111,7 @@ def _complete(asked: dict[str, Any], scene: Scene) -> RenderSettings:
             "max_depth": wishes.max_depth,
             "exposure_ev": wishes.exposure_ev,
             "photons": None if "seconds" in asked else wishes.photons,
+            "tally": stats,
             **asked,
         }
     )

@@ -16,7 +16,7 @@ import numpy as np
 
 from app.gpu import records
 from app.gpu.context import Context
-from app.gpu.map_atlas import MapAtlas, Tile
+from app.gpu.map_atlas import MapAtlas
 from app.gpu.scene_buffers import SceneBuffers
 from app.gpu.splat_tables import SplatTables
 from app.model.features import Features
@@ -81,6 +81,7 @@ class LightHalf:
         self.variables = context.ctx.buffer(np.ascontiguousarray(buffers.variable_table if buffers.groups.count else np.zeros((1, 2), "f4")).tobytes())
         self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
         self._weight_sum = 0.0
+        self._resolved: list[moderngl.Texture] = []
 
     def prepare(self) -> None:
         """Pilot, maps and spectral tables. Afterwards `layout`, `atlas`, `tables` and `plans` exist."""
@@ -219,13 +220,63 @@ class LightHalf:
         return np.array(sides)
 
     def resolved_textures(self) -> list[moderngl.Texture]:
-        """The summed maps for look-ups."""
+        """The summed maps for look-ups: charts' seams folded home and their gutters filled."""
         self.atlas.flush()
-        return self.atlas.total_textures
+        if not self.layout.charts:
+            return self.atlas.total_textures
+        total = self.atlas.read_total()
+        for receiver, charts in self.layout.charts.items():
+            x0, y0, x1, y1 = self.layout.tiles[receiver][0].rect
+            total[y0:y1, x0:x1] = charts.fill(charts.fold(total[y0:y1, x0:x1]))
+        self._release_resolved()
+        for target in range(self.features.targets):
+            data = np.ascontiguousarray(total[..., 4 * target : 4 * target + 4])
+            texture = self.context.ctx.texture(self.atlas.size, 4, data.tobytes(), dtype="f4")
+            texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            texture.repeat_x = texture.repeat_y = False
+            self._resolved.append(texture)
+        return self._resolved
 
-    def resolved_tile(self, tile: Tile) -> np.ndarray:
-        """A tile of the summed maps: float32 (height, width, channels), row 0 at texel y = 0."""
-        return self.atlas.read_tile(tile)
+    def _release_resolved(self) -> None:
+        for texture in self._resolved:
+            texture.release()
+        self._resolved = []
+
+    def resolved_tile(self, receiver: int) -> np.ndarray:
+        """A receiver's finest map, seams folded: float32 (height, width, channels), row 0 at texel y = 0."""
+        tile = self.atlas.read_tile(self.layout.tiles[receiver][0])
+        charts = self.layout.charts.get(receiver)
+        return tile if charts is None else charts.fold(tile).astype(np.float32)
+
+    def map_flux(self) -> float:
+        """What the maps hold where they are read, in the sum of the last channel of XYZ maps (W), or of all bins."""
+        total = self.atlas.read_total()
+        total = total[..., 3] if self.bin_edges_nm is None else total.sum(axis=-1)
+        flux = 0.0
+        for receiver, tiles in self.layout.tiles.items():
+            charts = self.layout.charts.get(receiver)
+            for level, tile in enumerate(tiles):
+                x0, y0, x1, y1 = tile.rect
+                energy = total[y0:y1, x0:x1].astype(float)
+                if charts is not None:
+                    energy = charts.fold(energy)
+                elif level:
+                    energy = self._outside_finer(receiver, level, energy)
+                flux += energy.sum()
+        return flux
+
+    def _outside_finer(self, receiver: int, level: int, energy: np.ndarray) -> np.ndarray:
+        """Energy of a coarse window without the part that the finer window is read for."""
+        fine, coarse = self.layout.windows[receiver][level - 1 : level + 1]
+        height, width = energy.shape
+        share = [
+            np.clip(np.minimum(high_f, edges[1:]) - np.maximum(low_f, edges[:-1]), 0.0, None) / np.diff(edges)
+            for low_f, high_f, edges in (
+                (fine.low[0], fine.high[0], np.linspace(coarse.low[0], coarse.high[0], width + 1)),
+                (fine.low[1], fine.high[1], np.linspace(coarse.low[1], coarse.high[1], height + 1)),
+            )
+        ]
+        return energy * (1.0 - share[1][:, None] * share[0])
 
     def finish(self) -> None:
         """Sum what is pending and fetch the counters."""
@@ -236,6 +287,7 @@ class LightHalf:
 
     def release(self) -> None:
         """Free everything."""
+        self._release_resolved()
         self.trace.release()
         self.splatter.release()
         for name in ("tables", "atlas", "receivers", "variables"):

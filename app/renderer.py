@@ -125,8 +125,8 @@ def _render(context: Context, scene: Scene, settings: RenderSettings, progress: 
             rgb, spectral = _eye_layer(context, scene, settings, buffers, light, progress, cancelled)
         stats.eye_seconds = time.perf_counter() - eye_started
         stats.seconds = time.perf_counter() - started
-        total = light.atlas.read_total()
-        stats.map_flux_w = float(total[..., 3].sum(dtype=float)) if settings.bins is None else float(total.sum(dtype=float))
+        if settings.tally:
+            stats.map_flux_w = light.map_flux()
         return RenderResult(rgb, spectral, light.bin_edges_nm, stats)
     finally:
         light.release()
@@ -161,10 +161,9 @@ def _map_layer(light: LightHalf) -> tuple[np.ndarray, np.ndarray | None]:
     """The caustic map itself as a picture: irradiance (or reflected light) on the receiver, lm/unit²."""
     receiver = light.map_receiver
     assert receiver is not None
-    tile = light.layout.tiles[receiver][0]
     record = light.layout.receivers[receiver]
     area = light.layout.placements["texel_area"][record["placement"]]
-    texels = light.resolved_tile(tile)[::-1] * np.float32(light.map_scale / area)
+    texels = light.resolved_tile(receiver)[::-1] * np.float32(light.map_scale / area)
     if light.bin_edges_nm is None:
         return xyz_to_rgb709(texels[..., :3].astype(float)).astype(np.float32), None
     channels = Channels(tuple(light.bin_edges_nm.tolist()))

@@ -29,3 +29,5 @@ class RenderSettings:
     """Photons in flight at once; None lets the device's limits decide. Never changes the picture."""
     smoothing: float = 0.6
     """Standard deviation of a footprint in lattice spacings; 0.5 is where a square lattice of Gaussians turns flat."""
+    tally: bool = False
+    """Also sum up what the maps hold, for `--stats`."""

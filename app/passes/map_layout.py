@@ -167,7 +167,7 @@ def _place(scene: Scene, buffers: SceneBuffers, plans, tiles: list[Tile], size: 
             rows = atlas.rows.copy()
             rows[..., 3] += rows[..., :3] @ buffers.space.centre
             rows[..., :3] /= buffers.space.scale
-            placements.append(placement_rows(own[0], rows, atlas.texel_area))
+            placements.append(placement_rows(own[0], rows, atlas.texel_area, atlas.triangle_rects))
             count += len(atlas.rows)
             charts[receiver] = atlas
     return MapLayout(size, np.concatenate(placements), receivers, tile_of, {r: w for r, _, w, _ in plans}, charts)
