@@ -84,14 +84,19 @@ float mean_throughput(PhotonRecord photon) {
 #endif
 }
 
+// Whether the photon has only a part of its table's band. One of no width stands for all of it.
+bool is_cut(PhotonRecord photon, vec4 band) {
+    return photon.x_hi > photon.x_lo && photon.x_hi - photon.x_lo < band.y - band.x - 1e-5;
+}
+
 SplatRecord small_splat(PhotonRecord photon, Footprint f, vec4 band) {
     SplatRecord splat;
     float cut = 0.0;
 #ifdef BAND_CUTS
-    cut = photon.x_hi > photon.x_lo && photon.x_hi - photon.x_lo < band.y - band.x - 1e-5 ? 1.0 : 0.0;
+    cut = is_cut(photon, band) ? 1.0 : 0.0;
 #endif
     vec2 variance = f.axis_s * f.axis_s + f.axis_t * f.axis_t + f.chord * f.chord * TEXEL_VARIANCE;
-    vec2 sigma = sqrt(max(variance, vec2(1e-4)));
+    vec2 sigma = sqrt(max(variance, vec2(1e-3)));
     splat.centre = f.centre + f.chord * (cut > 0.0 ? 0.0 : band.z - 0.5);
     splat.along = 0.5 + CUT * sigma;
     splat.across = SQRT_HALF / sigma;
@@ -100,11 +105,16 @@ SplatRecord small_splat(PhotonRecord photon, Footprint f, vec4 band) {
     splat.y_edge = 0.0;
     splat.y_box = 0.0;
     splat.throughput = vec4(photon.x_anchor, photon.throughput.y, 0.0, 0.0);
-    splat.xi_range = vec2(photon.x_lo, photon.x_hi);
+    splat.x_range = vec2(photon.x_lo, photon.x_hi);
     splat.xi_half = cut;
     splat.inverse_sigma_xi = 0.0;
     splat.kind = 1u;
     return splat;
+}
+
+// Share of a box of width `box`, blurred by `s`, within `edge` of its middle.
+float kept_by_cut(float edge, float box, float s) {
+    return 1.0 - 2.0 * s / box * (normal_excess((edge - 0.5 * box) / s) - normal_excess((edge + 0.5 * box) / s));
 }
 
 SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
@@ -145,35 +155,25 @@ SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
     float along2 = max(a + TEXEL_VARIANCE - b * shear, SAMPLED_VARIANCE * (1.0 + shear * shear));
     float sigma = sqrt(along2);
 
-    // The whole band of the table, of which a cut photon has a part.
-    float part_lo = 0.0;
-    float part_hi = 1.0;
-    float whole = sweep;
+    sigma = max(sigma, sweep * MIN_SIGMA_TO_SWEEP);
+    bool cut = false;
 #ifdef BAND_CUTS
-    if (photon.x_hi > photon.x_lo) {
-        float band_width = max(band.y - band.x, 1e-9);
-        part_lo = (photon.x_lo - band.x) / band_width;
-        part_hi = (photon.x_hi - band.x) / band_width;
-        whole = sweep / max(part_hi - part_lo, 1e-6);
-    }
+    cut = is_cut(photon, band);
 #endif
-    sigma = max(sigma, whole * MIN_SIGMA_TO_SWEEP);
-    whole = max(whole, sigma / MAX_SIGMA_TO_SWEEP);
-    float reach = 0.5 * whole + CUT * sigma;
-    float xi_half = 0.5 * whole / reach;
-    float xi_lo = mix(-xi_half, xi_half, part_lo);
-    float xi_hi = mix(-xi_half, xi_half, part_hi);
+    sweep = max(sweep, sigma * (cut ? 0.05 : 1.0 / MAX_SIGMA_TO_SWEEP));
+    float reach = 0.5 * sweep + CUT * sigma;
+    float xi_half = 0.5 * sweep / reach;
 
     float s = sqrt(s2);
     float y_edge = CUT * sqrt(c_total);
-    float kept = 1.0 - 2.0 * s / box * (normal_excess((y_edge - 0.5 * box) / s) - normal_excess((y_edge + 0.5 * box) / s));
+    float kept = kept_by_cut(y_edge, box, s) * (cut ? kept_by_cut(reach, sweep, sigma) : 1.0);
     float on_grid = grid_sum(f.centre, e, m, shear, box, s2, sigma * sigma, sweep);
 
     splat.centre = f.centre;
     splat.along = e * reach;
     splat.across = (m + shear * e) * y_edge;
     splat.amplitude = 1.0 / (reach * box * kept * on_grid);
-    splat.table_row = ((log2(sigma / whole) - log2(MIN_SIGMA_TO_SWEEP)) * ROWS_PER_OCTAVE + 0.5) / float(table_rows);
+    splat.table_row = ((log2(sigma / sweep) - log2(MIN_SIGMA_TO_SWEEP)) * ROWS_PER_OCTAVE + 0.5) / float(table_rows);
     splat.y_edge = y_edge * SQRT_HALF / s;
     splat.y_box = 0.5 * box * SQRT_HALF / s;
 #ifdef POINT_SPECTRUM
@@ -181,15 +181,17 @@ SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
 #else
     float width = photon.x_hi - photon.x_lo;
     float anchor = width > 0.0 ? clamp((photon.x_anchor - photon.x_lo) / width, 0.0, 1.0) : 0.5;
-    float xi_anchor = mix(xi_lo, xi_hi, anchor);
-    splat.throughput = vec4(xi_anchor, photon.throughput.y,
-                            anchor > 1e-3 && width > 0.0 ? (photon.throughput.y - photon.throughput.x) / (xi_anchor - xi_lo) : 0.0,
-                            anchor < 0.999 && width > 0.0 ? (photon.throughput.z - photon.throughput.y) / (xi_hi - xi_anchor) : 0.0);
+    // Slopes by xi, or by x for a cut band.
+    vec2 ends = cut ? vec2(photon.x_lo, photon.x_hi) : vec2(-xi_half, xi_half);
+    float at = mix(ends.x, ends.y, anchor);
+    splat.throughput = vec4(at, photon.throughput.y,
+                            anchor > 1e-3 && width > 0.0 ? (photon.throughput.y - photon.throughput.x) / (at - ends.x) : 0.0,
+                            anchor < 0.999 && width > 0.0 ? (photon.throughput.z - photon.throughput.y) / (ends.y - at) : 0.0);
 #endif
-    splat.xi_range = vec2(xi_lo, xi_hi);
+    splat.x_range = vec2(photon.x_lo, photon.x_hi);
     splat.xi_half = xi_half;
     splat.inverse_sigma_xi = SQRT_HALF * reach / sigma;
-    splat.kind = 2u;
+    splat.kind = cut ? 3u : 2u;
     return splat;
 }
 
@@ -233,8 +235,9 @@ bool contains(vec4 rect, vec2 centre, float margin) {
 }
 
 bool bounded(vec2 v) {
-    // False for NaN and infinity too.
-    return abs(v.x) < extent_limit && abs(v.y) < extent_limit;
+    // Compared as integers, which order NaN last: a compiler may turn !(a < b) into a >= b.
+    uvec2 magnitude = floatBitsToUint(v) & 0x7fffffffu;
+    return all(lessThan(magnitude, uvec2(floatBitsToUint(extent_limit))));
 }
 
 void main() {

@@ -1,5 +1,6 @@
-// One parallelogram a splat by vertex pulling: four corners through an index buffer, nothing instanced.
-// Splats of the other class become points outside the picture. SMALL or SWEPT chooses the class.
+// Vertex pulling, nothing instanced; splats of the other classes collapse outside the picture. SMALL, SWEPT or CUT
+// chooses the class (KIND): a swept splat is a parallelogram (four corners through an index buffer), a small one a triangle about
+// its square, which costs a software rasteriser one set-up instead of two (it wins below about 40 texels).
 layout(std140, binding = 0) uniform DrawParameters {
     vec2 atlas_size;
     vec2 table_u;  // texture u = table_u.x * xi + table_u.y
@@ -13,15 +14,19 @@ layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };
 layout(std430, binding = 6) readonly buffer Integrals { vec4 band_integral[]; };  // by layer
 layout(std430, binding = 7) readonly buffer Curves { vec4 curve[]; };  // by light and class: density over x, or its running integral
 
+flat out vec4 rect;
 #ifdef SMALL
 noperspective out vec2 at;
-flat out vec4 box;  // half a texel along x, y in units of sqrt(2) sigma
+flat out vec2 half_texel;  // along x, y in units of sqrt(2) sigma
 #else
-noperspective out vec4 at;  // across, along xi, table u, table row
-flat out vec4 shape;        // half texel across, layer, amplitude, unused
+noperspective out vec3 at;  // across, along xi, table u
+flat out vec3 shape;        // half texel across, table row, layer
 #ifndef POINT_SPECTRUM
 flat out vec4 throughput;
-flat out vec4 band_xi;
+flat out vec4 band;
+#ifdef CUT
+flat out float curve_row;
+#endif
 #endif
 #endif
 #if defined(SMALL) || defined(POINT_SPECTRUM)
@@ -34,15 +39,15 @@ vec4 energy(SplatRecord splat, uint g) {
     uint row = splat.layer / (bands * uint(TARGETS)) * uint(TARGETS) + g;
 #ifdef POINT_SPECTRUM
     // One wavelength: its density over x, unless the photon stands for a band (or a line).
-    vec4 band = table_bands[splat.layer / uint(TARGETS)];
-    bool single = splat.xi_range.y <= splat.xi_range.x && band.y > band.x;
+    vec4 span = table_bands[splat.layer / uint(TARGETS)];
+    bool single = splat.x_range.y <= splat.x_range.x && span.y > span.x;
     if (single) {
         uint cell = min(uint(splat.throughput.x * float(density_cells)), density_cells - 1u);
         return curve[row * density_cells + cell];
     }
 #elif defined(BAND_CUTS)
     if (splat.xi_half > 0.0) {
-        vec2 place = clamp(splat.xi_range, 0.0, 1.0) * float(cumulative_samples - 1u);
+        vec2 place = clamp(splat.x_range, 0.0, 1.0) * float(cumulative_samples - 1u);
         uvec2 i = min(uvec2(place), cumulative_samples - 2u);
         vec2 part = place - vec2(i);
         uint base = row * cumulative_samples;
@@ -54,34 +59,40 @@ vec4 energy(SplatRecord splat, uint g) {
 #endif
 
 void main() {
-    SplatRecord splat = splats[gl_VertexID >> 2];
-    vec2 corner = vec2(float(gl_VertexID & 1), float((gl_VertexID >> 1) & 1)) * 2.0 - 1.0;
 #ifdef SMALL
-    bool mine = splat.kind == 1u;
-    vec2 position = clamp(splat.centre + corner * splat.along, splat.rect.xy, splat.rect.zw);
-    at = (position - splat.centre) * splat.across;
-    box = vec4(0.5 * splat.across, 0.0, 0.0);
+    SplatRecord splat = splats[gl_VertexID / 3];
+    int third = gl_VertexID % 3;
+    vec2 corner = vec2(third == 1 ? 3.0 : -1.0, third == 2 ? 3.0 : -1.0);
+    bool mine = splat.kind == KIND;
+    vec2 reach = corner * splat.along;
+    vec2 position = splat.centre + reach;
+    at = reach * splat.across;
+    half_texel = 0.5 * splat.across;
     for (int g = 0; g < TARGETS; ++g) {
         splat_colour[g] = splat.amplitude * energy(splat, uint(g));
     }
 #else
-    bool mine = splat.kind == 2u;
+    SplatRecord splat = splats[gl_VertexID >> 2];
+    vec2 corner = vec2(float(gl_VertexID & 1), float((gl_VertexID >> 1) & 1)) * 2.0 - 1.0;
+    bool mine = splat.kind == KIND;
     float xi = corner.x;
     vec2 position = splat.centre + xi * splat.along + corner.y * splat.across;
-    gl_ClipDistance[0] = position.x - splat.rect.x;
-    gl_ClipDistance[1] = position.y - splat.rect.y;
-    gl_ClipDistance[2] = splat.rect.z - position.x;
-    gl_ClipDistance[3] = splat.rect.w - position.y;
-    at = vec4(corner.y * splat.y_edge, xi, table_u.x * xi + table_u.y, splat.table_row);
-    shape = vec4(splat.y_box, float(splat.layer), splat.amplitude, 0.0);
+    at = vec3(corner.y * splat.y_edge, xi, table_u.x * xi + table_u.y);
+    shape = vec3(splat.y_box, splat.table_row, float(splat.layer));
 #ifdef POINT_SPECTRUM
     for (int g = 0; g < TARGETS; ++g) {
         splat_colour[g] = splat.throughput.y * splat.amplitude * energy(splat, uint(g));
     }
 #else
-    throughput = splat.throughput;
-    band_xi = vec4(splat.xi_range, splat.xi_half, splat.inverse_sigma_xi);
+    throughput = vec4(splat.throughput.x, splat.amplitude * splat.throughput.yzw);
+#ifdef CUT
+    band = vec4(splat.x_range, splat.xi_half, splat.inverse_sigma_xi);
+    curve_row = float(splat.layer / (bands * uint(TARGETS)) * uint(TARGETS));
+#else
+    band = vec4(splat.xi_half);
 #endif
 #endif
+#endif
+    rect = splat.rect;
     gl_Position = mine ? vec4(position / atlas_size * 2.0 - 1.0, 0.0, 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
 }

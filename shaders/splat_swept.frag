@@ -2,19 +2,22 @@
 // spectrum blurred as this fragment sees it. Its cost does not depend on the number of wavelengths.
 #include "lib/gaussian.glsl"
 
-noperspective in vec4 at;
-flat in vec4 shape;
+flat in vec4 rect;
+noperspective in vec3 at;
+flat in vec3 shape;
 #ifdef POINT_SPECTRUM
 flat in vec4 splat_colour[TARGETS];
 #else
 flat in vec4 throughput;
-flat in vec4 band_xi;
+flat in vec4 band;  // half of the band in xi
 layout(binding = 0) uniform sampler2DArray spectra;
 #endif
 layout(location = 0) out vec4 deposited[TARGETS];
 
 void main() {
-    float share = gaussian_box(at.x, shape.x);
+    // Clip distances would do, but llvmpipe loses triangles that two of them cut.
+    bvec4 within = bvec4(greaterThan(gl_FragCoord.xy, rect.xy), lessThan(gl_FragCoord.xy, rect.zw));
+    float share = !all(within) ? 0.0 : gaussian_box(at.x, shape.x);
 #ifdef POINT_SPECTRUM
     // No sweep: a Gaussian cut at three standard deviations, which holds 0.9973 of it.
     share *= 1.20011 * exp(-4.5 * at.y * at.y);
@@ -22,16 +25,10 @@ void main() {
         deposited[g] = share * splat_colour[g];
     }
 #else
-    float xi = clamp(at.y, band_xi.x, band_xi.y) - throughput.x;
-    share *= shape.z * (throughput.y + min(xi, 0.0) * throughput.z + max(xi, 0.0) * throughput.w);
-#ifdef BAND_CUTS
-    float k = band_xi.w;
-    float kept = erf_approx((band_xi.y - at.y) * k) - erf_approx((band_xi.x - at.y) * k);
-    float whole = erf_approx((band_xi.z - at.y) * k) - erf_approx((-band_xi.z - at.y) * k);
-    share *= clamp(kept / max(whole, 1e-6), 0.0, 1.0);
-#endif
+    float xi = clamp(at.y, -band.x, band.x) - throughput.x;
+    share *= throughput.y + min(xi, 0.0) * throughput.z + max(xi, 0.0) * throughput.w;
     for (int g = 0; g < TARGETS; ++g) {
-        deposited[g] = share * texture(spectra, vec3(at.z, at.w, shape.y + float(g)));
+        deposited[g] = share * texture(spectra, vec3(at.z, shape.y, shape.z + float(g)));
     }
 #endif
 }

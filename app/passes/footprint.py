@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from app.gpu.map_atlas import MapAtlas
     from app.gpu.splat_tables import SplatTables
 
-KIND_NONE, KIND_SMALL, KIND_SWEPT = 0, 1, 2
 WORKGROUP = 64
 
 SPLAT = Struct(
@@ -35,11 +34,11 @@ SPLAT = Struct(
         Field("y_edge", "float", "swept: across half extent, units of sqrt(2) standard deviations"),
         Field("y_box", "float", "swept: half width of the texel across, same units"),
         Field("layer", "uint", "first layer of the spectral tables"),
-        Field("kind", "uint", "0 nothing, 1 small, 2 swept"),
-        Field("throughput", "vec4", "xi (point spectrum: x) of the anchor, value there, slope below and above it per unit of xi"),
-        Field("xi_range", "vec2", "the photon's band in xi (small: in x)"),
-        Field("xi_half", "float", "half of the table's band in xi (small: 1 where the band was cut, else 0)"),
-        Field("inverse_sigma_xi", "float", "1 / (sqrt(2) standard deviation along, in xi)"),
+        Field("kind", "uint", "0 nothing, 1 small, 2 swept, 3 swept with a cut band"),
+        Field("throughput", "vec4", "anchor, value there, slope below and above it; by xi (cut, point spectrum, small: by x)"),
+        Field("x_range", "vec2", "the photon's band, spectral coordinate"),
+        Field("xi_half", "float", "half of the band in xi (small: 1 where the band was cut, else 0)"),
+        Field("inverse_sigma_xi", "float", "1 / (sqrt(2) standard deviations along, in xi)"),
         Field("rect", "vec4", "x0, y0, x1, y1: nothing is drawn outside, atlas texels"),
     ),
 )

@@ -1,6 +1,6 @@
-"""Draws splat records into the caustic maps: additive blending, two programs, fixed order.
+"""Draws splat records into the caustic maps: additive blending, a program a class, fixed order.
 
-Small splats and swept ones have a program each because a software renderer runs both sides of a branch. A group of
+Small splats, swept ones and those of a cut band have a program each because a software renderer runs both sides of a branch. A group of
 photons is made into splats and drawn before the next, so the splat records of a few ten thousand photons are all
 that exists at a time, and the order of all sums is the photons' own order.
 """
@@ -49,13 +49,20 @@ class Splatter:
         self._features = features
         self._footprints = Footprints(ctx, features, GROUP)
         defines = splat_defines(features)
-        self._small = shader.program(ctx, "splat.vert", "splat_small.frag", defines | {"SMALL": 1}, (SPLAT,))
-        self._swept = shader.program(ctx, "splat.vert", "splat_swept.frag", defines | {"SWEPT": 1}, (SPLAT,))
         slots = GROUP * self._footprints.slots_per_photon
         corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(slots, dtype=np.uint32)[:, None]
         self._indices = ctx.buffer(corners)
-        self._draw_small = ctx.vertex_array(self._small, [], index_buffer=self._indices)
-        self._draw_swept = ctx.vertex_array(self._swept, [], index_buffer=self._indices)
+        classes = [("splat_small.frag", {"SMALL": 1, "KIND": "1u"}), ("splat_swept.frag", {"SWEPT": 1, "KIND": "2u"})]
+        if features.band_cuts and not features.point_spectrum:
+            classes.append(("splat_cut.frag", {"CUT": 1, "KIND": "3u"}))
+        self._draws: list[tuple[moderngl.VertexArray, int]] = []
+        """A vertex array for each class and its vertices per splat."""
+        for fragment, chosen in classes:
+            program = shader.program(ctx, "splat.vert", fragment, defines | chosen, (SPLAT,))
+            if "SMALL" in chosen:
+                self._draws.append((ctx.vertex_array(program, []), 3))
+            else:
+                self._draws.append((ctx.vertex_array(program, [], index_buffer=self._indices), 6))
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
 
     def run(
@@ -107,13 +114,9 @@ class Splatter:
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_equation = moderngl.FUNC_ADD
         ctx.blend_func = moderngl.ONE, moderngl.ONE
-        vertices = 6 * photons * self._footprints.slots_per_photon
-        self._draw_small.render(moderngl.TRIANGLES, vertices=vertices)
-        for plane in range(4):
-            ctx.enable_direct(_CLIP_DISTANCE0 + plane)
-        self._draw_swept.render(moderngl.TRIANGLES, vertices=vertices)
-        for plane in range(4):
-            ctx.disable_direct(_CLIP_DISTANCE0 + plane)
+        slots = photons * self._footprints.slots_per_photon
+        for vertex_array, vertices in self._draws:
+            vertex_array.render(moderngl.TRIANGLES, vertices=vertices * slots)
         ctx.enable_only(moderngl.NOTHING)
 
     def counts(self) -> dict[str, float]:
@@ -125,9 +128,9 @@ class Splatter:
         self._footprints.reset_counts()
 
     def release(self) -> None:
-        for resource in (self._draw_small, self._draw_swept, self._small, self._swept, self._indices, self._parameters):
-            resource.release()
+        for vertex_array, _ in self._draws:
+            vertex_array.program.release()
+            vertex_array.release()
+        self._indices.release()
+        self._parameters.release()
         self._footprints.release()
-
-
-_CLIP_DISTANCE0 = 0x3000

@@ -1,0 +1,220 @@
+"""Single splats: their energy, their shape against float64 quadrature, and where they may and may not be drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.gpu.records import FLAG_FOOTPRINT_DROPPED
+from app.model import spectrum
+from app.model.colorimetry import K_M, VISIBLE_NM, cmf_xyz
+from tests.reference.splat_reference import splat_image
+from tests.reference.splat_rig import Rig, SplatFeatures, photons
+
+PLAIN = SplatFeatures()
+CUTS = SplatFeatures(band_cuts=True)
+TINY = np.array([1e-3, 0.0])
+
+
+def frame(angle_rad: float, long: float, short: float) -> tuple[np.ndarray, np.ndarray]:
+    along = np.array([np.cos(angle_rad), np.sin(angle_rad)])
+    return along * long, np.array([-along[1], along[0]]) * short
+
+
+def xyzw(light: spectrum.Spectrum) -> np.ndarray:
+    return np.append(light.xyz(), light.power_w())
+
+
+def relative_error(image: np.ndarray, reference: np.ndarray) -> float:
+    return float(np.sqrt(((image - reference) ** 2).sum() / (reference**2).sum()))
+
+
+@pytest.fixture(scope="module")
+def rig(gl) -> Rig:
+    return Rig(gl.ctx, PLAIN)
+
+
+@pytest.fixture(scope="module")
+def cut_rig(gl) -> Rig:
+    return Rig(gl.ctx, CUTS)
+
+
+def spectrum_samples(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """D65's XYZW in `count` equal parts of the range: places (-½..½) and energies (count, 4)."""
+    light = spectrum.illuminant("D65")
+    energy = light.density[:, None] * np.column_stack([K_M * cmf_xyz(), np.ones(401)])
+    place = (VISIBLE_NM - 380.0) / 400.0 - 0.5
+    place[0], place[-1] = -0.5 + 0.125 / 400.0, 0.5 - 0.125 / 400.0
+    part = np.minimum(((place + 0.5) * count).astype(int), count - 1)
+    energies = np.zeros((count, 4))
+    np.add.at(energies, part, energy)
+    places = np.array([place[part == i].mean() for i in range(count)])
+    return places, energies
+
+
+@pytest.mark.parametrize("case", range(10))
+def test_shape_of_resolved_splats_matches_quadrature(rig: Rig, case: int) -> None:
+    rng = np.random.default_rng(case)
+    axes = frame(rng.uniform(0.0, np.pi), rng.uniform(1.0, 3.0), rng.uniform(0.9, 2.0))
+    chord = rng.uniform(0.5, 16.0) * np.array(frame(rng.uniform(0.0, 2.0 * np.pi), 1.0, 1.0)[0])
+    centre = 32.0 + rng.uniform(-0.5, 0.5, 2)
+    image = rig.draw(photons(PLAIN, centre, *axes, chord))
+    covariance = np.outer(axes[0], axes[0]) + np.outer(axes[1], axes[1])
+    reference = splat_image((64, 64), centre, covariance, chord, *spectrum_samples(100))
+    errors = [relative_error(image[..., c], reference[..., c]) for c in range(4)]
+    assert max(errors) < 0.02, errors
+    assert image.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=2e-3)
+
+
+@pytest.mark.parametrize(("angle_deg", "limit"), [(0.0, 0.02), (20.0, 0.06), (45.0, 0.06), (80.0, 0.06)])
+def test_thin_line_keeps_its_width(rig: Rig, angle_deg: float, limit: float) -> None:
+    axes = frame(np.radians(angle_deg), 3.0, 0.15)
+    centre = np.array([32.2, 31.7])
+    image = rig.draw(photons(PLAIN, centre, *axes))
+    covariance = np.outer(axes[0], axes[0]) + np.outer(axes[1], axes[1])
+    reference = splat_image((64, 64), centre, covariance, np.zeros(2), np.zeros(1), xyzw(rig.light)[None])
+    assert relative_error(image, reference) < limit
+
+
+def test_focus_keeps_energy_and_peak(rig: Rig) -> None:
+    image = rig.draw(photons(PLAIN, [[32.5, 20.5]], 0.05 * np.eye(2)[0], 0.05 * np.eye(2)[1]))
+    assert image[20, 32] == pytest.approx(xyzw(rig.light), rel=1e-5)
+    assert np.count_nonzero(image[..., 3] > 1e-5 * rig.light.power_w()) == 1
+    split = rig.draw(photons(PLAIN, [[32.0, 20.5]], TINY, TINY))
+    assert split[20, 31, 3] == pytest.approx(split[20, 32, 3], rel=1e-3)
+    assert split[..., 3].sum() == pytest.approx(rig.light.power_w(), rel=1e-4)
+
+
+def test_no_footprint_and_no_sweep_still_deposits_everything(rig: Rig) -> None:
+    image = rig.draw(photons(PLAIN, [[10.3, 11.8]]))
+    assert image.sum(axis=(0, 1)) == pytest.approx(xyzw(rig.light), rel=1e-5)
+
+
+def test_violet_lies_at_the_low_end_of_the_chord(rig: Rig) -> None:
+    image = rig.draw(photons(PLAIN, [[32.0, 32.0]], [1.0, 0.0], [0.0, 1.0], [20.0, 0.0]))
+    place = (np.arange(64) + 0.5) @ image.sum(axis=0) / image.sum(axis=(0, 1))
+    light, nm = spectrum.illuminant("D65").density, (VISIBLE_NM - 380.0) / 400.0
+    for channel, weight in enumerate(cmf_xyz().T):
+        expected = 22.0 + 20.0 * np.sum(nm * light * weight) / np.sum(light * weight)
+        assert place[channel] == pytest.approx(expected, abs=0.03)
+
+
+def test_cut_bands_add_up_to_the_whole(cut_rig: Rig) -> None:
+    axes, chord, centre = frame(0.4, 1.5, 0.8), np.array([9.0, 5.0]), np.array([31.0, 33.0])
+    whole = cut_rig.draw(photons(CUTS, centre, *axes, chord))
+    parts = np.zeros_like(whole)
+    edges = [0.0, 0.3, 0.301, 0.7, 1.0]
+    for lo, hi in zip(edges[:-1], edges[1:], strict=True):
+        middle = 0.5 * (lo + hi)
+        part = cut_rig.draw(photons(CUTS, centre + (middle - 0.5) * chord, *axes, chord, lo, hi))
+        nm = 380.0 + 400.0 * np.array([lo, hi])
+        expected = np.diff(np.interp(nm, np.append(VISIBLE_NM - 0.5, 780.5), np.append(0.0, np.cumsum(cut_rig.light.density))))
+        assert part[..., 3].sum() == pytest.approx(expected[0], rel=5e-3)
+        parts += part
+    assert relative_error(parts[..., 1], whole[..., 1]) < 0.02
+    assert parts.sum(axis=(0, 1)) == pytest.approx(whole.sum(axis=(0, 1)), rel=5e-3)
+
+
+def test_cut_of_a_small_splat_takes_its_share(cut_rig: Rig) -> None:
+    part = cut_rig.draw(photons(CUTS, [[20.2, 20.7]], TINY, TINY, x_lo=0.25, x_hi=0.5))
+    expected = spectrum.illuminant("D65").density[100:200].sum()
+    assert part[..., 3].sum() == pytest.approx(expected, rel=3e-3)
+
+
+def test_throughput_over_the_band(rig: Rig) -> None:
+    """Linear throughput over a chord of equal energy: the moments are those of quadrature."""
+    image = rig.draw(photons(PLAIN, [[32.0, 32.0]], [1.0, 0.0], [0.0, 1.0], [24.0, 0.0], throughput=(0.2, 0.5, 0.9)))
+    place = (VISIBLE_NM - 380.0) / 400.0
+    weight = np.interp(place, [0.0, 0.5, 1.0], [0.2, 0.5, 0.9]) * rig.light.density
+    assert image[..., 3].sum() == pytest.approx(weight.sum(), rel=3e-3)
+    centroid = (np.arange(64) + 0.5) @ image[..., 3].sum(axis=0) / image[..., 3].sum()
+    assert centroid == pytest.approx(20.0 + 24.0 * (place @ weight) / weight.sum(), abs=0.06)
+
+
+def test_bins_hold_their_own_light_and_sum_to_all(gl) -> None:
+    features = SplatFeatures(targets=2)
+    edges = np.linspace(380.0, 780.0, 6)
+    rig = Rig(gl.ctx, features, channels=tuple(edges))
+    image = rig.draw(photons(features, [[32.0, 32.0]], [1.0, 0.0], [0.0, 1.0], [10.0, 0.0])).sum(axis=(0, 1))
+    cells = np.append(VISIBLE_NM - 0.5, 780.5)
+    cells[0], cells[-1] = 380.0, 780.0
+    expected = np.diff(np.interp(edges, cells, np.append(0.0, np.cumsum(rig.light.density))))
+    assert image[:5] == pytest.approx(expected, rel=1e-3)
+    assert np.all(image[5:] == 0.0)
+
+
+def test_laser_lines_land_at_their_wavelengths(gl) -> None:
+    light = spectrum.laser(430.0, 2.0) + spectrum.laser(690.0, 1.0)
+    rig = Rig(gl.ctx, PLAIN, light=light)
+    row = rig.draw(photons(PLAIN, [[32.0, 32.0]], [0.5, 0.0], [0.0, 0.5], [40.0, 0.0]))[..., 3].sum(axis=0)
+    x = np.arange(64) + 0.5
+    for nm, power in light.lines:
+        near = np.abs(x - (12.0 + 40.0 * (nm - 380.0) / 400.0)) < 5.0
+        assert row[near].sum() == pytest.approx(power, rel=2e-3)
+        assert (x[near] @ row[near]) / row[near].sum() == pytest.approx(12.0 + 40.0 * (nm - 380.0) / 400.0, abs=0.02)
+
+
+def test_one_wavelength_a_photon_averages_to_the_spectrum(gl) -> None:
+    features = SplatFeatures(spectral_groups=0, point_spectrum=True)
+    rig = Rig(gl.ctx, features)
+    count = 4096
+    records = photons(features, np.full((count, 2), 32.3), [0.8, 0.0], [0.0, 0.8])
+    records["x_anchor"] = records["x_lo"] = records["x_hi"] = (np.arange(count) + 0.5) / count
+    assert rig.draw(records).sum(axis=(0, 1)) / count == pytest.approx(xyzw(rig.light), rel=1e-3)
+    band = rig.draw(photons(features, [[32.3, 32.3]], [0.8, 0.0], [0.0, 0.8]))
+    assert band.sum(axis=(0, 1)) == pytest.approx(xyzw(rig.light), rel=3e-3)
+
+
+def test_nothing_is_drawn_outside_the_tile_and_outside_flux_is_counted(rig: Rig) -> None:
+    centres = [[63.8, 30.0], [-5.0, 30.0], [30.0, 90.0]]
+    axes = frame(0.3, 2.0, 1.0)
+    image = rig.draw(photons(PLAIN, centres, *axes))
+    total = rig.atlas.read_total()
+    assert total.sum(dtype=np.float64) == pytest.approx(image.sum(), rel=1e-6)
+    assert 0.4 < image[..., 3].sum() / rig.light.power_w() < 0.7
+    assert rig.splatter.counts() == {"outside_map_w": 2.0, "footprints_dropped": 0}
+
+
+@pytest.mark.parametrize("broken", [np.nan, np.inf, 1e30])
+def test_broken_footprints_become_single_texels_and_are_counted(rig: Rig, broken: float) -> None:
+    records = photons(PLAIN, [[20.5, 20.5], [40.5, 40.5], [50.5, 50.5]], [1.0, 0.0], [0.0, 1.0], [5.0, 0.0])
+    records["dposition_ds"][0, 0] = broken
+    records["dposition_dvar0"][1, 1] = broken
+    records["flags"][2] = FLAG_FOOTPRINT_DROPPED
+    image = rig.draw(records)
+    for at in (20, 40, 50):
+        assert image[at, at, 3] == pytest.approx(rig.light.power_w(), rel=1e-5)
+    assert rig.splatter.counts()["footprints_dropped"] == 3
+
+
+def test_nested_windows_are_complete_where_they_are_read(gl) -> None:
+    features = SplatFeatures(nested_windows=True)
+    rows = np.array([[0.25, 0.0, 0.0, 24.0], [0.0, 0.25, 0.0, 24.0]])
+    rig = Rig(gl.ctx, features, coarse=((64, 64), rows, 16.0))
+    rng = np.random.default_rng(5)
+    records = photons(features, rng.uniform(-60.0, 124.0, (20000, 2)), [1.2, 0.3], [-0.2, 1.0], [3.0, 1.0])
+    fine = rig.draw(records)
+    coarse = rig.draw(records, tile=1)
+    alone = Rig(gl.ctx, SplatFeatures(), size=(64, 64))
+    expected = alone.draw(records)
+    np.testing.assert_allclose(fine, expected, rtol=2e-3, atol=2e-3 * expected.max())
+    # Coarse texels 24..39 are under the fine window; those outside and their neighbours must hold everything.
+    records["position"][:, :2] = 0.25 * records["position"][:, :2] + 24.0
+    for name in ("dposition_ds", "dposition_dt", "dposition_dvar0"):
+        records[name] *= 0.25
+    full = alone.draw(records)
+    read = np.ones((64, 64), bool)
+    read[25:39, 25:39] = False
+    np.testing.assert_allclose(coarse[read], full[read], rtol=1e-3, atol=2e-3 * full.max())
+    assert coarse[31, 31, 3] < 0.1 * full[31, 31, 3]
+
+
+def test_picture_does_not_depend_on_batches(rig: Rig) -> None:
+    rng = np.random.default_rng(2)
+    count = 70000
+    angles, sizes = rng.uniform(0.0, np.pi, count), rng.uniform(0.1, 2.0, count)
+    axis = np.stack([np.cos(angles), np.sin(angles)], axis=1) * sizes[:, None]
+    records = photons(PLAIN, rng.uniform(5.0, 59.0, (count, 2)), axis, 0.5 * axis[:, ::-1] * [1, -1], axis[::-1])
+    whole = rig.draw(records)
+    np.testing.assert_array_equal(rig.draw(records, batch=32768), whole)
+    np.testing.assert_allclose(rig.draw(records, batch=10007), whole, rtol=2e-6)
