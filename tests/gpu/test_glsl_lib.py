@@ -1,4 +1,4 @@
-"""Random numbers, emission maps, spot edges and spectral tables of shaders/lib against their float64 twins."""
+"""Random numbers, emission, spots, spectral tables, Gaussians and media of shaders/lib against their float64 twins."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from app.gpu import bindings
-from app.gpu.scene_buffers import SCENE_STRUCTS
-from app.gpu.scene_texels import spectra_texture
+from app.gpu.records import NONE, ray_record
+from app.gpu.scene_buffers import OBJECT, SCENE_STRUCTS
+from app.gpu.scene_texels import SceneTexels, spectra_texture
 from tests.gpu.glsl_harness import as_f32, evaluate
 from tests.reference import optics
 
@@ -147,3 +148,59 @@ def test_spectral_rows_are_linear_between_samples(gl) -> None:
     at = np.linspace(0, 1, samples)
     np.testing.assert_allclose(got["a"], np.interp(x, at, table[0]), atol=3e-6)
     np.testing.assert_allclose(got["c"], np.interp(x, at, table[2]), atol=3e-6)
+
+
+def test_gaussian_integrals(gl) -> None:
+    from scipy.special import erf
+
+    x = as_f32(np.concatenate([np.linspace(-6, 6, 2001), [0, 1e-6, 50, -50, 1e6]]))
+    width = as_f32(np.full(len(x), 0.37))
+    body = "e = erf_approx(x); box = gaussian_box(x, w); excess = normal_excess(x); s = sinc_pi(x);"
+    outputs = {"e": "float", "box": "float", "excess": "float", "s": "float"}
+    got = evaluate(gl.ctx, ["lib/gaussian.glsl"], body, {"x": x, "w": width}, outputs)
+    # The polynomial is good to 3e-7; its sixteenth power multiplies float32's own rounding.
+    assert np.abs(got["e"] - erf(x)).max() < 2e-6
+    assert np.abs(got["box"] - 0.5 * (erf(x + width) - erf(x - width))).max() < 2e-6
+    near = np.abs(x) < 10
+    z = x[near]
+    # E[max(Z - z, 0)]: z weighs the error of erf.
+    excess = np.exp(-0.5 * z * z) / np.sqrt(2 * np.pi) - 0.5 * z * (1 - erf(z / np.sqrt(2)))
+    assert (np.abs(got["excess"][near] - excess) / (1 + np.abs(z))).max() < 2e-6
+    assert np.abs(got["s"][near] - np.sinc(z)).max() < 2e-6
+
+
+NESTED = {"MEDIUM_STACK": 1, "STACK_SIZE": 3, "STACK_OBJECTS": "uint[](4u, 0u, 2u)", "INDEX_ROW": 0, "SPECTRAL_GROUPS": 0}
+
+
+def test_the_highest_solid_around_a_ray_is_its_medium(gl) -> None:
+    # Bits by priority: object 4 below object 0 below object 2; every mask, every object, both ways.
+    order = [4, 0, 2]
+    cases = [(mask, bit, enter) for mask in range(8) for bit in range(3) for enter in (0, 1)]
+    mask, bit, enter = np.array(cases, np.uint32).T
+    objects = OBJECT.zeros(5)
+    objects["stack_bit"] = NONE
+    objects["stack_bit"][order] = range(3)
+    body = """
+    RayRecord ray;
+    ray.inside_mask = mask;
+    ray.inside_object = NONE;
+    Crossing c = cross_boundary(ray, object, enter != 0u);
+    before = c.before; after = c.after; mask_after = c.mask_after; changes = c.changes ? 1u : 0u;
+    """
+    outputs = dict.fromkeys(("before", "after", "mask_after", "changes"), "uint")
+    inputs = {"mask": mask, "object": np.array(order, np.uint32)[bit], "enter": enter}
+    texels = SceneTexels(gl.ctx, {"OBJECTS": objects})
+    defines = {**bindings.SCENE_DEFINES, **texels.defines, "SPECTRAL_SAMPLES": 2, **NESTED}
+    structs = (*SCENE_STRUCTS, ray_record(0))
+    textures = {bindings.UNIT_SCENE: texels.texture}
+    got = evaluate(gl.ctx, ["lib/medium.glsl"], body, inputs, outputs, defines, structs, textures=textures)
+    texels.release()
+
+    def medium(held: int) -> int:
+        return order[held.bit_length() - 1] if held else NONE
+
+    for row, (held, own, entering) in enumerate(cases):
+        outside, inside = held & ~(1 << own), held | (1 << own)
+        before, after = (outside, inside) if entering else (inside, outside)
+        want = (medium(before), medium(after), after, int(medium(before) != medium(after)))
+        assert tuple(int(got[name][row]) for name in outputs) == want, cases[row]

@@ -95,7 +95,8 @@ def refract_column_textbook(
 def refract_column_stable(
     direction: Array, ddirection: Array, normal: Array, dnormal: Array, eta_it: Array, deta_it: Array
 ) -> Array:
-    """The same, arranged so that nothing cancels at eta_it near 1 (docs: physics notes, section 2)."""
+    """The same, arranged so that nothing cancels at eta_it near 1: with omega² = (1-eta)(1+eta) + eta²theta²,
+    mu is (1-eta)(1+eta) / (omega - eta theta) instead of the difference eta theta + omega."""
     eta = np.asarray(eta_it, np.float64)
     theta = dot(direction, normal)
     sine2 = (1.0 - theta) * (1.0 + theta)

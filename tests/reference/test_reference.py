@@ -182,7 +182,7 @@ def test_reflection_on_request_and_its_fresnel_share() -> None:
 
 
 def closed_form(points: np.ndarray, p0: np.ndarray, v: np.ndarray, covariance: np.ndarray, band: tuple[float, float]) -> np.ndarray:
-    """The published closed form (physics notes, section 3), scalar and slow."""
+    """The integral done by hand: along the sweep a difference of error functions, across it the Gaussian."""
     from math import erf
 
     lower = np.linalg.cholesky(covariance)
