@@ -22,7 +22,7 @@ layout(std430, binding = 3) readonly buffer Receivers { Receiver receivers[]; };
 layout(std430, binding = 4) readonly buffer VarTables { float var_table[]; };
 layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };  // x_lo, x_hi, mean place of the light in it (0..1), unused
 layout(std430, binding = 6) buffer Outside { float outside_w[]; };
-layout(std430, binding = 7) buffer Counters { uint count_dropped; };
+layout(std430, binding = 7) buffer Commands { uint draw_words[15]; uint count_dropped; };  // five words a class; the second is the instance count
 
 const float TEXEL_VARIANCE = 1.0 / 12.0;
 // Standard deviations. Below the first two a splat is smaller than what a map can show: SMALL.
@@ -240,6 +240,13 @@ bool bounded(vec2 v) {
     return all(lessThan(magnitude, uvec2(floatBitsToUint(extent_limit))));
 }
 
+// All write the same value, so nothing need be atomic.
+void ask_to_draw(uint kind) {
+    if (kind > 0u) {
+        draw_words[5u * (kind - 1u) + 1u] = 1u;
+    }
+}
+
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= photon_count) {
@@ -295,6 +302,7 @@ void main() {
     if (!drawn) {
         fine.kind = 0u;
     }
+    ask_to_draw(fine.kind);
     uint slot = i * uint(SLOTS);
     splats[slot] = fine;
 
@@ -316,6 +324,7 @@ void main() {
             }
         }
     }
+    ask_to_draw(coarse.kind);
     splats[slot + 1u] = coarse;
 #endif
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,10 @@ from app.gpu import shader
 if TYPE_CHECKING:
     import moderngl
 
-_SIDE = 16
+    from app.gpu.map_atlas import Tile
+    from app.model.charts import ChartAtlas
+
+_SIDE, _GROUP = 16, 64
 
 
 class Accumulate:
@@ -32,3 +36,66 @@ class Accumulate:
 
     def release(self) -> None:
         self._program.release()
+
+
+class SeamFold:
+    """Brings home what fell into chart gutters, from the total into a resolved copy.
+
+    The gathering order is fixed, so the result is the same every time. Gutters then hold what lies across their seam,
+    for interpolated look-ups; those beyond an open border keep what fell there, which is lost to the receiver.
+    """
+
+    def __init__(self, ctx: moderngl.Context, charts: Sequence[tuple[Tile, ChartAtlas]]) -> None:
+        """Each `ChartAtlas` lies at its tile of the map atlas."""
+        self._ctx = ctx
+        gather, fill, sources, ratios = [], [], [], []
+        first = 0
+        for tile, chart in charts:
+            corner = np.array([tile.x, tile.y], np.int64)
+            destinations, offsets, gutters = chart.gather_lists()
+            gather.append(np.column_stack([destinations + corner, first + offsets[:-1], np.diff(offsets)]))
+            first += len(gutters)
+            sources.append(gutters + corner)
+            kept = chart.destination_xy[:, 0] >= 0
+            fill.append(np.column_stack([chart.gutter_texel_xy[kept] + corner, chart.destination_xy[kept] + corner]))
+            ratios.append(chart.fill_ratio[kept])
+        self._counts = sum(map(len, gather)), sum(map(len, fill))
+        self._gather_buffer = _uints(ctx, gather, 4)
+        self._fill_buffer = _uints(ctx, fill, 4)
+        self._source_buffer = _uints(ctx, sources, 2)
+        self._ratio_buffer = ctx.buffer(np.concatenate([*ratios, np.ones(1)]).astype(np.float32))
+        self._gather = shader.compute(ctx, "seam_fold.comp", {"WORKGROUP": _GROUP})
+        self._fill = shader.compute(ctx, "seam_fold.comp", {"WORKGROUP": _GROUP, "FILL": 1})
+
+    def run(self, total: Sequence[moderngl.Texture], resolved: Sequence[moderngl.Texture]) -> None:
+        """All RGBA32F and of the atlas size; `total` stays as it is."""
+        for source, target in zip(total, resolved, strict=True):
+            self._copy(source, target)
+            source.bind_to_image(0, read=True, write=False)
+            target.bind_to_image(1, read=True, write=True)
+            self._source_buffer.bind_to_storage_buffer(1)
+            self._ratio_buffer.bind_to_storage_buffer(2)
+            for program, buffer, count in zip((self._gather, self._fill), (self._gather_buffer, self._fill_buffer), self._counts, strict=True):
+                if count:
+                    buffer.bind_to_storage_buffer(0)
+                    program["count"].value = count
+                    self._ctx.memory_barrier()
+                    program.run(-(-count // _GROUP))
+        self._ctx.memory_barrier()
+
+    def _copy(self, source: moderngl.Texture, target: moderngl.Texture) -> None:
+        self._ctx.memory_barrier()
+        read, write = self._ctx.framebuffer([source]), self._ctx.framebuffer([target])
+        self._ctx.copy_framebuffer(write, read)
+        read.release()
+        write.release()
+
+    def release(self) -> None:
+        for resource in (self._gather, self._fill, self._gather_buffer, self._fill_buffer, self._source_buffer, self._ratio_buffer):
+            resource.release()
+
+
+def _uints(ctx: moderngl.Context, parts: list[np.ndarray], width: int) -> moderngl.Buffer:
+    """One uint32 buffer of all rows, never empty."""
+    rows = np.concatenate([*(p.reshape(-1, width) for p in parts), np.zeros((1, width))])
+    return ctx.buffer(np.ascontiguousarray(rows, np.uint32))

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from app.gpu.splat_tables import SplatTables
 
 WORKGROUP = 64
+VERTICES = (3, 6, 6)
+"""Per splat of the small, swept and cut class."""
 
 SPLAT = Struct(
     "SplatRecord",
@@ -100,7 +102,8 @@ class Footprints:
         self._program = shader.compute(ctx, "footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
         self._outside = ctx.buffer(np.zeros(group, np.float32))
-        self._counters = ctx.buffer(np.zeros(1, np.uint32))
+        self.commands = ctx.buffer(np.zeros(16, np.uint32))
+        """Indirect draws of the small, swept and cut class, five words each; then the dropped footprints."""
         self._group = group
         self.slots_per_photon = defines["SLOTS"]
         self.splats = ctx.buffer(reserve=group * self.slots_per_photon * SPLAT.stride)
@@ -124,22 +127,24 @@ class Footprints:
         self._parameters.write(values.tobytes())
         self._parameters.bind_to_uniform_block(0)
         for binding, buffer in enumerate(
-            (photons, self.splats, atlas.placements, receivers, var_table, tables.band_buffer, self._outside, self._counters)
+            (photons, self.splats, atlas.placements, receivers, var_table, tables.band_buffer, self._outside, self.commands)
         ):
             buffer.bind_to_storage_buffer(binding)
+        slots = count * self.slots_per_photon
+        self.commands.write(np.array([[vertices * slots, 0, 0, 0, 0] for vertices in VERTICES], np.uint32))
         self._program.run(group_x=-(-count // WORKGROUP))
 
     def counts(self) -> dict[str, float]:
         """Since the last reset: `outside_map_w` (flux of photons whose centre no window holds, W),
         `footprints_dropped` (numbers of photons)."""
         outside = np.frombuffer(self._outside.read(), np.float32).sum(dtype=np.float64)
-        dropped = int(np.frombuffer(self._counters.read(), np.uint32)[0])
+        dropped = int(np.frombuffer(self.commands.read(), np.uint32)[15])
         return {"outside_map_w": float(outside), "footprints_dropped": dropped}
 
     def reset_counts(self) -> None:
         self._outside.clear()
-        self._counters.clear()
+        self.commands.clear()
 
     def release(self) -> None:
-        for resource in (self._program, self._parameters, self._outside, self._counters, self.splats):
+        for resource in (self._program, self._parameters, self._outside, self.commands, self.splats):
             resource.release()

@@ -55,14 +55,13 @@ class Splatter:
         classes = [("splat_small.frag", {"SMALL": 1, "KIND": "1u"}), ("splat_swept.frag", {"SWEPT": 1, "KIND": "2u"})]
         if features.band_cuts and not features.point_spectrum:
             classes.append(("splat_cut.frag", {"CUT": 1, "KIND": "3u"}))
-        self._draws: list[tuple[moderngl.VertexArray, int]] = []
-        """A vertex array for each class and its vertices per splat."""
+        self._draws: list[moderngl.VertexArray] = []
         for fragment, chosen in classes:
             program = shader.program(ctx, "splat.vert", fragment, defines | chosen, (SPLAT,))
             if "SMALL" in chosen:
-                self._draws.append((ctx.vertex_array(program, []), 3))
+                self._draws.append(ctx.vertex_array(program, []))
             else:
-                self._draws.append((ctx.vertex_array(program, [], index_buffer=self._indices), 6))
+                self._draws.append(ctx.vertex_array(program, [], index_buffer=self._indices))
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
 
     def run(
@@ -87,7 +86,7 @@ class Splatter:
             self._ctx.memory_barrier()
             self._footprints.run(photons, first, part, var_table, tables, atlas, receivers, smoothing, EXTENT_LIMIT, samples)
             self._ctx.memory_barrier()
-            self._draw(part, tables, atlas)
+            self._draw(tables, atlas)
             atlas.pending += part
             if atlas.pending >= CHUNK:
                 atlas.flush()
@@ -95,7 +94,7 @@ class Splatter:
         if error != "GL_NO_ERROR":
             raise RuntimeError(f"{error} while splatting {count} photons into a {atlas.size[0]} x {atlas.size[1]} atlas")
 
-    def _draw(self, photons: int, tables: SplatTables, atlas: MapAtlas) -> None:
+    def _draw(self, tables: SplatTables, atlas: MapAtlas) -> None:
         import moderngl
 
         from app.gpu.splat_tables import CUMULATIVE_SAMPLES, DENSITY_CELLS
@@ -114,9 +113,8 @@ class Splatter:
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_equation = moderngl.FUNC_ADD
         ctx.blend_func = moderngl.ONE, moderngl.ONE
-        slots = photons * self._footprints.slots_per_photon
-        for vertex_array, vertices in self._draws:
-            vertex_array.render(moderngl.TRIANGLES, vertices=vertices * slots)
+        for kind, vertex_array in enumerate(self._draws):
+            vertex_array.render_indirect(self._footprints.commands, moderngl.TRIANGLES, 1, first=kind)  # a class that no splat of the group belongs to has no instance
         ctx.enable_only(moderngl.NOTHING)
 
     def counts(self) -> dict[str, float]:
@@ -128,7 +126,7 @@ class Splatter:
         self._footprints.reset_counts()
 
     def release(self) -> None:
-        for vertex_array, _ in self._draws:
+        for vertex_array in self._draws:
             vertex_array.program.release()
             vertex_array.release()
         self._indices.release()

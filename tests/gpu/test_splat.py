@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.gpu.records import FLAG_FOOTPRINT_DROPPED
+from app.gpu.map_atlas import MapAtlas, pack, placement_rows
+from app.gpu.records import FLAG_FOOTPRINT_DROPPED, RECEIVER
 from app.model import spectrum
+from app.model.charts import build_charts
 from app.model.colorimetry import K_M, VISIBLE_NM, cmf_xyz
+from app.model.primitives import box
+from app.passes.accumulate import SeamFold
 from tests.reference.splat_reference import splat_image
 from tests.reference.splat_rig import Rig, SplatFeatures, photons
 
@@ -218,3 +222,36 @@ def test_picture_does_not_depend_on_batches(rig: Rig) -> None:
     whole = rig.draw(records)
     np.testing.assert_array_equal(rig.draw(records, batch=32768), whole)
     np.testing.assert_allclose(rig.draw(records, batch=10007), whole, rtol=2e-6)
+
+
+def test_charts_splat_by_triangle_and_seams_fold_home(gl) -> None:
+    """Photons all over a box, drawn through its charts: folded on the GPU as on the CPU, all energy kept."""
+    charts = build_charts(box((1.0, 1.0, 1.0)), total_texels=4096)
+    tiles, size = pack([(30, 20), (charts.width, charts.height)])
+    placements = placement_rows(tiles[1], charts.rows, charts.texel_area, charts.triangle_rects)
+    rig = Rig(gl.ctx, PLAIN)
+    atlas = MapAtlas(gl.ctx, size, placements)
+    receiver = RECEIVER.zeros(1)
+    receiver["kind"], receiver["first_triangle"] = 1, 100
+    mesh = box((1.0, 1.0, 1.0))
+    rng = np.random.default_rng(4)
+    corners = mesh.vertices[mesh.triangles]
+    weights = rng.dirichlet(np.ones(3), (400, len(corners)))
+    records = photons(PLAIN, np.zeros((400 * len(corners), 2)))
+    records["position"] = np.einsum("ntk,tkd->ntd", weights, corners).reshape(-1, 3)
+    records["triangle"] = 100 + np.tile(np.arange(len(corners)), 400)
+    spread = rng.normal(size=(2, len(records), 3)) * np.sqrt(charts.texel_area.mean())
+    records["dposition_ds"], records["dposition_dt"] = spread
+    buffer = gl.ctx.buffer(records)
+    rig.splatter.run(buffer, len(records), rig.variable, rig.tables, atlas, gl.ctx.buffer(receiver), 0.8)
+    total = atlas.read_total()
+    fold = SeamFold(gl.ctx, [(tiles[1], charts)])
+    resolved = gl.ctx.texture(size, 4, dtype="f4")
+    fold.run(atlas.total_textures, [resolved])
+    image = np.frombuffer(resolved.read(), np.float32).reshape(size[1], size[0], 4)
+    x0, y0, x1, y1 = tiles[1].rect
+    folded = charts.fold(total[y0:y1, x0:x1])
+    np.testing.assert_allclose(image[y0:y1, x0:x1], charts.fill(folded), rtol=1e-4, atol=1e-5 * folded.max())
+    carried = len(records) * rig.light.power_w()
+    assert folded[..., 3].sum() == pytest.approx(carried, rel=0.01)
+    assert total[y0:y1, x0:x1, 3][charts.owner < 0].sum() > 0.02 * carried
