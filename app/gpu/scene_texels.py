@@ -2,7 +2,8 @@
 
 A texel is four words and one fetch. llvmpipe (Mesa 22.3) gathers a texel for eight rays at once
 but walks through a storage buffer ray by ray and word by word, under a mask test each: the tree
-is about 4 times faster this way there, and no slower on a GPU. Words are kept as unsigned
+is about 4 times faster this way there, and no slower on a GPU. It works out a mip level per ray for
+every `texelFetch`, half of the cost, so there the texture is bound as an image. Words are kept as unsigned
 integers, so that no driver flushes or quiets a bit pattern that is not a float.
 """
 
@@ -27,14 +28,18 @@ SECTIONS = ("TREE", "TRIANGLES", "NORMALS", "OBJECTS")
 class SceneTexels:
     """One RGBA32UI texture of sections that follow one another; `defines` holds each one's first texel."""
 
-    def __init__(self, ctx: moderngl.Context, sections: Mapping[str, np.ndarray]) -> None:
+    def __init__(self, ctx: moderngl.Context, sections: Mapping[str, np.ndarray], as_image: bool | None = None) -> None:
         """`sections`: name (of SECTIONS; those not given are empty) → array of whole texels, 16 bytes each, of any dtype.
+        `as_image` chooses how shaders read them (None: what suits the renderer).
 
         Raises `UserError` when the scene does not fit a texture of this device.
         """
         words = {name: _words(sections.get(name)) for name in SECTIONS}
         starts = np.cumsum([0] + [len(part) for part in words.values()]).tolist()
         self.defines = {f"{name}_AT": start for name, start in zip(words, starts[:-1], strict=True)}
+        self._as_image = "llvmpipe" in ctx.info["GL_RENDERER"] if as_image is None else as_image
+        if self._as_image:
+            self.defines["SCENE_IMAGE"] = 1
         rows = max(1, -(-starts[-1] // ROW_TEXELS))
         limit = ctx.info["GL_MAX_TEXTURE_SIZE"]
         if rows > limit:
@@ -50,7 +55,10 @@ class SceneTexels:
 
     def bind(self) -> None:
         """Bind the texture to its unit."""
-        self.texture.use(bindings.UNIT_SCENE)
+        if self._as_image:
+            self.texture.bind_to_image(bindings.IMAGE_SCENE, read=True, write=False)
+        else:
+            self.texture.use(bindings.UNIT_SCENE)
 
     def release(self) -> None:
         """Free the texture."""

@@ -12,7 +12,11 @@
 #define KIND_DIELECTRIC 3u
 
 // Tree, triangles, corner normals and objects, one after the other, in rows of 4096 texels.
+#ifdef SCENE_IMAGE
+layout(rgba32ui, binding = IMAGE_SCENE) uniform readonly restrict uimage2D scene_texels;
+#else
 layout(binding = UNIT_SCENE) uniform usampler2D scene_texels;
+#endif
 // One spectral table a row; a texel holds two neighbouring samples.
 layout(binding = UNIT_SPECTRA) uniform sampler2D spectra;
 #ifdef CONVEX_SOLIDS
@@ -22,7 +26,12 @@ layout(std430, binding = BIND_PLANES) readonly restrict buffer Planes { vec4 pla
 
 uvec4 scene_texel(uint i)
 {
-    return texelFetch(scene_texels, ivec2(int(i & 4095u), int(i >> 12u)), 0);
+    ivec2 at = ivec2(int(i & 4095u), int(i >> 12u));
+#ifdef SCENE_IMAGE
+    return imageLoad(scene_texels, at);
+#else
+    return texelFetch(scene_texels, at, 0);
+#endif
 }
 
 Triangle triangle_at(uint slot)

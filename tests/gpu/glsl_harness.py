@@ -10,7 +10,7 @@ then the difference is the arithmetic's error alone.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,13 +43,13 @@ def evaluate(
     defines: Mapping[str, int | float | str] | None = None,
     structs: Sequence[Struct] = (),
     buffers: Mapping[int, np.ndarray] | None = None,
-    textures: Mapping[int, moderngl.Texture] | None = None,
+    binders: Sequence[Callable[[], None]] = (),
 ) -> dict[str, np.ndarray]:
     """Run `body` once per row of the inputs.
 
     Inputs are (N,) or (N, 2..4) arrays (unsigned integers (N,) or (N, 2) stay integers) and appear
     in `body` as locals of their names; `body` assigns the outputs, named with their GLSL types. `buffers` fills
-    bindings of the included files, `textures` (the caller's) their texture units. Returns float64 (uint32 for unsigned) arrays of N rows.
+    bindings of the included files, `binders` are called to bind their textures. Returns float64 (uint32 for unsigned) arrays of N rows.
     """
     count = len(next(iter(inputs.values())))
     declarations, words, offset = [], [], 0
@@ -103,8 +103,8 @@ def evaluate(
     try:
         for binding, buffer in held.items():
             buffer.bind_to_storage_buffer(binding)
-        for unit, texture in (textures or {}).items():
-            texture.use(unit)
+        for bind in binders:
+            bind()
         kernel.run(-(-count // _GROUP))
         ctx.finish()
         raw = np.frombuffer(held[_BIND_OUT].read(), np.uint32)

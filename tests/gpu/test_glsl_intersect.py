@@ -89,7 +89,7 @@ class Shaders:
             "from_object": np.full(count, NONE if slots is None else 0, np.uint32),
             "inside": np.full(count, inside, np.uint32),
         }
-        return evaluate(self.ctx, ["lib/intersect.glsl"], BODY, inputs, OUTPUTS, self.defines, SCENE_STRUCTS, self.buffers, {bindings.UNIT_SCENE: self.texels.texture})
+        return evaluate(self.ctx, ["lib/intersect.glsl"], BODY, inputs, OUTPUTS, self.defines, SCENE_STRUCTS, self.buffers, [self.texels.bind])
 
 
 def rays(count: int, seed: int, spread: float = 2.0) -> tuple[np.ndarray, np.ndarray]:

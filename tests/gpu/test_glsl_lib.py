@@ -142,7 +142,7 @@ def test_spectral_rows_are_linear_between_samples(gl) -> None:
         {"a": "float", "c": "float"},
         {**bindings.SCENE_DEFINES, **dict.fromkeys(("TRIANGLES_AT", "NORMALS_AT", "OBJECTS_AT"), 0), "SPECTRAL_SAMPLES": samples},
         SCENE_STRUCTS,
-        textures={bindings.UNIT_SPECTRA: texture},
+        binders=[lambda: texture.use(bindings.UNIT_SPECTRA)],
     )
     texture.release()
     at = np.linspace(0, 1, samples)
@@ -192,8 +192,7 @@ def test_the_highest_solid_around_a_ray_is_its_medium(gl) -> None:
     texels = SceneTexels(gl.ctx, {"OBJECTS": objects})
     defines = {**bindings.SCENE_DEFINES, **texels.defines, "SPECTRAL_SAMPLES": 2, **NESTED}
     structs = (*SCENE_STRUCTS, ray_record(0))
-    textures = {bindings.UNIT_SCENE: texels.texture}
-    got = evaluate(gl.ctx, ["lib/medium.glsl"], body, inputs, outputs, defines, structs, textures=textures)
+    got = evaluate(gl.ctx, ["lib/medium.glsl"], body, inputs, outputs, defines, structs, binders=[texels.bind])
     texels.release()
 
     def medium(held: int) -> int:
