@@ -47,6 +47,7 @@ class Splatter:
     def __init__(self, ctx: moderngl.Context, features: SplatFeatures) -> None:
         self._ctx = ctx
         self._features = features
+        self.group = GROUP
         self._footprints = Footprints(ctx, features, GROUP)
         defines = splat_defines(features)
         slots = GROUP * self._footprints.slots_per_photon
@@ -86,7 +87,7 @@ class Splatter:
             self._ctx.memory_barrier()
             self._footprints.run(photons, first, part, var_table, tables, atlas, receivers, smoothing, EXTENT_LIMIT, samples)
             self._ctx.memory_barrier()
-            self._draw(tables, atlas)
+            self.draw(tables, atlas)
             atlas.pending += part
             if atlas.pending >= CHUNK:
                 atlas.flush()
@@ -94,7 +95,8 @@ class Splatter:
         if error != "GL_NO_ERROR":
             raise RuntimeError(f"{error} while splatting {count} photons into a {atlas.size[0]} x {atlas.size[1]} atlas")
 
-    def _draw(self, tables: SplatTables, atlas: MapAtlas) -> None:
+    def draw(self, tables: SplatTables, atlas: MapAtlas) -> None:
+        """Add the splats of the last group of photons to the atlas's scratch textures."""
         import moderngl
 
         from app.gpu.splat_tables import CUMULATIVE_SAMPLES, DENSITY_CELLS
