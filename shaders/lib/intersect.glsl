@@ -57,6 +57,10 @@ float crossing_key(float distance, float facing)
 #endif
 }
 
+// Rounding errors of the edge tests, as a share of |edge| (|origin - vertex| + |edge|): three products
+// and sums each. Where two facets share an edge at least one accepts the ray, however small they are.
+#define EDGE_ERROR 5e-7
+
 void try_triangle(uint slot, vec3 origin_p, vec3 direction, RayOrigin origin, inout float best_key, inout Hit hit)
 {
     Triangle facet = triangle_at(slot);
@@ -69,8 +73,10 @@ void try_triangle(uint slot, vec3 origin_p, vec3 direction, RayOrigin origin, in
     float v = dot(facet.edge1, q) * inverse;
     float distance = -dot(to_origin, normal) * inverse;
     float key = crossing_key(distance, facing);
+    float edge = sqrt(max(dot(facet.edge1, facet.edge1), dot(facet.edge2, facet.edge2)));
+    float slack = EDGE_ERROR * edge * (sqrt(dot(to_origin, to_origin)) + edge) * abs(inverse);
     // Comparisons are written so that NaN (an edge-on or degenerate triangle) fails them.
-    bool inside = u >= -1e-6 && v >= -1e-6 && u + v <= 1.000001 && key < best_key && slot != origin.primitive;
+    bool inside = u >= -slack && v >= -slack && u + v <= 1.0 + 2.0 * slack && key < best_key && slot != origin.primitive;
     if (inside && accept_hit(distance, facing, facet.object, origin)) {
         best_key = key;
         hit.distance = distance;
@@ -205,6 +211,9 @@ bool intersect_closest(vec3 origin_p, vec3 direction, float far, RayOrigin origi
         Triangle facet = hit_triangle(hit);
         hit.object = facet.object;
         hit.normal_g = normalize(cross(facet.edge1, facet.edge2));
+        // A hit within the edges' slack is moved onto the facet.
+        hit.bary.x = clamp(hit.bary.x, 0.0, 1.0);
+        hit.bary.y = clamp(hit.bary.y, 0.0, 1.0 - hit.bary.x);
     }
 #endif
 #ifdef CONVEX_SOLIDS
