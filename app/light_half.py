@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import moderngl
 import numpy as np
@@ -23,6 +24,7 @@ from app.model.features import Features
 from app.model.scene import Dielectric, Diffuse, Mirror, Scene
 from app.model.settings import RenderSettings
 from app.model.spectral_tables import SpectralAxis
+from app.passes.accumulate import LevelsFold, SeamFold, copy_texture
 from app.passes.emission_domain import EmissionDomain, emission_domain
 from app.passes.map_layout import MapLayout, check_map_receiver, layout_maps
 from app.passes.pilot import Pilot, PilotFit, landings_of, run_pilot
@@ -30,7 +32,15 @@ from app.passes.splat import Splatter
 from app.passes.trace import Band, Batch, FluxTally, LatticeSlice, TracePass
 
 DEFAULT_BATCH = 1 << 16
+TINTED_BANDS = 16
+"""Least number of bands where glass absorbs or mirrors are coloured."""
 _SHIFT_GENERATORS = (3242174889, 2447445414, 3141592653, 1640531527, 2246822519)
+
+
+class Releasable(Protocol):
+    """Anything that holds GPU memory."""
+
+    def release(self) -> None: ...
 
 
 @dataclass
@@ -81,7 +91,7 @@ class LightHalf:
         self.variables = context.ctx.buffer(np.ascontiguousarray(buffers.variable_table if buffers.groups.count else np.zeros((1, 2), "f4")).tobytes())
         self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
         self._weight_sum = 0.0
-        self._resolved: list[moderngl.Texture] = []
+        self._prepared: list[Releasable] = []
 
     def prepare(self) -> None:
         """Pilot, maps and spectral tables. Afterwards `layout`, `atlas`, `tables` and `plans` exist."""
@@ -107,7 +117,16 @@ class LightHalf:
         self.tables = SplatTables.build(ctx, self.buffers.axis, [light.spectral_power for light in self.scene.lights], self.reflectances, spans, channels)
         self.atlas = MapAtlas(ctx, self.layout.size, self.layout.placements, self.features.targets)
         self.receivers = ctx.buffer(np.ascontiguousarray(self.layout.receivers).tobytes())
+        self._resolved = [ctx.texture(self.atlas.size, 4, dtype="f4") for _ in range(self.features.targets)]
+        self._levels_fold = LevelsFold(ctx, self.layout.folds)
+        self._seam_fold = SeamFold(ctx, [(self.layout.tiles[r][0], charts) for r, charts in self.layout.charts.items()])
+        self._prepared = [self.tables, self.atlas, self.receivers, *self._resolved, self._levels_fold, self._seam_fold]
         self.splatter.reset_counts()
+
+    @property
+    def _tinted(self) -> bool:
+        """Something on the way changes a spectrum's shape."""
+        return self.features.absorption or (self.features.mirrors and self.features.spectral_weights)
 
     @property
     def _needs_spectral_pilot(self) -> bool:
@@ -205,7 +224,13 @@ class LightHalf:
             middles = axis.x_of_nm(0.5 * (edges_nm[:-1] + edges_nm[1:]))
         else:
             count = fit.band_count() if method == "srd" and self.features.spectral_groups else 1
-            edges = np.linspace(float(axis.x_of_nm(max(lo_nm - 0.5, 380.0))), float(axis.x_of_nm(min(hi_nm + 0.5, 780.0))), count + 1)
+            lo_nm, hi_nm = max(lo_nm - 0.5, 380.0), min(hi_nm + 0.5, 780.0)
+            edges = np.linspace(float(axis.x_of_nm(lo_nm)), float(axis.x_of_nm(hi_nm)), count + 1)
+            if self._tinted and count < TINTED_BANDS:
+                # Three weights a band cannot follow a colour over the whole spectrum; steps even in both measures.
+                nm = np.linspace(lo_nm, hi_nm, 401)
+                even = 0.5 * (nm - lo_nm) / (hi_nm - lo_nm) + 0.5 * (axis.x_of_nm(nm) - edges[0]) / (edges[-1] - edges[0])
+                edges = axis.x_of_nm(np.interp(np.linspace(0.0, 1.0, TINTED_BANDS + 1), even, nm))
             middles = 0.5 * (edges[:-1] + edges[1:])
         return tuple(
             Band(float(lo), float(hi), float(mid), float(power.band(lo, hi)[3])) for lo, hi, mid in zip(edges[:-1], edges[1:], middles, strict=True)
@@ -220,37 +245,36 @@ class LightHalf:
         return np.array(sides)
 
     def resolved_textures(self) -> list[moderngl.Texture]:
-        """The summed maps for look-ups: charts' seams folded home and their gutters filled."""
+        """The summed maps for look-ups: wide texels added to fine ones, charts' seams folded home."""
         self.atlas.flush()
-        if not self.layout.charts:
-            return self.atlas.total_textures
-        total = self.atlas.read_total()
-        for receiver, charts in self.layout.charts.items():
-            x0, y0, x1, y1 = self.layout.tiles[receiver][0].rect
-            total[y0:y1, x0:x1] = charts.fill(charts.fold(total[y0:y1, x0:x1]))
-        self._release_resolved()
-        for target in range(self.features.targets):
-            data = np.ascontiguousarray(total[..., 4 * target : 4 * target + 4])
-            texture = self.context.ctx.texture(self.atlas.size, 4, data.tobytes(), dtype="f4")
-            texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
-            texture.repeat_x = texture.repeat_y = False
-            self._resolved.append(texture)
+        ctx = self.context.ctx
+        total = self.atlas.total_textures
+        if self.layout.charts:
+            self._seam_fold.run(total, self._resolved)
+        else:
+            for source, target in zip(total, self._resolved, strict=True):
+                copy_texture(ctx, source, target)
+        self._levels_fold.run(self._resolved)
         return self._resolved
 
-    def _release_resolved(self) -> None:
-        for texture in self._resolved:
-            texture.release()
-        self._resolved = []
+    def _read_resolved(self) -> np.ndarray:
+        """All maps put together, float32 (height, width, channels)."""
+        width, height = self.atlas.size
+        layers = []
+        for texture in self.resolved_textures():
+            layer = np.empty((height, width, 4), np.float32)
+            texture.read_into(layer)
+            layers.append(layer)
+        return np.concatenate(layers, axis=-1)
 
-    def resolved_tile(self, receiver: int) -> np.ndarray:
-        """A receiver's finest map, seams folded: float32 (height, width, channels), row 0 at texel y = 0."""
-        tile = self.atlas.read_tile(self.layout.tiles[receiver][0])
-        charts = self.layout.charts.get(receiver)
-        return tile if charts is None else charts.fold(tile).astype(np.float32)
+    def resolved_map(self, receiver: int) -> np.ndarray:
+        """A receiver's finest map: float32 (height, width, channels), row 0 at texel y = 0."""
+        x0, y0, x1, y1 = self.layout.tiles[receiver][0].rect
+        return self._read_resolved()[y0:y1, x0:x1]
 
     def map_flux(self) -> float:
-        """What the maps hold where they are read, in the sum of the last channel of XYZ maps (W), or of all bins."""
-        total = self.atlas.read_total()
+        """What the maps hold where they are read: the sum of XYZ maps' last channel (W), or of all bins."""
+        total = self._read_resolved()
         total = total[..., 3] if self.bin_edges_nm is None else total.sum(axis=-1)
         flux = 0.0
         for receiver, tiles in self.layout.tiles.items():
@@ -259,7 +283,7 @@ class LightHalf:
                 x0, y0, x1, y1 = tile.rect
                 energy = total[y0:y1, x0:x1].astype(float)
                 if charts is not None:
-                    energy = charts.fold(energy)
+                    energy = energy[charts.owner >= 0]
                 elif level:
                     energy = self._outside_finer(receiver, level, energy)
                 flux += energy.sum()
@@ -287,12 +311,11 @@ class LightHalf:
 
     def release(self) -> None:
         """Free everything."""
-        self._release_resolved()
         self.trace.release()
         self.splatter.release()
-        for name in ("tables", "atlas", "receivers", "variables"):
-            if hasattr(self, name):
-                getattr(self, name).release()
+        self.variables.release()
+        for owned in self._prepared:
+            owned.release()
 
 
 def reflectance_classes(scene: Scene, buffers: SceneBuffers) -> tuple[list[np.ndarray | None], dict[int, int]]:

@@ -163,7 +163,7 @@ def _map_layer(light: LightHalf) -> tuple[np.ndarray, np.ndarray | None]:
     assert receiver is not None
     record = light.layout.receivers[receiver]
     area = light.layout.placements["texel_area"][record["placement"]]
-    texels = light.resolved_tile(receiver)[::-1] * np.float32(light.map_scale / area)
+    texels = light.resolved_map(receiver)[::-1] * np.float32(light.map_scale / area)
     if light.bin_edges_nm is None:
         return xyz_to_rgb709(texels[..., :3].astype(float)).astype(np.float32), None
     channels = Channels(tuple(light.bin_edges_nm.tolist()))

@@ -33,9 +33,11 @@ const float ACROSS_FLOOR = 0.1;
 const float SAMPLED_VARIANCE = 0.2;
 const float THIN_VARIANCE = 0.15;
 const float CUT = 3.0;
+// Splats of six texels' standard deviation at least go to a map with texels four times as wide.
+const float BROAD_VARIANCE = 36.0;
 const float MIN_SIGMA_TO_SWEEP = 1.0 / 256.0;
-const float MAX_SIGMA_TO_SWEEP = 64.0;
-const float ROWS_PER_OCTAVE = 4.0;
+const float MAX_SIGMA_TO_SWEEP = 8.0;
+const float ROWS_PER_OCTAVE = 8.0;
 
 struct Footprint {
     vec2 centre;  // texels, at the middle of the chord
@@ -160,7 +162,21 @@ SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
 #ifdef BAND_CUTS
     cut = is_cut(photon, band);
 #endif
-    sweep = max(sweep, sigma * (cut ? 0.05 : 1.0 / MAX_SIGMA_TO_SWEEP));
+    float row = 0.0;
+    if (cut) {
+        sweep = max(sweep, 0.05 * sigma);
+    } else {
+        // To the nearest row of the table, by changing what the picture depends on least: a blur that is small in the sweep, or a
+        // sweep that is small in the blur.
+        row = log2(clamp(sigma / max(sweep, 1e-6), MIN_SIGMA_TO_SWEEP, MAX_SIGMA_TO_SWEEP) / MIN_SIGMA_TO_SWEEP);
+        row = round(row * ROWS_PER_OCTAVE);
+        float ratio = MIN_SIGMA_TO_SWEEP * exp2(row / ROWS_PER_OCTAVE);
+        if (ratio > 0.3) {
+            sweep = sigma / ratio;
+        } else {
+            sigma = ratio * sweep;
+        }
+    }
     float reach = 0.5 * sweep + CUT * sigma;
     float xi_half = 0.5 * sweep / reach;
 
@@ -173,7 +189,7 @@ SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
     splat.along = e * reach;
     splat.across = (m + shear * e) * y_edge;
     splat.amplitude = 1.0 / (reach * box * kept * on_grid);
-    splat.table_row = ((log2(sigma / sweep) - log2(MIN_SIGMA_TO_SWEEP)) * ROWS_PER_OCTAVE + 0.5) / float(table_rows);
+    splat.table_row = (row + 0.5) / float(table_rows);
     splat.y_edge = y_edge * SQRT_HALF / s;
     splat.y_box = 0.5 * box * SQRT_HALF / s;
 #ifdef POINT_SPECTRUM
@@ -206,6 +222,32 @@ Footprint footprint_in(Placement place, PhotonRecord photon, vec3 sweep_middle, 
     f.axis_t = smoothing * to_texels(place, photon.dposition_dt);
     f.chord = to_texels(place, sweep);
     return f;
+}
+
+// Smaller principal variance of the footprint, texels².
+float thin_variance(Footprint f) {
+    float trace = f.axis_s.x * f.axis_s.x + f.axis_t.x * f.axis_t.x + f.axis_s.y * f.axis_s.y + f.axis_t.y * f.axis_t.y;
+    float area = f.axis_s.x * f.axis_t.y - f.axis_s.y * f.axis_t.x;
+    float root = sqrt(max(0.25 * trace * trace - area * area, 0.0));
+    return 0.5 * trace - root;
+}
+
+// A splat broad in every direction is as well drawn in texels four times as wide, for a sixteenth of the
+// fragments; the maps are put together again when they are read (levels_fold.comp, bilinearly).
+void choose_level(inout Placement place, inout Footprint f, PhotonRecord photon, vec3 middle, vec3 sweep) {
+    bool blurred = false;
+    for (int step = 0; step < 2; ++step) {
+        if (place.blurred != NONE && thin_variance(f) > BROAD_VARIANCE) {
+            place = placements[place.blurred];
+            f = footprint_in(place, photon, middle, sweep);
+            blurred = true;
+        }
+    }
+    // The wider texel's box and the interpolation blur by a quarter texel² in all: take that off beforehand.
+    float thin = thin_variance(f);
+    float shrink = blurred ? sqrt(max(1.0 - 0.25 / max(thin, 0.25), 0.0)) : 1.0;
+    f.axis_s *= shrink;
+    f.axis_t *= shrink;
 }
 
 SplatRecord splat_of(PhotonRecord photon, Footprint f, uint layer, vec4 band) {
@@ -295,10 +337,12 @@ void main() {
     uint layer = table * uint(TARGETS);
     vec4 table_band = table_bands[table];
 
-    SplatRecord fine = splat_of(photon, f, layer, table_band);
-    fine.rect = place.rect;
     bool inside = contains(place.rect, f.centre, 0.0);
-    bool drawn = touches(place.rect, fine.centre, half_extent(fine));
+    Placement drawn_in = place;
+    choose_level(drawn_in, f, photon, middle, sweep);
+    SplatRecord fine = splat_of(photon, f, layer, table_band);
+    fine.rect = drawn_in.rect;
+    bool drawn = touches(drawn_in.rect, fine.centre, half_extent(fine));
     if (!drawn) {
         fine.kind = 0u;
     }
@@ -311,11 +355,12 @@ void main() {
     if (place.next != NONE) {
         // The coarse map is read outside the fine window: up to its border, plus what a bilinear look-up there reaches.
         Placement outer = placements[place.next];
-        float margin = 3.0 * sqrt(outer.texel_area / place.texel_area);
-        vec2 extent = half_extent(fine) + margin;
-        bool only_fine = all(greaterThan(fine.centre - extent, place.rect.xy)) && all(lessThan(fine.centre + extent, place.rect.zw));
         Footprint g = footprint_in(outer, photon, middle, sweep);
         inside = inside || contains(outer.rect, g.centre, 0.0);
+        choose_level(outer, g, photon, middle, sweep);
+        float margin = 3.0 * sqrt(outer.texel_area / drawn_in.texel_area);
+        vec2 extent = half_extent(fine) + margin;
+        bool only_fine = all(greaterThan(fine.centre - extent, drawn_in.rect.xy)) && all(lessThan(fine.centre + extent, drawn_in.rect.zw));
         if (!only_fine) {
             coarse = splat_of(photon, g, layer, table_band);
             coarse.rect = outer.rect;

@@ -91,6 +91,7 @@ def placement_rows(tile: Tile, world_to_texel: np.ndarray, texel_area: np.ndarra
     records["rect"] = (whole if rects is None else np.asarray(rects, np.float64)) + (tile.x, tile.y, tile.x, tile.y)
     records["texel_area"] = texel_area
     records["next"] = NONE
+    records["blurred"] = NONE
     records["kind"] = KIND_FLAT if flat else KIND_CHART
     return records
 

@@ -63,7 +63,7 @@ PLACEMENT = Struct(
         Field("texel_area", "float", "scene unit² per texel"),
         Field("next", "uint", "the coarser placement of the same receiver, or NONE"),
         Field("kind", "uint", "0 flat window, 1 chart triangle"),
-        Field("reserved", "uint", ""),
+        Field("blurred", "uint", "the same window in texels four times as wide, for broad splats, or NONE"),
     ),
 )
 

@@ -1,4 +1,4 @@
-"""Adds the scratch textures of the caustic maps to their total, and folds chart seams."""
+"""Adds the scratch textures of the caustic maps to their total, and puts the maps together for reading."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class SeamFold:
     def run(self, total: Sequence[moderngl.Texture], resolved: Sequence[moderngl.Texture]) -> None:
         """All RGBA32F and of the atlas size; `total` stays as it is."""
         for source, target in zip(total, resolved, strict=True):
-            self._copy(source, target)
+            copy_texture(self._ctx, source, target)
             source.bind_to_image(0, read=True, write=False)
             target.bind_to_image(1, read=True, write=True)
             self._source_buffer.bind_to_storage_buffer(1)
@@ -83,16 +83,42 @@ class SeamFold:
                     program.run(-(-count // _GROUP))
         self._ctx.memory_barrier()
 
-    def _copy(self, source: moderngl.Texture, target: moderngl.Texture) -> None:
-        self._ctx.memory_barrier()
-        read, write = self._ctx.framebuffer([source]), self._ctx.framebuffer([target])
-        self._ctx.copy_framebuffer(write, read)
-        read.release()
-        write.release()
-
     def release(self) -> None:
         for resource in (self._gather, self._fill, self._gather_buffer, self._fill_buffer, self._source_buffer, self._ratio_buffer):
             resource.release()
+
+
+class LevelsFold:
+    """Adds what lies in a window's wide texels (broad splats, footprint.comp) to its fine ones, in place."""
+
+    def __init__(self, ctx: moderngl.Context, folds: Sequence[tuple[Tile, Tile]]) -> None:
+        """`folds`: (wide tile, fine tile) in the order in which they are added up."""
+        self._ctx = ctx
+        self._folds = folds
+        self._program = shader.compute(ctx, "levels_fold.comp")
+
+    def run(self, maps: Sequence[moderngl.Texture]) -> None:
+        """RGBA32F textures of the atlas size."""
+        for texture in maps:
+            texture.bind_to_image(0, read=True, write=True)
+            for wide, fine in self._folds:
+                self._program["wide"].value = wide.rect
+                self._program["fine"].value = fine.rect
+                self._ctx.memory_barrier()
+                self._program.run(-(-fine.width // 8), -(-fine.height // 8))
+        self._ctx.memory_barrier()
+
+    def release(self) -> None:
+        self._program.release()
+
+
+def copy_texture(ctx: moderngl.Context, source: moderngl.Texture, target: moderngl.Texture) -> None:
+    """Copy a whole texture to another of the same size and format."""
+    ctx.memory_barrier()
+    read, write = ctx.framebuffer([source]), ctx.framebuffer([target])
+    ctx.copy_framebuffer(write, read)
+    read.release()
+    write.release()
 
 
 def _uints(ctx: moderngl.Context, parts: list[np.ndarray], width: int) -> moderngl.Buffer:

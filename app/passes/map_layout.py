@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 FINE_TILE_MAX = 2048
 COARSE_TILE_MAX = 768
 MIN_TILE = 32
+LEVEL_STEPS = (1, 4, 16)
+"""Texel widths in which every window is kept: broad splats go to the wider ones (footprint.comp)."""
 TEXELS_PER_PIXEL = 2.0
 """Texels along a pixel's side in a fine window: a splat is blurred by half a texel, a picture by its pixel."""
 _QUANTILE = 0.01
@@ -68,7 +70,7 @@ class PlaneFrame:
 
 @dataclass(frozen=True)
 class MapLayout:
-    """Everything the atlas and the look-ups need; `tiles[receiver]` lists fine first."""
+    """Everything the atlas and the look-ups need; `tiles[receiver]` lists each window's finest texels, fine window first."""
 
     size: tuple[int, int]
     placements: np.ndarray
@@ -76,6 +78,8 @@ class MapLayout:
     tiles: dict[int, list[Tile]]
     windows: dict[int, list[Window]]
     charts: dict[int, ChartAtlas]
+    folds: tuple[tuple[Tile, Tile], ...]
+    """(wider texels, finer texels) of the same window, in the order in which they are added up."""
 
 
 def plane_frame(points: np.ndarray) -> PlaneFrame:
@@ -115,11 +119,12 @@ def layout_maps(
             if receiver == map_receiver and picture is not None:
                 windows = [_with_aspect(windows[-1] if landed is None else _extent_of_light(frame, extent, landed), picture)]
             for level, window in enumerate(windows):
-                fine = level == 0 and len(windows) > 1
-                sizes.append(
+                fine = level == 0 or len(windows) == 1
+                size = (
                     picture if receiver == map_receiver and picture is not None
-                    else _tile_size(scene.camera, buffers, frame, window, picture, FINE_TILE_MAX if fine or len(windows) == 1 else COARSE_TILE_MAX)
+                    else _tile_size(scene.camera, buffers, frame, window, picture, FINE_TILE_MAX if fine else COARSE_TILE_MAX)
                 )
+                sizes += [(-(-size[0] // step), -(-size[1] // step)) for step in LEVEL_STEPS]
             plans.append((receiver, frame, windows, None))
         else:
             lit = landed is not None or receiver == map_receiver
@@ -138,6 +143,7 @@ def _place(scene: Scene, buffers: SceneBuffers, plans, tiles: list[Tile], size: 
     receivers = RECEIVER.zeros(len(plans))
     tile_of: dict[int, list[Tile]] = {}
     charts: dict[int, ChartAtlas] = {}
+    folds: list[tuple[Tile, Tile]] = []
     count, next_tile = 0, 0
     for receiver, frame, windows, atlas in plans:
         object_index = buffers.receivers[receiver]
@@ -148,19 +154,26 @@ def _place(scene: Scene, buffers: SceneBuffers, plans, tiles: list[Tile], size: 
         record["reflectance_class"] = reflectance_class[receiver]
         assert isinstance(material, Diffuse)
         record["reflectance_rgb"] = 1.0 if material.reflectance is not None else material.reflectance_rgb
-        own = [tiles[next_tile + i] for i in range(max(1, len(windows)))]
-        next_tile += len(own)
+        levels = [tiles[next_tile + i] for i in range(max(1, len(LEVEL_STEPS) * len(windows)))]
+        next_tile += len(levels)
+        own = levels[:: len(LEVEL_STEPS)] if windows else levels
         tile_of[receiver] = own
         if atlas is None:
             assert frame is not None
-            for level, (window, tile) in enumerate(zip(windows, own, strict=True)):
-                scale = np.array([tile.width, tile.height]) / window.size
-                rows = np.concatenate([frame.axes, (-(frame.axes @ frame.origin) - window.low)[:, None]], axis=1) * scale[:, None]
-                texel_area = float(np.prod(window.size / (tile.width, tile.height))) / buffers.space.scale**2
-                placed = placement_rows(tile, rows, texel_area)
-                placed["next"] = count + level + 1 if level + 1 < len(windows) else NONE
-                placements.append(placed)
-            count += len(windows)
+            for level, window in enumerate(windows):
+                of_window = levels[level * len(LEVEL_STEPS) : (level + 1) * len(LEVEL_STEPS)]
+                for i, (tile, step) in enumerate(zip(of_window, LEVEL_STEPS, strict=True)):
+                    # Wider texels are exactly `step` of the finest, also where those do not fill the last one.
+                    texels = np.array([of_window[0].width, of_window[0].height]) / step
+                    scale = texels / window.size
+                    rows = np.concatenate([frame.axes, (-(frame.axes @ frame.origin) - window.low)[:, None]], axis=1) * scale[:, None]
+                    placed = placement_rows(tile, rows, float(np.prod(window.size / texels)) / buffers.space.scale**2)
+                    first = count + level * len(LEVEL_STEPS)
+                    placed["next"] = first + len(LEVEL_STEPS) if level + 1 < len(windows) else NONE
+                    placed["blurred"] = first + i + 1 if i + 1 < len(LEVEL_STEPS) else NONE
+                    placements.append(placed)
+                folds += [(of_window[i + 1], of_window[i]) for i in reversed(range(len(LEVEL_STEPS) - 1))]
+            count += len(LEVEL_STEPS) * len(windows)
         else:
             record["kind"] = 1
             # The charts' rows act on world positions; the records hold GPU-space ones.
@@ -170,7 +183,7 @@ def _place(scene: Scene, buffers: SceneBuffers, plans, tiles: list[Tile], size: 
             placements.append(placement_rows(own[0], rows, atlas.texel_area, atlas.triangle_rects))
             count += len(atlas.rows)
             charts[receiver] = atlas
-    return MapLayout(size, np.concatenate(placements), receivers, tile_of, {r: w for r, _, w, _ in plans}, charts)
+    return MapLayout(size, np.concatenate(placements), receivers, tile_of, {r: w for r, _, w, _ in plans}, charts, tuple(folds))
 
 
 def _extent(points: np.ndarray) -> Window:

@@ -103,8 +103,7 @@ class Splatter:
 
         ctx = self._ctx
         values = PARAMETERS.zeros(1)
-        scale = 0.5 * (tables.width - 1) / tables.width
-        values[0] = (atlas.size, (scale, 0.5), tables.bands, DENSITY_CELLS, CUMULATIVE_SAMPLES, 0)
+        values[0] = (atlas.size, (0.5, 0.5), tables.bands, DENSITY_CELLS, CUMULATIVE_SAMPLES, 0)
         self._parameters.write(values.tobytes())
         self._parameters.bind_to_uniform_block(0)
         curve = tables.density_buffer if self._features.point_spectrum else tables.cumulative_buffer

@@ -360,6 +360,7 @@ def test_the_sun_glints_in_a_mirror(gl):
 def flat_maps(gl, scene: SceneBuffers, windows, channels: np.ndarray, scale=1.0) -> CausticMaps:
     """Maps of one flat receiver: `windows` are (x0, y0, world side, atlas x, atlas y, texels a side), finest first."""
     placements = PLACEMENT.zeros(len(windows))
+    placements["blurred"] = NONE
     for i, (x0, y0, side, ax, ay, count) in enumerate(windows):
         per_unit = count / side
         to_world = 1.0 / scene.space.scale  # rows act on GPU space
