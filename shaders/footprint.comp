@@ -36,8 +36,7 @@ const float CUT = 3.0;
 // Splats of six texels' standard deviation at least go to a map with texels four times as wide.
 const float BROAD_VARIANCE = 36.0;
 const float MIN_SIGMA_TO_SWEEP = 1.0 / 256.0;
-const float MAX_SIGMA_TO_SWEEP = 8.0;
-const float ROWS_PER_OCTAVE = 8.0;
+const float MAX_SIGMA_TO_SWEEP = 32.0;
 
 struct Footprint {
     vec2 centre;  // texels, at the middle of the chord
@@ -168,9 +167,10 @@ SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
     } else {
         // To the nearest row of the table, by changing what the picture depends on least: a blur that is small in the sweep, or a
         // sweep that is small in the blur.
-        row = log2(clamp(sigma / max(sweep, 1e-6), MIN_SIGMA_TO_SWEEP, MAX_SIGMA_TO_SWEEP) / MIN_SIGMA_TO_SWEEP);
-        row = round(row * ROWS_PER_OCTAVE);
-        float ratio = MIN_SIGMA_TO_SWEEP * exp2(row / ROWS_PER_OCTAVE);
+        // Rows: 4 an octave from 2^-8, 8 an octave from 2^-4.
+        float octave = log2(clamp(sigma / max(sweep, 1e-6), MIN_SIGMA_TO_SWEEP, MAX_SIGMA_TO_SWEEP));
+        row = octave < -4.0 ? round(4.0 * (octave + 8.0)) : 16.0 + round(8.0 * (octave + 4.0));
+        float ratio = exp2(row < 16.0 ? 0.25 * row - 8.0 : 0.125 * (row - 16.0) - 4.0);
         if (ratio > 0.3) {
             sweep = sigma / ratio;
         } else {

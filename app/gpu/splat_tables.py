@@ -24,11 +24,14 @@ if TYPE_CHECKING:
 
 CUT = 3.0
 """Standard deviations that a splat reaches beyond its sweep (as in footprint.comp)."""
-ROWS_PER_OCTAVE = 4
-SIGMAS = 2.0 ** (np.arange(14 * ROWS_PER_OCTAVE + 1) / ROWS_PER_OCTAVE - 8.0)
-"""Standard deviation / sweep length of each row, 2^-8 to 2^6 (as in footprint.comp)."""
-WIDTH, WIDTH_WITH_LINES = 256, 1024
+SIGMAS = np.concatenate([2.0 ** (np.arange(16) / 4.0 - 8.0), 2.0 ** (np.arange(73) / 8.0 - 4.0)])
+"""Standard deviation / sweep length of each row: 2^-8 to 2^5, closer together from 2^-4 on (as in footprint.comp), where
+it shapes the splat. The footprint pass makes every
+splat fit a row, so that the nearest texel serves; filtering would cost a software renderer a fifth of its rate."""
+WIDTH, WIDTH_WITH_LINES = 512, 1024
 """Samples along xi; a line needs more, since nothing but the splat's width blurs it."""
+FINEST = 512
+"""Cells of a band for the sharpest row."""
 DENSITY_CELLS, CUMULATIVE_SAMPLES = 1024, 2049
 
 Channels = Literal["xyz"] | Sequence[float]
@@ -94,7 +97,7 @@ class SplatTables:
                 integrals[i, j, :count] = energy.reshape(count, targets, 4)
                 spans[i, j, :count] = np.column_stack([edges, place, np.zeros(count)])
         texture = ctx.texture_array((width, len(SIGMAS), texels[..., 0, 0, 0].size), 4, texels, dtype="f4")
-        texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         texture.repeat_x = texture.repeat_y = False
         buffers = (ctx.buffer(np.ascontiguousarray(a)) for a in (spans, integrals, density, running))
         return cls(texture, *buffers, classes=shape[1], bands=band_count, targets=targets, rows=len(SIGMAS), width=width)
@@ -145,19 +148,16 @@ class _Source:
         columns = self.line_energy.shape[1]
         lo, hi = edges[:, :1], edges[:, 1:]
         lines = self._lines_of_bands(edges)
-        masses: dict[int, np.ndarray] = {}
+        x = lo + (hi - lo) * np.linspace(0.0, 1.0, FINEST + 1)
+        finest = np.diff(self.smooth.at(x), axis=1).transpose(1, 0, 2)
+        masses = {n: finest.reshape(n, -1, finest[0].size).sum(axis=1).astype(np.float32) for n in {_cells(s) for s in SIGMAS}}
         kernels = _kernels(width)
-        rows = []
-        for sigma in SIGMAS:
+        rows = np.empty((len(SIGMAS), width, finest[0].size), np.float32)
+        for row, sigma in zip(rows, SIGMAS, strict=True):
             cells = _cells(sigma)
-            if cells not in masses:
-                x = lo + (hi - lo) * np.linspace(0.0, 1.0, cells + 1)
-                masses[cells] = np.diff(self.smooth.at(x), axis=1).transpose(1, 0, 2).reshape(cells, -1)
-            row = kernels[cells, float(sigma)] @ masses[cells].astype(np.float32)
+            np.matmul(kernels[cells, float(sigma)], masses[cells], out=row)
             for band, place, energy in lines:
                 row[:, band * columns : (band + 1) * columns] += _kernel(width, sigma, np.array([place]), sigma) * energy
-            rows.append(row)
-        finest = masses[max(masses)].reshape(-1, len(edges), columns)
         energies = finest.sum(axis=0)
         places = (np.arange(len(finest)) + 0.5) / len(finest)
         weight_channel = 1 if columns == 4 else slice(None)
@@ -169,7 +169,7 @@ class _Source:
             totals[band] += np.sum(energy[weight_channel])
         lit = totals > 0.0
         mean = np.where(lit, moments / np.where(lit, totals, 1.0), 0.5)
-        return np.array(rows), energies, mean
+        return rows, energies, mean
 
     def _lines_of_bands(self, edges: np.ndarray) -> list[tuple[int, float, np.ndarray]]:
         """(band, place in it, energy) of each line in each band, ends (lo, hi] so that none counts twice."""
@@ -211,8 +211,9 @@ def _line_weights(line_nm: np.ndarray, channels: Channels, columns: int) -> np.n
 
 
 def _cells(sigma: float) -> int:
-    """Cells of a band, each at most a quarter of a standard deviation wide (uniform cells then add 1 % to the variance)."""
-    return max(8, int(np.ceil(4.0 / sigma)))
+    """Cells of a band, a power of two, each at most a quarter of a standard deviation wide (then they add up to 1 % to the variance)
+    unless the spectrum itself is no finer."""
+    return int(min(FINEST, max(8, 2 ** np.ceil(np.log2(4.0 / sigma)))))
 
 
 @lru_cache(maxsize=2)
@@ -232,8 +233,8 @@ def _kernels(width: int) -> dict[tuple[int, float], np.ndarray]:
 
 def _kernel(width: int, sigma: float, places: np.ndarray, blur: float) -> np.ndarray:
     """Gaussians of standard deviation `blur` about `places`, over xi of the row `sigma`, each of unit integral."""
-    xi = np.linspace(-1.0, 1.0, width, dtype=places.dtype)
+    xi = ((2.0 * np.arange(width) + 1.0) / width - 1.0).astype(places.dtype)
     distance = (0.5 + float(0.5 + CUT * sigma) * xi[:, None] - places) / float(blur)
     kernel = np.exp(-0.5 * distance * distance)
-    integral = (kernel.sum(axis=0) - 0.5 * (kernel[0] + kernel[-1])) * (xi[1] - xi[0])
+    integral = kernel.sum(axis=0) * (2.0 / width)
     return kernel / integral

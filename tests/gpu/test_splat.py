@@ -67,7 +67,7 @@ def test_shape_of_resolved_splats_matches_quadrature(rig: Rig, case: int) -> Non
     reference = splat_image((64, 64), centre, covariance, chord, *spectrum_samples(100))
     errors = [relative_error(image[..., c], reference[..., c]) for c in range(4)]
     assert max(errors) < 0.02, errors
-    assert image.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=2e-3)
+    assert image.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=8e-3)
 
 
 @pytest.mark.parametrize(("angle_deg", "limit"), [(0.0, 0.02), (20.0, 0.06), (45.0, 0.06), (80.0, 0.06)])
@@ -116,7 +116,7 @@ def test_cut_bands_add_up_to_the_whole(cut_rig: Rig) -> None:
         assert part[..., 3].sum() == pytest.approx(expected[0], rel=5e-3)
         parts += part
     assert relative_error(parts[..., 1], whole[..., 1]) < 0.02
-    assert parts.sum(axis=(0, 1)) == pytest.approx(whole.sum(axis=(0, 1)), rel=5e-3)
+    assert parts.sum(axis=(0, 1)) == pytest.approx(whole.sum(axis=(0, 1)), rel=8e-3)
 
 
 def test_cut_of_a_small_splat_takes_its_share(cut_rig: Rig) -> None:
@@ -143,7 +143,7 @@ def test_bins_hold_their_own_light_and_sum_to_all(gl) -> None:
     cells = np.append(VISIBLE_NM - 0.5, 780.5)
     cells[0], cells[-1] = 380.0, 780.0
     expected = np.diff(np.interp(edges, cells, np.append(0.0, np.cumsum(rig.light.density))))
-    assert image[:5] == pytest.approx(expected, rel=1e-3)
+    assert image[:5] == pytest.approx(expected, rel=8e-3)
     assert np.all(image[5:] == 0.0)
 
 
@@ -154,7 +154,7 @@ def test_laser_lines_land_at_their_wavelengths(gl) -> None:
     x = np.arange(64) + 0.5
     for nm, power in light.lines:
         near = np.abs(x - (12.0 + 40.0 * (nm - 380.0) / 400.0)) < 5.0
-        assert row[near].sum() == pytest.approx(power, rel=2e-3)
+        assert row[near].sum() == pytest.approx(power, rel=1e-2)
         assert (x[near] @ row[near]) / row[near].sum() == pytest.approx(12.0 + 40.0 * (nm - 380.0) / 400.0, abs=0.02)
 
 
