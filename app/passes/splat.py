@@ -114,8 +114,9 @@ class Splatter:
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_equation = moderngl.FUNC_ADD
         ctx.blend_func = moderngl.ONE, moderngl.ONE
+        # A class that no splat of the group belongs to has no instance.
         for kind, vertex_array in enumerate(self._draws):
-            vertex_array.render_indirect(self._footprints.commands, moderngl.TRIANGLES, 1, first=kind)  # a class that no splat of the group belongs to has no instance
+            vertex_array.render_indirect(self._footprints.commands, moderngl.TRIANGLES, 1, first=kind)
         ctx.enable_only(moderngl.NOTHING)
 
     def counts(self) -> dict[str, float]:
