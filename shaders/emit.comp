@@ -10,6 +10,10 @@ layout(std430, binding = BIND_RAYS_OUT) writeonly restrict buffer RaysOut { uvec
 layout(std430, binding = BIND_INDICES) readonly restrict buffer Order { uint order[]; };
 layout(std430, binding = BIND_OUTCOMES) writeonly restrict buffer Outcomes { uvec4 outcomes[]; };
 
+// Share of a lattice cell on the lit side of a hard edge `inside` domain units away: a lattice that is
+// cut off sharply would leave a saw-toothed edge.
+float coverage(float inside) { return clamp(inside / p.spacing + 0.5, 0.0, 1.0); }
+
 vec3 to_world(vec3 local) { return local.x * p.tangent + local.y * p.bitangent + local.z * p.axis; }
 
 void main()
@@ -46,7 +50,8 @@ void main()
     ddirection_dt = p.spacing * to_world(dy);
     position = p.origin;
 #ifdef LIGHT_POINT
-    weight *= spot_falloff(direction, p.light_axis, p.cone);
+    weight *= p.cone.y - p.cone.x > 1e-7 ? spot_falloff(direction, p.light_axis, p.cone)
+                                         : coverage(p.cone.y - angle_between(direction, p.light_axis));
 #else
     vec2 on_light = p.is_disc != 0u ? concentric_disc(on_disc) : 2.0 * on_disc - 1.0;
     position += on_light.x * p.light_u + on_light.y * p.light_v;
@@ -61,7 +66,9 @@ void main()
     dposition_dt = p.spacing * p.bitangent;
     // A collimated beam ends at its aperture.
     vec2 at = vec2(dot(on_plane - p.aperture_centre, p.light_u), dot(on_plane - p.aperture_centre, p.light_v));
-    alive = alive && (p.is_disc != 0u ? dot(at, at) <= 1.0 : max(abs(at.x), abs(at.y)) <= 1.0);
+    vec2 half_size = 1.0 / max(vec2(length(p.light_u), length(p.light_v)), vec2(1e-20));
+    vec2 inside = half_size * (1.0 - abs(at));
+    weight *= p.has_aperture == 0u ? 1.0 : p.is_disc != 0u ? coverage(half_size.x * (1.0 - length(at))) : coverage(inside.x) * coverage(inside.y);
 #endif
     alive = alive && weight > 0.0;
     if (alive) {

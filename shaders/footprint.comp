@@ -236,7 +236,7 @@ float thin_variance(Footprint f) {
 // fragments; the maps are put together again when they are read (levels_fold.comp, bilinearly).
 void choose_level(inout Placement place, inout Footprint f, PhotonRecord photon, vec3 middle, vec3 sweep) {
     bool blurred = false;
-    for (int step = 0; step < 2; ++step) {
+    for (int step = 0; step < 3; ++step) {
         if (place.blurred != NONE && thin_variance(f) > BROAD_VARIANCE) {
             place = placements[place.blurred];
             f = footprint_in(place, photon, middle, sweep);

@@ -17,7 +17,7 @@ layout(location = 0) out vec4 deposited[TARGETS];
 void main() {
     // Clip distances would do, but llvmpipe loses triangles that two of them cut.
     bvec4 within = bvec4(greaterThan(gl_FragCoord.xy, rect.xy), lessThan(gl_FragCoord.xy, rect.zw));
-    float share = !all(within) ? 0.0 : gaussian_box(at.x, shape.x);
+    float share = !all(within) ? 0.0 : gaussian_box_fast(at.x, shape.x);
 #ifdef POINT_SPECTRUM
     // No sweep: a Gaussian cut at three standard deviations, which holds 0.9973 of it.
     share *= 1.20011 * exp(-4.5 * at.y * at.y);

@@ -21,6 +21,17 @@ float gaussian_box(float y, float half_width) {
     return 0.5 * (erf_approx(y + half_width) - erf_approx(y - half_width));
 }
 
+// The same to 5e-4 with one division (7.1.27). Over boxes side by side the errors cancel, so no energy is lost by it.
+float gaussian_box_fast(float y, float half_width) {
+    vec2 x = vec2(y + half_width, y - half_width);
+    vec2 a = abs(x);
+    vec2 p = 1.0 + a * (0.278393 + a * (0.230389 + a * (0.000972 + a * 0.078108)));
+    p *= p;
+    p *= p;
+    vec2 side = vec2(x.x < 0.0 ? -0.5 : 0.5, x.y < 0.0 ? -0.5 : 0.5);
+    return side.x - side.y - (side.x * p.y - side.y * p.x) / (p.x * p.y);
+}
+
 // Mean excess E[max(Z - z, 0)] of a standard normal variable.
 float normal_excess(float z) {
     return 0.39894228 * exp(-0.5 * z * z) - z * 0.5 * (1.0 - erf_approx(z * SQRT_HALF));
