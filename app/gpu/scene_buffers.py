@@ -162,7 +162,10 @@ class SceneBuffers:
         self._texels.bind()
         self._spectra.use(bindings.UNIT_SPECTRA)
         for binding, buffer in self._buffers.items():
-            buffer.bind_to_storage_buffer(binding)
+            if self._in_storage:
+                buffer.bind_to_storage_buffer(binding)
+            else:
+                buffer.bind_to_uniform_block(binding)
 
     def release(self) -> None:
         """Free buffers and textures."""
@@ -177,10 +180,6 @@ class SceneBuffers:
         """GPU memory held."""
         pixels = (self._texels.texture, 16), (self._spectra, 8)
         return sum(buffer.size for buffer in self._buffers.values()) + sum(t.width * t.height * size for t, size in pixels)
-
-    def _store(self, binding: int, data: np.ndarray) -> None:
-        raw = np.ascontiguousarray(data)
-        self._buffers[binding] = self.ctx.buffer(raw.tobytes()) if raw.nbytes else self.ctx.buffer(reserve=64)
 
     def _pack_geometry(self) -> None:
         corners, owner, source, normals = [], [], [], []
@@ -206,8 +205,13 @@ class SceneBuffers:
         for record, values in zip(solid_records, solids, strict=True):
             record["first_plane"], record["plane_count"], record["object"], _ = values
         self.solid_count = len(solids)
-        self._store(bindings.SOLIDS, solid_records)
-        self._store(bindings.PLANES, np.concatenate(planes).astype("f4") if planes else np.zeros((1, 4), "f4"))
+        all_planes = np.concatenate(planes).astype("f4") if planes else np.zeros((0, 4), "f4")
+        self.defines["PLANE_COUNT"] = len(all_planes)
+        self._in_storage = max(all_planes.nbytes, solid_records.nbytes) > self.ctx.info["GL_MAX_UNIFORM_BLOCK_SIZE"]
+        if self._in_storage:
+            self.defines["SOLIDS_IN_STORAGE"] = 1
+        if planes:
+            self._buffers = {bindings.SOLIDS: self.ctx.buffer(solid_records), bindings.PLANES: self.ctx.buffer(all_planes)}
 
         self.triangle_count = sum(len(c) for c in corners)
         if not corners:

@@ -74,7 +74,8 @@ void try_triangle(uint slot, vec3 origin_p, vec3 direction, RayOrigin origin, in
     float distance = -dot(to_origin, normal) * inverse;
     float key = crossing_key(distance, facing);
     float edge = sqrt(max(dot(facet.edge1, facet.edge1), dot(facet.edge2, facet.edge2)));
-    float slack = EDGE_ERROR * edge * (sqrt(dot(to_origin, to_origin)) + edge) * abs(inverse);
+    // Of a facet seen edge-on the bound says nothing any more: no hit lies far outside it.
+    float slack = min(EDGE_ERROR * edge * (sqrt(dot(to_origin, to_origin)) + edge) * abs(inverse), 0.1);
     // Comparisons are written so that NaN (an edge-on or degenerate triangle) fails them.
     bool inside = u >= -slack && v >= -slack && u + v <= 1.0 + 2.0 * slack && key < best_key && slot != origin.primitive;
     if (inside && accept_hit(distance, facing, facet.object, origin)) {
@@ -211,9 +212,6 @@ bool intersect_closest(vec3 origin_p, vec3 direction, float far, RayOrigin origi
         Triangle facet = hit_triangle(hit);
         hit.object = facet.object;
         hit.normal_g = normalize(cross(facet.edge1, facet.edge2));
-        // A hit within the edges' slack is moved onto the facet.
-        hit.bary.x = clamp(hit.bary.x, 0.0, 1.0);
-        hit.bary.y = clamp(hit.bary.y, 0.0, 1.0 - hit.bary.x);
     }
 #endif
 #ifdef CONVEX_SOLIDS

@@ -20,8 +20,14 @@ layout(binding = UNIT_SCENE) uniform usampler2D scene_texels;
 // One spectral table a row; a texel holds two neighbouring samples.
 layout(binding = UNIT_SPECTRA) uniform sampler2D spectra;
 #ifdef CONVEX_SOLIDS
-layout(std430, binding = BIND_SOLIDS) readonly restrict buffer Solids { Solid solids[]; };
-layout(std430, binding = BIND_PLANES) readonly restrict buffer Planes { vec4 planes[]; };
+// Every ray walks through the same planes: constants to all, where they fit a uniform block.
+#ifdef SOLIDS_IN_STORAGE
+layout(std430, binding = BIND_SOLIDS) readonly restrict buffer Solids { Solid solids[SOLID_COUNT]; };
+layout(std430, binding = BIND_PLANES) readonly restrict buffer Planes { vec4 planes[PLANE_COUNT]; };
+#else
+layout(std140, binding = BIND_SOLIDS) uniform Solids { Solid solids[SOLID_COUNT]; };
+layout(std140, binding = BIND_PLANES) uniform Planes { vec4 planes[PLANE_COUNT]; };
+#endif
 #endif
 
 uvec4 scene_texel(uint i)

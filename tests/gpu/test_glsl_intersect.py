@@ -63,7 +63,7 @@ def nearest(triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray, 
 class Shaders:
     """`intersect_closest` over one list of triangles."""
 
-    def __init__(self, gl, triangles: np.ndarray, tree: bool, defines: dict[str, int] | None = None, buffers: dict | None = None) -> None:
+    def __init__(self, gl, triangles: np.ndarray, tree: bool, defines: dict[str, int] | None = None, buffers: dict | None = None, binders: tuple = ()) -> None:
         self.ctx = gl.ctx
         built = bvh.build_bvh(triangles.astype(np.float32), use_cache=False)
         self.order = built.order if tree else np.arange(len(triangles), dtype=np.int32)
@@ -74,6 +74,7 @@ class Shaders:
         records["normals"], records["source"] = NONE, self.order
         self.texels = SceneTexels(gl.ctx, {"TREE": tree_texels(built.nodes), "TRIANGLES": records, "OBJECTS": OBJECT.zeros(1)})
         self.buffers = buffers or {}
+        self.binders = [self.texels.bind, *binders]
         chosen = {"HAS_TREE": 1, "LOOSE_TRIANGLES": 1, "TREE_STACK": bvh.MAX_DEPTH} if tree else {"LOOSE_TRIANGLES": 1}
         if defines is not None:
             chosen = defines
@@ -89,7 +90,7 @@ class Shaders:
             "from_object": np.full(count, NONE if slots is None else 0, np.uint32),
             "inside": np.full(count, inside, np.uint32),
         }
-        return evaluate(self.ctx, ["lib/intersect.glsl"], BODY, inputs, OUTPUTS, self.defines, SCENE_STRUCTS, self.buffers, [self.texels.bind])
+        return evaluate(self.ctx, ["lib/intersect.glsl"], BODY, inputs, OUTPUTS, self.defines, SCENE_STRUCTS, self.buffers, self.binders)
 
 
 def rays(count: int, seed: int, spread: float = 2.0) -> tuple[np.ndarray, np.ndarray]:
@@ -166,7 +167,8 @@ def test_a_ray_does_not_meet_the_surface_it_leaves(gl, grazing_deg: float) -> No
     assert (shaders.closest(start, outward, slots, inside=0)["distance"] < 0).all()  # convex: nothing outside
 
 
-def test_half_spaces_equal_the_triangles_of_a_cube(gl) -> None:
+@pytest.mark.parametrize("in_storage", [False, True], ids=["uniform", "storage"])
+def test_half_spaces_equal_the_triangles_of_a_cube(gl, in_storage: bool) -> None:
     axes = np.concatenate([np.eye(3), -np.eye(3)])
     planes = np.column_stack([axes, np.full(6, 0.5)]).astype(np.float32)
     faces = []
@@ -178,7 +180,14 @@ def test_half_spaces_equal_the_triangles_of_a_cube(gl) -> None:
     cube = as_f32(np.array(faces))
     solid = SOLID.zeros(1)
     solid["plane_count"] = 6
-    shaders = Shaders(gl, cube, tree=False, defines={"CONVEX_SOLIDS": 1, "SOLID_COUNT": 1}, buffers={bindings.SOLIDS: solid, bindings.PLANES: planes})
+    defines = {"CONVEX_SOLIDS": 1, "SOLID_COUNT": 1, "PLANE_COUNT": 6}
+    blocks = {bindings.SOLIDS: solid, bindings.PLANES: planes}
+    if in_storage:
+        shaders = Shaders(gl, cube, tree=False, defines=defines | {"SOLIDS_IN_STORAGE": 1}, buffers=blocks)
+    else:
+        held = {binding: gl.ctx.buffer(block) for binding, block in blocks.items()}
+        binders = tuple(lambda b=binding, h=buffer: h.bind_to_uniform_block(b) for binding, buffer in held.items())
+        shaders = Shaders(gl, cube, tree=False, defines=defines, binders=binders)
     origins, directions = rays(1500, 6, spread=1.5)
     got = shaders.closest(origins, directions)
     want, _ = nearest(cube, origins, directions)
