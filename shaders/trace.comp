@@ -1,6 +1,6 @@
 // One specular event for every ray in flight: to the nearest surface, then reflection and
 // refraction with all derivative columns. A ray leaves at most two children (or one photon on a
-// receiver) in slots of its own; `compact_*.comp` list the living ones in order for the next call, so
+// receiver) in slots of its own; `queue_*.comp` list the living ones in order for the next call, so
 // results do not depend on how threads were scheduled.
 layout(local_size_x = 64) in;
 
