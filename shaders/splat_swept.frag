@@ -15,9 +15,12 @@ layout(binding = 0) uniform sampler2DArray spectra;
 layout(location = 0) out vec4 deposited[TARGETS];
 
 void main() {
+    float share = gaussian_box_fast(at.x, shape.x);
+#ifdef EDGE
     // Clip distances would do, but llvmpipe loses triangles that two of them cut.
     bvec4 within = bvec4(greaterThan(gl_FragCoord.xy, rect.xy), lessThan(gl_FragCoord.xy, rect.zw));
-    float share = !all(within) ? 0.0 : gaussian_box_fast(at.x, shape.x);
+    share = all(within) ? share : 0.0;
+#endif
 #ifdef POINT_SPECTRUM
     // No sweep: a Gaussian cut at three standard deviations, which holds 0.9973 of it.
     share *= 1.20011 * exp(-4.5 * at.y * at.y);

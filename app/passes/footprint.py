@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from app.gpu.splat_tables import SplatTables
 
 WORKGROUP = 64
-VERTICES = (3, 6, 6)
-"""Per splat of the small, swept and cut class."""
+VERTICES = (3, 6, 6, 6)
+"""Per splat of kinds 1 to 4."""
 
 SPLAT = Struct(
     "SplatRecord",
@@ -36,7 +36,7 @@ SPLAT = Struct(
         Field("y_edge", "float", "swept: across half extent, units of sqrt(2) standard deviations"),
         Field("y_box", "float", "swept: half width of the texel across, same units"),
         Field("layer", "uint", "first layer of the spectral tables"),
-        Field("kind", "uint", "0 nothing, 1 small, 2 swept, 3 swept with a cut band"),
+        Field("kind", "uint", "0 nothing, 1 small, 2 swept, 3 swept with a cut band, 4 swept over the edge of rect"),
         Field("throughput", "vec4", "anchor, value there, slope below and above it; by xi (cut, point spectrum, small: by x)"),
         Field("x_range", "vec2", "the photon's band, spectral coordinate"),
         Field("xi_half", "float", "half of the band in xi (small: 1 where the band was cut, else 0)"),
@@ -102,8 +102,8 @@ class Footprints:
         self._program = shader.compute(ctx, "footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
         self._outside = ctx.buffer(np.zeros(group, np.float32))
-        self.commands = ctx.buffer(np.zeros(16, np.uint32))
-        """Indirect draws of the small, swept and cut class, five words each; then the dropped footprints."""
+        self.commands = ctx.buffer(np.zeros(21, np.uint32))
+        """Indirect draws of kinds 1 to 4, five words each; then the dropped footprints."""
         self._group = group
         self.slots_per_photon = defines["SLOTS"]
         self.splats = ctx.buffer(reserve=group * self.slots_per_photon * SPLAT.stride)
@@ -138,7 +138,7 @@ class Footprints:
         """Since the last reset: `outside_map_w` (flux of photons whose centre no window holds, W),
         `footprints_dropped` (numbers of photons)."""
         outside = np.frombuffer(self._outside.read(), np.float32).sum(dtype=np.float64)
-        dropped = int(np.frombuffer(self.commands.read(), np.uint32)[15])
+        dropped = int(np.frombuffer(self.commands.read(), np.uint32)[20])
         return {"outside_map_w": float(outside), "footprints_dropped": dropped}
 
     def reset_counts(self) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from app.gpu import shader
 from app.gpu.schema import Field, Struct
-from app.passes.footprint import SPLAT, Footprints, SplatFeatures, splat_defines
+from app.passes.footprint import SPLAT, VERTICES, Footprints, SplatFeatures, splat_defines
 
 if TYPE_CHECKING:
     import moderngl
@@ -53,16 +53,18 @@ class Splatter:
         slots = GROUP * self._footprints.slots_per_photon
         corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(slots, dtype=np.uint32)[:, None]
         self._indices = ctx.buffer(corners)
-        classes = [("splat_small.frag", {"SMALL": 1, "KIND": "1u"}), ("splat_swept.frag", {"SWEPT": 1, "KIND": "2u"})]
+        classes = {
+            1: ("splat_small.frag", {"SMALL": 1}),
+            2: ("splat_swept.frag", {"SWEPT": 1}),
+            4: ("splat_swept.frag", {"SWEPT": 1, "EDGE": 1}),
+        }
         if features.band_cuts and not features.point_spectrum:
-            classes.append(("splat_cut.frag", {"CUT": 1, "KIND": "3u"}))
-        self._draws: list[moderngl.VertexArray] = []
-        for fragment, chosen in classes:
-            program = shader.program(ctx, "splat.vert", fragment, defines | chosen, (SPLAT,))
-            if "SMALL" in chosen:
-                self._draws.append(ctx.vertex_array(program, []))
-            else:
-                self._draws.append(ctx.vertex_array(program, [], index_buffer=self._indices))
+            classes[3] = ("splat_cut.frag", {"CUT": 1})
+        self._draws: dict[int, moderngl.VertexArray] = {}
+        for kind, (fragment, chosen) in sorted(classes.items()):
+            program = shader.program(ctx, "splat.vert", fragment, defines | chosen | {"KIND": f"{kind}u"}, (SPLAT,))
+            corners_shared = VERTICES[kind - 1] == 6
+            self._draws[kind] = ctx.vertex_array(program, [], index_buffer=self._indices if corners_shared else None)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
 
     def run(
@@ -114,9 +116,9 @@ class Splatter:
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_equation = moderngl.FUNC_ADD
         ctx.blend_func = moderngl.ONE, moderngl.ONE
-        # A class that no splat of the group belongs to has no instance.
-        for kind, vertex_array in enumerate(self._draws):
-            vertex_array.render_indirect(self._footprints.commands, moderngl.TRIANGLES, 1, first=kind)
+        # A kind that no splat of the group is of has no instance.
+        for kind, vertex_array in self._draws.items():
+            vertex_array.render_indirect(self._footprints.commands, moderngl.TRIANGLES, 1, first=kind - 1)
         ctx.enable_only(moderngl.NOTHING)
 
     def counts(self) -> dict[str, float]:
@@ -128,7 +130,7 @@ class Splatter:
         self._footprints.reset_counts()
 
     def release(self) -> None:
-        for vertex_array in self._draws:
+        for vertex_array in self._draws.values():
             vertex_array.program.release()
             vertex_array.release()
         self._indices.release()
