@@ -28,7 +28,7 @@ COARSE_TILE_MAX = 768
 MIN_TILE = 32
 LEVEL_STEPS = (1, 4, 16, 64)
 """Texel widths in which every window is kept: broad splats go to the wider ones (footprint.comp)."""
-TEXELS_PER_PIXEL = 1.5
+TEXELS_PER_PIXEL = 2.0
 """Texels along a pixel's side in a fine window: a splat is blurred by half a texel, a picture by its pixel."""
 _QUANTILE = 0.01
 _MARGIN = 0.06
