@@ -11,6 +11,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import numpy as np
+
 from app import cli_options as options
 from app.errors import UserError
 from app.model.scene import Scene
@@ -58,6 +60,9 @@ def render_command(request: RenderRequest) -> int:
 
     scene = load_scene(scene_file)
     settings = _complete(asked, scene, request.stats)
+    # Before the work: who waits for minutes should know what was assumed, and also if it fails.
+    for note in (*scene.notes, *_unused_options(request)):
+        print(f"note: {note}", file=sys.stderr)
 
     from app.renderer import render
 
@@ -71,8 +76,8 @@ def render_command(request: RenderRequest) -> int:
         spectral=result.spectral,
         bin_edges_nm=result.bin_edges_nm,
     )
-    for note in scene.notes:
-        print(f"note: {note}", file=sys.stderr)
+    if not np.isfinite(result.rgb).all():
+        print(f"note: {request.output} holds numbers that are not finite: a power or a size is beyond float32", file=sys.stderr)
     print(_summary(request, settings, result.stats, stopped))
     if request.stats:
         print("\n".join(result.stats.lines()))
@@ -118,6 +123,17 @@ def _complete(asked: dict[str, Any], scene: Scene, stats: bool) -> RenderSetting
     options.check_layer(settings.layer, scene)
     options.check_picture_memory(settings.width, settings.height, settings.bins)
     return settings
+
+
+def _unused_options(request: RenderRequest) -> list[str]:
+    """A sentence for each option that the output's format has no use for."""
+    suffix = request.output.suffix.lower()
+    notes = []
+    if request.bins is not None and suffix != ".exr":
+        notes.append(f"--bins: a {suffix} picture holds no spectral channels; write an .exr to keep them")
+    if request.exposure is not None and suffix != ".png":
+        notes.append(f"--exposure does not change a {suffix} picture, which is linear; it is for .png")
+    return notes
 
 
 def _integer(option: str, low: int, high: int) -> Callable[[str], int]:

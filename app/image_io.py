@@ -41,8 +41,8 @@ def check_suffix(path: Path | str) -> str:
     """The suffix of `path` in lower case; raises `UserError` when no writer knows it."""
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
-        told = f"the suffix '{suffix}'" if suffix else "no suffix"
-        raise UserError(f"cannot write {path}: {told} is not a picture format; use one of {', '.join(SUFFIXES)}")
+        told = f"the suffix '{suffix}' is not a picture format" if suffix else "it has no suffix to tell the picture format"
+        raise UserError(f"cannot write {path}: {told}; use one of {', '.join(SUFFIXES)}")
     return suffix
 
 

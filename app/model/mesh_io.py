@@ -19,6 +19,8 @@ from app.model.mesh_health import weld_map
 from app.model.mesh_raw import RawMesh
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl")
+MAX_COORDINATE = 1e30
+"""As for numbers in a scene file: far enough from where squares and float32 overflow."""
 
 
 def load_mesh(path: str | os.PathLike[str], smooth: bool | float | None = None, name: str | None = None) -> Mesh:
@@ -38,6 +40,8 @@ def load_mesh(path: str | os.PathLike[str], smooth: bool | float | None = None, 
         raise UserError(f"{path}: smooth must be true, false or a crease angle from 0 to 180 degrees, not {smooth:g}")
     raw = _read(path, suffix)
     mesh = make_mesh(name or path.stem, raw.vertices, raw.triangles, raw.corner_normals, raw.uv, str(path))
+    if len(far := np.flatnonzero((np.abs(mesh.vertices) > MAX_COORDINATE).any(axis=1))):
+        raise UserError(f"{path}: vertex {far[0]} lies beyond {MAX_COORDINATE:g} units; export the mesh in larger units")
     if smooth is None:
         return mesh
     if smooth is False:

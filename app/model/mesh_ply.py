@@ -56,6 +56,8 @@ def read_ply(data: bytes, path: str) -> RawMesh:
     if corners is None:
         raise UserError(f"{path}: the PLY header has no faces with vertex_indices; a point cloud cannot be rendered")
     sizes, indices = corners
+    if not len(sizes):
+        raise UserError(f"{path}: the PLY file has no faces; a point cloud cannot be rendered")
     triangles = indices.astype(np.int64)[fan_corners(sizes)]
     vertices = _stack(vertex, ("x", "y", "z"))
     in_range = bool(((triangles >= 0) & (triangles < len(vertices))).all())
@@ -184,7 +186,7 @@ class _BinaryBody:
                     lists[p.name][0].append(size)
                     lists[p.name][1].append(values)
         return {name: np.array(values) for name, values in scalars.items()} | {
-            name: (np.array(sizes), np.concatenate(values)) for name, (sizes, values) in lists.items()
+            name: _joined(sizes, values) for name, (sizes, values) in lists.items()
         }
 
     def finish(self) -> None:
@@ -192,6 +194,11 @@ class _BinaryBody:
         rest = len(self._data) - self._at
         if self._data[self._at :].strip():
             raise UserError(f"{self._path}: {rest} bytes follow what the PLY header promises; export the mesh again")
+
+
+def _joined(sizes: list[int], parts: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Lists of all rows one after another; an element may well have no rows."""
+    return np.array(sizes, np.int64), np.concatenate(parts) if parts else np.zeros(0)
 
 
 class _AsciiBody:
@@ -246,7 +253,7 @@ class _AsciiBody:
                 at += size
         self._at = at
         return {name: np.array(column) for name, column in scalars.items()} | {
-            name: (np.array(sizes), np.concatenate(parts)) for name, (sizes, parts) in lists.items()
+            name: _joined(sizes, parts) for name, (sizes, parts) in lists.items()
         }
 
     def finish(self) -> None:

@@ -61,6 +61,8 @@ def _read_toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except tomllib.TOMLDecodeError as error:
         raise UserError(f"{path.name} is not valid TOML: {error}; texts need quotes and keys one line each") from error
+    except RecursionError as error:
+        raise UserError(f"{path.name} is not a scene: its lists are nested too deeply; see assets/scenes for examples") from error
     except UnicodeDecodeError as error:
         raise UserError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8") from error
     except OSError as error:
@@ -78,7 +80,8 @@ def _scene_from_table(table: SceneTable) -> Scene:
     reader = ObjectReader(materials)
     objects = [item for entry in table.tables("objects") for item in reader.read(entry)]
     if not objects:
-        table.finish("a scene")
+        table.given(("camera", "lights"))
+        table.finish("a scene")  # a misspelt [[object]] is the likelier mistake
         table.fail("objects", "is missing or empty; add at least one [[objects]]")
     notes = list(reader.notes)
     around = surroundings_of(objects)

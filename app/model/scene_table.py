@@ -15,6 +15,9 @@ from app.errors import UserError, nearest_names
 
 Vec3 = tuple[float, float, float]
 
+MAX_MAGNITUDE = 1e30
+"""Largest number in a scene: the renderer's float32 ends at 3e38, and sums need room."""
+
 _REQUIRED: Any = object()
 """Default of a key that has none."""
 
@@ -49,7 +52,9 @@ class SceneTable:
             self._fail_unknown(unknown[0], noun)
 
     def _fail_unknown(self, key: str, noun: str) -> NoReturn:
-        near = nearest_names(key, self._asked, count=1)
+        # Typing errors keep the first letter; what does not ("camera" for "name") is far-fetched.
+        initial = key.casefold()[:1]
+        near = nearest_names(key, [known for known in self._asked if known.casefold().startswith(initial)], count=1)
         if not near and len(key) > 2:  # "fov" for "vertical_fov_deg"
             near = [known for known in sorted(self._asked) if key.casefold() in known.casefold()]
         if near:
@@ -226,6 +231,8 @@ class SceneTable:
             number = math.inf
         if math.isnan(number) or (math.isinf(number) and not infinite):
             self.fail(key, f"is {number} but must be a finite number")
+        if math.isfinite(number) and abs(number) > MAX_MAGNITUDE:
+            self.fail(key, f"is {number:g} but must lie within ±{MAX_MAGNITUDE:g}; choose larger units")
         return number
 
     # -- tables and files -----------------------------------------------------------------
