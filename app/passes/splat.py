@@ -23,8 +23,11 @@ if TYPE_CHECKING:
 
 GROUP = 1 << 15
 """Photons turned to splats and drawn at a time."""
-CHUNK = 1 << 18
-"""Photons between two flushes of the scratch textures; a multiple of GROUP."""
+CHUNK, SMALLEST_CHUNK = 1 << 18, 1 << 11
+"""Photons between two flushes of the scratch textures, at most and at least. The fewer, the less a sum's rounding
+depends on the order in which batches bring the photons."""
+FLUSH_SHARE = 16
+"""Texels of the atlas per photon of a chunk: what flushing may cost, in texels a photon."""
 EXTENT_LIMIT = 8192.0
 """Texels. A footprint axis or a sweep beyond twice the largest map is a numerical accident."""
 
@@ -84,14 +87,16 @@ class Splatter:
         """
         groups = max(self._features.spectral_groups, 1)
         samples = var_table.size // 4 // groups
-        for first in range(0, count, GROUP):
-            part = min(GROUP, count - first)
+        chunk = int(np.clip(atlas.size[0] * atlas.size[1] // FLUSH_SHARE, SMALLEST_CHUNK, CHUNK))
+        group = min(GROUP, chunk)
+        for first in range(0, count, group):
+            part = min(group, count - first)
             self._ctx.memory_barrier()
             self._footprints.run(photons, first, part, var_table, tables, atlas, receivers, smoothing, EXTENT_LIMIT, samples)
             self._ctx.memory_barrier()
             self.draw(tables, atlas)
             atlas.pending += part
-            if atlas.pending >= CHUNK:
+            if atlas.pending >= chunk:
                 atlas.flush()
         error = self._ctx.error
         if error != "GL_NO_ERROR":

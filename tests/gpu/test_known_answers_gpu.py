@@ -113,7 +113,7 @@ def through_ball(height: float, index: Index) -> np.ndarray:
 
 @pytest.mark.parametrize("nm", [F_NM, D_NM, C_NM])
 def test_t4_ball_lens(gl, nm: float) -> None:
-    ball = ball_mesh(81_920)
+    ball = ball_mesh(327_680)
     photons = trace_beam(gl, ball, glass("N-BK7"), screen([1.2, 0, 0], [1, 0, 0]), [-3, 0, 0], [1, 0, 0], 0.85, nm, count=600).of_depth(2)
     index = Index(float(glasses.index("N-BK7", nm)))
     height = np.linalg.norm(photons.start[:, 1:], axis=1)
@@ -121,8 +121,8 @@ def test_t4_ball_lens(gl, nm: float) -> None:
     radial[:, 0] = 0
     exact = np.array([through_ball(h, index) for h in height])
     assert len(height) > 400 and height.max() > 0.84
-    # The facets of 80k triangles are 0.01 wide: second order leaves 1e-4.
-    assert np.abs(dot(photons.position, radial) - exact[:, 0, 1]).max() < 1.5e-4
+    # The facets of 330k triangles are 0.005 wide: second order leaves 5e-5.
+    assert np.abs(dot(photons.position, radial) - exact[:, 0, 1]).max() < 1e-4
     assert np.median(np.abs(dot(photons.position, radial) - exact[:, 0, 1])) < 5e-5
     spectral = np.abs(dot(photons.dposition_dn, radial) - exact[:, 1, 1])
     assert np.median(spectral / np.abs(exact[:, 1, 1])) < 2e-3 and spectral.max() < 0.02
@@ -182,7 +182,8 @@ def test_t14_prism_spectrum_on_a_screen(gl, name: str, x_mm: tuple[float, ...], 
     for i, nm in enumerate((400.0, 500.0, 600.0, 700.0)):
         heading, dheading_dn = across_prism(gl, name, incidence, nm, around=straight)
         off = straight - heading
-        assert 1000 * np.median(np.tan(off)) == pytest.approx(x_mm[i], rel=1e-4)
+        # Near the axis 1e-4 of so small an angle is below what float32 holds: 1e-6 rad.
+        assert 1000 * np.median(np.tan(off)) == pytest.approx(x_mm[i], rel=1e-4, abs=1e-3)
         assert np.abs(1000 * np.tan(off) - x_mm[i]).max() < 5e-3  # each photon's angle to 5e-6 rad
         if dnm_dmm:
             dmm_dnm = -dheading_dn * glasses.slope(name, nm) / np.cos(off) ** 2
@@ -231,7 +232,7 @@ def test_whole_paths_against_the_reference_over_the_same_triangles(gl, kind: str
     )
     seeds = [*orthonormal_frame(direction), np.zeros(3)]
     index = Index(float(glasses.index("F2", D_NM)), np.array([0.0, 0.0, 1.0]))
-    flux_w = photons.tally.emitted / photons.lattice_in_disc
+    flux_w = photons.flux_w
     agreeing = 0
     for i, record in enumerate(photons.records):
         path = trace(make_ray(photons.start[i], direction, seeds), scene, [index], mirrored_at)

@@ -1,0 +1,190 @@
+"""The whole pipeline: energy closes, batches and order do not matter, frames and scales do not matter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.model.mesh import make_mesh
+from app.model.scene import Scene
+from app.model.scene_file import load_scene
+from app.model.settings import METHODS, RenderSettings
+from app.model.spectrum import Spectrum
+from app.paths import assets_dir
+from app.renderer import render
+
+SCENES = sorted(p.stem for p in (assets_dir() / "scenes").glob("*.toml"))
+SMALL = RenderSettings(width=96, height=54, photons=20_000, spp=2)
+
+PRISM = """
+[camera]
+position = [0.5, -4.0, 3.0]
+target = [0.8, 0.0, 0.0]
+[[lights]]
+kind = "spot"
+position = [-6.0, 0.3, 4.0]
+target = [0.0, 0.0, 1.0]
+half_angle_deg = 6.0
+intensity_cd = 1000.0
+[[objects]]
+name = "glass"
+shape = "{shape}"
+glass = "N-SF11"
+position = [0.0, 0.0, 1.0]
+[[objects]]
+name = "table"
+shape = "plane"
+width = 12.0
+height = 12.0
+material = {{ kind = "diffuse", colour = 0.8 }}
+"""
+
+
+def scene_of(tmp_path: Path, shape: str = "prism") -> Scene:
+    file = tmp_path / "scene.toml"
+    file.write_text(PRISM.format(shape=shape))
+    return load_scene(file)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_flux_closes_in_every_shipped_scene(gl, name: str) -> None:
+    result = render(load_scene(assets_dir() / "scenes" / f"{name}.toml"), SMALL, context=gl)
+    assert result.stats.light.tally.emitted > 0.0
+    assert result.stats.light.tally.ended["deposited"] > 0.0
+    assert result.stats.light.tally.imbalance < 1e-4
+    assert result.stats.light.tally.fallbacks["queue_overflow"] == 0
+    assert np.isfinite(result.rgb).all()
+    assert result.rgb.max() > 0.0
+
+
+@pytest.mark.parametrize("shape", ["prism", "sphere"])
+def test_batch_size_does_not_change_the_picture(gl, tmp_path: Path, shape: str) -> None:
+    scene = scene_of(tmp_path, shape)
+    whole = render(scene, replace(SMALL, photons=60_000, batch=65_536), context=gl).rgb
+    split = render(scene, replace(SMALL, photons=60_000, batch=8_192), context=gl).rgb
+    assert np.abs(split - whole).max() <= 1e-6 * np.abs(whole).max()
+
+
+def test_same_seed_same_picture_other_seed_other(gl, tmp_path: Path) -> None:
+    scene = scene_of(tmp_path)
+    first, again, other = (render(scene, replace(SMALL, seed=seed), context=gl).rgb for seed in (3, 3, 4))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+def moved(scene: Scene, matrix: np.ndarray) -> Scene:
+    """Everything under one similarity transform; intensities follow the square of the scale."""
+    scale = np.cbrt(np.linalg.det(matrix[:3, :3]))
+
+    def point(p: tuple[float, float, float]) -> tuple[float, float, float]:
+        return tuple((matrix[:3, :3] @ p + matrix[:3, 3]).tolist())
+
+    def direction(d: tuple[float, float, float]) -> tuple[float, float, float]:
+        return tuple((matrix[:3, :3] @ d / scale).tolist())
+
+    camera = replace(scene.camera, position=point(scene.camera.position), target=point(scene.camera.target), up=direction(scene.camera.up))
+    lights = tuple(
+        replace(
+            light,
+            position=point(light.position),
+            direction=direction(light.direction),
+            spectral_power=Spectrum(light.spectral_power.density * scale**2, light.spectral_power.lines),
+        )
+        for light in scene.lights
+    )
+    objects = tuple(replace(o, object_to_world=matrix @ o.object_to_world) for o in scene.objects)
+    return replace(scene, camera=camera, lights=lights, objects=objects)
+
+
+def turn(axis: tuple[float, float, float], degrees: float) -> np.ndarray:
+    a = np.asarray(axis, float) / np.linalg.norm(axis)
+    k = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+    angle = np.radians(degrees)
+    matrix = np.eye(4)
+    matrix[:3, :3] += np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+    return matrix
+
+
+def placed(scale: float = 1.0, offset: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> np.ndarray:
+    matrix = np.diag([scale, scale, scale, 1.0])
+    matrix[:3, 3] = offset
+    return matrix
+
+
+@pytest.mark.parametrize(
+    ("matrix", "tolerance"),
+    [
+        (placed(scale=1e4), 0.01),
+        (placed(scale=1e-4), 0.01),
+        (placed(offset=(1e4, -1e4, 1e4)), 0.02),
+        (turn((1.0, 2.0, 0.5), 71.0), 0.06),
+    ],
+    ids=["scale 1e4", "scale 1e-4", "offset 1e4", "turned"],
+)
+def test_frame_and_scale_do_not_matter(gl, tmp_path: Path, matrix: np.ndarray, tolerance: float) -> None:
+    scene = scene_of(tmp_path)
+    settings = replace(SMALL, photons=100_000, spp=4)
+    before = render(scene, settings, context=gl).rgb.astype(float)
+    after = render(moved(scene, matrix), settings, context=gl).rgb.astype(float)
+    assert np.sqrt(np.sum((after - before) ** 2) / np.sum(before**2)) < tolerance
+    assert after.sum() == pytest.approx(before.sum(), rel=0.005)
+
+
+def test_order_of_objects_does_not_matter(gl, tmp_path: Path) -> None:
+    scene = scene_of(tmp_path, "sphere")
+    before = render(scene, SMALL, context=gl).rgb
+    after = render(replace(scene, objects=scene.objects[::-1]), SMALL, context=gl).rgb
+    # Facets are met in another order, so hits on an edge may fall to the neighbour.
+    assert np.abs(after - before).max() <= 1e-3 * np.abs(before).max()
+
+
+def test_subdividing_a_flat_face_does_not_matter(gl, tmp_path: Path) -> None:
+    """The same prism in four times the triangles is the same intersection of half-spaces, and as a soup the same solid."""
+    scene = scene_of(tmp_path)
+    glass = scene.objects[0]
+    fine = replace(glass, mesh=subdivided(glass.mesh))
+    before = render(scene, SMALL, context=gl).rgb
+    after = render(replace(scene, objects=(fine, *scene.objects[1:])), SMALL, context=gl).rgb
+    assert np.abs(after - before).max() <= 1e-3 * np.abs(before).max()
+
+
+def subdivided(mesh):
+    corners = mesh.corners()
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+    parts = np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    vertices, index = np.unique(parts.reshape(-1, 3).round(12), axis=0, return_inverse=True)
+    return make_mesh(mesh.name, vertices, index.reshape(-1, 3))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_methods_agree_on_energy(gl, tmp_path: Path, method: str) -> None:
+    scene = scene_of(tmp_path)
+    settings = replace(SMALL, photons=60_000, layer="caustic")
+    truth = render(scene, settings, context=gl).rgb.sum()
+    assert render(scene, replace(settings, method=method), context=gl).rgb.sum() == pytest.approx(truth, rel=0.03)
+
+
+def test_map_layer_and_bins(gl, tmp_path: Path) -> None:
+    scene = scene_of(tmp_path)
+    settings = replace(SMALL, photons=60_000, layer="map:table", width=128, height=128)
+    xyz = render(scene, settings, context=gl)
+    bins = render(scene, replace(settings, bins=8), context=gl)
+    assert xyz.rgb.shape == (128, 128, 3)
+    assert bins.spectral is not None and bins.spectral.shape == (128, 128, 8)
+    assert len(bins.bin_edges_nm) == 9
+    assert bins.rgb.sum() == pytest.approx(xyz.rgb.sum(), rel=0.05)
+
+
+def test_a_stop_keeps_what_is_done(gl, tmp_path: Path) -> None:
+    """Asked to stop at once, a rendering still is a complete (coarser) picture of the right brightness."""
+    scene = scene_of(tmp_path)
+    settings = replace(SMALL, photons=200_000, batch=8_192)
+    full = render(scene, settings, context=gl)
+    part = render(scene, settings, context=gl, cancelled=lambda: True)
+    assert part.stats.photons < 0.3 * full.stats.photons
+    assert part.rgb.sum() == pytest.approx(full.rgb.sum(), rel=0.03)
+
