@@ -54,6 +54,9 @@ def _reserve(target: Path) -> Path:
     """Create an empty temporary file beside `target`, with the permissions umask gives."""
     if os.path.isdir(target):  # unlike Path.is_dir, silent about a name that is too long
         raise _refusal(target, IsADirectoryError(errno.EISDIR, "Is a directory"))
+    if os.path.exists(target) and not os.path.isfile(target):
+        # A rename would put a file where a device or a pipe was.
+        raise UserError(f"cannot write {target}: it is a device or a pipe; give the name of an ordinary file")
     # Bounded, so that a target name near the file system's 255 bytes still has a neighbour.
     stem = target.stem.encode()[:100].decode(errors="ignore")
     temporary = _real(target).with_name(f".{stem}.{secrets.token_hex(4)}.part{target.suffix}")

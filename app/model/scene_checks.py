@@ -6,13 +6,17 @@ import numpy as np
 
 from app.errors import UserError
 from app.model.scene import Dielectric, Diffuse, Light, Scene, SceneObject
+from app.model.scene_defaults import bounds_of
+
+MAX_SIZE_RATIO = 1e12
+"""Largest to smallest object."""
 
 
 def check_scene(scene: Scene, file_name: str) -> list[str]:
     """Notes about `scene`; raises UserError for one that cannot give a picture.
 
-    Errors: no objects, no light, no receiver, a light inside glass, a laser line outside a
-    glass's data. Notes: glasses whose data are clamped, or unusual.
+    Errors: no objects, no light, no receiver, objects of absurdly different size, a light
+    inside glass, a laser line outside a glass's data. Notes: glasses whose data are clamped, or unusual.
     """
     if not scene.objects:
         raise UserError(f"{file_name}: the scene holds no objects; add one with [[objects]]")
@@ -23,6 +27,7 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
             f"{file_name}: nothing receives the light; add a diffuse object, "
             'such as [[objects]] shape = "plane", material = "diffuse"'
         )
+    _check_sizes(scene, file_name)
     glasses = [o for o in scene.objects if isinstance(o.material, Dielectric)]
     for light in scene.lights:
         if light.kind != "directional":
@@ -49,6 +54,17 @@ def contains(item: SceneObject, point: np.ndarray) -> bool:
     )
     winding = np.arctan2(triple, denominator).sum() / (2.0 * np.pi)
     return bool(abs(winding) > 0.5)
+
+
+def _check_sizes(scene: Scene, file_name: str) -> None:
+    """Refuse an object that float32 cannot tell from a point beside the others (a slip of units)."""
+    sizes = {o.name: float(np.linalg.norm(np.subtract(*bounds_of([o])))) for o in scene.objects}
+    small, large = min(sizes, key=sizes.__getitem__), max(sizes, key=sizes.__getitem__)
+    if sizes[small] * MAX_SIZE_RATIO < sizes[large]:
+        raise UserError(
+            f"{file_name}: object '{small}' is {sizes[small]:.2g} units large and '{large}' {sizes[large]:.2g}, "
+            "too different to be computed together; check the units of their sizes and scales"
+        )
 
 
 def _check_outside(light: Light, glasses: list[SceneObject], file_name: str) -> None:

@@ -18,6 +18,8 @@ from app.model.spectrum import read_csv
 KINDS = ("glass", "mirror", "diffuse", "black")
 DEFAULT_GLASS = "N-BK7"
 MAX_PRIORITY = 1_000_000
+MAX_ATTENUATION = 1e15
+"""Per scene unit; float32 holds it in any unit the renderer may choose."""
 
 _INDEX_KEYS = ("glass", "n_d", "sellmeier", "cauchy", "formula", "table", "csv")
 _FITS_WITH_RANGE = ("sellmeier", "cauchy", "formula")
@@ -180,6 +182,8 @@ def _read_absorption(table: SceneTable) -> Absorption | None:
             alpha = -np.log(transmittance) / distance
     if alpha.min() < 0.0:
         inner.fail("coefficient", "is negative somewhere; glass cannot amplify light")
+    if alpha.max() > MAX_ATTENUATION:
+        inner.fail("distance", f"makes the glass opaque within {1.0 / MAX_ATTENUATION:g} units; use material = \"black\" for that")
     inner.finish("absorption")
     return Absorption(alpha)
 
