@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -52,7 +53,8 @@ def render_command(request: RenderRequest) -> int:
     asked = _parse(request)
     check_suffix(request.output)
     scene_file = options.find_scene(request.scene)
-    if request.output.exists() and request.output.samefile(scene_file):
+    # os.path.exists, unlike Path.exists, is silent about a name that is too long.
+    if os.path.exists(request.output) and request.output.samefile(scene_file):
         raise UserError(f"cannot write {request.output}: it is the scene itself; choose another name")
     check_writable(request.output)
 

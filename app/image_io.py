@@ -74,7 +74,9 @@ def write_image(
             _write_exr(temporary, rgb, _spectral_channels(rgb, spectral, bin_edges_nm), bin_edges_nm, metadata)
         else:
             with temporary.open("wb") as file:
-                np.save(file, rgb)
+                # Not np.save: the error of its tofile does not say that the disk is full.
+                np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(rgb))
+                file.write(rgb.data)
 
 
 def read_image(path: Path | str) -> Picture:
