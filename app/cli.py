@@ -37,8 +37,8 @@ def run(arguments: Sequence[str]) -> int:
     """Run one command line; returns the exit code. Raises `UserError` for wrong usage."""
     try:
         code = app(args=list(arguments) or ["--help"], prog_name="spectrasplat", standalone_mode=False)
-    except typer.Abort:
-        return 130
+    except typer.Abort as abort:  # what click makes of Ctrl-C
+        raise KeyboardInterrupt from abort
     except Exception as error:
         # click's usage errors; typer has moved click inside itself, so there is no one class to name.
         if not hasattr(error, "format_message"):
