@@ -20,8 +20,10 @@ from app.passes.map_layout import Landings
 from app.passes.trace import Band, LatticeSlice, TracePass
 
 PHOTONS = 4096
-PLACES = (0.02, 0.25, 0.5, 0.75, 0.98)
+PLACES = (0.02, 0.25, 0.75, 0.98)
 """Spectral coordinates traced one by one."""
+MAX_DEPTH = 12
+"""Specular events of a pilot photon: what comes after them is too faint to fit anything to."""
 RIM = ((1.0, 0.5), (0.5, 1.0))
 """Places on an extended light, its middle being (0.5, 0.5)."""
 BAND_TOLERANCE = 0.25
@@ -58,7 +60,7 @@ def run_pilot(trace: TracePass, scene: Scene, light: int, domain: EmissionDomain
 
     def traced(band: Band, place: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
         piece = LatticeSlice(light, (band,), count, 0, 1, count, (0, 0), (0, 0), 0, 1, light_place=place)
-        batch = trace.run(piece, domain)
+        batch = trace.run(piece, domain, MAX_DEPTH)
         raw = trace.photons.read(size=batch.photons * trace.photon.stride) if batch.photons else b""
         return np.frombuffer(raw, trace.photon.dtype)
 
@@ -102,7 +104,7 @@ class PilotFit:
         errors, weights = [], []
         for place, record in zip(PLACES, self.pilot.spectral, strict=True):
             mine, theirs = same_paths(whole, record)
-            if abs(place - 0.5) < 0.2 or not len(mine):
+            if not len(mine):
                 continue
             predicted = mine["position"] + self._sweep(mine, place)
             miss = np.linalg.norm(predicted - theirs["position"], axis=1)

@@ -172,11 +172,14 @@ class TracePass:
         """Flattened source of the programs that run (for `inspect` and tests)."""
         return {"trace.comp": shader.load_source("trace.comp", self._defines, (*self._structs, records.TRACE_PARAMETERS)).text}
 
-    def run(self, piece: LatticeSlice, domain: EmissionDomain) -> Batch:
-        """Trace `piece.count` ≤ batch lattice points; their photons replace the buffer's content."""
+    def run(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int | None = None) -> Batch:
+        """Trace `piece.count` ≤ batch lattice points; their photons replace the buffer's content.
+
+        `max_depth`: specular events, by default the pass's own."""
+        max_depth = self.max_depth if max_depth is None else min(max_depth, self.max_depth)
         if piece.count > self.batch:
             raise ValueError(f"{piece.count} lattice points in a batch of {self.batch}")
-        self._start(piece, domain)
+        self._start(piece, domain, max_depth)
         ctx = self.context.ctx
         self.scene.bind()
         self._bind_queue(0)
@@ -189,7 +192,7 @@ class TracePass:
         self._trace_parameters.bind_to_uniform_block(bindings.PARAMETERS)
 
         # Walking through covered surfaces and cutting bands take steps without being events.
-        limit = 2 * self.max_depth + 32
+        limit = 2 * max_depth + 32
         step, alive = 0, emitted
         while alive and step < limit:
             if step == limit - 1:
@@ -207,7 +210,7 @@ class TracePass:
         photons = int(state["photon_first"]) + int(state["photons_new"])
         return Batch(photons, emitted, self._tally(int(state["overflow"])), step)
 
-    def _start(self, piece: LatticeSlice, domain: EmissionDomain) -> None:
+    def _start(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int) -> None:
         state = self._state_zero.copy()
         state["alive"] = piece.count
         state["dispatched"] = piece.count
@@ -232,7 +235,7 @@ class TracePass:
         p["light"], p["stride"] = piece.light, piece.stride
         p["mask"] = np.packbits(domain.mask.ravel(), bitorder="little").view("<u4")
         self._emit_parameters.write(p.tobytes())
-        self._write_trace_parameters(piece, self.max_depth)
+        self._write_trace_parameters(piece, max_depth)
 
     def _write_trace_parameters(self, piece: LatticeSlice, max_depth: int) -> None:
         p = records.TRACE_PARAMETERS.zeros(1)
