@@ -11,14 +11,30 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer.core import TyperGroup
 
 from app import __version__
 from app import cli_options as options
 from app.errors import UserError
 from app.model.settings import METHODS
 
+
+class _Interrupted(Exception):
+    """Ctrl-C, carried past typer, some of whose versions turn it silently into an exit code."""
+
+
+class _Program(TyperGroup):
+    def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override]
+        """Run the command."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as interrupt:
+            raise _Interrupted from interrupt
+
+
 app = typer.Typer(
     name="spectrasplat",
+    cls=_Program,
     add_completion=False,
     pretty_exceptions_enable=False,
     no_args_is_help=False,
@@ -37,8 +53,8 @@ def run(arguments: Sequence[str]) -> int:
     """Run one command line; returns the exit code. Raises `UserError` for wrong usage."""
     try:
         code = app(args=list(arguments) or ["--help"], prog_name="spectrasplat", standalone_mode=False)
-    except typer.Abort as abort:  # what click makes of Ctrl-C
-        raise KeyboardInterrupt from abort
+    except _Interrupted as interrupted:
+        raise KeyboardInterrupt from interrupted
     except Exception as error:
         # click's usage errors; typer has moved click inside itself, so there is no one class to name.
         if not hasattr(error, "format_message"):
