@@ -12,6 +12,8 @@
 // Distances below this (GPU units) are suspect: the same surface met again, or two that touch.
 #define NEAR_DISTANCE 3e-5
 #define FAR_DISTANCE 1e30
+// Rays that start farther than this from the middle of the scene are met from nearby.
+#define FAR_START 4.0
 
 struct Hit {
     float distance;
@@ -61,17 +63,20 @@ float crossing_key(float distance, float facing)
 // and sums each. Where two facets share an edge at least one accepts the ray, however small they are.
 #define EDGE_ERROR 5e-7
 
-void try_triangle(uint slot, vec3 origin_p, vec3 direction, RayOrigin origin, inout float best_key, inout Hit hit)
+// Triangles and boxes are met from the point `near_p` of the ray that comes closest to the middle of
+// the scene, `ahead` beyond the ray's own start: a lamp far away then costs no digits, and the
+// slack at edges stays that of the glass, not of the distance.
+void try_triangle(uint slot, vec3 near_p, float ahead, vec3 direction, RayOrigin origin, inout float best_key, inout Hit hit)
 {
     Triangle facet = triangle_at(slot);
-    vec3 to_origin = origin_p - facet.vertex;
+    vec3 to_origin = near_p - facet.vertex;
     vec3 normal = cross(facet.edge1, facet.edge2);
     float facing = dot(direction, normal);
     vec3 q = cross(to_origin, direction);
     float inverse = 1.0 / facing;
     float u = -dot(facet.edge2, q) * inverse;
     float v = dot(facet.edge1, q) * inverse;
-    float distance = -dot(to_origin, normal) * inverse;
+    float distance = ahead - dot(to_origin, normal) * inverse;
     float key = crossing_key(distance, facing);
     float edge = sqrt(max(dot(facet.edge1, facet.edge1), dot(facet.edge2, facet.edge2)));
     // Of a facet seen edge-on the bound says nothing any more: no hit lies far outside it.
@@ -89,25 +94,27 @@ void try_triangle(uint slot, vec3 origin_p, vec3 direction, RayOrigin origin, in
 #ifdef HAS_TREE
 #define LEAF_BIT 0x80000000u
 
-float box_entry(vec3 low, vec3 high, vec3 origin_p, vec3 inverse_direction, float far)
+// Where the ray enters the box, counted from `near_p`; FAR_DISTANCE where it misses.
+float box_entry(vec3 low, vec3 high, vec3 near_p, vec3 inverse_direction, float start, float far)
 {
-    vec3 t0 = (low - origin_p) * inverse_direction, t1 = (high - origin_p) * inverse_direction;
+    vec3 t0 = (low - near_p) * inverse_direction, t1 = (high - near_p) * inverse_direction;
     vec3 tmin = min(t0, t1), tmax = max(t0, t1);
-    float enter = max(max(tmin.x, tmin.y), max(tmin.z, -NEAR_DISTANCE));
-    // The factor makes the slab test conservative in float32 [Ize 2013].
-    float leave = min(min(tmax.x, tmax.y), min(tmax.z, far)) * 1.0000004 + 1e-7;
-    return enter <= leave ? enter : FAR_DISTANCE;
+    float enter = max(max(tmin.x, tmin.y), max(tmin.z, start));
+    float leave = min(min(tmax.x, tmax.y), min(tmax.z, far));
+    // The slack makes the slab test conservative in float32, also behind `near_p` [Ize 2013].
+    return enter <= leave + abs(leave) * 4e-7 + 1e-7 ? enter : FAR_DISTANCE;
 }
 
 // A node is four texels: both children's boxes, then their links. A link is the number of an inner
 // node, or LEAF_BIT | triangles << 28 | first triangle; NONE ends the stack. All rays of a group
 // first go down to a leaf each, then test triangles together: where both sides of a branch
 // are executed, neither kind of step then pays for the other [Aila and Laine 2009].
-void intersect_tree(vec3 origin_p, vec3 direction, RayOrigin origin, bool any_hit, inout float best_key, inout Hit hit)
+void intersect_tree(vec3 near_p, float ahead, vec3 direction, RayOrigin origin, bool any_hit, inout float best_key, inout Hit hit)
 {
     // A zero component would make 0 * inf = NaN on a slab's plane.
     vec3 safe = mix(direction, vec3(1e-20), lessThan(abs(direction), vec3(1e-20)));
     vec3 inverse_direction = 1.0 / safe;
+    float start = -NEAR_DISTANCE - ahead;
     uint stack[TREE_STACK + 1];
     stack[0] = NONE;
     int top = 1;
@@ -116,9 +123,9 @@ void intersect_tree(vec3 origin_p, vec3 direction, RayOrigin origin, bool any_hi
         while (current < LEAF_BIT) {
             uint at = uint(TREE_AT) + 4u * current;
             uvec4 a = scene_texel(at), b = scene_texel(at + 1u), c = scene_texel(at + 2u), links = scene_texel(at + 3u);
-            float far = best_key + NEAR_DISTANCE;
-            float enter0 = box_entry(uintBitsToFloat(a.xyz), uintBitsToFloat(uvec3(a.w, b.xy)), origin_p, inverse_direction, far);
-            float enter1 = box_entry(uintBitsToFloat(uvec3(b.zw, c.x)), uintBitsToFloat(c.yzw), origin_p, inverse_direction, far);
+            float far = best_key + NEAR_DISTANCE - ahead;
+            float enter0 = box_entry(uintBitsToFloat(a.xyz), uintBitsToFloat(uvec3(a.w, b.xy)), near_p, inverse_direction, start, far);
+            float enter1 = box_entry(uintBitsToFloat(uvec3(b.zw, c.x)), uintBitsToFloat(c.yzw), near_p, inverse_direction, start, far);
             bool hit0 = enter0 < FAR_DISTANCE, hit1 = enter1 < FAR_DISTANCE;
             bool swap = enter1 < enter0;
             if (hit0 && hit1) stack[top++] = swap ? links.x : links.y;
@@ -128,7 +135,7 @@ void intersect_tree(vec3 origin_p, vec3 direction, RayOrigin origin, bool any_hi
         if (current == NONE) break;
         uint first = current & 0x0fffffffu, end = first + ((current >> 28u) & 7u);
         for (; first < end; ++first)
-            try_triangle(first, origin_p, direction, origin, best_key, hit);
+            try_triangle(first, near_p, ahead, direction, origin, best_key, hit);
         if (any_hit && hit.primitive != NONE) break;
         current = stack[--top];
     }
@@ -188,11 +195,14 @@ bool intersect(vec3 origin_p, vec3 direction, float far, RayOrigin origin, bool 
     for (uint i = 0u; i < uint(SOLID_COUNT); ++i)
         intersect_solid(i, origin_p, direction, origin, best_key, hit);
 #endif
+    float ahead = -dot(origin_p, direction);
+    ahead = ahead > FAR_START ? ahead : 0.0;
+    vec3 near_p = origin_p + ahead * direction;
 #ifdef HAS_TREE
-    intersect_tree(origin_p, direction, origin, any_hit, best_key, hit);
+    intersect_tree(near_p, ahead, direction, origin, any_hit, best_key, hit);
 #elif defined(LOOSE_TRIANGLES)
     for (uint i = 0u; i < uint(TRIANGLE_COUNT); ++i)
-        try_triangle(i, origin_p, direction, origin, best_key, hit);
+        try_triangle(i, near_p, ahead, direction, origin, best_key, hit);
 #endif
     return hit.primitive != NONE;
 }
