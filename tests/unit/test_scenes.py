@@ -106,15 +106,45 @@ def test_the_achromat_corrects_what_its_singlet_does_not() -> None:
     powers, single = {}, {}
     for line, wavelength in LINES_NM.items():
         n1, n2 = float(crown.index(wavelength)), float(flint.index(wavelength))
-        powers[line] = power_of_lens([(1.4330, 1.0, n1, 0.20), (-1.4330, n1, n2, 0.08), (-25.93, n2, 1.0, 0.0)])
-        single[line] = (n2 - 1.0) / 1.98413
-    assert 1.0 / powers["d"] == pytest.approx(3.2, rel=0.03) and 1.0 / single["d"] == pytest.approx(3.2, rel=1e-4)
+        powers[line] = power_of_lens([(0.92, 1.0, n1, 0.30), (-0.92, n1, n2, 0.08), (-30.0, n2, 1.0, 0.0)])
+        single[line] = (n2 - 1.0) / 1.3021
+    assert 1.0 / powers["d"] == pytest.approx(2.1, rel=0.03) and 1.0 / single["d"] == pytest.approx(2.1, rel=1e-4)
     assert abs(powers["F"] / powers["C"] - 1.0) < 2e-3
     assert single["F"] / single["C"] - 1.0 == pytest.approx(1.0 / 36.366, rel=0.02)
     # The cemented faces share their vertices to the last bit.
     front, back = (set(map(tuple, o.mesh.vertices)) for o in scene.objects[:2])
     assert len(front & back) > 1000
     np.testing.assert_array_equal(scene.objects[0].object_to_world, scene.objects[1].object_to_world)
+
+
+def test_the_ball_shows_its_second_rainbow_and_the_stop_leaves_it_alone() -> None:
+    """Two reflections inside: deviation 2π + 2i − 6r is stationary where sin²i = (9 − n²)/8."""
+    scene = shipped("ball")
+    ball, stop, table = scene.objects
+    n = ball.material.dispersion.n_d
+    height = math.sqrt((9.0 - n * n) / 8.0)
+    assert isinstance(stop.material, Black)
+    assert np.max(np.hypot(*stop.mesh.vertices[:, :2].T)) < height - 0.05 and scene.lights[0].radius > height + 0.05
+    # The stop stands across the beam, on its axis.
+    direction = np.array(scene.lights[0].direction)
+    assert abs(stop.object_to_world[:3, 2] @ direction) == pytest.approx(1.0, abs=1e-6)
+    assert np.linalg.norm(np.cross(stop.object_to_world[:3, 3], direction)) < 1e-2
+    # The comment's angle, and a ring that falls on the table inside the picture's width.
+    deviation = 360.0 + 2.0 * math.degrees(math.asin(height)) - 6.0 * math.degrees(math.asin(height / n))
+    assert 360.0 - deviation == pytest.approx(41.4, abs=0.3)
+    assert table.object_to_world[2, 3] == pytest.approx(-1.001)
+
+
+def test_the_lenses_colours_cross_in_order_on_the_table() -> None:
+    """f = R/(n − 1), and the beam's upper edge comes down well behind the last focus."""
+    scene = shipped("lens")
+    glass, light = scene.objects[0].material.dispersion, scene.lights[0]
+    foci = {line: 1.3 / (float(glass.index(nm)) - 1.0) for line, nm in LINES_NM.items()}
+    assert foci["F"] < foci["d"] < foci["C"] and foci["d"] == pytest.approx(1.41, abs=0.005)
+    assert (foci["C"] - foci["F"]) / foci["d"] == pytest.approx(1.0 / 20.9, rel=0.05)
+    dx, _, dz = light.direction
+    top_at_lens = light.position[2] + 0.375 * dx - (light.position[0] + 0.375 * dz) / dx * dz
+    assert top_at_lens * dx / -dz > 2.0 * foci["C"]
 
 
 def test_the_amici_prism_lets_yellow_through_straight() -> None:
