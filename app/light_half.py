@@ -27,7 +27,7 @@ from app.model.spectral_tables import SpectralAxis
 from app.passes.accumulate import LevelsFold, SeamFold, copy_texture
 from app.passes.emission_domain import EmissionDomain, emission_domain
 from app.passes.map_layout import MapLayout, check_map_receiver, layout_maps
-from app.passes.pilot import Pilot, PilotFit, landings_of, run_pilot
+from app.passes.pilot import Pilot, PilotFit, has_extent, landings_of, run_pilot
 from app.passes.splat import Splatter
 from app.passes.trace import Band, Batch, FluxTally, LatticeSlice, TracePass
 
@@ -151,7 +151,7 @@ class LightHalf:
         if not self.plans:
             return True
         counts = [self._lattice_count(plan, photons) for plan in self.plans]
-        rounds = max(1, *(-(-n * plan.lattices // self.trace.batch) for n, plan in zip(counts, self.plans, strict=True)))
+        rounds = max(-(-n // max(1, self.trace.batch // plan.lattices)) for n, plan in zip(counts, self.plans, strict=True))
         for j in range(rounds):
             go_on = True
             for i, (plan, lattice) in enumerate(zip(self.plans, counts, strict=True)):
@@ -205,10 +205,15 @@ class LightHalf:
             budget = int((self.settings.photons or self.scene.render.photons) * share)
             fit = PilotFit(pilots[i], self._texel_size(), self.buffers.variable_table, self.settings.smoothing, budget)
             bands = self._bands(i, fit)
-            plans.append(LightPlan(i, domains[i], bands, fit.light_points(len(bands)), share))
+            points = fit.light_points(len(bands)) if self.features.footprints else self._scattered_points(i, len(bands), budget)
+            plans.append(LightPlan(i, domains[i], bands, points, share))
             self.stats.bands[self.scene.lights[i].name] = len(bands)
             self.stats.light_points[self.scene.lights[i].name] = plans[-1].light_points
         return plans
+
+    def _scattered_points(self, light: int, bands: int, budget: int) -> int:
+        """Points on an extended light for photons without footprints, which need no lattice of their own."""
+        return min(self.trace.batch // bands, max(1, budget // (16 * bands))) if has_extent(self.scene.lights[light]) else 1
 
     def _bands(self, light: int, fit: PilotFit) -> tuple[Band, ...]:
         power = self.buffers.light_power[light]

@@ -32,7 +32,13 @@ void main()
     vec4 band = p.bands[band_index];
     Outcome outcome = Outcome(0u, 0.0, 0.0, 0.0);
 
-    vec2 unit = lattice_point(point, p.lattice_count, p.shift + sub * uvec2(PLASTIC_1, PLASTIC_2));
+    // Where wavelengths do not part, all bands share one lattice: or its ripple would be coloured.
+#if SPECTRAL_GROUPS > 0
+    uint own_lattice = sub;
+#else
+    uint own_lattice = sub / p.band_count;
+#endif
+    vec2 unit = lattice_point(point, p.lattice_count, p.shift + own_lattice * uvec2(PLASTIC_1, PLASTIC_2));
     uvec2 cell = uvec2(unit * float(MASK_SIZE));
     uint bit = min(cell.y, uint(MASK_SIZE - 1)) * uint(MASK_SIZE) + min(cell.x, uint(MASK_SIZE - 1));
     bool alive = (p.mask[bit >> 5u] & (1u << (bit & 31u))) != 0u;
@@ -82,9 +88,12 @@ void main()
         ray.x_hi = band.y;
         ray.x_anchor = band.z;
 #ifdef RANDOM_WAVELENGTH
-        ray.x_anchor = kronecker(id, 3774877043u, p.shift_spectral);
+        // Uniform over the band; a laser's band has no width, and its photons all have its wavelength.
+        ray.x_anchor = mix(band.x, band.y, kronecker(id, 3774877043u, p.shift_spectral));
         ray.x_lo = ray.x_anchor;
         ray.x_hi = ray.x_anchor;
+        float width = band.y - band.x;
+        ray.throughput *= width > 0.0 ? width : 1.0;
 #endif
         ray.survival = 1.0;
         ray.photon_id = id;

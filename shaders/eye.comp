@@ -91,11 +91,12 @@ void add_diffuse(EyePath path, Hit hit, vec3 position, uint pixel_key, inout vec
     uint placement;
     vec2 texel;
     if (find_texel(receiver, source, position, placement, texel)) {
-        // A pixel covers an area of (pixel size)² / cosine.
-        float pixel = (p.pixel_size + p.pixel_angle * (path.travelled + hit.distance)) * inversesqrt(max(abs(facing), 1e-3));
-        bool bilinear = texel_size(placement) > pixel;
+        float pixel = p.pixel_size + p.pixel_angle * (path.travelled + hit.distance);
+        // Texels larger than pixels are interpolated, smaller ones weighed by their share of the sample.
+        bool magnified = texel_size(placement) > pixel * inversesqrt(max(abs(facing), 1e-3));
+        vec2 box = magnified ? vec2(1.0) : texel_box(placement, path.direction, hit.normal_g, p.sample_side * pixel);
         for (int t = 0; t < TARGETS; ++t)
-            irradiance[t] = p.map_scale * map_to_channels(caustic_irradiance(t, placement, texel, bilinear));
+            irradiance[t] = p.map_scale * map_to_channels(caustic_irradiance(t, placement, texel, box));
     }
 #ifdef LAYER_BEAUTY
     vec3 normal = facing < 0.0 ? hit.normal_g : -hit.normal_g;

@@ -348,6 +348,8 @@ void main()
             child = whole;
             anchor_at(child, whole.x_lo, at);
             child.flux_w = whole.flux_w * share;
+            // Roulette counts by power, also where a band was only divided: or cuts would breed.
+            child.survival = whole.survival * share;
             child.branch_key = hash_combine(whole.branch_key, 5u);
             lives = true;
         }
@@ -387,6 +389,7 @@ void main()
             child = whole;
             anchor_at(child, at, whole.x_hi);
             child.flux_w = whole.flux_w * (1.0 - share);
+            child.survival = whole.survival * (1.0 - share);
             child.branch_key = hash_combine(whole.branch_key, 6u);
             lives = true;
         }

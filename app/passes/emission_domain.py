@@ -109,6 +109,8 @@ def _plane_domain(
     if np.any(box_high <= box_low):
         return None
     rect, mask = _rect_and_mask(low, high, box_low, box_high)
+    if is_disc:
+        mask &= _disc_mask(rect, (position - middle) @ frame.T, half[0])
     area = rect[2] * rect[3] / space.scale**2
     return EmissionDomain("plane", centre, direction, tangent, bitangent, rect, mask, area, back, light_u, light_v, position, is_disc, (float(tilt), 0.0))
 
@@ -211,6 +213,13 @@ def _cone_box(axis_local: np.ndarray, outer: float) -> tuple[np.ndarray, np.ndar
     flat = azimuthal_plane(directions).reshape(-1, 2)
     slack = 0.01 * np.ptp(flat, axis=0)
     return flat.min(axis=0) - slack, flat.max(axis=0) + slack
+
+
+def _disc_mask(rect: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
+    """Cells of the rectangle that a disc may touch."""
+    cells = (np.arange(MASK_SIZE) + 0.5) / MASK_SIZE
+    x, y = np.meshgrid(rect[0] + cells * rect[2] - centre[0], rect[1] + cells * rect[3] - centre[1])
+    return np.hypot(x, y) <= radius + np.hypot(rect[2], rect[3]) / MASK_SIZE
 
 
 def _cone_mask(rect: np.ndarray, axis_local: np.ndarray, outer: float) -> np.ndarray:

@@ -72,6 +72,8 @@ EYE_PARAMETERS = Struct(
         Field("pixel_angle", "float", "and how that grows with distance (pinhole)"),
         Field("map_scale", "float", "factor on the caustic maps: one over the passes in them"),
         Field("x_eye", "float", "spectral coordinate of the eye's rays"),
+        Field("sample_side", "float", "side of a sample's share of its pixel, pixels"),
+        Field("unused", "float", "", 3),
         Field("inside_mask", "uint", "solids the camera stands in, bits of the medium stack"),
         Field("inside_object", "uint", "solid outside the stack it stands in, or NONE"),
         Field("reserved", "uvec2", ""),
@@ -155,6 +157,7 @@ class EyePass:
             texture.use(location=unit)
             picture.bind_to_image(unit, read=True, write=True)
         parameters = self._parameters(camera, width, height, maps.scale, seed)
+        parameters["sample_side"] = 1.0 / np.sqrt(samples + sample_offset)
         for index, place in enumerate(_pixel_lattice(samples, sample_offset)):
             parameters["sample_index"] = sample_offset + index
             parameters["within_pixel"] = place

@@ -113,6 +113,10 @@ class PilotFit:
             together = miss < 2.0 * np.maximum(spread, 1e-12)
             errors.append(miss[together] / (2.0 * place - 1.0) ** 2 / self.texel[mine["receiver"][together]])
             weights.append(mine["flux_w"][together])
+        # The chord itself: halfway between the band's ends it should meet the anchor.
+        sag = 0.5 * (self._sweep(whole, 0.0) + self._sweep(whole, 1.0))
+        errors.append(np.linalg.norm(sag, axis=1) / self.texel[whole["receiver"]])
+        weights.append(whole["flux_w"])
         if not sum(map(len, errors)):
             return 1
         typical = _weighted_quantile(np.concatenate(errors), np.concatenate(weights), 0.9)

@@ -34,18 +34,32 @@ float texel_size(uint placement)
     return inversesqrt(length(placements[placement].row_u.xyz) * length(placements[placement].row_v.xyz));
 }
 
-// Irradiance, the map's unit per scene unit². Bilinear where texels are larger than pixels; nearest
-// otherwise, since the pixel's own samples already average and a second blur would soften the caustic.
-vec4 caustic_irradiance(int target, uint placement, vec2 texel, bool bilinear)
+// Sides in texels of the box on the map that a sample of side `side` (GPU units, across the ray) covers.
+vec2 texel_box(uint placement, vec3 direction, vec3 normal, float side)
+{
+    float facing = max(abs(dot(direction, normal)), 1e-3);
+    vec3 level = cross(direction, normal);
+    vec3 across = dot(level, level) > 1e-8 ? normalize(level) : normalize(cross(direction, abs(direction.x) < 0.5 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0)));
+    vec3 along = cross(normal, across) / facing;
+    vec3 row_u = placements[placement].row_u.xyz, row_v = placements[placement].row_v.xyz;
+    return side * vec2(length(vec2(dot(row_u, across), dot(row_u, along))), length(vec2(dot(row_v, across), dot(row_v, along))));
+}
+
+// Irradiance, the map's unit per scene unit²: the mean of the map's texels over a box with these sides
+// (at most one texel), so that a pixel's samples together weigh every texel by its share of the pixel.
+// A side of one texel is bilinear interpolation.
+vec4 caustic_irradiance(int target, uint placement, vec2 texel, vec2 box)
 {
     ivec2 low = ivec2(floor(placements[placement].rect.xy)), high = ivec2(ceil(placements[placement].rect.zw)) - 1;
     float per_area = 1.0 / placements[placement].texel_area;
-    if (!bilinear) return texelFetch(caustic_map[target], clamp(ivec2(floor(texel)), low, high), 0) * per_area;
-    vec2 at = texel - 0.5;
-    ivec2 corner = ivec2(floor(at));
-    vec2 share = at - vec2(corner);
+    vec2 side = clamp(box, 1e-4, 1.0);
+    vec2 from = texel - 0.5 * side, to = texel + 0.5 * side;
+    vec2 border = floor(to);
+    vec2 share = clamp((to - border) / side, 0.0, 1.0);
+    ivec2 a = ivec2(floor(from)), b = ivec2(border);
     // Clamped, so that the border keeps its own value instead of fading into the neighbouring tile.
-    ivec2 a = clamp(corner, low, high), b = clamp(corner + 1, low, high);
+    a = clamp(a, low, high);
+    b = clamp(b, low, high);
     vec4 below = mix(texelFetch(caustic_map[target], a, 0), texelFetch(caustic_map[target], ivec2(b.x, a.y), 0), share.x);
     vec4 above = mix(texelFetch(caustic_map[target], ivec2(a.x, b.y), 0), texelFetch(caustic_map[target], b, 0), share.x);
     return mix(below, above, share.y) * per_area;
