@@ -196,7 +196,8 @@ def test_seed_decides(render: Render) -> None:
     first, again, other = (render(PRISM_SCENE, f"--layer caustic --seed {seed}").rgb for seed in (5, 5, 6))
     assert first == pytest.approx(again, abs=1e-6 * float(first.max()))
     assert np.abs(first - other).max() > 1e-3 * first.max()
-    assert first.sum() == pytest.approx(other.sum(), rel=0.02)
+    # A few thousand photons behind a slit: another lattice lets another handful through.
+    assert first.sum() == pytest.approx(other.sum(), rel=0.04)
 
 
 def test_stats_close_the_balance(render: Render) -> None:
