@@ -34,8 +34,13 @@ layout(std430, binding = BIND_STATE) readonly restrict buffer StateBlock { Queue
 #define SPATIAL 0
 #endif
 
+// Survivors of roulette are only nearly a lattice: wider footprints keep their unevenness unseen.
+#define SURVIVOR_SOFTNESS 1.5
+
 // Narrower bands are not cut at total internal reflection.
 #define MIN_CUT_BAND 1e-4
+// GPU units that a cut may move a ray's start.
+#define MAX_MOVED_START 0.01
 
 // A column longer than this (GPU units, the glass is about 1) has left the linear regime for good.
 #define COLUMN_LIMIT 1e6
@@ -48,8 +53,12 @@ bool survives(inout RayRecord ray, inout float roulette_w, float share, uint bra
     ray.survival *= share;
     ray.branch_key = hash_combine(ray.branch_key, branch);
     float chance = ray.survival / p.split_threshold;
-    if (chance >= 1.0) return true;
-    float draw = kronecker(ray.photon_id, 3774877043u + 2u * (ray.depth * 668265263u), ray.branch_key);
+    // What a first surface throws back is seen all round the glass: it keeps its whole lattice.
+    if (chance >= 1.0 || ray.depth == 1u) return true;
+    // One irrational a depth: the square roots of primes, as far from rational as from the lattice's golden ratio.
+    // The count is that of the sub-lattice's own points: a multiple of an irrational may be a poor one.
+    const uint generators[8] = uint[](1779033703u, 3144134277u, 2773480763u, 1359893119u, 2600822925u, 528734635u, 1541459225u, 3418070365u);
+    float draw = kronecker(ray.photon_id / p.lattices, generators[ray.depth & 7u], ray.branch_key + (ray.photon_id % p.lattices) * 2654435769u);
     if (draw >= chance) {
         roulette_w += ray.flux_w;
         return false;
@@ -58,7 +67,7 @@ bool survives(inout RayRecord ray, inout float roulette_w, float share, uint bra
     roulette_w -= ray.flux_w * (boost - 1.0);
     ray.flux_w *= boost;
     ray.throughput *= boost;
-    ray.footprint_scale *= sqrt(boost);
+    ray.footprint_scale *= SURVIVOR_SOFTNESS * sqrt(boost);
     ray.survival = p.split_threshold;
     return true;
 }
@@ -337,6 +346,15 @@ void main()
             at = 0.5 * (a + b);
             // A sliver of a band is not worth a path of its own.
             cut = min(at - ray.x_lo, ray.x_hi - at) > 0.01 * MIN_CUT_BAND;
+            // Nor is a start moved so far along the columns that it may lie beyond another surface.
+            vec3 to_low = vec3(0.0), to_high = vec3(0.0);
+            for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+                to_low += variable_step(uint(g), 0.5 * (ray.x_lo + at), ray.x_anchor) * whole.dposition[SPATIAL + g].xyz;
+                to_high += variable_step(uint(g), 0.5 * (at + ray.x_hi), ray.x_anchor) * whole.dposition[SPATIAL + g].xyz;
+            }
+            float longest = max(dot(to_low, to_low), dot(to_high, to_high));
+            float allowed = min(MAX_MOVED_START, 0.1 * hit.distance);
+            cut = cut && longest < allowed * allowed;
         }
         if (cut) {
             float power_lo = spectral_row(uint(p.power_row), ray.x_lo), power_at = spectral_row(uint(p.power_row), at), power_hi = spectral_row(uint(p.power_row), ray.x_hi);

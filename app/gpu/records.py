@@ -207,6 +207,6 @@ TRACE_PARAMETERS = Struct(
         Field("max_depth", "uint", "specular events"),
         Field("split_threshold", "float", "survival below which a child plays roulette"),
         Field("power_row", "uint", "row of the light's cumulative power over x"),
-        Field("reserved", "uint"),
+        Field("lattices", "uint", "sub-lattices of the pass: photon_id = lattice point · lattices + sub-lattice"),
     ),
 )

@@ -241,6 +241,7 @@ class TracePass:
         p = records.TRACE_PARAMETERS.zeros(1)
         p["max_depth"], p["split_threshold"] = max_depth, self.split_threshold
         p["power_row"] = self.scene.layout.power_row + piece.light
+        p["lattices"] = len(piece.bands) * piece.light_points
         self._trace_parameters.write(p.tobytes())
 
     def _bind_queue(self, step: int) -> None:
