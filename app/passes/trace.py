@@ -108,7 +108,7 @@ class LatticeSlice:
 class TracePass:
     """Owns the programs and queue buffers of emission and tracing; `photons` is the output buffer."""
 
-    def __init__(self, context: Context, features: Features, scene: SceneBuffers, batch: int, max_depth: int, split_threshold: float = 0.2) -> None:
+    def __init__(self, context: Context, features: Features, scene: SceneBuffers, batch: int, max_depth: int, split_threshold: float = 0.3) -> None:
         self.context = context
         self.scene = scene
         self.batch = batch
