@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -42,7 +42,6 @@ class RenderStats:
     atlas_size: tuple[int, int] = (0, 0)
     bytes: int = 0
     map_flux_w: float = 0.0
-    notes: list[str] = field(default_factory=list)
 
     @property
     def photons(self) -> int:
@@ -72,7 +71,7 @@ class RenderStats:
             f"seconds             prepare {self.prepare_seconds:.2f}, emit and trace {self.light.trace_seconds:.2f}, "
             f"splat {self.light.splat_seconds:.2f}, eye {self.eye_seconds:.2f}, all {self.seconds:.2f}",
         ]
-        return text + self.notes
+        return text
 
 
 @dataclass(frozen=True)

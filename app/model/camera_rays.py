@@ -1,4 +1,4 @@
-"""Camera rays in float64, for fitting maps and for tests; the eye pass has its own in GLSL."""
+"""A camera's frame and rays in float64, for fitting maps and for tests; the eye pass makes its rays in GLSL."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from app.model.scene import Camera
 
 
 def camera_frame(camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Unit right, up and forward vectors."""
+    """Unit right, up and forward of a camera, float64 (3,) each."""
     forward = np.asarray(camera.target, float) - np.asarray(camera.position, float)
     forward /= np.linalg.norm(forward)
-    right = np.cross(forward, camera.up)
+    up = np.asarray(camera.up, float)
+    right = np.cross(forward, up)
+    if np.linalg.norm(right) < 1e-9 * np.linalg.norm(up):  # looking along `up`: any upright will do
+        right = np.cross(forward, np.eye(3)[np.argmin(np.abs(forward))])
     right /= np.linalg.norm(right)
     return right, np.cross(right, forward), forward
 

@@ -19,6 +19,7 @@ from app.gpu.context import Context
 from app.gpu.records import NONE, PLACEMENT, RECEIVER
 from app.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
 from app.gpu.schema import Field, Struct
+from app.model.camera_rays import camera_frame
 from app.model.colorimetry import xyz_to_rgb709_matrix
 from app.model.scene import Camera, Dielectric, Diffuse, Light, Mirror
 from app.model.scene_checks import contains
@@ -314,18 +315,6 @@ class EyePass:
             textures = [self._ctx.texture((1, 1), 4, bytes(16), dtype="f4") for _ in range(self.channels.targets)]
             self._empty = CausticMaps(textures, self._ctx.buffer(receivers.tobytes()), self._ctx.buffer(reserve=PLACEMENT.stride))
         return self._empty
-
-
-def camera_frame(camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Unit right, up and forward of a camera, float64 (3,) each."""
-    forward = np.asarray(camera.target, float) - np.asarray(camera.position, float)
-    forward /= np.linalg.norm(forward)
-    up = np.asarray(camera.up, float)
-    right = np.cross(forward, up)
-    if np.linalg.norm(right) < 1e-9 * np.linalg.norm(up):  # looking along `up`: any upright will do
-        right = np.cross(forward, np.eye(3)[np.argmin(np.abs(forward))])
-    right /= np.linalg.norm(right)
-    return right, np.cross(right, forward), forward
 
 
 def _pixel_lattice(samples: int, offset: int) -> np.ndarray:

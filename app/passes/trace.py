@@ -47,13 +47,11 @@ class FluxTally:
     ended: dict[str, float] = field(default_factory=lambda: dict.fromkeys(records.CATEGORIES, 0.0))
     roulette: float = 0.0
     fallbacks: dict[str, int] = field(default_factory=lambda: dict.fromkeys(records.FALLBACKS, 0))
-    traced_rays: int = 0
 
     def merge(self, other: FluxTally) -> None:
         """Add another batch."""
         self.emitted += other.emitted
         self.roulette += other.roulette
-        self.traced_rays += other.traced_rays
         for name in self.ended:
             self.ended[name] += other.ended[name]
         for name in self.fallbacks:
@@ -166,11 +164,6 @@ class TracePass:
     def bytes(self) -> int:
         """GPU memory held."""
         return sum(b.size for b in (*self._rays, self._outcomes, self._slots, self._indices, self._counts, self.photons))
-
-    @property
-    def programs(self) -> dict[str, str]:
-        """Flattened source of the programs that run (for `inspect` and tests)."""
-        return {"trace.comp": shader.load_source("trace.comp", self._defines, (*self._structs, records.TRACE_PARAMETERS)).text}
 
     def run(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int | None = None) -> Batch:
         """Trace `piece.count` ≤ batch lattice points; their photons replace the buffer's content.

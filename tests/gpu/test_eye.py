@@ -16,7 +16,8 @@ from app.model.mesh import make_mesh
 from app.model.scene import Absorption, Camera, Dielectric, Diffuse, Light, Mirror, Scene, SceneObject
 from app.model.settings import RenderSettings
 from app.model.spectral_tables import SpectralAxis
-from app.passes.eye import CausticMaps, EyePass, camera_frame
+from app.model.camera_rays import camera_frame
+from app.passes.eye import CausticMaps, EyePass
 
 REFLECTANCE = 0.5
 WHITE = spectrum.illuminant("D65").scaled_to_luminous(1000.0)  # R = G = B = 1000
