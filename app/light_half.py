@@ -16,6 +16,7 @@ import moderngl
 import numpy as np
 
 from app.gpu import records
+from app.gpu.records import MAX_BANDS
 from app.gpu.context import Context
 from app.gpu.map_atlas import MapAtlas
 from app.gpu.scene_buffers import SceneBuffers
@@ -27,11 +28,13 @@ from app.model.spectral_tables import SpectralAxis
 from app.passes.accumulate import LevelsFold, SeamFold, copy_texture
 from app.passes.emission_domain import EmissionDomain, emission_domain
 from app.passes.map_layout import MapLayout, check_map_receiver, layout_maps
-from app.passes.pilot import Pilot, PilotFit, has_extent, landings_of, run_pilot
+from app.passes.pilot import MAX_LIGHT_POINTS, Pilot, PilotFit, has_extent, landings_of, run_pilot
 from app.passes.splat import Splatter
 from app.passes.trace import Band, Batch, FluxTally, LatticeSlice, TracePass
 
 DEFAULT_BATCH = 1 << 16
+SMALLEST_BATCH = MAX_BANDS * MAX_LIGHT_POINTS
+"""One point of every sub-lattice a light may have."""
 TINTED_BANDS = 16
 """Least number of bands where glass absorbs or mirrors are coloured."""
 _SHIFT_GENERATORS = (3242174889, 2447445414, 3141592653, 1640531527, 2246822519)
@@ -86,7 +89,8 @@ class LightHalf:
         self.buffers = buffers
         self.stats = LightStats()
         batch = settings.batch or DEFAULT_BATCH * (1 if context.is_software else 4)
-        self.trace = TracePass(context, features, buffers, min(batch, _largest_batch(context, features)), settings.max_depth)
+        batch = max(min(batch, _largest_batch(context, features)), SMALLEST_BATCH)
+        self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
         self.splatter = Splatter(context.ctx, features)
         self.variables = context.ctx.buffer(np.ascontiguousarray(buffers.variable_table if buffers.groups.count else np.zeros((1, 2), "f4")).tobytes())
         self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
@@ -100,17 +104,13 @@ class LightHalf:
         domains = {i: emission_domain(light, self.scene, self.buffers.space, triangles) for i, light in enumerate(self.scene.lights)}
         domains = {i: d for i, d in domains.items() if d is not None}
         pilots = {i: run_pilot(self.trace, self.scene, i, domain, self._full_power(i), self._needs_spectral_pilot) for i, domain in domains.items()}
-        picture: tuple[int, int] | None = (self.settings.width, self.settings.height)
-        map_receiver = None
-        if self.settings.layer.startswith("map:"):
-            map_receiver = check_map_receiver(self.scene, self.buffers, self.settings.layer[4:])
-        self.map_receiver = map_receiver
-        landings = landings_of(pilots.values())
-        self.layout: MapLayout = layout_maps(self.scene, self.buffers, landings, picture, self.reflectance_class, map_receiver)
+        picture = (self.settings.width, self.settings.height)
+        shows_map = self.settings.layer.startswith("map:")
+        self.map_receiver = check_map_receiver(self.scene, self.buffers, self.settings.layer[4:]) if shows_map else None
+        self.layout: MapLayout = layout_maps(self.scene, self.buffers, landings_of(pilots.values()), picture, self.reflectance_class, self.map_receiver)
         self.plans = self._plan(domains, pilots)
-        limits = [[(b.x_lo, b.x_hi) for b in plan.bands] for plan in self.plans]
-        used = {plan.index: n for n, plan in enumerate(self.plans)}
-        spans = [limits[used[i]] if i in used else [(0.0, 1.0)] for i in range(len(self.scene.lights))]
+        limits = {plan.index: [(b.x_lo, b.x_hi) for b in plan.bands] for plan in self.plans}
+        spans = [limits.get(i, [(0.0, 1.0)]) for i in range(len(self.scene.lights))]
         channels = "xyz" if self.settings.bins is None else list(np.linspace(380.0, 780.0, self.settings.bins + 1))
         ctx = self.context.ctx
         self.bin_edges_nm = None if channels == "xyz" else np.asarray(channels)
@@ -151,7 +151,7 @@ class LightHalf:
         if not self.plans:
             return True
         counts = [self._lattice_count(plan, photons) for plan in self.plans]
-        rounds = max(-(-n // max(1, self.trace.batch // plan.lattices)) for n, plan in zip(counts, self.plans, strict=True))
+        rounds = max(-(-n // (self.trace.batch // plan.lattices)) for n, plan in zip(counts, self.plans, strict=True))
         for j in range(rounds):
             go_on = True
             for i, (plan, lattice) in enumerate(zip(self.plans, counts, strict=True)):
@@ -213,7 +213,7 @@ class LightHalf:
 
     def _scattered_points(self, light: int, bands: int, budget: int) -> int:
         """Points on an extended light for photons without footprints, which need no lattice of their own."""
-        return min(self.trace.batch // bands, max(1, budget // (16 * bands))) if has_extent(self.scene.lights[light]) else 1
+        return min(SMALLEST_BATCH // bands, max(1, budget // (16 * bands))) if has_extent(self.scene.lights[light]) else 1
 
     def _bands(self, light: int, fit: PilotFit) -> tuple[Band, ...]:
         power = self.buffers.light_power[light]

@@ -38,7 +38,6 @@ class RenderStats:
     seconds: float = 0.0
     prepare_seconds: float = 0.0
     eye_seconds: float = 0.0
-    passes: int = 0
     atlas_size: tuple[int, int] = (0, 0)
     bytes: int = 0
     map_flux_w: float = 0.0
@@ -113,7 +112,7 @@ def _render(context: Context, scene: Scene, settings: RenderSettings, progress: 
     try:
         light.prepare()
         stats.prepare_seconds = time.perf_counter() - started
-        stats.passes = _trace_and_splat(light, scene, settings, progress, cancelled)
+        _trace_and_splat(light, scene, settings, progress, cancelled)
         light.finish()
         stats.atlas_size = light.layout.size
         stats.bytes = buffers.bytes + light.trace.bytes
@@ -132,15 +131,15 @@ def _render(context: Context, scene: Scene, settings: RenderSettings, progress: 
         buffers.release()
 
 
-def _trace_and_splat(light: LightHalf, scene: Scene, settings: RenderSettings, progress: Progress, cancelled: Cancelled) -> int:
-    """Passes of shifted lattices until the photons or the seconds are spent; returns their number."""
+def _trace_and_splat(light: LightHalf, scene: Scene, settings: RenderSettings, progress: Progress, cancelled: Cancelled) -> None:
+    """Passes of shifted lattices until the photons or the seconds are spent."""
     if settings.seconds is None:
         def proceed(fraction: float) -> bool:
             progress(0.9 * fraction, "tracing photons")
             return not cancelled()
 
         light.run_pass(0, settings.photons or scene.render.photons, proceed)
-        return 1
+        return
     begun = time.perf_counter()
     budget = settings.seconds
 
@@ -153,7 +152,6 @@ def _trace_and_splat(light: LightHalf, scene: Scene, settings: RenderSettings, p
     while light.run_pass(number, photons, in_time) and in_time(0.0):
         number += 1
         photons = min(2 * photons, LAST_PASS_PHOTONS)
-    return number + 1
 
 
 def _map_layer(light: LightHalf) -> tuple[np.ndarray, np.ndarray | None]:

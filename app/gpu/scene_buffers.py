@@ -223,10 +223,7 @@ class SceneBuffers:
             bvh = build_bvh(all_corners)
             order = bvh.order
             self._sections["TREE"] = tree_texels(bvh.nodes)
-            self.tree_depth = bvh.depth
             self.defines |= {"TREE_STACK": max(bvh.depth, 1)}
-        else:
-            self.tree_depth = 0
         all_corners = all_corners[order]
         records = TRIANGLE.zeros(len(order))
         records["vertex"] = all_corners[:, 0]

@@ -104,7 +104,6 @@ class Footprints:
         self._outside = ctx.buffer(np.zeros(group, np.float32))
         self.commands = ctx.buffer(np.zeros(21, np.uint32))
         """Indirect draws of kinds 1 to 4, five words each; then the dropped footprints."""
-        self._group = group
         self.slots_per_photon = defines["SLOTS"]
         self.splats = ctx.buffer(reserve=group * self.slots_per_photon * SPLAT.stride)
 

@@ -96,7 +96,7 @@ def layout_maps(
     scene: Scene,
     buffers: SceneBuffers,
     landings: dict[int, Landings],
-    picture: tuple[int, int] | None,
+    picture: tuple[int, int],
     reflectance_class: dict[int, int],
     map_receiver: int | None = None,
     max_side: int = 4096,
@@ -115,20 +115,17 @@ def layout_maps(
         if is_flat(item):
             frame = plane_frame(points)
             extent = _extent(frame.project(points))
-            windows = _flat_windows(scene.camera, buffers, frame, extent, landed, picture if map_receiver is None else None)
-            if receiver == map_receiver and picture is not None:
+            windows = _flat_windows(scene.camera, buffers, frame, extent, landed, None if map_receiver is not None else picture)
+            if receiver == map_receiver:
                 windows = [_with_aspect(windows[-1] if landed is None else _extent_of_light(frame, extent, landed), picture)]
             for level, window in enumerate(windows):
-                fine = level == 0 or len(windows) == 1
-                size = (
-                    picture if receiver == map_receiver and picture is not None
-                    else _tile_size(scene.camera, buffers, frame, window, picture, FINE_TILE_MAX if fine else COARSE_TILE_MAX)
-                )
+                largest = COARSE_TILE_MAX if level else FINE_TILE_MAX
+                size = picture if receiver == map_receiver else _tile_size(scene.camera, buffers, frame, window, picture, largest)
                 sizes += [(-(-size[0] // step), -(-size[1] // step)) for step in LEVEL_STEPS]
             plans.append((receiver, frame, windows, None))
         else:
             lit = landed is not None or receiver == map_receiver
-            side = int(np.clip((picture or (512, 512))[0], 256, 1024)) if lit else 64
+            side = int(np.clip(picture[0], 256, 1024)) if lit else 64
             from app.model.charts import build_charts
 
             atlas = build_charts(buffers.world_meshes[object_index], total_texels=side * side)
@@ -238,7 +235,7 @@ def _flat_windows(
     if fine is None:
         return [everything]
     if np.prod(fine.size) > 0.6 * np.prod(everything.size):
-        return [everything if seen is None else everything]
+        return [everything]
     return [fine, everything]
 
 
@@ -259,23 +256,19 @@ def _visible(camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, picture: 
 
 
 def _tile_size(
-    camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, window: Window, picture: tuple[int, int] | None, largest: int
+    camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, window: Window, picture: tuple[int, int], largest: int
 ) -> tuple[int, int]:
     """Texels of a window: `TEXELS_PER_PIXEL` where the camera sees it, within `largest`."""
     size = window.size
-    texel = np.max(size) / (512 if picture is None else largest)
-    if picture is not None:
+    if camera.kind == "pinhole":
         # Pixels are smallest where the window comes nearest to the camera.
         u, v = np.meshgrid(np.linspace(window.low[0], window.high[0], 9), np.linspace(window.low[1], window.high[1], 9))
         points = frame.origin + np.stack([u.ravel(), v.ravel()], axis=-1) @ frame.axes
-        position = buffers.space.to_gpu(np.array(camera.position))
-        if camera.kind == "pinhole":
-            distance = np.linalg.norm(points - position, axis=1)
-            pixel = np.quantile(distance, 0.25) * 2 * np.tan(np.radians(0.5 * camera.vertical_fov_deg)) / picture[1]
-        else:
-            pixel = camera.vertical_extent * buffers.space.scale / picture[1]
-        texel = pixel / TEXELS_PER_PIXEL
-    count = np.ceil(size / texel)
+        distance = np.linalg.norm(points - buffers.space.to_gpu(np.array(camera.position)), axis=1)
+        pixel = np.quantile(distance, 0.25) * 2 * np.tan(np.radians(0.5 * camera.vertical_fov_deg)) / picture[1]
+    else:
+        pixel = camera.vertical_extent * buffers.space.scale / picture[1]
+    count = np.ceil(size * TEXELS_PER_PIXEL / pixel)
     count *= min(1.0, largest / count.max())
     width, height = np.clip(count, MIN_TILE, largest).astype(int)
     return int(width), int(height)

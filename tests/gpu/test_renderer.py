@@ -106,6 +106,15 @@ def test_batch_size_does_not_change_the_picture(gl, tmp_path: Path, shape: str) 
     assert np.abs(split - whole).max() <= 1e-6 * np.abs(whole).max()
 
 
+def test_a_tiny_batch_fits_no_other_maps_or_bands(gl, tmp_path: Path) -> None:
+    """The pilot is the same however few photons may be in flight at once."""
+    scene = scene_of(tmp_path)
+    whole, tiny = (render(scene, replace(SMALL, batch=batch), context=gl) for batch in (65_536, 20))
+    assert tiny.stats.light.bands == whole.stats.light.bands
+    assert tiny.stats.atlas_size == whole.stats.atlas_size
+    assert np.abs(tiny.rgb - whole.rgb).max() <= 1e-6 * np.abs(whole.rgb).max()
+
+
 def test_same_seed_same_picture_other_seed_other(gl, tmp_path: Path) -> None:
     scene = scene_of(tmp_path)
     first, again, other = (render(scene, replace(SMALL, seed=seed), context=gl).rgb for seed in (3, 3, 4))

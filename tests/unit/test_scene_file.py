@@ -12,7 +12,7 @@ from app.errors import UserError
 from app.model.scene import Black, Dielectric, Diffuse, Mirror, Scene
 from app.model.scene_checks import contains
 from app.model.scene_file import load_scene
-from app.model.scene_lights import flux_factor, spot_solid_angle_sr
+from app.model.scene_lights import spot_solid_angle_sr
 from app.model.scene_save import save_scene
 
 THREE_LINES = '[[objects]]\nshape = "sphere"\nglass = "N-SF11"\n'
