@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.model.scene import Black, Camera, Dielectric, Diffuse, Light, Material, Scene, SceneObject
+from app.model.scene import (
+    Black,
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Material,
+    Scene,
+    SceneObject,
+)
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

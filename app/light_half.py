@@ -16,9 +16,9 @@ import moderngl
 import numpy as np
 
 from app.gpu import records
-from app.gpu.records import MAX_BANDS
 from app.gpu.context import Context
 from app.gpu.map_atlas import MapAtlas
+from app.gpu.records import MAX_BANDS
 from app.gpu.scene_buffers import SceneBuffers
 from app.gpu.splat_tables import SplatTables
 from app.model.features import Features
@@ -28,7 +28,14 @@ from app.model.spectral_tables import SpectralAxis
 from app.passes.accumulate import LevelsFold, SeamFold, copy_texture
 from app.passes.emission_domain import EmissionDomain, emission_domain
 from app.passes.map_layout import MapLayout, check_map_receiver, layout_maps
-from app.passes.pilot import MAX_LIGHT_POINTS, Pilot, PilotFit, has_extent, landings_of, run_pilot
+from app.passes.pilot import (
+    MAX_LIGHT_POINTS,
+    Pilot,
+    PilotFit,
+    has_extent,
+    landings_of,
+    run_pilot,
+)
 from app.passes.splat import Splatter
 from app.passes.trace import Band, Batch, FluxTally, LatticeSlice, TracePass
 

@@ -17,11 +17,23 @@ from app.gpu.records import NONE
 from app.gpu.scene_texels import SceneTexels, spectra_texture, tree_texels
 from app.gpu.schema import Field, Struct
 from app.model.bvh import build_bvh
-from app.model.features import MAX_GROUPS, Features, dispersive_materials, is_convex_solid, overlapping_solids, world_bounds
+from app.model.colorimetry import VISIBLE_NM, rgb_partition
+from app.model.features import (
+    MAX_GROUPS,
+    Features,
+    dispersive_materials,
+    is_convex_solid,
+    overlapping_solids,
+    world_bounds,
+)
 from app.model.glass import Dispersion
 from app.model.scene import Black, Dielectric, Diffuse, Mirror, Scene
-from app.model.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative, index_table
-from app.model.colorimetry import VISIBLE_NM, rgb_partition
+from app.model.spectral_tables import (
+    CumulativeSpectrum,
+    SpectralAxis,
+    cumulative,
+    index_table,
+)
 
 SAMPLES = 1025
 """Equally spaced samples of every spectral table over x in [0, 1]; linear interpolation errs below 2e-7 in n."""

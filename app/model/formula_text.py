@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from app.model.dispersion_formulas import KHR_A, KHR_B, Coefficients, Kind, sellmeier_poles
+from app.model.dispersion_formulas import (
+    KHR_A,
+    KHR_B,
+    Coefficients,
+    Kind,
+    sellmeier_poles,
+)
 
 _SUPERSCRIPT = str.maketrans("-0123456789.", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹·")
 

@@ -17,11 +17,31 @@ import numpy as np
 
 from app.errors import UserError
 from app.model.gltf_document import GltfDocument, open_document
-from app.model.gltf_materials import DISPERSION, EXTRAS, IOR, TRANSMISSION, VOLUME, read_gltf_material
+from app.model.gltf_materials import (
+    DISPERSION,
+    EXTRAS,
+    IOR,
+    TRANSMISSION,
+    VOLUME,
+    read_gltf_material,
+)
 from app.model.mesh import Mesh, make_mesh
 from app.model.mesh_health import examine, repair
-from app.model.scene import Camera, Dielectric, Diffuse, Light, Material, Scene, SceneObject
-from app.model.scene_defaults import default_camera, default_light, default_table, surroundings_of
+from app.model.scene import (
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Material,
+    Scene,
+    SceneObject,
+)
+from app.model.scene_defaults import (
+    default_camera,
+    default_light,
+    default_table,
+    surroundings_of,
+)
 from app.model.scene_lights import Surroundings, read_light
 from app.model.scene_table import SceneTable
 
@@ -274,7 +294,11 @@ class _Reader:
         return tuple(lights)
 
     def _light(self, entry: dict[str, Any], label: str, world: np.ndarray, around: Surroundings) -> Light | None:
-        from app.model.colorimetry import illuminant_table, rgb709_to_xyz_matrix, rgb_partition
+        from app.model.colorimetry import (
+            illuminant_table,
+            rgb709_to_xyz_matrix,
+            rgb_partition,
+        )
         from app.model.spectrum import Spectrum
 
         position, direction = _vec3(world[:3, 3]), _vec3(-_unit(world[:3, 2]))

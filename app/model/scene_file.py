@@ -16,9 +16,22 @@ from typing import Any
 import numpy as np
 
 from app.errors import UserError
-from app.model.scene import Camera, Dielectric, Diffuse, Light, RenderDefaults, Scene, SceneObject
+from app.model.scene import (
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    RenderDefaults,
+    Scene,
+    SceneObject,
+)
 from app.model.scene_checks import check_scene
-from app.model.scene_defaults import default_camera, default_light, default_table, surroundings_of
+from app.model.scene_defaults import (
+    default_camera,
+    default_light,
+    default_table,
+    surroundings_of,
+)
 from app.model.scene_lights import Surroundings, read_light
 from app.model.scene_materials import DEFAULT_GLASS, read_materials
 from app.model.scene_objects import MESH_SUFFIXES, ObjectReader, load_checked_mesh

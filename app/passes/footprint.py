@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from app.gpu import shader
-from app.gpu.records import FLAG_FOOTPRINT_DROPPED, NONE, PLACEMENT, RECEIVER, photon_record
+from app.gpu.records import (
+    FLAG_FOOTPRINT_DROPPED,
+    NONE,
+    PLACEMENT,
+    RECEIVER,
+    photon_record,
+)
 from app.gpu.schema import Field, Struct
 
 if TYPE_CHECKING:

@@ -11,7 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.model.colorimetry import K_M, VISIBLE_NM, cmf_xyz, illuminant_table, rgb_partition, xyz_to_rgb709
+from app.model.colorimetry import (
+    K_M,
+    VISIBLE_NM,
+    cmf_xyz,
+    illuminant_table,
+    rgb_partition,
+    xyz_to_rgb709,
+)
 from app.model.spectrum import Spectrum
 
 

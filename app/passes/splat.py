@@ -13,7 +13,13 @@ import numpy as np
 
 from app.gpu import shader
 from app.gpu.schema import Field, Struct
-from app.passes.footprint import SPLAT, VERTICES, Footprints, SplatFeatures, splat_defines
+from app.passes.footprint import (
+    SPLAT,
+    VERTICES,
+    Footprints,
+    SplatFeatures,
+    splat_defines,
+)
 
 if TYPE_CHECKING:
     import moderngl

@@ -10,13 +10,22 @@ import pytest
 from app.gpu.records import NONE, PLACEMENT, RECEIVER
 from app.gpu.scene_buffers import SceneBuffers
 from app.model import glass, primitives, spectrum
+from app.model.camera_rays import camera_frame
 from app.model.colorimetry import rgb709_to_xyz
 from app.model.features import Features
 from app.model.mesh import make_mesh
-from app.model.scene import Absorption, Camera, Dielectric, Diffuse, Light, Mirror, Scene, SceneObject
+from app.model.scene import (
+    Absorption,
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Mirror,
+    Scene,
+    SceneObject,
+)
 from app.model.settings import RenderSettings
 from app.model.spectral_tables import SpectralAxis
-from app.model.camera_rays import camera_frame
 from app.passes.eye import CausticMaps, EyePass
 
 REFLECTANCE = 0.5

@@ -10,8 +10,8 @@ from app.gpu.records import NONE
 from app.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, SOLID, TRIANGLE
 from app.gpu.scene_texels import SceneTexels, tree_texels
 from app.model import bvh
-from tests.gpu.glsl_harness import as_f32, evaluate
-from tests.reference import optics
+from app.truth import optics
+from app.truth.glsl_function import as_f32, evaluate
 
 BODY = """
     Hit hit;

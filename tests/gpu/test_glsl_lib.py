@@ -9,8 +9,8 @@ from app.gpu import bindings
 from app.gpu.records import NONE, ray_record
 from app.gpu.scene_buffers import OBJECT, SCENE_STRUCTS
 from app.gpu.scene_texels import SceneTexels, spectra_texture
-from tests.gpu.glsl_harness import as_f32, evaluate
-from tests.reference import optics
+from app.truth import optics
+from app.truth.glsl_function import as_f32, evaluate
 
 COUNT = 4096
 WORD = 2**32

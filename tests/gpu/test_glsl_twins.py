@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.gpu.glsl_harness import as_f32, evaluate
-from tests.reference import optics
-from tests.reference.glasses import C_NM, D_NM, F_NM, index
-from tests.reference.optics import dot, times
+from app.truth import optics
+from app.truth.glasses import C_NM, D_NM, F_NM, index
+from app.truth.glsl_function import as_f32, evaluate
+from app.truth.optics import dot, times
 
 OPTICS = ["lib/optics.glsl"]
 COUNT = 4096

@@ -17,8 +17,8 @@ from app.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, TRIANGLE
 from app.gpu.scene_texels import SceneTexels, tree_texels
 from app.model.bvh import build_bvh
 from app.model.primitives_round import sphere
-from tests.gpu.glsl_harness import as_f32, evaluate
-from tests.reference.optics import dot, unit
+from app.truth.glsl_function import as_f32, evaluate
+from app.truth.optics import dot, unit
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,21 @@ from app.model.mesh import Mesh
 from app.model.primitives import slab
 from app.model.primitives_round import sphere as sphere_mesh
 from app.passes.emission_domain import orthonormal_frame
-from tests.gpu.light_paths import Photons, extruded, glass, screen, trace_beam
-from tests.reference import glasses
-from tests.reference.glasses import C_NM, D_NM, F_NM
-from tests.reference.optics import dot, unit
-from tests.reference.surfaces import Plane, sphere
-from tests.reference.tracer import AIR, RECEIVER, Index, TriangleList, make_ray, onto, through, trace
+from app.truth import glasses
+from app.truth.glasses import C_NM, D_NM, F_NM
+from app.truth.gpu_paths import Photons, extruded, glass, screen, trace_beam
+from app.truth.optics import dot, unit
+from app.truth.surfaces import Plane, sphere
+from app.truth.tracer import (
+    AIR,
+    RECEIVER,
+    Index,
+    TriangleList,
+    make_ray,
+    onto,
+    through,
+    trace,
+)
 
 APEX = np.pi / 3
 

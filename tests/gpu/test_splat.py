@@ -12,8 +12,8 @@ from app.model.charts import build_charts
 from app.model.colorimetry import K_M, VISIBLE_NM, cmf_xyz
 from app.model.primitives import box
 from app.passes.accumulate import SeamFold
-from tests.reference.splat_reference import splat_image
-from tests.reference.splat_rig import Rig, SplatFeatures, photons
+from app.truth.splat_reference import splat_image
+from app.truth.splat_rig import Rig, SplatFeatures, photons
 
 PLAIN = SplatFeatures()
 CUTS = SplatFeatures(band_cuts=True)

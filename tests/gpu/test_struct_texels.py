@@ -7,7 +7,7 @@ import pytest
 
 from app.gpu.records import OUTCOME, photon_record, ray_record
 from app.gpu.schema import Field, Struct
-from tests.gpu.glsl_harness import evaluate
+from app.truth.glsl_function import evaluate
 
 MIXED = Struct(
     "Mixed",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.reference.splat_rig import Rig, SplatFeatures, photons
+from app.truth.splat_rig import Rig, SplatFeatures, photons
 
 FEATURES = SplatFeatures()
 TILES, SIDE = 15, 96

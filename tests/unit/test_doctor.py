@@ -14,7 +14,6 @@ from app.doctor import Check
 from app.errors import UserError
 from app.gpu.limits import NEEDED
 
-
 REAL_REQUIREMENTS = doctor.requirements
 
 

@@ -20,7 +20,17 @@ from app.model.colorimetry import VISIBLE_NM, attenuation_from_colour
 from app.model.gltf import load_gltf
 from app.model.gltf_document import open_document
 from app.model.gltf_write import save_gltf
-from app.model.scene import Absorption, Black, Camera, Dielectric, Diffuse, Light, Mirror, Scene, SceneObject
+from app.model.scene import (
+    Absorption,
+    Black,
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Mirror,
+    Scene,
+    SceneObject,
+)
 from app.model.scene_describe import describe_material
 from app.model.spectrum import blackbody, illuminant, laser, xyz_to_rgb709
 

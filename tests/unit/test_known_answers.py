@@ -12,10 +12,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tests.reference import glasses, optics
-from tests.reference.glasses import C_NM, D_NM, F_NM
-from tests.reference.surfaces import Plane, Quadric, sphere
-from tests.reference.tracer import AIR, Index, Ray, make_ray, onto, refracted, through
+from app.truth import glasses, optics
+from app.truth.glasses import C_NM, D_NM, F_NM
+from app.truth.surfaces import Plane, Quadric, sphere
+from app.truth.tracer import AIR, Index, Ray, make_ray, onto, refracted, through
 
 N_BK7_D = float(glasses.index("N-BK7", D_NM))
 BALL = sphere((0.0, 0.0, 0.0), 1.0)

@@ -21,10 +21,14 @@ from app.model.scene import Camera, Dielectric, Diffuse, Light, Scene, SceneObje
 from app.model.settings import RenderSettings
 from app.model.spectral_tables import SpectralAxis
 from app.model.spectrum import constant
-from app.passes.emission_domain import EmissionDomain, emission_domain, orthonormal_frame
+from app.passes.emission_domain import (
+    EmissionDomain,
+    emission_domain,
+    orthonormal_frame,
+)
 from app.passes.trace import Band, FluxTally, LatticeSlice, TracePass
-from tests.reference.glasses import sellmeier_terms
-from tests.reference.optics import unit
+from app.truth.glasses import sellmeier_terms
+from app.truth.optics import unit
 
 GOLDEN = 2654435769
 WORD = 2**32

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tests.reference.optics import normalised_derivative, shading_normal_column, unit
+from app.truth.optics import normalised_derivative, shading_normal_column, unit
 
 
 class Surface(Protocol):

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tests.reference import optics
-from tests.reference.surfaces import Facet, Surface
+from app.truth import optics
+from app.truth.surfaces import Facet, Surface
 
 
 def _no_columns() -> np.ndarray:

@@ -5,10 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.reference import glasses, optics
-from tests.reference.splat import gaussian, swept_gaussian, texel_average
-from tests.reference.surfaces import Plane, sphere
-from tests.reference.tracer import AIR, RECEIVER, Index, Path, TriangleList, central_difference, make_ray, onto, through, trace
+from app.truth import glasses, optics
+from app.truth.splat import gaussian, swept_gaussian, texel_average
+from app.truth.surfaces import Plane, sphere
+from app.truth.tracer import (
+    AIR,
+    RECEIVER,
+    Index,
+    Path,
+    TriangleList,
+    central_difference,
+    make_ray,
+    onto,
+    through,
+    trace,
+)
 
 RNG = np.random.default_rng
 
