@@ -1,0 +1,114 @@
+"""What a bench run has measured, as plain values: written to results.json, read back to resume, shown by the report."""
+
+from __future__ import annotations
+
+import msgspec
+
+PHOTON_STAGES = ("trace", "splat", "resolve")
+"""Stages whose sum is photon time: emission and tracing, footprints and drawing, putting the maps together."""
+
+
+class Sample(msgspec.Struct, frozen=True):
+    """One rendering: a method, a photon budget and a seed."""
+
+    photons: int
+    """Asked for; the abscissa of the error-against-photons plot."""
+    seed: int
+    emitted: int
+    splats: int
+    seconds: dict[str, float]
+    """By stage; `PHOTON_STAGES` and "eye" (display, the same for every method and not counted)."""
+    metrics: dict[str, float]
+    """relmse, relmse_trimmed, smape, chroma, nrmse, flip, energy_ratio (Σ picture / Σ reference)."""
+    error_rgb: float = 0.0
+
+    @property
+    def photon_seconds(self) -> float:
+        return sum(self.seconds.get(stage, 0.0) for stage in PHOTON_STAGES)
+
+
+class Point(msgspec.Struct, frozen=True):
+    """All seeds of one photon budget."""
+
+    photons: int
+    seconds: float
+    """Mean photon time."""
+    relmse: float
+    relmse_low: float
+    relmse_high: float
+    """Over seeds: mean, least and largest."""
+    bias2: float
+    variance: float
+    """relMSE told apart: bias² of the mean picture (less what its own variance leaves) and mean variance."""
+
+
+class Curve(msgspec.Struct):
+    """One method in one scene."""
+
+    method: str
+    setup_seconds: dict[str, float]
+    """Once per scene and not in photon time: "buffers" (tree and uploads), "compile", "pilot"."""
+    samples: list[Sample]
+    points: list[Point] = []
+    slope: float = 0.0
+    """Exponent of relMSE against photons over the curve's second half, and its 95 % confidence half-width."""
+    slope_half_width: float = 0.0
+    buffers_mib: float = 0.0
+
+
+class ReferenceInfo(msgspec.Struct):
+    """The picture that errors are measured against."""
+
+    method: str
+    photons: int
+    seconds: float
+    relmse: float
+    """Its own error (variance of the mean, estimated from independent parts), as relMSE."""
+    key: str
+    """Hash of scene content, camera and size: the cache's key."""
+
+
+class Claim(msgspec.Struct):
+    """One thing that this scene must show, and what it showed."""
+
+    name: str
+    asked: str
+    measured: str
+    holds: bool
+    why: str = ""
+    """Where it does not hold: the reason as far as the numbers tell."""
+
+
+class SceneResult(msgspec.Struct):
+    """One scene."""
+
+    scene: str
+    title: str
+    size: tuple[int, int]
+    seeds: int
+    seconds: float
+    """Photon time given to each method and seed's largest rendering."""
+    reference: ReferenceInfo | None
+    curves: list[Curve]
+    claims: list[Claim] = []
+    time_to_equal_error: dict[str, float] = {}
+    """For each method: time `stochastic` needs over time the method needs to reach `stochastic`'s final error;
+    below 1 the method is slower, absent when it never gets there."""
+    strongest_glass: str = ""
+    strongest_abbe: float = 0.0
+    """Lowest V_d in the scene; 0 when nothing disperses."""
+    pictures: dict[str, str] = {}
+    """Files beside results.json: "reference", "METHOD" (at equal time), as .npy of XYZ (H, W, 3)."""
+    equal_time: float = 0.0
+    """Photon seconds at which `pictures` were made."""
+
+
+class BenchResult(msgspec.Struct):
+    """One run of `spectrasplat bench`."""
+
+    version: str
+    date: str
+    command: str
+    machine: dict[str, str]
+    """processor, cores, renderer, driver, opengl, system, python."""
+    scenes: list[SceneResult]
