@@ -103,32 +103,55 @@ class LightHalf:
         self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
         self._weight_sum = 0.0
         self._prepared: list[Releasable] = []
+        self._tables: SplatTables | None = None
+        self._spans: list[list[tuple[float, float]]] = []
 
     def prepare(self) -> None:
-        """Pilot, maps and spectral tables. Afterwards `layout`, `atlas`, `tables` and `plans` exist."""
+        """Pilots and maps, once for a scene. Afterwards `layout` and `atlas` exist."""
         specular = [self.buffers.space.to_gpu(m.corners()) for m, o in zip(self.buffers.world_meshes, self.scene.objects, strict=True) if isinstance(o.material, Dielectric | Mirror)]
         triangles = np.concatenate(specular) if specular else np.zeros((0, 3, 3))
         domains = {i: emission_domain(light, self.scene, self.buffers.space, triangles) for i, light in enumerate(self.scene.lights)}
         domains = {i: d for i, d in domains.items() if d is not None}
         pilots = {i: run_pilot(self.trace, self.scene, i, domain, self._full_power(i), self._needs_spectral_pilot) for i, domain in domains.items()}
+        self._domains, self._pilots = domains, pilots
         picture = (self.settings.width, self.settings.height)
         shows_map = self.settings.layer.startswith("map:")
         self.map_receiver = check_map_receiver(self.scene, self.buffers, self.settings.layer[4:]) if shows_map else None
         self.layout: MapLayout = layout_maps(self.scene, self.buffers, landings_of(pilots.values()), picture, self.reflectance_class, self.map_receiver)
-        self.plans = self._plan(domains, pilots)
-        limits = {plan.index: [(b.x_lo, b.x_hi) for b in plan.bands] for plan in self.plans}
-        spans = [limits.get(i, [(0.0, 1.0)]) for i in range(len(self.scene.lights))]
-        channels = "xyz" if self.settings.bins is None else list(np.linspace(380.0, 780.0, self.settings.bins + 1))
         ctx = self.context.ctx
-        self.bin_edges_nm = None if channels == "xyz" else np.asarray(channels)
-        self.tables = SplatTables.build(ctx, self.buffers.axis, [light.spectral_power for light in self.scene.lights], self.reflectances, spans, channels)
+        self.bin_edges_nm = None if self.settings.bins is None else np.linspace(380.0, 780.0, self.settings.bins + 1)
         self.atlas = MapAtlas(ctx, self.layout.size, self.layout.placements, self.features.targets)
         self.receivers = ctx.buffer(np.ascontiguousarray(self.layout.receivers).tobytes())
         self._resolved = [ctx.texture(self.atlas.size, 4, dtype="f4") for _ in range(self.features.targets)]
         self._levels_fold = LevelsFold(ctx, self.layout.folds)
         self._seam_fold = SeamFold(ctx, [(self.layout.tiles[r][0], charts) for r, charts in self.layout.charts.items()])
-        self._prepared = [self.tables, self.atlas, self.receivers, *self._resolved, self._levels_fold, self._seam_fold]
+        self._prepared = [self.atlas, self.receivers, *self._resolved, self._levels_fold, self._seam_fold]
+
+    def begin(self, photons: int, seed: int) -> None:
+        """Empty maps and a plan for passes of about `photons`; what was summed and counted before is forgotten.
+
+        Afterwards `plans` and `tables` exist. Pilots and maps stay, so a rendering may be begun again and again."""
+        self.seed = seed
+        self.stats = LightStats()
+        self._weight_sum = 0.0
+        self.atlas.clear()
         self.splatter.reset_counts()
+        self.plans = self._plan(photons)
+        limits = {plan.index: [(b.x_lo, b.x_hi) for b in plan.bands] for plan in self.plans}
+        spans = [limits.get(i, [(0.0, 1.0)]) for i in range(len(self.scene.lights))]
+        if spans != self._spans:
+            if self._tables is not None:
+                self._tables.release()
+            channels = "xyz" if self.bin_edges_nm is None else self.bin_edges_nm.tolist()
+            spectra = [light.spectral_power for light in self.scene.lights]
+            self._tables = SplatTables.build(self.context.ctx, self.buffers.axis, spectra, self.reflectances, spans, channels)
+            self._spans = spans
+
+    @property
+    def tables(self) -> SplatTables:
+        """The spectral tables of the plan that was begun."""
+        assert self._tables is not None
+        return self._tables
 
     @property
     def _tinted(self) -> bool:
@@ -189,9 +212,9 @@ class LightHalf:
 
     def _lattice_slice(self, plan: LightPlan, number: int, lattice: int, first: int, stride: int, points: int, weight: float) -> LatticeSlice:
         # Successive passes follow a Kronecker sequence, so their union is again even.
-        start = (self.settings.seed * 0x9E3779B1 + plan.index * 0x85EBCA6B) & 0xFFFFFFFF
+        start = (self.seed * 0x9E3779B1 + plan.index * 0x85EBCA6B) & 0xFFFFFFFF
         shifts = [(start + (number + 1) * g) & 0xFFFFFFFF for g in _SHIFT_GENERATORS]
-        seed = (self.settings.seed + 7919 * number) & 0xFFFFFFFF
+        seed = (self.seed + 7919 * number) & 0xFFFFFFFF
         return LatticeSlice(
             plan.index, plan.bands, lattice, first, stride, points, (shifts[0], shifts[1]), (shifts[2], shifts[3]), shifts[4], seed, plan.light_points, weight=weight
         )
@@ -200,8 +223,9 @@ class LightHalf:
         """Points of each sub-lattice over the whole rectangle, so that about the light's share of photons starts."""
         return max(1, int(round(photons * plan.share / plan.lattices / plan.domain.active_share)))
 
-    def _plan(self, domains: dict[int, EmissionDomain], pilots: dict[int, Pilot]) -> list[LightPlan]:
+    def _plan(self, photons: int) -> list[LightPlan]:
         """Photons, bands and points of each light that reaches a receiver."""
+        domains, pilots = self._domains, self._pilots
         power = {i: max(float(self.buffers.light_power[i].band(0.0, 1.0)[1]) * d.measure * d.active_share, 0.0) for i, d in domains.items()}
         lit = [i for i in domains if power[i] > 0.0 and len(pilots[i].whole)]
         total = sum(power[i] for i in lit)
@@ -209,7 +233,7 @@ class LightHalf:
         for i in lit:
             # Half by power, half evenly: a dim light must not be left coarse.
             share = 0.5 * power[i] / total + 0.5 / len(lit)
-            budget = int((self.settings.photons or self.scene.render.photons) * share)
+            budget = int(photons * share)
             fit = PilotFit(pilots[i], self._texel_size(), self.buffers.variable_table, self.settings.smoothing, budget)
             bands = self._bands(i, fit)
             points = fit.light_points(len(bands)) if self.features.footprints else self._scattered_points(i, len(bands), budget)
@@ -328,6 +352,8 @@ class LightHalf:
         self.variables.release()
         for owned in self._prepared:
             owned.release()
+        if self._tables is not None:
+            self._tables.release()
 
 
 def reflectance_classes(scene: Scene, buffers: SceneBuffers) -> tuple[list[np.ndarray | None], dict[int, int]]:

@@ -19,8 +19,7 @@ from app.passes.eye import CausticMaps, EyePass
 from app.passes.present import Channels
 
 FIRST_PASS_PHOTONS = 1 << 17
-"""Lattice of a timed rendering's first pass; each next one is twice as fine, up to the last."""
-LAST_PASS_PHOTONS = 1 << 22
+"""Photons of a timed rendering's first pass, which finds out how fast the scene goes."""
 DEFAULT_SAMPLES = 16
 """Camera samples a pixel."""
 
@@ -112,8 +111,12 @@ def _render(context: Context, scene: Scene, settings: RenderSettings, progress: 
     try:
         light.prepare()
         stats.prepare_seconds = time.perf_counter() - started
-        _trace_and_splat(light, scene, settings, progress, cancelled)
+        if settings.seconds is None:
+            _trace_and_splat(light, settings.photons or scene.render.photons, settings.seed, progress, cancelled)
+        else:
+            _trace_for(light, settings.seconds, settings.seed, progress, cancelled)
         light.finish()
+        stats.light = light.stats
         stats.atlas_size = light.layout.size
         stats.bytes = buffers.bytes + light.trace.bytes
         eye_started = time.perf_counter()
@@ -131,27 +134,43 @@ def _render(context: Context, scene: Scene, settings: RenderSettings, progress: 
         buffers.release()
 
 
-def _trace_and_splat(light: LightHalf, scene: Scene, settings: RenderSettings, progress: Progress, cancelled: Cancelled) -> None:
-    """Passes of shifted lattices until the photons or the seconds are spent."""
-    if settings.seconds is None:
-        def proceed(fraction: float) -> bool:
-            progress(0.9 * fraction, "tracing photons")
-            return not cancelled()
+def _trace_and_splat(light: LightHalf, photons: int, seed: int, progress: Progress, cancelled: Cancelled) -> None:
+    """One pass of so many photons."""
 
-        light.run_pass(0, settings.photons or scene.render.photons, proceed)
-        return
+    def proceed(fraction: float) -> bool:
+        progress(0.9 * fraction, "tracing photons")
+        return not cancelled()
+
+    light.begin(photons, seed)
+    light.run_pass(0, photons, proceed)
+
+
+def _trace_for(light: LightHalf, seconds: float, seed: int, progress: Progress, cancelled: Cancelled) -> None:
+    """Passes as fine as `seconds` allow.
+
+    Coarse footprints blur, and what they blurred stays in the sum: so a first small pass only tells how
+    fast this scene goes, and everything starts anew with one pass that fills the time that is left.
+    """
     begun = time.perf_counter()
-    budget = settings.seconds
 
     def in_time(_: float) -> bool:
-        spent = (time.perf_counter() - begun) / budget
+        spent = (time.perf_counter() - begun) / seconds
         progress(0.9 * min(spent, 1.0), "tracing photons")
         return spent < 1.0 and not cancelled()
 
-    number, photons = 0, FIRST_PASS_PHOTONS
-    while light.run_pass(number, photons, in_time) and in_time(0.0):
+    photons = FIRST_PASS_PHOTONS
+    light.begin(photons, seed)
+    complete = light.run_pass(0, photons, in_time) and in_time(0.0)
+    spent = light.stats.trace_seconds + light.stats.splat_seconds
+    left = seconds - (time.perf_counter() - begun)
+    affordable = int(left * light.stats.photons / max(spent, 1e-6))
+    if not complete or affordable < 2 * photons:
+        number = 1
+    else:
+        number, photons = 0, affordable
+        light.begin(photons, seed)
+    while in_time(0.0) and light.run_pass(number, photons, in_time):
         number += 1
-        photons = min(2 * photons, LAST_PASS_PHOTONS)
 
 
 def _map_layer(light: LightHalf) -> tuple[np.ndarray, np.ndarray | None]:
