@@ -7,6 +7,22 @@ import msgspec
 PHOTON_STAGES = ("trace", "splat", "resolve")
 """Stages whose sum is photon time: emission and tracing, footprints and drawing, putting the maps together."""
 
+EARLY_SHARE = 0.1
+"""The early pictures are made after this share of the photon time given."""
+
+
+class BenchSettings(msgspec.Struct, frozen=True):
+    """What was asked for; results of other settings are never mixed."""
+
+    seconds: float
+    """Photon time of the largest rendering of each method and seed."""
+    seeds: int
+    methods: tuple[str, ...]
+    size: tuple[int, int] | None
+    """Width and height in pixels; None: 480 wide, in each scene's own aspect."""
+    reference_seconds: float
+    """Most time that may be spent on one scene's reference."""
+
 
 class Sample(msgspec.Struct, frozen=True):
     """One rendering: a method, a photon budget and a seed."""
@@ -17,10 +33,11 @@ class Sample(msgspec.Struct, frozen=True):
     emitted: int
     splats: int
     seconds: dict[str, float]
-    """By stage; `PHOTON_STAGES` and "eye" (display, the same for every method and not counted)."""
+    """By stage: `PHOTON_STAGES`; and, not counted, "plan" (bands and spectral tables, once before a rendering) and
+    "eye" (display, the same for every method)."""
     metrics: dict[str, float]
-    """relmse, relmse_trimmed, smape, chroma, nrmse, flip, energy_ratio (Σ picture / Σ reference)."""
-    error_rgb: float = 0.0
+    """relmse, relmse_raw (the reference's own variance left in), relmse_trimmed, smape, chroma, nrmse, energy_ratio
+    (Σ picture / Σ reference); "flip" for the equal-time pictures alone. See `metrics`."""
 
     @property
     def photon_seconds(self) -> float:
@@ -39,7 +56,8 @@ class Point(msgspec.Struct, frozen=True):
     """Over seeds: mean, least and largest."""
     bias2: float
     variance: float
-    """relMSE told apart: bias² of the mean picture (less what its own variance leaves) and mean variance."""
+    """relMSE told apart: bias² of the mean picture (less what its own variance leaves) and mean variance. With one
+    seed they cannot be told apart: both are 0."""
 
 
 class Curve(msgspec.Struct):
@@ -49,6 +67,8 @@ class Curve(msgspec.Struct):
     setup_seconds: dict[str, float]
     """Once per scene and not in photon time: "buffers" (tree and uploads), "compile", "pilot"."""
     samples: list[Sample]
+    budgets: list[int] = []
+    """Photons of each point, from the rate that a first trial had; the same for every seed."""
     points: list[Point] = []
     slope: float = 0.0
     """Exponent of relMSE against photons over the curve's second half, and its 95 % confidence half-width."""
@@ -63,7 +83,8 @@ class ReferenceInfo(msgspec.Struct):
     photons: int
     seconds: float
     relmse: float
-    """Its own error (variance of the mean, estimated from independent parts), as relMSE."""
+    """Its own error (variance of the mean, estimated from independent parts), as relMSE. It is subtracted from every
+    relMSE reported."""
     key: str
     """Hash of scene content, camera and size: the cache's key."""
 
@@ -98,9 +119,16 @@ class SceneResult(msgspec.Struct):
     strongest_abbe: float = 0.0
     """Lowest V_d in the scene; 0 when nothing disperses."""
     pictures: dict[str, str] = {}
-    """Files beside results.json: "reference", "METHOD" (at equal time), as .npy of XYZ (H, W, 3)."""
+    """Files beside results.json, .npy of XYZ float32 (H, W, 3): "reference", "reference_variance", "METHOD" (after
+    `equal_time` of photon time) and "METHOD early" (after `EARLY_SHARE` of it)."""
     equal_time: float = 0.0
-    """Photon seconds at which `pictures` were made."""
+    """Photon seconds for which the pictures named by a method alone were made."""
+    picture_samples: dict[str, Sample] = {}
+    """What each of `pictures` but the reference took and how far off it is, by the same name; "flip" among its metrics."""
+    reference_too_coarse: bool = False
+    """The reference's own error is more than a tenth of the smallest error reported."""
+    complete: bool = False
+    """Every method has had every seed, and the pictures are made."""
 
 
 class BenchResult(msgspec.Struct):
@@ -110,5 +138,6 @@ class BenchResult(msgspec.Struct):
     date: str
     command: str
     machine: dict[str, str]
-    """processor, cores, renderer, driver, opengl, system, python."""
+    """processor, cores, renderer, driver, opengl, system, python, program (hash of what renders and measures)."""
+    settings: BenchSettings
     scenes: list[SceneResult]
