@@ -7,6 +7,8 @@ import msgspec
 PHOTON_STAGES = ("trace", "splat", "resolve")
 """Stages whose sum is photon time: emission and tracing, footprints and drawing, putting the maps together."""
 
+DEFAULT_METHODS = ("stochastic", "stochastic-point", "regular-7", "regular-16", "srd-lambda", "srd")
+
 EARLY_SHARE = 0.1
 """The early pictures are made after this share of the photon time given."""
 
@@ -14,14 +16,14 @@ EARLY_SHARE = 0.1
 class BenchSettings(msgspec.Struct, frozen=True):
     """What was asked for; results of other settings are never mixed."""
 
-    seconds: float
+    seconds: float = 3.0
     """Photon time of the largest rendering of each method and seed."""
-    seeds: int
-    methods: tuple[str, ...]
-    size: tuple[int, int] | None
+    seeds: int = 5
+    methods: tuple[str, ...] = DEFAULT_METHODS
+    size: tuple[int, int] | None = None
     """Width and height in pixels; None: 480 wide, in each scene's own aspect."""
-    reference_seconds: float
-    """Most time that may be spent on one scene's reference."""
+    reference_seconds: float = 60.0
+    """Most time that one run spends on a scene's reference; what earlier runs made is used as well."""
 
 
 class Sample(msgspec.Struct, frozen=True):
@@ -119,7 +121,7 @@ class SceneResult(msgspec.Struct):
     strongest_abbe: float = 0.0
     """Lowest V_d in the scene; 0 when nothing disperses."""
     pictures: dict[str, str] = {}
-    """Files beside results.json, .npy of XYZ float32 (H, W, 3): "reference", "reference_variance", "METHOD" (after
+    """Files beside results.json, .npy of XYZ float32 (H, W, 3): "reference", "METHOD" (after
     `equal_time` of photon time) and "METHOD early" (after `EARLY_SHARE` of it)."""
     equal_time: float = 0.0
     """Photon seconds for which the pictures named by a method alone were made."""
@@ -139,5 +141,5 @@ class BenchResult(msgspec.Struct):
     command: str
     machine: dict[str, str]
     """processor, cores, renderer, driver, opengl, system, python, program (hash of what renders and measures)."""
-    settings: BenchSettings
     scenes: list[SceneResult]
+    settings: BenchSettings = BenchSettings()
