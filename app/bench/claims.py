@@ -1,0 +1,113 @@
+"""What a scene must show about `srd`, what it showed, and by how much and why it falls short."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from app.bench.curves import error_at_time, speed_up
+from app.bench.results import PHOTON_STAGES, Claim, Curve, Point, SceneResult
+
+ASKED_SPEED_UP = 30.0
+"""`stochastic` must take at least this many times longer: 2 minutes against 60 in Elek et al. 2014."""
+EARLY_SECONDS = 0.1
+LATE_SECONDS = 3.0
+STRONG_ABBE = 40.0
+"""Flints and stronger: below this `srd` must beat `srd-lambda`."""
+_COMPARED_SECONDS = (0.1, 1.0)
+
+
+def claims_of(scene: SceneResult) -> list[Claim]:
+    """The claims that the methods and the time of this scene allow to judge."""
+    curves = {curve.method: curve for curve in scene.curves if curve.points}
+    srd = curves.get("srd")
+    if srd is None:
+        return []
+    claims = []
+    stochastic = curves.get("stochastic")
+    if stochastic is not None:
+        claims.append(_speed_up_claim(scene, srd, stochastic))
+        if scene.seconds >= LATE_SECONDS:
+            claims.append(_first_picture_claim(scene, srd, stochastic))
+    linear = curves.get("srd-lambda")
+    if linear is not None and 0.0 < scene.strongest_abbe < STRONG_ABBE:
+        claims.append(_index_claim(scene, srd, linear))
+    return claims
+
+
+def ratios_of(curves: Sequence[Curve]) -> dict[str, float]:
+    """Method → how many times sooner it reaches the error that `stochastic` ends with."""
+    by_method: Mapping[str, Curve] = {curve.method: curve for curve in curves}
+    if "stochastic" not in by_method:
+        return {}
+    found = {name: speed_up(curve.points, by_method["stochastic"].points) for name, curve in by_method.items()}
+    return {name: reached.seconds for name, reached in found.items() if reached is not None}
+
+
+def _speed_up_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> Claim:
+    end = stochastic.points[-1]
+    asked = f"at most 1/{ASKED_SPEED_UP:.0f} of the time of stochastic to its error at the end ({end.relmse:.3g} after {end.seconds:.2f} s)"
+    reached = speed_up(srd.points, stochastic.points)
+    if reached is None:
+        last = srd.points[-1]
+        times = last.relmse / max(end.relmse, 1e-30)
+        measured = f"not reached in {last.seconds:.2f} s: srd ends at {last.relmse:.3g}, {times:.2g} times that"
+        return Claim("time to equal error", asked, measured, False, reason(scene, srd))
+    measured = f"{'at least ' if reached.at_once else ''}{reached.seconds:.3g} times sooner"
+    holds = reached.seconds >= ASKED_SPEED_UP
+    why = ""
+    if not holds and reached.at_once:
+        first = srd.points[0]
+        why = f"srd's smallest rendering ({first.photons:,} photons, {first.seconds:.3f} s) is already as good: {_stage_shares(srd, first)}; longer runs would tell more"
+    elif not holds:
+        why = f"short by a factor of {ASKED_SPEED_UP / reached.seconds:.2g}; {reason(scene, srd)}"
+    return Claim("time to equal error", asked, measured, holds, why)
+
+
+def _first_picture_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> Claim:
+    late = error_at_time(stochastic.points, LATE_SECONDS)
+    end = stochastic.points[-1]
+    late = end.relmse if late is None else late
+    asked = f"the picture after {EARLY_SECONDS} s of photon time is better than stochastic's after {LATE_SECONDS:.0f} s (relMSE {late:.3g})"
+    early = error_at_time(srd.points, EARLY_SECONDS)
+    if early is None:
+        first = srd.points[0]
+        why = f"even {first.photons:,} photons take {first.seconds:.2f} s: {_stage_shares(srd, first)}"
+        return Claim("first picture", asked, f"no picture before {first.seconds:.2f} s, then relMSE {first.relmse:.3g}", False, why)
+    holds = early < late
+    why = "" if holds else f"{early / max(late, 1e-30):.2g} times stochastic's; {reason(scene, srd, EARLY_SECONDS)}"
+    return Claim("first picture", asked, f"relMSE {early:.3g}", holds, why)
+
+
+def _index_claim(scene: SceneResult, srd: Curve, linear: Curve) -> Claim:
+    """Smaller error than the column by wavelength, at every time compared."""
+    common = min(srd.points[-1].seconds, linear.points[-1].seconds)
+    times = sorted({t for t in _COMPARED_SECONDS if t < common} | {common})
+    pairs = [(t, error_at_time(srd.points, t), error_at_time(linear.points, t)) for t in times]
+    compared = [(t, a, b) for t, a, b in pairs if a is not None and b is not None]
+    asked = f"smaller error than srd-lambda at equal time, the strongest glass being {scene.strongest_glass} (V_d {scene.strongest_abbe:.1f})"
+    measured = ", ".join(f"at {t:.2g} s {a:.3g} against {b:.3g} ({b / max(a, 1e-30):.2g}×)" for t, a, b in compared)
+    lost = [t for t, a, b in compared if not a < b]
+    why = "" if not lost else f"not at {', '.join(f'{t:.2g} s' for t in lost)}; {reason(scene, srd)}"
+    return Claim("index against wavelength", asked, measured, not lost, why)
+
+
+def reason(scene: SceneResult, curve: Curve, seconds: float | None = None) -> str:
+    """What the error of `curve` at its end (or at the point next to `seconds`) consists of."""
+    point = curve.points[-1] if seconds is None else min(curve.points, key=lambda p: abs(p.seconds - seconds))
+    parts = []
+    if scene.reference is not None and scene.reference.relmse > 0.5 * point.relmse:
+        parts.append(f"the reference's own relMSE of {scene.reference.relmse:.2g} leaves the true error of {point.relmse:.2g} uncertain")
+    total = point.bias2 + point.variance
+    if total > 0.0 and len({s.seed for s in curve.samples}) > 1:
+        share = point.bias2 / total
+        cause = "footprints, bands and texels blur it, which only finer lattices reduce" if share > 0.5 else "noise, which more photons reduce"
+        parts.append(f"{100 * share:.0f} % of {curve.method}'s error at {point.seconds:.2g} s is bias² and {100 * (1 - share):.0f} % variance, so mostly {cause}")
+    parts.append(_stage_shares(curve, point))
+    return "; ".join(parts)
+
+
+def _stage_shares(curve: Curve, point: Point) -> str:
+    samples = [s for s in curve.samples if s.photons == point.photons]
+    spent = {stage: sum(s.seconds.get(stage, 0.0) for s in samples) for stage in PHOTON_STAGES}
+    total = sum(spent.values()) or 1.0
+    return "its time is " + ", ".join(f"{100 * seconds / total:.0f} % {stage}" for stage, seconds in spent.items())

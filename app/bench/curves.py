@@ -1,0 +1,110 @@
+"""From samples to curves: points with bias and variance, the tail's slope, and who needs how much time for an error.
+
+Everything between two points is interpolated in log-log. Where a curve is not monotone the later, worse crossing
+counts, so that a lucky rendering gains nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.bench.metrics import Truth, bias_variance
+from app.bench.results import Curve, Point, Sample
+
+SMALLEST_ERROR = 1e-12
+"""Stands for 0 in logarithms."""
+CONFIDENCE = 0.95
+
+
+def make_point(samples: Sequence[Sample], mean_difference: np.ndarray, truth: Truth) -> Point:
+    """All seeds of one photon budget; `mean_difference`: mean over them of I − R̂, XYZ (H, W, 3)."""
+    told_apart = bias_variance(mean_difference, [s.metrics["relmse_raw"] for s in samples], truth)
+    single = [s.metrics["relmse"] for s in samples]
+    return Point(
+        samples[0].photons,
+        float(np.mean([s.photon_seconds for s in samples])),
+        told_apart.relmse,
+        min(single),
+        max(single),
+        told_apart.bias2,
+        told_apart.variance,
+    )
+
+
+def tail_slope(samples: Sequence[Sample], budgets: Sequence[int]) -> tuple[float, float]:
+    """Exponent of relMSE against photons over the larger half of `budgets`, and its 95 % half-width.
+
+    Least squares over all single renderings, which are independent; (nan, nan) with fewer than three of them or of
+    fewer than two budgets.
+    """
+    tail = set(sorted(budgets)[len(budgets) // 2 :])
+    kept = [s for s in samples if s.photons in tail and s.metrics["relmse"] > SMALLEST_ERROR]
+    if len(kept) < 3 or len({s.photons for s in kept}) < 2:
+        return float("nan"), float("nan")
+    from scipy.stats import t
+
+    x = np.log([float(s.photons) for s in kept])
+    y = np.log([s.metrics["relmse"] for s in kept])
+    x -= x.mean()
+    spread = float(np.sum(x**2))
+    slope = float(np.sum(x * y) / spread)
+    residual = y - y.mean() - slope * x
+    freedom = len(kept) - 2
+    error = np.sqrt(float(np.sum(residual**2)) / freedom / spread)
+    return slope, float(t.ppf(0.5 + CONFIDENCE / 2, freedom) * error)
+
+
+def complete_curve(curve: Curve, mean_differences: Mapping[int, np.ndarray], truth: Truth) -> None:
+    """Fill `curve.points` and its slope from its samples; budgets without a mean picture are left out."""
+    by_budget: dict[int, list[Sample]] = {}
+    for sample in curve.samples:
+        by_budget.setdefault(sample.photons, []).append(sample)
+    curve.points = [make_point(by_budget[n], mean_differences[n], truth) for n in sorted(by_budget) if n in mean_differences]
+    slope, half_width = tail_slope(curve.samples, curve.budgets)
+    curve.slope, curve.slope_half_width = (slope, half_width) if np.isfinite(slope) else (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Reached:
+    """When a curve reaches an error."""
+
+    seconds: float
+    at_once: bool
+    """Its first point is already as good: the true time is at most `seconds`."""
+
+
+def time_to_error(points: Sequence[Point], error: float) -> Reached | None:
+    """Photon time from which on the curve stays at or below `error`; None when it ends above."""
+    if not points or points[-1].relmse > error:
+        return None
+    last_above = max((i for i, p in enumerate(points) if p.relmse > error), default=-1)
+    if last_above < 0:
+        return Reached(points[0].seconds, True)
+    above, below = points[last_above], points[last_above + 1]
+    high, low = _log(above.relmse), _log(below.relmse)
+    share = (high - _log(error)) / (high - low)
+    return Reached(float(np.exp((1.0 - share) * np.log(above.seconds) + share * np.log(below.seconds))), False)
+
+
+def error_at_time(points: Sequence[Point], seconds: float) -> float | None:
+    """relMSE after `seconds` of photon time; None before the first picture. After the last point, that of the last."""
+    if not points or seconds < points[0].seconds:
+        return None
+    order = sorted(points, key=lambda p: p.seconds)
+    return float(np.exp(np.interp(np.log(seconds), [np.log(p.seconds) for p in order], [_log(p.relmse) for p in order])))
+
+
+def speed_up(points: Sequence[Point], baseline: Sequence[Point]) -> Reached | None:
+    """How many times sooner `points` reach the error that `baseline` ends with, as `Reached` whose seconds are the
+    ratio; `at_once` then means "at least". None when they never get there."""
+    if not baseline:
+        return None
+    reached = time_to_error(points, baseline[-1].relmse)
+    return None if reached is None else Reached(baseline[-1].seconds / reached.seconds, reached.at_once)
+
+
+def _log(error: float) -> float:
+    return float(np.log(max(error, SMALLEST_ERROR)))
