@@ -1,0 +1,176 @@
+"""What the bench report says in words: numbers as people read them, the protocol, definitions, warnings and limits.
+
+Plain text only; `report_html` escapes it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from app.bench.results import BenchResult, Claim, Curve, SceneResult
+
+METHODS = {
+    "srd": "The default. Each photon carries spectral ray differentials by refractive index, one column for each dispersive glass, "
+    "and leaves an anisotropic Gaussian swept along its spectrum, drawn in closed form. As many spectral bands as the measured "
+    "error of a chord asks for.",
+    "srd-lambda": "The published method (Elek et al. 2014): one column by wavelength, one anchor in the middle of the band.",
+    "stochastic": "One random wavelength a photon, spatial footprint. The baseline: unbiased in wavelength, noisy in colour.",
+    "stochastic-point": "One random wavelength a photon, one texel. Unbiased light tracing.",
+    "regular-7": "Seven fixed wavelengths a photon path, a splat each. Shows banding where the spectrum is spread wider than a footprint.",
+    "regular-16": "Sixteen fixed wavelengths a photon path, a splat each.",
+    "progressive": "The default made consistent: anchors and kernels change from pass to pass so that the bias goes to zero.",
+}
+
+METRICS = {
+    "relMSE": "mean over pixels and over X, Y, Z of (I − R)² / (R² + ε), I the picture, R the reference, ε = 10⁻² · mean(R)². "
+    "The reference's own variance is taken off.",
+    "relMSE trimmed": "the same without the 0.1 % of pixels with the largest error: what single fireflies cannot sway.",
+    "bias² and variance": "relMSE told apart over n seeds: bias² = mean[((Ī − R)² − Var/n) / (R² + ε)] with Ī the mean picture, "
+    "variance = mean[Var / (R² + ε)]. An estimate of bias² at or below zero means that no bias could be detected.",
+    "SMAPE": "mean of |I − R| / (|I| + |R|), 0 to 1.",
+    "Δu'v'": "mean chroma error in CIE 1976 u'v' on the pixels the reference lights: chromatic noise that luminance hides.",
+    "nRMSE": "root of the mean square error over the root mean square of the reference.",
+    "HDR-FLIP": "mean perceived difference over exposures (Andersson et al. 2021), 0 to 1, on linear RGB.",
+    "energy": "sum of the picture over sum of the reference; 1 is right.",
+    "tail slope": "exponent of relMSE against photons over the curve's second half, with its 95 % confidence interval. "
+    "Pure noise of independent photons gives −1; a bias floor bends it towards 0.",
+    "time to equal error": "time `stochastic` needs for its longest rendering, over the time the method needs to reach the same mean error, "
+    "read off the curves by log-log interpolation. ≥ marks a method whose shortest rendering is already better.",
+}
+
+STAGES = {
+    "trace": "emission and tracing of photons",
+    "splat": "footprints and drawing into the caustic maps",
+    "resolve": "putting the maps together",
+}
+
+PROTOCOL = (
+    "One process and one OpenGL context; all methods share emission, tracing, accumulation and display and use the same seeds. "
+    "They differ in sampling and splat alone, so a difference between curves is a difference between methods.",
+    "Every point is an independent rendering from nothing with one photon budget; budgets rise in equal ratios. Methods take turns "
+    "within a seed, so that disturbances of the machine reach all alike.",
+    "Photon time is trace + splat + resolve. Not in it: set-up of the scene (tree, uploads, compilation, pilot photons), "
+    "which is listed by itself, and the camera's pass, which is the same for every method.",
+    "Errors are taken on linear XYZ of the caustic layer before tone mapping and gamut clipping, against a reference that shares no "
+    "splat code: random wavelength, one photon one pixel.",
+)
+
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+REFERENCE_SHARE = 0.1
+"""A reference's own error above this share of the smallest error measured calls for a warning."""
+
+
+def superscript(value: float) -> str:
+    """A tick such as 10⁻³ or 3·10⁻³."""
+    exponent = math.floor(math.log10(value) + 1e-9)
+    digit = round(value / 10.0**exponent)
+    power = f"10{str(exponent).translate(_SUPERSCRIPTS)}"
+    return power if digit == 1 else f"{digit}·{power}"
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    """A table's number: "–" when there is none, plain between 0.001 and 10⁵, else with a power of ten."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value == 0:
+        return "0"
+    sign = "−" if value < 0 else ""
+    size = abs(value)
+    if 1e-3 <= size < 1e5:
+        decimals = max(digits - 1 - math.floor(math.log10(size)), 0)
+        return f"{sign}{size:.{decimals}f}"
+    exponent = math.floor(math.log10(size))
+    return f"{sign}{size / 10.0**exponent:.{digits - 1}f}·10{str(exponent).translate(_SUPERSCRIPTS)}"
+
+
+def count(value: float) -> str:
+    """A number of photons: 16.4 M, 250 k."""
+    for unit, suffix in ((1e9, " G"), (1e6, " M"), (1e3, " k")):
+        if value >= unit:
+            return f"{value / unit:.3g}{suffix}"
+    return f"{value:.0f}"
+
+
+def ratio_text(ratio: float, lower_bound: bool = False) -> str:
+    """A time ratio: 45×, 2.3×, ≥ 120×."""
+    digits = f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.2g}"
+    return f"{'≥ ' if lower_bound else ''}{digits}×"
+
+
+def smallest_error(scene: SceneResult) -> float:
+    """The least positive mean relMSE of any curve; 0 when there is none."""
+    errors = [p.relmse for c in scene.curves for p in c.points if p.relmse > 0 and math.isfinite(p.relmse)]
+    return min(errors, default=0.0)
+
+
+def warnings_of(scene: SceneResult) -> list[str]:
+    """What a reader must know before trusting a scene's numbers."""
+    told = []
+    least = smallest_error(scene)
+    if scene.reference is None:
+        told.append("There is no reference yet, so there are no errors.")
+    elif not math.isfinite(scene.reference.relmse):
+        told.append("The reference's own error is not known.")
+    elif least > 0 and scene.reference.relmse > REFERENCE_SHARE * least:
+        share = scene.reference.relmse / least
+        told.append(
+            f"The reference's own error ({number(scene.reference.relmse)}) is {share:.2g} times the smallest error reported "
+            f"({number(least)}), above the tenth that the protocol asks for. Its variance has been taken off, yet errors near it are less "
+            "certain than the band between seeds shows, and a ratio read there is less certain too."
+        )
+    if any(p.relmse <= 0 for c in scene.curves for p in c.points):
+        told.append("Where a debiased error is zero or below, the picture cannot be told from the reference; the plots show a hollow triangle on the floor.")
+    unfinished = [curve.method for curve in scene.curves if not curve.points]
+    if unfinished:
+        told.append(f"Not finished: {', '.join(unfinished)}.")
+    if scene.seeds < 5:
+        told.append(f"Only {'one seed' if scene.seeds == 1 else f'{scene.seeds} seeds'}: the band over seeds and the parting of bias and variance are weak; the protocol asks for five.")
+    return told
+
+
+def headline(result: BenchResult) -> list[str]:
+    """The findings in two or three sentences."""
+    claims = [claim for scene in result.scenes for claim in scene.claims]
+    ratios = sorted(r for s in result.scenes if (r := s.time_to_equal_error.get("srd", 0.0)) > 0 and math.isfinite(r))
+    told = []
+    if ratios:
+        enough = sum(ratio >= 30 for ratio in ratios)
+        middle = ratios[len(ratios) // 2] if len(ratios) % 2 else math.sqrt(ratios[len(ratios) // 2 - 1] * ratios[len(ratios) // 2])
+        told.append(
+            f"srd reached the error that stochastic has at its end in at most 1/30 of the time in {enough} of {len(result.scenes)} scenes; "
+            f"least {ratio_text(ratios[0])}, median {ratio_text(middle)}, largest {ratio_text(ratios[-1])}."
+        )
+    if claims:
+        told.append(f"{sum(claim.holds for claim in claims)} of {len(claims)} claims hold; what does not is told under Limits.")
+    if not told:
+        told.append("Nothing has been compared yet: the run was stopped early or had one method only.")
+    return told
+
+
+def limits(result: BenchResult) -> list[tuple[str, Claim]]:
+    """(scene, claim) for every claim that does not hold."""
+    return [(scene.scene, claim) for scene in result.scenes for claim in scene.claims if not claim.holds]
+
+
+def limit_sentence(claim: Claim) -> str:
+    """One failed claim in words."""
+    why = claim.why.strip() or "the numbers do not tell why."
+    return f"Asked: {claim.asked}. Measured: {claim.measured}. Why: {why}"
+
+
+def ratio_in_words(ratio: float | None) -> str:
+    """A time ratio as a sentence's end, for those who stumble over ratios."""
+    if ratio is None or not math.isfinite(ratio) or ratio <= 0:
+        return "never got there"
+    if abs(ratio - 1) < 0.05:
+        return "as fast"
+    return f"{ratio_text(ratio)[:-1]} times less time" if ratio > 1 else f"{ratio_text(1 / ratio)[:-1]} times more time"
+
+
+def bias_share(curve: Curve) -> float | None:
+    """Share of bias² in bias² + variance at the largest budget, 0 to 1; None where it cannot be told."""
+    if not curve.points:
+        return None
+    last = max(curve.points, key=lambda point: point.photons)
+    bias2, variance = max(last.bias2, 0.0), max(last.variance, 0.0)
+    return bias2 / (bias2 + variance) if bias2 + variance > 0 and math.isfinite(bias2 + variance) else None
