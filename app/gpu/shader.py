@@ -2,19 +2,23 @@
 
 moderngl's own includes go one level deep and lose line numbers, so sources are flattened
 here: `#include "lib/x.glsl"` (relative to the shaders folder, each file once), then
-`#version`, the defines of the scene's `Features`, and the structs of `records` on top. A table
+`#version`, the defines of the scene's `Features`, and the structs of `records` on top. What then cannot
+run is left out (`lean_source`), so the text that is compiled holds only what the scene needs. A table
 from flattened line to (file, line) turns a compiler message back into something to click on.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app import paths
+from app.gpu.glsl_conditionals import Line
+from app.gpu.lean_source import lean
 from app.gpu.schema import Struct
 
 if TYPE_CHECKING:
@@ -31,8 +35,9 @@ class ShaderError(RuntimeError):
 
 @dataclass(frozen=True)
 class Source:
-    """Flattened GLSL and where each of its lines came from."""
+    """Flattened GLSL, as it is handed to the driver, and where each of its lines came from."""
 
+    name: str
     text: str
     origin: tuple[tuple[str, int], ...]
 
@@ -54,17 +59,15 @@ def load_source(
     structs: Sequence[Struct] = (),
     root: Path | None = None,
 ) -> Source:
-    """Flatten the shader `name` (path under the shaders folder).
+    """Flatten the shader `name` (path under the shaders folder) and leave out what cannot run.
 
     Raises `ShaderError` naming the including file and line when an include is missing.
     """
     root = root or paths.shaders_dir()
-    lines: list[str] = []
-    origin: list[tuple[str, int]] = []
+    lines: list[Line] = []
 
     def emit(text: str, file: str, line: int) -> None:
-        lines.append(text)
-        origin.append((file, line))
+        lines.append(Line(text, file, line))
 
     emit("#version 430 core", "<generated>", 1)
     for key, value in (defines or {}).items():
@@ -91,7 +94,28 @@ def load_source(
                 emit(line, file, number)
 
     flatten(name, "the program")
-    return Source("\n".join(lines) + "\n", tuple(origin))
+    kept = lean(lines)
+    return Source(name, "\n".join(line.text for line in kept) + "\n", tuple((line.file, line.number) for line in kept))
+
+
+_recordings: list[list[Source]] = []
+
+
+@contextmanager
+def recorded() -> Iterator[list[Source]]:
+    """Collects the sources of every program that is built meanwhile."""
+    sources: list[Source] = []
+    _recordings.append(sources)
+    try:
+        yield sources
+    finally:
+        _recordings.pop()
+
+
+def _handed_over(source: Source) -> str:
+    for sources in _recordings:
+        sources.append(source)
+    return source.text
 
 
 def compute(
@@ -100,7 +124,7 @@ def compute(
     """Compile the compute shader `name`; raises `ShaderError` with file and line."""
     source = load_source(name, defines, structs)
     try:
-        return ctx.compute_shader(source.text)
+        return ctx.compute_shader(_handed_over(source))
     except Exception as error:  # moderngl raises its own Error type with the driver's log
         raise ShaderError(f"{name} does not compile:\n{source.explain(str(error))}") from error
 
@@ -116,7 +140,7 @@ def program(
     vertex_source = load_source(vertex, defines, structs)
     fragment_source = load_source(fragment, defines, structs)
     try:
-        return ctx.program(vertex_shader=vertex_source.text, fragment_shader=fragment_source.text)
+        return ctx.program(vertex_shader=_handed_over(vertex_source), fragment_shader=_handed_over(fragment_source))
     except Exception as error:
         log = str(error)
         source = fragment_source if "fragment" in log.lower() else vertex_source
