@@ -1,68 +1,120 @@
 """Photons of the real emit and trace passes in scenes made for one question, in world coordinates.
 
-A collimated disc of light falls on glass before one large diffuse screen; the photon records
-come back with the float64 start of the lattice point each grew from, so that every photon can be
-held against a closed form or the reference tracer.
+A light falls on glass or mirrors before a diffuse screen; the photon records come back with the
+float64 start of the lattice point each grew from and the choices of its path, so that every photon
+can be held against a closed form or the reference tracer.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
+from itertools import product
 
 import numpy as np
 
 from app.gpu.context import Context
-from app.gpu.scene_buffers import SceneBuffers
+from app.gpu.scene_buffers import Groups, SceneBuffers
 from app.light_half import spectral_axis
 from app.model.features import Features
 from app.model.glass import sellmeier
 from app.model.mesh import Mesh, make_mesh
-from app.model.scene import Camera, Dielectric, Diffuse, Light, Scene, SceneObject
+from app.model.scene import (
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Mirror,
+    Scene,
+    SceneObject,
+)
 from app.model.settings import RenderSettings
 from app.model.spectral_tables import SpectralAxis
 from app.model.spectrum import constant
-from app.passes.emission_domain import (
-    EmissionDomain,
-    emission_domain,
-    orthonormal_frame,
-)
+from app.passes.emission_domain import emission_domain, orthonormal_frame
 from app.passes.trace import Band, FluxTally, LatticeSlice, TracePass
+from app.truth.emission import Emitter
 from app.truth.glasses import sellmeier_terms
 from app.truth.optics import unit
+from app.truth.random_numbers import hash_combine
 
-GOLDEN = 2654435769
-WORD = 2**32
 SHIFT = (123456789, 987654321)
+SEED = 1
+REFLECTED, REFRACTED, MIRRORED, CUT_LOW, CUT_HIGH = 1, 2, 3, 5, 6
+"""Choices of a path as trace.comp names them in the branch key."""
 
 
 @dataclass(frozen=True)
 class Photons:
-    """Landings of one band, world units; N rows."""
+    """Landings, world units; N rows, G spectral groups."""
 
     records: np.ndarray
     """The photon buffer as it is."""
+    emitter: Emitter
+    q: np.ndarray
+    """float64 (N, 2): the point of the emission domain."""
     start: np.ndarray
     """float64 (N, 3): where each ray left the light."""
+    direction: np.ndarray
+    """float64 (N, 3): in which direction."""
     position: np.ndarray
     dposition_ds: np.ndarray
-    """(N, 3) per world unit along the beam's first axis."""
+    """(N, 3) per unit of q: world units across a beam, of the azimuthal plane for light that diverges."""
     dposition_dt: np.ndarray
-    dposition_dn: np.ndarray
-    """(N, 3) per unit of refractive index."""
+    dposition_dvar: np.ndarray
+    """(N, G, 3) per unit of each group's variable."""
+    weight: np.ndarray
+    """(N,): flux each photon's band starts with, float64."""
+    nm: np.ndarray
+    """(N, 3): wavelengths of the band's start, the anchor and the band's end."""
     axis: SpectralAxis
+    groups: Groups
     lattice_in_disc: int
-    """Lattice points inside the disc that was asked for."""
+    """Lattice points inside the disc that was asked for (all of them, without one)."""
     flux_w: float
-    """Flux that each of them starts with."""
+    """Flux of a lattice point of full weight."""
     tally: FluxTally
+
+    @property
+    def dposition_dn(self) -> np.ndarray:
+        """(N, 3) per unit of the first group's variable; zero without dispersion."""
+        return self.dposition_dvar[:, 0] if self.dposition_dvar.shape[1] else np.zeros_like(self.position)
 
     def of_depth(self, depth: int) -> Photons:
         """Those after `depth` specular events."""
         return self.where(self.records["depth"] == depth)
 
+    def of_choices(self, *choices: int) -> Photons:
+        """Those whose path took these choices, one an event (`REFLECTED`, …)."""
+        keys = {int(band): branch_key(choices, int(band)) for band in np.unique(self._band)}
+        return self.where(self.records["branch_key"] == np.array([keys[int(band)] for band in self._band], np.uint32))
+
+    def choices(self, longest: int) -> list[tuple[int, ...] | None]:
+        """Each photon's choices, up to `longest` of them; None where more or others were made."""
+        table: dict[tuple[int, int], tuple[int, ...]] = {}
+        for length in range(1, longest + 1):
+            for path in product((REFLECTED, REFRACTED, MIRRORED, CUT_LOW, CUT_HIGH), repeat=length):
+                for band in np.unique(self._band):
+                    table[int(band), branch_key(path, int(band))] = path
+        return [table.get((int(b), int(k))) for b, k in zip(self._band, self.records["branch_key"], strict=True)]
+
+    def of_band(self, band: int) -> Photons:
+        """Those of one of the bands that were asked for."""
+        return self.where(self._band == band)
+
     def where(self, chosen: np.ndarray) -> Photons:
-        names = ("records", "start", "position", "dposition_ds", "dposition_dt", "dposition_dn")
+        names = ("records", "q", "start", "direction", "position", "dposition_ds", "dposition_dt", "dposition_dvar", "weight", "nm")
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
+
+    @property
+    def _band(self) -> np.ndarray:
+        return self.records["light_and_source"] >> 8 & 0xFF
+
+
+def branch_key(choices: Sequence[int], band: int = 0) -> int:
+    """The key that trace.comp gives a path of these choices, first light."""
+    return int(reduce(hash_combine, choices, hash_combine(SEED, band)))
 
 
 def glass(name: str) -> Dielectric:
@@ -86,72 +138,97 @@ def extruded(name: str, section: np.ndarray, half: float = 0.5) -> Mesh:
     return make_mesh(name, np.concatenate([low, high]), np.array(caps + sides))
 
 
-def trace_beam(
+def placed(name: str, mesh: Mesh, material: Dielectric | Diffuse | Mirror) -> SceneObject:
+    """An object where its mesh is."""
+    return SceneObject(name, mesh, material)
+
+
+def trace_light(
     gl: Context,
-    solid: Mesh,
-    material: Dielectric,
-    screen_mesh: Mesh,
-    start: np.ndarray,
-    direction: np.ndarray,
-    radius: float,
-    nm: float | tuple[float, float],
+    objects: Sequence[SceneObject],
+    light: Light,
+    bands_nm: Sequence[tuple[float, float]],
     count: int = 256,
     max_depth: int = 3,
+    method: str = "srd",
+    place: tuple[float, float] = (0.5, 0.5),
 ) -> Photons:
-    """Send about `count` lattice points of a disc beam at one wavelength, or over a band (lo, hi), through `solid`.
+    """All landings of `count` lattice points for each spectral band.
 
-    The real beam is wider, and what starts outside the disc is dropped: at the beam's own edge a
-    lattice cell is covered in part only and its photon weaker. Every interface splits and nothing plays roulette, so each path is there once and with its true flux.
+    Every interface splits and nothing plays roulette, so each path is there once and with its true flux (1 W
+    per unit of the light's quantity and band). `place` is where on an extended light the rays start.
     """
-    wider = 1.0 + 3.0 / np.sqrt(count)
-    count = int(np.ceil(count * wider**2))
-    light = Light("beam", "collimated", constant(1.0), position=tuple(start), direction=tuple(unit(np.asarray(direction, float))), radius=radius * wider)
-    objects = (SceneObject("solid", solid, material), SceneObject("screen", screen_mesh, Diffuse()))
-    scene = Scene("question", Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), (light,), objects)
-    features = Features.of(scene, RenderSettings())
+    scene = Scene("question", Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), (light,), tuple(objects))
+    features = Features.of(scene, RenderSettings(method=method))
     buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
-    trace = TracePass(gl, features, buffers, batch=max(2 * count, 1024), max_depth=max_depth, split_threshold=0.0)
+    trace = TracePass(gl, features, buffers, batch=max(2 * count * len(bands_nm), 1024), max_depth=max_depth, split_threshold=0.0)
     try:
-        domain = emission_domain(light, scene, buffers.space, buffers.space.to_gpu(solid.corners()))
+        space = buffers.space
+        specular = [o.mesh.corners() for o in objects if not isinstance(o.material, Diffuse)]
+        domain = emission_domain(light, scene, space, space.to_gpu(np.concatenate(specular)))
         assert domain is not None
-        lo, hi = buffers.axis.x_of_nm(np.array(nm if isinstance(nm, tuple) else (nm, nm)))
-        band = Band(float(lo), float(hi), float(0.5 * (lo + hi)), 1.0)
-        piece = LatticeSlice(0, (band,), count, 0, 1, count, SHIFT, (0, 0), 0, seed=1)
-        batch = trace.run(piece, domain)
+        ends = [buffers.axis.x_of_nm(np.array(band)) for band in bands_nm]
+        bands = tuple(Band(float(lo), float(hi), float(0.5 * (lo + hi)), 1.0) for lo, hi in ends)
+        batch = trace.run(LatticeSlice(0, bands, count, 0, 1, count, SHIFT, (0, 0), 0, SEED, light_place=place), domain)
         assert batch.tally.fallbacks["queue_overflow"] == 0
         assert batch.tally.imbalance < 1e-4
         records = np.frombuffer(trace.photons.read(size=batch.photons * trace.photon.stride), trace.photon.dtype)
-        scale = buffers.space.scale
-        on_plane = _domain_points(domain, count)[records["photon_id"]]
-        spacing = domain.spacing(count)
-        from_axis = np.cross(_domain_points(domain, count) - buffers.space.to_gpu(np.asarray(start, float)), domain.axis)
-        inside = np.linalg.norm(from_axis, axis=1) <= radius * scale
-        everything = Photons(
-            records,
-            buffers.space.to_world(on_plane - domain.back * domain.axis),
-            buffers.space.to_world(records["position"]),
-            records["dposition_ds"] / spacing,
-            records["dposition_dt"] / spacing,
-            records["dposition_dvar0"][:, :3] / scale if features.spectral_groups else np.zeros((len(records), 3)),
-            buffers.axis,
-            int(np.count_nonzero(inside)),
-            domain.measure / count,
-            batch.tally,
-        )
-        return everything.where(inside[records["photon_id"]])
+        emitter = Emitter(light, domain, space, place)
+        # Only wavelengths that part have lattices of their own.
+        lattices = [emitter.lattice(count, SHIFT, k if features.spectral_groups else 0) for k in range(len(bands))]
+        q = np.stack(lattices, axis=1).reshape(-1, 2)[records["photon_id"]]
+        start, direction = emitter.start(q)
+        per_q = 1.0 / (domain.spacing(count) * space.scale * emitter.unit_length)
+        groups = [records[f"dposition_dvar{g}"][:, :3] for g in range(features.spectral_groups)]
+        return Photons(
+            records, emitter, q, start, direction, space.to_world(records["position"]),
+            records["dposition_ds"] * per_q, records["dposition_dt"] * per_q,
+            np.stack(groups, axis=1) / space.scale if groups else np.zeros((len(records), 0, 3)),
+            emitter.weight(q, count), buffers.axis.nm_of_x(np.column_stack([records[f"x_{end}"] for end in ("lo", "anchor", "hi")])),
+            buffers.axis, buffers.groups, count * len(bands), domain.measure / count, batch.tally,
+        )  # fmt: skip
     finally:
         trace.release()
         buffers.release()
 
 
-def _domain_points(domain: EmissionDomain, count: int) -> np.ndarray:
-    """Every lattice point on the beam's plane, GPU space (count, 3)."""
-    plane = _lattice(np.arange(count), count) * domain.rect[2:] + domain.rect[:2]
-    return domain.origin + plane[:, :1] * domain.tangent + plane[:, 1:] * domain.bitangent
+def beam_light(start: np.ndarray, direction: np.ndarray, radius: float) -> Light:
+    """Collimated white light from a disc."""
+    return Light("beam", "collimated", constant(1.0), position=tuple(start), direction=tuple(unit(np.asarray(direction, float))), radius=radius)
 
 
-def _lattice(ids: np.ndarray, count: int) -> np.ndarray:
-    """Points (N, 2) of the emission lattice in the unit square."""
-    along = (ids + (SHIFT[0] >> 8) / 2**24) / count
-    across = ((ids.astype(np.uint64) * GOLDEN + SHIFT[1]) % WORD >> np.uint64(8)) / 2**24
-    return np.column_stack([along, across])
+def trace_beam(
+    gl: Context,
+    solid: Mesh | Sequence[SceneObject],
+    material: Dielectric | Mirror | None,
+    screen_mesh: Mesh,
+    start: np.ndarray,
+    direction: np.ndarray,
+    radius: float,
+    nm: float | tuple[float, float] | Sequence[tuple[float, float]],
+    count: int = 256,
+    max_depth: int = 3,
+    method: str = "srd",
+) -> Photons:
+    """Send about `count` lattice points of a disc beam through `solid` (a mesh of `material`, or several objects).
+
+    `nm` is one wavelength, a band (lo, hi), or several bands. The real beam is wider, and what starts outside the
+    disc is dropped: at the beam's own edge a lattice cell is covered in part only and its photon weaker.
+    """
+    wider = 1.0 + 3.0 / np.sqrt(count)
+    if isinstance(solid, Mesh):
+        assert material is not None
+        solid = (placed("solid", solid, material),)
+    bands = [(nm, nm)] if isinstance(nm, float) else [nm] if isinstance(nm, tuple) else list(nm)
+    objects = (*solid, placed("screen", screen_mesh, Diffuse()))
+    count = int(np.ceil(count * wider**2))
+    everything = trace_light(gl, objects, beam_light(start, direction, radius * wider), bands, count, max_depth, method)
+
+    def inside(points: np.ndarray) -> np.ndarray:
+        from_axis = np.cross(points - np.asarray(start, float), everything.emitter.domain.axis)
+        return np.linalg.norm(from_axis, axis=-1) <= radius
+
+    own = range(len(bands) if everything.groups.count else 1)
+    lattice = np.concatenate([everything.emitter.start(everything.emitter.lattice(count, SHIFT, k))[0] for k in own])
+    chosen = everything.where(inside(everything.start))
+    return replace(chosen, lattice_in_disc=int(np.count_nonzero(inside(lattice))))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
@@ -112,6 +113,23 @@ def onto(ray: Ray, surface: Surface, root: int = 0) -> Ray:
 RECEIVER, MIRROR = -1, -2
 """Materials of a triangle that are not glass; a glass is its position in the list of indices."""
 
+TOUCHING = 1e-9
+"""Two surfaces closer than this are at one place: a ray enters what lies there before it leaves."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """What a ray meets, at one wavelength."""
+
+    index: Index = AIR
+    absorption: float = 0.0
+    """Per unit of length, inside."""
+    reflectance: float = 1.0
+    """Of a mirror."""
+    priority: int = 0
+    """Where glasses overlap, the highest decides; of equal ones the later."""
+    kind: Literal["glass", "mirror", "receiver"] = "glass"
+
 
 @dataclass(frozen=True, eq=False)
 class TriangleList:
@@ -126,24 +144,40 @@ class TriangleList:
         normals = None if self.corner_normals is None else self.corner_normals[triangle]
         return Facet(self.corners[triangle], normals if normals is not None and normals.any() else None)
 
-    def nearest(self, ray: Ray, leaving: int | None) -> tuple[int, float] | None:
-        """(triangle, distance) of the closest hit that is not the triangle just left."""
+    def nearest(self, ray: Ray, leaving: int | None, inside: frozenset[int] = frozenset()) -> tuple[int, float] | None:
+        """(triangle, distance) of the closest hit that is not the triangle just left.
+
+        Glass is entered from outside and left from `inside` only: so surfaces that touch cannot be met twice.
+        """
+        crossed, distance, leaves = self._crossings(ray)
+        glass, within = self.material >= 0, np.isin(self.material, list(inside))
+        crossed &= np.where(glass, (distance > -TOUCHING) & (within == leaves), distance > 0.0)
+        if leaving is not None:
+            crossed[leaving] = False
+        if not crossed.any():
+            return None
+        best = int(np.where(crossed, distance + TOUCHING * (glass & within), np.inf).argmin())
+        return best, float(distance[best])
+
+    def holding(self, ray: Ray) -> frozenset[int]:
+        """The glasses round a ray's start: those that it leaves once more than it enters them."""
+        crossed, distance, leaves = self._crossings(ray)
+        ahead = crossed & (distance > 0.0) & (self.material >= 0)
+        balance = {int(solid): np.sum(np.where(leaves, 1, -1)[ahead & (self.material == solid)]) for solid in np.unique(self.material[ahead])}
+        return frozenset(solid for solid, exits in balance.items() if exits > 0)
+
+    def _crossings(self, ray: Ray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Over all triangles (T,): whether the ray's line meets it, at which distance, and from behind."""
         a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
         normal = np.cross(b - a, c - a)
         facing = normal @ ray.direction
         crossed = facing != 0.0
         distance = np.full(len(a), np.inf)
         distance[crossed] = optics.dot(a - ray.position, normal)[crossed] / facing[crossed]
-        crossed &= distance > 0.0
-        if leaving is not None:
-            crossed[leaving] = False
         point = ray.position + np.where(crossed, distance, 0.0)[:, None] * ray.direction
         for start, end in ((a, b), (b, c), (c, a)):
             crossed &= optics.dot(np.cross(end - start, point - start), normal) >= 0.0
-        if not crossed.any():
-            return None
-        best = int(np.where(crossed, distance, np.inf).argmin())
-        return best, float(distance[best])
+        return crossed, distance, facing > 0.0
 
 
 @dataclass(frozen=True)
@@ -154,10 +188,74 @@ class Path:
     """At the last hit, with its columns (at the last departure, where it escaped)."""
     triangles: tuple[int, ...]
     reflections: tuple[bool, ...]
-    """For each specular hit: whether it was reflected."""
+    """For each specular event: whether it was reflected."""
     landed: bool
     transmittance: float = 1.0
-    """Product of the Fresnel factors of the branches taken."""
+    """Product of Fresnel factors of the branches taken, absorption and mirrors."""
+
+
+def follow(
+    ray: Ray,
+    scene: TriangleList,
+    bodies: Sequence[Body],
+    reflects: Callable[[int], bool] = lambda event: False,
+    max_depth: int = 64,
+    along: Sequence[int] | None = None,
+    inside: frozenset[int] | None = None,
+) -> Path:
+    """Follow one path among glasses that may nest or touch, mirrors and receivers.
+
+    A triangle's material is an index into `bodies`, and glass has one that is not negative: mirrors and
+    receivers stand at the end and are counted from there. `reflects(event)` chooses reflection at a specular event (total
+    reflection happens anyway). `along` forces a sequence of triangles: each is met on its whole
+    plane, inside its edges or not, as a difference quotient over one and the same path needs.
+    `inside`: glasses that the ray starts in, found by counting boundaries where it is not given.
+    """
+    inside = scene.holding(ray) if inside is None else inside
+    triangles: list[int] = []
+    reflections: list[bool] = []
+    factor = 1.0
+    while len(reflections) <= max_depth:
+        if along is not None:
+            hit = None if len(triangles) >= len(along) else (along[len(triangles)], _distance(ray, scene.facet(along[len(triangles)])))
+        else:
+            hit = scene.nearest(ray, triangles[-1] if triangles else None, inside)
+        if hit is None:
+            return Path(ray, tuple(triangles), tuple(reflections), False, factor)
+        triangle, distance = hit
+        factor *= float(np.exp(-_medium(inside, bodies).absorption * distance))
+        triangles.append(triangle)
+        arrived, geometric, normal, dnormal = advance(ray, scene.facet(triangle), distance)
+        material = int(scene.material[triangle])
+        body = bodies[material]
+        if body.kind == "receiver":
+            return Path(arrived, tuple(triangles), tuple(reflections), True, factor)
+        if body.kind == "mirror":
+            ray = reflected(arrived, normal, dnormal)
+            factor *= body.reflectance
+            reflections.append(True)
+            continue
+        before = inside - {material} if ray.direction @ geometric < 0.0 else inside | {material}
+        after = before ^ {material}
+        n_i, n_t = _medium(before, bodies), _medium(after, bodies)
+        if n_i is n_t:
+            # Another glass decides here: the boundary is not seen.
+            ray, inside = arrived, after
+            continue
+        reflectance = float(optics.fresnel_reflectance(arrived.direction, normal, n_i.index.n / n_t.index.n))
+        beyond = None if reflects(len(reflections)) else refracted(arrived, normal, dnormal, n_i.index, n_t.index)
+        factor *= reflectance if beyond is None else 1.0 - reflectance
+        reflections.append(beyond is None)
+        ray, inside = (reflected(arrived, normal, dnormal), before) if beyond is None else (beyond, after)
+    return Path(ray, tuple(triangles), tuple(reflections), False, factor)
+
+
+_OUTSIDE = Body()
+
+
+def _medium(inside: frozenset[int], bodies: Sequence[Body]) -> Body:
+    """The glass that decides among those a ray is inside of."""
+    return bodies[max(inside, key=lambda i: (bodies[i].priority, i))] if inside else _OUTSIDE
 
 
 def trace(
@@ -168,40 +266,9 @@ def trace(
     max_depth: int = 64,
     along: Sequence[int] | None = None,
 ) -> Path:
-    """Follow the transmitted path (total reflection where it must, reflection at events `reflect_at`).
-
-    `along` forces a sequence of triangles: each is met on its whole plane, inside its edges or
-    not, as a difference quotient over one and the same path needs. The outside is air; a solid is
-    entered where the ray runs against its geometric normal.
-    """
-    triangles: list[int] = []
-    reflections: list[bool] = []
-    factor = 1.0
-    for depth in range(max_depth + 1):
-        if along is not None:
-            hit = None if depth >= len(along) else (along[depth], _distance(ray, scene.facet(along[depth])))
-        else:
-            hit = scene.nearest(ray, triangles[-1] if triangles else None)
-        if hit is None:
-            return Path(ray, tuple(triangles), tuple(reflections), False, factor)
-        triangle, distance = hit
-        triangles.append(triangle)
-        arrived, geometric, normal, dnormal = advance(ray, scene.facet(triangle), distance)
-        material = int(scene.material[triangle])
-        if material == RECEIVER:
-            return Path(arrived, tuple(triangles), tuple(reflections), True, factor)
-        if material == MIRROR:
-            ray = reflected(arrived, normal, dnormal)
-            reflections.append(True)
-            continue
-        glass = indices[material]
-        n_i, n_t = (AIR, glass) if ray.direction @ geometric < 0.0 else (glass, AIR)
-        reflectance = float(optics.fresnel_reflectance(arrived.direction, normal, n_i.n / n_t.n))
-        beyond = None if depth in reflect_at else refracted(arrived, normal, dnormal, n_i, n_t)
-        factor *= reflectance if beyond is None else 1.0 - reflectance
-        reflections.append(beyond is None)
-        ray = reflected(arrived, normal, dnormal) if beyond is None else beyond
-    return Path(ray, tuple(triangles), tuple(reflections), False, factor)
+    """`follow` through clear glasses of `indices`, perfect mirrors (`MIRROR`) and receivers (`RECEIVER`)."""
+    bodies = [*map(Body, indices), Body(kind="mirror"), Body(kind="receiver")]
+    return follow(ray, scene, bodies, lambda event: event in reflect_at, max_depth, along)
 
 
 def _distance(ray: Ray, facet: Facet) -> float:

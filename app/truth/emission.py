@@ -1,0 +1,76 @@
+"""Where rays leave a light, in float64 and world units: the twin of emit.comp.
+
+Without derivatives: difference quotients over `Emitter.start` judge the shader's columns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.gpu.scene_buffers import GpuSpace
+from app.model.scene import Light
+from app.passes.emission_domain import EmissionDomain
+from app.truth.emission_maps import (
+    PLASTIC,
+    azimuthal_direction,
+    concentric_disc,
+    lattice_point,
+    spot_falloff,
+)
+from app.truth.optics import unit
+
+
+@dataclass(frozen=True)
+class Emitter:
+    """One light's emission domain and the place on the light that all rays come from."""
+
+    light: Light
+    domain: EmissionDomain
+    space: GpuSpace
+    place: tuple[float, float]
+    """In the unit square; matters to lights of some extent."""
+
+    @property
+    def unit_length(self) -> float:
+        """Domain coordinates are this many world units (beams), or of the azimuthal plane (1)."""
+        return 1.0 / self.space.scale if self.domain.kind == "plane" else 1.0
+
+    def start(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(position, direction), each (..., 3), of the ray at the domain's point `q` (..., 2).
+
+        `q` is in world units for directional and collimated light, on the azimuthal plane otherwise.
+        """
+        domain = self.domain
+        frame = np.stack([domain.tangent, domain.bitangent])
+        origin = self.space.to_world(domain.origin)
+        q = np.asarray(q, np.float64)
+        if domain.kind == "plane":
+            direction = unit(domain.axis + domain.cone[0] * concentric_disc(np.array(self.place)) @ frame)
+            position = origin + q @ frame - domain.back / self.space.scale * direction
+            return position, np.broadcast_to(direction, position.shape)
+        local = azimuthal_direction(q)
+        if domain.kind == "area":
+            square = 2.0 * np.array(self.place) - 1.0
+            on_light = concentric_disc(np.array(self.place)) if domain.is_disc else square
+            origin = origin + on_light @ np.stack([domain.light_u, domain.light_v]) / self.space.scale
+        return np.broadcast_to(origin, local.shape), local @ np.vstack([frame, domain.axis])
+
+    def weight(self, q: np.ndarray, count: int) -> np.ndarray:
+        """What one of `count` lattice points at `q` (..., 2) carries per unit of the light's own quantity, away from hard edges."""
+        share = self.domain.measure / count
+        direction = self.start(q)[1]
+        axis = unit(np.asarray(self.light.direction, float))
+        if self.light.kind == "spot":
+            inner, outer = np.radians([self.light.inner_half_angle_deg, self.light.outer_half_angle_deg])
+            return share * spot_falloff(direction, axis, inner, outer)
+        if self.light.kind == "area":
+            return share * np.maximum(direction @ axis, 0.0)
+        return np.full(direction.shape[:-1], share)
+
+    def lattice(self, count: int, shift: tuple[int, int], sub_lattice: int = 0) -> np.ndarray:
+        """All points (count, 2) of a sub-lattice of the domain, in the coordinates of `start`."""
+        own = tuple((s + sub_lattice * g) % 2**32 for s, g in zip(shift, PLASTIC, strict=True))
+        square = lattice_point(np.arange(count), count, own)
+        return self.unit_length * (self.domain.rect[:2] + square * self.domain.rect[2:])
