@@ -44,15 +44,16 @@ def evaluate(
     structs: Sequence[Struct] = (),
     buffers: Mapping[int, np.ndarray] | None = None,
     binders: Sequence[Callable[[], None]] = (),
+    declarations: str = "",
 ) -> dict[str, np.ndarray]:
     """Run `body` once per row of the inputs.
 
     Inputs are (N,) or (N, 2..4) arrays (unsigned integers (N,) or (N, 2) stay integers) and appear
     in `body` as locals of their names; `body` assigns the outputs, named with their GLSL types. `buffers` fills
-    bindings of the included files, `binders` are called to bind their textures. Returns float64 (uint32 for unsigned) arrays of N rows.
+    bindings of the included files, `binders` are called to bind their textures; `declarations` is GLSL put after the includes. Returns float64 (uint32 for unsigned) arrays of N rows.
     """
     count = len(next(iter(inputs.values())))
-    declarations, words, offset = [], [], 0
+    fetched, words, offset = [], [], 0
     for name, values in inputs.items():
         values = np.asarray(values)
         if len(values) != count:
@@ -65,13 +66,13 @@ def evaluate(
         fetches = [f"words_in[{offset}u + {size}u * row + {c}u]" for c in range(size)]
         if not unsigned:
             fetches = [f"uintBitsToFloat({fetch})" for fetch in fetches]
-        declarations.append(f"    {kind} {name} = {kind}({', '.join(fetches)});")
+        fetched.append(f"    {kind} {name} = {kind}({', '.join(fetches)});")
         offset += words[-1].size
 
     stores, sizes, start = [], {}, 0
     for name, kind in outputs.items():
         size = _COMPONENTS[kind]
-        declarations.append(f"    {kind} {name} = {kind}(0);")
+        fetched.append(f"    {kind} {name} = {kind}(0);")
         for c in range(size):
             value = name if size == 1 else f"{name}[{c}]"
             value = value if kind.startswith("u") else f"floatBitsToUint({value})"
@@ -82,12 +83,13 @@ def evaluate(
     lines = [
         f"layout(local_size_x = {_GROUP}) in;",
         *(f'#include "{name}"' for name in includes),
+        declarations,
         f"layout(std430, binding = {_BIND_IN}) readonly buffer WordsIn {{ uint words_in[]; }};",
         f"layout(std430, binding = {_BIND_OUT}) writeonly buffer WordsOut {{ uint words_out[]; }};",
         "void main() {",
         "    uint row = gl_GlobalInvocationID.x;",
         f"    if (row >= {count}u) return;",
-        *declarations,
+        *fetched,
         body,
         *stores,
         "}",

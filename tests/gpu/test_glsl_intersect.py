@@ -13,6 +13,7 @@ from app.model import bvh
 from app.truth import optics
 from app.truth.glsl_function import as_f32, evaluate
 
+COVERS = {"intersect.glsl": ("try_triangle", "intersect_tree", "intersect_solid", "intersect", "hit_triangle", "intersect_closest")}
 BODY = """
     Hit hit;
     RayOrigin origin = RayOrigin(from, from_object, inside != 0u, 0u);

@@ -10,6 +10,12 @@ from app.truth.glasses import C_NM, D_NM, F_NM, index
 from app.truth.glsl_function import as_f32, evaluate
 from app.truth.optics import dot, times
 
+COVERS = {
+    "optics.glsl": (
+        "transmitted_cosine2", "refraction_mu", "refract_direction", "reflect_direction", "reflect_column", "refract_column",
+        "transfer_column", "normalised_derivative", "barycentric_gradients", "fresnel_reflectance",
+    ),
+}
 OPTICS = ["lib/optics.glsl"]
 COUNT = 4096
 EPSILON = float(np.finfo(np.float32).eps)

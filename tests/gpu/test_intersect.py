@@ -20,6 +20,8 @@ from app.model.primitives_round import sphere
 from app.truth.glsl_function import as_f32, evaluate
 from app.truth.optics import dot, unit
 
+COVERS = {"intersect.glsl": ("intersect_any",)}
+
 
 @dataclass(frozen=True)
 class Tree:
