@@ -1,4 +1,5 @@
-// total += scratch, and the scratch is emptied in the same pass.
+// total += scratch; what rounding kept out of the total stays in the scratch for the next time [Kahan 1965], so that the
+// number of flushes does not matter.
 layout(local_size_x = SIDE, local_size_y = SIDE) in;
 layout(rgba32f, binding = 0) uniform restrict image2D scratch;
 layout(rgba32f, binding = 1) uniform restrict image2D total;
@@ -8,6 +9,10 @@ void main() {
     if (any(greaterThanEqual(at, imageSize(total)))) {
         return;
     }
-    imageStore(total, at, imageLoad(total, at) + imageLoad(scratch, at));
-    imageStore(scratch, at, vec4(0.0));
+    vec4 before = imageLoad(total, at), added = imageLoad(scratch, at);
+    precise vec4 after = before + added;
+    precise vec4 taken = after - before;
+    precise vec4 kept_out = added - taken;
+    imageStore(total, at, after);
+    imageStore(scratch, at, kept_out);
 }

@@ -19,7 +19,7 @@ _SIDE, _GROUP = 16, 64
 
 
 class Accumulate:
-    """total += scratch; scratch = 0."""
+    """total += scratch; scratch keeps what rounding left out (under half a unit of the total's last place)."""
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
