@@ -87,7 +87,7 @@ def requirements() -> list[tuple[str, str]]:
     found = []
     for line in listed:
         match = re.match(r"([A-Za-z0-9._-]+)\s*(?:>=\s*([0-9.]+))?", line)
-        if match and "extra ==" not in line:
+        if match and ";" not in line:  # extras, and what only some Pythons have, are done without
             found.append((match[1], match[2] or "0"))
     return found
 

@@ -25,7 +25,7 @@ def make_point(samples: Sequence[Sample], mean_difference: np.ndarray, truth: Tr
     single = [s.metrics["relmse"] for s in samples]
     return Point(
         samples[0].photons,
-        float(np.mean([s.photon_seconds for s in samples])),
+        float(np.median([s.photon_seconds for s in samples])),
         told_apart.relmse,
         min(single),
         max(single),
@@ -95,6 +95,14 @@ def error_at_time(points: Sequence[Point], seconds: float) -> float | None:
         return None
     order = sorted(points, key=lambda p: p.seconds)
     return float(np.exp(np.interp(np.log(seconds), [np.log(p.seconds) for p in order], [_log(p.relmse) for p in order])))
+
+
+def photons_at_time(points: Sequence[Point], seconds: float) -> int:
+    """Photons that take about `seconds`: in proportion beyond the last point, at least those of the first."""
+    order = sorted(points, key=lambda p: p.seconds)
+    if seconds > order[-1].seconds:
+        return int(order[-1].photons * seconds / order[-1].seconds)
+    return int(np.exp(np.interp(np.log(seconds), [np.log(p.seconds) for p in order], [np.log(p.photons) for p in order])))
 
 
 def speed_up(points: Sequence[Point], baseline: Sequence[Point]) -> Reached | None:

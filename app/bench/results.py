@@ -51,11 +51,11 @@ class Point(msgspec.Struct, frozen=True):
 
     photons: int
     seconds: float
-    """Mean photon time."""
+    """Median photon time: a moment's disturbance of the machine is no property of the method."""
     relmse: float
     relmse_low: float
     relmse_high: float
-    """Over seeds: mean, least and largest."""
+    """Over seeds: mean, least and largest; freed of the reference's own variance."""
     bias2: float
     variance: float
     """relMSE told apart: bias² of the mean picture (less what its own variance leaves) and mean variance. With one
@@ -67,7 +67,8 @@ class Curve(msgspec.Struct):
 
     method: str
     setup_seconds: dict[str, float]
-    """Once per scene and not in photon time: "buffers" (tree and uploads), "compile", "pilot"."""
+    """Once per scene and not in photon time: "buffers" (tree and uploads), "compile", "pilot", "warm-up" (a small
+    rendering, in which drivers finish compiling)."""
     samples: list[Sample]
     budgets: list[int] = []
     """Photons of each point, from the rate that a first trial had; the same for every seed."""

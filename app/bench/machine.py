@@ -1,0 +1,52 @@
+"""Where and with what a bench ran: figures mean little without it, and those of two machines are never mixed."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.paths import shaders_dir
+
+if TYPE_CHECKING:
+    from app.gpu.context import Context
+
+_MEASURING = ("light_half.py", "renderer.py", "gpu/*.py", "model/*.py", "passes/*.py", "bench/metrics.py", "bench/rendering.py", "bench/runner.py")
+"""Sources beside the shaders whose change changes a picture, its time or its error."""
+
+
+def machine(context: Context) -> dict[str, str]:
+    """What `results.BenchResult.machine` lists."""
+    return {
+        "processor": processor(),
+        "cores": str(os.cpu_count() or 1),
+        "renderer": context.renderer,
+        "driver": context.vendor,
+        "opengl": context.version,
+        "system": f"{platform.system()} {platform.release()}",
+        "python": platform.python_version(),
+        "program": program_hash(),
+    }
+
+
+def processor() -> str:
+    """The processor's name, where the system tells it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(named, platform.processor() or platform.machine())
+
+
+def program_hash() -> str:
+    """Short hash of the shaders and of the Python that renders and measures."""
+    app = Path(__file__).resolve().parents[1]
+    files = [path for path in sorted(shaders_dir().rglob("*")) if path.is_file()]
+    files += [path for pattern in _MEASURING for path in sorted(app.glob(pattern))]
+    digest = hashlib.sha256()
+    for path in files:
+        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]

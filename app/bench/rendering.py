@@ -1,0 +1,122 @@
+"""One method in one scene, ready to render again and again: what the bench times, and nothing else.
+
+Programs, buffers, pilot and maps are made once. Then each rendering starts from nothing with one lattice of the
+photons asked for. Times are wall clock between points where the device has finished, on software and GPU alike; on
+a GPU the wait after every slice costs a little, which the figures then contain.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.errors import UserError
+from app.gpu.context import Context
+from app.gpu.scene_buffers import SceneBuffers
+from app.light_half import LightHalf, spectral_axis
+from app.model.colorimetry import rgb709_to_xyz
+from app.model.features import Features
+from app.model.scene import Scene
+from app.model.settings import RenderSettings
+from app.passes.eye import CausticMaps, EyePass
+from app.renderer import DEFAULT_SAMPLES
+
+WARM_UP_PHOTONS = 2048
+SMALLEST_BUDGET = 64
+FIRST_SECONDS = 0.02
+"""Photon time of the smallest budget, as far as the costs that do not depend on it allow."""
+_TRIAL_SHARE = 0.25
+"""A trial this long, as a share of the time given, tells the rate of the longest rendering."""
+_TRIAL_GROWTH = 4
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """A picture and what it took."""
+
+    xyz: np.ndarray
+    """float64 (H, W, 3), linear XYZ of the caustic layer, row 0 on top."""
+    seconds: dict[str, float]
+    """"plan", "trace", "splat", "resolve", "eye"."""
+    emitted: int
+    splats: int
+
+
+class MethodRig:
+    """Owns everything on the device for one scene, method and picture size."""
+
+    def __init__(self, context: Context, scene: Scene, method: str, width: int, height: int) -> None:
+        self._context = context
+        self._scene = scene
+        self._settings = RenderSettings(width=width, height=height, method=method, layer="caustic", max_depth=scene.render.max_depth)
+        features = Features.of(scene, self._settings)
+        started = time.perf_counter()
+        self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+        buffered = self._finished()
+        self._light = LightHalf(context, scene, self._settings, features, self._buffers)
+        self._eye = EyePass(context, self._buffers, "caustic", self._light.reflectances)
+        compiled = self._finished()
+        self._light.prepare()
+        piloted = self._finished()
+        # Drivers put off part of the compiling until a program runs.
+        self.render(WARM_UP_PHOTONS, 1)
+        if not self._light.stats.splats:
+            raise UserError(f"scene '{scene.name}' throws no light through glass or off mirrors on a receiver: there is nothing to measure")
+        self.setup_seconds = {"buffers": buffered - started, "compile": compiled - buffered, "pilot": piloted - compiled, "warm-up": self._finished() - piloted}
+        self.buffers_mib = (self._buffers.bytes + self._light.trace.bytes) / 2**20
+
+    def render(self, photons: int, seed: int) -> Rendering:
+        """One rendering from nothing with one lattice of about `photons`, seen by the camera."""
+        seconds = self._light_seconds(photons, seed)
+        started = time.perf_counter()
+        light, settings = self._light, self._settings
+        maps = CausticMaps(self._textures, light.receivers, light.atlas.placements, light.map_scale)
+        self._eye.run(self._scene.camera, settings.width, settings.height, DEFAULT_SAMPLES, 0, maps, seed)
+        xyz = rgb709_to_xyz(self._eye.read_rgb().astype(np.float64))
+        seconds["eye"] = time.perf_counter() - started
+        return Rendering(xyz, seconds, light.stats.photons, light.stats.splats)
+
+    def budgets(self, seconds: float, count: int) -> list[int]:
+        """At most `count` photon counts, evenly spaced in the logarithm, the largest of which takes about `seconds`.
+
+        The first trials are small; each is four times the last, until one tells the rate."""
+        photons = WARM_UP_PHOTONS
+        while (took := self._photon_seconds(photons)) < _TRIAL_SHARE * seconds:
+            photons *= _TRIAL_GROWTH
+        largest = max(photons * seconds / took, SMALLEST_BUDGET)
+        smallest = min(max(largest * min(FIRST_SECONDS / seconds, 0.5), SMALLEST_BUDGET), largest)
+        return sorted({int(round(n)) for n in np.geomspace(smallest, largest, count)})
+
+    def release(self) -> None:
+        """Free everything on the device."""
+        self._eye.release()
+        self._light.release()
+        self._buffers.release()
+
+    def _photon_seconds(self, photons: int) -> float:
+        return sum(seconds for stage, seconds in self._light_seconds(photons, 0).items() if stage != "plan")
+
+    def _light_seconds(self, photons: int, seed: int) -> dict[str, float]:
+        """Fill the maps; seconds by stage. All that a pass does beside tracing counts as splatting."""
+        light = self._light
+        started = self._finished()
+        light.begin(photons, seed)
+        planned = self._finished()
+        light.run_pass(0, photons, self._wait)
+        filled = self._finished()
+        self._textures = light.resolved_textures()
+        resolved = self._finished()
+        self._context.check("a rendering of the bench")
+        trace = light.stats.trace_seconds
+        return {"plan": planned - started, "trace": trace, "splat": filled - planned - trace, "resolve": resolved - filled}
+
+    def _wait(self, _: float) -> bool:
+        """Finish a slice before the next is traced, so that its time is told to the right stage."""
+        self._context.finish()
+        return True
+
+    def _finished(self) -> float:
+        self._context.finish()
+        return time.perf_counter()

@@ -1,0 +1,185 @@
+"""The bench, top to bottom: scene → reference → rigs → trials → every seed, every method, every budget → pictures.
+
+All methods of a scene stay on the device side by side. Within a seed they take turns, and who begins changes from seed
+to seed, so that what disturbs the machine hits all alike. After every method and seed all is on disk.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+
+import numpy as np
+
+from app.bench import metrics
+from app.bench.claims import claims_of, ratios_of
+from app.bench.curves import complete_curve, photons_at_time
+from app.bench.metrics import Truth
+from app.bench.rendering import MethodRig, Rendering
+from app.bench.results import EARLY_SHARE, BenchSettings, Curve, ReferenceInfo, Sample, SceneResult
+from app.bench.store import Store
+from app.bench.truth_picture import make_truth, truth_key
+from app.errors import UserError
+from app.gpu.context import Context
+from app.model.scene import Dielectric, Scene
+
+POINTS = 10
+"""Photon budgets a curve."""
+DEFAULT_WIDTH = 480
+_REFERENCE_SHARE = 0.15
+"""Of a scene's progress bar."""
+_COARSE_SHARE = 0.1
+"""The reference's own error should be at most this times the smallest error reported."""
+
+Progress = Callable[[float, str], None]
+TruthMaker = Callable[[Scene, int, int, float, Progress], tuple[Truth, ReferenceInfo]]
+KeyMaker = Callable[[Scene, int, int], str]
+
+
+def run_bench(
+    context: Context, scenes: dict[str, Scene], store: Store, progress: Progress, truth_maker: TruthMaker = make_truth, key_maker: KeyMaker = truth_key
+) -> None:
+    """Measure every scene by name that `store` does not hold yet; a KeyboardInterrupt loses one method's seed at most.
+
+    Raises `UserError` when a scene has changed since `store` was begun."""
+    for index, (name, scene) in enumerate(scenes.items()):
+        def share(fraction: float, text: str, done: int = index, name: str = name) -> None:
+            progress((done + fraction) / len(scenes), f"{name}: {text}")
+
+        _SceneBench(context, name, scene, store, share, truth_maker, key_maker).run()
+
+
+def picture_size(scene: Scene, settings: BenchSettings) -> tuple[int, int]:
+    """As asked for, or `DEFAULT_WIDTH` in the scene's aspect."""
+    if settings.size is not None:
+        return settings.size
+    return DEFAULT_WIDTH, max(1, round(DEFAULT_WIDTH * scene.render.height / scene.render.width))
+
+
+class _SceneBench:
+    """One scene's measurements."""
+
+    def __init__(self, context: Context, name: str, scene: Scene, store: Store, progress: Progress, truth_maker: TruthMaker, key_maker: KeyMaker) -> None:
+        self._context, self._scene, self._store, self._progress, self._truth_maker = context, scene, store, progress, truth_maker
+        self._settings = store.result.settings
+        self._size = picture_size(scene, self._settings)
+        key = key_maker(scene, *self._size)
+        earlier = store.scene(name)
+        if earlier is not None and earlier.reference is not None and earlier.reference.key != key:
+            raise UserError(f"scene '{name}' has changed since {store.path} was made: give --fresh to begin anew, or another -o")
+        self._result = earlier or _empty_result(name, scene, self._size, self._settings)
+
+    def run(self) -> None:
+        """Do what is missing."""
+        result, settings = self._result, self._settings
+        if result.complete:
+            return
+        self._truth = self._reference()
+        with self._rigs() as rigs:
+            for number in range(settings.seeds):
+                turn = number % len(rigs)
+                methods = [*rigs][turn:] + [*rigs][:turn]
+                for place, method in enumerate(methods):
+                    done = (number * len(rigs) + place) / (settings.seeds * len(rigs))
+                    self._measure_seed(rigs[method], self._curve(method), number + 1, done)
+            for method, rig in rigs.items():
+                self._progress(0.99, f"pictures of {method}")
+                self._make_pictures(method, rig)
+        result.complete = True
+        self._store.save()
+        self._store.drop_partial(result)
+
+    def _reference(self) -> Truth:
+        """The truth that this scene's samples are measured against: one and the same, also over interruptions."""
+        result, store = self._result, self._store
+        kept = store.load_truth(result.scene)
+        if kept is not None and result.reference is not None and kept.xyz.shape[:2] == (self._size[1], self._size[0]):
+            return kept
+        truth, result.reference = self._truth_maker(
+            self._scene, *self._size, self._settings.reference_seconds, lambda fraction, text: self._progress(_REFERENCE_SHARE * fraction, f"reference {text}")
+        )
+        # What was measured against another reference cannot be gone on from.
+        result.curves = []
+        store.save_truth(result.scene, truth)
+        result.pictures["reference"] = store.save_picture(result.scene, "reference", truth.xyz)
+        store.put_scene(result)
+        store.save()
+        return truth
+
+    @contextmanager
+    def _rigs(self) -> Iterator[dict[str, MethodRig]]:
+        """Every method, ready to render, with its photon budgets known."""
+        rigs: dict[str, MethodRig] = {}
+        with ExitStack() as stack:
+            for method in self._settings.methods:
+                self._progress(_REFERENCE_SHARE, f"preparing {method}")
+                rig = rigs[method] = MethodRig(self._context, self._scene, method, *self._size)
+                stack.callback(rig.release)
+                if all(curve.method != method for curve in self._result.curves):
+                    budgets = rig.budgets(self._settings.seconds, POINTS)
+                    self._result.curves.append(Curve(method, rig.setup_seconds, [], budgets, buffers_mib=rig.buffers_mib))
+            yield rigs
+
+    def _curve(self, method: str) -> Curve:
+        return next(curve for curve in self._result.curves if curve.method == method)
+
+    def _measure_seed(self, rig: MethodRig, curve: Curve, seed: int, done: float) -> None:
+        """All budgets of one method and seed, unless results.json has them already."""
+        store, result, truth = self._store, self._result, self._truth
+        if any(sample.seed == seed for sample in curve.samples):
+            return
+        earlier = store.load_sums(result.scene, curve.method, seed - 1) if seed > 1 else np.zeros((len(curve.budgets), *truth.xyz.shape), np.float32)
+        if earlier is None:
+            raise UserError(f"{store.directory} has lost what going on with '{result.scene}' needs (folder 'partial'): give --fresh to begin anew")
+        sums, samples = earlier, []
+        for i, photons in enumerate(curve.budgets):
+            step = (1.0 - _REFERENCE_SHARE) / (self._settings.seeds * len(self._settings.methods))
+            self._progress(_REFERENCE_SHARE + (1.0 - _REFERENCE_SHARE) * done + step * i / len(curve.budgets), f"{curve.method}, seed {seed} of {self._settings.seeds}")
+            rendering = rig.render(photons, seed)
+            samples.append(self._sample(rendering, curve.method, photons, seed))
+            sums[i] += rendering.xyz - truth.xyz
+        store.save_sums(result.scene, curve.method, seed, sums)
+        curve.samples.extend(samples)
+        complete_curve(curve, {n: sums[i].astype(np.float64) / seed for i, n in enumerate(curve.budgets)}, truth)
+        self._judge()
+        store.save()
+        store.drop_sums(result.scene, curve.method, seed - 1)
+
+    def _sample(self, rendering: Rendering, method: str, photons: int, seed: int) -> Sample:
+        if not np.isfinite(rendering.xyz).all():
+            raise RuntimeError(f"{method} gave a picture with numbers that are not finite ({self._result.scene}, {photons} photons, seed {seed})")
+        return Sample(photons, seed, rendering.emitted, rendering.splats, rendering.seconds, metrics.measure(rendering.xyz, self._truth))
+
+    def _judge(self) -> None:
+        """What all curves so far say about each other."""
+        result = self._result
+        result.time_to_equal_error = ratios_of(result.curves)
+        result.claims = claims_of(result)
+        errors = [point.relmse for curve in result.curves for point in curve.points]
+        assert result.reference is not None
+        result.reference_too_coarse = bool(errors) and result.reference.relmse > _COARSE_SHARE * min(errors)
+
+    def _make_pictures(self, method: str, rig: MethodRig) -> None:
+        """Pictures at equal photon time, with FLIP."""
+        result = self._result
+        points = self._curve(method).points
+        for name, seconds in ((method, self._settings.seconds), (f"{method} early", EARLY_SHARE * self._settings.seconds)):
+            photons = photons_at_time(points, seconds)
+            rendering = rig.render(photons, 1)
+            sample = self._sample(rendering, method, photons, 1)
+            look = metrics.flip(rendering.xyz, self._truth)
+            if look is not None:
+                sample.metrics["flip"] = look
+            result.pictures[name] = self._store.save_picture(result.scene, name, rendering.xyz)
+            result.picture_samples[name] = sample
+
+
+def _empty_result(name: str, scene: Scene, size: tuple[int, int], settings: BenchSettings) -> SceneResult:
+    glasses = [o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)]
+    strongest = min((g for g in glasses if g.is_dispersive and np.isfinite(g.V_d)), key=lambda g: abs(g.V_d), default=None)
+    return SceneResult(
+        name, scene.name, size, settings.seeds, settings.seconds, None, [],
+        strongest_glass="" if strongest is None else strongest.name,
+        strongest_abbe=0.0 if strongest is None else abs(strongest.V_d),
+        equal_time=settings.seconds,
+    )
