@@ -192,8 +192,8 @@ SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
     splat.table_row = (row + 0.5) / float(table_rows);
     splat.y_edge = y_edge * SQRT_HALF / s;
     splat.y_box = 0.5 * box * SQRT_HALF / s;
-#ifdef POINT_SPECTRUM
-    splat.throughput = vec4(photon.x_anchor, photon.throughput.y, 0.0, 0.0);
+#ifdef ONE_COLOUR
+    splat.throughput = vec4(photon.x_anchor, mean_throughput(photon), 0.0, 0.0);
 #else
     float width = photon.x_hi - photon.x_lo;
     float anchor = width > 0.0 ? clamp((photon.x_anchor - photon.x_lo) / width, 0.0, 1.0) : 0.5;
@@ -305,7 +305,10 @@ void main() {
     }
     PhotonRecord photon = photons[first_photon + i];
     Receiver receiver = receivers[photon.receiver];
-    uint at = receiver.placement + (receiver.kind == 1u ? photon.triangle - receiver.first_triangle : 0u);
+    uint at = receiver.placement;
+#ifdef CHARTS
+    at += receiver.kind == 1u ? photon.triangle - receiver.first_triangle : 0u;
+#endif
     Placement place = placements[at];
 
     vec3 to_lo = vec3(0.0);

@@ -21,7 +21,7 @@ flat out vec2 half_texel;  // along x, y in units of sqrt(2) sigma
 #else
 noperspective out vec3 at;  // across, along xi, table u
 flat out vec3 shape;        // half texel across, table row, layer
-#ifndef POINT_SPECTRUM
+#ifndef ONE_COLOUR
 flat out vec4 throughput;
 flat out vec4 band;
 #ifdef CUT
@@ -29,11 +29,11 @@ flat out float curve_row;
 #endif
 #endif
 #endif
-#if defined(SMALL) || defined(POINT_SPECTRUM)
+#if defined(SMALL) || defined(ONE_COLOUR)
 flat out vec4 splat_colour[TARGETS];
 #endif
 
-#if defined(SMALL) || defined(POINT_SPECTRUM)
+#if defined(SMALL) || defined(ONE_COLOUR)
 // Energy of the splat in each channel of target g, per unit throughput.
 vec4 energy(SplatRecord splat, uint g) {
     uint row = splat.layer / (bands * uint(TARGETS)) * uint(TARGETS) + g;
@@ -79,7 +79,7 @@ void main() {
     vec2 position = splat.centre + xi * splat.along + corner.y * splat.across;
     at = vec3(corner.y * splat.y_edge, xi, table_u.x * xi + table_u.y);
     shape = vec3(splat.y_box, splat.table_row, float(splat.layer));
-#ifdef POINT_SPECTRUM
+#ifdef ONE_COLOUR
     for (int g = 0; g < TARGETS; ++g) {
         splat_colour[g] = splat.throughput.y * splat.amplitude * energy(splat, uint(g));
     }

@@ -1,11 +1,11 @@
-// A Gaussian swept along its spectral chord: across, the average over a texel; along, one look-up of the band's
+// A Gaussian swept along its spectral chord (or standing still, where it has one colour): across, the average over a texel; along, one look-up of the band's
 // spectrum blurred as this fragment sees it. Its cost does not depend on the number of wavelengths.
 #include "lib/gaussian.glsl"
 
 flat in vec4 rect;
 noperspective in vec3 at;
 flat in vec3 shape;
-#ifdef POINT_SPECTRUM
+#ifdef ONE_COLOUR
 flat in vec4 splat_colour[TARGETS];
 #else
 flat in vec4 throughput;
@@ -21,7 +21,7 @@ void main() {
     bvec4 within = bvec4(greaterThan(gl_FragCoord.xy, rect.xy), lessThan(gl_FragCoord.xy, rect.zw));
     share = all(within) ? share : 0.0;
 #endif
-#ifdef POINT_SPECTRUM
+#ifdef ONE_COLOUR
     // No sweep: a Gaussian cut at three standard deviations, which holds 0.9973 of it.
     share *= 1.20011 * exp(-4.5 * at.y * at.y);
     for (int g = 0; g < TARGETS; ++g) {

@@ -161,8 +161,11 @@ void main()
 
     // Move to the surface; a triangle's own coordinates place the point on it better than the ray does.
     vec3 start = ray.position;
-    vec3 normal = hit.normal_g, summed = vec3(0.0);
+    vec3 normal = hit.normal_g;
+#ifdef SMOOTH_NORMALS
+    vec3 summed = vec3(0.0);
     bool smooth_facet = false;
+#endif
     if (met) {
         ray.position = start + hit.distance * ray.direction;
 #ifdef CONVEX_SOLIDS
@@ -247,6 +250,7 @@ void main()
         theta_g = -abs(theta_g);
         normal = entering ? normal : -normal;
         float theta = dot(ray.direction, normal);
+#ifdef SMOOTH_NORMALS
         // The geometric normal judges: a shading normal that sees the ray from behind is not used.
         if (smooth_facet && !(theta < -1e-6)) {
             normal = normal_g;
@@ -254,13 +258,13 @@ void main()
             smooth_facet = false;
             outcome.what |= FELL_NORMAL;
         }
+#endif
         if ((ray.light_and_source >> 16) == 0xffffu)
             ray.light_and_source = (ray.light_and_source & 0xffffu) | (object << 16);
 
-#if COLUMNS > 0
+#if COLUMNS > 0 && defined(SMOOTH_NORMALS)
         vec3 dnormal[COLUMNS];
         for (int c = 0; c < COLUMNS; ++c) dnormal[c] = vec3(0.0);
-#ifdef SMOOTH_NORMALS
         if (smooth_facet) {
             vec3 gradient_u, gradient_v;
             barycentric_gradients(facet.edge1, facet.edge2, gradient_u, gradient_v);
@@ -272,7 +276,9 @@ void main()
                 dnormal[c] = sign_n * normalised_derivative(summed, dsummed);
             }
         }
-#endif
+#define NORMAL_COLUMN(c) dnormal[c]
+#else
+#define NORMAL_COLUMN(c) vec3(0.0)
 #endif
         Crossing crossing = cross_boundary(ray, object, entering);
         uint kept_flags = ray.flags & FLAG_FOOTPRINT_DROPPED;
@@ -296,7 +302,7 @@ void main()
             child.direction = normalize(reflect_direction(ray.direction, normal, theta));
 #if COLUMNS > 0
             for (int c = 0; c < COLUMNS; ++c)
-                child.ddirection[c].xyz = reflect_column(ray.direction, ray.ddirection[c].xyz, normal, dnormal[c], theta);
+                child.ddirection[c].xyz = reflect_column(ray.direction, ray.ddirection[c].xyz, normal, NORMAL_COLUMN(c), theta);
 #endif
             lives = survives(child, outcome.roulette_w, kept.y, 3u);
         }
@@ -308,7 +314,7 @@ void main()
         vec3 x3 = vec3(ray.x_lo, ray.x_anchor, ray.x_hi);
 #if SPECTRAL_GROUPS > 0
         for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-            float dtheta = dot(ray.ddirection[SPATIAL + g].xyz, normal) + dot(ray.direction, dnormal[SPATIAL + g]);
+            float dtheta = dot(ray.ddirection[SPATIAL + g].xyz, normal) + dot(ray.direction, NORMAL_COLUMN(SPATIAL + g));
             theta3.x += dtheta * variable_step(uint(g), x3.x, x3.y);
             theta3.z += dtheta * variable_step(uint(g), x3.z, x3.y);
         }
@@ -337,7 +343,7 @@ void main()
                 float x = 0.5 * (a + b);
                 float theta_x = theta;
                 for (int g = 0; g < SPECTRAL_GROUPS; ++g)
-                    theta_x += (dot(ray.ddirection[SPATIAL + g].xyz, normal) + dot(ray.direction, dnormal[SPATIAL + g])) * variable_step(uint(g), x, ray.x_anchor);
+                    theta_x += (dot(ray.ddirection[SPATIAL + g].xyz, normal) + dot(ray.direction, NORMAL_COLUMN(SPATIAL + g))) * variable_step(uint(g), x, ray.x_anchor);
                 float eta_x = medium_index(crossing.before, x) / medium_index(crossing.after, x);
                 bool passes_x = transmitted_cosine2(clamp(theta_x, -1.0, -1e-6), eta_x) > 0.0;
                 a = passes_x == passes_a ? x : a;
@@ -381,7 +387,7 @@ void main()
             child.direction = normalize(reflect_direction(ray.direction, facing_n, facing_theta));
 #if COLUMNS > 0
             for (int c = 0; c < COLUMNS; ++c)
-                child.ddirection[c].xyz = reflect_column(ray.direction, ray.ddirection[c].xyz, facing_n, geometric ? vec3(0.0) : dnormal[c], facing_theta);
+                child.ddirection[c].xyz = reflect_column(ray.direction, ray.ddirection[c].xyz, facing_n, geometric ? vec3(0.0) : NORMAL_COLUMN(c), facing_theta);
 #endif
             outcome.what |= geometric ? FELL_NORMAL : 0u;
             lives = child.flux_w > 0.0 && survives(child, outcome.roulette_w, reflectance.y, 1u);
@@ -441,7 +447,7 @@ void main()
                 if (c >= SPATIAL)
                     deta_it = index_ratio_derivative(crossing, uint(c - SPATIAL), ray.x_anchor, n_i.y, n_t.y);
 #endif
-                child.ddirection[c].xyz = refract_column(ray.direction, ray.ddirection[c].xyz, facing_n, geometric ? vec3(0.0) : dnormal[c], facing_theta, eta_it, omega, deta_it);
+                child.ddirection[c].xyz = refract_column(ray.direction, ray.ddirection[c].xyz, facing_n, geometric ? vec3(0.0) : NORMAL_COLUMN(c), facing_theta, eta_it, omega, deta_it);
             }
 #endif
             lives = survives(child, outcome.roulette_w, through, 2u);

@@ -35,6 +35,7 @@ class _Features:
     spectral_groups: int = 1
     band_cuts: bool = True
     nested_windows: bool = False
+    charts: bool = False
     targets: int = 1
     point_spectrum: bool = False
 

@@ -80,16 +80,21 @@ class SplatFeatures(Protocol):
     def targets(self) -> int: ...
     @property
     def point_spectrum(self) -> bool: ...
+    @property
+    def charts(self) -> bool: ...
 
 
 def splat_defines(features: SplatFeatures) -> dict[str, int]:
     """Defines common to every program of the splat half."""
-    defines = {"TARGETS": features.targets, "SLOTS": 2 if features.nested_windows else 1}
-    if features.band_cuts:
-        defines["BAND_CUTS"] = 1
-    if features.point_spectrum:
-        defines["POINT_SPECTRUM"] = 1
-    return defines
+    switches = {
+        "BAND_CUTS": features.band_cuts,
+        "POINT_SPECTRUM": features.point_spectrum,
+        # A splat that no wavelength moves is a Gaussian of one colour.
+        "ONE_COLOUR": features.point_spectrum or features.spectral_groups == 0,
+        "CHARTS": features.charts,
+    }
+    counts = {"TARGETS": features.targets, "SLOTS": 2 if features.nested_windows else 1}
+    return counts | {name: 1 for name, on in switches.items() if on}
 
 
 class Footprints:

@@ -14,14 +14,19 @@ bool find_texel(uint receiver, uint source, vec3 position, out uint placement, o
     placement = receivers[receiver].placement;
     texel = vec2(0.0);
     if (placement == NONE) return false;
+#ifdef CHARTS
     if (receivers[receiver].kind == 1u) placement += source - receivers[receiver].first_triangle;
+#endif
     // At most two windows are nested; a chain of four is more than enough.
     for (int level = 0; level < 4 && placement != NONE; ++level) {
         vec4 row_u = placements[placement].row_u, row_v = placements[placement].row_v;
         vec4 rect = placements[placement].rect;
         texel = vec2(dot(row_u.xyz, position) + row_u.w, dot(row_v.xyz, position) + row_v.w);
+        float slack = 0.0;
+#ifdef CHARTS
         // A chart's rectangle has a gutter, so rounding at its edge must not lose the place.
-        float slack = placements[placement].kind == 1u ? 1.0 : 0.0;
+        slack = placements[placement].kind == 1u ? 1.0 : 0.0;
+#endif
         if (all(greaterThanEqual(texel, rect.xy - slack)) && all(lessThan(texel, rect.zw + slack))) return true;
         placement = placements[placement].next;
     }
