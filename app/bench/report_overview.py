@@ -28,7 +28,7 @@ def overview(result: BenchResult) -> Figure:
     scenes = sorted(result.scenes, key=lambda s: s.time_to_equal_error.get("srd", -1.0))
     height = 1.75 + 0.34 * max(len(scenes), 1)
     figure = style.new_figure(8.6, height)
-    axes = figure.add_axes((0.235, 0.92 / height, 0.735, 1 - 1.6 / height))
+    axes = figure.add_axes((0.27, 0.92 / height, 0.705, 1 - 1.6 / height))
     ratios = [r for s in scenes for r in s.time_to_equal_error.values() if r > 0 and math.isfinite(r)]
     left, right = min([0.5, *ratios]) / 2.2, max([ASKED_RATIO * 2, *ratios]) * 2.2
     axes.set_xscale("log")
@@ -66,9 +66,8 @@ def _draw_ratios(axes: Axes, row: int, scene: SceneResult, left: float) -> None:
             x, row, look.marker, ms=8.5 if strong else 5.0, zorder=5 + look.rank, clip_on=False, alpha=1.0 if reached else 0.75,
             mfc=look.colour if reached else style.PAPER, mec=look.colour if not strong or not reached else style.PAPER, mew=1.0,
         )  # fmt: skip
-        if strong:
-            text = "never" if ratio is None else ratio_text(ratio, is_lower_bound(scene, "srd"))
-            axes.annotate(text, (x, row), xytext=(8, 0), textcoords="offset points", va="center", color=look.colour,
+        if strong and ratio is not None:
+            axes.annotate(ratio_text(ratio, is_lower_bound(scene, "srd")), (x, row), xytext=(8, 0), textcoords="offset points", va="center", color=look.colour,
                           fontweight="bold", fontsize=9, zorder=14)  # fmt: skip
 
 
@@ -93,9 +92,10 @@ def _ratio_axes(axes: Axes, scenes: Sequence[SceneResult]) -> None:
 
 
 def _scene_label(scene: SceneResult) -> str:
+    name = scene.scene if len(scene.scene) <= 20 else f"{scene.scene[:19]}…"
     if scene.strongest_abbe <= 0:
-        return f"{scene.scene}  (no dispersion)"
-    return f"{scene.scene}  ({scene.strongest_glass}, Abbe {scene.strongest_abbe:.0f})"
+        return f"{name}  (no dispersion)"
+    return f"{name}  ({scene.strongest_glass[:14]}, Abbe {scene.strongest_abbe:.0f})"
 
 
 def _method_key(axes: Axes, scenes: Sequence[SceneResult], height_in: float) -> None:
@@ -108,7 +108,7 @@ def _method_key(axes: Axes, scenes: Sequence[SceneResult], height_in: float) -> 
     handles = [Line2D([], [], ls="", marker=(look := style.method_style(name)).marker, ms=8 if name == "srd" else 5.5,
                       mfc=look.colour, mec=look.colour, label=name) for name in names]  # fmt: skip
     axes.figure.legend(
-        handles=handles, loc="lower left", bbox_to_anchor=(0.225, 0.06 / height_in), ncols=len(handles), frameon=False,
+        handles=handles, loc="lower left", bbox_to_anchor=(0.26, 0.06 / height_in), ncols=len(handles), frameon=False,
         fontsize=8, handletextpad=0.2, columnspacing=1.3,
     )  # fmt: skip
 

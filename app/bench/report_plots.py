@@ -31,10 +31,10 @@ def bias_and_variance(scene: SceneResult) -> Figure | None:
     names = style.by_rank(list(parts))
     columns = min(len(names), _PANELS_A_ROW)
     rows = math.ceil(len(names) / columns)
-    width, height = max(1.85 * columns + 0.75, 4.2), 2.15 * rows + 0.95
+    width, height = max(1.85 * columns + 0.75, 4.2), 2.15 * rows + 1.12
     figure = style.new_figure(width, height)
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    figure.subplots_adjust(left=0.68 / width, right=1 - 0.1 / width, bottom=0.5 / height, top=1 - 0.68 / height, wspace=0.1, hspace=0.3)
+    figure.subplots_adjust(left=0.68 / width, right=1 - 0.1 / width, bottom=0.5 / height, top=1 - 0.85 / height, wspace=0.1, hspace=0.3)
     everything = [Series(name, seconds, values, values, values) for name, (seconds, *both) in parts.items() for values in both]
     for axes in grid.flat[len(names) :]:
         axes.set_visible(False)
@@ -68,11 +68,11 @@ def _key(figure: Figure, width_in: float, height_in: float, text: str) -> None:
 
     figure.text(0.68 / width_in, 1 - 0.12 / height_in, text, fontsize=10.5, fontweight="bold", va="top", parse_math=False)
     handles = [
-        Line2D([], [], color=style.MUTED, lw=2.0, label="variance (the method's colour)"),
+        Line2D([], [], color=style.MUTED, lw=2.0, label="variance"),
         Line2D([], [], color=style.INK, lw=1.0, marker="o", ms=3.2, label="bias²"),
         Line2D([], [], ls="", marker="v", ms=5, mfc=style.PAPER, mec=style.INK, label="no bias detected"),
     ]
-    figure.legend(handles=handles, loc="upper right", bbox_to_anchor=(1 - 0.02 / width_in, 1 - 0.02 / height_in), ncols=3, frameon=False,
+    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.58 / width_in, 1 - 0.26 / height_in), ncols=3, frameon=False,
                   fontsize=8, handlelength=1.8, columnspacing=1.3)  # fmt: skip
 
 
@@ -119,7 +119,7 @@ def _draw_bar(axes: Axes, place: int, samples: list[Sample], stages: dict[str, f
     for stage in PHOTON_STAGES:
         length = stages[stage] / photons * 1e6
         axes.barh(place, length, left=start, height=0.62, color=style.STAGE_COLOURS[stage], lw=0)
-        if length > 0.075 * longest_us:
+        if length > 0.11 * longest_us:
             ink = style.PAPER if stage == "trace" else style.ON_LIGHT_BAR
             axes.text(start + length / 2, place, f"{100 * stages[stage] / total:.0f} %", ha="center", va="center", fontsize=8, color=ink)
         start += length

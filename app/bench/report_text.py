@@ -22,15 +22,15 @@ METHODS = {
 }
 
 METRICS = {
-    "relMSE": "mean over pixels and over X, Y, Z of (I − R)² / (R² + ε), I the picture, R the reference, ε = 10⁻² · mean(R)². "
+    "relMSE": "mean over pixels and over X, Y, Z of (I − R)² / (R² + ε), I the picture, R the reference, ε = 10⁻² · (mean R)². "
     "The reference's own variance is taken off.",
     "relMSE trimmed": "the same without the 0.1 % of pixels with the largest error: what single fireflies cannot sway.",
     "bias² and variance": "relMSE told apart over n seeds: bias² = mean[((Ī − R)² − Var/n) / (R² + ε)] with Ī the mean picture, "
     "variance = mean[Var / (R² + ε)]. An estimate of bias² at or below zero means that no bias could be detected.",
-    "SMAPE": "mean of |I − R| / (|I| + |R|), 0 to 1.",
-    "Δu'v'": "mean chroma error in CIE 1976 u'v' on the pixels the reference lights: chromatic noise that luminance hides.",
-    "nRMSE": "root of the mean square error over the root mean square of the reference.",
-    "HDR-FLIP": "mean perceived difference over exposures (Andersson et al. 2021), 0 to 1, on linear RGB.",
+    "SMAPE": "mean of |I − R| / (|I| + |R| + √ε), 0 to 1.",
+    "Δu'v'": "mean distance in CIE 1976 u'v' over the pixels that the reference lights: chromatic noise that luminance hides.",
+    "nRMSE": "root mean square error over the root mean square of the reference, the reference's variance taken off.",
+    "HDR-FLIP": "mean perceived difference over a range of exposures (Andersson et al. 2021), 0 to 1, on linear Rec.709; of the equal-time pictures alone.",
     "energy": "sum of the picture over sum of the reference; 1 is right.",
     "tail slope": "exponent of relMSE against photons over the curve's second half, with its 95 % confidence interval. "
     "Pure noise of independent photons gives −1; a bias floor bends it towards 0.",
@@ -50,10 +50,16 @@ PROTOCOL = (
     "Every point is an independent rendering from nothing with one photon budget; budgets rise in equal ratios. Methods take turns "
     "within a seed, so that disturbances of the machine reach all alike.",
     "Photon time is trace + splat + resolve. Not in it: set-up of the scene (tree, uploads, compilation, pilot photons), "
-    "which is listed by itself, and the camera's pass, which is the same for every method.",
+    "the plan of spectral bands before each rendering (all listed by themselves), and the camera's pass, which is the same for every method.",
     "Errors are taken on linear XYZ of the caustic layer before tone mapping and gamut clipping, against a reference that shares no "
     "splat code: random wavelength, one photon one pixel.",
 )
+
+NOT_COVERED = {
+    "other machines": "Times hold for the machine above. Ratios move where tracing and drawing differ in speed, as between a CPU and a GPU.",
+    "the view": "Errors are those of the pixels the camera sees; light that falls elsewhere costs time and earns nothing here, for every method alike.",
+    "one scene setting": "Each scene was measured at one picture size and one camera; a finer picture shows the bias of footprints sooner.",
+}
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 REFERENCE_SHARE = 0.1
@@ -118,13 +124,17 @@ def warnings_of(scene: SceneResult) -> list[str]:
             f"({number(least)}), above the tenth that the protocol asks for. Its variance has been taken off, yet errors near it are less "
             "certain than the band between seeds shows, and a ratio read there is less certain too."
         )
+    elif scene.reference_too_coarse:
+        told.append("The reference's own error is above a tenth of the smallest error reported.")
     if any(p.relmse <= 0 for c in scene.curves for p in c.points):
         told.append("Where a debiased error is zero or below, the picture cannot be told from the reference; the plots show a hollow triangle on the floor.")
     unfinished = [curve.method for curve in scene.curves if not curve.points]
     if unfinished:
-        told.append(f"Not finished: {', '.join(unfinished)}.")
+        told.append(f"No finished point yet: {', '.join(unfinished)}.")
+    if not scene.complete:
+        told.append("The run was stopped before this scene was complete; the same command goes on where it stopped.")
     if scene.seeds < 5:
-        told.append(f"Only {'one seed' if scene.seeds == 1 else f'{scene.seeds} seeds'}: the band over seeds and the parting of bias and variance are weak; the protocol asks for five.")
+        told.append(f"Only {seeds_text(scene.seeds)}: the band over seeds and the parting of bias and variance are weak; the protocol asks for five.")
     return told
 
 
@@ -174,3 +184,13 @@ def bias_share(curve: Curve) -> float | None:
     last = max(curve.points, key=lambda point: point.photons)
     bias2, variance = max(last.bias2, 0.0), max(last.variance, 0.0)
     return bias2 / (bias2 + variance) if bias2 + variance > 0 and math.isfinite(bias2 + variance) else None
+
+
+def seeds_text(seeds: int) -> str:
+    """"one seed" or "5 seeds"."""
+    return "one seed" if seeds == 1 else f"{seeds} seeds"
+
+
+def signed(value: float) -> str:
+    """Two decimals with a true minus sign."""
+    return f"{value:.2f}".replace("-", "−")

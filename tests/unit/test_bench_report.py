@@ -63,9 +63,10 @@ def synthetic_pictures(directory: Path, scene: str, methods: Sequence[str], rng:
     reference = inside[..., None] * cmf_xyz()[(20 + 300 * (1 - position)).astype(int)]
     noise = {"stochastic": 0.35, "stochastic-point": 0.6, "regular-7": 0.1, "regular-16": 0.08, "srd-lambda": 0.05, "srd": 0.015}
     files = {}
-    for name in ("reference", *methods):
-        picture = reference * np.exp(rng.normal(0, noise.get(name, 0.0), reference.shape)) if name != "reference" else reference
-        files[name] = f"pictures/{scene}_{name}.npy"
+    for name in ("reference", *methods, *(f"{method} early" for method in methods)):
+        level = noise.get(name.removesuffix(" early"), 0.0) * (3.0 if name.endswith("early") else 1.0)
+        picture = reference * np.exp(rng.normal(0, level, reference.shape))
+        files[name] = f"pictures/{scene}_{name.replace(' ', '_')}.npy"
         np.save(directory / files[name], picture.astype(np.float32))
     return files
 
@@ -76,8 +77,11 @@ def synthetic_scene(directory: Path, name: str, *, gain: float = 40.0, methods: 
     curves = [synthetic_curve(m, difficulty, seeds, longest_s, rng) for m in methods]
     scene = SceneResult(
         name, f"A made-up {name}", SIZE, seeds, longest_s, ReferenceInfo("photon histogram", 400_000_000, 61.0, own_error, "a1b2c3"), curves,
-        strongest_glass="N-SF66", strongest_abbe=20.9, equal_time=0.3, pictures=synthetic_pictures(directory, name, methods, rng),
+        strongest_glass="N-SF66", strongest_abbe=20.9, equal_time=longest_s, complete=True, pictures=synthetic_pictures(directory, name, methods, rng),
     )  # fmt: skip
+    for curve in curves:
+        scene.picture_samples[curve.method] = curve.samples[-1]
+        scene.picture_samples[f"{curve.method} early"] = curve.samples[0]
     if {"srd", "stochastic"} <= set(methods):
         scene.time_to_equal_error = {"stochastic": 1.0, "srd": gain, "stochastic-point": 0.4, "srd-lambda": 3.0, "regular-16": 1.7}
         holds = gain >= 30

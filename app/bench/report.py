@@ -1,0 +1,80 @@
+"""Writes what a bench run has found: plots as PNG and SVG, and one page that stands alone.
+
+    DIR/plots/SCENE_error_time.png .svg    DIR/plots/SCENE_error_photons.png .svg
+    DIR/plots/overview.png .svg            DIR/report.html
+
+A run that was stopped can be reported as well: what is missing is named where it would stand.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from app.atomic import atomic_output
+from app.bench import report_scene, report_sections, report_style
+from app.bench.plots import error_against
+from app.bench.report_html import Html, page
+from app.bench.report_overview import overview, small_multiples
+from app.bench.results import BenchResult, SceneResult
+from app.errors import UserError
+from app.progress import ProgressReporter
+
+
+def write_report(result: BenchResult, directory: Path) -> None:
+    """Write plots and page into `directory`, where the files that `SceneResult.pictures` names lie as well.
+
+    Each file appears whole or not at all. Raises `UserError` where one cannot be written.
+    """
+    plots = directory / "plots"
+    try:
+        plots.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"cannot make the folder {plots}: {error.strerror or error}; choose another place") from error
+    names = file_names([scene.scene for scene in result.scenes])
+    sections = []
+    with report_style.plot_style(), ProgressReporter("report") as progress:
+        for index, (scene, name) in enumerate(zip(result.scenes, names, strict=True)):
+            progress(index / (len(names) + 1), scene.scene)
+            sections.append(report_scene.section(scene, f"scene-{name}", _curve_plots(scene, name, plots), directory))
+        figure = overview(result)
+        report_style.save(figure, plots / "overview")
+        glance = report_scene.svg_of(figure, "overview", "time to equal error of each method in each scene, as a ratio to stochastic")
+        progress(1.0, "page")
+    body = [
+        report_sections.header(result), report_sections.contents(result, [f"scene-{name}" for name in names]), report_sections.claims(result, glance),
+        report_sections.definitions(result), sections, report_sections.limits(result),
+    ]  # fmt: skip
+    with atomic_output(directory / "report.html") as temporary:
+        temporary.write_text(page(f"Error against run time, SpectraSplat {result.version}", body), encoding="utf-8")
+
+
+def readme_plot(result: BenchResult, path: Path) -> None:
+    """Write the README's figure, error against time of `stochastic`, `srd-lambda` and `srd` in each scene; the suffix (.png, .svg) is the format."""
+    with report_style.plot_style():
+        figure = small_multiples(result)
+        with atomic_output(path) as temporary:
+            figure.savefig(temporary, dpi=160)
+
+
+def _curve_plots(scene: SceneResult, name: str, plots: Path) -> dict[str, Html]:
+    """Error over time and over photons: saved, and as SVG for the page."""
+    drawn = {}
+    for abscissa, ending, words in (("seconds", "time", "photon time"), ("photons", "photons", "photons")):
+        figure = error_against(scene, abscissa)
+        report_style.save(figure, plots / f"{name}_error_{ending}")
+        drawn[abscissa] = report_scene.svg_of(figure, f"{name}-{ending}", f"{scene.scene}: relMSE of each method against {words}, logarithmic axes")
+    return drawn
+
+
+def file_names(scenes: list[str]) -> list[str]:
+    """Names fit for files and anchors, each used once: letters, digits, hyphen, underscore."""
+    taken: list[str] = []
+    for scene in scenes:
+        base = re.sub(r"[^A-Za-z0-9_-]+", "_", scene)[:60].strip("_") or "scene"
+        name, count = base, 1
+        while name in taken or name == "overview":
+            count += 1
+            name = f"{base}_{count}"
+        taken.append(name)
+    return taken
