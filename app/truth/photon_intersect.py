@@ -1,0 +1,172 @@
+"""Rays against triangles in float64, compiled: the reference renderer's own walk through the tree.
+
+The side of a surface a photon is on decides near the place it left, not an offset: on the object
+just left only the opposite crossing can be true, and of two touching solids the photon's own
+record of what it is inside of tells which surface it has crossed already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numba import njit
+
+SLACK = 1e-10
+"""Barycentric: facets that share an edge overlap by this much, so that no ray slips between them."""
+STACK_SIZE = 64
+
+
+def compiled(function: Callable) -> Callable:
+    """`function` as machine code, kept on disk where some folder can be written (else compiled anew each run)."""
+    options = {"nogil": True, "error_model": "numpy"}
+    try:
+        return njit(cache=True, **options)(function)
+    except RuntimeError:  # numba: no folder for the cache
+        return njit(**options)(function)
+
+
+@compiled
+def _enter(bounds, node, ox, oy, oz, ix, iy, iz, far):
+    """Distance at which the ray enters a node's box, or infinity."""
+    a = (bounds[node, 0] - ox) * ix
+    b = (bounds[node, 3] - ox) * ix
+    low = min(a, b)
+    high = max(a, b)
+    a = (bounds[node, 1] - oy) * iy
+    b = (bounds[node, 4] - oy) * iy
+    low = max(low, min(a, b))
+    high = min(high, max(a, b))
+    a = (bounds[node, 2] - oz) * iz
+    b = (bounds[node, 5] - oz) * iz
+    low = max(low, min(a, b))
+    high = min(high, max(a, b))
+    slack = 1e-14 * (abs(low) + abs(high))
+    if low <= high + slack and high >= -slack and low <= far + slack:
+        return low
+    return np.inf
+
+
+@compiled
+def _inverse(component):
+    return 1.0 / component if abs(component) > 1e-200 else 1e200
+
+
+@compiled
+def _crossed_already(bit, mask, facing):
+    """Whether a photon inside the solids of `mask` has this surface behind it."""
+    inside = (mask >> np.uint64(bit)) & np.uint64(1)
+    return (inside == np.uint64(1)) == (facing < 0.0)
+
+
+@compiled
+def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance):
+    """(distance, triangle, u, v) of the nearest surface; triangle −1: none.
+
+    `last`, `last_object`: facet and object the ray starts on (−1: none), `within`: on its inner
+    side; `mask`: solids it is inside of; `stack`, `stack_distance`: scratch (STACK_SIZE,).
+    """
+    ix, iy, iz = _inverse(dx), _inverse(dy), _inverse(dz)
+    best_key, best, best_triangle, best_u, best_v = np.inf, np.inf, -1, 0.0, 0.0
+    near = scene.near
+    # Of two surfaces at one place the one that is entered comes first: no film of air between solids.
+    nested = scene.stack.shape[0] > 1
+    node = 0
+    top = 0
+    while True:
+        if scene.node_count[node] > 0:
+            first = scene.node_first[node]
+            for i in range(first, first + scene.node_count[node]):
+                if i == last:
+                    continue
+                e1x, e1y, e1z = scene.corners[i, 3], scene.corners[i, 4], scene.corners[i, 5]
+                e2x, e2y, e2z = scene.corners[i, 6], scene.corners[i, 7], scene.corners[i, 8]
+                # Möller and Trumbore 1997.
+                px, py, pz = dy * e2z - dz * e2y, dz * e2x - dx * e2z, dx * e2y - dy * e2x
+                determinant = e1x * px + e1y * py + e1z * pz
+                if determinant == 0.0:
+                    continue
+                inverse = 1.0 / determinant
+                sx, sy, sz = ox - scene.corners[i, 0], oy - scene.corners[i, 1], oz - scene.corners[i, 2]
+                u = (sx * px + sy * py + sz * pz) * inverse
+                if not -SLACK <= u <= 1.0 + SLACK:
+                    continue
+                qx, qy, qz = sy * e1z - sz * e1y, sz * e1x - sx * e1z, sx * e1y - sy * e1x
+                v = (dx * qx + dy * qy + dz * qz) * inverse
+                if not (v >= -SLACK and u + v <= 1.0 + SLACK):
+                    continue
+                t = (e2x * qx + e2y * qy + e2z * qz) * inverse
+                facing = -determinant
+                key = t + near if nested and facing > 0.0 else t
+                if key >= best_key or t <= -near:
+                    continue
+                owner = scene.owner[i]
+                if t < near:
+                    if owner == last_object:
+                        if t <= 0.0 or within == (facing < 0.0):
+                            continue
+                    elif scene.bit[owner] >= 0 and _crossed_already(scene.bit[owner], mask, facing):
+                        continue
+                best_key, best, best_triangle, best_u, best_v = key, t, i, u, v
+        else:
+            left = scene.node_first[node]
+            far = best_key + near
+            a = _enter(scene.node_bounds, left, ox, oy, oz, ix, iy, iz, far)
+            b = _enter(scene.node_bounds, left + 1, ox, oy, oz, ix, iy, iz, far)
+            if a < np.inf or b < np.inf:
+                nearer = left if a <= b else left + 1
+                if a < np.inf and b < np.inf:
+                    stack[top] = 2 * left + 1 - nearer
+                    stack_distance[top] = max(a, b)
+                    top += 1
+                node = nearer
+                continue
+        node = -1
+        while top > 0:
+            top -= 1
+            if stack_distance[top] <= best_key + near:
+                node = stack[top]
+                break
+        if node < 0:
+            return best, best_triangle, best_u, best_v
+
+
+@compiled
+def blocked(scene, ox, oy, oz, dx, dy, dz, far, last, stack):
+    """Whether any surface but facet `last` lies between the start and `far`."""
+    ix, iy, iz = _inverse(dx), _inverse(dy), _inverse(dz)
+    node = 0
+    top = 0
+    while True:
+        if scene.node_count[node] > 0:
+            first = scene.node_first[node]
+            for i in range(first, first + scene.node_count[node]):
+                if i == last:
+                    continue
+                e1x, e1y, e1z = scene.corners[i, 3], scene.corners[i, 4], scene.corners[i, 5]
+                e2x, e2y, e2z = scene.corners[i, 6], scene.corners[i, 7], scene.corners[i, 8]
+                px, py, pz = dy * e2z - dz * e2y, dz * e2x - dx * e2z, dx * e2y - dy * e2x
+                determinant = e1x * px + e1y * py + e1z * pz
+                if determinant == 0.0:
+                    continue
+                inverse = 1.0 / determinant
+                sx, sy, sz = ox - scene.corners[i, 0], oy - scene.corners[i, 1], oz - scene.corners[i, 2]
+                u = (sx * px + sy * py + sz * pz) * inverse
+                qx, qy, qz = sy * e1z - sz * e1y, sz * e1x - sx * e1z, sx * e1y - sy * e1x
+                v = (dx * qx + dy * qy + dz * qz) * inverse
+                if u >= -SLACK and v >= -SLACK and u + v <= 1.0 + SLACK:
+                    t = (e2x * qx + e2y * qy + e2z * qz) * inverse
+                    if scene.near < t < far:
+                        return True
+        else:
+            left = scene.node_first[node]
+            if _enter(scene.node_bounds, left, ox, oy, oz, ix, iy, iz, far) < np.inf:
+                stack[top] = left
+                top += 1
+            if _enter(scene.node_bounds, left + 1, ox, oy, oz, ix, iy, iz, far) < np.inf:
+                stack[top] = left + 1
+                top += 1
+        if top == 0:
+            return False
+        top -= 1
+        node = stack[top]
