@@ -1,0 +1,149 @@
+"""Curves and claims on power laws whose answers are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.bench.claims import claims_of, ratios_of
+from app.bench.curves import complete_curve, error_at_time, photons_at_time, speed_up, tail_slope, time_to_error
+from app.bench.metrics import Truth
+from app.bench.results import Claim, Curve, Point, ReferenceInfo, Sample, SceneResult
+
+BUDGETS = [int(n) for n in np.geomspace(1000, 200_000, 10)]
+RATE = 60_000.0
+"""Photons a second."""
+
+
+def law(scale: float, exponent: float = -1.0, floor: float = 0.0) -> list[Point]:
+    """relMSE = scale · t^exponent + floor."""
+    return [Point(n, n / RATE, e, e, e, floor, e - floor) for n in BUDGETS for e in [scale * (n / RATE) ** exponent + floor]]
+
+
+def curve(method: str, points: list[Point], seeds: int = 5) -> Curve:
+    seconds = {"trace": 0.5, "splat": 0.4, "resolve": 0.1}
+    samples = [
+        Sample(p.photons, s + 1, p.photons, p.photons, {k: v * p.seconds for k, v in seconds.items()}, {"relmse": p.relmse, "relmse_raw": p.relmse})
+        for p in points
+        for s in range(seeds)
+    ]
+    return Curve(method, {}, samples, BUDGETS, points)
+
+
+def scene(*curves: Curve, abbe: float = 25.7, seconds: float = 200_000 / RATE) -> SceneResult:
+    reference = ReferenceInfo("made up", 1, 1.0, 1e-9, "key")
+    return SceneResult("made_up", "made up", (4, 4), 5, seconds, reference, list(curves), strongest_glass="N-SF11", strongest_abbe=abbe)
+
+
+def test_time_to_equal_error_of_power_laws() -> None:
+    slow, fast = law(1.0), law(0.01)
+    ratio = speed_up(fast, slow)
+    assert ratio is not None and not ratio.at_once and ratio.seconds == pytest.approx(100.0, rel=1e-9)
+    # Other exponents: 0.1 t^-2 = 1 / t_end at t = sqrt(0.1 t_end).
+    end = slow[-1].seconds
+    ratio = speed_up(law(0.1, -2.0), slow)
+    assert ratio is not None and ratio.seconds == pytest.approx(end / np.sqrt(0.1 * end), rel=1e-9)
+    same = speed_up(slow, slow)
+    assert same is not None and same.seconds == pytest.approx(1.0)
+
+
+def test_a_curve_that_never_gets_there_and_one_that_is_there_at_once() -> None:
+    slow = law(0.1)
+    assert speed_up(law(0.01, floor=1.0), slow) is None
+    at_once = speed_up(law(1e-6), slow)
+    assert at_once is not None and at_once.at_once and at_once.seconds == pytest.approx(slow[-1].seconds / slow[0].seconds)
+    assert speed_up(law(1.0), []) is None and time_to_error([], 1.0) is None
+
+
+def test_a_lucky_point_gains_nothing() -> None:
+    points = law(1.0)
+    lucky = points.copy()
+    lucky[2] = Point(points[2].photons, points[2].seconds, 1e-9, 1e-9, 1e-9, 0.0, 0.0)
+    target = points[6].relmse
+    plain, with_luck = time_to_error(points, target), time_to_error(lucky, target)
+    assert plain is not None and with_luck is not None and with_luck.seconds == pytest.approx(plain.seconds)
+
+
+def test_errors_and_photons_at_a_time() -> None:
+    points = law(1.0)
+    assert error_at_time(points, 0.1) == pytest.approx(10.0)
+    assert error_at_time(points, 1e-3) is None
+    assert error_at_time(points, 1e3) == pytest.approx(points[-1].relmse)
+    assert photons_at_time(points, 0.1) == pytest.approx(0.1 * RATE, abs=1)
+    assert photons_at_time(points, 10.0) == pytest.approx(10.0 * RATE, rel=1e-6)
+    assert photons_at_time(points, 1e-4) == pytest.approx(points[0].photons, abs=1)
+    zero = [Point(1, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0), *points]
+    assert error_at_time(zero, 0.01) == pytest.approx(1e-12)
+
+
+def noisy_samples(rng: np.random.Generator, exponent: float) -> list[Sample]:
+    return [
+        Sample(n, s, n, n, {}, {"relmse": float(1e3 * n**exponent * np.exp(rng.normal(0.0, 0.1)))})
+        for n in BUDGETS
+        for s in range(5)
+    ]
+
+
+def test_slope_and_its_interval() -> None:
+    """Of 1000 intervals 95 % must hold the truth; fewer than 93 % or more than 97 % is 3 standard errors off. Half as wide ones,
+    the mutant, hold it 68 times in 100."""
+    rng = np.random.default_rng(5)
+    slopes = np.array([tail_slope(noisy_samples(rng, -0.8), BUDGETS) for _ in range(1000)])
+    off = np.abs(slopes[:, 0] + 0.8)
+    assert 0.93 < np.mean(off < slopes[:, 1]) < 0.97
+    assert np.mean(off < 0.5 * slopes[:, 1]) < 0.8
+    assert np.isnan(tail_slope([], BUDGETS)[0]) and np.isnan(tail_slope(noisy_samples(rng, -1.0)[:3], BUDGETS)[0])
+
+
+def test_points_hold_all_seeds() -> None:
+    truth = Truth(np.ones((2, 2, 3)), np.full((2, 2, 3), 0.0101))
+    errors = (0.04, 0.02, 0.03)
+    samples = [Sample(100, s + 1, 100, 90, {"trace": t, "eye": 5.0}, {"relmse": e - 0.01, "relmse_raw": e}) for s, (e, t) in enumerate(zip(errors, (1.0, 9.0, 2.0), strict=True))]
+    made = Curve("srd", {}, samples, [100, 200])
+    complete_curve(made, {100: np.full((2, 2, 3), 0.15)}, truth)
+    (point,) = made.points
+    assert (point.photons, point.seconds, point.relmse_low, point.relmse_high) == (100, 2.0, pytest.approx(0.01), pytest.approx(0.03))
+    of_mean = 0.15**2 / 1.01
+    variance = 3 * (0.03 - of_mean) / 2
+    assert point.variance == pytest.approx(variance) and point.bias2 == pytest.approx(of_mean - variance / 3 - 0.01)
+    assert point.relmse == pytest.approx(0.02) and (made.slope, made.slope_half_width) == (0.0, 0.0)
+
+
+def by_name(claims: list[Claim]) -> dict[str, Claim]:
+    return {claim.name: claim for claim in claims}
+
+
+def test_claims_that_hold() -> None:
+    claims = by_name(claims_of(scene(curve("stochastic", law(1.0)), curve("srd-lambda", law(0.05)), curve("srd", law(0.001)))))
+    assert set(claims) == {"time to equal error", "first picture", "index against wavelength"}
+    assert all(claim.holds and not claim.why for claim in claims.values())
+    assert "at least 200 times sooner" in claims["time to equal error"].measured
+    assert "50×" in claims["index against wavelength"].measured
+
+
+def test_claims_that_fall_short_say_by_how_much_and_why() -> None:
+    claims = by_name(claims_of(scene(curve("stochastic", law(1.0)), curve("srd-lambda", law(0.05)), curve("srd", law(0.1)))))
+    short = claims["time to equal error"]
+    assert not short.holds and "10 times sooner" in short.measured and "short by a factor of 3" in short.why and "variance" in short.why
+    assert not claims["first picture"].holds and "3 times" in claims["first picture"].why
+    assert not claims["index against wavelength"].holds and "0.1 s" in claims["index against wavelength"].why
+
+
+def test_a_bias_floor_is_named() -> None:
+    claims = by_name(claims_of(scene(curve("stochastic", law(0.1)), curve("srd", law(1e-4, floor=0.2)))))
+    assert "not reached" in claims["time to equal error"].measured and "bias²" in claims["time to equal error"].why
+    assert "footprints" in claims["time to equal error"].why
+
+
+def test_claims_need_their_methods_their_time_and_their_glass() -> None:
+    srd, stochastic = curve("srd", law(0.01)), curve("stochastic", law(1.0))
+    assert claims_of(scene(stochastic)) == []
+    assert set(by_name(claims_of(scene(srd, stochastic, seconds=1.0)))) == {"time to equal error"}
+    assert "index against wavelength" not in by_name(claims_of(scene(srd, curve("srd-lambda", law(0.05)), abbe=64.2)))
+    assert ratios_of([srd]) == {} and ratios_of([stochastic, srd])["srd"] == pytest.approx(100.0)
+
+
+def test_no_picture_that_early_is_said() -> None:
+    late = [Point(p.photons, p.seconds + 0.2, p.relmse, p.relmse, p.relmse, 0.0, p.variance) for p in law(0.001)]
+    claim = by_name(claims_of(scene(curve("stochastic", law(1.0)), curve("srd", late))))["first picture"]
+    assert not claim.holds and "no picture before 0.22 s" in claim.measured

@@ -1,0 +1,108 @@
+"""The bench's measures: hand-made values, and that noise of the reference and few seeds do not tilt them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.bench.metrics import Truth, bias_variance, flip, measure, relmse_of_difference, relmse_raw
+
+SHAPE = (12, 20, 3)
+
+
+def exact(xyz: np.ndarray) -> Truth:
+    return Truth(xyz, np.zeros_like(xyz))
+
+
+def test_values_by_hand() -> None:
+    reference = np.zeros((1, 2, 3))
+    reference[0, 0] = 6.0, 6.0, 12.0  # the mean over all is 4, so ε = 0.16
+    picture = reference.copy()
+    picture[0, 0] = 7.0, 6.0, 9.0
+    picture[0, 1] = 0.4, 0.4, 0.4
+    found = measure(picture, exact(reference))
+    relmse = (1.0 / 36.16 + 9.0 / 144.16 + 3 * 0.16 / 0.16) / 6.0
+    assert found["relmse"] == pytest.approx(relmse, rel=1e-12) == found["relmse_raw"]
+    assert found["relmse_trimmed"] == pytest.approx((relmse * 6.0 - 1.0) / 5.0, rel=1e-12)  # the largest of six goes
+    assert found["smape"] == pytest.approx((1.0 / 13.4 + 3.0 / 21.4 + 3 * 0.4 / 0.8) / 6.0, rel=1e-12)
+    assert found["nrmse"] == pytest.approx(np.sqrt((1.0 + 9.0 + 3 * 0.16) / 216.0), rel=1e-12)
+    assert found["energy_ratio"] == pytest.approx(23.2 / 24.0, rel=1e-12)
+    uv, uv_reference = np.array([28.0, 54.0]) / (7.0 + 90.0 + 27.0), np.array([24.0, 54.0]) / (6.0 + 90.0 + 36.0)
+    assert found["chroma"] == pytest.approx(np.linalg.norm(uv - uv_reference), rel=1e-12)
+
+
+def test_a_perfect_picture_has_no_error() -> None:
+    reference = np.random.default_rng(1).random(SHAPE)
+    found = measure(reference, exact(reference))
+    assert found.pop("energy_ratio") == 1.0
+    assert set(found.values()) == {0.0}
+
+
+def test_black_pictures_and_black_references_give_numbers() -> None:
+    black, lit = np.zeros(SHAPE), np.ones(SHAPE)
+    assert measure(black, exact(lit))["relmse"] == pytest.approx(1.0 / 1.01)
+    assert measure(black, exact(lit))["chroma"] == pytest.approx(np.hypot(4 / 19 - 0.19783, 9 / 19 - 0.46832), rel=1e-9)
+    assert all(np.isfinite(value) for picture in (black, lit) for value in measure(picture, exact(black)).values())
+    assert flip(lit, exact(black)) is None
+
+
+def noisy_truth(rng: np.random.Generator, xyz: np.ndarray, sigma: float) -> Truth:
+    return Truth(xyz + rng.normal(0.0, sigma, xyz.shape), np.full(xyz.shape, sigma**2))
+
+
+def test_the_references_variance_is_taken_out() -> None:
+    """400 noisy references of 720 values: the mean of the freed error has a standard error of 0.3 %, so 1.5 % would show.
+
+    Raw errors, the mutant, are 25 % too large here.
+    """
+    rng = np.random.default_rng(2)
+    xyz = 10.0 + rng.random(SHAPE)
+    # Errors of both signs: the weight's own noise is correlated with the error, a second-order effect that one sign would show.
+    picture = xyz * (1.0 + 0.02 * rng.choice((-1.0, 1.0), xyz.shape))
+    true = measure(picture, exact(xyz))["relmse"]
+    truths = [noisy_truth(rng, xyz, 0.1) for _ in range(400)]
+    raw = np.mean([relmse_raw(picture, truth) for truth in truths])
+    freed = np.mean([measure(picture, truth)["relmse"] for truth in truths])
+    assert freed == pytest.approx(true, rel=0.015)
+    assert not raw == pytest.approx(true, rel=0.2)
+
+
+@pytest.mark.parametrize("bias", [0.0, 0.3])
+def test_bias_and_variance_are_told_apart_without_bias(bias: float) -> None:
+    """300 repeats of 4 seeds, noise 0.5, reference noise 0.1, all in units of a grey 10.
+
+    Standard errors, in units of 1e-4 of relMSE: variance 0.07 of 25, bias² 0.06 of 9; 0.3 of each would show. The mutant without
+    − V/n is 6.2 off, the one without the reference's variance 1.
+    """
+    rng = np.random.default_rng(3)
+    xyz = np.full(SHAPE, 10.0)
+    weight = 1.0 / (100.0 + 1.0)
+    found, naive = [], []
+    for _ in range(300):
+        truth = noisy_truth(rng, xyz, 0.1)
+        pictures = [xyz + bias + rng.normal(0.0, 0.5, SHAPE) for _ in range(4)]
+        difference = np.mean(pictures, axis=0) - truth.xyz
+        parts = bias_variance(difference, [relmse_raw(p, truth) for p in pictures], truth)
+        found.append((relmse_of_difference(difference, truth) - parts.variance / 4 - truth.own_relmse, parts.variance, parts.relmse))
+        assert parts.bias2 == max(found[-1][0], 0.0)
+        naive.append(relmse_of_difference(difference, truth) - truth.own_relmse)
+    bias2, variance, relmse = np.mean(found, axis=0)
+    assert bias2 == pytest.approx(bias**2 * weight, abs=3e-5)
+    assert variance == pytest.approx(0.25 * weight, abs=3e-5)
+    assert relmse == pytest.approx(bias2 + variance, rel=1e-9)
+    assert np.mean(naive) - bias**2 * weight > 5e-4
+
+
+def test_one_seed_cannot_be_told_apart() -> None:
+    xyz = np.ones(SHAPE)
+    parts = bias_variance(0.1 * xyz, [0.01 / 1.01], exact(xyz))
+    assert (parts.bias2, parts.variance) == (0.0, 0.0) and parts.relmse == pytest.approx(0.01 / 1.01)
+
+
+def test_flip_grows_with_noise_and_takes_mostly_black_pictures() -> None:
+    pytest.importorskip("flip_evaluator")
+    rng = np.random.default_rng(4)
+    xyz = np.zeros((48, 64, 3))
+    xyz[20:30, 10:50] = 50.0 * rng.random((10, 40, 1)) + 20.0
+    values = [flip(xyz + amount * (xyz > 0.0) * rng.normal(0.0, 1.0, xyz.shape), exact(xyz)) for amount in (0.0, 3.0, 15.0)]
+    assert values[0] == 0.0 and 0.0 < values[1] < values[2] < 1.0
