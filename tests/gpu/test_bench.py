@@ -1,0 +1,91 @@
+"""The bench on the real renderer, small: rigs render again and again, and a tiny run ends in a report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from app.__main__ import main
+from app.bench import runner
+from app.bench.metrics import Truth, measure
+from app.bench.rendering import MethodRig
+from app.bench.results import PHOTON_STAGES, BenchResult
+from app.cli_options import find_scene
+from app.errors import UserError
+from app.model.colorimetry import rgb709_to_xyz
+from app.model.scene import Scene
+from app.model.scene_file import load_scene
+from app.model.settings import RenderSettings
+from app.renderer import render
+
+WIDTH, HEIGHT = 64, 36
+
+
+@pytest.fixture(scope="module")
+def prism() -> Scene:
+    return load_scene(find_scene("prism"))
+
+
+def test_a_rig_renders_what_render_does_again_and_again(gl: Any, prism: Scene) -> None:
+    rig = MethodRig(gl, prism, "srd", WIDTH, HEIGHT)
+    try:
+        first, other, again = rig.render(3000, 5), rig.render(700, 6), rig.render(3000, 5)
+        budgets = rig.budgets(0.02, 4)
+    finally:
+        rig.release()
+    settings = RenderSettings(width=WIDTH, height=HEIGHT, photons=3000, seed=5, layer="caustic", max_depth=prism.render.max_depth)
+    picture = rgb709_to_xyz(render(prism, settings, context=gl).rgb.astype(float))
+    assert np.allclose(first.xyz, picture, rtol=1e-4, atol=1e-5 * picture.max())
+    assert np.allclose(again.xyz, first.xyz, rtol=1e-5, atol=1e-6 * picture.max())  # nothing is left of the rendering between
+    assert not np.allclose(other.xyz, first.xyz, rtol=0.05, atol=1e-3 * picture.max())
+    assert set(first.seconds) == {"plan", *PHOTON_STAGES, "eye"} and all(seconds > 0.0 for seconds in first.seconds.values())
+    assert 0.5 * 3000 < first.emitted < 2 * 3000 and other.emitted < first.emitted and first.splats > 0
+    assert set(rig.setup_seconds) == {"buffers", "compile", "pilot", "warm-up"} and rig.buffers_mib > 1.0
+    assert budgets == sorted(set(budgets)) and 1 <= len(budgets) <= 4 and budgets[-1] >= 64
+
+
+def test_more_photons_err_less(gl: Any, prism: Scene) -> None:
+    """The truth is srd's own picture of many photons: only that the chain from photons to relMSE holds together."""
+    rig = MethodRig(gl, prism, "srd", WIDTH, HEIGHT)
+    try:
+        fine = rig.render(100_000, 1).xyz
+        truth = Truth(fine, np.zeros_like(fine))
+        errors = [measure(rig.render(photons, 2).xyz, truth) for photons in (1000, 16_000)]
+    finally:
+        rig.release()
+    assert errors[1]["relmse"] < 0.2 * errors[0]["relmse"] and errors[1]["energy_ratio"] == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_scene_that_throws_no_light_is_said(gl: Any, prism: Scene) -> None:
+    dark = replace(prism, objects=tuple(o for o in prism.objects if type(o.material).__name__ != "Dielectric"))
+    with pytest.raises(UserError, match="throws no light"):
+        MethodRig(gl, dark, "srd", WIDTH, HEIGHT)
+
+
+def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two methods against the real reference of one second, through the command line."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(runner, "POINTS", 3)
+    monkeypatch.setattr("app.bench.machine.program_hash", lambda: "as it is")  # an editor may be at work
+    out = tmp_path / "out"
+    arguments = ["bench", "prism", "-o", str(out), "--seconds", "0.2", "--seeds", "2", "--methods", "stochastic,srd", "--size", f"{WIDTH}x{HEIGHT}"]
+    assert main([*arguments, "--reference-seconds", "1"]) == 0
+    shown = capsys.readouterr().out
+    result = msgspec.json.decode((out / "results.json").read_bytes(), type=BenchResult)
+    (scene,) = result.scenes
+    assert scene.complete and [curve.method for curve in scene.curves] == ["stochastic", "srd"]
+    assert scene.reference is not None and scene.reference.photons > 1000 and 0.0 < scene.reference.relmse < 1.0
+    for curve in scene.curves:
+        assert len(curve.samples) == 2 * len(curve.budgets) == 2 * len(curve.points)
+        assert all(0.8 < sample.metrics["energy_ratio"] < 1.2 for sample in curve.samples)  # 1 s of reference: its energy is known to a few %
+        assert curve.points[-1].relmse < curve.points[0].relmse and curve.points[0].seconds < curve.points[-1].seconds
+    assert {"time to equal error"} == {claim.name for claim in scene.claims} and "time to equal error" in shown
+    assert (out / "report.html").stat().st_size > 10_000 and (out / "plots" / "overview.svg").exists()
+    before = (out / "results.json").read_bytes()
+    assert main([*arguments, "--reference-seconds", "1"]) == 0  # all is there already
+    assert (out / "results.json").read_bytes() == before

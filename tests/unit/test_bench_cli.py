@@ -1,0 +1,168 @@
+"""`spectrasplat bench` on the command line: wrong options end in one sentence before any work, right ones in the runner."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import pytest
+
+from app import cli_bench
+from app.__main__ import main
+from app.bench import runner
+from app.bench.results import BenchSettings, Curve, Point, Sample, SceneResult
+from app.errors import UserError
+
+
+class FakeContext:
+    renderer, vendor, version = "llvmpipe", "Mesa", "4.5"
+
+    def __enter__(self) -> FakeContext:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+class Seen:
+    """What the runner and the report were given."""
+
+    def __init__(self) -> None:
+        self.scenes: list[str] = []
+        self.settings: BenchSettings | None = None
+        self.command = ""
+        self.interrupt = False
+        self.reported: Path | None = None
+
+
+@pytest.fixture
+def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
+    """The command without OpenGL: the runner is made up."""
+    found = Seen()
+
+    def run(_context: object, scenes: dict[str, Any], store: Any, _progress: object) -> None:
+        found.scenes, found.settings, found.command = [*scenes], store.result.settings, store.result.command
+        points = [Point(n, n / 1000, 1 / n, 1 / n, 1 / n, 0.2 / n, 0.8 / n) for n in (100, 1000)]
+        samples = [Sample(n, 1, n, n, {"trace": n / 1000}, {"relmse": 1 / n}) for n in (100, 1000)]
+        for name in scenes:
+            curve = Curve("srd", {}, samples, [100, 1000], points, -1.0, 0.1)
+            store.put_scene(SceneResult(name, name, (4, 4), 2, 1.0, None, [curve], time_to_equal_error={"srd": 40.0}, complete=not found.interrupt))
+        store.save()
+        if found.interrupt:
+            raise KeyboardInterrupt
+
+    def report(_result: object, directory: Path) -> None:
+        found.reported = directory
+
+    monkeypatch.setattr("app.gpu.context.create_context", FakeContext)
+    monkeypatch.setattr(runner, "run_bench", run)
+    monkeypatch.setattr("app.bench.report.write_report", report)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["prism"], "give one with -o DIR"),
+        (["prsm", "-o", "out"], "did you mean 'prism' or"),
+        (["prism", "-o", "out", "--methods", "srd,stochstic"], "--methods 'stochstic' is unknown, did you mean 'stochastic'"),
+        (["prism", "-o", "out", "--methods", ""], "--methods '' is unknown, known are"),
+        (["prism", "-o", "out", "--seeds", "0"], "--seeds 0 is out of range"),
+        (["prism", "-o", "out", "--seeds", "2.5"], "--seeds '2.5' is not a whole number"),
+        (["prism", "-o", "out", "--seconds", "0"], "--seconds 0 is out of range: give more than 0"),
+        (["prism", "-o", "out", "--seconds", "-1"], "--seconds -1 is out of range"),
+        (["prism", "-o", "out", "--seconds", "nan"], "--seconds nan is out of range"),
+        (["prism", "-o", "out", "--seconds", "soon"], "--seconds 'soon' is not a number"),
+        (["prism", "-o", "out", "--reference-seconds", "0"], "--reference-seconds 0 is out of range"),
+        (["prism", "-o", "out", "--size", "64"], "--size '64' is not WIDTHxHEIGHT"),
+        (["prism", "-o", "out", "--size", "16384x16384", "--seeds", "1"], ""),
+        (["--features", "prism", "ball"], "'bench --features prism' without further scenes"),
+        (["--features", "nowhere"], "neither a file nor shipped"),
+    ],
+)
+def test_mistakes_are_one_sentence(arguments: list[str], told: str, seen: Seen, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    if not told:  # depends on the machine
+        monkeypatch.setattr("app.cli_options.memory_bytes", lambda: 1 << 30)
+        told = "choose a smaller one"
+    assert main(["bench", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert told in error and error.count("\n") == 1 and error.startswith("spectrasplat: ")
+    assert seen.scenes == [] and list(tmp_path.iterdir()) == []
+
+
+def test_folders_that_cannot_be_used(seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "file"
+    file.write_text("")
+    assert main(["bench", "prism", "-o", str(file)]) == 2
+    assert f"cannot make the folder {file}" in capsys.readouterr().err
+    assert main(["bench", "prism", "-o", str(file / "below")]) == 2
+    assert "cannot make the folder" in capsys.readouterr().err
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "results.json").mkdir()
+    assert main(["bench", "prism", "-o", str(tmp_path / "out")]) == 2
+    assert "it is a folder" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_write_protected_folder(seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tmp_path.chmod(0o500)
+    assert main(["bench", "prism", "-o", str(tmp_path / "out")]) == 2
+    assert "cannot make the folder" in capsys.readouterr().err
+
+
+def test_options_reach_the_runner(seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    options = ["--seconds", "0.5", "--seeds", "2", "--methods", "srd, regular", "--size", "64x36", "--reference-seconds", "4"]
+    assert main(["bench", "prism", "ball", "-o", str(out), *options]) == 0
+    assert seen.scenes == ["prism", "ball"] and seen.reported == out
+    assert seen.settings == BenchSettings(0.5, 2, ("srd", "regular-7", "regular-16"), (64, 36), 4.0)
+    words = shlex.split(seen.command)
+    assert words == ["spectrasplat", "bench", "prism", "ball", "-o", "out", "--seconds", "0.5", "--seeds", "2", "--methods", "srd, regular", "--size", "64x36", "--reference-seconds", "4"]
+    shown = capsys.readouterr().out
+    assert "prism, 64" not in shown and "1/40" in shown and "-1.00 ± 0.10" in shown and "20 %" in shown and "report.html" in shown
+
+
+def test_defaults_are_all_scenes_with_glass_and_all_methods(seen: Seen, tmp_path: Path) -> None:
+    assert main(["bench", "-o", str(tmp_path)]) == 0
+    assert seen.settings == BenchSettings() and len(BenchSettings().methods) == 6
+    assert {"prism", "brilliant", "ball_plain", "wine_glass"} <= set(seen.scenes) and len(seen.scenes) >= 6
+    assert shlex.split(seen.command)[2 : 2 + len(seen.scenes)] == seen.scenes
+
+
+def test_ctrl_c_says_what_is_kept_and_reports_it(seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    seen.interrupt = True
+    assert main(["bench", "prism", "-o", str(tmp_path)]) == 130
+    told = capsys.readouterr()
+    assert "stopped; 0 scenes done, 1 of 12 method seeds of 'prism' kept; the same command goes on from there" in told.err
+    assert seen.reported == tmp_path and "1/40" in told.out
+
+
+def test_two_scenes_of_one_name(tmp_path: Path) -> None:
+    other = tmp_path / "prism.toml"
+    other.write_text('[[objects]]\nshape = "sphere"\nglass = "N-SF11"\n')
+    with pytest.raises(UserError, match="another scene of this run is called 'prism' too"):
+        cli_bench.load_scenes(["prism", str(other)])
+
+
+def test_features_has_its_own_command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    asked = []
+    stand_in = ModuleType("features_cost")
+    stand_in.command = lambda scene, output: asked.append((scene.name, output)) or 0  # type: ignore[attr-defined]
+    monkeypatch.setattr("app.bench.features_cost", stand_in, raising=False)
+    monkeypatch.setitem(__import__("sys").modules, "app.bench.features_cost", stand_in)
+    assert main(["bench", "--features", "ball_plain", "-o", str(tmp_path)]) == 0
+    assert main(["bench", "--features", "prism"]) == 0
+    assert asked == [("ball without dispersion", tmp_path), ("prism", None)]
+
+
+def test_notes_under_the_table() -> None:
+    sample = Sample(1, 1, 1, 1, {}, {"relmse": 0.1})
+    scene: Any = SimpleNamespace(claims=[], reference_too_coarse=True, reference=SimpleNamespace(relmse=0.02), picture_samples={"srd": sample})
+    coarse, flip = cli_bench.claim_lines(scene)
+    assert "above a tenth" in coarse and "--reference-seconds" in coarse and "flip-evaluator" in flip
+    sample.metrics["flip"] = 0.1
+    assert len(cli_bench.claim_lines(scene)) == 1
