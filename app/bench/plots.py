@@ -16,7 +16,7 @@ import numpy as np
 
 from app.bench import report_style as style
 from app.bench.curves import speed_up
-from app.bench.report_text import ratio_text, superscript
+from app.bench.report_text import number, ratio_text, superscript
 from app.bench.results import Curve, SceneResult
 
 if TYPE_CHECKING:
@@ -84,17 +84,17 @@ def set_limits(axes: Axes, groups: Sequence[Sequence[Series]], own_errors: Seque
     """Logarithmic axes around all that is positive, with ticks that read as plain numbers."""
     everything = [one for group in groups for one in group]
     x = np.concatenate([one.x for one in everything])
-    y = np.concatenate([np.concatenate([one.mean, one.low, one.high]) for one in everything] + [np.asarray(own_errors, float)])
-    y = y[np.isfinite(y) & (y > 0)]
-    least, largest = (float(y.min()), float(y.max())) if y.size else (1e-3, 1.0)
-    # A single lucky seed must not stretch the axis over empty decades.
-    means = np.concatenate([one.mean for one in everything])
-    if np.any(means > 0):
-        least = max(least, float(means[means > 0].min()) / 10)
+    means, spans = np.concatenate([one.mean for one in everything]), np.concatenate([np.append(one.low, one.high) for one in everything])
+    least_mean = float(np.min(means, where=means > 0, initial=np.inf))
+    if math.isinf(least_mean):
+        least_mean = 1e-3
+    # Neither a single lucky seed nor a very good reference may stretch the axis over empty decades.
+    kept = [*spans[spans > least_mean / 10], *(own for own in own_errors if least_mean / 300 < own < math.inf)]
+    least, largest = min([least_mean, *kept]), max([least_mean * 3, *means, *kept])
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlim(float(x.min()) / 1.25, float(x.max()) * 1.12)
-    axes.set_ylim(least / 1.8, largest * 1.6)
+    axes.set_ylim(float(least) / 1.8, float(largest) * 1.6)
     axes.set_xlabel("photon time (s)" if abscissa == "seconds" else "photons")
     _ticks(axes, abscissa)
     axes.grid(True, which="major", color=style.GRID, lw=0.7)
@@ -151,9 +151,12 @@ def draw_series(axes: Axes, one: Series, markers: bool = True) -> None:
 
 
 def _draw_reference_error(axes: Axes, own: float) -> None:
-    if not own > 0:
+    if not 0 < own < math.inf:
         return
     low, high = axes.get_ylim()
+    if own < low:
+        axes.text(0.012, 0.012, f"reference's own error {number(own)}, below", transform=axes.transAxes, fontsize=8, color=style.INK, zorder=13)
+        return
     axes.axhline(own, color=style.INK, lw=1.1, ls=(0.0, (1.0, 1.8)), zorder=2.5)
     under = own > math.sqrt(low * high)
     axes.annotate(

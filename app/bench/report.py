@@ -37,9 +37,8 @@ def write_report(result: BenchResult, directory: Path) -> None:
         for index, (scene, name) in enumerate(zip(result.scenes, names, strict=True)):
             progress(index / (len(names) + 1), scene.scene)
             sections.append(report_scene.section(scene, f"scene-{name}", _curve_plots(scene, name, plots), directory))
-        figure = overview(result)
-        report_style.save(figure, plots / "overview")
-        glance = report_scene.svg_of(figure, "overview", "time to equal error of each method in each scene, as a ratio to stochastic")
+        document = report_style.save(overview(result), plots / "overview")
+        glance = report_scene.inlined(document, "overview", "time to equal error of each method in each scene, as a ratio to stochastic")
         progress(1.0, "page")
     body = [
         report_sections.header(result), report_sections.contents(result, [f"scene-{name}" for name in names]), report_sections.claims(result, glance),
@@ -61,9 +60,8 @@ def _curve_plots(scene: SceneResult, name: str, plots: Path) -> dict[str, Html]:
     """Error over time and over photons: saved, and as SVG for the page."""
     drawn = {}
     for abscissa, ending, words in (("seconds", "time", "photon time"), ("photons", "photons", "photons")):
-        figure = error_against(scene, abscissa)
-        report_style.save(figure, plots / f"{name}_error_{ending}")
-        drawn[abscissa] = report_scene.svg_of(figure, f"{name}-{ending}", f"{scene.scene}: relMSE of each method against {words}, logarithmic axes")
+        document = report_style.save(error_against(scene, abscissa), plots / f"{name}_error_{ending}")
+        drawn[abscissa] = report_scene.inlined(document, f"{name}-{ending}", f"{scene.scene}: relMSE of each method against {words}, logarithmic axes")
     return drawn
 
 

@@ -61,9 +61,9 @@ def table(headings: Sequence[object], rows: Iterable[Sequence[object]], caption:
     return element("div", inner, cls="wide")
 
 
-def figure(content: object, caption: object) -> Html:
-    """A figure with its caption."""
-    return element("figure", content, element("figcaption", caption))
+def figure(content: object, caption: object = None, size: str | None = None) -> Html:
+    """A figure with its caption; size: "half" or "most" of the page's width, None: all there is."""
+    return element("figure", content, element("figcaption", caption) if caption else None, cls=size)
 
 
 def page(title: str, body: object) -> Html:
@@ -78,7 +78,7 @@ def page(title: str, body: object) -> Html:
 _CSS = """
 *{box-sizing:border-box}
 body{margin:0 auto;max-width:86rem;padding:2rem clamp(1rem,3vw,3rem) 4rem;background:var(--paper);color:var(--ink);
-  font:16px/1.5 system-ui,-apple-system,"Segoe UI","DejaVu Sans",sans-serif;font-variant-numeric:tabular-nums}
+  font:1rem/1.5 system-ui,-apple-system,"Segoe UI","DejaVu Sans",sans-serif;font-variant-numeric:tabular-nums}
 h1{font-size:2rem;line-height:1.15;margin:.2rem 0 .4rem;letter-spacing:-.01em}
 h2{font-size:1.4rem;margin:3rem 0 .6rem;padding-top:.8rem;border-top:2px solid var(--ink)}
 h3{font-size:1.05rem;margin:1.8rem 0 .4rem}
@@ -90,6 +90,8 @@ a{color:inherit}
 figcaption{max-width:90ch;margin-top:.3rem}
 figure{margin:1rem 0}
 figure svg{width:100%;height:auto;display:block}
+figure.half{max-width:42rem}
+figure.most{max-width:62rem}
 pre{background:var(--wash);padding:.7rem .9rem;overflow-x:auto;white-space:pre-wrap;overflow-wrap:anywhere;border-radius:4px;font-size:.9rem}
 nav ul{display:flex;flex-wrap:wrap;gap:.2rem 1.1rem;list-style:none;padding:0;margin:1rem 0}
 .wide{overflow-x:auto;margin:.8rem 0}
@@ -101,11 +103,12 @@ tbody th{font-weight:500}
 th.n,td.n{text-align:right;padding-left:.4rem}
 td.n{white-space:nowrap}
 table.claims{width:100%}
-table.claims td{min-width:7rem}
+table.claims td:nth-last-child(2){white-space:nowrap}
 .yes{color:var(--good);font-weight:600}
 .no{color:var(--bad);font-weight:600}
 .srd{color:var(--srd);font-weight:700}
-.facts{display:grid;grid-template-columns:max-content 1fr;gap:.15rem 1.2rem;font-size:.9rem;margin:1rem 0}
+.facts{columns:26rem;column-gap:2.5rem;font-size:.9rem;margin:1rem 0}
+.facts div{display:grid;grid-template-columns:6.5rem 1fr;gap:1rem;break-inside:avoid;padding:.08rem 0}
 .facts dt{color:var(--muted)}
 .facts dd,.terms dd{margin:0}
 .terms dt{font-weight:600;margin-top:.5rem}
@@ -115,7 +118,7 @@ table.claims td{min-width:7rem}
 .warning p{margin:.2rem 0}
 table.pictures{border-collapse:separate;border-spacing:.5rem .35rem;margin-left:-.5rem;table-layout:fixed;width:100%;min-width:62rem}
 table.pictures th,table.pictures td{border:0;padding:0;vertical-align:top}
-table.pictures th.row{width:5.6rem;color:var(--muted);font-weight:500;font-size:.8rem}
+table.pictures .row{width:5.6rem;color:var(--muted);font-weight:500;font-size:.8rem}
 table.pictures thead th{color:var(--ink);font-weight:600}
 table.pictures thead th.srd{color:var(--srd)}
 table.pictures img{display:block;width:100%;height:auto;background:#000}
@@ -129,11 +132,13 @@ img.crop{image-rendering:pixelated}
 .scale div{display:flex;justify-content:space-between}
 @media print{
   @page{size:A4 landscape;margin:12mm}
-  body{max-width:none;padding:0;font-size:11px}
+  html{font-size:10.5px}
+  body{max-width:none;padding:0}
   h2{break-before:page;margin-top:0}
   h2.flow{break-before:auto;margin-top:1.5rem}
   h2,h3{break-after:avoid}
-  figure,tr,.warning,.scale{break-inside:avoid}
+  figure,tr,.warning,.scale,dl div,.wide:not(:has(.claims)){break-inside:avoid}
+  dt{break-after:avoid}
   .wide{overflow:visible}
   table.pictures{min-width:0}
   nav{display:none}

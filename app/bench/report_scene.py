@@ -27,7 +27,7 @@ def section(scene: SceneResult, anchor: str, curve_svgs: Mapping[str, Html], dir
         element("p", scene.title) if scene.title and scene.title != scene.scene else None,
         element("p", _setting(scene), cls="muted"),
         element("div", [element("p", warning) for warning in warnings], cls="warning") if warnings else None,
-        element("div", [element("figure", svg) for svg in curve_svgs.values()], cls="two"),
+        element("div", [figure(svg) for svg in curve_svgs.values()], cls="two"),
         _speed_table(scene),
         _bias_figure(scene, anchor),
         _error_table(scene),
@@ -39,11 +39,12 @@ def section(scene: SceneResult, anchor: str, curve_svgs: Mapping[str, Html], dir
 
 
 def _setting(scene: SceneResult) -> str:
-    glass = f"strongest glass {scene.strongest_glass} (V_d {scene.strongest_abbe:.1f})" if scene.strongest_abbe > 0 else "no dispersion"
+    glass = f"strongest glass {scene.strongest_glass} (Abbe number {scene.strongest_abbe:.1f})" if scene.strongest_abbe > 0 else "no dispersion"
     parts = [f"{scene.size[0]}×{scene.size[1]} pixels", text.seeds_text(scene.seeds), f"{scene.seconds:g} s of photon time", glass]
     if scene.reference is not None:
         own = scene.reference
-        parts.append(f"reference: {own.method}, {text.count(own.photons)} photons in {own.seconds:.0f} s, own relMSE {text.number(own.relmse)}, key {own.key[:12]}")
+        parts.append(f"reference: {own.method}, {text.count(own.photons)} photons in {own.seconds:.0f} s")
+        parts.append(f"its own relMSE {text.number(own.relmse)}, its key {own.key[:12]}")
     return "; ".join(parts) + "."
 
 
@@ -66,25 +67,23 @@ def _ends(curve: Curve) -> tuple[Point, Point] | None:
 
 def _speed_table(scene: SceneResult) -> Html:
     rows = []
+    compared = any(curve.method == BASELINE and curve.points for curve in scene.curves)
     for curve in _curves(scene):
         ends, ratio = _ends(curve), scene.time_to_equal_error.get(curve.method)
         reached = ratio is not None and math.isfinite(ratio) and ratio > 0
-        ratio_cell = text.ratio_text(ratio, is_lower_bound(scene, curve.method)) if reached else "–"
-        if curve.method == BASELINE:
-            ratio_cell, words = "1", "the measure"
-        else:
-            words = text.ratio_in_words(ratio) if BASELINE in {c.method for c in scene.curves} else "–"
+        unreached = "never" if compared and ends is not None else "–"
+        ratio_cell = text.ratio_text(ratio, is_lower_bound(scene, curve.method)) if reached else unreached
         if ends is None:
-            rows.append([_name(curve.method), *["–"] * 7])
+            rows.append([_name(curve.method), *["–"] * 6])
             continue
         first, last = ends
         rows.append([
-            _name(curve.method), ratio_cell, words, f"{text.number(first.relmse)} at {first.seconds:.2g} s", text.number(last.relmse),
+            _name(curve.method), ratio_cell, f"{text.number(first.relmse)} at {first.seconds:.2g} s", text.number(last.relmse),
             f"{text.number(last.relmse_low)} to {text.number(last.relmse_high)}", f"{last.seconds:.3g}", text.count(last.photons),
         ])  # fmt: skip
     return table(
-        ("method", "time ratio", "in words", "relMSE, shortest run", "relMSE, longest run", "over seeds", "photon s", "photons"), rows,
-        "Time to equal error: time of stochastic over time of the method, to the error stochastic has at its end.",
+        ("method", "time ratio", "relMSE, shortest run", "relMSE, longest run", "over seeds", "photon s", "photons"), rows,
+        "Time ratio: time of stochastic over time of the method, to the error that stochastic ends with; above 1 the method is faster.",
     )  # fmt: skip
 
 
@@ -92,7 +91,7 @@ def _bias_figure(scene: SceneResult, anchor: str) -> Html | None:
     drawn = report_plots.bias_and_variance(scene)
     if drawn is None:
         return None
-    svg = svg_of(drawn, f"{anchor}-bias", f"{scene.scene}: bias squared and variance of each method against photon time")
+    svg = inlined(report_style.svg_text(drawn), f"{anchor}-bias", f"{scene.scene}: bias squared and variance of each method against photon time")
     return figure(svg, "relMSE told apart: variance falls with more photons, bias² stays. A hollow triangle means that no bias could be detected there.")
 
 
@@ -120,9 +119,8 @@ def _stage_figure(scene: SceneResult, anchor: str) -> Html | None:
     drawn = report_plots.time_by_stage(scene)
     if drawn is None:
         return None
-    svg = svg_of(drawn, f"{anchor}-stages", f"{scene.scene}: photon time by stage for each method")
-    shown = element("figure", svg, element("figcaption", "At the largest budget of each method, mean over seeds; emission is counted in the trace."))
-    return element("div", shown, cls="two")
+    svg = inlined(report_style.svg_text(drawn), f"{anchor}-stages", f"{scene.scene}: photon time by stage for each method")
+    return figure(svg, "At the largest budget of each method, mean over seeds; emission is counted in the trace.", "half")
 
 
 def _cost_table(scene: SceneResult) -> Html:
@@ -150,9 +148,9 @@ def _mean(values: list[float]) -> float | None:
     return sum(finite) / len(finite) if finite else None
 
 
-def svg_of(drawn: object, prefix: str, label: str) -> Html:
-    """A Matplotlib figure as inline SVG."""
-    return Html(report_style.inline_svg(drawn, prefix, html.escape(label, quote=True)))  # type: ignore[arg-type]
+def inlined(document: str, prefix: str, label: str) -> Html:
+    """An SVG document as an element of the page."""
+    return Html(report_style.inline_svg(document, prefix, html.escape(label, quote=True)))
 
 
 def _pictures(scene: SceneResult, directory: Path) -> Html:
@@ -180,7 +178,7 @@ def _pictures(scene: SceneResult, directory: Path) -> Html:
     rows.append(_picture_row(f"{scene.equal_time:.2g} s, whole", names, whole))
     maps = {name: (_image(pictures.error_map(error, limit), f"{scene.scene}, {name}: signed error", None), None) for name, error in errors.items()}
     rows.append(_picture_row("signed error, whole", names, {"reference": (_scale(limit), None)} | maps))
-    head = element("tr", element("td", ""), [element("th", name, scope="col", cls="srd" if name == "srd" else None) for name in names])
+    head = element("tr", element("td", "", cls="row"), [element("th", name, scope="col", cls="srd" if name == "srd" else None) for name in names])
     matrix = element("table", element("thead", head), element("tbody", rows), cls="pictures")
     return element("div", title, element("div", matrix, cls="wide"), element("p", _caption(exposure), cls="muted"))
 
@@ -215,7 +213,7 @@ def _numbers(scene: SceneResult, name: str, found: Mapping[str, np.ndarray]) -> 
         epsilon = EPSILON_SHARE * max(float(reference.mean()), 1e-30) ** 2
         relmse, note = float(np.mean((found[name] - reference) ** 2 / (reference**2 + epsilon))), " (raw)"
     flip = metrics.get("flip", math.nan)
-    lines = [f"relMSE {text.number(relmse)}{note}", f"FLIP {flip:.3f}" if math.isfinite(flip) else "FLIP not measured"]
+    lines = [f"relMSE {text.number(relmse)}{note}", f"HDR-FLIP {flip:.3f}" if math.isfinite(flip) else "HDR-FLIP not measured"]
     if sample is not None:
         lines.append(f"{sample.photon_seconds:.2g} s, {text.count(sample.photons)} photons")
     return element("div", [(line, element("br")) for line in lines], cls="numbers")
@@ -231,7 +229,7 @@ def _scale(limit: float) -> Html:
 
 def _caption(exposure: float) -> str:
     return (
-        f"All pictures at one exposure ({exposure:+.1f} EV) chosen for the reference, and the part chosen on the reference alone, where light and structure are "
-        "richest. Whole pictures are means of 2×2 pixels. Signed error is (Y − Y_ref) / √(Y_ref² + ε), luminance, the same scale for all, full resolution; "
+        f"All pictures at one exposure ({exposure:+.1f} EV) chosen for the reference, and the part chosen on the reference alone, where light and "
+        "structure are richest. Whole pictures are means of 2×2 pixels. Signed error is (Y − R) / √(R² + ε), luminance, the same scale for all, full resolution; "
         "colours follow the root of its size, and the mean of its square is the luminance's part of relMSE. Measures are of the one picture shown."
     )

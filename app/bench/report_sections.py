@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from app.bench import report_text as text
-from app.bench.report_html import Html, element, table
+from app.bench.report_html import Html, element, figure
 from app.bench.report_style import by_rank
 from app.bench.results import BenchResult
 
@@ -25,7 +25,7 @@ def header(result: BenchResult) -> Html:
         element("p", "SpectraSplat bench", cls="muted"),
         element("h1", "Error against run time"),
         [element("p", sentence, cls="lead") for sentence in text.headline(result)],
-        element("dl", [(element("dt", key), element("dd", value)) for key, value in facts.items()], cls="facts"),
+        element("dl", [element("div", element("dt", key), element("dd", value)) for key, value in facts.items()], cls="facts"),
         element("p", "The command that repeats it:"),
         element("pre", element("code", result.command)),
     )
@@ -41,7 +41,8 @@ def _effort(result: BenchResult) -> str:
 
 def contents(result: BenchResult, anchors: list[str]) -> Html:
     """Links to every part of the page."""
-    links = [("Claims", "claims"), ("Method", "method"), *((scene.scene, anchor) for scene, anchor in zip(result.scenes, anchors, strict=True)), ("Limits", "limits")]
+    scenes = [(scene.scene, anchor) for scene, anchor in zip(result.scenes, anchors, strict=True)]
+    links = [("Claims", "claims"), ("How it was measured", "method"), *scenes, ("Limits", "limits")]
     return element("nav", element("ul", [element("li", element("a", name, href=f"#{target}")) for name, target in links]), aria_label="Contents")
 
 
@@ -59,28 +60,30 @@ def claims(result: BenchResult, overview_svg: Html) -> Html:
         "section",
         element("h2", "Claims", id="claims", cls="flow"),
         element("div", body, cls="wide") if rows else element("p", "No claim could be judged: it takes srd and a method to compare it with."),
-        element("figure", overview_svg, element("figcaption", text.METRICS["time to equal error"].capitalize())),
+        figure(overview_svg, text.sentence(text.METRICS["time to equal error"]), "most"),
     )
 
 
 def definitions(result: BenchResult) -> Html:
     """The protocol in short; every method and every metric."""
     used = by_rank(sorted({curve.method for scene in result.scenes for curve in scene.curves}))
+    described = {name: text.METHODS.get(name, "Not described.") for name in used}
     return element(
         "section",
         element("h2", "How it was measured", id="method"),
         element("ul", [element("li", sentence) for sentence in text.PROTOCOL]),
         element(
             "div",
-            element("div", element("h3", "Methods"), _terms({name: text.METHODS.get(name, "(not described)") for name in used})),
-            element("div", element("h3", "Metrics"), _terms(text.METRICS), element("h3", "Stages of photon time"), _terms(text.STAGES)),
+            element("div", element("h3", "Methods"), _terms(described), element("h3", "Stages of photon time"), _terms(text.STAGES)),
+            element("div", element("h3", "Metrics"), _terms(text.METRICS)),
             cls="two",
         ),
     )
 
 
 def _terms(entries: Mapping[str, str]) -> Html:
-    return element("dl", [(element("dt", term, cls="srd" if term == "srd" else None), element("dd", meaning)) for term, meaning in entries.items()], cls="terms")
+    pairs = [(element("dt", term, cls="srd" if term == "srd" else None), element("dd", meaning)) for term, meaning in entries.items()]
+    return element("dl", pairs, cls="terms")
 
 
 def limits(result: BenchResult) -> Html:
@@ -89,6 +92,7 @@ def limits(result: BenchResult) -> Html:
     told = [element("li", element("strong", f"{scene}, {claim.name}. "), text.limit_sentence(claim)) for scene, claim in failed]
     doubts = [element("li", element("strong", f"{scene.scene}. "), warning) for scene in result.scenes for warning in text.warnings_of(scene)]
     judged = any(scene.claims for scene in result.scenes)
+    sound = "Every reference is at least ten times better than the smallest error reported, and every scene is complete."
     nothing = "Every claim that could be judged holds in every scene." if judged else "No claim was judged."
     return element(
         "section",
@@ -96,6 +100,7 @@ def limits(result: BenchResult) -> Html:
         element("h3", "Claims that do not hold"),
         element("ul", told) if told else element("p", nothing),
         element("h3", "Doubts about the measurement"),
-        element("ul", doubts) if doubts else element("p", "Every reference is at least ten times better than the smallest error reported, and every scene is complete."),
-        table(("not covered", ""), text.NOT_COVERED.items(), left=2),
+        element("ul", doubts) if doubts else element("p", sound),
+        element("h3", "What this does not cover"),
+        _terms(text.NOT_COVERED),
     )

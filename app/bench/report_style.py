@@ -124,23 +124,29 @@ def title(axes: Axes, text: str, detail: str = "") -> None:
         )  # fmt: skip
 
 
-def save(figure: Figure, stem: Path) -> None:
-    """Write `stem`.png (200 dpi) and `stem`.svg, each whole or not at all."""
+def svg_text(figure: Figure) -> str:
+    """The figure as an SVG document."""
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None})
+    return buffer.getvalue()
+
+
+def save(figure: Figure, stem: Path) -> str:
+    """Write `stem`.png (160 dpi) and `stem`.svg, each whole or not at all; returns the SVG document."""
     with atomic_output(stem.with_name(stem.name + ".png")) as temporary:
-        figure.savefig(temporary, format="png", dpi=200)
+        figure.savefig(temporary, format="png", dpi=160)
+    document = svg_text(figure)
     with atomic_output(stem.with_name(stem.name + ".svg")) as temporary:
-        figure.savefig(temporary, format="svg", metadata={"Date": None})
+        temporary.write_text(document, encoding="utf-8")
+    return document
 
 
-def inline_svg(figure: Figure, prefix: str, label: str) -> str:
-    """The figure as an <svg> element for an HTML page: no name spaces, ids made unique by `prefix`, colours as CSS variables.
+def inline_svg(document: str, prefix: str, label: str) -> str:
+    """An SVG document as an element for an HTML page: no name spaces, ids made unique by `prefix`, colours as CSS variables.
 
     label: what the plot shows, for those who cannot see it; must already be escaped.
     """
-    buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None})
-    text = buffer.getvalue()
-    text = text[text.index("<svg") :]
+    text = document[document.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", text)
     text = text.replace("xlink:href=", "href=")

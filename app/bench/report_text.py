@@ -6,6 +6,7 @@ Plain text only; `report_html` escapes it.
 from __future__ import annotations
 
 import math
+import statistics
 
 from app.bench.results import BenchResult, Claim, Curve, SceneResult
 
@@ -34,7 +35,7 @@ METRICS = {
     "energy": "sum of the picture over sum of the reference; 1 is right.",
     "tail slope": "exponent of relMSE against photons over the curve's second half, with its 95 % confidence interval. "
     "Pure noise of independent photons gives −1; a bias floor bends it towards 0.",
-    "time to equal error": "time `stochastic` needs for its longest rendering, over the time the method needs to reach the same mean error, "
+    "time to equal error": "time that stochastic needs for its longest rendering, over the time that the method needs to reach the same mean error, "
     "read off the curves by log-log interpolation. ≥ marks a method whose shortest rendering is already better.",
 }
 
@@ -141,20 +142,31 @@ def warnings_of(scene: SceneResult) -> list[str]:
 def headline(result: BenchResult) -> list[str]:
     """The findings in two or three sentences."""
     claims = [claim for scene in result.scenes for claim in scene.claims]
-    ratios = sorted(r for s in result.scenes if (r := s.time_to_equal_error.get("srd", 0.0)) > 0 and math.isfinite(r))
+    compared = [s for s in result.scenes if {"srd", "stochastic"} <= {curve.method for curve in s.curves if curve.points}]
+    ratios = sorted(r for s in compared if (r := s.time_to_equal_error.get("srd", 0.0)) > 0 and math.isfinite(r))
     told = []
-    if ratios:
+    if compared:
         enough = sum(ratio >= 30 for ratio in ratios)
-        middle = ratios[len(ratios) // 2] if len(ratios) % 2 else math.sqrt(ratios[len(ratios) // 2 - 1] * ratios[len(ratios) // 2])
         told.append(
-            f"srd reached the error that stochastic has at its end in at most 1/30 of the time in {enough} of {len(result.scenes)} scenes; "
-            f"least {ratio_text(ratios[0])}, median {ratio_text(middle)}, largest {ratio_text(ratios[-1])}."
+            f"srd reached the error that stochastic ends with in at most 1/30 of its time in {enough} of {len(compared)} "
+            f"scene{'' if len(compared) == 1 else 's'}{_range_of(ratios)}."
         )
+        if len(ratios) < len(compared):
+            told.append(f"In {len(compared) - len(ratios)} of them it never got there.")
     if claims:
         told.append(f"{sum(claim.holds for claim in claims)} of {len(claims)} claims hold; what does not is told under Limits.")
     if not told:
         told.append("Nothing has been compared yet: the run was stopped early or had one method only.")
     return told
+
+
+def _range_of(ratios: list[float]) -> str:
+    """A clause with the least, the median and the largest of rising `ratios`."""
+    if not ratios:
+        return ""
+    if len(ratios) < 3:
+        return f"; it took {' and '.join(ratio_text(ratio) for ratio in ratios)} less time"
+    return f"; times less: {ratio_text(ratios[0])} at least, {ratio_text(statistics.median(ratios))} in the median, {ratio_text(ratios[-1])} at most"
 
 
 def limits(result: BenchResult) -> list[tuple[str, Claim]]:
@@ -166,15 +178,6 @@ def limit_sentence(claim: Claim) -> str:
     """One failed claim in words."""
     why = claim.why.strip() or "the numbers do not tell why."
     return f"Asked: {claim.asked}. Measured: {claim.measured}. Why: {why}"
-
-
-def ratio_in_words(ratio: float | None) -> str:
-    """A time ratio as a sentence's end, for those who stumble over ratios."""
-    if ratio is None or not math.isfinite(ratio) or ratio <= 0:
-        return "never got there"
-    if abs(ratio - 1) < 0.05:
-        return "as fast"
-    return f"{ratio_text(ratio)[:-1]} times less time" if ratio > 1 else f"{ratio_text(1 / ratio)[:-1]} times more time"
 
 
 def bias_share(curve: Curve) -> float | None:
@@ -194,3 +197,8 @@ def seeds_text(seeds: int) -> str:
 def signed(value: float) -> str:
     """Two decimals with a true minus sign."""
     return f"{value:.2f}".replace("-", "−")
+
+
+def sentence(words: str) -> str:
+    """With a capital at its start."""
+    return words[:1].upper() + words[1:]
