@@ -14,6 +14,7 @@ from app.model.scene import Light
 from app.passes.emission_domain import EmissionDomain
 from app.truth.emission_maps import (
     PLASTIC,
+    angle_between,
     azimuthal_direction,
     concentric_disc,
     lattice_point,
@@ -58,15 +59,29 @@ class Emitter:
         return np.broadcast_to(origin, local.shape), local @ np.vstack([frame, domain.axis])
 
     def weight(self, q: np.ndarray, count: int) -> np.ndarray:
-        """What one of `count` lattice points at `q` (..., 2) carries per unit of the light's own quantity, away from hard edges."""
-        share = self.domain.measure / count
-        direction = self.start(q)[1]
-        axis = unit(np.asarray(self.light.direction, float))
-        if self.light.kind == "spot":
-            inner, outer = np.radians([self.light.inner_half_angle_deg, self.light.outer_half_angle_deg])
-            return share * spot_falloff(direction, axis, inner, outer)
-        if self.light.kind == "area":
+        """What one of `count` lattice points at `q` (..., 2) carries per unit of the light's own quantity.
+
+        At a hard edge that is the covered share of a lattice cell.
+        """
+        light, share = self.light, self.domain.measure / count
+        start, direction = self.start(q)
+        axis = unit(np.asarray(light.direction, float))
+        spacing = self.domain.spacing(count) * self.unit_length
+
+        def covered(inside: np.ndarray) -> np.ndarray:
+            return np.clip(inside / spacing + 0.5, 0.0, 1.0)
+
+        if light.kind == "spot":
+            inner, outer = np.radians([light.inner_half_angle_deg, light.outer_half_angle_deg])
+            return share * (covered(outer - angle_between(direction, axis)) if inner == outer else spot_falloff(direction, axis, inner, outer))
+        if light.kind == "area":
             return share * np.maximum(direction @ axis, 0.0)
+        if light.kind == "collimated":
+            offset = (start - np.array(light.position)) @ np.stack([self.domain.tangent, self.domain.bitangent]).T
+            if light.shape == "disc":
+                return share * covered(light.radius - np.linalg.norm(offset, axis=-1))
+            inside = 0.5 * np.array([light.width, light.height]) - np.abs(offset)
+            return share * covered(inside[..., 0]) * covered(inside[..., 1])
         return np.full(direction.shape[:-1], share)
 
     def lattice(self, count: int, shift: tuple[int, int], sub_lattice: int = 0) -> np.ndarray:

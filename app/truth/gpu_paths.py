@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from itertools import product
 
 import numpy as np
 
@@ -90,14 +89,15 @@ class Photons:
         keys = {int(band): branch_key(choices, int(band)) for band in np.unique(self._band)}
         return self.where(self.records["branch_key"] == np.array([keys[int(band)] for band in self._band], np.uint32))
 
-    def choices(self, longest: int) -> list[tuple[int, ...] | None]:
-        """Each photon's choices, up to `longest` of them; None where more or others were made."""
-        table: dict[tuple[int, int], tuple[int, ...]] = {}
-        for length in range(1, longest + 1):
-            for path in product((REFLECTED, REFRACTED, MIRRORED, CUT_LOW, CUT_HIGH), repeat=length):
-                for band in np.unique(self._band):
-                    table[int(band), branch_key(path, int(band))] = path
-        return [table.get((int(b), int(k))) for b, k in zip(self._band, self.records["branch_key"], strict=True)]
+    def choices(self, longest: int) -> list[tuple[int, ...]]:
+        """Each photon's choices, at most `longest` of them; KeyError where a path made more."""
+        table = {}
+        for band in np.unique(self._band).tolist():
+            keys = {(): branch_key((), band)}
+            for _ in range(longest):
+                keys = {(*path, c): int(hash_combine(key, c)) for path, key in keys.items() for c in (REFLECTED, REFRACTED, MIRRORED, CUT_LOW, CUT_HIGH)}
+                table |= {(band, key): path for path, key in keys.items()}
+        return [table[int(band), int(key)] for band, key in zip(self._band, self.records["branch_key"], strict=True)]
 
     def of_band(self, band: int) -> Photons:
         """Those of one of the bands that were asked for."""
@@ -171,8 +171,8 @@ def trace_light(
         bands = tuple(Band(float(lo), float(hi), float(0.5 * (lo + hi)), 1.0) for lo, hi in ends)
         batch = trace.run(LatticeSlice(0, bands, count, 0, 1, count, SHIFT, (0, 0), 0, SEED, light_place=place), domain)
         assert batch.tally.fallbacks["queue_overflow"] == 0
-        assert batch.tally.imbalance < 1e-4
-        records = np.frombuffer(trace.photons.read(size=batch.photons * trace.photon.stride), trace.photon.dtype)
+        assert batch.tally.imbalance < 1e-4, "flux does not close"
+        records = np.frombuffer(trace.photons.read(), trace.photon.dtype, batch.photons)
         emitter = Emitter(light, domain, space, place)
         # Only wavelengths that part have lattices of their own.
         lattices = [emitter.lattice(count, SHIFT, k if features.spectral_groups else 0) for k in range(len(bands))]

@@ -192,6 +192,8 @@ class Path:
     landed: bool
     transmittance: float = 1.0
     """Product of Fresnel factors of the branches taken, absorption and mirrors."""
+    margin: float = 1.0
+    """Smallest cosine on the way, incident on a facet or (imaginary ones too) transmitted: how far from the hazards."""
 
 
 def follow(
@@ -214,22 +216,23 @@ def follow(
     inside = scene.holding(ray) if inside is None else inside
     triangles: list[int] = []
     reflections: list[bool] = []
-    factor = 1.0
+    factor, margin = 1.0, 1.0
     while len(reflections) <= max_depth:
         if along is not None:
             hit = None if len(triangles) >= len(along) else (along[len(triangles)], _distance(ray, scene.facet(along[len(triangles)])))
         else:
             hit = scene.nearest(ray, triangles[-1] if triangles else None, inside)
         if hit is None:
-            return Path(ray, tuple(triangles), tuple(reflections), False, factor)
+            return Path(ray, tuple(triangles), tuple(reflections), False, factor, margin)
         triangle, distance = hit
         factor *= float(np.exp(-_medium(inside, bodies).absorption * distance))
         triangles.append(triangle)
         arrived, geometric, normal, dnormal = advance(ray, scene.facet(triangle), distance)
+        margin = min(margin, abs(float(ray.direction @ geometric)))
         material = int(scene.material[triangle])
         body = bodies[material]
         if body.kind == "receiver":
-            return Path(arrived, tuple(triangles), tuple(reflections), True, factor)
+            return Path(arrived, tuple(triangles), tuple(reflections), True, factor, margin)
         if body.kind == "mirror":
             ray = reflected(arrived, normal, dnormal)
             factor *= body.reflectance
@@ -242,12 +245,14 @@ def follow(
             # Another glass decides here: the boundary is not seen.
             ray, inside = arrived, after
             continue
-        reflectance = float(optics.fresnel_reflectance(arrived.direction, normal, n_i.index.n / n_t.index.n))
+        eta_it = n_i.index.n / n_t.index.n
+        reflectance = float(optics.fresnel_reflectance(arrived.direction, normal, eta_it))
+        margin = min(margin, float(np.sqrt(abs(optics.transmitted_cosine2(arrived.direction, normal, eta_it)))))
         beyond = None if reflects(len(reflections)) else refracted(arrived, normal, dnormal, n_i.index, n_t.index)
         factor *= reflectance if beyond is None else 1.0 - reflectance
         reflections.append(beyond is None)
         ray, inside = (reflected(arrived, normal, dnormal), before) if beyond is None else (beyond, after)
-    return Path(ray, tuple(triangles), tuple(reflections), False, factor)
+    return Path(ray, tuple(triangles), tuple(reflections), False, factor, margin)
 
 
 _OUTSIDE = Body()
