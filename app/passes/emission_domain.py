@@ -20,6 +20,11 @@ from app.model.scene import Light, Scene
 _COARSE_ANGLE = 0.15
 """Triangles that look larger than this from the light (rad, or of the unit sphere) are subdivided before projection."""
 _MAX_SUBDIVIDED = 400_000
+_NEAR_ANTIPODE = 3.0 * _COARSE_ANGLE
+"""Triangles this close (rad) to the point behind a light are bent too much on the plane to be held by their corners' box."""
+_SOFT_EDGE = 1.0 / 64.0
+"""Room about an aperture, as a share of its size: emission spreads its edge over half a lattice spacing on both sides, and what
+does not fit is lost. Enough for lattices of 1024 points."""
 
 
 @dataclass(frozen=True)
@@ -96,12 +101,13 @@ def _plane_domain(
     grow = tilt * np.abs(relative @ direction).max(axis=1)[:, None]
     low, high = flat.min(axis=1) - grow, flat.max(axis=1) + grow
     box_low, box_high = low.min(axis=0), high.max(axis=0)
-    centre, light_u, light_v, is_disc = middle, np.zeros(3), np.zeros(3), False
+    centre, light_u, light_v, is_disc, rim = middle, np.zeros(3), np.zeros(3), False, 0.0
     if light.kind == "collimated":
         half = _half_extent(light) * space.scale
         light_u, light_v, is_disc = tangent / half[0], bitangent / half[1], light.shape == "disc"
         at = (position - middle) @ frame.T
-        box_low, box_high = np.maximum(box_low, at - half), np.minimum(box_high, at + half)
+        rim = _SOFT_EDGE * float(np.sqrt(np.prod(2.0 * half)))
+        box_low, box_high = np.maximum(box_low, at - half - rim), np.minimum(box_high, at + half + rim)
         back = float((middle - position) @ direction)
     else:
         ends = np.concatenate([space.to_gpu(_world_corners(item)) for item in scene.objects])
@@ -110,7 +116,7 @@ def _plane_domain(
         return None
     rect, mask = _rect_and_mask(low, high, box_low, box_high)
     if is_disc:
-        mask &= _disc_mask(rect, (position - middle) @ frame.T, half[0])
+        mask &= _disc_mask(rect, (position - middle) @ frame.T, half[0] + rim)
     area = rect[2] * rect[3] / space.scale**2
     return EmissionDomain("plane", centre, direction, tangent, bitangent, rect, mask, area, back, light_u, light_v, position, is_disc, (float(tilt), 0.0))
 
@@ -128,7 +134,9 @@ def _diverging_domain(
     lengths = np.linalg.norm(relative, axis=-1)
     flat = azimuthal_plane(relative / np.maximum(lengths, 1e-12)[..., None])
     light_u = light_v = np.zeros(3)
-    grow = np.zeros((len(triangles), 1))
+    # Farthest from the axis, with what the extent of the light adds to it.
+    farthest = np.arccos(np.clip((relative[..., 2] / np.maximum(lengths, 1e-12)).min(axis=1), -1.0, 1.0))
+    shift = np.zeros(len(triangles))
     area = 1.0
     if light.kind == "area":
         half = _half_extent(light)
@@ -136,10 +144,20 @@ def _diverging_domain(
         light_u, light_v = edge_u * half[0] * space.scale, edge_v * half[1] * space.scale
         area = float(half[0] * half[1]) * (np.pi if light.shape == "disc" else 4.0)
         reach = np.linalg.norm(half) * space.scale if light.shape == "rectangle" else half[0] * space.scale
-        # Seen from the light's rim the object shifts by at most this angle; 1.5 covers the plane's stretch.
-        grow = 1.5 * np.arcsin(np.clip(reach / np.maximum(lengths.min(axis=1), 1e-12), 0.0, 1.0))[:, None]
+        # Seen from the light's rim the object shifts by at most this angle.
+        shift = np.arcsin(np.clip(reach / np.maximum(lengths.min(axis=1), 1e-12), 0.0, 1.0))
+        farthest = np.minimum(farthest + shift, np.pi)
+    # The plane stretches angles by 1 / cos(angle / 2) on its way out.
+    grow = (shift * np.maximum(1.5, 1.0 / np.maximum(np.cos(0.5 * farthest), 1e-3)))[:, None]
     low, high = np.maximum(flat.min(axis=1) - grow, -2.0), np.minimum(flat.max(axis=1) + grow, 2.0)
     box_low, box_high = low.min(axis=0), high.max(axis=0)
+    # The point behind the light is the plane's whole rim: what lies near it gets a ring instead of boxes.
+    behind = np.pi - farthest < _NEAR_ANTIPODE
+    ring = np.inf
+    if behind.any():
+        nearest = np.arccos(np.clip(relative[behind, :, 2] / np.maximum(lengths[behind], 1e-12), -1.0, 1.0)).min(axis=1) - shift[behind]
+        ring = 2.0 * float(np.sin(0.5 * max(nearest.min(), 0.0)))
+        box_low, box_high = np.full(2, -2.0), np.full(2, 2.0)
     outer = np.radians(light.outer_half_angle_deg) if light.kind == "spot" else 4.0
     inner = np.radians(light.inner_half_angle_deg) if light.kind == "spot" else 4.0
     cone_limit = None
@@ -150,6 +168,7 @@ def _diverging_domain(
         if np.any(box_high <= box_low):
             return None
     rect, mask = _rect_and_mask(low, high, box_low, box_high)
+    mask |= ~_disc_mask(rect, np.zeros(2), ring - 2.0 * float(np.hypot(rect[2], rect[3])) / MASK_SIZE)
     if cone_limit is not None:
         mask &= _cone_mask(rect, *cone_limit)
     if not mask.any():
