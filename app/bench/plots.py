@@ -203,7 +203,7 @@ def label_ends(axes: Axes, drawn: Sequence[Series], gap_pt: float = 11.5) -> Non
         look = style.method_style(name)
         axes.annotate(
             name, (x, error), xytext=(1.035, place / height_pt), textcoords="axes fraction", va="center", ha="left",
-            fontsize=9, color=look.colour, fontweight="bold" if name == "srd" else "normal", annotation_clip=False, parse_math=False,
+            fontsize=9, color=look.colour, fontweight="bold" if name == "srd" else "normal", annotation_clip=False,
             arrowprops={"arrowstyle": "-", "color": look.colour, "lw": 0.6, "shrinkA": 1, "shrinkB": 3, "alpha": 0.7, "relpos": (0.0, 0.5)},
         )  # fmt: skip
 

@@ -84,7 +84,7 @@ def _ratio_axes(axes: Axes, scenes: Sequence[SceneResult]) -> None:
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}×"))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xlabel("time of stochastic ÷ time of the method, to the error stochastic has at its end; larger is faster")
-    axes.set_yticks(range(len(scenes)), [_scene_label(scene) for scene in scenes], parse_math=False)
+    axes.set_yticks(range(len(scenes)), [_scene_label(scene) for scene in scenes])
     axes.tick_params(axis="y", length=0)
     axes.grid(True, axis="both", color=style.GRID, lw=0.7)
     axes.set_axisbelow(True)
@@ -142,7 +142,7 @@ def _draw_panel(axes: Axes, scene: SceneResult, drawn: Sequence[Series], named: 
     draw_ratio_arrow(axes, scene, drawn, named=False)
     if named:
         label_ends(axes, drawn)
-    axes.set_title(scene.scene, loc="left", fontsize=10, fontweight="bold", pad=5, parse_math=False)
+    axes.set_title(scene.scene, loc="left", fontsize=10, fontweight="bold", pad=5)
     ratio, compared = _ratio(scene, "srd"), {BASELINE, "srd"} <= {one.method for one in drawn}
     if ratio is None or ratio < 1:
         text = f"{ratio_text(1 / ratio)} the time" if ratio else "never as good" if compared else ""

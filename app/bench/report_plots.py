@@ -41,7 +41,7 @@ def bias_and_variance(scene: SceneResult) -> Figure | None:
     for index, (axes, name) in enumerate(zip(grid.flat, names, strict=False)):
         set_limits(axes, [everything], [], "seconds")
         axes.set(xlabel="photon time (s)", ylabel="share of relMSE" if index % columns == 0 else "")
-        axes.set_title(name, loc="left", fontsize=9.5, color=style.method_style(name).colour, pad=4, parse_math=False,
+        axes.set_title(name, loc="left", fontsize=9.5, color=style.method_style(name).colour, pad=4,
                        fontweight="bold" if name == "srd" else "normal")  # fmt: skip
         _draw_parts(axes, name, *parts[name])
     _key(figure, width, height, f"{scene.scene}: bias and variance")
@@ -66,7 +66,7 @@ def _draw_parts(axes: Axes, name: str, seconds: np.ndarray, bias2: np.ndarray, v
 def _key(figure: Figure, width_in: float, height_in: float, text: str) -> None:
     from matplotlib.lines import Line2D
 
-    figure.text(0.68 / width_in, 1 - 0.12 / height_in, text, fontsize=10.5, fontweight="bold", va="top", parse_math=False)
+    figure.text(0.68 / width_in, 1 - 0.12 / height_in, text, fontsize=10.5, fontweight="bold", va="top")
     handles = [
         Line2D([], [], color=style.MUTED, lw=2.0, label="variance"),
         Line2D([], [], color=style.INK, lw=1.0, marker="o", ms=3.2, label="bias²"),
@@ -104,7 +104,7 @@ def time_by_stage(scene: SceneResult) -> Figure | None:
     for place, (method, samples, stages) in enumerate(rows):
         _draw_bar(axes, place, samples, stages, longest)
         axes.text(-0.02, place, method, transform=axes.get_yaxis_transform(), ha="right", va="center", color=style.method_style(method).colour,
-                  fontweight="bold" if method == "srd" else "normal", parse_math=False)  # fmt: skip
+                  fontweight="bold" if method == "srd" else "normal")  # fmt: skip
     axes.set(xlim=(0, longest * 1.02), ylim=(-0.6, len(rows) - 0.4), yticks=[], xlabel="photon time for each photon (µs)")
     axes.spines["left"].set_visible(False)
     axes.grid(True, axis="x", color=style.GRID, lw=0.7)

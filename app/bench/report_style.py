@@ -81,7 +81,7 @@ def by_rank(names: list[str]) -> list[str]:
 
 @contextmanager
 def plot_style() -> Iterator[None]:
-    """Matplotlib's settings for drawing and for saving; figures must be made and saved inside."""
+    """Matplotlib's settings for drawing and for saving; figures must be made and saved inside. No text is parsed as mathematics."""
     import matplotlib
 
     settings = {
@@ -92,7 +92,7 @@ def plot_style() -> Iterator[None]:
         "xtick.labelsize": 8.5, "ytick.labelsize": 8.5, "axes.labelsize": 9.0,
         "axes.spines.top": False, "axes.spines.right": False,
         "xtick.minor.size": 0.0, "ytick.minor.size": 0.0, "xtick.major.size": 3.0, "ytick.major.size": 3.0,
-        "svg.fonttype": "none", "svg.hashsalt": "spectrasplat",
+        "text.parse_math": False, "svg.fonttype": "none", "svg.hashsalt": "spectrasplat",
     }  # fmt: skip
     with matplotlib.rc_context(settings), warnings.catch_warnings():
         # A scene may be named in any script; the SVG keeps the letters, the PNG draws a box.
@@ -111,16 +111,16 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 
 
 def title(axes: Axes, text: str, detail: str = "") -> None:
-    """A bold title, flush left, and a muted line of detail under it; neither is parsed as mathematics."""
+    """A bold title, flush left, and a muted line of detail under it."""
     rise = 20.0 if detail else 8.0
     axes.annotate(
         text, (0, 1), xycoords="axes fraction", xytext=(0, rise), textcoords="offset points",
-        fontsize=10.5, fontweight="bold", va="bottom", parse_math=False, annotation_clip=False,
+        fontsize=10.5, fontweight="bold", va="bottom", annotation_clip=False,
     )  # fmt: skip
     if detail:
         axes.annotate(
             detail, (0, 1), xycoords="axes fraction", xytext=(0, 7), textcoords="offset points",
-            fontsize=8.5, color=MUTED, va="bottom", parse_math=False, annotation_clip=False,
+            fontsize=8.5, color=MUTED, va="bottom", annotation_clip=False,
         )  # fmt: skip
 
 

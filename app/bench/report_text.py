@@ -81,13 +81,11 @@ def number(value: float | None, digits: int = 2) -> str:
         return "–"
     if value == 0:
         return "0"
-    sign = "−" if value < 0 else ""
-    size = abs(value)
-    if 1e-3 <= size < 1e5:
-        decimals = max(digits - 1 - math.floor(math.log10(size)), 0)
-        return f"{sign}{size:.{decimals}f}"
-    exponent = math.floor(math.log10(size))
-    return f"{sign}{size / 10.0**exponent:.{digits - 1}f}·10{str(exponent).translate(_SUPERSCRIPTS)}"
+    mantissa, exponent_text = f"{abs(value):.{digits - 1}e}".split("e")
+    sign, exponent = "−" if value < 0 else "", int(exponent_text)
+    if -3 <= exponent < 5:
+        return f"{sign}{float(f'{mantissa}e{exponent}'):.{max(digits - 1 - exponent, 0)}f}"
+    return f"{sign}{mantissa}·10{str(exponent).translate(_SUPERSCRIPTS)}"
 
 
 def count(value: float) -> str:

@@ -1,98 +1,305 @@
-"""The bench report on made-up results: everything measured is in it, nothing from outside, and nothing odd breaks it.
-
-The made-up results behave as real ones do: variance falls as a power of the photons, a method's bias floor
-stays, and the pictures are a coloured band with each method's own noise.
-"""
+"""The bench report on made-up results: everything measured is in it, nothing from outside, and nothing odd breaks it."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections import Counter
 from html.parser import HTMLParser
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
-from app.bench.results import BenchResult, Claim, Curve, Point, ReferenceInfo, Sample, SceneResult
+from app.bench import plots, report, report_pictures, report_plots, report_style, report_text
+from app.bench.metrics import EPSILON_SHARE
+from app.bench.report_html import Html, element
+from app.bench.report_overview import overview
+from app.bench.results import BenchResult, Claim, Curve, Point, SceneResult
+from app.errors import UserError
+from tests.unit.bench_synthetic import METHODS, synthetic_result, synthetic_scene
 
-# Seconds per photon, variance at 1000 photons, its exponent, bias².
-METHODS = {
-    "stochastic-point": (0.8e-6, 60.0, -1.0, 0.0),
-    "stochastic": (1.0e-6, 8.0, -0.85, 2e-5),
-    "regular-7": (2.2e-6, 2.0, -0.9, 2e-2),
-    "regular-16": (4.0e-6, 1.2, -0.9, 5e-3),
-    "srd-lambda": (1.6e-6, 0.35, -1.2, 1.5e-2),
-    "srd": (2.0e-6, 0.30, -1.3, 3e-5),
-}
-SIZE = (96, 54)
+class Page(HTMLParser):
+    """Collects what a page holds; an element that is closed wrongly is an error."""
 
+    VOID = frozenset({"img", "br", "meta"})
 
-def synthetic_curve(method: str, difficulty: float, seeds: int, longest_s: float, rng: np.random.Generator) -> Curve:
-    per_photon, start, exponent, bias2 = METHODS[method]
-    overhead_s = 0.01
-    samples, points = [], []
-    for seconds in np.geomspace(0.025, longest_s, 10):
-        photons = int((seconds - overhead_s) / per_photon)
-        variance = difficulty * start * (photons / 1000) ** exponent
-        spread = variance * np.exp(rng.normal(0, 0.12, seeds))
-        errors = bias2 * difficulty + spread
-        for seed, error in enumerate(errors, 1):
-            share = seconds - overhead_s
-            samples.append(Sample(
-                photons, seed, photons, int(photons * 1.7), {"trace": 0.6 * share, "splat": 0.4 * share, "resolve": overhead_s, "eye": 0.02},
-                {"relmse": float(error), "relmse_trimmed": float(error) * 0.7, "smape": 0.2, "chroma": 0.01, "nrmse": 0.1, "flip": 0.05,
-                 "energy_ratio": 0.999},
-            ))  # fmt: skip
-        points.append(Point(photons, float(seconds), float(errors.mean()), float(errors.min()), float(errors.max()), bias2 * difficulty, float(spread.mean())))
-    return Curve(
-        method, {"buffers": 0.05, "compile": 1.2, "pilot": 0.08}, samples, points=points, slope=exponent, slope_half_width=0.06, buffers_mib=42.0,
-        budgets=[p.photons for p in points],
-    )  # fmt: skip
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.tags: Counter[str] = Counter()
+        self.attributes: list[tuple[str, str, str]] = []
+        self.words: list[str] = []
+        self.feed(text)
+        self.close()
 
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags[tag] += 1
+        self.attributes += [(tag, key, value or "") for key, value in attrs]
+        if tag not in self.VOID:
+            self.open.append(tag)
 
-def synthetic_pictures(directory: Path, scene: str, methods: Sequence[str], rng: np.random.Generator) -> dict[str, str]:
-    """A curved spectrum on black, with noise and blur that suit each method; XYZ float32 files."""
-    from app.model.spectrum import cmf_xyz
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in self.VOID:
+            self.open.pop()
 
-    (directory / "pictures").mkdir(parents=True, exist_ok=True)
-    y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]] / SIZE[1]
-    position = np.clip((np.hypot(x - 0.9, y + 0.2) - 0.55) / 0.5, 0, 1)
-    inside = np.exp(-(((np.arctan2(y + 0.2, x - 0.9) - 1.7) / 0.55) ** 4)) * (position > 0) * (position < 1)
-    reference = inside[..., None] * cmf_xyz()[(20 + 300 * (1 - position)).astype(int)]
-    noise = {"stochastic": 0.35, "stochastic-point": 0.6, "regular-7": 0.1, "regular-16": 0.08, "srd-lambda": 0.05, "srd": 0.015}
-    files = {}
-    for name in ("reference", *methods, *(f"{method} early" for method in methods)):
-        level = noise.get(name.removesuffix(" early"), 0.0) * (3.0 if name.endswith("early") else 1.0)
-        picture = reference * np.exp(rng.normal(0, level, reference.shape))
-        files[name] = f"pictures/{scene}_{name.replace(' ', '_')}.npy"
-        np.save(directory / files[name], picture.astype(np.float32))
-    return files
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open and self.open.pop() == tag, f"</{tag}> closes nothing"
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join("".join(self.words).split())
 
 
-def synthetic_scene(directory: Path, name: str, *, gain: float = 40.0, methods: Sequence[str] = tuple(METHODS), seeds: int = 5,
-                    difficulty: float = 1.0, own_error: float = 2e-5, longest_s: float = 3.0) -> SceneResult:  # fmt: skip
-    rng = np.random.default_rng(sum(name.encode()))
-    curves = [synthetic_curve(m, difficulty, seeds, longest_s, rng) for m in methods]
-    scene = SceneResult(
-        name, f"A made-up {name}", SIZE, seeds, longest_s, ReferenceInfo("photon histogram", 400_000_000, 61.0, own_error, "a1b2c3"), curves,
-        strongest_glass="N-SF66", strongest_abbe=20.9, equal_time=longest_s, complete=True, pictures=synthetic_pictures(directory, name, methods, rng),
-    )  # fmt: skip
-    for curve in curves:
-        scene.picture_samples[curve.method] = curve.samples[-1]
-        scene.picture_samples[f"{curve.method} early"] = curve.samples[0]
-    if {"srd", "stochastic"} <= set(methods):
-        scene.time_to_equal_error = {"stochastic": 1.0, "srd": gain, "stochastic-point": 0.4, "srd-lambda": 3.0, "regular-16": 1.7}
-        holds = gain >= 30
-        scene.claims = [
-            Claim("1/30 of the time", "at least 30×", f"{gain:.0f}×", holds, "" if holds else "bias² is 61 % of the remaining error"),
-            Claim("first picture", "better at 0.1 s than stochastic at 3 s", "0.002 against 0.02", True),
-            Claim("beats srd-lambda", "less error at equal time", "0.0006 against 0.015", True),
-        ]
+def assert_stands_alone(text: str) -> Page:
+    """Well-formed, nothing fetched, no script, ids unique, every reference inside the page resolves."""
+    page = Page(text)
+    assert not page.open
+    assert "http" not in text
+    assert page.tags["script"] == 0 and page.tags["link"] == 0 and page.tags["iframe"] == 0
+    ids = Counter(value for _, key, value in page.attributes if key == "id")
+    assert not [name for name, times in ids.items() if times > 1]
+    for tag, key, value in page.attributes:
+        assert not key.startswith("on"), f"{tag} has {key}"
+        if key == "src":
+            assert value.startswith("data:image/png;base64,")
+        if key in ("href", "xlink:href"):
+            assert value.startswith("#") and value[1:] in ids, value
+        for target in re.findall(r"url\(#([^)]+)\)", value):
+            assert target in ids, target
+    assert "url(" not in text.replace("url(#", "")
+    return page
+
+
+def assert_numbers_are_finite(svg: str) -> None:
+    for node in ElementTree.fromstring(svg).iter():
+        for key, value in node.attrib.items():
+            if key in ("d", "points", "x", "y", "transform", "width", "height", "viewBox"):
+                assert not re.search(r"nan|inf", value, re.IGNORECASE), f"{node.tag} {key}={value[:60]}"
+
+
+def svg_of(figure: object) -> str:
+    text = report_style.svg_text(figure)
+    assert_numbers_are_finite(text)
+    return text
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[BenchResult, Path]:
+    """A whole run of two scenes, reported once."""
+    directory = tmp_path_factory.mktemp("bench")
+    result = synthetic_result([synthetic_scene(directory, "ball"), synthetic_scene(directory, "wine_glass", gain=12.5, difficulty=3.0)])
+    report.write_report(result, directory)
+    return result, directory
+
+
+def test_page_stands_alone_and_holds_everything(written: tuple[BenchResult, Path]) -> None:
+    result, directory = written
+    page = assert_stands_alone((directory / "report.html").read_text(encoding="utf-8"))
+    told = [result.command, result.version, result.date, *result.machine.values()]
+    for scene in result.scenes:
+        told += [scene.scene, scene.title, scene.strongest_glass]
+        told += [text for claim in scene.claims for text in (claim.name, claim.asked, claim.measured, claim.why)]
+        told += [curve.method for curve in scene.curves]
+    told += [*report_text.METRICS, *(report_text.METHODS[name] for name in METHODS)]
+    for words in told:
+        assert words in page.text, words
+    # Per scene: seven columns in two rows of parts and one of whole pictures, six error maps and their scale.
+    assert page.tags["img"] == 2 * (3 * 7 + 6 + 1)
+    assert page.tags["svg"] == 1 + 2 * 4
+
+
+def test_files_are_whole_and_nothing_else_is_left(written: tuple[BenchResult, Path]) -> None:
+    _, directory = written
+    stems = [f"{scene}_error_{over}" for scene in ("ball", "wine_glass") for over in ("time", "photons")] + ["overview"]
+    assert sorted(p.name for p in (directory / "plots").iterdir()) == sorted(stem + suffix for stem in stems for suffix in (".png", ".svg"))
+    assert not [p for p in directory.rglob("*") if ".part" in p.name]
+    for path in (directory / "plots").glob("*.svg"):
+        assert_numbers_are_finite(path.read_text(encoding="utf-8"))
+
+
+def test_limits_tell_each_claim_that_fails(written: tuple[BenchResult, Path]) -> None:
+    _, directory = written
+    text = Page((directory / "report.html").read_text(encoding="utf-8")).text
+    limits = text[text.rindex("Claims that do not hold") :]
+    assert "wine_glass, 1/30 of the time." in limits and "bias² is 61 % of the remaining error" in limits
+    assert "ball, 1/30" not in limits
+    assert "5 of 6 claims hold" in text
+
+
+def test_partial_run_of_one_method_and_one_seed(tmp_path: Path) -> None:
+    """Hostile names, no reference, no pictures, an unfinished curve: all is told, nothing breaks, nothing leaks into the page."""
+    nasty = '<script>alert("1")</script> & $x_$ 桜'
+    scene = synthetic_scene(tmp_path, "x", methods=["srd"], seeds=1)
+    scene.scene, scene.title, scene.reference, scene.pictures, scene.complete = nasty, nasty, None, {"reference": "pictures/gone.npy"}, False
+    scene.claims = [Claim(nasty, nasty, nasty, False, nasty)]
+    scene.curves.append(Curve(nasty, {}, []))
+    result = synthetic_result([scene])
+    result.command = nasty
+    report.write_report(result, tmp_path)
+    page = assert_stands_alone((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert page.text.count(nasty) > 10
+    for words in ("There are no pictures", "There is no reference yet", "Only one seed", "stopped before this scene was complete", "No finished point yet"):
+        assert words in page.text, words
+
+
+def test_empty_run_and_refused_folder(tmp_path: Path) -> None:
+    report.write_report(synthetic_result([]), tmp_path)
+    assert "Nothing has been compared yet" in assert_stands_alone((tmp_path / "report.html").read_text(encoding="utf-8")).text
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="cannot make the folder"):
+        report.write_report(synthetic_result([]), tmp_path / "file")
+
+
+def test_failure_keeps_the_earlier_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "report.html").write_text("earlier")
+    monkeypatch.setattr(report, "page", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        report.write_report(synthetic_result([]), tmp_path)
+    assert (tmp_path / "report.html").read_text() == "earlier"
+    assert not list(tmp_path.glob(".*"))
+
+
+def made_of(points: list[Point], tmp_path: Path) -> SceneResult:
+    scene = synthetic_scene(tmp_path, "odd", methods=["stochastic", "srd"])
+    scene.curves[1].points = points
     return scene
 
 
-def synthetic_result(scenes: list[SceneResult]) -> BenchResult:
-    machine = {"processor": "A processor", "cores": "2", "renderer": "llvmpipe", "driver": "Mesa", "opengl": "4.5", "system": "Linux", "python": "3.12"}
-    return BenchResult("0.1.0", "2026-11-21 10:00", "spectrasplat bench ball prism -o out --seeds 5", machine, scenes)
+@pytest.mark.parametrize("abscissa", ["seconds", "photons"])
+def test_errors_that_have_no_logarithm(tmp_path: Path, abscissa: str) -> None:
+    """Zero and negative errors stand on the floor as triangles; NaN and infinity are left out; axes stay finite and sane."""
+    good = [Point(10**k, 10.0 ** (k - 6), 10.0**-k, 0.5 * 10.0**-k, 2 * 10.0**-k, 0.0, 10.0**-k) for k in range(3, 6)]
+    odd = [
+        Point(1_000_000, 1.0, 0.0, 0.0, 1e-6, 0.0, 0.0), Point(2_000_000, 2.0, -1e-7, -1e-6, 0.0, -1e-7, 0.0),
+        Point(3_000_000, 3.0, math.nan, 0.0, 1.0, math.nan, 0.0), Point(4_000_000, 4.0, math.inf, 0.0, math.inf, 0.0, math.inf), Point(0, 0.0, 1.0, 1.0, 1.0, 0.0, 1.0),
+    ]  # fmt: skip
+    scene = made_of(good + odd, tmp_path)
+    with report_style.plot_style():
+        figure = plots.error_against(scene, abscissa)
+        svg_of(figure)
+        axes = figure.axes[0]
+        low, high = axes.get_ylim()
+        assert 1e-6 < low < 1e-5 and high < 1e3
+        on_floor = [line for line in axes.lines if line.get_marker() == "v" and np.all(line.get_ydata() == low)]
+        assert [len(line.get_xdata()) for line in on_floor] == [2]
+        for points in ([], odd[:2], odd[2:], good[:1]):
+            scene = made_of(points, tmp_path)
+            svg_of(plots.error_against(scene, abscissa))
+            if (drawn := report_plots.bias_and_variance(scene)) is not None:
+                svg_of(drawn)
+    assert any("cannot be told from the reference" in told for told in report_text.warnings_of(made_of(odd[:1], tmp_path)))
+
+
+def test_overview_and_readme_plot(tmp_path: Path) -> None:
+    """A method that never gets there stands at the left edge, and a shortest rendering that is already as good is marked ≥."""
+    near, far, none = (synthetic_scene(tmp_path, name) for name in ("near", "far", "none"))
+    near.time_to_equal_error["srd"], far.time_to_equal_error = 120.0, {"stochastic": 1.0}
+    near.curves[-1].points = [Point(1000, 0.025, 1e-6, 1e-6, 1e-6, 0.0, 1e-6)]
+    none.curves = []
+    assert plots.is_lower_bound(near, "srd") and not plots.is_lower_bound(far, "srd") and not plots.is_lower_bound(none, "srd")
+    with report_style.plot_style():
+        svg = svg_of(overview(synthetic_result([near, far, none])))
+    assert ">≥ 120×<" in svg and ">never<" in svg
+    for suffix in (".png", ".svg"):
+        report.readme_plot(synthetic_result([near, far, none]), tmp_path / f"readme{suffix}")
+    svg = (tmp_path / "readme.svg").read_text(encoding="utf-8")
+    assert_numbers_are_finite(svg)
+    assert ">near<" in svg and ">far<" in svg and ">none<" not in svg and ">never as good<" in svg and ">regular-7<" not in svg
+    report.readme_plot(synthetic_result([]), tmp_path / "empty.png")
+
+
+def test_reference_warning_begins_at_a_tenth(tmp_path: Path) -> None:
+    scene = synthetic_scene(tmp_path, "x")
+    least = report_text.smallest_error(scene)
+    for share, warned in ((0.099, False), (0.101, True)):
+        scene.reference.relmse = share * least
+        assert any("times the smallest error" in told for told in report_text.warnings_of(scene)) is warned
+
+
+def test_same_result_gives_the_same_svg_and_both_themes_read_well(tmp_path: Path) -> None:
+    scene = synthetic_scene(tmp_path, "ball")
+    with report_style.plot_style():
+        first, second = (svg_of(plots.error_against(scene, "seconds")) for _ in range(2))
+    assert first == second
+    inline = report_style.inline_svg(first, "a", "label")
+    assert not re.search(r"#[0-9a-fA-F]{6}(?![0-9a-fA-F])", re.sub(r'(href="|url\()#', "", inline)), "a colour that dark screens do not exchange"
+    on_paper = [pair[0] for pair in report_style.PALETTE.values()]
+    assert len(set(on_paper)) == len(on_paper)
+    for theme in (0, 1):
+        colours = {name: pair[theme] for name, pair in report_style.PALETTE.items()}
+        texts = {"ink": 7.0, "muted": 4.5, "srd": 4.5, "good": 4.5, "bad": 4.5} | dict.fromkeys(("stochastic", *METHODS), 3.5)
+        for name, asked in texts.items():
+            assert contrast(colours[name], colours["paper"]) >= asked, (name, theme)
+
+
+def contrast(first: str, second: str) -> float:
+    """Contrast ratio of two colours (WCAG 2.1)."""
+    from app.tone_map import luminance, srgb_eotf
+
+    levels = [float(luminance(srgb_eotf(np.array([int(c[i : i + 2], 16) for i in (1, 3, 5)]) / 255))) + 0.05 for c in (first, second)]
+    return max(levels) / min(levels)
+
+
+def test_labels_are_pushed_apart_as_little_as_can_be() -> None:
+    for wanted, places in (([10, 40, 90], [10, 40, 90]), ([50, 50, 50], [38, 50, 62]), ([0, 0, 99], [0, 12, 99]), ([99, 99, 99], [76, 88, 100])):
+        assert plots.spread(wanted, 12, 100) == pytest.approx(places)
+
+
+def test_crop_finds_structure_and_error_maps_are_true(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    reference = np.full((60, 90, 3), 0.05)
+    reference[35:50, 60:80] = 1.0 + rng.random((15, 20, 1))
+    window = report_pictures.choose_window(reference)
+    covered = window.of(np.ones((60, 90)))
+    assert covered.shape == (window.height, window.width) == (16, 24)
+    assert window.of(reference)[..., 1].sum() > 0.9 * reference[35:50, 60:80, 1].sum()
+    for black in (np.zeros((60, 90, 3)), np.zeros((1, 1, 3)), np.zeros((3, 200, 3))):
+        assert report_pictures.choose_window(black).of(black).size
+    picture = reference * (1 + 0.1 * rng.standard_normal(reference.shape))
+    epsilon = EPSILON_SHARE * reference.mean() ** 2
+    relmse_y = np.mean(((picture - reference) ** 2 / (reference**2 + epsilon))[..., 1])
+    assert np.mean(report_pictures.signed_error(picture, reference) ** 2) == pytest.approx(relmse_y, rel=1e-12)
+    brighter = pixels(report_pictures.error_map(np.array([[-1.0, -0.25, 0.0, 0.25, 1.0]]), 1.0))[0].astype(int)
+    assert brighter[2].min() > 240 and abs(np.ptp(brighter[2])) < 4
+    assert brighter[4, 0] > brighter[4, 2] + 50 and brighter[0, 2] > brighter[0, 0] + 50
+    scale = pixels(report_pictures.error_scale())[0]
+    assert np.array_equal(scale[[0, 16, 32, 48, 64]], brighter), "the scale is marked at −1, 0 and 1; a quarter lies half-way"
+
+
+def pixels(address: str) -> np.ndarray:
+    """RGB of a picture in a data: address."""
+    import base64
+    import io
+
+    from PIL import Image
+
+    return np.asarray(Image.open(io.BytesIO(base64.b64decode(address.partition(",")[2]))).convert("RGB"))
+
+
+def test_broken_pictures_are_left_out(tmp_path: Path) -> None:
+    whole = np.ones((4, 6, 3), np.float32)
+    np.save(tmp_path / "reference.npy", whole)
+    np.save(tmp_path / "srd.npy", 2 * whole)
+    np.save(tmp_path / "size.npy", whole[:2])
+    np.save(tmp_path / "nan.npy", np.where(np.arange(6)[:, None] == 3, np.nan, whole))
+    np.save(tmp_path / "object.npy", np.array([{}], object))
+    (tmp_path / "cut.npy").write_bytes((tmp_path / "srd.npy").read_bytes()[:200])
+    files = {name: f"{name}.npy" for name in ("reference", "srd", "size", "nan", "object", "cut", "gone")}
+    assert sorted(report_pictures.load_pictures(files, tmp_path)) == ["reference", "srd"]
+    assert report_pictures.load_pictures({"srd": "srd.npy"}, tmp_path) == {}
+
+
+def test_escaping_and_words() -> None:
+    assert element("p", "<&>", Html("<b>"), None, ["a", 1], title='"<') == '<p title="&quot;&lt;">&lt;&amp;&gt;<b>a1</p>'
+    assert report.file_names(["a/b c", "a_b_c", "", "overview", "桜"]) == ["a_b_c", "a_b_c_2", "scene", "overview_2", "scene_2"]
+    assert [report_text.number(v) for v in (0.0, math.nan, None, 0.01234, -5.678e-5, 123.0)] == ["0", "–", "–", "0.012", "−5.7·10⁻⁵", "120"]
+    assert [report_text.number(v) for v in (0.00999, 9.99e-5, 0.0009999)] == ["0.010", "1.0·10⁻⁴", "0.0010"]
+    assert [report_text.superscript(v) for v in (1.0, 0.001, 3e-5)] == ["10⁰", "10⁻³", "3·10⁻⁵"]
+    assert [report_text.count(v) for v in (999, 250_000, 16_400_000, 2e9)] == ["999", "250 k", "16.4 M", "2 G"]
+    assert [report_text.ratio_text(*v) for v in ((0.81,), (2.345,), (45.4,), (120.0, True))] == ["0.81×", "2.3×", "45×", "≥ 120×"]
