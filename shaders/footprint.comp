@@ -24,6 +24,8 @@ layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };  // x
 layout(std430, binding = 6) buffer Outside { float outside_w[]; };
 layout(std430, binding = 7) buffer Commands { uint draw_words[20]; uint count_dropped; };  // five words a class; the second is the instance count
 
+#define RECEIVER_CHARTS 1u
+
 const float TEXEL_VARIANCE = 1.0 / 12.0;
 // Standard deviations. Below the first two a splat is smaller than what a map can show: SMALL.
 const float SMALL_STD = 0.4;
@@ -307,7 +309,7 @@ void main() {
     Receiver receiver = receivers[photon.receiver];
     uint at = receiver.placement;
 #ifdef CHARTS
-    at += receiver.kind == 1u ? photon.triangle - receiver.first_triangle : 0u;
+    at += receiver.kind == RECEIVER_CHARTS ? photon.triangle - receiver.first_triangle : 0u;
 #endif
     Placement place = placements[at];
 

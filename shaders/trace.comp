@@ -163,7 +163,7 @@ void main()
     vec3 start = ray.position;
     vec3 normal = hit.normal_g;
 #ifdef SMOOTH_NORMALS
-    vec3 summed = vec3(0.0);
+    vec3 summed;
     bool smooth_facet = false;
 #endif
     if (met) {
@@ -262,7 +262,7 @@ void main()
         if ((ray.light_and_source >> 16) == 0xffffu)
             ray.light_and_source = (ray.light_and_source & 0xffffu) | (object << 16);
 
-#if COLUMNS > 0 && defined(SMOOTH_NORMALS)
+#ifdef NORMAL_DERIVATIVES
         vec3 dnormal[COLUMNS];
         for (int c = 0; c < COLUMNS; ++c) dnormal[c] = vec3(0.0);
         if (smooth_facet) {
@@ -280,7 +280,6 @@ void main()
 #else
 #define NORMAL_COLUMN(c) vec3(0.0)
 #endif
-        Crossing crossing = cross_boundary(ray, object, entering);
         uint kept_flags = ray.flags & FLAG_FOOTPRINT_DROPPED;
         // Each child is stored in one place, whichever event made it: where every branch is executed, every
         // store costs even when no ray takes it.
@@ -308,6 +307,7 @@ void main()
         }
 #endif
 #ifdef HAS_DIELECTRIC
+        Crossing crossing = cross_boundary(ray, object, entering);
         bool splits = kind == KIND_DIELECTRIC && crossing.changes, cut = false;
         vec3 theta3 = vec3(theta), n_i, n_t;
 #ifdef SPECTRAL_WEIGHTS

@@ -40,6 +40,8 @@ class Source:
     name: str
     text: str
     origin: tuple[tuple[str, int], ...]
+    flattened_lines: int
+    """Lines there were before those that cannot run were left out."""
 
     def explain(self, compiler_log: str) -> str:
         """The compiler's log with flattened line numbers replaced by file:line."""
@@ -95,7 +97,7 @@ def load_source(
 
     flatten(name, "the program")
     kept = lean(lines)
-    return Source(name, "\n".join(line.text for line in kept) + "\n", tuple((line.file, line.number) for line in kept))
+    return Source(name, "\n".join(line.text for line in kept) + "\n", tuple((line.file, line.number) for line in kept), len(lines))
 
 
 _recordings: list[list[Source]] = []

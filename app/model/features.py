@@ -45,6 +45,8 @@ class Features:
     mirrors: bool
     smooth_normals: bool
     """Some specular surface has interpolated normals."""
+    normal_derivatives: bool
+    """They bend columns too."""
     absorption: bool
     medium_stack: bool
     """Transparent solids nest or touch, so priorities decide the medium."""
@@ -73,6 +75,7 @@ class Features:
             "HAS_DIELECTRIC": self.dielectrics,
             "HAS_MIRROR": self.mirrors,
             "SMOOTH_NORMALS": self.smooth_normals,
+            "NORMAL_DERIVATIVES": self.normal_derivatives,
             "ABSORPTION": self.absorption,
             "MEDIUM_STACK": self.medium_stack,
             "HAS_TREE": self.tree,
@@ -93,18 +96,21 @@ class Features:
         loose = [o for o in scene.objects if not is_convex_solid(o)]
         loose_triangles = sum(len(o.mesh.triangles) for o in loose)
         absorbing = any(o.material.absorption is not None for o in dielectrics)
+        smooth = any(o.mesh.corner_normals is not None for o in scene.objects if isinstance(o.material, Dielectric | Mirror))
+        footprints = settings.method != "stochastic-point"
         coloured_mirror = any(isinstance(o.material, Mirror) and len(set(o.material.reflectance_rgb)) > 1 for o in scene.objects)
         return Features(
             spectral_groups=groups,
             merged_groups=groups > 0 and (settings.method == "srd-lambda" or len(dispersive) > MAX_GROUPS),
             spectral_weights=not single and (groups > 0 or absorbing or coloured_mirror),
-            footprints=settings.method != "stochastic-point",
+            footprints=footprints,
             point_spectrum=single,
             random_wavelength=settings.method.startswith("stochastic"),
             band_cuts=groups > 0,
             dielectrics=bool(dielectrics),
             mirrors=any(isinstance(o.material, Mirror) for o in scene.objects),
-            smooth_normals=any(o.mesh.corner_normals is not None for o in scene.objects if isinstance(o.material, Dielectric | Mirror)),
+            smooth_normals=smooth,
+            normal_derivatives=smooth and (footprints or groups > 0),
             absorption=absorbing,
             medium_stack=bool(overlapping_solids(scene)),
             tree=loose_triangles > MAX_LOOSE_TRIANGLES,
@@ -184,7 +190,9 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
         ("spatial columns", features.footprints, "footprints are anisotropic" if features.footprints else "the method splats single texels"),
         ("refraction", features.dielectrics, "there is glass" if features.dielectrics else "there is no glass"),
         ("mirrors", features.mirrors, "there are mirrors" if features.mirrors else "there are no mirrors"),
-        ("normal derivatives", features.smooth_normals, "some specular surface is smooth" if features.smooth_normals else "all specular facets are flat"),
+        ("interpolated normals", features.smooth_normals, "some specular surface is smooth" if features.smooth_normals else "all specular facets are flat"),
+        ("normal derivatives", features.normal_derivatives, "columns bend with the normals" if features.normal_derivatives else
+         ("no columns" if features.smooth_normals else "all specular facets are flat")),
         ("absorption", features.absorption, "some glass absorbs" if features.absorption else "all glass is clear"),
         ("medium stack", features.medium_stack, f"{names(touching)} nest or touch" if features.medium_stack else "no two solids nest or touch"),
         ("triangle tree", features.tree, f"{loose} triangles" if features.tree else f"{loose} loose triangle(s) are looped over"),

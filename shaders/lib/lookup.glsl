@@ -3,6 +3,9 @@
 #ifndef LOOKUP_GLSL
 #define LOOKUP_GLSL
 
+#define RECEIVER_CHARTS 1u
+#define PLACED_CHART 1u
+
 layout(std430, binding = BIND_RECEIVERS) readonly restrict buffer Receivers { Receiver receivers[]; };
 layout(std430, binding = BIND_PLACEMENTS) readonly restrict buffer Placements { Placement placements[]; };
 layout(binding = 0) uniform sampler2D caustic_map[TARGETS];
@@ -15,7 +18,7 @@ bool find_texel(uint receiver, uint source, vec3 position, out uint placement, o
     texel = vec2(0.0);
     if (placement == NONE) return false;
 #ifdef CHARTS
-    if (receivers[receiver].kind == 1u) placement += source - receivers[receiver].first_triangle;
+    if (receivers[receiver].kind == RECEIVER_CHARTS) placement += source - receivers[receiver].first_triangle;
 #endif
     // At most two windows are nested; a chain of four is more than enough.
     for (int level = 0; level < 4 && placement != NONE; ++level) {
@@ -25,7 +28,7 @@ bool find_texel(uint receiver, uint source, vec3 position, out uint placement, o
         float slack = 0.0;
 #ifdef CHARTS
         // A chart's rectangle has a gutter, so rounding at its edge must not lose the place.
-        slack = placements[placement].kind == 1u ? 1.0 : 0.0;
+        slack = placements[placement].kind == PLACED_CHART ? 1.0 : 0.0;
 #endif
         if (all(greaterThanEqual(texel, rect.xy - slack)) && all(lessThan(texel, rect.zw + slack))) return true;
         placement = placements[placement].next;

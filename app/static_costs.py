@@ -1,0 +1,83 @@
+"""What each feature of a scene adds to what is stored and moved, in bytes: facts that need no measuring.
+
+`inspect` shows them; what a feature costs in time is measured by `bench --features`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from app.gpu.records import photon_record, ray_record
+from app.gpu.scene_buffers import SAMPLES, TRIANGLE
+from app.model.features import Features, is_convex_solid, overlapping_solids
+from app.model.scene import Dielectric, Diffuse, Mirror, Scene
+from app.passes.footprint import SPLAT
+
+_TEXEL = 16
+"""Bytes of an RGBA32F or RGBA32UI texel."""
+_NODE = 4 * _TEXEL
+
+
+@dataclass(frozen=True)
+class RecordSizes:
+    """Bytes per record, and derivative columns a ray carries."""
+
+    ray: int
+    photon: int
+    splats_per_photon: int
+    texel: int
+    columns: int
+
+    @staticmethod
+    def of(features: Features) -> RecordSizes:
+        """The sizes under `features`."""
+        columns = features.defines()["COLUMNS"]
+        slots = (2 if features.nested_windows else 1) * SPLAT.stride
+        return RecordSizes(ray_record(columns).stride, photon_record(features.spectral_groups).stride, slots, features.targets * _TEXEL, columns)
+
+    def words(self) -> str:
+        """One line for people."""
+        return (
+            f"A ray is {self.ray} bytes with {self.columns} derivative column(s), a photon record {self.photon}, "
+            f"its splats {self.splats_per_photon}, a map's texel {self.texel}."
+        )
+
+
+def static_costs(scene: Scene, features: Features) -> dict[str, str]:
+    """By `explain`'s names: what the features that are in add. Those that are out, or add nothing, are not listed."""
+    sizes = RecordSizes.of(features)
+    unspectral = RecordSizes.of(replace(features, spectral_groups=0))
+    unspatial = RecordSizes.of(replace(features, footprints=False))
+    specular = [o for o in scene.objects if isinstance(o.material, Dielectric | Mirror)]
+    loose = [o for o in scene.objects if not is_convex_solid(o)]
+    triangles = sum(len(o.mesh.triangles) for o in loose)
+    smooth = sum(len(o.mesh.triangles) for o in specular if o.mesh.corner_normals is not None)
+    planes = sum(len(o.mesh.convex_planes) for o in scene.objects if is_convex_solid(o))
+    row = SAMPLES * 8
+    glasses = {o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)}
+    absorbing = sum(isinstance(o.material, Dielectric) and o.material.absorption is not None for o in scene.objects)
+    mirrors = sum(isinstance(o.material, Mirror) for o in scene.objects)
+    curved = [o for o in scene.objects if isinstance(o.material, Diffuse)]
+    told = {
+        "spectral columns": (features.spectral_groups > 0, f"{sizes.ray - unspectral.ray} B a ray, {sizes.photon - unspectral.photon} B a photon"),
+        "shared spectral variable": (features.merged_groups, f"one look-up of the slope a refraction, {_size(row * len(glasses))}"),
+        "weights over the band": (features.spectral_weights, "Fresnel and indices at 3 wavelengths instead of 1"),
+        "band cuts": (features.band_cuts, "one program more; a cut ray becomes two"),
+        "spatial columns": (features.footprints, f"{sizes.ray - unspatial.ray} B a ray"),
+        "refraction": (features.dielectrics, f"{_size(row * len(glasses))} of indices; two children a surface"),
+        "mirrors": (features.mirrors, f"{_size(row * mirrors)} of reflectances"),
+        "interpolated normals": (features.smooth_normals, f"{3 * _TEXEL} B a facet, {_size(3 * _TEXEL * smooth)}"),
+        "normal derivatives": (features.normal_derivatives, "one more vector a column and surface"),
+        "absorption": (features.absorption, f"3 look-ups a flight, {_size(row * absorbing)}"),
+        "medium stack": (features.medium_stack, f"{len(overlapping_solids(scene))} bit(s) of a ray's mask"),
+        "triangle tree": (features.tree, f"about {_size(triangles * (TRIANGLE.stride + _NODE // 2))}"),
+        "half-space solids": (features.convex_solids, f"{planes} planes, {_size(planes * _TEXEL)}: each ray walks through all"),
+        "charts": (features.charts, f"{len(curved)} receiver(s) with a placement a facet"),
+        "nested windows": (features.nested_windows, f"{SPLAT.stride} B a photon: a splat for each window"),
+        "spectral bins": (features.targets > 1, f"{sizes.texel} B a texel instead of {_TEXEL}"),
+    }
+    return {name: words for name, (included, words) in told.items() if included}
+
+
+def _size(count: int) -> str:
+    return f"{count} B" if count < 2048 else f"{count / 1024:.0f} KiB" if count < 1 << 21 else f"{count / (1 << 20):.1f} MiB"
