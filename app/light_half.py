@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import moderngl
@@ -98,7 +98,6 @@ class LightHalf:
         batch = settings.batch or DEFAULT_BATCH * (1 if context.is_software else 4)
         batch = max(min(batch, _largest_batch(context, features)), SMALLEST_BATCH)
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
-        self.splatter = Splatter(context.ctx, features)
         self.variables = context.ctx.buffer(np.ascontiguousarray(buffers.variable_table if buffers.groups.count else np.zeros((1, 2), "f4")).tobytes())
         self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
         self._weight_sum = 0.0
@@ -107,7 +106,7 @@ class LightHalf:
         self._spans: list[list[tuple[float, float]]] = []
 
     def prepare(self) -> None:
-        """Pilots and maps, once for a scene. Afterwards `layout` and `atlas` exist."""
+        """Pilots and maps, once for a scene. Afterwards `layout` and `atlas` exist, and `features` are those of the maps too."""
         specular = [self.buffers.space.to_gpu(m.corners()) for m, o in zip(self.buffers.world_meshes, self.scene.objects, strict=True) if isinstance(o.material, Dielectric | Mirror)]
         triangles = np.concatenate(specular) if specular else np.zeros((0, 3, 3))
         domains = {i: emission_domain(light, self.scene, self.buffers.space, triangles) for i, light in enumerate(self.scene.lights)}
@@ -118,14 +117,17 @@ class LightHalf:
         shows_map = self.settings.layer.startswith("map:")
         self.map_receiver = check_map_receiver(self.scene, self.buffers, self.settings.layer[4:]) if shows_map else None
         self.layout: MapLayout = layout_maps(self.scene, self.buffers, landings_of(pilots.values()), picture, self.reflectance_class, self.map_receiver)
+        # Only the pilot tells whether a fine window pays: without one no splat is drawn twice.
+        self.features = replace(self.features, nested_windows=any(len(windows) > 1 for windows in self.layout.windows.values()))
         ctx = self.context.ctx
+        self.splatter = Splatter(ctx, self.features)
         self.bin_edges_nm = None if self.settings.bins is None else np.linspace(380.0, 780.0, self.settings.bins + 1)
         self.atlas = MapAtlas(ctx, self.layout.size, self.layout.placements, self.features.targets)
         self.receivers = ctx.buffer(np.ascontiguousarray(self.layout.receivers).tobytes())
         self._resolved = [ctx.texture(self.atlas.size, 4, dtype="f4") for _ in range(self.features.targets)]
         self._levels_fold = LevelsFold(ctx, self.layout.folds)
         self._seam_fold = SeamFold(ctx, [(self.layout.tiles[r][0], charts) for r, charts in self.layout.charts.items()])
-        self._prepared = [self.atlas, self.receivers, *self._resolved, self._levels_fold, self._seam_fold]
+        self._prepared = [self.splatter, self.atlas, self.receivers, *self._resolved, self._levels_fold, self._seam_fold]
 
     def begin(self, photons: int, seed: int) -> None:
         """Empty maps and a plan for passes of about `photons`; what was summed and counted before is forgotten.
@@ -348,7 +350,6 @@ class LightHalf:
     def release(self) -> None:
         """Free everything."""
         self.trace.release()
-        self.splatter.release()
         self.variables.release()
         for owned in self._prepared:
             owned.release()

@@ -46,6 +46,8 @@ class Trial:
     same_map: bool
     """Both must draw the same caustic map, since the scene does not need the feature."""
     note: str = ""
+    same_splats: bool = True
+    """Both splat photons of like footprints, so that the splat's times say something about the feature."""
 
 
 DISPERSION = "dispersion in all"
@@ -58,7 +60,7 @@ def trials(scene: Scene, features: Features) -> list[Trial]:
     for name, included, reason in explain(scene, features):
         carried, absent, note = _pair(name, included, scene, features)
         same = not included or name == "half-space solids"
-        found.append(Trial(name, included, reason, carried, absent, same and carried is not None, note))
+        found.append(Trial(name, included, reason, carried, absent, same and carried is not None, note, not included or name != "normal derivatives"))
     return found
 
 
@@ -112,7 +114,7 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             features = replace(base, convex_solids=False, loose_triangles=True, tree=loose > 24)
             return asked, Variant(meshed, features), f"against {'a tree' if features.tree else 'a loop'} over the same facets"
         case "nested windows":
-            return asked, Variant(scene, replace(base, nested_windows=False)), "the light half decides by the maps it fits; here against one window"
+            return asked, Variant(scene, replace(base, nested_windows=False)), "against the finest window alone"
         case "refraction" | "mirrors":
             return None, None, "cannot be left out here: light would end there"
         case "interpolated normals" | "charts":

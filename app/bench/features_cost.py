@@ -139,14 +139,16 @@ def measure(context: Context, scene: Scene, repeats: int = REPEATS, seconds: flo
     """(the report so far, share done) after the proof and after each feature."""
     settings = RenderSettings(width=scene.render.width, height=scene.render.height, max_depth=scene.render.max_depth)
     features = Features.of(scene, settings)
-    asked = trials(scene, features)
     report = FeatureReport(
         __version__, datetime.now(UTC).isoformat(timespec="seconds"), scene.name, context.renderer,
-        "processor time" if context.is_software else "wall clock", 0, repeats, 0.0, 0.0, RecordSizes.of(features).words(), [], [], [], complete=False,
+        "processor time" if context.is_software else "wall clock", 0, repeats, 0.0, 0.0, "", [], [], [], complete=False,
     )  # fmt: skip
-    _prove(report, context, scene, settings, features)
     light = _begun(context, scene, settings, features)
     try:
+        features = light.features
+        asked = trials(scene, features)
+        report.records = RecordSizes.of(features).words()
+        _prove(report, context, scene, settings, features)
         if not light.plans:
             raise UserError(f"scene '{scene.name}': no light meets glass or a mirror, so no feature costs anything; name a scene with a caustic")
         work = _calibrated(report, light, seconds, context)
@@ -211,7 +213,7 @@ def _cost(trial: Trial, bytes_told: str, context: Context, work: Work, repeats: 
         for rig in rigs:
             rig.release()
     trace, splat = (_percent(ratios[:, stage]) for stage in range(2))
-    return FeatureCost(trial.feature, trial.included, trial.reason, bytes_told, trace, splat, difference, trial.note)
+    return FeatureCost(trial.feature, trial.included, trial.reason, bytes_told, trace, splat if trial.same_splats else None, difference, trial.note)
 
 
 def _percent(ratios: np.ndarray) -> Percent:

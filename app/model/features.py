@@ -198,7 +198,7 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
         ("triangle tree", features.tree, f"{loose} triangles" if features.tree else f"{loose} loose triangle(s) are looped over"),
         ("half-space solids", features.convex_solids, names(solids) if features.convex_solids else "no convex faceted solid"),
         ("charts", features.charts, f"{sum(not is_flat(o) for o in diffuse)} curved receiver(s)" if features.charts else "all receivers are flat"),
-        ("nested windows", features.nested_windows, "flat receivers get a fine window inside a coarse one" if features.nested_windows else "no flat receiver"),
+        ("nested windows", features.nested_windows, "flat receivers may get a fine window inside a coarse one" if features.nested_windows else "no receiver has two windows"),
         ("spectral bins", features.targets > 1, f"{features.targets} targets" if features.targets > 1 else "XYZ in one target"),
         ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
     ]
