@@ -1,0 +1,250 @@
+"""Random numbers, lattices and roulette's draws: uniform alone, in pairs and over passes.
+
+The numpy twins stand for the shaders here; tests/gpu holds them equal bit for bit. Independent draws are judged by
+chi² (a tilt of `tilt` is seen with probability 0.99), low-discrepancy ones by their discrepancy too, against
+bounds a few times what golden-ratio lattices reach and a tenth of what random numbers of that count have.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from app import paths
+from app.gpu.records import TRACE_PARAMETERS, ray_record
+from app.light_half import _SHIFT_GENERATORS
+from app.passes.eye import _pixel_lattice
+from app.truth.emission_maps import GOLDEN, PLASTIC, lattice_point
+from app.truth.glsl_function import evaluate
+from app.truth.random_numbers import hash_combine, hash_pcg, kronecker, unit_float
+from tests.statistical.chi_square import (
+    ALPHA,
+    box_discrepancy,
+    chi_square,
+    smallest_tilt,
+    star_discrepancy,
+)
+
+COUNT = 1 << 18
+WORD = 2**32
+TILT = 0.035
+
+
+def even(*coordinates: np.ndarray, bins: int = 64) -> float:
+    """p-value of coordinates in [0, 1) being even over `bins` cells in all."""
+    each = round(bins ** (1.0 / len(coordinates)))
+    counts, _ = np.histogramdd(np.column_stack(coordinates), bins=each, range=[(0.0, 1.0)] * len(coordinates))
+    assert smallest_tilt(counts.sum(), counts.size) < TILT
+    return chi_square(counts, np.ones(counts.shape)).p_value
+
+
+def test_hashes_are_uniform_and_neighbours_independent() -> None:
+    i = np.arange(COUNT, dtype=np.uint32)
+    hashed = hash_pcg(i)
+    low = (hashed & np.uint32(0xFFFF)) / 65536.0
+    assert min(even(unit_float(hashed)), even(low), even(unit_float(hashed[:-1]), unit_float(hashed[1:])), even(unit_float(hashed), low)) > ALPHA
+    # As the eye uses them: keys of pixels, then of lights.
+    x, y = i % 512, i // 512
+    pixel = hash_combine(hash_combine(np.uint32(1), x), y)
+    right = hash_combine(hash_combine(np.uint32(1), x + 1), y)
+    below = hash_combine(hash_combine(np.uint32(1), x), y + 1)
+    for other in (right, below, hash_combine(pixel, 0), hash_combine(pixel, 1)):
+        assert even(unit_float(pixel), unit_float(other)) > ALPHA
+    assert len(np.unique(pixel)) > COUNT - 20  # birthday: 8 pairs of 2^18 in 2^32
+    # Mutants: the generator without its output permutation, and a bit that is stuck half the time.
+    raw = (i.astype(np.uint64) * np.uint64(747796405) + np.uint64(2891336453)) % np.uint64(WORD)
+    assert even(unit_float(raw[:-1]), unit_float(raw[1:])) < 1e-3 * ALPHA
+    stuck = np.where(low < 0.05, hashed & np.uint32(0x7FFFFFFF), hashed)
+    assert even(unit_float(stuck)) < 1e-3 * ALPHA
+
+
+def test_a_random_shift_makes_every_lattice_point_uniform() -> None:
+    rng = np.random.default_rng(1)
+    i, shift = rng.integers(0, 1000, COUNT), rng.integers(0, WORD, (2, COUNT))
+    point = lattice_point(i, 1000, (shift[0], shift[1]))
+    assert even(point[:, 0], point[:, 1]) > ALPHA
+    # One point of the lattice alone is even along its second axis, and along its own thousandth of the first.
+    alone = lattice_point(np.full(COUNT, 7), 1000, (shift[0], shift[1]))
+    assert even(alone[:, 0] * 1000.0 - 7.0, alone[:, 1]) > ALPHA
+    # Mutant: two shifts that are not independent.
+    biased = lattice_point(np.full(COUNT, 7), 1000, (shift[0], shift[1] & (shift[0] | 0x7FFFFFFF)))
+    assert even(biased[:, 0] * 1000.0 - 7.0, biased[:, 1]) < 1e-3 * ALPHA
+
+
+@pytest.mark.parametrize("count", [1000, 4096, 65_536])
+def test_lattices_are_far_more_even_than_chance(count: int) -> None:
+    i = np.arange(count)
+    bound = 3.0 * np.log(count) / count
+    for shift in ((0, 0), (123456789, 987654321)):
+        points = lattice_point(i, count, shift)
+        assert star_discrepancy(points[:, 1]) < bound
+        assert box_discrepancy(points) < bound
+    assert box_discrepancy(np.random.default_rng(2).random((count, 2))) > 3.0 * bound if count > 60_000 else True
+    rational = np.column_stack([i / count, i * 0.625 % 1.0])
+    assert box_discrepancy(rational) > 3.0 * bound
+
+
+def test_shifts_are_even_over_passes() -> None:
+    """Where a given lattice point comes to lie from pass to pass, alone and for each pair of dimensions."""
+    passes = 1024
+    shift = np.column_stack([kronecker(np.arange(1, passes + 1), g, 0) for g in _SHIFT_GENERATORS])
+    for first in range(len(_SHIFT_GENERATORS)):
+        assert star_discrepancy(shift[:, first]) < 3.0 * np.log(passes) / passes
+        for second in range(first):
+            assert box_discrepancy(shift[:, [second, first]], 16) < 0.02
+    # An earlier generator of wavelengths had three times its multiple within 4.5e-4 of the second shift's.
+    related = np.column_stack([shift[:, 1], kronecker(np.arange(1, passes + 1), 2246822519, 0)])
+    assert box_discrepancy(related, 16) > 0.03
+
+
+def test_sub_lattices_of_bands_and_places_are_shifted_evenly() -> None:
+    sub = np.arange(1024)
+    points = np.column_stack([kronecker(sub, g, 0) for g in PLASTIC])
+    assert box_discrepancy(points, 16) < 0.02
+
+
+@pytest.mark.parametrize("light_points", [1, 3, 16, 256, 4096, 8192])
+def test_one_wavelength_a_photon_is_even_whatever_the_number_of_places(light_points: int) -> None:
+    """`stochastic`: with every number of places on a light the wavelengths of a pass are even, alone and with the lattice."""
+    points = 65_536 // light_points
+    photon = np.arange(points * light_points)
+    colour = kronecker(photon, 3774877043, 0)
+    assert star_discrepancy(colour) < 3.0 * np.log(len(photon)) / len(photon)
+    point, place = photon // light_points, photon % light_points
+    on_light = lattice_point(place, light_points, (0, 0))
+    for other in ([point / points] if points > 64 else []) + [kronecker(point, GOLDEN, 0)] * (points > 64) + [on_light[:, 0], on_light[:, 1]] * (light_points > 64):
+        assert box_discrepancy(np.column_stack([colour, other]), 16) < 0.02
+
+
+def test_places_in_a_pixel_are_even_in_one_launch_and_over_many() -> None:
+    for samples in (1, 2, 4, 16, 64):
+        places = _pixel_lattice(samples, 0)
+        assert ((places >= 0.0) & (places < 1.0)).all()
+        # Each column of the pixel cut into `samples` holds one.
+        assert sorted((places[:, 0] * samples).astype(int)) == list(range(samples))
+        assert star_discrepancy(places[:, 1]) <= 1.9 / samples
+    # The viewer adds four samples at a time.
+    launches = np.concatenate([_pixel_lattice(4, 4 * k) for k in range(1024)])
+    assert box_discrepancy(launches) < 0.01
+    single = np.concatenate([_pixel_lattice(1, k) for k in range(4096)])
+    assert box_discrepancy(single) < 0.01
+    still = np.concatenate([_pixel_lattice(4, 0) for _ in range(1024)])
+    assert box_discrepancy(still) > 0.05
+
+
+THRESHOLD = 0.3
+LATTICES = 3
+
+
+def survives_source() -> str:
+    """The tracer's roulette as it stands in trace.comp, with the parameters it reads."""
+    text = (paths.shaders_dir() / "trace.comp").read_text()
+    softness = re.search(r"#define SURVIVOR_SOFTNESS .*", text)[0]
+    function = re.search(r"^bool survives\(.*?^}", text, re.MULTILINE | re.DOTALL)[0]
+    return f"{softness}\nTraceParameters p = TraceParameters(64u, {THRESHOLD}, 0u, {LATTICES}u);\n{function}"
+
+
+def generators() -> list[int]:
+    """Roulette's irrationals, one a depth."""
+    return [int(g) for g in re.search(r"generators\[\d+\] = uint\[\]\(([^)]*)\)", survives_source())[1].replace("u", "").split(",")]
+
+
+def draws(depth: int, key: np.ndarray | int, photon: np.ndarray, irrationals: list[int]) -> np.ndarray:
+    """Twin of roulette's number."""
+    shift = (np.asarray(key, np.uint64) + (photon % LATTICES).astype(np.uint64) * np.uint64(GOLDEN)) % np.uint64(WORD)
+    return kronecker(photon // LATTICES, irrationals[depth % len(irrationals)], shift)
+
+
+def play(gl, photon: np.ndarray, depth: np.ndarray, key: np.ndarray, survival: np.ndarray, share: np.ndarray) -> dict[str, np.ndarray]:
+    body = """
+    RayRecord ray;
+    ray.flux_w = survival; ray.throughput = vec3(survival); ray.survival = survival; ray.photon_id = photon; ray.depth = depth; ray.branch_key = key;
+    ray.footprint_scale = 1.0;
+    float roulette = 0.0;
+    ray.flux_w *= share; ray.throughput *= share;
+    alive = survives(ray, roulette, share, 2u) ? 1u : 0u;
+    flux = ray.flux_w; taken = roulette; left = ray.survival; next_key = ray.branch_key; throughput = ray.throughput.y;
+    """
+    inputs = {"photon": photon.astype(np.uint32), "depth": depth.astype(np.uint32), "key": key.astype(np.uint32), "survival": survival, "share": share}
+    outputs = {"alive": "uint", "flux": "float", "taken": "float", "left": "float", "next_key": "uint", "throughput": "float"}
+    return evaluate(gl.ctx, ["lib/random.glsl"], body, inputs, outputs, structs=[ray_record(0), TRACE_PARAMETERS], declarations=survives_source())
+
+
+def test_roulette_lets_the_right_share_live_and_keeps_the_flux(gl) -> None:
+    rng = np.random.default_rng(3)
+    photon, depth = rng.integers(0, 1 << 22, COUNT), rng.integers(2, 20, COUNT)
+    key = rng.integers(0, WORD, COUNT)
+    survival, share = np.float32(rng.uniform(0.05, 1.0, COUNT)).astype(float), np.float32(rng.uniform(0.01, 1.0, COUNT)).astype(float)
+    got = play(gl, photon, depth, key, survival, share)
+    np.testing.assert_array_equal(got["next_key"], hash_combine(key, np.uint32(2)))
+    chance = np.minimum(survival * share / THRESHOLD, 1.0)
+    drawn = np.concatenate([draws(int(d), got["next_key"][depth == d], photon[depth == d], generators()) for d in np.unique(depth)])
+    alive = np.concatenate([got["alive"][depth == d] for d in np.unique(depth)])
+    chances = np.concatenate([chance[depth == d] for d in np.unique(depth)])
+    np.testing.assert_array_equal(alive == 1, (drawn < chances) | (chances >= 1.0))
+    # Counts by chance: each of twenty classes against the binomial of its rays, keys being random.
+    plays = chance < 1.0
+    classes = np.minimum((chance[plays] * 20).astype(int), 19)
+    rays, living = np.bincount(classes, minlength=20), np.bincount(classes, got["alive"][plays], 20)
+    expected, variance = np.bincount(classes, chance[plays], 20), np.bincount(classes, chance[plays] * (1 - chance[plays]), 20)
+    z = (living - expected) / np.sqrt(variance)
+    assert (rays > 1000).all() and np.abs(z).max() < 4.5
+    wrong = (living * 1.03 - expected) / np.sqrt(variance)  # a bias of 3 % of the chance is seen
+    assert np.abs(wrong).max() > 4.5
+    # Flux: what lives weighs as much more as it is rarer, and the balance is kept ray by ray.
+    before = survival * share
+    np.testing.assert_allclose(np.where(got["alive"] == 1, got["flux"], 0.0) + got["taken"], before, rtol=0, atol=2e-6)
+    living_rays = plays & (got["alive"] == 1)
+    np.testing.assert_allclose(got["flux"][living_rays], THRESHOLD, rtol=1e-5)
+    np.testing.assert_allclose(got["throughput"][living_rays], got["flux"][living_rays], rtol=1e-6)
+    np.testing.assert_allclose(got["left"][living_rays], THRESHOLD, rtol=1e-6)
+
+
+def test_a_first_surface_splits_and_never_plays(gl) -> None:
+    count = 1000
+    got = play(gl, np.arange(count), np.full(count, 1), np.arange(count), np.full(count, 1.0), np.full(count, 0.01))
+    assert got["alive"].all() and not got["taken"].any()
+
+
+def test_roulettes_draws_are_even_in_one_pass_alone_and_against_the_lattice() -> None:
+    count = 1 << 15
+    photon = np.arange(count * LATTICES)
+    one = photon[photon % LATTICES == 1]
+    place = lattice_point(one // LATTICES, count, (0, 0))
+    irrationals = generators()
+    for depth in range(len(irrationals)):
+        drawn = draws(depth, 12345, one, irrationals)
+        assert star_discrepancy(drawn) < 6.0 * np.log(count) / count
+        for axis in (0, 1):  # survivors of any part of the picture are as many as anywhere
+            assert box_discrepancy(np.column_stack([place[:, axis], drawn]), 16) < 0.004
+    golden = kronecker(one // LATTICES, GOLDEN, 12345)
+    assert box_discrepancy(np.column_stack([place[:, 1], golden]), 16) > 0.02
+
+
+def test_roulettes_draws_are_even_jointly_over_bounces() -> None:
+    """A path that plays at two depths of eight lives with the product of the chances: pairs of draws fill the square."""
+    count = 1 << 15
+    photon = np.arange(count) * LATTICES
+    irrationals = generators()
+    for first in range(len(irrationals)):
+        for second in range(first):
+            pair = np.column_stack([draws(first, 1, photon, irrationals), draws(second, 2, photon, irrationals)])
+            assert box_discrepancy(pair, 16) < 0.006, (first, second)
+    same = np.column_stack([draws(2, 1, photon, irrationals), draws(2, 2, photon, irrationals)])
+    assert box_discrepancy(same, 16) > 0.05
+
+
+def test_draws_of_one_photon_are_uniform_over_passes() -> None:
+    """Keys differ from pass to pass: over many the draws of any two depths are even, those of the same irrational too."""
+    passes = 1 << 18
+    key = hash_combine(np.arange(passes), np.uint32(0))
+    deeper = key
+    for _ in range(8):
+        deeper = hash_combine(deeper, np.uint32(1))
+    photon = np.full(passes, 3 * 777)
+    irrationals = generators()
+    first, eighth = draws(2, key, photon, irrationals), draws(10, deeper, photon, irrationals)
+    assert min(even(first), even(eighth), even(first, eighth)) > ALPHA
+    assert even(first, draws(2, key, photon + 3, irrationals)) < 1e-3 * ALPHA  # neighbours are a lattice
