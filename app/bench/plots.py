@@ -30,11 +30,11 @@ BASELINE = "stochastic"
 
 @dataclass(frozen=True)
 class Series:
-    """What can be drawn of one curve; float64 arrays of one length, rising in `x`."""
+    """What can be drawn of one curve; float64 arrays of one length, by rising number of photons (the last is the longest rendering)."""
 
     method: str
     x: np.ndarray
-    """Photon seconds or photons, > 0."""
+    """Photon seconds or photons, > 0; on a busy machine seconds need not rise."""
     mean: np.ndarray
     low: np.ndarray
     high: np.ndarray
@@ -43,8 +43,8 @@ class Series:
 
 def series(curve: Curve, abscissa: str) -> Series:
     """The finite points of `curve` over `abscissa` ("seconds" or "photons")."""
-    rows = [(float(getattr(p, abscissa)), p.relmse, p.relmse_low, p.relmse_high) for p in curve.points]
-    rows = sorted(row for row in rows if row[0] > 0 and all(math.isfinite(value) for value in row))
+    rows = [(float(getattr(p, abscissa)), p.relmse, p.relmse_low, p.relmse_high) for p in sorted(curve.points, key=lambda p: p.photons)]
+    rows = [row for row in rows if row[0] > 0 and all(math.isfinite(value) for value in row)]
     x, mean, low, high = np.array(rows, float).reshape(-1, 4).T
     return Series(curve.method, x, mean, low, high)
 

@@ -92,7 +92,11 @@ def _bias_figure(scene: SceneResult, anchor: str) -> Html | None:
     if drawn is None:
         return None
     svg = inlined(report_style.svg_text(drawn), f"{anchor}-bias", f"{scene.scene}: bias squared and variance of each method against photon time")
-    return figure(svg, "relMSE told apart: variance falls with more photons, bias² stays. A hollow triangle means that no bias could be detected there.")
+    caption = (
+        "relMSE told apart: variance is what differs between seeds, bias² what all seeds share, such as footprints and bands that are too wide. "
+        "A hollow triangle means that no bias could be detected there."
+    )
+    return figure(svg, caption)
 
 
 def _error_table(scene: SceneResult) -> Html:
@@ -230,6 +234,6 @@ def _scale(limit: float) -> Html:
 def _caption(exposure: float) -> str:
     return (
         f"All pictures at one exposure ({exposure:+.1f} EV) chosen for the reference, and the part chosen on the reference alone, where light and "
-        "structure are richest. Whole pictures are means of 2×2 pixels. Signed error is (Y − R) / √(R² + ε), luminance, the same scale for all, full resolution; "
-        "colours follow the root of its size, and the mean of its square is the luminance's part of relMSE. Measures are of the one picture shown."
+        "structure are richest. Whole pictures are means of 2×2 pixels. Signed error is (Y − R) / √(R² + ε), luminance, the same scale for all, full "
+        "resolution; colours follow the root of its size, and the mean of its square is the luminance's part of relMSE. Measures are of the one picture shown."
     )

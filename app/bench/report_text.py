@@ -5,6 +5,7 @@ Plain text only; `report_html` escapes it.
 
 from __future__ import annotations
 
+import itertools
 import math
 import statistics
 
@@ -63,6 +64,8 @@ NOT_COVERED = {
 }
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+BUSY_SHARE = 0.9
+"""A larger budget that took less than this times the time of the one before it gives a busy machine away."""
 REFERENCE_SHARE = 0.1
 """A reference's own error above this share of the smallest error measured calls for a warning."""
 
@@ -127,6 +130,12 @@ def warnings_of(scene: SceneResult) -> list[str]:
         told.append("The reference's own error is above a tenth of the smallest error reported.")
     if any(p.relmse <= 0 for c in scene.curves for p in c.points):
         told.append("Where a debiased error is zero or below, the picture cannot be told from the reference; the plots show a hollow triangle on the floor.")
+    busy = [curve.method for curve in scene.curves if _times_fall(curve)]
+    if busy:
+        told.append(
+            f"Photon time does not rise with the number of photons for {', '.join(busy)}: the machine was busy with other work, so times and time ratios "
+            "here are rough. Errors against photons are not touched by that."
+        )
     unfinished = [curve.method for curve in scene.curves if not curve.points]
     if unfinished:
         told.append(f"No finished point yet: {', '.join(unfinished)}.")
@@ -135,6 +144,12 @@ def warnings_of(scene: SceneResult) -> list[str]:
     if scene.seeds < 5:
         told.append(f"Only {seeds_text(scene.seeds)}: the band over seeds and the parting of bias and variance are weak; the protocol asks for five.")
     return told
+
+
+def _times_fall(curve: Curve) -> bool:
+    """Whether more photons once took clearly less time."""
+    seconds = [point.seconds for point in sorted(curve.points, key=lambda point: point.photons)]
+    return any(later < BUSY_SHARE * earlier for earlier, later in itertools.pairwise(seconds))
 
 
 def headline(result: BenchResult) -> list[str]:

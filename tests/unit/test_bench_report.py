@@ -20,6 +20,7 @@ from app.bench.results import BenchResult, Claim, Curve, Point, SceneResult
 from app.errors import UserError
 from tests.unit.bench_synthetic import METHODS, synthetic_result, synthetic_scene
 
+
 class Page(HTMLParser):
     """Collects what a page holds; an element that is closed wrongly is an error."""
 
@@ -177,7 +178,8 @@ def test_errors_that_have_no_logarithm(tmp_path: Path, abscissa: str) -> None:
     good = [Point(10**k, 10.0 ** (k - 6), 10.0**-k, 0.5 * 10.0**-k, 2 * 10.0**-k, 0.0, 10.0**-k) for k in range(3, 6)]
     odd = [
         Point(1_000_000, 1.0, 0.0, 0.0, 1e-6, 0.0, 0.0), Point(2_000_000, 2.0, -1e-7, -1e-6, 0.0, -1e-7, 0.0),
-        Point(3_000_000, 3.0, math.nan, 0.0, 1.0, math.nan, 0.0), Point(4_000_000, 4.0, math.inf, 0.0, math.inf, 0.0, math.inf), Point(0, 0.0, 1.0, 1.0, 1.0, 0.0, 1.0),
+        Point(3_000_000, 3.0, math.nan, 0.0, 1.0, math.nan, 0.0), Point(4_000_000, 4.0, math.inf, 0.0, math.inf, 0.0, math.inf),
+        Point(0, 0.0, 1.0, 1.0, 1.0, 0.0, 1.0),
     ]  # fmt: skip
     scene = made_of(good + odd, tmp_path)
     with report_style.plot_style():
@@ -220,6 +222,12 @@ def test_reference_warning_begins_at_a_tenth(tmp_path: Path) -> None:
     for share, warned in ((0.099, False), (0.101, True)):
         scene.reference.relmse = share * least
         assert any("times the smallest error" in told for told in report_text.warnings_of(scene)) is warned
+
+
+def test_busy_machine_is_told(tmp_path: Path) -> None:
+    for factor, told in ((0.95, False), (0.85, True)):
+        scene = made_of([Point(n, s, 1e-3, 1e-3, 1e-3, 0.0, 1e-3) for n, s in ((1000, 1.0), (2000, factor), (4000, 2.0))], tmp_path)
+        assert any("the machine was busy" in words and "srd" in words for words in report_text.warnings_of(scene)) is told
 
 
 def test_same_result_gives_the_same_svg_and_both_themes_read_well(tmp_path: Path) -> None:
