@@ -52,7 +52,7 @@ def _speed_up_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> Claim:
         times = last.relmse / max(end.relmse, 1e-30)
         measured = f"not reached in {last.seconds:.2f} s: srd ends at {last.relmse:.3g}, {times:.2g} times that"
         return Claim("time to equal error", asked, measured, False, reason(scene, srd))
-    measured = f"{'at least ' if reached.at_once else ''}{reached.seconds:.3g} times sooner"
+    measured = f"{'at least ' if reached.at_once else ''}{reached.seconds:.3g} times sooner" if reached.seconds >= 1.0 else f"{1.0 / reached.seconds:.3g} times later"
     holds = reached.seconds >= ASKED_SPEED_UP
     why = ""
     if not holds and reached.at_once:

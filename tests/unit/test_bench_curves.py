@@ -47,6 +47,15 @@ def test_time_to_equal_error_of_power_laws() -> None:
     assert same is not None and same.seconds == pytest.approx(1.0)
 
 
+def test_a_baseline_that_stopped_improving_is_given_the_time_it_got_there() -> None:
+    flat = [p if p.seconds < 1.0 else Point(p.photons, p.seconds, 1.0, 1.0, 1.0, 1.0, 0.0) for p in law(1.0)]
+    first_flat = next(p.seconds for p in flat if p.relmse == 1.0)
+    ratio = speed_up(law(0.01), flat)
+    assert ratio is not None and ratio.seconds == pytest.approx(first_flat / flat[0].seconds) and ratio.at_once
+    own = speed_up(flat, flat)
+    assert own is not None and own.seconds == pytest.approx(1.0)
+
+
 def test_a_curve_that_never_gets_there_and_one_that_is_there_at_once() -> None:
     slow = law(0.1)
     assert speed_up(law(0.01, floor=1.0), slow) is None
