@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.bench import report_style as style
-from app.bench.curves import speed_up
+from app.bench.curves import speed_up, time_to_error
 from app.bench.report_text import number, ratio_text, superscript
 from app.bench.results import Curve, SceneResult
 
@@ -75,7 +75,7 @@ def error_against(scene: SceneResult, abscissa: str) -> Figure:
         draw_series(axes, one)
     _draw_reference_error(axes, own)
     if abscissa == "seconds":
-        draw_ratio_arrow(axes, scene, drawn, named=True)
+        draw_ratio_arrow(axes, scene, named=True)
     label_ends(axes, drawn)
     return figure
 
@@ -165,13 +165,14 @@ def _draw_reference_error(axes: Axes, own: float) -> None:
     )  # fmt: skip
 
 
-def draw_ratio_arrow(axes: Axes, scene: SceneResult, drawn: Sequence[Series], named: bool) -> None:
+def draw_ratio_arrow(axes: Axes, scene: SceneResult, named: bool) -> None:
     """From the end of `stochastic` to where `srd` reaches that error: the ratio that counts, to be seen as a length."""
     ratio = scene.time_to_equal_error.get("srd", 0.0)
-    base = next((one for one in drawn if one.method == BASELINE), None)
-    if base is None or not ratio > 1.2 or not base.mean[-1] > 0 or not math.isfinite(ratio):
+    points = next((curve.points for curve in scene.curves if curve.method == BASELINE), [])
+    own = time_to_error(points, points[-1].relmse) if points else None
+    if own is None or not 1.2 < ratio < math.inf or not 0 < points[-1].relmse < math.inf:
         return
-    end_s, error = float(base.x[-1]), float(base.mean[-1])
+    end_s, error = own.seconds, points[-1].relmse
     reached_s = max(end_s / ratio, axes.get_xlim()[0])
     colour = style.method_style("srd").colour
     axes.annotate(

@@ -139,7 +139,7 @@ def small_multiples(result: BenchResult) -> Figure:
 def _draw_panel(axes: Axes, scene: SceneResult, drawn: Sequence[Series], named: bool) -> None:
     for one in drawn:
         draw_series(axes, one, markers=False)
-    draw_ratio_arrow(axes, scene, drawn, named=False)
+    draw_ratio_arrow(axes, scene, named=False)
     if named:
         label_ends(axes, drawn)
     axes.set_title(scene.scene, loc="left", fontsize=10, fontweight="bold", pad=5)

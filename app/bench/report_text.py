@@ -27,6 +27,7 @@ METRICS = {
     "relMSE": "mean over pixels and over X, Y, Z of (I − R)² / (R² + ε), I the picture, R the reference, ε = 10⁻² · (mean R)². "
     "The reference's own variance is taken off.",
     "relMSE trimmed": "the same without the 0.1 % of pixels with the largest error: what single fireflies cannot sway.",
+    "relMSE lit": "the same with ε from the mean of the lit pixels, so that a dark frame around the caustic does not weigh.",
     "bias² and variance": "relMSE told apart over n seeds: bias² = mean[((Ī − R)² − Var/n) / (R² + ε)] with Ī the mean picture, "
     "variance = mean[Var / (R² + ε)]. An estimate of bias² at or below zero means that no bias could be detected.",
     "SMAPE": "mean of |I − R| / (|I| + |R| + √ε), 0 to 1.",
@@ -39,6 +40,9 @@ METRICS = {
     "time to equal error": "time that stochastic needs for its longest rendering, over the time that the method needs to reach the same mean error, "
     "read off the curves by log-log interpolation. ≥ marks a method whose shortest rendering is already better.",
 }
+
+MEASURES = {"relmse_lit": "relMSE lit", "relmse_trimmed": "relMSE trimmed", "nrmse": "nRMSE", "smape": "SMAPE", "chroma": "Δu'v'"}
+"""Names of `results.OTHER_MEASURES` as the reader sees them."""
 
 STAGES = {
     "trace": "emission and tracing of photons",
