@@ -155,6 +155,13 @@ def test_a_bias_floor_is_named() -> None:
     assert "footprints" in claims["time to equal error"].why
 
 
+def test_the_texels_share_of_a_bias_is_told() -> None:
+    srd, stochastic = curve("srd", law(1e-4, floor=0.2)), curve("stochastic", law(0.1))
+    with_point = scene(stochastic, srd, curve("stochastic-point", law(1.0, floor=0.05)))
+    assert "25 % of that bias² is found in stochastic-point too" in claims_of(with_point)[0].why
+    assert "stochastic-point" not in claims_of(scene(stochastic, srd, curve("stochastic-point", law(1.0, floor=0.01))))[0].why
+
+
 def test_claims_need_their_methods_their_time_and_their_glass() -> None:
     srd, stochastic = curve("srd", law(0.01)), curve("stochastic", law(1.0))
     assert claims_of(scene(stochastic)) == []
