@@ -14,7 +14,7 @@ from app.model.primitives import slab
 from app.model.primitives_gem import brilliant
 from app.model.scene import Dielectric, Diffuse
 from app.stress.case import Case, Measurement
-from app.stress.judging import EPSILON, judged, length, not_finite_in
+from app.stress.judging import EPSILON, judged, not_finite_in
 from app.truth import optics
 from app.truth.gpu_paths import (
     REFRACTED,
