@@ -13,7 +13,7 @@ from app.model.primitives_gem import brilliant
 from app.model.primitives_round import sphere
 from app.model.scene import Scene
 from app.paths import assets_dir
-from app.stress import contact_cases, light_cases, mesh_cases
+from app.stress import contact_cases, light_cases, mesh_file_cases
 from app.stress.case import Case, Measurement
 from app.stress.probe import Held, measurement, probe
 from app.stress.scene_parts import SUN, solid, stage
@@ -92,7 +92,7 @@ def default_sweeps() -> tuple[Case, ...]:
 CASES: tuple[Case, ...] = (
     *contact_cases.CASES,
     *light_cases.CASES,
-    *mesh_cases.CASES,
+    *mesh_file_cases.CASES,
     Case("gems", "A prism, a ball, a diamond and a cube of glass that no maker sells, against one-wavelength photons",
          "A splat sweeps over half the table, total reflection cuts bands at every face, dn/dλ changes its sign.", "glass", measure_gems, len(gems()), logarithmic=False),
     Case("shipped", "Every shipped scene with few photons", "What works in a test scene must work in a real one.", "scene", measure_shipped, len(shipped_names()), logarithmic=False),
