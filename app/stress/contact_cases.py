@@ -20,7 +20,15 @@ from app.model.primitives_lens import doublet, lens
 from app.model.primitives_round import sphere
 from app.model.scene import Camera, Scene, SceneObject
 from app.stress.case import Case, Measurement
-from app.stress.probe import SMALL, Held, energy_error, measurement, picture_error, probe
+from app.stress.probe import (
+    SMALL,
+    Held,
+    Probe,
+    energy_error,
+    measurement,
+    picture_error,
+    probe,
+)
 from app.stress.scene_parts import CROWN, FLINT, SUN, WATER, solid, stage, turn
 
 CAUSTIC = replace(SMALL, layer="caustic")
@@ -31,11 +39,11 @@ NOISE, TEXELS = 3.0, 0.02
 SAME_ENERGY = 2e-3
 PLATES = 2e-3
 """Transmittance of a stack of plates: roulette over 32 thousand photons leaves some 1e-4 to 1e-3."""
-GAPS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 0.0)
-OVERLAPS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 0.0)
+GAPS = (1e-1, 1e-3, 1e-4, 1e-5, 1e-7, 0.0)
+OVERLAPS = (1e-1, 1e-3, 1e-5, 1e-7, 0.0)
 CONTACT = 6e-5
 """Surfaces nearer than 3e-5 GPU units (`NEAR_DISTANCE` of intersect.glsl; here twice that in scene units) are in optical contact."""
-STACKS = (1, 2, 4, 8, 16, 32)
+STACKS = (1, 4, 16, 32)
 _TILT = turn((1.0, 0.4, 0.2), 28.0)
 _CENTRE = np.array([0.0, 0.0, 1.2])
 
@@ -57,12 +65,20 @@ class Pair:
 
 def measure_pairs(context: Context) -> Iterator[Measurement]:
     """Each pair: same picture, same energy, no leak."""
+    plain: dict[tuple[Callable[[], Scene], int], Probe] = {}
+
+    def rendered(pair: Pair, seed: int) -> Probe:
+        """The plain scene, once for all pairs that share it."""
+        key = pair.plain, seed
+        if key not in plain:
+            plain[key] = probe(context, pair.plain(), replace(CAUSTIC, layer=pair.layer, seed=seed))
+        return plain[key]
+
     for number, pair in enumerate(PAIRS, 1):
-        settings = replace(CAUSTIC, layer=pair.layer)
-        base, found = probe(context, pair.plain(), settings), probe(context, pair.joined(), settings)
+        base, found = rendered(pair, 1), probe(context, pair.joined(), replace(CAUSTIC, layer=pair.layer))
         bound = SAME_PICTURE
         if pair.redrawn:
-            bound = TEXELS + pair.edges + NOISE * picture_error(probe(context, pair.plain(), replace(settings, seed=2)).picture, base.picture)
+            bound = TEXELS + pair.edges + NOISE * picture_error(rendered(pair, 2).picture, base.picture)
         held = Held(
             {"picture": picture_error(found.picture, base.picture), "energy": energy_error(found.picture, base.picture)},
             {"picture": bound, "energy": 5 * SAME_ENERGY if pair.redrawn else SAME_ENERGY},

@@ -27,8 +27,8 @@ DROPPED = 0.01
 """Largest share of photons splatted as one texel for want of a usable footprint."""
 FULL_SWEEP = "prism"
 """The scene whose sweep runs whole without being asked for."""
-ALSO = {"wine_glass": ("scale", "rotation"), "brilliant": ("depth",)}
-"""Parts of the sweep on scenes that are hard in that respect: nested smooth solids with absorption; long chains."""
+ALSO = {"achromat": ("scale", "rotation"), "brilliant": ("depth",)}
+"""Parts of the sweep on scenes that are hard in that respect: smooth solids that touch; long chains."""
 
 
 def gems() -> list[tuple[str, Dispersion]]:
