@@ -58,7 +58,7 @@ class Pair:
     redrawn: bool = False
     """Lattices, maps or roulette's dice of the two differ, so that chance does."""
     edges: float = 0.0
-    """Added to the bound on the picture where one of the two draws direct light by splats, which blur a shadow's edge, or a focus of few texels lies on others."""
+    """Added to the bound on the picture where one of the two draws direct light by splats, which blur a shadow's edge, or a rim's glints lie on other texels."""
     layer: str = "caustic"
     """"beauty" where what is caustic in one is direct light in the other."""
 
@@ -187,12 +187,12 @@ def _vessel(water: float, water_priority: int, hollow: bool) -> Scene:
 
 
 def _doublet() -> Scene:
-    front, back = doublet(0.9, -0.9, -3.0, 0.35, 0.1, 1.0, triangles=4800)
+    front, back = doublet(2.0, -2.0, -6.0, 0.25, 0.1, 1.0, triangles=4800)
     return stage(*tilted(solid("front", front, FLINT), solid("back", back, FLINT)), lights=[SUN])
 
 
 def _lens() -> Scene:
-    return stage(*tilted(solid("lens", lens(0.9, -3.0, 0.45, 1.0, triangles=2400), FLINT, (0.0, 0.0, -0.125))), lights=[SUN])
+    return stage(*tilted(solid("lens", lens(2.0, -6.0, 0.35, 1.0, triangles=2400), FLINT, (0.0, 0.0, -0.075))), lights=[SUN])
 
 
 PAIRS = (
@@ -208,7 +208,7 @@ PAIRS = (
          lambda: stage(*tilted(solid("hollow", cavity(box(), box((0.5, 0.5, 0.5))), FLINT)), lights=[SUN])),
     Pair("water that ends at the wall, and one that is carved out", lambda: _vessel(0.6, 0, True), lambda: _vessel(0.6, 1, False)),
     Pair("water that reaches into the wall, and one that is carved out", lambda: _vessel(0.8, -1, True), lambda: _vessel(0.6, 1, False)),
-    Pair("a cemented doublet of one glass, and a lens", _doublet, _lens, redrawn=True, edges=0.1),
+    Pair("a cemented doublet of one glass, and a lens", _doublet, _lens, redrawn=True, edges=0.05),
     Pair("two prisms that share an edge, and 1e-4 apart", lambda: _prisms(0.0), lambda: _prisms(1e-4)),
     Pair("a block sunk by 0.1 in the table, and by 0.2", lambda: _standing(0.1), lambda: stage(
         solid("block", box((1.0, 0.8, 1.0)), FLINT, (0.0, 0.0, 0.3)), lights=[SUN]), redrawn=True),
