@@ -17,7 +17,6 @@ import pytest
 from app.model.mesh import Mesh, make_mesh
 from app.model.scene import (
     Camera,
-    Dielectric,
     Diffuse,
     Light,
     Mirror,
