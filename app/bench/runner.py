@@ -148,7 +148,7 @@ class _SceneBench:
             return
         earlier = store.load_sums(result.scene, curve.method, seed - 1) if seed > 1 else np.zeros((len(curve.budgets), *truth.xyz.shape), np.float32)
         if earlier is None:
-            raise UserError(f"{store.directory} has lost what going on with '{result.scene}' needs (folder 'partial'): give --fresh to begin anew")
+            raise UserError(f"{store.directory}/partial has lost what going on with '{result.scene}' needs: give --fresh to begin anew")
         sums, samples = earlier, []
         for i, photons in enumerate(curve.budgets):
             step = (1.0 - _REFERENCE_SHARE) / (self._settings.seeds * len(self._settings.methods))
