@@ -58,7 +58,8 @@ class Pair:
     redrawn: bool = False
     """Lattices, maps or roulette's dice of the two differ, so that chance does."""
     edges: float = 0.0
-    """Added to the bound on the picture where one of the two draws direct light by splats, which blur a shadow's edge, or a rim's glints lie on other texels."""
+    """Added to the bound on the picture where one of the two draws direct light by splats, which blur a shadow's edge, or where
+    a rim's glints lie on other texels."""
     layer: str = "caustic"
     """"beauty" where what is caustic in one is direct light in the other."""
 
@@ -201,7 +202,8 @@ PAIRS = (
     Pair("a block in eight parts", lambda: stage(*tilted(*_eighths()), lights=[SUN]), _block, redrawn=True),
     Pair("the same block twice", lambda: _block(solid("again", box(), FLINT)), _block, redrawn=True),
     Pair("a ball of the same glass in a block", lambda: _block(_ball(0.4)), _block, redrawn=True),
-    Pair("a block of n = 1 half over a block", lambda: _seen(solid("air", box(), constant(1.0, "air"), (0.5, 0.0, 0.0), priority=-1)), _seen, redrawn=True, edges=0.03, layer="beauty"),
+    Pair("a block of n = 1 half over a block", lambda: _seen(solid("air", box(), constant(1.0, "air"), (0.5, 0.0, 0.0), priority=-1)), _seen,
+         redrawn=True, edges=0.03, layer="beauty"),
     Pair("eight nested shells of one glass", lambda: stage(*tilted(*(_ball(0.1 * k, f"shell {k}", 320) for k in range(8, 0, -1))), lights=[SUN]),
          lambda: stage(*tilted(_ball(0.8, triangles=320)), lights=[SUN])),
     Pair("a bubble as a solid of n = 1, and as a cavity", lambda: _block(solid("bubble", box((0.5, 0.5, 0.5)), constant(1.0, "air"), priority=1)),

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
-
 from app.errors import UserError
 from app.gpu.context import Context
 from app.model.glass import constant
@@ -18,8 +17,22 @@ from app.model.scene import Camera, Diffuse, Light, Scene, SceneObject
 from app.model.scene_checks import check_scene
 from app.model.spectrum import Spectrum, illuminant
 from app.stress.case import Case, Measurement
-from app.stress.contact_cases import CAUSTIC, NOISE, PLATES, SAME_PICTURE, TEXELS, plates
-from app.stress.probe import LOST_TO_NUMERICS, Held, energy_error, measurement, picture_error, probe
+from app.stress.contact_cases import (
+    CAUSTIC,
+    NOISE,
+    PLATES,
+    SAME_PICTURE,
+    TEXELS,
+    plates,
+)
+from app.stress.probe import (
+    LOST_TO_NUMERICS,
+    Held,
+    energy_error,
+    measurement,
+    picture_error,
+    probe,
+)
 from app.stress.scene_parts import BEAM, FLINT, SUN, brighter, solid, stage
 
 GLASS = constant(1.5, "n 1.5")

@@ -14,7 +14,16 @@ from app.gpu import records
 from app.model.primitives import box
 from app.stress import contact_cases, probe, sweep_cases
 from app.stress.probe import WatchedLight, with_photons
-from app.stress.scene_parts import BEAM, FLINT, brighter, extent, moved, solid, stage, turn
+from app.stress.scene_parts import (
+    BEAM,
+    FLINT,
+    brighter,
+    extent,
+    moved,
+    solid,
+    stage,
+    turn,
+)
 
 FEW = with_photons(4096)
 
