@@ -86,6 +86,7 @@ def render_reference(
     What was done when `cancelled()` turned true is kept. Raises ValueError without any limit, UserError
     without numba or where too many solids nest.
     """
+    progress(0.0, "preparing")
     return continue_run(ReferenceRun(scene, width, height, max_depth, seed), photons, seconds, target_relmse, progress, cancelled)
 
 
@@ -114,6 +115,7 @@ def cached_reference(
         picture = summed(stored["sums"], stored["units"], stored["tallies"], int(stored["unit"]), float(stored["seconds"]))
         if _suffices(picture, photons, target_relmse):
             return picture
+    progress(0.0, "preparing")
     run = ReferenceRun(scene, width, height, max_depth, _SEED)
     if stored is not None and int(stored["unit"]) == run.unit:
         run.sums[:], run.units[:], run.tallies[:] = stored["sums"], stored["units"], stored["tallies"]
@@ -175,7 +177,7 @@ def _forget_oldest(folder: Path, newest: Path) -> None:
 
 def _suffices(picture: ReferencePicture, photons: int | None, target_relmse: float | None) -> bool:
     enough = photons is not None and picture.photons >= photons
-    return enough or (target_relmse is not None and picture.photons > 0 and picture.relmse <= target_relmse)
+    return enough or (target_relmse is not None and picture.is_within(target_relmse))
 
 
 def _plain(value: object) -> object:

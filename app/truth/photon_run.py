@@ -42,6 +42,7 @@ _ROUND_SECONDS = 0.5
 _CHECK_SHARE = 0.1
 """Share of the time that may pass until the error is worked out again."""
 _LAST_POINT = 2**31
+_BLACK_PHOTONS = 1 << 20
 
 Progress = Callable[[float, str], None]
 Cancelled = Callable[[], bool]
@@ -81,6 +82,10 @@ class ReferencePicture:
         xyz = self.xyz()
         epsilon = RELMSE_EPSILON * xyz.mean() ** 2
         return float(np.mean(self.xyz_variance() / (xyz**2 + epsilon))) if epsilon > 0.0 else 0.0
+
+    def is_within(self, target_relmse: float) -> bool:
+        """Whether the error is known to be no larger; blackness is believed after many photons only."""
+        return self.relmse <= target_relmse and (bool(self.rgb.any()) or self.photons >= _BLACK_PHOTONS)
 
 
 class ReferenceRun:
@@ -219,7 +224,7 @@ def continue_run(
     if photons is None and seconds is None and target_relmse is None:
         raise ValueError("a reference needs a limit: photons, seconds or target_relmse")
     started = time.perf_counter()
-    checked, error = -1.0, np.inf
+    checked, error, enough = -1.0, np.inf, False
     while True:
         spent = time.perf_counter() - started
         reached = [0.0]
@@ -229,8 +234,9 @@ def continue_run(
             reached.append(spent / seconds)
         if target_relmse is not None and run.photons:
             if checked < 0.0 or spent - checked > _CHECK_SHARE * spent:
-                checked, error = spent, run.picture().relmse
-            reached.append(target_relmse / error if error > 0.0 else 1.0)
+                picture = run.picture()
+                checked, error, enough = spent, picture.relmse, picture.is_within(target_relmse)
+            reached.append(1.0 if enough else min(target_relmse / max(error, target_relmse), 0.99))
         done = max(reached)
         progress(min(done, 1.0), f"{run.photons / 1e6:.1f} M photons" + (f", relMSE {error:.1e}" if np.isfinite(error) else ""))
         if done >= 1.0 or run.exhausted or cancelled():

@@ -310,7 +310,7 @@ def test_an_interrupt_keeps_what_is_done(small: Scene, tmp_path: Path) -> None:
 
     def interrupt(fraction: float, text: str) -> None:
         calls.append(fraction)
-        if len(calls) == 4:
+        if len(calls) == 5:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
