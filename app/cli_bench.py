@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from app import __version__
 from app import cli_options as options
-from app.bench.results import DEFAULT_METHODS, BenchResult, BenchSettings, SceneResult
+from app.bench.results import BenchResult, BenchSettings
 from app.errors import UserError, suggestion
 from app.model.settings import METHODS
 
@@ -166,25 +166,13 @@ def _features(request: BenchRequest) -> int:
 def _report(result: BenchResult, directory: Path, show: Callable[[object], None]) -> None:
     """Tables on the screen, then plots and pages in the folder."""
     from app.bench.report import write_report
-    from app.bench.screen import scene_table
+    from app.bench.screen import scene_lines, scene_table
 
     measured = [scene for scene in result.scenes if any(curve.points for curve in scene.curves)]
     for scene in measured:
         show(scene_table(scene))
-        for line in claim_lines(scene):
+        for line in scene_lines(scene):
             show(line)
     if measured:
         write_report(result, directory)
         show(f"{(directory / 'report.html').resolve()}: the report; {(directory / 'results.json').resolve()}: every number")
-
-
-def claim_lines(scene: SceneResult) -> list[str]:
-    """One line a claim, and notes about what limits the figures."""
-    lines = []
-    for claim in scene.claims:
-        lines.append(f"  {'holds' if claim.holds else 'FALLS SHORT'}: {claim.name}: {claim.asked}: {claim.measured}{f' ({claim.why})' if claim.why else ''}")
-    if scene.reference_too_coarse and scene.reference is not None:
-        lines.append(f"  note: the reference's own relMSE, {scene.reference.relmse:.2g}, is above a tenth of the smallest error; --reference-seconds lowers it")
-    if scene.picture_samples and all("flip" not in sample.metrics for sample in scene.picture_samples.values()):
-        lines.append("  note: FLIP is not available; 'pip install flip-evaluator' brings it, on Pythons that it has wheels for")
-    return lines

@@ -56,9 +56,11 @@ bool survives(inout RayRecord ray, inout float roulette_w, float share, uint bra
     // What a first surface throws back is seen all round the glass: it keeps its whole lattice.
     if (chance >= 1.0 || ray.depth == 1u) return true;
     // One irrational a depth: the square roots of primes, as far from rational as from the lattice's golden ratio.
+    // Deeper ones are hashed: with one that comes again, a path's later draws would follow from its earlier ones.
     // The count is that of the sub-lattice's own points: a multiple of an irrational may be a poor one.
     const uint generators[8] = uint[](1779033703u, 3144134277u, 2773480763u, 1359893119u, 2600822925u, 528734635u, 1541459225u, 3418070365u);
-    float draw = kronecker(ray.photon_id / p.lattices, generators[ray.depth & 7u], ray.branch_key + (ray.photon_id % p.lattices) * 2654435769u);
+    uint generator = ray.depth < 8u ? generators[ray.depth] : hash_pcg(ray.depth) | 1u;
+    float draw = kronecker(ray.photon_id / p.lattices, generator, ray.branch_key + (ray.photon_id % p.lattices) * 2654435769u);
     if (draw >= chance) {
         roulette_w += ray.flux_w;
         return false;

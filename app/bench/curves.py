@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from app.bench.metrics import Truth, bias_variance
@@ -65,6 +66,12 @@ def complete_curve(curve: Curve, mean_differences: Mapping[int, np.ndarray], tru
     curve.points = [make_point(by_budget[n], mean_differences[n], truth) for n in sorted(by_budget) if n in mean_differences]
     slope, half_width = tail_slope(curve.samples, curve.budgets)
     curve.slope, curve.slope_half_width = (slope, half_width) if np.isfinite(slope) else (0.0, 0.0)
+
+
+def points_by(curve: Curve, measure: str) -> list[Point]:
+    """The curve's points with another measure, its mean over seeds, in the place of relMSE."""
+    of_budget = {p.photons: [s.metrics[measure] for s in curve.samples if s.photons == p.photons] for p in curve.points}
+    return [msgspec.structs.replace(p, relmse=float(np.mean(of_budget[p.photons]))) for p in curve.points]
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,8 @@ EPSILON_SHARE = 1e-2
 """ε of relMSE = mean[(I−R)²/(R²+ε)] is this times mean(R)², the mean taken over all pixels and channels."""
 TRIMMED_SHARE = 1e-3
 """Share of the largest terms that relmse_trimmed leaves out."""
+LIT_FLOOR = 1e-4
+"""Pixels whose Y exceeds this times the largest are lit, for relmse_lit."""
 LIT_SHARE = 0.1
 """Colour is judged where the reference's Y exceeds this times its mean."""
 _GREY_UV = (0.19783, 0.46832)
@@ -36,7 +38,16 @@ class Truth:
     @cached_property
     def weight(self) -> np.ndarray:
         """1/(R² + ε), float64 (H, W, 3). All 1 for a black reference."""
-        mean = float(self.xyz.mean())
+        return self._weight(float(self.xyz.mean()))
+
+    @cached_property
+    def lit_weight(self) -> np.ndarray:
+        """The same with ε from the mean of the lit pixels alone, which does not depend on how much darkness surrounds them."""
+        luminance = self.xyz[..., 1]
+        lit = luminance > LIT_FLOOR * luminance.max()
+        return self._weight(float(self.xyz[lit].mean()) if lit.any() else 0.0)
+
+    def _weight(self, mean: float) -> np.ndarray:
         return 1.0 / (self.xyz**2 + EPSILON_SHARE * mean**2) if mean > 0.0 else np.ones_like(self.xyz)
 
     @cached_property
@@ -53,7 +64,7 @@ def relmse_raw(xyz: np.ndarray, truth: Truth) -> float:
 def measure(xyz: np.ndarray, truth: Truth) -> dict[str, float]:
     """All measures of `xyz` (H, W, 3) that `results.Sample.metrics` lists, but FLIP.
 
-    relmse and nrmse are freed of the reference's variance and never below 0; smape = mean |I−R|/(|I|+|R|+√ε), from
+    relmse, relmse_lit and nrmse are freed of the reference's variance and never below 0; smape = mean |I−R|/(|I|+|R|+√ε), from
     0 to 1; chroma = mean distance in CIE 1976 u′v′ over lit pixels.
     """
     difference = xyz - truth.xyz
@@ -69,6 +80,7 @@ def measure(xyz: np.ndarray, truth: Truth) -> dict[str, float]:
         "relmse": max(raw - truth.own_relmse, 0.0),
         "relmse_raw": raw,
         "relmse_trimmed": _trimmed(terms, noise),
+        "relmse_lit": max(float(np.mean(truth.lit_weight * (difference**2 - truth.variance))), 0.0),
         "smape": float(np.mean(np.abs(difference) / np.where(sums > 0.0, sums, 1.0))),
         "chroma": _chroma(xyz, truth.xyz),
         "nrmse": float(np.sqrt(max(np.sum(difference**2 - truth.variance), 0.0) / square)) if square else 0.0,

@@ -9,6 +9,9 @@ PHOTON_STAGES = ("trace", "splat", "resolve")
 
 DEFAULT_METHODS = ("stochastic", "stochastic-point", "regular-7", "regular-16", "srd-lambda", "srd")
 
+OTHER_MEASURES = ("relmse_lit", "relmse_trimmed", "nrmse", "smape", "chroma")
+"""Measures beside relMSE by which times to equal error are told, so that no conclusion hangs on one."""
+
 EARLY_SHARE = 0.1
 """The early pictures are made after this share of the photon time given."""
 
@@ -38,8 +41,8 @@ class Sample(msgspec.Struct, frozen=True):
     """By stage: `PHOTON_STAGES`; and, not counted, "plan" (bands and spectral tables, once before a rendering) and
     "eye" (display, the same for every method)."""
     metrics: dict[str, float]
-    """relmse, relmse_raw (the reference's own variance left in), relmse_trimmed, smape, chroma, nrmse, energy_ratio
-    (Σ picture / Σ reference); "flip" for the equal-time pictures alone. See `metrics`."""
+    """relmse, relmse_raw (the reference's own variance left in), relmse_trimmed, relmse_lit (ε from the lit pixels' mean),
+    smape, chroma, nrmse, energy_ratio (Σ picture / Σ reference); "flip" for the equal-time pictures alone. See `metrics`."""
 
     @property
     def photon_seconds(self) -> float:
@@ -118,6 +121,8 @@ class SceneResult(msgspec.Struct):
     time_to_equal_error: dict[str, float] = {}
     """For each method: time `stochastic` needs over time the method needs to reach `stochastic`'s final error;
     below 1 the method is slower, absent when it never gets there."""
+    time_to_equal_other: dict[str, dict[str, float]] = {}
+    """The same by other measures: `OTHER_MEASURES` → method → ratio."""
     strongest_glass: str = ""
     strongest_abbe: float = 0.0
     """Lowest V_d in the scene; 0 when nothing disperses."""

@@ -16,7 +16,7 @@ from app.bench.claims import claims_of, ratios_of
 from app.bench.curves import complete_curve, photons_at_time
 from app.bench.metrics import Truth
 from app.bench.rendering import MethodRig, Rendering
-from app.bench.results import EARLY_SHARE, BenchSettings, Curve, ReferenceInfo, Sample, SceneResult
+from app.bench.results import EARLY_SHARE, OTHER_MEASURES, BenchSettings, Curve, ReferenceInfo, Sample, SceneResult
 from app.bench.store import Store
 from app.bench.truth_picture import make_truth, truth_key
 from app.errors import UserError
@@ -154,6 +154,7 @@ class _SceneBench:
         """What all curves so far say about each other."""
         result = self._result
         result.time_to_equal_error = ratios_of(result.curves)
+        result.time_to_equal_other = {measure: ratios_of(result.curves, measure) for measure in OTHER_MEASURES}
         result.claims = claims_of(result)
         errors = [point.relmse for curve in result.curves for point in curve.points]
         assert result.reference is not None

@@ -1,4 +1,4 @@
-"""A scene's bench as a table on the screen: one line a method."""
+"""A scene's bench on the screen: a table with one line a method, then claims and what limits the figures."""
 
 from __future__ import annotations
 
@@ -32,6 +32,21 @@ def scene_table(scene: SceneResult) -> Table:
     return table
 
 
+def scene_lines(scene: SceneResult) -> list[str]:
+    """Times to equal error by the other measures, one line a claim, and notes."""
+    lines = []
+    if scene.time_to_equal_other and any(curve.method == "srd" for curve in scene.curves):
+        told = ", ".join(f"{measure} {ratio_text(ratios.get('srd'))}" for measure, ratios in scene.time_to_equal_other.items())
+        lines.append(f"  srd's time to the error that stochastic ends with, by other measures: {told}")
+    for claim in scene.claims:
+        lines.append(f"  {'holds' if claim.holds else 'FALLS SHORT'}: {claim.name}: {claim.asked}: {claim.measured}{f' ({claim.why})' if claim.why else ''}")
+    if scene.reference_too_coarse and scene.reference is not None:
+        lines.append(f"  note: the reference's own relMSE, {scene.reference.relmse:.2g}, is above a tenth of the smallest error; --reference-seconds lowers it")
+    if scene.picture_samples and all("flip" not in sample.metrics for sample in scene.picture_samples.values()):
+        lines.append("  note: FLIP is not available; 'pip install flip-evaluator' brings it, on Pythons that it has wheels for")
+    return lines
+
+
 def _ending(scene: SceneResult, curve: Curve) -> list[str]:
     last = curve.points[-1]
     total = last.bias2 + last.variance
@@ -42,8 +57,15 @@ def _ending(scene: SceneResult, curve: Curve) -> list[str]:
         f"{last.photons:,}",
         f"{100.0 * last.bias2 / total:.0f} %" if total > 0.0 else "–",
         f"{curve.slope:+.2f} ± {curve.slope_half_width:.2f}" if curve.slope_half_width > 0.0 else "–",
-        "not reached" if ratio is None else f"1/{ratio:.3g}" if ratio >= 1.0 else f"{1.0 / ratio:.3g}×",
+        ratio_text(ratio),
     ]
+
+
+def ratio_text(ratio: float | None) -> str:
+    """A time as a share of stochastic's: "1/33", "2×" where it is longer."""
+    if ratio is None:
+        return "not reached"
+    return f"1/{ratio:.3g}" if ratio >= 1.0 else f"{1.0 / ratio:.3g}×"
 
 
 def _error(error: float | None) -> str:

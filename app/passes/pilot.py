@@ -17,13 +17,13 @@ from app.gpu.records import MAX_BANDS
 from app.model.scene import Light, Scene
 from app.passes.emission_domain import EmissionDomain
 from app.passes.map_layout import Landings
-from app.passes.trace import Band, LatticeSlice, TracePass
+from app.passes.trace import Band, FluxTally, LatticeSlice, TracePass
 
 PHOTONS = 4096
 PLACES = (0.02, 0.25, 0.75, 0.98)
 """Spectral coordinates traced one by one."""
 MAX_DEPTH = 12
-"""Specular events of a pilot photon: what comes after them is too faint to fit anything to."""
+"""Specular events of a pilot photon: what comes after them is too faint to fit anything to, unless most light is still on its way then."""
 RIM = ((1.0, 0.5), (0.5, 1.0))
 """Places on an extended light, its middle being (0.5, 0.5)."""
 BAND_TOLERANCE = 0.25
@@ -62,19 +62,25 @@ def run_pilot(trace: TracePass, scene: Scene, light: int, domain: EmissionDomain
     # In as many slices as the batch asks for: what a pilot finds must not depend on it.
     slices = -(-count // trace.batch)
 
-    def traced(band: Band, place: tuple[float, float] = (0.5, 0.5)) -> np.ndarray:
-        raw = b""
+    def traced(band: Band, depth: int, place: tuple[float, float] = (0.5, 0.5)) -> tuple[np.ndarray, FluxTally]:
+        raw, tally = b"", FluxTally()
         for first in range(slices):
             points = len(range(first, count, slices))
-            batch = trace.run(LatticeSlice(light, (band,), count, first, slices, points, (0, 0), (0, 0), 0, 1, light_place=place), domain, MAX_DEPTH)
+            batch = trace.run(LatticeSlice(light, (band,), count, first, slices, points, (0, 0), (0, 0), 0, 1, light_place=place), domain, depth)
             raw += trace.photons.read(size=batch.photons * trace.photon.stride) if batch.photons else b""
-        return np.frombuffer(raw, trace.photon.dtype)
+            tally.merge(batch.tally)
+        return np.frombuffer(raw, trace.photon.dtype), tally
 
+    depth, everything = MAX_DEPTH, Band(0.0, 1.0, 0.5, power_w)
+    whole, tally = traced(everything, depth)
+    if tally.ended["lost_depth"] > tally.ended["deposited"]:
+        depth = trace.max_depth
+        whole, _ = traced(everything, depth)
     return Pilot(
         count,
-        traced(Band(0.0, 1.0, 0.5, power_w)),
-        [traced(Band(x, x, x, power_w)) for x in PLACES] if spectral else [],
-        [traced(Band(0.0, 1.0, 0.5, power_w), place) for place in RIM] if has_extent(scene.lights[light]) else [],
+        whole,
+        [traced(Band(x, x, x, power_w), depth)[0] for x in PLACES] if spectral else [],
+        [traced(everything, depth, place)[0] for place in RIM] if has_extent(scene.lights[light]) else [],
     )
 
 

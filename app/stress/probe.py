@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from app.model.scene import Scene
     from app.passes.trace import Batch
 
-SMALL = RenderSettings(width=160, height=90, photons=32_768, spp=2)
-"""What a sweep renders unless the case is about just that."""
+SMALL = RenderSettings(width=160, height=90, photons=32_768, spp=16)
+"""What a sweep renders unless the case is about just that. Fewer than 16 samples a pixel would miss texels of a sharp focus."""
 LOST_TO_NUMERICS = 1e-3
 """Largest share of the flux that may end for numerical reasons (cracks, overflows): a tenth of what a picture shows."""
 
@@ -42,6 +42,8 @@ class WatchedLight(LightHalf):
 
     def _account(self, batch: Batch) -> None:
         super()._account(batch)
+        if not batch.photons:
+            return
         photons = np.frombuffer(self.trace.photons.read(batch.photons * self.trace.photon.stride), self.trace.photon.dtype)
         self.watched += len(photons)
         dropped = (photons["flags"] & records.FLAG_FOOTPRINT_DROPPED) != 0

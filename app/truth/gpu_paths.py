@@ -86,29 +86,30 @@ class Photons:
 
     def of_choices(self, *choices: int) -> Photons:
         """Those whose path took these choices, one an event (`REFLECTED`, …)."""
-        keys = {int(band): branch_key(choices, int(band)) for band in np.unique(self._band)}
-        return self.where(self.records["branch_key"] == np.array([keys[int(band)] for band in self._band], np.uint32))
+        keys = {int(band): branch_key(choices, int(band)) for band in np.unique(self.band)}
+        return self.where(self.records["branch_key"] == np.array([keys[int(band)] for band in self.band], np.uint32))
 
     def choices(self, longest: int) -> list[tuple[int, ...]]:
         """Each photon's choices, at most `longest` of them; KeyError where a path made more."""
         table = {}
-        for band in np.unique(self._band).tolist():
+        for band in np.unique(self.band).tolist():
             keys = {(): branch_key((), band)}
             for _ in range(longest):
                 keys = {(*path, c): int(hash_combine(key, c)) for path, key in keys.items() for c in (REFLECTED, REFRACTED, MIRRORED, CUT_LOW, CUT_HIGH)}
                 table |= {(band, key): path for path, key in keys.items()}
-        return [table[int(band), int(key)] for band, key in zip(self._band, self.records["branch_key"], strict=True)]
+        return [table[int(band), int(key)] for band, key in zip(self.band, self.records["branch_key"], strict=True)]
 
     def of_band(self, band: int) -> Photons:
         """Those of one of the bands that were asked for."""
-        return self.where(self._band == band)
+        return self.where(self.band == band)
 
     def where(self, chosen: np.ndarray) -> Photons:
         names = ("records", "q", "start", "direction", "position", "dposition_ds", "dposition_dt", "dposition_dvar", "weight", "nm")
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
     @property
-    def _band(self) -> np.ndarray:
+    def band(self) -> np.ndarray:
+        """Number of each photon's band among those asked for (N,)."""
         return self.records["light_and_source"] >> 8 & 0xFF
 
 

@@ -17,6 +17,7 @@ from app.model.primitives import slab
 from app.model.primitives_round import sphere as sphere_mesh
 from app.passes.emission_domain import orthonormal_frame
 from app.truth import glasses
+from app.truth.far_field import outgoing
 from app.truth.glasses import C_NM, D_NM, F_NM
 from app.truth.gpu_paths import Photons, extruded, glass, screen, trace_beam
 from app.truth.optics import dot, unit
@@ -50,28 +51,18 @@ def in_plane(angle_rad: float) -> np.ndarray:
     return np.array([np.cos(angle_rad), np.sin(angle_rad), 0.0])
 
 
-def by_start(photons: Photons) -> Photons:
-    return photons.where(np.argsort(photons.records["photon_id"]))
-
-
 def across_prism(gl: Context, name: str, incidence: float, nm: float, around: float) -> tuple[np.ndarray, np.ndarray]:
     """(headings, d(heading)/dn) of all photons that go straight through the prism of T2; screens face `around`."""
     middle = np.array([-np.sin(APEX / 2) / 2, np.cos(APEX / 2) / 2, 0])
     direction = in_plane(incidence - APEX / 2)
-    near, far = (
-        by_start(
-            trace_beam(
-                gl, extruded("prism", tilted_section(APEX)), glass(name), screen(distance * in_plane(around), in_plane(around)),
-                middle - direction, direction, 0.04, nm,
-            ).of_depth(2)
-        )
-        for distance in (1.5, 5.5)
-    )  # fmt: skip
-    assert len(near.records) > 100
-    assert np.array_equal(near.records["photon_id"], far.records["photon_id"])
-    way, dway = far.position - near.position, far.dposition_dn - near.dposition_dn
-    heading = np.arctan2(way[:, 1], way[:, 0])
-    return heading, (way[:, 0] * dway[:, 1] - way[:, 1] * dway[:, 0]) / (way[:, 0] ** 2 + way[:, 1] ** 2)
+    prism = extruded("prism", tilted_section(APEX))
+
+    def traced_onto(target: Mesh) -> Photons:
+        return trace_beam(gl, prism, glass(name), target, middle - direction, direction, 0.04, nm).of_depth(2)
+
+    rays = outgoing(traced_onto, in_plane(around), 1.5, 5.5)
+    assert len(rays.heading) > 100
+    return rays.heading, rays.dheading_dn[:, 0]
 
 
 @pytest.mark.parametrize(
@@ -269,7 +260,7 @@ def test_the_same_scene_elsewhere_and_in_other_units(gl, scale: float, offset: f
         ).of_depth(2)
         for m in (np.eye(4), matrix)
     )  # fmt: skip
-    plain, moved = by_start(plain), by_start(moved)
+    plain, moved = (photons.where(np.argsort(photons.records["photon_id"])) for photons in (plain, moved))
     assert np.array_equal(plain.records["photon_id"], moved.records["photon_id"])
     assert len(plain.records) > 200
     assert np.abs((moved.start - centre) / scale - plain.start).max() < 1e-10

@@ -12,7 +12,7 @@ import pytest
 
 from app import cli_bench
 from app.__main__ import main
-from app.bench import runner
+from app.bench import runner, screen
 from app.bench.results import BenchSettings, Curve, Point, Sample, SceneResult
 from app.errors import UserError
 
@@ -161,8 +161,9 @@ def test_features_has_its_own_command(monkeypatch: pytest.MonkeyPatch, tmp_path:
 
 def test_notes_under_the_table() -> None:
     sample = Sample(1, 1, 1, 1, {}, {"relmse": 0.1})
-    scene: Any = SimpleNamespace(claims=[], reference_too_coarse=True, reference=SimpleNamespace(relmse=0.02), picture_samples={"srd": sample})
-    coarse, flip = cli_bench.claim_lines(scene)
+    scene: Any = SimpleNamespace(claims=[], time_to_equal_other={"nrmse": {"srd": 33.0}, "chroma": {}}, curves=[Curve("srd", {}, [])], reference_too_coarse=True, reference=SimpleNamespace(relmse=0.02), picture_samples={"srd": sample})
+    other, coarse, flip = screen.scene_lines(scene)
+    assert "nrmse 1/33, chroma not reached" in other
     assert "above a tenth" in coarse and "--reference-seconds" in coarse and "flip-evaluator" in flip
     sample.metrics["flip"] = 0.1
-    assert len(cli_bench.claim_lines(scene)) == 1
+    assert len(screen.scene_lines(scene)) == 2

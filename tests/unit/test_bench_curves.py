@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.bench.claims import claims_of, ratios_of
-from app.bench.curves import complete_curve, error_at_time, photons_at_time, speed_up, tail_slope, time_to_error
+from app.bench.curves import complete_curve, error_at_time, photons_at_time, points_by, speed_up, tail_slope, time_to_error
 from app.bench.metrics import Truth
 from app.bench.results import Claim, Curve, Point, ReferenceInfo, Sample, SceneResult
 
@@ -53,6 +53,17 @@ def test_a_curve_that_never_gets_there_and_one_that_is_there_at_once() -> None:
     at_once = speed_up(law(1e-6), slow)
     assert at_once is not None and at_once.at_once and at_once.seconds == pytest.approx(slow[-1].seconds / slow[0].seconds)
     assert speed_up(law(1.0), []) is None and time_to_error([], 1.0) is None
+
+
+def test_ratios_by_another_measure() -> None:
+    def measured(method: str, scale: float) -> Curve:
+        plain = curve(method, law(1.0))
+        plain.samples = [Sample(s.photons, s.seed, 1, 1, s.seconds, {"nrmse": scale * (1.5 if s.seed == 1 else 0.875) * RATE / s.photons}) for s in plain.samples]
+        return plain
+
+    curves = [measured("stochastic", 1.0), measured("srd", 0.05)]
+    assert points_by(curves[0], "nrmse")[-1].relmse == pytest.approx(RATE / BUDGETS[-1])
+    assert ratios_of(curves, "nrmse")["srd"] == pytest.approx(20.0) and ratios_of(curves)["srd"] == pytest.approx(1.0)
 
 
 def test_a_lucky_point_gains_nothing() -> None:
