@@ -90,7 +90,12 @@ void main()
         ray.x_anchor = band.z;
 #ifdef RANDOM_WAVELENGTH
         // Uniform over the band; a laser's band has no width, and its photons all have its wavelength.
-        ray.x_anchor = mix(band.x, band.y, kronecker(id, 3774877043u, p.shift_spectral));
+#ifdef EVEN_WAVELENGTHS
+        float place_in_band = kronecker(id, 3774877043u, p.shift_spectral);
+#else
+        float place_in_band = unit_float(hash_combine(hash_combine(p.shift_spectral, p.light), id));
+#endif
+        ray.x_anchor = mix(band.x, band.y, place_in_band);
         ray.x_lo = ray.x_anchor;
         ray.x_hi = ray.x_anchor;
         float width = band.y - band.x;

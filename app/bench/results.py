@@ -7,7 +7,7 @@ import msgspec
 PHOTON_STAGES = ("trace", "splat", "resolve")
 """Stages whose sum is photon time: emission and tracing, footprints and drawing, putting the maps together."""
 
-DEFAULT_METHODS = ("stochastic", "stochastic-point", "regular-7", "regular-16", "srd-lambda", "srd")
+DEFAULT_METHODS = ("stochastic", "stochastic-even", "stochastic-point", "regular-7", "regular-16", "srd-lambda", "srd")
 
 OTHER_MEASURES = ("relmse_lit", "relmse_trimmed", "nrmse", "smape", "chroma")
 """Measures beside relMSE by which times to equal error are told, so that no conclusion hangs on one."""

@@ -281,6 +281,8 @@ class TracePass:
             defines = self._defines | {f"LIGHT_{kind.upper()}": 1}
             if self._features.point_spectrum and self._features.random_wavelength:
                 defines["RANDOM_WAVELENGTH"] = 1
+                if self._features.even_wavelengths:
+                    defines["EVEN_WAVELENGTHS"] = 1
             self._emit[kind] = shader.compute(self.context.ctx, "emit.comp", defines, (*self._structs, records.EMIT_PARAMETERS))
         return self._emit[kind]
 
