@@ -156,6 +156,19 @@ def bench(
     raise typer.Exit(bench_command(request, _print))
 
 
+@app.command()
+def stress(
+    scenes: Annotated[list[str] | None, typer.Argument(metavar="[SCENE]...", help="Sweep these scenes; default: all stiff cases, and a sweep over shipped scenes.")] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder for stress.json and stress.html.")] = None,
+    cases: Annotated[Text, typer.Option(metavar="A,B", help="Only these cases; 'prism/' is all of that scene's.")] = None,
+    list_cases: Annotated[bool, typer.Option("--list", help="List the cases with their number of severities, and measure nothing.")] = False,
+) -> None:
+    """Measure stiff and extreme cases against their promises; exits with 1 where one is broken."""
+    from app.cli_stress import StressRequest, stress_command
+
+    raise typer.Exit(stress_command(StressRequest(tuple(scenes or ()), output, cases, list_cases), _print))
+
+
 @app.command("bench-speed")
 def bench_speed() -> None:
     """Measure tracing, splatting, tree building, memory and the warm start on this machine."""

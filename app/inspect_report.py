@@ -48,7 +48,7 @@ def inspect_text(scene: Scene) -> RenderableType:
     glasses = list(dict.fromkeys(o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)))
     if glasses:
         parts.insert(2, _glasses_table(glasses))
-    parts.append(_features_table(scene))
+    parts += _compiled(scene)
     parts += [f"Note: {note}" for note in scene.notes]
     return Group(*parts)
 
@@ -150,15 +150,18 @@ def _lights_table(lights: tuple[Light, ...]) -> Table:
     return table
 
 
-def _features_table(scene: Scene) -> Table:
+def _compiled(scene: Scene) -> list[RenderableType]:
     from app.model.features import Features, explain
     from app.model.settings import RenderSettings
+    from app.static_costs import RecordSizes, static_costs
 
     settings = RenderSettings(width=scene.render.width, height=scene.render.height, max_depth=scene.render.max_depth)
-    table = _table("Compiled into the programs", ("part", False), ("", False), ("why", False))
-    for name, included, reason in explain(scene, Features.of(scene, settings)):
-        table.add_row(name, "in" if included else "out", reason)
-    return table
+    features = Features.of(scene, settings)
+    costs = static_costs(scene, features)
+    table = _table("Compiled into the programs", ("part", False), ("", False), ("why", False), ("costs", False))
+    for name, included, reason in explain(scene, features):
+        table.add_row(name, "in" if included else "out", reason, costs.get(name, ""))
+    return [table, f"{RecordSizes.of(features).words()} What each part costs in time: bench --features."]
 
 
 # -- words --------------------------------------------------------------------------------

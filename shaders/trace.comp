@@ -265,8 +265,8 @@ void main()
             ray.light_and_source = (ray.light_and_source & 0xffffu) | (object << 16);
 
 #ifdef NORMAL_DERIVATIVES
-        vec3 dnormal[COLUMNS];
-        for (int c = 0; c < COLUMNS; ++c) dnormal[c] = vec3(0.0);
+        vec3 normal_columns[COLUMNS];
+        for (int c = 0; c < COLUMNS; ++c) normal_columns[c] = vec3(0.0);
         if (smooth_facet) {
             vec3 gradient_u, gradient_v;
             barycentric_gradients(facet.edge1, facet.edge2, gradient_u, gradient_v);
@@ -275,10 +275,10 @@ void main()
             for (int c = 0; c < COLUMNS; ++c) {
                 vec3 dp = ray.dposition[c].xyz;
                 vec3 dsummed = dot(gradient_u, dp) * (n1 - n0) + dot(gradient_v, dp) * (n2 - n0);
-                dnormal[c] = sign_n * normalised_derivative(summed, dsummed);
+                normal_columns[c] = sign_n * normalised_derivative(summed, dsummed);
             }
         }
-#define NORMAL_COLUMN(c) dnormal[c]
+#define NORMAL_COLUMN(c) normal_columns[c]
 #else
 #define NORMAL_COLUMN(c) vec3(0.0)
 #endif

@@ -113,12 +113,15 @@ def photons_at_time(points: Sequence[Point], seconds: float) -> int:
 
 
 def speed_up(points: Sequence[Point], baseline: Sequence[Point]) -> Reached | None:
-    """How many times sooner `points` reach the error that `baseline` ends with, as `Reached` whose seconds are the
-    ratio; `at_once` then means "at least". None when they never get there."""
-    if not baseline:
+    """How many times sooner than `baseline` `points` reach the error that `baseline` ends with, as `Reached` whose seconds
+    are the ratio; `at_once` then means "at least". None when they never get there.
+
+    A baseline that stopped improving is given the time at which it got there, not its last."""
+    own = time_to_error(baseline, baseline[-1].relmse) if baseline else None
+    reached = time_to_error(points, baseline[-1].relmse) if baseline else None
+    if own is None or reached is None:
         return None
-    reached = time_to_error(points, baseline[-1].relmse)
-    return None if reached is None else Reached(baseline[-1].seconds / reached.seconds, reached.at_once)
+    return Reached(own.seconds / reached.seconds, reached.at_once)
 
 
 def _log(error: float) -> float:

@@ -96,7 +96,8 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
         case "band cuts":
             return asked, Variant(scene, uncut), ""
         case "spatial columns":
-            return asked, Variant(scene, replace(base, footprints=False, normal_derivatives=base.smooth_normals and base.spectral_groups > 0)), "without them every splat is one texel"
+            bare = replace(plain, footprints=False, normal_derivatives=False)
+            return Variant(scene, plain), Variant(scene, bare), "without them every splat is one texel; both without spectral columns"
         case "normal derivatives":
             return asked, Variant(scene, replace(base, normal_derivatives=False)), "without them footprints are wrong, but light goes the same ways"
         case "absorption":

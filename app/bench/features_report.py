@@ -113,8 +113,8 @@ def _heading(report: FeatureReport) -> str:
 
 def _reading(report: FeatureReport) -> str:
     return (
-        "Percentages are of the time without the feature: the median over turns with and without, then the interval of the median "
-        f"({'96 %' if report.repeats == 9 else 'extremes inside'}). An interval on both sides of 0 means that no cost was found."
+        "Percentages are of the time without the feature: the median over turns with and without, then the interval that holds "
+        "the true median with 95 %. An interval on both sides of 0 means that no cost was found."
     )
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.bench import report_style as style
-from app.bench.curves import speed_up
+from app.bench.curves import speed_up, time_to_error
 from app.bench.report_text import number, ratio_text, superscript
 from app.bench.results import Curve, SceneResult
 
@@ -30,11 +30,11 @@ BASELINE = "stochastic"
 
 @dataclass(frozen=True)
 class Series:
-    """What can be drawn of one curve; float64 arrays of one length, rising in `x`."""
+    """What can be drawn of one curve; float64 arrays of one length, by rising number of photons (the last is the longest rendering)."""
 
     method: str
     x: np.ndarray
-    """Photon seconds or photons, > 0."""
+    """Photon seconds or photons, > 0; on a busy machine seconds need not rise."""
     mean: np.ndarray
     low: np.ndarray
     high: np.ndarray
@@ -43,8 +43,8 @@ class Series:
 
 def series(curve: Curve, abscissa: str) -> Series:
     """The finite points of `curve` over `abscissa` ("seconds" or "photons")."""
-    rows = [(float(getattr(p, abscissa)), p.relmse, p.relmse_low, p.relmse_high) for p in curve.points]
-    rows = sorted(row for row in rows if row[0] > 0 and all(math.isfinite(value) for value in row))
+    rows = [(float(getattr(p, abscissa)), p.relmse, p.relmse_low, p.relmse_high) for p in sorted(curve.points, key=lambda p: p.photons)]
+    rows = [row for row in rows if row[0] > 0 and all(math.isfinite(value) for value in row)]
     x, mean, low, high = np.array(rows, float).reshape(-1, 4).T
     return Series(curve.method, x, mean, low, high)
 
@@ -75,7 +75,7 @@ def error_against(scene: SceneResult, abscissa: str) -> Figure:
         draw_series(axes, one)
     _draw_reference_error(axes, own)
     if abscissa == "seconds":
-        draw_ratio_arrow(axes, scene, drawn, named=True)
+        draw_ratio_arrow(axes, scene, named=True)
     label_ends(axes, drawn)
     return figure
 
@@ -165,13 +165,14 @@ def _draw_reference_error(axes: Axes, own: float) -> None:
     )  # fmt: skip
 
 
-def draw_ratio_arrow(axes: Axes, scene: SceneResult, drawn: Sequence[Series], named: bool) -> None:
+def draw_ratio_arrow(axes: Axes, scene: SceneResult, named: bool) -> None:
     """From the end of `stochastic` to where `srd` reaches that error: the ratio that counts, to be seen as a length."""
     ratio = scene.time_to_equal_error.get("srd", 0.0)
-    base = next((one for one in drawn if one.method == BASELINE), None)
-    if base is None or not ratio > 1.2 or not base.mean[-1] > 0 or not math.isfinite(ratio):
+    points = next((curve.points for curve in scene.curves if curve.method == BASELINE), [])
+    own = time_to_error(points, points[-1].relmse) if points else None
+    if own is None or not 1.2 < ratio < math.inf or not 0 < points[-1].relmse < math.inf:
         return
-    end_s, error = float(base.x[-1]), float(base.mean[-1])
+    end_s, error = own.seconds, points[-1].relmse
     reached_s = max(end_s / ratio, axes.get_xlim()[0])
     colour = style.method_style("srd").colour
     axes.annotate(

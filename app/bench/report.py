@@ -1,7 +1,8 @@
 """Writes what a bench run has found: plots as PNG and SVG, and one page that stands alone.
 
     DIR/plots/SCENE_error_time.png .svg    DIR/plots/SCENE_error_photons.png .svg
-    DIR/plots/overview.png .svg            DIR/report.html
+    DIR/plots/overview.png .svg            DIR/plots/scenes.png .svg (the README's figure)
+    DIR/report.html
 
 A run that was stopped can be reported as well: what is missing is named where it would stand.
 """
@@ -39,6 +40,7 @@ def write_report(result: BenchResult, directory: Path) -> None:
             sections.append(report_scene.section(scene, f"scene-{name}", _curve_plots(scene, name, plots), directory))
         document = report_style.save(overview(result), plots / "overview")
         glance = report_scene.inlined(document, "overview", "time to equal error of each method in each scene, as a ratio to stochastic")
+        readme_plot(result, plots / "scenes")
         progress(1.0, "page")
     body = [
         report_sections.header(result), report_sections.contents(result, [f"scene-{name}" for name in names]), report_sections.claims(result, glance),
@@ -48,12 +50,10 @@ def write_report(result: BenchResult, directory: Path) -> None:
         temporary.write_text(page(f"Error against run time, SpectraSplat {result.version}", body), encoding="utf-8")
 
 
-def readme_plot(result: BenchResult, path: Path) -> None:
-    """Write the README's figure, error against time of `stochastic`, `srd-lambda` and `srd` in each scene; the suffix (.png, .svg) is the format."""
+def readme_plot(result: BenchResult, stem: Path) -> None:
+    """Write the README's figure, error against time of `stochastic`, `srd-lambda` and `srd` in each scene, to `stem`.png and `stem`.svg."""
     with report_style.plot_style():
-        figure = small_multiples(result)
-        with atomic_output(path) as temporary:
-            figure.savefig(temporary, dpi=160)
+        report_style.save(small_multiples(result), stem)
 
 
 def _curve_plots(scene: SceneResult, name: str, plots: Path) -> dict[str, Html]:
@@ -71,7 +71,7 @@ def file_names(scenes: list[str]) -> list[str]:
     for scene in scenes:
         base = re.sub(r"[^A-Za-z0-9_-]+", "_", scene)[:60].strip("_") or "scene"
         name, count = base, 1
-        while name in taken or name == "overview":
+        while name in taken or name in ("overview", "scenes"):
             count += 1
             name = f"{base}_{count}"
         taken.append(name)

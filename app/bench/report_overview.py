@@ -37,13 +37,13 @@ def overview(result: BenchResult) -> Figure:
     axes.axvspan(ASKED_RATIO, right, color=style.WASH, lw=0, zorder=0)
     axes.axvline(ASKED_RATIO, color=style.INK, lw=1.2, zorder=2)
     axes.axvline(1.0, color=style.MUTED, lw=0.8, ls=(0.0, (3.0, 2.0)), zorder=1)
-    notes = [(ASKED_RATIO, "asked of srd: 1/30 of the time", style.INK), (1.0, "as fast as stochastic", style.MUTED)]
+    notes = [(right, "asked of srd: at most 1/30 of the time", style.INK), (1.0, "as fast as stochastic", style.MUTED)]
     if any(_ratio(scene, curve.method) is None for scene in scenes for curve in scene.curves if curve.method != BASELINE):
         notes.append((left * _NEVER_PLACE, "never", style.MUTED))
     for x, text, colour in notes:
         axes.annotate(
-            text, (x, 1), xycoords=("data", "axes fraction"), xytext=(3 if x == ASKED_RATIO else 0, 3), textcoords="offset points",
-            ha="left" if x == ASKED_RATIO else "center", va="bottom", fontsize=8, color=colour,
+            text, (x, 1), xycoords=("data", "axes fraction"), xytext=(0, 3), textcoords="offset points",
+            ha="right" if x == right else "center", va="bottom", fontsize=8, color=colour,
         )  # fmt: skip
     style.title(axes, "Time to equal error", " ")
     for row, scene in enumerate(scenes):
@@ -67,7 +67,7 @@ def _draw_ratios(axes: Axes, row: int, scene: SceneResult, left: float) -> None:
             mfc=look.colour if reached else style.PAPER, mec=look.colour if not strong or not reached else style.PAPER, mew=1.0,
         )  # fmt: skip
         if strong and ratio is not None:
-            axes.annotate(ratio_text(ratio, is_lower_bound(scene, "srd")), (x, row), xytext=(8, 0), textcoords="offset points", va="center", color=look.colour,
+            axes.annotate(ratio_text(ratio, is_lower_bound(scene, "srd")), (x, row), xytext=(0, 5), textcoords="offset points", ha="center", color=look.colour,
                           fontweight="bold", fontsize=9, zorder=14)  # fmt: skip
 
 
@@ -139,7 +139,7 @@ def small_multiples(result: BenchResult) -> Figure:
 def _draw_panel(axes: Axes, scene: SceneResult, drawn: Sequence[Series], named: bool) -> None:
     for one in drawn:
         draw_series(axes, one, markers=False)
-    draw_ratio_arrow(axes, scene, drawn, named=False)
+    draw_ratio_arrow(axes, scene, named=False)
     if named:
         label_ends(axes, drawn)
     axes.set_title(scene.scene, loc="left", fontsize=10, fontweight="bold", pad=5)

@@ -49,8 +49,9 @@ def bias_and_variance(scene: SceneResult) -> Figure | None:
 
 
 def _parts(curve: Curve) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Photon seconds, bias² and variance of the points that are finite, rising in time."""
-    rows = sorted((p.seconds, p.bias2, p.variance) for p in curve.points if p.seconds > 0 and math.isfinite(p.bias2 + p.variance))
+    """Photon seconds, bias² and variance of the points that are finite, by rising number of photons."""
+    order = sorted(curve.points, key=lambda p: p.photons)
+    rows = [(p.seconds, p.bias2, p.variance) for p in order if p.seconds > 0 and math.isfinite(p.bias2 + p.variance)]
     seconds, bias2, variance = np.array(rows, float).reshape(-1, 3).T
     return seconds, bias2, variance
 

@@ -15,7 +15,7 @@ from app.bench import report_text as text
 from app.bench.metrics import EPSILON_SHARE
 from app.bench.plots import BASELINE, is_lower_bound
 from app.bench.report_html import Html, element, figure, table
-from app.bench.results import EARLY_SHARE, PHOTON_STAGES, Curve, Point, SceneResult
+from app.bench.results import EARLY_SHARE, OTHER_MEASURES, PHOTON_STAGES, Curve, Point, SceneResult
 
 
 def section(scene: SceneResult, anchor: str, curve_svgs: Mapping[str, Html], directory: Path) -> Html:
@@ -29,6 +29,7 @@ def section(scene: SceneResult, anchor: str, curve_svgs: Mapping[str, Html], dir
         element("div", [element("p", warning) for warning in warnings], cls="warning") if warnings else None,
         element("div", [figure(svg) for svg in curve_svgs.values()], cls="two"),
         _speed_table(scene),
+        _other_measures_table(scene),
         _bias_figure(scene, anchor),
         _error_table(scene),
         _pictures(scene, directory),
@@ -87,12 +88,31 @@ def _speed_table(scene: SceneResult) -> Html:
     )  # fmt: skip
 
 
+def _other_measures_table(scene: SceneResult) -> Html | None:
+    """Time ratios by every measure, so that none is trusted alone."""
+    measures = [name for name in OTHER_MEASURES if name in scene.time_to_equal_other]
+    if not measures:
+        return None
+    columns = [scene.time_to_equal_error, *(scene.time_to_equal_other[name] for name in measures)]
+    rows = [[_name(c.method), *(_ratio_or_never(column.get(c.method)) for column in columns)] for c in _curves(scene) if c.method != BASELINE]
+    headings = [text.MEASURES.get(name, name) for name in measures]
+    return table(("time ratio by", "relMSE", *headings), rows, "The same ratio by other measures: a finding that hangs on one measure is none.")
+
+
+def _ratio_or_never(ratio: float | None) -> str:
+    return text.ratio_text(ratio) if ratio is not None and math.isfinite(ratio) and ratio > 0 else "never"
+
+
 def _bias_figure(scene: SceneResult, anchor: str) -> Html | None:
     drawn = report_plots.bias_and_variance(scene)
     if drawn is None:
         return None
     svg = inlined(report_style.svg_text(drawn), f"{anchor}-bias", f"{scene.scene}: bias squared and variance of each method against photon time")
-    return figure(svg, "relMSE told apart: variance falls with more photons, bias² stays. A hollow triangle means that no bias could be detected there.")
+    caption = (
+        "relMSE told apart: variance is what differs between seeds, bias² what all seeds share, such as footprints and bands that are too wide. "
+        "A hollow triangle means that no bias could be detected there."
+    )
+    return figure(svg, caption)
 
 
 def _error_table(scene: SceneResult) -> Html:
@@ -230,6 +250,6 @@ def _scale(limit: float) -> Html:
 def _caption(exposure: float) -> str:
     return (
         f"All pictures at one exposure ({exposure:+.1f} EV) chosen for the reference, and the part chosen on the reference alone, where light and "
-        "structure are richest. Whole pictures are means of 2×2 pixels. Signed error is (Y − R) / √(R² + ε), luminance, the same scale for all, full resolution; "
-        "colours follow the root of its size, and the mean of its square is the luminance's part of relMSE. Measures are of the one picture shown."
+        "structure are richest. Whole pictures are means of 2×2 pixels. Signed error is (Y − R) / √(R² + ε), luminance, the same scale for all, full "
+        "resolution; colours follow the root of its size, and the mean of its square is the luminance's part of relMSE. Measures are of the one picture shown."
     )

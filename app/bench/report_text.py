@@ -5,6 +5,7 @@ Plain text only; `report_html` escapes it.
 
 from __future__ import annotations
 
+import itertools
 import math
 import statistics
 
@@ -26,6 +27,7 @@ METRICS = {
     "relMSE": "mean over pixels and over X, Y, Z of (I − R)² / (R² + ε), I the picture, R the reference, ε = 10⁻² · (mean R)². "
     "The reference's own variance is taken off.",
     "relMSE trimmed": "the same without the 0.1 % of pixels with the largest error: what single fireflies cannot sway.",
+    "relMSE lit": "the same with ε from the mean of the lit pixels, so that a dark frame around the caustic does not weigh.",
     "bias² and variance": "relMSE told apart over n seeds: bias² = mean[((Ī − R)² − Var/n) / (R² + ε)] with Ī the mean picture, "
     "variance = mean[Var / (R² + ε)]. An estimate of bias² at or below zero means that no bias could be detected.",
     "SMAPE": "mean of |I − R| / (|I| + |R| + √ε), 0 to 1.",
@@ -38,6 +40,9 @@ METRICS = {
     "time to equal error": "time that stochastic needs for its longest rendering, over the time that the method needs to reach the same mean error, "
     "read off the curves by log-log interpolation. ≥ marks a method whose shortest rendering is already better.",
 }
+
+MEASURES = {"relmse_lit": "relMSE lit", "relmse_trimmed": "relMSE trimmed", "nrmse": "nRMSE", "smape": "SMAPE", "chroma": "Δu'v'"}
+"""Names of `results.OTHER_MEASURES` as the reader sees them."""
 
 STAGES = {
     "trace": "emission and tracing of photons",
@@ -63,6 +68,8 @@ NOT_COVERED = {
 }
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+BUSY_SHARE = 0.9
+"""A larger budget that took less than this times the time of the one before it gives a busy machine away."""
 REFERENCE_SHARE = 0.1
 """A reference's own error above this share of the smallest error measured calls for a warning."""
 
@@ -127,6 +134,12 @@ def warnings_of(scene: SceneResult) -> list[str]:
         told.append("The reference's own error is above a tenth of the smallest error reported.")
     if any(p.relmse <= 0 for c in scene.curves for p in c.points):
         told.append("Where a debiased error is zero or below, the picture cannot be told from the reference; the plots show a hollow triangle on the floor.")
+    busy = [curve.method for curve in scene.curves if _times_fall(curve)]
+    if busy:
+        told.append(
+            f"Photon time does not rise with the number of photons for {', '.join(busy)}: the machine was busy with other work, so times and time ratios "
+            "here are rough. Errors against photons are not touched by that."
+        )
     unfinished = [curve.method for curve in scene.curves if not curve.points]
     if unfinished:
         told.append(f"No finished point yet: {', '.join(unfinished)}.")
@@ -135,6 +148,12 @@ def warnings_of(scene: SceneResult) -> list[str]:
     if scene.seeds < 5:
         told.append(f"Only {seeds_text(scene.seeds)}: the band over seeds and the parting of bias and variance are weak; the protocol asks for five.")
     return told
+
+
+def _times_fall(curve: Curve) -> bool:
+    """Whether more photons once took clearly less time."""
+    seconds = [point.seconds for point in sorted(curve.points, key=lambda point: point.photons)]
+    return any(later < BUSY_SHARE * earlier for earlier, later in itertools.pairwise(seconds))
 
 
 def headline(result: BenchResult) -> list[str]:

@@ -29,7 +29,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "refraction": ("refract_direction", "fresnel_reflectance", "transmitted_cosine2", "medium_index", "cross_boundary", "cross_glass", "INDEX_ROW"),
     "mirrors": ("KIND_MIRROR",),
     "interpolated normals": ("corner_normal", "smooth_facet", "summed", "NORMALS_AT"),
-    "normal derivatives": ("barycentric_gradients", "normalised_derivative", "dnormal", "dsummed"),
+    "normal derivatives": ("barycentric_gradients", "normalised_derivative", "normal_columns", "dsummed"),
     "absorption": ("medium_weight_row", "alpha", "filling"),
     "medium stack": ("medium_of", "stack_objects", "STACK_OBJECTS", "mask_before"),
     "triangle tree": ("intersect_tree", "box_entry", "LEAF_BIT", "TREE_AT", "TREE_STACK"),

@@ -292,8 +292,9 @@ class EyePass:
             elapsed = time.perf_counter() - start
             self._samples_of_row[row : row + rows] += 1
             row += rows
-            fitting = self._rows_a_dispatch * _TARGET_SECONDS / max(elapsed, 1e-4)
-            self._rows_a_dispatch = int(np.clip(fitting // _GROUP * _GROUP, _GROUP, max(_GROUP, 4 * self._rows_a_dispatch)))
+            fitting = rows * _TARGET_SECONDS / max(elapsed, 1e-4)
+            most = min(4 * self._rows_a_dispatch, -(-height // _GROUP) * _GROUP)
+            self._rows_a_dispatch = int(np.clip(fitting // _GROUP * _GROUP, _GROUP, max(_GROUP, most)))
             yield row / height
 
     def _read(self) -> np.ndarray:

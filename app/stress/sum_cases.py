@@ -65,7 +65,7 @@ def measure_one_texel(context: Context) -> Iterator[Measurement]:
 
 
 def measure_one_chunk(context: Context) -> Iterator[Measurement]:
-    for side in (64, 510, 1022, 2046):
+    for side in (64, 1022, 2046):
         rig = Rig(context.ctx, PLAIN, size=(side, side))
         count = int(np.clip((side + 2) ** 2 // 16, 2048, CHUNK))
         rng = np.random.default_rng(7)
@@ -83,8 +83,7 @@ def measure_one_chunk(context: Context) -> Iterator[Measurement]:
                 "photons that differ": (np.array([abs(mixed / (power * share.sum()) - 1.0)]), 5.0 * np.sqrt(count) * HALF + 8.0 * EPSILON),
             }
         )
-        rig_note = f"map of {side}² texels"
-        yield Measurement(float(count), f"{count:,} photons", not_finite([np.array([same, mixed])]), errors, bounds, note=rig_note)
+        yield Measurement(float(count), f"{count:,} photons", not_finite([np.array([same, mixed])]), errors, bounds, note=f"map of {side}² texels")
 
 
 def broken_records(value: float) -> np.ndarray:
@@ -100,7 +99,8 @@ def broken_records(value: float) -> np.ndarray:
 
 def measure_overflow(context: Context) -> Iterator[Measurement]:
     rig = Rig(context.ctx, PLAIN, size=(32, 16))
-    for value in (1.0, 1e10, 1e20, 1e30, 1e38, -1e38, float("inf"), float("-inf"), float("nan")):
+    severe = {1.0: 1.0, 1e10: 1e10, 1e20: 1e20, 1e30: 1e30, 1e38: 1e38, -3e38: 3e38, float("inf"): 1e39, float("-inf"): 1e40, float("nan"): 1e41}
+    for value, severity in severe.items():
         records = broken_records(value)
         image = rig.draw(records)
         sound = np.isfinite(value) and abs(value) < EXTENT_LIMIT
@@ -115,7 +115,7 @@ def measure_overflow(context: Context) -> Iterator[Measurement]:
             }
         )
         yield Measurement(
-            min(abs(value), 1e39) if not np.isnan(value) else 1e40,
+            severity,
             f"{value:g}",
             not_finite([image]),
             errors,
@@ -142,13 +142,13 @@ CASES = (
         "Equal photons on one texel all round alike and may lose n · 2^-24; photons that differ lose its root.",
         "photons between two flushes",
         measure_one_chunk,
-        steps=4,
+        steps=3,
     ),
     Case(
         "overflow",
         "Columns of 1e10, 1e38, infinity and NaN",
         "A photon whose columns overflowed has lost its shape, not its light: it is drawn as one texel, and counted.",
-        "value put into a column",
+        "value put into a column (infinite from 1e39, NaN 1e41)",
         measure_overflow,
         steps=9,
     ),

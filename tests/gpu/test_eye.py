@@ -234,6 +234,15 @@ def test_launches_accumulate_and_repeat_bit_for_bit(gl, monkeypatch):
     assert np.abs(both - converged).mean() < 0.85 * np.abs(first - converged).mean()
 
 
+def test_rows_of_a_dispatch_stay_within_the_picture(gl):
+    """They once grew fourfold with every quick sample, until after some 500 of them they were no number any more."""
+    eye = eye_pass(gl, [floor()])
+    eye.run(ABOVE, 16, 12, 6)
+    assert 8 <= eye._rows_a_dispatch <= 16
+    eye.release()
+    eye.scene.release()
+
+
 def test_a_stop_keeps_what_is_there(gl, monkeypatch):
     eye = eye_pass(gl, [floor()], background=(3, 3, 3), camera=ABOVE)
     seen = []

@@ -22,6 +22,7 @@ from app.truth import glasses
 from app.truth.curved_meshes import mirror_arc
 from app.truth.far_field import OutgoingRays, outgoing
 from app.truth.glasses import C_NM, D_NM, F_NM
+from app.truth.glsl_function import evaluate
 from app.truth.gpu_paths import (
     MIRRORED,
     REFLECTED,
@@ -104,6 +105,27 @@ def test_t6_aplanatic_sphere(gl) -> None:
             assert np.abs(image[chosen] - want).max() < tolerance
     assert exact(np.radians(10), F_NM) == pytest.approx(-1.5309890, abs=6e-7)
     assert exact(np.radians(80), F_NM) == pytest.approx(-1.5635224, abs=6e-7)
+
+
+def test_t6_up_to_89_degrees_on_the_exact_sphere(gl) -> None:
+    """The GLSL refraction at points of the sphere itself."""
+    for nm, expected in ((D_NM, {}), (F_NM, {10: -1.5309890, 80: -1.5635224})):
+        degrees = np.array([1, 10, 30, 45, 60, 80, 89])
+        angle, n = np.radians(degrees), float(glasses.index("N-BK7", nm))
+        direction = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))])
+        source = np.array([-1 / N_BK7_D, 0, 0])
+        along = -direction @ source + np.sqrt((direction @ source) ** 2 + 1 - source @ source)
+        point = source + along[:, None] * direction
+        got = evaluate(
+            gl.ctx, ["lib/optics.glsl"],
+            "float theta = dot(d, n); out_d = refract_direction(d, n, theta, eta, sqrt(transmitted_cosine2(theta, eta)));",
+            {"d": direction, "n": -point, "eta": np.full(len(angle), n)}, {"out_d": "vec3"},
+        )["out_d"]  # fmt: skip
+        image = point[:, 0] - point[:, 1] * got[:, 0] / got[:, 1]
+        if nm == D_NM:
+            np.testing.assert_allclose(image, -N_BK7_D, rtol=1e-4)
+        for wanted, x in expected.items():
+            assert image[degrees == wanted] == pytest.approx(x, rel=1e-4)
 
 
 def test_t7_cartesian_ellipsoid(gl) -> None:

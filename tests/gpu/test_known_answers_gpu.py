@@ -1,4 +1,5 @@
-"""The known answers T2, T3, T4, T13, T14, T15, and whole paths, through the real emit and trace shaders.
+"""The known answers T2, T3, T4, T13, T14, T15, and whole paths, through the real emit and trace shaders
+(T1, T8, T12, T16: `test_known_answers_flat_gpu.py`; T5 to T7, T9 to T11: `test_known_answers_curved_gpu.py`).
 
 Directions and their derivatives come from the same photons on two screens at different
 distances. Float32: 1e-4 relative, mostly much better.
@@ -7,6 +8,7 @@ distances. Float32: 1e-4 relative, mostly much better.
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,6 +34,7 @@ from app.truth.tracer import (
     through,
     trace,
 )
+from tests.gpu.mutants import mutate
 
 APEX = np.pi / 3
 
@@ -83,10 +86,12 @@ def test_t2_prism_at_minimum_deviation(gl, name: str, deviations_deg: tuple[floa
             assert -dheading_dn * glasses.slope(name, nm) == pytest.approx(slope_rad_um, rel=1e-4)
 
 
-@pytest.mark.parametrize(("name", "x", "dx_dum"), [("N-BK7", 0.526946, 0.018554), ("N-SF11", 0.431514, 0.043846)])
-def test_t3_slab_leaves_direction_without_dispersion(gl, name: str, x: float, dx_dum: float) -> None:
+def slab_agrees(gl: Context, name: str) -> None:
+    """T3 with every photon of a beam, on two screens; AssertionError where it is off."""
     block = slab(8.0, 8.0, 1.0)  # thickness along z
     bottom = float(block.bounds()[0][2])
+    n, slope, s = float(glasses.index(name, D_NM)), float(glasses.slope(name, D_NM)), np.sin(np.pi / 4)
+    x, dx_dum = s / np.sqrt(n * n - s * s), -s * n * slope / (n * n - s * s) ** 1.5
     columns = []
     for gap in (1.0, 21.0):
         below = screen(np.array([0, 0, bottom - gap]), [0, 0, 1])
@@ -96,10 +101,28 @@ def test_t3_slab_leaves_direction_without_dispersion(gl, name: str, x: float, dx
         drop = photons.start[:, 2] - bottom - 1 + gap
         inside = photons.position[:, 0] - photons.start[:, 0] - drop
         assert inside == pytest.approx(x, abs=1e-4 * x + 1e-6 * gap)
-        columns.append(photons.dposition_dn * glasses.slope(name, D_NM))
-        assert columns[-1][:, 0] == pytest.approx(dx_dum, rel=1e-4)
+        columns.append(photons.dposition_dn * slope)
+        assert columns[-1][:, 0] == pytest.approx(dx_dum, rel=1e-4), "column"
     # Twenty units further down the column is the same: the direction does not disperse.
-    assert np.abs(columns[1].mean(0) - columns[0].mean(0)).max() / 20 < 1e-6
+    assert np.abs(columns[1].mean(0) - columns[0].mean(0)).max() / 20 < 1e-6, "column"
+
+
+@pytest.mark.parametrize(("name", "x", "dx_dum"), [("N-BK7", 0.526946, 0.018554), ("F2", None, None), ("N-SF11", 0.431514, 0.043846)])
+def test_t3_slab_leaves_direction_without_dispersion(gl, name: str, x: float | None, dx_dum: float | None) -> None:
+    slab_agrees(gl, name)
+    if x is not None:
+        n, s = float(glasses.index(name, D_NM)), np.sin(np.pi / 4)
+        assert s / np.sqrt(n * n - s * s) == pytest.approx(x, abs=6e-7)
+        assert -s * n * glasses.slope(name, D_NM) / (n * n - s * s) ** 1.5 == pytest.approx(dx_dum, abs=6e-7)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("derivative -= n_i", "derivative += n_i"), ("derivative += medium_slope", "derivative -= medium_slope")], ids=["entering", "leaving"]
+)
+def test_t3_catches_one_sign_at_both_faces(gl, old: str, new: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mutate(monkeypatch, tmp_path, "lib/medium.glsl", old, new)
+    with pytest.raises(AssertionError, match="^column"):
+        slab_agrees(gl, "N-BK7")
 
 
 def through_ball(height: float, index: Index) -> np.ndarray:
@@ -130,24 +153,6 @@ def test_t4_ball_lens(gl, nm: float) -> None:
     inner = height < 0.12
     focal_length = 1.2 / (1 - dot(photons.position, radial) / height)[inner]
     assert np.median(focal_length) == pytest.approx(index.n / (2 * (index.n - 1)), rel=1e-2)
-
-
-def test_t4_convergence_in_tessellation(gl) -> None:
-    index = Index(float(glasses.index("N-BK7", D_NM)))
-    errors = []
-    for triangles in (320, 1280, 5120):
-        photons = trace_beam(
-            gl, ball_mesh(triangles), glass("N-BK7"), screen([1.2, 0, 0], [1, 0, 0]), [-3, 0, 0], [1, 0, 0], 0.8, D_NM, count=200
-        ).of_depth(2)
-        height = np.linalg.norm(photons.start[:, 1:], axis=1)
-        exact = np.array([through_ball(h, index) for h in height])
-        errors.append([
-            np.median(np.abs(np.linalg.norm(photons.position[:, 1:], axis=1) - np.abs(exact[:, 0, 1]))),
-            np.median(np.abs(np.linalg.norm(photons.dposition_dn[:, 1:], axis=1) - np.abs(exact[:, 1, 1]))),
-        ])  # fmt: skip
-    position, column = np.array(errors).T
-    assert (position[:-1] > 2.5 * position[1:]).all()  # four times as many triangles: a quarter of the error
-    assert (column[:-1] > 1.4 * column[1:]).all()  # columns see the facets' own slope: half
 
 
 def test_t13_band_split_by_total_reflection(gl) -> None:
@@ -209,6 +214,19 @@ def test_t15_energy_near_the_fold_of_a_ball(gl) -> None:
     height = np.linalg.norm(straight.start[:, 1:], axis=1)
     near = np.abs(height - 0.5028279) < 0.004
     assert radius[near].max() == pytest.approx(fold, rel=2e-3)
+
+
+def test_t15_fold_of_each_line(gl) -> None:
+    photons = trace_beam(
+        gl, ball_mesh(81_920), glass("N-BK7"), screen([1.2, 0, 0], [1, 0, 0]), [-3, 0, 0], [1, 0, 0], 0.55, [(nm, nm) for nm in (F_NM, D_NM, C_NM)], count=3000
+    ).of_depth(2)
+    radius = np.linalg.norm(photons.position[:, 1:], axis=1)
+    height = np.linalg.norm(photons.start[:, 1:], axis=1)
+    for band, fold in enumerate((0.0615807, 0.06458174, 0.0659364)):
+        near = (photons.band == band) & (np.abs(height - 0.5) < 0.05)
+        # The largest radius of a parabola through them; facets leave 1e-5.
+        c, b, a = np.polynomial.polynomial.polyfit(height[near] - 0.5, radius[near], 2)
+        assert c - b * b / (4 * a) == pytest.approx(fold, rel=1e-3)
 
 
 @pytest.mark.parametrize(

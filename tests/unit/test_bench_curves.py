@@ -47,6 +47,15 @@ def test_time_to_equal_error_of_power_laws() -> None:
     assert same is not None and same.seconds == pytest.approx(1.0)
 
 
+def test_a_baseline_that_stopped_improving_is_given_the_time_it_got_there() -> None:
+    flat = [p if p.seconds < 1.0 else Point(p.photons, p.seconds, 1.0, 1.0, 1.0, 1.0, 0.0) for p in law(1.0)]
+    first_flat = next(p.seconds for p in flat if p.relmse == 1.0)
+    ratio = speed_up(law(0.01), flat)
+    assert ratio is not None and ratio.seconds == pytest.approx(first_flat / flat[0].seconds) and ratio.at_once
+    own = speed_up(flat, flat)
+    assert own is not None and own.seconds == pytest.approx(1.0)
+
+
 def test_a_curve_that_never_gets_there_and_one_that_is_there_at_once() -> None:
     slow = law(0.1)
     assert speed_up(law(0.01, floor=1.0), slow) is None
@@ -144,6 +153,13 @@ def test_a_bias_floor_is_named() -> None:
     claims = by_name(claims_of(scene(curve("stochastic", law(0.1)), curve("srd", law(1e-4, floor=0.2)))))
     assert "not reached" in claims["time to equal error"].measured and "bias²" in claims["time to equal error"].why
     assert "footprints" in claims["time to equal error"].why
+
+
+def test_the_texels_share_of_a_bias_is_told() -> None:
+    srd, stochastic = curve("srd", law(1e-4, floor=0.2)), curve("stochastic", law(0.1))
+    with_point = scene(stochastic, srd, curve("stochastic-point", law(1.0, floor=0.05)))
+    assert "25 % of that bias² is found in stochastic-point too" in claims_of(with_point)[0].why
+    assert "stochastic-point" not in claims_of(scene(stochastic, srd, curve("stochastic-point", law(1.0, floor=0.01))))[0].why
 
 
 def test_claims_need_their_methods_their_time_and_their_glass() -> None:

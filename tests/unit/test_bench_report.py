@@ -20,6 +20,7 @@ from app.bench.results import BenchResult, Claim, Curve, Point, SceneResult
 from app.errors import UserError
 from tests.unit.bench_synthetic import METHODS, synthetic_result, synthetic_scene
 
+
 class Page(HTMLParser):
     """Collects what a page holds; an element that is closed wrongly is an error."""
 
@@ -109,6 +110,7 @@ def test_page_stands_alone_and_holds_everything(written: tuple[BenchResult, Path
     told += [*report_text.METRICS, *(report_text.METHODS[name] for name in METHODS)]
     for words in told:
         assert words in page.text, words
+    assert "61×" in page.text and "17×" in page.text
     # Per scene: seven columns in two rows of parts and one of whole pictures, six error maps and their scale.
     assert page.tags["img"] == 2 * (3 * 7 + 6 + 1)
     assert page.tags["svg"] == 1 + 2 * 4
@@ -116,7 +118,7 @@ def test_page_stands_alone_and_holds_everything(written: tuple[BenchResult, Path
 
 def test_files_are_whole_and_nothing_else_is_left(written: tuple[BenchResult, Path]) -> None:
     _, directory = written
-    stems = [f"{scene}_error_{over}" for scene in ("ball", "wine_glass") for over in ("time", "photons")] + ["overview"]
+    stems = [f"{scene}_error_{over}" for scene in ("ball", "wine_glass") for over in ("time", "photons")] + ["overview", "scenes"]
     assert sorted(p.name for p in (directory / "plots").iterdir()) == sorted(stem + suffix for stem in stems for suffix in (".png", ".svg"))
     assert not [p for p in directory.rglob("*") if ".part" in p.name]
     for path in (directory / "plots").glob("*.svg"):
@@ -177,7 +179,8 @@ def test_errors_that_have_no_logarithm(tmp_path: Path, abscissa: str) -> None:
     good = [Point(10**k, 10.0 ** (k - 6), 10.0**-k, 0.5 * 10.0**-k, 2 * 10.0**-k, 0.0, 10.0**-k) for k in range(3, 6)]
     odd = [
         Point(1_000_000, 1.0, 0.0, 0.0, 1e-6, 0.0, 0.0), Point(2_000_000, 2.0, -1e-7, -1e-6, 0.0, -1e-7, 0.0),
-        Point(3_000_000, 3.0, math.nan, 0.0, 1.0, math.nan, 0.0), Point(4_000_000, 4.0, math.inf, 0.0, math.inf, 0.0, math.inf), Point(0, 0.0, 1.0, 1.0, 1.0, 0.0, 1.0),
+        Point(3_000_000, 3.0, math.nan, 0.0, 1.0, math.nan, 0.0), Point(4_000_000, 4.0, math.inf, 0.0, math.inf, 0.0, math.inf),
+        Point(0, 0.0, 1.0, 1.0, 1.0, 0.0, 1.0),
     ]  # fmt: skip
     scene = made_of(good + odd, tmp_path)
     with report_style.plot_style():
@@ -206,12 +209,12 @@ def test_overview_and_readme_plot(tmp_path: Path) -> None:
     with report_style.plot_style():
         svg = svg_of(overview(synthetic_result([near, far, none])))
     assert ">≥ 120×<" in svg and ">never<" in svg
-    for suffix in (".png", ".svg"):
-        report.readme_plot(synthetic_result([near, far, none]), tmp_path / f"readme{suffix}")
+    report.readme_plot(synthetic_result([near, far, none]), tmp_path / "readme")
+    assert (tmp_path / "readme.png").stat().st_size > 10_000
     svg = (tmp_path / "readme.svg").read_text(encoding="utf-8")
     assert_numbers_are_finite(svg)
     assert ">near<" in svg and ">far<" in svg and ">none<" not in svg and ">never as good<" in svg and ">regular-7<" not in svg
-    report.readme_plot(synthetic_result([]), tmp_path / "empty.png")
+    report.readme_plot(synthetic_result([]), tmp_path / "empty")
 
 
 def test_reference_warning_begins_at_a_tenth(tmp_path: Path) -> None:
@@ -220,6 +223,12 @@ def test_reference_warning_begins_at_a_tenth(tmp_path: Path) -> None:
     for share, warned in ((0.099, False), (0.101, True)):
         scene.reference.relmse = share * least
         assert any("times the smallest error" in told for told in report_text.warnings_of(scene)) is warned
+
+
+def test_busy_machine_is_told(tmp_path: Path) -> None:
+    for factor, told in ((0.95, False), (0.85, True)):
+        scene = made_of([Point(n, s, 1e-3, 1e-3, 1e-3, 0.0, 1e-3) for n, s in ((1000, 1.0), (2000, factor), (4000, 2.0))], tmp_path)
+        assert any("the machine was busy" in words and "srd" in words for words in report_text.warnings_of(scene)) is told
 
 
 def test_same_result_gives_the_same_svg_and_both_themes_read_well(tmp_path: Path) -> None:
@@ -251,7 +260,7 @@ def test_labels_are_pushed_apart_as_little_as_can_be() -> None:
         assert plots.spread(wanted, 12, 100) == pytest.approx(places)
 
 
-def test_crop_finds_structure_and_error_maps_are_true(tmp_path: Path) -> None:
+def test_crop_finds_structure_and_error_maps_are_true() -> None:
     rng = np.random.default_rng(3)
     reference = np.full((60, 90, 3), 0.05)
     reference[35:50, 60:80] = 1.0 + rng.random((15, 20, 1))

@@ -77,6 +77,16 @@ def test_features_come_with_their_reasons(tmp_path: Path) -> None:
     assert "gem" in row(text, "half-space solids")
 
 
+def test_features_that_are_in_tell_what_they_add(tmp_path: Path) -> None:
+    text = said(scene(tmp_path))
+    # Two vec4 a column in a ray, one in a photon; both lists hold two glasses.
+    assert "64 B a ray, 32 B a photon" in row(text, "spectral columns") and "64 B a ray" in row(text, "spatial columns")
+    assert "73 planes" in row(text, "half-space solids")
+    assert " B" not in row(text, "mirrors")
+    assert "A ray is 224 bytes with 4 derivative column(s), a photon record 128, its splats 192, a map's texel 16." in " ".join(text.split())
+    assert "bench --features" in text
+
+
 def test_notes_of_the_loader_are_shown(tmp_path: Path) -> None:
     value = scene(tmp_path)
     text = " ".join(said(value).split())

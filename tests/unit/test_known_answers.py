@@ -49,7 +49,7 @@ def axis_crossing(ray: Ray) -> float:
 
 def envelope(ray: Ray) -> np.ndarray:
     """Caustic point of a plane one-parameter family: where its column becomes parallel to the ray."""
-    cross = lambda a, b: a[0] * b[1] - a[1] * b[0]  # noqa: E731
+    cross = lambda a, b: a[0] * b[1] - a[1] * b[0]
     return ray.at(-cross(ray.dposition[0], ray.direction) / cross(ray.ddirection[0], ray.direction))
 
 
@@ -135,6 +135,25 @@ def test_t3_slab_leaves_direction_without_dispersion(glass: str, x: float, dx_du
     np.testing.assert_allclose(out.direction, start.direction, atol=1e-15)
     if shift is not None:
         assert np.linalg.norm(np.cross(out.position, out.direction)) == pytest.approx(shift, abs=6e-7)
+
+
+@pytest.mark.parametrize("glass", ["N-BK7", "F2", "N-SF11"])
+@pytest.mark.parametrize("nm", [F_NM, D_NM, C_NM])
+def test_t3_t4_t5_formulas_in_every_glass(glass: str, nm: float) -> None:
+    """Slab, ball and plano-convex lens against their formulas where the table prints no number."""
+    index, n, slope, s = per_um(glass, nm), float(glasses.index(glass, nm)), float(glasses.slope(glass, nm)), np.sin(np.pi / 4)
+    inside = through(make_ray([-1, 1, 0], [1, -1, 0], [[0, 0, 0]]), Plane((0, 0, 0), (0, 1, 0)), AIR, index)
+    out = through(inside, Plane((0, -1, 0), (0, 1, 0)), index, AIR)
+    assert out.position[0] == pytest.approx(s / np.sqrt(n * n - s * s), rel=1e-12)
+    assert out.dposition[0, 0] == pytest.approx(-s * n * slope / (n * n - s * s) ** 1.5, rel=1e-12)
+    np.testing.assert_allclose(out.ddirection, 0, atol=1e-15)
+    assert -1 / through_ball(0.0, per_index(glass, nm)).ddirection[1, 1] == pytest.approx(n / (2 * (n - 1)), rel=1e-12)
+    for height in (0.5, 0.8):
+        ball, r = through_ball(height, per_index(glass, nm)), np.arcsin(height / n)
+        assert -heading(ball) == pytest.approx(2 * (np.arcsin(height) - r), rel=1e-12)
+        assert -dheading(ball) == pytest.approx(2 * np.tan(r) / n, rel=1e-12)
+    flat = through(make_ray([-2, 0, 0], [1, 0, 0], [[0, 1, 0]]), Plane((0.5, 0, 0), (-1, 0, 0)), AIR, Index(n))
+    assert -1 / through(flat, BALL, Index(n), AIR, root=1).ddirection[0, 1] == pytest.approx(1 / (n - 1), rel=1e-12)
 
 
 def through_ball(height: float, index: Index) -> Ray:

@@ -1,0 +1,99 @@
+"""Every stress case of single events, paths and splats keeps its promises, and breaks them where a shader is wrong.
+
+A mutant is one mistake in a copy of the shaders (or of the scene's packing); the case that is there
+for it must notice. What each can see is its bound, printed by `spectrasplat stress`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.gpu import scene_buffers
+from app.stress import judging, optics_cases, path_cases, splat_cases
+from app.stress.case import Case
+from app.truth import optics
+from tests.gpu.mutants import mutate
+
+CASES = {case.name: case for case in (*optics_cases.CASES, *path_cases.CASES, *splat_cases.CASES)}
+QUICK = ("tir-margin", "grazing", "index-matched", "gem-bands", "long-chain", "collapse", "one-texel", "overflow")
+
+
+@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in CASES])
+def test_case_keeps_its_promises(gl, name: str) -> None:
+    case = CASES[name]
+    measured = list(case.measure(gl))
+    assert len(measured) == case.steps
+    assert [sentence for m in measured for sentence in m.broken()] == []
+    assert len({m.severity for m in measured}) == case.steps
+    assert all(m.errors.keys() == m.bounds.keys() for m in measured)
+
+
+def broken(case: Case, gl) -> list[str]:
+    """The first promises to break, or none."""
+    return next((m.broken() for m in case.measure(gl) if m.broken()), [])
+
+
+MUTANTS = {
+    "wrong sign of the turning normal": ("tir-margin", "lib/optics.glsl", "- mu * dnormal", "+ mu * dnormal", "column s"),
+    "the textbook's mu": (
+        "index-matched", "lib/optics.glsl", "return (1.0 - eta_it) * (1.0 + eta_it) / (omega - eta_it * theta);", "return eta_it * theta + omega;", "bend mu",
+    ),
+    "the shading normal on a receiver": ("grazing", "lib/optics.glsl", "dot(direction, normal_g)) * direction", "dot(direction, normal_g)) * normal_g", "column on a receiver"),
+    "wrong sign of dispersion when leaving": (
+        "gem-bands", "lib/medium.glsl", "derivative += medium_slope(crossing.before, x)", "derivative -= medium_slope(crossing.before, x)", "band ends",
+    ),
+    "overflow not seen": ("overflow", "footprint.comp", "bool accident = !(", "bool accident = false && !(", ""),
+    "lost footprints not counted": ("overflow", "footprint.comp", "atomicAdd(count_dropped, 1u);", "", "photons were degraded but only 0 fall-backs counted"),
+    "dropped columns not counted": ("far-screen", "trace.comp", "outcome.what |= FELL_FOOTPRINT;", "", "flags not counted"),
+    "brightness capped": ("collapse", "splat_small.frag", "share * splat_colour[g]", "min(share, 0.9) * splat_colour[g]", "energy"),
+    "rounding of the total lost": ("one-texel", "accumulate.comp", "imageStore(scratch, at, kept_out);", "imageStore(scratch, at, vec4(0.0));", "energy in the texel"),
+    "facets that do not overlap": ("slivers", "lib/intersect.glsl", "#define EDGE_ERROR 5e-7", "#define EDGE_ERROR -1e-4", "light leaked"),
+}  # fmt: skip
+SLOW_MUTANTS = ("rounding of the total lost", "facets that do not overlap")
+
+
+@pytest.mark.parametrize("mistake", [pytest.param(m, marks=pytest.mark.slow) if m in SLOW_MUTANTS else m for m in MUTANTS])
+def test_case_notices_a_mistake_in_a_shader(gl, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, mistake: str) -> None:
+    name, file, old, new, said = MUTANTS[mistake]
+    mutate(monkeypatch, tmp_path, file, old, new)
+    sentences = broken(CASES[name], gl)
+    assert sentences
+    assert said in "; ".join(sentences)
+
+
+def test_needles_notice_triangles_begun_at_any_corner(gl, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scene_buffers, "_best_corner_first", lambda corners: np.broadcast_to(np.arange(3)[None, :, None], (len(corners), 3, 1)))
+    assert "error of landing" in "; ".join(broken(CASES["needles"], gl))
+
+
+def test_triangles_begin_at_the_corner_nearest_to_a_right_angle() -> None:
+    rng = np.random.default_rng(3)
+    # A needle each way round, and a right-angled triangle.
+    needle = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1e-4, 0.0]])
+    triangles = np.array([np.roll(needle, k, axis=0) for k in range(3)] + [[[0, 1, 0], [0, 0, 0], [1, 0, 0]]]) @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    order = scene_buffers._best_corner_first(triangles)
+    turned = np.take_along_axis(triangles, order, axis=1)
+    edges = turned[:, 1:] - turned[:, :1]
+    cosine = np.abs(np.sum(edges[:, 0] * edges[:, 1], axis=1)) / np.prod(np.linalg.norm(edges, axis=2), axis=1)
+    assert cosine.max() < 2e-4
+    # Only turned, never mirrored.
+    assert np.allclose(np.cross(edges[:, 0], edges[:, 1]), np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), atol=1e-12)
+    assert scene_buffers._best_corner_first(np.zeros((1, 3, 3))).shape == (1, 3, 1)
+
+
+def test_a_wrong_reference_does_not_agree(gl, monkeypatch: pytest.MonkeyPatch) -> None:
+    right = optics.refract_column_stable
+    monkeypatch.setattr(optics, "refract_column_stable", lambda *arguments: right(*arguments) * (1.0 + 1e-5))
+    assert "error of column n" in "; ".join(broken(CASES["grazing"], gl))
+
+
+def test_what_is_not_finite_is_the_worst() -> None:
+    assert judging.worst(np.array([1.0, np.nan, 2.0]), np.array([1.0, 7.0, 1.0])) == (np.inf, 7.0)
+    assert judging.worst(np.array([1.0, 3.0]), np.array([0.1, 1.0])) == (1.0, 0.1)
+    assert judging.not_finite([np.array([1.0, np.inf]), np.array([np.nan])]) == 2
+    records = np.zeros(2, [("a", "f4", 3), ("b", "u4")])
+    records["a"][1, 2] = np.nan
+    assert judging.not_finite_in(records) == 1

@@ -1,0 +1,139 @@
+"""What a scene does not need is not in the text of its programs, nor in its records; what it needs is.
+
+These tests read the sources as the driver gets them, without a driver. `tests/gpu/test_features_cost.py`
+does the same with every program that a rendering builds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from app import paths
+from app.bench.symbol_proof import FEATURE_SYMBOLS, occurring, program_texts, prove
+from app.gpu import records, shader
+from app.gpu.scene_buffers import SCENE_STRUCTS
+from app.model.features import Features, explain
+from app.model.scene_file import load_scene
+from app.model.settings import RenderSettings
+from app.passes.eye import EYE_LIGHT, EYE_PARAMETERS
+from app.passes.footprint import SPLAT, splat_defines
+from app.static_costs import RecordSizes, static_costs
+
+EVERYTHING = Features(
+    spectral_groups=2, merged_groups=True, spectral_weights=True, footprints=True, point_spectrum=False, random_wavelength=False, band_cuts=True,
+    dielectrics=True, mirrors=True, smooth_normals=True, normal_derivatives=True, absorption=True, medium_stack=True, tree=True,
+    loose_triangles=True, convex_solids=True, charts=True, nested_windows=True, targets=2,
+)  # fmt: skip
+WITHOUT = {
+    "spectral columns": {"spectral_groups": 0, "merged_groups": False, "band_cuts": False},
+    "shared spectral variable": {"merged_groups": False},
+    "weights over the band": {"spectral_weights": False, "spectral_groups": 0, "merged_groups": False, "band_cuts": False},
+    "band cuts": {"band_cuts": False},
+    "spatial columns": {"footprints": False, "spectral_groups": 0, "merged_groups": False, "band_cuts": False, "normal_derivatives": False},
+    "refraction": {"dielectrics": False, "absorption": False, "band_cuts": False, "spectral_weights": False, "spectral_groups": 0, "merged_groups": False},
+    "mirrors": {"mirrors": False},
+    "interpolated normals": {"smooth_normals": False, "normal_derivatives": False},
+    "normal derivatives": {"normal_derivatives": False},
+    "absorption": {"absorption": False},
+    "medium stack": {"medium_stack": False},
+    "triangle tree": {"tree": False},
+    "half-space solids": {"convex_solids": False},
+    "charts": {"charts": False},
+    "nested windows": {"nested_windows": False},
+    "spectral bins": {"targets": 1},
+}
+
+
+def sources(features: Features) -> list[shader.Source]:
+    """The light half's and the eye's sources, with stand-ins for the numbers that only a scene's data give."""
+    ray, photon = records.ray_record(features.defines()["COLUMNS"]), records.photon_record(features.spectral_groups)
+    structs = (*SCENE_STRUCTS, ray, photon, records.OUTCOME, records.TRACE_PARAMETERS, records.EMIT_PARAMETERS)
+    copies = " ".join(f"photon.dposition_dvar{g} = ray.dposition[SPATIAL + {g}];" for g in range(features.spectral_groups))
+    numbers = {"SPECTRAL_COPY": copies, "TREE_AT": 0, "TREE_STACK": 9, "NORMALS_AT": 0, "INDEX_ROW": 0, "SLOPE_ROW": 1, "VARIABLE_ROW": 2}
+    numbers |= {"STACK_SIZE": 1, "STACK_OBJECTS": "uint[](0u)", "SOLID_COUNT": 1, "PLANE_COUNT": 6, "TRIANGLE_COUNT": 9}
+    light = features.defines() | numbers
+    splat = splat_defines(features) | {"GROUPS": features.spectral_groups}
+    eye = light | {"LAYER_BEAUTY": 1}
+    made = [shader.load_source("trace.comp", light, structs), shader.load_source("emit.comp", light | {"LIGHT_POINT": 1}, structs)]
+    made.append(shader.load_source("footprint.comp", splat, (photon, records.PLACEMENT, records.RECEIVER, SPLAT)))
+    draws = {"splat_small.frag": "SMALL", "splat_swept.frag": "SWEPT"} | ({"splat_cut.frag": "CUT"} if features.band_cuts else {})
+    for fragment, kind in draws.items():
+        made += [shader.load_source(name, splat | {kind: 1}, (SPLAT,)) for name in ("splat.vert", fragment)]
+    made.append(shader.load_source("eye.comp", eye, (*SCENE_STRUCTS, EYE_LIGHT, EYE_PARAMETERS, records.RECEIVER, records.PLACEMENT)))
+    return made
+
+
+def scene_features(name: str) -> Features:
+    return Features.of(load_scene(paths.assets_dir() / "scenes" / f"{name}.toml"), RenderSettings())
+
+
+@pytest.mark.parametrize("feature", FEATURE_SYMBOLS)
+def test_symbols_come_and_go_with_their_feature(feature: str) -> None:
+    """Every symbol listed is in some program with the feature in, and in none with it out."""
+    symbols = tuple(s for s in FEATURE_SYMBOLS[feature] if "1[0-9]" not in s)
+    present = {s for source in sources(EVERYTHING) for s in occurring(source.text, symbols)}
+    assert present == set(symbols)
+    for source in sources(replace(EVERYTHING, **WITHOUT[feature])):
+        assert occurring(source.text, symbols) == (), source.name
+
+
+SHIPPED = {
+    "ball_plain": ("spectral columns", "weights over the band", "band cuts", "absorption", "medium stack", "spectral bins", "mirrors", "charts"),
+    "prism": ("interpolated normals", "normal derivatives", "triangle tree", "absorption", "medium stack", "spectral bins", "mirrors", "charts"),
+    "brilliant": ("interpolated normals", "normal derivatives", "triangle tree", "absorption", "medium stack"),
+}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_scenes_leave_out_what_they_do_not_need(name: str) -> None:
+    scene = load_scene(paths.assets_dir() / "scenes" / f"{name}.toml")
+    features = Features.of(scene, RenderSettings())
+    included = {feature: inside for feature, inside, _ in explain(scene, features)}
+    assert not any(included[feature] for feature in SHIPPED[name])
+    proofs = prove(program_texts(sources(features)), included)
+    assert [p.feature for p in proofs if not p.holds] == []
+
+
+def test_a_scene_without_dispersion_has_no_spectral_code_nor_columns() -> None:
+    features = scene_features("ball_plain")
+    for source in sources(features):
+        for word in ("dposition_dvar", "variable_step", "spectral_variable", "is_cut", "texture("):
+            assert word not in source.text, (source.name, word)
+    forced = replace(features, spectral_groups=1, spectral_weights=True, band_cuts=True)
+    plain, carrying = RecordSizes.of(features), RecordSizes.of(forced)
+    assert (carrying.ray - plain.ray, carrying.photon - plain.photon) == (32, 16)
+    assert (plain.columns, carrying.columns) == (2, 3)
+
+
+def test_what_is_in_tells_its_bytes_and_what_is_out_tells_none() -> None:
+    scene = load_scene(paths.assets_dir() / "scenes" / "brilliant.toml")
+    features = Features.of(scene, RenderSettings())
+    costs = static_costs(scene, features)
+    assert set(costs) == {name for name, included, _ in explain(scene, features) if included} - {"blockers"}
+    assert costs["spectral columns"] == "32 B a ray, 16 B a photon"
+
+
+def test_the_proof_fails_where_a_program_carries_what_it_should_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    features = scene_features("prism")
+    included = dict.fromkeys(FEATURE_SYMBOLS, False)
+    # Comments and guarded code left in, as in a text whose conditions only the driver resolves.
+    monkeypatch.setattr(shader, "lean", lambda lines: lines)
+    told = {p.feature: p.holds for p in prove(program_texts(sources(features)), included)}
+    assert not told["triangle tree"] and not told["normal derivatives"] and not told["medium stack"]
+
+
+def test_a_guard_forgotten_in_a_shader_is_noticed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    mutant = tmp_path / "shaders"
+    for file in paths.shaders_dir().rglob("*"):
+        if file.is_file():
+            copy = mutant / file.relative_to(paths.shaders_dir())
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_bytes(file.read_bytes())
+    text = (mutant / "lib" / "intersect.glsl").read_text()
+    (mutant / "lib" / "intersect.glsl").write_text(text.replace("#ifdef HAS_TREE", "#if 1"))
+    monkeypatch.setattr(paths, "shaders_dir", lambda: mutant)
+    proofs = prove(program_texts(sources(scene_features("prism"))), dict.fromkeys(FEATURE_SYMBOLS, False))
+    assert not next(p for p in proofs if p.feature == "triangle tree").holds
