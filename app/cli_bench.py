@@ -60,7 +60,8 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
         stopped = False
         try:
             with ProgressReporter("bench") as progress:
-                run_bench(context, scenes, store, progress)
+                # Who names scenes wants them measured; of all that there are, those that cannot be are told.
+                run_bench(context, scenes, store, progress, None if request.scenes else lambda reason: print(f"note: {reason}", file=sys.stderr))
         except KeyboardInterrupt:
             stopped = True
             print(f"spectrasplat: stopped; {kept_text(store.result)}", file=sys.stderr)

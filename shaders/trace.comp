@@ -137,6 +137,15 @@ void main()
     RayOrigin origin = RayOrigin(ray.last_primitive, ray.last_object, (ray.flags & FLAG_INSIDE) != 0u, ray.inside_mask);
     Hit hit;
     bool met = intersect_closest(ray.position, ray.direction, FAR_DISTANCE, origin, hit);
+#ifdef LOOPS_MAY_END
+    // llvmpipe ends every loop of an invocation once they have run 65,535 rounds together, and goes on with what there is.
+    uint rounds = 0u;
+    while (rounds < 2u) rounds += min(p.lattices, 1u);
+    if (rounds < 2u) {
+        outcomes[k] = uvec4(LOST_NUMERIC, floatBitsToUint(ray.flux_w), 0u, 0u);
+        return;
+    }
+#endif
     float theta_g = dot(ray.direction, hit.normal_g);
     // Looked up once for all branches; some object and facet where nothing was met.
     uint object = met ? hit.object : 0u;

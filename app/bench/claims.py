@@ -85,6 +85,8 @@ def _index_claim(scene: SceneResult, srd: Curve, linear: Curve) -> Claim:
     pairs = [(t, error_at_time(srd.points, t), error_at_time(linear.points, t)) for t in times]
     compared = [(t, a, b) for t, a, b in pairs if a is not None and b is not None]
     asked = f"smaller error than srd-lambda at equal time, the strongest glass being {scene.strongest_glass} (V_d {scene.strongest_abbe:.1f})"
+    if not compared:
+        return Claim("index against wavelength", asked, "no time at which both have a picture", False, _stage_shares(srd, srd.points[0]))
     measured = ", ".join(f"at {t:.2g} s {a:.3g} against {b:.3g} ({b / max(a, 1e-30):.2g}×)" for t, a, b in compared)
     lost = [t for t, a, b in compared if not a < b]
     why = "" if not lost else f"not at {', '.join(f'{t:.2g} s' for t in lost)}; {reason(scene, srd)}"

@@ -143,7 +143,7 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
             return Variant(scene, replace(base, mirrors=True)), asked, ""
         case "interpolated normals" | "normal derivatives":
             every = all(is_convex_solid(o) for o in _specular(scene))
-            note = "half-spaces have no corners to interpolate between: the code is there and waits" if every else "every facet with three equal normals"
+            note = "half-spaces have no corners to interpolate: the code is there and waits" if every else "every facet with three equal normals"
             smooth = Variant(_with_normals(scene), replace(base, smooth_normals=True))
             if name == "interpolated normals":
                 return smooth, asked, note

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from app.atomic import atomic_output, check_writable
+from app.errors import UserError
 
 if TYPE_CHECKING:
     from app.bench.features_cost import FeatureReport, Percent
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 _COST_HEADINGS = ("feature", "", "why", "trace", "splat", "adds", "note")
 _PROOF_HEADINGS = ("feature", "", "symbols looked for", "found in", "")
 _PROGRAM_HEADINGS = ("program", "lines", "of", "holds code of")
+_NUMBERS = ("trace", "splat", "lines", "of")
+_PAGE_ALONE = ("adds", "symbols looked for")
 
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>
@@ -23,7 +26,8 @@ _PAGE = """<!doctype html>
 :root {{ color-scheme: light dark; --ink: #1c1e21; --muted: #5b6068; --line: #e2e4e7; --paper: #fefefe; }}
 @media (prefers-color-scheme: dark) {{ :root {{ --ink: #e9eaec; --muted: #a4aab3; --line: #33373d; --paper: #15171a; }} }}
 body {{ font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 75rem; margin: 2rem auto; padding: 0 1rem; }}
-table {{ border-collapse: collapse; margin: 0.5rem 0 2rem; }} th, td {{ text-align: left; padding: 0.25rem 0.8rem 0.25rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }}
+table {{ border-collapse: collapse; margin: 0.5rem 0 2rem; }}
+th, td {{ text-align: left; padding: 0.25rem 0.8rem 0.25rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }}
 th, .muted {{ color: var(--muted); font-weight: normal; }} .number {{ text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }}
 .wide {{ overflow-x: auto; }} code {{ font-size: 0.9em; }}
 </style></head><body>
@@ -34,7 +38,11 @@ th, .muted {{ color: var(--muted); font-weight: normal; }} .number {{ text-align
 
 
 def check(directory: Path) -> None:
-    """Raises `UserError` where the folder cannot be made or written."""
+    """Makes the folder; raises `UserError` where it cannot be made or written."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"-o {directory}: the folder cannot be made ({error.strerror}); name another") from error
     for name in ("features.json", "features.html"):
         check_writable(directory / name)
 
@@ -48,7 +56,7 @@ def write(report: FeatureReport, directory: Path) -> None:
 
 
 def show(report: FeatureReport) -> None:
-    """Three tables on stdout."""
+    """Three tables on stdout; what would make them too wide is on the page."""
     from rich.console import Console
     from rich.table import Table
 
@@ -56,10 +64,11 @@ def show(report: FeatureReport) -> None:
     console.print(_heading(report))
     for title, headings, rows in _tables(report):
         table = Table(title=title, title_justify="left")
-        for heading in headings:
-            table.add_column(heading, justify="right" if heading in ("trace", "splat", "lines", "of") else "left", overflow="fold")
+        narrow = [index for index, heading in enumerate(headings) if heading not in _PAGE_ALONE]
+        for index in narrow:
+            table.add_column(headings[index], justify="right" if headings[index] in _NUMBERS else "left", overflow="fold")
         for row in rows:
-            table.add_row(*row)
+            table.add_row(*(row[index] for index in narrow))
         console.print(table)
     console.print(_reading(report))
 
@@ -82,7 +91,7 @@ def page(report: FeatureReport) -> str:
 
 
 def _class(heading: str) -> str:
-    return ' class="number"' if heading in ("trace", "splat", "lines", "of") else ""
+    return ' class="number"' if heading in _NUMBERS else ""
 
 
 def _tables(report: FeatureReport) -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:

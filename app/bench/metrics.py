@@ -1,7 +1,8 @@
 """How far a picture is from the truth: one number each for energy, noise, colour and look.
 
 All but FLIP are taken on linear XYZ before tone mapping, pooled over pixels and channels. The reference is a
-Monte Carlo picture itself, so what its own variance adds to a squared error is subtracted: E[(I − R̂)²] = (I − R)² + var R̂. That the weight 1/(R̂² + ε) is noisy too is an effect of second order.
+Monte Carlo picture itself, so what its own variance adds to a squared error is subtracted:
+E[(I − R̂)²] = (I − R)² + var R̂. That the weight 1/(R̂² + ε) is noisy too is an effect of second order.
 """
 
 from __future__ import annotations

@@ -32,6 +32,10 @@ _TRIAL_SHARE = 0.25
 _TRIAL_GROWTH = 4
 
 
+class NothingToMeasure(UserError):
+    """The scene's caustic layer is black."""
+
+
 @dataclass(frozen=True)
 class Rendering:
     """A picture and what it took."""
@@ -61,9 +65,10 @@ class MethodRig:
         self._light.prepare()
         piloted = self._finished()
         # Drivers put off part of the compiling until a program runs.
-        self.render(WARM_UP_PHOTONS, 1)
-        if not self._light.stats.splats:
-            raise UserError(f"scene '{scene.name}' throws no light through glass or off mirrors on a receiver: there is nothing to measure")
+        seen = self.render(WARM_UP_PHOTONS, 1).xyz.any()
+        if not seen:
+            self.release()
+            raise NothingToMeasure(f"scene '{scene.name}': no light that glass or mirrors throw falls on what the camera sees directly, so there is nothing to measure")
         self.setup_seconds = {"buffers": buffered - started, "compile": compiled - buffered, "pilot": piloted - compiled, "warm-up": self._finished() - piloted}
         self.buffers_mib = (self._buffers.bytes + self._light.trace.bytes) / 2**20
 

@@ -15,7 +15,7 @@ from app.bench import metrics
 from app.bench.claims import claims_of, ratios_of
 from app.bench.curves import complete_curve, photons_at_time
 from app.bench.metrics import Truth
-from app.bench.rendering import MethodRig, Rendering
+from app.bench.rendering import MethodRig, NothingToMeasure, Rendering
 from app.bench.results import EARLY_SHARE, OTHER_MEASURES, BenchSettings, Curve, ReferenceInfo, Sample, SceneResult
 from app.bench.store import Store
 from app.bench.truth_picture import make_truth, truth_key
@@ -37,16 +37,28 @@ KeyMaker = Callable[[Scene, int, int], str]
 
 
 def run_bench(
-    context: Context, scenes: dict[str, Scene], store: Store, progress: Progress, truth_maker: TruthMaker = make_truth, key_maker: KeyMaker = truth_key
+    context: Context,
+    scenes: dict[str, Scene],
+    store: Store,
+    progress: Progress,
+    skipped: Callable[[str], None] | None = None,
+    truth_maker: TruthMaker = make_truth,
+    key_maker: KeyMaker = truth_key,
 ) -> None:
     """Measure every scene by name that `store` does not hold yet; a KeyboardInterrupt loses one method's seed at most.
 
-    Raises `UserError` when a scene has changed since `store` was begun."""
+    Raises `UserError` when a scene has changed since `store` was begun, and where there is nothing to measure, unless
+    `skipped` takes the reason."""
     for index, (name, scene) in enumerate(scenes.items()):
         def share(fraction: float, text: str, done: int = index, name: str = name) -> None:
             progress((done + fraction) / len(scenes), f"{name}: {text}")
 
-        _SceneBench(context, name, scene, store, share, truth_maker, key_maker).run()
+        try:
+            _SceneBench(context, name, scene, store, share, truth_maker, key_maker).run()
+        except NothingToMeasure as reason:
+            if skipped is None:
+                raise
+            skipped(str(reason))
 
 
 def picture_size(scene: Scene, settings: BenchSettings) -> tuple[int, int]:
@@ -74,8 +86,9 @@ class _SceneBench:
         result, settings = self._result, self._settings
         if result.complete:
             return
-        self._truth = self._reference()
         with self._rigs() as rigs:
+            self._truth = self._reference()
+            self._set_budgets(rigs)
             for number in range(settings.seeds):
                 turn = number % len(rigs)
                 methods = [*rigs][turn:] + [*rigs][:turn]
@@ -108,17 +121,22 @@ class _SceneBench:
 
     @contextmanager
     def _rigs(self) -> Iterator[dict[str, MethodRig]]:
-        """Every method, ready to render, with its photon budgets known."""
+        """Every method, ready to render."""
         rigs: dict[str, MethodRig] = {}
         with ExitStack() as stack:
             for method in self._settings.methods:
-                self._progress(_REFERENCE_SHARE, f"preparing {method}")
+                self._progress(0.0, f"preparing {method}")
                 rig = rigs[method] = MethodRig(self._context, self._scene, method, *self._size)
                 stack.callback(rig.release)
-                if all(curve.method != method for curve in self._result.curves):
-                    budgets = rig.budgets(self._settings.seconds, POINTS)
-                    self._result.curves.append(Curve(method, rig.setup_seconds, [], budgets, buffers_mib=rig.buffers_mib))
             yield rigs
+
+    def _set_budgets(self, rigs: dict[str, MethodRig]) -> None:
+        """Photon budgets of the methods that have none yet."""
+        for method, rig in rigs.items():
+            if all(curve.method != method for curve in self._result.curves):
+                self._progress(_REFERENCE_SHARE, f"trying {method}")
+                budgets = rig.budgets(self._settings.seconds, POINTS)
+                self._result.curves.append(Curve(method, rig.setup_seconds, [], budgets, buffers_mib=rig.buffers_mib))
 
     def _curve(self, method: str) -> Curve:
         return next(curve for curve in self._result.curves if curve.method == method)
@@ -130,7 +148,7 @@ class _SceneBench:
             return
         earlier = store.load_sums(result.scene, curve.method, seed - 1) if seed > 1 else np.zeros((len(curve.budgets), *truth.xyz.shape), np.float32)
         if earlier is None:
-            raise UserError(f"{store.directory} has lost what going on with '{result.scene}' needs (folder 'partial'): give --fresh to begin anew")
+            raise UserError(f"{store.directory}/partial has lost what going on with '{result.scene}' needs: give --fresh to begin anew")
         sums, samples = earlier, []
         for i, photons in enumerate(curve.budgets):
             step = (1.0 - _REFERENCE_SHARE) / (self._settings.seeds * len(self._settings.methods))

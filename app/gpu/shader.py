@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import moderngl
 
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
-_MESA_LINE = re.compile(r"\b\d+:(\d+)\(")
+_MESA_LINE = re.compile(r"\b\d+:(\d+)(?=\()")
 _NVIDIA_LINE = re.compile(r"\b\d+\((\d+)\)")
 
 

@@ -126,6 +126,8 @@ class TracePass:
             "FALLBACK_COUNT": f"{len(records.FALLBACKS)}u",
             "SPECTRAL_COPY": copies,
         }
+        if features.tree and context.is_software:
+            defines["LOOPS_MAY_END"] = 1
         self._features = features
         self._defines = defines
         self._structs = structs

@@ -114,7 +114,7 @@ def measure_needles(context: Context) -> Iterator[Measurement]:
     turn[:3, :3] *= np.sign(np.linalg.det(turn[:3, :3]))
     direction = np.array([np.cos(SLOPE), 0.0, -np.sin(SLOPE)])
     start = np.array([1.0, 0.0, 0.5]) - 1.6 * direction
-    for segments in (300, 1000, 3000, 10_000):
+    for segments in (300, 1000, 3000, 10_000, 22_000):
         width = 2.0 * np.pi / 3.0 / segments
         floor = screen([0, 0, 0], [0, 0, 1], 3.0).transformed(turn)
         photons = trace_beam(
@@ -126,10 +126,13 @@ def measure_needles(context: Context) -> Iterator[Measurement]:
             {
                 # As in the cusp; what a needle's normal and place lose must not show.
                 "landing": (missed, width**2 / 4.0 + 24.0 * EPSILON),
-                "light that slipped through": (np.array([1.0 - len(landed.records) / photons.lattice_in_disc]), 0.0),
+                "light that slipped through": (np.array([(photons.tally.ended["direct"] + photons.tally.ended["escaped"]) / photons.tally.emitted]), 0.0),
             }
         )
-        yield Measurement(2.3 / width, f"{2.3 / width:.0f} : 1", not_finite_in(photons.records), errors, bounds, photons.tally.imbalance, dict(photons.tally.fallbacks), dropped(photons))
+        # Boxes of slanting needles all overlap, and llvmpipe stops a ray's walk after 65,535 rounds: lost, and said so.
+        given_up = photons.tally.ended["lost_numeric"] / photons.tally.emitted
+        note = f"{given_up:.0%} of the light given up by the software renderer" if given_up else ""
+        yield Measurement(2.3 / width, f"{2.3 / width:.0f} : 1", not_finite_in(photons.records), errors, bounds, photons.tally.imbalance, dict(photons.tally.fallbacks), dropped(photons), note)
 
 
 def measure_normals(context: Context) -> Iterator[Measurement]:
@@ -178,7 +181,7 @@ CASES = (
         "The cross product of a needle's two long edges loses as many digits as the needle is thin. Every triangle is turned to begin at its best corner, so a needle shows its short edge.",
         "aspect of the needles",
         measure_needles,
-        steps=4,
+        steps=5,
     ),
     Case(
         "bad-normals",

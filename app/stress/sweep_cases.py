@@ -8,7 +8,7 @@ within its noise.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +16,6 @@ import numpy as np
 from app.gpu.context import Context
 from app.model.glass import Dispersion, from_abbe
 from app.model.scene import Scene
-from app.model.settings import RenderSettings
 from app.stress.case import Case, Measurement
 from app.stress.probe import (
     SMALL,
@@ -34,16 +33,16 @@ from app.stress.probe import (
 )
 from app.stress.scene_parts import extent, moved, turn, with_glass
 
-SCALES = (1e-8, 1e-4, 1e-2, 1e2, 1e4, 1e8)
-OFFSETS = (1.0, 1e2, 1e4, 1e6)
-TURNS = (30.0, 45.0, 90.0, 137.0)
-DEPTHS = (1, 2, 4, 16, 64, 256)
-SMOOTHINGS = (0.01, 0.2, 2.0, 20.0)
-BATCHES = (20, 1000, 8192)
+SCALES = (1e-8, 1e-4, 1e4, 1e8)
+OFFSETS = (1.0, 1e4, 1e6)
+TURNS = (30.0, 90.0, 137.0)
+DEPTHS = (1, 4, 16, 256)
+SMOOTHINGS = (0.01, 0.2, 20.0)
+BATCHES = (20, 1000)
 SIZES = ((1, 1), (16, 16), (4096, 1), (1, 4096))
 COUNTS = (1, 10, 1000)
-ABBE_NUMBERS = (1.0, 5.0, 20.0, 64.0, 1000.0)
-PASSES = (4, 16, 64)
+ABBE_NUMBERS = (1.0, 5.0, 20.0, 1000.0)
+PASSES = (4, 64)
 AXIS = (1.0, 2.0, 0.5)
 
 SAME_PICTURE = 0.01
@@ -61,27 +60,41 @@ ANEW_ENERGY = 0.01
 """The sum over a picture drawn anew: what enters or leaves over its borders and receivers' edges."""
 
 
+class Base:
+    """The scene as it is, rendered when a case first asks for it."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self._probe: Probe | None = None
+
+    def probe(self, context: Context) -> Probe:
+        """Its rendering under `SMALL`."""
+        if self._probe is None:
+            self._probe = probe(context, self.scene, SMALL)
+        return self._probe
+
+
 def scene_sweep(scene: Scene, prefix: str = "") -> tuple[Case, ...]:
     """All cases for one scene; `prefix` goes before their names."""
-    name = scene.name
+    name, base = scene.name, Base(scene)
     cases = [
         Case("scale", f"{name}: the whole scene larger and smaller", "Fixed epsilons leak or speckle; GPU space is scaled to the glass.",
-             "scale factor", lambda context: _scales(context, scene), len(SCALES)),
+             "scale factor", lambda context: _scales(context, base), len(SCALES)),
         Case("offset", f"{name}: the whole scene far from the origin", "float32 world coordinates would lose the glass; GPU space is centred in float64.",
-             "offset, scene extents", lambda context: _offsets(context, scene), len(OFFSETS)),
+             "offset, scene extents", lambda context: _offsets(context, base), len(OFFSETS)),
         Case("rotation", f"{name}: the whole scene turned", "Map axes, lattices and trees follow the axes; the picture must not.",
-             "angle, degrees", lambda context: _turns(context, scene), len(TURNS), logarithmic=False),
+             "angle, degrees", lambda context: _turns(context, base), len(TURNS), logarithmic=False),
         Case("depth", f"{name}: paths cut short", "What a depth limit takes must be counted as lost, not vanish.",
              "depth limit", lambda context: _depths(context, scene), len(DEPTHS)),
         Case("smoothing", f"{name}: footprints far too narrow and far too wide", "A kernel's width must not change the energy.",
-             "footprint σ, lattice spacings", lambda context: _smoothings(context, scene), len(SMOOTHINGS)),
+             "footprint σ, lattice spacings", lambda context: _smoothings(context, base), len(SMOOTHINGS)),
         Case("batch", f"{name}: the same photons in tiny batches", "How many photons are in flight must not change the picture.",
              "photons in flight", lambda context: _batches(context, scene), len(BATCHES)),
         Case("size", f"{name}: pictures of one pixel, one row, one column", "Aspect ratios and windows degenerate.",
              "width / height", lambda context: _sizes(context, scene), len(SIZES)),
         Case("photons", f"{name}: next to no photons", "Lattices of a single point; footprints as wide as the scene.",
              "photons", lambda context: _counts(context, scene), len(COUNTS)),
-        Case("bins", f"{name}: 32 spectral bins", "Eight targets; their sum must be the same light.", "bins", lambda context: _bins(context, scene), 1),
+        Case("bins", f"{name}: 32 spectral bins", "Eight targets; their sum must be the same light.", "bins", lambda context: _bins(context, base), 1),
         Case("passes", f"{name}: the same pass added again and again", "Running float32 sums stall; scratch textures are flushed into the total.",
              "passes", lambda context: _passes(context, scene), len(PASSES)),
         Case("dispersion", f"{name}: every glass with another Abbe number", "Wide swept splats, bands that total reflection cuts; energy and colours "
@@ -97,22 +110,23 @@ def _compared(found: Probe, base: Probe, picture: float, energy: float) -> Held:
     )
 
 
-def _scales(context: Context, scene: Scene) -> Iterator[Measurement]:
-    base = probe(context, scene)
+def _scales(context: Context, whole: Base) -> Iterator[Measurement]:
+    scene, base = whole.scene, whole.probe(context)
     for scale in SCALES:
         found = probe(context, moved(scene, scale=scale))
         yield measurement(scale, f"× {scale:.0e}", found, _compared(found, base, SAME_PICTURE, SAME_ENERGY))
 
 
-def _offsets(context: Context, scene: Scene) -> Iterator[Measurement]:
-    base, size = probe(context, scene), extent(scene)
+def _offsets(context: Context, whole: Base) -> Iterator[Measurement]:
+    scene, base = whole.scene, whole.probe(context)
+    size = extent(scene)
     for offset in OFFSETS:
         found = probe(context, moved(scene, offset=(offset * size, -offset * size, offset * size)))
         yield measurement(offset, f"{offset:.0e} extents", found, _compared(found, base, SAME_PICTURE, SAME_ENERGY))
 
 
-def _turns(context: Context, scene: Scene) -> Iterator[Measurement]:
-    base = probe(context, scene)
+def _turns(context: Context, whole: Base) -> Iterator[Measurement]:
+    scene, base = whole.scene, whole.probe(context)
     noise = picture_error(probe(context, scene, replace(SMALL, seed=2)).picture, base.picture)
     for degrees in TURNS:
         found = probe(context, moved(scene, rotation=turn(AXIS, degrees)))
@@ -136,9 +150,9 @@ def _depths(context: Context, scene: Scene) -> Iterator[Measurement]:
         yield measurement(depth, f"{depth} events", found, held)
 
 
-def _smoothings(context: Context, scene: Scene) -> Iterator[Measurement]:
+def _smoothings(context: Context, whole: Base) -> Iterator[Measurement]:
     """Wider footprints reach over receivers' edges and the picture's border, and that is lost; narrow ones keep everything."""
-    base = probe(context, scene)
+    scene, base = whole.scene, whole.probe(context)
     for smoothing in SMOOTHINGS:
         found = probe(context, scene, replace(SMALL, smoothing=smoothing))
         held = Held({"map": found.map_error, "picture": picture_error(found.picture, base.picture)})
@@ -167,10 +181,10 @@ def _counts(context: Context, scene: Scene) -> Iterator[Measurement]:
         yield measurement(photons, f"{photons}", found, Held({"map": found.map_error}))
 
 
-def _bins(context: Context, scene: Scene) -> Iterator[Measurement]:
+def _bins(context: Context, whole: Base) -> Iterator[Measurement]:
     """White pixels of the two kinds of map differ by the bins' width against the colour matching functions'."""
-    base = probe(context, scene)
-    found = probe(context, scene, replace(SMALL, bins=32))
+    base = whole.probe(context)
+    found = probe(context, whole.scene, replace(SMALL, bins=32))
     yield measurement(32, "32 bins", found, _compared(found, base, 0.05, 0.02))
 
 
@@ -202,18 +216,18 @@ def _dispersive(glass: Dispersion, v_d: float) -> Dispersion:
     return from_abbe(glass.n_d, v_d, f"{glass.name} V_d {v_d:g}")
 
 
-def against_single_wavelengths(context: Context, scene: Scene, severity: float, label: str, settings: RenderSettings = SMALL) -> Measurement:
+def against_single_wavelengths(context: Context, scene: Scene, severity: float, label: str, smeared: float = 0.0) -> Measurement:
     """The default method against `stochastic` (one random wavelength a photon, no spectral column) on blocks of ten pixels.
 
     Its bound is the difference between two seeds of `stochastic`, which is what chance alone makes, and 3 % of the picture for
-    the kernel's tails across the blocks' borders; the energy's is 3 %.
+    the kernel's tails across the blocks' borders, and `smeared`; the energy's is 3 %.
     """
-    settings = replace(settings, layer="caustic")
+    settings = replace(SMALL, layer="caustic")
     found = probe(context, scene, settings)
     truth, other = (probe(context, scene, replace(settings, method="stochastic", seed=seed)).picture for seed in (1, 2))
     chance = picture_error(blocks(other), blocks(truth))
     held = Held(
         {"blocks": picture_error(blocks(found.picture), blocks(0.5 * (truth + other))), "energy": energy_error(found.picture, 0.5 * (truth + other))},
-        {"blocks": chance + 0.03, "energy": 0.03},
+        {"blocks": chance + 0.03 + smeared, "energy": 0.03},
     )
     return measurement(severity, label, found, held)

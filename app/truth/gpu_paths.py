@@ -42,6 +42,7 @@ SHIFT = (123456789, 987654321)
 SEED = 1
 REFLECTED, REFRACTED, MIRRORED, CUT_LOW, CUT_HIGH = 1, 2, 3, 5, 6
 """Choices of a path as trace.comp names them in the branch key."""
+_CHOICES = (REFLECTED, REFRACTED, MIRRORED, CUT_LOW, CUT_HIGH)
 
 
 @dataclass(frozen=True)
@@ -91,13 +92,17 @@ class Photons:
 
     def choices(self, longest: int) -> list[tuple[int, ...]]:
         """Each photon's choices, at most `longest` of them; KeyError where a path made more."""
+        wanted = set(zip(self.band.tolist(), self.records["branch_key"].tolist(), strict=True))
         table = {}
         for band in np.unique(self.band).tolist():
-            keys = {(): branch_key((), band)}
-            for _ in range(longest):
-                keys = {(*path, c): int(hash_combine(key, c)) for path, key in keys.items() for c in (REFLECTED, REFRACTED, MIRRORED, CUT_LOW, CUT_HIGH)}
-                table |= {(band, key): path for path, key in keys.items()}
-        return [table[int(band), int(key)] for band, key in zip(self.band, self.records["branch_key"], strict=True)]
+            keys = np.array([branch_key((), band)])
+            for length in range(1, longest + 1):
+                keys = hash_combine(keys[:, None], np.array(_CHOICES)).ravel()
+                for place in np.flatnonzero(np.isin(keys, self.records["branch_key"])).tolist():
+                    if (band, int(keys[place])) in wanted:
+                        digits = np.unravel_index(place, (len(_CHOICES),) * length)
+                        table[band, int(keys[place])] = tuple(_CHOICES[digit] for digit in digits)
+        return [table[key] for key in zip(self.band.tolist(), self.records["branch_key"].tolist(), strict=True)]
 
     def of_band(self, band: int) -> Photons:
         """Those of one of the bands that were asked for."""

@@ -18,6 +18,17 @@ def dot(a: Array, b: Array) -> Array:
     return np.sum(np.asarray(a, np.float64) * b, axis=-1)
 
 
+def cross(a: Array, b: Array) -> Array:
+    """Vector product over the last axis (numpy's own takes ten times as long for single vectors)."""
+    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    (ax, ay, az), (bx, by, bz) = ((v[..., 0], v[..., 1], v[..., 2]) for v in (a, b))
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    product[..., 0] = ay * bz - az * by
+    product[..., 1] = az * bx - ax * bz
+    product[..., 2] = ax * by - ay * bx
+    return product
+
+
 def times(factor: Array, vector: Array) -> Array:
     """A scalar (...) times a vector (..., 3)."""
     return np.asarray(factor)[..., None] * vector
@@ -30,7 +41,7 @@ def unit(vector: Array) -> Array:
 
 def transmitted_cosine2(direction: Array, normal: Array, eta_it: Array) -> Array:
     """Squared cosine of the transmitted angle by Snell's law, from the sine itself; <= 0: total reflection."""
-    sine_i = np.linalg.norm(np.cross(direction, normal), axis=-1)
+    sine_i = np.linalg.norm(cross(direction, normal), axis=-1)
     sine_t = eta_it * sine_i
     return (1.0 - sine_t) * (1.0 + sine_t)
 
@@ -44,7 +55,7 @@ def refract(direction: Array, normal: Array, eta_it: Array) -> Array:
 
 def eta_it_times_tangential(direction: Array, normal: Array, eta_it: Array) -> Array:
     """eta_it times the part of the direction along the surface (n × (d × n))."""
-    return times(eta_it, np.cross(normal, np.cross(direction, normal)))
+    return times(eta_it, cross(normal, cross(direction, normal)))
 
 
 def reflect(direction: Array, normal: Array) -> Array:
@@ -122,8 +133,8 @@ def normalised_derivative(vector: Array, dvector: Array) -> Array:
 def barycentric_weights(triangle: Array, point: Array) -> Array:
     """Weights (3,) of the corners for a point in the plane of `triangle` (3, 3), by signed areas."""
     a, b, c = triangle
-    normal = np.cross(b - a, c - a)
-    areas = np.array([np.cross(c - b, point - b), np.cross(a - c, point - c), np.cross(b - a, point - a)]) @ normal
+    normal = cross(b - a, c - a)
+    areas = np.array([cross(c - b, point - b), cross(a - c, point - c), cross(b - a, point - a)]) @ normal
     return areas / (normal @ normal)
 
 

@@ -226,6 +226,8 @@ def trace(scene, camera, domain, colour, sequence, first, count, share, max_dept
                 kept = math.exp(-_table(scene.weights, scene.weight[filling], nm) * t)
                 tally[ABSORBED] += watt * (1.0 - kept)
                 watt *= kept
+                if watt <= 0.0:
+                    break
             px += t * dx
             py += t * dy
             pz += t * dz
@@ -292,6 +294,8 @@ def trace(scene, camera, domain, colour, sequence, first, count, share, max_dept
                 kept = _table(scene.weights, scene.weight[thing], nm)
                 tally[ABSORBED] += watt * (1.0 - kept)
                 watt *= kept
+                if watt <= 0.0:
+                    break
                 reflects, cosine_t, eta = True, 0.0, 1.0
             else:
                 eta = _refractive_index(scene, before, nm) / _refractive_index(scene, after, nm)

@@ -143,7 +143,7 @@ def _load(path: Path | None, picture: tuple[int, int]) -> dict[str, np.ndarray] 
     if path is None or not path.is_file():
         return None
     try:
-        with np.load(path) as stored:
+        with path.open("rb") as file, np.load(file) as stored:
             values = {name: stored[name] for name in _FIELDS}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None

@@ -12,7 +12,12 @@ from typing import Protocol
 
 import numpy as np
 
-from app.truth.optics import normalised_derivative, shading_normal_column, unit
+from app.truth.optics import (
+    cross,
+    normalised_derivative,
+    shading_normal_column,
+    unit,
+)
 
 
 class Surface(Protocol):
@@ -89,4 +94,4 @@ class Facet:
 
     def area_vector(self) -> np.ndarray:
         a, b, c = self.corners
-        return np.cross(b - a, c - a)
+        return cross(b - a, c - a)

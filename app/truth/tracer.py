@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -166,17 +167,22 @@ class TriangleList:
         balance = {int(solid): np.sum(np.where(leaves, 1, -1)[ahead & (self.material == solid)]) for solid in np.unique(self.material[ahead])}
         return frozenset(solid for solid, exits in balance.items() if exits > 0)
 
+    @cached_property
+    def _planes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Normals (T, 3) and, in each plane, the vectors (T, 3, 3) across the edges that point inwards."""
+        edges = np.roll(self.corners, -1, axis=1) - self.corners
+        normal = optics.cross(edges[:, 0], -edges[:, 2])
+        return normal, optics.cross(normal[:, None], edges)
+
     def _crossings(self, ray: Ray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Over all triangles (T,): whether the ray's line meets it, at which distance, and from behind."""
-        a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
-        normal = np.cross(b - a, c - a)
+        normal, inward = self._planes
         facing = normal @ ray.direction
         crossed = facing != 0.0
-        distance = np.full(len(a), np.inf)
-        distance[crossed] = optics.dot(a - ray.position, normal)[crossed] / facing[crossed]
+        distance = np.full(len(facing), np.inf)
+        distance[crossed] = optics.dot(self.corners[:, 0] - ray.position, normal)[crossed] / facing[crossed]
         point = ray.position + np.where(crossed, distance, 0.0)[:, None] * ray.direction
-        for start, end in ((a, b), (b, c), (c, a)):
-            crossed &= optics.dot(np.cross(end - start, point - start), normal) >= 0.0
+        crossed &= (optics.dot(point[:, None] - self.corners, inward) >= 0.0).all(axis=1)
         return crossed, distance, facing > 0.0
 
 

@@ -99,13 +99,13 @@ CASES = {
     "inner reflections": Case(lambda: (ball("water"),), point(), depth=5, each=3, refractions=1),
     "total reflection": Case(lambda: (placed("half cube", extruded("half cube", np.array([[0, -1.0], [0, 1.0], [-1, 0]])), glass("N-BK7")),), point(), depth=4, each=2),
     "mirror ball": Case(lambda: (placed("mirror", sphere(0.8, 320), Mirror()), ball(centre=(-0.6, 1.9, 0.3), radius=0.9)), point(), depth=3, each=2),
-    "doublet": Case(cemented, point(), groups=2, each=8, refractions=2),
-    "three glasses": Case(lambda: blocks("N-BK7", "N-SF11", "F2"), needle(), depth=4, groups=3, each=8, refractions=4),
-    "four glasses": Case(lambda: blocks("N-BK7", "N-SF11", "F2", "water"), needle(), depth=5, groups=4, each=8, refractions=5),
-    "five glasses": Case(lambda: blocks("N-BK7", "N-SF11", "F2", "water", "fused silica"), needle(), depth=6, groups=4, each=8, refractions=6),
-    "nested": Case(lambda: (ball("water"), ball("N-SF11", (0.2, 0.1, 0.0), 0.5, priority=1)), point(), depth=4, groups=2, each=8, refractions=3),
+    "doublet": Case(cemented, point(), groups=2, each=6, refractions=2),
+    "three glasses": Case(lambda: blocks("N-BK7", "N-SF11", "F2"), needle(), depth=4, groups=3, each=6, refractions=4),
+    "four glasses": Case(lambda: blocks("N-BK7", "N-SF11", "F2", "water"), needle(), depth=5, groups=4, each=6, refractions=5),
+    "five glasses": Case(lambda: blocks("N-BK7", "N-SF11", "F2", "water", "fused silica"), needle(), depth=6, groups=4, each=6, refractions=6),
+    "nested": Case(lambda: (ball("water"), ball("N-SF11", (0.2, 0.1, 0.0), 0.5, priority=1)), point(), depth=4, groups=2, each=6, refractions=3),
     "overlapping": Case(lambda: (ball("water", (0, 0.4, 0), 0.8, priority=1), ball("F2", (0.3, -0.3, 0), 0.8)), point(), groups=2, each=4, refractions=2),
-    "by wavelength": Case(cemented, point(), method="srd-lambda", each=8, refractions=2),
+    "by wavelength": Case(cemented, point(), method="srd-lambda", each=6, refractions=2),
     "no spectrum": Case(lambda: (ball(),), point(), method="regular-7", groups=0),
 }
 
@@ -142,7 +142,7 @@ def columns_agree(gl: Context, case: Case) -> None:
         assert (np.linalg.norm(got - want, axis=1) <= COLUMN * np.maximum(length, SMALL)).all(), f"column after {choices[i]}: {got - want}"
         assert photons.records["flux_w"][i] == pytest.approx(photons.weight[i] * path.transmittance, rel=1e-4, abs=1e-6 * photons.flux_w)
         sensitive += length > SMALL
-    assert compared >= 7 and skipped <= 1, f"paths differ: {compared} the same, {skipped} others"
+    assert compared >= 6 and skipped <= 1, f"paths differ: {compared} the same, {skipped} others"
     assert (sensitive >= 3).all(), sensitive
 
 
@@ -167,7 +167,10 @@ MUTANTS = {
 }
 
 
-@pytest.mark.parametrize("name", MUTANTS)
+QUICK = ("sign of the index behind", "another glass's slope", "flat normals", "mirror forgets the normal", "axes swapped")
+
+
+@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in MUTANTS if name not in QUICK)])
 def test_mutants_are_caught(gl, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file, old, new, case = MUTANTS[name]
     mutate(monkeypatch, tmp_path, file, old, new)

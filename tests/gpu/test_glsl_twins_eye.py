@@ -101,7 +101,7 @@ def test_lights_as_a_point_and_as_a_ray_see_them(gl, kind: int) -> None:
         assert not got["seen"].any()
 
 
-LOOKUP = {"TARGETS": 1, "CHARTS": 1, "NESTED_WINDOWS": 1, "CHARTS": 1, "BIND_RECEIVERS": 8, "BIND_PLACEMENTS": 9, "NONE": f"{NONE}u"}
+LOOKUP = {"TARGETS": 1, "CHARTS": 1, "NESTED_WINDOWS": 1, "BIND_RECEIVERS": 8, "BIND_PLACEMENTS": 9, "NONE": f"{NONE}u"}
 
 
 def test_the_finest_window_that_holds_a_place_is_found(gl) -> None:

@@ -84,9 +84,9 @@ def test_children_and_photons_are_listed_in_order(gl, count: int) -> None:
     np.testing.assert_array_equal(counts["fallbacks"].sum(axis=0), queue.fallbacks(outcomes, FALLBACKS))
     for name in ("absorbed_w", "roulette_w"):
         assert counts[name].sum(dtype=float) == pytest.approx(outcomes[name].sum(dtype=float), rel=1e-5)
-    groups = state["trace_groups"]
-    assert groups.tolist() == [-(-len(children) // 64), 1, 1, 0]
-    assert state["next_chunk_groups"].tolist() == [-(--(-len(children) // 64) // 64), 1, 1, 0]
+    groups = -(-len(children) // GROUP)
+    assert state["trace_groups"].tolist() == [groups, 1, 1, 0]
+    assert state["next_chunk_groups"].tolist() == [-(-groups // GROUP), 1, 1, 0]
     rig.release()
 
 

@@ -145,7 +145,7 @@ def test_t12_amici_prism_of_three_touching_solids(gl) -> None:
 @pytest.mark.parametrize(
     ("file", "old", "new"),
     [
-        ("lib/medium.glsl", "derivative -= n_i", "derivative += n_i"),
+        pytest.param("lib/medium.glsl", "derivative -= n_i", "derivative += n_i", marks=pytest.mark.slow),
         ("lib/intersect.glsl", "return facing > 0.0 ? distance + NEAR_DISTANCE : distance;", "return distance;"),
     ],
     ids=["sign of the slope", "a film of air"],

@@ -43,7 +43,7 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
     """The command without OpenGL: the runner is made up."""
     found = Seen()
 
-    def run(_context: object, scenes: dict[str, Any], store: Any, _progress: object) -> None:
+    def run(_context: object, scenes: dict[str, Any], store: Any, _progress: object, _skipped: object) -> None:
         found.scenes, found.settings, found.command = [*scenes], store.result.settings, store.result.command
         points = [Point(n, n / 1000, 1 / n, 1 / n, 1 / n, 0.2 / n, 0.8 / n) for n in (100, 1000)]
         samples = [Sample(n, 1, n, n, {"trace": n / 1000}, {"relmse": 1 / n}) for n in (100, 1000)]

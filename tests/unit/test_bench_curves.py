@@ -170,6 +170,12 @@ def test_claims_need_their_methods_their_time_and_their_glass() -> None:
     assert ratios_of([srd]) == {} and ratios_of([stochastic, srd])["srd"] == pytest.approx(100.0)
 
 
+def test_curves_without_a_common_time_show_nothing() -> None:
+    late = [Point(p.photons, p.seconds + 100.0, p.relmse, p.relmse, p.relmse, 0.0, p.variance) for p in law(0.001)]
+    claim = by_name(claims_of(scene(curve("srd-lambda", law(1.0)), curve("srd", late))))["index against wavelength"]
+    assert not claim.holds and "no time at which both" in claim.measured
+
+
 def test_no_picture_that_early_is_said() -> None:
     late = [Point(p.photons, p.seconds + 0.2, p.relmse, p.relmse, p.relmse, 0.0, p.variance) for p in law(0.001)]
     claim = by_name(claims_of(scene(curve("stochastic", law(1.0)), curve("srd", late))))["first picture"]

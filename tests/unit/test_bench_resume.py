@@ -15,7 +15,7 @@ import pytest
 
 from app.bench import runner
 from app.bench.metrics import Truth
-from app.bench.rendering import Rendering
+from app.bench.rendering import NothingToMeasure, Rendering
 from app.bench.results import BenchResult, BenchSettings, ReferenceInfo, SceneResult
 from app.bench.store import Store
 from app.errors import UserError
@@ -82,11 +82,11 @@ class Bench:
     """Opens the folder and runs, as the command does."""
 
     def __init__(self, directory: Path, rigs: Rigs) -> None:
-        self.directory, self.rigs, self.truths, self.told = directory, rigs, 0, []
+        self.directory, self.rigs, self.truths, self.told, self.skipped = directory, rigs, 0, [], None
 
     def run(self, settings: BenchSettings = SETTINGS, key: str = "key", fresh: bool = False, names: tuple[str, ...] = ("one", "two")) -> BenchResult:
         store = Store(self.directory, BenchResult("0", "today", "command", dict(MACHINE), [], settings), fresh)
-        runner.run_bench(None, dict.fromkeys(names, glass_scene()), store, lambda f, t: self.told.append((f, t)), self._truth, lambda *_: key)  # type: ignore[arg-type]
+        runner.run_bench(None, dict.fromkeys(names, glass_scene()), store, lambda f, t: self.told.append((f, t)), self.skipped, self._truth, lambda *_: key)  # type: ignore[arg-type]
         return store.result
 
     def _truth(self, _scene: Scene, width: int, height: int, seconds: float, progress: Callable[[float, str], None]) -> tuple[Truth, ReferenceInfo]:
@@ -136,7 +136,7 @@ def test_one_whole_run(tmp_path: Path, rigs: Rigs) -> None:
     assert not (bench.directory / "partial").exists()
     fractions = [fraction for fraction, _ in bench.told]
     assert fractions == sorted(fractions) and 0.0 <= fractions[0] and fractions[-1] <= 1.0
-    assert bench.told[0][1].startswith("one: reference")
+    assert bench.told[0][1] == "one: preparing stochastic" and any(text.startswith("one: reference") for _, text in bench.told)
 
 
 @pytest.mark.parametrize("stop_at", [0, 1, 5, 12, 13, 22, 25, 30])
@@ -234,6 +234,19 @@ def test_pictures_that_are_not_finite_are_no_result(tmp_path: Path, rigs: Rigs, 
     monkeypatch.setattr(Rig, "render", lambda *_: Rendering(np.full((HEIGHT, WIDTH, 3), np.nan), {}, 1, 1))
     with pytest.raises(RuntimeError, match="stochastic .* not finite .*one"):
         Bench(tmp_path, rigs).run()
+
+
+def test_a_black_scene_is_an_error_by_name_and_skipped_among_all(tmp_path: Path, rigs: Rigs, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise NothingToMeasure("nothing")
+
+    monkeypatch.setattr(runner, "MethodRig", refuse)
+    bench = Bench(tmp_path, rigs)
+    with pytest.raises(UserError, match="nothing"):
+        bench.run()
+    reasons: list[str] = []
+    bench.skipped = reasons.append
+    assert bench.run().scenes == [] and reasons == ["nothing", "nothing"] and bench.truths == 0
 
 
 def test_default_size_follows_the_scene() -> None:

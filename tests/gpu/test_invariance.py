@@ -1,0 +1,265 @@
+"""Pictures that must not change: no reference is needed, the same scene said in another way is the reference.
+
+Tolerances are relative root mean square differences of the caustic alone. `EXACT` is for changes that leave GPU space the
+same (lengths times a power of two, a shift by round numbers): rounding of float32 sums. `SAME_RAYS` is for changes in the order in
+which surfaces are met: a ray on an edge may go to the neighbour. `OTHER_LATTICE` is for changes that turn emission
+lattices and map texels: twice what was measured (0.015; two seeds differ by 0.007). Every tolerance stands
+beside a mutant: the scene with one thing not moved along differs by much more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.model.mesh import Mesh, make_mesh
+from app.model.scene import (
+    Camera,
+    Diffuse,
+    Light,
+    Mirror,
+    Scene,
+    SceneObject,
+)
+from app.model.settings import RenderSettings
+from app.model.spectrum import Spectrum, illuminant
+from app.renderer import render
+from app.truth.gpu_paths import extruded, glass
+
+EXACT, SAME_RAYS, OTHER_LATTICE = 1e-6, 3e-3, 0.03
+ENERGY = 0.004
+"""Relative, of the whole picture, where lattices differ."""
+SLOW = pytest.mark.slow
+SMALL = RenderSettings(width=64, height=36, photons=30_000, spp=4, layer="caustic")
+D65 = illuminant("D65")
+
+
+def lit(power: float) -> Spectrum:
+    return Spectrum(D65.density * power, D65.lines)
+
+
+def floor() -> Mesh:
+    corners = np.array([[-6.0, -6.0, 0.0], [6.0, -6.0, 0.0], [6.0, 6.0, 0.0], [-6.0, 6.0, 0.0]])
+    return make_mesh("floor", corners, np.array([[0, 1, 2], [0, 2, 3]]))
+
+
+def scene() -> Scene:
+    """A flint prism and a mirror over a floor, in the light of a spot and of a beam."""
+    turn = np.radians([29.0, 149.0, 269.0])
+    section = 0.6 * np.column_stack([np.cos(turn), np.sin(turn)])
+    upright = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
+    prism = SceneObject("prism", extruded("prism", section, half=0.6), glass("N-SF11"), upright)
+    pane = make_mesh("pane", np.array([[0.0, -0.4, 0.2], [0.0, 0.4, 0.2], [0.2, 0.4, 0.9], [0.2, -0.4, 0.9]]) + [-1.6, 0.5, 0.0], np.array([[0, 1, 2], [0, 2, 3]]))
+    spot = Light("spot", "spot", lit(20.0), position=(-5.0, 0.4, 3.2), direction=tuple(np.array([5.0, -0.4, -2.2]) / np.linalg.norm([5.0, -0.4, -2.2])), inner_half_angle_deg=3.0, outer_half_angle_deg=8.0)
+    beam = Light("beam", "collimated", lit(0.4), position=(-3.0, 0.1, 2.6), direction=tuple(np.array([3.0, 0.0, -1.6]) / 3.4), radius=0.25)
+    objects = (prism, SceneObject("pane", pane, Mirror()), SceneObject("floor", floor(), Diffuse()))
+    return Scene("invariance", Camera((1.0, -5.0, 4.0), (0.9, 0.0, 0.0)), (spot, beam), objects)
+
+
+def moved(question: Scene, matrix: np.ndarray, lights: bool = True) -> Scene:
+    """Everything under a similarity transform; only intensities (W/sr) follow the scale, by its square."""
+    scale = float(np.cbrt(np.linalg.det(matrix[:3, :3])))
+
+    def point(p: tuple[float, float, float]) -> tuple[float, float, float]:
+        return tuple((matrix[:3, :3] @ p + matrix[:3, 3]).tolist())
+
+    def direction(d: tuple[float, float, float]) -> tuple[float, float, float]:
+        return tuple((matrix[:3, :3] @ d / scale).tolist())
+
+    def light(source: Light) -> Light:
+        factor = scale**2 if source.kind in ("point", "spot") else 1.0
+        spectrum = Spectrum(source.spectral_power.density * factor, source.spectral_power.lines)
+        return replace(source, position=point(source.position), direction=direction(source.direction), radius=source.radius * scale, spectral_power=spectrum)
+
+    camera = replace(question.camera, position=point(question.camera.position), target=point(question.camera.target), up=direction(question.camera.up))
+    objects = tuple(replace(o, object_to_world=matrix @ o.object_to_world) for o in question.objects)
+    return replace(question, camera=camera, objects=objects, lights=tuple(map(light, question.lights)) if lights else question.lights)
+
+
+def placed(scale: float = 1.0, offset: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> np.ndarray:
+    matrix = np.diag([scale, scale, scale, 1.0])
+    matrix[:3, 3] = offset
+    return matrix
+
+
+def turned(axis: tuple[float, float, float], degrees: float) -> np.ndarray:
+    a, angle = np.asarray(axis, float) / np.linalg.norm(axis), np.radians(degrees)
+    cross = np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+    matrix = np.eye(4)
+    matrix[:3, :3] += np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    return matrix
+
+
+def with_mesh(question: Scene, name: str, change) -> Scene:
+    return replace(question, objects=tuple(replace(o, mesh=change(o.mesh)) if o.name == name else o for o in question.objects))
+
+
+def subdivided(mesh: Mesh) -> Mesh:
+    """Every triangle in four of the same plane."""
+    a, b, c = np.moveaxis(mesh.corners(), 1, 0)
+    ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+    corners = np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    vertices, triangles = np.unique(corners.reshape(-1, 3).round(12), axis=0, return_inverse=True)
+    return make_mesh(mesh.name, vertices, triangles.reshape(-1, 3))
+
+
+def unwelded(mesh: Mesh) -> Mesh:
+    """Each triangle with corners of its own."""
+    corners = mesh.corners().reshape(-1, 3)
+    return make_mesh(mesh.name, corners, np.arange(len(corners)).reshape(-1, 3))
+
+
+def shuffled(mesh: Mesh) -> Mesh:
+    """Triangles in another order and begun at other corners, vertices numbered anew."""
+    rng = np.random.default_rng(3)
+    vertex, triangle = rng.permutation(len(mesh.vertices)), rng.permutation(len(mesh.triangles))
+    rolled = np.array([np.roll(vertex.argsort()[mesh.triangles[t]], k % 3) for k, t in enumerate(triangle)])
+    return make_mesh(mesh.name, mesh.vertices[vertex], rolled)
+
+
+def dented(mesh: Mesh) -> Mesh:
+    """The mesh with a corner moved by a hundredth of its size."""
+    vertices = mesh.vertices.copy()
+    vertices[0] += 0.01 * np.ptp(mesh.vertices, axis=0).max()
+    return make_mesh(mesh.name, vertices, mesh.triangles)
+
+
+def ball(mesh: Mesh) -> Mesh:
+    from app.model.primitives_round import sphere
+
+    return sphere(0.5, 2000)
+
+
+def picture(gl, question: Scene, **changes) -> np.ndarray:
+    return render(question, replace(SMALL, **changes), context=gl).rgb.astype(float)
+
+
+def difference(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.sqrt(np.sum((a - b) ** 2) / np.sum(b**2)))
+
+
+@pytest.fixture(scope="module")
+def original(gl) -> np.ndarray:
+    return picture(gl, scene())
+
+
+@pytest.fixture(scope="module")
+def through_ball(gl) -> tuple[Scene, np.ndarray]:
+    """The same with a smooth ball in a tree instead of the prism's half-spaces."""
+    question = with_mesh(scene(), "prism", ball)
+    return question, picture(gl, question)
+
+
+@pytest.mark.parametrize("scale", [2.0**10, pytest.param(2.0**-10, marks=SLOW)])
+def test_units_of_length_by_powers_of_two_change_nothing(gl, original: np.ndarray, scale: float) -> None:
+    assert difference(picture(gl, moved(scene(), placed(scale))), original) < EXACT
+
+
+@pytest.mark.slow
+def test_the_origin_may_lie_anywhere(gl, original: np.ndarray) -> None:
+    far = moved(scene(), placed(offset=(1024.0, -2048.0, 512.0)))
+    assert difference(picture(gl, far), original) < EXACT
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scale", [1e3, 1e-3])
+def test_any_unit_of_length_will_do(gl, original: np.ndarray, scale: float) -> None:
+    after = picture(gl, moved(scene(), placed(scale)))
+    assert difference(after, original) < OTHER_LATTICE
+    assert after.sum() == pytest.approx(original.sum(), rel=ENERGY)
+
+
+@pytest.mark.parametrize(("axis", "degrees"), [((0.0, 0.0, 1.0), 90.0), pytest.param((1.0, 2.0, 0.5), 71.0, marks=SLOW)], ids=["quarter", "askew"])
+def test_all_may_turn_together(gl, original: np.ndarray, axis: tuple[float, float, float], degrees: float) -> None:
+    after = picture(gl, moved(scene(), turned(axis, degrees)))
+    assert difference(after, original) < OTHER_LATTICE
+    assert after.sum() == pytest.approx(original.sum(), rel=ENERGY)
+
+
+def test_what_does_not_move_along_is_seen(gl, original: np.ndarray) -> None:
+    """Mutants: the scene turned by two degrees, or made 2 % larger, without its lights."""
+    for matrix in (turned((0.0, 0.0, 1.0), 2.0), placed(1.02)):
+        assert difference(picture(gl, moved(scene(), matrix, lights=False)), original) > 2.0 * OTHER_LATTICE
+
+
+@pytest.mark.slow
+def test_batches_do_not_show(gl, original: np.ndarray) -> None:
+    assert difference(picture(gl, scene(), batch=8192), original) < EXACT
+
+
+@pytest.mark.parametrize("change", [pytest.param(subdivided, marks=SLOW), unwelded, pytest.param(shuffled, marks=SLOW)], ids=lambda f: f.__name__)
+def test_how_a_flat_solid_is_cut_into_triangles_does_not_show(gl, original: np.ndarray, change) -> None:
+    assert difference(picture(gl, with_mesh(scene(), "prism", change)), original) < SAME_RAYS
+
+
+@pytest.mark.parametrize("name", ["floor", pytest.param("pane", marks=SLOW)])
+def test_how_a_plane_is_cut_into_triangles_does_not_show(gl, original: np.ndarray, name: str) -> None:
+    assert difference(picture(gl, with_mesh(scene(), name, subdivided)), original) < SAME_RAYS
+
+
+@pytest.mark.slow
+def test_a_dent_is_seen(gl, original: np.ndarray) -> None:
+    assert difference(picture(gl, with_mesh(scene(), "prism", dented)), original) > 10 * SAME_RAYS
+
+
+@pytest.mark.slow
+def test_order_of_triangles_in_a_tree_does_not_show(gl, through_ball: tuple[Scene, np.ndarray]) -> None:
+    question, before = through_ball
+
+    def reordered(mesh: Mesh) -> Mesh:
+        order = np.random.default_rng(4).permutation(len(mesh.triangles))
+        return replace(mesh, triangles=mesh.triangles[order], corner_normals=mesh.corner_normals[order])
+
+    assert difference(picture(gl, with_mesh(question, "prism", reordered)), before) < SAME_RAYS
+
+
+@pytest.mark.slow
+def test_order_of_objects_does_not_show(gl, original: np.ndarray) -> None:
+    question = scene()
+    assert difference(picture(gl, replace(question, objects=question.objects[::-1])), original) < SAME_RAYS
+
+
+@pytest.mark.slow
+def test_order_of_lights_does_not_show(gl, original: np.ndarray) -> None:
+    """A light's number shifts its lattice."""
+    question = scene()
+    after = picture(gl, replace(question, lights=question.lights[::-1]))
+    assert difference(after, original) < OTHER_LATTICE
+    assert after.sum() == pytest.approx(original.sum(), rel=ENERGY)
+
+
+@pytest.mark.slow
+def test_two_halves_of_a_light_are_the_light(gl, original: np.ndarray) -> None:
+    question = scene()
+    halves = tuple(replace(light, name=f"{light.name} {k}", spectral_power=Spectrum(0.5 * light.spectral_power.density)) for light in question.lights for k in (1, 2))
+    after = picture(gl, replace(question, lights=halves), photons=2 * SMALL.photons)
+    assert difference(after, original) < OTHER_LATTICE
+    assert after.sum() == pytest.approx(original.sum(), rel=ENERGY)
+
+
+@pytest.mark.slow
+def test_resolution_of_a_map_does_not_change_what_it_holds(gl) -> None:
+    """The window is the same, so the mean of its irradiance is; what blurs over its rim is all that may differ."""
+    coarse, fine = (picture(gl, scene(), layer="map:floor", width=side, height=side).mean(axis=(0, 1)) for side in (48, 160))
+    np.testing.assert_allclose(fine, coarse, rtol=3e-3)
+
+
+@pytest.mark.slow
+def test_seeds_differ_and_their_means_agree(gl) -> None:
+    """Two sets of eight seeds: the difference of each block of pixels, and of the sum, in standard errors. Sums that differ by
+    2 % would be seen with probability 0.99."""
+    settings = {"photons": 8_000, "layer": "caustic", "method": "stochastic"}
+    seeds = np.array([picture(gl, scene(), seed=seed, **settings) for seed in range(16)])
+    assert not np.array_equal(seeds[0], seeds[1])
+    blocks = seeds[:, :, :, 1].reshape(16, 6, 6, 8, 8).sum(axis=(2, 4))
+    first, second = blocks[:8], blocks[8:]
+    error = np.sqrt((first.var(axis=0, ddof=1) + second.var(axis=0, ddof=1)) / 8)
+    lit_blocks = blocks.mean(axis=0) > 0.05 * blocks.mean(axis=0).max()
+    t = np.abs(first.mean(axis=0) - second.mean(axis=0))[lit_blocks] / error[lit_blocks]
+    assert t.max() < 7.0  # Student's t of 14 degrees over some tens of blocks: 1e-4
+    sums = seeds.sum(axis=(1, 2, 3))
+    spread = sums.std(ddof=1) / np.sqrt(8)
+    assert (5.0 + 2.33) * np.sqrt(2.0) * spread < 0.02 * sums.mean()
+    assert abs(sums[:8].mean() - sums[8:].mean()) < 5.0 * np.sqrt(2.0) * spread

@@ -1,0 +1,127 @@
+"""Whole-scene stress cases: a few real ones hold, mutants of the renderer break them, and (slow) the whole run does."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.__main__ import main
+from app.gpu import records
+from app.model.primitives import box
+from app.stress import contact_cases, probe, sweep_cases
+from app.stress.probe import WatchedLight, with_photons
+from app.stress.scene_parts import (
+    BEAM,
+    FLINT,
+    brighter,
+    extent,
+    moved,
+    solid,
+    stage,
+    turn,
+)
+
+FEW = with_photons(4096)
+
+
+def block():
+    return stage(solid("block", box(), FLINT, (0.3, 0.0, 0.8), turned=turn((1.0, 0.3, 0.2), 25.0)))
+
+
+def test_a_pile_of_plates_transmits_what_reflections_add_up_to() -> None:
+    """Closed forms for one plate of n and for a film of air, and light that goes in comes out: reversed, the pile is as clear."""
+    r = (0.5 / 2.5) ** 2
+    assert contact_cases.plates([1.5]) == pytest.approx((1 - r) / (1 + r), abs=1e-14)
+    assert contact_cases.plates([1.5, 1.0, 1.5]) == pytest.approx((1 - r) / (1 + 3 * r), abs=1e-14)
+    assert contact_cases.plates([1.5, 1.9, 1.2]) == pytest.approx(contact_cases.plates([1.2, 1.9, 1.5]), abs=1e-14)
+
+
+def test_gap_and_contact_hold(gl, monkeypatch) -> None:
+    monkeypatch.setattr(contact_cases, "GAPS", (1e-3, 0.0))
+    found = list(contact_cases.measure_gaps(gl))
+    assert [m.note for m in found] == ["a film of air", "optical contact"]
+    assert [m.broken() for m in found] == [[], []]
+
+
+def test_a_pile_of_sixteen_keeps_its_light(gl, monkeypatch) -> None:
+    """Pilots once gave up after twelve events and saw nothing; roulette once drew the same numbers every eight events (1.6e-2)."""
+    monkeypatch.setattr(contact_cases, "STACKS", (16,))
+    (found,) = contact_cases.measure_stacks(gl)
+    assert found.broken() == []
+
+
+def test_scale_holds(gl, monkeypatch) -> None:
+    monkeypatch.setattr(sweep_cases, "SCALES", (1e-4,))
+    (found,) = sweep_cases._scales(gl, sweep_cases.Base(block()))
+    assert found.broken() == []
+    assert found.errors["picture"] < 1e-3
+
+
+def test_passes_add_up(gl, monkeypatch) -> None:
+    monkeypatch.setattr(sweep_cases, "PASSES", (3,))
+    (found,) = sweep_cases._passes(gl, block())
+    assert found.broken() == []
+
+
+def test_a_picture_that_knows_its_scale_is_found(gl, monkeypatch) -> None:
+    """Mutant: intensities do not follow the scale (here: a light 2 % too bright)."""
+    scene = block()
+    base = probe.probe(gl, scene, FEW)
+    brighter_one = replace(scene, lights=(replace(BEAM, spectral_power=brighter(BEAM.spectral_power, 1.02)),))
+    found = probe.probe(gl, moved(brighter_one, scale=1e-4), FEW)
+    held = sweep_cases._compared(found, base, sweep_cases.SAME_PICTURE, sweep_cases.SAME_ENERGY)
+    broken = probe.measurement(1.0, "", found, held).broken()
+    assert len(broken) == 2 and "picture" in broken[0] and "energy" in broken[1]
+
+
+def test_every_nan_is_found_and_every_dropped_footprint_must_be_counted(gl, monkeypatch) -> None:
+    """Mutant: after tracing, three photons lose their position and two more their footprint without being counted."""
+    account = WatchedLight._account
+
+    def spoil(self: WatchedLight, batch) -> None:
+        photons = np.frombuffer(self.trace.photons.read(batch.photons * self.trace.photon.stride), self.trace.photon.dtype).copy()
+        photons["position"][:3, 1] = np.nan
+        photons["flags"][3:5] |= records.FLAG_FOOTPRINT_DROPPED
+        photons["dposition_ds"][3:5] = np.inf
+        self.trace.photons.write(photons.tobytes())
+        account(self, batch)
+
+    monkeypatch.setattr(WatchedLight, "_account", spoil)
+    found = probe.measurement(1.0, "", probe.probe(gl, block(), FEW))
+    assert found.nonfinite == 3 and found.dropped == 2
+    assert len([s for s in found.broken() if "finite" in s or "uncounted" in s]) == 2
+
+
+def test_nan_in_maps_and_pictures_are_counted() -> None:
+    values = np.ones((4, 5, 3))
+    values[1, 2] = np.nan
+    values[0, 0, 0] = -np.inf
+    assert probe.nonfinite(values) == 4
+    assert probe.picture_error(np.zeros((2, 2)), np.zeros((2, 2))) == 0.0
+    assert probe.picture_error(np.ones((2, 2)), np.zeros((2, 2))) == np.inf
+    assert np.allclose(probe.blocks(np.arange(400.0).reshape(20, 20, 1)), np.array([[[94.5], [104.5]], [[294.5], [304.5]]]))
+
+
+def test_moved_scenes_are_the_same_scene() -> None:
+    """Distances and the solid's extent follow the scale; directions stay unit vectors; the sun's irradiance stays, a lamp's intensity grows."""
+    scene = block()
+    large = moved(scene, 10.0, (1.0, 2.0, 3.0), turn((0.0, 0.0, 1.0), 90.0))
+    assert extent(large) == pytest.approx(10.0 * extent(scene))
+    assert large.lights[0].radius == pytest.approx(10.0 * BEAM.radius)
+    assert np.linalg.norm(large.lights[0].direction) == pytest.approx(1.0)
+    assert large.lights[0].spectral_power == scene.lights[0].spectral_power
+    assert np.allclose(large.camera.position, (1.0, 2.0, 3.0 - 50.0))
+    lamp = replace(BEAM, kind="point")
+    assert np.allclose(moved(replace(scene, lights=(lamp,)), 10.0).lights[0].spectral_power.density, 100.0 * lamp.spectral_power.density)
+
+
+@pytest.mark.slow
+def test_the_whole_run_keeps_every_promise(tmp_path: Path, capsys) -> None:
+    assert main(["stress", "-o", str(tmp_path)]) == 0, capsys.readouterr().out[-2000:]
+    held = json.loads((tmp_path / "stress.json").read_text(encoding="utf-8"))
+    assert not held["partial"] and held["broken"] == []
+    assert sum(len(case["measurements"]) for case in held["cases"]) > 200

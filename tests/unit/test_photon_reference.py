@@ -1,0 +1,347 @@
+"""The reference renderer against closed forms: places, Fresnel, Beer, every light's power, the pixel's measure, its own error.
+
+Counts are about 1e5 photons of a scrambled Sobol sequence: fluxes scatter by 1e-4 to 2e-3, and each
+test's tolerance is at least four of its own standard deviations; the mutants at the end must fail.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.model import primitives
+from app.model.colorimetry import K_M, xyz_to_rgb709
+from app.model.glass import constant as constant_index
+from app.model.primitives_round import sphere
+from app.model.scene import Absorption, Black, Camera, Dielectric, Diffuse, Light, Material, Mirror, Scene, SceneObject
+from app.model.scene_file import load_scene
+from app.model.scene_lights import spot_solid_angle_sr
+from app.model.spectrum import cmf_at, constant, laser
+from app.paths import assets_dir
+from app.truth import photon_emission, photon_kernel, photon_run
+from app.truth.photon_reference import cached_reference, render_reference, scene_key
+
+N_SLAB = 1.5168
+SINK = Mirror((0.0, 0.0, 0.0))
+"""A specular object that swallows light: what it absorbs is the flux that falls on it."""
+ABOVE = Camera((0.0, 0.0, 9.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), kind="orthographic", vertical_extent=1.0)
+
+
+@pytest.fixture(autouse=True)
+def short_pilot(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(photon_run, "_PILOT_PHOTONS", 1 << 12)
+
+
+def place(mesh, material: Material, at=(0.0, 0.0, 0.0), rotation: np.ndarray | None = None) -> SceneObject:
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.eye(3) if rotation is None else rotation
+    matrix[:3, 3] = at
+    return SceneObject(mesh.name, mesh, material, matrix)
+
+
+def scene_of(light: Light | tuple[Light, ...], *objects: SceneObject, camera: Camera = ABOVE) -> Scene:
+    return Scene("test", camera, light if isinstance(light, tuple) else (light,), objects)
+
+
+def turned(axis: int, angle_deg: float) -> np.ndarray:
+    c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    rotation = np.eye(3)
+    i, j = [(1, 2), (2, 0), (0, 1)][axis]
+    rotation[[i, i, j, j], [i, j, i, j]] = c, -s, s, c
+    return rotation
+
+
+# ---- one slab: place, Fresnel, Beer -------------------------------------------------------
+
+
+def slab_scene(absorption: Absorption | None = None) -> tuple[Scene, float, float]:
+    """A pencil of laser light meets a slab at 45°; the camera sees 0.01 units round the landing point of T3.
+
+    Returns the scene, the pixel area and the length of the way through the glass.
+    """
+    light = Light("pencil", "collimated", laser(550.0, 1.0 / (math.pi * 1e-12)), (-6.0, 0.0, 8.0), (math.sqrt(0.5), 0.0, -math.sqrt(0.5)), radius=1e-6)
+    slab = place(primitives.box((4.0, 4.0, 1.0)), Dielectric(constant_index(N_SLAB), absorption), (0.0, 0.0, 2.5))
+    floor = place(primitives.plane(40.0, 40.0), Diffuse((0.8, 0.8, 0.8)))
+    sine = math.sqrt(0.5) / N_SLAB
+    lands = -6.0 + (8.0 - 1.0) + math.tan(math.asin(sine))
+    camera = Camera((lands, 0.0, 1.5), (lands, 0.0, 0.0), up=(0.0, 1.0, 0.0), kind="orthographic", vertical_extent=0.01)
+    return scene_of(light, slab, floor, camera=camera), (0.01 / 11) ** 2, 1.0 / math.sqrt(1.0 - sine**2)
+
+
+def through_slab(absorption: Absorption | None = None) -> tuple[np.ndarray, float, float]:
+    scene, area, way = slab_scene(absorption)
+    return render_reference(scene, 11, 11, photons=1 << 17).xyz(), area, way
+
+
+def test_a_pencil_lands_where_the_slab_sends_it_with_fresnels_share() -> None:
+    xyz, area, _ = through_slab()
+    assert np.count_nonzero(xyz[..., 1]) == 1 and xyz[5, 5, 1] > 0.0
+    cosine_i, cosine_t = math.sqrt(0.5), math.sqrt(1.0 - 0.5 / N_SLAB**2)
+    s = (cosine_i - N_SLAB * cosine_t) / (cosine_i + N_SLAB * cosine_t)
+    p = (N_SLAB * cosine_i - cosine_t) / (N_SLAB * cosine_i + cosine_t)
+    transmitted = (1.0 - 0.5 * (s * s + p * p)) ** 2
+    expected = K_M * cmf_at(550.0) * transmitted * 0.8 / math.pi / area
+    np.testing.assert_allclose(xyz[5, 5], expected, rtol=4e-3)
+
+
+def test_absorption_is_beers_law_over_the_way_in_the_glass() -> None:
+    clear, _, way = through_slab()
+    tinted, _, _ = through_slab(Absorption(np.full(401, 0.7)))
+    # The same photons in both, so the ratio has no noise.
+    assert tinted[5, 5, 1] / clear[5, 5, 1] == pytest.approx(math.exp(-0.7 * way), rel=1e-9)
+
+
+# ---- every light's power -----------------------------------------------------------------
+
+
+def flux_on_sink(light: Light, *objects: SceneObject) -> float:
+    """W, for a light of 1 W (per quantity) in the visible."""
+    picture = render_reference(scene_of(light, *objects), 4, 4, photons=1 << 17)
+    return picture.balance["absorbed"]
+
+
+ONE = constant(1.0 / 401.0)
+PLATE = place(primitives.plane(2.0, 2.0), SINK)
+DOWN = {"position": (0.0, 0.0, 1.5), "direction": (0.0, 0.0, -1.0)}
+
+
+def square_factor(side: float, distance: float) -> float:
+    """Form factor of two equal coaxial squares (Howell, configuration C-11)."""
+    x = side / distance
+    q = math.sqrt(1.0 + x * x)
+    return 2.0 / (math.pi * x * x) * (math.log(q * q / math.sqrt(1.0 + 2.0 * x * x)) + 2.0 * x * q * math.atan(x / q) - 2.0 * x * math.atan(x))
+
+
+@pytest.mark.parametrize(
+    ("light", "expected"),
+    [
+        (Light("point", "point", ONE, (0.0, 0.0, 1.5)), 4.0 * math.atan(1.0 / (1.5 * math.sqrt(1.5**2 + 2.0)))),
+        (Light("spot", "spot", ONE, **DOWN, inner_half_angle_deg=10.0, outer_half_angle_deg=30.0), spot_solid_angle_sr(10.0, 30.0)),
+        (Light("hard", "spot", ONE, **DOWN, inner_half_angle_deg=25.0, outer_half_angle_deg=25.0), spot_solid_angle_sr(25.0, 25.0)),
+        (Light("slanted", "directional", ONE, direction=(0.6, 0.0, -0.8)), 4.0 * 0.8),
+        (Light("sun", "directional", ONE, direction=(0.0, 0.0, -1.0), angular_diameter_deg=8.0), 4.0),
+        (Light("beam", "collimated", ONE, **DOWN, radius=0.7), math.pi * 0.49),
+        (Light("sheet", "collimated", ONE, **DOWN, shape="rectangle", width=0.3, height=3.0), 0.6),
+        (Light("panel", "area", ONE, **DOWN, shape="rectangle", width=2.0, height=2.0), math.pi * 4.0 * square_factor(2.0, 1.5)),
+    ],
+    ids=lambda value: value.name if isinstance(value, Light) else "",
+)
+def test_every_light_has_its_power(light: Light, expected: float) -> None:
+    assert flux_on_sink(light, PLATE) == pytest.approx(expected, rel=4e-3)
+
+
+def test_a_point_among_mirrors_shines_all_round() -> None:
+    """The cube of planes: inside a closed box every photon is swallowed."""
+    box = place(primitives.box((3.0, 2.0, 4.0)), SINK, (0.3, 0.1, -0.4))
+    assert flux_on_sink(Light("lamp", "point", ONE, (0.2, 0.3, 0.1)), box) == pytest.approx(4.0 * math.pi, rel=2e-3)
+
+
+def test_light_that_nothing_specular_can_meet_is_none() -> None:
+    scene = scene_of(Light("away", "collimated", ONE, (0.0, 0.0, 5.0), (1.0, 0.0, 0.0), radius=0.5), PLATE)
+    picture = render_reference(scene, 4, 4, photons=1000)
+    assert picture.photons == 0 and not picture.rgb.any() and picture.relmse == 0.0
+
+
+# ---- the pixel's measure -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["pinhole", "orthographic"])
+def test_an_evenly_lit_floor_is_even_in_a_slanted_picture(kind: str) -> None:
+    """Sunlight that a large tilted mirror throws straight down: radiance E ρ/π in every pixel, wherever the camera stands."""
+    light = Light("sun", "directional", ONE.scaled_to_luminous(100.0), direction=(1.0, 0.0, 0.0))
+    mirror = place(primitives.plane(30.0, 30.0), Mirror(), (0.0, 0.0, 14.0), turned(1, 45.0))
+    floor = place(primitives.plane(100.0, 100.0), Diffuse((0.5, 0.25, 0.75)))
+    camera = Camera((1.0, -6.0, 2.0), (0.0, 0.0, 0.0), kind=kind, vertical_fov_deg=50.0, vertical_extent=3.0)  # type: ignore[arg-type]
+    picture = render_reference(scene_of(light, mirror, floor, camera=camera), 16, 12, photons=400_000, seed=3)
+    white = ONE.scaled_to_luminous(100.0).xyz()
+    expected = xyz_to_rgb709(white) * (0.5, 0.25, 0.75) / math.pi
+    lower = picture.rgb[4:]  # below the horizon
+    assert lower.mean(axis=(0, 1)) == pytest.approx(expected, rel=3e-3)
+    z = (lower - expected) / np.sqrt(picture.variance[4:])
+    assert np.sqrt(np.mean(z**2)) < 1.6  # 8 parts: Student's t of 7 degrees has 1.18
+    rows = lower.mean(axis=1) / expected
+    assert np.abs(rows - 1.0).max() < 0.02
+
+
+def test_light_on_the_far_side_of_a_sheet_is_not_seen() -> None:
+    light = Light("up", "collimated", ONE, (0.0, 0.0, -3.0), (0.0, 0.0, 1.0), radius=0.3)
+    pane = place(primitives.box((1.0, 1.0, 0.2)), Dielectric(constant_index(1.5)), (0.0, 0.0, -1.0))
+    sheet = place(primitives.plane(4.0, 4.0), Diffuse())
+    above = render_reference(scene_of(light, pane, sheet), 8, 8, photons=20_000)
+    below = render_reference(scene_of(light, pane, sheet, camera=replace(ABOVE, position=(0.0, 0.0, -0.5))), 8, 8, photons=20_000)
+    assert above.balance["deposited"] > 0.1 and not above.rgb.any() and below.rgb.any()
+
+
+def test_glass_hides_what_lies_behind_it() -> None:
+    light = Light("down", "collimated", ONE, (0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=0.3)
+    pane = place(primitives.box((1.0, 1.0, 0.2)), Dielectric(constant_index(1.5)), (0.0, 0.0, 1.0))
+    floor = place(primitives.plane(4.0, 4.0), Diffuse())
+    assert not render_reference(scene_of(light, pane, floor), 8, 8, photons=20_000).rgb.any()
+
+
+# ---- flux, depth, error --------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def busy() -> Scene:
+    """Nested, touching, absorbing, mirrored, smooth: everything at once."""
+    tint = Absorption(np.full(401, 0.3))
+    light = Light("lamp", "point", constant(1.0), (0.4, -1.0, 4.0))
+    return scene_of(
+        (light, Light("sun", "directional", laser(600.0), direction=(0.3, 0.2, -0.9), angular_diameter_deg=3.0)),
+        place(sphere(0.8, 1280), Dielectric(constant_index(1.5), None, 1), (0.0, 0.0, 1.0)),
+        place(sphere(0.4, 1280), Dielectric(constant_index(1.33), tint, 2), (0.1, 0.0, 1.0)),
+        place(primitives.box((0.6, 0.6, 0.6)), Dielectric(constant_index(1.7), tint, 0), (1.2, 0.0, 1.0)),
+        place(primitives.box((0.6, 0.6, 0.6)), Dielectric(constant_index(1.6), None, 0), (1.8, 0.0, 1.0)),
+        place(sphere(0.4, 320), Mirror((0.9, 0.5, 0.2)), (-1.2, 0.3, 0.6)),
+        place(sphere(0.2, 320), Black(), (0.0, 1.2, 0.6)),
+        place(primitives.plane(9.0, 9.0), Diffuse(), (0.0, 0.0, 0.0)),
+        camera=Camera((0.0, -6.0, 5.0), (0.0, 0.0, 0.0)),
+    )
+
+
+def test_flux_closes_and_none_slips_through_cracks(busy: Scene) -> None:
+    balance = render_reference(busy, 32, 24, photons=60_000).balance
+    fates = [name for name in balance if name != "emitted"]
+    assert sum(balance[name] for name in fates) == pytest.approx(balance["emitted"], rel=1e-10)
+    assert all(balance[name] > 0.0 for name in ("deposited", "direct", "absorbed", "escaped"))
+    assert balance["lost_numeric"] < 1e-6 * balance["emitted"]
+
+
+def test_depth_counts_as_the_program_counts_it(busy: Scene) -> None:
+    """A pane takes two events: with one allowed, all that enters is lost."""
+    light = Light("beam", "collimated", ONE, (0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=0.3)
+    pane = place(primitives.box((1.0, 1.0, 0.2)), Dielectric(constant_index(1.5)), (0.0, 0.0, 1.0))
+    scene = scene_of(light, pane, place(primitives.plane(4.0, 4.0), Diffuse()))
+    one, two = (render_reference(scene, 4, 4, photons=20_000, max_depth=depth).balance for depth in (1, 2))
+    assert one["lost_depth"] == pytest.approx(0.96 * one["emitted"], rel=5e-3) and one["deposited"] == 0.0
+    assert two["deposited"] == pytest.approx(0.96**2 * two["emitted"], rel=5e-3)
+
+
+def test_touching_blocks_of_one_glass_are_one_block() -> None:
+    """No film of air between coincident faces: a beam along the axis of two halves loses only two surfaces."""
+    light = Light("beam", "collimated", ONE, (0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=0.3)
+    glass = Dielectric(constant_index(1.5))
+    halves = [place(primitives.box((1.0, 1.0, 0.5)), glass, (0.0, 0.0, z)) for z in (1.0, 1.5)]
+    balance = render_reference(scene_of(light, *halves, place(primitives.plane(4.0, 4.0), Diffuse())), 4, 4, photons=20_000).balance
+    rest = 0.04
+    assert balance["deposited"] / balance["emitted"] == pytest.approx((1 - rest) ** 2 / (1 - rest**2), rel=3e-3)
+
+
+def test_its_own_error_is_true(busy: Scene) -> None:
+    """The scatter of eight whole runs is the variance they claim: the ratio's 4 σ is 25 % over 768 pixels and three seeds' noise."""
+    runs = [render_reference(busy, 32, 24, photons=16_000, seed=seed) for seed in range(8)]
+    observed = np.var([run.rgb[..., 1] for run in runs], axis=0, ddof=1).sum()
+    claimed = np.mean([run.variance[..., 1] for run in runs], axis=0).sum()
+    assert observed / claimed == pytest.approx(1.0, abs=0.3)
+
+
+# ---- the sampler's own promises --------------------------------------------------------------
+
+
+def test_the_sequence_is_a_net_in_its_first_two_dimensions_and_stratified_in_all() -> None:
+    sequence = photon_kernel.scrambled(5, 0, 0)
+    bits = (np.arange(256)[:, None] >> np.arange(32)) & 1
+    words = np.zeros((photon_kernel.DIMENSIONS, 256), np.uint32)
+    for d in range(photon_kernel.DIMENSIONS):
+        words[d] = np.bitwise_xor.reduce(np.where(bits == 1, sequence.directions[d], np.uint32(0)), axis=1) ^ sequence.shift[d]
+        assert len(np.unique(words[d] >> 24)) == 256
+    for k in range(9):  # one point in each of the 256 boxes of 2^k × 2^(8−k)
+        assert len(np.unique((words[0].astype(np.uint64) >> (32 - k) << 8) | (words[1] >> np.uint64(24 + k)))) == 256
+
+
+def _lamp_domain() -> photon_emission.Domain:
+    triangles = np.array([[[-1, -1, 0], [1, -1, 0], [1, 1, 0]], [[-1, -1, 0], [1, 1, 0], [-1, 1, 0]]], float)
+    return photon_emission.domains(Light("spot", "spot", ONE, **DOWN, inner_half_angle_deg=10.0, outer_half_angle_deg=30.0), triangles, np.zeros(3), 2.0)[0]
+
+
+def emitted(domain: photon_emission.Domain, count: int = 20_000) -> float:
+    numbers = np.random.default_rng(2).random((count, 4))
+    return float(np.mean([photon_emission.emit(domain, *row)[6] for row in numbers]))
+
+
+def test_an_aimed_density_leaves_the_flux_alone_and_a_wrong_one_does_not() -> None:
+    domain = _lamp_domain()
+    aim = np.zeros((photon_emission.GRID, photon_emission.GRID))
+    aim[20:30, 40:44] = 1.0
+    aimed = photon_emission.refined(domain, aim)
+    expected = spot_solid_angle_sr(10.0, 30.0)
+    assert emitted(domain) == pytest.approx(expected, rel=0.03)
+    assert emitted(aimed) == pytest.approx(expected, rel=0.08)
+    # A mutant that draws by the aimed density and weighs by the even one.
+    ratio = photon_emission.density(aimed) / np.maximum(photon_emission.density(domain), 1e-300)
+    photons = [photon_emission.emit(aimed, *row) for row in np.random.default_rng(2).random((20_000, 4))]
+    assert np.mean([p[6] * ratio[p[7], p[8]] for p in photons]) != pytest.approx(expected, rel=0.08)
+
+
+# ---- limits and the cache --------------------------------------------------------------------
+
+
+@pytest.fixture
+def small(busy: Scene) -> Scene:
+    return replace(busy, objects=busy.objects[:1] + busy.objects[-1:], lights=busy.lights[:1])
+
+
+def test_a_stored_reference_is_reused_and_grows(small: Scene, tmp_path: Path) -> None:
+    first = cached_reference(small, 16, 12, photons=16_000, folder=tmp_path)
+    again = cached_reference(small, 16, 12, photons=10_000, folder=tmp_path)
+    assert again.photons == first.photons and np.array_equal(again.rgb, first.rgb)
+    more = cached_reference(small, 16, 12, photons=64_000, folder=tmp_path)
+    at_once = render_reference(small, 16, 12, photons=more.photons)
+    assert more.photons == at_once.photons > first.photons and more.relmse < first.relmse
+    np.testing.assert_allclose(more.rgb, at_once.rgb, rtol=1e-9, atol=1e-12)
+    good_enough = cached_reference(small, 16, 12, target_relmse=more.relmse * 1.01, folder=tmp_path)
+    assert good_enough.photons == more.photons
+
+
+def test_a_damaged_store_is_ignored(small: Scene, tmp_path: Path) -> None:
+    first = cached_reference(small, 16, 12, photons=4000, folder=tmp_path)
+    (stored,) = tmp_path.glob("*.npz")
+    stored.write_bytes(stored.read_bytes()[:900])
+    assert np.array_equal(cached_reference(small, 16, 12, photons=4000, folder=tmp_path).rgb, first.rgb)
+
+
+def test_an_interrupt_keeps_what_is_done(small: Scene, tmp_path: Path) -> None:
+    calls = []
+
+    def interrupt(fraction: float, text: str) -> None:
+        calls.append(fraction)
+        if len(calls) == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        cached_reference(small, 16, 12, photons=10**9, progress=interrupt, folder=tmp_path)
+    kept = cached_reference(small, 16, 12, photons=1, folder=tmp_path)
+    assert kept.photons > 0 and kept.rgb.any()
+    stopped = render_reference(small, 16, 12, photons=10**9, cancelled=iter([False, False, True]).__next__)
+    assert 0 < stopped.photons < 10**9
+
+
+def test_limits() -> None:
+    with pytest.raises(ValueError, match="limit"):
+        render_reference(scene_of(Light("l", "point", ONE, (0, 0, 1)), PLATE), 4, 4)
+    scene = load_scene(assets_dir() / "scenes" / "prism.toml")
+    rough = render_reference(scene, 24, 16, target_relmse=0.05)
+    assert 0.0 < rough.relmse <= 0.05
+    assert render_reference(scene, 24, 16, seconds=0.2).seconds < 5.0
+
+
+def test_the_key_tells_pictures_apart_and_nothing_else(small: Scene) -> None:
+    key = scene_key(small, 16, 12, 64)
+    light, glass = small.lights[0], small.objects[0]
+    assert scene_key(replace(small, name="other", notes=("note",), background_rgb=(1.0, 0.0, 0.0)), 16, 12, 64) == key
+    others = [
+        scene_key(small, 16, 13, 64),
+        scene_key(small, 16, 12, 63),
+        scene_key(replace(small, camera=replace(small.camera, vertical_fov_deg=35.1)), 16, 12, 64),
+        scene_key(replace(small, lights=(replace(light, spectral_power=light.spectral_power.scaled(2.0)),)), 16, 12, 64),
+        scene_key(replace(small, lights=(replace(light, position=(0.4, -1.0, 4.1)),)), 16, 12, 64),
+        scene_key(replace(small, objects=(replace(glass, material=Dielectric(constant_index(1.51), None, 1)), small.objects[1])), 16, 12, 64),
+        scene_key(replace(small, objects=(replace(glass, object_to_world=np.diag([1.0, 1.0, 1.01, 1.0])), small.objects[1])), 16, 12, 64),
+    ]
+    assert len({key, *others}) == 8
+    assert photon_run.PARTS >= 8

@@ -1,0 +1,180 @@
+"""The stress runner and its reports on made-up measurements: verdicts, errors, stops, and numbers that JSON has no word for."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.errors import UserError
+from app.stress.case import Case, Measurement
+from app.stress.plots import case_plot, drawn_names
+from app.stress.record import number, write_json
+from app.stress.report import html_text
+from app.stress.runner import StressResult, all_cases, choose, run
+from app.stress.table import summary, table
+
+
+class NoContext:
+    """Stands for a `Context` that made-up cases never touch."""
+
+    def check(self, _where: str) -> None:
+        """Nothing was drawn."""
+
+
+GOOD = Measurement(1e-3, "1e-3 rad", 0, {"energy": 2e-4, "shown only": 0.5}, {"energy": 1e-3}, 3e-8, {"band_cut": 7})
+BAD = Measurement(1e-4, "1e-4 rad", 0, {"energy": 2e-2}, {"energy": 1e-3}, 3e-8)
+NOT_FINITE = Measurement(1e-5, "1e-5 rad", 3, {"energy": math.nan, "other": math.inf}, {"energy": 1e-3, "other": 1.0}, math.nan)
+
+
+def case(name: str, *measurements: Measurement, steps: int | None = None, fails: BaseException | None = None, logarithmic: bool = True) -> Case:
+    def measure(_: object) -> Iterator[Measurement]:
+        yield from measurements
+        if fails is not None:
+            raise fails
+
+    return Case(name, f"the title of {name}", "why <it> matters & how", "margin, rad", measure, len(measurements) if steps is None else steps, logarithmic)
+
+
+def ran(*cases: Case) -> StressResult:
+    result = StressResult("0", "2026-01-01T00:00:00+00:00", "spectrasplat stress -o out", {"renderer": "made <up>"}, len(cases))
+    result.finished = run(result, cases, NoContext(), lambda fraction, text: None, lambda so_far: None)  # type: ignore[attr-defined, arg-type]
+    return result
+
+
+def test_kept_promises_are_told_so() -> None:
+    result = ran(case("one", GOOD))
+    assert result.broken() == [] and not result.partial
+    assert "every promise holds" in summary(result)
+    assert "Every promise holds" in html_text(result)
+
+
+@pytest.mark.parametrize(
+    ("measurement", "said"),
+    [
+        (BAD, "error of energy 2.00e-02 > 1.00e-03"),
+        (NOT_FINITE, "3 values are not finite"),
+        (NOT_FINITE, "error of energy nan"),
+        (NOT_FINITE, "flux does not close"),
+        (Measurement(1.0, "x", 0, flux_imbalance=2e-4), "flux does not close"),
+        (Measurement(1.0, "x", 0, dropped=2, fallbacks={"footprint_dropped": 1}), "2 photons were degraded but only 1"),
+    ],
+)
+def test_each_broken_promise_is_told(measurement: Measurement, said: str) -> None:
+    result = ran(case("one", GOOD, measurement))
+    assert any(said in sentence for sentence in result.broken())
+    assert "every promise" not in summary(result)
+    assert said.replace(">", "&gt;") in html_text(result)
+
+
+def test_a_case_that_fails_is_a_broken_promise_and_the_others_go_on() -> None:
+    result = ran(case("first", GOOD, fails=RuntimeError("the driver\nwent away"), steps=2), case("second", GOOD))
+    assert [len(c.measurements) for c in result.cases] == [1, 1]
+    assert result.broken() == ["first, stopped by an error: RuntimeError: the driver went away"]
+    assert not result.partial
+
+
+def test_a_case_that_yields_too_little_is_a_broken_promise() -> None:
+    assert ran(case("one", GOOD, steps=3)).broken() == ["one, stopped by an error: measured 1 of 3 severities"]
+
+
+def test_ctrl_c_keeps_what_is_done() -> None:
+    result = ran(case("first", GOOD), case("second", GOOD, fails=KeyboardInterrupt(), steps=2), case("third", GOOD))
+    assert not result.finished  # type: ignore[attr-defined]
+    assert [c.case.name for c in result.cases] == ["first", "second"]
+    assert result.partial and result.broken() == []
+    assert "stopped early; 2 of 3 cases, 2 severities" in summary(result)
+    page = html_text(result)
+    assert "This report is partial" in page and "Stopped after 1 of 2 severities" in page
+
+
+def test_what_is_done_is_kept_after_every_case() -> None:
+    kept: list[int] = []
+    result = StressResult("0", "", "", {}, 2)
+    run(result, (case("a", GOOD), case("b", GOOD)), NoContext(), lambda *_: None, lambda so_far: kept.append(len(so_far.cases)))  # type: ignore[arg-type]
+    assert kept == [1, 2]
+
+
+def test_json_holds_everything_and_no_nan(tmp_path: Path) -> None:
+    file = tmp_path / "stress.json"
+    write_json(ran(case("one", GOOD, NOT_FINITE)), file)
+
+    def refuse(text: str) -> None:
+        raise AssertionError(f"{text} is not JSON")
+
+    held = json.loads(file.read_text(encoding="utf-8"), parse_constant=refuse)
+    first, second = held["cases"][0]["measurements"]
+    assert first["errors"] == {"energy": 2e-4, "shown only": 0.5} and first["bounds"] == {"energy": 1e-3} and first["fallbacks"] == {"band_cut": 7}
+    assert second["errors"] == {"energy": "NaN", "other": "Infinity"} and second["flux_imbalance"] == "NaN" and second["nonfinite"] == 3
+    assert held["partial"] is False and len(held["broken"]) == 4
+    assert number(-math.inf) == "-Infinity"
+
+
+def test_the_page_stands_alone_and_escapes() -> None:
+    page = html_text(ran(case("one", GOOD, BAD), case("two", GOOD)))
+    assert "<script" not in page and "http" not in page and "src=" not in page
+    assert "why &lt;it&gt; matters &amp; how" in page and "made &lt;up&gt;" in page
+    assert page.count("<svg") == 2
+    ids = re.findall(r'\bid="([^"]*)"', page)
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r'href="#([^"]*)"', page)) <= set(ids)
+
+
+@pytest.mark.parametrize(
+    "measurements",
+    [
+        (GOOD, BAD, NOT_FINITE),
+        (Measurement(0.0, "none", 0, {"energy": 0.0}, {"energy": 1.0}), GOOD),
+        (Measurement(1.0, "a name", 0, {"energy": 1e-30, "b": 1e30}, {"energy": 1.0}), BAD),
+        (GOOD,),
+    ],
+)
+@pytest.mark.parametrize("logarithmic", [True, False])
+def test_any_measurement_can_be_drawn(measurements: tuple[Measurement, ...], logarithmic: bool) -> None:
+    result = ran(case("one", *measurements, logarithmic=logarithmic))
+    figure = case_plot(result.cases[0])
+    assert figure is not None
+    axes = figure.axes[0]
+    for line in axes.lines:
+        for values in (line.get_xdata(), line.get_ydata()):
+            assert all(math.isfinite(v) for v in values)
+    assert "<svg" in html_text(result)
+
+
+def test_nothing_to_draw_is_no_plot() -> None:
+    zero = ran(case("one", Measurement(1.0, "x", 0, {"lost": 0.0}, {"lost": 1e-3}))).cases[0]
+    assert drawn_names(zero) == [] and case_plot(zero) is None
+
+
+def test_a_breach_is_marked_in_the_plot() -> None:
+    crosses = [sum(len(line.get_xdata()) for line in case_plot(ran(case("one", *m)).cases[0]).axes[0].lines if line.get_marker() == "x") for m in ((GOOD,), (GOOD, BAD))]
+    assert crosses == [0, 1]
+
+
+def test_the_table_shows_every_severity_and_verdict() -> None:
+    from rich.console import Console
+
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(table(ran(case("one", GOOD, BAD), case("failed", fails=RuntimeError("oh"), steps=1))))
+    text = console.export_text()
+    assert "1e-3 rad" in text and "1e-4 rad" in text and "band_cut 7" in text
+    assert text.count("BROKEN") == 2 and text.count(" ok ") == 1
+
+
+def test_cases_have_names_of_their_own_and_are_chosen_by_them() -> None:
+    cases = all_cases()
+    names = [c.name for c in cases]
+    assert len(names) == len(set(names))
+    assert all(c.steps > 0 and c.title and c.why and c.severity_name for c in cases)
+    assert [c.name for c in choose(cases, "stack, gap")] == ["gap", "stack"]
+    assert {c.name.split("/")[0] for c in choose(cases, "prism/")} == {"prism"}
+    assert choose(cases, None) == cases
+    with pytest.raises(UserError, match="did you mean 'stack'"):
+        choose(cases, "stak")
+    with pytest.raises(UserError, match="names no case"):
+        choose(cases, " , ")
