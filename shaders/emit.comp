@@ -12,7 +12,7 @@ layout(std430, binding = BIND_OUTCOMES) writeonly restrict buffer Outcomes { uve
 
 // Share of a lattice cell on the lit side of a hard edge `inside` domain units away: a lattice that is
 // cut off sharply would leave a saw-toothed edge.
-float coverage(float inside) { return clamp(inside / p.spacing + 0.5, 0.0, 1.0); }
+float coverage(float inside, float spacing) { return clamp(inside / spacing + 0.5, 0.0, 1.0); }
 
 vec3 to_world(vec3 local) { return local.x * p.tangent + local.y * p.bitangent + local.z * p.axis; }
 
@@ -52,12 +52,12 @@ void main()
     alive = alive && dot(q, q) < 4.0;
     vec3 dx, dy;
     direction = to_world(azimuthal_direction(q, dx, dy));
-    ddirection_ds = p.spacing * to_world(dx);
-    ddirection_dt = p.spacing * to_world(dy);
+    ddirection_ds = p.spacing.x * to_world(dx);
+    ddirection_dt = p.spacing.y * to_world(dy);
     position = p.origin;
 #ifdef LIGHT_POINT
     weight *= p.cone.y - p.cone.x > 1e-7 ? spot_falloff(direction, p.light_axis, p.cone)
-                                         : coverage(p.cone.y - angle_between(direction, p.light_axis));
+                                         : coverage(p.cone.y - angle_between(direction, p.light_axis), p.mean_spacing);
 #else
     vec2 on_light = p.is_disc != 0u ? concentric_disc(on_disc) : 2.0 * on_disc - 1.0;
     position += on_light.x * p.light_u + on_light.y * p.light_v;
@@ -68,13 +68,14 @@ void main()
     direction = normalize(p.axis + tilt.x * p.tangent + tilt.y * p.bitangent);
     vec3 on_plane = p.origin + q.x * p.tangent + q.y * p.bitangent;
     position = on_plane - p.back * direction;
-    dposition_ds = p.spacing * p.tangent;
-    dposition_dt = p.spacing * p.bitangent;
+    dposition_ds = p.spacing.x * p.tangent;
+    dposition_dt = p.spacing.y * p.bitangent;
     // A collimated beam ends at its aperture.
     vec2 at = vec2(dot(on_plane - p.aperture_centre, p.light_u), dot(on_plane - p.aperture_centre, p.light_v));
     vec2 half_size = 1.0 / max(vec2(length(p.light_u), length(p.light_v)), vec2(1e-20));
     vec2 inside = half_size * (1.0 - abs(at));
-    weight *= p.has_aperture == 0u ? 1.0 : p.is_disc != 0u ? coverage(half_size.x * (1.0 - length(at))) : coverage(inside.x) * coverage(inside.y);
+    weight *= p.has_aperture == 0u ? 1.0 : p.is_disc != 0u ? coverage(half_size.x * (1.0 - length(at)), p.mean_spacing)
+                                                        : coverage(inside.x, p.spacing.x) * coverage(inside.y, p.spacing.y);
 #endif
     alive = alive && weight > 0.0;
     if (alive) {
@@ -89,7 +90,12 @@ void main()
         ray.x_anchor = band.z;
 #ifdef RANDOM_WAVELENGTH
         // Uniform over the band; a laser's band has no width, and its photons all have its wavelength.
-        ray.x_anchor = mix(band.x, band.y, kronecker(id, 3774877043u, p.shift_spectral));
+#ifdef EVEN_WAVELENGTHS
+        float place_in_band = kronecker(id, 3774877043u, p.shift_spectral);
+#else
+        float place_in_band = unit_float(hash_combine(hash_combine(p.shift_spectral, p.light), id));
+#endif
+        ray.x_anchor = mix(band.x, band.y, place_in_band);
         ray.x_lo = ray.x_anchor;
         ray.x_hi = ray.x_anchor;
         float width = band.y - band.x;

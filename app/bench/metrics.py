@@ -13,11 +13,12 @@ from functools import cached_property
 import numpy as np
 
 EPSILON_SHARE = 1e-2
-"""ε of relMSE = mean[(I−R)²/(R²+ε)] is this times mean(R)², the mean taken over all pixels and channels."""
+"""ε of relMSE = mean[(I−R)²/(R²+ε)] is this times mean(R)², the mean taken over lit pixels and all channels: it then does not
+depend on how much darkness surrounds a caustic (nor does darkness itself outweigh it)."""
 TRIMMED_SHARE = 1e-3
 """Share of the largest terms that relmse_trimmed leaves out."""
 LIT_FLOOR = 1e-4
-"""Pixels whose Y exceeds this times the largest are lit, for relmse_lit."""
+"""Pixels whose Y exceeds this times the largest are lit."""
 LIT_SHARE = 0.1
 """Colour is judged where the reference's Y exceeds this times its mean."""
 _GREY_UV = (0.19783, 0.46832)
@@ -25,6 +26,13 @@ _GREY_UV = (0.19783, 0.46832)
 _FLIP_WHITE = 2.119
 """Luminance that FLIP's ACES curve shows at 85 %, from which FLIP counts its exposures (Andersson et al. 2021, sec. 3.2)."""
 _HIGHLIGHT_QUANTILE = 0.999
+
+
+def lit_mean(xyz: np.ndarray) -> float:
+    """Mean over the lit pixels of (H, W, 3) and their channels; 0 for a black picture."""
+    luminance = xyz[..., 1]
+    lit = luminance > LIT_FLOOR * luminance.max()
+    return float(xyz[lit].mean()) if lit.any() else 0.0
 
 
 @dataclass(frozen=True)
@@ -39,14 +47,12 @@ class Truth:
     @cached_property
     def weight(self) -> np.ndarray:
         """1/(R² + ε), float64 (H, W, 3). All 1 for a black reference."""
-        return self._weight(float(self.xyz.mean()))
+        return self._weight(lit_mean(self.xyz))
 
     @cached_property
-    def lit_weight(self) -> np.ndarray:
-        """The same with ε from the mean of the lit pixels alone, which does not depend on how much darkness surrounds them."""
-        luminance = self.xyz[..., 1]
-        lit = luminance > LIT_FLOOR * luminance.max()
-        return self._weight(float(self.xyz[lit].mean()) if lit.any() else 0.0)
+    def whole_weight(self) -> np.ndarray:
+        """The same with ε from the mean of the whole picture, for relmse_whole."""
+        return self._weight(float(self.xyz.mean()))
 
     def _weight(self, mean: float) -> np.ndarray:
         return 1.0 / (self.xyz**2 + EPSILON_SHARE * mean**2) if mean > 0.0 else np.ones_like(self.xyz)
@@ -65,7 +71,7 @@ def relmse_raw(xyz: np.ndarray, truth: Truth) -> float:
 def measure(xyz: np.ndarray, truth: Truth) -> dict[str, float]:
     """All measures of `xyz` (H, W, 3) that `results.Sample.metrics` lists, but FLIP.
 
-    relmse, relmse_lit and nrmse are freed of the reference's variance and never below 0; smape = mean |I−R|/(|I|+|R|+√ε), from
+    relmse, relmse_whole and nrmse are freed of the reference's variance and never below 0; smape = mean |I−R|/(|I|+|R|+√ε), from
     0 to 1; chroma = mean distance in CIE 1976 u′v′ over lit pixels.
     """
     difference = xyz - truth.xyz
@@ -81,7 +87,7 @@ def measure(xyz: np.ndarray, truth: Truth) -> dict[str, float]:
         "relmse": max(raw - truth.own_relmse, 0.0),
         "relmse_raw": raw,
         "relmse_trimmed": _trimmed(terms, noise),
-        "relmse_lit": max(float(np.mean(truth.lit_weight * (difference**2 - truth.variance))), 0.0),
+        "relmse_whole": max(float(np.mean(truth.whole_weight * (difference**2 - truth.variance))), 0.0),
         "smape": float(np.mean(np.abs(difference) / np.where(sums > 0.0, sums, 1.0))),
         "chroma": _chroma(xyz, truth.xyz),
         "nrmse": float(np.sqrt(max(np.sum(difference**2 - truth.variance), 0.0) / square)) if square else 0.0,

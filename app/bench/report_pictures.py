@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.bench.metrics import EPSILON_SHARE
+from app.bench.metrics import EPSILON_SHARE, lit_mean
 from app.model.colorimetry import xyz_to_rgb709
 from app.tone_map import auto_exposure, tone_map_8bit
 
@@ -104,7 +104,7 @@ def halved(xyz: np.ndarray) -> np.ndarray:
 
 def signed_error(xyz: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """(Y_I − Y_R)/√(Y_R² + ε), (H, W), with relMSE's ε: the mean of its square is the luminance's part of relMSE."""
-    mean = max(float(reference.mean()), 1e-30)
+    mean = max(lit_mean(reference), 1e-30)
     return (xyz[..., 1] - reference[..., 1]) / np.sqrt(reference[..., 1] ** 2 + EPSILON_SHARE * mean**2)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from app.bench import report_pictures as pictures
 from app.bench import report_plots, report_style
 from app.bench import report_text as text
-from app.bench.metrics import EPSILON_SHARE
+from app.bench.metrics import EPSILON_SHARE, lit_mean
 from app.bench.plots import BASELINE, is_lower_bound
 from app.bench.report_html import Html, element, figure, table
 from app.bench.results import EARLY_SHARE, OTHER_MEASURES, PHOTON_STAGES, Curve, Point, SceneResult
@@ -230,7 +230,7 @@ def _numbers(scene: SceneResult, name: str, found: Mapping[str, np.ndarray]) -> 
     note = ""
     if not math.isfinite(relmse):
         reference = found["reference"]
-        epsilon = EPSILON_SHARE * max(float(reference.mean()), 1e-30) ** 2
+        epsilon = EPSILON_SHARE * max(lit_mean(reference), 1e-30) ** 2
         relmse, note = float(np.mean((found[name] - reference) ** 2 / (reference**2 + epsilon))), " (raw)"
     flip = metrics.get("flip", math.nan)
     lines = [f"relMSE {text.number(relmse)}{note}", f"HDR-FLIP {flip:.3f}" if math.isfinite(flip) else "HDR-FLIP not measured"]

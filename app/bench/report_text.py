@@ -17,6 +17,7 @@ METHODS = {
     "error of a chord asks for.",
     "srd-lambda": "The published method (Elek et al. 2014): one column by wavelength, one anchor in the middle of the band.",
     "stochastic": "One random wavelength a photon, spatial footprint. The baseline: unbiased in wavelength, noisy in colour.",
+    "stochastic-even": "The same with wavelengths from a low-discrepancy sequence instead of chance: the usual answer at its best.",
     "stochastic-point": "One random wavelength a photon, one texel. Unbiased light tracing.",
     "regular-7": "Seven fixed wavelengths a photon path, a splat each. Shows banding where the spectrum is spread wider than a footprint.",
     "regular-16": "Sixteen fixed wavelengths a photon path, a splat each.",
@@ -24,10 +25,10 @@ METHODS = {
 }
 
 METRICS = {
-    "relMSE": "mean over pixels and over X, Y, Z of (I − R)² / (R² + ε), I the picture, R the reference, ε = 10⁻² · (mean R)². "
+    "relMSE": "mean over pixels and over X, Y, Z of (I − R)² / (R² + ε), I the picture, R the reference, ε = 10⁻² · (mean of R over the lit pixels)². "
     "The reference's own variance is taken off.",
     "relMSE trimmed": "the same without the 0.1 % of pixels with the largest error: what single fireflies cannot sway.",
-    "relMSE lit": "the same with ε from the mean of the lit pixels, so that a dark frame around the caustic does not weigh.",
+    "relMSE, ε of the whole picture": "the same with ε from the mean of R over all pixels: where most of a picture is dark, that ε is small and a faint blur over the edge of a shadow weighs most.",
     "bias² and variance": "relMSE told apart over n seeds: bias² = mean[((Ī − R)² − Var/n) / (R² + ε)] with Ī the mean picture, "
     "variance = mean[Var / (R² + ε)]. An estimate of bias² at or below zero means that no bias could be detected.",
     "SMAPE": "mean of |I − R| / (|I| + |R| + √ε), 0 to 1.",
@@ -41,7 +42,7 @@ METRICS = {
     "read off the curves by log-log interpolation. ≥ marks a method whose shortest rendering is already better.",
 }
 
-MEASURES = {"relmse_lit": "relMSE lit", "relmse_trimmed": "relMSE trimmed", "nrmse": "nRMSE", "smape": "SMAPE", "chroma": "Δu'v'"}
+MEASURES = {"relmse_whole": "relMSE, ε of the whole picture", "relmse_trimmed": "relMSE trimmed", "nrmse": "nRMSE", "smape": "SMAPE", "chroma": "Δu'v'"}
 """Names of `results.OTHER_MEASURES` as the reader sees them."""
 
 STAGES = {

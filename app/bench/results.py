@@ -7,9 +7,9 @@ import msgspec
 PHOTON_STAGES = ("trace", "splat", "resolve")
 """Stages whose sum is photon time: emission and tracing, footprints and drawing, putting the maps together."""
 
-DEFAULT_METHODS = ("stochastic", "stochastic-point", "regular-7", "regular-16", "srd-lambda", "srd")
+DEFAULT_METHODS = ("stochastic", "stochastic-even", "stochastic-point", "regular-7", "regular-16", "srd-lambda", "srd")
 
-OTHER_MEASURES = ("relmse_lit", "relmse_trimmed", "nrmse", "smape", "chroma")
+OTHER_MEASURES = ("relmse_whole", "relmse_trimmed", "nrmse", "smape", "chroma")
 """Measures beside relMSE by which times to equal error are told, so that no conclusion hangs on one."""
 
 EARLY_SHARE = 0.1
@@ -41,7 +41,7 @@ class Sample(msgspec.Struct, frozen=True):
     """By stage: `PHOTON_STAGES`; and, not counted, "plan" (bands and spectral tables, once before a rendering) and
     "eye" (display, the same for every method)."""
     metrics: dict[str, float]
-    """relmse, relmse_raw (the reference's own variance left in), relmse_trimmed, relmse_lit (ε from the lit pixels' mean),
+    """relmse, relmse_raw (the reference's own variance left in), relmse_trimmed, relmse_whole (ε from the whole picture's mean),
     smape, chroma, nrmse, energy_ratio (Σ picture / Σ reference); "flip" for the equal-time pictures alone. See `metrics`."""
 
     @property

@@ -39,6 +39,8 @@ class Features:
     """Each photon has one wavelength instead of a band."""
     random_wavelength: bool
     """That wavelength is drawn at random."""
+    even_wavelengths: bool
+    """Random wavelengths follow a low-discrepancy sequence instead of chance."""
     band_cuts: bool
     """Total internal reflection may cut a band."""
     dielectrics: bool
@@ -106,6 +108,7 @@ class Features:
             footprints=footprints,
             point_spectrum=single,
             random_wavelength=settings.method.startswith("stochastic"),
+            even_wavelengths=settings.method == "stochastic-even",
             band_cuts=groups > 0,
             dielectrics=bool(dielectrics),
             mirrors=any(isinstance(o.material, Mirror) for o in scene.objects),

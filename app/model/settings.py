@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-METHODS = ("srd", "srd-lambda", "stochastic", "stochastic-point", "regular-7", "regular-16")
+METHODS = ("srd", "srd-lambda", "stochastic", "stochastic-even", "stochastic-point", "regular-7", "regular-16")
 """Sampling methods that every comparison holds (README, "Methods")."""
 
 

@@ -55,9 +55,14 @@ class EmissionDomain:
         """Share of the rectangle that the mask keeps."""
         return float(self.mask.mean())
 
-    def spacing(self, count: int) -> float:
-        """Distance between neighbours of a lattice of `count` points over the rectangle."""
-        return float(np.sqrt(self.rect[2] * self.rect[3] / count))
+    def spacing(self, count: int) -> np.ndarray:
+        """Distances (2,) along the axes between neighbours of a lattice of `count` points over the rectangle.
+
+        In proportion to the rectangle: what light outlines there (an aperture, a solid) is as long as
+        the rectangle along each axis, so that the blur of all its edges is least. The golden lattice is as even under every
+        such stretch.
+        """
+        return self.rect[2:] / np.sqrt(count)
 
 
 def orthonormal_frame(axis: np.ndarray, tangent: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -101,12 +106,12 @@ def _plane_domain(
     grow = tilt * np.abs(relative @ direction).max(axis=1)[:, None]
     low, high = flat.min(axis=1) - grow, flat.max(axis=1) + grow
     box_low, box_high = low.min(axis=0), high.max(axis=0)
-    centre, light_u, light_v, is_disc, rim = middle, np.zeros(3), np.zeros(3), False, 0.0
+    centre, light_u, light_v, is_disc, rim = middle, np.zeros(3), np.zeros(3), False, np.zeros(2)
     if light.kind == "collimated":
         half = _half_extent(light) * space.scale
         light_u, light_v, is_disc = tangent / half[0], bitangent / half[1], light.shape == "disc"
         at = (position - middle) @ frame.T
-        rim = _SOFT_EDGE * float(np.sqrt(np.prod(2.0 * half)))
+        rim = _SOFT_EDGE * 2.0 * half
         box_low, box_high = np.maximum(box_low, at - half - rim), np.minimum(box_high, at + half + rim)
         back = float((middle - position) @ direction)
     else:
@@ -116,7 +121,7 @@ def _plane_domain(
         return None
     rect, mask = _rect_and_mask(low, high, box_low, box_high)
     if is_disc:
-        mask &= _disc_mask(rect, (position - middle) @ frame.T, half[0] + rim)
+        mask &= _disc_mask(rect, (position - middle) @ frame.T, half[0] + rim[0])
     area = rect[2] * rect[3] / space.scale**2
     return EmissionDomain("plane", centre, direction, tangent, bitangent, rect, mask, area, back, light_u, light_v, position, is_disc, (float(tilt), 0.0))
 

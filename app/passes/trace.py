@@ -214,7 +214,8 @@ class TracePass:
         p = records.EMIT_PARAMETERS.zeros(1)
         p["origin"], p["axis"], p["tangent"], p["bitangent"] = domain.origin, domain.axis, domain.tangent, domain.bitangent
         p["weight"] = domain.measure * piece.weight / (piece.lattice_count * piece.light_points)
-        p["spacing"] = domain.spacing(piece.lattice_count)
+        p["spacing"] = spacing = domain.spacing(piece.lattice_count)
+        p["mean_spacing"] = np.sqrt(np.prod(spacing))
         p["back"] = domain.back
         p["light_axis"] = np.asarray(self.scene.scene.lights[piece.light].direction, float)
         p["light_u"], p["light_v"], p["aperture_centre"] = domain.light_u, domain.light_v, domain.aperture_centre
@@ -282,6 +283,8 @@ class TracePass:
             defines = self._defines | {f"LIGHT_{kind.upper()}": 1}
             if self._features.point_spectrum and self._features.random_wavelength:
                 defines["RANDOM_WAVELENGTH"] = 1
+                if self._features.even_wavelengths:
+                    defines["EVEN_WAVELENGTHS"] = 1
             self._emit[kind] = shader.compute(self.context.ctx, "emit.comp", defines, (*self._structs, records.EMIT_PARAMETERS))
         return self._emit[kind]
 

@@ -68,20 +68,22 @@ class Emitter:
         axis = unit(np.asarray(light.direction, float))
         spacing = self.domain.spacing(count) * self.unit_length
 
-        def covered(inside: np.ndarray) -> np.ndarray:
+        def covered(inside: np.ndarray, spacing: float) -> np.ndarray:
             return np.clip(inside / spacing + 0.5, 0.0, 1.0)
+
+        radial = float(np.sqrt(np.prod(spacing)))
 
         if light.kind == "spot":
             inner, outer = np.radians([light.inner_half_angle_deg, light.outer_half_angle_deg])
-            return share * (covered(outer - angle_between(direction, axis)) if inner == outer else spot_falloff(direction, axis, inner, outer))
+            return share * (covered(outer - angle_between(direction, axis), radial) if inner == outer else spot_falloff(direction, axis, inner, outer))
         if light.kind == "area":
             return share * np.maximum(direction @ axis, 0.0)
         if light.kind == "collimated":
             offset = (start - np.array(light.position)) @ np.stack([self.domain.tangent, self.domain.bitangent]).T
             if light.shape == "disc":
-                return share * covered(light.radius - np.linalg.norm(offset, axis=-1))
+                return share * covered(light.radius - np.linalg.norm(offset, axis=-1), radial)
             inside = 0.5 * np.array([light.width, light.height]) - np.abs(offset)
-            return share * covered(inside[..., 0]) * covered(inside[..., 1])
+            return share * covered(inside[..., 0], spacing[0]) * covered(inside[..., 1], spacing[1])
         return np.full(direction.shape[:-1], share)
 
     def lattice(self, count: int, shift: tuple[int, int], sub_lattice: int = 0) -> np.ndarray:

@@ -184,11 +184,11 @@ def trace_light(
         lattices = [emitter.lattice(count, SHIFT, k if features.spectral_groups else 0) for k in range(len(bands))]
         q = np.stack(lattices, axis=1).reshape(-1, 2)[records["photon_id"]]
         start, direction = emitter.start(q)
-        per_q = 1.0 / (domain.spacing(count) * space.scale * emitter.unit_length)
+        per_s, per_t = 1.0 / (domain.spacing(count) * space.scale * emitter.unit_length)
         groups = [records[f"dposition_dvar{g}"][:, :3] for g in range(features.spectral_groups)]
         return Photons(
             records, emitter, q, start, direction, space.to_world(records["position"]),
-            records["dposition_ds"] * per_q, records["dposition_dt"] * per_q,
+            records["dposition_ds"] * per_s, records["dposition_dt"] * per_t,
             np.stack(groups, axis=1) / space.scale if groups else np.zeros((len(records), 0, 3)),
             emitter.weight(q, count), buffers.axis.nm_of_x(np.column_stack([records[f"x_{end}"] for end in ("lo", "anchor", "hi")])),
             buffers.axis, buffers.groups, count * len(bands), domain.measure / count, batch.tally,

@@ -160,9 +160,9 @@ MUTANTS = {
     "normal not turned inside": ("trace.comp", "float sign_n = entering ? 1.0 : -1.0", "float sign_n = 1.0", "beam"),
     "mirror forgets the normal": ("lib/optics.glsl", "(dtheta * normal + theta * dnormal)", "(dtheta * normal)", "mirror ball"),
     "position follows the shading normal": ("trace.comp", "ray.direction, hit.normal_g, hit.distance)", "ray.direction, normal, hit.distance)", "sun"),
-    "axes swapped": ("emit.comp", "ddirection_ds = p.spacing * to_world(dx)", "ddirection_ds = p.spacing * to_world(dy)", "spot"),
+    "axes swapped": ("emit.comp", "ddirection_ds = p.spacing.x * to_world(dx)", "ddirection_ds = p.spacing.x * to_world(dy)", "spot"),
     "flat map": ("lib/emission.glsl", "k - q.x * q.x / (4.0 * k)", "k", "disc"),
-    "tilted sun's plane": ("emit.comp", "dposition_ds = p.spacing * p.tangent", "dposition_ds = 1.01 * p.spacing * p.tangent", "sun"),
+    "tilted sun's plane": ("emit.comp", "dposition_ds = p.spacing.x * p.tangent", "dposition_ds = 1.01 * p.spacing.x * p.tangent", "sun"),
     "lowest priority": ("lib/medium.glsl", "stack_objects[findMSB(mask)]", "stack_objects[findLSB(mask)]", "overlapping"),
 }
 

@@ -107,7 +107,7 @@ def test_sub_lattices_of_bands_and_places_are_shifted_evenly() -> None:
 
 @pytest.mark.parametrize("light_points", [1, 3, 16, 256, 4096, 8192])
 def test_one_wavelength_a_photon_is_even_whatever_the_number_of_places(light_points: int) -> None:
-    """`stochastic`: with every number of places on a light the wavelengths of a pass are even, alone and with the lattice."""
+    """`stochastic-even`: with every number of places on a light the wavelengths of a pass are even, alone and with the lattice."""
     points = 65_536 // light_points
     photon = np.arange(points * light_points)
     colour = kronecker(photon, 3774877043, 0)

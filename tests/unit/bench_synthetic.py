@@ -81,7 +81,7 @@ def synthetic_scene(directory: Path, name: str, *, gain: float = 40.0, methods: 
     if {"srd", "stochastic"} <= set(methods):
         scene.time_to_equal_error = {"stochastic": 1.0, "srd": gain, "stochastic-point": 0.4, "srd-lambda": 3.0, "regular-16": 1.7}
         holds = gain >= 30
-        scene.time_to_equal_other = {"nrmse": {"srd": 61.0, "stochastic": 1.0}, "relmse_lit": {"srd": 17.0}}
+        scene.time_to_equal_other = {"nrmse": {"srd": 61.0, "stochastic": 1.0}, "relmse_whole": {"srd": 17.0}}
         scene.claims = [
             Claim("1/30 of the time", "at least 30×", f"{gain:.0f}×", holds, "" if holds else "bias² is 61 % of the remaining error"),
             Claim("first picture", "better at 0.1 s than stochastic at 3 s", "0.002 against 0.02", True),

@@ -16,16 +16,15 @@ def exact(xyz: np.ndarray) -> Truth:
 
 def test_values_by_hand() -> None:
     reference = np.zeros((1, 2, 3))
-    reference[0, 0] = 6.0, 6.0, 12.0  # the mean over all is 4, so ε = 0.16
+    reference[0, 0] = 6.0, 6.0, 12.0  # the mean over the lit pixel is 8, so ε = 0.64
     picture = reference.copy()
     picture[0, 0] = 7.0, 6.0, 9.0
     picture[0, 1] = 0.4, 0.4, 0.4
     found = measure(picture, exact(reference))
-    relmse = (1.0 / 36.16 + 9.0 / 144.16 + 3 * 0.16 / 0.16) / 6.0
+    relmse = (1.0 / 36.64 + 9.0 / 144.64 + 3 * 0.16 / 0.64) / 6.0
     assert found["relmse"] == pytest.approx(relmse, rel=1e-12) == found["relmse_raw"]
-    assert found["relmse_trimmed"] == pytest.approx((relmse * 6.0 - 1.0) / 5.0, rel=1e-12)  # the largest of six goes
-    lit = 0.01 * 8.0**2  # the mean over the lit pixel is 8
-    assert found["relmse_lit"] == pytest.approx((1.0 / (36 + lit) + 9.0 / (144 + lit) + 3 * 0.16 / lit) / 6.0, rel=1e-12)
+    assert found["relmse_trimmed"] == pytest.approx((relmse * 6.0 - 0.25) / 5.0, rel=1e-12)  # the largest of six goes
+    assert found["relmse_whole"] == pytest.approx((1.0 / 36.16 + 9.0 / 144.16 + 3 * 0.16 / 0.16) / 6.0, rel=1e-12)  # the mean over all is 4
     assert found["smape"] == pytest.approx((1.0 / 13.4 + 3.0 / 21.4 + 3 * 0.4 / 0.8) / 6.0, rel=1e-12)
     assert found["nrmse"] == pytest.approx(np.sqrt((1.0 + 9.0 + 3 * 0.16) / 216.0), rel=1e-12)
     assert found["energy_ratio"] == pytest.approx(23.2 / 24.0, rel=1e-12)
