@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.truth.photon_emission import emit, search
+from app.truth.photon_emit import emit, search
 from app.truth.photon_intersect import STACK_SIZE, blocked, compiled, nearest
 from app.truth.photon_scene import BLACK, DIFFUSE, MIRROR
 

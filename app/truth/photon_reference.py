@@ -26,7 +26,16 @@ from app.atomic import atomic_output
 from app.errors import UserError
 from app.model.colorimetry import VISIBLE_NM
 from app.model.scene import Dielectric, Diffuse, Mirror, Scene
-from app.truth.photon_run import PARTS, TALLY_SIZE, Cancelled, Progress, ReferencePicture, ReferenceRun, continue_run, summed
+from app.truth.photon_run import (
+    PARTS,
+    TALLY_SIZE,
+    Cancelled,
+    Progress,
+    ReferencePicture,
+    ReferenceRun,
+    continue_run,
+    summed,
+)
 
 REFERENCE_VERSION = 1
 """Grows whenever the same scene would give another picture."""

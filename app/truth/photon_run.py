@@ -200,7 +200,7 @@ class ReferenceRun:
         return aimed, [int(2**step) for step in np.rint(steps).astype(int)]
 
     def _pilot(self, domains: list[Domain], weight: np.ndarray, number: int) -> tuple[np.ndarray, list[np.ndarray]]:
-        from app.truth.photon_emission import GRID
+        from app.truth.photon_emit import GRID
 
         picture, importance = np.zeros(self.sums.shape[1:]), [np.zeros((GRID, GRID)) for _ in domains]
         for d, (domain, colour) in enumerate(zip(domains, self._colours, strict=True)):

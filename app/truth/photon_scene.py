@@ -14,7 +14,13 @@ import numpy as np
 
 from app.errors import UserError
 from app.model.bvh import Bvh, build_bvh
-from app.model.colorimetry import K_M, VISIBLE_NM, cmf_xyz, rgb_partition, xyz_to_rgb709_matrix
+from app.model.colorimetry import (
+    K_M,
+    VISIBLE_NM,
+    cmf_xyz,
+    rgb_partition,
+    xyz_to_rgb709_matrix,
+)
 from app.model.mesh import Mesh
 from app.model.scene import Black, Camera, Dielectric, Diffuse, Mirror, Scene
 from app.model.spectrum import Spectrum, cmf_at
@@ -128,7 +134,7 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         elif isinstance(material, Mirror):
             reflectance = rgb_partition() @ np.asarray(material.reflectance_rgb, float)
             weight[-1] = weights.add(np.interp(TABLE_NM, VISIBLE_NM, reflectance))
-    classes, reflectance_class = reflectance_classes(scene)
+    _, reflectance_class = reflectance_classes(scene)
     factor = [
         np.asarray(o.material.reflectance_rgb, float) if isinstance(o.material, Diffuse) and o.material.reflectance is None else np.ones(3)
         for o in scene.objects

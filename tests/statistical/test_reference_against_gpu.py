@@ -20,7 +20,16 @@ from app.model import primitives
 from app.model.colorimetry import rgb709_to_xyz
 from app.model.glass import sellmeier
 from app.model.primitives_round import sphere
-from app.model.scene import Absorption, Camera, Dielectric, Diffuse, Light, Mirror, Scene, SceneObject
+from app.model.scene import (
+    Absorption,
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Mirror,
+    Scene,
+    SceneObject,
+)
 from app.model.scene_file import load_scene
 from app.model.settings import RenderSettings
 from app.model.spectrum import blackbody, illuminant

@@ -17,12 +17,23 @@ from app.model import primitives
 from app.model.colorimetry import K_M, xyz_to_rgb709
 from app.model.glass import constant as constant_index
 from app.model.primitives_round import sphere
-from app.model.scene import Absorption, Black, Camera, Dielectric, Diffuse, Light, Material, Mirror, Scene, SceneObject
+from app.model.scene import (
+    Absorption,
+    Black,
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Material,
+    Mirror,
+    Scene,
+    SceneObject,
+)
 from app.model.scene_file import load_scene
 from app.model.scene_lights import spot_solid_angle_sr
 from app.model.spectrum import cmf_at, constant, laser
 from app.paths import assets_dir
-from app.truth import photon_emission, photon_kernel, photon_run
+from app.truth import photon_emission, photon_emit, photon_kernel, photon_run
 from app.truth.photon_reference import cached_reference, render_reference, scene_key
 
 N_SLAB = 1.5168
@@ -261,12 +272,12 @@ def _lamp_domain() -> photon_emission.Domain:
 
 def emitted(domain: photon_emission.Domain, count: int = 20_000) -> float:
     numbers = np.random.default_rng(2).random((count, 4))
-    return float(np.mean([photon_emission.emit(domain, *row)[6] for row in numbers]))
+    return float(np.mean([photon_emit.emit(domain, *row)[6] for row in numbers]))
 
 
 def test_an_aimed_density_leaves_the_flux_alone_and_a_wrong_one_does_not() -> None:
     domain = _lamp_domain()
-    aim = np.zeros((photon_emission.GRID, photon_emission.GRID))
+    aim = np.zeros((photon_emit.GRID, photon_emit.GRID))
     aim[20:30, 40:44] = 1.0
     aimed = photon_emission.refined(domain, aim)
     expected = spot_solid_angle_sr(10.0, 30.0)
@@ -274,7 +285,7 @@ def test_an_aimed_density_leaves_the_flux_alone_and_a_wrong_one_does_not() -> No
     assert emitted(aimed) == pytest.approx(expected, rel=0.08)
     # A mutant that draws by the aimed density and weighs by the even one.
     ratio = photon_emission.density(aimed) / np.maximum(photon_emission.density(domain), 1e-300)
-    photons = [photon_emission.emit(aimed, *row) for row in np.random.default_rng(2).random((20_000, 4))]
+    photons = [photon_emit.emit(aimed, *row) for row in np.random.default_rng(2).random((20_000, 4))]
     assert np.mean([p[6] * ratio[p[7], p[8]] for p in photons]) != pytest.approx(expected, rel=0.08)
 
 
