@@ -7,6 +7,7 @@ simpler description, and a stack of plates at normal incidence, whose transmitta
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -122,7 +123,7 @@ def plates(indices: Sequence[float]) -> float:
     """
     media = [1.0, *indices, 1.0]
     behind, through = 0.0, 1.0
-    for a, b in zip(media[:-1], media[1:], strict=True):
+    for a, b in itertools.pairwise(media):
         r = ((a - b) / (a + b)) ** 2
         passed = 1.0 / (1.0 - behind * r)
         through, behind = through * (1.0 - r) * passed, r + (1.0 - r) ** 2 * behind * passed
