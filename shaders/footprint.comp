@@ -22,7 +22,7 @@ layout(std430, binding = 3) readonly buffer Receivers { Receiver receivers[]; };
 layout(std430, binding = 4) readonly buffer VarTables { float var_table[]; };
 layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };  // x_lo, x_hi, mean place of the light in it (0..1), unused
 layout(std430, binding = 6) buffer Outside { float outside_w[]; };
-layout(std430, binding = 7) buffer Commands { uint draw_words[20]; uint count_dropped; };  // five words a class; the second is the instance count
+layout(std430, binding = 7) buffer Commands { uint draw_words[20]; uint count_dropped; };
 
 #define RECEIVER_CHARTS 1u
 
@@ -35,8 +35,11 @@ const float ACROSS_FLOOR = 0.1;
 const float SAMPLED_VARIANCE = 0.2;
 const float THIN_VARIANCE = 0.15;
 const float CUT = 3.0;
-// Splats of six texels' standard deviation at least go to a map with texels four times as wide.
-const float BROAD_VARIANCE = 36.0;
+// Splats of three texels' standard deviation at least go to a map with texels twice as wide.
+const float BROAD_VARIANCE = 9.0;
+const int WIDER_LEVELS = 6;
+// Of the wide texels' own area: their box and the interpolation at each level on the way back to the finest.
+const float LEVEL_BLUR = 0.29;
 const float MIN_SIGMA_TO_SWEEP = 1.0 / 256.0;
 const float MAX_SIGMA_TO_SWEEP = 32.0;
 
@@ -59,7 +62,8 @@ vec2 to_texels(Placement place, vec3 direction) {
 }
 
 // Sum over texel centres of the splat to be drawn, by Poisson's formula: 1 plus the harmonics that the texel grid sees.
-float grid_sum(vec2 centre, vec2 e, vec2 m, float shear, float box, float s2, float along2, float sweep) {
+// `box_along`: a cut band's blur along the sweep is a box, so wide; else it is Gaussian, of variance along2.
+float grid_sum(vec2 centre, vec2 e, vec2 m, float shear, float box, float s2, float along2, float box_along, float sweep) {
     float total = 1.0;
     vec2 phase = centre - 0.5;
     for (int i = 0; i < 4; ++i) {
@@ -67,7 +71,7 @@ float grid_sum(vec2 centre, vec2 e, vec2 m, float shear, float box, float s2, fl
         float ke = dot(k, e);
         float km = dot(k, m) + shear * ke;
         float damping = exp(-0.5 * TWO_PI * TWO_PI * (s2 * km * km + along2 * ke * ke));
-        total += 2.0 * damping * sinc_pi(box * km) * sinc_pi(sweep * ke) * cos(TWO_PI * dot(k, phase));
+        total += 2.0 * damping * sinc_pi(box * km) * sinc_pi(box_along * ke) * sinc_pi(sweep * ke) * cos(TWO_PI * dot(k, phase));
     }
     return clamp(total, 0.7, 1.4);
 }
@@ -184,8 +188,8 @@ SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
 
     float s = sqrt(s2);
     float y_edge = CUT * sqrt(c_total);
-    float kept = kept_by_cut(y_edge, box, s) * (cut ? kept_by_cut(reach, sweep, sigma) : 1.0);
-    float on_grid = grid_sum(f.centre, e, m, shear, box, s2, sigma * sigma, sweep);
+    float kept = kept_by_cut(y_edge, box, s);
+    float on_grid = grid_sum(f.centre, e, m, shear, box, s2, cut ? 0.0 : sigma * sigma, cut ? sqrt(12.0) * sigma : 0.0, sweep);
 
     splat.centre = f.centre;
     splat.along = e * reach;
@@ -234,20 +238,20 @@ float thin_variance(Footprint f) {
     return 0.5 * trace - root;
 }
 
-// A splat broad in every direction is as well drawn in texels four times as wide, for a sixteenth of the
+// A splat broad in every direction is as well drawn in texels twice as wide, for a quarter of the
 // fragments; the maps are put together again when they are read (levels_fold.comp, bilinearly).
 void choose_level(inout Placement place, inout Footprint f, PhotonRecord photon, vec3 middle, vec3 sweep) {
     bool blurred = false;
-    for (int step = 0; step < 3; ++step) {
+    for (int step = 0; step < WIDER_LEVELS; ++step) {
         if (place.blurred != NONE && thin_variance(f) > BROAD_VARIANCE) {
             place = placements[place.blurred];
             f = footprint_in(place, photon, middle, sweep);
             blurred = true;
         }
     }
-    // The wider texel's box and the interpolation blur by a quarter texel² in all: take that off beforehand.
+    // What that will blur is taken off beforehand.
     float thin = thin_variance(f);
-    float shrink = blurred ? sqrt(max(1.0 - 0.25 / max(thin, 0.25), 0.0)) : 1.0;
+    float shrink = blurred ? sqrt(max(1.0 - LEVEL_BLUR / max(thin, LEVEL_BLUR), 0.0)) : 1.0;
     f.axis_s *= shrink;
     f.axis_t *= shrink;
 }
@@ -291,13 +295,6 @@ bool bounded(vec2 v) {
     // Compared as integers, which order NaN last: a compiler may turn !(a < b) into a >= b.
     uvec2 magnitude = floatBitsToUint(v) & 0x7fffffffu;
     return all(lessThan(magnitude, uvec2(floatBitsToUint(extent_limit))));
-}
-
-// All write the same value, so nothing need be atomic.
-void ask_to_draw(uint kind) {
-    if (kind > 0u) {
-        draw_words[5u * (kind - 1u) + 1u] = 1u;
-    }
 }
 
 void main() {
@@ -361,7 +358,6 @@ void main() {
         fine.kind = 0u;
     }
     mark_edge(fine);
-    ask_to_draw(fine.kind);
     uint slot = i * uint(SLOTS);
     splats[slot] = fine;
 
@@ -385,7 +381,6 @@ void main() {
         }
     }
     mark_edge(coarse);
-    ask_to_draw(coarse.kind);
     splats[slot + 1u] = coarse;
 #endif
 

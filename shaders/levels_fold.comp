@@ -1,5 +1,5 @@
-// Adds a window kept in wide texels (broad splats) to the same window in texels a quarter as wide:
-// bilinear between the wide texels' centres, a sixteenth of their energy for each fine texel.
+// Adds a window kept in wide texels (broad splats) to the same window in texels half as wide:
+// bilinear between the wide texels' centres, a quarter of their energy for each fine texel.
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(rgba32f, binding = 0) uniform image2D maps;
@@ -15,11 +15,11 @@ void main()
 {
     ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(texel, fine.zw - fine.xy))) return;
-    vec2 at = (vec2(texel) + 0.5) * 0.25 - 0.5;
+    vec2 at = (vec2(texel) + 0.5) * 0.5 - 0.5;
     ivec2 corner = ivec2(floor(at));
     vec2 share = at - vec2(corner);
     vec4 below = mix(wide_texel(corner), wide_texel(corner + ivec2(1, 0)), share.x);
     vec4 above = mix(wide_texel(corner + ivec2(0, 1)), wide_texel(corner + ivec2(1, 1)), share.x);
-    vec4 sum = imageLoad(maps, fine.xy + texel) + mix(below, above, share.y) * (1.0 / 16.0);
+    vec4 sum = imageLoad(maps, fine.xy + texel) + mix(below, above, share.y) * 0.25;
     imageStore(maps, fine.xy + texel, sum);
 }

@@ -1,5 +1,4 @@
-// Vertex pulling, nothing instanced; splats of the other classes collapse outside the picture. SMALL, SWEPT or CUT
-// chooses the class (KIND): a swept splat is a parallelogram (four corners through an index buffer), a small one a triangle about
+// Vertex pulling, nothing instanced. SMALL, SWEPT or CUT chooses the class: a swept splat is a parallelogram (four corners through an index buffer), a small one a triangle about
 // its square, which costs a software rasteriser one set-up instead of two (it wins below about 40 texels).
 layout(std140, binding = 0) uniform DrawParameters {
     vec2 atlas_size;
@@ -10,6 +9,7 @@ layout(std140, binding = 0) uniform DrawParameters {
     uint reserved;
 };
 layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };
+layout(std430, binding = 8) readonly buffer Lists { uint lists[]; };  // slots of each kind (splat_list.comp)
 layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };
 layout(std430, binding = 6) readonly buffer Integrals { vec4 band_integral[]; };  // by layer
 layout(std430, binding = 7) readonly buffer Curves { vec4 curve[]; };  // by light and class: density over x, or its running integral
@@ -58,12 +58,25 @@ vec4 energy(SplatRecord splat, uint g) {
 }
 #endif
 
+#ifdef CLIPPED
+// The least and largest (xi, eta) in [-1, 1]² that the splat's rectangle holds: what is outside need not be drawn.
+vec4 part_inside(SplatRecord splat) {
+    float area = splat.along.x * splat.across.y - splat.along.y * splat.across.x;
+    vec4 range = vec4(vec2(1e30), vec2(-1e30));
+    for (int i = 0; i < 4; ++i) {
+        vec2 to_corner = vec2((i & 1) == 0 ? splat.rect.x : splat.rect.z, (i & 2) == 0 ? splat.rect.y : splat.rect.w) - splat.centre;
+        vec2 place = vec2(to_corner.x * splat.across.y - to_corner.y * splat.across.x, splat.along.x * to_corner.y - splat.along.y * to_corner.x) / area;
+        range = vec4(min(range.xy, place), max(range.zw, place));
+    }
+    return vec4(max(range.xy, vec2(-1.0)), min(range.zw, vec2(1.0)));
+}
+#endif
+
 void main() {
 #ifdef SMALL
-    SplatRecord splat = splats[gl_VertexID / 3];
+    SplatRecord splat = splats[lists[FIRST_OF_KIND + uint(gl_VertexID / 3)]];
     int third = gl_VertexID % 3;
     vec2 corner = vec2(third == 1 ? 3.0 : -1.0, third == 2 ? 3.0 : -1.0);
-    bool mine = splat.kind == KIND;
     vec2 reach = corner * splat.along;
     vec2 position = splat.centre + reach;
     at = reach * splat.across;
@@ -72,9 +85,13 @@ void main() {
         splat_colour[g] = splat.amplitude * energy(splat, uint(g));
     }
 #else
-    SplatRecord splat = splats[gl_VertexID >> 2];
+    SplatRecord splat = splats[lists[FIRST_OF_KIND + uint(gl_VertexID >> 2)]];
     vec2 corner = vec2(float(gl_VertexID & 1), float((gl_VertexID >> 1) & 1)) * 2.0 - 1.0;
-    bool mine = splat.kind == KIND;
+#ifdef CLIPPED
+    vec4 inside = part_inside(splat);
+    inside.zw = max(inside.xy, inside.zw);
+    corner = mix(inside.xy, inside.zw, 0.5 * corner + 0.5);
+#endif
     float xi = corner.x;
     vec2 position = splat.centre + xi * splat.along + corner.y * splat.across;
     at = vec3(corner.y * splat.y_edge, xi, table_u.x * xi + table_u.y);
@@ -94,5 +111,5 @@ void main() {
 #endif
 #endif
     rect = splat.rect;
-    gl_Position = mine ? vec4(position / atlas_size * 2.0 - 1.0, 0.0, 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
+    gl_Position = vec4(position / atlas_size * 2.0 - 1.0, 0.0, 1.0);
 }

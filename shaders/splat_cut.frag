@@ -1,5 +1,5 @@
-// A swept splat whose band was cut at total internal reflection, so that no table was made for it: the sum of a few pieces of
-// the band, each of one colour (from the running integral over x, so that all energy is there) and each no longer than half the blur.
+// A swept splat whose band was cut at total internal reflection, so that no table was made for it: the difference of
+// the light's running integral over x at two places.
 #include "lib/gaussian.glsl"
 
 layout(std140, binding = 0) uniform DrawParameters {
@@ -11,10 +11,6 @@ layout(std140, binding = 0) uniform DrawParameters {
     uint reserved;
 };
 layout(std430, binding = 7) readonly buffer Curves { vec4 curve[]; };
-
-const float SQRT_TWO = 1.41421356;
-const int MIN_PIECES = 4;
-const int MAX_PIECES = 24;
 
 flat in vec4 rect;
 noperspective in vec3 at;
@@ -31,31 +27,18 @@ vec4 energy_below(uint row, float x) {
     return mix(curve[base], curve[base + 1u], place - float(i));
 }
 
+// A Gaussian blur of the spectrum is done by the box of the same variance: two look-ups in the running integral, and all
+// energy is there whatever the band.
 void main() {
     bvec4 within = bvec4(greaterThan(gl_FragCoord.xy, rect.xy), lessThan(gl_FragCoord.xy, rect.zw));
-    float share = !all(within) ? 0.0 : gaussian_box(at.x, shape.x) / (2.0 * band.z);
-    float sweep_to_sigma = 2.0 * SQRT_TWO * band.z * band.w;
-    int pieces = clamp(int(ceil(2.0 * sweep_to_sigma)), MIN_PIECES, MAX_PIECES);
-    float length_xi = 2.0 * band.z / float(pieces);
-    float length_x = (band.y - band.x) / float(pieces);
-
-    vec4 below[TARGETS];
+    float half_box = sqrt(1.5) / band.w;
+    float share = !all(within) ? 0.0 : gaussian_box(at.x, shape.x) / (2.0 * half_box);
+    vec2 ends = clamp(at.y + vec2(-half_box, half_box), -band.z, band.z);
+    vec2 x = mix(band.xx, band.yy, 0.5 + 0.5 * ends / band.z);
+    float middle = 0.5 * (x.x + x.y) - throughput.x;
+    share *= throughput.y + min(middle, 0.0) * throughput.z + max(middle, 0.0) * throughput.w;
     for (int g = 0; g < TARGETS; ++g) {
-        below[g] = energy_below(uint(curve_row) + uint(g), band.x);
-        deposited[g] = vec4(0.0);
-    }
-    float erf_below = erf_approx((-band.z - at.y) * band.w);
-    for (int piece = 1; piece <= pieces; ++piece) {
-        float x = band.x + float(piece) * length_x;
-        float erf_here = erf_approx((-band.z + float(piece) * length_xi - at.y) * band.w);
-        float middle = x - 0.5 * length_x - throughput.x;
-        float weight = throughput.y + min(middle, 0.0) * throughput.z + max(middle, 0.0) * throughput.w;
-        weight *= share * 0.5 * (erf_here - erf_below) * float(pieces);
-        erf_below = erf_here;
-        for (int g = 0; g < TARGETS; ++g) {
-            vec4 here = energy_below(uint(curve_row) + uint(g), x);
-            deposited[g] += weight * (here - below[g]);
-            below[g] = here;
-        }
+        uint row = uint(curve_row) + uint(g);
+        deposited[g] = share * (energy_below(row, x.y) - energy_below(row, x.x));
     }
 }

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from app.gpu.map_atlas import MapAtlas
     from app.gpu.splat_tables import SplatTables
 
-WORKGROUP = 64
+WORKGROUP, LIST_WORKGROUP = 64, 256
 VERTICES = (3, 6, 6, 6)
 """Per splat of kinds 1 to 4."""
 
@@ -102,6 +102,7 @@ class Footprints:
 
     def __init__(self, ctx: moderngl.Context, features: SplatFeatures, group: int) -> None:
         """`group`: the most photons one dispatch covers."""
+        self._ctx = ctx
         groups = features.spectral_groups
         defines = splat_defines(features) | {
             "WORKGROUP": WORKGROUP,
@@ -116,7 +117,13 @@ class Footprints:
         self.commands = ctx.buffer(np.zeros(21, np.uint32))
         """Indirect draws of kinds 1 to 4, five words each; then the dropped footprints."""
         self.slots_per_photon = defines["SLOTS"]
-        self.splats = ctx.buffer(reserve=group * self.slots_per_photon * SPLAT.stride)
+        self.capacity = group * self.slots_per_photon
+        """Splats of a kind that the lists have room for."""
+        self.splats = ctx.buffer(reserve=self.capacity * SPLAT.stride)
+        self.lists = ctx.buffer(reserve=len(VERTICES) * self.capacity * 4)
+        """Slots of kinds 1 to 4, `capacity` each."""
+        self._list = shader.compute(ctx, "splat_list.comp", {"WORKGROUP": LIST_WORKGROUP}, (SPLAT,))
+        self._list["capacity"].value = self.capacity
 
     def run(
         self,
@@ -141,8 +148,12 @@ class Footprints:
         ):
             buffer.bind_to_storage_buffer(binding)
         slots = count * self.slots_per_photon
-        self.commands.write(np.array([[vertices * slots, 0, 0, 0, 0] for vertices in VERTICES], np.uint32))
+        self.commands.write(np.array([[vertices, 1, 0, 0, 0] for vertices in VERTICES], np.uint32))
         self._program.run(group_x=-(-count // WORKGROUP))
+        self._ctx.memory_barrier()
+        self.lists.bind_to_storage_buffer(8)
+        self._list["slots"].value = slots
+        self._list.run(1)
 
     def counts(self) -> dict[str, float]:
         """Since the last reset: `outside_map_w` (flux of photons whose centre no window holds, W),
@@ -156,5 +167,5 @@ class Footprints:
         self.commands.clear()
 
     def release(self) -> None:
-        for resource in (self._program, self._parameters, self._outside, self.commands, self.splats):
+        for resource in (self._program, self._list, self.lists, self._parameters, self._outside, self.commands, self.splats):
             resource.release()

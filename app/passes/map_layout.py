@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 FINE_TILE_MAX = 2048
 COARSE_TILE_MAX = 768
 MIN_TILE = 32
-LEVEL_STEPS = (1, 4, 16, 64)
+LEVEL_STEPS = (1, 2, 4, 8, 16, 32, 64)
 """Texel widths in which every window is kept: broad splats go to the wider ones (footprint.comp)."""
 TEXELS_PER_PIXEL = 2.0
 """Texels along a pixel's side in a fine window: a splat is blurred by half a texel, a picture by its pixel."""

@@ -65,13 +65,13 @@ class Splatter:
         classes = {
             1: ("splat_small.frag", {"SMALL": 1}),
             2: ("splat_swept.frag", {"SWEPT": 1}),
-            4: ("splat_swept.frag", {"SWEPT": 1, "EDGE": 1}),
+            4: ("splat_swept.frag", {"SWEPT": 1, "EDGE": 1, "CLIPPED": 1}),
         }
         if features.band_cuts and not features.point_spectrum:
-            classes[3] = ("splat_cut.frag", {"CUT": 1})
+            classes[3] = ("splat_cut.frag", {"CUT": 1, "CLIPPED": 1})
         self._draws: dict[int, moderngl.VertexArray] = {}
         for kind, (fragment, chosen) in sorted(classes.items()):
-            program = shader.program(ctx, "splat.vert", fragment, defines | chosen | {"KIND": f"{kind}u"}, (SPLAT,))
+            program = shader.program(ctx, "splat.vert", fragment, defines | chosen | {"FIRST_OF_KIND": f"{(kind - 1) * self._footprints.capacity}u"}, (SPLAT,))
             corners_shared = VERTICES[kind - 1] == 6
             self._draws[kind] = ctx.vertex_array(program, [], index_buffer=self._indices if corners_shared else None)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
@@ -120,14 +120,14 @@ class Splatter:
         self._parameters.write(values.tobytes())
         self._parameters.bind_to_uniform_block(0)
         curve = tables.density_buffer if self._features.point_spectrum else tables.cumulative_buffer
-        for binding, buffer in ((1, self._footprints.splats), (5, tables.band_buffer), (6, tables.integral_buffer), (7, curve)):
+        for binding, buffer in ((1, self._footprints.splats), (5, tables.band_buffer), (6, tables.integral_buffer), (7, curve), (8, self._footprints.lists)):
             buffer.bind_to_storage_buffer(binding)
         tables.texture.use(0)
         atlas.framebuffer.use()
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_equation = moderngl.FUNC_ADD
         ctx.blend_func = moderngl.ONE, moderngl.ONE
-        # A kind that no splat of the group is of has no instance.
+        # A kind that no splat of the group is of has no vertices.
         for kind, vertex_array in self._draws.items():
             vertex_array.render_indirect(self._footprints.commands, moderngl.TRIANGLES, 1, first=kind - 1)
         ctx.enable_only(moderngl.NOTHING)
