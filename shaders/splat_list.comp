@@ -1,0 +1,49 @@
+// Lists the splats of each kind in photon order, and how many vertices each kind's draw has: draws then pull only what is theirs.
+// One work group, each thread a run of slots: counted, summed over the threads before it, listed. No atomics: the order in
+// which splats are added is a function of the photons alone.
+layout(local_size_x = WORKGROUP) in;
+
+const uint KINDS = 4u;
+
+layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };
+layout(std430, binding = 7) buffer Commands { uint draw_words[20]; uint count_dropped; };
+layout(std430, binding = 8) writeonly buffer Lists { uint lists[]; };  // `capacity` a kind
+
+uniform uint slots;
+uniform uint capacity;
+
+shared uint counts[WORKGROUP * KINDS];
+
+void main() {
+    uint me = gl_LocalInvocationID.x;
+    uint run = (slots + uint(WORKGROUP) - 1u) / uint(WORKGROUP);
+    uint first = min(me * run, slots), last = min(first + run, slots);
+    uint mine[KINDS];
+    for (uint k = 0u; k < KINDS; ++k) mine[k] = 0u;
+    for (uint slot = first; slot < last; ++slot) {
+        uint kind = splats[slot].kind;
+        for (uint k = 0u; k < KINDS; ++k) mine[k] += kind == k + 1u ? 1u : 0u;
+    }
+    for (uint k = 0u; k < KINDS; ++k) counts[k * uint(WORKGROUP) + me] = mine[k];
+    barrier();
+    if (me < KINDS) {
+        uint sum = 0u;
+        for (uint i = 0u; i < uint(WORKGROUP); ++i) {
+            uint count = counts[me * uint(WORKGROUP) + i];
+            counts[me * uint(WORKGROUP) + i] = sum;
+            sum += count;
+        }
+        draw_words[5u * me] *= sum;
+    }
+    barrier();
+    for (uint k = 0u; k < KINDS; ++k) mine[k] = k * capacity + counts[k * uint(WORKGROUP) + me];
+    for (uint slot = first; slot < last; ++slot) {
+        uint kind = splats[slot].kind;
+        for (uint k = 0u; k < KINDS; ++k) {
+            if (kind == k + 1u) {
+                lists[mine[k]] = slot;
+                ++mine[k];
+            }
+        }
+    }
+}
