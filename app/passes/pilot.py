@@ -162,9 +162,10 @@ class PilotFit:
         return float(np.sqrt(PHOTONS * lattices / max(self.budget, 1)))
 
     def _footprint_texels(self, lattices: int) -> float:
-        """Typical standard deviation of a footprint, texels."""
+        """Typical standard deviation of a footprint (the geometric mean of its two), texels."""
         whole = self.pilot.whole
-        axis = np.median(np.linalg.norm(whole["dposition_ds"], axis=1) / self.texel[whole["receiver"]])
+        area = np.linalg.norm(np.cross(whole["dposition_ds"], whole["dposition_dt"]), axis=1)
+        axis = np.median(np.sqrt(area) / self.texel[whole["receiver"]])
         return float(self.smoothing * axis * self._coarsening(lattices))
 
     def _sweep(self, photons: np.ndarray, x: float) -> np.ndarray:
