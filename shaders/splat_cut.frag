@@ -32,7 +32,7 @@ vec4 energy_below(uint row, float x) {
 void main() {
     bvec4 within = bvec4(greaterThan(gl_FragCoord.xy, rect.xy), lessThan(gl_FragCoord.xy, rect.zw));
     float half_box = sqrt(1.5) / band.w;
-    float share = !all(within) ? 0.0 : gaussian_box(at.x, shape.x) / (2.0 * half_box);
+    float share = !all(within) ? 0.0 : gaussian_box_fast(at.x, shape.x) / (2.0 * half_box);
     vec2 ends = clamp(at.y + vec2(-half_box, half_box), -band.z, band.z);
     vec2 x = mix(band.xx, band.yy, 0.5 + 0.5 * ends / band.z);
     float middle = 0.5 * (x.x + x.y) - throughput.x;

@@ -27,7 +27,8 @@ class RenderSettings:
     """Camera samples a pixel; None chooses by the scene."""
     batch: int | None = None
     """Photons in flight at once; None lets the device's limits decide. Never changes the picture."""
-    smoothing: float = 0.6
-    """Standard deviation of a footprint in lattice spacings; 0.5 is where a square lattice of Gaussians turns flat."""
+    smoothing: float = 0.45
+    """Standard deviation of a footprint in lattice spacings. From 0.5 on a square lattice of Gaussians is flat to a per cent; a little
+    less ripples by a few, below what a pixel shows, and blurs edges less (prism, 4000 photons: relMSE 0.0051 at 0.6, 0.0025 at 0.4)."""
     tally: bool = False
     """Also sum up what the maps hold, for `--stats`."""
