@@ -13,7 +13,7 @@ import numpy as np
 from app.bench import report_style as style
 from app.bench.plots import Series, scene_series, set_limits
 from app.bench.report_text import count
-from app.bench.results import PHOTON_STAGES, Curve, Sample, SceneResult
+from app.bench.results import STAGES, Curve, Sample, SceneResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,7 +87,7 @@ def stage_seconds(samples: list[Sample]) -> dict[str, float]:
     """Mean seconds of each photon stage over `samples`; empty when there are none."""
     if not samples:
         return {}
-    return {stage: float(np.mean([max(sample.seconds.get(stage, 0.0), 0.0) for sample in samples])) for stage in PHOTON_STAGES}
+    return {stage: float(np.mean([max(sample.seconds.get(stage, 0.0), 0.0) for sample in samples])) for stage in STAGES}
 
 
 def time_by_stage(scene: SceneResult) -> Figure | None:
@@ -117,7 +117,7 @@ def time_by_stage(scene: SceneResult) -> Figure | None:
 def _draw_bar(axes: Axes, place: int, samples: list[Sample], stages: dict[str, float], longest_us: float) -> None:
     photons, total = samples[0].photons, sum(stages.values())
     start = 0.0
-    for stage in PHOTON_STAGES:
+    for stage in STAGES:
         length = stages[stage] / photons * 1e6
         axes.barh(place, length, left=start, height=0.62, color=style.STAGE_COLOURS[stage], lw=0)
         if length > 0.11 * longest_us:
@@ -131,6 +131,6 @@ def _stage_key(axes: Axes, scene: SceneResult) -> None:
     from matplotlib.patches import Patch
 
     style.title(axes, f"{scene.scene}: where the photon time goes", " ")
-    handles = [Patch(color=style.STAGE_COLOURS[stage], label="emission and trace" if stage == "trace" else stage) for stage in PHOTON_STAGES]
+    handles = [Patch(color=style.STAGE_COLOURS[stage], label="emission and trace" if stage == "trace" else stage) for stage in STAGES]
     axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(-0.02, 0.985), ncols=3, frameon=False, fontsize=8, handlelength=1.0,
                 columnspacing=1.4, borderaxespad=0.0)  # fmt: skip

@@ -15,7 +15,7 @@ from app.bench import report_text as text
 from app.bench.metrics import EPSILON_SHARE, lit_mean
 from app.bench.plots import BASELINE, is_lower_bound
 from app.bench.report_html import Html, element, figure, table
-from app.bench.results import EARLY_SHARE, OTHER_MEASURES, PHOTON_STAGES, Curve, Point, SceneResult
+from app.bench.results import EARLY_SHARE, OTHER_MEASURES, STAGES, Curve, Point, SceneResult
 
 
 def section(scene: SceneResult, anchor: str, curve_svgs: Mapping[str, Html], directory: Path) -> Html:
@@ -153,7 +153,7 @@ def _cost_table(scene: SceneResult) -> Html:
         splats = _mean([s.splats / s.photons for s in samples if s.photons > 0])
         setup = [text.number(curve.setup_seconds.get(part)) for part in ("buffers", "compile", "pilot")]
         rows.append([
-            _name(curve.method), *setup, text.number(plan), *(text.number(stages.get(stage)) for stage in PHOTON_STAGES),
+            _name(curve.method), *setup, text.number(plan), *(text.number(stages.get(stage)) for stage in STAGES),
             f"{text.count(samples[0].photons / total)}/s" if total > 0 else "–", text.number(splats), text.number(curve.buffers_mib or None, 3),
         ])  # fmt: skip
     return table(

@@ -48,7 +48,7 @@ MEASURES = {"relmse_whole": "relMSE, ε of the whole picture", "relmse_trimmed":
 STAGES = {
     "trace": "emission and tracing of photons",
     "splat": "footprints and drawing into the caustic maps",
-    "resolve": "putting the maps together",
+    "resolve": "putting the maps together (display, not photon time)",
 }
 
 PROTOCOL = (

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import msgspec
 
-PHOTON_STAGES = ("trace", "splat", "resolve")
-"""Stages whose sum is photon time: emission and tracing, footprints and drawing, putting the maps together."""
+PHOTON_STAGES = ("trace", "splat")
+"""Stages whose sum is photon time: emission and tracing; footprints and drawing."""
+STAGES = (*PHOTON_STAGES, "resolve")
+"""And putting the maps together for the picture: part of display, the same for every method, shown but not counted."""
 
 DEFAULT_METHODS = ("stochastic", "stochastic-even", "stochastic-point", "regular-7", "regular-16", "srd-lambda", "srd")
 
@@ -38,7 +40,7 @@ class Sample(msgspec.Struct, frozen=True):
     emitted: int
     splats: int
     seconds: dict[str, float]
-    """By stage: `PHOTON_STAGES`; and, not counted, "plan" (bands and spectral tables, once before a rendering) and
+    """By stage: `STAGES`; and, not counted, "plan" (bands and spectral tables, once before a rendering) and
     "eye" (display, the same for every method)."""
     metrics: dict[str, float]
     """relmse, relmse_raw (the reference's own variance left in), relmse_trimmed, relmse_whole (ε from the whole picture's mean),
