@@ -44,7 +44,7 @@ SMALLEST_BATCH = MAX_BANDS * MAX_LIGHT_POINTS
 """One point of every sub-lattice a light may have."""
 TINTED_BANDS = 16
 """Least number of bands where glass absorbs or mirrors are coloured."""
-_SHIFT_GENERATORS = (3242174889, 2447445414, 3141592653, 1640531527, 1359893119)
+_SHIFT_GENERATORS = (1116352409, 1899447441, 3141592653, 1640531527, 1359893119)
 
 
 class Releasable(Protocol):

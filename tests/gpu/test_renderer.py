@@ -235,3 +235,39 @@ def test_a_stop_keeps_what_is_done(gl, tmp_path: Path) -> None:
     assert part.stats.photons < 0.3 * full.stats.photons
     assert part.rgb.sum() == pytest.approx(full.rgb.sum(), rel=0.03)
 
+
+
+FAR_SIDE = """
+[camera]
+kind = "orthographic"
+position = [0.0, 0.0, {eye}]
+target = [0.0, 0.0, 0.0]
+up = [0.0, 1.0, 0.0]
+vertical_extent = 1.0
+[[lights]]
+kind = "collimated"
+position = [0.0, 0.0, -3.0]
+direction = [0.0, 0.0, 1.0]
+radius = 0.3
+illuminance_lx = 10.0
+[[objects]]
+shape = "slab"
+thickness = 0.2
+position = [0.0, 0.0, -1.0]
+[[objects]]
+name = "sheet"
+shape = "plane"
+width = 4.0
+height = 4.0
+material = {{ kind = "diffuse", colour = 0.8 }}
+"""
+
+
+def test_light_does_not_shine_through_a_receiver(gl, tmp_path: Path) -> None:
+    """From above the sheet nothing of the beam from below is seen; from below it is."""
+    pictures = []
+    for eye in (2.0, -0.5):
+        path = tmp_path / "sheet.toml"
+        path.write_text(FAR_SIDE.format(eye=eye))
+        pictures.append(render(load_scene(path), replace(SMALL, layer="caustic"), context=gl).rgb)
+    assert not pictures[0].any() and pictures[1].max() > 0.0
