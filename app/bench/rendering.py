@@ -91,7 +91,16 @@ class MethodRig:
         while (took := self._photon_seconds(photons)) < _TRIAL_SHARE * seconds:
             photons *= _TRIAL_GROWTH
         largest = max(photons * seconds / took, SMALLEST_BUDGET)
-        smallest = min(max(largest * min(FIRST_SECONDS / seconds, 0.5), SMALLEST_BUDGET), largest)
+        # Few photons have broad splats: the time of a rendering grows more slowly than its photons, so the other end is tried out too.
+        smallest = float(WARM_UP_PHOTONS)
+        first_seconds = min(FIRST_SECONDS, 0.5 * seconds)
+        took = self._photon_seconds(WARM_UP_PHOTONS)
+        if took < first_seconds:
+            smallest *= first_seconds / took
+        while took > first_seconds and smallest > SMALLEST_BUDGET:
+            smallest = max(smallest / _TRIAL_GROWTH, SMALLEST_BUDGET)
+            took = self._photon_seconds(int(smallest))
+        smallest = min(smallest, largest)
         return sorted({int(round(n)) for n in np.geomspace(smallest, largest, count)})
 
     def release(self) -> None:

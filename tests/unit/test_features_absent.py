@@ -23,7 +23,7 @@ from app.passes.footprint import SPLAT, splat_defines
 from app.static_costs import RecordSizes, static_costs
 
 EVERYTHING = Features(
-    spectral_groups=2, merged_groups=True, spectral_weights=True, footprints=True, point_spectrum=False, random_wavelength=False, band_cuts=True,
+    spectral_groups=2, merged_groups=True, spectral_weights=True, footprints=True, point_spectrum=False, random_wavelength=False, even_wavelengths=False, band_cuts=True,
     dielectrics=True, mirrors=True, smooth_normals=True, normal_derivatives=True, absorption=True, medium_stack=True, tree=True,
     loose_triangles=True, convex_solids=True, charts=True, nested_windows=True, targets=2,
 )  # fmt: skip
