@@ -32,5 +32,6 @@ def no_gl_errors_left_behind(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
         return
     context = request.getfixturevalue("gl")
+    context.ctx.__enter__()  # a test may have made a context of its own, which took this one's place
     yield
     context.check(request.node.name)

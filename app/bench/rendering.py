@@ -24,7 +24,7 @@ from app.passes.eye import CausticMaps, EyePass
 from app.renderer import DEFAULT_SAMPLES
 
 WARM_UP_PHOTONS = 2048
-SMALLEST_BUDGET = 64
+SMALLEST_BUDGET = 128
 FIRST_SECONDS = 0.02
 """Photon time of the smallest budget, as far as the costs that do not depend on it allow."""
 _TRIAL_SHARE = 0.25

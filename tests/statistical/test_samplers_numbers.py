@@ -94,8 +94,8 @@ def test_shifts_are_even_over_passes() -> None:
         assert star_discrepancy(shift[:, first]) < 3.0 * np.log(passes) / passes
         for second in range(first):
             assert box_discrepancy(shift[:, [second, first]], 16) < 0.02
-    # An earlier generator of wavelengths had three times its multiple within 4.5e-4 of the second shift's.
-    related = np.column_stack([shift[:, 1], kronecker(np.arange(1, passes + 1), 2246822519, 0)])
+    # Two generators this was built with once: three times the second is within 4.5e-4 of the first.
+    related = np.column_stack([kronecker(np.arange(1, passes + 1), g, 0) for g in (2447445414, 2246822519)])
     assert box_discrepancy(related, 16) > 0.03
 
 
