@@ -90,8 +90,7 @@ void add_diffuse(EyePath path, Hit hit, vec3 position, uint pixel_key, inout vec
 
     uint placement;
     vec2 texel;
-    bool lit_face = receivers[receiver].side * facing <= 0.0;
-    if (lit_face && find_texel(receiver, source, position, placement, texel)) {
+    if (find_texel(receiver, source, position, placement, texel)) {
         float pixel = p.pixel_size + p.pixel_angle * (path.travelled + hit.distance);
         // Texels larger than pixels are interpolated, smaller ones weighed by their share of the sample.
         bool magnified = texel_size(placement) > pixel * inversesqrt(max(abs(facing), 1e-3));

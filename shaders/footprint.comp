@@ -358,11 +358,6 @@ void main() {
         fine.kind = 0u;
     }
     mark_edge(fine);
-    // A map holds one face's light: what met the other must not shine through.
-    bool on_face = photon.cosine * receiver.side >= 0.0;
-    if (!on_face) {
-        fine.kind = 0u;
-    }
     uint slot = i * uint(SLOTS);
     splats[slot] = fine;
 
@@ -386,9 +381,6 @@ void main() {
         }
     }
     mark_edge(coarse);
-    if (!on_face) {
-        coarse.kind = 0u;
-    }
     splats[slot + 1u] = coarse;
 #endif
 

@@ -227,7 +227,7 @@ void main()
             photon.light_and_source = ray.light_and_source;
             photon.branch_key = ray.branch_key;
             photon.depth = ray.depth;
-            photon.cosine = -theta_g;
+            photon.cosine = abs(theta_g);
 #if SPECTRAL_GROUPS > 0
             SPECTRAL_COPY
 #endif

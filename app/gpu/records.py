@@ -47,7 +47,7 @@ def photon_record(groups: int) -> Struct:
             Field("branch_key", "uint", "hash of the choices of the path"),
             Field("flags", "uint", "FLAG_*"),
             Field("depth", "uint", "specular events on the path"),
-            Field("cosine", "float", "of incidence on the receiver; positive on its front"),
+            Field("cosine", "float", "|cos| of incidence on the receiver"),
             *spectral,
         ),
         texels=True,
@@ -76,8 +76,6 @@ RECEIVER = Struct(
         Field("first_triangle", "uint", "global index of the object's first triangle"),
         Field("reflectance_class", "uint", "which reflectance the spectral tables were folded with"),
         Field("object", "uint", "scene object index"),
-        Field("side", "float", "the only face the maps are kept for: 1 front, -1 back; 0 both"),
-        Field("reserved", "uint", "", 3),
     ),
 )
 

@@ -16,7 +16,7 @@ from app.errors import UserError
 from app.gpu.map_atlas import Tile, pack, placement_rows
 from app.gpu.records import NONE, RECEIVER
 from app.gpu.scene_buffers import SceneBuffers
-from app.model.camera_rays import camera_frame, camera_rays
+from app.model.camera_rays import camera_rays
 from app.model.features import is_flat
 from app.model.scene import Camera, Diffuse, Scene
 
@@ -132,10 +132,7 @@ def layout_maps(
             sizes.append((atlas.width, atlas.height))
             plans.append((receiver, None, [], atlas))
     tiles, size = pack(sizes, max_side)
-    layout = _place(scene, buffers, plans, tiles, size, reflectance_class)
-    if map_receiver is not None:
-        layout.receivers["side"][map_receiver] = 0.0
-    return layout
+    return _place(scene, buffers, plans, tiles, size, reflectance_class)
 
 
 def _place(scene: Scene, buffers: SceneBuffers, plans, tiles: list[Tile], size: tuple[int, int], reflectance_class: dict[int, int]) -> MapLayout:
@@ -152,7 +149,6 @@ def _place(scene: Scene, buffers: SceneBuffers, plans, tiles: list[Tile], size: 
         record["object"], record["placement"] = object_index, count
         record["first_triangle"] = buffers.first_triangle[object_index]
         record["reflectance_class"] = reflectance_class[receiver]
-        record["side"] = _seen_side(scene.camera, buffers, object_index) if windows else 0.0
         assert isinstance(material, Diffuse)
         record["reflectance_rgb"] = 1.0 if material.reflectance is not None else material.reflectance_rgb
         levels = [tiles[next_tile + i] for i in range(max(1, len(LEVEL_STEPS) * len(windows)))]
@@ -185,15 +181,6 @@ def _place(scene: Scene, buffers: SceneBuffers, plans, tiles: list[Tile], size: 
             count += len(atlas.rows)
             charts[receiver] = atlas
     return MapLayout(size, np.concatenate(placements), receivers, tile_of, {r: w for r, _, w, _ in plans}, charts, tuple(folds))
-
-
-def _seen_side(camera: Camera, buffers: SceneBuffers, object_index: int) -> float:
-    """Which face of a flat receiver the camera sees: 1 front, -1 back, 0 where its facets disagree or it is seen edge-on."""
-    corners = buffers.world_meshes[object_index].corners()
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    toward = -camera_frame(camera)[2] if camera.kind == "orthographic" else np.array(camera.position) - corners[0, 0]
-    faces = np.sign(np.sum(normals * toward, axis=1))
-    return float(faces[0]) if np.all(faces == faces[0]) else 0.0
 
 
 def _extent(points: np.ndarray) -> Window:

@@ -46,9 +46,10 @@ def floor(half=12.0) -> SceneObject:
     return horizontal(-half, half, -half, half, 0.0, Diffuse((REFLECTANCE,) * 3), "floor")
 
 
-def eye_pass(gl, objects, lights=(), background=(0.0, 0.0, 0.0), camera=ABOVE, **options) -> EyePass:
+def eye_pass(gl, objects, lights=(), background=(0.0, 0.0, 0.0), camera=ABOVE, charts=False, **options) -> EyePass:
     scene = Scene("test", camera, tuple(lights), tuple(objects), background)
     features = Features.of(scene, RenderSettings())
+    features = replace(features, charts=charts or features.charts)
     axis = SpectralAxis.build([o.material.dispersion for o in objects if isinstance(o.material, Dielectric)])
     return EyePass(gl, SceneBuffers(gl.ctx, scene, features, axis), **options)
 
@@ -432,7 +433,7 @@ def test_nested_windows_show_the_finest_map_that_covers_a_place(gl, layer):
 def test_charts_have_a_placement_a_triangle(gl):
     """A receiver of two triangles whose charts lie apart in the atlas, after another object's triangles."""
     blocker = horizontal(50, 51, 50, 51, 1, Diffuse((0, 0, 0)), "elsewhere")
-    eye = eye_pass(gl, [blocker, horizontal(-2, 2, -2, 2, 0, Diffuse((REFLECTANCE,) * 3))])
+    eye = eye_pass(gl, [blocker, horizontal(-2, 2, -2, 2, 0, Diffuse((REFLECTANCE,) * 3))], charts=True)
     lumens = np.zeros((16, 40))
     lumens[2:10, 2:10], lumens[5:13, 20:28] = 1.0, 3.0
     maps = flat_maps(gl, eye.scene, [(-2, -2, 4.0, 2, 2, 8), (-2, -2, 4.0, 20, 5, 8)], white_texels(lumens))

@@ -116,7 +116,8 @@ def test_cut_bands_add_up_to_the_whole(cut_rig: Rig) -> None:
         # A sliver of a band has a hard-edged box for its blur: 0.7 % by where that falls on the grid.
         assert part[..., 3].sum() == pytest.approx(expected[0], rel=1e-2)
         parts += part
-    assert relative_error(parts[..., 1], whole[..., 1]) < 0.02
+    # A cut band is blurred by the box of the same variance, so its two ends differ from the whole band's Gaussian ones.
+    assert relative_error(parts[..., 1], whole[..., 1]) < 0.12
     assert parts.sum(axis=(0, 1)) == pytest.approx(whole.sum(axis=(0, 1)), rel=8e-3)
 
 
