@@ -66,6 +66,8 @@ class LightStats:
     splat_seconds: float = 0.0
     outside_map_w: float = 0.0
     footprints_dropped: int = 0
+    dropped_w: float = 0.0
+    """Flux of those photons, splatted as one texel each."""
 
 
 @dataclass(frozen=True)
@@ -346,6 +348,7 @@ class LightHalf:
         counts = self.splatter.counts()
         self.stats.outside_map_w = counts["outside_map_w"]
         self.stats.footprints_dropped = int(counts["footprints_dropped"])
+        self.stats.dropped_w = counts["dropped_w"]
 
     def release(self) -> None:
         """Free everything."""

@@ -63,7 +63,7 @@ class RenderStats:
             f"map holds           {self.map_flux_w / max(tally.ended['deposited'], 1e-300):10.6f} of what was deposited; "
             f"outside every map {self.light.outside_map_w / max(tally.ended['deposited'], 1e-300):.6f}",
             "fall-backs          " + ", ".join(f"{name} {count}" for name, count in tally.fallbacks.items())
-            + f", splat_footprint_dropped {self.light.footprints_dropped}",
+            + f", splat_footprint_dropped {self.light.footprints_dropped} ({self.light.dropped_w / max(tally.ended['deposited'], 1e-300):.1e} of what was deposited)",
             "bands × points      " + ", ".join(f"{name} {count} × {self.light.light_points[name]}" for name, count in self.light.bands.items()),
             f"maps                {self.atlas_size[0]}×{self.atlas_size[1]} texels, buffers {self.bytes / 2**20:.0f} MiB",
             f"seconds             prepare {self.prepare_seconds:.2f}, emit and trace {self.light.trace_seconds:.2f}, "

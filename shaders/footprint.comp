@@ -21,7 +21,7 @@ layout(std430, binding = 2) readonly buffer Placements { Placement placements[];
 layout(std430, binding = 3) readonly buffer Receivers { Receiver receivers[]; };
 layout(std430, binding = 4) readonly buffer VarTables { float var_table[]; };
 layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };  // x_lo, x_hi, mean place of the light in it (0..1), unused
-layout(std430, binding = 6) buffer Outside { float outside_w[]; };
+layout(std430, binding = 6) buffer Unusual { vec2 unusual_w[]; };  // x: centre in no window, y: drawn as one texel
 layout(std430, binding = 7) buffer Commands { uint draw_words[20]; uint count_dropped; };
 
 #define RECEIVER_CHARTS 1u
@@ -340,6 +340,7 @@ void main() {
         sweep = vec3(0.0);
         f = footprint_in(place, photon, middle, sweep);
         atomicAdd(count_dropped, 1u);
+        unusual_w[i].y += photon.flux_w;
     }
 
     uint light = photon.light_and_source & 255u;
@@ -385,6 +386,6 @@ void main() {
 #endif
 
     if (!inside) {
-        outside_w[i] += photon.flux_w;
+        unusual_w[i].x += photon.flux_w;
     }
 }

@@ -113,7 +113,7 @@ class Footprints:
         structs = (photon_record(groups), PLACEMENT, RECEIVER, SPLAT)
         self._program = shader.compute(ctx, "footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
-        self._outside = ctx.buffer(np.zeros(group, np.float32))
+        self._unusual = ctx.buffer(np.zeros((group, 2), np.float32))
         self.commands = ctx.buffer(np.zeros(21, np.uint32))
         """Indirect draws of kinds 1 to 4, five words each; then the dropped footprints."""
         self.slots_per_photon = defines["SLOTS"]
@@ -144,7 +144,7 @@ class Footprints:
         self._parameters.write(values.tobytes())
         self._parameters.bind_to_uniform_block(0)
         for binding, buffer in enumerate(
-            (photons, self.splats, atlas.placements, receivers, var_table, tables.band_buffer, self._outside, self.commands)
+            (photons, self.splats, atlas.placements, receivers, var_table, tables.band_buffer, self._unusual, self.commands)
         ):
             buffer.bind_to_storage_buffer(binding)
         slots = count * self.slots_per_photon
@@ -157,15 +157,15 @@ class Footprints:
 
     def counts(self) -> dict[str, float]:
         """Since the last reset: `outside_map_w` (flux of photons whose centre no window holds, W),
-        `footprints_dropped` (numbers of photons)."""
-        outside = np.frombuffer(self._outside.read(), np.float32).sum(dtype=np.float64)
+        `footprints_dropped` (number of photons), `dropped_w` (their flux, W)."""
+        outside, dropped_w = np.frombuffer(self._unusual.read(), np.float32).reshape(-1, 2).sum(axis=0, dtype=np.float64)
         dropped = int(np.frombuffer(self.commands.read(), np.uint32)[20])
-        return {"outside_map_w": float(outside), "footprints_dropped": dropped}
+        return {"outside_map_w": float(outside), "footprints_dropped": dropped, "dropped_w": float(dropped_w)}
 
     def reset_counts(self) -> None:
-        self._outside.clear()
+        self._unusual.clear()
         self.commands.clear()
 
     def release(self) -> None:
-        for resource in (self._program, self._list, self.lists, self._parameters, self._outside, self.commands, self.splats):
+        for resource in (self._program, self._list, self.lists, self._parameters, self._unusual, self.commands, self.splats):
             resource.release()

@@ -134,7 +134,7 @@ class Splatter:
 
     def counts(self) -> dict[str, float]:
         """Since the last reset: `outside_map_w` (flux of photons whose centre no map holds, W) and
-        `footprints_dropped` (photons splatted as one texel for want of a usable footprint)."""
+        `footprints_dropped` (photons splatted as one texel for want of a usable footprint; `dropped_w`: their flux, W)."""
         return self._footprints.counts()
 
     def reset_counts(self) -> None:
