@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -38,6 +38,8 @@ class Dispersion:
     """In the order of `dispersion_formulas`; a table is λ (µm), n, λ, n, …, λ ascending."""
     range_nm: tuple[float, float] = _ALL_WAVELENGTHS
     """Where the fit holds; wavelengths outside are clamped to it."""
+    gain: float = 1.0
+    """Factor on n(λ) − n_d: 1 is the material itself, 0 has no dispersion, more is stronger than nature. n_d stays."""
 
     def index(self, wavelength_nm: np.ndarray | float) -> np.ndarray:
         """Refractive index, float64 of the shape of `wavelength_nm`."""
@@ -52,12 +54,16 @@ class Dispersion:
 
     def _evaluate(self, wavelength_nm: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
         clamped = np.clip(np.asarray(wavelength_nm, dtype=np.float64), *self.range_nm)
-        return formulas.evaluate(self.kind, self.coefficients, clamped * 1e-3)
+        n, slope = formulas.evaluate(self.kind, self.coefficients, clamped * 1e-3)
+        if self.gain == 1.0:
+            return n, slope
+        return self.n_d + self.gain * (n - self.n_d), self.gain * slope
 
     @cached_property
     def n_d(self) -> float:
         """Index at the helium line d, 587.56 nm."""
-        return float(self.index(LINE_D_NM))
+        d_um = min(max(LINE_D_NM, self.range_nm[0]), self.range_nm[1]) * 1e-3
+        return float(formulas.evaluate(self.kind, self.coefficients, np.float64(d_um))[0])
 
     @cached_property
     def V_d(self) -> float:  # noqa: N802  (the standard symbol)
@@ -200,6 +206,16 @@ def table(wavelength_nm: Sequence[float], n: Sequence[float], name: str = "", wh
             raise UserError(f"{_prefix(where)}the table has n = {value:g} at {wavelength:g} nm; an index must be a positive number")
     flat = tuple(float(x) for pair in zip(lam * 1e-3, values, strict=True) for x in pair)
     return _checked(Dispersion(name, "table", flat, (float(lam[0]), float(lam[-1]))), where)
+
+
+def with_gain(dispersion: Dispersion, gain: float, where: str = "") -> Dispersion:
+    """The same material with its dispersion `gain` times as strong about n_d.
+
+    Raises `UserError` for a gain that is not finite or negative, or that makes an index ≤ 0 in the visible range.
+    """
+    if not (math.isfinite(gain) and gain >= 0.0):
+        raise UserError(f"{_prefix(where)}dispersion_gain is {gain:g}; give a number from 0 (none) over 1 (as in nature) upwards")
+    return _checked(replace(dispersion, gain=float(gain)), where)
 
 
 def abbe_to_gltf_dispersion(v_d: float) -> float:

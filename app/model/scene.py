@@ -110,6 +110,22 @@ Material = Dielectric | Mirror | Diffuse | Black
 
 
 @dataclass(frozen=True)
+class Dab:
+    """One touch of the dispersion brush on a receiver: a local gain of dispersion. Not physical; `local_dispersion` says how dabs add up."""
+
+    position: Vec3
+    """Centre, in the receiver's own coordinates, so that it moves with the object."""
+    radius: float
+    """In the receiver's own units; beyond it the dab does nothing."""
+    log2_gain: float
+    """Doublings of the gain at the centre: positive widens colours, negative narrows them. Unused by an eraser."""
+    falloff: float = 0.5
+    """Share of the radius over which the dab fades out: 0 is a hard edge, 1 fades from the centre on."""
+    erase: float = 0.0
+    """Share of what earlier dabs did that this one takes away at its centre (0: it is no eraser)."""
+
+
+@dataclass(frozen=True)
 class SceneObject:
     """A mesh placed in the world. Instances share one `Mesh` value."""
 
@@ -118,6 +134,8 @@ class SceneObject:
     material: Material
     object_to_world: np.ndarray = field(default_factory=lambda: np.eye(4))
     """float64 (4, 4), column vectors: p_world = M @ p_object."""
+    local_dispersion: tuple[Dab, ...] = ()
+    """Touches of the dispersion brush on this receiver, oldest first."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,40 @@
+"""What a live rendering tells about itself, for the timing panel and for tests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class LiveStats:
+    """One moment of a `LiveEngine`; times of the last `advance` in seconds (wall clock, device finished)."""
+
+    renderer: str = ""
+    is_software: bool = True
+    rays_traced: int = 0
+    """Rays emitted since the engine was made. Does not move when photons are only splatted again."""
+    photons: int = 0
+    """Emitted photons that the shown map holds."""
+    photons_stored: int = 0
+    """Photon records kept for splatting again."""
+    passes: int = 0
+    camera_samples: float = 0.0
+    """Camera samples a pixel of the shown picture."""
+    trace_s: float = 0.0
+    splat_s: float = 0.0
+    eye_s: float = 0.0
+    photons_per_second: float = 0.0
+    """Emitted photons per second of trace and splat time, over the last second."""
+    first_order: bool = False
+    """The stored paths belong to a glass of another dispersion; the picture follows the edit to first order."""
+    converged: bool = False
+    """Nothing is left to do: the target is reached."""
+    resolution_scale: float = 1.0
+    """Side of the shown picture over the side asked for."""
+    bytes: int = 0
+    """GPU memory held."""
+    fallbacks: dict[str, int] = field(default_factory=dict)
+    lost: dict[str, float] = field(default_factory=dict)
+    """Shares of the emitted flux by how it ended."""
+    bands: dict[str, int] = field(default_factory=dict)
+    """Spectral bands of each light."""

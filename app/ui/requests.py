@@ -1,0 +1,175 @@
+"""What a panel asks the host to do that a change of values cannot say: files, pictures, questions to the renderer.
+
+A panel appends a request to the state it returns; the host (`session.py`) carries requests out in
+order and clears them. Nothing here does anything.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from app.model.scene import Vec3
+
+
+@dataclass(frozen=True)
+class NewScene:
+    """Start from the default scene."""
+
+
+@dataclass(frozen=True)
+class Open:
+    """Load a scene, a GLB or a bare mesh (which gets a glass, a light and a table)."""
+
+    path: Path
+
+
+@dataclass(frozen=True)
+class Save:
+    """Save to `path` (.toml or .glb); None saves where the scene came from."""
+
+    path: Path | None = None
+
+
+@dataclass(frozen=True)
+class Undo:
+    """One step back."""
+
+
+@dataclass(frozen=True)
+class Redo:
+    """One step forward again."""
+
+
+@dataclass(frozen=True)
+class GoTo:
+    """To entry `index` of the history."""
+
+    index: int
+
+
+@dataclass(frozen=True)
+class Quit:
+    """Close; asks first where changes are unsaved."""
+
+
+@dataclass(frozen=True)
+class Recover:
+    """Load the autosave of a session that crashed; `discard` deletes it instead."""
+
+    discard: bool = False
+
+
+@dataclass(frozen=True)
+class SelectAt:
+    """Select what made the picture at a pixel of the viewport: glass, or the object whose caustic it is.
+
+    `itself` selects the surface hit, even when a caustic lies on it."""
+
+    x: float
+    y: float
+    itself: bool = False
+
+
+@dataclass(frozen=True)
+class BeginPull:
+    """Take hold of the caustic's colour at a pixel: the host fills `State.pull`."""
+
+    x: float
+    y: float
+    local: bool = False
+    """Solve for the local gain instead of the object's Abbe number."""
+
+
+@dataclass(frozen=True)
+class FrameSelection:
+    """Move the camera so that the selection (or everything) fills the view."""
+
+
+@dataclass(frozen=True)
+class Retrace:
+    """Trace anew with the present glass, where the picture followed an edit to first order only."""
+
+
+@dataclass(frozen=True)
+class ReloadShaders:
+    """Compile the shaders from disk again, keeping the last good programs."""
+
+
+@dataclass(frozen=True)
+class Screenshot:
+    """Write the picture to `path`: .png as displayed, .exr linear, spectral .exr when `spectral`."""
+
+    path: Path
+    spectral: bool = False
+    with_interface: bool = False
+
+
+@dataclass(frozen=True)
+class Bake:
+    """Write a receiver's caustic map with its placement (`.json` beside it): .exr or .png."""
+
+    path: Path
+    receiver: str
+
+
+@dataclass(frozen=True)
+class Animate:
+    """Render an animation: a turntable, or the keys of `State.animation`."""
+
+    path: Path
+    kind: Literal["turntable", "keys"] = "turntable"
+    frames: int = 120
+    fps: float = 24.0
+
+
+@dataclass(frozen=True)
+class CancelJob:
+    """Stop the running export; what is finished stays."""
+
+
+@dataclass(frozen=True)
+class ComputeReference:
+    """Start (again) the reference that compare modes show."""
+
+
+@dataclass(frozen=True)
+class CopyMaterial:
+    """Of object `index` to the material clipboard."""
+
+    index: int
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Show one sentence for a few seconds."""
+
+    text: str
+    is_error: bool = False
+
+
+Request = (
+    NewScene | Open | Save | Undo | Redo | GoTo | Quit | Recover | SelectAt | BeginPull | FrameSelection | Retrace | ReloadShaders
+    | Screenshot | Bake | Animate | CancelJob | ComputeReference | CopyMaterial | Notice
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Pull:
+    """A colour held by the cursor (`BeginPull`): what `pull.py` needs to solve for a dispersion while it is dragged."""
+
+    object_index: int
+    """The glass whose dispersion is solved for."""
+    receiver_index: int
+    start: Vec3
+    """World position taken hold of."""
+    reference: Vec3
+    """World position where the same light lands at the d line: the point that stays."""
+    direction: Vec3
+    """Unit world direction along which this colour moves as the dispersion grows."""
+    wavelength_nm: float
+    gain_at_start: float
+    """The material's dispersion gain, or the local gain there, when it was taken."""
+    v_d_at_start: float
+    local: bool = False
