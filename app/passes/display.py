@@ -1,0 +1,197 @@
+"""From the linear picture to the 8-bit texture that the window shows; two pictures where they are compared.
+
+Nothing here changes light: exposure, tone curves, false colour and the error map are ways to look at it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import moderngl
+import numpy as np
+
+from app.colour_maps import ERROR, FALSE_COLOUR, glsl_table
+from app.gpu import shader
+from app.gpu.schema import Field, Struct
+from app.ui.state import Compare
+from app.ui.state import Display as Settings
+
+if TYPE_CHECKING:
+    from app.gpu.context import Context
+
+DISPLAY_PARAMETERS = Struct(
+    "DisplayParameters",
+    (
+        Field("origin", "vec2", "texture coordinate of the output's corner"),
+        Field("step_uv", "vec2", "texture coordinates an output pixel covers"),
+        Field("false_stops", "vec2", "ends of the false-colour scale, stops about display white"),
+        Field("gain", "float", "2^exposure"),
+        Field("wipe_px", "float", "place of the wipe's line"),
+        Field("error_floor", "float", "reference below which errors count less, share of display white"),
+        Field("error_range", "float", "relative error at the ends of the scale"),
+    ),
+)
+Shows = Literal["picture", "other", "wipe", "error"]
+ERROR_RANGE = 0.5
+"""Relative error at the ends of the error map's scale."""
+ERROR_FLOOR = 0.02
+"""Share of display white added to the reference's brightness there: what is nearly black on the screen is not called wrong."""
+NEAREST_FROM = 4.0
+"""Enlarged more than this, pixels are shown as squares."""
+_MAX_TAPS = 4
+_GROUP = 8
+
+
+@dataclass(frozen=True)
+class _Variant:
+    """What a program is made for."""
+
+    tone: str
+    """A tone curve, or "false_colour"; unused in the error map."""
+    shows: Shows
+    taps: int
+    """Look-ups along a side of an output pixel."""
+
+    def defines(self) -> dict[str, int | str]:
+        table = ERROR if self.shows == "error" else FALSE_COLOUR
+        return {"COLOUR_TABLE": glsl_table(table), "TAPS": self.taps, f"TONE_{self.tone.upper()}": 1, f"SHOW_{self.shows.upper()}": 1}
+
+
+class Display:
+    """Owns the programs, made when first needed, and the textures they write; a texture stays valid until the next call that writes it."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._ctx = context.ctx
+        self._programs: dict[_Variant, moderngl.ComputeShader] = {}
+        self._parameters = self._ctx.buffer(reserve=DISPLAY_PARAMETERS.stride)
+        self._samplers = {
+            kind: self._ctx.sampler(repeat_x=False, repeat_y=False, filter=(kind, kind)) for kind in (moderngl.NEAREST, moderngl.LINEAR)
+        }
+        self._outputs: dict[str, moderngl.Texture] = {}
+
+    def run(
+        self,
+        picture: moderngl.Texture,
+        settings: Settings,
+        exposure_ev: float,
+        size: tuple[int, int],
+        other: moderngl.Texture | None = None,
+        compare: Compare | None = None,
+    ) -> moderngl.Texture:
+        """`picture` (RGBA32F, linear Rec.709, row 0 on top) as an RGBA8 texture of `size` (width, height), sRGB codes, row 0 on top.
+
+        `exposure_ev` is absolute (as `tone_map.to_display` takes it). `other` is what `compare` shows beside it, over it or
+        takes the error against; without it the picture alone is shown.
+        """
+        parameters = self._develop(settings, exposure_ev)
+        parameters["step_uv"] = 1.0 / size[0], 1.0 / size[1]
+        shows: Shows = "picture"
+        if other is not None and compare is not None:
+            shows = _shown(compare)
+            parameters["wipe_px"] = np.clip(compare.wipe, 0.0, 1.0) * size[0]
+        if shows == "other" and other is not None:
+            picture = other
+        shrunk = max(picture.width / size[0], picture.height / size[1])
+        variant = _Variant(_tone(settings), shows, int(np.clip(np.ceil(shrunk - 0.01), 1, _MAX_TAPS)))
+        enlarged = max(size[0] / picture.width, size[1] / picture.height)
+        # Pixel for pixel nothing is blended, so that one broken pixel stays one.
+        nearest = enlarged > NEAREST_FROM or picture.size == size
+        return self._dispatch("picture", variant, parameters, (picture, other or picture), size, nearest)
+
+    def magnify(
+        self, picture: moderngl.Texture, pixel: tuple[int, int], settings: Settings, exposure_ev: float, zoom: int = 12, pixels: int = 15
+    ) -> moderngl.Texture:
+        """`pixels`² pixels of `picture` about `pixel` (column, row from the top), each `zoom`² large, as `run` would show them.
+
+        Beyond the border the outermost pixels go on.
+        """
+        parameters = self._develop(settings, exposure_ev)
+        corner = np.array(pixel, float) - (pixels - 1) / 2
+        parameters["origin"] = corner / picture.size
+        parameters["step_uv"] = 1.0 / (zoom * np.array(picture.size, float))
+        variant = _Variant(_tone(settings), "picture", 1)
+        return self._dispatch("magnifier", variant, parameters, (picture, picture), (pixels * zoom, pixels * zoom), nearest=True)
+
+    def reload(self) -> None:
+        """Compile the programs from disk again; raises `ShaderError` and keeps all of them when one does not compile."""
+        fresh: dict[_Variant, moderngl.ComputeShader] = {}
+        try:
+            for variant in self._programs:
+                fresh[variant] = self._compiled(variant)
+        except shader.ShaderError:
+            for program in fresh.values():
+                program.release()
+            raise
+        for program in self._programs.values():
+            program.release()
+        self._programs = fresh
+
+    def release(self) -> None:
+        """Free programs, buffers and textures."""
+        for owned in (*self._programs.values(), self._parameters, *self._samplers.values(), *self._outputs.values()):
+            owned.release()
+        self._programs.clear()
+        self._outputs.clear()
+
+    def _develop(self, settings: Settings, exposure_ev: float) -> np.ndarray:
+        """Parameters of the look alone."""
+        parameters = DISPLAY_PARAMETERS.zeros(1)
+        parameters["gain"] = 2.0 ** float(np.clip(exposure_ev, -60.0, 60.0))
+        low, high = settings.false_colour_stops
+        parameters["false_stops"] = low, max(high, low + 0.01)
+        parameters["error_floor"], parameters["error_range"] = ERROR_FLOOR, ERROR_RANGE
+        return parameters
+
+    def _dispatch(
+        self,
+        name: str,
+        variant: _Variant,
+        parameters: np.ndarray,
+        pictures: tuple[moderngl.Texture, moderngl.Texture],
+        size: tuple[int, int],
+        nearest: bool,
+    ) -> moderngl.Texture:
+        output = self._output(name, size)
+        self._parameters.write(parameters.tobytes())
+        self._parameters.bind_to_storage_buffer(0)
+        sampler = self._samplers[moderngl.NEAREST if nearest else moderngl.LINEAR]
+        self._ctx.memory_barrier()
+        for unit, texture in enumerate(pictures):
+            texture.use(unit)
+            sampler.use(unit)
+        output.bind_to_image(0, read=False, write=True)
+        self._program(variant).run(-(-size[0] // _GROUP), -(-size[1] // _GROUP))
+        for unit in (0, 1):
+            sampler.clear(unit)
+        self._ctx.memory_barrier()
+        self._context.check("the display pass")
+        return output
+
+    def _program(self, variant: _Variant) -> moderngl.ComputeShader:
+        if variant not in self._programs:
+            self._programs[variant] = self._compiled(variant)
+        return self._programs[variant]
+
+    def _compiled(self, variant: _Variant) -> moderngl.ComputeShader:
+        return shader.compute(self._ctx, "display.comp", variant.defines(), [DISPLAY_PARAMETERS])
+
+    def _output(self, name: str, size: tuple[int, int]) -> moderngl.Texture:
+        texture = self._outputs.get(name)
+        if texture is None or texture.size != size:
+            if texture is not None:
+                texture.release()
+            texture = self._outputs[name] = self._ctx.texture(size, 4, dtype="f1")
+            texture.repeat_x = texture.repeat_y = False
+        return texture
+
+
+def _tone(settings: Settings) -> str:
+    return "false_colour" if settings.false_colour else settings.tone
+
+
+def _shown(compare: Compare) -> Shows:
+    if compare.holding:
+        return "other"
+    return "picture" if compare.mode in ("off", "hold") else compare.mode
