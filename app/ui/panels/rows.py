@@ -1,0 +1,82 @@
+"""What controls share: the row they stand in, the tooltip that explains them, the words between them.
+
+`widgets.py` is made of this and hands on what panels need of it.
+"""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from app.ui import item_rects, theme
+
+_LABEL_EM, _LABEL_SHARE = 8.4, 0.42
+_LEAST_FIELD_EM = 4.5
+_TIP_EM = 26.0
+
+
+def begin_row(label: str) -> bool:
+    """Draw the label and give the next item the rest of the row; True when the label was double-clicked.
+
+    A label wider than its column pushes the field aside, or onto a line of its own: nothing is cut off.
+    """
+    shown = label.split("##")[0]
+    room = imgui.get_content_region_avail().x
+    column = min(theme.em(_LABEL_EM), _LABEL_SHARE * room)
+    gap = imgui.get_style().item_inner_spacing.x
+    start, hit = imgui.get_cursor_pos_x(), False
+    if shown:
+        imgui.align_text_to_frame_padding()
+        imgui.text_unformatted(shown)
+        hit = double_clicked()
+        column = max(column, imgui.calc_text_size(shown).x)
+        if room - column - gap >= theme.em(_LEAST_FIELD_EM):
+            imgui.same_line(start + column + gap)
+    else:
+        imgui.set_cursor_pos_x(start + column + gap)
+    imgui.set_next_item_width(-1.0)
+    return hit
+
+
+def explain(label: str, tip: str, unit: str = "", how: str = "") -> None:
+    """Tell the last item to `item_rects` and give it its tooltip: what it does, its unit, how to handle it."""
+    item_rects.note(label)
+    tooltip(tip, f"Unit: {unit}" if unit else "", how)
+
+
+def how_to(default: str | None) -> str:
+    """The tooltip's line about typing and resetting a number."""
+    return "Ctrl+click: type" + (f", double-click: back to {default}" if default else "")
+
+
+def double_clicked() -> bool:
+    """Whether the last item was double-clicked in this frame."""
+    return imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0)
+
+
+def is_typed_in(label: str) -> bool:
+    """Whether the row's number is (from this frame on) a field to type into."""
+    starts = imgui.get_io().key_ctrl and imgui.is_mouse_clicked(0)
+    return starts or imgui.internal.temp_input_is_active(imgui.get_id(f"##{label}"))
+
+
+def tooltip(text: str, *extra: str) -> None:
+    """Explain the last item when it is hovered, switched-off ones too."""
+    flags = imgui.HoveredFlags_.for_tooltip.value | imgui.HoveredFlags_.allow_when_disabled.value
+    if not text or not imgui.is_item_hovered(flags):
+        return
+    imgui.begin_tooltip()
+    imgui.push_text_wrap_pos(theme.em(_TIP_EM))
+    imgui.text_unformatted(text)
+    with theme.coloured(theme.palette().muted):
+        for line in filter(None, extra):
+            imgui.text_unformatted(line)
+    imgui.pop_text_wrap_pos()
+    imgui.end_tooltip()
+
+
+def words(text: str, colour: theme.Colour) -> None:
+    """Text wrapped to the window."""
+    imgui.push_text_wrap_pos(0.0)
+    with theme.coloured(colour):
+        imgui.text_unformatted(text)
+    imgui.pop_text_wrap_pos()
