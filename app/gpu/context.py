@@ -17,7 +17,8 @@ from app.gpu.limits import Limits
 if TYPE_CHECKING:
     import moderngl
 
-Backend = Literal["egl", "osmesa"]
+Backend = Literal["egl", "osmesa", "window"]
+"""How a context was made; a window brings its own."""
 BACKENDS: tuple[Backend, ...] = ("egl", "osmesa")
 ENVIRONMENT_VARIABLE = "SPECTRASPLAT_BACKEND"
 GL_VERSION = (4, 3)

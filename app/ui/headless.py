@@ -14,8 +14,10 @@ import numpy as np
 from imgui_bundle import imgui
 
 from app.gpu.context import Context
+from app.ui import theme
 from app.ui.imgui_host import ImguiHost
 from app.ui.item_rects import ItemRect, Recorder, recording
+from app.ui.state import Preferences
 
 Point = tuple[float, float]
 FRAME_S = 1 / 60
@@ -23,10 +25,10 @@ FRAME_S = 1 / 60
 
 
 class HeadlessInterface:
-    """An interface of `size` pixels whose frame is `draw()`; `prepare()` runs before each frame, outside of imgui's.
+    """An interface of `size` pixels whose frame is `draw()`.
 
-    A context manager; `release()` frees it. `items` tells where controls are. With a `Session`:
-    `HeadlessInterface(context, lambda: session.frame(draw_interface), prepare=session.prepare)`.
+    `prepare()` and `finished()` run before and after each frame, outside of imgui's; `preferences()`
+    tells the theme. A context manager; `release()` frees it. `items` tells where controls are.
     """
 
     def __init__(
@@ -35,12 +37,16 @@ class HeadlessInterface:
         draw: Callable[[], None],
         size: tuple[int, int] = (1280, 720),
         prepare: Callable[[], None] | None = None,
+        finished: Callable[[], None] | None = None,
+        preferences: Callable[[], Preferences] = Preferences,
     ) -> None:
         self.size = size
         self.items = Recorder()
         self._context = context
         self._draw = draw
         self._prepare = prepare
+        self._finished = finished
+        self._preferences = preferences
         self._host = ImguiHost()
         self._texture = context.ctx.texture(size, 4)
         self._framebuffer = context.ctx.framebuffer([self._texture])
@@ -72,6 +78,7 @@ class HeadlessInterface:
         self._host.make_current()
         if self._prepare is not None:
             self._prepare()
+        theme.apply(self._preferences())
         imgui.get_io().delta_time = FRAME_S
         self.items.clear()
         with recording(self.items), self._host.frame():
@@ -80,6 +87,8 @@ class HeadlessInterface:
         self._framebuffer.clear(0.0, 0.0, 0.0, 1.0)
         self._host.render()
         self._no_framebuffer.use()
+        if self._finished is not None:
+            self._finished()
 
     def screenshot(self) -> np.ndarray:
         """The last frame, uint8 (height, width, 3), top row first."""

@@ -10,6 +10,8 @@ from contextlib import contextmanager
 
 from imgui_bundle import imgui, implot
 
+from app.ui import theme
+
 GLSL_VERSION = "#version 430"
 
 
@@ -28,6 +30,7 @@ class ImguiHost:
         io.config_windows_move_from_title_bar_only = True
         if not imgui.backends.opengl3_init(GLSL_VERSION):
             raise RuntimeError("imgui's OpenGL backend did not start")
+        theme.set_up()
         self._is_released = False
 
     def make_current(self) -> None:

@@ -1,0 +1,301 @@
+"""The interface in a glfw window: events in, frames out, and nothing at all while nothing changes.
+
+The window knows a `Guest` (the session) that draws one frame within imgui and tells how long
+it can wait for the next; everything else here is glfw.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol, Self
+
+import moderngl
+import numpy as np
+from imgui_bundle import imgui  # before glfw: it brings the GLFW that both then use
+
+import glfw  # isort: skip
+
+from app.errors import UserError
+from app.gpu.context import GL_VERSION, GL_VERSION_CODE, Context
+from app.ui import theme
+from app.ui.imgui_host import ImguiHost
+from app.ui.state import Preferences
+
+SETTLE_FRAMES = 3
+"""Frames drawn after an event before waiting again: imgui's layout and hovering need two."""
+MIN_SIDE = 320
+NO_DISPLAY = "there is no display to open a window on: 'spectrasplat render SCENE -o OUT.png' needs none"
+
+
+@dataclass(frozen=True)
+class WindowGeometry:
+    """Where the window is, in screen coordinates; None lets the system choose."""
+
+    width: int = 1440
+    height: int = 900
+    x: int | None = None
+    y: int | None = None
+    maximized: bool = False
+
+
+class Guest(Protocol):
+    """What the window shows."""
+
+    def prepare(self) -> None:
+        """Before a frame, outside of imgui's."""
+
+    def draw(self) -> None:
+        """One frame, within imgui's."""
+
+    def finished(self) -> None:
+        """After the frame is on the screen."""
+
+    def wait_s(self) -> float:
+        """Seconds that the window may sleep when no event comes; 0 for the next frame at once."""
+
+    def drop(self, paths: list[Path]) -> None:
+        """Files were dropped on the window."""
+
+    def ask_to_close(self) -> None:
+        """The window's close button was pressed."""
+
+    @property
+    def preferences(self) -> Preferences:
+        """Theme and scale."""
+
+    @property
+    def title(self) -> str:
+        """Of the window."""
+
+    @property
+    def wants_to_close(self) -> bool:
+        """The window may close now."""
+
+
+class _Loader:
+    """Finds OpenGL's functions through GLFW, however it made its context (GLX, EGL, WGL)."""
+
+    def load(self, name: str) -> int:
+        """Address of the OpenGL function `name`, 0 when unknown."""
+        return glfw.get_proc_address(name) or 0
+
+    def release(self) -> None:
+        """The window owns the context."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        """Stays current."""
+
+
+class Window:
+    """One window with its OpenGL context, current from here on; a context manager.
+
+    Raises `UserError` without a display or without OpenGL 4.3.
+    """
+
+    def __init__(self, geometry: WindowGeometry | None = None, visible: bool = True) -> None:
+        geometry = geometry or WindowGeometry()
+        self._handle = _create(geometry, visible)
+        glfw.make_context_current(self._handle)
+        self.context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=_Loader()), "window")
+        # A GPU waits for the screen; on the processor waiting would be time taken from the photons.
+        glfw.swap_interval(0 if self.context.is_software else 1)
+        self._screen = self.context.ctx.detect_framebuffer(0)
+        self._settling = SETTLE_FRAMES
+        self._dropped: list[Path] = []
+        self._close_pressed = False
+        self._listen()
+        self._host = ImguiHost()
+        imgui.backends.glfw_init_for_opengl(ctypes.cast(self._handle, ctypes.c_void_p).value, True)
+        self._title = ""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self.release()
+
+    def release(self) -> None:
+        """Close the window; its context is gone with it."""
+        self._host.make_current()
+        imgui.backends.glfw_shutdown()
+        self._host.release()
+        glfw.destroy_window(self._handle)
+        glfw.terminate()
+
+    @property
+    def geometry(self) -> WindowGeometry:
+        """To be remembered."""
+        width, height = glfw.get_window_size(self._handle)
+        maximized = bool(glfw.get_window_attrib(self._handle, glfw.MAXIMIZED))
+        if glfw.get_platform() == glfw.PLATFORM_WAYLAND:  # windows there do not know where they are
+            return WindowGeometry(width, height, maximized=maximized)
+        x, y = glfw.get_window_pos(self._handle)
+        return WindowGeometry(width, height, x, y, maximized)
+
+    @property
+    def framebuffer_size(self) -> tuple[int, int]:
+        """Device pixels."""
+        width, height = glfw.get_framebuffer_size(self._handle)
+        return width, height
+
+    @property
+    def interface_scale(self) -> float:
+        """Interface pixels per logical pixel: 2 on a HiDPI screen where imgui counts device pixels, else 1."""
+        content = glfw.get_window_content_scale(self._handle)[0]
+        window, framebuffer = glfw.get_window_size(self._handle)[0], self.framebuffer_size[0]
+        return content if not window or framebuffer == window else content * window / framebuffer
+
+    @property
+    def refresh_s(self) -> float:
+        """Time between two pictures of the screen, seconds."""
+        monitor = glfw.get_primary_monitor()
+        mode = glfw.get_video_mode(monitor) if monitor else None
+        return 1.0 / mode.refresh_rate if mode and mode.refresh_rate else 1 / 60
+
+    def run(self, guest: Guest, until: Callable[[], bool] = lambda: False) -> None:
+        """Show `guest` until it wants to close, or until `until()`."""
+        while not guest.wants_to_close and not until():
+            self._take_events(guest)
+            if glfw.get_window_attrib(self._handle, glfw.ICONIFIED):
+                # Nothing to be seen: the picture waits, files and jobs are looked after.
+                time.sleep(0.05)
+            self.frame(guest)
+
+    def frame(self, guest: Guest) -> None:
+        """Draw one frame and show it."""
+        self._host.make_current()
+        guest.prepare()
+        theme.apply(guest.preferences, self.interface_scale)
+        if guest.title != self._title:
+            self._title = guest.title
+            glfw.set_window_title(self._handle, self._title)
+        imgui.backends.glfw_new_frame()
+        with self._host.frame():
+            guest.draw()
+        self._screen.use()
+        self._screen.viewport = (0, 0, *self.framebuffer_size)
+        self._screen.clear(0.0, 0.0, 0.0, 1.0)
+        self._host.render()
+        glfw.swap_buffers(self._handle)
+        guest.finished()
+
+    def screenshot(self) -> np.ndarray:
+        """The last frame, interface and all, uint8 (height, width, 3), top row first."""
+        width, height = self.framebuffer_size
+        # The window's own framebuffer need not keep what nobody sees, so the frame is drawn once more.
+        texture = self.context.ctx.texture((width, height), 4)
+        target = self.context.ctx.framebuffer([texture])
+        target.use()
+        target.clear(0.0, 0.0, 0.0, 1.0)
+        self._host.render()
+        data = target.read(components=3, alignment=1)
+        self._screen.use()
+        target.release()
+        texture.release()
+        return np.frombuffer(data, np.uint8).reshape(height, width, 3)[::-1].copy()
+
+    def wake(self) -> None:
+        """Draw some frames even if no event comes."""
+        self._settling = SETTLE_FRAMES
+
+    def _take_events(self, guest: Guest) -> None:
+        wait = 0.0 if self._settling > 0 else guest.wait_s()
+        self._settling = max(self._settling - 1, 0)
+        if wait > 0:
+            glfw.wait_events_timeout(wait)
+        else:
+            glfw.poll_events()
+        if self._dropped:
+            guest.drop(self._dropped)
+            self._dropped = []
+        if self._close_pressed:
+            self._close_pressed = False
+            guest.ask_to_close()
+
+    def _listen(self) -> None:
+        """Any event wakes the loop. imgui's own callbacks, installed later, call these first."""
+
+        def wake(*_event: object) -> None:
+            self.wake()
+
+        for listen in (
+            glfw.set_key_callback,
+            glfw.set_char_callback,
+            glfw.set_mouse_button_callback,
+            glfw.set_cursor_pos_callback,
+            glfw.set_cursor_enter_callback,
+            glfw.set_scroll_callback,
+            glfw.set_window_focus_callback,
+            glfw.set_framebuffer_size_callback,
+            glfw.set_window_refresh_callback,
+        ):
+            listen(self._handle, wake)
+
+        def dropped(_window: object, paths: list[str]) -> None:
+            self._dropped += [Path(path) for path in paths]
+            self.wake()
+
+        def closing(_window: object) -> None:
+            glfw.set_window_should_close(self._handle, False)
+            self._close_pressed = True
+            self.wake()
+
+        glfw.set_drop_callback(self._handle, dropped)
+        glfw.set_window_close_callback(self._handle, closing)
+
+
+def _create(geometry: WindowGeometry, visible: bool) -> object:
+    """A glfw window with an OpenGL 4.3 core context, or a `UserError`."""
+    problems: list[str] = []
+    glfw.set_error_callback(lambda _code, text: problems.append(text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)))
+    if not glfw.init():
+        raise UserError(NO_DISPLAY if not _has_display() else f"{NO_DISPLAY} ({_first(problems)})")
+    glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, GL_VERSION[0])
+    glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, GL_VERSION[1])
+    glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
+    glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
+    glfw.window_hint(glfw.VISIBLE, visible)
+    glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
+    glfw.window_hint(glfw.MAXIMIZED, geometry.maximized)
+    glfw.window_hint(glfw.DEPTH_BITS, 0)
+    glfw.window_hint(glfw.STENCIL_BITS, 0)
+    handle = glfw.create_window(geometry.width, geometry.height, "SpectraSplat", None, None)
+    if not handle:
+        glfw.terminate()
+        wanted = f"{GL_VERSION[0]}.{GL_VERSION[1]}"
+        raise UserError(
+            f"no window with OpenGL {wanted} could be opened ({_first(problems)}): update the graphics driver, "
+            "or set LIBGL_ALWAYS_SOFTWARE=1 for the software renderer"
+        )
+    if glfw.get_platform() != glfw.PLATFORM_NULL:  # which takes the least side for the height
+        glfw.set_window_size_limits(handle, MIN_SIDE, MIN_SIDE, glfw.DONT_CARE, glfw.DONT_CARE)
+    if geometry.x is not None and geometry.y is not None and _is_on_a_screen(geometry):
+        glfw.set_window_pos(handle, geometry.x, geometry.y)
+    return handle
+
+
+def _is_on_a_screen(geometry: WindowGeometry) -> bool:
+    """Whether enough of the title bar can be reached: the screen of last time may be unplugged."""
+    for monitor in glfw.get_monitors():
+        left, top, width, height = glfw.get_monitor_workarea(monitor)
+        x, y = geometry.x or 0, geometry.y or 0
+        if left <= x + geometry.width - 80 and x + 80 <= left + width and top <= y <= top + height - 40:
+            return True
+    return False
+
+
+def _has_display() -> bool:
+    return os.name != "posix" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+
+
+def _first(problems: list[str]) -> str:
+    return " ".join(problems[0].split()) if problems else "the driver gives no reason"
+
