@@ -51,7 +51,15 @@ class GoTo:
 
 @dataclass(frozen=True)
 class Quit:
-    """Close; asks first where changes are unsaved."""
+    """Close; asks first where changes are unsaved (`Facts.asks_to_quit`)."""
+
+    discard: bool = False
+    """The answer "Discard" to that question: close without saving."""
+
+
+@dataclass(frozen=True)
+class CancelQuit:
+    """The answer "Cancel" to that question, and "Save" before it saves: stay open, ask no more."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +158,7 @@ class Notice:
 
 
 Request = (
-    NewScene | Open | Save | Undo | Redo | GoTo | Quit | Recover | SelectAt | BeginPull | FrameSelection | Retrace | ReloadShaders
+    NewScene | Open | Save | Undo | Redo | GoTo | Quit | CancelQuit | Recover | SelectAt | BeginPull | FrameSelection | Retrace | ReloadShaders
     | Screenshot | Bake | Animate | CancelJob | ComputeReference | CopyMaterial | Notice
 )  # fmt: skip
 

@@ -92,21 +92,21 @@ def set_up() -> None:
         _load_fonts(imgui.get_io())
 
 
-def apply(preferences: Preferences, scale: float = 1.0) -> None:
+def apply(preferences: Preferences, scale: float | None = None) -> None:
     """Make the theme and the size of `preferences` those in effect.
 
     `scale` is interface pixels per logical pixel: the content scale of the screen where imgui's
-    coordinates are device pixels (X11, Windows), 1 where the system scales by itself (macOS).
-    Cheap when nothing changed.
+    coordinates are device pixels (X11, Windows), 1 where the system scales by itself (macOS); None
+    keeps what was said last. Cheap when nothing changed.
     """
-    chosen = palette(preferences)
+    chosen, style = palette(preferences), imgui.get_style()
+    scale = style.font_scale_dpi if scale is None else scale
     total = preferences.ui_scale * scale
-    style = imgui.get_style()
-    in_effect = style.color_(imgui.Col_.window_bg)
-    if abs(style.font_scale_main - total) < 1e-6 and abs(in_effect.x - chosen.window[0]) < 1e-6:
+    is_coloured = abs(style.color_(imgui.Col_.window_bg).x - chosen.window[0]) < 1e-6
+    if is_coloured and abs(style.font_scale_main * style.font_scale_dpi - total) < 1e-6:
         return
     _set_sizes(style, total)
-    style.font_scale_main = total
+    style.font_scale_main, style.font_scale_dpi = preferences.ui_scale, scale
     for name, colour in _colours(chosen).items():
         style.set_color_(imgui.Col_[name], imgui.ImVec4(*colour))
     if implot.get_current_context() is not None:

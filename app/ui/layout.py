@@ -1,0 +1,99 @@
+"""Where the windows are docked: the picture in the middle, tools around it, and a way back to that.
+
+Dear ImGui keeps what the user moves; the host saves it as ini text. The default layout is built
+where that text holds none, and again after `reset`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from imgui_bundle import imgui
+
+from app.ui import theme
+
+VIEWPORT = "Viewport"
+_DOCKSPACE = "SpectraSplat dock"
+_HOST = "##dock host"
+
+Place = Literal["left top", "left bottom", "right top", "right bottom", "bottom", "floating"]
+
+
+@dataclass(frozen=True)
+class Docked:
+    """A window's title and where the default layout puts it; those of one place share tabs, first in front."""
+
+    title: str
+    place: Place
+
+
+def dockspace(windows: tuple[Docked, ...], bottom_margin: float) -> None:
+    """Submit the dock space below the menu bar, `bottom_margin` pixels above the lower edge; before every docked window."""
+    viewport = imgui.get_main_viewport()
+    size = imgui.ImVec2(viewport.work_size.x, viewport.work_size.y - bottom_margin)
+    imgui.set_next_window_pos(viewport.work_pos)
+    imgui.set_next_window_size(size)
+    imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(0, 0))
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
+    imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
+    imgui.begin(_HOST, None, _BARE)
+    imgui.pop_style_var(3)
+    dock = imgui.get_id(_DOCKSPACE)
+    if imgui.internal.dock_builder_get_node(dock) is None:
+        _build(dock, size, windows)
+    imgui.dock_space(dock)
+    _hide_tab_of_picture()
+    imgui.end()
+
+
+def reset() -> None:
+    """Forget where windows are docked: the next `dockspace` builds the default. Call it before that, in the same frame or not."""
+    host = imgui.internal.find_window_by_name(_HOST)
+    if host is not None:
+        imgui.internal.dock_builder_remove_node(host.get_id(_DOCKSPACE))
+
+
+_BARE = (
+    imgui.WindowFlags_.no_decoration
+    | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_docking
+    | imgui.WindowFlags_.no_bring_to_front_on_focus
+    | imgui.WindowFlags_.no_nav_focus
+    | imgui.WindowFlags_.no_background
+    | imgui.WindowFlags_.no_saved_settings
+)
+
+
+def _build(dock: int, size: imgui.ImVec2, windows: tuple[Docked, ...]) -> None:
+    builder = imgui.internal
+    builder.dock_builder_add_node(dock, imgui.internal.DockNodeFlagsPrivate_.dock_space)
+    builder.dock_builder_set_node_size(dock, size)
+    nodes: dict[str, int] = {}
+    # Side columns in text heights, so that labels fit at every scale; never more than their share of a small window.
+    right = min(theme.em(24.0) / size.x, 0.30)
+    nodes["right top"], rest = _split(dock, imgui.Dir.right, right)
+    nodes["right bottom"], nodes["right top"] = _split(nodes["right top"], imgui.Dir.down, 0.62)
+    left = min(theme.em(15.0) / (size.x * (1.0 - right)), 0.25)
+    nodes["left top"], rest = _split(rest, imgui.Dir.left, left)
+    nodes["left bottom"], nodes["left top"] = _split(nodes["left top"], imgui.Dir.down, 0.36)
+    nodes["bottom"], middle = _split(rest, imgui.Dir.down, min(theme.em(14.0) / size.y, 0.34))
+    builder.dock_builder_dock_window(VIEWPORT, middle)
+    for window in windows:
+        if window.place != "floating":
+            builder.dock_builder_dock_window(window.title, nodes[window.place])
+    builder.dock_builder_finish(dock)
+
+
+def _split(node: int, direction: imgui.Dir, share: float) -> tuple[int, int]:
+    """(new node in that direction, what is left)."""
+    split = imgui.internal.dock_builder_split_node(node, direction, share)
+    return split.id_at_dir, split.id_at_opposite_dir
+
+
+def _hide_tab_of_picture() -> None:
+    """A lone viewport needs no tab: every pixel is the picture's."""
+    window = imgui.internal.find_window_by_name(VIEWPORT)
+    node = None if window is None else window.dock_node
+    if node is not None:
+        node.set_local_flags(node.local_flags | imgui.internal.DockNodeFlagsPrivate_.no_tab_bar)

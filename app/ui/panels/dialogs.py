@@ -1,0 +1,153 @@
+"""The dialogues that stand between the user and lost work: open, save as, unsaved changes, quit.
+
+What is asked next (`_pending`) is memory of the interface while a dialogue is open; the host only
+ever gets the final requests.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from imgui_bundle import imgui
+
+from app.ui import requests, theme
+from app.ui.facts import Facts
+from app.ui.panels import file_browser, widgets
+from app.ui.state import State
+
+OPENABLE = (".toml", ".glb", ".gltf", ".obj", ".ply", ".stl")
+SAVEABLE = (".toml", ".glb")
+_UNSAVED = "Unsaved changes"
+
+
+@dataclass
+class _Memory:
+    pending: list[requests.Request] = field(default_factory=list)
+    """What waits for the answer to "save first?"."""
+    is_saving: bool = False
+    """Save was chosen: `pending` goes on once nothing is unsaved."""
+
+
+_memory = _Memory()
+
+
+def reset() -> None:
+    """Close every dialogue, as a new window does."""
+    file_browser.close()
+    _memory.pending.clear()
+    _memory.is_saving = False
+
+
+def open_file(state: State, facts: Facts) -> State:
+    """Ask which file to open."""
+    start = facts.path.parent if facts.path is not None else _recent_folder(facts)
+    file_browser.ask(file_browser.Question("open", "Open", OPENABLE, start))
+    return state
+
+
+def open_path(state: State, facts: Facts, path: Path) -> State:
+    """Open `path`; asks first when work would be lost."""
+    return _unless_unsaved(state, facts, requests.Open(path))
+
+
+def new_scene(state: State, facts: Facts) -> State:
+    """Start from the default scene; asks first when work would be lost."""
+    return _unless_unsaved(state, facts, requests.NewScene())
+
+
+def save_as(state: State, facts: Facts) -> State:
+    """Ask where to save."""
+    folder = facts.path.parent if facts.path is not None else _recent_folder(facts)
+    name = facts.path.name if facts.path is not None else f"{_file_stem(facts.title)}.toml"
+    file_browser.ask(file_browser.Question("save", "Save as", SAVEABLE, folder / name, saving=True))
+    return state
+
+
+def draw_dialogs(state: State, facts: Facts) -> State:
+    """Draw what is open and carry its answers on."""
+    file_browser.draw()
+    chosen = file_browser.take("open")
+    if chosen is not None:
+        state = open_path(state, facts, chosen)
+    target = file_browser.take("save")
+    if target is not None:
+        state = state.asking(requests.Save(target))
+    elif _memory.is_saving and not file_browser.is_open("save"):
+        state = _after_saving(state, facts)
+    if (_memory.pending and not _memory.is_saving) or facts.asks_to_quit:
+        state = _unsaved_question(state, facts)
+    return state
+
+
+def _unless_unsaved(state: State, facts: Facts, request: requests.Request) -> State:
+    if not facts.unsaved:
+        return state.asking(request).with_panels(start_page=False)
+    _memory.pending, _memory.is_saving = [request], False
+    return state
+
+
+def _after_saving(state: State, facts: Facts) -> State:
+    """Saving was carried out last frame: go on, or, when it failed or was cancelled, keep everything as it is."""
+    pending = tuple(_memory.pending)
+    _memory.pending, _memory.is_saving = [], False
+    if facts.unsaved:
+        return state
+    return state.asking(*pending).with_panels(start_page=False)
+
+
+def _unsaved_question(state: State, facts: Facts) -> State:
+    if not imgui.is_popup_open(_UNSAVED):
+        imgui.open_popup(_UNSAVED)
+    centre = imgui.get_main_viewport().get_center()
+    imgui.set_next_window_pos(centre, imgui.Cond_.appearing, imgui.ImVec2(0.5, 0.5))
+    if not imgui.begin_popup_modal(_UNSAVED, None, imgui.WindowFlags_.always_auto_resize)[0]:
+        return state
+    is_quitting = facts.asks_to_quit
+    imgui.text_unformatted(f"{facts.title} has changes that are not saved.")
+    widgets.hint("Save them before quitting?" if is_quitting else "Save them before another scene takes its place?")
+    imgui.dummy(imgui.ImVec2(theme.em(26), theme.em(0.4)))
+    width = theme.em(7)
+    if widgets.button("Save##unsaved", tip="Save, then go on.", width=width):
+        state = _save_first(state, facts)
+    imgui.same_line()
+    if widgets.button("Discard", tip="Go on; the changes are lost.", width=width):
+        state = _go_on(state, facts)
+    imgui.same_line()
+    if widgets.button("Cancel##unsaved", tip="Stay, with everything as it is.", width=width) or imgui.is_key_pressed(imgui.Key.escape):
+        state = _stay(state, facts)
+    imgui.end_popup()
+    return state
+
+
+def _go_on(state: State, facts: Facts) -> State:
+    """Without saving."""
+    imgui.close_current_popup()
+    if facts.asks_to_quit:
+        return state.asking(requests.Quit(discard=True))
+    pending, _memory.pending = tuple(_memory.pending), []
+    return state.asking(*pending).with_panels(start_page=False)
+
+
+def _stay(state: State, facts: Facts) -> State:
+    imgui.close_current_popup()
+    _memory.pending, _memory.is_saving = [], False
+    return state.asking(requests.CancelQuit()) if facts.asks_to_quit else state
+
+
+def _save_first(state: State, facts: Facts) -> State:
+    imgui.close_current_popup()
+    if facts.asks_to_quit:
+        state = _stay(state, facts)
+        _memory.pending = [requests.Quit()]
+    _memory.is_saving = True
+    return state.asking(requests.Save()) if facts.path is not None else save_as(state, facts)
+
+
+def _recent_folder(facts: Facts) -> Path:
+    return facts.recent[0].parent if facts.recent else Path.home()
+
+
+def _file_stem(title: str) -> str:
+    kept = "".join(c if c.isalnum() or c in "-_ " else "_" for c in title).strip()
+    return kept or "scene"

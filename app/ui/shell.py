@@ -1,0 +1,119 @@
+"""The whole interface of one frame: `draw_interface(state, facts) -> state`, the one function a host calls.
+
+Every panel draws its own contents; the windows around them, with their close buttons, are opened here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from imgui_bundle import imgui
+
+from app.ui import item_rects, layout, shortcuts, theme
+from app.ui.facts import Facts
+from app.ui.layout import Docked, Place
+from app.ui.panels import (
+    about,
+    dialogs,
+    help_list,
+    history_panel,
+    inspector,
+    menu,
+    messages,
+    outliner,
+    spectrum,
+    start_page,
+    status_bar,
+    timing,
+    view_panel,
+)
+from app.ui.panels.abbe import draw_abbe
+from app.ui.panels.brush_panel import draw_brush
+from app.ui.panels.compare_panel import draw_compare
+from app.ui.panels.dispersion import draw_dispersion
+from app.ui.panels.export_panel import draw_export
+from app.ui.state import State
+from app.ui.viewport import draw_viewport
+
+Draw = Callable[[State, Facts], State]
+
+
+@dataclass(frozen=True)
+class PanelWindow:
+    """A panel's window."""
+
+    field: str
+    """Of `Panels`."""
+    title: str
+    place: Place
+    draw: Draw
+    size_em: tuple[float, float] = (26.0, 22.0)
+    """Width and height when it floats, text heights."""
+
+
+WINDOWS = (
+    PanelWindow("outliner", "Outliner", "left top", outliner.draw_outliner),
+    PanelWindow("history", "History", "left bottom", history_panel.draw_history),
+    PanelWindow("inspector", "Inspector", "right top", inspector.draw_inspector),
+    PanelWindow("view", "View", "right top", view_panel.draw_view),
+    PanelWindow("dispersion", "Dispersion", "right bottom", draw_dispersion),
+    PanelWindow("brush", "Brush", "right bottom", draw_brush),
+    PanelWindow("export", "Export", "right bottom", draw_export),
+    PanelWindow("timing", "Timing", "bottom", timing.draw_timing),
+    PanelWindow("spectrum", "Spectrum", "bottom", spectrum.draw_spectrum),
+    PanelWindow("compare", "Compare", "bottom", draw_compare),
+    PanelWindow("abbe", "Abbe diagram", "floating", draw_abbe, (44.0, 34.0)),
+    PanelWindow("shortcuts", "Shortcuts", "floating", help_list.draw_shortcuts, (46.0, 34.0)),
+    PanelWindow("about", "About SpectraSplat", "floating", about.draw_about, (32.0, 20.0)),
+)
+_DOCKED = tuple(Docked(window.title, window.place) for window in WINDOWS)
+
+
+def draw_interface(state: State, facts: Facts) -> State:
+    """Draw everything and return the state as the user left it, with requests for the host appended."""
+    theme.set_up()
+    theme.apply(state.preferences)
+    state = shortcuts.handle(state, facts)
+    state = menu.draw_menu(state, facts)
+    if state.preferences.panels.start_page:
+        state = start_page.draw_start_page(state, facts)
+    else:
+        state = _draw_windows(state, facts)
+    state = dialogs.draw_dialogs(state, facts)
+    return messages.draw_messages(state, facts)
+
+
+def _draw_windows(state: State, facts: Facts) -> State:
+    layout.dockspace(_DOCKED, status_bar.height())
+    status_bar.draw_status_bar(state, facts)
+    state = _draw_picture(state, facts)
+    for window in WINDOWS:
+        if getattr(state.preferences.panels, window.field):
+            state = _draw_panel(window, state, facts)
+    return state
+
+
+def _draw_picture(state: State, facts: Facts) -> State:
+    flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse | imgui.WindowFlags_.no_collapse
+    imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(0, 0))
+    shown, _ = imgui.begin(layout.VIEWPORT, None, flags)
+    imgui.pop_style_var()
+    if shown:
+        state = draw_viewport(state, facts)
+    imgui.end()
+    return state
+
+
+def _draw_panel(window: PanelWindow, state: State, facts: Facts) -> State:
+    viewport = imgui.get_main_viewport()
+    width = min(theme.em(window.size_em[0]), viewport.work_size.x * 0.9)
+    height = min(theme.em(window.size_em[1]), viewport.work_size.y * 0.85)
+    imgui.set_next_window_size((width, height), imgui.Cond_.first_use_ever)
+    imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.first_use_ever, imgui.ImVec2(0.5, 0.5))
+    shown, stays = imgui.begin(window.title, True)
+    item_rects.note(f"Window: {window.title}")
+    if shown:
+        state = window.draw(state, facts)
+    imgui.end()
+    return state if stays else state.with_panels(**{window.field: False})

@@ -1,0 +1,104 @@
+"""Keyboard shortcuts: the keys of `commands`, and the list of keys and mouse gestures that F1 shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+from imgui_bundle import imgui
+
+from app.ui.commands import COMMANDS, PANELS, VIEWS, Command
+from app.ui.facts import Facts
+from app.ui.state import State
+
+COMPARE_KEY = imgui.Key.c
+"""Held down, the viewport shows the reference."""
+
+_REPEATING = ("Undo", "Redo", "Brighter", "Darker")
+"""A held key goes on."""
+
+_NAMED = {
+    "Esc": imgui.Key.escape,
+    "Delete": imgui.Key.delete,
+    "Space": imgui.Key.space,
+    "Home": imgui.Key.home,
+    "=": imgui.Key.equal,
+    "-": imgui.Key.minus,
+}
+_MODIFIERS = {"Ctrl": imgui.Key.mod_ctrl, "Shift": imgui.Key.mod_shift, "Alt": imgui.Key.mod_alt}
+
+
+@dataclass(frozen=True)
+class Gesture:
+    """A line of the list that no command stands for: what the viewport does with mouse and keys."""
+
+    keys: str
+    group: str
+    what: str
+
+
+GESTURES = (
+    Gesture("Click", "Mouse in the picture", "Select an object, or the object whose caustic it is"),
+    Gesture("Ctrl+click", "Mouse in the picture", "Select the surface itself, even under a caustic"),
+    Gesture("Middle drag, Alt+left drag", "Mouse in the picture", "Orbit"),
+    Gesture("Shift+middle drag", "Mouse in the picture", "Pan"),
+    Gesture("Wheel", "Mouse in the picture", "Zoom to the cursor"),
+    Gesture("Right drag + W A S D Q E", "Mouse in the picture", "Fly; Shift is faster, Ctrl slower"),
+    Gesture("Hold C", "Compare", "Show the reference"),
+    Gesture("[  and  ]", "Brush and pull", "Smaller, larger brush"),
+    Gesture("Shift+wheel", "Brush and pull", "Radius of the brush"),
+    Gesture("Shift while painting", "Brush and pull", "Erase"),
+    Gesture("Ctrl while painting", "Brush and pull", "Narrow instead of widen"),
+    Gesture("Shift while pulling", "Brush and pull", "Change the local gain, not the glass"),
+    Gesture("Ctrl+click on a field", "Panels", "Type a value"),
+    Gesture("Double-click on a field", "Panels", "Back to its default"),
+)
+
+
+@cache
+def chord(keys: str) -> int:
+    """The imgui key chord of "Ctrl+Shift+Z"; KeyError for a key that does not exist."""
+    *modifiers, name = keys.split("+")
+    key = _NAMED.get(name) or imgui.Key[f"_{name}" if name.isdigit() else name.lower()]
+    return sum(int(_MODIFIERS[modifier]) for modifier in modifiers) + int(key)
+
+
+def handle(state: State, facts: Facts) -> State:
+    """Carry out the commands whose keys were pressed in this frame; nothing while a text field or a dialogue has them."""
+    io = imgui.get_io()
+    is_free = not io.want_text_input and not imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+    # The right button held means flying: its letters belong to the camera.
+    if not is_free or imgui.is_mouse_down(imgui.MouseButton_.right):
+        return _hold_compare(state, False)
+    for command in _all():
+        if _is_pressed(command) and command.enabled(state, facts):
+            state = command.act(state, facts)
+    return _hold_compare(state, imgui.is_key_down(COMPARE_KEY) and not (io.key_ctrl or io.key_shift or io.key_alt))
+
+
+@cache
+def _all() -> tuple[Command, ...]:
+    return (*COMMANDS, *PANELS, *VIEWS)
+
+
+def _is_pressed(command: Command) -> bool:
+    flags = imgui.InputFlags_.repeat if command.name in _REPEATING else 0
+    return any(imgui.internal.is_key_chord_pressed(chord(keys), flags) for keys in command.keys)
+
+
+def _hold_compare(state: State, is_held: bool) -> State:
+    if state.compare.holding == is_held:
+        return state
+    return replace(state, compare=replace(state.compare, holding=is_held))
+
+
+def listed() -> dict[str, list[tuple[str, str]]]:
+    """What F1 shows: (keys, what they do) by group."""
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for command in COMMANDS:
+        if command.keys:
+            groups.setdefault(command.group, []).append((", ".join(command.keys), command.name))
+    groups["View"] += [("1 … 9", "Go to a stored view"), ("Ctrl+1 … 9", "Store the present view")]
+    for gesture in GESTURES:
+        groups.setdefault(gesture.group, []).append((gesture.keys, gesture.what))
+    return groups
