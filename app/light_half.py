@@ -8,51 +8,34 @@ from the truth (so the spectrum is cut into as few bands as that error allows).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import moderngl
 import numpy as np
 
 from app.gpu import records
 from app.gpu.context import Context
+from app.gpu.gain_buffers import GainBuffers
 from app.gpu.map_atlas import MapAtlas
-from app.gpu.records import MAX_BANDS
 from app.gpu.scene_buffers import SceneBuffers
+from app.gpu.shader import Releasable
 from app.gpu.splat_tables import SplatTables
+from app.light_plan import SMALLEST_BATCH, Planner
 from app.model.features import Features
-from app.model.scene import Dielectric, Diffuse, Mirror, Scene
+from app.model.scene import Camera, Dielectric, Diffuse, Mirror, Scene
 from app.model.settings import RenderSettings
 from app.model.spectral_tables import SpectralAxis
+from app.model.spectrum import Spectrum
 from app.passes.accumulate import LevelsFold, SeamFold, copy_texture
 from app.passes.emission_domain import EmissionDomain, emission_domain
+from app.passes.footprint import SpectralVariables
 from app.passes.map_layout import MapLayout, check_map_receiver, layout_maps
-from app.passes.pilot import (
-    MAX_LIGHT_POINTS,
-    Pilot,
-    PilotFit,
-    has_extent,
-    landings_of,
-    run_pilot,
-)
+from app.passes.pilot import Pilot, landings_of, run_pilot
 from app.passes.splat import Splatter
-from app.passes.trace import Band, Batch, FluxTally, LatticeSlice, TracePass
+from app.passes.trace import Batch, FluxTally, LatticeSlice, TracePass
 
 DEFAULT_BATCH = 1 << 16
-SMALLEST_BATCH = MAX_BANDS * MAX_LIGHT_POINTS
-"""One point of every sub-lattice a light may have."""
-TINTED_BANDS = 16
-"""Least number of bands where glass absorbs or mirrors are coloured."""
-_SHIFT_GENERATORS = (1116352409, 1899447441, 3141592653, 1640531527, 1359893119)
-
-
-class Releasable(Protocol):
-    """Anything that holds GPU memory."""
-
-    def release(self) -> None: ...
-
-
 @dataclass
 class LightStats:
     """What the light half did."""
@@ -71,20 +54,25 @@ class LightStats:
 
 
 @dataclass(frozen=True)
-class LightPlan:
-    """One light's share of every pass."""
+class PassStep:
+    """A pause within a pass."""
 
+    fraction: float
+    """Share of the pass that is done."""
+    round_done: bool
+    """What is summed up is an even lattice: the maps may be shown."""
+
+
+@dataclass(frozen=True)
+class RoundOf:
+    """Where a batch belongs."""
+
+    number: int
+    """Pass."""
     index: int
-    domain: EmissionDomain
-    bands: tuple[Band, ...]
-    light_points: int
-    share: float
-    """Share of the photons."""
-
-    @property
-    def lattices(self) -> int:
-        """Sub-lattices: one a band and point on the light."""
-        return len(self.bands) * self.light_points
+    count: int
+    """Round `index` of `count`, each an even sub-lattice."""
+    is_last_light: bool
 
 
 class LightHalf:
@@ -100,36 +88,52 @@ class LightHalf:
         batch = settings.batch or DEFAULT_BATCH * (1 if context.is_software else 4)
         batch = max(min(batch, _largest_batch(context, features)), SMALLEST_BATCH)
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
-        self.variables = context.ctx.buffer(np.ascontiguousarray(buffers.variable_table if buffers.groups.count else np.zeros((1, 2), "f4")).tobytes())
+        self.variables = SpectralVariables.build(context.ctx, buffers.variable_table)
+        self.gains = GainBuffers(context.ctx, scene, buffers.receivers, buffers.space, buffers.axis) if features.local_gain else None
         self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
-        self._weight_sum = 0.0
-        self._prepared: list[Releasable] = []
+        self._laid_out: list[Releasable] = []
+        self.photon_weight = 0.0
         self._tables: SplatTables | None = None
         self._spans: list[list[tuple[float, float]]] = []
 
     def prepare(self) -> None:
         """Pilots and maps, once for a scene. Afterwards `layout` and `atlas` exist, and `features` are those of the maps too."""
+        for _ in self.preparing():
+            pass
+
+    def preparing(self) -> Iterator[None]:
+        """`prepare`, pausing after each light's pilot: whoever draws meanwhile may bind what it likes."""
         specular = [self.buffers.space.to_gpu(m.corners()) for m, o in zip(self.buffers.world_meshes, self.scene.objects, strict=True) if isinstance(o.material, Dielectric | Mirror)]
         triangles = np.concatenate(specular) if specular else np.zeros((0, 3, 3))
         domains = {i: emission_domain(light, self.scene, self.buffers.space, triangles) for i, light in enumerate(self.scene.lights)}
-        domains = {i: d for i, d in domains.items() if d is not None}
-        pilots = {i: run_pilot(self.trace, self.scene, i, domain, self._full_power(i), self._needs_spectral_pilot) for i, domain in domains.items()}
-        self._domains, self._pilots = domains, pilots
-        picture = (self.settings.width, self.settings.height)
+        self.domains: dict[int, EmissionDomain] = {i: d for i, d in domains.items() if d is not None}
+        self.pilots: dict[int, Pilot] = {}
+        for i, domain in self.domains.items():
+            yield
+            self.pilots[i] = run_pilot(self.trace, self.scene, i, domain, self._full_power(i), self._needs_spectral_pilot)
+        yield
         shows_map = self.settings.layer.startswith("map:")
         self.map_receiver = check_map_receiver(self.scene, self.buffers, self.settings.layer[4:]) if shows_map else None
-        self.layout: MapLayout = layout_maps(self.scene, self.buffers, landings_of(pilots.values()), picture, self.reflectance_class, self.map_receiver)
+        self.bin_edges_nm = None if self.settings.bins is None else np.linspace(380.0, 780.0, self.settings.bins + 1)
+        self.lay_out(self.scene.camera)
+
+    def lay_out(self, camera: Camera) -> None:
+        """Maps fitted to where light lands and to what `camera` sees of it; empty."""
+        for owned in self._laid_out:
+            owned.release()
+        picture = (self.settings.width, self.settings.height)
+        seen = replace(self.scene, camera=camera)
+        self.layout: MapLayout = layout_maps(seen, self.buffers, landings_of(self.pilots.values()), picture, self.reflectance_class, self.map_receiver)
         # Only the pilot tells whether a fine window pays: without one no splat is drawn twice.
         self.features = replace(self.features, nested_windows=any(len(windows) > 1 for windows in self.layout.windows.values()))
         ctx = self.context.ctx
         self.splatter = Splatter(ctx, self.features)
-        self.bin_edges_nm = None if self.settings.bins is None else np.linspace(380.0, 780.0, self.settings.bins + 1)
         self.atlas = MapAtlas(ctx, self.layout.size, self.layout.placements, self.features.targets)
         self.receivers = ctx.buffer(np.ascontiguousarray(self.layout.receivers).tobytes())
         self._resolved = [ctx.texture(self.atlas.size, 4, dtype="f4") for _ in range(self.features.targets)]
         self._levels_fold = LevelsFold(ctx, self.layout.folds)
         self._seam_fold = SeamFold(ctx, [(self.layout.tiles[r][0], charts) for r, charts in self.layout.charts.items()])
-        self._prepared = [self.splatter, self.atlas, self.receivers, *self._resolved, self._levels_fold, self._seam_fold]
+        self._laid_out: list[Releasable] = [self.splatter, self.atlas, self.receivers, *self._resolved, self._levels_fold, self._seam_fold]
 
     def begin(self, photons: int, seed: int) -> None:
         """Empty maps and a plan for passes of about `photons`; what was summed and counted before is forgotten.
@@ -137,30 +141,35 @@ class LightHalf:
         Afterwards `plans` and `tables` exist. Pilots and maps stay, so a rendering may be begun again and again."""
         self.seed = seed
         self.stats = LightStats()
-        self._weight_sum = 0.0
-        self.atlas.clear()
-        self.splatter.reset_counts()
-        self.plans = self._plan(photons)
+        self.clear_maps()
+        planner = Planner(self.scene, self.settings, self.features, self.buffers, self.domains, self.pilots)
+        self.plans = planner.plans(photons, self._texel_size())
+        for plan in self.plans:
+            name = self.scene.lights[plan.index].name
+            self.stats.bands[name], self.stats.light_points[name] = len(plan.bands), plan.light_points
         limits = {plan.index: [(b.x_lo, b.x_hi) for b in plan.bands] for plan in self.plans}
         spans = [limits.get(i, [(0.0, 1.0)]) for i in range(len(self.scene.lights))]
         if spans != self._spans:
-            if self._tables is not None:
-                self._tables.release()
-            channels = "xyz" if self.bin_edges_nm is None else self.bin_edges_nm.tolist()
-            spectra = [light.spectral_power for light in self.scene.lights]
-            self._tables = SplatTables.build(self.context.ctx, self.buffers.axis, spectra, self.reflectances, spans, channels)
             self._spans = spans
+            self._build_tables([light.spectral_power for light in self.scene.lights])
+
+    def clear_maps(self) -> None:
+        """Forget what was deposited; plans, tables and counts stay."""
+        self.photon_weight = 0.0
+        self.atlas.clear()
+        self.splatter.reset_counts()
+
+    def _build_tables(self, spectra: Sequence[Spectrum]) -> None:
+        if self._tables is not None:
+            self._tables.release()
+        channels = "xyz" if self.bin_edges_nm is None else self.bin_edges_nm.tolist()
+        self._tables = SplatTables.build(self.context.ctx, self.buffers.axis, spectra, self.reflectances, self._spans, channels)
 
     @property
     def tables(self) -> SplatTables:
         """The spectral tables of the plan that was begun."""
         assert self._tables is not None
         return self._tables
-
-    @property
-    def _tinted(self) -> bool:
-        """Something on the way changes a spectrum's shape."""
-        return self.features.absorption or (self.features.mirrors and self.features.spectral_weights)
 
     @property
     def _needs_spectral_pilot(self) -> bool:
@@ -173,7 +182,7 @@ class LightHalf:
     @property
     def map_scale(self) -> float:
         """Factor from what the atlas has summed to energy per texel."""
-        return 1.0 / self._weight_sum if self._weight_sum else 0.0
+        return 1.0 / self.photon_weight if self.photon_weight else 0.0
 
     def run_pass(self, number: int, photons: int, proceed: Callable[[float], bool]) -> bool:
         """One shifted set of lattices with about `photons` points over all lights.
@@ -182,99 +191,69 @@ class LightHalf:
         between rounds is complete everywhere, only coarser. `proceed(fraction)` is asked after
         every slice; returns False when it said stop.
         """
-        if not self.plans:
-            return True
-        counts = [self._lattice_count(plan, photons) for plan in self.plans]
-        rounds = max(-(-n // (self.trace.batch // plan.lattices)) for n, plan in zip(counts, self.plans, strict=True))
-        for j in range(rounds):
-            go_on = True
-            for i, (plan, lattice) in enumerate(zip(self.plans, counts, strict=True)):
-                points = len(range(j, lattice, rounds))
-                if points:
-                    self._slice(self._lattice_slice(plan, number, lattice, j, rounds, points, float(photons)), plan.domain)
-                go_on = proceed((j * len(counts) + i + 1) / (rounds * len(counts)))
-            self._weight_sum += photons / rounds
-            if not go_on and j + 1 < rounds:
+        go_on, done = True, 0.0
+        for step in self.pass_steps(number, photons):
+            if step.fraction > done:
+                done = step.fraction
+                go_on = proceed(done)
+            if step.round_done and not go_on and done < 1.0:
                 return False
         return True
 
-    def _slice(self, piece: LatticeSlice, domain: EmissionDomain) -> None:
+    def pass_steps(self, number: int, photons: int) -> Generator[PassStep, None, None]:
+        """`run_pass`, pausing after every event of the rays and after every splatting: whoever draws meanwhile may bind what it likes."""
+        if not self.plans:
+            return
+        counts = [plan.lattice_count(photons) for plan in self.plans]
+        rounds = max(-(-n // (self.trace.batch // plan.lattices)) for n, plan in zip(counts, self.plans, strict=True))
+        slices = rounds * len(self.plans)
+        for j in range(rounds):
+            for i, (plan, lattice) in enumerate(zip(self.plans, counts, strict=True)):
+                done = j * len(self.plans) + i
+                points = len(range(j, lattice, rounds))
+                if points:
+                    piece = plan.piece(self.seed, number, lattice, j, rounds, points, float(photons))
+                    for _ in self._slice(piece, plan.domain, RoundOf(number, j, rounds, i + 1 == len(self.plans))):
+                        yield PassStep(done / slices, False)
+                if i + 1 < len(self.plans):
+                    yield PassStep((done + 1) / slices, False)
+            self.photon_weight += photons / rounds
+            yield PassStep((j + 1) / rounds, True)
+
+    def _slice(self, piece: LatticeSlice, domain: EmissionDomain, of: RoundOf) -> Iterator[None]:
         started = time.perf_counter()
-        batch = self.trace.run(piece, domain)
-        traced = time.perf_counter()
-        self.splatter.run(self.trace.photons, batch.photons, self.variables, self.tables, self.atlas, self.receivers, self.settings.smoothing)
+        steps = self.trace.steps(piece, domain)
+        while True:
+            try:
+                next(steps)
+            except StopIteration as finished:
+                batch: Batch = finished.value
+                break
+            self.stats.trace_seconds += time.perf_counter() - started
+            yield
+            started = time.perf_counter()
+        self.stats.trace_seconds += time.perf_counter() - started
+        self.keep(batch, of)
+        yield
+        self.splat(self.trace.photons, batch.photons)
+        self._account(batch)
+
+    def keep(self, batch: Batch, of: RoundOf) -> None:
+        """Called with every batch while `trace.photons` holds it; a live rendering stores the records."""
+
+    def splat(self, photons: moderngl.Buffer, count: int, coarsening: float = 1.0) -> None:
+        """Add photon records to the maps, with footprints `coarsening` times as wide."""
+        started = time.perf_counter()
+        smoothing = self.settings.smoothing * coarsening
+        self.splatter.run(photons, count, self.variables, self.tables, self.atlas, self.receivers, smoothing, self.gains)
         if self.context.is_software:
             self.context.finish()
-        self.stats.trace_seconds += traced - started
-        self.stats.splat_seconds += time.perf_counter() - traced
-        self._account(batch)
+        self.stats.splat_seconds += time.perf_counter() - started
 
     def _account(self, batch: Batch) -> None:
         self.stats.photons += batch.emitted_photons
         self.stats.splats += batch.photons
         self.stats.tally.merge(batch.tally)
-
-    def _lattice_slice(self, plan: LightPlan, number: int, lattice: int, first: int, stride: int, points: int, weight: float) -> LatticeSlice:
-        # Successive passes follow a Kronecker sequence, so their union is again even.
-        start = (self.seed * 0x9E3779B1 + plan.index * 0x85EBCA6B) & 0xFFFFFFFF
-        shifts = [(start + (number + 1) * g) & 0xFFFFFFFF for g in _SHIFT_GENERATORS]
-        seed = (self.seed + 7919 * number) & 0xFFFFFFFF
-        return LatticeSlice(
-            plan.index, plan.bands, lattice, first, stride, points, (shifts[0], shifts[1]), (shifts[2], shifts[3]), shifts[4], seed, plan.light_points, weight=weight
-        )
-
-    def _lattice_count(self, plan: LightPlan, photons: int) -> int:
-        """Points of each sub-lattice over the whole rectangle, so that about the light's share of photons starts."""
-        return max(1, int(round(photons * plan.share / plan.lattices / plan.domain.active_share)))
-
-    def _plan(self, photons: int) -> list[LightPlan]:
-        """Photons, bands and points of each light that reaches a receiver."""
-        domains, pilots = self._domains, self._pilots
-        power = {i: max(float(self.buffers.light_power[i].band(0.0, 1.0)[1]) * d.measure * d.active_share, 0.0) for i, d in domains.items()}
-        lit = [i for i in domains if power[i] > 0.0 and len(pilots[i].whole)]
-        total = sum(power[i] for i in lit)
-        plans = []
-        for i in lit:
-            # Half by power, half evenly: a dim light must not be left coarse.
-            share = 0.5 * power[i] / total + 0.5 / len(lit)
-            budget = int(photons * share)
-            fit = PilotFit(pilots[i], self._texel_size(), self.buffers.variable_table, self.settings.smoothing, budget)
-            bands = self._bands(i, fit)
-            points = fit.light_points(len(bands)) if self.features.footprints else self._scattered_points(i, len(bands), budget)
-            plans.append(LightPlan(i, domains[i], bands, points, share))
-            self.stats.bands[self.scene.lights[i].name] = len(bands)
-            self.stats.light_points[self.scene.lights[i].name] = plans[-1].light_points
-        return plans
-
-    def _scattered_points(self, light: int, bands: int, budget: int) -> int:
-        """Points on an extended light for photons without footprints, which need no lattice of their own."""
-        return min(SMALLEST_BATCH // bands, max(1, budget // (16 * bands))) if has_extent(self.scene.lights[light]) else 1
-
-    def _bands(self, light: int, fit: PilotFit) -> tuple[Band, ...]:
-        power = self.buffers.light_power[light]
-        axis = self.buffers.axis
-        lo_nm, hi_nm = self.scene.lights[light].spectral_power.support_nm()
-        if hi_nm - lo_nm < 1e-6:
-            x = float(axis.x_of_nm(lo_nm))
-            return (Band(x, x, x, float(power.values[-1, 3])),)
-        method = self.settings.method
-        if method.startswith("regular"):
-            edges_nm = np.linspace(max(lo_nm, 380.0), min(hi_nm, 780.0), int(method.split("-")[1]) + 1)
-            edges = axis.x_of_nm(edges_nm)
-            middles = axis.x_of_nm(0.5 * (edges_nm[:-1] + edges_nm[1:]))
-        else:
-            count = fit.band_count() if method == "srd" and self.features.spectral_groups else 1
-            lo_nm, hi_nm = max(lo_nm - 0.5, 380.0), min(hi_nm + 0.5, 780.0)
-            edges = np.linspace(float(axis.x_of_nm(lo_nm)), float(axis.x_of_nm(hi_nm)), count + 1)
-            if self._tinted and count < TINTED_BANDS:
-                # Three weights a band cannot follow a colour over the whole spectrum; steps even in both measures.
-                nm = np.linspace(lo_nm, hi_nm, 401)
-                even = 0.5 * (nm - lo_nm) / (hi_nm - lo_nm) + 0.5 * (axis.x_of_nm(nm) - edges[0]) / (edges[-1] - edges[0])
-                edges = axis.x_of_nm(np.interp(np.linspace(0.0, 1.0, TINTED_BANDS + 1), even, nm))
-            middles = 0.5 * (edges[:-1] + edges[1:])
-        return tuple(
-            Band(float(lo), float(hi), float(mid), float(power.band(lo, hi)[3])) for lo, hi, mid in zip(edges[:-1], edges[1:], middles, strict=True)
-        )
 
     def _texel_size(self) -> np.ndarray:
         """Texel side of each receiver's finest window, GPU units."""
@@ -354,10 +333,9 @@ class LightHalf:
         """Free everything."""
         self.trace.release()
         self.variables.release()
-        for owned in self._prepared:
-            owned.release()
-        if self._tables is not None:
-            self._tables.release()
+        for owned in (*self._laid_out, self.gains, self._tables):
+            if owned is not None:
+                owned.release()
 
 
 def reflectance_classes(scene: Scene, buffers: SceneBuffers) -> tuple[list[np.ndarray | None], dict[int, int]]:

@@ -14,6 +14,9 @@ layout(std140, binding = 0) uniform Parameters {
     uint table_rows;
     float smoothing;
     float extent_limit;
+    uint traced_row;
+    float x_reference;
+    vec2 unused;
 };
 layout(std430, binding = 0) readonly buffer Photons { PhotonRecord photons[]; };
 layout(std430, binding = 1) writeonly buffer Splats { SplatRecord splats[]; };
@@ -23,6 +26,11 @@ layout(std430, binding = 4) readonly buffer VarTables { float var_table[]; };
 layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };  // x_lo, x_hi, mean place of the light in it (0..1), unused
 layout(std430, binding = 6) buffer Unusual { vec2 unusual_w[]; };  // x: centre in no window, y: drawn as one texel
 layout(std430, binding = 7) buffer Commands { uint draw_words[20]; uint count_dropped; };
+
+#ifdef LOCAL_GAIN
+layout(std430, binding = 9) readonly buffer GainBoxes { GainBox gain_boxes[]; };
+layout(std430, binding = 10) readonly buffer Gains { float gains[]; };
+#endif
 
 #define RECEIVER_CHARTS 1u
 
@@ -56,6 +64,30 @@ float spectral_variable(uint group, float x) {
     uint base = group * var_samples + i;
     return mix(var_table[base], var_table[base + 1u], at - float(i));
 }
+
+#ifdef LOCAL_GAIN
+// The brush's gain of dispersion at a place on a receiver: trilinear between voxel centres, 1 outside the box.
+float local_gain(uint receiver, vec3 position) {
+    GainBox box = gain_boxes[receiver];
+    if (box.voxels.x == 0u) return 1.0;
+    vec4 at = vec4(position, 1.0);
+    vec3 voxel = vec3(dot(box.row_x, at), dot(box.row_y, at), dot(box.row_z, at));
+    uvec3 count = box.voxels.xyz;
+    vec3 last = vec3(count) - 1.0;
+    if (any(lessThan(voxel, vec3(-0.5))) || any(greaterThan(voxel, last + 0.5))) return 1.0;
+    voxel = clamp(voxel, vec3(0.0), last);
+    uvec3 low = uvec3(voxel), high = min(low + 1u, count - 1u);
+    vec3 f = voxel - vec3(low);
+    float gain = 0.0;
+    for (uint corner = 0u; corner < 8u; ++corner) {
+        bvec3 far = bvec3((corner & 1u) != 0u, (corner & 2u) != 0u, (corner & 4u) != 0u);
+        uvec3 c = uvec3(far.x ? high.x : low.x, far.y ? high.y : low.y, far.z ? high.z : low.z);
+        vec3 w = vec3(far.x ? f.x : 1.0 - f.x, far.y ? f.y : 1.0 - f.y, far.z ? f.z : 1.0 - f.z);
+        gain += w.x * w.y * w.z * gains[box.voxels.w + (c.z * count.y + c.y) * count.x + c.x];
+    }
+    return gain;
+}
+#endif
 
 vec2 to_texels(Placement place, vec3 direction) {
     return vec2(dot(place.row_u.xyz, direction), dot(place.row_v.xyz, direction));
@@ -313,8 +345,25 @@ void main() {
     vec3 to_lo = vec3(0.0);
     vec3 to_hi = vec3(0.0);
 #if GROUPS > 0
+    // The path belongs to the glass it was traced through; what is shown may have another dispersion, followed to first order.
+#ifdef LOCAL_GAIN
+    // Displacements grow about where the light of the reference wavelength lands, the same place for all bands of a path.
+    vec3 to_reference = vec3(0.0);
+#define ADD_REFERENCE(g) to_reference += photon.dposition_dvar##g.xyz * (spectral_variable(uint(g), x_reference) - spectral_variable(traced_row + uint(g), photon.x_anchor));
+    ADD_REFERENCE(0)
+#if GROUPS > 1
+    ADD_REFERENCE(1)
+#endif
+#if GROUPS > 2
+    ADD_REFERENCE(2)
+#endif
+#if GROUPS > 3
+    ADD_REFERENCE(3)
+#endif
+    float gain = local_gain(photon.receiver, photon.position + to_reference);
+#endif
 #define ADD_GROUP(g) { \
-        float anchor = spectral_variable(uint(g), photon.x_anchor); \
+        float anchor = spectral_variable(traced_row + uint(g), photon.x_anchor); \
         to_lo += photon.dposition_dvar##g.xyz * (spectral_variable(uint(g), photon.x_lo) - anchor); \
         to_hi += photon.dposition_dvar##g.xyz * (spectral_variable(uint(g), photon.x_hi) - anchor); \
     }
@@ -327,6 +376,10 @@ void main() {
 #endif
 #if GROUPS > 3
     ADD_GROUP(3)
+#endif
+#ifdef LOCAL_GAIN
+    to_lo = mix(to_reference, to_lo, gain);
+    to_hi = mix(to_reference, to_hi, gain);
 #endif
 #endif
     vec3 middle = 0.5 * (to_lo + to_hi);

@@ -339,6 +339,9 @@ void main()
         vec3 eta3 = n_i / n_t;
         vec3 cosine2 = transmitted_cosine2(theta3, eta3);
         vec3 reflectance = fresnel_reflectance(theta3, eta3, cosine2);
+#ifdef ANCHOR_WEIGHTS
+        reflectance = vec3(reflectance.y);
+#endif
         float eta_it = eta3.y, through = 1.0 - reflectance.y;
 #ifdef BAND_CUTS
         bvec3 passes = greaterThan(cosine2, vec3(0.0));

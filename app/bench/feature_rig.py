@@ -17,6 +17,7 @@ from app.bench.feature_variants import Variant
 from app.gpu.map_atlas import MapAtlas
 from app.gpu.scene_buffers import SceneBuffers
 from app.gpu.splat_tables import SplatTables
+from app.passes.footprint import SpectralVariables
 from app.passes.splat import Splatter
 from app.passes.trace import LatticeSlice, TracePass
 
@@ -76,8 +77,7 @@ class Rig:
         self._trace = TracePass(context, variant.features, self._buffers, work.batch, light.settings.max_depth)
         self._splatter = Splatter(ctx, variant.features)
         self._atlas = MapAtlas(ctx, light.layout.size, light.layout.placements, variant.features.targets)
-        table = self._buffers.variable_table if self._buffers.groups.count else np.zeros((1, 2), "f4")
-        self._variables = ctx.buffer(np.ascontiguousarray(table).tobytes())
+        self._variables = SpectralVariables.build(ctx, self._buffers.variable_table)
         spans = {plan.index: [(band.x_lo, band.x_hi) for band in plan.bands] for plan in light.plans}
         channels = "xyz" if variant.bins is None else np.linspace(380.0, 780.0, variant.bins + 1).tolist()
         spectra = [lamp.spectral_power for lamp in scene.lights]

@@ -19,6 +19,7 @@ from app.gpu.records import RECEIVER, photon_record
 from app.gpu.splat_tables import SplatTables
 from app.model import spectrum
 from app.model.spectral_tables import SpectralAxis
+from app.passes.footprint import SpectralVariables
 from app.passes.splat import Splatter
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ class _Features:
     charts: bool = False
     targets: int = 1
     point_spectrum: bool = False
+    local_gain: bool = False
 
 
 def measure(ctx: moderngl.Context, pixels: float, count: int = 1 << 17) -> dict[str, float]:
@@ -55,7 +57,7 @@ def measure(ctx: moderngl.Context, pixels: float, count: int = 1 << 17) -> dict[
     tables = SplatTables.build(ctx, SpectralAxis.build([]), [spectrum.illuminant("D65")], [None], [[(0.0, 1.0)]])
     splatter = Splatter(ctx, features)
     receivers = ctx.buffer(RECEIVER.zeros(1))
-    variable = ctx.buffer(np.linspace(0.0, 1.0, 1025).astype("f4"))
+    variable = SpectralVariables.build(ctx, np.linspace(0.0, 1.0, 1025)[None])
     swept, still = (ctx.buffer(_photons(pixels, count, sweep)) for sweep in (True, False))
     plain = _Plain(ctx, count, size)
 

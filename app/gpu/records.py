@@ -79,6 +79,17 @@ RECEIVER = Struct(
     ),
 )
 
+GAIN_BOX = Struct(
+    "GainBox",
+    (
+        Field("row_x", "vec4", "voxel x = dot(row_x.xyz, position) + row_x.w; position in GPU space; voxel centres at integers"),
+        Field("row_y", "vec4", "voxel y likewise"),
+        Field("row_z", "vec4", "voxel z likewise"),
+        Field("voxels", "uvec4", "their numbers along x, y, z (0: no local gain), and the first one's index in the gains"),
+    ),
+)
+"""Where one receiver's local gains of dispersion lie (`model.local_dispersion.GainGrid`)."""
+
 
 def ray_record(columns: int) -> Struct:
     """State of one ray between two surfaces; `columns` derivative columns, spatial ones first."""

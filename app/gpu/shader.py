@@ -10,11 +10,12 @@ from flattened line to (file, line) turns a compiler message back into something
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from app import paths
 from app.gpu.glsl_conditionals import Line
@@ -24,6 +25,8 @@ from app.gpu.schema import Struct
 if TYPE_CHECKING:
     import moderngl
 
+    P = TypeVar("P", moderngl.ComputeShader, moderngl.Program)
+
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 _MESA_LINE = re.compile(r"\b\d+:(\d+)(?=\()")
 _NVIDIA_LINE = re.compile(r"\b\d+\((\d+)\)")
@@ -31,6 +34,12 @@ _NVIDIA_LINE = re.compile(r"\b\d+\((\d+)\)")
 
 class ShaderError(RuntimeError):
     """A shader that does not exist, compile or link; the message names file and line."""
+
+
+class Releasable(Protocol):
+    """Anything that holds device memory."""
+
+    def release(self) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -100,6 +109,44 @@ def load_source(
     return Source(name, "\n".join(line.text for line in kept) + "\n", tuple((line.file, line.number) for line in kept), len(lines))
 
 
+_kept: dict[int, OrderedDict[tuple[str, ...], moderngl.ComputeShader | moderngl.Program]] = {}
+KEPT_PROGRAMS = 96
+"""Programs that a context with `keep_programs` holds for the next user of the same text."""
+
+
+def keep_programs(ctx: moderngl.Context) -> None:
+    """From now on a program whose text was compiled before in `ctx` is not compiled again.
+
+    For a viewer, where an edit makes all passes anew: compiling takes a software renderer longer than tracing. Programs then
+    have several owners, who set every uniform before each use and give them back with `release`.
+    """
+    _kept.setdefault(id(ctx), OrderedDict())
+
+
+def forget_programs(ctx: moderngl.Context) -> None:
+    """Undo `keep_programs`; programs in use stay with their owners."""
+    _kept.pop(id(ctx), None)
+
+
+def release(owned: Releasable) -> None:
+    """Give a program (or any other resource) back; it is freed unless it is a program that its context keeps."""
+    if not any(owned is held for programs in _kept.values() for held in programs.values()):
+        owned.release()
+
+
+def _kept_or(ctx: moderngl.Context, texts: tuple[str, ...], compiled: Callable[[], P]) -> P:
+    programs = _kept.get(id(ctx))
+    if programs is None:
+        return compiled()
+    if texts not in programs:
+        programs[texts] = compiled()
+        if len(programs) > KEPT_PROGRAMS:
+            # Perhaps still in use: its owner frees it then, being no longer kept.
+            programs.popitem(last=False)
+    programs.move_to_end(texts)
+    return programs[texts]  # type: ignore[return-value]
+
+
 _recordings: list[list[Source]] = []
 
 
@@ -125,8 +172,9 @@ def compute(
 ) -> moderngl.ComputeShader:
     """Compile the compute shader `name`; raises `ShaderError` with file and line."""
     source = load_source(name, defines, structs)
+    text = _handed_over(source)
     try:
-        return ctx.compute_shader(_handed_over(source))
+        return _kept_or(ctx, (text,), lambda: ctx.compute_shader(text))
     except Exception as error:  # moderngl raises its own Error type with the driver's log
         raise ShaderError(f"{name} does not compile:\n{source.explain(str(error))}") from error
 
@@ -141,8 +189,9 @@ def program(
     """Compile and link a vertex and a fragment shader; raises `ShaderError` with file and line."""
     vertex_source = load_source(vertex, defines, structs)
     fragment_source = load_source(fragment, defines, structs)
+    texts = _handed_over(vertex_source), _handed_over(fragment_source)
     try:
-        return ctx.program(vertex_shader=_handed_over(vertex_source), fragment_shader=_handed_over(fragment_source))
+        return _kept_or(ctx, texts, lambda: ctx.program(vertex_shader=texts[0], fragment_shader=texts[1]))
     except Exception as error:
         log = str(error)
         source = fragment_source if "fragment" in log.lower() else vertex_source

@@ -64,6 +64,10 @@ class Features:
     """Flat receivers carry a fine window inside a coarse one."""
     targets: int
     """RGBA32F accumulation targets."""
+    local_gain: bool = False
+    """The dispersion brush scales spectral displacements on some receiver."""
+    anchor_weights: bool = False
+    """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
 
     def defines(self) -> dict[str, int]:
         """Preprocessor symbols; a feature that is out is not defined at all (use #ifdef) — counts are numbers."""
@@ -85,6 +89,7 @@ class Features:
             "CONVEX_SOLIDS": self.convex_solids,
             "CHARTS": self.charts,
             "NESTED_WINDOWS": self.nested_windows,
+            "ANCHOR_WEIGHTS": self.anchor_weights,
         }
         return numbers | {name: 1 for name, on in switches.items() if on}
 
@@ -122,6 +127,8 @@ class Features:
             charts=any(isinstance(o.material, Diffuse) and not is_flat(o) for o in scene.objects),
             nested_windows=any(isinstance(o.material, Diffuse) and is_flat(o) for o in scene.objects),
             targets=-(-settings.bins // 4) if settings.bins else 1,
+            local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
+            anchor_weights=settings.anchor_weights,
         )
 
 

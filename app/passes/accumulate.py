@@ -35,7 +35,7 @@ class Accumulate:
         self._ctx.memory_barrier()
 
     def release(self) -> None:
-        self._program.release()
+        shader.release(self._program)
 
 
 class SeamFold:
@@ -85,7 +85,7 @@ class SeamFold:
 
     def release(self) -> None:
         for resource in (self._gather, self._fill, self._gather_buffer, self._fill_buffer, self._source_buffer, self._ratio_buffer):
-            resource.release()
+            shader.release(resource)
 
 
 class LevelsFold:
@@ -109,7 +109,7 @@ class LevelsFold:
         self._ctx.memory_barrier()
 
     def release(self) -> None:
-        self._program.release()
+        shader.release(self._program)
 
 
 def copy_texture(ctx: moderngl.Context, source: moderngl.Texture, target: moderngl.Texture) -> None:

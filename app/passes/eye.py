@@ -126,6 +126,8 @@ class EyePass:
         self._pictures: list[moderngl.Texture] = []
         self._samples_of_row = np.zeros(0, int)
         self._rows_a_dispatch = 0
+        self.dispatch_seconds = _TARGET_SECONDS
+        """What one dispatch should take; rows are divided to fit."""
         self._program = shader.compute(self._ctx, "eye.comp", self._defines(layer, len(reflectances)), (*SCENE_STRUCTS, EYE_LIGHT, EYE_PARAMETERS, RECEIVER, PLACEMENT))
 
     def run(
@@ -145,9 +147,30 @@ class EyePass:
         `sample_offset` is the number of samples already there; 0 starts anew. `maps` None shows
         direct light only. `progress` gets the share done, 0 to 1.
         """
+        for share in self.samples(camera, width, height, samples, sample_offset, maps, seed):
+            if progress is not None:
+                progress(share)
+            if cancelled is not None and cancelled():
+                return False
+        return True
+
+    def samples(
+        self, camera: Camera, width: int, height: int, samples: int, sample_offset: int = 0, maps: CausticMaps | None = None, seed: int = 1
+    ) -> Iterator[float]:
+        """`run`, pausing after every band of rows with the share done: whoever draws meanwhile may bind what it likes."""
         if sample_offset == 0 or self._size != (width, height):
             self._clear(width, height)
         maps = maps or self._no_maps()
+        parameters = self._parameters(camera, width, height, maps.scale, seed)
+        parameters["sample_side"] = 1.0 / np.sqrt(samples + sample_offset)
+        for index, place in enumerate(_pixel_lattice(samples, sample_offset)):
+            parameters["sample_index"] = sample_offset + index
+            parameters["within_pixel"] = place
+            for share in self._add_sample(parameters, width, height, maps):
+                yield (index + share) / samples
+        self.context.check("the eye pass")
+
+    def _bind(self, maps: CausticMaps) -> None:
         self.scene.bind()
         for binding, buffer in self._buffers.items():
             buffer.bind_to_storage_buffer(binding)
@@ -157,18 +180,16 @@ class EyePass:
         for unit, (texture, picture) in enumerate(zip(maps.textures, self._pictures, strict=True)):
             texture.use(location=unit)
             picture.bind_to_image(unit, read=True, write=True)
-        parameters = self._parameters(camera, width, height, maps.scale, seed)
-        parameters["sample_side"] = 1.0 / np.sqrt(samples + sample_offset)
-        for index, place in enumerate(_pixel_lattice(samples, sample_offset)):
-            parameters["sample_index"] = sample_offset + index
-            parameters["within_pixel"] = place
-            for share in self._add_sample(parameters, width, height):
-                if progress is not None:
-                    progress((index + share) / samples)
-                if cancelled is not None and cancelled():
-                    return False
-        self.context.check("the eye pass")
-        return True
+
+    @property
+    def sums(self) -> Sequence[moderngl.Texture]:
+        """RGBA32F sums over the samples taken, four channels each."""
+        return self._pictures
+
+    @property
+    def samples_taken(self) -> int:
+        """Samples that every pixel has."""
+        return int(self._samples_of_row.min(initial=0))
 
     def read_rgb(self) -> np.ndarray:
         """Linear Rec.709 radiance, float32 (H, W, 3), lm/(sr unit²) per channel of white; row 0 on top."""
@@ -181,7 +202,7 @@ class EyePass:
     def release(self) -> None:
         """Free every buffer, texture and program."""
         for owned in (*self._buffers.values(), *self._pictures, self._parameters_buffer, self._program):
-            owned.release()
+            shader.release(owned)
         if self._empty is not None:
             for owned in (*self._empty.textures, self._empty.receivers, self._empty.placements):
                 owned.release()
@@ -277,12 +298,13 @@ class EyePass:
             picture.write(zeros)
         self._samples_of_row = np.zeros(height, int)
 
-    def _add_sample(self, parameters: np.ndarray, width: int, height: int) -> Iterator[float]:
+    def _add_sample(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
         """Dispatch one sample, yielding the share of rows done after each band of rows."""
         row = 0
         while row < height:
             rows = min(self._rows_a_dispatch, height - row)
             parameters["first_row"] = row
+            self._bind(maps)
             self._parameters_buffer.write(parameters.tobytes())
             start = time.perf_counter()
             # Groups that overlap the next band would add its rows twice, so bands are whole groups.
@@ -292,7 +314,7 @@ class EyePass:
             elapsed = time.perf_counter() - start
             self._samples_of_row[row : row + rows] += 1
             row += rows
-            fitting = rows * _TARGET_SECONDS / max(elapsed, 1e-4)
+            fitting = rows * self.dispatch_seconds / max(elapsed, 1e-4)
             most = min(4 * self._rows_a_dispatch, -(-height // _GROUP) * _GROUP)
             self._rows_a_dispatch = int(np.clip(fitting // _GROUP * _GROUP, _GROUP, max(_GROUP, most)))
             yield row / height

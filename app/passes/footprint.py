@@ -7,6 +7,7 @@ vertex and the fragment shaders need is worked out here once a splat, not once a
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -19,11 +20,13 @@ from app.gpu.records import (
     RECEIVER,
     photon_record,
 )
+from app.gpu.records import GAIN_BOX
 from app.gpu.schema import Field, Struct
 
 if TYPE_CHECKING:
     import moderngl
 
+    from app.gpu.gain_buffers import GainBuffers
     from app.gpu.map_atlas import MapAtlas
     from app.gpu.splat_tables import SplatTables
 
@@ -63,8 +66,33 @@ PARAMETERS = Struct(
         Field("table_rows", "uint", "rows of the spectral tables"),
         Field("smoothing", "float", "standard deviation of a footprint in lattice spacings"),
         Field("extent_limit", "float", "texels; anything larger is a numerical accident"),
+        Field("traced_row", "uint", "first row of the variables by which photons were traced"),
+        Field("x_reference", "float", "spectral coordinate whose landing point a local gain leaves alone"),
+        Field("unused", "vec2", ""),
     ),
 )
+
+
+@dataclass(frozen=True)
+class SpectralVariables:
+    """Each spectral group's variable over x, as it is shown and as the photons were traced."""
+
+    buffer: moderngl.Buffer
+    """float32 rows of `samples`: the shown ones by group, then the traced ones where they differ."""
+    samples: int
+    traced_row: int = 0
+    """First row of the traced ones."""
+
+    @classmethod
+    def build(cls, ctx: moderngl.Context, shown: np.ndarray, traced: np.ndarray | None = None) -> SpectralVariables:
+        """`shown`, `traced`: float (groups, samples), `traced` None where the photons' glass is the one shown."""
+        if not shown.size:
+            return cls(ctx.buffer(reserve=16), 2)
+        rows = shown if traced is None else np.concatenate([shown, traced])
+        return cls(ctx.buffer(np.ascontiguousarray(rows, np.float32)), shown.shape[1], 0 if traced is None else len(shown))
+
+    def release(self) -> None:
+        self.buffer.release()
 
 
 class SplatFeatures(Protocol):
@@ -82,6 +110,8 @@ class SplatFeatures(Protocol):
     def point_spectrum(self) -> bool: ...
     @property
     def charts(self) -> bool: ...
+    @property
+    def local_gain(self) -> bool: ...
 
 
 def splat_defines(features: SplatFeatures) -> dict[str, int]:
@@ -110,7 +140,9 @@ class Footprints:
             "NONE": f"{NONE}u",
             "FLAG_FOOTPRINT_DROPPED": f"{FLAG_FOOTPRINT_DROPPED}u",
         }
-        structs = (photon_record(groups), PLACEMENT, RECEIVER, SPLAT)
+        structs = (photon_record(groups), PLACEMENT, RECEIVER, SPLAT, GAIN_BOX)
+        if features.local_gain:
+            defines["LOCAL_GAIN"] = 1
         self._program = shader.compute(ctx, "footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
         self._unusual = ctx.buffer(np.zeros((group, 2), np.float32))
@@ -123,35 +155,38 @@ class Footprints:
         self.lists = ctx.buffer(reserve=len(VERTICES) * self.capacity * 4)
         """Slots of kinds 1 to 4, `capacity` each."""
         self._list = shader.compute(ctx, "splat_list.comp", {"WORKGROUP": LIST_WORKGROUP}, (SPLAT,))
-        self._list["capacity"].value = self.capacity
 
     def run(
         self,
         photons: moderngl.Buffer,
         first: int,
         count: int,
-        var_table: moderngl.Buffer,
+        variables: SpectralVariables,
         tables: SplatTables,
         atlas: MapAtlas,
         receivers: moderngl.Buffer,
         smoothing: float,
         extent_limit: float,
-        var_samples: int,
+        gains: GainBuffers | None = None,
     ) -> None:
         """Fill slots [0, count * slots_per_photon) from photons [first, first + count)."""
         values = PARAMETERS.zeros(1)
-        values[0] = (first, count, tables.classes, tables.bands, var_samples, tables.rows, smoothing, extent_limit)
+        x_reference = 0.0 if gains is None else gains.x_reference
+        values[0] = (first, count, tables.classes, tables.bands, variables.samples, tables.rows, smoothing, extent_limit, variables.traced_row, x_reference, (0.0, 0.0))
         self._parameters.write(values.tobytes())
         self._parameters.bind_to_uniform_block(0)
         for binding, buffer in enumerate(
-            (photons, self.splats, atlas.placements, receivers, var_table, tables.band_buffer, self._unusual, self.commands)
+            (photons, self.splats, atlas.placements, receivers, variables.buffer, tables.band_buffer, self._unusual, self.commands)
         ):
             buffer.bind_to_storage_buffer(binding)
+        if gains is not None:
+            gains.bind()
         slots = count * self.slots_per_photon
         self.commands.write(np.array([[vertices, 1, 0, 0, 0] for vertices in VERTICES], np.uint32))
         self._program.run(group_x=-(-count // WORKGROUP))
         self._ctx.memory_barrier()
         self.lists.bind_to_storage_buffer(8)
+        self._list["capacity"].value = self.capacity
         self._list["slots"].value = slots
         self._list.run(1)
 
@@ -168,4 +203,4 @@ class Footprints:
 
     def release(self) -> None:
         for resource in (self._program, self._list, self.lists, self._parameters, self._unusual, self.commands, self.splats):
-            resource.release()
+            shader.release(resource)

@@ -17,6 +17,7 @@ from app.passes.footprint import (
     SPLAT,
     VERTICES,
     Footprints,
+    SpectralVariables,
     SplatFeatures,
     splat_defines,
 )
@@ -24,6 +25,7 @@ from app.passes.footprint import (
 if TYPE_CHECKING:
     import moderngl
 
+    from app.gpu.gain_buffers import GainBuffers
     from app.gpu.map_atlas import MapAtlas
     from app.gpu.splat_tables import SplatTables
 
@@ -80,25 +82,24 @@ class Splatter:
         self,
         photons: moderngl.Buffer,
         count: int,
-        var_table: moderngl.Buffer,
+        variables: SpectralVariables,
         tables: SplatTables,
         atlas: MapAtlas,
         receivers: moderngl.Buffer,
         smoothing: float = 0.6,
+        gains: GainBuffers | None = None,
     ) -> None:
         """Deposit photons [0, count) of `photons` (photon_record(groups)).
 
-        `var_table`: float32 (groups, samples) of each group's variable at equally spaced x; `receivers`: RECEIVER
-        records; `smoothing`: standard deviation of a footprint in lattice spacings.
+        `variables`: each group's variable at equally spaced x; `receivers`: RECEIVER records; `smoothing`: standard deviation
+        of a footprint in lattice spacings; `gains`: the brush's, where the features have it.
         """
-        groups = max(self._features.spectral_groups, 1)
-        samples = var_table.size // 4 // groups
         chunk = int(np.clip(atlas.size[0] * atlas.size[1] // FLUSH_SHARE, SMALLEST_CHUNK, CHUNK))
         group = min(GROUP, chunk)
         for first in range(0, count, group):
             part = min(group, count - first)
             self._ctx.memory_barrier()
-            self._footprints.run(photons, first, part, var_table, tables, atlas, receivers, smoothing, EXTENT_LIMIT, samples)
+            self._footprints.run(photons, first, part, variables, tables, atlas, receivers, smoothing, EXTENT_LIMIT, gains)
             self._ctx.memory_barrier()
             self.draw(tables, atlas)
             atlas.pending += part
@@ -142,7 +143,7 @@ class Splatter:
 
     def release(self) -> None:
         for vertex_array in self._draws.values():
-            vertex_array.program.release()
+            shader.release(vertex_array.program)
             vertex_array.release()
         self._indices.release()
         self._parameters.release()

@@ -7,6 +7,7 @@ photons is a function of the lattice alone.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, field
 
 import moderngl
@@ -160,7 +161,7 @@ class TracePass:
             self._emit_parameters, self._trace_parameters, self._trace, self._count, self._scan, self._scatter,
             self._gather, self._advance, *self._emit.values(), *self._orders.values(),
         ):
-            owned.release()
+            shader.release(owned)
 
     @property
     def bytes(self) -> int:
@@ -171,6 +172,15 @@ class TracePass:
         """Trace `piece.count` ≤ batch lattice points; their photons replace the buffer's content.
 
         `max_depth`: specular events, by default the pass's own."""
+        steps = self.steps(piece, domain, max_depth)
+        while True:
+            try:
+                next(steps)
+            except StopIteration as done:
+                return done.value
+
+    def steps(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int | None = None) -> Generator[None, None, Batch]:
+        """`run`, pausing after every event of all rays: whoever draws meanwhile may bind what it likes."""
         max_depth = self.max_depth if max_depth is None else min(max_depth, self.max_depth)
         if piece.count > self.batch:
             raise ValueError(f"{piece.count} lattice points in a batch of {self.batch}")
@@ -184,7 +194,6 @@ class TracePass:
         self._indices.bind_to_storage_buffer(bindings.INDICES)
         self._list_children(first=True, chunks=-(-piece.count // _CHUNK))
         emitted = int(self._read_state()["alive"])
-        self._trace_parameters.bind_to_uniform_block(bindings.PARAMETERS)
 
         # Walking through covered surfaces and cutting bands take steps without being events.
         limit = 2 * max_depth + 32
@@ -192,6 +201,8 @@ class TracePass:
         while alive and step < limit:
             if step == limit - 1:
                 self._write_trace_parameters(piece, max_depth=0)
+            self.scene.bind()
+            self._trace_parameters.bind_to_uniform_block(bindings.PARAMETERS)
             self._bind_queue(step + 1)
             self._trace.run_indirect(self._state, records.QUEUE_STATE.dtype.fields["trace_groups"][1])
             self._list_children(first=False)
@@ -199,6 +210,7 @@ class TracePass:
             # Reading the count waits for the device: rarely on a GPU, where empty steps cost less.
             if self.context.is_software or step % 8 == 0:
                 alive = int(self._read_state()["alive"])
+            yield
         self.context.check("tracing photons")
         state = self._read_state()
         ctx.memory_barrier()

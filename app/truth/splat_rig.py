@@ -13,6 +13,7 @@ from app.gpu.records import NONE, RECEIVER, photon_record
 from app.gpu.splat_tables import SplatTables
 from app.model import spectrum
 from app.model.spectral_tables import SpectralAxis
+from app.passes.footprint import SpectralVariables
 from app.passes.splat import Splatter
 
 IDENTITY_ROWS = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
@@ -28,6 +29,7 @@ class SplatFeatures:
     charts: bool = False
     targets: int = 1
     point_spectrum: bool = False
+    local_gain: bool = False
 
 
 @dataclass
@@ -55,7 +57,7 @@ class Rig:
             assert placements["next"][1] == NONE
         self.atlas = MapAtlas(self.ctx, atlas_size, placements, self.features.targets)
         self.receivers = self.ctx.buffer(RECEIVER.zeros(1))
-        self.variable = self.ctx.buffer(np.linspace(0.0, 1.0, 1025).astype("f4"))
+        self.variable = SpectralVariables.build(self.ctx, np.linspace(0.0, 1.0, 1025)[None])
         self.splatter = Splatter(self.ctx, self.features)
 
     def draw(self, photons: np.ndarray, smoothing: float = 1.0, batch: int | None = None, tile: int = 0) -> np.ndarray:

@@ -14,7 +14,7 @@ import pytest
 
 from app import paths
 from app.gpu.records import TRACE_PARAMETERS, ray_record
-from app.light_half import _SHIFT_GENERATORS
+from app.light_plan import _SHIFT_GENERATORS
 from app.passes.eye import _pixel_lattice
 from app.truth.emission_maps import GOLDEN, PLASTIC, lattice_point
 from app.truth.glsl_function import evaluate
