@@ -157,9 +157,16 @@ class Notice:
     is_error: bool = False
 
 
+@dataclass(frozen=True)
+class DismissMessage:
+    """Take a message away (errors stay until then)."""
+
+    text: str
+
+
 Request = (
     NewScene | Open | Save | Undo | Redo | GoTo | Quit | CancelQuit | Recover | SelectAt | BeginPull | FrameSelection | Retrace | ReloadShaders
-    | Screenshot | Bake | Animate | CancelJob | ComputeReference | CopyMaterial | Notice
+    | Screenshot | Bake | Animate | CancelJob | ComputeReference | CopyMaterial | Notice | DismissMessage
 )  # fmt: skip
 
 
