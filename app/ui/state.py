@@ -135,6 +135,8 @@ class State:
     """Photons accumulate."""
     viewport_size: tuple[int, int] = (960, 540)
     """Pixels of the picture."""
+    hover: tuple[float, float] | None = None
+    """Where the cursor is over the picture, 0..1 from the top left; the viewport sets it in every frame."""
     clipboard: Material | None = None
     pull: Pull | None = None
     animation: tuple[Key, ...] = ()
