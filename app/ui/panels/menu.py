@@ -1,0 +1,166 @@
+"""The menu bar: every command by name, with its shortcut and its tooltip."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from imgui_bundle import imgui
+
+from app.ui import commands, item_rects, layout, theme
+from app.ui.commands import Command
+from app.ui.facts import Facts
+from app.ui.panels import dialogs, outliner, widgets
+from app.ui.panels.methods import METHOD_NAMES, METHOD_TIPS
+from app.ui.state import Panels, State
+
+_SCALES = (0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.0)
+
+
+def draw_menu(state: State, facts: Facts) -> State:
+    """Draw the menu bar at the top of the window."""
+    if not imgui.begin_main_menu_bar():
+        return state
+    for title, contents in _MENUS:
+        opened = imgui.begin_menu(title)
+        item_rects.note(f"Menu: {title}")
+        if opened:
+            state = contents(state, facts)
+            imgui.end_menu()
+    _title(facts)
+    imgui.end_main_menu_bar()
+    return state
+
+
+def _item(command: Command, state: State, facts: Facts, label: str | None = None) -> State:
+    checked = command.checked is not None and command.checked(state, facts)
+    keys = command.keys[0] if command.keys else ""
+    pressed, _ = imgui.menu_item(label or command.name, keys, checked, command.enabled(state, facts))
+    item_rects.note(command.name)
+    widgets.tooltip(command.tip)
+    return command.act(state, facts) if pressed else state
+
+
+def _items(names: tuple[str, ...], state: State, facts: Facts) -> State:
+    """Several commands; an empty name is a line between them."""
+    for name in names:
+        if name:
+            state = _item(commands.command(name), state, facts)
+        else:
+            imgui.separator()
+    return state
+
+
+def _file(state: State, facts: Facts) -> State:
+    state = _items(("New scene", "Start page", "", "Open…"), state, facts)
+    if imgui.begin_menu("Open recent", bool(facts.recent)):
+        for path in facts.recent:
+            if imgui.menu_item(f"{path.name}##{path}", "", False)[0]:
+                state = dialogs.open_path(state, facts, path)
+            widgets.tooltip(str(path))
+        imgui.end_menu()
+    return _items(("", "Save", "Save as…", "", "Export…", "", "Quit"), state, facts)
+
+
+def _edit(state: State, facts: Facts) -> State:
+    for name, label in (("Undo", facts.undo), ("Redo", facts.redo)):
+        shown = f"{name} {_lowered(label)}" if label else name
+        state = _item(commands.command(name), state, facts, f"{shown}###{name}")
+    state = _items(("", "Duplicate", "Delete", "", "Copy material", "Paste material"), state, facts)
+    imgui.separator()
+    if imgui.begin_menu("Add"):
+        state = outliner.draw_add_items(state)
+        imgui.end_menu()
+    return state
+
+
+def _view(state: State, facts: Facts) -> State:
+    state = _items(("Frame selection", "Frame everything", "Scene's own view", "Keep as scene's view"), state, facts)
+    for title, prefix in (("Go to view", "View"), ("Store view", "Store view")):
+        if imgui.begin_menu(title):
+            state = _items(tuple(f"{prefix} {number}" for number in range(1, 10)), state, facts)
+            imgui.end_menu()
+    imgui.separator()
+    state = _items(("Automatic exposure", "False colour", "Single wavelength", "Ray overlay", "Magnifier"), state, facts)
+    imgui.separator()
+    if imgui.begin_menu("Panels"):
+        state = _items(tuple(f"Panel: {command.name}" for command in commands.PANELS), state, facts)
+        imgui.end_menu()
+    state = _items(("Hide panels",), state, facts)
+    if imgui.menu_item("Reset layout", "", False)[0]:
+        layout.reset()
+        state = replace(state, preferences=replace(state.preferences, panels=Panels()))
+    item_rects.note("Reset layout")
+    widgets.tooltip("Put all panels back where they were at the first start.")
+    imgui.separator()
+    return _appearance(state)
+
+
+def _appearance(state: State) -> State:
+    preferences = state.preferences
+    for name, theme_name in (("Dark theme", "dark"), ("Light theme", "light")):
+        if imgui.menu_item(name, "", preferences.theme == theme_name)[0]:
+            preferences = replace(preferences, theme=theme_name)
+        item_rects.note(name)
+        widgets.tooltip("Colours of the interface; the picture stays as it is.")
+    if imgui.begin_menu("Interface size"):
+        for scale in _SCALES:
+            if imgui.menu_item(f"{scale:.0%}", "", abs(preferences.ui_scale - scale) < 1e-3)[0]:
+                preferences = replace(preferences, ui_scale=scale)
+            item_rects.note(f"{scale:.0%}")
+            widgets.tooltip("Size of text and controls, on top of the screen's own scale.")
+        imgui.end_menu()
+    return state if preferences == state.preferences else replace(state, preferences=preferences)
+
+
+def _render(state: State, facts: Facts) -> State:
+    state = _items(("Accumulate photons", "Trace again", "Physical picture", ""), state, facts)
+    if imgui.begin_menu("Method"):
+        for method, name in METHOD_NAMES.items():
+            if imgui.menu_item(name, "", state.method == method)[0]:
+                state = replace(state, method=method)
+            item_rects.note(name)
+            widgets.tooltip(METHOD_TIPS[method])
+        imgui.end_menu()
+    imgui.separator()
+    return _items(("Reload shaders",), state, facts)
+
+
+def _tools(state: State, facts: Facts) -> State:
+    return _items(("Select", "Move", "Rotate", "Scale", "", "Dispersion brush", "Pull a colour"), state, facts)
+
+
+def _help(state: State, facts: Facts) -> State:
+    return _items(("Shortcuts", "About SpectraSplat"), state, facts)
+
+
+_MENUS = (
+    ("File", _file),
+    ("Edit", _edit),
+    ("View", _view),
+    ("Render", _render),
+    ("Tools", _tools),
+    ("Help", _help),
+)
+
+
+def _title(facts: Facts) -> None:
+    """The scene's name at the right end, with a dot while it is not saved."""
+    text = facts.path.name if facts.path is not None else facts.title
+    mark = "  •" if facts.unsaved else ""
+    width = imgui.calc_text_size(text + mark).x + theme.em(0.8)
+    free = imgui.get_window_width() - imgui.get_cursor_pos_x()
+    if free < width + theme.em(1):
+        return
+    imgui.set_cursor_pos_x(imgui.get_window_width() - width)
+    imgui.text_disabled(text)
+    widgets.tooltip(str(facts.path) if facts.path is not None else "Not saved to a file yet.")
+    if facts.unsaved:
+        imgui.same_line(0, 0)
+        with theme.coloured(theme.palette().warning):
+            imgui.text_unformatted(mark)
+        widgets.tooltip("There are changes that are not saved.")
+
+
+def _lowered(label: str) -> str:
+    """An edit's label in the middle of a line: "Undo move prism"; acronyms keep their capitals."""
+    return label if label[:2].isupper() else label[:1].lower() + label[1:]

@@ -1,0 +1,25 @@
+"""The sampling methods in words."""
+
+from __future__ import annotations
+
+METHOD_NAMES = {
+    "srd": "Spectral ray differentials",
+    "srd-lambda": "Differentials by wavelength",
+    "stochastic": "Random wavelengths",
+    "stochastic-even": "Even random wavelengths",
+    "stochastic-point": "Light tracing, one texel",
+    "regular-7": "7 fixed wavelengths",
+    "regular-16": "16 fixed wavelengths",
+}
+"""Method of `METHODS` -> what it is called on the screen."""
+
+METHOD_TIPS = {
+    "srd": "The default: each photon is swept along its own spectrum in closed form; as many spectral bands as needed.",
+    "srd-lambda": "One derivative by wavelength and one anchor a photon: the published method.",
+    "stochastic": "One random wavelength a photon with a footprint: the usual answer.",
+    "stochastic-even": "The same with wavelengths from a low-discrepancy sequence: the usual answer at its best.",
+    "stochastic-point": "One random wavelength and one texel a photon: unbiased light tracing.",
+    "regular-7": "Seven fixed wavelengths, a splat each: shows banding.",
+    "regular-16": "Sixteen fixed wavelengths, a splat each: shows banding.",
+}
+"""Method of `METHODS` -> its tooltip."""
