@@ -1,0 +1,90 @@
+"""How deep the colour of a glass is: a colour that white light has taken on after a distance inside."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from app.model.colorimetry import attenuation_from_colour, rgb_partition
+from app.model.scene import Absorption, Dielectric, Vec3
+from app.ui.panels import widgets
+from app.ui.panels.glass_values import with_material
+from app.ui.state import State
+
+_FIRST_COLOUR, _FIRST_DISTANCE = (0.55, 0.85, 0.75), 1.0
+"""What a glass starts with when it is tinted: bottle green."""
+
+
+@dataclass
+class _Look:
+    """Colour and distance as they were set: a coefficient alone does not tell them apart."""
+
+    coefficient: np.ndarray | None = None
+    rgb: Vec3 = _FIRST_COLOUR
+    distance: float = _FIRST_DISTANCE
+
+
+_look = _Look()
+
+
+def draw_absorption(state: State, index: int) -> State:
+    """Rows for the absorption of object `index`, which is of glass."""
+    item = state.scene.objects[index]
+    material = item.material
+    if not isinstance(material, Dielectric):
+        return state
+    tip = "Let the glass absorb light on the way through it (Beer–Lambert). Off: perfectly clear."
+    changed, tinted = widgets.toggle("Tinted", material.absorption is not None, tip=tip)
+    if changed:
+        absorption = _absorption(_look.rgb, _look.distance) if tinted else None
+        return with_material(state, index, replace(material, absorption=absorption), f"Tint of {item.name}")
+    if material.absorption is None:
+        return state
+    return _draw_colour(state, index, material, material.absorption)
+
+
+def _draw_colour(state: State, index: int, material: Dielectric, absorption: Absorption) -> State:
+    described = colour_of(absorption)
+    if described is None:
+        widgets.hint("The absorption is a measured curve, which no colour describes.")
+        return state
+    rgb, distance = described
+    tip = "Colour of white light after the distance below, linear Rec.709 shown as sRGB."
+    colour_changed, rgb, colour_active = widgets.colour("Colour", rgb, tip=tip)
+    tip = "How far white light travels inside the glass until it has this colour. Shorter is deeper."
+    depth_changed, distance, depth_active = widgets.drag(
+        "At a depth of", distance, 1e-4, 1e6, unit="units", tip=tip, reset=_FIRST_DISTANCE, format="%.3f", logarithmic=True
+    )
+    state = widgets.holding(state, colour_active or depth_active)
+    if not (colour_changed or depth_changed):
+        return state
+    tinted = replace(material, absorption=_absorption(rgb, distance))
+    return with_material(state, index, tinted, f"Tint of {state.scene.objects[index].name}")
+
+
+def colour_of(absorption: Absorption) -> tuple[Vec3, float] | None:
+    """Linear colour and the distance at which white light has it; None where no colour gives this curve.
+
+    Where it was not set here, the distance at which the strongest channel has fallen to one half.
+    """
+    if _look.coefficient is not None and np.array_equal(_look.coefficient, absorption.coefficient):
+        return _look.rgb, _look.distance
+    strength, *_ = np.linalg.lstsq(rgb_partition(), absorption.coefficient, rcond=None)
+    strongest = float(strength.max())
+    if strongest <= 0.0:
+        return (1.0, 1.0, 1.0), _FIRST_DISTANCE
+    off = np.abs(rgb_partition() @ strength - absorption.coefficient).max()
+    if off > 1e-6 * strongest or strength.min() < -1e-6 * strongest:
+        return None
+    distance = math.log(2.0) / strongest
+    r, g, b = (float(c) for c in np.exp(-np.maximum(strength, 0.0) * distance))
+    return (r, g, b), distance
+
+
+def _absorption(rgb: Vec3, distance: float) -> Absorption:
+    held = tuple(min(max(c, 0.0), 1.0) for c in rgb)
+    coefficient = attenuation_from_colour(held, distance)
+    _look.coefficient, _look.rgb, _look.distance = coefficient, held, distance
+    return Absorption(coefficient)

@@ -1,0 +1,226 @@
+"""The dispersion of the selected object: its glass, n_d and Abbe number, the gain, n(λ) and its colour."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from imgui_bundle import ImVec2, imgui
+
+from app.errors import UserError
+from app.model import glass
+from app.model.glass import Dispersion
+from app.model.scene import Dielectric, SceneObject
+from app.model.scene_materials import MAX_PRIORITY
+from app.ui import theme
+from app.ui.facts import Facts
+from app.ui.panels import widgets
+from app.ui.panels.absorption_rows import draw_absorption
+from app.ui.panels.glass_picker import POPUP, draw_glass_picker
+from app.ui.panels.glass_values import (
+    abbe_text,
+    as_sold,
+    base_name,
+    is_as_sold,
+    lines_of,
+    natural,
+    selected_glass,
+    shown_name,
+    with_abbe,
+    with_glass,
+    with_material,
+)
+from app.ui.panels.index_curve import draw_index_curve
+from app.ui.state import State
+
+MOST_GAIN = 10.0
+
+
+@dataclass
+class _Look:
+    """The last edit that was refused, until one succeeds or something else is selected."""
+
+    refused: str = ""
+    of: str = ""
+
+
+_look = _Look()
+
+
+def draw_dispersion(state: State, facts: Facts) -> State:
+    """The panel's contents; the window is the shell's."""
+    selected = selected_glass(state)
+    if selected is None:
+        widgets.hint(_why_empty(state))
+        return state
+    index, item, material = selected
+    if _look.of != item.name:
+        _look.of, _look.refused = item.name, ""
+    _draw_header(item, material.dispersion)
+    state = _draw_buttons(state, facts, index)
+    if widgets.section("Dispersion"):
+        state = _draw_numbers(state, facts, index)
+    if widgets.section("Index curve n(λ)"):
+        state = draw_index_curve(state, facts)
+    if widgets.section("Colour and overlap", is_open=False):
+        state = draw_absorption(state, index)
+        state = _draw_priority(state, index)
+    return state
+
+
+def _why_empty(state: State) -> str:
+    if state.selection.kind is None:
+        return "Click an object of glass, or a caustic that it makes, to edit its dispersion."
+    if state.selection.kind == "light":
+        return "A light is selected. Its spectrum is in the inspector; click an object of glass to edit its dispersion."
+    return "The selected object is not of glass. Give it a glass in the inspector, or click another object."
+
+
+def _draw_header(item: SceneObject, dispersion: Dispersion) -> None:
+    with theme.heading(1.15):
+        imgui.text_unformatted(item.name)
+    imgui.text_unformatted(shown_name(dispersion))
+    sold = as_sold(dispersion)
+    if sold is not None and natural(dispersion) == sold:
+        widgets.tooltip("As in the catalogue.")
+    if dispersion.gain != 1.0:
+        imgui.same_line()
+        with theme.coloured(theme.palette().accent):
+            imgui.text_unformatted(f"× {dispersion.gain:.3g}")
+        widgets.tooltip("The dispersion is multiplied by this gain.")
+
+
+# ---- buttons ------------------------------------------------------------------------------
+
+
+def _draw_buttons(state: State, facts: Facts, index: int) -> State:
+    dispersion = selected_glass(state)[2].dispersion  # type: ignore[index]
+    if widgets.button("Choose glass…", tip="Search 1,700 glasses, plastics, liquids and gems by name, maker or number."):
+        imgui.open_popup(POPUP)
+    imgui.same_line()
+    abbe_open = state.preferences.panels.abbe
+    tip = "Every glass of the catalogue by n_d and Abbe number, to click in."
+    if widgets.button("Abbe diagram", tip=tip):
+        state = state.with_panels(abbe=not abbe_open)
+    imgui.same_line()
+    sold = as_sold(dispersion)
+    tip = f"Back to {base_name(dispersion)} as the catalogue has it, without gain." if sold else "This glass is not from the catalogue."
+    if widgets.button("As sold", tip=tip, enabled=sold is not None and not is_as_sold(dispersion)) and sold:
+        state = with_glass(state, index, sold, f"{sold.name} as sold")
+    state = _draw_clipboard(state, index)
+    if imgui.begin_popup(POPUP):
+        imgui.begin_child("picker", ImVec2(theme.em(46.0), theme.em(30.0)))
+        state = draw_glass_picker(state, facts)
+        imgui.end_child()
+        imgui.end_popup()
+    return state
+
+
+def _draw_clipboard(state: State, index: int) -> State:
+    item = state.scene.objects[index]
+    if widgets.button("Copy material", tip=f"Copy glass, gain and colour of {item.name}."):
+        state = replace(state, clipboard=item.material)
+    imgui.same_line()
+    held = state.clipboard
+    if isinstance(held, Dielectric):
+        tip = f"Give {item.name} the copied material: {shown_name(held.dispersion)}."
+    else:
+        tip = "Copy the material of an object of glass first."
+    if widgets.button("Paste material", tip=tip, enabled=isinstance(held, Dielectric)) and held is not None:
+        state = with_material(state, index, held, f"Paste material on {item.name}")
+    return state
+
+
+# ---- numbers ------------------------------------------------------------------------------
+
+
+def _draw_numbers(state: State, facts: Facts, index: int) -> State:
+    item = state.scene.objects[index]
+    dispersion = item.material.dispersion  # type: ignore[union-attr]
+    sold = as_sold(dispersion)
+    tip = "How many times stronger than in nature colours spread. 1 is the glass itself, 0 does not disperse; n_d stays."
+    changed, gain, active = widgets.slider(
+        "Dispersion gain", dispersion.gain, 0.0, MOST_GAIN, unit="×", tip=tip, reset=1.0, format="%.2f", mark=1.0
+    )
+    state = widgets.holding(state, active)
+    if changed:
+        state = _attempt(state, index, f"Dispersion gain of {item.name}", lambda: glass.with_gain(dispersion, gain))
+    material = natural(dispersion)
+    tip = "Refractive index at the helium d line, 587.56 nm: how strongly light is bent. The Abbe number stays."
+    changed, n_d, active = widgets.slider(
+        "Index n_d", material.n_d, 1.0, 2.8, unit="", tip=tip, reset=sold.n_d if sold else None, format="%.5f", clamp=False
+    )
+    state = widgets.holding(state, active)
+    if changed:
+        v_d = material.V_d
+        state = _attempt(state, index, f"n_d of {item.name}", lambda: with_abbe(dispersion, n_d, v_d))
+    tip = (
+        "Abbe number (n_d − 1)/(n_F − n_C) of the glass before its gain: small is dispersive, 20 to 90 for glass. "
+        "The slider is even in 1/V_d, so equal ways spread colours by equal amounts. Negative numbers (anomalous dispersion) can be typed."
+    )
+    changed, v_d, active = widgets.reciprocal_slider(
+        "Abbe number V_d", material.V_d, 8.0, unit="", tip=tip, reset=sold.V_d if sold else None
+    )
+    state = widgets.holding(state, active)
+    if changed:
+        state = _attempt(state, index, f"Abbe number of {item.name}", lambda: with_abbe(dispersion, material.n_d, v_d))
+    if _look.refused:
+        widgets.error(_look.refused)
+    _draw_lines(state.scene.objects[index].material.dispersion)  # type: ignore[union-attr]
+    if facts.stats.first_order:
+        widgets.hint("The caustic follows this edit to first order until it is traced again.")
+    return state
+
+
+def _attempt(state: State, index: int, label: str, make) -> State:
+    """The state with the glass that `make()` gives; a refusal is kept to be shown."""
+    try:
+        edited = with_glass(state, index, make(), label)
+    except UserError as refusal:
+        text = str(refusal)
+        _look.refused = text[:1].upper() + text[1:]
+        return state
+    _look.refused = ""
+    return edited
+
+
+def _draw_lines(dispersion: Dispersion) -> None:
+    """What is rendered, in a catalogue's numbers."""
+    lines = lines_of(dispersion)
+    cells = (
+        ("n_F", f"{lines.n_f:.5f}", "Index at the hydrogen F line, 486.13 nm (blue)."),
+        ("n_d", f"{lines.n_d:.5f}", "Index at the helium d line, 587.56 nm (yellow)."),
+        ("n_C", f"{lines.n_c:.5f}", "Index at the hydrogen C line, 656.27 nm (red)."),
+        ("n_F − n_C", f"{lines.principal:.5f}", "Principal dispersion, gain included."),
+        ("V_d", abbe_text(lines.v_d), "Abbe number of what is rendered, gain included."),
+        ("P_g,F", "–" if lines.partial_gf is None else f"{lines.partial_gf:.4f}",
+         "Relative partial dispersion (n_g − n_F)/(n_F − n_C), g at 435.83 nm: how blue stretches against red."),
+    )  # fmt: skip
+    imgui.spacing()
+    if imgui.begin_table("lines", 3, imgui.TableFlags_.sizing_stretch_same.value):
+        for name, value, tip in cells:
+            imgui.table_next_column()
+            with theme.coloured(theme.palette().muted):
+                imgui.text_unformatted(name)
+            widgets.tooltip(tip)
+            imgui.text_unformatted(value)
+            widgets.tooltip(tip)
+        imgui.end_table()
+    for told in dispersion.notes():
+        widgets.note(told[:1].upper() + told[1:])
+
+
+def _draw_priority(state: State, index: int) -> State:
+    item = state.scene.objects[index]
+    material = item.material
+    if not isinstance(material, Dielectric):
+        return state
+    tip = "Where solids overlap, the one of higher priority fills the place (a liquid in its vessel: lower than the glass)."
+    changed, priority, active = widgets.drag(
+        "Priority", float(material.priority), -MAX_PRIORITY, MAX_PRIORITY, unit="", tip=tip, reset=0.0, format="%.0f", speed=0.05
+    )
+    state = widgets.holding(state, active)
+    rounded = math.floor(priority + 0.5)
+    if not changed or rounded == material.priority:
+        return state
+    return with_material(state, index, replace(material, priority=rounded), f"Priority of {item.name}")
