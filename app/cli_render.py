@@ -68,7 +68,7 @@ def render_command(request: RenderRequest) -> int:
 
     from app.renderer import render
 
-    with _interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
+    with interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
         result = render(scene, settings, progress=progress, cancelled=interrupted)
         stopped = interrupted()
     write_image(
@@ -143,7 +143,7 @@ def _integer(option: str, low: int, high: int) -> Callable[[str], int]:
 
 
 @contextmanager
-def _interrupt_flag() -> Iterator[Callable[[], bool]]:
+def interrupt_flag() -> Iterator[Callable[[], bool]]:
     """Within the block the first Ctrl-C only sets a flag, which the yielded function tells.
 
     The renderer then stops after its batch and what it has is written. A second Ctrl-C
