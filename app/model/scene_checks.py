@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from app.errors import UserError
@@ -31,8 +33,8 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
     glasses = [o for o in scene.objects if isinstance(o.material, Dielectric)]
     for light in scene.lights:
         if light.kind != "directional":
-            _check_outside(light, glasses, file_name)
-        _check_lines(light, glasses, file_name)
+            check_outside(light, glasses, file_name)
+        check_lines(light, glasses, file_name)
     return _glass_notes(glasses)
 
 
@@ -67,7 +69,8 @@ def _check_sizes(scene: Scene, file_name: str) -> None:
         )
 
 
-def _check_outside(light: Light, glasses: list[SceneObject], file_name: str) -> None:
+def check_outside(light: Light, glasses: Sequence[SceneObject], file_name: str) -> None:
+    """Raise UserError for a light that stands inside one of `glasses`."""
     for item in glasses:
         if contains(item, np.array(light.position)):
             raise UserError(
@@ -75,7 +78,8 @@ def _check_outside(light: Light, glasses: list[SceneObject], file_name: str) -> 
             )
 
 
-def _check_lines(light: Light, glasses: list[SceneObject], file_name: str) -> None:
+def check_lines(light: Light, glasses: Sequence[SceneObject], file_name: str) -> None:
+    """Raise UserError for an emission line outside the data of one of `glasses`."""
     for wavelength_nm, power in light.spectral_power.lines:
         for item in glasses:
             low, high = item.material.dispersion.range_nm  # type: ignore[union-attr]

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from app.model.mesh_recipes import note_recipe
 from app.model.primitives import plane
 from app.model.scene import Camera, Diffuse, Light, SceneObject
 from app.model.scene_lights import DEFAULT_ILLUMINANCE, Surroundings, default_direction
@@ -57,7 +58,9 @@ def default_table(objects: Sequence[SceneObject]) -> SceneObject:
     matrix[2, 3] = bounds_of(objects)[0][2] - 1e-3 * around.radius
     matrix.setflags(write=False)
     size = 40.0 * around.radius
-    return SceneObject("table", plane(size, size, name="table"), Diffuse((0.8, 0.8, 0.8)), matrix)
+    mesh = plane(size, size, name="table")
+    note_recipe(mesh, {"shape": "plane", "width": size, "height": size})
+    return SceneObject("table", mesh, Diffuse((0.8, 0.8, 0.8)), matrix)
 
 
 def _vec3(vector: np.ndarray) -> tuple[float, float, float]:

@@ -202,6 +202,14 @@ def _read_heights(table: SceneTable, key: str) -> Any:
     return [list(row) for row in table.rows(key, len(value[0]))]
 
 
+def make_shape(shape: str, **parameters: Any) -> Mesh:
+    """The mesh of a shape of the scene file, saved by that description. Raises UserError for impossible sizes."""
+    recipe = {"shape": shape} | parameters
+    mesh = _make_shape(recipe)
+    note_recipe(mesh, recipe)
+    return mesh
+
+
 def _make_shape(recipe: dict[str, Any]) -> Mesh:
     arguments = {key: value for key, value in recipe.items() if key not in ("shape", "part")}
     shape = recipe["shape"]

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from app.errors import UserError
 from app.model.mesh import Mesh
 from app.model.mesh_recipes import recipe_of
 from app.model.scene import Camera, Light, Scene, SceneObject
@@ -40,9 +41,10 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     Meshes without a description go to PLY files in the folder `<stem>_meshes` beside it.
     Raises UserError when something cannot be written.
     """
-    from app.atomic import atomic_output
+    from app.atomic import atomic_output, check_writable
 
     path = Path(path)
+    check_writable(path)
     text = scene_text(scene, path)
     with atomic_output(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -168,7 +170,10 @@ def _mesh(mesh: Mesh, path: Path) -> dict[str, Any]:
     from app.model.mesh_io import save_ply
 
     folder = path.parent / f"{path.stem}_meshes"
-    folder.mkdir(exist_ok=True)
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise UserError(f"cannot write the meshes of {path}: {folder} cannot be made ({error.strerror}); choose another name") from error
     target = folder / f"{_file_stem(mesh)}.ply"
     save_ply(mesh, target)
     return {"mesh": _relative(str(target), path.parent)}

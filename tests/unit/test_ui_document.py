@@ -1,0 +1,211 @@
+"""Opening, saving, autosaving and recovering: nothing is lost and nobody's file is harmed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.errors import UserError
+from app.model.mesh_io import save_ply
+from app.model.primitives import sphere
+from app.model.scene import Dielectric, Scene
+from app.paths import assets_dir
+from app.ui.autosave import Autosave, recoveries
+from app.ui.document import Document
+
+SCENE = '[[objects]]\nshape = "box"\nname = "block"\nglass = "N-SF11"\n'
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "work" / "glass.toml"
+    path.parent.mkdir()
+    path.write_text(SCENE, encoding="utf-8")
+    return path
+
+
+def edited(document: Document, grey: float = 0.5) -> Scene:
+    scene = replace(document.scene, background_rgb=(grey, grey, grey))
+    document.history.push("Background", scene)
+    return scene
+
+
+# -- the document -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", [".toml", ".glb"])
+def test_save_as_and_reopen_gives_the_edited_scene(file: Path, suffix: str) -> None:
+    document = Document.open(file)
+    assert document.path == file and document.title == "glass.toml" and not document.unsaved
+    edited(document)
+    assert document.unsaved
+    target = document.save(file.with_name(f"other{suffix}"))
+    assert not document.unsaved and document.path == document.source == target and document.title == f"other{suffix}"
+    again = Document.open(target)
+    assert again.scene.background_rgb == (0.5, 0.5, 0.5)
+    assert [o.name for o in again.scene.objects] == [o.name for o in document.scene.objects]
+    assert again.scene.objects[0].material == document.scene.objects[0].material
+    assert file.read_text(encoding="utf-8") == SCENE
+
+
+def test_save_without_a_name_goes_back_and_undoing_it_is_unsaved(file: Path) -> None:
+    document = Document.open(file)
+    edited(document)
+    assert document.save() == file
+    assert Document.open(file).scene.background_rgb == (0.5, 0.5, 0.5)
+    document.history.undo()
+    assert document.unsaved
+
+
+@pytest.mark.parametrize("name", ["gone/scene.toml", "scene.png", "scene"])
+def test_a_failed_save_leaves_the_document_unsaved_and_where_it_was(file: Path, name: str) -> None:
+    document = Document.open(file)
+    edited(document)
+    with pytest.raises(UserError):
+        document.save(file.parent / name)
+    assert document.unsaved and document.path == file and file.read_text(encoding="utf-8") == SCENE
+
+
+def test_a_save_that_breaks_halfway_keeps_the_old_file(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from app.model import scene_save
+
+    document = Document.open(file)
+    edited(document)
+
+    def full(scene: Scene, path: Path) -> str:
+        raise UserError("the disk is full")
+
+    monkeypatch.setattr(scene_save, "scene_text", full)
+    with pytest.raises(UserError, match="full"):
+        document.save()
+    assert file.read_text(encoding="utf-8") == SCENE and document.unsaved
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_starting_points_are_never_written_back_to(tmp_path: Path) -> None:
+    save_ply(sphere(0.5), tmp_path / "ball.ply")
+    ball = Document.open(tmp_path / "ball.ply")
+    shipped = Document.open(assets_dir() / "scenes" / "ball.toml")
+    for document, title in ((ball, "ball"), (shipped, shipped.scene.name), (Document.new(), "untitled")):
+        assert document.path is None and document.title == title and not document.unsaved
+        with pytest.raises(UserError, match="no file yet"):
+            document.save()
+    assert ball.source == tmp_path / "ball.ply"
+    assert isinstance(ball.scene.objects[0].material, Dielectric) and len(ball.scene.objects) == 2
+
+
+def test_a_glb_keeps_what_is_not_ours(file: Path, tmp_path: Path) -> None:
+    import json
+
+    from app.model.gltf_document import open_document, save_document
+
+    glb = Document.open(file).save(tmp_path / "a.glb")
+    document = open_document(glb)
+    document.json["extras"] = {"studio": "somebody else's"}
+    save_document(document, glb)
+    opened = Document.open(glb)
+    edited(opened)
+    assert "somebody else's" in json.dumps(open_document(opened.save()).json)
+    edited(opened, 0.25)
+    assert "somebody else's" in json.dumps(open_document(opened.save(tmp_path / "b.glb")).json)
+
+
+# -- autosave -----------------------------------------------------------------------------
+
+
+class Clock:
+    """Seconds that pass when told to."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def test_autosave_waits_writes_aside_and_is_gone_after_a_clean_exit(file: Path, tmp_path: Path) -> None:
+    clock, config = Clock(), tmp_path / "config"
+    autosave = Autosave(config, 30.0, clock)
+    document = Document.open(file)
+
+    def update() -> None:
+        autosave.update(document.scene, document.title, document.source, document.unsaved)
+        autosave.wait()
+
+    update()
+    scene = edited(document)
+    clock.now = 29.0
+    update()
+    assert not autosave.path.exists()
+    clock.now = 31.0
+    update()
+    assert autosave.problem is None and autosave.path.is_file() and file.read_text(encoding="utf-8") == SCENE
+    assert recoveries(config) == ()  # this process lives
+    first = autosave.path.stat().st_mtime_ns
+    clock.now = 99.0
+    update()
+    assert autosave.path.stat().st_mtime_ns == first  # nothing changed since
+    edited(document, 0.6)
+    update()
+    assert autosave.path.stat().st_mtime_ns != first and scene is not document.scene
+    document.save()
+    update()
+    assert list((config / "autosave").iterdir()) == []
+    edited(document, 0.7)
+    clock.now = 200.0
+    update()
+    assert autosave.path.is_file()
+    autosave.close()
+    assert list((config / "autosave").iterdir()) == []
+
+
+def test_a_crash_leaves_a_recovery_and_recovering_belongs_to_the_old_file(file: Path, tmp_path: Path) -> None:
+    config = tmp_path / "config"
+    crash = f"""
+import os
+from dataclasses import replace
+from pathlib import Path
+from app.model.mesh import make_mesh
+from app.model.primitives import sphere
+from app.ui.autosave import Autosave
+from app.ui.document import Document
+document = Document.open(Path({str(file)!r}))
+ball = sphere(0.5)
+bare = make_mesh("scan", ball.vertices, ball.triangles, ball.corner_normals)
+item = replace(document.scene.objects[0], mesh=bare)
+scene = replace(document.scene, objects=(item, *document.scene.objects[1:]))
+Autosave(Path({str(config)!r})).write_now(scene, document.title, document.source)
+os._exit(1)
+"""
+    assert subprocess.run([sys.executable, "-c", crash], check=False, cwd=assets_dir().parent).returncode == 1
+    (recovery,) = recoveries(config)
+    assert recovery.original == file and recovery.note.title == "glass.toml"
+    document = Document.recovered(recovery.load(), recovery.original)
+    assert document.unsaved and document.path == file
+    mesh = document.scene.objects[0].mesh
+    np.testing.assert_allclose(np.linalg.norm(mesh.vertices, axis=1), 0.5, rtol=1e-5)
+    recovery.discard()
+    assert list((config / "autosave").iterdir()) == [] and recoveries(config) == ()
+
+
+def test_autosave_that_cannot_write_says_so_and_goes_on(tmp_path: Path, file: Path) -> None:
+    blocked = tmp_path / "config"
+    blocked.write_text("a file where the folder should be", encoding="utf-8")
+    autosave = Autosave(blocked)
+    autosave.write_now(Document.open(file).scene, "x", None)
+    assert autosave.problem is not None and "autosaved" in autosave.problem
+    autosave.close()
+    assert recoveries(blocked) == ()
+
+
+def test_damaged_notes_are_passed_over(tmp_path: Path) -> None:
+    folder = tmp_path / "autosave"
+    folder.mkdir()
+    (folder / "1_2.json").write_text("{", encoding="utf-8")
+    (folder / "3_4.json").write_text('{"pid": 3, "title": "t", "original": null, "saved_at": 1.0}', encoding="utf-8")
+    assert recoveries(tmp_path) == ()  # one is broken, the other has no scene
