@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from app.model.colorimetry import attenuation_from_colour, rgb_partition
+from app.model.colorimetry import rgb_partition
 from app.model.scene import Absorption, Dielectric, Vec3
+from app.ui import edits
 from app.ui.panels import widgets
-from app.ui.panels.glass_values import with_material
 from app.ui.state import State
 
 _FIRST_COLOUR, _FIRST_DISTANCE = (0.55, 0.85, 0.75), 1.0
@@ -38,14 +38,13 @@ def draw_absorption(state: State, index: int) -> State:
     tip = "Let the glass absorb light on the way through it (Beer–Lambert). Off: perfectly clear."
     changed, tinted = widgets.toggle("Tinted", material.absorption is not None, tip=tip)
     if changed:
-        absorption = _absorption(_look.rgb, _look.distance) if tinted else None
-        return with_material(state, index, replace(material, absorption=absorption), f"Tint of {item.name}")
+        return _tinted(state, index, _look.rgb if tinted else None, _look.distance)
     if material.absorption is None:
         return state
-    return _draw_colour(state, index, material, material.absorption)
+    return _draw_colour(state, index, material.absorption)
 
 
-def _draw_colour(state: State, index: int, material: Dielectric, absorption: Absorption) -> State:
+def _draw_colour(state: State, index: int, absorption: Absorption) -> State:
     described = colour_of(absorption)
     if described is None:
         widgets.hint("The absorption is a measured curve, which no colour describes.")
@@ -58,10 +57,7 @@ def _draw_colour(state: State, index: int, material: Dielectric, absorption: Abs
         "At a depth of", distance, 1e-4, 1e6, unit="units", tip=tip, reset=_FIRST_DISTANCE, format="%.3f", logarithmic=True
     )
     state = widgets.holding(state, colour_active or depth_active)
-    if not (colour_changed or depth_changed):
-        return state
-    tinted = replace(material, absorption=_absorption(rgb, distance))
-    return with_material(state, index, tinted, f"Tint of {state.scene.objects[index].name}")
+    return _tinted(state, index, rgb, distance) if colour_changed or depth_changed else state
 
 
 def colour_of(absorption: Absorption) -> tuple[Vec3, float] | None:
@@ -83,8 +79,15 @@ def colour_of(absorption: Absorption) -> tuple[Vec3, float] | None:
     return (r, g, b), distance
 
 
-def _absorption(rgb: Vec3, distance: float) -> Absorption:
-    held = tuple(min(max(c, 0.0), 1.0) for c in rgb)
-    coefficient = attenuation_from_colour(held, distance)
-    _look.coefficient, _look.rgb, _look.distance = coefficient, held, distance
-    return Absorption(coefficient)
+def _tinted(state: State, index: int, rgb: Vec3 | None, distance: float) -> State:
+    """Object `index` with that absorption, which is remembered as it was set."""
+    label = f"Tint of {state.scene.objects[index].name}"
+    if rgb is None:
+        return edits.attempt(state, label, edits.set_absorption, index, None)
+    r, g, b = (min(max(c, 0.0), 1.0) for c in rgb)
+    after = edits.attempt(state, label, edits.set_absorption, index, (r, g, b), distance)
+    material = after.scene.objects[index].material
+    is_done = after.scene is not state.scene
+    if is_done and isinstance(material, Dielectric) and material.absorption is not None:
+        _look.coefficient, _look.rgb, _look.distance = material.absorption.coefficient, (r, g, b), distance
+    return after

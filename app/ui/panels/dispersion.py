@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from imgui_bundle import ImVec2, imgui
@@ -12,7 +13,7 @@ from app.model import glass
 from app.model.glass import Dispersion
 from app.model.scene import Dielectric, SceneObject
 from app.model.scene_materials import MAX_PRIORITY
-from app.ui import theme
+from app.ui import edits, theme
 from app.ui.facts import Facts
 from app.ui.panels import widgets
 from app.ui.panels.absorption_rows import draw_absorption
@@ -24,11 +25,10 @@ from app.ui.panels.glass_values import (
     is_as_sold,
     lines_of,
     natural,
+    own_numbers,
     selected_glass,
     shown_name,
     with_abbe,
-    with_glass,
-    with_material,
 )
 from app.ui.panels.index_curve import draw_index_curve
 from app.ui.state import State
@@ -106,7 +106,7 @@ def _draw_buttons(state: State, facts: Facts, index: int) -> State:
     sold = as_sold(dispersion)
     tip = f"Back to {base_name(dispersion)} as the catalogue has it, without gain." if sold else "This glass is not from the catalogue."
     if widgets.button("As sold", tip=tip, enabled=sold is not None and not is_as_sold(dispersion)) and sold:
-        state = with_glass(state, index, sold, f"{sold.name} as sold")
+        state = edits.attempt(state, f"{sold.name} as sold", edits.set_dispersion, index, sold)
     state = _draw_clipboard(state, index)
     if imgui.begin_popup(POPUP):
         imgui.begin_child("picker", ImVec2(theme.em(46.0), theme.em(30.0)))
@@ -127,7 +127,7 @@ def _draw_clipboard(state: State, index: int) -> State:
     else:
         tip = "Copy the material of an object of glass first."
     if widgets.button("Paste material", tip=tip, enabled=isinstance(held, Dielectric)) and held is not None:
-        state = with_material(state, index, held, f"Paste material on {item.name}")
+        state = edits.attempt(state, f"Paste material on {item.name}", edits.set_material, index, held)
     return state
 
 
@@ -145,25 +145,24 @@ def _draw_numbers(state: State, facts: Facts, index: int) -> State:
     state = widgets.holding(state, active)
     if changed:
         state = _attempt(state, index, f"Dispersion gain of {item.name}", lambda: glass.with_gain(dispersion, gain))
-    material = natural(dispersion)
+    n_d, v_d = own_numbers(dispersion)
     tip = "Refractive index at the helium d line, 587.56 nm: how strongly light is bent. The Abbe number stays."
-    changed, n_d, active = widgets.slider(
-        "Index n_d", material.n_d, 1.0, 2.8, unit="", tip=tip, reset=sold.n_d if sold else None, format="%.5f", clamp=False
+    changed, new_n_d, active = widgets.slider(
+        "Index n_d", n_d, 1.0, 2.8, unit="", tip=tip, reset=sold.n_d if sold else None, format="%.5f", clamp=False
     )
     state = widgets.holding(state, active)
     if changed:
-        v_d = material.V_d
-        state = _attempt(state, index, f"n_d of {item.name}", lambda: with_abbe(dispersion, n_d, v_d))
+        state = _attempt(state, index, f"n_d of {item.name}", lambda: with_abbe(dispersion, new_n_d, v_d))
     tip = (
         "Abbe number (n_d − 1)/(n_F − n_C) of the glass before its gain: small is dispersive, 20 to 90 for glass. "
         "The slider is even in 1/V_d, so equal ways spread colours by equal amounts. Negative numbers (anomalous dispersion) can be typed."
     )
-    changed, v_d, active = widgets.reciprocal_slider(
-        "Abbe number V_d", material.V_d, 8.0, unit="", tip=tip, reset=sold.V_d if sold else None
+    changed, new_v_d, active = widgets.reciprocal_slider(
+        "Abbe number V_d", v_d, 8.0, unit="", tip=tip, reset=sold.V_d if sold else None
     )
     state = widgets.holding(state, active)
     if changed:
-        state = _attempt(state, index, f"Abbe number of {item.name}", lambda: with_abbe(dispersion, material.n_d, v_d))
+        state = _attempt(state, index, f"Abbe number of {item.name}", lambda: with_abbe(dispersion, n_d, new_v_d))
     if _look.refused:
         widgets.error(_look.refused)
     _draw_lines(state.scene.objects[index].material.dispersion)  # type: ignore[union-attr]
@@ -172,16 +171,16 @@ def _draw_numbers(state: State, facts: Facts, index: int) -> State:
     return state
 
 
-def _attempt(state: State, index: int, label: str, make) -> State:
+def _attempt(state: State, index: int, label: str, make: Callable[[], Dispersion]) -> State:
     """The state with the glass that `make()` gives; a refusal is kept to be shown."""
     try:
-        edited = with_glass(state, index, make(), label)
+        scene = edits.set_dispersion(state.scene, index, make())
     except UserError as refusal:
         text = str(refusal)
         _look.refused = text[:1].upper() + text[1:]
         return state
     _look.refused = ""
-    return edited
+    return state.edited(scene, label)
 
 
 def _draw_lines(dispersion: Dispersion) -> None:
@@ -223,4 +222,4 @@ def _draw_priority(state: State, index: int) -> State:
     rounded = math.floor(priority + 0.5)
     if not changed or rounded == material.priority:
         return state
-    return with_material(state, index, replace(material, priority=rounded), f"Priority of {item.name}")
+    return edits.attempt(state, f"Priority of {item.name}", edits.set_priority, index, rounded)

@@ -13,10 +13,11 @@ from imgui_bundle import ImVec2, imgui
 
 from app.model import catalogue, glass
 from app.model.catalogue import Entry
-from app.ui import item_rects, theme
+from app.model.scene import Scene
+from app.ui import edits, item_rects, theme
 from app.ui.facts import Facts
 from app.ui.panels import widgets
-from app.ui.panels.glass_values import abbe_text, selected_glass, with_glass
+from app.ui.panels.glass_values import abbe_text, selected_glass
 from app.ui.state import State
 
 POPUP = "Choose a glass"
@@ -59,13 +60,16 @@ def draw_glass_picker(state: State, facts: Facts) -> State:
 
 
 def apply_glass(state: State, entry: Entry) -> State:
-    """The selected object of that glass; its dispersion gain stays as it is."""
+    """The selected object of that glass; its dispersion gain stays as it is. A refusal becomes a notice."""
     selected = selected_glass(state)
     if selected is None:
         return state
     index, item, material = selected
-    chosen = glass.with_gain(entry.dispersion, material.dispersion.gain)
-    return with_glass(state, index, chosen, f"Glass of {item.name}: {entry.name}")
+
+    def edit(scene: Scene) -> Scene:
+        return edits.set_dispersion(scene, index, glass.with_gain(entry.dispersion, material.dispersion.gain))
+
+    return edits.attempt(state, f"Glass of {item.name}: {entry.name}", edit)
 
 
 @lru_cache(maxsize=64)

@@ -14,7 +14,8 @@ import numpy as np
 from app.errors import UserError
 from app.model import catalogue, glass
 from app.model.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM, Dispersion
-from app.model.scene import Dielectric, Material, Scene, SceneObject
+from app.model.scene import Dielectric, Scene, SceneObject
+from app.ui import edits
 from app.ui.state import State
 
 LINE_G_NM = 435.8343
@@ -24,6 +25,7 @@ CONTROL_NM = (380.0, 408.0, 440.0, LINE_F_NM, 530.0, LINE_D_NM, LINE_C_NM, 710.0
 """Where n(λ) can be taken hold of: the Fraunhofer lines F, d, C and six between and beyond them."""
 
 _EDITED, _SHAPED = " (edited)", " (shaped)"
+_SUFFIXES = (_EDITED, _SHAPED, " (drawn)")
 
 
 @dataclass(frozen=True)
@@ -63,17 +65,9 @@ def glasses_of(scene: Scene) -> list[tuple[int, SceneObject, Dielectric]]:
     return [(i, o, o.material) for i, o in enumerate(scene.objects) if isinstance(o.material, Dielectric)]
 
 
-def with_glass(state: State, index: int, dispersion: Dispersion, label: str) -> State:
-    """Object `index`, which must be of glass, made of another one; undone as `label`."""
-    material = state.scene.objects[index].material
-    return with_material(state, index, replace(material, dispersion=dispersion), label)
-
-
-def with_material(state: State, index: int, material: Material, label: str) -> State:
-    """Object `index` of another material; undone as `label`."""
-    objects = list(state.scene.objects)
-    objects[index] = replace(objects[index], material=material)
-    return state.edited(replace(state.scene, objects=tuple(objects)), label)
+def own_numbers(dispersion: Dispersion) -> tuple[float, float]:
+    """n_d and V_d of the material before its gain, such that `with_abbe` of them changes nothing."""
+    return edits.abbe_numbers(natural(dispersion))
 
 
 def natural(dispersion: Dispersion) -> Dispersion:
@@ -83,7 +77,10 @@ def natural(dispersion: Dispersion) -> Dispersion:
 
 def base_name(dispersion: Dispersion) -> str:
     """The name before it was edited or shaped."""
-    return dispersion.name.removesuffix(_EDITED).removesuffix(_SHAPED)
+    name = dispersion.name
+    for suffix in _SUFFIXES:
+        name = name.removesuffix(suffix)
+    return name
 
 
 def as_sold(dispersion: Dispersion) -> Dispersion | None:

@@ -10,7 +10,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui, implot
 from app.errors import UserError
 from app.model import glass
 from app.model.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM, Dispersion
-from app.ui import item_rects, theme
+from app.ui import edits, item_rects, theme
 from app.ui.facts import Facts
 from app.ui.panels import widgets
 from app.ui.panels.glass_values import (
@@ -18,9 +18,9 @@ from app.ui.panels.glass_values import (
     as_sold,
     natural,
     selected_glass,
-    with_glass,
     with_point,
 )
+from app.ui.panels.rows import begin_row
 from app.ui.panels.spectral_colour import colour_of_nm, draw_strip
 from app.ui.state import State
 
@@ -79,10 +79,12 @@ def _draw_reset(state: State, index: int, dispersion: Dispersion) -> State:
     sold = as_sold(dispersion)
     can_reset = sold is not None and natural(dispersion) != sold
     tip = f"Back to the curve of {sold.name}; the dispersion gain stays." if sold else "This glass is not from the catalogue."
+    begin_row("")
     if widgets.button("Reset curve", tip=tip, enabled=can_reset) and sold is not None:
         _look.refused = ""
         name = state.scene.objects[index].name
-        return with_glass(state, index, glass.with_gain(sold, dispersion.gain), f"Reset n(λ) of {name}")
+        natural_curve = glass.with_gain(sold, dispersion.gain)
+        return edits.attempt(state, f"Reset n(λ) of {name}", edits.set_dispersion, index, natural_curve)
     return state
 
 
@@ -188,11 +190,12 @@ def _moved(state: State, index: int, dispersion: Dispersion, at: int, area: _Are
     try:
         n = float(dispersion.index(CONTROL_NM[at])) + step
         shaped = with_point(dispersion, at, n, _look.keep_n_d)
+        scene = edits.set_dispersion(state.scene, index, shaped)
     except UserError as refusal:
         _look.refused = str(refusal)
         return state
     _look.refused = ""
-    return with_glass(state, index, shaped, f"Shape n(λ) of {state.scene.objects[index].name}")
+    return state.edited(scene, f"Shape n(λ) of {state.scene.objects[index].name}")
 
 
 def _draw_handle(pixel: ImVec2, nm: float, radius: float, is_fixed: bool, is_lit: bool) -> None:

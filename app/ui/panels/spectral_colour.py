@@ -17,7 +17,7 @@ _DIMMEST = 0.25
 def spectral_srgb() -> np.ndarray:
     """sRGB-encoded colours of 380, 381, … 780 nm: float64 (401, 3), read-only."""
     rgb = xyz_to_rgb709(cmf_xyz())
-    rgb = rgb - np.minimum(rgb.min(axis=1, keepdims=True), 0.0)
+    rgb = np.maximum(rgb, 0.0)
     rgb = rgb / rgb.max(axis=1, keepdims=True)
     rise = np.clip((VISIBLE_NM - 380.0) / 40.0, 0.0, 1.0)
     fall = np.clip((780.0 - VISIBLE_NM) / 90.0, 0.0, 1.0)
