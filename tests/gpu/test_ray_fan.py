@@ -1,0 +1,262 @@
+"""Single rays on the device against the float64 tracer, and the fan a teacher would draw."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.gpu import bindings
+from app.gpu.records import NONE
+from app.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, TRIANGLE, SceneBuffers
+from app.gpu.scene_texels import SceneTexels
+from app.light_half import spectral_axis
+from app.model import glass, primitives_round, spectrum
+from app.model.features import Features
+from app.model.mesh import make_mesh
+from app.model.scene import (
+    Black,
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Mirror,
+    Scene,
+    SceneObject,
+)
+from app.model.scene_file import load_scene
+from app.model.settings import RenderSettings
+from app.passes.ray_fan import RayFan
+from app.passes.ray_paths import RayPaths
+from app.truth import optics, tracer
+from app.truth.glsl_function import as_f32, evaluate
+from app.truth.tracer import Body, Index, TriangleList
+
+COVERS = {"surface.glsl": ("facing_geometric", "facing_normal", "reflected_direction", "refracted_direction", "surface_point")}
+SCENES = Path(__file__).parents[2] / "assets" / "scenes"
+LINES_NM = (440.0, 546.0, 640.0)
+WHITE = spectrum.illuminant("D65").scaled_to_luminous(1000.0)
+
+
+@contextmanager
+def tracing(gl, scene: Scene) -> Iterator[RayPaths]:
+    features = Features.of(scene, RenderSettings())
+    buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
+    paths = RayPaths(gl, buffers)
+    try:
+        yield paths
+    finally:
+        paths.release()
+        buffers.release()
+
+
+def truth_of(scene: Scene, origin: np.ndarray, direction: np.ndarray, nm: float) -> tuple[tracer.Path, TriangleList]:
+    """The same ray in float64."""
+    corners, material, normals, bodies = [], [], [], []
+    for item in scene.objects:
+        mesh = item.mesh.transformed(item.object_to_world)
+        corners.append(mesh.corners())
+        smooth = mesh.corner_normals is not None and not isinstance(item.material, Diffuse)
+        normals.append(mesh.corner_normals if smooth else np.zeros_like(corners[-1]))
+        kind = {Mirror: -2, Dielectric: len(bodies)}.get(type(item.material), -1)
+        material.append(np.full(len(corners[-1]), kind))
+        if isinstance(item.material, Dielectric):
+            bodies.append(Body(Index(float(item.material.dispersion.index(nm))), priority=item.material.priority))
+    world = TriangleList(np.concatenate(corners), np.concatenate(material), np.concatenate(normals))
+    ends = [Body(kind="mirror"), Body(kind="receiver")]
+    return tracer.follow(tracer.make_ray(origin, direction), world, [*bodies, *ends], max_depth=23), world
+
+
+@pytest.mark.parametrize("name, rays", [("prism", 5), ("achromat", 2), ("default", 5)])
+def test_rays_of_a_scene_follow_the_float64_path(gl, name: str, rays: int) -> None:
+    scene = load_scene(SCENES / f"{name}.toml")
+    with tracing(gl, scene) as paths:
+        fan = RayFan(gl, paths.scene, paths)
+        glasses = [i for i, item in enumerate(scene.objects) if isinstance(item.material, Dielectric)]
+        lines = fan.trace(None, glasses[0], rays, LINES_NM)
+    assert len(lines) == 3 * rays
+    assert [line.wavelength_nm for line in lines[:3]] == list(LINES_NM)
+    compared = 0
+    for line in lines:
+        path, _ = truth_of(scene, line.points[0], line.points[1] - line.points[0], line.wavelength_nm)
+        assert path.landed
+        if path.margin < 0.02:
+            continue  # so close to an edge or to total reflection float32 may choose otherwise
+        compared += 1
+        assert len(line.points) == len(path.triangles) + 1
+        assert line.points[-1] == pytest.approx(path.ray.position, abs=2e-4)
+    assert compared >= 2 * rays
+
+
+def test_a_prism_opens_the_fan_by_wavelength(gl) -> None:
+    scene = load_scene(SCENES / "prism.toml")
+    with tracing(gl, scene) as paths:
+        lines = RayFan(gl, paths.scene, paths).trace(0, 0, 3, LINES_NM)
+    assert all(len(line.points) == 4 for line in lines)  # in, out, onto the table
+    by_ray = np.array([[line.points for line in lines[3 * i : 3 * i + 3]] for i in range(3)])
+    assert np.ptp(by_ray[:, :, :2], axis=1) == pytest.approx(0.0, abs=1e-6)  # one ray up to the glass
+    middle, ends = by_ray[1, 1], by_ray[1, :, -1]
+    turned = optics.cross(middle[1] - middle[0], middle[-1] - middle[-2])[2]
+    spread = optics.cross(ends[0] - middle[2], ends[2] - middle[2])[2]
+    # Blue is bent more than red, to the side to which the prism bends all.
+    assert np.sign(turned) == -np.sign(spread)
+    assert np.linalg.norm(ends[0] - ends[2]) > 0.1
+
+
+def ball(radius: float, material, centre=(0.0, 0.0, 0.0)) -> SceneObject:
+    matrix = np.eye(4)
+    matrix[:3, 3] = centre
+    return SceneObject("ball", primitives_round.sphere(radius), material, matrix)
+
+
+def quad(half: float, z: float, material, name: str = "floor") -> SceneObject:
+    corners = np.array([[-half, -half, z], [half, -half, z], [half, half, z], [-half, half, z]])
+    return SceneObject(name, make_mesh(name, corners, np.array([[0, 1, 2], [0, 2, 3]])), material)
+
+
+CAMERA = Camera((0, -9, 3), (0, 0, 0))
+GLASS = Dielectric(glass.from_abbe(1.6, 30.0, "flint"))
+
+
+@pytest.mark.parametrize(
+    "light",
+    [
+        Light("lamp", "point", WHITE, position=(0.3, 0.2, 6.0)),
+        Light("sun", "directional", WHITE, direction=(0.2, 0.1, -0.97)),
+        Light("beam", "collimated", WHITE, position=(0.1, 0.0, 6.0), direction=(0.0, 0.0, -1.0), radius=0.4),
+        Light("slit", "collimated", WHITE, position=(0.1, 0.0, 6.0), direction=(0.0, 0.0, -1.0), shape="rectangle", width=0.1, height=3.0, tangent=(1, 0, 0)),
+        Light("spot", "spot", WHITE, position=(0.0, 0.0, 6.0), direction=(0.0, 0.0, -1.0), inner_half_angle_deg=5.0, outer_half_angle_deg=6.0),
+        Light("panel", "area", WHITE, position=(0.0, 0.0, 6.0), direction=(0.0, 0.0, -1.0), radius=0.3),
+    ],
+    ids=lambda light: light.name,
+)
+def test_every_kind_of_light_sends_its_rays_onto_the_object(gl, light: Light) -> None:
+    scene = Scene("test", CAMERA, (light,), (ball(1.0, GLASS), quad(9.0, -2.0, Diffuse())))
+    with tracing(gl, scene) as paths:
+        lines = RayFan(gl, paths.scene, paths).trace(0, 0, 7, [550.0])
+    assert lines
+    starts = np.array([line.points[0] for line in lines])
+    first = np.array([line.points[1] for line in lines])
+    # All meet the ball first, in one plane, and none twice the same way.
+    assert np.linalg.norm(first, axis=1) == pytest.approx(1.0, abs=0.01)
+    assert np.linalg.svd(first - first.mean(axis=0))[1][-1] < 1e-5
+    assert len(np.unique(first.round(4), axis=0)) == len(lines)
+    if light.kind == "collimated":
+        across = starts - np.asarray(light.position)
+        assert np.abs(across @ [1.0, 0.0, 0.0]).max() <= 0.5 * light.width if light.shape == "rectangle" else np.linalg.norm(across, axis=1).max() <= light.radius
+    if light.kind == "spot":
+        cosine = optics.unit(first - starts) @ np.array([0.0, 0.0, -1.0])
+        assert np.degrees(np.arccos(cosine)).max() <= light.outer_half_angle_deg
+
+
+def test_a_beam_that_passes_by_gives_nothing_and_the_brighter_light_is_taken(gl) -> None:
+    aside = Light("aside", "collimated", WHITE.scaled(100.0), position=(5.0, 0.0, 6.0), direction=(0, 0, -1), radius=0.5)
+    behind = Light("behind", "collimated", WHITE.scaled(100.0), position=(0.0, 0.0, -1.5), direction=(0, 0, -1), radius=0.5)
+    dim, bright = (Light(n, "directional", WHITE.scaled(s), direction=(0, 0, -1)) for n, s in (("dim", 1.0), ("bright", 3.0)))
+    scene = Scene("test", CAMERA, (aside, behind, dim, bright), (ball(1.0, GLASS), quad(9.0, -2.0, Diffuse())))
+    with tracing(gl, scene) as paths:
+        fan = RayFan(gl, paths.scene, paths)
+        assert fan.trace(0, 0, 5, LINES_NM) == []
+        assert fan.trace(1, 0, 5, LINES_NM) == []
+        assert fan.brightest_light(0) == 3
+        assert fan.trace(0, 0, 0, LINES_NM) == []
+
+
+def test_paths_end_where_they_should(gl) -> None:
+    """On black things, after a mirror, and a given way beyond the last surface."""
+    scene = Scene("test", CAMERA, (), (quad(2.0, 0.0, Mirror(), "mirror"), quad(0.5, 3.0, Black(), "stop"), ball(0.5, GLASS, (5.0, 0.0, 0.0))))
+    down, aslant = np.array([0.0, 0.0, -1.0]), optics.unit(np.array([0.6, 0.0, -0.8]))
+    with tracing(gl, scene) as paths:
+        bounced, missed = paths.trace(np.array([[0.2, 0.1, 2.0], [0.0, 0.0, 2.0]]), np.array([down, aslant]), np.full(2, 550.0), 4.0)
+    assert bounced.points == pytest.approx(np.array([[0.2, 0.1, 2.0], [0.2, 0.1, 0.0], [0.2, 0.1, 3.0]]), abs=1e-5)
+    assert (bounced.first_object, bounced.last_object) == (0, 1)
+    assert missed.points == pytest.approx(np.array([[0, 0, 2.0], [1.5, 0, 0], [3.9, 0, 3.2]]), abs=1e-5)
+    assert (missed.first_object, missed.last_object) == (0, None)
+    assert missed.first_normal == pytest.approx([0, 0, 1])
+
+
+def test_total_reflection_and_a_start_inside_glass(gl) -> None:
+    cube = SceneObject("cube", make_mesh("cube", *_box(1.0)), GLASS)
+    scene = Scene("test", CAMERA, (), (cube, quad(9.0, -4.0, Diffuse())))
+    start, slanting = np.array([0.95, 0.1, 0.0]), optics.unit(np.array([0.5, 0.0, -0.87]))
+    with tracing(gl, scene) as paths:
+        path = paths.trace(start[None], slanting[None], np.array([550.0]), 4.0)[0]
+    truth, _ = truth_of(scene, start, slanting, 550.0)
+    assert truth.reflections == (True, False)
+    assert path.points[-1] == pytest.approx(truth.ray.position, abs=1e-4)
+
+
+def _box(half: float) -> tuple[np.ndarray, np.ndarray]:
+    corners = half * np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return corners, np.array([t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))])
+
+
+def test_surface_functions_against_their_twins(gl) -> None:
+    """Flat and smooth facets, met from both sides, some at grazing incidence where shading normals mislead."""
+    rng = np.random.default_rng(8)
+    count = 2000
+    records = TRIANGLE.zeros(count)
+    for name in ("vertex", "edge1", "edge2"):
+        records[name] = rng.normal(size=(count, 3))
+    smooth = np.arange(count) % 3 > 0
+    records["normals"] = np.where(smooth, 3 * np.arange(count), NONE)
+    normal_g = optics.unit(np.cross(records["edge1"].astype(float), records["edge2"].astype(float)))
+    corner = optics.unit(normal_g[:, None] + 0.4 * rng.normal(size=(count, 3, 3)))
+    normals = np.zeros((3 * count, 4), np.float32)
+    normals[:, :3] = corner.reshape(-1, 3)
+    texels = SceneTexels(gl.ctx, {"TRIANGLES": records, "NORMALS": normals, "OBJECTS": OBJECT.zeros(1)})
+    inputs = {
+        "d": as_f32(optics.unit(rng.normal(size=(count, 3)))), "n_g": as_f32(normal_g), "bary": as_f32(rng.uniform(0.05, 0.45, (count, 2))),
+        "eta": as_f32(rng.choice([1 / 1.6, 1.6, 1.0], count)), "slot": np.arange(count, dtype=np.uint32),
+    }  # fmt: skip
+    body = """
+    Hit hit = Hit(1.0, slot, 0u, n_g, bary);
+    vec3 n = facing_normal(hit, d);
+    bool is_total;
+    facing = facing_geometric(hit, d);
+    shading = n;
+    mirrored = reflected_direction(hit, d, n);
+    bent = refracted_direction(hit, d, n, eta, is_total);
+    total = is_total ? 1u : 0u;
+    place = surface_point(hit, vec3(0.0), d);
+    """
+    outputs = {"facing": "vec3", "shading": "vec3", "mirrored": "vec3", "bent": "vec3", "total": "uint", "place": "vec3"}
+    defines = {**bindings.SCENE_DEFINES, **texels.defines, "TRIANGLE_COUNT": count, "SPECTRAL_SAMPLES": 2, "LOOSE_TRIANGLES": 1, "SMOOTH_NORMALS": 1}
+    got = evaluate(gl.ctx, ["lib/surface.glsl"], body, inputs, outputs, defines, SCENE_STRUCTS, binders=[texels.bind])
+    texels.release()
+
+    d, g, eta = inputs["d"], inputs["n_g"], inputs["eta"]
+    facing = np.where((optics.dot(d, g) < 0)[:, None], g, -g)
+    weights = np.column_stack([1 - inputs["bary"].sum(axis=1), inputs["bary"]])
+    shading = optics.unit(np.einsum("nc,ncj->nj", weights, normals.reshape(count, 3, 4)[..., :3].astype(float)))
+    shading = np.where((optics.dot(shading, facing) < 0)[:, None], -shading, shading)
+    shading = np.where((smooth & (optics.dot(d, shading) < -1e-4))[:, None], shading, facing)
+    cosine2 = optics.transmitted_cosine2(d, shading, eta)
+    clear = (np.abs(cosine2) > 1e-3) & (np.abs(optics.dot(d, facing)) > 1e-3) & (np.abs(optics.dot(d, shading)) > 1e-3)
+    mirrored = optics.reflect(d, shading)
+    by_geometry = optics.dot(mirrored, facing) <= 0
+    mirrored = np.where(by_geometry[:, None], optics.reflect(d, facing), mirrored)
+    bent = np.array([_bent(*row) for row in zip(d, shading, facing, eta, mirrored, strict=True)])
+    assert got["facing"] == pytest.approx(facing, abs=1e-6)
+    assert got["shading"][clear] == pytest.approx(shading[clear], abs=1e-5)
+    assert got["mirrored"][clear] == pytest.approx(mirrored[clear], abs=1e-4)
+    assert np.all(got["total"][clear & (cosine2 <= 0)] == 1)
+    close = np.linalg.norm(got["bent"] - bent, axis=1) < 2e-4
+    assert close[clear].mean() > 0.998  # at the seam between the two normals either may win
+    assert by_geometry[clear].sum() > 20 and (cosine2[clear] <= 0).sum() > 100
+    at = records["vertex"] + inputs["bary"][:, :1] * records["edge1"] + inputs["bary"][:, 1:] * records["edge2"]
+    assert got["place"] == pytest.approx(at, abs=1e-5)
+
+
+def _bent(d: np.ndarray, shading: np.ndarray, facing: np.ndarray, eta: float, mirrored: np.ndarray) -> np.ndarray:
+    if optics.transmitted_cosine2(d, shading, eta) <= 0:
+        return mirrored
+    bent = optics.refract(d, shading, eta)
+    if bent @ facing >= 0:
+        inside = optics.transmitted_cosine2(d, facing, eta) > 0
+        bent = optics.refract(d, facing, eta) if inside else optics.reflect(d, facing)
+    return bent
