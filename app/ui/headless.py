@@ -24,10 +24,14 @@ FRAME_S = 1 / 60
 """Time that passes on the interface's clock in a frame: fixed, so that runs repeat."""
 
 
+def _nothing() -> None:
+    pass
+
+
 class HeadlessInterface:
     """An interface of `size` pixels whose frame is `draw()`.
 
-    `prepare()` and `finished()` run before and after each frame, outside of imgui's; `preferences()`
+    `prepare()` runs before each frame, `rendered()` and `finished()` after it, outside of imgui's; `preferences()`
     tells the theme. A context manager; `release()` frees it. `items` tells where controls are.
     """
 
@@ -36,8 +40,9 @@ class HeadlessInterface:
         context: Context,
         draw: Callable[[], None],
         size: tuple[int, int] = (1280, 720),
-        prepare: Callable[[], None] | None = None,
-        finished: Callable[[], None] | None = None,
+        prepare: Callable[[], None] = _nothing,
+        rendered: Callable[[], None] = _nothing,
+        finished: Callable[[], None] = _nothing,
         preferences: Callable[[], Preferences] = Preferences,
     ) -> None:
         self.size = size
@@ -45,6 +50,7 @@ class HeadlessInterface:
         self._context = context
         self._draw = draw
         self._prepare = prepare
+        self._rendered = rendered
         self._finished = finished
         self._preferences = preferences
         self._host = ImguiHost()
@@ -76,8 +82,7 @@ class HeadlessInterface:
 
     def _one_frame(self) -> None:
         self._host.make_current()
-        if self._prepare is not None:
-            self._prepare()
+        self._prepare()
         theme.apply(self._preferences())
         imgui.get_io().delta_time = FRAME_S
         self.items.clear()
@@ -87,8 +92,8 @@ class HeadlessInterface:
         self._framebuffer.clear(0.0, 0.0, 0.0, 1.0)
         self._host.render()
         self._no_framebuffer.use()
-        if self._finished is not None:
-            self._finished()
+        self._rendered()
+        self._finished()
 
     def screenshot(self) -> np.ndarray:
         """The last frame, uint8 (height, width, 3), top row first."""

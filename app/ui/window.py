@@ -10,7 +10,6 @@ import ctypes
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, Self
 
@@ -24,23 +23,13 @@ from app.errors import UserError
 from app.gpu.context import GL_VERSION, GL_VERSION_CODE, Context
 from app.ui import theme
 from app.ui.imgui_host import ImguiHost
+from app.ui.preferences import WindowPlace
 from app.ui.state import Preferences
 
 SETTLE_FRAMES = 3
 """Frames drawn after an event before waiting again: imgui's layout and hovering need two."""
 MIN_SIDE = 320
 NO_DISPLAY = "there is no display to open a window on: 'spectrasplat render SCENE -o OUT.png' needs none"
-
-
-@dataclass(frozen=True)
-class WindowGeometry:
-    """Where the window is, in screen coordinates; None lets the system choose."""
-
-    width: int = 1440
-    height: int = 900
-    x: int | None = None
-    y: int | None = None
-    maximized: bool = False
 
 
 class Guest(Protocol):
@@ -51,6 +40,9 @@ class Guest(Protocol):
 
     def draw(self) -> None:
         """One frame, within imgui's."""
+
+    def rendered(self) -> None:
+        """The frame is drawn, and not yet on the screen."""
 
     def finished(self) -> None:
         """After the frame is on the screen."""
@@ -100,9 +92,9 @@ class Window:
     Raises `UserError` without a display or without OpenGL 4.3.
     """
 
-    def __init__(self, geometry: WindowGeometry | None = None, visible: bool = True) -> None:
-        geometry = geometry or WindowGeometry()
-        self._handle = _create(geometry, visible)
+    def __init__(self, place: WindowPlace | None = None, visible: bool = True) -> None:
+        place = place or WindowPlace()
+        self._handle = _create(place, visible)
         glfw.make_context_current(self._handle)
         self.context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=_Loader()), "window")
         # A GPU waits for the screen; on the processor waiting would be time taken from the photons.
@@ -131,14 +123,14 @@ class Window:
         glfw.terminate()
 
     @property
-    def geometry(self) -> WindowGeometry:
+    def place(self) -> WindowPlace:
         """To be remembered."""
         width, height = glfw.get_window_size(self._handle)
-        maximized = bool(glfw.get_window_attrib(self._handle, glfw.MAXIMIZED))
+        maximised = bool(glfw.get_window_attrib(self._handle, glfw.MAXIMIZED))
         if glfw.get_platform() == glfw.PLATFORM_WAYLAND:  # windows there do not know where they are
-            return WindowGeometry(width, height, maximized=maximized)
+            return WindowPlace(None, (width, height), maximised)
         x, y = glfw.get_window_pos(self._handle)
-        return WindowGeometry(width, height, x, y, maximized)
+        return WindowPlace((x, y), (width, height), maximised)
 
     @property
     def framebuffer_size(self) -> tuple[int, int]:
@@ -184,6 +176,9 @@ class Window:
         self._screen.viewport = (0, 0, *self.framebuffer_size)
         self._screen.clear(0.0, 0.0, 0.0, 1.0)
         self._host.render()
+        if self.context.is_software:
+            self.context.finish()
+        guest.rendered()
         glfw.swap_buffers(self._handle)
         guest.finished()
 
@@ -252,7 +247,7 @@ class Window:
         glfw.set_window_close_callback(self._handle, closing)
 
 
-def _create(geometry: WindowGeometry, visible: bool) -> object:
+def _create(place: WindowPlace, visible: bool) -> object:
     """A glfw window with an OpenGL 4.3 core context, or a `UserError`."""
     problems: list[str] = []
     glfw.set_error_callback(lambda _code, text: problems.append(text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)))
@@ -264,10 +259,10 @@ def _create(geometry: WindowGeometry, visible: bool) -> object:
     glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
     glfw.window_hint(glfw.VISIBLE, visible)
     glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
-    glfw.window_hint(glfw.MAXIMIZED, geometry.maximized)
+    glfw.window_hint(glfw.MAXIMIZED, place.maximised)
     glfw.window_hint(glfw.DEPTH_BITS, 0)
     glfw.window_hint(glfw.STENCIL_BITS, 0)
-    handle = glfw.create_window(geometry.width, geometry.height, "SpectraSplat", None, None)
+    handle = glfw.create_window(*place.size, "SpectraSplat", None, None)
     if not handle:
         glfw.terminate()
         wanted = f"{GL_VERSION[0]}.{GL_VERSION[1]}"
@@ -277,17 +272,17 @@ def _create(geometry: WindowGeometry, visible: bool) -> object:
         )
     if glfw.get_platform() != glfw.PLATFORM_NULL:  # which takes the least side for the height
         glfw.set_window_size_limits(handle, MIN_SIDE, MIN_SIDE, glfw.DONT_CARE, glfw.DONT_CARE)
-    if geometry.x is not None and geometry.y is not None and _is_on_a_screen(geometry):
-        glfw.set_window_pos(handle, geometry.x, geometry.y)
+    if place.position is not None and _is_on_a_screen(place.position, place.size[0]):
+        glfw.set_window_pos(handle, *place.position)
     return handle
 
 
-def _is_on_a_screen(geometry: WindowGeometry) -> bool:
+def _is_on_a_screen(position: tuple[int, int], window_width: int) -> bool:
     """Whether enough of the title bar can be reached: the screen of last time may be unplugged."""
+    x, y = position
     for monitor in glfw.get_monitors():
         left, top, width, height = glfw.get_monitor_workarea(monitor)
-        x, y = geometry.x or 0, geometry.y or 0
-        if left <= x + geometry.width - 80 and x + 80 <= left + width and top <= y <= top + height - 40:
+        if left <= x + window_width - 80 and x + 80 <= left + width and top <= y <= top + height - 40:
             return True
     return False
 

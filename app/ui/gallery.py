@@ -1,0 +1,160 @@
+"""The scenes of the start page with their thumbnails, which another process renders one by one.
+
+A thumbnail is kept in the config folder under a name made of the scene's content, so it is rendered once. The process
+runs at the lowest priority: neither its start nor a broken scene can hold up the interface.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app import __version__
+from app.ui.facts import SceneEntry
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from app.gpu.context import Context
+
+SIZE = (320, 180)
+PHOTONS = "400k"
+PATIENCE_S = 120.0
+FOLDER = "thumbnails"
+
+Render = Callable[[Path, Path], "subprocess.Popen[bytes]"]
+
+
+@dataclass
+class _Job:
+    index: int
+    process: subprocess.Popen[bytes]
+    part: Path
+    target: Path
+    started_s: float
+
+
+class Gallery:
+    """Owns the thumbnails' textures. `scenes`: name → file."""
+
+    def __init__(self, context: Context, config: Path, scenes: Mapping[str, Path], render: Render | None = None) -> None:
+        self._ctx = context.ctx
+        self._folder = config / FOLDER
+        self._render = render or _render
+        self._textures: list[moderngl.Texture] = []
+        self._job: _Job | None = None
+        self.entries = tuple(_entry(name, path) for name, path in scenes.items())
+        self._waiting = list(range(len(self.entries)))
+
+    @property
+    def is_busy(self) -> bool:
+        """A thumbnail is being rendered or read."""
+        return self._job is not None or bool(self._waiting)
+
+    def step(self) -> None:
+        """A little of the work, between frames: take what is finished, start the next."""
+        if self._job is not None:
+            self._look_after(self._job)
+        elif self._waiting:
+            index = self._waiting.pop(0)
+            target = self._thumbnail(self.entries[index].path)
+            if not self._show(index, target):
+                self._start(index, target)
+
+    def _start(self, index: int, target: Path) -> None:
+        part = target.with_suffix(".part.png")
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            process = self._render(self.entries[index].path, part)
+        except OSError:  # no thumbnail is no harm
+            return
+        self._job = _Job(index, process, part, target, time.monotonic())
+
+    def _look_after(self, job: _Job) -> None:
+        if job.process.poll() is None:
+            if time.monotonic() - job.started_s > PATIENCE_S:
+                self._stop(job)
+            return
+        self._job = None
+        with suppress(OSError):
+            if job.process.returncode == 0:
+                os.replace(job.part, job.target)
+                self._show(job.index, job.target)
+            else:
+                job.part.unlink(missing_ok=True)
+
+    def _stop(self, job: _Job) -> None:
+        job.process.kill()
+        job.process.wait()
+        self._job = None
+        with suppress(OSError):
+            job.part.unlink(missing_ok=True)
+
+    def _show(self, index: int, path: Path) -> bool:
+        """Put the picture at `path` into a texture; False when it is not there or broken."""
+        from PIL import Image
+
+        try:
+            with Image.open(path) as image:
+                rgba = image.convert("RGBA")
+        except (OSError, ValueError):
+            return False
+        texture = self._ctx.texture(rgba.size, 4, rgba.tobytes())
+        self._textures.append(texture)
+        entry = replace(self.entries[index], thumbnail=texture.glo, thumbnail_size=rgba.size)
+        self.entries = (*self.entries[:index], entry, *self.entries[index + 1 :])
+        return True
+
+    def _thumbnail(self, scene: Path) -> Path:
+        try:
+            content = scene.read_bytes()
+        except OSError:
+            content = b""
+        key = hashlib.sha256(f"{__version__} {SIZE} {PHOTONS}".encode() + content).hexdigest()[:16]
+        return self._folder / f"{scene.stem}-{key}.png"
+
+    def release(self) -> None:
+        """Free the textures and end the process."""
+        if self._job is not None:
+            self._stop(self._job)
+        for texture in self._textures:
+            texture.release()
+        self._textures.clear()
+        self._waiting.clear()
+
+
+def _entry(name: str, path: Path) -> SceneEntry:
+    """Title from the file's `name`, description from the comment it opens with."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        title = str(tomllib.loads(text).get("name", name))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return SceneEntry(path, name, "", None)
+    lines = []
+    for line in text.splitlines():
+        if not line.startswith("#"):
+            break
+        lines.append(line.removeprefix("#").strip())
+    return SceneEntry(path, title[:1].upper() + title[1:], " ".join(lines), None)
+
+
+def _render(scene: Path, output: Path) -> subprocess.Popen[bytes]:
+    """Start rendering a thumbnail."""
+    size = f"{SIZE[0]}x{SIZE[1]}"
+    command = [sys.executable, "-P", "-m", "app", "render", str(scene), "-o", str(output)]
+    command += ["--size", size, "--photons", PHOTONS, "--spp", "4"]
+    # One thread: the others belong to the window.
+    environment = os.environ | {"LP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
+    nice = {"preexec_fn": lambda: os.nice(19)} if os.name == "posix" else {}
+    return subprocess.Popen(
+        command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **nice
+    )  # fmt: skip

@@ -1,0 +1,206 @@
+"""The picture of the viewport: the engine's radiance, its exposure, and the 8-bit texture that is shown.
+
+The only part of the host that touches the device. When the engine fails it is given up, what went wrong is
+raised as `EngineError`, and `restart` makes a new one; the last picture stays.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from app.gpu.shader import ShaderError
+from app.live.stats import LiveStats
+from app.passes.display import Display
+from app.passes.sample_picture import SamplePicture
+from app.ui.auto_exposure import AutoExposure
+from app.ui.state import State
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from app.gpu.context import Context
+    from app.live.engine import LiveEngine
+
+
+class EngineError(RuntimeError):
+    """The engine stopped: a bug, or the device is lost. `__cause__` is what happened."""
+
+
+class Other(Protocol):
+    """What the picture is compared with."""
+
+    @property
+    def picture(self) -> moderngl.Texture | None:
+        """Radiance, as the engine's."""
+
+
+_SHADER_FILE = re.compile(r"\.(comp|vert|frag|glsl)\b")
+
+
+class LivePicture:
+    """Owns the engine and what shows its picture."""
+
+    def __init__(self, context: Context, make_engine: Callable[[Context], LiveEngine] | None = None) -> None:
+        self._context = context
+        self._make_engine = make_engine or _live_engine
+        self.engine: LiveEngine | None = self._make_engine(context)
+        self._display = Display(context)
+        self._replaced: list[Display] = []
+        self._sampler = SamplePicture(context)
+        self._exposure = AutoExposure()
+        self._size = (0, 0)
+        self._display_error: str | None = None
+        self.stats = LiveStats(renderer=context.renderer, is_software=context.is_software)
+        """The engine's, as of the last frame."""
+        self.shown: moderngl.Texture | None = None
+        """RGBA8, sRGB codes, row 0 on top."""
+        self.magnified: moderngl.Texture | None = None
+        self.exposure_ev = 0.0
+        self.display_s = 0.0
+
+    @property
+    def radiance(self) -> moderngl.Texture | None:
+        """The linear picture."""
+        return self.engine.picture if self.engine is not None else None
+
+    @property
+    def problem(self) -> str | None:
+        """Why the engine could not follow the last change; it shows what was before."""
+        return self.engine.problem if self.engine is not None else None
+
+    @property
+    def shader_error(self) -> str | None:
+        """A shader on disk that does not compile, with file and line; the last good programs go on."""
+        problem = self._display_error or self.problem
+        return problem if problem is not None and _SHADER_FILE.search(problem) else None
+
+    def resize(self, size: tuple[int, int]) -> None:
+        """Size of the shown texture from now on. Only between frames: imgui still draws the texture of the last call."""
+        self._size = size
+        for display in self._replaced:
+            display.release()
+        self._replaced.clear()
+
+    def restart(self) -> None:
+        """A new engine."""
+        if self.engine is not None:
+            with suppress(Exception):  # it may have failed, and the device with it
+                self.engine.release()
+        self.engine = None
+        self.engine = self._make_engine(self._context)
+
+    def reload_shaders(self) -> None:
+        """Compile from disk again, while the last good programs go on (`shader_error` tells what fails). Raises `EngineError`."""
+        if self.engine is None:
+            self.restart()
+            return
+        try:
+            display = Display(self._context)
+        except ShaderError as error:
+            self._display_error = str(error)
+            return
+        self._display_error = None
+        self._replaced.append(self._display)
+        self._display = display
+        with self._guarded():
+            self.engine.rebuild()
+
+    def new_scene(self) -> None:
+        """Another scene: its exposure is found at once."""
+        self._exposure.restart()
+
+    def advance(self, state: State, budget_s: float) -> None:
+        """Let the engine follow `state`. Raises `EngineError`."""
+        if self.engine is None:
+            return
+        with self._guarded():
+            self.engine.playing = state.playing
+            self.engine.target_photons = state.preferences.target_photons
+            self.engine.refine_when_still = state.preferences.refine_when_still
+            self.engine.set(state.live_inputs)
+            self.engine.advance(budget_s, state.interacting)
+            self.stats = self.engine.stats
+
+    def show(self, state: State, now_s: float, delta_s: float, other: Other | None = None) -> None:
+        """Develop the engine's picture for the screen."""
+        radiance = self.radiance
+        if radiance is None or min(self._size) < 1:
+            return
+        started = time.perf_counter()
+        self._expose(state, radiance, now_s, delta_s)
+        texture = other.picture if other is not None else None
+        self.shown = self._display.run(radiance, state.display, self.exposure_ev, self._size, texture, state.compare)
+        self.magnified = None
+        if state.display.magnifier and state.hover is not None:
+            pixel = pixel_of(state.hover, radiance.size)
+            self.magnified = self._display.magnify(radiance, pixel, state.display, self.exposure_ev)
+        self.display_s = time.perf_counter() - started
+
+    def _expose(self, state: State, radiance: moderngl.Texture, now_s: float, delta_s: float) -> None:
+        if not state.display.auto_exposure:
+            self.exposure_ev = state.display.exposure_ev
+            return
+        measured = self._exposure.follow(lambda: self._sampler.run(radiance), now_s, delta_s)
+        self.exposure_ev = measured + state.scene.render.exposure_ev
+
+    @property
+    def is_settling(self) -> bool:
+        """The exposure is still on its way."""
+        return self._exposure.is_moving
+
+    def pixel(self, place: tuple[float, float]) -> tuple[float, float, float] | None:
+        """Radiance at a place of the picture, 0..1 from the top left."""
+        radiance = self.radiance
+        if radiance is None:
+            return None
+        framebuffer = self._context.ctx.framebuffer([radiance])
+        data = framebuffer.read(viewport=(*pixel_of(place, radiance.size), 1, 1), components=3, dtype="f4")
+        framebuffer.release()
+        red, green, blue = (float(v) for v in np.frombuffer(data, np.float32))
+        return red, green, blue
+
+    def release(self) -> None:
+        """Free everything."""
+        if self.engine is not None:
+            with suppress(Exception):
+                self.engine.release()
+        self._display.release()
+        self._sampler.release()
+
+    def _guarded(self) -> _Guard:
+        return _Guard(self)
+
+
+class _Guard:
+    """Turns what an engine should never raise into `EngineError`, and gives the engine up."""
+
+    def __init__(self, owner: LivePicture) -> None:
+        self._owner = owner
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _trace: object) -> None:
+        if isinstance(error, Exception):
+            failed, self._owner.engine = self._owner.engine, None
+            if failed is not None:
+                with suppress(Exception):
+                    failed.release()
+            raise EngineError(str(error) or type(error).__name__) from error
+
+
+def pixel_of(place: tuple[float, float], size: tuple[int, int]) -> tuple[int, int]:
+    """Column and row (from the top) of a place 0..1 in a picture of `size`."""
+    return min(max(int(place[0] * size[0]), 0), size[0] - 1), min(max(int(place[1] * size[1]), 0), size[1] - 1)
+
+
+def _live_engine(context: Context) -> LiveEngine:
+    from app.live.engine import LiveEngine
+
+    return LiveEngine(context)

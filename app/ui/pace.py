@@ -1,0 +1,29 @@
+"""How long the engine may work in a frame so that input is answered in time, whatever else a frame costs."""
+
+from __future__ import annotations
+
+SOFTWARE_FRAME_S = 0.045
+"""A frame on the software renderer: within the 50 ms in which input must be answered, and above 15 Hz."""
+GPU_SHARE = 0.75
+"""Of the time between two pictures of the screen; the rest is the driver's and the window system's."""
+LEAST_SHARE = 0.25
+"""Of a frame that the engine always gets: a slow interface must not stop the light."""
+_SMOOTHING = 0.2
+
+
+class Pace:
+    """`budget_s` for the next frame, from what the last ones cost beside the engine."""
+
+    def __init__(self, is_software: bool, refresh_s: float = 1 / 60) -> None:
+        self.frame_s = SOFTWARE_FRAME_S if is_software else GPU_SHARE * refresh_s
+        self._besides_s = 0.0
+
+    @property
+    def budget_s(self) -> float:
+        """Seconds for the engine."""
+        return max(self.frame_s - self._besides_s, LEAST_SHARE * self.frame_s)
+
+    def note(self, besides_s: float) -> None:
+        """A frame took `besides_s` seconds beside the engine's work (without waiting for the screen)."""
+        # One long frame (a file was read) says nothing about the next.
+        self._besides_s += _SMOOTHING * (min(besides_s, self.frame_s) - self._besides_s)

@@ -1,0 +1,188 @@
+"""What the host does for each request: one short function a request, found by its type."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.errors import UserError
+from app.model.scene import Diffuse
+from app.model.scene_defaults import bounds_of
+from app.ui import camera_controls, requests
+from app.ui.caustic_source import source_at
+from app.ui.document import Document
+from app.ui.state import Selection
+
+if TYPE_CHECKING:
+    from app.ui.session import Session
+
+PICK_PHOTONS = 400_000
+"""Stored photons that are asked whose caustic lies at a point."""
+
+
+def carry_out(session: Session, request: requests.Request) -> None:
+    """Do what `request` says. Raises `UserError`, and NotImplementedError for one that nobody answers."""
+    handler = _HANDLERS.get(type(request))
+    if handler is None:
+        raise NotImplementedError(f"no answer to {type(request).__name__}")
+    handler(session, request)
+
+
+def _new_scene(session: Session, _request: requests.NewScene) -> None:
+    session.show_document(Document.new())
+
+
+def _open(session: Session, request: requests.Open) -> None:
+    session.show_document(Document.open(request.path))
+
+
+def _save(session: Session, request: requests.Save) -> None:
+    path = session.document.save(request.path)
+    session.settings = session.settings.opened(path)
+    session.messages.tell(f"Saved {path.name}.")
+
+
+def _undo(session: Session, _request: requests.Undo) -> None:
+    session.show_scene(session.document.history.undo())
+
+
+def _redo(session: Session, _request: requests.Redo) -> None:
+    session.show_scene(session.document.history.redo())
+
+
+def _go_to(session: Session, request: requests.GoTo) -> None:
+    session.show_scene(session.document.history.go_to(request.index))
+
+
+def _quit(session: Session, request: requests.Quit) -> None:
+    if session.document.unsaved and not request.discard:
+        session.asks_to_quit = True
+    else:
+        session.wants_to_close = True
+
+
+def _cancel_quit(session: Session, _request: requests.CancelQuit) -> None:
+    session.asks_to_quit = False
+
+
+def _recover(session: Session, request: requests.Recover) -> None:
+    recovery = session.recovery
+    if recovery is None:
+        return
+    if request.discard:
+        recovery.discard()
+        session.recovery = None
+        return
+    session.show_document(Document.recovered(recovery.load(), recovery.original))
+    # This session's own autosave covers the work from here on.
+    session.autosave.write_now(session.document.scene, session.document.title, session.document.source)
+    recovery.discard()
+    session.recovery = None
+    session.messages.tell(f"Recovered {recovery.note.title}. Save it to keep it.")
+
+
+def _select_at(session: Session, request: requests.SelectAt) -> None:
+    engine = session.picture.engine
+    hit = None if engine is None else engine.pick(request.x, request.y)
+    if hit is None:
+        session.state = replace(session.state, selection=Selection())
+        return
+    chosen = hit.object_index
+    if not request.itself and isinstance(session.state.scene.objects[chosen].material, Diffuse):
+        source = _source_at(session, np.asarray(hit.position), chosen)
+        chosen = chosen if source is None else source
+    session.state = replace(session.state, selection=Selection("object", chosen))
+
+
+def _source_at(session: Session, position: np.ndarray, receiver: int) -> int | None:
+    assert session.picture.engine is not None
+    photons = session.picture.engine.stored_photons(PICK_PHOTONS)
+    return source_at(position, receiver, photons.position, photons.flux_w, photons.source, photons.receiver)
+
+
+def _begin_pull(session: Session, request: requests.BeginPull) -> None:
+    from app.ui.session_pull import begin_pull_at
+
+    session.state = replace(session.state, pull=begin_pull_at(session, request))
+
+
+def _frame_selection(session: Session, _request: requests.FrameSelection) -> None:
+    state = session.state
+    chosen = list(state.scene.objects)
+    if state.selection.kind == "object":
+        chosen = [state.scene.objects[state.selection.index]]
+    elif state.selection.kind == "light":
+        position = np.asarray(state.scene.lights[state.selection.index].position, float)
+        session.state = replace(state, camera=_looking_at(state.camera, position))
+        return
+    if not chosen:
+        raise UserError("the scene is empty: there is nothing to frame")
+    low, high = bounds_of(chosen)
+    if state.selection.kind is None:
+        low, high = _without_endless_receivers(session, low, high)
+    width, height = state.viewport_size
+    session.state = replace(state, camera=camera_controls.frame(state.camera, low, high, width / height))
+
+
+def _looking_at(camera: camera_controls.Camera, position: np.ndarray) -> camera_controls.Camera:
+    x, y, z = (float(v) for v in position)
+    return replace(camera, target=(x, y, z))
+
+
+def _without_endless_receivers(session: Session, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The box of what is worth seeing: a table forty times as wide as the prism on it would make that a dot."""
+    interesting = [o for o in session.state.scene.objects if not isinstance(o.material, Diffuse)]
+    if not interesting:
+        return low, high
+    inner_low, inner_high = bounds_of(interesting)
+    room = 1.5 * float(np.linalg.norm(inner_high - inner_low))
+    return np.maximum(low, inner_low - room), np.minimum(high, inner_high + room)
+
+
+def _retrace(session: Session, _request: requests.Retrace) -> None:
+    if session.picture.engine is None:
+        session.picture.restart()
+    else:
+        session.picture.engine.retrace()
+
+
+def _reload_shaders(session: Session, _request: requests.ReloadShaders) -> None:
+    session.reload_shaders()
+
+
+def _copy_material(session: Session, request: requests.CopyMaterial) -> None:
+    thing = session.state.scene.objects[request.index]
+    session.state = replace(session.state, clipboard=thing.material)
+    session.messages.tell(f"Copied the material of {thing.name}.")
+
+
+def _notice(session: Session, request: requests.Notice) -> None:
+    session.messages.tell(request.text, request.is_error)
+
+
+def _dismiss(session: Session, request: requests.DismissMessage) -> None:
+    session.messages.close(request.text)
+
+
+_HANDLERS: dict[type, Callable] = {
+    requests.NewScene: _new_scene,
+    requests.Open: _open,
+    requests.Save: _save,
+    requests.Undo: _undo,
+    requests.Redo: _redo,
+    requests.GoTo: _go_to,
+    requests.Quit: _quit,
+    requests.CancelQuit: _cancel_quit,
+    requests.Recover: _recover,
+    requests.SelectAt: _select_at,
+    requests.BeginPull: _begin_pull,
+    requests.FrameSelection: _frame_selection,
+    requests.Retrace: _retrace,
+    requests.ReloadShaders: _reload_shaders,
+    requests.CopyMaterial: _copy_material,
+    requests.Notice: _notice,
+    requests.DismissMessage: _dismiss,
+}

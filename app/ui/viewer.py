@@ -1,0 +1,80 @@
+"""A session as a window or the headless interface shows it: draw function, pace, and nothing else."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.ui.headless import HeadlessInterface
+from app.ui.pace import Pace
+from app.ui.session import Draw, Session
+from app.ui.shell import draw_interface
+from app.ui.state import Preferences
+
+if TYPE_CHECKING:
+    from app.gpu.context import Context
+
+
+class Viewer:
+    """What a `Window` asks of its guest, answered by a `Session` (see `window.Guest`)."""
+
+    def __init__(self, session: Session, draw: Draw = draw_interface, refresh_s: float = 1 / 60) -> None:
+        self.session = session
+        self.pace = Pace(session.context.is_software, refresh_s)
+        self._draw = draw
+        self._drawn_at = 0.0
+
+    def prepare(self) -> None:
+        """Before a frame."""
+        self._drawn_at = time.perf_counter()
+        self.session.prepare()
+
+    def draw(self) -> None:
+        """One frame."""
+        self.session.frame(self._draw, self.pace.budget_s)
+
+    def rendered(self) -> None:
+        """imgui has drawn; the screen has not been waited for."""
+        self.pace.note(time.perf_counter() - self._drawn_at - self.session.engine_s)
+
+    def finished(self) -> None:
+        """The frame is on the screen."""
+        self.session.finished()
+
+    def wait_s(self) -> float:
+        """Seconds the window may sleep."""
+        return self.session.wait_s()
+
+    def drop(self, paths: list[Path]) -> None:
+        """Files were dropped."""
+        self.session.drop(paths)
+
+    def ask_to_close(self) -> None:
+        """The close button."""
+        self.session.ask_to_close()
+
+    @property
+    def preferences(self) -> Preferences:
+        """Theme and scale."""
+        return self.session.state.preferences
+
+    @property
+    def title(self) -> str:
+        """ "prism.toml* – SpectraSplat"."""
+        document = self.session.document
+        return f"{document.title}{'*' if document.unsaved else ''} – SpectraSplat"
+
+    @property
+    def wants_to_close(self) -> bool:
+        """The window may close."""
+        return self.session.wants_to_close
+
+
+def headless_viewer(context: Context, session: Session, size: tuple[int, int] = (1280, 720), draw: Draw = draw_interface) -> HeadlessInterface:
+    """`session` in a windowless interface of `size` pixels. The session stays the caller's to release."""
+    viewer = Viewer(session, draw)
+    return HeadlessInterface(
+        context, viewer.draw, size, prepare=viewer.prepare, rendered=viewer.rendered, finished=viewer.finished,
+        preferences=lambda: viewer.preferences,
+    )  # fmt: skip
