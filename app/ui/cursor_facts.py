@@ -9,7 +9,6 @@ import numpy as np
 
 from app.ui.facts import CursorFacts
 from app.ui.live_picture import LivePicture, pixel_of
-from app.ui.projection import View
 from app.ui.state import State
 
 if TYPE_CHECKING:
@@ -17,8 +16,6 @@ if TYPE_CHECKING:
 
 SPECTRUM_S = 0.1
 """Least time between two spectra: each reads stored photons."""
-SPECTRUM_RADIUS = 0.012
-"""Of the disc whose light is taken apart, share of the picture's height at that distance."""
 
 
 class Cursor:
@@ -68,7 +65,7 @@ class Cursor:
             if before is not None and before.object_index == self._hit.object_index:
                 self.facts = replace(self.facts, spectrum_nm=before.spectrum_nm, spectrum=before.spectrum)
             return
-        radius = SPECTRUM_RADIUS * View.of(state.camera, 1.0).height_at(self._hit.distance)
-        wavelengths, irradiance = picture.engine.caustic_spectrum(self._hit.object_index, np.asarray(self._hit.position, float), radius)
+        found = picture.engine.caustic_spectrum(self._hit.object_index, np.asarray(self._hit.position, float))
         self._spectrum_key, self._spectrum_s = key, now_s
-        self.facts = replace(self.facts, spectrum_nm=wavelengths, spectrum=irradiance)
+        if found is not None:
+            self.facts = replace(self.facts, spectrum_nm=found[0], spectrum=found[1])

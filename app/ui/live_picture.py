@@ -87,12 +87,16 @@ class LivePicture:
             display.release()
         self._replaced.clear()
 
+    def give_up(self) -> None:
+        """Do without an engine until `restart`; the last picture stays."""
+        failed, self.engine = self.engine, None
+        if failed is not None:
+            with suppress(Exception):  # it has failed, and perhaps the device with it
+                failed.release()
+
     def restart(self) -> None:
         """A new engine."""
-        if self.engine is not None:
-            with suppress(Exception):  # it may have failed, and the device with it
-                self.engine.release()
-        self.engine = None
+        self.give_up()
         self.engine = self._make_engine(self._context)
 
     def reload_shaders(self) -> None:
@@ -167,9 +171,7 @@ class LivePicture:
 
     def release(self) -> None:
         """Free everything."""
-        if self.engine is not None:
-            with suppress(Exception):
-                self.engine.release()
+        self.give_up()
         self._display.release()
         self._sampler.release()
 
@@ -188,10 +190,7 @@ class _Guard:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _trace: object) -> None:
         if isinstance(error, Exception):
-            failed, self._owner.engine = self._owner.engine, None
-            if failed is not None:
-                with suppress(Exception):
-                    failed.release()
+            self._owner.give_up()
             raise EngineError(str(error) or type(error).__name__) from error
 
 

@@ -161,17 +161,25 @@ class Session:
         try:
             self.picture.advance(self.state, budget_s)
         except EngineError as error:
-            self.save_from_crash("rendering", error)
-            self.messages.tell(f"The renderer stopped ({_brief(error)}). Your work is kept; press F5 to try again.", is_error=True)
+            self._renderer_stopped(error)
             return
-        self.engine_s = self._clock() - started
+        finally:
+            self.engine_s = self._clock() - started
         problem = self.picture.problem
         if problem is not None and problem != self._told and self.picture.shader_error is None:
             self.messages.tell(problem, is_error=True)
         self._told = problem
         now = self._clock()
-        self.picture.show(self.state, now, self.delta_s)
-        self.cursor.update(self.state, self.picture, now)
+        try:
+            self.picture.show(self.state, now, self.delta_s)
+            self.cursor.update(self.state, self.picture, now)
+        except Exception as error:  # a bug, or the device is lost
+            self.picture.give_up()
+            self._renderer_stopped(error)
+
+    def _renderer_stopped(self, error: Exception) -> None:
+        self.save_from_crash("rendering", error)
+        self.messages.tell(f"The renderer stopped ({_brief(error)}). Your work is kept; press F5 to try again.", is_error=True)
 
     # What requests use
 
@@ -205,8 +213,7 @@ class Session:
         try:
             self.picture.reload_shaders()
         except EngineError as error:
-            self.save_from_crash("reloading shaders", error)
-            self.messages.tell(f"The renderer stopped ({_brief(error)}). Your work is kept; press F5 to try again.", is_error=True)
+            self._renderer_stopped(error)
 
     def save_from_crash(self, doing: str, error: BaseException) -> None:
         """Write autosave and crash log."""
