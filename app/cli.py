@@ -108,6 +108,32 @@ def render(
 
 
 @app.command()
+def animate(
+    scene: SceneArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="A movie (.mp4), or a folder for numbered PNGs, which can be resumed.")],
+    turntable: Annotated[bool, typer.Option("--turntable", help="Turn the camera once about its target; what happens when nothing else is asked for.")] = False,
+    keys: Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Keys of any parameter: [[keys]] with time_s, parameter, value, interpolation.")] = None,
+    ranges: Annotated[list[str] | None, typer.Option("--set", metavar="P=A:B", help="Let a parameter go from A to B, for example objects.prism.dispersion_gain=0:3; may be repeated.")] = None,
+    frames: Annotated[Text, typer.Option(metavar="N", help="Pictures in all; default: 120, or as many as the keys last.")] = None,
+    fps: Annotated[Text, typer.Option(metavar="F", help="Pictures a second; default: 24.")] = None,
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: the scene's.")] = None,
+    photons: Annotated[Text, typer.Option(metavar="N", help="Photons of each traced frame; default: the scene's.")] = None,
+    spp: Annotated[Text, typer.Option(metavar="N", help="Camera samples a pixel; default: 16.")] = None,
+    exposure: Annotated[Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than is automatic in the first frame.")] = None,
+    seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers, the same for all frames; default: 1.")] = None,
+    method: Annotated[Text, typer.Option(metavar="NAME", help=f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the frames of another animation in the folder.")] = False,
+) -> None:
+    """Render an animation: a turntable, or any parameters over time."""
+    from app.cli_animate import AnimateRequest, animate_command
+
+    request = AnimateRequest(
+        scene, output, turntable, keys, tuple(ranges or ()), frames, fps, size, photons, spp, exposure, seed, method, overwrite
+    )
+    raise typer.Exit(animate_command(request))
+
+
+@app.command()
 def inspect(scene: SceneArgument) -> None:
     """Show what a scene holds, its glasses and mesh health, and which features its programs need."""
     from app.inspect_report import inspect_text

@@ -1,0 +1,247 @@
+"""Pictures of a stage that changes, frame after frame, keeping what stays: for animations and other work beside the window.
+
+Where only the camera moves, photons are traced once: caustic maps do not depend on it. Where light changes,
+every frame is traced anew with the same counters, and maps are fitted once to all frames, so that what
+stands still in the scene stands still in the pictures, to the bit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from app.gpu.context import Context
+from app.gpu.scene_buffers import GpuSpace, SceneBuffers
+from app.gpu.splat_tables import SplatTables
+from app.light_half import LightHalf, spectral_axis
+from app.light_plan import LightPlan
+from app.live.difference import redo
+from app.live.inputs import LiveInputs, Redo
+from app.live.light import solo
+from app.model.features import Features
+from app.model.glass import Dispersion
+from app.model.scene import Camera, Scene
+from app.model.settings import RenderSettings
+from app.model.spectral_tables import SpectralAxis
+from app.passes.eye import CausticMaps, EyePass
+from app.passes.pilot import Pilot
+from app.passes.trace import Band
+from app.ui.parameters import Stage
+
+DEFAULT_SAMPLES = 16
+"""Camera samples a pixel."""
+_SURVEYED = 5
+"""Frames whose pilots tell where maps are needed."""
+_WIDE_DEG = 150.0
+_LIGHT_SHARE = 0.8
+"""Of a frame's progress, where its light is traced."""
+
+
+@dataclass(frozen=True)
+class _Survey:
+    """What one frame needs: where its light landed and into how many sub-lattices it is divided."""
+
+    space: GpuSpace
+    pilots: tuple[Pilot, ...]
+    glasses: tuple[Dispersion, ...]
+    counts: dict[int, tuple[int, int]]
+    """Spectral bands and points of each light."""
+
+
+class _FramedLight(LightHalf):
+    """Maps and lattices fitted to several frames, so that neither changes from one to the next."""
+
+    surveys: Sequence[_Survey] = ()
+    view: Camera | None = None
+
+    def lay_out(self, camera: Camera) -> None:
+        """Maps for all landings, as `view` sees them."""
+        own = self.pilots
+        moved = [_moved(pilot, s.space, self.buffers.space) for s in self.surveys for pilot in s.pilots]
+        self.pilots = dict(enumerate([*own.values(), *moved]))
+        super().lay_out(self.view or camera)
+        self.pilots = own
+
+    def begin(self, photons: int, seed: int) -> None:
+        """As in `LightHalf`, with the finest division that any frame asks for."""
+        super().begin(photons, seed)
+        self.plans = [self._divided(plan) for plan in self.plans]
+        for plan in self.plans:
+            name = self.scene.lights[plan.index].name
+            self.stats.bands[name], self.stats.light_points[name] = len(plan.bands), plan.light_points
+        limits = {plan.index: [(b.x_lo, b.x_hi) for b in plan.bands] for plan in self.plans}
+        spans = [limits.get(i, [(0.0, 1.0)]) for i in range(len(self.scene.lights))]
+        if spans != self._spans:
+            self.tables.release()
+            channels = "xyz" if self.bin_edges_nm is None else self.bin_edges_nm.tolist()
+            spectra = [light.spectral_power for light in self.scene.lights]
+            self._tables = SplatTables.build(self.context.ctx, self.buffers.axis, spectra, self.reflectances, spans, channels)
+            self._spans = spans
+
+    def _divided(self, plan: LightPlan) -> LightPlan:
+        needs = [s.counts[plan.index] for s in self.surveys if plan.index in s.counts]
+        count = max([len(plan.bands), *(bands for bands, _ in needs)])
+        points = max([plan.light_points, *(points for _, points in needs)])
+        bands = plan.bands
+        if count > len(bands) and self.features.spectral_groups:
+            power = self.buffers.light_power[plan.index]
+            edges = np.linspace(bands[0].x_lo, bands[-1].x_hi, count + 1).tolist()
+            bands = tuple(Band(lo, hi, 0.5 * (lo + hi), float(power.band(lo, hi)[3])) for lo, hi in pairwise(edges))
+        return replace(plan, bands=bands, light_points=points)
+
+
+class FrameRenderer:
+    """Owns what frames share. Run `steps(stage)` to its end, then read."""
+
+    def __init__(self, context: Context, settings: RenderSettings, stages: Sequence[Stage]) -> None:
+        """`stages`: what will be asked for; maps and lattices are fitted to some of them.
+
+        Where light changes, `shader.keep_programs` on the context spares compiling every frame's programs."""
+        self._context = context
+        self._settings = settings
+        self._shown: LiveInputs | None = None
+        self._buffers: SceneBuffers | None = None
+        self.light: LightHalf | None = None
+        self._eye: EyePass | None = None
+        self._view, self._map_settings = _map_view([s.camera for s in stages], settings)
+        self._unsurveyed = self._distinct(stages)
+        self._surveys: list[_Survey] = []
+        self.traces = 0
+        """How often photons were traced."""
+
+    def steps(self, stage: Stage) -> Iterator[float]:
+        """Render a frame, pausing with the share done."""
+        yield from self._survey()
+        inputs = self._inputs(stage)
+        # A change of what is merely looked at may still concern the maps' records, so only a moved camera keeps the light.
+        if self._shown is None or redo(self._shown, self._shown, replace(inputs, camera=self._shown.camera)) != Redo.NOTHING:
+            yield from self._trace(stage)
+        self._shown = inputs
+        if self._settings.layer.startswith("map:"):
+            return
+        assert self.light is not None and self._eye is not None
+        light, settings = self.light, self._settings
+        maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
+        for share in self._eye.samples(stage.camera, settings.width, settings.height, settings.spp or DEFAULT_SAMPLES, 0, maps, settings.seed):
+            yield _LIGHT_SHARE + (1.0 - _LIGHT_SHARE) * share
+
+    def run(self, stage: Stage) -> np.ndarray:
+        """The whole frame at once: `rgb` of it."""
+        for _ in self.steps(stage):
+            pass
+        return self.rgb()
+
+    def rgb(self) -> np.ndarray:
+        """Linear Rec.709, float32 (H, W, 3), row 0 on top, of the last frame."""
+        assert self._eye is not None
+        return self._eye.read_rgb()
+
+    def spectral(self) -> tuple[np.ndarray, np.ndarray]:
+        """Radiance per bin (H, W, bins) and the bins' edges (nm), with `RenderSettings.bins`."""
+        assert self._eye is not None and self.light is not None and self.light.bin_edges_nm is not None
+        return self._eye.read_spectral(), self.light.bin_edges_nm
+
+    def release(self) -> None:
+        """Free everything but the context's programs."""
+        for owned in (self._eye, self.light, self._buffers):
+            if owned is not None:
+                owned.release()
+        self._eye = self.light = self._buffers = self._shown = None
+
+    def _inputs(self, stage: Stage) -> LiveInputs:
+        s = self._settings
+        return LiveInputs(stage.scene, stage.camera, s.width, s.height, s.method, s.smoothing, stage.solo_nm, s.local_gain, s.seed)
+
+    def _distinct(self, stages: Sequence[Stage]) -> list[Stage]:
+        """Stages, evenly spread, whose light differs; none where all share it, for then a frame's own pilot says everything."""
+        found: list[Stage] = []
+        for index in np.unique(np.linspace(0, len(stages) - 1, _SURVEYED).astype(int)):
+            new = self._inputs(stages[index])
+            old = [replace(self._inputs(s), camera=new.camera) for s in found]
+            if all(redo(o, o, new) != Redo.NOTHING for o in old):
+                found.append(stages[index])
+        return found if len(found) > 1 else []
+
+    def _survey(self) -> Iterator[float]:
+        while self._unsurveyed:
+            light, buffers = self._made(self._unsurveyed[0])
+            try:
+                for _ in light.preparing():
+                    yield 0.0
+                light.begin(self._photons(light.scene), self._settings.seed)
+                counts = {plan.index: (len(plan.bands), plan.light_points) for plan in light.plans}
+                self._surveys.append(_Survey(buffers.space, tuple(light.pilots.values()), buffers.axis.glasses, counts))
+            finally:
+                light.release()
+                buffers.release()
+            self._unsurveyed.pop(0)
+
+    def _trace(self, stage: Stage) -> Iterator[float]:
+        self.release()
+        self.light, self._buffers = light, buffers = self._made(stage)
+        light.surveys = self._surveys
+        for _ in light.preparing():
+            yield 0.0
+        photons = self._photons(stage.scene)
+        light.begin(photons, self._settings.seed)
+        for step in light.pass_steps(0, photons):
+            yield _LIGHT_SHARE * step.fraction
+        light.finish()
+        self.traces += 1
+        self._eye = EyePass(self._context, buffers, self._settings.layer, light.reflectances, light.bin_edges_nm)
+
+    def _photons(self, scene: Scene) -> int:
+        return self._settings.photons or scene.render.photons
+
+    def _axis(self, scene: Scene, features: Features) -> SpectralAxis:
+        """One axis for all frames: bands of equal places on it are then the same wavelengths in all."""
+        own = spectral_axis(scene, features)
+        glasses = [glass for survey in self._surveys for glass in survey.glasses]
+        return SpectralAxis.build(glasses) if own.glasses and glasses else own
+
+    def _made(self, stage: Stage) -> tuple[_FramedLight, SceneBuffers]:
+        scene = lit(stage)
+        features = Features.of(scene, self._map_settings)
+        buffers = SceneBuffers(self._context.ctx, scene, features, self._axis(scene, features))
+        light = _FramedLight(self._context, scene, self._map_settings, features, buffers)
+        light.view = self._view
+        return light, buffers
+
+
+def lit(stage: Stage) -> Scene:
+    """The scene as the camera of `stage` sees it, with the light of one wavelength only where it says so."""
+    lights = stage.scene.lights
+    if stage.solo_nm is not None:
+        lights = tuple(replace(light, spectral_power=solo(light.spectral_power, stage.solo_nm)) for light in lights)
+    return replace(stage.scene, camera=stage.camera, lights=lights)
+
+
+def _map_view(cameras: Sequence[Camera], settings: RenderSettings) -> tuple[Camera | None, RenderSettings]:
+    """The view that maps are fitted to, and the settings whose size belongs to it: a camera that moves
+    gets one that sees everything, with pixels as small as those of the nearest."""
+    first = cameras[0]
+    if settings.layer.startswith("map:") or all(camera == first for camera in cameras):
+        return None, settings
+    nearest = min(cameras, key=lambda c: np.linalg.norm(np.subtract(c.position, c.target)) * (c.vertical_extent if c.kind == "orthographic" else math.tan(math.radians(0.5 * c.vertical_fov_deg))))
+    if nearest.kind == "orthographic":
+        factor, view = 8.0, replace(nearest, vertical_extent=8.0 * nearest.vertical_extent)
+    else:
+        factor = math.tan(math.radians(0.5 * _WIDE_DEG)) / math.tan(math.radians(0.5 * nearest.vertical_fov_deg))
+        view = replace(nearest, vertical_fov_deg=max(_WIDE_DEG, nearest.vertical_fov_deg))
+        factor = max(factor, 1.0)
+    return view, replace(settings, width=round(factor * settings.width), height=round(factor * settings.height))
+
+
+def _moved(pilot: Pilot, old: GpuSpace, new: GpuSpace) -> Pilot:
+    """The pilot with its landings in another frame's GPU space."""
+
+    def moved(records: np.ndarray) -> np.ndarray:
+        records = records.copy()
+        records["position"] = new.to_gpu(old.to_world(records["position"].astype(float)))
+        return records
+
+    return replace(pilot, whole=moved(pilot.whole), spectral=[moved(r) for r in pilot.spectral], rim=[moved(r) for r in pilot.rim])
