@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
+    from app.model.glass import Dispersion
+
 _QUANTITY = {
     # kind: (photometric unit, radiometric unit) of Light.spectral_power; areas are in scene units
     "point": ("cd", "W/sr"),
@@ -121,7 +123,7 @@ def _glasses_table(glasses: list) -> Table:
         reach = "any wavelength" if math.isinf(high) else f"{low:g}–{high:g} nm"
         v_d = "∞ (no dispersion)" if math.isinf(glass.V_d) else f"{glass.V_d:.2f}"
         table.add_row(
-            glass.name or "(unnamed)",
+            (glass.name or "(unnamed)") + _gain_words(glass),
             f"{glass.n_d:.6f}",
             v_d,
             f"{float(glass.index(400.0)):.6f}",
@@ -164,6 +166,10 @@ def _compiled(scene: Scene) -> list[RenderableType]:
     return [table, f"{RecordSizes.of(features).words()} What each part costs in time: bench --features."]
 
 
+def _gain_words(glass: Dispersion) -> str:
+    return "" if glass.gain == 1.0 else f", {glass.gain:g} times as dispersive"
+
+
 # -- words --------------------------------------------------------------------------------
 
 
@@ -171,6 +177,7 @@ def describe_material(material: Material) -> str:
     """A material in a few words."""
     if isinstance(material, Dielectric):
         words = material.dispersion.name or f"glass of n_d {material.dispersion.n_d:.4f}"
+        words += _gain_words(material.dispersion)
         words += ", absorbing" if material.absorption is not None else ""
         return words + (f", priority {material.priority}" if material.priority else "")
     if isinstance(material, Diffuse):

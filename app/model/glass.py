@@ -66,7 +66,7 @@ class Dispersion:
         return float(formulas.evaluate(self.kind, self.coefficients, np.float64(d_um))[0])
 
     @cached_property
-    def V_d(self) -> float:  # noqa: N802  (the standard symbol)
+    def V_d(self) -> float:
         """Abbe number (n_d − 1)/(n_F − n_C): small = dispersive, inf = flat, < 0 = anomalous."""
         spread = float(self.index(LINE_F_NM) - self.index(LINE_C_NM))
         return math.inf if abs(spread) < 1e-12 else (self.n_d - 1.0) / spread
@@ -94,6 +94,8 @@ class Dispersion:
         told = [self.clamps_visible()] if self.clamps_visible() else []
         label = self.name or "the index"
         n = self.index(_CHECK_NM)
+        if self.gain != 1.0:
+            told.append(f"{label}: its dispersion is {self.gain:g} times that of the material (dispersion_gain), which nature does not offer.")
         if n.min() < 1.0:
             at = _CHECK_NM[int(n.argmin())]
             told.append(f"{label}: the index falls below 1 (n = {n.min():.6g} at {at:g} nm), which is legal but rare.")
@@ -107,7 +109,10 @@ class Dispersion:
         """The formula with its coefficients, for people (λ in µm)."""
         from app.model.formula_text import formula_text
 
-        return formula_text(self.kind, self.coefficients)
+        text = formula_text(self.kind, self.coefficients)
+        if self.gain == 1.0:
+            return text
+        return f"{text}\nand from it n_d + {self.gain:.10g} (n − n_d), n_d = {self.n_d:.10g}"
 
 
 _CHECK_NM = np.arange(380.0, 780.5, 1.0)

@@ -17,6 +17,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.model.gltf_document import GltfDocument, open_document
+from app.model.gltf_extras import read_node_dabs, read_scene_extras
 from app.model.gltf_materials import (
     DISPERSION,
     EXTRAS,
@@ -122,7 +123,8 @@ class _Reader:
             self.notes.append("No camera in the file: one that sees the objects was added.")
         name = self.document.path.stem
         notes = tuple(dict.fromkeys(self.notes))
-        return Scene(name, camera, lights, tuple(self.objects), notes=notes), self.origins
+        background, render = read_scene_extras(self.document)
+        return Scene(name, camera, lights, tuple(self.objects), background, render, notes), self.origins
 
     # -- structure ------------------------------------------------------------------------
 
@@ -205,7 +207,8 @@ class _Reader:
             name = self._unique(label)
             matrix = world.copy()
             matrix.setflags(write=False)
-            self.objects.append(SceneObject(name, mesh, material, matrix))
+            dabs = read_node_dabs(self.document, index, number, material)
+            self.objects.append(SceneObject(name, mesh, material, matrix, dabs))
             self.origins.objects[name] = (index, number)
 
     def _material(self, index: int | None) -> Material:

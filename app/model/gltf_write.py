@@ -18,6 +18,7 @@ import numpy as np
 from app.errors import UserError
 from app.model.gltf import LIGHTS, Origins, open_document, read_scene
 from app.model.gltf_document import GltfDocument, save_document
+from app.model.gltf_extras import write_node_dabs, write_scene_extras
 from app.model.gltf_materials import EXTRAS, write_gltf_material
 from app.model.mesh import Mesh
 from app.model.mesh_health import weld_map
@@ -71,8 +72,11 @@ class _Writer:
             self._update_node(node, new)
         for item in scene.objects:
             if item.name not in self.origins.objects:
-                self._add_node({"name": item.name, "mesh": self._mesh(item)}, item.object_to_world)
+                entry = {"name": item.name, "mesh": self._mesh(item)}
+                write_node_dabs(entry, {0: item.local_dispersion})
+                self._add_node(entry, item.object_to_world)
         self._lights(scene)
+        write_scene_extras(self.json, scene)
         if scene.camera != self.old_camera or self.origins.camera is None:
             self._camera(scene.camera)
         self._close_buffer()
@@ -105,7 +109,10 @@ class _Writer:
             # The node also carries something that stays: the moved parts get nodes of their own.
             for number, item in moved.items():
                 mesh = self._append("meshes", {"name": item.name, "primitives": [kept.pop(number)]})
-                self._add_node({"name": item.name, "mesh": mesh}, item.object_to_world)
+                own = {"name": item.name, "mesh": mesh}
+                write_node_dabs(own, {0: item.local_dispersion})
+                self._add_node(own, item.object_to_world)
+        write_node_dabs(entry, {at: new[names[number]].local_dispersion for at, number in enumerate(kept) if number in names})
         remaining = list(kept.values())
         if not remaining:
             del entry["mesh"]

@@ -7,6 +7,7 @@ value came from: a spectrum proportional to D65 is "D65" however it was made.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -90,6 +91,8 @@ def _describe_glass(material: Dielectric) -> dict[str, Any]:
 
 
 def _describe_dispersion(dispersion: Dispersion) -> dict[str, Any]:
+    if dispersion.gain != 1.0:
+        return _describe_dispersion(replace(dispersion, gain=1.0)) | {"dispersion_gain": dispersion.gain}
     from app.model import catalogue
 
     try:

@@ -21,7 +21,6 @@ from app.model.scene import (
     Dielectric,
     Diffuse,
     Light,
-    RenderDefaults,
     Scene,
     SceneObject,
 )
@@ -35,11 +34,10 @@ from app.model.scene_defaults import (
 from app.model.scene_lights import Surroundings, read_light
 from app.model.scene_materials import DEFAULT_GLASS, read_materials
 from app.model.scene_objects import MESH_SUFFIXES, ObjectReader, load_checked_mesh
+from app.model.scene_render import read_background, read_render
 from app.model.scene_table import SceneTable
 
 GLTF_SUFFIXES = (".glb", ".gltf")
-MAX_PICTURE_SIDE = 16384
-MAX_DEPTH = 4096
 
 
 def load_scene(path: str | os.PathLike[str]) -> Scene:
@@ -85,10 +83,8 @@ def _read_toml(path: Path) -> dict[str, Any]:
 def _scene_from_table(table: SceneTable) -> Scene:
     name = table.string("name", table.file.stem)
     table.string("units", "units")  # a label for people; every length is in it
-    background = table.numbers("background", (0.0, 0.0, 0.0), count=3)
-    if min(background) < 0.0:
-        table.fail("background", "must be three radiances of 0 or more")
-    render = _read_render(table.table("render"))
+    background = read_background(table)
+    render = read_render(table.table("render"))
     materials = read_materials(table)
     reader = ObjectReader(materials)
     objects = [item for entry in table.tables("objects") for item in reader.read(entry)]
@@ -103,7 +99,7 @@ def _scene_from_table(table: SceneTable) -> Scene:
     table.finish("a scene")
     if not (table.has("camera") or table.has("lights")):
         _add_table(objects, notes)
-    return Scene(name, camera, lights, tuple(objects), background, render, tuple(notes))  # type: ignore[arg-type]
+    return Scene(name, camera, lights, tuple(objects), background, render, tuple(notes))
 
 
 def _read_lights(table: SceneTable, around: Surroundings, notes: list[str]) -> tuple[Light, ...]:
@@ -141,25 +137,6 @@ def _read_camera(table: SceneTable, around: Surroundings, notes: list[str]) -> C
         camera = replace(camera, vertical_extent=extent)
     inner.finish(f"a camera of kind '{kind}'")
     return camera
-
-
-def _read_render(table: SceneTable | None) -> RenderDefaults:
-    defaults = RenderDefaults()
-    if table is None:
-        return defaults
-    width, height = table.numbers("size", (defaults.width, defaults.height), count=2)
-    for side in (width, height):
-        if side != int(side) or not 1 <= side <= MAX_PICTURE_SIDE:
-            table.fail("size", f"is {width:g} × {height:g} but each side must be 1 to {MAX_PICTURE_SIDE} whole pixels")
-    render = RenderDefaults(
-        width=int(width),
-        height=int(height),
-        photons=table.integer("photons", defaults.photons, at_least=1, at_most=10**12),
-        exposure_ev=table.number("exposure_ev", defaults.exposure_ev, at_least=-64.0, at_most=64.0),
-        max_depth=table.integer("max_depth", defaults.max_depth, at_least=1, at_most=MAX_DEPTH),
-    )
-    table.finish("[render]")
-    return render
 
 
 def _add_table(objects: list[SceneObject], notes: list[str]) -> None:

@@ -17,6 +17,7 @@ from app.model.spectrum import read_csv
 
 KINDS = ("glass", "mirror", "diffuse", "black")
 DEFAULT_GLASS = "N-BK7"
+GAIN = "dispersion_gain"
 MAX_PRIORITY = 1_000_000
 MAX_ATTENUATION = 1e15
 """Per scene unit; float32 holds it in any unit the renderer may choose."""
@@ -35,7 +36,7 @@ def read_object_material(table: SceneTable, named: dict[str, Material]) -> Mater
     """The material of one object: `glass = "…"`, `material = "NAME"`, `material = {…}` or the default glass.
 
     "mirror", "diffuse" and "black" are known without being defined. The object's `priority`
-    goes above the material's own.
+    and `dispersion_gain` go above the material's own.
     """
     key = table.one_of(("glass", "material"), "the material")
     if key == "material" and isinstance(table.raw(key), str):
@@ -51,6 +52,10 @@ def read_object_material(table: SceneTable, named: dict[str, Material]) -> Mater
         material = read_material(inner)
     else:
         material = Dielectric(_catalogue(table, key or "", table.string("glass", DEFAULT_GLASS)))
+    if table.has(GAIN):
+        if not isinstance(material, Dielectric):
+            table.fail(GAIN, "is for glass; this object has none")
+        material = replace(material, dispersion=_with_gain(table, material.dispersion))
     if table.has("priority"):
         if not isinstance(material, Dielectric):
             table.fail("priority", "decides between overlapping solids of glass; this object has none")
@@ -106,6 +111,15 @@ def _rgb_under_white(reflectance: np.ndarray) -> tuple[float, float, float]:
 
 
 def _read_dispersion(table: SceneTable) -> Dispersion:
+    dispersion = _read_index(table)
+    return _with_gain(table, dispersion) if table.has(GAIN) else dispersion
+
+
+def _with_gain(table: SceneTable, dispersion: Dispersion) -> Dispersion:
+    return glass.with_gain(dispersion, table.number(GAIN, at_least=0.0), table.where(GAIN))
+
+
+def _read_index(table: SceneTable) -> Dispersion:
     key = table.one_of(_INDEX_KEYS, "the refractive index")
     if key is None:
         if table.has("V_d"):

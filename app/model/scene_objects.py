@@ -16,6 +16,7 @@ from app.model.mesh import Mesh
 from app.model.mesh_recipes import note_recipe
 from app.model.placement import read_placement
 from app.model.scene import Dielectric, Material, SceneObject
+from app.model.scene_dabs import read_dabs
 from app.model.scene_materials import read_object_material
 from app.model.scene_table import SceneTable
 
@@ -39,10 +40,11 @@ class ObjectReader:
         mesh = self._read_mesh(table, solid=isinstance(material, Dielectric))
         base = read_placement(table)
         rest = table.number("rests_at_z", None)
+        painted = read_dabs(table, material)
         placed: list[SceneObject] = []
         if not table.has("instances"):
             name = self._unique_name(table, mesh.name)
-            placed.append(SceneObject(name, mesh, material, _rested(mesh, base, rest)))
+            placed.append(SceneObject(name, mesh, material, _rested(mesh, base, rest), painted))
         else:
             entries = table.tables("instances")
             if not entries:
@@ -51,8 +53,9 @@ class ObjectReader:
             for i, entry in enumerate(entries):
                 label = self._unique_name(entry, f"{name} {i + 1}")
                 matrix = _rested(mesh, read_placement(entry) @ base, rest)
+                more = read_dabs(entry, material)
                 entry.finish("an instance")
-                placed.append(SceneObject(label, mesh, material, matrix))
+                placed.append(SceneObject(label, mesh, material, matrix, painted + more))
         table.finish("this object")
         return placed
 

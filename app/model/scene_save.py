@@ -19,7 +19,9 @@ import numpy as np
 from app.errors import UserError
 from app.model.mesh import Mesh
 from app.model.mesh_recipes import recipe_of
-from app.model.scene import Camera, Light, Scene, SceneObject
+from app.model.scene import Camera, Light, RenderDefaults, Scene, SceneObject
+from app.model.scene_dabs import KEY as DABS
+from app.model.scene_dabs import describe_dabs
 from app.model.scene_describe import describe_material, describe_spectrum
 from app.model.scene_objects import INLINE
 
@@ -54,18 +56,7 @@ def scene_text(scene: Scene, path: Path) -> str:
     """The TOML text of `scene` as it would stand in `path`; writes PLY files where it must."""
     parts = [_block("", {"name": scene.name, "background": list(scene.background_rgb)})]
     parts.append(_block("[camera]", _camera(scene.camera)))
-    render = scene.render
-    parts.append(
-        _block(
-            "[render]",
-            {
-                "size": [render.width, render.height],
-                "photons": render.photons,
-                "exposure_ev": render.exposure_ev,
-                "max_depth": render.max_depth,
-            },
-        )
-    )
+    parts.append(_block("[render]", render_values(scene.render)))
     parts += [_block("[[lights]]", light_values(light)) for light in scene.lights]
     materials: dict[str, dict[str, Any]] = {}
     objects = [
@@ -88,6 +79,16 @@ def _camera(camera: Camera) -> dict[str, Any]:
     if camera.kind == "pinhole":
         return values | {"vertical_fov_deg": camera.vertical_fov_deg}
     return values | {"vertical_extent": camera.vertical_extent}
+
+
+def render_values(render: RenderDefaults) -> dict[str, Any]:
+    """The [render] table of a scene file."""
+    return {
+        "size": [render.width, render.height],
+        "photons": render.photons,
+        "exposure_ev": render.exposure_ev,
+        "max_depth": render.max_depth,
+    }
 
 
 def light_values(light: Light) -> dict[str, Any]:
@@ -130,10 +131,15 @@ def _objects(group: list[SceneObject], materials: dict[str, dict[str, Any]], pat
     values: dict[str, Any] = {"name": first.name} if len(group) == 1 else {}
     values |= _mesh(first.mesh, path) | _material(first, materials)
     if len(group) > 1:
-        values["instances"] = [{"name": item.name, "matrix": _matrix(item)} for item in group]
-    elif not np.array_equal(first.object_to_world, np.eye(4)):
+        values["instances"] = [{"name": item.name, "matrix": _matrix(item)} | _dabs(item) for item in group]
+        return values
+    if not np.array_equal(first.object_to_world, np.eye(4)):
         values["matrix"] = _matrix(first)
-    return values
+    return values | _dabs(first)
+
+
+def _dabs(item: SceneObject) -> dict[str, Any]:
+    return {DABS: describe_dabs(item.local_dispersion)} if item.local_dispersion else {}
 
 
 def _matrix(item: SceneObject) -> list[float]:

@@ -48,7 +48,7 @@ class SpectralAxis:
     @classmethod
     def build(cls, dispersions: Sequence[Dispersion]) -> SpectralAxis:
         """The axis for all materials of a scene; non-dispersive and repeated ones do not count."""
-        seen = {(d.kind, d.coefficients, d.range_nm): d for d in dispersions if d.is_dispersive}
+        seen = {(d.kind, d.coefficients, d.range_nm, d.gain): d for d in dispersions if d.is_dispersive}
         glasses = tuple(seen.values())
         if not glasses:
             return cls((), (), _HI_NM - _LO_NM, 1.0, False)

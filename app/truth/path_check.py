@@ -59,7 +59,7 @@ class ReferenceScene:
 
     def bodies(self, nm: float, index_of: IndexOf | None = None) -> list[Body]:
         """All materials at one wavelength, by default with the indices of the reference's own glasses."""
-        index_of = index_of or (lambda glass: glass.n_d if glass.kind == "constant" else float(glasses.index(glass.name, nm)))
+        index_of = index_of or (lambda glass: _own_index(glass, nm))
         found = []
         for item in self.objects:
             match item.material:
@@ -111,3 +111,11 @@ def shifted_indices(photons: Photons, group: int, nm: float, step: float) -> Ind
         return float(glasses.index(glass.name, moved_nm)) + added
 
     return index_of
+
+
+def _own_index(glass: Dispersion, nm: float) -> float:
+    """n of a scene's glass by the reference's own data, its dispersion scaled about the d line as the scene asks."""
+    if glass.kind == "constant":
+        return glass.n_d
+    n, n_d = (float(glasses.index(glass.name, each)) for each in (nm, glasses.D_NM))
+    return n_d + glass.gain * (n - n_d)

@@ -25,11 +25,11 @@ from app.model.scene import (
     Vec3,
 )
 from app.model.scene_checks import check_lines, check_outside, check_scene
+from app.model.scene_dabs import MAX_DAB_LOG2
 from app.ui import matrices
 from app.ui.edit_adding import beside
 from app.ui.names import checked_name, free_name
 
-MAX_DAB_LOG2 = 60.0
 MAX_LENGTH = 1e30
 """As in a scene file: float32 ends at 3e38."""
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from app.errors import UserError
 from app.model.scene import Camera, RenderDefaults, Scene, Vec3
-from app.model.scene_file import MAX_DEPTH, MAX_PICTURE_SIDE
+from app.model.scene_render import MAX_DEPTH, MAX_PICTURE_SIDE
 from app.ui.edit_adding import RECEIVERS, SHAPES, add_object
 from app.ui.edit_glass import (
     abbe_numbers,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -228,3 +229,70 @@ def test_plot_is_a_picture_and_refuses_other_names(tmp_path) -> None:  # noqa: A
     with pytest.raises(UserError, match="must end in .png"):
         glass_report.plot(catalogue.find_entry("N-BK7"), tmp_path / "plot.jpg")
     assert [p.name for p in tmp_path.iterdir()] == ["plot.png"]
+
+
+# -- gain of the dispersion -----------------------------------------------------------------
+
+
+def test_a_gain_scales_n_about_the_d_line_and_is_told() -> None:
+    plain = catalogue.find("N-SF11")
+    strong = glass.with_gain(plain, 3.0)
+    nm = np.linspace(380.0, 780.0, 101)
+    np.testing.assert_allclose(strong.index(nm) - plain.n_d, 3.0 * (plain.index(nm) - plain.n_d), rtol=1e-12)
+    np.testing.assert_allclose(strong.derivative(nm), 3.0 * plain.derivative(nm), rtol=1e-14)
+    assert strong.n_d == plain.n_d and strong.V_d == pytest.approx(plain.V_d / 3.0)
+    assert strong != plain and glass.with_gain(strong, 1.0) == plain
+    assert "3 (n" in strong.formula_text() and "3 (n" not in plain.formula_text()
+    assert any("3 times" in note for note in strong.notes()) and plain.notes() == []
+    assert not glass.with_gain(plain, 0.0).is_dispersive
+
+
+@pytest.mark.parametrize("gain", [-1.0, math.nan, math.inf, 1e4])
+def test_an_impossible_gain_is_refused(gain: float) -> None:
+    with pytest.raises(UserError, match="block: "):
+        glass.with_gain(catalogue.find("N-SF11"), gain, "block")
+
+
+def test_distinct_gains_are_distinct_glasses_to_the_renderer() -> None:
+    from app.gpu.scene_buffers import Groups
+    from app.model import primitives
+    from app.model.features import Features, dispersive_materials
+    from app.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
+    from app.model.scene_defaults import default_light
+    from app.model.settings import RenderSettings
+    from app.model.spectral_tables import SpectralAxis
+    from app.truth.photon_reference import scene_key
+
+    def scene(*gains: float) -> Scene:
+        plain = catalogue.find("N-SF11")
+        balls = [SceneObject(f"ball {i}", primitives.box(), Dielectric(glass.with_gain(plain, gain))) for i, gain in enumerate(gains)]
+        floor = SceneObject("floor", primitives.plane(), Diffuse())
+        return Scene("s", Camera((0, -3, 1), (0, 0, 0)), (default_light(),), (*balls, floor))
+
+    two = scene(1.0, 2.0)
+    assert dispersive_materials(two) == [0, 1] and dispersive_materials(scene(2.0, 2.0)) == [0]
+    features = Features.of(two, RenderSettings())
+    assert Groups.of(two, features).glasses == tuple(o.material.dispersion for o in two.objects[:2])
+    axis = SpectralAxis.build(Groups.of(two, features).glasses)
+    assert len(axis.glasses) == 2
+    one, three = (SpectralAxis.build([glass.with_gain(catalogue.find("N-SF11"), g)]).total for g in (1.0, 3.0))
+    assert three == pytest.approx(3.0 * one)
+    assert scene_key(scene(1.0), 8, 8, 4) != scene_key(scene(2.0), 8, 8, 4)
+
+
+def test_the_float64_references_follow_a_gain() -> None:
+    from app.model import primitives
+    from app.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
+    from app.model.scene_defaults import default_light
+    from app.truth.path_check import ReferenceScene
+    from app.truth.photon_scene import TABLE_NM, photon_scene
+
+    item = SceneObject("box", primitives.box(), Dielectric(glass.with_gain(catalogue.find("N-BK7"), 2.5)))
+    floor = SceneObject("floor", primitives.plane(), Diffuse())
+    named = replace(item.material.dispersion, name="N-BK7")
+    item = replace(item, material=Dielectric(named))
+    reference = ReferenceScene.of([item, floor])
+    for nm in (400.0, 587.56, 700.0):
+        assert reference.bodies(nm)[0].index.n == pytest.approx(float(item.material.dispersion.index(nm)), rel=1e-6)
+    packed, _ = photon_scene(Scene("s", Camera((0, -3, 1), (0, 0, 0)), (default_light(),), (item, floor)))
+    np.testing.assert_allclose(packed.index[0], item.material.dispersion.index(TABLE_NM))

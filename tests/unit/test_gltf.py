@@ -24,10 +24,12 @@ from app.model.scene import (
     Absorption,
     Black,
     Camera,
+    Dab,
     Dielectric,
     Diffuse,
     Light,
     Mirror,
+    RenderDefaults,
     Scene,
     SceneObject,
 )
@@ -528,3 +530,81 @@ def test_save_refuses_other_suffixes_and_keeps_old_files(tmp_path: Path, monkeyp
     with pytest.raises(UserError, match="disk is full"):
         save_gltf(_rich_scene(), tmp_path / "a.glb")
     assert (tmp_path / "a.glb").read_bytes() == before and len(list(tmp_path.iterdir())) == 1
+
+
+# -- edited dispersion ----------------------------------------------------------------------
+
+
+def _painted_scene() -> Scene:
+    scene = _rich_scene()
+    objects = list(scene.objects)
+    strong = glass.with_gain(catalogue.find("N-SF11"), 3.0)
+    objects[0] = replace(objects[0], material=Dielectric(strong, objects[0].material.absorption, 3))
+    dabs = (Dab((0.1, 0.2, 0.0), 0.3, 1.25, 0.7), Dab((-0.3, 1 / 3, 0.0), 0.5, 0.0, 1.0, 0.5))
+    objects[-1] = replace(objects[-1], local_dispersion=dabs)
+    render = RenderDefaults(640, 360, 5_000, -0.5, 12)
+    return replace(scene, objects=tuple(objects), background_rgb=(0.1, 0.2, 0.3), render=render)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".gltf"])
+def test_gain_dabs_background_and_render_defaults_come_back_exactly(tmp_path: Path, suffix: str) -> None:
+    scene, path = _painted_scene(), tmp_path / f"a{suffix}"
+    save_gltf(scene, path)
+    again = load_gltf(path)
+    assert again.objects[0].material.dispersion == scene.objects[0].material.dispersion
+    assert again.objects[1].material.dispersion.gain == 1.0
+    assert [o.local_dispersion for o in again.objects] == [o.local_dispersion for o in scene.objects]
+    assert (again.background_rgb, again.render) == (scene.background_rgb, scene.render)
+
+
+def test_other_viewers_get_the_effective_abbe_number(tmp_path: Path) -> None:
+    save_gltf(_painted_scene(), tmp_path / "a.gltf")
+    materials = json.loads((tmp_path / "a.gltf").read_text())["materials"]
+    told = [m["extensions"]["KHR_materials_dispersion"]["dispersion"] for m in materials if "KHR_materials_dispersion" in m.get("extensions", {})]
+    plain = 20.0 / catalogue.find("N-SF11").V_d
+    assert told[:2] == [pytest.approx(3.0 * plain), pytest.approx(plain)]
+
+
+def test_painting_and_erasing_a_loaded_file_touches_only_its_node(tmp_path: Path) -> None:
+    save_gltf(_rich_scene(), tmp_path / "a.gltf")
+    before = json.loads((tmp_path / "a.gltf").read_text())
+    scene = load_gltf(tmp_path / "a.gltf")
+    painted = replace(scene.objects[-1], local_dispersion=(Dab((0.0, 0.0, 0.0), 1.0, 1.0),))
+    save_gltf(replace(scene, objects=(*scene.objects[:-1], painted)), tmp_path / "b.gltf", tmp_path / "a.gltf")
+    after = json.loads((tmp_path / "b.gltf").read_text())
+    changed = [a.get("name") for a, b in zip(after["nodes"], before["nodes"], strict=True) if a != b]
+    assert changed == ["floor"] and after["materials"] == before["materials"]
+    again = load_gltf(tmp_path / "b.gltf")
+    assert again.objects[-1].local_dispersion == painted.local_dispersion
+    save_gltf(scene, tmp_path / "c.gltf", tmp_path / "b.gltf")
+    assert json.loads((tmp_path / "c.gltf").read_text())["nodes"] == before["nodes"]
+
+
+def test_dabs_follow_their_primitive_when_others_leave_the_node(tmp_path: Path) -> None:
+    builder = Builder().tetrahedron({"name": "paint"})
+    mesh = builder.json["meshes"][0]
+    mesh["primitives"] = [dict(mesh["primitives"][0]) for _ in range(3)]
+    path = tmp_path / "a.gltf"
+    builder.json["buffers"] = [
+        {"byteLength": len(builder.data), "uri": "data:application/octet-stream;base64," + base64.b64encode(builder.data).decode()}
+    ]
+    path.write_text(json.dumps(builder.json))
+    scene = load_gltf(path)
+    _, second, third = scene.objects
+    dabs = [(Dab((float(i), 0.0, 0.0), 1.0, 1.0),) for i in range(3)]
+    moved = np.array(second.object_to_world)
+    moved[0, 3] += 5.0
+    objects = (replace(second, object_to_world=moved, local_dispersion=dabs[1]), replace(third, local_dispersion=dabs[2]))
+    save_gltf(replace(scene, objects=objects), tmp_path / "b.gltf", path)
+    again = {float(o.object_to_world[0, 3]): o.local_dispersion for o in load_gltf(tmp_path / "b.gltf").objects}
+    assert again == {5.0: dabs[1], 0.0: dabs[2]}
+
+
+def test_dabs_on_glass_in_a_glb_are_refused(tmp_path: Path) -> None:
+    save_gltf(_painted_scene(), tmp_path / "a.gltf")
+    values = json.loads((tmp_path / "a.gltf").read_text())
+    kept = next(n for n in values["nodes"] if n["name"] == "floor").pop("extras")
+    next(n for n in values["nodes"] if n["name"] == "ball")["extras"] = kept
+    (tmp_path / "a.gltf").write_text(json.dumps(values))
+    with pytest.raises(UserError, match=r"a\.gltf: nodes.*local_dispersion.*not diffuse"):
+        load_gltf(tmp_path / "a.gltf")

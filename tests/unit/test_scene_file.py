@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.errors import UserError
-from app.model.scene import Black, Dielectric, Diffuse, Mirror, Scene
+from app.model.scene import Black, Dab, Dielectric, Diffuse, Mirror, Scene
 from app.model.scene_checks import contains
 from app.model.scene_file import load_scene
 from app.model.scene_lights import spot_solid_angle_sr
@@ -359,3 +359,85 @@ def test_meshes_without_a_description_are_saved_as_triangles(tmp_path: Path) -> 
     assert again.objects[0].mesh.corner_normals is not None
     np.testing.assert_array_equal(again.objects[1].mesh.vertices, box().vertices)
     assert 'shape = "inline"' in saved.read_text()
+
+
+# -- edited dispersion ----------------------------------------------------------------------
+
+PAINTED = """
+[materials.strong]
+n_d = 1.6
+V_d = 30
+dispersion_gain = 2.5
+[[objects]]
+name = "ball"
+shape = "sphere"
+material = "strong"
+[[objects]]
+name = "sf11"
+shape = "sphere"
+glass = "N-SF11"
+dispersion_gain = 0.25
+position = [2, 0, 0]
+[[objects]]
+name = "stronger"
+shape = "sphere"
+material = "strong"
+dispersion_gain = 4
+position = [4, 0, 0]
+[[objects]]
+name = "wall"
+shape = "plane"
+material = "diffuse"
+position = [0, 0, -3]
+local_dispersion = [{position = [0.25, 0.1, 0.0], radius = 0.5, log2_gain = 1.5}, {position = [0, 0, 0], radius = 1, falloff = 0.2, erase = 0.75}]
+[[objects]]
+name = "tile"
+shape = "plane"
+material = "diffuse"
+local_dispersion = [{position = [0, 0, 0], radius = 1, log2_gain = -1}]
+instances = [{position = [0, 0, -4]}, {position = [0, 0, -5], local_dispersion = [{position = [0, 1, 0], radius = 2, log2_gain = 1}]}]
+"""
+
+
+def test_gain_and_dabs_are_read_and_saved(tmp_path: Path) -> None:
+    scene = load(tmp_path, PAINTED)
+    ball, sf11, stronger, wall, tile1, tile2 = scene.objects
+    assert [o.material.dispersion.gain for o in (ball, sf11, stronger)] == [2.5, 0.25, 4.0]
+    assert ball.material.dispersion.V_d == pytest.approx(12.0, rel=1e-3)
+    assert sf11.material.dispersion.n_d == pytest.approx(1.784720, abs=1e-6)
+    assert wall.local_dispersion == (Dab((0.25, 0.1, 0.0), 0.5, 1.5), Dab((0, 0, 0), 1.0, 0.0, 0.2, 0.75))
+    assert tile1.local_dispersion == (Dab((0, 0, 0), 1.0, -1.0),)
+    assert tile2.local_dispersion == (Dab((0, 0, 0), 1.0, -1.0), Dab((0, 1, 0), 2.0, 1.0))
+    assert any("2.5 times" in note for note in scene.notes)
+    save_scene(scene, tmp_path / "again.toml")
+    again = load_scene(tmp_path / "again.toml")
+    assert_same(scene, again)
+    assert [o.local_dispersion for o in again.objects] == [o.local_dispersion for o in scene.objects]
+    assert again.objects[4].mesh is again.objects[5].mesh
+
+
+PAINT = '[[objects]]\nshape = "plane"\nmaterial = "diffuse"\nlocal_dispersion = '
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("dispersion_gain = -1", "objects[0].dispersion_gain is -1 but must be at least 0"),
+        ("dispersion_gain = nan", "objects[0].dispersion_gain is nan but must be a finite number"),
+        ("dispersion_gain = 1000", "objects[0].dispersion_gain: the refractive index is"),
+        ("dispersion_gane = 2", "unknown key 'objects[0].dispersion_gane', did you mean 'dispersion_gain'?"),
+        ("local_dispersion = [{position = [0, 0, 0], radius = 1}]", "objects[0].local_dispersion is painted on what receives"),
+        ('[[objects]]\nshape = "plane"\nmaterial = "black"\ndispersion_gain = 2', "objects[1].dispersion_gain is for glass"),
+        ('[[objects]]\nshape = "plane"\nmaterial = {kind = "mirror", dispersion_gain = 2}', "unknown key 'objects[1].material.dispersion_gain'"),
+        (PAINT + "[{position = [0, 0, 0], radius = -1}]", "objects[1].local_dispersion[0].radius is -1 but must be above 0"),
+        (PAINT + "[{position = [0, 0, nan], radius = 1}]", "objects[1].local_dispersion[0].position[2] is nan"),
+        (PAINT + "[{position = [0, 0, 0]}]", "objects[1].local_dispersion[0].radius is missing"),
+        (PAINT + "[{position = [0, 0, 0], radius = 1, falloff = 2}]", "falloff is 2 but must be at most 1"),
+        (PAINT + "[{position = [0, 0, 0], radius = 1, erase = -1}]", "erase is -1 but must be at least 0"),
+        (PAINT + "[{position = [0, 0, 0], radius = 1, log2_gain = 99}]", "log2_gain is 99 but must be at most 60"),
+        (PAINT + "[{position = [0, 0, 0], radius = 1, strength = 2}]", "unknown key 'objects[1].local_dispersion[0].strength'"),
+        (PAINT + "[3]", "objects[1].local_dispersion must be a list of tables"),
+    ],
+)
+def test_mistakes_of_gain_and_dabs_have_their_sentence(tmp_path: Path, text: str, expected: str) -> None:
+    assert expected in refusal(tmp_path, THREE_LINES + text)
