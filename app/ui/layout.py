@@ -17,6 +17,11 @@ VIEWPORT = "Viewport"
 _DOCKSPACE = "SpectraSplat dock"
 _HOST = "##dock host"
 
+_TALL_EM = 50.0
+"""A window of more text heights than this has two rows of panels on the right, a lower one tabs only."""
+_SETTLED_AFTER = 4
+"""Frames until new windows have taken their places and the focus."""
+
 Place = Literal["left top", "left bottom", "right top", "right bottom", "bottom", "floating"]
 
 
@@ -40,8 +45,12 @@ def dockspace(windows: tuple[Docked, ...], bottom_margin: float) -> None:
     imgui.begin(_HOST, None, _BARE)
     imgui.pop_style_var(3)
     dock = imgui.get_id(_DOCKSPACE)
+    memory, built = imgui.get_state_storage(), imgui.get_id("built in frame")
     if imgui.internal.dock_builder_get_node(dock) is None:
         _build(dock, size, windows)
+        memory.set_int(built, imgui.get_frame_count())
+    elif memory.get_int(built, -9) == imgui.get_frame_count() - _SETTLED_AFTER:
+        _bring_to_front(windows)
     imgui.dock_space(dock)
     _hide_tab_of_picture()
     imgui.end()
@@ -73,7 +82,9 @@ def _build(dock: int, size: imgui.ImVec2, windows: tuple[Docked, ...]) -> None:
     # Side columns in text heights, so that labels fit at every scale; never more than their share of a small window.
     right = min(theme.em(24.0) / size.x, 0.30)
     nodes["right top"], rest = _split(dock, imgui.Dir.right, right)
-    nodes["right bottom"], nodes["right top"] = _split(nodes["right top"], imgui.Dir.down, 0.62)
+    nodes["right bottom"] = nodes["right top"]
+    if size.y > theme.em(_TALL_EM):
+        nodes["right bottom"], nodes["right top"] = _split(nodes["right top"], imgui.Dir.down, 0.6)
     left = min(theme.em(15.0) / (size.x * (1.0 - right)), 0.25)
     nodes["left top"], rest = _split(rest, imgui.Dir.left, left)
     nodes["left bottom"], nodes["left top"] = _split(nodes["left top"], imgui.Dir.down, 0.36)
@@ -83,6 +94,17 @@ def _build(dock: int, size: imgui.ImVec2, windows: tuple[Docked, ...]) -> None:
         if window.place != "floating":
             builder.dock_builder_dock_window(window.title, nodes[window.place])
     builder.dock_builder_finish(dock)
+
+
+def _bring_to_front(windows: tuple[Docked, ...]) -> None:
+    """Show the tab that matters of each place: all of them came to the front in turn as they appeared."""
+    done: set[int] = set()
+    for title in (*(listed.title for listed in windows), VIEWPORT):
+        window = imgui.internal.find_window_by_name(title)
+        node = None if window is None else window.dock_node
+        if window is not None and node is not None and node.id_ not in done:
+            done.add(node.id_)
+            imgui.internal.focus_window(window)
 
 
 def _split(node: int, direction: imgui.Dir, share: float) -> tuple[int, int]:

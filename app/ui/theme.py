@@ -137,6 +137,16 @@ def coloured(colour: Colour) -> Iterator[None]:
     imgui.pop_style_color()
 
 
+@contextmanager
+def chosen_rows() -> Iterator[None]:
+    """Draw chosen rows of lists in the accent colour."""
+    accent = palette().accent
+    imgui.push_style_color(imgui.Col_.header, (*accent[:3], 0.30))
+    imgui.push_style_color(imgui.Col_.header_hovered, (*accent[:3], 0.22))
+    yield
+    imgui.pop_style_color(2)
+
+
 def packed(colour: Colour, opacity: float = 1.0) -> int:
     """`colour` as a draw list takes it."""
     return imgui.color_convert_float4_to_u32((*colour[:3], colour[3] * opacity))
@@ -214,6 +224,7 @@ def _set_sizes(style: imgui.Style, scale: float) -> None:
     style.separator_text_border_size = 1.0
     style.separator_text_padding = imgui.ImVec2(0.0, 4.0 * scale)
     style.window_menu_button_position = imgui.Dir.none
+    style.docking_node_has_close_button = False
     style.hover_stationary_delay = 0.12
 
 
@@ -224,7 +235,6 @@ def _colours(chosen: Palette) -> dict[str, Colour]:
 
     frame, accent, text = chosen.frame, chosen.accent, chosen.text
     hovered, active = mixed(frame, text, 0.10), mixed(frame, text, 0.18)
-    chosen_row = mixed(chosen.window, accent, 0.32)
     clear = (0.0, 0.0, 0.0, 0.0)
     return {
         "text": text,
@@ -250,13 +260,13 @@ def _colours(chosen: Palette) -> dict[str, Colour]:
         "scrollbar_grab_active": mixed(chosen.window, text, 0.42),
         "check_mark": accent,
         "checkbox_selected_bg": frame,
-        "slider_grab": mixed(frame, text, 0.55),
+        "slider_grab": mixed(frame, text, 0.38),
         "slider_grab_active": accent,
         "button": frame,
         "button_hovered": hovered,
         "button_active": mixed(frame, accent, 0.55),
-        "header": chosen_row,
-        "header_hovered": mixed(chosen.window, text, 0.12),
+        "header": mixed(chosen.window, text, 0.11),
+        "header_hovered": mixed(chosen.window, text, 0.17),
         "header_active": mixed(chosen.window, accent, 0.42),
         "separator": chosen.border,
         "separator_hovered": accent,

@@ -1,0 +1,173 @@
+"""Place and material of the selection in numbers; the scene's own settings when nothing is selected."""
+
+from __future__ import annotations
+
+
+import numpy as np
+from imgui_bundle import imgui
+
+from app.model import catalogue
+from app.model.scene import Black, Dielectric, Diffuse, Material, Mirror, SceneObject, Vec3
+from app.ui import edits, theme
+from app.ui.facts import Facts
+from app.ui.panels import outliner, widgets
+from app.ui.state import State
+
+_KINDS: dict[str, type] = {"Glass": Dielectric, "Diffuse": Diffuse, "Mirror": Mirror, "Black": Black}
+_NEW_GLASS = "N-BK7"
+_UNITS = "scene units"
+
+_keeps_proportions = {"on": True}
+"""Whether the three scales move together: memory of the interface."""
+
+
+def draw_inspector(state: State, facts: Facts) -> State:
+    """Draw the panel's contents."""
+    selection = state.selection
+    if selection.kind == "object" and selection.index < len(state.scene.objects):
+        return _object(state, selection.index)
+    if selection.kind == "light" and selection.index < len(state.scene.lights):
+        from app.ui.panels.light_panel import draw_light
+
+        return draw_light(state, facts)
+    return _scene(state)
+
+
+def _object(state: State, index: int) -> State:
+    thing = state.scene.objects[index]
+    with theme.heading():
+        imgui.text_unformatted(f"{outliner.icon_of(thing)}  {thing.name}")
+    changed, name = widgets.text_field("Name", thing.name, tip="Name of the object; no two objects share one.")
+    if changed:
+        state = edits.attempt(state, f"Rename {thing.name}", edits.rename, index, name)
+    if widgets.section("Place"):
+        state = _place(state, index)
+    if widgets.section("Material"):
+        state = _material(state, index)
+    if widgets.section("Mesh", is_open=False):
+        _mesh(thing)
+    return state
+
+
+def _place(state: State, index: int) -> State:
+    thing = state.scene.objects[index]
+    position, rotation, scale = edits.decompose(thing.object_to_world)
+    moved, position, active = widgets.vec3("Position", position, unit=_UNITS, tip="Where the object's origin stands: x, y, z.", speed=_speed(thing))
+    if moved:
+        state = edits.attempt(state, f"Move {thing.name}", edits.set_position, index, position)
+    turned, rotation, turning = widgets.vec3(
+        "Rotation", rotation, unit="°", format="%.2f", speed=0.25, reset=(0.0, 0.0, 0.0),
+        tip="Angles about the world's x, then y, then z axis.",
+    )  # fmt: skip
+    if turned:
+        state = edits.attempt(state, f"Rotate {thing.name}", edits.set_rotation, index, rotation)
+    scaled, wanted, scaling = widgets.vec3(
+        "Scale", scale, unit="×", speed=0.005, reset=(1.0, 1.0, 1.0), tip="Factors along the object's own axes; a negative one mirrors."
+    )
+    if scaled:
+        factors = _in_proportion(scale, wanted) if _keeps_proportions["on"] else wanted
+        state = edits.attempt(state, f"Scale {thing.name}", edits.set_scale, index, factors)
+    _, _keeps_proportions["on"] = widgets.toggle(
+        "Keep proportions", _keeps_proportions["on"], tip="Changing one scale changes the other two by the same factor."
+    )
+    return widgets.holding(state, active or turning or scaling)
+
+
+def _speed(thing: SceneObject) -> float:
+    """Scene units a pixel: a drag across the field moves an object by about its own size."""
+    low, high = thing.mesh.bounds()
+    size = float(np.linalg.norm((high - low) * np.linalg.norm(thing.object_to_world[:3, :3], axis=0)))
+    return max(size / 400.0, 1e-6)
+
+
+def _in_proportion(before: Vec3, after: Vec3) -> Vec3:
+    """All three scales by the factor of the one that changed."""
+    changed = [i for i in range(3) if after[i] != before[i]]
+    if len(changed) != 1 or before[changed[0]] == 0.0:
+        return after
+    factor = after[changed[0]] / before[changed[0]]
+    return (before[0] * factor, before[1] * factor, before[2] * factor)
+
+
+def _material(state: State, index: int) -> State:
+    thing = state.scene.objects[index]
+    material = thing.material
+    kind = next(name for name, made in _KINDS.items() if isinstance(material, made))
+    changed, wanted = widgets.combo(
+        "Kind", tuple(_KINDS), kind, tip="Glass refracts, diffuse surfaces receive caustics, mirrors reflect, black absorbs."
+    )
+    if changed:
+        return edits.attempt(state, f"Make {thing.name} {wanted.lower()}", edits.set_material, index, _fresh(wanted))
+    if isinstance(material, Dielectric):
+        return _glass(state, material)
+    if isinstance(material, Diffuse | Mirror):
+        return _colour(state, index, material)
+    widgets.hint("Absorbs all light that meets it.")
+    return state
+
+
+def _fresh(kind: str) -> Material:
+    if kind == "Glass":
+        return Dielectric(catalogue.find(_NEW_GLASS))
+    return Diffuse() if kind == "Diffuse" else Mirror() if kind == "Mirror" else Black()
+
+
+def _glass(state: State, material: Dielectric) -> State:
+    dispersion = material.dispersion
+    widgets.read_out("Glass", dispersion.name or "unnamed", tip="Name of the glass. Its dispersion is edited in the Dispersion panel.")
+    number = f"{dispersion.V_d:.2f}" if np.isfinite(dispersion.V_d) else "none"
+    widgets.read_out("n_d, V_d", f"{dispersion.n_d:.5f}, {number}", tip="Index at 587.56 nm and Abbe number, gain included. No unit.")
+    if not state.preferences.panels.dispersion and widgets.button("Edit dispersion", tip="Open the Dispersion panel.", width=-1):
+        state = state.with_panels(dispersion=True)
+    return state
+
+
+def _colour(state: State, index: int, material: Diffuse | Mirror) -> State:
+    thing = state.scene.objects[index]
+    changed, rgb, active = widgets.colour("Reflectance", material.reflectance_rgb, tip="Share of light reflected, linear Rec.709, 0 to 1.")
+    if isinstance(material, Diffuse) and material.reflectance is not None:
+        widgets.hint("A measured spectral reflectance is in use; choosing a colour replaces it.")
+    if changed:
+        clipped = (min(max(rgb[0], 0.0), 1.0), min(max(rgb[1], 0.0), 1.0), min(max(rgb[2], 0.0), 1.0))
+        state = edits.attempt(state, f"Colour of {thing.name}", edits.set_diffuse_colour, index, clipped)
+    if thing.local_dispersion:
+        widgets.note(f"{len(thing.local_dispersion)} dabs of the dispersion brush lie here. Not physical.")
+    return widgets.holding(state, active)
+
+
+def _mesh(thing: SceneObject) -> None:
+    mesh = thing.mesh
+    low, high = mesh.bounds()
+    size = np.abs(high - low) * np.linalg.norm(thing.object_to_world[:3, :3], axis=0)
+    widgets.read_out("Shape", mesh.name or "mesh", tip="Shape, or the name in the file it came from.")
+    widgets.read_out("Triangles", f"{len(mesh.triangles):,}", tip="Number of triangles.")
+    widgets.read_out("Vertices", f"{len(mesh.vertices):,}", tip="Number of vertices, welded.")
+    widgets.read_out("Size", " × ".join(f"{s:.3g}" for s in size), tip="Extent along its own axes, scene units.")
+    widgets.read_out("Closed", "yes" if mesh.is_closed else "no", tip="Glass must be closed: light needs an inside.")
+
+
+def _scene(state: State) -> State:
+    scene = state.scene
+    with theme.heading():
+        imgui.text_unformatted(scene.name)
+    widgets.hint("Select an object or a light to edit it: click it in the picture or in the outliner.")
+    if widgets.section("Scene"):
+        triangles = sum(len(thing.mesh.triangles) for thing in scene.objects)
+        widgets.read_out("Objects", str(len(scene.objects)), tip="Number of objects.")
+        widgets.read_out("Lights", str(len(scene.lights)), tip="Number of lights.")
+        widgets.read_out("Triangles", f"{triangles:,}", tip="Triangles of all objects.")
+        changed, rgb, active = widgets.colour("Background", scene.background_rgb, tip="Radiance behind everything, lm/(sr unit²). Lights nothing.")
+        if changed:
+            state = edits.attempt(state, "Background", edits.set_background, rgb)
+        state = widgets.holding(state, active)
+        depth_changed, depth, active = widgets.slider(
+            "Longest path", scene.render.max_depth, 1, 64, unit="events", format="%.0f", reset=64,
+            tip="Refractions and reflections after which a photon is given up.",
+        )  # fmt: skip
+        if depth_changed and round(depth) != scene.render.max_depth:
+            state = edits.attempt(state, "Longest path", edits.set_render_defaults, max_depth=round(depth))
+        state = widgets.holding(state, active)
+    if scene.notes and widgets.section("Notes"):
+        for note in scene.notes:
+            widgets.hint(note)
+    return state

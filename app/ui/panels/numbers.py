@@ -1,0 +1,34 @@
+"""Numbers as words of fixed width and sensible precision."""
+
+from __future__ import annotations
+
+
+def count(number: float) -> str:
+    """A count with a metric suffix: "1.25 M", "640"."""
+    for limit, divisor, suffix in ((1e3, 1.0, ""), (1e6, 1e3, " k"), (1e9, 1e6, " M"), (1e12, 1e9, " G")):
+        if abs(number) < 0.9995 * limit:
+            return f"{number:.0f}" if divisor == 1.0 else f"{number / divisor:.3g}{suffix}"
+    return f"{number / 1e12:.3g} T"
+
+
+def size(number: int) -> str:
+    """Bytes in binary units: "96 MiB"."""
+    value = float(number)
+    for suffix in ("B", "KiB", "MiB"):
+        if value < 1024:
+            return f"{value:.0f} {suffix}"
+        value /= 1024
+    return f"{value:.2f} GiB"
+
+
+def milliseconds(value: float) -> str:
+    """A duration in ms: "0.42 ms", "18.3 ms", "120 ms"."""
+    digits = 2 if value < 10 else 1 if value < 100 else 0
+    return f"{value:.{digits}f} ms"
+
+
+def percent(share: float) -> str:
+    """A share: "1.6 %", "0.02 %", "< 0.01 %"."""
+    if 0.0 < share < 1e-4:
+        return "< 0.01 %"
+    return f"{100 * share:.3g} %"

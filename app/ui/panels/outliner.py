@@ -1,0 +1,239 @@
+"""The list of lights and objects: click selects, double click frames, F2 renames, right click offers the rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from imgui_bundle import icons_fontawesome_6 as icons
+from imgui_bundle import imgui
+
+from app.model.scene import Black, Dielectric, Diffuse, Light, Material, SceneObject
+from app.model.scene_lights import KINDS
+from app.ui import edits, item_rects, theme
+from app.ui.facts import Facts
+from app.ui.panels import widgets
+from app.ui.requests import CopyMaterial, FrameSelection
+from app.ui.state import Selection, State
+
+_SEARCH_FROM = 12
+"""A scene of more things than this gets a search field."""
+
+_memory: dict[str, object] = {"renaming": None, "text": "", "search": ""}
+"""What is being typed: memory of the interface, no part of the state."""
+
+
+def draw_outliner(state: State, _facts: Facts) -> State:
+    """Draw the panel's contents."""
+    state = _toolbar(state)
+    wanted = str(_memory["search"]).strip().lower()
+    state = _group(state, "Lights", "light", state.scene.lights, wanted)
+    state = _group(state, "Objects", "object", state.scene.objects, wanted)
+    if imgui.is_window_hovered() and imgui.is_mouse_clicked(0) and not imgui.is_any_item_hovered():
+        state = replace(state, selection=Selection())
+    if _wants_rename(state):
+        _start_renaming(state, state.selection)
+    return state
+
+
+def draw_add_items(state: State) -> State:
+    """Menu items that add lights and objects to the scene and select what was added."""
+    if imgui.begin_menu(f"{icons.ICON_FA_LIGHTBULB}  Light"):
+        for kind in KINDS:
+            pressed, _ = imgui.menu_item(f"{kind.capitalize()}##light", "", False)
+            item_rects.note(f"Add {kind} light")
+            widgets.tooltip(_LIGHT_TIPS.get(kind, ""))
+            if pressed:
+                state = _added(state, Selection("light", len(state.scene.lights)), f"Add {kind} light", edits.add_light, kind)
+        imgui.end_menu()
+    item_rects.note("Add light")
+    for title, shapes in (("Glass", [s for s in edits.SHAPES if s not in edits.RECEIVERS]), ("Receiver", list(edits.RECEIVERS))):
+        icon = icons.ICON_FA_GEM if title == "Glass" else icons.ICON_FA_SQUARE
+        if imgui.begin_menu(f"{icon}  {title}"):
+            for shape in shapes:
+                words = shape.replace("_", " ")
+                pressed, _ = imgui.menu_item(f"{words.capitalize()}##shape", "", False)
+                item_rects.note(f"Add {words}")
+                widgets.tooltip(f"A {words} beside the other objects; lengths follow the scene.")
+                if pressed:
+                    state = _added(state, Selection("object", len(state.scene.objects)), f"Add {words}", edits.add_object, shape)
+            imgui.end_menu()
+        item_rects.note(f"Add {title.lower()}")
+    return state
+
+
+_LIGHT_TIPS = {
+    "point": "Shines alike in all directions (cd).",
+    "spot": "A point that shines into a cone (cd).",
+    "directional": "Sunlight: parallel, everywhere (lx).",
+    "collimated": "A beam with an edge (lx).",
+    "area": "A shining disc or rectangle (cd/unit²).",
+}
+
+
+def duplicate(state: State, selection: Selection) -> State:
+    """Copy an object or a light, and select the copy."""
+    name = _name(state, selection)
+    if selection.kind == "light":
+        copy = Selection("light", len(state.scene.lights))
+        return _added(state, copy, f"Duplicate {name}", edits.duplicate_light, selection.index)
+    copy = Selection("object", len(state.scene.objects))
+    return _added(state, copy, f"Duplicate {name}", edits.duplicate, selection.index)
+
+
+def delete(state: State, selection: Selection) -> State:
+    """Remove an object or a light; the last one is refused with a notice."""
+    edit = edits.delete_light if selection.kind == "light" else edits.delete
+    after = edits.attempt(state, f"Delete {_name(state, selection)}", edit, selection.index)
+    return after if after.scene is state.scene else replace(after, selection=Selection())
+
+
+def paste_material(state: State, selection: Selection) -> State:
+    """Give an object the material on the clipboard."""
+    label = f"Paste material on {_name(state, selection)}"
+    return edits.attempt(state, label, edits.set_material, selection.index, state.clipboard)
+
+
+def icon_of(thing: SceneObject | Light) -> str:
+    """What stands before a name: by material, or a lamp."""
+    if isinstance(thing, Light):
+        return icons.ICON_FA_SUN if thing.kind == "directional" else icons.ICON_FA_LIGHTBULB
+    return _material_icon(thing.material)
+
+
+def _material_icon(material: Material) -> str:
+    if isinstance(material, Dielectric):
+        return icons.ICON_FA_GEM
+    if isinstance(material, Diffuse):
+        return icons.ICON_FA_SQUARE
+    return icons.ICON_FA_CIRCLE if isinstance(material, Black) else icons.ICON_FA_CIRCLE_HALF_STROKE
+
+
+def _added(state: State, selection: Selection, label: str, edit: object, *args: object) -> State:
+    after = edits.attempt(state, label, edit, *args)
+    return after if after.scene is state.scene else replace(after, selection=selection)
+
+
+def _name(state: State, selection: Selection) -> str:
+    things = state.scene.lights if selection.kind == "light" else state.scene.objects
+    return things[selection.index].name
+
+
+def _toolbar(state: State) -> State:
+    if widgets.button(f"{icons.ICON_FA_PLUS}  Add##outliner", tip="Add a light, a glass or a receiver."):
+        imgui.open_popup("##add")
+    if imgui.begin_popup("##add"):
+        state = draw_add_items(state)
+        imgui.end_popup()
+    if len(state.scene.objects) + len(state.scene.lights) > _SEARCH_FROM:
+        imgui.same_line()
+        imgui.set_next_item_width(-1)
+        _, _memory["search"] = imgui.input_text_with_hint("##search", "Search", str(_memory["search"]))
+        item_rects.note("Search outliner")
+        widgets.tooltip("Show only names that hold these letters.")
+    else:
+        _memory["search"] = ""
+    return state
+
+
+def _group(state: State, title: str, kind: str, things: tuple[Light, ...] | tuple[SceneObject, ...], wanted: str) -> State:
+    imgui.separator_text(f"{title}  {len(things)}")
+    for index, thing in enumerate(things):
+        if wanted in thing.name.lower():
+            imgui.push_id(f"{kind} {index}")
+            state = _row(state, Selection("light" if kind == "light" else "object", index), thing)
+            imgui.pop_id()
+    return state
+
+
+def _row(state: State, selection: Selection, thing: SceneObject | Light) -> State:
+    if _memory["renaming"] == selection:
+        return _rename_field(state, selection, thing)
+    flags = imgui.SelectableFlags_.allow_double_click
+    with theme.chosen_rows():
+        clicked, _ = imgui.selectable(f"{icon_of(thing)}  {thing.name}###row", state.selection == selection, flags)
+    item_rects.note(thing.name)
+    widgets.tooltip(_about(thing), "Double-click: frame. F2: rename. Right-click: more.")
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    if clicked:
+        state = replace(state, selection=selection)
+        if imgui.is_mouse_double_clicked(0):
+            state = state.asking(FrameSelection())
+    if imgui.begin_popup_context_item("##more"):
+        state = _context_menu(replace(state, selection=selection), selection)
+        imgui.end_popup()
+    _aside(thing, low, high)
+    return state
+
+
+def _aside(thing: SceneObject | Light, low: imgui.ImVec2, high: imgui.ImVec2) -> None:
+    """What it is made of, at the right end where there is room."""
+    text = _material_words(thing.material) if isinstance(thing, SceneObject) else thing.kind
+    width = imgui.calc_text_size(text).x
+    name_end = low.x + imgui.calc_text_size(f"{icon_of(thing)}  {thing.name}").x
+    if name_end + theme.em(1) + width < high.x:
+        at = imgui.ImVec2(high.x - width - theme.em(0.2), low.y + 0.5 * (high.y - low.y - imgui.get_font_size()))
+        imgui.get_window_draw_list().add_text(at, theme.packed(theme.palette().muted), text)
+
+
+def _material_words(material: Material) -> str:
+    if isinstance(material, Dielectric):
+        return material.dispersion.name or "glass"
+    return type(material).__name__.lower()
+
+
+def _about(thing: SceneObject | Light) -> str:
+    if isinstance(thing, Light):
+        return f"{thing.kind.capitalize()} light."
+    return f"{_material_words(thing.material)}, {len(thing.mesh.triangles):,} triangles."
+
+
+def _context_menu(state: State, selection: Selection) -> State:
+    def item(label: str, tip: str, enabled: bool = True) -> bool:
+        pressed, _ = imgui.menu_item(label, "", False, enabled)
+        item_rects.note(f"Context: {label}")
+        widgets.tooltip(tip)
+        return pressed
+
+    if item("Frame", "Move the camera so that it fills the view (F)."):
+        state = state.asking(FrameSelection())
+    if item("Rename", "Give it another name (F2)."):
+        _start_renaming(state, selection)
+    if item("Duplicate", "Copy it (Ctrl+D)."):
+        return duplicate(state, selection)
+    if selection.kind == "object":
+        imgui.separator()
+        if item("Copy material", "Copy its material (Ctrl+C)."):
+            state = state.asking(CopyMaterial(selection.index))
+        if item("Paste material", "Give it the copied material (Ctrl+V).", state.clipboard is not None):
+            return paste_material(state, selection)
+    imgui.separator()
+    if item("Delete", "Remove it (Delete)."):
+        return delete(state, selection)
+    return state
+
+
+def _wants_rename(state: State) -> bool:
+    return state.selection.kind is not None and imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.f2)
+
+
+def _start_renaming(state: State, selection: Selection) -> None:
+    _memory.update(renaming=selection, text=_name(state, selection), focus=True)
+
+
+def _rename_field(state: State, selection: Selection, thing: SceneObject | Light) -> State:
+    if _memory.get("focus"):
+        imgui.set_keyboard_focus_here()
+        _memory["focus"] = False
+    imgui.set_next_item_width(-1)
+    flags = imgui.InputTextFlags_.auto_select_all | imgui.InputTextFlags_.enter_returns_true
+    done, _memory["text"] = imgui.input_text("##name", str(_memory["text"]), flags)
+    item_rects.note("Rename")
+    widgets.tooltip("Enter keeps the name, Esc the old one.")
+    if not done and not imgui.is_item_deactivated():
+        return state
+    _memory["renaming"] = None
+    text = str(_memory["text"]).strip()
+    if imgui.is_key_pressed(imgui.Key.escape) or text == thing.name:
+        return state
+    edit = edits.rename_light if selection.kind == "light" else edits.rename
+    return edits.attempt(state, f"Rename {thing.name}", edit, selection.index, text)

@@ -1,0 +1,103 @@
+"""The spectrum of the caustic under the cursor, in its own colours, with its chromaticity and dominant wavelength."""
+
+from __future__ import annotations
+
+import numpy as np
+from imgui_bundle import imgui, implot
+
+from app.ui import theme
+from app.ui.chromaticity import ColourFacts, colour_facts
+from app.ui.facts import CursorFacts, Facts
+from app.ui.panels import numbers, rows, spectral_colour, widgets
+from app.ui.state import State
+
+
+def draw_spectrum(state: State, facts: Facts) -> State:
+    """Draw the panel's contents."""
+    cursor = facts.cursor
+    if cursor is None:
+        widgets.hint("Point at a receiver in the picture to see the spectrum of the light that falls there.")
+        return state
+    colour = None
+    if cursor.spectrum is not None and cursor.spectrum_nm is not None:
+        colour = colour_facts(cursor.spectrum_nm, cursor.spectrum)
+    _told(state, cursor, colour)
+    if cursor.spectrum is None or cursor.spectrum_nm is None:
+        widgets.hint("The surface under the cursor is no receiver: caustics are recorded on diffuse objects only.")
+    elif colour is None:
+        widgets.hint("No caustic light falls here.")
+    else:
+        _plot(cursor.spectrum_nm, cursor.spectrum)
+    return state
+
+
+def _told(state: State, cursor: CursorFacts, colour: ColourFacts | None) -> None:
+    parts = [("Radiance", "  ".join(f"{c:.3g}" for c in cursor.rgb), "Linear Rec.709 radiance of the pixel, lm/(sr unit²).")]
+    if colour is not None:
+        parts += [
+            ("Illuminance", f"{colour.illuminance:.4g} lm/unit²", "Luminous flux of the caustic per area of the receiver."),
+            ("x, y", f"{colour.x:.4f}, {colour.y:.4f}", "CIE 1931 chromaticity of the caustic's light."),
+            ("Dominant", _dominant_text(colour), "Wavelength of the spectral colour of the same hue, from D65; c: of the opposite hue."),
+            ("Purity", numbers.percent(colour.purity), "Excitation purity: 100 % is a spectral colour, 0 % is white."),
+        ]
+    if cursor.object_index is not None and cursor.object_index < len(state.scene.objects):
+        parts.insert(0, ("On", state.scene.objects[cursor.object_index].name, "The first surface under the cursor."))
+    room = imgui.get_content_region_avail().x
+    gap, used = theme.em(1.2), 0.0
+    for label, text, tip in parts:
+        width = imgui.calc_text_size(f"{label}  {text}").x + gap
+        if used and used + width <= room:
+            imgui.same_line(0, gap)
+        else:
+            used = 0.0
+        used += width
+        imgui.begin_group()
+        imgui.text_disabled(label)
+        imgui.same_line(0, theme.em(0.5))
+        imgui.text_unformatted(text)
+        imgui.end_group()
+        rows.explain(label, tip)
+
+
+def _dominant_text(colour: ColourFacts) -> str:
+    if colour.dominant_nm is None:
+        return "none (white)"
+    return f"{colour.dominant_nm:.0f} nm" + (" c" if colour.is_complementary else "")
+
+
+def _plot(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> None:
+    flags = implot.Flags_.no_legend | implot.Flags_.no_menus
+    height = max(imgui.get_content_region_avail().y, theme.em(7))
+    if not implot.begin_plot("##spectrum", imgui.ImVec2(-1, height), flags):
+        return
+    scaled, unit = _scaled(spectrum)
+    implot.setup_axes("λ (nm)", f"E ({unit}/unit²/nm)", implot.AxisFlags_.none, implot.AxisFlags_.none)
+    implot.setup_axis_limits(implot.ImAxis_.x1, 380, 780, implot.Cond_.always)
+    implot.setup_axis_limits(implot.ImAxis_.y1, 0, 1.1 * float(scaled.max()), implot.Cond_.always)
+    implot.push_plot_clip_rect()
+    _fill(wavelengths_nm, scaled)
+    implot.pop_plot_clip_rect()
+    outline = imgui.ImVec4(*theme.palette().text[:3], 0.85)
+    implot.plot_line("##outline", np.ascontiguousarray(wavelengths_nm, float), scaled, implot.Spec(line_color=outline, line_weight=1.2))
+    implot.end_plot()
+    rows.explain("Spectrum plot", "")
+
+
+def _scaled(spectrum: np.ndarray) -> tuple[np.ndarray, str]:
+    """The values in W, mW, µW … so that the axis needs no powers of ten."""
+    values = np.ascontiguousarray(spectrum, float)
+    peak = float(values.max())
+    for factor, unit in ((1.0, "W"), (1e3, "mW"), (1e6, "µW"), (1e9, "nW")):
+        if peak * factor >= 0.1:
+            return values * factor, unit
+    return values * 1e12, "pW"
+
+
+def _fill(wavelengths_nm: np.ndarray, values: np.ndarray) -> None:
+    """A bar of its own colour for every nanometre, a pixel wider than that: no seam must show between them."""
+    drawing = implot.get_plot_draw_list()
+    fine = np.arange(float(wavelengths_nm[0]), float(wavelengths_nm[-1]), 1.0)
+    heights = np.interp(fine + 0.5, wavelengths_nm, values)
+    for left, height in zip(fine.tolist(), heights.tolist(), strict=True):
+        low, high = implot.plot_to_pixels(left, height), implot.plot_to_pixels(left + 1.0, 0.0)
+        drawing.add_rect_filled(low, imgui.ImVec2(high.x + 1.0, high.y), spectral_colour.colour_of_nm(left + 0.5))

@@ -1,0 +1,175 @@
+"""The first thing seen: scenes as cards, recent files, the work of a session that crashed, and where to drop a file."""
+
+from __future__ import annotations
+
+from imgui_bundle import icons_fontawesome_6 as icons
+from imgui_bundle import imgui
+
+from app.ui import item_rects, theme
+from app.ui.facts import Facts, SceneEntry
+from app.ui.panels import dialogs, widgets
+from app.ui.requests import Recover
+from app.ui.state import State
+
+_CARD_EM, _GAP_EM = 17.0, 1.1
+_ASPECT = 9 / 16
+_FLAGS = (
+    imgui.WindowFlags_.no_decoration
+    | imgui.WindowFlags_.no_docking
+    | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.no_bring_to_front_on_focus
+)
+
+
+def draw_start_page(state: State, facts: Facts) -> State:
+    """Draw the page over the whole window below the menu bar; it closes itself when something is opened."""
+    viewport = imgui.get_main_viewport()
+    imgui.set_next_window_pos(viewport.work_pos)
+    imgui.set_next_window_size(viewport.work_size)
+    imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(theme.em(2.2), theme.em(1.6)))
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
+    imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
+    imgui.begin("##start page", None, _FLAGS)
+    imgui.pop_style_var(3)
+    _title(facts)
+    if facts.recovery is not None:
+        state = _recovery(state)
+    imgui.dummy(imgui.ImVec2(0, theme.em(0.4)))
+    imgui.begin_child("##side", imgui.ImVec2(theme.em(15), 0))
+    state = _side(state, facts)
+    imgui.end_child()
+    imgui.same_line(0, theme.em(2))
+    imgui.begin_child("##cards", imgui.ImVec2(0, 0))
+    state = _cards(state, facts)
+    imgui.end_child()
+    imgui.end()
+    return state
+
+
+def _title(facts: Facts) -> None:
+    with theme.heading(1.9):
+        imgui.text_unformatted("SpectraSplat")
+    widgets.hint("Dispersive caustics, live. Choose a scene, or drop a scene, a GLB or a mesh on the window.")
+    if facts.stats.renderer:
+        widgets.hint(f"Draws with {facts.stats.renderer}")
+
+
+def _recovery(state: State) -> State:
+    chosen = theme.palette()
+    imgui.dummy(imgui.ImVec2(0, theme.em(0.3)))
+    imgui.push_style_color(imgui.Col_.child_bg, chosen.raised)
+    imgui.push_style_color(imgui.Col_.border, chosen.warning)
+    flags = imgui.ChildFlags_.borders | imgui.ChildFlags_.auto_resize_y | imgui.ChildFlags_.always_use_window_padding
+    imgui.begin_child("##recovery", imgui.ImVec2(min(theme.em(44), imgui.get_content_region_avail().x), 0), flags)
+    with theme.coloured(chosen.warning), theme.heading():
+        imgui.text_unformatted(f"{icons.ICON_FA_TRIANGLE_EXCLAMATION}  Unsaved work was found")
+    widgets.hint("The last session ended without saving. Recover it, or discard it for good.")
+    if widgets.button("Recover", tip="Open the work as it was last written, at most 30 s before the end.", width=theme.em(7)):
+        state = state.asking(Recover()).with_panels(start_page=False)
+    imgui.same_line()
+    if widgets.button("Discard##recovery", tip="Delete the recovered work.", width=theme.em(7)):
+        state = state.asking(Recover(discard=True))
+    imgui.end_child()
+    imgui.pop_style_color(2)
+    return state
+
+
+def _side(state: State, facts: Facts) -> State:
+    if widgets.button(f"{icons.ICON_FA_FOLDER_OPEN}  Open…", tip="Scenes, glTF and meshes (Ctrl+O).", width=-1):
+        state = dialogs.open_file(state, facts)
+    if widgets.button(f"{icons.ICON_FA_FILE}  New scene", tip="Start from the default scene (Ctrl+N).", width=-1):
+        state = dialogs.new_scene(state, facts)
+    if widgets.button(f"{icons.ICON_FA_ARROW_RIGHT}  Continue", tip=f"On with {facts.title}.", width=-1):
+        state = state.with_panels(start_page=False)
+    imgui.dummy(imgui.ImVec2(0, theme.em(0.5)))
+    with theme.heading():
+        imgui.text_unformatted("Recent")
+    if not facts.recent:
+        widgets.hint("Files that you open or save appear here.")
+    for index, path in enumerate(facts.recent):
+        pressed, _ = imgui.selectable(f"{path.name}##recent {index}", False)
+        item_rects.note(f"Recent: {path.name}")
+        widgets.tooltip(str(path))
+        if pressed:
+            state = dialogs.open_path(state, facts, path)
+    return state
+
+
+def _cards(state: State, facts: Facts) -> State:
+    if not facts.scenes:
+        widgets.hint("No scenes were found.")
+        return state
+    room, gap = imgui.get_content_region_avail().x, theme.em(_GAP_EM)
+    columns = max(1, int((room + gap) / (theme.em(_CARD_EM) + gap)))
+    width = (room - gap * (columns - 1)) / columns
+    width = min(width, theme.em(_CARD_EM * 1.6))
+    for index, entry in enumerate(facts.scenes):
+        if index % columns:
+            imgui.same_line(0, gap)
+        imgui.push_id(index)
+        pressed = _card(entry, width)
+        imgui.pop_id()
+        if pressed:
+            state = dialogs.open_path(state, facts, entry.path)
+        if index % columns == columns - 1:
+            imgui.dummy(imgui.ImVec2(0, theme.em(0.3)))
+    return state
+
+
+def _card(entry: SceneEntry, width: float) -> bool:
+    """A picture, a title and two lines of words; True when clicked."""
+    padding, line = theme.em(0.6), imgui.get_text_line_height_with_spacing()
+    picture_height = width * _ASPECT
+    height = picture_height + 3 * line + 2 * padding
+    start = imgui.get_cursor_screen_pos()
+    pressed = imgui.invisible_button("##card", imgui.ImVec2(width, height))
+    item_rects.note(entry.title)
+    hovered = imgui.is_item_hovered()
+    widgets.tooltip(entry.description or entry.title, str(entry.path.name))
+    chosen, drawing = theme.palette(), imgui.get_window_draw_list()
+    end = imgui.ImVec2(start.x + width, start.y + height)
+    rounding = theme.em(0.4)
+    drawing.add_rect_filled(start, end, theme.packed(chosen.frame if hovered else chosen.raised), rounding)
+    _picture(drawing, entry, start, imgui.ImVec2(end.x, start.y + picture_height), rounding)
+    drawing.add_rect(start, end, theme.packed(chosen.accent if hovered else chosen.border), rounding)
+    left, top = start.x + padding, start.y + picture_height + padding
+    drawing.add_text(theme.bold(), imgui.get_font_size(), imgui.ImVec2(left, top), theme.packed(chosen.text), entry.title)
+    words = _first_lines(entry.description, width - 2 * padding, 2)
+    for number, text in enumerate(words):
+        drawing.add_text(imgui.ImVec2(left, top + (number + 1) * line), theme.packed(chosen.muted), text)
+    return pressed
+
+
+def _picture(drawing: imgui.ImDrawList, entry: SceneEntry, low: imgui.ImVec2, high: imgui.ImVec2, rounding: float) -> None:
+    if entry.thumbnail is None:
+        drawing.add_rect_filled(low, high, theme.packed(theme.palette().canvas), rounding, imgui.ImDrawFlags_.round_top)
+        word = "Drawing…"
+        size = imgui.calc_text_size(word)
+        middle = imgui.ImVec2((low.x + high.x - size.x) / 2, (low.y + high.y - size.y) / 2)
+        drawing.add_text(middle, theme.packed(theme.palette().muted), word)
+        return
+    texture = imgui.ImTextureRef(entry.thumbnail)
+    white = theme.packed((1.0, 1.0, 1.0, 1.0))
+    drawing.add_image_rounded(texture, low, high, (0, 0), (1, 1), white, rounding, imgui.ImDrawFlags_.round_top)
+
+
+def _first_lines(text: str, width: float, count: int) -> list[str]:
+    """`text` broken at blanks into at most `count` lines of `width` pixels, the last one ending in … when more follows."""
+    lines, words = [""], text.split()
+    for position, word in enumerate(words):
+        longer = f"{lines[-1]} {word}".strip()
+        if imgui.calc_text_size(longer).x <= width or not lines[-1]:
+            lines[-1] = longer
+        elif len(lines) < count:
+            lines.append(word)
+        else:
+            return [*lines[:-1], _shortened(" ".join([lines[-1], *words[position:]]), width)]
+    return lines
+
+
+def _shortened(text: str, width: float) -> str:
+    """With … at the last blank that fits."""
+    while " " in text and imgui.calc_text_size(f"{text}…").x > width:
+        text = text.rpartition(" ")[0]
+    return f"{text.rstrip(' ,.;:')}…"

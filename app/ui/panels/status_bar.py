@@ -1,0 +1,116 @@
+"""The line at the bottom: what runs, how far it is, what is selected, and the export in progress."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from imgui_bundle import icons_fontawesome_6 as icons
+from imgui_bundle import imgui
+
+from app.ui import item_rects, theme
+from app.ui.facts import Facts
+from app.ui.panels import numbers, rows, widgets
+from app.ui.requests import CancelJob
+from app.ui.state import State
+
+_FLAGS = (
+    imgui.WindowFlags_.no_decoration
+    | imgui.WindowFlags_.no_docking
+    | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.no_nav
+    | imgui.WindowFlags_.no_bring_to_front_on_focus
+)
+
+
+def height() -> float:
+    """Height of the bar, interface pixels."""
+    return imgui.get_frame_height() + theme.em(0.3)
+
+
+def draw_status_bar(state: State, facts: Facts) -> State:
+    """Draw the bar along the lower edge of the window."""
+    viewport = imgui.get_main_viewport()
+    imgui.set_next_window_pos((viewport.work_pos.x, viewport.work_pos.y + viewport.work_size.y - height()))
+    imgui.set_next_window_size((viewport.work_size.x, height()))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(theme.em(0.5), theme.em(0.15)))
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)
+    imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
+    imgui.push_style_color(imgui.Col_.window_bg, theme.palette().raised)
+    imgui.begin("##status", None, _FLAGS)
+    imgui.align_text_to_frame_padding()
+    state = _progress(state, facts)
+    _selection(state)
+    if facts.job is not None:
+        state = _job(state, facts)
+    _right_end(facts)
+    imgui.end()
+    imgui.pop_style_color()
+    imgui.pop_style_var(3)
+    return state
+
+
+def _progress(state: State, facts: Facts) -> State:
+    stats, target = facts.stats, max(state.preferences.target_photons, 1)
+    imgui.push_style_color(imgui.Col_.button, (0.0, 0.0, 0.0, 0.0))
+    pressed = imgui.button((icons.ICON_FA_PAUSE if state.playing else icons.ICON_FA_PLAY) + "##play")
+    imgui.pop_style_color()
+    rows.explain("Play or pause", "Pause the photons (Space)." if state.playing else "Let photons accumulate (Space).")
+    if pressed:
+        state = replace(state, playing=not state.playing)
+    imgui.same_line()
+    share = min(stats.photons / target, 1.0)
+    imgui.push_style_color(imgui.Col_.plot_histogram, theme.palette().good if stats.converged else theme.palette().accent)
+    imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + theme.em(0.55))
+    imgui.progress_bar(share, imgui.ImVec2(theme.em(7), theme.em(0.4)), "")
+    imgui.pop_style_color()
+    rows.explain("Progress", f"{stats.photons:,} of {target:,} photons.")
+    imgui.same_line()
+    word = "Done" if stats.converged else "Accumulating" if state.playing else "Paused"
+    imgui.text_unformatted(f"{word}, {numbers.count(stats.photons)} photons")
+    return state
+
+
+def _selection(state: State) -> None:
+    kind, index = state.selection.kind, state.selection.index
+    found = state.scene.objects if kind == "object" else state.scene.lights if kind == "light" else ()
+    if index < len(found):
+        imgui.same_line(0, theme.em(1.6))
+        imgui.text_disabled("Selected")
+        imgui.same_line()
+        imgui.text_unformatted(found[index].name)
+        item_rects.note("Selected")
+
+
+def _job(state: State, facts: Facts) -> State:
+    job = facts.job
+    if job is None:
+        return state
+    imgui.same_line(0, theme.em(1.6))
+    imgui.text_unformatted(job.title)
+    imgui.same_line()
+    imgui.progress_bar(job.fraction, imgui.ImVec2(theme.em(9), 0.0), f"{job.fraction:.0%}")
+    widgets.tooltip(job.text or job.title)
+    imgui.same_line()
+    if widgets.button("Cancel##job", tip="Stop the export; what is finished stays."):
+        state = state.asking(CancelJob())
+    return state
+
+
+def _right_end(facts: Facts) -> None:
+    """Rate and frame time, flush with the window's edge, where there is room."""
+    recent = facts.frame_ms[-10:]
+    parts = []
+    if facts.stats.photons_per_second > 0:
+        parts.append(f"{numbers.count(facts.stats.photons_per_second)} photons/s")
+    if recent:
+        parts.append(f"{numbers.milliseconds(sum(recent) / len(recent))} a frame")
+    text = "    ".join(parts)
+    x = imgui.get_window_width() - imgui.calc_text_size(text).x - theme.em(0.6)
+    imgui.same_line()
+    if text and x > imgui.get_cursor_pos_x() + theme.em(1):
+        imgui.set_cursor_pos_x(x)
+        imgui.text_disabled(text)
+        rows.explain("Rate", "Photons per second of trace and splat time; mean duration of the last ten frames.")
+    else:
+        imgui.new_line()

@@ -1,0 +1,175 @@
+"""What a frame costs and what the photons are doing: times by pass, rates, memory, everything that was dropped."""
+
+from __future__ import annotations
+
+import numpy as np
+from imgui_bundle import imgui, implot
+
+from app.live.stats import LiveStats
+from app.ui import theme
+from app.ui.facts import Facts
+from app.ui.panels import numbers, rows, widgets
+from app.ui.requests import Retrace
+from app.ui.state import State
+
+PASSES = {
+    "trace": "Photons through the glass, to the receivers.",
+    "splat": "Stored photons into the caustic maps.",
+    "resolve": "Levels and seams of the maps put together.",
+    "eye": "Camera samples: what the picture shows, through glass and mirrors.",
+    "display": "Exposure, tone curve and comparison.",
+    "interface": "Panels and plots.",
+}
+"""Pass -> what it does; in the order of the frame."""
+
+
+def draw_timing(state: State, facts: Facts) -> State:
+    """Draw the panel's contents."""
+    state = _first_order(state, facts.stats)
+    wide = imgui.get_content_region_avail().x > theme.em(34)
+    if wide and imgui.begin_table("##columns", 3, imgui.TableFlags_.sizing_stretch_prop):
+        for name, weight in (("frame", 1.15), ("passes", 1.0), ("numbers", 1.1)):
+            imgui.table_setup_column(name, imgui.TableColumnFlags_.width_stretch, weight)
+        imgui.table_next_row()
+        imgui.table_next_column()
+        _frame_plot(facts, max(imgui.get_content_region_avail().y, theme.em(7)))
+        imgui.table_next_column()
+        _passes(facts)
+        imgui.table_next_column()
+        _numbers(state, facts.stats)
+        imgui.end_table()
+    elif not wide:
+        _frame_plot(facts, theme.em(7))
+        _passes(facts)
+        _numbers(state, facts.stats)
+    return state
+
+
+def _first_order(state: State, stats: LiveStats) -> State:
+    if not stats.first_order:
+        return state
+    imgui.align_text_to_frame_padding()
+    with theme.coloured(theme.palette().warning):
+        imgui.text_unformatted("The picture follows the dispersion edit to first order.")
+    widgets.tooltip("The stored photons were traced with another dispersion and moved along their spectral derivative.")
+    imgui.same_line()
+    if widgets.button("Retrace", tip="Trace photons anew with the present glass (Ctrl+R)."):
+        state = state.asking(Retrace())
+    return state
+
+
+def _frame_plot(facts: Facts, height: float) -> None:
+    times = np.asarray(facts.frame_ms[-240:], float)
+    latest = float(times[-10:].mean()) if times.size else 0.0
+    rate = f"{1000 / latest:.0f} frames/s" if latest > 0 else "no frame yet"
+    imgui.text_unformatted(f"Frame  {numbers.milliseconds(latest)}")
+    rows.explain("Frame time", "Mean duration of the last ten frames, milliseconds.")
+    imgui.same_line()
+    imgui.text_disabled(rate)
+    flags = implot.Flags_.no_legend | implot.Flags_.no_inputs | implot.Flags_.no_menus | implot.Flags_.no_mouse_text
+    size = imgui.ImVec2(-1, max(height - imgui.get_text_line_height_with_spacing(), theme.em(4)))
+    if not implot.begin_plot("##frame time", size, flags):
+        return
+    implot.setup_axes("", "ms", implot.AxisFlags_.no_tick_labels | implot.AxisFlags_.no_tick_marks, implot.AxisFlags_.no_highlight)
+    top = max(20.0, float(np.percentile(times, 98)) * 1.3) if times.size else 20.0
+    implot.setup_axes_limits(0, 239, 0, top, implot.Cond_.always)
+    muted = imgui.ImVec4(*theme.palette().muted)
+    implot.plot_inf_lines("##limits", np.array([1000 / 60, 50.0]), implot.Spec(line_color=muted, flags=implot.InfLinesFlags_.horizontal))
+    if times.size:
+        start = 240 - times.size
+        accent = imgui.ImVec4(*theme.palette().accent)
+        implot.plot_line("##frame", np.arange(start, 240, dtype=float), times, implot.Spec(line_color=accent, line_weight=1.5))
+    implot.end_plot()
+    rows.explain("Frame plot", "Durations of the last 240 frames in milliseconds. Lines: 16.7 ms (60 frames/s) and 50 ms.")
+
+
+def _passes(facts: Facts) -> None:
+    known = [name for name in PASSES if name in facts.pass_ms]
+    names = known + [name for name in facts.pass_ms if name not in PASSES]
+    imgui.text_unformatted("By pass")
+    rows.explain("By pass", "Time of each pass in the last frame, milliseconds: GPU timers, or the wall clock on a software renderer.")
+    if not names:
+        widgets.hint("Nothing was computed in the last frame.")
+        return
+    longest = max(max(facts.pass_ms.values()), 1e-6)
+    if not imgui.begin_table("##passes", 3, imgui.TableFlags_.sizing_fixed_fit):
+        return
+    imgui.table_setup_column("pass")
+    imgui.table_setup_column("bar", imgui.TableColumnFlags_.width_stretch)
+    imgui.table_setup_column("ms")
+    for name in names:
+        spent = facts.pass_ms[name]
+        imgui.table_next_row()
+        imgui.table_next_column()
+        imgui.text_unformatted(name.capitalize())
+        rows.explain(name.capitalize(), PASSES.get(name, "Time of this pass, milliseconds."))
+        imgui.table_next_column()
+        _bar(spent / longest)
+        imgui.table_next_column()
+        _right_aligned(numbers.milliseconds(spent), theme.em(4.2))
+    imgui.end_table()
+
+
+def _bar(share: float) -> None:
+    width, height = imgui.get_content_region_avail().x, imgui.get_text_line_height()
+    low = imgui.get_cursor_screen_pos()
+    high = imgui.ImVec2(low.x + max(width * min(share, 1.0), 1.0), low.y + height * 0.8)
+    imgui.get_window_draw_list().add_rect_filled(
+        imgui.ImVec2(low.x, low.y + height * 0.25), high, theme.packed(theme.palette().accent, 0.8), 2.0
+    )
+    imgui.dummy(imgui.ImVec2(width, height))
+
+
+def _right_aligned(text: str, width: float) -> None:
+    room = max(width - imgui.calc_text_size(text).x, 0.0)
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + room)
+    imgui.text_unformatted(text)
+
+
+def _numbers(state: State, stats: LiveStats) -> None:
+    target = state.preferences.target_photons
+    lines = [
+        ("Photons", f"{numbers.count(stats.photons)} of {numbers.count(target)}", "Emitted photons that the shown map holds, and where it stops."),
+        ("Rate", f"{numbers.count(stats.photons_per_second)}/s", "Emitted photons per second of trace and splat time."),
+        ("Stored", numbers.count(stats.photons_stored), "Photon records kept, to be splatted again after an edit of dispersion."),
+        ("Rays traced", numbers.count(stats.rays_traced), "Rays emitted since the start. Stands still when photons are only splatted again."),
+        ("Samples", f"{stats.camera_samples:.1f} a pixel", "Camera samples of the shown picture."),
+        ("Resolution", f"{stats.resolution_scale:.0%}", "Side of the shown picture over the viewport's: less while something moves."),
+        ("Memory", numbers.size(stats.bytes), "GPU memory held by maps, photons and scene."),
+    ]  # fmt: skip
+    _table("##numbers", lines)
+    dropped = [(_words(k), numbers.count(v), "Counted, never hidden.") for k, v in sorted(stats.fallbacks.items()) if v]
+    lost = [(_words(k), numbers.percent(v), "Share of the emitted flux that ended this way.") for k, v in sorted(stats.lost.items()) if v]
+    bands = [(name, f"{n} bands", "Spectral bands of this light.") for name, n in sorted(stats.bands.items())]
+    for title, tip, told in (
+        ("Fall-backs", "Photons that took a simpler way.", dropped),
+        ("Where light ended", "Shares of the emitted flux.", lost),
+        ("Spectral bands", "How finely each light's spectrum is divided.", bands),
+    ):
+        if told:
+            imgui.separator_text(title)
+            widgets.tooltip(tip)
+            _table(f"##{title}", told)
+    if stats.renderer:
+        widgets.hint(stats.renderer + (" (software)" if stats.is_software else ""))
+        widgets.tooltip("What draws: the graphics driver's name.")
+
+
+def _table(identity: str, lines: list[tuple[str, str, str]]) -> None:
+    if not imgui.begin_table(identity, 2, imgui.TableFlags_.sizing_stretch_prop):
+        return
+    for label, value, tip in lines:
+        imgui.table_next_row()
+        imgui.table_next_column()
+        imgui.text_disabled(label)
+        rows.explain(label, tip)
+        imgui.table_next_column()
+        imgui.text_unformatted(value)
+        widgets.tooltip(tip)
+    imgui.end_table()
+
+
+def _words(key: str) -> str:
+    """A counter's name on the screen: "no_footprint" is "No footprint"."""
+    text = key.replace("_", " ").replace("-", " ")
+    return text[:1].upper() + text[1:]
