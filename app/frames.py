@@ -61,8 +61,9 @@ class _FramedLight(LightHalf):
     def lay_out(self, camera: Camera) -> None:
         """Maps for all landings, as `view` sees them."""
         own = self.pilots
-        moved = [_moved(pilot, s.space, self.buffers.space) for s in self.surveys for pilot in s.pilots]
-        self.pilots = dict(enumerate([*own.values(), *moved]))
+        space = self.buffers.space
+        everywhere = [(space, pilot) for pilot in own.values()] + [(s.space, pilot) for s in self.surveys for pilot in s.pilots]
+        self.pilots = {i: _landings(pilot, at, space) for i, (at, pilot) in enumerate(everywhere)}
         super().lay_out(self.view or camera)
         self.pilots = own
 
@@ -236,12 +237,17 @@ def _map_view(cameras: Sequence[Camera], settings: RenderSettings) -> tuple[Came
     return view, replace(settings, width=round(factor * settings.width), height=round(factor * settings.height))
 
 
-def _moved(pilot: Pilot, old: GpuSpace, new: GpuSpace) -> Pilot:
-    """The pilot with its landings in another frame's GPU space."""
+_LANDING = np.dtype([("position", "f4", 3), ("flux_w", "f4"), ("receiver", "u4")])
+"""What maps are fitted to; the records of two frames may differ in their columns."""
+
+
+def _landings(pilot: Pilot, old: GpuSpace, new: GpuSpace) -> Pilot:
+    """Only the landings of `pilot`, in another frame's GPU space."""
 
     def moved(records: np.ndarray) -> np.ndarray:
-        records = records.copy()
-        records["position"] = new.to_gpu(old.to_world(records["position"].astype(float)))
-        return records
+        found = np.zeros(len(records), _LANDING)
+        found["position"] = records["position"] if old is new else new.to_gpu(old.to_world(records["position"].astype(float)))
+        found["flux_w"], found["receiver"] = records["flux_w"], records["receiver"]
+        return found
 
     return replace(pilot, whole=moved(pilot.whole), spectral=[moved(r) for r in pilot.spectral], rim=[moved(r) for r in pilot.rim])
