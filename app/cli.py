@@ -134,6 +134,20 @@ def animate(
 
 
 @app.command()
+def view(
+    scene: Annotated[Text, typer.Argument(metavar="[SCENE]", help="A scene file, a bare mesh, or a shipped scene's name; default: the default scene.")] = None,
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Of the window; default: as it was last.")] = None,
+    theme: Annotated[Text, typer.Option(metavar="NAME", help="dark or light; default: as it was last.")] = None,
+    screenshot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Write a picture of the window and close.")] = None,
+    after: Annotated[Text, typer.Option(metavar="S", help="Seconds until --screenshot; default: 10.")] = None,
+) -> None:
+    """Open the viewer: edit dispersion and caustics on the screen."""
+    from app.cli_view import ViewRequest, view_command
+
+    raise typer.Exit(view_command(ViewRequest(scene, size, theme, screenshot, after)))
+
+
+@app.command()
 def inspect(scene: SceneArgument) -> None:
     """Show what a scene holds, its glasses and mesh health, and which features its programs need."""
     from app.inspect_report import inspect_text

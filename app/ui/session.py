@@ -79,6 +79,8 @@ class Session:
         self.state = _first_state(self.document.scene, self.settings, welcome=path is None and self.recovery is not None)
         if notice:
             self.messages.tell(notice, is_error=True)
+        if path is not None and self.recovery is not None:
+            self.messages.tell("Work of a session that ended badly can be recovered: File, Start page.")
         self.tell_notes()
         self._remember_file(path)
 

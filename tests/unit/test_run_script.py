@@ -79,6 +79,11 @@ def test_without_arguments_the_default_scene_is_rendered(machine: Machine) -> No
     assert machine.call("run").stdout == "program: render default -o spectrasplat-default.png\n"
 
 
+@pytest.mark.parametrize("variable", ["DISPLAY", "WAYLAND_DISPLAY"])
+def test_without_arguments_on_a_display_the_viewer_opens(machine: Machine, variable: str) -> None:
+    assert machine.call("run", **{variable: ":0"}).stdout == "program: view\n"
+
+
 def test_a_changed_project_is_installed_again(machine: Machine) -> None:
     machine.call("run", "doctor")
     with (machine.root / "pyproject.toml").open("a") as project:

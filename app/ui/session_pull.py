@@ -1,0 +1,46 @@
+"""Takes hold of a colour of the caustic: from a pixel of the viewport to what `pull` solves with."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.errors import UserError
+from app.model.colorimetry import rgb709_to_xyz
+from app.ui.projection import View
+from app.ui.pull import PullPhotons, begin_pull
+from app.ui.requests import BeginPull, Pull
+
+if TYPE_CHECKING:
+    from app.ui.session import Session
+
+PHOTONS = 400_000
+RADIUS = 0.01
+"""Of what is taken hold of, share of the picture's height at that distance."""
+
+
+def begin_pull_at(session: Session, request: BeginPull) -> Pull:
+    """What lies at the pixel of `request`. Raises `UserError` with the reason where there is nothing to pull."""
+    engine, state = session.picture.engine, session.state
+    hit = None if engine is None else engine.pick(request.x, request.y)
+    if engine is None or hit is None or not hit.is_receiver:
+        raise UserError("there is no caustic here; take hold of a coloured part of one")
+    stored = engine.stored_photons(PHOTONS)
+    photons = PullPhotons(
+        stored.position, stored.dposition_dn, stored.n_anchor, stored.flux_w, stored.source, stored.receiver, stored.band_nm,
+        stored.variables, stored.group_of_object,
+    )  # fmt: skip
+    rgb = np.array(session.picture.pixel((request.x, request.y)) or (0.0, 0.0, 0.0))
+    return begin_pull(
+        photons,
+        state.scene,
+        hit.position,
+        hit.normal,
+        RADIUS * View.of(state.camera, 1.0).height_at(hit.distance),
+        hit.object_index,
+        wavelength_nm=state.solo_nm,
+        xyz=rgb709_to_xyz(rgb),
+        prefer=state.selection.index if state.selection.kind == "object" else None,
+        local=request.local,
+    )

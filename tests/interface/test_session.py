@@ -1,0 +1,326 @@
+"""The host of the interface, with panels that are scripted functions and an engine that draws one colour."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.errors import UserError
+from app.gpu.context import Context
+from app.live.near import StoredPhotons
+from app.model.scene import Camera, Dielectric, Diffuse
+from app.passes.pick import PickHit
+from app.ui import requests
+from app.ui.crash_log import FILE_NAME
+from app.ui.facts import Facts
+from app.ui.live_picture import LivePicture
+from app.ui.preferences import config_dir
+from app.ui.session import Session
+from app.ui.state import Selection, State
+from tests.interface.fake_engine import FakeEngine
+
+Edit = Callable[[State], State]
+
+
+@dataclass
+class Rig:
+    """A session whose panels do what the test says."""
+
+    session: Session
+    facts: Facts = Facts()
+
+    def frame(self, edit: Edit = lambda state: state) -> State:
+        """One frame in which the panels return `edit(state)`; returns the state after it."""
+
+        def draw(state: State, facts: Facts) -> State:
+            self.facts = facts
+            return edit(replace(state, viewport_size=(64, 36)))
+
+        self.session.prepare()
+        self.session.frame(draw)
+        self.session.finished()
+        return self.session.state
+
+    def ask(self, *asked: requests.Request) -> State:
+        """A frame with requests and one more, whose facts tell what came of them."""
+        self.frame(lambda state: state.asking(*asked))
+        return self.frame()
+
+    def rename(self, name: str, label: str = "Rename", interacting: bool = False) -> State:
+        """A frame that edits the scene."""
+        return self.frame(lambda state: replace(state.edited(replace(state.scene, name=name), label), interacting=interacting))
+
+    @property
+    def engine(self) -> FakeEngine:
+        engine = self.session.picture.engine
+        assert isinstance(engine, FakeEngine)
+        return engine
+
+
+@pytest.fixture
+def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A config folder of the test's own."""
+    monkeypatch.setenv("SPECTRASPLAT_CONFIG", str(tmp_path / "config"))
+    return config_dir()
+
+
+@pytest.fixture
+def rig(gl: Context, config: Path) -> Iterator[Rig]:
+    rig = Rig(Session(gl, make_engine=FakeEngine))
+    rig.frame()
+    yield rig
+    rig.session.autosave.close()
+    rig.session.release()
+
+
+def test_the_picture_of_a_frame_answers_its_input(rig: Rig) -> None:
+    rig.frame(lambda state: replace(state, camera=Camera((0, 0, 7.0), (0, 0, 0))))
+    assert rig.engine.inputs is not None and rig.engine.inputs.camera.position == (0, 0, 7.0)
+    assert rig.session.picture.pixel((0.5, 0.5)) == pytest.approx((0.7, 0.7, 0.7))
+    rig.frame()
+    assert rig.facts.picture_size == (64, 36) and rig.facts.picture is not None
+    assert set(rig.facts.pass_ms) >= {"trace", "splat", "eye", "display", "interface"}
+
+
+def test_shown_texture_stays_valid_in_the_frame_in_which_the_size_changes(rig: Rig) -> None:
+    rig.frame()
+    before = rig.session.picture.shown
+    rig.session.prepare()
+    rig.session.frame(lambda state, _facts: replace(state, viewport_size=(128, 72)))
+    assert rig.session.picture.shown is before  # imgui has yet to draw it
+    rig.session.prepare()
+    rig.session.frame(lambda state, _facts: replace(state, viewport_size=(128, 72)))
+    assert rig.session.picture.shown is not None and rig.session.picture.shown.size == (128, 72)
+
+
+def test_edits_are_undone_one_by_one_and_a_drag_is_one_step(rig: Rig) -> None:
+    first = rig.session.state.scene
+    rig.rename("a")
+    for name in ("b", "c", "d"):
+        rig.rename(name, "Drag", interacting=True)
+    rig.rename("e", "Drag")  # the value of the last frame, the button is up
+    rig.frame()
+    rig.rename("f", "Drag")
+    rig.frame()
+    assert [entry.label for entry in rig.facts.history] == ["Open", "Rename", "Drag", "Drag"]
+    names = [rig.ask(requests.Undo()).scene.name for _ in range(4)]
+    assert names[:2] == ["e", "a"]
+    assert rig.session.state.scene is first
+    assert rig.facts.undo is None and rig.facts.redo == "Rename" and not rig.facts.unsaved
+    assert rig.ask(requests.Redo()).scene.name == "a"
+    assert rig.ask(requests.GoTo(3)).scene.name == "f"
+    assert rig.facts.unsaved
+
+
+def test_undo_of_a_deletion_keeps_the_selection_in_range(rig: Rig) -> None:
+    scene = rig.session.state.scene
+    last = len(scene.objects) - 1
+    rig.frame(lambda state: replace(state, selection=Selection("object", last)))
+    rig.frame(lambda state: state.edited(replace(scene, objects=(*scene.objects, scene.objects[0])), "Add"))
+    rig.frame(lambda state: replace(state, selection=Selection("object", last + 1)))
+    assert rig.ask(requests.Undo()).selection == Selection()
+
+
+def test_save_and_open_again(rig: Rig, tmp_path: Path) -> None:
+    rig.rename("mine")
+    target = tmp_path / "mine.toml"
+    rig.ask(requests.Save(target))
+    assert not rig.facts.unsaved and rig.facts.path == target and rig.facts.recent == (target,)
+    rig.ask(requests.NewScene())
+    assert rig.facts.path is None
+    assert rig.ask(requests.Open(target)).scene.name == "mine"
+    assert rig.facts.history[0].is_present and len(rig.facts.history) == 1
+
+
+def test_what_cannot_be_opened_or_saved_is_told_and_changes_nothing(rig: Rig, tmp_path: Path) -> None:
+    before = rig.rename("kept").scene
+    broken = tmp_path / "broken.toml"
+    broken.write_text("name = ")
+    rig.ask(requests.Open(broken), requests.Save(), requests.Save(tmp_path / "none" / "x.toml"))
+    texts = [message.text for message in rig.facts.messages if message.is_error]
+    assert len(texts) == 3
+    assert "broken.toml" in texts[0] and "no file yet" in texts[1] and "none" in texts[2]
+    assert rig.session.state.scene is before and rig.facts.unsaved
+    rig.ask(requests.DismissMessage(texts[0]))
+    assert texts[0] not in [message.text for message in rig.facts.messages]
+
+
+def test_quitting_asks_only_where_work_would_be_lost(rig: Rig) -> None:
+    rig.rename("unsaved")
+    rig.session.ask_to_close()
+    rig.frame()
+    assert rig.facts.asks_to_quit and not rig.session.wants_to_close
+    rig.ask(requests.CancelQuit())
+    assert not rig.facts.asks_to_quit
+    rig.ask(requests.Quit())
+    rig.ask(requests.Quit(discard=True))
+    assert rig.session.wants_to_close
+
+
+def test_quitting_with_nothing_unsaved_closes(rig: Rig) -> None:
+    rig.ask(requests.Quit())
+    assert rig.session.wants_to_close
+
+
+def test_a_bug_in_a_request_is_logged_and_the_work_autosaved(rig: Rig, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rig.rename("precious")
+
+    def bug(*_arguments: object) -> None:
+        raise ZeroDivisionError("a fault")
+
+    monkeypatch.setattr("app.ui.session_requests.source_at", bug)
+    rig.engine.hit = _hit(rig, Diffuse)
+    rig.ask(requests.SelectAt(0.5, 0.5))
+    assert any("a fault" in message.text and message.is_error for message in rig.facts.messages)
+    log = (config / FILE_NAME).read_text()
+    assert "SelectAt" in log and "ZeroDivisionError" in log
+    assert "precious" in rig.session.autosave.path.read_text()
+
+
+def test_a_failed_engine_is_replaced_on_demand_and_the_work_kept(rig: Rig, config: Path) -> None:
+    rig.rename("precious")
+    failed = rig.engine
+    failed.fails = RuntimeError("GL_CONTEXT_LOST")
+    rig.frame()
+    rig.frame()
+    assert rig.session.picture.engine is None and failed.released
+    assert any("GL_CONTEXT_LOST" in message.text and "F5" in message.text for message in rig.facts.messages)
+    assert "GL_CONTEXT_LOST" in (config / FILE_NAME).read_text()
+    assert "precious" in rig.session.autosave.path.read_text()
+    rig.rename("goes on")
+    rig.ask(requests.ReloadShaders())
+    assert rig.engine is not failed and rig.engine.advanced > 0
+    assert rig.session.state.scene.name == "goes on"
+
+
+def test_what_the_engine_cannot_show_is_told_once(rig: Rig) -> None:
+    rig.engine.problem = "the maps of this scene are too large"
+    for _ in range(3):
+        rig.frame()
+    assert [m.text for m in rig.facts.messages].count("the maps of this scene are too large") == 1
+    rig.ask(requests.DismissMessage("the maps of this scene are too large"))
+    rig.frame()
+    assert "the maps of this scene are too large" not in [m.text for m in rig.facts.messages]
+
+
+def test_a_shader_error_is_shown_as_one(rig: Rig) -> None:
+    rig.engine.problem = "trace.comp does not compile:\ntrace.comp:12 : syntax error"
+    rig.frame()
+    rig.frame()
+    assert rig.facts.shader_error == rig.engine.problem
+    assert not any("trace.comp" in message.text for message in rig.facts.messages)
+
+
+def test_recovery_after_a_crash(gl: Context, rig: Rig, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rig.rename("lost and found")
+    session = rig.session
+    session.autosave.write_now(session.document.scene, session.document.title, session.document.source)
+    monkeypatch.setattr("app.ui.autosave._is_held", lambda _path: False)  # as if that process were gone
+    second = Rig(Session(gl, make_engine=FakeEngine))
+    second.frame()
+    assert second.facts.recovery == session.autosave.path and second.session.state.preferences.panels.start_page
+    second.ask(requests.Recover())
+    assert second.session.state.scene.name == "lost and found"
+    assert second.facts.unsaved and second.facts.recovery is None
+    second.session.autosave.close()
+    second.session.release()
+
+
+def _hit(rig: Rig, kind: type) -> PickHit:
+    index = next(i for i, o in enumerate(rig.session.state.scene.objects) if isinstance(o.material, kind))
+    return PickHit(index, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 5.0, kind is Diffuse)
+
+
+def test_a_click_selects_glass_or_whose_caustic_it_is(rig: Rig) -> None:
+    objects = rig.session.state.scene.objects
+    glass = next(i for i, o in enumerate(objects) if isinstance(o.material, Dielectric))
+    hit = _hit(rig, Diffuse)
+    count = 2000
+    rng = np.random.default_rng(2)
+    places = rng.normal(0, 0.3, (count, 3)) * [1, 1, 0]
+    rig.engine.hit = hit
+    rig.engine.photons = replace(
+        StoredPhotons.none(), position=places, flux_w=np.ones(count), source=np.full(count, glass), receiver=np.full(count, hit.object_index),
+        dposition_dn=np.zeros((count, 0, 3)),
+    )  # fmt: skip
+    assert rig.ask(requests.SelectAt(0.5, 0.5)).selection == Selection("object", glass)
+    assert rig.ask(requests.SelectAt(0.5, 0.5, itself=True)).selection == Selection("object", hit.object_index)
+    rig.engine.photons = None
+    assert rig.ask(requests.SelectAt(0.5, 0.5)).selection == Selection("object", hit.object_index)
+    rig.engine.hit = None
+    assert rig.ask(requests.SelectAt(0.5, 0.5)).selection == Selection()
+
+
+def test_facts_under_the_cursor(rig: Rig) -> None:
+    rig.engine.hit = _hit(rig, Diffuse)
+    hover: Edit = lambda state: replace(state, hover=(0.25, 0.75))  # noqa: E731
+    rig.frame(hover)
+    rig.frame(hover)
+    cursor = rig.facts.cursor
+    assert cursor is not None and cursor.pixel == (16, 27) and cursor.is_receiver
+    grey = 0.1 * rig.session.state.camera.position[2]
+    assert cursor.rgb == pytest.approx((grey,) * 3)
+    assert cursor.spectrum is not None and cursor.spectrum_nm is not None
+    rig.frame()
+    rig.frame()
+    assert rig.facts.cursor is None
+
+
+def test_copy_material_and_frame_selection(rig: Rig) -> None:
+    state = rig.ask(requests.CopyMaterial(0))
+    assert state.clipboard is state.scene.objects[0].material
+    before = state.camera
+    rig.frame(lambda state: replace(state, selection=Selection("object", 1)))
+    after = rig.ask(requests.FrameSelection()).camera
+    assert after.target != before.target and after.vertical_fov_deg == before.vertical_fov_deg
+
+
+def test_settings_reach_the_engine_and_the_next_session(gl: Context, config: Path) -> None:
+    rig = Rig(Session(gl, make_engine=FakeEngine))
+    rig.frame(lambda s: replace(s, playing=False, preferences=replace(s.preferences, theme="light", target_photons=5_000_000)))
+    assert rig.engine.playing is False and rig.engine.target_photons == 5_000_000
+    rig.session.close()
+    second = Session(gl, make_engine=FakeEngine)
+    assert second.state.preferences.theme == "light" and second.state.preferences.target_photons == 5_000_000
+    second.release()
+
+
+def test_idle_costs_nothing_once_converged(rig: Rig) -> None:
+    rig.session.gallery.release()  # no thumbnails are waited for
+    assert rig.session.wait_s() == 0.0
+    for _ in range(10):
+        rig.frame()
+    for message in rig.session.messages.messages():
+        rig.session.messages.close(message.text)
+    assert rig.session.wait_s() > 0.1
+
+
+def test_no_request_is_without_an_answer() -> None:
+    from app.ui import session_requests
+
+    asked = set(requests.Request.__args__)
+    assert asked <= set(session_requests._HANDLERS)
+
+
+def test_a_missing_scene_is_one_sentence(gl: Context, config: Path, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="nothing.toml"):
+        Session(gl, tmp_path / "nothing.toml", make_engine=FakeEngine)
+
+
+def test_exposure_is_automatic_until_it_is_set(rig: Rig) -> None:
+    automatic = rig.session.picture.exposure_ev
+    assert automatic != 0.0
+    rig.frame(lambda s: replace(s, display=replace(s.display, auto_exposure=False, exposure_ev=-2.5)))
+    rig.frame()
+    assert rig.facts.exposure_ev == -2.5
+
+
+def test_the_live_picture_frees_what_it_owns(gl: Context) -> None:
+    picture = LivePicture(gl, FakeEngine)
+    engine = picture.engine
+    picture.release()
+    assert isinstance(engine, FakeEngine) and engine.released
