@@ -99,12 +99,14 @@ def _build(dock: int, size: imgui.ImVec2, windows: tuple[Docked, ...]) -> None:
 def _bring_to_front(windows: tuple[Docked, ...]) -> None:
     """Show the tab that matters of each place: all of them came to the front in turn as they appeared."""
     done: set[int] = set()
-    for title in (*(listed.title for listed in windows), VIEWPORT):
-        window = imgui.internal.find_window_by_name(title)
+    for listed in windows:
+        window = imgui.internal.find_window_by_name(listed.title)
         node = None if window is None else window.dock_node
-        if window is not None and node is not None and node.id_ not in done:
+        if window is not None and node is not None and node.tab_bar is not None and node.id_ not in done:
             done.add(node.id_)
-            imgui.internal.focus_window(window)
+            node.tab_bar.next_selected_tab_id = window.tab_id
+    # Else the window with the focus, the last that appeared, would come back to the front.
+    imgui.set_window_focus(VIEWPORT)
 
 
 def _split(node: int, direction: imgui.Dir, share: float) -> tuple[int, int]:

@@ -55,16 +55,16 @@ class PanelWindow:
 WINDOWS = (
     PanelWindow("outliner", "Outliner", "left top", outliner.draw_outliner),
     PanelWindow("history", "History", "left bottom", history_panel.draw_history),
+    PanelWindow("dispersion", "Dispersion", "right bottom", draw_dispersion),
     PanelWindow("inspector", "Inspector", "right top", inspector.draw_inspector),
     PanelWindow("view", "View", "right top", view_panel.draw_view),
-    PanelWindow("dispersion", "Dispersion", "right bottom", draw_dispersion),
     PanelWindow("brush", "Brush", "right bottom", draw_brush),
     PanelWindow("export", "Export", "right bottom", draw_export),
     PanelWindow("timing", "Timing", "bottom", timing.draw_timing),
     PanelWindow("spectrum", "Spectrum", "bottom", spectrum.draw_spectrum),
     PanelWindow("compare", "Compare", "bottom", draw_compare),
     PanelWindow("abbe", "Abbe diagram", "floating", draw_abbe, (44.0, 34.0)),
-    PanelWindow("shortcuts", "Shortcuts", "floating", help_list.draw_shortcuts, (46.0, 34.0)),
+    PanelWindow("shortcuts", "Shortcuts", "floating", help_list.draw_shortcuts, (62.0, 38.0)),
     PanelWindow("about", "About SpectraSplat", "floating", about.draw_about, (32.0, 20.0)),
 )
 _DOCKED = tuple(Docked(window.title, window.place) for window in WINDOWS)

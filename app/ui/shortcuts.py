@@ -66,6 +66,7 @@ def chord(keys: str) -> int:
 def handle(state: State, facts: Facts) -> State:
     """Carry out the commands whose keys were pressed in this frame; nothing while a text field or a dialogue has them."""
     io = imgui.get_io()
+    _close_menus()
     is_free = not io.want_text_input and not imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
     # The right button held means flying: its letters belong to the camera.
     if not is_free or imgui.is_mouse_down(imgui.MouseButton_.right):
@@ -74,6 +75,13 @@ def handle(state: State, facts: Facts) -> State:
         if _is_pressed(command) and command.enabled(state, facts):
             state = command.act(state, facts)
     return _hold_compare(state, imgui.is_key_down(COMPARE_KEY) and not (io.key_ctrl or io.key_shift or io.key_alt))
+
+
+def _close_menus() -> None:
+    """Esc closes menus and pickers; dialogues answer it themselves. (imgui does so only with its keyboard navigation on.)"""
+    is_menu = imgui.is_popup_open("", imgui.PopupFlags_.any_popup) and imgui.internal.get_top_most_popup_modal() is None
+    if is_menu and imgui.is_key_pressed(imgui.Key.escape):
+        imgui.internal.close_popup_to_level(0, True)
 
 
 @cache
