@@ -63,6 +63,8 @@ class _Look:
     is_setting: bool = False
     """A Ctrl-drag is under way."""
     refused: str = ""
+    corners: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 0.0), (0.0, 0.0))
+    """Where the plot was drawn last, pixels: top left, bottom right."""
 
 
 _look = _Look()
@@ -88,6 +90,8 @@ def draw_abbe(state: State, facts: Facts) -> State:
     _draw_glasses(shown)
     _draw_objects(state)
     state = _answer_mouse(state, shown)
+    corner, size = implot.get_plot_pos(), implot.get_plot_size()
+    _look.corners = (corner.x, corner.y), (corner.x + size.x, corner.y + size.y)
     implot.end_plot()
     item_rects.note("Abbe plot")
     return state

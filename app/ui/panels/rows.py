@@ -49,8 +49,8 @@ def how_to(default: str | None) -> str:
 
 
 def double_clicked() -> bool:
-    """Whether the last item was double-clicked in this frame."""
-    return imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0)
+    """Whether the last item was double-clicked in this frame (with Ctrl a click means typing)."""
+    return imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0) and not imgui.get_io().key_ctrl
 
 
 def is_typed_in(label: str) -> bool:

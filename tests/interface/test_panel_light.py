@@ -1,0 +1,172 @@
+"""The light panel and the brush panel: units, kinds, spectra, dabs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from panel_rig import PanelRig, receiver_of, scene_state
+
+from app.gpu.context import Context
+from app.model.scene import Dab
+from app.ui import edits
+from app.ui.panels import light_panel, light_spectrum
+from app.ui.panels.brush_panel import draw_brush
+from app.ui.panels.light_panel import angles_of, direction_of, draw_light
+from app.ui.panels.light_spectrum import LAMPS
+
+
+@pytest.fixture(autouse=True)
+def fresh_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(light_panel, "_power_key", {})
+    monkeypatch.setattr(light_spectrum, "_look", light_spectrum._Look())
+
+
+@pytest.fixture
+def panel(gl: Context) -> Iterator[PanelRig]:
+    with PanelRig(gl, draw_light, scene_state(select="light")) as rig:
+        yield rig
+
+
+def choose(rig: PanelRig, label: str, option: str) -> None:
+    """Open a combo and take an option."""
+    rig.click(label)
+    rig.frame(2)
+    rig.click(option)
+    rig.frame(2)
+
+
+def test_power_is_typed_in_its_unit(panel: PanelRig) -> None:
+    panel.type_into("Power", "1234")
+    assert panel.light.spectral_power.luminous() == pytest.approx(1234.0, rel=1e-6)
+    assert panel.labels == ["Power of slit"]
+
+
+def test_flux_of_a_beam_is_its_illuminance_times_its_area(panel: PanelRig) -> None:
+    choose(panel, "Quantity", "Luminous flux (lm)")
+    panel.type_into("Power", "50")
+    area = panel.light.width * panel.light.height
+    assert panel.light.spectral_power.luminous() * area == pytest.approx(50.0, rel=1e-6)
+
+
+def test_another_kind_keeps_the_name_and_shows_its_own_rows(panel: PanelRig) -> None:
+    choose(panel, "Kind", "Spot")
+    assert panel.light.kind == "spot"
+    assert "Half angle" in panel.items.items
+    assert "Width" not in panel.items.items
+    panel.type_into("Half angle", "12")
+    assert panel.light.outer_half_angle_deg == 12.0
+    assert panel.light.inner_half_angle_deg <= 12.0
+
+
+def test_spectrum_keeps_the_photometric_power(panel: PanelRig) -> None:
+    lumens = panel.light.spectral_power.luminous()
+    choose(panel, "Spectrum", "Black body")
+    assert edits.spectrum_words(panel.light.spectral_power) == ("blackbody", pytest.approx(3200.0))
+    panel.type_into("Temperature", "5800")
+    assert edits.spectrum_words(panel.light.spectral_power)[1] == pytest.approx(5800.0, rel=1e-5)
+    choose(panel, "Spectrum", "Gas lamp")
+    assert [nm for nm, _ in panel.light.spectral_power.lines] == [nm for nm, _ in LAMPS["Mercury"]]
+    choose(panel, "Lamp", "Sodium")
+    assert len(panel.light.spectral_power.lines) == 2
+    assert panel.light.spectral_power.luminous() == pytest.approx(lumens, rel=1e-9)
+
+
+def test_laser_slider_is_dragged_live(panel: PanelRig) -> None:
+    choose(panel, "Spectrum", "Laser line")
+    panel.was_held = False
+    panel.drag_slider("Wavelength", 0.4, 0.75)
+    kind, nm = edits.spectrum_words(panel.light.spectral_power)
+    assert kind == "laser"
+    assert nm == pytest.approx(680.0, abs=8.0)
+    assert panel.was_held
+
+
+def test_a_measured_spectrum_is_read_from_a_file(panel: PanelRig, tmp_path: Path) -> None:
+    file = tmp_path / "lamp.csv"
+    file.write_text("wavelength_nm, power\n400, 0\n500, 1\n600, 0\n")
+    choose(panel, "Spectrum", "Measured, from file")
+    panel.click("Spectrum file")
+    panel.type(str(file))
+    panel.click("Read file")
+    density = panel.light.spectral_power.density
+    assert int(np.argmax(density)) + 380 == 500
+    assert panel.state.requests == ()
+
+
+def test_a_missing_file_is_said_and_changes_nothing(panel: PanelRig) -> None:
+    before = panel.light
+    choose(panel, "Spectrum", "Measured, from file")
+    panel.click("Spectrum file")
+    panel.type("/nowhere/lamp.csv")
+    panel.click("Read file")
+    assert panel.light == before
+    assert "/nowhere/lamp.csv" in panel.state.requests[0].text
+
+
+def test_direction_is_turned_by_angles(panel: PanelRig) -> None:
+    panel.type_into("Elevation", "-45")
+    panel.type_into("Azimuth", "90")
+    assert panel.light.direction == pytest.approx((0.0, 0.5**0.5, -(0.5**0.5)), abs=1e-4)
+
+
+def test_azimuth_survives_straight_down() -> None:
+    azimuth, elevation = angles_of(direction_of(40.0, -90.0))
+    assert azimuth == pytest.approx(40.0, abs=1e-6)
+    assert elevation == pytest.approx(-89.999)
+
+
+def test_name_is_taken_when_the_field_is_left(panel: PanelRig) -> None:
+    panel.double_click("Name")
+    panel.type("sunbeam")
+    panel.click("Light spectrum")
+    assert panel.light.name == "sunbeam"
+
+
+# ---- brush --------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def painted(gl: Context) -> Iterator[PanelRig]:
+    state = scene_state()
+    dabs = [Dab((0.1 * i, 0.0, 0.0), 0.2, 1.0) for i in range(3)]
+    state = replace(state, scene=edits.add_dabs(state.scene, receiver_of(state), dabs))
+    with PanelRig(gl, draw_brush, state) as rig:
+        yield rig
+
+
+def test_clearing_takes_the_dabs_of_that_receiver(painted: PanelRig) -> None:
+    painted.click("Clear 3 dabs")
+    index = receiver_of(painted.state)
+    assert painted.state.scene.objects[index].local_dispersion == ()
+    assert painted.labels == [f"Clear dabs of {painted.state.scene.objects[index].name}"]
+
+
+def test_physical_picture_is_a_switch_that_edits_nothing(painted: PanelRig) -> None:
+    scene = painted.state.scene
+    painted.click("Physical picture")
+    assert painted.state.physical
+    assert painted.state.scene is scene
+
+
+def test_brush_settings_and_tools(painted: PanelRig) -> None:
+    painted.click("Brush")
+    assert painted.state.tool == "brush"
+    choose(painted, "Mode", "Erase")
+    painted.type_into("Radius", "0.25")
+    painted.drag_slider("Falloff", 0.7, 0.1)
+    brush = painted.state.brush
+    assert (brush.mode, brush.radius) == ("erase", 0.25)
+    assert brush.falloff == pytest.approx(0.1, abs=0.05)
+    painted.double_click("Radius")
+    assert painted.state.brush.radius == 0.05
+
+
+def test_strength_of_the_eraser_leaves_that_of_the_others(painted: PanelRig) -> None:
+    painted.type_into("Strength", "4")
+    choose(painted, "Mode", "Erase")
+    choose(painted, "Mode", "Widen colours")
+    assert painted.state.brush.strength == 4.0
