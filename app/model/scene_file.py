@@ -13,8 +13,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from app.errors import UserError
 from app.model.scene import (
     Camera,
@@ -24,6 +22,7 @@ from app.model.scene import (
     Scene,
     SceneObject,
 )
+from app.model.scene_camera import read_camera
 from app.model.scene_checks import check_scene
 from app.model.scene_defaults import (
     default_camera,
@@ -118,25 +117,7 @@ def _read_camera(table: SceneTable, around: Surroundings, notes: list[str]) -> C
     if inner is None:
         notes.append("No camera given: one that sees the objects and what falls beside them was added.")
         return default_camera(around)
-    kind = inner.choice("kind", ("pinhole", "orthographic"), "pinhole")
-    position = inner.vector("position")
-    x, y, z = (float(v) for v in around.centre)
-    target = inner.vector("target", (x, y, z))
-    up = inner.vector("up", (0.0, 0.0, 1.0), nonzero=True)
-    forward = np.subtract(target, position)
-    if np.linalg.norm(forward) < 1e-150:
-        inner.fail("target", "lies at the camera's own position and so gives no direction")
-    sine = np.linalg.norm(np.cross(forward, up)) / (np.linalg.norm(forward) * np.linalg.norm(up))
-    if sine < 1e-9:
-        inner.fail("up", "is parallel to the viewing direction; give a direction across it")
-    camera = Camera(position, target, up, kind)  # type: ignore[arg-type]
-    if kind == "pinhole":
-        camera = replace(camera, vertical_fov_deg=inner.number("vertical_fov_deg", 35.0, above=0.0, below=180.0))
-    else:
-        extent = inner.number("vertical_extent", 4.0 * around.radius, above=0.0)
-        camera = replace(camera, vertical_extent=extent)
-    inner.finish(f"a camera of kind '{kind}'")
-    return camera
+    return read_camera(inner, around)
 
 
 def _add_table(objects: list[SceneObject], notes: list[str]) -> None:

@@ -54,22 +54,23 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
 
 def scene_text(scene: Scene, path: Path) -> str:
     """The TOML text of `scene` as it would stand in `path`; writes PLY files where it must."""
-    parts = [_block("", {"name": scene.name, "background": list(scene.background_rgb)})]
-    parts.append(_block("[camera]", _camera(scene.camera)))
-    parts.append(_block("[render]", render_values(scene.render)))
-    parts += [_block("[[lights]]", light_values(light)) for light in scene.lights]
+    parts = [toml_block("", {"name": scene.name, "background": list(scene.background_rgb)})]
+    parts.append(toml_block("[camera]", camera_values(scene.camera)))
+    parts.append(toml_block("[render]", render_values(scene.render)))
+    parts += [toml_block("[[lights]]", light_values(light)) for light in scene.lights]
     materials: dict[str, dict[str, Any]] = {}
     objects = [
-        _block("[[objects]]", _objects(group, materials, path)) for group in _groups(scene.objects)
+        toml_block("[[objects]]", _objects(group, materials, path)) for group in _groups(scene.objects)
     ]
-    parts += [_block(f"[materials.{_key(name)}]", values) for name, values in materials.items()]
+    parts += [toml_block(f"[materials.{toml_key(name)}]", values) for name, values in materials.items()]
     return "\n".join(parts + objects)
 
 
 # -- parts of a scene ---------------------------------------------------------------------
 
 
-def _camera(camera: Camera) -> dict[str, Any]:
+def camera_values(camera: Camera) -> dict[str, Any]:
+    """The [camera] table of a scene file."""
     values: dict[str, Any] = {
         "kind": camera.kind,
         "position": list(camera.position),
@@ -92,6 +93,7 @@ def render_values(render: RenderDefaults) -> dict[str, Any]:
 
 
 def light_values(light: Light) -> dict[str, Any]:
+    """One of the [[lights]] of a scene file."""
     values: dict[str, Any] = {"name": light.name, "kind": light.kind}
     if light.kind != "directional":
         values["position"] = list(light.position)
@@ -206,12 +208,14 @@ def _relative(target: str, folder: Path) -> str:
 # -- TOML ---------------------------------------------------------------------------------
 
 
-def _block(header: str, values: dict[str, Any]) -> str:
+def toml_block(header: str, values: dict[str, Any]) -> str:
+    """A table with its header ("" for the top level), as TOML text."""
     lines = [header] if header else []
-    return "\n".join(lines + [f"{_key(key)} = {_value(value)}" for key, value in values.items()]) + "\n"
+    return "\n".join(lines + [f"{toml_key(key)} = {_value(value)}" for key, value in values.items()]) + "\n"
 
 
-def _key(key: str) -> str:
+def toml_key(key: str) -> str:
+    """A key, in quotes where it needs them."""
     bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
     return key if bare else _value(key)
 
@@ -227,5 +231,5 @@ def _value(value: Any) -> str:
     if isinstance(value, float):
         return repr(float(value)) if math.isfinite(value) else ("inf" if value > 0 else "-inf")
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
+        return "{" + ", ".join(f"{toml_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
     return "[" + ", ".join(_value(entry) for entry in value) + "]"

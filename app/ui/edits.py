@@ -10,6 +10,8 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from app.errors import UserError
 from app.model.scene import Camera, RenderDefaults, Scene, Vec3
 from app.model.scene_render import MAX_DEPTH, MAX_PICTURE_SIDE
@@ -95,7 +97,12 @@ def set_render_defaults(scene: Scene, **changes: float) -> Scene:
 
 
 def set_camera(scene: Scene, camera: Camera) -> Scene:
-    """Make `camera` the view the scene is saved with."""
-    if camera.position == camera.target:
+    """Make `camera` the view the scene is saved with; an up direction along the view, which a file may not hold, is turned aside."""
+    forward = np.subtract(camera.target, camera.position)
+    if not np.isfinite(forward).all() or np.linalg.norm(forward) < 1e-150:
         raise UserError("the camera looks at its own position; choose another target")
+    forward = forward / np.linalg.norm(forward)
+    if np.linalg.norm(np.cross(forward, camera.up)) < 1e-6 * np.linalg.norm(camera.up):
+        across = np.eye(3)[int(np.argmin(np.abs(forward)))]
+        camera = replace(camera, up=(float(across[0]), float(across[1]), float(across[2])))
     return replace(scene, camera=camera)

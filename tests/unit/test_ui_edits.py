@@ -327,6 +327,13 @@ def test_scene_values(scene: Scene) -> None:
     assert edits.set_render_defaults(scene, width=640, exposure_ev=-1.5).render.width == 640
     assert "max depth" in refusal(edits.set_render_defaults, scene, max_depth=0)
     assert edits.set_camera(scene, replace(scene.camera, vertical_fov_deg=20.0)).camera.vertical_fov_deg == 20.0
+    assert "own position" in refusal(edits.set_camera, scene, replace(scene.camera, target=scene.camera.position))
+
+
+def test_a_camera_that_looks_straight_down_can_be_saved(scene: Scene, tmp_path: Path) -> None:
+    down = replace(scene.camera, position=(0.0, 0.0, 9.0), target=(0.0, 0.0, 0.0))
+    saved = edits.set_camera(scene, down)
+    assert reopened(saved, tmp_path).camera == saved.camera != down
 
 
 def test_an_attempt_is_an_edit_or_a_notice(scene: Scene) -> None:
