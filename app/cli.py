@@ -148,6 +148,21 @@ def view(
 
 
 @app.command()
+def bake(
+    scene: SceneArgument,
+    receiver: Annotated[str, typer.Argument(metavar="RECEIVER", help="The diffuse object whose caustic is baked.")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="The texture: .exr or .npy (linear irradiance), .png (to look at); where it lies is written to a .json beside it.")],
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Texels; default: 1024x1024.")] = None,
+    photons: Annotated[Text, typer.Option(metavar="N", help="Photons to emit; default: the scene's.")] = None,
+    seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
+) -> None:
+    """Bake the caustic on an object to a texture, with its placement."""
+    from app.cli_bake import BakeRequest, bake_command
+
+    raise typer.Exit(bake_command(BakeRequest(scene, receiver, output, size, photons, seed)))
+
+
+@app.command()
 def inspect(scene: SceneArgument) -> None:
     """Show what a scene holds, its glasses and mesh health, and which features its programs need."""
     from app.inspect_report import inspect_text
