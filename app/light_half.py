@@ -19,15 +19,14 @@ from app.gpu.context import Context
 from app.gpu.gain_buffers import GainBuffers
 from app.gpu.map_atlas import MapAtlas
 from app.gpu.scene_buffers import SceneBuffers
-from app.gpu.shader import Releasable
 from app.gpu.splat_tables import SplatTables
+from app.light_maps import LightMaps
 from app.light_plan import SMALLEST_BATCH, Planner
 from app.model.features import Features
 from app.model.scene import Camera, Dielectric, Diffuse, Mirror, Scene
 from app.model.settings import RenderSettings
 from app.model.spectral_tables import SpectralAxis
 from app.model.spectrum import Spectrum
-from app.passes.accumulate import LevelsFold, SeamFold, copy_texture
 from app.passes.emission_domain import EmissionDomain, emission_domain
 from app.passes.footprint import SpectralVariables
 from app.passes.map_layout import MapLayout, check_map_receiver, layout_maps
@@ -91,8 +90,8 @@ class LightHalf:
         self.variables = SpectralVariables.build(context.ctx, buffers.variable_table)
         self.gains = GainBuffers(context.ctx, scene, buffers.receivers, buffers.space, buffers.axis) if features.local_gain else None
         self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
-        self._laid_out: list[Releasable] = []
-        self.photon_weight = 0.0
+        self.maps: LightMaps | None = None
+        self._shown_spectra: Sequence[Spectrum] = [light.spectral_power for light in scene.lights]
         self._tables: SplatTables | None = None
         self._spans: list[list[tuple[float, float]]] = []
 
@@ -119,21 +118,58 @@ class LightHalf:
 
     def lay_out(self, camera: Camera) -> None:
         """Maps fitted to where light lands and to what `camera` sees of it; empty."""
-        for owned in self._laid_out:
-            owned.release()
-        picture = (self.settings.width, self.settings.height)
+        if self.maps is not None:
+            self.maps.release()
+        self.maps = self.maps_for(camera, self.settings.width, self.settings.height)
+        self.features = self.maps.features
+
+    def maps_for(self, camera: Camera, width: int, height: int) -> LightMaps:
+        """Maps fitted to what `camera` sees in a picture of `width` × `height`; the caller's to release."""
         seen = replace(self.scene, camera=camera)
-        self.layout: MapLayout = layout_maps(seen, self.buffers, landings_of(self.pilots.values()), picture, self.reflectance_class, self.map_receiver)
-        # Only the pilot tells whether a fine window pays: without one no splat is drawn twice.
-        self.features = replace(self.features, nested_windows=any(len(windows) > 1 for windows in self.layout.windows.values()))
-        ctx = self.context.ctx
-        self.splatter = Splatter(ctx, self.features)
-        self.atlas = MapAtlas(ctx, self.layout.size, self.layout.placements, self.features.targets)
-        self.receivers = ctx.buffer(np.ascontiguousarray(self.layout.receivers).tobytes())
-        self._resolved = [ctx.texture(self.atlas.size, 4, dtype="f4") for _ in range(self.features.targets)]
-        self._levels_fold = LevelsFold(ctx, self.layout.folds)
-        self._seam_fold = SeamFold(ctx, [(self.layout.tiles[r][0], charts) for r, charts in self.layout.charts.items()])
-        self._laid_out: list[Releasable] = [self.splatter, self.atlas, self.receivers, *self._resolved, self._levels_fold, self._seam_fold]
+        layout = layout_maps(seen, self.buffers, landings_of(self.pilots.values()), (width, height), self.reflectance_class, self.map_receiver)
+        return LightMaps(self.context.ctx, layout, self.features)
+
+    @property
+    def _maps(self) -> LightMaps:
+        assert self.maps is not None, "prepare() comes first"
+        return self.maps
+
+    @property
+    def layout(self) -> MapLayout:
+        """Where the maps lie."""
+        return self._maps.layout
+
+    @property
+    def atlas(self) -> MapAtlas:
+        """What splats are added to."""
+        return self._maps.atlas
+
+    @property
+    def receivers(self) -> moderngl.Buffer:
+        """RECEIVER records."""
+        return self._maps.receivers
+
+    @property
+    def splatter(self) -> Splatter:
+        """The splat pass of the maps."""
+        return self._maps.splatter
+
+    @property
+    def map_scale(self) -> float:
+        """Factor from what the maps have summed to energy per texel."""
+        return self._maps.scale
+
+    def resolved_textures(self) -> list[moderngl.Texture]:
+        """The summed maps for look-ups: wide texels added to fine ones, charts' seams folded home."""
+        return self._maps.resolved_textures()
+
+    def resolved_map(self, receiver: int) -> np.ndarray:
+        """A receiver's finest map: float32 (height, width, channels), row 0 at texel y = 0."""
+        return self._maps.receiver(receiver)
+
+    def map_flux(self) -> float:
+        """What the maps hold where they are read: the sum of XYZ maps' last channel (W), or of all bins."""
+        return self._maps.flux(self.bin_edges_nm is None)
 
     def begin(self, photons: int, seed: int) -> None:
         """Empty maps and a plan for passes of about `photons`; what was summed and counted before is forgotten.
@@ -141,7 +177,7 @@ class LightHalf:
         Afterwards `plans` and `tables` exist. Pilots and maps stay, so a rendering may be begun again and again."""
         self.seed = seed
         self.stats = LightStats()
-        self.clear_maps()
+        self._maps.clear()
         planner = Planner(self.scene, self.settings, self.features, self.buffers, self.domains, self.pilots)
         self.plans = planner.plans(photons, self._texel_size())
         for plan in self.plans:
@@ -150,20 +186,13 @@ class LightHalf:
         limits = {plan.index: [(b.x_lo, b.x_hi) for b in plan.bands] for plan in self.plans}
         spans = [limits.get(i, [(0.0, 1.0)]) for i in range(len(self.scene.lights))]
         if spans != self._spans:
-            self._spans = spans
-            self._build_tables([light.spectral_power for light in self.scene.lights])
+            if self._tables is not None:
+                self._tables.release()
+            self._spans, self._tables = spans, self._tables_of(spans)
 
-    def clear_maps(self) -> None:
-        """Forget what was deposited; plans, tables and counts stay."""
-        self.photon_weight = 0.0
-        self.atlas.clear()
-        self.splatter.reset_counts()
-
-    def _build_tables(self, spectra: Sequence[Spectrum]) -> None:
-        if self._tables is not None:
-            self._tables.release()
+    def _tables_of(self, spans: list[list[tuple[float, float]]]) -> SplatTables:
         channels = "xyz" if self.bin_edges_nm is None else self.bin_edges_nm.tolist()
-        self._tables = SplatTables.build(self.context.ctx, self.buffers.axis, spectra, self.reflectances, self._spans, channels)
+        return SplatTables.build(self.context.ctx, self.buffers.axis, self._shown_spectra, self.reflectances, spans, channels)
 
     @property
     def tables(self) -> SplatTables:
@@ -178,11 +207,6 @@ class LightHalf:
     def _full_power(self, light: int) -> float:
         """Radiant power of a light's whole spectrum per unit weight, W."""
         return float(self.buffers.light_power[light].band(0.0, 1.0)[3])
-
-    @property
-    def map_scale(self) -> float:
-        """Factor from what the atlas has summed to energy per texel."""
-        return 1.0 / self.photon_weight if self.photon_weight else 0.0
 
     def run_pass(self, number: int, photons: int, proceed: Callable[[float], bool]) -> bool:
         """One shifted set of lattices with about `photons` points over all lights.
@@ -200,14 +224,16 @@ class LightHalf:
                 return False
         return True
 
-    def pass_steps(self, number: int, photons: int) -> Generator[PassStep, None, None]:
-        """`run_pass`, pausing after every event of the rays and after every splatting: whoever draws meanwhile may bind what it likes."""
+    def pass_steps(self, number: int, photons: int, first_round: int = 0) -> Generator[PassStep, None, None]:
+        """`run_pass`, pausing after every event of the rays and after every splatting: whoever draws meanwhile may bind what it likes.
+
+        `first_round`: where a pass goes on that was left before."""
         if not self.plans:
             return
         counts = [plan.lattice_count(photons) for plan in self.plans]
         rounds = max(-(-n // (self.trace.batch // plan.lattices)) for n, plan in zip(counts, self.plans, strict=True))
         slices = rounds * len(self.plans)
-        for j in range(rounds):
+        for j in range(first_round, rounds):
             for i, (plan, lattice) in enumerate(zip(self.plans, counts, strict=True)):
                 done = j * len(self.plans) + i
                 points = len(range(j, lattice, rounds))
@@ -217,7 +243,7 @@ class LightHalf:
                         yield PassStep(done / slices, False)
                 if i + 1 < len(self.plans):
                     yield PassStep((done + 1) / slices, False)
-            self.photon_weight += photons / rounds
+            self._maps.photon_weight += photons / rounds
             yield PassStep((j + 1) / rounds, True)
 
     def _slice(self, piece: LatticeSlice, domain: EmissionDomain, of: RoundOf) -> Iterator[None]:
@@ -241,11 +267,16 @@ class LightHalf:
     def keep(self, batch: Batch, of: RoundOf) -> None:
         """Called with every batch while `trace.photons` holds it; a live rendering stores the records."""
 
-    def splat(self, photons: moderngl.Buffer, count: int, coarsening: float = 1.0) -> None:
-        """Add photon records to the maps, with footprints `coarsening` times as wide."""
+    def splat(
+        self, photons: moderngl.Buffer, count: int, coarsening: float = 1.0, tables: SplatTables | None = None, maps: LightMaps | None = None
+    ) -> None:
+        """Add photon records to the maps, with footprints `coarsening` times as wide.
+
+        `tables` of another plan than the one begun, `maps` of another layout than the light half's own."""
         started = time.perf_counter()
+        maps = maps or self._maps
         smoothing = self.settings.smoothing * coarsening
-        self.splatter.run(photons, count, self.variables, self.tables, self.atlas, self.receivers, smoothing, self.gains)
+        maps.splatter.run(photons, count, self.variables, tables or self.tables, maps.atlas, maps.receivers, smoothing, self.gains)
         if self.context.is_software:
             self.context.finish()
         self.stats.splat_seconds += time.perf_counter() - started
@@ -263,64 +294,6 @@ class LightHalf:
             sides.append(np.sqrt(area) * self.buffers.space.scale)
         return np.array(sides)
 
-    def resolved_textures(self) -> list[moderngl.Texture]:
-        """The summed maps for look-ups: wide texels added to fine ones, charts' seams folded home."""
-        self.atlas.flush()
-        ctx = self.context.ctx
-        total = self.atlas.total_textures
-        if self.layout.charts:
-            self._seam_fold.run(total, self._resolved)
-        else:
-            for source, target in zip(total, self._resolved, strict=True):
-                copy_texture(ctx, source, target)
-        self._levels_fold.run(self._resolved)
-        return self._resolved
-
-    def _read_resolved(self) -> np.ndarray:
-        """All maps put together, float32 (height, width, channels)."""
-        width, height = self.atlas.size
-        layers = []
-        for texture in self.resolved_textures():
-            layer = np.empty((height, width, 4), np.float32)
-            texture.read_into(layer)
-            layers.append(layer)
-        return np.concatenate(layers, axis=-1)
-
-    def resolved_map(self, receiver: int) -> np.ndarray:
-        """A receiver's finest map: float32 (height, width, channels), row 0 at texel y = 0."""
-        x0, y0, x1, y1 = self.layout.tiles[receiver][0].rect
-        return self._read_resolved()[y0:y1, x0:x1]
-
-    def map_flux(self) -> float:
-        """What the maps hold where they are read: the sum of XYZ maps' last channel (W), or of all bins."""
-        total = self._read_resolved()
-        total = total[..., 3] if self.bin_edges_nm is None else total.sum(axis=-1)
-        flux = 0.0
-        for receiver, tiles in self.layout.tiles.items():
-            charts = self.layout.charts.get(receiver)
-            for level, tile in enumerate(tiles):
-                x0, y0, x1, y1 = tile.rect
-                energy = total[y0:y1, x0:x1].astype(float)
-                if charts is not None:
-                    energy = energy[charts.owner >= 0]
-                elif level:
-                    energy = self._outside_finer(receiver, level, energy)
-                flux += energy.sum()
-        return flux
-
-    def _outside_finer(self, receiver: int, level: int, energy: np.ndarray) -> np.ndarray:
-        """Energy of a coarse window without the part that the finer window is read for."""
-        fine, coarse = self.layout.windows[receiver][level - 1 : level + 1]
-        height, width = energy.shape
-        share = [
-            np.clip(np.minimum(high_f, edges[1:]) - np.maximum(low_f, edges[:-1]), 0.0, None) / np.diff(edges)
-            for low_f, high_f, edges in (
-                (fine.low[0], fine.high[0], np.linspace(coarse.low[0], coarse.high[0], width + 1)),
-                (fine.low[1], fine.high[1], np.linspace(coarse.low[1], coarse.high[1], height + 1)),
-            )
-        ]
-        return energy * (1.0 - share[1][:, None] * share[0])
-
     def finish(self) -> None:
         """Sum what is pending and fetch the counters."""
         self.atlas.flush()
@@ -333,7 +306,7 @@ class LightHalf:
         """Free everything."""
         self.trace.release()
         self.variables.release()
-        for owned in (*self._laid_out, self.gains, self._tables):
+        for owned in (self.maps, self.gains, self._tables):
             if owned is not None:
                 owned.release()
 

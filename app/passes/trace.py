@@ -112,6 +112,8 @@ class TracePass:
         self.scene = scene
         self.batch = batch
         self.max_depth = max_depth
+        self.rays_traced = 0
+        """Rays emitted since this pass was made, pilots and all."""
         self.split_threshold = split_threshold
         self._ray = records.ray_record(features.defines()["COLUMNS"])
         self.photon = records.photon_record(features.spectral_groups)
@@ -194,6 +196,7 @@ class TracePass:
         self._indices.bind_to_storage_buffer(bindings.INDICES)
         self._list_children(first=True, chunks=-(-piece.count // _CHUNK))
         emitted = int(self._read_state()["alive"])
+        self.rays_traced += emitted
 
         # Walking through covered surfaces and cutting bands take steps without being events.
         limit = 2 * max_depth + 32

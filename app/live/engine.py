@@ -1,0 +1,437 @@
+"""A rendering that is never finished: it follows its inputs, answers in time, and gets better while nothing changes.
+
+`set` says what is wanted, `advance` works on it for a while. The difference of the wanted inputs to
+those that the photons stand for decides what is redone: nothing, camera samples, splats or tracing. Work is cut
+into pieces of a few milliseconds, so that a frame's budget is kept on a software renderer too.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.errors import UserError
+from app.gpu import shader
+from app.gpu.scene_buffers import SceneBuffers
+from app.light_half import spectral_axis
+from app.light_maps import LightMaps
+from app.live.accumulation import Accumulation
+from app.live.difference import redo
+from app.live.eye import LiveEye, solo_scene
+from app.live.inputs import LiveInputs, Redo
+from app.live.light import LiveLight
+from app.live.near import StoredPhotons, caustic_spectrum, reach_of, world_photons
+from app.live.refit import wants_new_maps
+from app.live.stats import LiveStats
+from app.model.features import Features
+from app.model.settings import RenderSettings
+from app.passes.eye import CausticMaps
+from app.passes.pick import Picker, PickHit
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from app.gpu.context import Context
+
+STILL_S = 0.5
+"""Without a change for so long, what was only approximated is done properly."""
+CALM_S = 0.12
+"""Without a change for so long, a coarse picture is replaced by a full one."""
+EYE_SHARE = 0.4
+"""Of a frame, where photons are traced as well."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Sizes that depend on the device."""
+
+    batch: int
+    first_photons: int
+    largest_photons: int
+    store_bytes: int
+
+    @staticmethod
+    def of(context: Context) -> Budget:
+        """A software renderer answers in small steps; a GPU takes millions at a time."""
+        if context.is_software:
+            return Budget(8192, 1 << 14, 1 << 22, 256 << 20)
+        return Budget(1 << 18, 1 << 20, 1 << 25, 1 << 30)
+
+
+@dataclass
+class Shown:
+    """A light half and how far it has come."""
+
+    traced: LiveInputs
+    light: LiveLight
+    accumulation: Accumulation
+    steps: Iterator[None] = field(default_factory=lambda: iter(()))
+    """What is left of the accumulation."""
+
+
+class LiveEngine:
+    """Owns everything of one live rendering; `context` stays the caller's and must be current in every call."""
+
+    def __init__(self, context: Context, budget: Budget | None = None) -> None:
+        self.context = context
+        self.budget = budget or Budget.of(context)
+        self.target_photons = 32_000_000
+        self.refine_when_still = True
+        """Trace again with the new glass once nothing changes, where the picture followed an edit to first order only."""
+        self.playing = True
+        """Photons accumulate."""
+        self.problem: str | None = None
+        """Why the last change could not be shown (bad shader, maps too large); the picture before it stays."""
+        shader.keep_programs(context.ctx)
+        self._eye = LiveEye(context)
+        self._wanted: LiveInputs | None = None
+        self._inputs: LiveInputs | None = None
+        """What the picture shows."""
+        self._shown: Shown | None = None
+        self._building: Iterator[Shown] | None = None
+        self._being_built: LiveInputs | None = None
+        self._job: Iterator[None] | None = None
+        self._maps: CausticMaps | None = None
+        self._picker: Picker | None = None
+        self._changed_at = 0.0
+        self._interacting = False
+        self._urgent = False
+        self._retrace = False
+        self._rays_before = 0
+        self._quick_photons = 1 << 13
+        self._times = {"trace": 0.0, "splat": 0.0, "eye": 0.0}
+        self._history: list[tuple[float, int, float]] = []
+        self._published_photons = 0.0
+
+    # ---- what is wanted ----------------------------------------------------------------------
+
+    def set(self, inputs: LiveInputs) -> Redo:
+        """Want `inputs` from now on; returns what that asks for. The work is done by `advance`."""
+        before = self._wanted
+        if before is not None and redo(before, before, inputs) == Redo.NOTHING:
+            self._wanted = inputs
+            return Redo.NOTHING
+        self._wanted = inputs
+        self._changed_at = time.perf_counter()
+        self._urgent = True
+        if self._shown is None or self._inputs is None:
+            return Redo.BUILD
+        return redo(self._shown.traced, self._inputs, inputs)
+
+    def retrace(self) -> None:
+        """Trace with the glass that is shown, where the picture followed an edit to first order only."""
+        self._retrace = self._shown is not None and self._shown.light.first_order
+
+    def rebuild(self) -> None:
+        """Compile every program again (shaders changed on disk). Raises `ShaderError`, and the present ones stay, where that fails."""
+        shader.forget_programs(self.context.ctx)
+        shader.keep_programs(self.context.ctx)
+        self.problem = None
+        self._start_building(self._wanted)
+        while self._building is not None:
+            try:
+                self._build(float("inf"))
+            except (shader.ShaderError, UserError):
+                self._building = self._being_built = None
+                raise
+
+    # ---- work --------------------------------------------------------------------------------
+
+    def advance(self, budget_s: float, interacting: bool = False) -> None:
+        """Work for about `budget_s` seconds. `interacting`: something is being dragged, so answer at once and coarsely."""
+        started = time.perf_counter()
+        deadline = started + budget_s
+        self._times = dict.fromkeys(self._times, 0.0)
+        if self._wanted is None:
+            return
+        if self._interacting and not interacting:
+            self._changed_at, self._urgent = started, True
+        self._interacting = interacting
+        try:
+            self._follow(budget_s)
+            self._work(deadline, budget_s)
+        except (shader.ShaderError, UserError) as error:
+            self._building = self._being_built = None
+            self.problem = str(error)
+
+    def _work(self, deadline: float, budget_s: float) -> None:
+        if self._building is not None:
+            self._build(deadline - (EYE_SHARE * budget_s if self._maps is not None and self._eye.owes_picture else 0.0))
+        elif self._job is not None and self.playing and not self._interacting_with_camera:
+            eye_waits = not self._eye.is_done
+            self._run_job(deadline - (EYE_SHARE * budget_s if eye_waits else 0.0))
+        if self._maps is not None and self._inputs is not None:
+            end = max(deadline, time.perf_counter() + 0.25 * budget_s) if self._eye.owes_picture else deadline
+            self._times["eye"] += self._eye.advance(end, one_sample=self._interacting)
+            calm = not self._interacting and time.perf_counter() - self._changed_at > CALM_S
+            if calm and self._eye.is_coarse and not self._eye.owes_picture:
+                self._restart_eye(same_view=True)
+
+    @property
+    def _interacting_with_camera(self) -> bool:
+        """A dragged camera gets the whole budget."""
+        return self._interacting and self._eye.owes_picture
+
+    def _follow(self, budget_s: float) -> None:
+        """Bring what is shown nearer to what is wanted."""
+        wanted, shown = self._wanted, self._shown
+        assert wanted is not None
+        if shown is None or self._inputs is None:
+            if self._building is None and self.problem is None:
+                self._start_building(wanted)
+            elif self.problem is not None and self._urgent:
+                self.problem = None
+                self._start_building(wanted)
+            self._urgent = False
+            return
+        still = not self._interacting and time.perf_counter() - self._changed_at > STILL_S
+        if self._retrace or (still and self.refine_when_still and shown.light.first_order):
+            self._retrace = False
+            if self._building is None:
+                self._start_building(wanted)
+            return
+        if self._urgent:
+            self._urgent = False
+            self._answer(redo(shown.traced, self._inputs, wanted), budget_s)
+        elif still and self._building is None and wants_new_maps(shown.light, wanted):
+            self._eye.pause()
+            self._maps = None
+            shown.light.fit_to(wanted)
+            self._job = shown.accumulation.after_edit()
+
+    def _answer(self, cost: Redo, budget_s: float) -> None:
+        wanted, shown = self._wanted, self._shown
+        assert wanted is not None and shown is not None and self._inputs is not None
+        if cost >= Redo.TRACE:
+            # A build that runs is finished first and shown; then the newest wish is looked at again.
+            if self._building is None:
+                self.problem = None
+                self._start_building(wanted)
+            else:
+                self._urgent = wanted is not self._being_built
+            cost = Redo.LOOK if self._only_camera_besides(wanted) else Redo.NOTHING
+        same_size = (wanted.width, wanted.height) == (self._inputs.width, self._inputs.height)
+        if cost == Redo.SPLAT:
+            shown.light.show(wanted)
+            self._inputs = wanted
+            self._look_at(wanted)
+            self._answer_quickly(0.4 * budget_s)
+            self._job = shown.accumulation.after_edit()
+            return
+        elif cost == Redo.LOOK:
+            if self._building is None:
+                if wanted.scene is not self._inputs.scene:
+                    self._look_at(wanted)
+                self._inputs = wanted
+            else:
+                self._inputs = replace(self._inputs, camera=wanted.camera, width=wanted.width, height=wanted.height)
+        else:
+            return
+        self._restart_eye(same_view=False, resized=not same_size)
+
+    def _answer_quickly(self, seconds: float) -> None:
+        """As many stored photons as can be splatted in about `seconds`, in coarse maps of their own, as the picture for now."""
+        assert self._shown is not None and self._inputs is not None
+        started = time.perf_counter()
+        maps = self._shown.light.splat_quickly(self._quick_photons)
+        if maps is None:
+            return
+        self._set_maps(maps)
+        took = time.perf_counter() - started
+        self._quick_photons = int(np.clip(self._quick_photons * np.clip(seconds / max(took, 1e-4), 0.5, 2.0), 1 << 10, 1 << 24))
+        self._restart_eye(same_view=False)
+
+    def _only_camera_besides(self, wanted: LiveInputs) -> bool:
+        assert self._inputs is not None
+        return wanted.camera != self._inputs.camera or (wanted.width, wanted.height) != (self._inputs.width, self._inputs.height)
+
+    def _restart_eye(self, *, same_view: bool, resized: bool = False) -> None:
+        if self._maps is None or self._inputs is None:
+            return
+        # One coarse answer now; `advance` asks again in full size when things are still.
+        seconds = None if same_view else 0.012 if self.context.is_software else 0.004
+        self._eye.restart(self._inputs.camera, self._inputs.width, self._inputs.height, self._maps, seconds=seconds, same_view=same_view)
+
+    # ---- building ----------------------------------------------------------------------------
+
+    def _start_building(self, wanted: LiveInputs | None) -> None:
+        if wanted is None:
+            return
+        self._being_built = wanted
+        self._building = self._build_steps(wanted)
+
+    def _build(self, deadline: float) -> None:
+        assert self._building is not None
+        while time.perf_counter() < deadline:
+            built = next(self._building, None)
+            if built is not None:
+                self._swap(built)
+                return
+
+    def _build_steps(self, wanted: LiveInputs) -> Iterator[Shown | None]:
+        """Everything for a scene that photons must be traced for, up to its first picture; None while it is not done."""
+        settings = RenderSettings(
+            width=wanted.width, height=wanted.height, method=wanted.method, seed=wanted.seed, smoothing=wanted.smoothing,
+            max_depth=wanted.scene.render.max_depth, batch=self.budget.batch, local_gain=wanted.local_gain, anchor_weights=True,
+        )  # fmt: skip
+        scene = replace(wanted.scene, camera=wanted.camera)
+        features = Features.of(scene, settings)
+        buffers = SceneBuffers(self.context.ctx, scene, features, spectral_axis(scene, features))
+        light = LiveLight(self.context, scene, settings, features, buffers, self.budget.store_bytes)
+        try:
+            yield None
+            for _ in light.preparing():
+                yield None
+            light.show(wanted)
+            largest = min(self.budget.largest_photons, max(self.target_photons, self.budget.first_photons))
+            first = min(self.budget.first_photons, largest)
+            shown = Shown(wanted, light, Accumulation(light, first, largest, self.target_photons, wanted.seed, lambda: None))
+            published: list[bool] = []
+            shown.accumulation.publish = lambda: published.append(True)
+            steps = shown.accumulation.steps()
+            while not published:
+                next(steps, None)
+                yield None
+            shown.accumulation.publish = self._publish_maps
+            shown.steps = steps
+        except BaseException:  # also when the generator is closed because nobody wants this scene any more
+            light.release()
+            raise
+        yield shown
+
+    def _swap(self, built: Shown) -> None:
+        before, self._shown = self._shown, built
+        self._building, self._job = None, built.steps
+        self._inputs, self._being_built = built.traced, None
+        if before is not None:
+            self._rays_before += before.light.trace.rays_traced
+            before.light.release()
+        if self._picker is not None:
+            self._picker.release()
+        self._picker = Picker(self.context, built.light.buffers)
+        self._look_at(built.traced)
+        self._publish_maps()
+        # What was wished for meanwhile is looked at in the next frame.
+        self._urgent = self._wanted is not built.traced
+
+    def _look_at(self, inputs: LiveInputs) -> None:
+        assert self._shown is not None
+        scene = replace(solo_scene(inputs.scene, inputs.solo_nm), camera=inputs.camera)
+        self._eye.look_at(self._shown.light.buffers, scene, self._shown.light.reflectances)
+
+    # ---- light -------------------------------------------------------------------------------
+
+    def _run_job(self, deadline: float) -> None:
+        assert self._shown is not None and self._job is not None
+        stats = self._shown.light.stats
+        before = stats.trace_seconds, stats.splat_seconds, stats.photons
+        while time.perf_counter() < deadline:
+            if next(self._job, self) is self:
+                self._job = None
+                break
+        stats = self._shown.light.stats
+        traced = max(stats.trace_seconds - before[0], 0.0)
+        splatted = max(stats.splat_seconds - before[1], 0.0)
+        self._times["trace"] += traced
+        self._times["splat"] += splatted
+        self._history = [h for h in self._history if h[0] > time.perf_counter() - 1.0]
+        self._history.append((time.perf_counter(), max(stats.photons - before[2], 0), traced + splatted))
+
+    def _publish_maps(self) -> None:
+        """The maps as they are become what the eye looks at."""
+        assert self._shown is not None
+        maps = self._shown.light.maps
+        assert maps is not None
+        self._set_maps(maps)
+        self._restart_eye(same_view=not self._interacting and self._eye.scale == 1.0)
+
+    def _set_maps(self, maps: LightMaps) -> None:
+        self._maps = CausticMaps(maps.resolved_textures(), maps.receivers, maps.atlas.placements, maps.scale)
+        self._published_photons = maps.photon_weight
+
+    # ---- what there is -----------------------------------------------------------------------
+
+    @property
+    def picture(self) -> moderngl.Texture | None:
+        """RGBA32F, linear Rec.709 radiance (lm/(sr unit²) for white), top row first; None before the first."""
+        return self._eye.picture
+
+    @property
+    def inputs(self) -> LiveInputs | None:
+        """What the picture shows, or is about to."""
+        return self._inputs
+
+    @property
+    def stats(self) -> LiveStats:
+        """This moment's."""
+        context, eye = self.context, self._eye
+        common = LiveStats(renderer=context.renderer, is_software=context.is_software, camera_samples=float(eye.shown_samples), resolution_scale=eye.scale)
+        if self._shown is None:
+            return common
+        light = self._shown.light
+        tally = light.stats.tally
+        seconds = sum(h[2] for h in self._history)
+        return replace(
+            common,
+            rays_traced=self._rays_before + light.trace.rays_traced,
+            photons=int(self._published_photons),
+            photons_stored=light.photons_stored,
+            passes=self._shown.accumulation.number,
+            trace_s=self._times["trace"],
+            splat_s=self._times["splat"],
+            eye_s=self._times["eye"],
+            photons_per_second=sum(h[1] for h in self._history) / seconds if seconds > 0.0 else 0.0,
+            first_order=light.first_order,
+            converged=self.is_idle,
+            bytes=light.bytes,
+            fallbacks=dict(tally.fallbacks),
+            lost={name: flux / tally.emitted for name, flux in tally.ended.items()} if tally.emitted else {},
+            bands=dict(light.stats.bands),
+        )
+
+    @property
+    def is_idle(self) -> bool:
+        """Nothing is left to do until an input changes."""
+        waits = self._building is not None or self._urgent or (self._job is not None and self.playing)
+        refines = self._shown is not None and self.refine_when_still and self._shown.light.first_order
+        return self._wanted is None or not (waits or refines or not self._eye.is_done)
+
+    def pick(self, x: float, y: float) -> PickHit | None:
+        """First surface at (x, y) of the picture, 0 to 1 from its top left corner; None beyond everything."""
+        if self._picker is None or self._inputs is None:
+            return None
+        return self._picker.pick(self._inputs.camera, self._inputs.width, self._inputs.height, x, y)
+
+    def stored_photons(self, limit: int = 200_000) -> StoredPhotons:
+        """About `limit` stored photons in world space, as they are shown."""
+        if self._shown is None or self._inputs is None:
+            return StoredPhotons.none()
+        return world_photons(self._shown.light, self._inputs, limit)
+
+    def caustic_spectrum(self, receiver: int, position: np.ndarray, bins: int = 40) -> tuple[np.ndarray, np.ndarray] | None:
+        """Shape of the caustic's spectrum at a world position on object `receiver`: wavelengths (bins,) nm, relative irradiance (bins,)."""
+        if self._shown is None or self._inputs is None or receiver not in self._shown.light.buffers.receivers:
+            return None
+        spectra = [light.spectral_power.density for light in self._inputs.scene.lights]
+        radius = reach_of(self._shown.light, receiver)
+        return caustic_spectrum(self.stored_photons(), receiver, position, radius, spectra, bins)
+
+    @property
+    def buffers(self) -> SceneBuffers | None:
+        """The traced scene on the device, for overlays that ask it more (ray fans)."""
+        return self._shown.light.buffers if self._shown else None
+
+    def release(self) -> None:
+        """Free everything."""
+        self._building = None
+        if self._shown is not None:
+            self._shown.light.release()
+        if self._picker is not None:
+            self._picker.release()
+        self._eye.release()
+        shader.forget_programs(self.context.ctx)
+        self._shown = self._job = self._maps = self._picker = None

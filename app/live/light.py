@@ -1,0 +1,234 @@
+"""The light half of a live rendering: photons are stored, and shown through an edited scene without being traced again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.gpu.gain_buffers import GainBuffers
+from app.gpu.splat_tables import SplatTables
+from app.light_half import LightHalf, RoundOf
+from app.light_maps import LightMaps
+from app.live.difference import shown_glasses
+from app.live.store import PhotonStore
+from app.model.colorimetry import VISIBLE_NM
+from app.model.spectrum import Spectrum
+from app.passes.footprint import SpectralVariables
+from app.passes.trace import Batch
+
+if TYPE_CHECKING:
+    from app.gpu.context import Context
+    from app.gpu.scene_buffers import SceneBuffers
+    from app.live.inputs import LiveInputs
+    from app.model.features import Features
+    from app.model.glass import Dispersion
+    from app.model.scene import Scene
+    from app.model.settings import RenderSettings
+
+QUICK = 3
+"""Pixels to a texel's side in the maps that answer a drag."""
+SOLO_WIDTH_NM = 4.0
+"""Standard deviation of the window that a single wavelength is seen through."""
+SOLO_GAIN_NM = 100.0
+"""A continuous spectrum is shown as bright as if so many nanometres of it had this wavelength."""
+
+
+@dataclass
+class Stored:
+    """The stored photons of one pass, with the spectral tables of its plan."""
+
+    store: PhotonStore
+    spans: list[list[tuple[float, float]]]
+    tables: SplatTables
+    pass_photons: int
+    """Photons the pass was asked for: the weight that its records carry."""
+
+    def release(self) -> None:
+        """Free photons and tables."""
+        self.store.clear()
+        self.tables.release()
+
+
+class LiveLight(LightHalf):
+    """Photons of one traced scene and how they are shown.
+
+    A pass that has only begun holds fewer photons than the one before it: until it has as many, the older ones stay.
+    """
+
+    def __init__(self, context: Context, scene: Scene, settings: RenderSettings, features: Features, buffers: SceneBuffers, capacity_bytes: int) -> None:
+        super().__init__(context, scene, settings, features, buffers)
+        self.capacity_bytes = capacity_bytes
+        self.first_order = False
+        """What is shown has another dispersion than what was traced."""
+        self.view = scene.camera
+        """What the maps are laid out for."""
+        self.judged_view: object = None
+        """The view for which `refit` last looked whether the maps fit."""
+        self._running: Stored | None = None
+        self._older: Stored | None = None
+        self._quick: LightMaps | None = None
+
+    def begin(self, photons: int, seed: int) -> None:
+        """As in `LightHalf`; the photons of the pass before stay until there are as many new ones."""
+        fuller = max(self._bundles, key=lambda s: s.store.photons, default=None)
+        for bundle in self._bundles:
+            if bundle is not fuller:
+                bundle.release()
+        self._older, self._running = fuller, None
+        # Its tables stay with it: the new plan gets its own.
+        self._tables, self._spans = None, []
+        super().begin(photons, seed)
+        self._running = Stored(PhotonStore(self.context.ctx, self.capacity_bytes), self._spans, self.tables, photons)
+
+    def keep(self, batch: Batch, of: RoundOf) -> None:
+        """Store the batch."""
+        assert self._running is not None
+        self._running.store.keep(self.trace.photons, batch.photons, self.trace.photon.stride, of)
+        if self._older is not None and self._running.store.photons >= self._older.store.photons:
+            self._older.release()
+            self._older = None
+
+    @property
+    def _bundles(self) -> list[Stored]:
+        return [bundle for bundle in (self._older, self._running) if bundle is not None]
+
+    @property
+    def _fuller(self) -> Stored | None:
+        """The stored photons that show most."""
+        return max(self._bundles, key=lambda s: s.store.photons, default=None)
+
+    @property
+    def photons_stored(self) -> int:
+        """Records that can be splatted again."""
+        return self._fuller.store.photons if self._fuller else 0
+
+    @property
+    def rounds_running(self) -> int:
+        """Whole rounds stored of the pass that runs."""
+        return self._running.store.rounds if self._running else 0
+
+    def show(self, inputs: LiveInputs) -> None:
+        """Take over dispersion, spectra, solo and local gain of `inputs`; maps keep what was deposited until they are splatted again.
+
+        `inputs.scene` must be one that these photons can follow (`difference.redo` below TRACE).
+        """
+        glasses = shown_glasses(self.scene, inputs.scene)
+        if glasses is None:
+            raise ValueError("these photons cannot follow the scene: it must be traced")
+        self._show_variables({a: b for a, b in glasses.items() if a != b})
+        self._show_gains(inputs)
+        spectra = [light.spectral_power if inputs.solo_nm is None else solo(light.spectral_power, inputs.solo_nm) for light in inputs.scene.lights]
+        if spectra != self._shown_spectra:
+            self._shown_spectra = spectra
+            for bundle in self._bundles:
+                bundle.tables.release()
+                bundle.tables = self._tables_of(bundle.spans)
+            self._tables = self._running.tables if self._running else None
+
+    def fit_to(self, inputs: LiveInputs) -> None:
+        """Maps laid out for the camera and picture size of `inputs`; empty, to be filled from the stored photons."""
+        self.settings = replace(self.settings, width=inputs.width, height=inputs.height)
+        self.view = inputs.camera
+        self.lay_out(self.view)
+        if self._quick is not None:
+            self._quick.release()
+            self._quick = None
+
+    def _show_variables(self, changed: dict[Dispersion, Dispersion]) -> None:
+        self.variables.release()
+        self.first_order = bool(changed)
+        if not changed:
+            self.variables = SpectralVariables.build(self.context.ctx, self.buffers.variable_table)
+            return
+        groups = self.buffers.groups
+        shown = replace(groups, glasses=tuple(changed.get(glass, glass) for glass in groups.glasses))
+        table = shown.variables(self.buffers.axis).astype("f4")
+        self.variables = SpectralVariables.build(self.context.ctx, table, self.buffers.variable_table)
+
+    def _show_gains(self, inputs: LiveInputs) -> None:
+        wanted = inputs.local_gain and self.features.spectral_groups > 0 and any(o.local_dispersion for o in inputs.scene.objects)
+        if wanted != self.features.local_gain:
+            self.features = replace(self.features, local_gain=wanted)
+            for maps in (self._maps, self._quick):
+                if maps is not None:
+                    maps.take(self.features)
+            if self.gains is not None:
+                self.gains.release()
+                self.gains = None
+        if not wanted:
+            return
+        if self.gains is None:
+            buffers = self.buffers
+            self.gains = GainBuffers(self.context.ctx, inputs.scene, buffers.receivers, buffers.space, buffers.axis)
+        else:
+            self.gains.update(inputs.scene)
+
+    def splat_stored(self, *, of_running: bool = False) -> Iterator[None]:
+        """Empty maps, then the stored photons as they are shown now, pausing after every slab.
+
+        Where only the first rounds are stored, footprints are as much wider. `of_running`: those of the running pass as they
+        are, so that it can go on. Nothing is shown where nothing is stored.
+        """
+        bundle = self._running if of_running else self._fuller
+        maps = self._maps
+        maps.clear()
+        if bundle is None:
+            return
+        store = bundle.store
+        if of_running:
+            store.drop_unfinished()
+        share = store.rounds / store.rounds_of_pass
+        for slab in store.of_rounds(0, store.rounds):
+            self.splat(slab.buffer, slab.count, 1.0 if of_running else share**-0.5, bundle.tables)
+            yield
+        maps.photon_weight = bundle.pass_photons * share
+
+    def splat_quickly(self, photons: int) -> LightMaps | None:
+        """About so many stored photons as they are shown now, in maps of their own with texels `QUICK` times as wide; None where none are stored.
+
+        For answers while something is dragged: the maps that accumulate are left alone.
+        """
+        bundle = self._fuller
+        if bundle is None or not bundle.store.rounds:
+            return None
+        if self._quick is None:
+            self._quick = self.maps_for(self.view, max(1, round(self.settings.width / QUICK)), max(1, round(self.settings.height / QUICK)))
+        self._quick.clear()
+        rounds = bundle.store.first_rounds(photons)
+        share = rounds / bundle.store.rounds_of_pass
+        for slab in bundle.store.of_rounds(0, rounds):
+            self.splat(slab.buffer, slab.count, share**-0.5, bundle.tables, self._quick)
+        self._quick.photon_weight = bundle.pass_photons * share
+        return self._quick
+
+    def stored_records(self, limit: int) -> np.ndarray:
+        """About `limit` stored records (`gpu.records.photon_record`)."""
+        dtype = self.trace.photon.dtype
+        return self._fuller.store.read(limit, dtype) if self._fuller else np.zeros(0, dtype)
+
+    @property
+    def bytes(self) -> int:
+        """Device memory of photons, queues, maps and scene."""
+        stored = sum(bundle.store.bytes for bundle in self._bundles)
+        return stored + self.trace.bytes + self.buffers.bytes + sum(maps.bytes for maps in (self.maps, self._quick) if maps is not None)
+
+    def release(self) -> None:
+        """Free everything, the stored photons and the scene's buffers too."""
+        for bundle in self._bundles:
+            bundle.release()
+        self._tables = self._running = self._older = None
+        if self._quick is not None:
+            self._quick.release()
+        super().release()
+        self.buffers.release()
+
+
+def solo(spectrum: Spectrum, wavelength_nm: float) -> Spectrum:
+    """The part of `spectrum` about one wavelength; a continuum is shown as bright as `SOLO_GAIN_NM` of it, a line as itself."""
+    window = np.exp(-0.5 * ((VISIBLE_NM - wavelength_nm) / SOLO_WIDTH_NM) ** 2)
+    density = spectrum.density * window * (SOLO_GAIN_NM / window.sum())
+    lines = tuple((nm, power * float(np.exp(-0.5 * ((nm - wavelength_nm) / SOLO_WIDTH_NM) ** 2))) for nm, power in spectrum.lines)
+    return Spectrum(density, lines)
