@@ -192,8 +192,9 @@ def _file_stem(mesh: Mesh) -> str:
     import hashlib
 
     digest = hashlib.sha256(mesh.vertices.tobytes() + mesh.triangles.tobytes())
-    if mesh.corner_normals is not None:
-        digest.update(mesh.corner_normals.tobytes())
+    for more in (mesh.corner_normals, mesh.uv):
+        if more is not None:
+            digest.update(more.tobytes())
     plain = "".join(c if c.isalnum() else "_" for c in mesh.name)[:40]
     return f"{plain}_{digest.hexdigest()[:12]}"
 

@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO
 
@@ -21,6 +21,8 @@ import msgspec
 
 from app.atomic import atomic_output
 from app.errors import UserError
+from app.model.mesh import Mesh
+from app.model.mesh_recipes import recipe_of
 from app.model.scene import Scene
 from app.model.scene_file import load_scene
 from app.model.scene_save import save_scene
@@ -55,8 +57,16 @@ class Recovery:
         return None if self.note.original is None else Path(self.note.original)
 
     def load(self) -> Scene:
-        """The scene. Raises UserError when it cannot be read."""
-        return load_scene(self.path)
+        """The scene, which needs none of the autosave's files any more. Raises UserError when it cannot be read."""
+        scene = load_scene(self.path)
+        here = self.path.parent.resolve()
+        own: dict[Mesh, Mesh] = {}
+        for mesh in {item.mesh for item in scene.objects}:
+            recipe = recipe_of(mesh) or {}
+            if "mesh" in recipe and Path(recipe["mesh"]).is_relative_to(here):
+                # Another value has no recipe: it is saved as triangles, not as a file that is about to go.
+                own[mesh] = replace(mesh, source=None)
+        return replace(scene, objects=tuple(replace(o, mesh=own.get(o.mesh, o.mesh)) for o in scene.objects))
 
     def discard(self) -> None:
         """Delete it."""

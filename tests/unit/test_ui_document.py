@@ -178,7 +178,8 @@ document = Document.open(Path({str(file)!r}))
 ball = sphere(0.5)
 bare = make_mesh("scan", ball.vertices, ball.triangles, ball.corner_normals)
 item = replace(document.scene.objects[0], mesh=bare)
-scene = replace(document.scene, objects=(item, *document.scene.objects[1:]))
+twin = replace(item, name="twin", object_to_world=item.object_to_world + 0.0)
+scene = replace(document.scene, objects=(item, twin, *document.scene.objects[1:]))
 Autosave(Path({str(config)!r})).write_now(scene, document.title, document.source)
 os._exit(1)
 """
@@ -189,8 +190,13 @@ os._exit(1)
     assert document.unsaved and document.path == file
     mesh = document.scene.objects[0].mesh
     np.testing.assert_allclose(np.linalg.norm(mesh.vertices, axis=1), 0.5, rtol=1e-5)
+    assert document.scene.objects[1].mesh is mesh
     recovery.discard()
     assert list((config / "autosave").iterdir()) == [] and recoveries(config) == ()
+    # What was recovered does not live on files that are gone.
+    saved = Document.open(document.save())
+    np.testing.assert_array_equal(saved.scene.objects[0].mesh.vertices, mesh.vertices)
+    assert Path(saved.scene.objects[0].mesh.source or "").is_relative_to(file.parent)
 
 
 def test_autosave_that_cannot_write_says_so_and_goes_on(tmp_path: Path, file: Path) -> None:
