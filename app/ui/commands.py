@@ -68,6 +68,11 @@ def _set_tool(tool: Tool, state: State, _facts: Facts) -> State:
     return replace(state, tool=tool)
 
 
+def _take_brush(state: State, _facts: Facts) -> State:
+    """With its panel, which tells radius and strength and how to compare with the physical picture."""
+    return replace(state, tool="brush").with_panels(brush=True)
+
+
 def _toggle_playing(state: State, _facts: Facts) -> State:
     return replace(state, playing=not state.playing)
 
@@ -137,7 +142,8 @@ COMMANDS: tuple[Command, ...] = (
     _tool("Move", "move", "G", "Move the selection with the gizmo."),
     _tool("Rotate", "rotate", "T", "Turn the selection with the gizmo."),
     _tool("Scale", "scale", "Y", "Scale the selection with the gizmo."),
-    _tool("Dispersion brush", "brush", "B", "Paint a local gain of dispersion on a receiver. Not physical."),
+    Command("Dispersion brush", ("B",), "Tools", "Paint a local gain of dispersion on a receiver. Not physical.", _take_brush,
+            checked=lambda state, _facts: state.tool == "brush"),
     _tool("Pull a colour", "pull", "P", "Drag a colour of the caustic: the dispersion follows."),
     Command("Accumulate photons", ("Space",), "Render", "Go on or pause.", _toggle_playing,
             checked=lambda state, _facts: state.playing),

@@ -30,13 +30,24 @@ from app.ui.panels import (
 )
 from app.ui.panels.abbe import draw_abbe
 from app.ui.panels.brush_panel import draw_brush
-from app.ui.panels.compare_panel import draw_compare
 from app.ui.panels.dispersion import draw_dispersion
-from app.ui.panels.export_panel import draw_export
 from app.ui.state import State
 from app.ui.viewport import draw_viewport
 
 Draw = Callable[[State, Facts], State]
+
+
+def _draw_compare(state: State, facts: Facts) -> State:
+    # Panels that are seldom open are loaded when they are: the window comes up sooner.
+    from app.ui.panels.compare_panel import draw_compare
+
+    return draw_compare(state, facts)
+
+
+def _draw_export(state: State, facts: Facts) -> State:
+    from app.ui.panels.export_panel import draw_export
+
+    return draw_export(state, facts)
 
 
 @dataclass(frozen=True)
@@ -59,10 +70,10 @@ WINDOWS = (
     PanelWindow("inspector", "Inspector", "right top", inspector.draw_inspector),
     PanelWindow("view", "View", "right top", view_panel.draw_view),
     PanelWindow("brush", "Brush", "right bottom", draw_brush),
-    PanelWindow("export", "Export", "right bottom", draw_export),
+    PanelWindow("export", "Export", "right bottom", _draw_export),
     PanelWindow("timing", "Timing", "bottom", timing.draw_timing),
     PanelWindow("spectrum", "Spectrum", "bottom", spectrum.draw_spectrum),
-    PanelWindow("compare", "Compare", "bottom", draw_compare),
+    PanelWindow("compare", "Compare", "bottom", _draw_compare),
     PanelWindow("abbe", "Abbe diagram", "floating", draw_abbe, (44.0, 34.0)),
     PanelWindow("shortcuts", "Shortcuts", "floating", help_list.draw_shortcuts, (62.0, 38.0)),
     PanelWindow("about", "About SpectraSplat", "floating", about.draw_about, (32.0, 20.0)),
@@ -73,7 +84,7 @@ _DOCKED = tuple(Docked(window.title, window.place) for window in WINDOWS)
 def draw_interface(state: State, facts: Facts) -> State:
     """Draw everything and return the state as the user left it, with requests for the host appended."""
     theme.set_up()
-    theme.apply(state.preferences)
+    theme.apply(state.preferences, facts.interface_scale)
     state = shortcuts.handle(state, facts)
     state = menu.draw_menu(state, facts)
     if state.preferences.panels.start_page:
@@ -86,7 +97,7 @@ def draw_interface(state: State, facts: Facts) -> State:
 
 def _draw_windows(state: State, facts: Facts) -> State:
     layout.dockspace(_DOCKED, status_bar.height())
-    status_bar.draw_status_bar(state, facts)
+    state = status_bar.draw_status_bar(state, facts)
     state = _draw_picture(state, facts)
     for window in WINDOWS:
         if getattr(state.preferences.panels, window.field):

@@ -1,4 +1,4 @@
-"""Place and material of the selection in numbers; the scene's own settings when nothing is selected."""
+"""Placement and material of the selection in numbers; the scene's own settings when nothing is selected."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from app.ui.state import State
 
 _KINDS: dict[str, type] = {"Glass": Dielectric, "Diffuse": Diffuse, "Mirror": Mirror, "Black": Black}
 _NEW_GLASS = "N-BK7"
-_UNITS = "scene units"
+_UNITS = "units"
 
 _keeps_proportions = {"on": True}
 """Whether the three scales move together: memory of the interface."""
@@ -40,7 +40,7 @@ def _object(state: State, index: int) -> State:
     changed, name = widgets.text_field("Name", thing.name, tip="Name of the object; no two objects share one.")
     if changed:
         state = edits.attempt(state, f"Rename {thing.name}", edits.rename, index, name)
-    if widgets.section("Place"):
+    if widgets.section("Placement"):
         state = _place(state, index)
     if widgets.section("Material"):
         state = _material(state, index)

@@ -175,8 +175,8 @@ def _camera(state: State) -> State:
             "Height", camera.vertical_extent, 1e-4, 1e6, unit="units", tip="Height of what is seen, in scene units."
         )
         camera = replace(camera, vertical_extent=extent)
-    _, position, moving = widgets.vec3("Position", camera.position, unit="scene units", tip="Where the camera stands: x, y, z.", speed=0.02)
-    _, target, aiming = widgets.vec3("Target", camera.target, unit="scene units", tip="The point in the middle of the picture: x, y, z.", speed=0.02)
+    _, position, moving = widgets.vec3("Position", camera.position, unit="units", tip="Where the camera stands: x, y, z.", speed=0.02)
+    _, target, aiming = widgets.vec3("Target", camera.target, unit="units", tip="The point in the middle of the picture: x, y, z.", speed=0.02)
     if position != target:  # a camera looks at something else than itself
         camera = replace(camera, position=position, target=target)
     if widgets.button("Scene's own view", tip="Back to the camera that the scene was saved with (0).", width=-1):
