@@ -127,10 +127,11 @@ def begin_pull(
     assert isinstance(material, Dielectric)
     reference = point - moved
     receiver = scene.objects[receiver_index]
-    gain = float(gain_at(receiver.local_dispersion, _to_object(receiver, reference)[None])[0]) if local else material.dispersion.gain
-    return Pull(
-        source, receiver_index, _vec3(point), _vec3(reference), _vec3(moved / length), wavelength_nm, gain, material.dispersion.V_d, local
+    pull = Pull(
+        source, receiver_index, _vec3(point), _vec3(reference), _vec3(moved / length), wavelength_nm, material.dispersion.gain,
+        material.dispersion.V_d, local,
     )  # fmt: skip
+    return replace(pull, gain_at_start=local_gain(receiver, pull)) if local else pull
 
 
 def _candidates(photons: PullPhotons, point: np.ndarray, radius: float, receiver: int) -> PullPhotons:
@@ -189,6 +190,15 @@ def _source(photons: PullPhotons, weight: np.ndarray, prefer: int | None) -> int
     return max(sums, key=sums.__getitem__)
 
 
+def nearest_on_line(pull: Pull, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """The point of the line that the held colour moves along, nearest to a camera ray (unit `direction`)."""
+    start, along = np.asarray(pull.start), np.asarray(pull.direction)
+    # Across the ray only: where the line runs towards the eye the cursor says nothing, and the colour stays.
+    across = along - (along @ direction) * direction
+    square = float(across @ across)
+    return start if square < 1e-6 else start + float((origin - start) @ across) / square * along
+
+
 def solve(pull: Pull, point: Vec3 | np.ndarray) -> float:
     """The gain, 0 to 10, with which the held colour lands where `point` (world) stands along the pull's direction."""
     direction, reference = np.asarray(pull.direction), np.asarray(pull.reference)
@@ -229,6 +239,11 @@ def local_dabs(receiver: SceneObject, pull: Pull, gain: float, radius: float, fa
     before = float(np.log2(gain_at(rest, place[None])[0]))
     wanted = float(np.clip(np.log2(max(gain, 1e-9)), MIN_LOG2_GAIN, MAX_LOG2_GAIN))
     return (*rest, Dab(_vec3(place), object_radius(receiver, radius), wanted - before, falloff))
+
+
+def local_gain(receiver: SceneObject, pull: Pull) -> float:
+    """The local gain where the held light's d line lands."""
+    return float(gain_at(receiver.local_dispersion, _to_object(receiver, np.asarray(pull.reference))[None])[0])
 
 
 def _to_object(item: SceneObject, point: np.ndarray) -> np.ndarray:

@@ -1,0 +1,120 @@
+"""What is drawn over the picture in scene coordinates: rays, the brush's ring, the held colour, lights, the selection's box.
+
+Drawn with imgui's draw list, so it costs the renderer nothing and is no part of the picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from imgui_bundle import ImVec2, imgui
+
+from app.ui.facts import RayLine
+from app.ui.panels.spectral_colour import colour_of_nm
+from app.ui.projection import View
+
+Colour = tuple[float, float, float, float]
+NEAR = 1e-3
+"""Nearest depth that is drawn, as a share of the target's distance."""
+_BORDER = 0.5
+"""How far beyond the picture lines are kept, picture widths: beyond, float32 coordinates break."""
+_HALO, _CORE = ((6.0, 0.06), (3.2, 0.12)), (1.4, 0.85)
+"""Widths (logical pixels) and opacities of a ray's glow and of its core: added up, they look like light."""
+
+
+@dataclass(frozen=True)
+class Canvas:
+    """The picture on the screen."""
+
+    drawing: imgui.ImDrawList
+    view: View
+    left: float
+    top: float
+    width: float
+    height: float
+    scale: float = 1.0
+    """Interface pixels per logical pixel."""
+
+    def pixels(self, points: np.ndarray) -> np.ndarray:
+        """World (..., 3) → screen (..., 2); NaN behind a pinhole."""
+        place, _ = self.view.project(points)
+        return place * [self.width, self.height] + [self.left, self.top]
+
+    def segments(self, points: np.ndarray, closed: bool = False) -> np.ndarray:
+        """A world polyline (n, 3) as screen segments (m, 2, 2), cut at the near plane and a little outside the picture."""
+        points = np.asarray(points, float)
+        ends = np.roll(points, -1, axis=0) if closed else points[1:]
+        pairs = np.stack([points if closed else points[:-1], ends], axis=1)
+        if not self.view.is_orthographic:
+            pairs = _cut_near(pairs, self.view.depth(pairs), NEAR * self.view.target_distance)
+        if not len(pairs):
+            return np.zeros((0, 2, 2))
+        place, _ = self.view.project(pairs)
+        return _cut_border(place) * [self.width, self.height] + [self.left, self.top]
+
+
+def _cut_near(pairs: np.ndarray, depth: np.ndarray, near: float) -> np.ndarray:
+    """Segments (n, 2, 3) without what lies nearer than `near`."""
+    ahead = depth > near
+    pairs, depth, ahead = pairs[ahead.any(axis=1)], depth[ahead.any(axis=1)], ahead[ahead.any(axis=1)]
+    crossing = ahead[:, 0] != ahead[:, 1]
+    share = np.where(crossing, (near - depth[:, 0]) / np.where(crossing, depth[:, 1] - depth[:, 0], 1.0), 0.0)[:, None]
+    at = pairs[:, 0] + share * (pairs[:, 1] - pairs[:, 0])
+    start = np.where((crossing & ~ahead[:, 0])[:, None], at, pairs[:, 0])
+    end = np.where((crossing & ~ahead[:, 1])[:, None], at, pairs[:, 1])
+    return np.stack([start, end], axis=1)
+
+
+def _cut_border(place: np.ndarray) -> np.ndarray:
+    """Picture segments (n, 2, 2) clipped to a box around the picture [Liang and Barsky 1984]."""
+    start, way = place[:, 0], place[:, 1] - place[:, 0]
+    enter, leave = np.zeros(len(place)), np.ones(len(place))
+    for axis in range(2):
+        safe = np.where(np.abs(way[:, axis]) < 1e-12, 1e-12, way[:, axis])
+        low, high = (-_BORDER - start[:, axis]) / safe, (1.0 + _BORDER - start[:, axis]) / safe
+        enter, leave = np.maximum(enter, np.minimum(low, high)), np.minimum(leave, np.maximum(low, high))
+    kept = enter < leave
+    cut = np.stack([start + enter[:, None] * way, start + leave[:, None] * way], axis=1)
+    return cut[kept]
+
+
+def lines(canvas: Canvas, segments: Iterable[np.ndarray], colour: int, width: float) -> None:
+    """Draw screen segments."""
+    for (x0, y0), (x1, y1) in segments:
+        canvas.drawing.add_line(ImVec2(x0, y0), ImVec2(x1, y1), colour, width * canvas.scale)
+
+
+def draw_rays(canvas: Canvas, rays: Iterable[RayLine]) -> None:
+    """The ray overlay: every path in the colour of its wavelength, glowing softly."""
+    cut = [(ray.wavelength_nm, canvas.segments(ray.points)) for ray in rays]
+    for width, opacity in (*_HALO, _CORE):
+        for nm, segments in cut:
+            lines(canvas, segments, colour_of_nm(nm, opacity), width)
+
+
+def draw_outlined(canvas: Canvas, points: np.ndarray, colour: Colour, width: float = 1.5, closed: bool = True) -> None:
+    """A world polyline that is seen over any picture: a dark seam under a coloured line."""
+    segments = canvas.segments(points, closed)
+    lines(canvas, segments, imgui.color_convert_float4_to_u32((0.0, 0.0, 0.0, 0.55 * colour[3])), width + 2.0)
+    lines(canvas, segments, imgui.color_convert_float4_to_u32(colour), width)
+
+
+_EDGES = ((0, 1), (0, 2), (0, 4), (1, 3), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 6), (5, 7), (6, 7))
+_CORNER_SHARE = 0.18
+"""Of every edge of a selection's box, drawn from both of its ends."""
+
+
+def draw_box(canvas: Canvas, corners: np.ndarray, colour: Colour) -> None:
+    """The corners of a box (8, 3), as brackets: says what is selected and hides little of it."""
+    for a, b in _EDGES:
+        for start, end in ((corners[a], corners[b]), (corners[b], corners[a])):
+            draw_outlined(canvas, np.stack([start, start + _CORNER_SHARE * (end - start)]), colour, 1.2, closed=False)
+
+
+def box_corners(vertices: np.ndarray, object_to_world: np.ndarray) -> np.ndarray:
+    """World corners (8, 3) of the box round an object's vertices along its own axes."""
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    own = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    return own @ object_to_world[:3, :3].T + object_to_world[:3, 3]

@@ -1,0 +1,114 @@
+"""The picture with everything that is done in it: tools, camera, gizmo, brush, pulling, overlays.
+
+`draw_viewport` fills the window it is drawn in. It knows the picture only as a texture number and what lies under
+the cursor only from `Facts`; wishes that need the renderer are requests.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from imgui_bundle import ImVec2, imgui
+
+from app.ui import item_rects, overlay, theme
+from app.ui.facts import Facts
+from app.ui.gizmo import Gizmo
+from app.ui.overlay import Canvas
+from app.ui.projection import View
+from app.ui.state import State
+from app.ui.view_axes import draw_axes
+from app.ui.viewport_hand import Hand, Mouse
+from app.ui.viewport_marks import draw_lights, draw_magnifier, draw_marks, draw_wipe
+from app.ui.viewport_tools import MARGIN_EM, badges, draw_badges, draw_toolbar
+
+LEAST_SIDE = 64
+"""Pixels of the picture, however small the window."""
+_FLAGS = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_nav
+
+hand = Hand()
+"""What the mouse holds."""
+gizmo = Gizmo()
+
+
+def draw_viewport(state: State, facts: Facts) -> State:
+    """Draw the picture into the present window and answer what is done in it."""
+    room = imgui.get_content_region_avail()
+    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
+    imgui.begin_child("picture", ImVec2(max(room.x, 1.0), max(room.y, 1.0)), 0, _FLAGS)
+    imgui.pop_style_var()
+    state = _draw_inside(state, facts)
+    imgui.end_child()
+    return state
+
+
+def picture_size(width: float, height: float, scale: float) -> tuple[int, int]:
+    """Pixels of a picture that fills `width` × `height` interface pixels: even, and not too small to trace."""
+    wide, high = (max(LEAST_SIDE, 2 * round(0.5 * side * scale)) for side in (width, height))
+    return wide, high
+
+
+def _draw_inside(state: State, facts: Facts) -> State:
+    corner, size = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
+    width, height = max(size.x, 1.0), max(size.y, 1.0)
+    state = replace(state, viewport_size=picture_size(width, height, facts.framebuffer_scale))
+    _draw_picture(state, facts, corner, ImVec2(width, height))
+    canvas = _canvas(state, corner, width, height)
+    drawing = imgui.get_window_draw_list()
+    drawing.push_clip_rect(corner, ImVec2(corner.x + width, corner.y + height), True)
+    if state.display.ray_overlay:
+        overlay.draw_rays(canvas, facts.rays)
+    draw_marks(canvas, state, facts, hand.grip == "brush")
+    state = draw_lights(canvas, state)
+    state = gizmo.draw(state, canvas.view, (corner.x, corner.y, width, height))
+    draw_wipe(canvas, state, facts)
+    state = draw_toolbar(state, gizmo, corner.x, corner.y)
+    inset = theme.em(MARGIN_EM)
+    if height > theme.em(9.0) and width > theme.em(12.0):
+        state = draw_axes(state, canvas.view, corner.x + width - inset, corner.y + inset)
+    draw_badges(badges(state, facts), corner.x, corner.y + height)
+    mouse = _mouse(canvas)
+    state = hand.act(state, facts, canvas, mouse)
+    state = _with_hover(state, mouse)
+    if state.display.magnifier and mouse.is_over:
+        draw_magnifier(canvas, facts)
+    drawing.pop_clip_rect()
+    return state
+
+
+def _draw_picture(state: State, facts: Facts, corner: ImVec2, size: ImVec2) -> None:
+    if facts.picture is not None:
+        imgui.image(imgui.ImTextureRef(facts.picture), size)
+        item_rects.note("Picture")
+        return
+    imgui.dummy(size)
+    item_rects.note("Picture")
+    text = "Preparing the scene…"
+    extent = imgui.calc_text_size(text)
+    at = ImVec2(corner.x + 0.5 * (size.x - extent.x), corner.y + 0.5 * (size.y - extent.y))
+    imgui.get_window_draw_list().add_text(at, theme.packed(theme.palette().muted), text)
+
+
+def _canvas(state: State, corner: ImVec2, width: float, height: float) -> Canvas:
+    wide, high = state.viewport_size
+    scale = theme.em(1.0) / theme.FONT_SIZE
+    return Canvas(imgui.get_window_draw_list(), View.of(state.camera, wide / high), corner.x, corner.y, width, height, scale)
+
+
+def _mouse(canvas: Canvas) -> Mouse:
+    io = imgui.get_io()
+    position, delta = io.mouse_pos, io.mouse_delta
+    known = abs(position.x) < 1e30 and abs(position.y) < 1e30
+    x, y = ((position.x - canvas.left) / canvas.width, (position.y - canvas.top) / canvas.height) if known else (-1.0, -1.0)
+    inside = 0.0 <= x < 1.0 and 0.0 <= y < 1.0
+    busy = imgui.is_any_item_hovered() or imgui.is_any_item_active() or gizmo.is_in_the_way()
+    is_over = inside and imgui.is_window_hovered() and not busy
+    return Mouse(x, y, is_over, delta.x / canvas.height, delta.y / canvas.height)
+
+
+def _with_hover(state: State, mouse: Mouse) -> State:
+    """The host looks at what lies there; while the camera is dragged nobody needs to know."""
+    dragging = hand.grip in ("brush", "pull", "click", "wipe")
+    inside = 0.0 <= mouse.x < 1.0 and 0.0 <= mouse.y < 1.0
+    hovers = (mouse.is_over and hand.is_free) or (dragging and inside)
+    return replace(state, hover=(float(np.clip(mouse.x, 0.0, 1.0)), float(np.clip(mouse.y, 0.0, 1.0))) if hovers else None)

@@ -1,0 +1,175 @@
+"""Marks over the picture that answer the cursor: the brush's ring, the held colour, lights, selection, wipe, magnifier."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as icons
+
+from app.ui import brush as brushes
+from app.ui import item_rects, placing, pull, theme
+from app.ui.facts import CursorFacts, Facts
+from app.ui.overlay import Canvas, box_corners, draw_box, draw_outlined
+from app.ui.panels.rows import tooltip
+from app.ui.panels.spectral_colour import colour_of_nm
+from app.ui.state import Brush, Selection, State
+
+_RING_COLOURS = {"widen": (1.0, 0.84, 0.45, 0.95), "narrow": (0.55, 0.80, 1.0, 0.95), "erase": (1.0, 0.55, 0.50, 0.95)}
+_MAGNIFIER_EM = 11.0
+_LIGHT_EM = 0.85
+_ARROW_EM = 3.2
+
+
+def draw_marks(canvas: Canvas, state: State, facts: Facts, is_painting: bool) -> None:
+    """What lies in the scene: selection, the ring of the brush, a colour being pulled."""
+    _draw_selection(canvas, state)
+    if state.tool == "brush" and facts.cursor is not None:
+        _draw_ring(canvas, state, facts.cursor, is_painting)
+    if state.pull is not None:
+        _draw_pull(canvas, state)
+
+
+def _draw_selection(canvas: Canvas, state: State) -> None:
+    chosen = state.selection
+    if chosen.kind != "object" or chosen.index >= len(state.scene.objects):
+        return
+    item = state.scene.objects[chosen.index]
+    accent = theme.palette().accent
+    draw_box(canvas, box_corners(item.mesh.vertices, item.object_to_world), (*accent[:3], 0.8))
+
+
+def _draw_ring(canvas: Canvas, state: State, cursor: CursorFacts, is_painting: bool) -> None:
+    if cursor.position is None or cursor.normal is None:
+        return
+    if not brushes.can_paint(state.scene, cursor.object_index):
+        imgui.set_mouse_cursor(imgui.MouseCursor_.not_allowed)
+        return
+    io = imgui.get_io()
+    brush: Brush = brushes.mode_held(state.brush, io.key_shift, io.key_ctrl)
+    red, green, blue, opacity = _RING_COLOURS[brush.mode]
+    draw_outlined(canvas, brushes.ring(cursor.position, cursor.normal, brush.radius), (red, green, blue, opacity), 2.2 if is_painting else 1.6)
+    inner = brush.radius * (1.0 - brush.falloff)
+    if 0.05 < 1.0 - brush.falloff < 0.95:
+        draw_outlined(canvas, brushes.ring(cursor.position, cursor.normal, inner), (red, green, blue, 0.4), 1.0)
+
+
+def _draw_pull(canvas: Canvas, state: State) -> None:
+    """From the d line's landing point, which stays, to where the held colour stands now."""
+    held = state.pull
+    assert held is not None
+    gain = _present_gain(state)
+    start, reference = np.asarray(held.start), np.asarray(held.reference)
+    now = reference + (start - reference) * gain / max(held.gain_at_start, 1e-9)
+    draw_outlined(canvas, np.stack([reference, now]), (1.0, 1.0, 1.0, 0.8), 1.4, closed=False)
+    radius = 0.5 * theme.em(1.0)
+    for point, colour in ((reference, theme.packed((1.0, 0.86, 0.3, 1.0))), (now, colour_of_nm(held.wavelength_nm))):
+        x, y = canvas.pixels(point)
+        if np.isfinite(x):
+            canvas.drawing.add_circle_filled(ImVec2(x, y), radius, theme.packed((0.0, 0.0, 0.0, 0.6)), 24)
+            canvas.drawing.add_circle_filled(ImVec2(x, y), 0.68 * radius, colour, 24)
+    x, y = canvas.pixels(now)
+    if np.isfinite(x):
+        what = f"local gain × {gain:.2f}" if held.local else f"gain × {gain:.2f}   V_d {pull.abbe_number(held, gain):.1f}"
+        _label(canvas, x + theme.em(0.9), y - theme.em(1.6), f"{held.wavelength_nm:.0f} nm   {what}")
+
+
+def _present_gain(state: State) -> float:
+    held = state.pull
+    assert held is not None
+    if held.local:
+        return pull.local_gain(state.scene.objects[held.receiver_index], held)
+    material = state.scene.objects[held.object_index].material
+    return float(getattr(getattr(material, "dispersion", None), "gain", held.gain_at_start))
+
+
+def _label(canvas: Canvas, x: float, y: float, text: str) -> None:
+    palette, size, pad = theme.palette(), imgui.calc_text_size(text), theme.em(0.35)
+    x = min(max(x, canvas.left + pad), canvas.left + canvas.width - size.x - pad)
+    y = min(max(y, canvas.top + pad), canvas.top + canvas.height - size.y - pad)
+    canvas.drawing.add_rect_filled(ImVec2(x - pad, y - 0.5 * pad), ImVec2(x + size.x + pad, y + size.y + 0.5 * pad), theme.packed(palette.window, 0.88), 4.0)
+    canvas.drawing.add_text(ImVec2(x, y), theme.packed(palette.text), text)
+
+
+def draw_lights(canvas: Canvas, state: State) -> State:
+    """A small lamp where each light stands: faint, so that the picture shines, and clickable."""
+    if state.tool in ("brush", "pull"):
+        return state
+    for index, light in enumerate(state.scene.lights):
+        chosen = state.selection == Selection("light", index)
+        if light.kind == "directional" and not chosen:
+            continue  # it stands nowhere
+        place = placing.light_place(state.scene, light)
+        x, y = canvas.pixels(place)
+        inside = np.isfinite(x) and canvas.left < x < canvas.left + canvas.width and canvas.top < y < canvas.top + canvas.height
+        if not inside:
+            continue
+        half = theme.em(_LIGHT_EM)
+        imgui.set_cursor_screen_pos(ImVec2(x - half, y - half))
+        pressed = imgui.invisible_button(f"##light {index}", ImVec2(2 * half, 2 * half))
+        item_rects.note(f"Light: {light.name}")
+        tooltip(f"Light: {light.name} ({light.kind})", "Click to select it.")
+        _draw_light(canvas, state, index, place, float(x), float(y), chosen, imgui.is_item_hovered())
+        if pressed:
+            state = replace(state, selection=Selection("light", index))
+    return state
+
+
+def _draw_light(canvas: Canvas, state: State, index: int, place: np.ndarray, x: float, y: float, chosen: bool, hovered: bool) -> None:
+    palette, light = theme.palette(), state.scene.lights[index]
+    colour = palette.accent if chosen else (1.0, 0.92, 0.7, 1.0)
+    opacity = 1.0 if chosen or hovered else 0.5
+    if (chosen or hovered) and light.kind != "point":
+        length = canvas.view.height_at(max(float(canvas.view.depth(place)), 1e-9)) * theme.em(_ARROW_EM) / canvas.height
+        tip = place + length * placing.light_axes(light)[:, 2]
+        draw_outlined(canvas, np.stack([place, tip]), (*colour[:3], 0.9), 1.6, closed=False)
+    canvas.drawing.add_circle_filled(ImVec2(x, y), theme.em(0.78), theme.packed((0.0, 0.0, 0.0, 1.0), 0.5 * opacity), 24)
+    icon = icons.ICON_FA_SUN if light.kind == "directional" else icons.ICON_FA_LIGHTBULB
+    size = imgui.calc_text_size(icon)
+    canvas.drawing.add_text(ImVec2(x - 0.5 * size.x, y - 0.5 * size.y), theme.packed(colour, opacity), icon)
+
+
+def draw_wipe(canvas: Canvas, state: State, facts: Facts) -> None:
+    """The handle on the wipe's line, with what is on either side."""
+    if state.compare.mode != "wipe" or facts.picture is None:
+        return
+    x = canvas.left + state.compare.wipe * canvas.width
+    middle, radius = canvas.top + 0.5 * canvas.height, theme.em(0.8)
+    mouse = imgui.get_io().mouse_pos
+    near = imgui.is_window_hovered() and abs(mouse.x - x) < 6.0 * canvas.scale
+    if near:
+        imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
+    palette = theme.palette()
+    canvas.drawing.add_circle_filled(ImVec2(x, middle), radius, theme.packed(palette.window, 0.9), 32)
+    canvas.drawing.add_circle(ImVec2(x, middle), radius, theme.packed(palette.accent if near else palette.text, 0.9), 32, 1.6 * canvas.scale)
+    size = imgui.calc_text_size(icons.ICON_FA_LEFT_RIGHT)
+    canvas.drawing.add_text(ImVec2(x - 0.5 * size.x, middle - 0.5 * size.y), theme.packed(palette.text), icons.ICON_FA_LEFT_RIGHT)
+    y = canvas.top + theme.em(0.8)
+    left, right = state.method, state.compare.method
+    gap = theme.em(1.0)
+    _label(canvas, x - gap - imgui.calc_text_size(left).x, y, left)
+    _label(canvas, x + gap, y, right)
+
+
+def draw_magnifier(canvas: Canvas, facts: Facts) -> None:
+    """The pixels round the cursor, enlarged, beside it; a cross marks the one that is read out."""
+    cursor, mouse = facts.cursor, imgui.get_io().mouse_pos
+    if cursor is None or cursor.magnified is None:
+        return
+    side, gap, palette = theme.em(_MAGNIFIER_EM), theme.em(1.6), theme.palette()
+    text = f"{cursor.pixel[0]}, {cursor.pixel[1]}   R {cursor.rgb[0]:.3g}  G {cursor.rgb[1]:.3g}  B {cursor.rgb[2]:.3g}"
+    foot = imgui.get_text_line_height() + theme.em(0.5)
+    width = max(side, imgui.calc_text_size(text).x + theme.em(0.8))
+    x = mouse.x + gap if mouse.x + gap + width < canvas.left + canvas.width else mouse.x - gap - width
+    y = mouse.y + gap if mouse.y + gap + side + foot < canvas.top + canvas.height else mouse.y - gap - side - foot
+    low, high = ImVec2(x, y), ImVec2(x + width, y + side + foot)
+    canvas.drawing.add_rect_filled(low, high, theme.packed(palette.window, 0.95), 4.0)
+    left = x + 0.5 * (width - side)
+    canvas.drawing.add_image(imgui.ImTextureRef(cursor.magnified), ImVec2(left, y), ImVec2(left + side, y + side))
+    canvas.drawing.add_rect(low, high, theme.packed(palette.border), 4.0)
+    middle, reach = ImVec2(left + 0.5 * side, y + 0.5 * side), theme.em(0.45)
+    for colour, thickness in ((theme.packed((0, 0, 0, 0.7)), 3.0), (theme.packed((1, 1, 1, 0.9)), 1.0)):
+        canvas.drawing.add_line(ImVec2(middle.x - reach, middle.y), ImVec2(middle.x + reach, middle.y), colour, thickness)
+        canvas.drawing.add_line(ImVec2(middle.x, middle.y - reach), ImVec2(middle.x, middle.y + reach), colour, thickness)
+    canvas.drawing.add_text(ImVec2(x + theme.em(0.4), y + side + theme.em(0.2)), theme.packed(palette.text), text)

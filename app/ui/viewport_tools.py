@@ -1,0 +1,130 @@
+"""What lies over the picture and is clicked: the tools, play and pause, the physical switch, badges that say what one sees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as icons
+
+from app.ui import item_rects, theme
+from app.ui.commands import command
+from app.ui.facts import Facts
+from app.ui.gizmo import Gizmo
+from app.ui.panels.brush_panel import NOT_PHYSICAL
+from app.ui.panels.rows import tooltip
+from app.ui.state import State, Tool
+
+MARGIN_EM = 0.6
+_BUTTON_EM = 1.9
+_GAP_EM = 0.55
+_TOOLS: tuple[tuple[Tool, str, str], ...] = (
+    ("select", "Select", icons.ICON_FA_ARROW_POINTER),
+    ("move", "Move", icons.ICON_FA_UP_DOWN_LEFT_RIGHT),
+    ("rotate", "Rotate", icons.ICON_FA_ROTATE),
+    ("scale", "Scale", icons.ICON_FA_UP_RIGHT_AND_DOWN_LEFT_FROM_CENTER),
+    ("brush", "Dispersion brush", icons.ICON_FA_PAINTBRUSH),
+    ("pull", "Pull a colour", icons.ICON_FA_EYE_DROPPER),
+)
+
+
+@dataclass(frozen=True)
+class Badge:
+    """A few words on what the picture is not."""
+
+    text: str
+    tip: str
+    is_warning: bool = True
+
+
+def draw_toolbar(state: State, gizmo: Gizmo, left: float, top: float) -> State:
+    """The column of tools with its upper left corner at (left, top), pixels."""
+    size, gap = theme.em(_BUTTON_EM), theme.em(_GAP_EM)
+    has_axes = state.tool in ("move", "rotate")
+    y = top + theme.em(MARGIN_EM)
+    x = left + theme.em(MARGIN_EM)
+    _ground(x, y, size, len(_TOOLS))
+    for tool, name, icon in _TOOLS:
+        what = command(name)
+        if _button(name, icon, x, y, state.tool == tool, what.tip, what.keys):
+            state = replace(state, tool=tool)
+        y += size
+    y += gap
+    if has_axes:
+        _ground(x, y, size, 1)
+        name, icon = ("Object's axes", icons.ICON_FA_CUBE) if gizmo.is_local else ("World's axes", icons.ICON_FA_GLOBE)
+        tip = f"The gizmo shows the {name[:1].lower()}{name[1:]}; click for the {'world' if gizmo.is_local else 'object'}'s."
+        if _button("Gizmo axes", icon, x, y, gizmo.is_local, tip, ()):
+            gizmo.is_local = not gizmo.is_local
+        y += size + gap
+    _ground(x, y, size, 2)
+    what = command("Accumulate photons")
+    icon, tip = (icons.ICON_FA_PAUSE, "Pause: keep the picture as it is.") if state.playing else (icons.ICON_FA_PLAY, "Go on accumulating photons.")
+    if _button("Pause" if state.playing else "Play", icon, x, y, not state.playing, tip, what.keys):
+        state = replace(state, playing=not state.playing)
+    what = command("Physical picture")
+    if _button("Physical picture", icons.ICON_FA_ATOM, x, y + size, state.physical, what.tip, what.keys):
+        state = replace(state, physical=not state.physical)
+    return state
+
+
+def _ground(x: float, y: float, size: float, count: int) -> None:
+    palette, rounding = theme.palette(), imgui.get_style().frame_rounding + 1.0
+    low, high = ImVec2(x - 1, y - 1), ImVec2(x + size + 1, y + count * size + 1)
+    imgui.get_window_draw_list().add_rect_filled(low, high, theme.packed(palette.window, 0.82), rounding)
+    imgui.get_window_draw_list().add_rect(low, high, theme.packed(palette.border, 0.6), rounding)
+
+
+def _button(name: str, icon: str, x: float, y: float, is_on: bool, tip: str, keys: tuple[str, ...]) -> bool:
+    palette, size = theme.palette(), theme.em(_BUTTON_EM)
+    imgui.set_cursor_screen_pos(ImVec2(x, y))
+    clear = imgui.ImVec4(0, 0, 0, 0)
+    imgui.push_style_color(imgui.Col_.button, imgui.ImVec4(*palette.accent[:3], 0.85) if is_on else clear)
+    imgui.push_style_color(imgui.Col_.button_hovered, imgui.ImVec4(*(palette.accent if is_on else palette.frame)))
+    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(1, 1, 1, 1) if is_on else imgui.ImVec4(*palette.text))
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(0, 0))
+    pressed = imgui.button(f"{icon}##{name}", ImVec2(size, size))
+    imgui.pop_style_var()
+    imgui.pop_style_color(3)
+    item_rects.note(name)
+    tooltip(name, tip, f"Key: {keys[0]}" if keys else "")
+    return pressed
+
+
+def badges(state: State, facts: Facts) -> list[Badge]:
+    """What must be said of the present picture."""
+    told = []
+    painted = any(item.local_dispersion for item in state.scene.objects)
+    if painted and not state.physical:
+        told.append(Badge(NOT_PHYSICAL, "The dispersion brush has changed how far colours spread on a receiver. V shows the physical picture."))
+    elif painted:
+        told.append(Badge("Physical: local gain left out", "What the dispersion brush painted is kept but not shown. V brings it back.", False))
+    if facts.stats.first_order:
+        told.append(Badge("First order", "Photons were traced through a glass of another dispersion; the picture follows the edit to first order until they are traced again (Ctrl+R)."))
+    if state.solo_nm is not None:
+        told.append(Badge(f"Only {state.solo_nm:.0f} nm", "The light of a single wavelength is shown. L goes back to all of it.", False))
+    if state.compare.holding:
+        told.append(Badge("Reference", "Shown while C is held down.", False))
+    if not state.playing:
+        told.append(Badge("Paused", "No photons are added. Space goes on.", False))
+    return told
+
+
+def draw_badges(shown: list[Badge], left: float, bottom: float) -> None:
+    """A row of badges with its lower left corner at (left, bottom), pixels."""
+    palette, pad_x, pad_y = theme.palette(), theme.em(0.55), theme.em(0.28)
+    x = left + theme.em(MARGIN_EM)
+    for badge in shown:
+        text = imgui.calc_text_size(badge.text)
+        size = ImVec2(text.x + 2 * pad_x, text.y + 2 * pad_y)
+        low = ImVec2(x, bottom - theme.em(MARGIN_EM) - size.y)
+        high = ImVec2(low.x + size.x, low.y + size.y)
+        drawing, colour = imgui.get_window_draw_list(), palette.warning if badge.is_warning else palette.text
+        drawing.add_rect_filled(low, high, theme.packed(palette.window, 0.86), 0.5 * size.y)
+        drawing.add_rect(low, high, theme.packed(colour, 0.55), 0.5 * size.y)
+        drawing.add_text(ImVec2(low.x + pad_x, low.y + pad_y), theme.packed(colour), badge.text)
+        imgui.set_cursor_screen_pos(low)
+        imgui.invisible_button(f"##badge {badge.text}", size)
+        item_rects.note(badge.text)
+        tooltip(badge.tip)
+        x = high.x + theme.em(0.4)
