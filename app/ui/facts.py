@@ -120,6 +120,11 @@ class Facts:
     """Unsaved changes: the dialogue with Save, Discard and Cancel is open."""
     curves: tuple[ErrorCurve, ...] = ()
     reference_progress: float | None = None
+    """How far the picture that compare modes show is, 0 to 1; None where none was begun."""
+    compare_text: str = ""
+    """What that picture is and how good, or why there is none: one or two sentences."""
+    compare_stale: bool = False
+    """The scene or the view has changed since it was begun."""
     rays: tuple[RayLine, ...] = ()
     job: JobFacts | None = None
     exposure_ev: float = 0.0
@@ -127,3 +132,6 @@ class Facts:
     delta_s: float = 1 / 60
     """Since the last frame."""
     framebuffer_scale: float = 1.0
+    """Device pixels per interface pixel."""
+    interface_scale: float = 1.0
+    """Interface pixels per logical pixel: what `theme.apply` takes."""

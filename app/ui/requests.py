@@ -107,7 +107,7 @@ class ReloadShaders:
 
 @dataclass(frozen=True)
 class Screenshot:
-    """Write the picture to `path`: .png as displayed, .exr linear, spectral .exr when `spectral`."""
+    """Write the picture to `path`: .png as displayed, .exr or .npy linear, .exr with spectral bins when `spectral`."""
 
     path: Path
     spectral: bool = False
@@ -120,16 +120,26 @@ class Bake:
 
     path: Path
     receiver: str
+    size: tuple[int, int] = (1024, 1024)
+    """Texels."""
+    photons: int = 4_000_000
 
 
 @dataclass(frozen=True)
 class Animate:
-    """Render an animation: a turntable, or the keys of `State.animation`."""
+    """Render an animation to `path` (.mp4, or a folder for PNGs): a turntable, or the keys of `State.animation`."""
 
     path: Path
     kind: Literal["turntable", "keys"] = "turntable"
-    frames: int = 120
+    frames: int | None = 120
+    """None takes as many as the keys last."""
     fps: float = 24.0
+    size: tuple[int, int] | None = None
+    """Pixels; None takes those of the viewport."""
+    photons: int = 1_000_000
+    """Of each traced frame."""
+    samples: int = 16
+    """Camera samples a pixel."""
 
 
 @dataclass(frozen=True)
