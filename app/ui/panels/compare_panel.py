@@ -1,0 +1,164 @@
+"""Against a reference or another method: what is shown, what it is, and how fast each gets there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from imgui_bundle import imgui, implot
+
+from app.colour_maps import ERROR, sample
+from app.model.settings import METHODS
+from app.ui import theme
+from app.ui.facts import ErrorCurve, Facts
+from app.ui.panels import rows, widgets
+from app.ui.panels.methods import METHOD_NAMES, METHOD_TIPS
+from app.ui.requests import ComputeReference
+from app.ui.state import Compare, State
+
+MODES = {"off": "Picture alone", "hold": "Hold C to see it", "wipe": "Wipe", "error": "Error map"}
+MODE_TIPS = {
+    "off": "Show the picture alone. Hold C at any time to see what it is compared with.",
+    "hold": "Compute the other picture and show it as long as C is held.",
+    "wipe": "The picture left of the line, the other right of it. Drag the line in the picture.",
+    "error": "Relative error of the picture: blue is too dark, red too bright.",
+}
+REFERENCE = "reference"
+ERROR_RANGE = 0.5
+"""Relative error at the ends of the map's scale (`passes.display.ERROR_RANGE`)."""
+_WIDE_EM = 40.0
+_LEGEND_STEPS = 40
+
+
+def draw_compare(state: State, facts: Facts) -> State:
+    """Draw the panel's contents."""
+    if imgui.get_content_region_avail().x < theme.em(_WIDE_EM):
+        return _plot(_controls(state, facts), facts, theme.em(13))
+    if imgui.begin_table("##compare", 2, imgui.TableFlags_.sizing_stretch_prop):
+        imgui.table_setup_column("controls", imgui.TableColumnFlags_.width_stretch, 1.0)
+        imgui.table_setup_column("plot", imgui.TableColumnFlags_.width_stretch, 1.3)
+        imgui.table_next_row()
+        imgui.table_next_column()
+        state = _controls(state, facts)
+        imgui.table_next_column()
+        state = _plot(state, facts, max(imgui.get_content_region_avail().y, theme.em(9)))
+        imgui.end_table()
+    return state
+
+
+def _controls(state: State, facts: Facts) -> State:
+    compare = state.compare
+    _, mode = widgets.combo("Show", MODES, compare.mode, tip=MODE_TIPS[compare.mode])
+    others = {REFERENCE: "Reference"} | {name: METHOD_NAMES[name] for name in METHODS if name != state.method}
+    tip = METHOD_TIPS.get(compare.method, "An independent rendering in float64 that shares no code with this one, refined in the background.")
+    _, method = widgets.combo("With", others, compare.method, tip=tip)
+    compare = replace(compare, mode=mode, method=method)
+    if mode == "wipe":
+        _, wipe, active = widgets.slider(
+            "Line at", 100.0 * compare.wipe, 0.0, 100.0, unit="%", format="%.0f", reset=50.0, tip="Place of the line, share of the picture's width."
+        )
+        compare = replace(compare, wipe=wipe / 100.0)
+        state = widgets.holding(state, active)
+    _, plot = widgets.toggle(
+        "Error over time", compare.plot, tip="Measure this method and the other against the reference while both run, and plot relMSE over time."
+    )
+    state = replace(state, compare=replace(compare, plot=plot))
+    if mode == "error":
+        _legend()
+    return _progress(state, facts)
+
+
+def _progress(state: State, facts: Facts) -> State:
+    """How far the other picture is, and what it is."""
+    if not is_comparing(state.compare):
+        widgets.hint("Choose what to show to begin. The other picture is computed in the time that this one leaves.")
+        return state
+    done = facts.reference_progress
+    rows.begin_row("Progress")
+    imgui.progress_bar(done or 0.0, imgui.ImVec2(-1, 0), "waiting" if done is None else f"{100 * done:.0f} %")
+    rows.explain("Progress", "How far the picture it is compared with has come. It goes on while the window is open.")
+    if facts.compare_stale:
+        widgets.note("Scene or view has changed: this is the picture from before.")
+    if facts.compare_text:
+        widgets.hint(facts.compare_text)
+    if widgets.button("Start again", tip="Compute what it is compared with anew, for the present scene and view.", width=-1):
+        state = state.asking(ComputeReference())
+    return state
+
+
+def is_comparing(compare: Compare) -> bool:
+    """Whether anything asks for the other picture."""
+    return compare.mode != "off" or compare.plot
+
+
+def _legend() -> None:
+    """The error map's scale."""
+    rows.begin_row("Scale")
+    width, height = imgui.get_content_region_avail().x, imgui.get_frame_height()
+    start = imgui.get_cursor_screen_pos()
+    imgui.invisible_button("##scale", imgui.ImVec2(width, height))
+    share = min(max((imgui.get_mouse_pos().x - start.x) / max(width, 1.0), 0.0), 1.0)
+    rows.explain("Scale", f"{100 * ERROR_RANGE * (2 * share - 1):+.0f} % of the reference. What is nearly black on the screen counts less; magenta is no number.")
+    drawing = imgui.get_window_draw_list()
+    colours = [theme.packed((*map(float, rgb), 1.0)) for rgb in sample(ERROR, np.linspace(0.0, 1.0, _LEGEND_STEPS + 1))]
+    for i in range(_LEGEND_STEPS):
+        low, high = start.x + width * i / _LEGEND_STEPS, start.x + width * (i + 1) / _LEGEND_STEPS
+        corners = imgui.ImVec2(low, start.y), imgui.ImVec2(high, start.y + height)
+        drawing.add_rect_filled_multi_color(*corners, colours[i], colours[i + 1], colours[i + 1], colours[i])
+    texts = (f"-{100 * ERROR_RANGE:.0f} %", (0.08, 0.08, 0.1, 1.0), 0.0), ("0", (0.9, 0.9, 0.9, 1.0), 0.5), (f"+{100 * ERROR_RANGE:.0f} %", (0.12, 0.06, 0.06, 1.0), 1.0)
+    pad = theme.em(0.35)
+    for text, tint, place in texts:
+        size = imgui.calc_text_size(text)
+        at = start.x + pad + place * (width - size.x - 2 * pad)
+        drawing.add_text(imgui.ImVec2(at, start.y + 0.5 * (height - size.y)), theme.packed(tint), text)
+
+
+def _plot(state: State, facts: Facts, height: float) -> State:
+    if not state.compare.plot:
+        return state
+    flags = implot.Flags_.no_menus | implot.Flags_.no_mouse_text
+    if not implot.begin_plot("##error over time", imgui.ImVec2(-1, height), flags):
+        return state
+    implot.setup_axes("time traced and splatted (s)", "relMSE")
+    for axis in (implot.ImAxis_.x1, implot.ImAxis_.y1):
+        implot.setup_axis_scale(axis, implot.Scale_.log10)
+    curves = [shown for shown in map(_drawable, facts.curves) if shown is not None]
+    x_range, y_range = _limits(curves)
+    implot.setup_axis_limits(implot.ImAxis_.x1, *x_range, implot.Cond_.always)
+    implot.setup_axis_limits(implot.ImAxis_.y1, *y_range, implot.Cond_.always)
+    implot.setup_legend(implot.Location_.south_west)
+    for curve, tint in zip(curves, _tints(), strict=False):
+        seconds, error = np.ascontiguousarray(curve.seconds, float), np.ascontiguousarray(curve.error, float)
+        name = METHOD_NAMES.get(curve.method, curve.method)
+        spec = implot.Spec(line_color=tint, line_weight=1.8, marker=implot.Marker_.circle, marker_size=2.5, marker_fill_color=tint)
+        implot.plot_line(name, seconds, error, spec)
+    implot.end_plot()
+    rows.explain("Error over time", "")
+    if not curves:
+        widgets.hint("Curves appear as soon as the reference is good enough to measure against.")
+    return state
+
+
+def _drawable(curve: ErrorCurve) -> ErrorCurve | None:
+    """The points that a logarithmic plot can show."""
+    keep = (curve.seconds > 0.0) & (curve.error > 0.0) & np.isfinite(curve.error)
+    return replace(curve, seconds=curve.seconds[keep], error=curve.error[keep]) if keep.any() else None
+
+
+def _limits(curves: list[ErrorCurve]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Whole decades round all points."""
+    if not curves:
+        return (0.1, 100.0), (1e-4, 1.0)
+    seconds = np.concatenate([curve.seconds for curve in curves])
+    error = np.concatenate([curve.error for curve in curves])
+    return _decades(seconds), _decades(error)
+
+
+def _decades(values: np.ndarray) -> tuple[float, float]:
+    low, high = np.floor(np.log10(values.min()) - 0.05), np.ceil(np.log10(values.max()) + 0.05)
+    return float(10.0**low), float(10.0**max(high, low + 1))
+
+
+def _tints() -> tuple[imgui.ImVec4, ...]:
+    palette = theme.palette()
+    return imgui.ImVec4(*palette.accent), imgui.ImVec4(*palette.warning)

@@ -1,0 +1,170 @@
+"""Taking pictures away: screenshots, baked caustic maps, animations; how far the running one is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+from imgui_bundle import imgui
+
+from app.model.scene import Diffuse
+from app.ui.facts import Facts
+from app.ui.panels import file_browser, keys_editor, rows, widgets
+from app.ui.requests import Animate, Bake, CancelJob, Screenshot
+from app.ui.state import State
+
+SIZES = {
+    "viewport": "As the viewport",
+    "960x540": "960 × 540",
+    "1280x720": "1280 × 720",
+    "1920x1080": "1920 × 1080",
+    "3840x2160": "3840 × 2160",
+}
+MAP_SIZES = {"512x512": "512 × 512", "1024x1024": "1024 × 1024", "2048x2048": "2048 × 2048", "4096x4096": "4096 × 4096"}
+PHOTONS = {"250000": "250 thousand", "1000000": "1 million", "4000000": "4 million", "16000000": "16 million", "64000000": "64 million"}
+_KINDS = {"turntable": "Turntable", "keys": "Keys"}
+_FORMATS = {"mp4": "Movie (MP4)", "png": "Sequence (PNG)"}
+
+
+@dataclass
+class _Choices:
+    """What was chosen last; memory of the interface, not of the document."""
+
+    spectral: bool = False
+    with_interface: bool = False
+    receiver: str = ""
+    map_size: str = "1024x1024"
+    map_photons: str = "4000000"
+    kind: Literal["turntable", "keys"] = "turntable"
+    format: str = "mp4"
+    frames: int = 120
+    fps: float = 24.0
+    size: str = "viewport"
+    photons: str = "1000000"
+
+
+_choices = _Choices()
+
+
+def draw_export(state: State, facts: Facts) -> State:
+    """Draw the panel's contents."""
+    if facts.job is not None:
+        state = _running(state, facts)
+    idle = facts.job is None
+    if widgets.section("Screenshot"):
+        _screenshot(facts, idle)
+    if widgets.section("Caustic map"):
+        _bake(state, facts, idle)
+    if widgets.section("Animation"):
+        state = _animation(state, facts, idle)
+    return _answers(state)
+
+
+def _running(state: State, facts: Facts) -> State:
+    job = facts.job
+    assert job is not None
+    imgui.text_unformatted(job.title)
+    imgui.progress_bar(job.fraction, imgui.ImVec2(-1, 0), f"{100 * job.fraction:.0f} %")
+    rows.explain("Export progress", "The export works in the time that the window leaves; editing does not change it.")
+    if job.text:
+        widgets.hint(job.text)
+    if widgets.button("Cancel export", tip="Stop the export. What is finished stays: a movie plays up to here, a sequence keeps its frames.", width=-1):
+        state = state.asking(CancelJob())
+    imgui.separator()
+    return state
+
+
+def _screenshot(facts: Facts, idle: bool) -> None:
+    _, _choices.spectral = widgets.toggle(
+        "Spectral bins", _choices.spectral, tip="Write an EXR with 20 spectral channels (W/(m² sr) in each bin), rendered anew in the background."
+    )
+    if not _choices.spectral:
+        _, _choices.with_interface = widgets.toggle("With interface", _choices.with_interface, tip="The whole window as it is on the screen (PNG).")
+    suffixes = (".exr",) if _choices.spectral else (".png",) if _choices.with_interface else (".png", ".exr", ".npy")
+    tip = "PNG: as displayed. EXR and NPY: linear Rec.709 radiance, lm/(sr unit²), without tone curve."
+    if widgets.button("Save screenshot…", tip=tip, enabled=idle, width=-1):
+        _ask("screenshot", "Save screenshot", suffixes, facts, facts.title)
+
+
+def _bake(state: State, facts: Facts, idle: bool) -> None:
+    names = list(dict.fromkeys(item.name for item in state.scene.objects if isinstance(item.material, Diffuse)))
+    if not names:
+        widgets.hint("Nothing in this scene is diffuse, so nothing carries a caustic.")
+        return
+    if _choices.receiver not in names:
+        _choices.receiver = names[0]
+    _, _choices.receiver = widgets.combo("Receiver", names, _choices.receiver, tip="The diffuse object whose caustic is baked.")
+    _, _choices.map_size = widgets.combo("Texels", MAP_SIZES, _choices.map_size, tip="Size of the texture, texels. A curved receiver gets about as many in all.")
+    _, _choices.map_photons = widgets.combo("Photons##map", PHOTONS, _choices.map_photons, tip="Photons emitted for the map.")
+    tip = "Irradiance of the caustic, lm/unit², as EXR or NPY (linear) or PNG (to look at). A .json beside it says where the texture lies in the world."
+    if widgets.button("Bake map…", tip=tip, enabled=idle, width=-1):
+        _ask("bake", "Bake caustic map", (".exr", ".png", ".npy"), facts, f"{facts.title}_{_choices.receiver}")
+
+
+def _animation(state: State, facts: Facts, idle: bool) -> State:
+    kind_tips = {
+        "turntable": "The camera goes once round its target; photons are traced once.",
+        "keys": "Parameters of the scene move from key to key.",
+    }
+    _, kind = widgets.combo("Kind", _KINDS, _choices.kind, tip=kind_tips[_choices.kind])
+    _choices.kind = "keys" if kind == "keys" else "turntable"
+    _, _choices.fps, _ = widgets.slider("Frame rate", _choices.fps, 1.0, 120.0, unit="fps", format="%.0f", reset=24.0, tip="Pictures a second.")
+    _choices.fps = float(round(_choices.fps))
+    if _choices.kind == "keys":
+        state = keys_editor.draw_keys(state, facts)
+        frames = keys_editor.frame_count(state.animation, _choices.fps)
+    else:
+        _, count, _ = widgets.slider("Frames", _choices.frames, 2, 720, unit="", format="%.0f", reset=120, tip="Pictures of one turn.", clamp=False)
+        _choices.frames = frames = max(1, round(count))
+    widgets.read_out("Length", f"{frames / _choices.fps:.2f} s, {frames} frames", tip="How long the animation plays.")
+    _, _choices.size = widgets.combo("Size", SIZES, _choices.size, tip="Pixels of each picture.")
+    _, _choices.photons = widgets.combo("Photons##frame", PHOTONS, _choices.photons, tip="Photons of each traced frame.")
+    _, _choices.format = widgets.combo("File", _FORMATS, _choices.format, tip="An H.264 movie, or a folder of numbered PNGs that can be resumed.")
+    can = idle and (_choices.kind == "turntable" or bool(state.animation))
+    tip = "Render all pictures with the present tone curve and exposure. The viewer stays usable meanwhile."
+    if widgets.button("Render animation…", tip=tip if can or not idle else "Add keys first.", enabled=can, width=-1):
+        _ask("animate", "Render animation", (".mp4",) if _choices.format == "mp4" else (".png",), facts, f"{facts.title}_{_choices.kind}")
+    return state
+
+
+def _ask(identity: str, title: str, suffixes: tuple[str, ...], facts: Facts, name: str) -> None:
+    folder = facts.path.parent if facts.path is not None else Path.home()
+    stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)
+    file_browser.ask(file_browser.Question(f"export {identity}", title, suffixes, folder / f"{stem}{suffixes[0]}", saving=True))
+
+
+def _answers(state: State) -> State:
+    """Places chosen in the file dialogue become requests."""
+    path = file_browser.take("export screenshot")
+    if path is not None:
+        state = state.asking(Screenshot(path, _choices.spectral, _choices.with_interface and not _choices.spectral))
+    path = file_browser.take("export bake")
+    if path is not None:
+        state = state.asking(Bake(path, _choices.receiver, _size(_choices.map_size, (1024, 1024)), int(_choices.map_photons)))
+    path = file_browser.take("export animate")
+    if path is not None:
+        # A sequence is a folder: the name that was given, without its ending.
+        target = path if _choices.format == "mp4" else path.with_suffix("")
+        frames = None if _choices.kind == "keys" else _choices.frames
+        size = None if _choices.size == "viewport" else _size(_choices.size, (960, 540))
+        state = state.asking(Animate(target, _choices.kind, frames, _choices.fps, size, int(_choices.photons)))
+    return state
+
+
+def _size(text: str, default: tuple[int, int]) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    return (int(width), int(height)) if height else default
+
+
+def reset() -> None:
+    """Choices as at the start."""
+    fresh = _Choices()
+    for name, value in vars(fresh).items():
+        setattr(_choices, name, value)
+
+
+def with_keys(state: State) -> State:
+    """The state with the panel open at the animation's keys."""
+    _choices.kind = "keys"
+    return replace(state.with_panels(export=True))

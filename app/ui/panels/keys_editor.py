@@ -1,0 +1,134 @@
+"""The keys of an animation: which parameter has which value at what time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from imgui_bundle import icons_fontawesome_6 as icons
+from imgui_bundle import imgui
+
+from app.ui import item_rects, theme
+from app.ui.facts import Facts
+from app.ui.panels import widgets
+from app.ui.parameters import Parameter, Stage, paths, value_of
+from app.ui.state import Key, State
+
+MAX_TIME_S = 3600.0
+_VIEW = tuple(f"camera.{field}.{axis}" for field in ("position", "target") for axis in "xyz")
+_DEFAULT_STEP_S = 2.0
+
+
+@dataclass
+class _Memory:
+    path: str = ""
+    time_s: float = 0.0
+
+
+_memory = _Memory()
+
+
+def draw_keys(state: State, facts: Facts) -> State:
+    """Draw the chooser of parameters and the table of keys."""
+    stage = Stage(state.scene, state.camera, facts.exposure_ev, state.solo_nm)
+    known = paths(stage.scene, stage.camera)
+    if _memory.path not in known:
+        _memory.path = next((path for path in known if path.endswith(".dispersion_gain")), next(iter(known)))
+    _, _memory.path = widgets.combo("Parameter", _names(known), _memory.path, tip=known[_memory.path].meaning + ".")
+    _, _memory.time_s, _ = widgets.drag("At", _memory.time_s, 0.0, MAX_TIME_S, unit="s", format="%.2f", reset=0.0, speed=0.02, tip="Time of the next key.")
+    half = 0.5 * (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x)
+    tip = "Add a key with the parameter's present value (turns: 0, power: 1)."
+    if widgets.button("Add key", tip=tip, width=half):
+        state = _with(state, [Key(_memory.time_s, _memory.path, value_of(stage, _memory.path))])
+        _memory.time_s += _DEFAULT_STEP_S
+    imgui.same_line()
+    if widgets.button("Key this view", tip="Add keys for the camera's position and target as they are now.", width=half):
+        state = _with(state, [Key(_memory.time_s, path, value_of(stage, path)) for path in _VIEW])
+        _memory.time_s += _DEFAULT_STEP_S
+    return _table(state, known)
+
+
+def frame_count(keys: Sequence[Key], fps: float) -> int:
+    """Frames from the first key to the last, both included; 0 without keys."""
+    if not keys:
+        return 0
+    times = [key.time_s for key in keys]
+    return max(1, round((max(times) - min(times)) * fps) + 1)
+
+
+def _names(known: dict[str, Parameter]) -> dict[str, str]:
+    """Path -> what the chooser shows: `prism: dispersion gain`."""
+    names = {}
+    for path in known:
+        head, _, rest = path.partition(".")
+        owner, _, field = rest.partition(".") if head in ("objects", "lights") else (head, "", rest or head)
+        names[path] = f"{owner}: {field.replace('_', ' ')}" if head != owner or rest else path.replace("_", " ")
+    return names
+
+
+def _with(state: State, keys: Sequence[Key]) -> State:
+    """With more keys; one of the same parameter at the same time gives way."""
+    replaced = {(key.path, key.time_s) for key in keys}
+    kept = [key for key in state.animation if (key.path, key.time_s) not in replaced]
+    return replace(state, animation=tuple(sorted([*kept, *keys], key=lambda key: (key.path, key.time_s))))
+
+
+def _table(state: State, known: dict[str, Parameter]) -> State:
+    if not state.animation:
+        widgets.hint("No keys yet. Two keys of one parameter make it move; between them it eases.")
+        return state
+    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_fixed_fit
+    if not imgui.begin_table("##keys", 4, flags):
+        return state
+    imgui.table_setup_column("Parameter", imgui.TableColumnFlags_.width_stretch)
+    imgui.table_setup_column("Time", imgui.TableColumnFlags_.width_fixed, theme.em(4.2))
+    imgui.table_setup_column("Value", imgui.TableColumnFlags_.width_fixed, theme.em(5.6))
+    imgui.table_setup_column("##delete", imgui.TableColumnFlags_.width_fixed, theme.em(1.8))
+    imgui.table_headers_row()
+    names = _names(known)
+    keys: list[Key] = []
+    for index, key in enumerate(state.animation):
+        imgui.push_id(index)
+        changed, active = _row(index, key, names, known)
+        imgui.pop_id()
+        state = widgets.holding(state, active)
+        if changed is not None:
+            keys.append(changed)
+    imgui.end_table()
+    missing = sorted({key.path for key in keys} - set(known))
+    if missing:
+        widgets.note(f"Not in this scene any more: {', '.join(missing)}. Delete these keys to render.")
+    return replace(state, animation=tuple(keys)) if tuple(keys) != state.animation else state
+
+
+def _row(index: int, key: Key, names: dict[str, str], known: dict[str, Parameter]) -> tuple[Key | None, bool]:
+    """The key as it was left (None: deleted), and whether a field of it is held."""
+    parameter = known.get(key.path)
+    imgui.table_next_row()
+    imgui.table_next_column()
+    imgui.align_text_to_frame_padding()
+    with theme.coloured(theme.palette().text if parameter else theme.palette().warning):
+        imgui.text_unformatted(names.get(key.path, key.path))
+    widgets.tooltip(f"{key.path}: {parameter.meaning}." if parameter else "This parameter is not in the scene any more.")
+    imgui.table_next_column()
+    imgui.set_next_item_width(-1)
+    moved, time_s = imgui.drag_float("##time", key.time_s, 0.02, 0.0, MAX_TIME_S, "%.2f s", imgui.SliderFlags_.always_clamp)
+    active = imgui.is_item_active()
+    item_rects.note(f"Key {index} time")
+    widgets.tooltip("Time of this key.", "Unit: s", "Ctrl+click: type")
+    imgui.table_next_column()
+    imgui.set_next_item_width(-1)
+    low, high = (parameter.low, parameter.high) if parameter else (-1e9, 1e9)
+    changed, value = imgui.drag_float("##value", key.value, max(abs(key.value) * 5e-3, 1e-3), low, high, "%.4g", imgui.SliderFlags_.always_clamp | imgui.SliderFlags_.no_round_to_format)
+    active |= imgui.is_item_active()
+    item_rects.note(f"Key {index} value")
+    unit = parameter.unit if parameter else ""
+    widgets.tooltip("Value of the parameter at that time.", f"Unit: {unit}" if unit else "", "Ctrl+click: type")
+    imgui.table_next_column()
+    deleted = imgui.button(icons.ICON_FA_TRASH)
+    item_rects.note(f"Key {index} delete")
+    widgets.tooltip("Delete this key.")
+    if deleted:
+        return None, False
+    after = replace(key, time_s=float(f"{time_s:.7g}") if moved else key.time_s, value=float(f"{value:.7g}") if changed else key.value)
+    return after, active
