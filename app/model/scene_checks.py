@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.errors import UserError
+from app.model.mesh import Mesh
 from app.model.scene import Dielectric, Diffuse, Light, Scene, SceneObject
-from app.model.scene_defaults import bounds_of
 
 MAX_SIZE_RATIO = 1e12
 """Largest to smallest object."""
@@ -39,34 +39,71 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
 
 
 def contains(item: SceneObject, point: np.ndarray) -> bool:
-    """Whether `point` (3,) lies inside the object's closed surface.
+    """Whether `point` (3,), in the world, lies inside the object's closed surface; slightly open meshes are judged too."""
+    local = np.linalg.solve(item.object_to_world[:3, :3], np.asarray(point) - item.object_to_world[:3, 3])
+    if item.mesh.is_closed:
+        return _crossings(item.mesh, local) != 0
+    return abs(_winding(item.mesh, local)) > 0.5
 
-    By the winding number, the sum of signed solid angles (van Oosterom and Strackee, IEEE
-    Trans. Biomed. Eng. 30, 1983, eq. 8) over 4π, which also judges slightly open meshes.
+
+def _crossings(mesh: Mesh, point: np.ndarray) -> int:
+    """How often a closed mesh winds round `point`: signed crossings of the ray from it along +z.
+
+    Cut by the plane x = 0, then by the line y = 0, each half-open and each edge computed from its lower end, so that
+    neighbours agree to the last bit and no ray slips through an edge. A few milliseconds for 250,000 triangles.
     """
-    corners = item.mesh.vertices @ item.object_to_world[:3, :3].T + (item.object_to_world[:3, 3] - point)
+    x, y, z = (mesh.vertices - point).T
+    beyond = x >= 0.0
+    a, b, c = mesh.triangles.T
+    cut = mesh.triangles[(beyond[a] != beyond[b]) | (beyond[a] != beyond[c])]
+    if len(cut) == 0:
+        return 0
+    side = beyond[cut]
+    ends = []
+    for following in (1, 0):  # the edge that goes to beyond, then the one that comes back
+        corner = np.argmax((side != np.roll(side, -1, axis=1)) & (np.roll(side, -1, axis=1) == following), axis=1)
+        rows = np.arange(len(cut))
+        edge = cut[rows, corner], cut[rows, (corner + 1) % 3]
+        low, high = edge if following else edge[::-1]
+        share = x[low] / (x[low] - x[high])
+        ends.append((y[low] + share * (y[high] - y[low]), z[low] + share * (z[high] - z[low])))
+    (y1, z1), (y2, z2) = ends
+    crossing = (y1 >= 0.0) != (y2 >= 0.0)
+    y1, z1, y2, z2 = (v[crossing] for v in (y1, z1, y2, z2))
+    above = z1 + y1 / (y1 - y2) * (z2 - z1) > 0.0
+    return int(np.where(y1 < y2, 1, -1)[above].sum())
+
+
+def _winding(mesh: Mesh, point: np.ndarray) -> float:
+    """Winding number of any mesh round `point`: the sum of signed solid angles over 4π (van Oosterom and
+    Strackee, IEEE Trans. Biomed. Eng. 30, 1983, eq. 8)."""
+    corners = mesh.vertices - point
     if np.any(corners.min(axis=0) > 0.0) or np.any(corners.max(axis=0) < 0.0):
-        return False
-    a, b, c = np.moveaxis(corners[item.mesh.triangles], 1, 0)
+        return 0.0
+    a, b, c = np.moveaxis(corners[mesh.triangles], 1, 0)
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
     triple = np.einsum("ij,ij->i", a, np.cross(b, c))
     dot = np.einsum
-    denominator = (
-        la * lb * lc + dot("ij,ij->i", a, b) * lc + dot("ij,ij->i", b, c) * la + dot("ij,ij->i", c, a) * lb
-    )
-    winding = np.arctan2(triple, denominator).sum() / (2.0 * np.pi)
-    return bool(abs(winding) > 0.5)
+    denominator = la * lb * lc + dot("ij,ij->i", a, b) * lc + dot("ij,ij->i", b, c) * la + dot("ij,ij->i", c, a) * lb
+    return float(np.arctan2(triple, denominator).sum() / (2.0 * np.pi))
 
 
 def _check_sizes(scene: Scene, file_name: str) -> None:
     """Refuse an object that float32 cannot tell from a point beside the others (a slip of units)."""
-    sizes = {o.name: float(np.linalg.norm(np.subtract(*bounds_of([o])))) for o in scene.objects}
+    sizes = {o.name: _size(o) for o in scene.objects}
     small, large = min(sizes, key=sizes.__getitem__), max(sizes, key=sizes.__getitem__)
     if sizes[small] * MAX_SIZE_RATIO < sizes[large]:
         raise UserError(
             f"{file_name}: object '{small}' is {sizes[small]:.2g} units large and '{large}' {sizes[large]:.2g}, "
             "too different to be computed together; check the units of their sizes and scales"
         )
+
+
+def _size(item: SceneObject) -> float:
+    """Diagonal of a world box round the object's own box: exact enough for a ratio, and quick for large meshes."""
+    vertices = item.mesh.vertices
+    extent = vertices.max(axis=0) - vertices.min(axis=0)
+    return float(np.linalg.norm(np.abs(item.object_to_world[:3, :3]) @ extent))
 
 
 def check_outside(light: Light, glasses: Sequence[SceneObject], file_name: str) -> None:

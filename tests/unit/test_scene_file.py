@@ -228,6 +228,29 @@ def test_inside_and_outside_by_winding_number(tmp_path: Path) -> None:
     assert not contains(ring, np.array([1.0, 0.0, 0.26]))
 
 
+@pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (2.0, -0.5, 1.0)])
+def test_counting_crossings_is_the_winding_number(scale: tuple[float, float, float]) -> None:
+    from app.model import primitives
+    from app.model.scene import SceneObject
+    from app.model.scene_checks import _winding
+
+    matrix = np.diag((*scale, 1.0))
+    matrix[:3, 3] = (0.5, 0.25, -1.0)
+    for mesh in (primitives.torus(0.5, 0.2, 900), primitives.brilliant(), primitives.box((1.5, 1.5, 1.0))):
+        item = SceneObject("", mesh, Black(), matrix)
+        # The ray from a whole or half step runs through vertices and along edges: the diagonal of the box, the rows of the ring.
+        random = np.random.default_rng(4).uniform(-0.8, 0.8, (150, 3))
+        grid = np.array([(x, y, 0.05) for x in (-0.5, -0.25, 0.0, 0.25, 0.5) for y in (-0.5, -0.25, 0.0, 0.25, 0.5)])
+        found = 0
+        for point in np.concatenate([random, grid]):
+            winding = abs(_winding(mesh, point))
+            if winding < 0.01 or winding > 0.99:  # on the surface either answer will do
+                inside = contains(item, matrix[:3, :3] @ point + matrix[:3, 3])
+                assert inside == (winding > 0.5), (mesh.name, point, winding)
+                found += inside
+        assert 5 < found < 170
+
+
 # -- saving -------------------------------------------------------------------------------
 
 RICH = """
