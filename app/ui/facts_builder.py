@@ -34,9 +34,11 @@ def facts_of(session: Session) -> Facts:
         shader_error=picture.shader_error,
         recovery=None if session.recovery is None else session.recovery.path,
         asks_to_quit=session.asks_to_quit,
+        rays=session.overlay.rays,
         exposure_ev=picture.exposure_ev,
         delta_s=session.delta_s,
         framebuffer_scale=session.framebuffer_scale,
+        interface_scale=session.interface_scale,
     )
 
 

@@ -28,6 +28,7 @@ from app.ui.gallery import Gallery
 from app.ui.live_picture import EngineError, LivePicture
 from app.ui.message_box import MessageBox
 from app.ui.preferences import Settings, config_dir, load_settings, save_settings
+from app.ui.ray_overlay import RayOverlay
 from app.ui.state import Selection, State
 
 if TYPE_CHECKING:
@@ -62,8 +63,9 @@ class Session:
         self.recovery: Recovery | None = next(iter(recoveries(config_dir())), None)
         self.picture = LivePicture(context, make_engine)
         self.cursor = Cursor()
+        self.overlay = RayOverlay(context)
         self.gallery = Gallery(context, config_dir(), shipped_scenes())
-        self.framebuffer_scale = 1.0
+        self.interface_scale = self.framebuffer_scale = 1.0
         self.asks_to_quit = False
         self.wants_to_close = False
         self.frame_ms: deque[float] = deque(maxlen=FRAMES_REMEMBERED)
@@ -149,7 +151,7 @@ class Session:
         try:
             session_requests.carry_out(self, request)
         except UserError as error:
-            self.messages.tell(str(error), is_error=True)
+            self.messages.tell(sentence(str(error)), is_error=True)
         except Exception as error:  # a bug: the work and the window outlive it
             self.save_from_crash(f"{type(request).__name__}", error)
             self.messages.tell(f"{_words(request)} failed by a fault of the program ({_brief(error)}); your work is kept.", is_error=True)
@@ -169,12 +171,15 @@ class Session:
             self.engine_s = self._clock() - started
         problem = self.picture.problem
         if problem is not None and problem != self._told and self.picture.shader_error is None:
-            self.messages.tell(problem, is_error=True)
+            self.messages.tell(sentence(problem), is_error=True)
         self._told = problem
         now = self._clock()
         try:
             self.picture.show(self.state, now, self.delta_s)
             self.cursor.update(self.state, self.picture, now)
+            self.overlay.update(self.state)
+        except UserError as error:
+            self.messages.tell(sentence(str(error)), is_error=True)
         except Exception as error:  # a bug, or the device is lost
             self.picture.give_up()
             self._renderer_stopped(error)
@@ -253,6 +258,7 @@ class Session:
     def release(self) -> None:
         """Free what the device holds."""
         self.gallery.release()
+        self.overlay.release()
         self.picture.release()
 
 
@@ -266,6 +272,14 @@ def _words(request: requests.Request) -> str:
     name = type(request).__name__
     words = "".join(f" {c.lower()}" if c.isupper() else c for c in name).strip()
     return words.capitalize()
+
+
+def sentence(text: str) -> str:
+    """A `UserError`'s text as it stands on its own."""
+    text = " ".join(text.split())
+    # A file's or an object's name stays as it is written.
+    start = text[:1].upper() if text.split(" ")[0].isalpha() else text[:1]
+    return f"{start}{text[1:]}{'' if text.endswith(('.', '?', '!')) else '.'}"
 
 
 def _brief(error: BaseException) -> str:

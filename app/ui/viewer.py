@@ -25,8 +25,9 @@ class Viewer:
         self._draw = draw
         self._drawn_at = 0.0
 
-    def prepare(self) -> None:
+    def prepare(self, interface_scale: float = 1.0, framebuffer_scale: float = 1.0) -> None:
         """Before a frame."""
+        self.session.interface_scale, self.session.framebuffer_scale = interface_scale, framebuffer_scale
         self._drawn_at = time.perf_counter()
         self.session.prepare()
 

@@ -35,8 +35,8 @@ NO_DISPLAY = "there is no display to open a window on: 'spectrasplat render SCEN
 class Guest(Protocol):
     """What the window shows."""
 
-    def prepare(self) -> None:
-        """Before a frame, outside of imgui's."""
+    def prepare(self, interface_scale: float, framebuffer_scale: float) -> None:
+        """Before a frame, outside of imgui's; scales as in `Facts`."""
 
     def draw(self) -> None:
         """One frame, within imgui's."""
@@ -164,7 +164,8 @@ class Window:
     def frame(self, guest: Guest) -> None:
         """Draw one frame and show it."""
         self._host.make_current()
-        guest.prepare()
+        width = max(glfw.get_window_size(self._handle)[0], 1)
+        guest.prepare(self.interface_scale, self.framebuffer_size[0] / width)
         theme.apply(guest.preferences, self.interface_scale)
         if guest.title != self._title:
             self._title = guest.title

@@ -201,10 +201,10 @@ def test_what_the_engine_cannot_show_is_told_once(rig: Rig) -> None:
     rig.engine.problem = "the maps of this scene are too large"
     for _ in range(3):
         rig.frame()
-    assert [m.text for m in rig.facts.messages].count("the maps of this scene are too large") == 1
-    rig.ask(requests.DismissMessage("the maps of this scene are too large"))
+    assert [m.text for m in rig.facts.messages].count("The maps of this scene are too large.") == 1
+    rig.ask(requests.DismissMessage("The maps of this scene are too large."))
     rig.frame()
-    assert "the maps of this scene are too large" not in [m.text for m in rig.facts.messages]
+    assert "The maps of this scene are too large." not in [m.text for m in rig.facts.messages]
 
 
 def test_a_shader_error_is_shown_as_one(rig: Rig) -> None:

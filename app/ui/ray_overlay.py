@@ -1,0 +1,83 @@
+"""The fan of rays of the overlay, traced anew only when something that it depends on changed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.model.scene import Dielectric
+from app.ui.facts import RayLine
+from app.ui.state import State
+
+if TYPE_CHECKING:
+    from app.gpu.context import Context
+    from app.gpu.scene_buffers import SceneBuffers
+    from app.model.scene import Scene
+    from app.passes.ray_fan import RayFan
+
+FIRST_NM, LAST_NM = 400.0, 700.0
+
+
+class RayOverlay:
+    """Owns a tracer of the scene as it is edited: rays follow a dragged dispersion before photons are traced again."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._scene: Scene | None = None
+        self._buffers: SceneBuffers | None = None
+        self._fan: RayFan | None = None
+        self._key: tuple[object, ...] = ()
+        self.rays: tuple[RayLine, ...] = ()
+
+    def update(self, state: State) -> None:
+        """Trace what `state` asks for. Raises `UserError` for a scene that does not fit on the device."""
+        index = self._object(state) if state.display.ray_overlay else None
+        if index is None:
+            self.rays, self._key = (), ()
+            return
+        key = (index, state.selection, state.display.ray_count, state.display.ray_wavelengths, state.solo_nm)
+        if key == self._key and state.scene is self._scene:
+            return
+        self._key = key
+        light = state.selection.index if state.selection.kind == "light" else None
+        self.rays = tuple(self._fan_of(state.scene).trace(light, index, state.display.ray_count, wavelengths_of(state)))
+
+    def release(self) -> None:
+        """Free the tracer and its scene."""
+        if self._fan is not None:
+            self._fan.release()
+        if self._buffers is not None:
+            self._buffers.release()
+        self._fan = self._buffers = self._scene = None
+
+    def _fan_of(self, scene: Scene) -> RayFan:
+        from app.gpu.scene_buffers import SceneBuffers
+        from app.light_half import spectral_axis
+        from app.model.features import Features
+        from app.model.settings import RenderSettings
+        from app.passes.ray_fan import RayFan
+
+        if self._fan is None or scene is not self._scene:
+            self.release()
+            features = Features.of(scene, RenderSettings())
+            self._scene = scene
+            self._buffers = SceneBuffers(self._context.ctx, scene, features, spectral_axis(scene, features))
+            self._fan = RayFan(self._context, self._buffers)
+        return self._fan
+
+    @staticmethod
+    def _object(state: State) -> int | None:
+        """The selected glass; with a light or nothing selected, the first glass there is."""
+        selection, objects = state.selection, state.scene.objects
+        if selection.kind == "object" and isinstance(objects[selection.index].material, Dielectric):
+            return selection.index
+        return next((i for i, o in enumerate(objects) if isinstance(o.material, Dielectric)), None)
+
+
+def wavelengths_of(state: State) -> list[float]:
+    """Evenly over the spectrum, or the one that is shown alone."""
+    if state.solo_nm is not None:
+        return [state.solo_nm]
+    count = max(state.display.ray_wavelengths, 1)
+    return [float(nm) for nm in np.linspace(FIRST_NM, LAST_NM, count)] if count > 1 else [550.0]
