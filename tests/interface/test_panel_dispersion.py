@@ -104,6 +104,14 @@ def test_as_sold_undoes_every_edit(panel: PanelRig) -> None:
     assert panel.labels[-1] == f"{N_SF11} as sold"
 
 
+def test_a_preset_is_a_glass_by_its_everyday_name(panel: PanelRig) -> None:
+    panel.click("Presets…")
+    panel.frame(2)
+    panel.click("Diamond")
+    assert panel.glass == catalogue.find("diamond")
+    assert panel.labels == ["Diamond for prism"]
+
+
 def test_copy_and_paste_between_objects(gl: Context) -> None:
     with PanelRig(gl, draw_dispersion, scene_state("achromat")) as rig:
         first = rig.state.scene.objects[rig.state.selection.index].material

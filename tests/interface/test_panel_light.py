@@ -68,11 +68,19 @@ def test_spectrum_keeps_the_photometric_power(panel: PanelRig) -> None:
     assert edits.spectrum_words(panel.light.spectral_power) == ("blackbody", pytest.approx(3200.0))
     panel.type_into("Temperature", "5800")
     assert edits.spectrum_words(panel.light.spectral_power)[1] == pytest.approx(5800.0, rel=1e-5)
-    choose(panel, "Spectrum", "Gas lamp")
-    assert [nm for nm, _ in panel.light.spectral_power.lines] == [nm for nm, _ in LAMPS["Mercury"]]
-    choose(panel, "Lamp", "Sodium")
+    choose(panel, "Spectrum", "Spectral lines")
+    assert [nm for nm, _ in panel.light.spectral_power.lines] == [nm for nm, _ in LAMPS["Mercury lamp"]]
+    choose(panel, "Lines", "Sodium lamp")
     assert len(panel.light.spectral_power.lines) == 2
     assert panel.light.spectral_power.luminous() == pytest.approx(lumens, rel=1e-9)
+
+
+def test_a_preset_is_a_spectrum_of_the_same_brightness(panel: PanelRig) -> None:
+    lumens = panel.light.spectral_power.luminous()
+    choose(panel, "Light presets…", "Mercury lamp")
+    assert panel.light.spectral_power.luminous() == pytest.approx(lumens, rel=1e-9)
+    assert panel.labels == ["Mercury lamp for slit"]
+    assert len(panel.light.spectral_power.lines) == 5
 
 
 def test_laser_slider_is_dragged_live(panel: PanelRig) -> None:

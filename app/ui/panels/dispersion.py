@@ -13,7 +13,7 @@ from app.model import glass
 from app.model.glass import Dispersion
 from app.model.scene import Dielectric, SceneObject
 from app.model.scene_materials import MAX_PRIORITY
-from app.ui import edits, theme
+from app.ui import edits, presets, theme
 from app.ui.facts import Facts
 from app.ui.panels import widgets
 from app.ui.panels.absorption_rows import draw_absorption
@@ -25,6 +25,7 @@ from app.ui.panels.glass_values import (
     is_as_sold,
     lines_of,
     natural,
+    notes_of,
     own_numbers,
     selected_glass,
     shown_name,
@@ -128,7 +129,12 @@ def _draw_clipboard(state: State, index: int) -> State:
         tip = "Copy the material of an object of glass first."
     if widgets.button("Paste material", tip=tip, enabled=isinstance(held, Dielectric)) and held is not None:
         state = edits.attempt(state, f"Paste material on {item.name}", edits.set_material, index, held)
-    return state
+    imgui.same_line()
+    ready = {p.name: p for p in presets.material_presets()}
+    chosen = widgets.menu_button("Presets…", {n: p.remark for n, p in ready.items()}, tip="Common glasses, liquids and gems by everyday names.")
+    if chosen is None:
+        return state
+    return edits.attempt(state, f"{chosen} for {item.name}", presets.apply_material, index, ready[chosen])
 
 
 # ---- numbers ------------------------------------------------------------------------------
@@ -205,7 +211,7 @@ def _draw_lines(dispersion: Dispersion) -> None:
             imgui.text_unformatted(value)
             widgets.tooltip(tip)
         imgui.end_table()
-    for told in dispersion.notes():
+    for told in notes_of(dispersion):
         widgets.note(told[:1].upper() + told[1:])
 
 

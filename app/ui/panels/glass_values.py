@@ -43,6 +43,13 @@ class Lines:
     """Relative partial dispersion P_g,F = (n_g − n_F)/(n_F − n_C); None without dispersion."""
 
 
+@lru_cache(maxsize=64)
+def notes_of(dispersion: Dispersion) -> tuple[str, ...]:
+    """`Dispersion.notes`, remembered from frame to frame."""
+    return tuple(dispersion.notes())
+
+
+@lru_cache(maxsize=64)
 def lines_of(dispersion: Dispersion) -> Lines:
     """The catalogue numbers of what is rendered, dispersion gain included."""
     n_g, n_f, n_c = (float(dispersion.index(nm)) for nm in (LINE_G_NM, LINE_F_NM, LINE_C_NM))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
@@ -55,6 +56,12 @@ class _Area:
 _look = _Look()
 
 
+@lru_cache(maxsize=16)
+def _curves(dispersion: Dispersion) -> tuple[np.ndarray, np.ndarray]:
+    """n and dn/dλ on `_CURVE_NM`, remembered from frame to frame."""
+    return dispersion.index(_CURVE_NM), dispersion.derivative(_CURVE_NM)
+
+
 def draw_index_curve(state: State, facts: Facts) -> State:
     """The plot, its switches and the way back; the state with the curve as it was dragged."""
     selected = selected_glass(state)
@@ -93,7 +100,7 @@ def _fit(dispersion: Dispersion) -> None:
     if _look.held or dispersion == _look.of:
         return
     sold = as_sold(dispersion)
-    values = [dispersion.index(_CURVE_NM)] + ([sold.index(_CURVE_NM)] if sold is not None else [])
+    values = [_curves(each)[0] for each in (dispersion, sold) if each is not None]
     low, high = float(np.min(values)), float(np.max(values))
     middle, span = (low + high) / 2, max(high - low, _LEAST_SPAN)
     _look.of, _look.limits = dispersion, (middle - 0.72 * span, middle + 0.62 * span)
@@ -110,7 +117,7 @@ def _draw_plot(dispersion: Dispersion) -> _Area | None:
     implot.setup_axis_format(implot.ImAxis_.y1.value, "%.4g")
     implot.setup_axis_limits(implot.ImAxis_.x1.value, 380.0, 780.0, implot.Cond_.always.value)
     implot.setup_axis_limits(implot.ImAxis_.y1.value, *_look.limits, implot.Cond_.always.value)
-    slope = dispersion.derivative(_CURVE_NM)
+    n, slope = _curves(dispersion)
     if _look.slope:
         _setup_slope_axis(plain, slope)
     implot.setup_finish()
@@ -118,8 +125,8 @@ def _draw_plot(dispersion: Dispersion) -> _Area | None:
     colours = theme.palette()
     sold = as_sold(dispersion)
     if sold is not None and sold != dispersion:
-        _line("catalogue", sold.index(_CURVE_NM), (*colours.muted[:3], 0.8), 1.5)
-    _line("n", dispersion.index(_CURVE_NM), colours.text, 2.0)
+        _line("catalogue", _curves(sold)[0], (*colours.muted[:3], 0.8), 1.5)
+    _line("n", n, colours.text, 2.0)
     if _look.slope:
         implot.set_axes(implot.ImAxis_.x1.value, implot.ImAxis_.y2.value)
         _line("slope", slope, colours.accent, 1.5)

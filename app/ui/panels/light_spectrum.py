@@ -11,7 +11,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app.model.colorimetry import VISIBLE_NM
 from app.model.spectrum import Spectrum, illuminant_names
-from app.ui import edits, item_rects, theme
+from app.ui import edits, item_rects, presets, theme
 from app.ui.panels import widgets
 from app.ui.panels.rows import begin_row
 from app.ui.panels.spectral_colour import colour_of_nm
@@ -21,18 +21,18 @@ _KINDS = {
     "illuminant": "Standard illuminant",
     "blackbody": "Black body",
     "laser": "Laser line",
-    "lines": "Gas lamp",
+    "lines": "Spectral lines",
     "csv": "Measured, from file",
 }
 
 LAMPS: dict[str, tuple[tuple[float, float], ...]] = {
-    "Mercury": ((404.656, 0.42), (435.833, 1.0), (546.074, 1.1), (576.960, 0.24), (579.066, 0.28)),
-    "Sodium": ((588.995, 2.0), (589.592, 1.0)),
-    "Hydrogen": ((410.174, 0.05), (434.047, 0.09), (486.135, 0.36), (656.279, 1.0)),
-    "Helium": ((447.148, 0.4), (471.314, 0.06), (492.193, 0.04), (501.568, 0.2), (587.562, 1.0), (667.815, 0.2), (706.519, 0.4)),
-    "Cadmium": ((467.815, 0.6), (479.991, 0.9), (508.582, 1.0), (643.847, 0.7)),
-    "F, d and C lines": ((486.1327, 1.0), (587.5618, 1.0), (656.2725, 1.0)),
-}
+    **{preset.name: preset.value for preset in presets.light_presets() if preset.kind == "lines"},  # type: ignore[dict-item]
+    "Hydrogen lamp": ((410.174, 0.05), (434.047, 0.09), (486.135, 0.36), (656.279, 1.0)),
+    "Helium lamp": (
+        (447.148, 0.4), (471.314, 0.06), (492.193, 0.04), (501.568, 0.2), (587.562, 1.0), (667.815, 0.2), (706.519, 0.4),
+    ),
+    "Cadmium lamp": ((467.815, 0.6), (479.991, 0.9), (508.582, 1.0), (643.847, 0.7)),
+}  # fmt: skip
 """Lines in air, nm (NIST Atomic Spectra Database), with relative powers as low-pressure lamps roughly have them."""
 
 _COMMON = ("D65", "D50", "A", "E", "LED-B1", "LED-B3", "LED-RGB1", "FL2", "FL11", "HP1")
@@ -69,7 +69,7 @@ def draw_spectrum_choice(state: State, index: int) -> State:
         if chosen == "csv":
             _look.wants_file.add(light.name)
             return state
-        first: dict[str, object] = {"illuminant": "D65", "blackbody": 3200.0, "laser": 532.0, "lines": LAMPS["Mercury"]}
+        first: dict[str, object] = {"illuminant": "D65", "blackbody": 3200.0, "laser": 532.0, "lines": LAMPS["Mercury lamp"]}
         return _set(state, index, chosen, first[chosen]) if chosen in first else state
     if shown == "csv":
         state = _draw_file(state, index)
@@ -82,7 +82,18 @@ def draw_spectrum_choice(state: State, index: int) -> State:
     elif kind == "lines":
         state = _draw_lamp(state, index, value)  # type: ignore[arg-type]
     _draw_plot(state.scene.lights[index].spectral_power)
-    return state
+    return _draw_presets(state, index)
+
+
+def _draw_presets(state: State, index: int) -> State:
+    ready = {p.name: p for p in presets.light_presets()}
+    tip = "Lamps, lasers and daylight by everyday names. The brightness stays."
+    chosen = widgets.menu_button("Light presets…", {n: p.remark for n, p in ready.items()}, tip=tip)
+    if chosen is None:
+        return state
+    name = state.scene.lights[index].name
+    _look.wants_file.discard(name)
+    return edits.attempt(state, f"{chosen} for {name}", presets.apply_light, index, ready[chosen])
 
 
 def _set(state: State, index: int, kind: str, value: object) -> State:
@@ -117,8 +128,8 @@ def _draw_laser(state: State, index: int, wavelength_nm: float) -> State:
 
 def _draw_lamp(state: State, index: int, lines: tuple[tuple[float, float], ...]) -> State:
     current = next((name for name, rows in LAMPS.items() if _same_lines(rows, lines)), f"{len(lines)} lines")
-    tip = "Emission lines of a gas: each makes a caustic of its own, side by side."
-    changed, chosen = widgets.combo("Lamp", list(LAMPS), current, tip=tip)
+    tip = "Emission lines of a gas, or laser lines: each makes a caustic of its own, side by side."
+    changed, chosen = widgets.combo("Lines", list(LAMPS), current, tip=tip)
     return _set(state, index, "lines", LAMPS[chosen]) if changed else state
 
 

@@ -32,7 +32,7 @@ from app.ui.panels.rows import (
 from app.ui.state import State
 
 __all__ = [
-    "FloatResult", "button", "colour", "combo", "drag", "error", "hint", "holding", "note", "read_out",
+    "FloatResult", "button", "colour", "combo", "drag", "error", "hint", "holding", "menu_button", "note", "read_out",
     "reciprocal_slider", "section", "slider", "text_field", "toggle", "tooltip", "vec3",
 ]  # fmt: skip
 
@@ -174,6 +174,20 @@ def button(label: str, *, tip: str, enabled: bool = True, width: float = 0.0) ->
     imgui.end_disabled()
     explain(label, tip)
     return pressed
+
+
+def menu_button(label: str, options: Mapping[str, str], *, tip: str) -> str | None:
+    """A button that opens a list; the one that was chosen. `options` are names and what their tooltips say."""
+    if button(label, tip=tip):
+        imgui.open_popup(f"list of {label}")
+    chosen = None
+    if imgui.begin_popup(f"list of {label}"):
+        for name, remark in options.items():
+            if imgui.selectable(name, False)[0]:
+                chosen = name
+            explain(name, remark)
+        imgui.end_popup()
+    return chosen
 
 
 def colour(label: str, rgb: Vec3, *, tip: str) -> tuple[bool, Vec3, bool]:
