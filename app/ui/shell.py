@@ -82,9 +82,10 @@ _DOCKED = tuple(Docked(window.title, window.place) for window in WINDOWS)
 
 
 def draw_interface(state: State, facts: Facts) -> State:
-    """Draw everything and return the state as the user left it, with requests for the host appended."""
-    theme.set_up()
-    theme.apply(state.preferences, facts.interface_scale)
+    """Draw everything and return the state as the user left it, with requests for the host appended.
+
+    The host applies the theme (`theme.apply`) between frames: sizes must not change within one.
+    """
     state = shortcuts.handle(state, facts)
     state = menu.draw_menu(state, facts)
     if state.preferences.panels.start_page:

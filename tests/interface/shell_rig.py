@@ -25,7 +25,7 @@ class ShellRig(HeadlessInterface):
         self.facts = facts or Facts(title="prism")
         self.asked: list[Request] = []
         dialogs.reset()
-        super().__init__(gl, self._draw_all, size)
+        super().__init__(gl, self._draw_all, size, preferences=lambda: self.state.preferences)
         self.frame(SETTLED)
 
     def _draw_all(self) -> None:

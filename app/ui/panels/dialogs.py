@@ -100,7 +100,8 @@ def _unsaved_question(state: State, facts: Facts) -> State:
     if not imgui.is_popup_open(_UNSAVED):
         imgui.open_popup(_UNSAVED)
     centre = imgui.get_main_viewport().get_center()
-    imgui.set_next_window_pos(centre, imgui.Cond_.appearing, imgui.ImVec2(0.5, 0.5))
+    # Always: its height is known only once its words are wrapped.
+    imgui.set_next_window_pos(centre, imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
     if not imgui.begin_popup_modal(_UNSAVED, None, imgui.WindowFlags_.always_auto_resize)[0]:
         return state
     is_quitting = facts.asks_to_quit

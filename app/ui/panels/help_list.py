@@ -20,7 +20,7 @@ def draw_shortcuts(state: State, _facts: Facts) -> State:
     item_rects.note("Search shortcuts")
     widgets.tooltip("Show only what holds these letters: a key or what it does.")
     wanted = _search["text"].strip().lower()
-    columns = max(1, min(3, int(imgui.get_content_region_avail().x / theme.em(21))))
+    columns = max(1, min(3, int(imgui.get_content_region_avail().x / theme.em(19))))
     groups = _matching(wanted)
     if not groups:
         widgets.hint("No shortcut holds these letters.")
@@ -57,8 +57,8 @@ def _group(title: str, lines: list[tuple[str, str]]) -> None:
     with theme.heading():
         imgui.text_unformatted(title)
     if imgui.begin_table(f"##{title}", 2, imgui.TableFlags_.sizing_stretch_prop):
-        imgui.table_setup_column("keys", imgui.TableColumnFlags_.width_stretch, 0.45)
-        imgui.table_setup_column("what", imgui.TableColumnFlags_.width_stretch, 0.55)
+        imgui.table_setup_column("keys", imgui.TableColumnFlags_.width_stretch, 0.42)
+        imgui.table_setup_column("what", imgui.TableColumnFlags_.width_stretch, 0.58)
         for keys, what in lines:
             imgui.table_next_row()
             imgui.table_next_column()

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-
 import numpy as np
 from imgui_bundle import imgui
 
 from app.model import catalogue
-from app.model.scene import Black, Dielectric, Diffuse, Material, Mirror, SceneObject, Vec3
+from app.model.scene import (
+    Black,
+    Dielectric,
+    Diffuse,
+    Material,
+    Mirror,
+    SceneObject,
+    Vec3,
+)
 from app.ui import edits, theme
 from app.ui.facts import Facts
 from app.ui.panels import outliner, widgets
