@@ -59,6 +59,12 @@ def ball(material: Dielectric | Mirror, centre: tuple[float, float, float] = (0,
     return placed(f"ball {centre} {radius}", sphere(radius, 320).transformed(matrix), material)
 
 
+def gained(name: str, gain: float) -> Dielectric:
+    """A glass with its dispersion scaled."""
+    plain = glass(name)
+    return replace(plain, dispersion=dispersion.with_gain(plain.dispersion, gain))
+
+
 def touching() -> tuple[SceneObject, ...]:
     """A crown and a flint block cemented along a slant."""
     crown = np.array([[-1, -0.5], [-0.2, -0.5], [0.2, 0.5], [-1, 0.5]])
@@ -105,6 +111,7 @@ CASES = {
         lambda: (ball(replace(glass("water"), absorption=ink(0.4, 0.02), priority=1), (0, 0.4, 0), 0.8), ball(replace(glass("F2"), absorption=ink(0.2, 0.02)), (0.3, -0.3, 0), 0.8)),
         refractions=2, covered=5,
     ),
+    "two gains of one glass": Case(lambda: (ball(gained("F2", 4.0), (0, 0.7, 0), 0.65), ball(gained("F2", 0.25), (0, -0.7, 0), 0.65)), refractions=1, tinted=False, lattice=120),
     "steep Fresnel": Case(lambda: (ball(glass("N-SF11"), (0, 0, 0), 1.0),), tinted=False, lattice=120),
 }  # fmt: skip
 
