@@ -77,6 +77,9 @@ class RoundOf:
 class LightHalf:
     """Owns the light half's passes and the caustic maps of one scene."""
 
+    least_batch = SMALLEST_BATCH
+    """With fewer rays in flight the plan would depend on the batch."""
+
     def __init__(self, context: Context, scene: Scene, settings: RenderSettings, features: Features, buffers: SceneBuffers) -> None:
         self.context = context
         self.scene = scene
@@ -85,12 +88,14 @@ class LightHalf:
         self.buffers = buffers
         self.stats = LightStats()
         batch = settings.batch or DEFAULT_BATCH * (1 if context.is_software else 4)
-        batch = max(min(batch, _largest_batch(context, features)), SMALLEST_BATCH)
+        batch = max(min(batch, _largest_batch(context, features)), self.least_batch)
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
         self.variables = SpectralVariables.build(context.ctx, buffers.variable_table)
         self.gains = GainBuffers(context.ctx, scene, buffers.receivers, buffers.space, buffers.axis) if features.local_gain else None
         self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
         self.maps: LightMaps | None = None
+        self.splat_part = 1 << 30
+        """Photons splatted without a pause."""
         self._shown_spectra: Sequence[Spectrum] = [light.spectral_power for light in scene.lights]
         self._tables: SplatTables | None = None
         self._spans: list[list[tuple[float, float]]] = []
@@ -178,7 +183,7 @@ class LightHalf:
         self.seed = seed
         self.stats = LightStats()
         self._maps.clear()
-        planner = Planner(self.scene, self.settings, self.features, self.buffers, self.domains, self.pilots)
+        planner = Planner(self.scene, self.settings, self.features, self.buffers, self.domains, self.pilots, self.trace.batch)
         self.plans = planner.plans(photons, self._texel_size())
         for plan in self.plans:
             name = self.scene.lights[plan.index].name
@@ -261,25 +266,35 @@ class LightHalf:
         self.stats.trace_seconds += time.perf_counter() - started
         self.keep(batch, of)
         yield
-        self.splat(self.trace.photons, batch.photons)
+        yield from self.splat_steps(self.trace.photons, batch.photons)
         self._account(batch)
 
     def keep(self, batch: Batch, of: RoundOf) -> None:
         """Called with every batch while `trace.photons` holds it; a live rendering stores the records."""
 
-    def splat(
-        self, photons: moderngl.Buffer, count: int, coarsening: float = 1.0, tables: SplatTables | None = None, maps: LightMaps | None = None
-    ) -> None:
-        """Add photon records to the maps, with footprints `coarsening` times as wide.
+    def splat_steps(
+        self,
+        photons: moderngl.Buffer,
+        count: int,
+        coarsening: float = 1.0,
+        tables: SplatTables | None = None,
+        maps: LightMaps | None = None,
+        stride: int = 1,
+    ) -> Iterator[None]:
+        """Add every `stride`-th photon record to the maps, with footprints `coarsening` times as wide, pausing after every `splat_part` of them.
 
-        `tables` of another plan than the one begun, `maps` of another layout than the light half's own."""
-        started = time.perf_counter()
+        `count`: of those that are added. `tables` of another plan than the one begun, `maps` of another layout than the light half's own."""
         maps = maps or self._maps
         smoothing = self.settings.smoothing * coarsening
-        maps.splatter.run(photons, count, self.variables, tables or self.tables, maps.atlas, maps.receivers, smoothing, self.gains)
-        if self.context.is_software:
-            self.context.finish()
-        self.stats.splat_seconds += time.perf_counter() - started
+        for start in range(0, count, self.splat_part):
+            started = time.perf_counter()
+            part = min(self.splat_part, count - start)
+            maps.splatter.run(photons, part, self.variables, tables or self.tables, maps.atlas, maps.receivers, smoothing, self.gains, start * stride, stride)
+            if self.context.is_software:
+                self.context.finish()
+            self.stats.splat_seconds += time.perf_counter() - started
+            if start + part < count:
+                yield
 
     def _account(self, batch: Batch) -> None:
         self.stats.photons += batch.emitted_photons

@@ -63,6 +63,8 @@ class Planner:
     buffers: SceneBuffers
     domains: dict[int, EmissionDomain]
     pilots: dict[int, Pilot]
+    batch: int = SMALLEST_BATCH
+    """Rays in flight at once: a sub-lattice of each kind must have a point in them."""
 
     def plans(self, photons: int, texel: np.ndarray) -> list[LightPlan]:
         """Photons, bands and points of each light that reaches a receiver; `texel`: side of each receiver's finest window, GPU units."""
@@ -77,6 +79,7 @@ class Planner:
             fit = PilotFit(self.pilots[i], texel, self.buffers.variable_table, self.settings.smoothing, budget)
             bands = self._bands(i, fit)
             points = fit.light_points(len(bands)) if self.features.footprints else self._scattered_points(i, len(bands), budget)
+            points = max(1, min(points, self.batch // len(bands)))
             plans.append(LightPlan(i, self.domains[i], bands, points, share))
         return plans
 

@@ -16,7 +16,8 @@ layout(std140, binding = 0) uniform Parameters {
     float extent_limit;
     uint traced_row;
     float x_reference;
-    vec2 unused;
+    uint stride;
+    uint unused;
 };
 layout(std430, binding = 0) readonly buffer Photons { PhotonRecord photons[]; };
 layout(std430, binding = 1) writeonly buffer Splats { SplatRecord splats[]; };
@@ -334,7 +335,7 @@ void main() {
     if (i >= photon_count) {
         return;
     }
-    PhotonRecord photon = photons[first_photon + i];
+    PhotonRecord photon = photons[first_photon + i * stride];
     Receiver receiver = receivers[photon.receiver];
     uint at = receiver.placement;
 #ifdef CHARTS

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -75,6 +75,9 @@ def load_source(
     Raises `ShaderError` naming the including file and line when an include is missing.
     """
     root = root or paths.shaders_dir()
+    key = (name, tuple((defines or {}).items()), tuple(structs), root)
+    if _kept and key in _sources:
+        return _sources[key]
     lines: list[Line] = []
 
     def emit(text: str, file: str, line: int) -> None:
@@ -106,10 +109,15 @@ def load_source(
 
     flatten(name, "the program")
     kept = lean(lines)
-    return Source(name, "\n".join(line.text for line in kept) + "\n", tuple((line.file, line.number) for line in kept), len(lines))
+    source = Source(name, "\n".join(line.text for line in kept) + "\n", tuple((line.file, line.number) for line in kept), len(lines))
+    if _kept:
+        _sources[key] = source
+    return source
 
 
 _kept: dict[int, OrderedDict[tuple[str, ...], moderngl.ComputeShader | moderngl.Program]] = {}
+_sources: dict[Hashable, Source] = {}
+"""Flattened sources, where programs are kept."""
 KEPT_PROGRAMS = 96
 """Programs that a context with `keep_programs` holds for the next user of the same text."""
 
@@ -126,6 +134,7 @@ def keep_programs(ctx: moderngl.Context) -> None:
 def forget_programs(ctx: moderngl.Context) -> None:
     """Undo `keep_programs`; programs in use stay with their owners."""
     _kept.pop(id(ctx), None)
+    _sources.clear()
 
 
 def release(owned: Releasable) -> None:

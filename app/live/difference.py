@@ -160,3 +160,13 @@ def _light(old: Light, new: Light) -> Redo:
     # Photons carry weights, not watts; bands reach as far as the light they were planned for.
     (a0, a1), (b0, b1) = old.spectral_power.support_nm(), new.spectral_power.support_nm()
     return Redo.SPLAT if a0 <= b0 and b1 <= a1 and (a0 < a1) else Redo.TRACE
+
+
+def looks_other(old: LiveInputs, new: LiveInputs) -> bool:
+    """Whether colours or lights that the eye sees directly differ: its rays follow n_d, so a dispersion alone changes nothing there."""
+    if old.solo_nm != new.solo_nm or old.scene.background_rgb != new.scene.background_rgb:
+        return True
+    if old.scene.lights is not new.scene.lights and any(a is not b for a, b in zip(old.scene.lights, new.scene.lights, strict=True)):
+        return True
+    pairs = zip(old.scene.objects, new.scene.objects, strict=True)
+    return any(a.material is not b.material and not (isinstance(a.material, Dielectric) and isinstance(b.material, Dielectric)) for a, b in pairs)

@@ -20,7 +20,7 @@ from app.gpu.scene_buffers import SceneBuffers
 from app.light_half import spectral_axis
 from app.light_maps import LightMaps
 from app.live.accumulation import Accumulation
-from app.live.difference import redo
+from app.live.difference import looks_other, redo
 from app.live.eye import LiveEye, solo_scene
 from app.live.inputs import LiveInputs, Redo
 from app.live.light import LiveLight
@@ -58,7 +58,7 @@ class Budget:
     def of(context: Context) -> Budget:
         """A software renderer answers in small steps; a GPU takes millions at a time."""
         if context.is_software:
-            return Budget(8192, 1 << 14, 1 << 22, 256 << 20)
+            return Budget(1 << 14, 1 << 14, 1 << 22, 256 << 20)
         return Budget(1 << 18, 1 << 20, 1 << 25, 1 << 30)
 
 
@@ -217,8 +217,9 @@ class LiveEngine:
         same_size = (wanted.width, wanted.height) == (self._inputs.width, self._inputs.height)
         if cost == Redo.SPLAT:
             shown.light.show(wanted)
-            self._inputs = wanted
-            self._look_at(wanted)
+            shown_before, self._inputs = self._inputs, wanted
+            if looks_other(shown_before, wanted):
+                self._look_at(wanted)
             self._answer_quickly(0.4 * budget_s)
             self._job = shown.accumulation.after_edit()
             return

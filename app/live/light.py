@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from app.model.scene import Scene
     from app.model.settings import RenderSettings
 
-QUICK = 3
+QUICK = 5
 """Pixels to a texel's side in the maps that answer a drag."""
 SOLO_WIDTH_NM = 4.0
 """Standard deviation of the window that a single wavelength is seen through."""
@@ -55,12 +55,15 @@ class Stored:
 class LiveLight(LightHalf):
     """Photons of one traced scene and how they are shown.
 
-    A pass that has only begun holds fewer photons than the one before it: until it has as many, the older ones stay.
+    Batches are small, so that they take little of a frame; extended lights make do with as many points. A pass that has only begun holds fewer photons than the one before it: until it has as many, the older ones stay.
     """
+
+    least_batch = 1024
 
     def __init__(self, context: Context, scene: Scene, settings: RenderSettings, features: Features, buffers: SceneBuffers, capacity_bytes: int) -> None:
         super().__init__(context, scene, settings, features, buffers)
         self.capacity_bytes = capacity_bytes
+        self.splat_part = 1 << 12 if context.is_software else 1 << 18
         self.first_order = False
         """What is shown has another dispersion than what was traced."""
         self.view = scene.camera
@@ -182,7 +185,7 @@ class LiveLight(LightHalf):
             store.drop_unfinished()
         share = store.rounds / store.rounds_of_pass
         for slab in store.of_rounds(0, store.rounds):
-            self.splat(slab.buffer, slab.count, 1.0 if of_running else share**-0.5, bundle.tables)
+            yield from self.splat_steps(slab.buffer, slab.count, 1.0 if of_running else share**-0.5, bundle.tables)
             yield
         maps.photon_weight = bundle.pass_photons * share
 
@@ -198,9 +201,13 @@ class LiveLight(LightHalf):
             self._quick = self.maps_for(self.view, max(1, round(self.settings.width / QUICK)), max(1, round(self.settings.height / QUICK)))
         self._quick.clear()
         rounds = bundle.store.first_rounds(photons)
-        share = rounds / bundle.store.rounds_of_pass
-        for slab in bundle.store.of_rounds(0, rounds):
-            self.splat(slab.buffer, slab.count, share**-0.5, bundle.tables, self._quick)
+        slabs = bundle.store.of_rounds(0, rounds)
+        # Records follow a space-filling curve over the lattice: every so manieth is nearly a lattice again.
+        stride = max(1, sum(slab.count for slab in slabs) // photons)
+        share = rounds / bundle.store.rounds_of_pass / stride
+        for slab in slabs:
+            for _ in self.splat_steps(slab.buffer, -(-slab.count // stride), share**-0.5, bundle.tables, self._quick, stride):
+                pass
         self._quick.photon_weight = bundle.pass_photons * share
         return self._quick
 

@@ -68,7 +68,8 @@ PARAMETERS = Struct(
         Field("extent_limit", "float", "texels; anything larger is a numerical accident"),
         Field("traced_row", "uint", "first row of the variables by which photons were traced"),
         Field("x_reference", "float", "spectral coordinate whose landing point a local gain leaves alone"),
-        Field("unused", "vec2", ""),
+        Field("stride", "uint", "step from one photon to the next that is splatted"),
+        Field("unused", "uint", ""),
     ),
 )
 
@@ -168,11 +169,12 @@ class Footprints:
         smoothing: float,
         extent_limit: float,
         gains: GainBuffers | None = None,
+        stride: int = 1,
     ) -> None:
-        """Fill slots [0, count * slots_per_photon) from photons [first, first + count)."""
+        """Fill slots [0, count * slots_per_photon) from photons first, first + stride, … (`count` of them)."""
         values = PARAMETERS.zeros(1)
         x_reference = 0.0 if gains is None else gains.x_reference
-        values[0] = (first, count, tables.classes, tables.bands, variables.samples, tables.rows, smoothing, extent_limit, variables.traced_row, x_reference, (0.0, 0.0))
+        values[0] = (first, count, tables.classes, tables.bands, variables.samples, tables.rows, smoothing, extent_limit, variables.traced_row, x_reference, stride, 0)
         self._parameters.write(values.tobytes())
         self._parameters.bind_to_uniform_block(0)
         for binding, buffer in enumerate(

@@ -88,18 +88,21 @@ class Splatter:
         receivers: moderngl.Buffer,
         smoothing: float = 0.6,
         gains: GainBuffers | None = None,
+        start: int = 0,
+        stride: int = 1,
     ) -> None:
-        """Deposit photons [0, count) of `photons` (photon_record(groups)).
+        """Deposit the `count` photons start, start + stride, … of `photons` (photon_record(groups)).
 
         `variables`: each group's variable at equally spaced x; `receivers`: RECEIVER records; `smoothing`: standard deviation
         of a footprint in lattice spacings; `gains`: the brush's, where the features have it.
         """
         chunk = int(np.clip(atlas.size[0] * atlas.size[1] // FLUSH_SHARE, SMALLEST_CHUNK, CHUNK))
         group = min(GROUP, chunk)
-        for first in range(0, count, group):
-            part = min(group, count - first)
+        for done in range(0, count, group):
+            part = min(group, count - done)
+            first = start + done * stride
             self._ctx.memory_barrier()
-            self._footprints.run(photons, first, part, variables, tables, atlas, receivers, smoothing, EXTENT_LIMIT, gains)
+            self._footprints.run(photons, first, part, variables, tables, atlas, receivers, smoothing, EXTENT_LIMIT, gains, stride)
             self._ctx.memory_barrier()
             self.draw(tables, atlas)
             atlas.pending += part
