@@ -22,12 +22,15 @@ _TALL_EM = 50.0
 _SETTLED_AFTER = 4
 """Frames until new windows have taken their places and the focus."""
 
-Place = Literal["left top", "left bottom", "right top", "right bottom", "bottom", "floating"]
+Place = Literal["left top", "left bottom", "right top", "right bottom", "right bottom if tall", "bottom", "floating"]
 
 
 @dataclass(frozen=True)
 class Docked:
-    """A window's title and where the default layout puts it; those of one place share tabs, first in front."""
+    """A window's title and where the default layout puts it; those of one place share tabs, first in front.
+
+    "if tall": floating in a low window, whose one row of tabs is full.
+    """
 
     title: str
     place: Place
@@ -85,13 +88,14 @@ def _build(dock: int, size: imgui.ImVec2, windows: tuple[Docked, ...]) -> None:
     nodes["right bottom"] = nodes["right top"]
     if size.y > theme.em(_TALL_EM):
         nodes["right bottom"], nodes["right top"] = _split(nodes["right top"], imgui.Dir.down, 0.6)
+        nodes["right bottom if tall"] = nodes["right bottom"]
     left = min(theme.em(15.0) / (size.x * (1.0 - right)), 0.25)
     nodes["left top"], rest = _split(rest, imgui.Dir.left, left)
     nodes["left bottom"], nodes["left top"] = _split(nodes["left top"], imgui.Dir.down, 0.36)
     nodes["bottom"], middle = _split(rest, imgui.Dir.down, min(theme.em(14.0) / size.y, 0.34))
     builder.dock_builder_dock_window(VIEWPORT, middle)
     for window in windows:
-        if window.place != "floating":
+        if window.place in nodes:
             builder.dock_builder_dock_window(window.title, nodes[window.place])
     builder.dock_builder_finish(dock)
 

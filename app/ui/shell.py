@@ -70,7 +70,7 @@ WINDOWS = (
     PanelWindow("inspector", "Inspector", "right top", inspector.draw_inspector),
     PanelWindow("view", "View", "right top", view_panel.draw_view),
     PanelWindow("brush", "Brush", "right bottom", draw_brush),
-    PanelWindow("export", "Export", "right bottom", _draw_export),
+    PanelWindow("export", "Export", "right bottom if tall", _draw_export, (26.0, 30.0)),
     PanelWindow("timing", "Timing", "bottom", timing.draw_timing),
     PanelWindow("spectrum", "Spectrum", "bottom", spectrum.draw_spectrum),
     PanelWindow("compare", "Compare", "bottom", _draw_compare),

@@ -17,6 +17,8 @@ COMPARE_KEY = imgui.Key.c
 _REPEATING = ("Undo", "Redo", "Brighter", "Darker")
 """A held key goes on."""
 
+_ON_START_PAGE = ("File", "Help")
+
 _NAMED = {
     "Esc": imgui.Key.escape,
     "Delete": imgui.Key.delete,
@@ -71,8 +73,13 @@ def handle(state: State, facts: Facts) -> State:
     # The right button held means flying: its letters belong to the camera.
     if not is_free or imgui.is_mouse_down(imgui.MouseButton_.right):
         return _hold_compare(state, False)
+    on_start_page = state.preferences.panels.start_page
+    if on_start_page and imgui.is_key_pressed(imgui.Key.escape):
+        return state.with_panels(start_page=False)
     for command in _all():
-        if _is_pressed(command) and command.enabled(state, facts):
+        # What the page hides must not be edited blindly.
+        is_reachable = not on_start_page or command.group in _ON_START_PAGE
+        if is_reachable and _is_pressed(command) and command.enabled(state, facts):
             state = command.act(state, facts)
     return _hold_compare(state, imgui.is_key_down(COMPARE_KEY) and not (io.key_ctrl or io.key_shift or io.key_alt))
 

@@ -153,6 +153,19 @@ def test_start_page_opens_a_card_and_closes(rig: ShellRig) -> None:
     assert not rig.state.preferences.panels.start_page
 
 
+def test_start_page_hides_no_edits_and_closes_by_esc(rig: ShellRig) -> None:
+    rig.open_panel(start_page=True)
+    rig.key(imgui.Key.delete)
+    assert len(rig.state.scene.objects) == 2 and not rig.asked
+    rig.key(imgui.Key.escape)
+    assert not rig.state.preferences.panels.start_page
+
+
+def test_status_bar_pauses(rig: ShellRig) -> None:
+    rig.click("Play or pause")
+    assert not rig.state.playing
+
+
 def test_start_page_offers_the_recovery(rig: ShellRig) -> None:
     rig.facts = replace(rig.facts, recovery=Path("autosave.toml"))
     rig.open_panel(start_page=True)

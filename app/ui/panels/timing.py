@@ -23,6 +23,21 @@ PASSES = {
 """Pass -> what it does; in the order of the frame."""
 
 
+_COUNTERS = {
+    "deposited": ("In the caustic", "Reached a receiver through glass or by a mirror, and lies in the caustic maps."),
+    "direct": ("Direct light", "Reached a receiver straight from the light; the picture adds it by itself."),
+    "absorbed": ("Absorbed", "Ended in coloured glass, a mirror or a black surface."),
+    "escaped": ("Left the scene", "Met nothing any more."),
+    "lost_depth": ("Path too long", "Given up after the scene's largest number of refractions and reflections."),
+    "lost_numeric": ("Not a number", "Lost to arithmetic; anything but zero here is a fault."),
+    "footprint_dropped": ("Footprint dropped", "The derivatives of the path overflowed: the photon keeps its light and becomes a point."),
+    "shading_normal": ("Flat normal used", "The smooth normal would have sent light to the wrong side: the facet's own was taken."),
+    "band_cut": ("Spectrum split", "Part of a photon's spectrum is totally reflected: the photon was split in two there."),
+    "queue_overflow": ("Queue full", "Photons that found no room among those in flight."),
+}
+"""What the engine counts -> its name on the screen, and what it means."""
+
+
 def draw_timing(state: State, facts: Facts) -> State:
     """Draw the panel's contents."""
     state = _first_order(state, facts.stats)
@@ -138,8 +153,8 @@ def _numbers(state: State, stats: LiveStats) -> None:
         ("Memory", numbers.size(stats.bytes), "GPU memory held by maps, photons and scene."),
     ]  # fmt: skip
     _table("##numbers", lines)
-    dropped = [(_words(k), numbers.count(v), "Counted, never hidden.") for k, v in sorted(stats.fallbacks.items()) if v]
-    lost = [(_words(k), numbers.percent(v), "Share of the emitted flux that ended this way.") for k, v in sorted(stats.lost.items()) if v]
+    dropped = [(_named(k), numbers.count(v), _tip(k)) for k, v in stats.fallbacks.items() if v]
+    lost = [(_named(k), numbers.percent(v), _tip(k)) for k, v in stats.lost.items() if v]
     bands = [(name, f"{n} bands", "Spectral bands of this light.") for name, n in sorted(stats.bands.items())]
     for title, tip, told in (
         ("Fall-backs", "Photons that took a simpler way.", dropped),
@@ -169,7 +184,9 @@ def _table(identity: str, lines: list[tuple[str, str, str]]) -> None:
     imgui.end_table()
 
 
-def _words(key: str) -> str:
-    """A counter's name on the screen: "no_footprint" is "No footprint"."""
-    text = key.replace("_", " ").replace("-", " ")
-    return text[:1].upper() + text[1:]
+def _named(key: str) -> str:
+    return _COUNTERS[key][0] if key in _COUNTERS else key.replace("_", " ").capitalize()
+
+
+def _tip(key: str) -> str:
+    return _COUNTERS[key][1] if key in _COUNTERS else "Counted, never hidden."
