@@ -98,12 +98,12 @@ def _draw_buttons(state: State, facts: Facts, index: int) -> State:
     dispersion = selected_glass(state)[2].dispersion  # type: ignore[index]
     if widgets.button("Choose glass…", tip="Search 1,700 glasses, plastics, liquids and gems by name, maker or number."):
         imgui.open_popup(POPUP)
-    imgui.same_line()
+    widgets.beside("Abbe diagram")
     abbe_open = state.preferences.panels.abbe
     tip = "Every glass of the catalogue by n_d and Abbe number, to click in."
     if widgets.button("Abbe diagram", tip=tip):
         state = state.with_panels(abbe=not abbe_open)
-    imgui.same_line()
+    widgets.beside("As sold")
     sold = as_sold(dispersion)
     tip = f"Back to {base_name(dispersion)} as the catalogue has it, without gain." if sold else "This glass is not from the catalogue."
     if widgets.button("As sold", tip=tip, enabled=sold is not None and not is_as_sold(dispersion)) and sold:
@@ -121,7 +121,7 @@ def _draw_clipboard(state: State, index: int) -> State:
     item = state.scene.objects[index]
     if widgets.button("Copy material", tip=f"Copy glass, gain and colour of {item.name}."):
         state = replace(state, clipboard=item.material)
-    imgui.same_line()
+    widgets.beside("Paste material")
     held = state.clipboard
     if isinstance(held, Dielectric):
         tip = f"Give {item.name} the copied material: {shown_name(held.dispersion)}."
@@ -129,7 +129,7 @@ def _draw_clipboard(state: State, index: int) -> State:
         tip = "Copy the material of an object of glass first."
     if widgets.button("Paste material", tip=tip, enabled=isinstance(held, Dielectric)) and held is not None:
         state = edits.attempt(state, f"Paste material on {item.name}", edits.set_material, index, held)
-    imgui.same_line()
+    widgets.beside("Presets…")
     ready = {p.name: p for p in presets.material_presets()}
     chosen = widgets.menu_button("Presets…", {n: p.remark for n, p in ready.items()}, tip="Common glasses, liquids and gems by everyday names.")
     if chosen is None:

@@ -37,6 +37,15 @@ def begin_row(label: str) -> bool:
     return hit
 
 
+def beside(label: str) -> None:
+    """Put a button of this label behind the last item where there is room, else on the next line."""
+    style = imgui.get_style()
+    width = imgui.calc_text_size(label.split("##")[0]).x + 2.0 * style.frame_padding.x
+    right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
+    if imgui.get_item_rect_max().x + style.item_spacing.x + width <= right:
+        imgui.same_line()
+
+
 def explain(label: str, tip: str, unit: str = "", how: str = "") -> None:
     """Tell the last item to `item_rects` and give it its tooltip: what it does, its unit, how to handle it."""
     item_rects.note(label)
@@ -60,9 +69,9 @@ def is_typed_in(label: str) -> bool:
 
 
 def tooltip(text: str, *extra: str) -> None:
-    """Explain the last item when it is hovered, switched-off ones too."""
+    """Explain the last item when it is hovered, switched-off ones too; not while it is being dragged or typed in."""
     flags = imgui.HoveredFlags_.for_tooltip.value | imgui.HoveredFlags_.allow_when_disabled.value
-    if not text or not imgui.is_item_hovered(flags):
+    if not text or imgui.is_item_active() or not imgui.is_item_hovered(flags):
         return
     imgui.begin_tooltip()
     imgui.push_text_wrap_pos(theme.em(_TIP_EM))

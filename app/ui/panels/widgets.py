@@ -22,6 +22,7 @@ from app.model.scene import Vec3
 from app.ui import item_rects, theme
 from app.ui.panels.rows import (
     begin_row,
+    beside,
     double_clicked,
     explain,
     how_to,
@@ -32,7 +33,7 @@ from app.ui.panels.rows import (
 from app.ui.state import State
 
 __all__ = [
-    "FloatResult", "button", "colour", "combo", "drag", "error", "hint", "holding", "menu_button", "note", "read_out",
+    "FloatResult", "beside", "button", "colour", "combo", "drag", "error", "hint", "holding", "menu_button", "note", "read_out",
     "reciprocal_slider", "section", "slider", "text_field", "toggle", "tooltip", "vec3",
 ]  # fmt: skip
 
