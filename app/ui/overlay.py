@@ -12,7 +12,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from app.ui.facts import RayLine
-from app.ui.panels.spectral_colour import colour_of_nm
+from app.ui.panels.spectral_colour import spectral_srgb
 from app.ui.projection import View
 
 Colour = tuple[float, float, float, float]
@@ -20,7 +20,7 @@ NEAR = 1e-3
 """Nearest depth that is drawn, as a share of the target's distance."""
 _BORDER = 0.5
 """How far beyond the picture lines are kept, picture widths: beyond, float32 coordinates break."""
-_HALO, _CORE = ((6.0, 0.06), (3.2, 0.12)), (1.4, 0.85)
+_HALO, _CORE = ((6.0, 0.06), (3.2, 0.12)), (1.3, 0.85)
 """Widths (logical pixels) and opacities of a ray's glow and of its core: added up, they look like light."""
 
 
@@ -43,32 +43,38 @@ class Canvas:
         return place * [self.width, self.height] + [self.left, self.top]
 
     def segments(self, points: np.ndarray, closed: bool = False) -> np.ndarray:
-        """A world polyline (n, 3) as screen segments (m, 2, 2), cut at the near plane and a little outside the picture."""
+        """A world polyline (n, 3) as screen segments (m, 2, 2)."""
         points = np.asarray(points, float)
         ends = np.roll(points, -1, axis=0) if closed else points[1:]
-        pairs = np.stack([points if closed else points[:-1], ends], axis=1)
+        return self.cut(np.stack([points if closed else points[:-1], ends], axis=1))[0]
+
+    def cut(self, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """World segments (n, 2, 3) as screen segments (m, 2, 2), cut at the near plane and a little outside the picture, and which (m,) of the n each was."""
+        index = np.arange(len(pairs))
         if not self.view.is_orthographic:
-            pairs = _cut_near(pairs, self.view.depth(pairs), NEAR * self.view.target_distance)
+            pairs, kept = _cut_near(pairs, self.view.depth(pairs), NEAR * self.view.target_distance)
+            index = index[kept]
         if not len(pairs):
-            return np.zeros((0, 2, 2))
-        place, _ = self.view.project(pairs)
-        return _cut_border(place) * [self.width, self.height] + [self.left, self.top]
+            return np.zeros((0, 2, 2)), index
+        place, kept = _cut_border(self.view.project(pairs)[0])
+        return place * [self.width, self.height] + [self.left, self.top], index[kept]
 
 
-def _cut_near(pairs: np.ndarray, depth: np.ndarray, near: float) -> np.ndarray:
-    """Segments (n, 2, 3) without what lies nearer than `near`."""
+def _cut_near(pairs: np.ndarray, depth: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
+    """Segments (n, 2, 3) without what lies nearer than `near`, and which are left."""
     ahead = depth > near
-    pairs, depth, ahead = pairs[ahead.any(axis=1)], depth[ahead.any(axis=1)], ahead[ahead.any(axis=1)]
+    kept = ahead.any(axis=1)
+    pairs, depth, ahead = pairs[kept], depth[kept], ahead[kept]
     crossing = ahead[:, 0] != ahead[:, 1]
     share = np.where(crossing, (near - depth[:, 0]) / np.where(crossing, depth[:, 1] - depth[:, 0], 1.0), 0.0)[:, None]
     at = pairs[:, 0] + share * (pairs[:, 1] - pairs[:, 0])
     start = np.where((crossing & ~ahead[:, 0])[:, None], at, pairs[:, 0])
     end = np.where((crossing & ~ahead[:, 1])[:, None], at, pairs[:, 1])
-    return np.stack([start, end], axis=1)
+    return np.stack([start, end], axis=1), kept
 
 
-def _cut_border(place: np.ndarray) -> np.ndarray:
-    """Picture segments (n, 2, 2) clipped to a box around the picture [Liang and Barsky 1984]."""
+def _cut_border(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Picture segments (n, 2, 2) clipped to a box around the picture [Liang and Barsky 1984], and which are left."""
     start, way = place[:, 0], place[:, 1] - place[:, 0]
     enter, leave = np.zeros(len(place)), np.ones(len(place))
     for axis in range(2):
@@ -77,7 +83,7 @@ def _cut_border(place: np.ndarray) -> np.ndarray:
         enter, leave = np.maximum(enter, np.minimum(low, high)), np.minimum(leave, np.maximum(low, high))
     kept = enter < leave
     cut = np.stack([start + enter[:, None] * way, start + leave[:, None] * way], axis=1)
-    return cut[kept]
+    return cut[kept], kept
 
 
 def lines(canvas: Canvas, segments: Iterable[np.ndarray], colour: int, width: float) -> None:
@@ -87,11 +93,33 @@ def lines(canvas: Canvas, segments: Iterable[np.ndarray], colour: int, width: fl
 
 
 def draw_rays(canvas: Canvas, rays: Iterable[RayLine]) -> None:
-    """The ray overlay: every path in the colour of its wavelength, glowing softly."""
-    cut = [(ray.wavelength_nm, canvas.segments(ray.points)) for ray in rays]
+    """The ray overlay: every path in the colour of its wavelength, glowing softly; where several run together, in their mixture."""
+    rays = tuple(rays)
+    if not rays:
+        return
+    pairs = np.concatenate([np.stack([ray.points[:-1], ray.points[1:]], axis=1) for ray in rays])
+    nm_of = np.repeat([ray.wavelength_nm for ray in rays], [len(ray.points) - 1 for ray in rays])
+    segments, index = canvas.cut(pairs)
+    together: dict[tuple[int, ...], tuple[np.ndarray, set[float]]] = {}
+    for segment, key, nm in zip(segments, np.round(2.0 * segments.reshape(-1, 4)).astype(int).tolist(), nm_of[index].tolist(), strict=True):
+        together.setdefault(tuple(key), (segment, set()))[1].add(nm)
+    all_nm = sorted({ray.wavelength_nm for ray in rays})
+    coloured = [(segment, mixed_srgb(sorted(nm), all_nm)) for segment, nm in together.values()]
     for width, opacity in (*_HALO, _CORE):
-        for nm, segments in cut:
-            lines(canvas, segments, colour_of_nm(nm, opacity), width)
+        for segment, colour in coloured:
+            lines(canvas, [segment], imgui.color_convert_float4_to_u32((*colour, opacity)), width)
+
+
+def mixed_srgb(wavelengths_nm: list[float], all_nm: list[float]) -> tuple[float, float, float]:
+    """The colour of some wavelengths together, sRGB, where all those of the overlay make white."""
+    colours = spectral_srgb()[np.clip(np.round(all_nm).astype(int) - 380, 0, 400)]
+    if len(wavelengths_nm) == 1 or len(all_nm) == 1:
+        red, green, blue = colours[all_nm.index(wavelengths_nm[0])]
+        return float(red), float(green), float(blue)
+    chosen = np.isin(all_nm, wavelengths_nm)
+    mixture = (colours[chosen] ** 2.2).sum(axis=0) / np.maximum((colours**2.2).sum(axis=0), 1e-6)
+    red, green, blue = (mixture / mixture.max()) ** (1.0 / 2.2)
+    return float(red), float(green), float(blue)
 
 
 def draw_outlined(canvas: Canvas, points: np.ndarray, colour: Colour, width: float = 1.5, closed: bool = True) -> None:

@@ -31,6 +31,12 @@ hand = Hand()
 gizmo = Gizmo()
 
 
+def reset() -> None:
+    """Let go of everything: another interface begins."""
+    global hand, gizmo
+    hand, gizmo = Hand(), Gizmo()
+
+
 def draw_viewport(state: State, facts: Facts) -> State:
     """Draw the picture into the present window and answer what is done in it."""
     room = imgui.get_content_region_avail()

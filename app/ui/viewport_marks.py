@@ -12,6 +12,7 @@ from app.ui import brush as brushes
 from app.ui import item_rects, placing, pull, theme
 from app.ui.facts import CursorFacts, Facts
 from app.ui.overlay import Canvas, box_corners, draw_box, draw_outlined
+from app.ui.panels.methods import METHOD_NAMES
 from app.ui.panels.rows import tooltip
 from app.ui.panels.spectral_colour import colour_of_nm
 from app.ui.state import Brush, Selection, State
@@ -146,7 +147,7 @@ def draw_wipe(canvas: Canvas, state: State, facts: Facts) -> None:
     size = imgui.calc_text_size(icons.ICON_FA_LEFT_RIGHT)
     canvas.drawing.add_text(ImVec2(x - 0.5 * size.x, middle - 0.5 * size.y), theme.packed(palette.text), icons.ICON_FA_LEFT_RIGHT)
     y = canvas.top + theme.em(0.8)
-    left, right = state.method, state.compare.method
+    left, right = (METHOD_NAMES.get(name, "Reference") for name in (state.method, state.compare.method))
     gap = theme.em(1.0)
     _label(canvas, x - gap - imgui.calc_text_size(left).x, y, left)
     _label(canvas, x + gap, y, right)

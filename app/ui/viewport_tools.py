@@ -63,7 +63,7 @@ def draw_toolbar(state: State, gizmo: Gizmo, left: float, top: float) -> State:
     if _button("Pause" if state.playing else "Play", icon, x, y, not state.playing, tip, what.keys):
         state = replace(state, playing=not state.playing)
     what = command("Physical picture")
-    if _button("Physical picture", icons.ICON_FA_ATOM, x, y + size, state.physical, what.tip, what.keys):
+    if _button("Physical picture", icons.ICON_FA_FLASK, x, y + size, state.physical, what.tip, what.keys):
         state = replace(state, physical=not state.physical)
     return state
 
