@@ -182,8 +182,7 @@ def _attempt(state: State, index: int, label: str, make: Callable[[], Dispersion
     try:
         scene = edits.set_dispersion(state.scene, index, make())
     except UserError as refusal:
-        text = str(refusal)
-        _look.refused = text[:1].upper() + text[1:]
+        _look.refused = str(refusal)
         return state
     _look.refused = ""
     return state.edited(scene, label)

@@ -240,8 +240,8 @@ def note(text: str) -> None:
 
 
 def error(text: str) -> None:
-    """Something that was refused, and why."""
-    words(text, theme.palette().error)
+    """Something that was refused, and why; written as a sentence whatever its ends."""
+    words(f"{text[:1].upper()}{text[1:].rstrip('.')}.", theme.palette().error)
 
 
 def holding(state: State, active: bool) -> State:
