@@ -75,6 +75,7 @@ class Gizmo:
         _IM.set_rect(*rect)
         _IM.set_orthographic(view.is_orthographic)
         _IM.set_gizmo_size_clip_space(_SIZE)
+        _IM.get_style().hatched_axis_line_thickness = 0.0
         frame = placing.frame_of(state.scene, state.selection, self.is_local) if self._drag is None else self._drag.now
         origin = frame[:3, 3] if self._drag is None else self._drag.before[:3, 3]
         after = self._manipulate(state.tool, view, frame, origin)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -103,14 +104,15 @@ def draw_rays(canvas: Canvas, rays: Iterable[RayLine]) -> None:
     together: dict[tuple[int, ...], tuple[np.ndarray, set[float]]] = {}
     for segment, key, nm in zip(segments, np.round(2.0 * segments.reshape(-1, 4)).astype(int).tolist(), nm_of[index].tolist(), strict=True):
         together.setdefault(tuple(key), (segment, set()))[1].add(nm)
-    all_nm = sorted({ray.wavelength_nm for ray in rays})
-    coloured = [(segment, mixed_srgb(sorted(nm), all_nm)) for segment, nm in together.values()]
+    all_nm = tuple(sorted({ray.wavelength_nm for ray in rays}))
+    coloured = [(segment, mixed_srgb(tuple(sorted(nm)), all_nm)) for segment, nm in together.values()]
     for width, opacity in (*_HALO, _CORE):
         for segment, colour in coloured:
             lines(canvas, [segment], imgui.color_convert_float4_to_u32((*colour, opacity)), width)
 
 
-def mixed_srgb(wavelengths_nm: list[float], all_nm: list[float]) -> tuple[float, float, float]:
+@lru_cache(4096)
+def mixed_srgb(wavelengths_nm: tuple[float, ...], all_nm: tuple[float, ...]) -> tuple[float, float, float]:
     """The colour of some wavelengths together, sRGB, where all those of the overlay make white."""
     colours = spectral_srgb()[np.clip(np.round(all_nm).astype(int) - 380, 0, 400)]
     if len(wavelengths_nm) == 1 or len(all_nm) == 1:
@@ -124,7 +126,10 @@ def mixed_srgb(wavelengths_nm: list[float], all_nm: list[float]) -> tuple[float,
 
 def draw_outlined(canvas: Canvas, points: np.ndarray, colour: Colour, width: float = 1.5, closed: bool = True) -> None:
     """A world polyline that is seen over any picture: a dark seam under a coloured line."""
-    segments = canvas.segments(points, closed)
+    _outlined(canvas, canvas.segments(points, closed), colour, width)
+
+
+def _outlined(canvas: Canvas, segments: np.ndarray, colour: Colour, width: float) -> None:
     lines(canvas, segments, imgui.color_convert_float4_to_u32((0.0, 0.0, 0.0, 0.55 * colour[3])), width + 2.0)
     lines(canvas, segments, imgui.color_convert_float4_to_u32(colour), width)
 
@@ -136,9 +141,10 @@ _CORNER_SHARE = 0.18
 
 def draw_box(canvas: Canvas, corners: np.ndarray, colour: Colour) -> None:
     """The corners of a box (8, 3), as brackets: says what is selected and hides little of it."""
-    for a, b in _EDGES:
-        for start, end in ((corners[a], corners[b]), (corners[b], corners[a])):
-            draw_outlined(canvas, np.stack([start, start + _CORNER_SHARE * (end - start)]), colour, 1.2, closed=False)
+    ends = corners[np.array(_EDGES)]
+    ends = np.concatenate([ends, ends[:, ::-1]])
+    pairs = np.stack([ends[:, 0], ends[:, 0] + _CORNER_SHARE * (ends[:, 1] - ends[:, 0])], axis=1)
+    _outlined(canvas, canvas.cut(pairs)[0], colour, 1.2)
 
 
 def box_corners(vertices: np.ndarray, object_to_world: np.ndarray) -> np.ndarray:

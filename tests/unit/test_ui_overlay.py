@@ -44,12 +44,12 @@ def test_lines_that_leave_the_picture_keep_their_slope() -> None:
 
 
 def test_all_wavelengths_together_are_white_and_one_is_its_own_colour() -> None:
-    all_nm = np.linspace(400.0, 700.0, 9).tolist()
+    all_nm = tuple(np.linspace(400.0, 700.0, 9).tolist())
     assert mixed_srgb(all_nm, all_nm) == pytest.approx((1.0, 1.0, 1.0))
-    assert mixed_srgb([all_nm[2]], all_nm) == pytest.approx(spectral_srgb()[round(all_nm[2]) - 380])
+    assert mixed_srgb((all_nm[2],), all_nm) == pytest.approx(spectral_srgb()[round(all_nm[2]) - 380])
     red, _, blue = mixed_srgb(all_nm[6:], all_nm)
     assert red > 3.0 * blue
-    assert mixed_srgb([550.0], [550.0]) == pytest.approx(spectral_srgb()[170])
+    assert mixed_srgb((550.0,), (550.0,)) == pytest.approx(spectral_srgb()[170])
 
 
 def test_a_box_stands_as_its_object_does() -> None:
