@@ -20,8 +20,8 @@ from app.gpu.splat_tables import SplatTables
 from app.light_half import LightHalf, spectral_axis
 from app.light_plan import LightPlan
 from app.live.difference import redo
+from app.live.eye import solo_scene
 from app.live.inputs import LiveInputs, Redo
-from app.live.light import solo
 from app.model.features import Features
 from app.model.glass import Dispersion
 from app.model.scene import Camera, Scene
@@ -215,10 +215,7 @@ class FrameRenderer:
 
 def lit(stage: Stage) -> Scene:
     """The scene as the camera of `stage` sees it, with the light of one wavelength only where it says so."""
-    lights = stage.scene.lights
-    if stage.solo_nm is not None:
-        lights = tuple(replace(light, spectral_power=solo(light.spectral_power, stage.solo_nm)) for light in lights)
-    return replace(stage.scene, camera=stage.camera, lights=lights)
+    return replace(solo_scene(stage.scene, stage.solo_nm), camera=stage.camera)
 
 
 def _map_view(cameras: Sequence[Camera], settings: RenderSettings) -> tuple[Camera | None, RenderSettings]:

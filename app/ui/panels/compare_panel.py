@@ -117,7 +117,7 @@ def _plot(state: State, facts: Facts, height: float) -> State:
     if not state.compare.plot:
         return state
     flags = implot.Flags_.no_menus | implot.Flags_.no_mouse_text
-    if not implot.begin_plot("##error over time", imgui.ImVec2(-1, height), flags):
+    if not implot.begin_plot("##error over time", imgui.ImVec2(-theme.em(0.6), height), flags):
         return state
     implot.setup_axes("time traced and splatted (s)", "relMSE")
     for axis in (implot.ImAxis_.x1, implot.ImAxis_.y1):
@@ -126,7 +126,7 @@ def _plot(state: State, facts: Facts, height: float) -> State:
     x_range, y_range = _limits(curves)
     implot.setup_axis_limits(implot.ImAxis_.x1, *x_range, implot.Cond_.always)
     implot.setup_axis_limits(implot.ImAxis_.y1, *y_range, implot.Cond_.always)
-    implot.setup_legend(implot.Location_.south_west)
+    implot.setup_legend(implot.Location_.north_east)
     for curve, tint in zip(curves, _tints(), strict=False):
         seconds, error = np.ascontiguousarray(curve.seconds, float), np.ascontiguousarray(curve.error, float)
         name = METHOD_NAMES.get(curve.method, curve.method)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -17,6 +18,10 @@ from app.ui.state import Key, State
 MAX_TIME_S = 3600.0
 _VIEW = tuple(f"camera.{field}.{axis}" for field in ("position", "target") for axis in "xyz")
 _DEFAULT_STEP_S = 2.0
+_FIELDS = tuple(f"{group}.{axis}" for group in ("position", "rotation") for axis in "xyz") + (
+    "n_d", "V_d", "dispersion_gain", "power", "radius", "width", "height", "inner_half_angle_deg", "half_angle_deg", "angular_diameter_deg",
+)  # fmt: skip
+_UNITS = re.compile(r"_(deg|ev|nm)$")
 
 
 @dataclass
@@ -57,12 +62,17 @@ def frame_count(keys: Sequence[Key], fps: float) -> int:
 
 
 def _names(known: dict[str, Parameter]) -> dict[str, str]:
-    """Path -> what the chooser shows: `prism: dispersion gain`."""
+    """Path -> what the chooser shows: `prism: dispersion gain`, `camera: orbit`."""
     names = {}
     for path in known:
         head, _, rest = path.partition(".")
-        owner, _, field = rest.partition(".") if head in ("objects", "lights") else (head, "", rest or head)
-        names[path] = f"{owner}: {field.replace('_', ' ')}" if head != owner or rest else path.replace("_", " ")
+        owner, field = (head, rest) if head == "camera" else ("", path)
+        if head in ("objects", "lights"):
+            # The parameter is what follows the name, which may hold dots itself.
+            field = next(f for f in _FIELDS if rest.endswith(f".{f}"))
+            owner = rest[: -len(field) - 1]
+        words = _UNITS.sub("", field).replace("_", " ").replace(".", " ")
+        names[path] = f"{owner}: {words}" if owner else words.capitalize()
     return names
 
 

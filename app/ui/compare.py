@@ -1,0 +1,304 @@
+"""What the picture is compared with: the reference, or another method, computed in the time that is left over.
+
+It belongs to the scene and view it was begun for. When those change it is kept and told to be stale; asking for
+it again begins anew. The reference is the caustic layer by independent light tracing (`reference_thread`), put on the picture
+without caustics; what is seen behind glass is not compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.gpu.scene_buffers import SceneBuffers
+from app.light_half import reflectance_classes, spectral_axis
+from app.live.difference import redo
+from app.live.inputs import LiveInputs, Redo
+from app.model.features import Features
+from app.model.settings import RenderSettings
+from app.passes.eye import EyePass
+from app.ui.error_curves import ErrorCurves
+from app.ui.facts import ErrorCurve
+from app.ui.panels.methods import METHOD_NAMES
+from app.ui.reference_thread import ReferenceThread
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import moderngl
+
+    from app.gpu.context import Context
+    from app.live.engine import LiveEngine
+    from app.model.scene import Scene
+    from app.ui.state import Compare, State
+
+REFERENCE = "reference"
+STAND_IN = "stochastic-even"
+"""Takes the reference's place where that cannot be computed."""
+DIRECT_SAMPLES = 32
+DISPATCH_SECONDS = 0.012
+_READY = 0.5
+"""relMSE from which on a reference is worth showing."""
+
+
+class Comparison:
+    """Owns the other picture. `advance` every frame; everything else may be read at any time."""
+
+    def __init__(self, context: Context, make_engine: Callable[[Context], LiveEngine] | None = None) -> None:
+        self._context = context
+        self._make_engine = make_engine or _engine
+        self._begun: LiveInputs | None = None
+        """What it was begun for; the method is the running one's."""
+        self._thread: ReferenceThread | None = None
+        self._engine: LiveEngine | None = None
+        self._direct: _DirectPicture | None = None
+        self._composed: moderngl.Texture | None = None
+        self._composed_from = 0
+        self._curves = ErrorCurves()
+        self._seconds: dict[str, tuple[float, int]] = {}
+        self._compare: Compare | None = None
+        self.is_stale = False
+
+    # ---- what there is -----------------------------------------------------------------------
+
+    @property
+    def picture(self) -> moderngl.Texture | None:
+        """RGBA32F as the engine's; None while there is nothing to show."""
+        if self._compare is None or not is_active(self._compare):
+            return None
+        if self._shows_reference:
+            return self._composed
+        return self._engine.picture if self._engine is not None else None
+
+    @property
+    def curves(self) -> tuple[ErrorCurve, ...]:
+        """Error against time of the running method and of the other."""
+        return self._curves.curves
+
+    @property
+    def progress(self) -> float | None:
+        """How far the other picture is, 0 to 1."""
+        if self._compare is None or not is_active(self._compare) or self._begun is None:
+            return None
+        if self._shows_reference:
+            return None if self._thread is None else self._thread.fraction
+        return None if self._engine is None else min(self._engine.stats.photons / max(self._engine.target_photons, 1), 1.0)
+
+    @property
+    def text(self) -> str:
+        """What the other picture is."""
+        if self._compare is None or not is_active(self._compare) or self._begun is None:
+            return ""
+        if not self._shows_reference:
+            photons = 0 if self._engine is None else self._engine.stats.photons
+            told = f"{METHOD_NAMES.get(self._method, self._method)}: {photons / 1e6:.2f} million photons."
+            return told if self._compare.method != REFERENCE else f"There is no reference: {self._thread_problem}. {told}"
+        snapshot = self._thread.snapshot if self._thread is not None else None
+        if snapshot is None:
+            return "Reference: the first photons are on their way."
+        told = f"Reference: light tracing in float64 without shared code, {snapshot.photons / 1e6:.1f} million photons, own relMSE {snapshot.relmse:.1e}."
+        if not snapshot.directly.all():
+            told += " What is seen behind glass or in mirrors is not compared."
+        if self._begun.local_gain and any(item.local_dispersion for item in self._begun.scene.objects):
+            told += " The brush's local gain is not in it: it is not physical."
+        return told
+
+    @property
+    def is_busy(self) -> bool:
+        """It would use more time (the window must not sleep)."""
+        if self._compare is None or not is_active(self._compare) or self.is_stale:
+            return False
+        refers = self._thread is not None and not self._thread.is_done and self._thread.problem is None
+        return refers or (self._engine is not None and self._needs_engine and not self._engine.is_idle)
+
+    # ---- work --------------------------------------------------------------------------------
+
+    def restart(self) -> None:
+        """Begin anew for what is wanted in the next `advance`."""
+        self._stop()
+        self._begun = None
+
+    def advance(self, state: State, running: LiveEngine | None, budget_s: float) -> None:
+        """Follow `state` and work for about `budget_s`; `running` is the engine whose picture is compared."""
+        self._compare = state.compare
+        self._count_seconds(running, state.method)
+        if not is_active(state.compare) or running is None:
+            self._pause()
+            return
+        wanted = state.live_inputs
+        if self._begun is None:
+            self._stop()
+            self._begun = wanted
+        assert self._begun is not None
+        self.is_stale = redo(self._begun, self._begun, replace(wanted, method=self._begun.method)) != Redo.NOTHING
+        if self.is_stale:
+            self._pause()
+            return
+        if self._needs_reference:
+            if self._thread is None:
+                self._start_reference(self._begun)
+            else:
+                self._thread.resume()
+        if self._needs_engine:
+            self._advance_engine(budget_s)
+        self._compose(running)
+        if state.compare.plot:
+            self._measure(state, running)
+
+    def release(self) -> None:
+        """Stop and free everything. Before the running engine is released."""
+        self._stop(wait=True)
+        if self._engine is not None:
+            self._engine.release()
+            self._engine = None
+
+    @property
+    def _method(self) -> str:
+        """The other method; of the reference, what stands in for it."""
+        assert self._compare is not None
+        return STAND_IN if self._compare.method == REFERENCE else self._compare.method
+
+    @property
+    def _thread_problem(self) -> str | None:
+        return self._thread.problem if self._thread is not None else None
+
+    @property
+    def _shows_reference(self) -> bool:
+        return self._compare is not None and self._compare.method == REFERENCE and self._thread_problem is None
+
+    @property
+    def _needs_reference(self) -> bool:
+        assert self._compare is not None
+        return self._compare.method == REFERENCE or self._compare.plot
+
+    @property
+    def _needs_engine(self) -> bool:
+        return not self._shows_reference
+
+    def _start_reference(self, begun: LiveInputs) -> None:
+        scene = _lit(begun)
+        self._thread = ReferenceThread(scene, begun.width, begun.height)
+        self._direct = _DirectPicture(self._context, scene, begun)
+
+    def _pause(self) -> None:
+        """Give the processor back; what there is stays."""
+        if self._thread is not None:
+            self._thread.pause()
+
+    def _stop(self, wait: bool = False) -> None:
+        if self._thread is not None:
+            self._thread.stop(wait)
+        for owned in (self._direct, self._composed):
+            if owned is not None:
+                owned.release()
+        self._thread = self._direct = self._composed = None
+        self._composed_from = 0
+        self._curves = ErrorCurves()
+
+    def _advance_engine(self, budget_s: float) -> None:
+        assert self._begun is not None
+        if self._engine is None:
+            self._engine = self._make_engine(self._context)
+        self._engine.set(replace(self._begun, method=self._method))
+        self._engine.advance(budget_s, False)
+        self._count_seconds(self._engine, self._method)
+
+    def _compose(self, running: LiveEngine) -> None:
+        """The reference's caustics on the picture without caustics; behind glass, the running picture."""
+        snapshot = self._thread.snapshot if self._thread is not None else None
+        if snapshot is None or self._direct is None or snapshot.number == self._composed_from or snapshot.relmse > _READY:
+            return
+        if not self._direct.advance():
+            return
+        shown = _read(running.picture) if running.picture is not None else None
+        height, width = snapshot.directly.shape
+        whole = self._direct.rgb + snapshot.caustic_rgb
+        if shown is not None and shown.shape == whole.shape:
+            whole[~snapshot.directly] = shown[~snapshot.directly]
+        self._composed_from = snapshot.number
+        texels = np.concatenate([whole, np.ones((height, width, 1), np.float32)], axis=-1)
+        if self._composed is None:
+            self._composed = self._context.ctx.texture((width, height), 4, dtype="f4")
+        self._composed.write(np.ascontiguousarray(texels))
+        self._curves.set_reference(self._direct.rgb + snapshot.caustic_rgb, snapshot.variance_xyz, snapshot.directly)
+
+    def _measure(self, state: State, running: LiveEngine) -> None:
+        engines = {state.method: running}
+        if self._engine is not None and self._needs_engine:
+            engines[self._method] = self._engine
+        for method, engine in engines.items():
+            stats, picture = engine.stats, engine.picture
+            whole = picture is not None and picture.size == (state.viewport_size[0], state.viewport_size[1])
+            if whole and stats.resolution_scale == 1.0 and self._curves.wants(method, stats.photons):
+                self._curves.add(method, self._seconds[method][0], stats.photons, _read(picture))
+
+    def _count_seconds(self, engine: LiveEngine | None, method: str) -> None:
+        """Seconds that the engine's present picture took to trace and to splat."""
+        if engine is None:
+            return
+        stats = engine.stats
+        seconds, photons = self._seconds.get(method, (0.0, 0))
+        if stats.photons < photons:
+            seconds = 0.0
+        self._seconds[method] = (seconds + stats.trace_s + stats.splat_s, stats.photons)
+
+
+def is_active(compare: Compare) -> bool:
+    """Whether anything asks for the other picture."""
+    return compare.mode != "off" or compare.plot
+
+
+class _DirectPicture:
+    """The picture without any caustic: direct light, glass and mirrors."""
+
+    def __init__(self, context: Context, scene: Scene, inputs: LiveInputs) -> None:
+        settings = RenderSettings(width=inputs.width, height=inputs.height, method=inputs.method)
+        features = Features.of(scene, settings)
+        self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+        reflectances, _ = reflectance_classes(scene, self._buffers)
+        self._eye = EyePass(context, self._buffers, "beauty", reflectances)
+        self._eye.dispatch_seconds = DISPATCH_SECONDS
+        self._steps: Iterator[float] | None = self._eye.samples(scene.camera, inputs.width, inputs.height, DIRECT_SAMPLES, 0, None, inputs.seed)
+        self._rgb: np.ndarray | None = None
+
+    def advance(self) -> bool:
+        """One dispatch of work; True once it is done."""
+        if self._steps is not None and next(self._steps, None) is None:
+            self._steps = None
+            self._rgb = self._eye.read_rgb()
+        return self._steps is None
+
+    @property
+    def rgb(self) -> np.ndarray:
+        """float32 (H, W, 3), once done."""
+        assert self._rgb is not None
+        return self._rgb
+
+    def release(self) -> None:
+        """Free everything."""
+        self._eye.release()
+        self._buffers.release()
+
+
+def _lit(inputs: LiveInputs) -> Scene:
+    """The scene as its camera sees it, with the light of one wavelength only where `solo_nm` says so."""
+    from app.live.eye import solo_scene
+
+    return replace(solo_scene(inputs.scene, inputs.solo_nm), camera=inputs.camera)
+
+
+def _read(picture: moderngl.Texture) -> np.ndarray:
+    """float32 (H, W, 3), row 0 on top."""
+    texels = np.empty((picture.height, picture.width, 4), np.float32)
+    picture.read_into(texels)
+    return texels[..., :3]
+
+
+def _engine(context: Context) -> LiveEngine:
+    from app.live.engine import Budget, LiveEngine
+
+    # It is never edited, so it need not store photons to show them again.
+    return LiveEngine(context, replace(Budget.of(context), store_bytes=1 << 20))

@@ -1,0 +1,272 @@
+"""Screenshots at once; spectral pictures, baked maps and animations as one background job that works a little in every frame."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.atomic import atomic_output, check_writable
+from app.cli_options import MAX_SIDE_PX, check_picture_memory
+from app.errors import UserError
+from app.image_io import check_suffix, write_image
+from app.model.settings import RenderSettings
+from app.passes.display import Display
+from app.ui import requests
+from app.ui.facts import JobFacts
+from app.ui.parameters import Stage
+from app.ui.state import Display as Look
+from app.ui.state import State
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from app.gpu.context import Context
+
+SPECTRAL_BINS = 20
+LEAST_PHOTONS = 1_000_000
+MOST_PHOTONS = 64_000_000
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What is on the screen."""
+
+    codes: moderngl.Texture
+    """RGBA8, sRGB, row 0 on top."""
+    radiance: moderngl.Texture
+    """RGBA32F, linear Rec.709, row 0 on top."""
+    exposure_ev: float
+    """Absolute, the one in use."""
+    photons: int = 0
+    """In the picture."""
+
+
+class Exports:
+    """Runs one job at a time. `begin` and `step` return a sentence when something is finished."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._job: _Job | None = None
+
+    @property
+    def job(self) -> JobFacts | None:
+        """The running job, for panels."""
+        return None if self._job is None else self._job.facts
+
+    def begin(self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, shown: Shown) -> str | None:
+        """Carry out `request`, or start it. Raises `UserError`; a running job is not disturbed."""
+        if isinstance(request, requests.Screenshot) and not request.spectral:
+            return save_screenshot(request.path, shown)
+        if self._job is not None:
+            raise UserError("an export is running already: wait for it, or cancel it first")
+        self._job = self._made(request, state, shown)
+        return None
+
+    def step(self, budget_s: float) -> str | None:
+        """Work on the job for about `budget_s`. Raises `UserError` when it fails; it is over then."""
+        if self._job is None:
+            return None
+        try:
+            told = self._job.step(budget_s)
+        except BaseException:
+            self._job = None
+            raise
+        if told is not None:
+            self._job = None
+        return told
+
+    def cancel(self) -> str | None:
+        """End the job; what is finished stays."""
+        if self._job is None:
+            return None
+        job, self._job = self._job, None
+        return job.cancel()
+
+    def release(self) -> None:
+        """End the job."""
+        self.cancel()
+
+    def _made(self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, shown: Shown) -> _Job:
+        stage = Stage(state.scene, state.camera, shown.exposure_ev, state.solo_nm)
+        name = request.path.name
+        if isinstance(request, requests.Screenshot):
+            work = _spectral(self._context, request.path, stage, state, shown.photons)
+            return _Job(f"Spectral picture: {name}", work, f"Saved {name}.", "Nothing was written: a picture is whole or not at all.")
+        if isinstance(request, requests.Bake):
+            work = _bake(self._context, request, stage, state)
+            return _Job(f"Caustic map: {name}", work, f"Baked {name}; its place is in {request.path.with_suffix('.json').name}.", "Nothing was written: a map is whole or not at all.")
+        work, frames = _animate(self._context, request, stage, state)
+        title = "Turntable" if request.kind == "turntable" else "Animation"
+        return _Job(f"{title}: {name}", work, f"Saved {name}, {frames} frames.", f"Stopped {name}; the frames that are done stay.", frames)
+
+
+class _Job:
+    """A generator of shares, with what is told about it."""
+
+    def __init__(self, title: str, work: Iterator[float], finished: str, cancelled: str, frames: int = 0) -> None:
+        self._title, self._work = title, work
+        self._finished, self._cancelled = finished, cancelled
+        self._frames = frames
+        self._fraction, self._worked_s = 0.0, 0.0
+
+    @property
+    def facts(self) -> JobFacts:
+        return JobFacts(self._title, self._fraction, self._text())
+
+    def step(self, budget_s: float) -> str | None:
+        started = time.perf_counter()
+        try:
+            while time.perf_counter() - started < budget_s:
+                self._fraction = max(self._fraction, next(self._work))
+        except StopIteration:
+            return self._finished
+        finally:
+            self._worked_s += time.perf_counter() - started
+        return None
+
+    def cancel(self) -> str:
+        close = getattr(self._work, "close", None)
+        if close is not None:
+            close()
+        return self._cancelled
+
+    def _text(self) -> str:
+        frame = f"Frame {min(int(self._fraction * self._frames) + 1, self._frames)} of {self._frames}" if self._frames else "Tracing and looking"
+        if self._fraction < 0.02:
+            return frame
+        left = self._worked_s * (1.0 - self._fraction) / self._fraction
+        about = f"{left:.0f} s" if left < 90 else f"{left / 60:.0f} min"
+        return f"{frame}, about {about} of work left"
+
+
+def save_screenshot(path: Path, shown: Shown) -> str:
+    """Write what is shown: .png as it is on the screen, .exr and .npy linear without tone curve. Returns the sentence to tell."""
+    if check_suffix(path) == ".png":
+        write_codes(path, texture_codes(shown.codes))
+    else:
+        write_image(path, _texels(shown.radiance))
+    return f"Saved {path.name}."
+
+
+def write_codes(path: Path, codes: np.ndarray) -> None:
+    """Write uint8 (H, W, 3) sRGB codes, row 0 on top, as a PNG; for pictures of the whole window too."""
+    from PIL import Image, PngImagePlugin
+
+    texts = PngImagePlugin.PngInfo()
+    texts.add(b"sRGB", b"\x00")  # rendering intent: perceptual
+    with atomic_output(path) as temporary:
+        Image.fromarray(codes).save(temporary, format="PNG", pnginfo=texts, compress_level=6)
+
+
+def texture_codes(texture: moderngl.Texture) -> np.ndarray:
+    """uint8 (H, W, 3) of an RGBA8 texture whose row 0 is the top."""
+    raw = np.frombuffer(texture.read(alignment=1), np.uint8)
+    return np.ascontiguousarray(raw.reshape(texture.height, texture.width, 4)[..., :3])
+
+
+def _texels(texture: moderngl.Texture) -> np.ndarray:
+    texels = np.empty((texture.height, texture.width, 4), np.float32)
+    texture.read_into(texels)
+    return np.ascontiguousarray(texels[..., :3])
+
+
+def _settings(state: State, size: tuple[int, int], photons: int, **changes: object) -> RenderSettings:
+    """What is shown, in another size and with so many photons."""
+    width, height = size
+    if not (1 <= width <= MAX_SIDE_PX and 1 <= height <= MAX_SIDE_PX):
+        raise UserError(f"a size of {width} × {height} pixels is out of range: no side may exceed {MAX_SIDE_PX}")
+    return RenderSettings(
+        width=width, height=height, photons=photons, method=state.method, smoothing=state.smoothing, max_depth=state.scene.render.max_depth,
+        local_gain=not state.physical, **changes,
+    )  # fmt: skip
+
+
+def _spectral(context: Context, path: Path, stage: Stage, state: State, photons: int) -> Iterator[float]:
+    from app.frames import FrameRenderer
+
+    if check_suffix(path) != ".exr":
+        raise UserError(f"cannot write {path}: spectral channels need an .exr")
+    check_writable(path)
+    check_picture_memory(*state.viewport_size, SPECTRAL_BINS)
+    settings = _settings(state, state.viewport_size, int(np.clip(photons, LEAST_PHOTONS, MOST_PHOTONS)), bins=SPECTRAL_BINS)
+
+    def work() -> Iterator[float]:
+        renderer = FrameRenderer(context, settings, [stage])
+        try:
+            for share in renderer.steps(stage):
+                yield 0.98 * share
+            spectral, edges = renderer.spectral()
+            write_image(path, renderer.rgb(), spectral=spectral, bin_edges_nm=edges)
+        finally:
+            renderer.release()
+
+    return work()
+
+
+def _bake(context: Context, request: requests.Bake, stage: Stage, state: State) -> Iterator[float]:
+    from app import bake
+
+    bake.check_output(request.path)
+    bake.check_receiver(stage.scene, request.receiver)
+    check_writable(request.path)
+    check_writable(bake.placement_path(request.path))
+    return bake.bake(context, stage, _settings(state, request.size, request.photons), request.receiver, request.path)
+
+
+def _animate(context: Context, request: requests.Animate, stage: Stage, state: State) -> tuple[Iterator[float], int]:
+    from app.animate import description, render_animation
+    from app.movie import open_sink
+    from app.ui import animation
+
+    if request.kind == "turntable":
+        made = animation.turntable(stage, request.frames or 1, request.fps)
+    else:
+        made = animation.keyed(stage, animation.tracks_of(state.animation), request.frames, request.fps)
+    size = request.size or state.viewport_size
+    settings = _settings(state, size, request.photons, spp=request.samples)
+    check_picture_memory(*size, None)
+    told = dict(description(made, settings, request.fps, request.photons)) | {"look": repr(state.display), "smoothing": state.smoothing}
+    sink = open_sink(request.path, size, request.fps, told)
+    develop = _Developer(context, state.display)
+
+    def work() -> Iterator[float]:
+        try:
+            yield 0.0
+            yield from render_animation(context, made, settings, sink, 0.0, develop)
+        finally:
+            develop.release()
+            sink.close()
+
+    steps = work()
+    next(steps)  # from here on closing it closes the sink, also when it is cancelled before its first frame
+    return steps, len(made.times_s)
+
+
+class _Developer:
+    """Linear pictures to codes as the window shows them: tone curve or false colour."""
+
+    def __init__(self, context: Context, look: Look) -> None:
+        self._context, self._look = context, look
+        self._display: Display | None = None
+
+    def __call__(self, rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
+        self._display = self._display or Display(self._context)
+        height, width = rgb.shape[:2]
+        texels = np.concatenate([rgb, np.ones((height, width, 1), np.float32)], axis=-1)
+        texture = self._context.ctx.texture((width, height), 4, np.ascontiguousarray(texels, np.float32).tobytes(), dtype="f4")
+        try:
+            return texture_codes(self._display.run(texture, self._look, exposure_ev, (width, height)))
+        finally:
+            texture.release()
+
+    def release(self) -> None:
+        if self._display is not None:
+            self._display.release()
+            self._display = None
+
+

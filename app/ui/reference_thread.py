@@ -1,0 +1,125 @@
+"""The independent reference in a thread of low priority: float64 light tracing that shares no code with the shaders.
+
+It computes the caustic layer on what the camera sees directly. Snapshots come as its error shrinks; `pause` and `stop` work
+after the round it is in.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.errors import UserError
+
+if TYPE_CHECKING:
+    from app.model.scene import Scene
+    from app.truth.photon_run import ReferencePicture
+
+TARGET_RELMSE = 2e-4
+MAX_SECONDS = 900.0
+_GROWTH = 1.4
+"""Photons from one snapshot to the next."""
+_NICENESS = 12
+"""So that drawing goes first."""
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The reference as far as it is; row 0 on top."""
+
+    number: int
+    caustic_rgb: np.ndarray
+    """float32 (H, W, 3), linear Rec.709 radiance: caustics on what is seen directly."""
+    variance_xyz: np.ndarray
+    """float32 (H, W, 3), of its XYZ as an estimate."""
+    directly: np.ndarray
+    """bool (H, W): pixels for which that is all there is of caustics."""
+    photons: int
+    relmse: float
+
+
+class ReferenceThread:
+    """Starts at once. `snapshot`, `problem` and `is_done` may be read at any time."""
+
+    def __init__(self, scene: Scene, width: int, height: int) -> None:
+        """`scene.camera` is what it is seen by."""
+        self.snapshot: Snapshot | None = None
+        self.problem: str | None = None
+        """Why there will be no reference."""
+        self.is_done = False
+        self._scene, self._size = scene, (width, height)
+        self._stopped = threading.Event()
+        self._going = threading.Event()
+        self._going.set()
+        self._thread = threading.Thread(target=self._run, name="reference", daemon=True)
+        self._thread.start()
+
+    @property
+    def fraction(self) -> float:
+        """How far it is on the way to `TARGET_RELMSE`."""
+        if self.is_done:
+            return 1.0
+        return 0.0 if self.snapshot is None else min(TARGET_RELMSE / max(self.snapshot.relmse, TARGET_RELMSE), 0.99)
+
+    def pause(self) -> None:
+        """Leave the processor alone until `resume`."""
+        self._going.clear()
+
+    def resume(self) -> None:
+        """Go on."""
+        self._going.set()
+
+    def stop(self, wait: bool = False) -> None:
+        """End after the round it is in; `wait` until then."""
+        self._stopped.set()
+        self._going.set()
+        if wait:
+            self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            # Linux: of this thread and of those it starts, not of the program.
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
+        except (OSError, AttributeError):
+            pass  # then it only takes more of the processor
+        try:
+            self._compute()
+        except UserError as error:
+            self.problem = str(error)
+        except ImportError as error:
+            self.problem = f"the reference renderer needs numba ({error})"
+        except MemoryError:
+            self.problem = "there is not enough memory for a reference of this size"
+        except (RuntimeError, ValueError, ArithmeticError, LookupError) as error:  # a fault of ours must not die unseen in a thread
+            self.problem = f"the reference renderer failed ({type(error).__name__}: {error})"
+
+    def _compute(self) -> None:
+        from app.truth.direct_view import seen_directly
+        from app.truth.photon_run import ReferenceRun
+
+        width, height = self._size
+        directly = seen_directly(self._scene, width, height)
+        run = ReferenceRun(self._scene, width, height, self._scene.render.max_depth)
+        told = 0
+        while not self._stopped.is_set():
+            self._going.wait()
+            if not run.exhausted:
+                run.advance()
+            over = run.exhausted or run.seconds > MAX_SECONDS
+            if run.photons >= _GROWTH * told or over:
+                told = run.photons
+                picture = run.picture()
+                self._publish(picture, directly)
+                if over or picture.is_within(TARGET_RELMSE):
+                    self.is_done = True
+                    return
+
+    def _publish(self, picture: ReferencePicture, directly: np.ndarray) -> None:
+        number = 1 if self.snapshot is None else self.snapshot.number + 1
+        self.snapshot = Snapshot(
+            number, picture.rgb.astype(np.float32), picture.xyz_variance().astype(np.float32), directly, picture.photons, picture.relmse
+        )
