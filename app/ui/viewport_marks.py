@@ -37,7 +37,7 @@ def _draw_selection(canvas: Canvas, state: State) -> None:
     if chosen.kind != "object" or chosen.index >= len(state.scene.objects):
         return
     item = state.scene.objects[chosen.index]
-    accent = theme.palette().accent
+    accent = theme.DARK.accent  # over the picture, which is dark in either theme
     draw_box(canvas, box_corners(item.mesh.vertices, item.object_to_world), (*accent[:3], 0.8))
 
 
@@ -118,8 +118,8 @@ def draw_lights(canvas: Canvas, state: State) -> State:
 
 
 def _draw_light(canvas: Canvas, state: State, index: int, place: np.ndarray, x: float, y: float, chosen: bool, hovered: bool) -> None:
-    palette, light = theme.palette(), state.scene.lights[index]
-    colour = palette.accent if chosen else (1.0, 0.92, 0.7, 1.0)
+    light = state.scene.lights[index]
+    colour = theme.DARK.accent if chosen else (1.0, 0.92, 0.7, 1.0)
     opacity = 1.0 if chosen or hovered else 0.5
     if (chosen or hovered) and light.kind != "point":
         length = canvas.view.height_at(max(float(canvas.view.depth(place)), 1e-9)) * theme.em(_ARROW_EM) / canvas.height
