@@ -120,11 +120,10 @@ def check_value(stage: Stage, path: str, value: float, where: str = "") -> float
 def value_of(stage: Stage, path: str) -> float:
     """The parameter's present value: relative ones stand at 0 (turns) or 1 (power)."""
     parameter(stage, path)
-    head, _, rest = path.partition(".")
+    head, name, field = parts(stage.scene, path)
     if head == "camera":
-        return _camera_value(stage.camera, rest)
-    if head in ("objects", "lights"):
-        name, field = _split(stage, head, rest)
+        return _camera_value(stage.camera, field)
+    if name:
         item = next(x for x in getattr(stage.scene, head) if x.name == name)
         return _object_value(item, field) if isinstance(item, SceneObject) else _light_value(item, field)
     if path == "exposure_ev":
@@ -135,11 +134,10 @@ def value_of(stage: Stage, path: str) -> float:
 def apply(stage: Stage, path: str, value: float) -> Stage:
     """`stage` with one parameter set; all objects (or lights) of that name follow. Raises `UserError`."""
     check_value(stage, path, value)
-    head, _, rest = path.partition(".")
+    head, name, field = parts(stage.scene, path)
     if head == "camera":
-        return replace(stage, camera=_with_camera(stage.camera, rest, value))
-    if head in ("objects", "lights"):
-        name, field = _split(stage, head, rest)
+        return replace(stage, camera=_with_camera(stage.camera, field, value))
+    if name:
         change: Callable = _with_object if head == "objects" else _with_light
         items = tuple(change(x, field, value) if x.name == name else x for x in getattr(stage.scene, head))
         return replace(stage, scene=replace(stage.scene, **{head: items}))
@@ -153,11 +151,14 @@ def apply_all(stage: Stage, values: Mapping[str, float]) -> Stage:
     return stage
 
 
-def _split(stage: Stage, head: str, rest: str) -> tuple[str, str]:
-    """Name and parameter; names may hold dots themselves."""
-    names = [x.name for x in getattr(stage.scene, head) if rest.startswith(x.name + ".")]
-    name = max(names, key=len)
-    return name, rest[len(name) + 1 :]
+def parts(scene: Scene, path: str) -> tuple[str, str, str]:
+    """Group ("camera", "objects", "lights" or ""), name ("" outside of the last two) and field of a path that `paths` knows."""
+    head, _, rest = path.partition(".")
+    if head not in ("objects", "lights"):
+        return (head, "", rest) if rest else ("", "", head)
+    # Names may hold dots themselves.
+    name = max((x.name for x in getattr(scene, head) if rest.startswith(x.name + ".")), key=len)
+    return head, name, rest[len(name) + 1 :]
 
 
 # ---- camera --------------------------------------------------------------------------------

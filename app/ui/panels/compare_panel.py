@@ -151,7 +151,8 @@ def _limits(curves: list[ErrorCurve]) -> tuple[tuple[float, float], tuple[float,
         return (0.1, 100.0), (1e-4, 1.0)
     seconds = np.concatenate([curve.seconds for curve in curves])
     error = np.concatenate([curve.error for curve in curves])
-    return _decades(seconds), _decades(error)
+    low, high = _decades(error)
+    return _decades(seconds), (low, 10.0 * high)  # room for the legend
 
 
 def _decades(values: np.ndarray) -> tuple[float, float]:

@@ -9,18 +9,16 @@ from dataclasses import dataclass, replace
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
+from app.model.scene import Scene
 from app.ui import item_rects, theme
 from app.ui.facts import Facts
 from app.ui.panels import widgets
-from app.ui.parameters import Parameter, Stage, paths, value_of
+from app.ui.parameters import Parameter, Stage, parts, paths, value_of
 from app.ui.state import Key, State
 
 MAX_TIME_S = 3600.0
 _VIEW = tuple(f"camera.{field}.{axis}" for field in ("position", "target") for axis in "xyz")
 _DEFAULT_STEP_S = 2.0
-_FIELDS = tuple(f"{group}.{axis}" for group in ("position", "rotation") for axis in "xyz") + (
-    "n_d", "V_d", "dispersion_gain", "power", "radius", "width", "height", "inner_half_angle_deg", "half_angle_deg", "angular_diameter_deg",
-)  # fmt: skip
 _UNITS = re.compile(r"_(deg|ev|nm)$")
 
 
@@ -39,7 +37,7 @@ def draw_keys(state: State, facts: Facts) -> State:
     known = paths(stage.scene, stage.camera)
     if _memory.path not in known:
         _memory.path = next((path for path in known if path.endswith(".dispersion_gain")), next(iter(known)))
-    _, _memory.path = widgets.combo("Parameter", _names(known), _memory.path, tip=known[_memory.path].meaning + ".")
+    _, _memory.path = widgets.combo("Parameter", _names(state.scene, known), _memory.path, tip=known[_memory.path].meaning + ".")
     _, _memory.time_s, _ = widgets.drag("At", _memory.time_s, 0.0, MAX_TIME_S, unit="s", format="%.2f", reset=0.0, speed=0.02, tip="Time of the next key.")
     half = 0.5 * (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x)
     tip = "Add a key with the parameter's present value (turns: 0, power: 1)."
@@ -61,17 +59,13 @@ def frame_count(keys: Sequence[Key], fps: float) -> int:
     return max(1, round((max(times) - min(times)) * fps) + 1)
 
 
-def _names(known: dict[str, Parameter]) -> dict[str, str]:
+def _names(scene: Scene, known: dict[str, Parameter]) -> dict[str, str]:
     """Path -> what the chooser shows: `prism: dispersion gain`, `camera: orbit`."""
     names = {}
     for path in known:
-        head, _, rest = path.partition(".")
-        owner, field = (head, rest) if head == "camera" else ("", path)
-        if head in ("objects", "lights"):
-            # The parameter is what follows the name, which may hold dots itself.
-            field = next(f for f in _FIELDS if rest.endswith(f".{f}"))
-            owner = rest[: -len(field) - 1]
-        words = _UNITS.sub("", field).replace("_", " ").replace(".", " ")
+        head, name, field = parts(scene, path)
+        words = field if field in ("n_d", "V_d") else _UNITS.sub("", field).replace("_", " ").replace(".", " ")
+        owner = name or head
         names[path] = f"{owner}: {words}" if owner else words.capitalize()
     return names
 
@@ -95,7 +89,7 @@ def _table(state: State, known: dict[str, Parameter]) -> State:
     imgui.table_setup_column("Value", imgui.TableColumnFlags_.width_fixed, theme.em(5.6))
     imgui.table_setup_column("##delete", imgui.TableColumnFlags_.width_fixed, theme.em(1.8))
     imgui.table_headers_row()
-    names = _names(known)
+    names = _names(state.scene, known)
     keys: list[Key] = []
     for index, key in enumerate(state.animation):
         imgui.push_id(index)
