@@ -30,7 +30,7 @@ from app.model.spectrum import Spectrum
 from app.passes.emission_domain import EmissionDomain, emission_domain
 from app.passes.footprint import SpectralVariables
 from app.passes.map_layout import MapLayout, check_map_receiver, layout_maps
-from app.passes.pilot import Pilot, landings_of, run_pilot
+from app.passes.pilot import Pilot, landings_of, pilot_steps
 from app.passes.splat import Splatter
 from app.passes.trace import Batch, FluxTally, LatticeSlice, TracePass
 
@@ -106,7 +106,7 @@ class LightHalf:
             pass
 
     def preparing(self) -> Iterator[None]:
-        """`prepare`, pausing after each light's pilot: whoever draws meanwhile may bind what it likes."""
+        """`prepare`, pausing often: whoever draws meanwhile may bind what it likes."""
         specular = [self.buffers.space.to_gpu(m.corners()) for m, o in zip(self.buffers.world_meshes, self.scene.objects, strict=True) if isinstance(o.material, Dielectric | Mirror)]
         triangles = np.concatenate(specular) if specular else np.zeros((0, 3, 3))
         domains = {i: emission_domain(light, self.scene, self.buffers.space, triangles) for i, light in enumerate(self.scene.lights)}
@@ -114,7 +114,7 @@ class LightHalf:
         self.pilots: dict[int, Pilot] = {}
         for i, domain in self.domains.items():
             yield
-            self.pilots[i] = run_pilot(self.trace, self.scene, i, domain, self._full_power(i), self._needs_spectral_pilot)
+            self.pilots[i] = yield from pilot_steps(self.trace, self.scene, i, domain, self._full_power(i), self._needs_spectral_pilot)
         yield
         shows_map = self.settings.layer.startswith("map:")
         self.map_receiver = check_map_receiver(self.scene, self.buffers, self.settings.layer[4:]) if shows_map else None

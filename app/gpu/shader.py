@@ -10,7 +10,7 @@ from flattened line to (file, line) turns a compiler message back into something
 from __future__ import annotations
 
 import re
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -75,9 +75,9 @@ def load_source(
     Raises `ShaderError` naming the including file and line when an include is missing.
     """
     root = root or paths.shaders_dir()
-    key = (name, tuple((defines or {}).items()), tuple(structs), root)
-    if _kept and key in _sources:
-        return _sources[key]
+    asked = (name, tuple((defines or {}).items()), tuple(structs), root)
+    if _kept and asked in _sources:
+        return _sources[asked]
     lines: list[Line] = []
 
     def emit(text: str, file: str, line: int) -> None:
@@ -111,11 +111,15 @@ def load_source(
     kept = lean(lines)
     source = Source(name, "\n".join(line.text for line in kept) + "\n", tuple((line.file, line.number) for line in kept), len(lines))
     if _kept:
-        _sources[key] = source
+        _sources[asked] = source
     return source
 
 
 _kept: dict[int, OrderedDict[tuple[str, ...], moderngl.ComputeShader | moderngl.Program]] = {}
+_keepers: Counter[int] = Counter()
+"""`keep_programs` not yet undone, by context."""
+_owners: Counter[int] = Counter()
+"""How many hold a program that was handed out while programs were kept, by its id."""
 _sources: dict[Hashable, Source] = {}
 """Flattened sources, where programs are kept."""
 KEPT_PROGRAMS = 96
@@ -126,21 +130,47 @@ def keep_programs(ctx: moderngl.Context) -> None:
     """From now on a program whose text was compiled before in `ctx` is not compiled again.
 
     For a viewer, where an edit makes all passes anew: compiling takes a software renderer longer than tracing. Programs then
-    have several owners, who set every uniform before each use and give them back with `release`.
+    have several owners, who set every uniform before each use and give them back with `release`. Every call wants one of
+    `forget_programs`.
     """
     _kept.setdefault(id(ctx), OrderedDict())
+    _keepers[id(ctx)] += 1
 
 
 def forget_programs(ctx: moderngl.Context) -> None:
-    """Undo `keep_programs`; programs in use stay with their owners."""
-    _kept.pop(id(ctx), None)
+    """Undo one `keep_programs`; after the last one programs stay only as long as they have owners."""
+    if id(ctx) not in _kept:
+        return
+    _keepers[id(ctx)] -= 1
+    if _keepers[id(ctx)] <= 0:
+        drop_programs(ctx)
+        del _kept[id(ctx)], _keepers[id(ctx)]
+
+
+def drop_programs(ctx: moderngl.Context) -> None:
+    """Compile what is asked for from now on again, from the text that is on the disk then."""
     _sources.clear()
+    programs = _kept.get(id(ctx), OrderedDict())
+    while programs:
+        _drop(programs.popitem(last=False)[1])
 
 
 def release(owned: Releasable) -> None:
-    """Give a program (or any other resource) back; it is freed unless it is a program that its context keeps."""
-    if not any(owned is held for programs in _kept.values() for held in programs.values()):
+    """Give a program (or any other resource) back; a program is freed when its last owner does so and its context keeps it no longer."""
+    owners = _owners.get(id(owned))
+    if owners is None:
         owned.release()
+        return
+    _owners[id(owned)] = owners - 1
+    if owners <= 1 and not any(owned is held for programs in _kept.values() for held in programs.values()):
+        _drop(owned)
+
+
+def _drop(program: Releasable) -> None:
+    """Free a program that is kept no longer, unless it has owners."""
+    if _owners.get(id(program), 0) <= 0:
+        _owners.pop(id(program), None)
+        program.release()
 
 
 def _kept_or(ctx: moderngl.Context, texts: tuple[str, ...], compiled: Callable[[], P]) -> P:
@@ -150,9 +180,9 @@ def _kept_or(ctx: moderngl.Context, texts: tuple[str, ...], compiled: Callable[[
     if texts not in programs:
         programs[texts] = compiled()
         if len(programs) > KEPT_PROGRAMS:
-            # Perhaps still in use: its owner frees it then, being no longer kept.
-            programs.popitem(last=False)
+            _drop(programs.popitem(last=False)[1])
     programs.move_to_end(texts)
+    _owners[id(programs[texts])] += 1
     return programs[texts]  # type: ignore[return-value]
 
 

@@ -112,6 +112,10 @@ def _by_target(values: np.ndarray, targets: int) -> np.ndarray:
     return values.reshape(len(values), targets, 4).transpose(1, 0, 2)
 
 
+_KEPT_TABLES = 8
+_blurred: dict[tuple[int | bytes, ...], tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+
+
 @dataclass(frozen=True)
 class _Source:
     """One light under one reflectance: a running integral without its lines, and the lines."""
@@ -144,7 +148,18 @@ class _Source:
         return energy * DENSITY_CELLS
 
     def blurred(self, edges: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """T for each row: (rows, width, bands · columns); energies (bands, columns); mean places (bands,)."""
+        """T for each row: (rows, width, bands · columns); energies (bands, columns); mean places (bands,).
+
+        The last few are kept: in a viewer the same light is cut into the same bands again and again."""
+        parts = (self.smooth.at(np.linspace(0.0, 1.0, FINEST + 1)), self.line_x, self.line_energy, edges)
+        key = (width, *(part.tobytes() for part in parts))
+        if key not in _blurred:
+            while len(_blurred) >= _KEPT_TABLES:
+                _blurred.pop(next(iter(_blurred)))
+            _blurred[key] = self._blur(edges, width)
+        return _blurred[key]
+
+    def _blur(self, edges: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         columns = self.line_energy.shape[1]
         lo, hi = edges[:, :1], edges[:, 1:]
         lines = self._lines_of_bands(edges)

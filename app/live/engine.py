@@ -23,7 +23,7 @@ from app.live.accumulation import Accumulation
 from app.live.difference import looks_other, redo
 from app.live.eye import LiveEye, solo_scene
 from app.live.inputs import LiveInputs, Redo
-from app.live.light import LiveLight
+from app.live.light import LiveLight, quick_size
 from app.live.near import StoredPhotons, caustic_spectrum, reach_of, world_photons
 from app.live.refit import wants_new_maps
 from app.live.stats import LiveStats
@@ -128,8 +128,7 @@ class LiveEngine:
 
     def rebuild(self) -> None:
         """Compile every program again (shaders changed on disk). Raises `ShaderError`, and the present ones stay, where that fails."""
-        shader.forget_programs(self.context.ctx)
-        shader.keep_programs(self.context.ctx)
+        shader.drop_programs(self.context.ctx)
         self.problem = None
         self._start_building(self._wanted)
         while self._building is not None:
@@ -197,11 +196,15 @@ class LiveEngine:
         if self._urgent:
             self._urgent = False
             self._answer(redo(shown.traced, self._inputs, wanted), budget_s)
-        elif still and self._building is None and wants_new_maps(shown.light, wanted):
+        elif self._building is None and self._fits_badly(shown.light, wanted, still):
             self._eye.pause()
             self._maps = None
             shown.light.fit_to(wanted)
             self._job = shown.accumulation.after_edit()
+
+    def _fits_badly(self, light: LiveLight, wanted: LiveInputs, still: bool) -> bool:
+        """Whether maps should be laid out anew: they are only a first answer, or the camera has come near."""
+        return (light.is_coarse and not self._interacting) or (still and wants_new_maps(light, wanted))
 
     def _answer(self, cost: Redo, budget_s: float) -> None:
         wanted, shown = self._wanted, self._shown
@@ -275,8 +278,9 @@ class LiveEngine:
 
     def _build_steps(self, wanted: LiveInputs) -> Iterator[Shown | None]:
         """Everything for a scene that photons must be traced for, up to its first picture; None while it is not done."""
+        width, height = quick_size(wanted.width, wanted.height)
         settings = RenderSettings(
-            width=wanted.width, height=wanted.height, method=wanted.method, seed=wanted.seed, smoothing=wanted.smoothing,
+            width=width, height=height, method=wanted.method, seed=wanted.seed, smoothing=wanted.smoothing,
             max_depth=wanted.scene.render.max_depth, batch=self.budget.batch, local_gain=wanted.local_gain, anchor_weights=True,
         )  # fmt: skip
         scene = replace(wanted.scene, camera=wanted.camera)

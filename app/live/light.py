@@ -73,6 +73,8 @@ class LiveLight(LightHalf):
         self._running: Stored | None = None
         self._older: Stored | None = None
         self._quick: LightMaps | None = None
+        self.is_coarse = True
+        """The maps are those of a first answer: `fit_to` makes proper ones."""
 
     def begin(self, photons: int, seed: int) -> None:
         """As in `LightHalf`; the photons of the pass before stay until there are as many new ones."""
@@ -133,12 +135,15 @@ class LiveLight(LightHalf):
 
     def fit_to(self, inputs: LiveInputs) -> None:
         """Maps laid out for the camera and picture size of `inputs`; empty, to be filled from the stored photons."""
-        self.settings = replace(self.settings, width=inputs.width, height=inputs.height)
         self.view = inputs.camera
+        self.is_coarse = False
+        self.settings = replace(self.settings, width=inputs.width, height=inputs.height)
+        quick, self._quick = self._quick, None
+        for maps in (quick, self.maps):
+            if maps is not None:
+                maps.release()
+        self.maps = None
         self.lay_out(self.view)
-        if self._quick is not None:
-            self._quick.release()
-            self._quick = None
 
     def _show_variables(self, changed: dict[Dispersion, Dispersion]) -> None:
         self.variables.release()
@@ -198,7 +203,7 @@ class LiveLight(LightHalf):
         if bundle is None or not bundle.store.rounds:
             return None
         if self._quick is None:
-            self._quick = self.maps_for(self.view, max(1, round(self.settings.width / QUICK)), max(1, round(self.settings.height / QUICK)))
+            self._quick = self.maps_for(self.view, *quick_size(self.settings.width, self.settings.height))
         self._quick.clear()
         rounds = bundle.store.first_rounds(photons)
         slabs = bundle.store.of_rounds(0, rounds)
@@ -231,6 +236,11 @@ class LiveLight(LightHalf):
             self._quick.release()
         super().release()
         self.buffers.release()
+
+
+def quick_size(width: int, height: int) -> tuple[int, int]:
+    """Picture size for which maps of a first answer are laid out."""
+    return max(16, round(width / QUICK)), max(16, round(height / QUICK))
 
 
 def solo(spectrum: Spectrum, wavelength_nm: float) -> Spectrum:

@@ -8,7 +8,7 @@ light smears what it throws (the number of points on it).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,32 +56,37 @@ def has_extent(light: Light) -> bool:
     return light.kind == "area" or (light.kind == "directional" and light.angular_diameter_deg > 0.0)
 
 
-def run_pilot(trace: TracePass, scene: Scene, light: int, domain: EmissionDomain, power_w: float, spectral: bool) -> Pilot:
-    """Trace the pilots of one light; `power_w`: its whole power per unit weight."""
+def pilot_steps(
+    trace: TracePass, scene: Scene, light: int, domain: EmissionDomain, power_w: float, spectral: bool
+) -> Generator[None, None, Pilot]:
+    """Trace the pilots of one light, pausing after every event of the rays; `power_w`: its whole power per unit weight."""
     count = min(max(1, int(PHOTONS / domain.active_share)), MAX_POINTS)
     # In as many slices as the batch asks for: what a pilot finds must not depend on it.
     slices = -(-count // trace.batch)
 
-    def traced(band: Band, depth: int, place: tuple[float, float] = (0.5, 0.5)) -> tuple[np.ndarray, FluxTally]:
+    def traced(band: Band, depth: int, place: tuple[float, float] = (0.5, 0.5)) -> Generator[None, None, tuple[np.ndarray, FluxTally]]:
         raw, tally = b"", FluxTally()
         for first in range(slices):
             points = len(range(first, count, slices))
-            batch = trace.run(LatticeSlice(light, (band,), count, first, slices, points, (0, 0), (0, 0), 0, 1, light_place=place), domain, depth)
+            piece = LatticeSlice(light, (band,), count, first, slices, points, (0, 0), (0, 0), 0, 1, light_place=place)
+            batch = yield from trace.steps(piece, domain, depth)
             raw += trace.photons.read(size=batch.photons * trace.photon.stride) if batch.photons else b""
             tally.merge(batch.tally)
         return np.frombuffer(raw, trace.photon.dtype), tally
 
     depth, everything = MAX_DEPTH, Band(0.0, 1.0, 0.5, power_w)
-    whole, tally = traced(everything, depth)
+    whole, tally = yield from traced(everything, depth)
     if tally.ended["lost_depth"] > tally.ended["deposited"]:
         depth = trace.max_depth
-        whole, _ = traced(everything, depth)
-    return Pilot(
-        count,
-        whole,
-        [traced(Band(x, x, x, power_w), depth)[0] for x in PLACES] if spectral else [],
-        [traced(everything, depth, place)[0] for place in RIM] if has_extent(scene.lights[light]) else [],
-    )
+        whole, _ = yield from traced(everything, depth)
+    at_places, from_rim = [], []
+    for x in PLACES if spectral else ():
+        record, _ = yield from traced(Band(x, x, x, power_w), depth)
+        at_places.append(record)
+    for place in RIM if has_extent(scene.lights[light]) else ():
+        record, _ = yield from traced(everything, depth, place)
+        from_rim.append(record)
+    return Pilot(count, whole, at_places, from_rim)
 
 
 def landings_of(pilots: Iterable[Pilot]) -> dict[int, Landings]:
