@@ -23,7 +23,7 @@ from app.passes.eye import EyePass
 from app.ui.error_curves import ErrorCurves
 from app.ui.facts import ErrorCurve
 from app.ui.panels.methods import METHOD_NAMES
-from app.ui.reference_thread import ReferenceThread
+from app.ui.reference_thread import ReferenceThread, Snapshot
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -40,8 +40,10 @@ STAND_IN = "stochastic-even"
 """Takes the reference's place where that cannot be computed."""
 DIRECT_SAMPLES = 32
 DISPATCH_SECONDS = 0.012
-_READY = 0.5
-"""relMSE from which on a reference is worth showing."""
+SHOWN_FROM = 1.0
+"""Photons a pixel from which on a reference is shown."""
+MEASURED_FROM = 6.0
+"""And from which on errors are measured against it: before, most lit pixels have not one photon, which looks like certainty."""
 
 
 class Comparison:
@@ -99,7 +101,12 @@ class Comparison:
         snapshot = self._thread.snapshot if self._thread is not None else None
         if snapshot is None:
             return "Reference: the first photons are on their way."
+        if not self._has(snapshot, SHOWN_FROM):
+            least = SHOWN_FROM * self._begun.width * self._begun.height
+            return f"Reference: {snapshot.photons / 1e6:.2f} million photons so far. It is shown from {least / 1e6:.2f} million on."
         told = f"Reference: light tracing in float64 without shared code, {snapshot.photons / 1e6:.1f} million photons, own relMSE {snapshot.relmse:.1e}."
+        if self._compare.plot and not self._has(snapshot, MEASURED_FROM):
+            told += f" Errors are measured from {MEASURED_FROM * self._begun.width * self._begun.height / 1e6:.1f} million on."
         if not snapshot.directly.all():
             told += " What is seen behind glass or in mirrors is not compared."
         if self._begun.local_gain and any(item.local_dispersion for item in self._begun.scene.objects):
@@ -143,7 +150,7 @@ class Comparison:
             else:
                 self._thread.resume()
         if self._needs_engine:
-            self._advance_engine(budget_s)
+            self._advance_engine(running.target_photons, budget_s)
         self._compose(running)
         if state.compare.plot:
             self._measure(state, running)
@@ -198,10 +205,11 @@ class Comparison:
         self._composed_from = 0
         self._curves = ErrorCurves()
 
-    def _advance_engine(self, budget_s: float) -> None:
+    def _advance_engine(self, target_photons: int, budget_s: float) -> None:
         assert self._begun is not None
         if self._engine is None:
             self._engine = self._make_engine(self._context)
+        self._engine.target_photons = target_photons
         self._engine.set(replace(self._begun, method=self._method))
         self._engine.advance(budget_s, False)
         self._count_seconds(self._engine, self._method)
@@ -209,7 +217,7 @@ class Comparison:
     def _compose(self, running: LiveEngine) -> None:
         """The reference's caustics on the picture without caustics; behind glass, the running picture."""
         snapshot = self._thread.snapshot if self._thread is not None else None
-        if snapshot is None or self._direct is None or snapshot.number == self._composed_from or snapshot.relmse > _READY:
+        if snapshot is None or self._direct is None or snapshot.number == self._composed_from or not self._has(snapshot, SHOWN_FROM):
             return
         if not self._direct.advance():
             return
@@ -223,7 +231,14 @@ class Comparison:
         if self._composed is None:
             self._composed = self._context.ctx.texture((width, height), 4, dtype="f4")
         self._composed.write(np.ascontiguousarray(texels))
+        if not self._has(snapshot, MEASURED_FROM):
+            return
         self._curves.set_reference(self._direct.rgb + snapshot.caustic_rgb, snapshot.variance_xyz, snapshot.directly)
+
+    def _has(self, snapshot: Snapshot, photons_a_pixel: float) -> bool:
+        """Whether the reference has come so far, or will not come farther."""
+        height, width = snapshot.directly.shape
+        return snapshot.photons >= photons_a_pixel * width * height or (self._thread is not None and self._thread.is_done)
 
     def _measure(self, state: State, running: LiveEngine) -> None:
         engines = {state.method: running}

@@ -94,7 +94,7 @@ def test_the_reference_agrees_with_the_picture_and_stops_when_the_scene_changes(
 
 def test_another_method_runs_beside_in_its_own_engine(gl, state: State, running: LiveEngine, comparison: Comparison) -> None:
     compared = replace(state, compare=Compare(mode="hold", method="stochastic-even"))
-    until(lambda: (comparison.progress or 0.0) > 0.0005 and comparison.picture is not None, lambda: comparison.advance(compared, running, 0.05))
+    until(lambda: (comparison.progress or 0.0) > 0.05 and comparison.picture is not None, lambda: comparison.advance(compared, running, 0.05))
     live, other = read(running.picture), read(comparison.picture)
     assert other.shape == live.shape and not np.array_equal(other, live)
     assert other.sum() == pytest.approx(live.sum(), rel=0.1)
