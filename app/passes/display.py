@@ -122,16 +122,16 @@ class Display:
                 fresh[variant] = self._compiled(variant)
         except shader.ShaderError:
             for program in fresh.values():
-                program.release()
+                shader.release(program)
             raise
         for program in self._programs.values():
-            program.release()
+            shader.release(program)
         self._programs = fresh
 
     def release(self) -> None:
         """Free programs, buffers and textures."""
         for owned in (*self._programs.values(), self._parameters, *self._samplers.values(), *self._outputs.values()):
-            owned.release()
+            shader.release(owned)
         self._programs.clear()
         self._outputs.clear()
 

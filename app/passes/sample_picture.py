@@ -41,5 +41,5 @@ class SamplePicture:
 
     def release(self) -> None:
         """Free the program and the buffer."""
-        self._program.release()
+        shader.release(self._program)
         self._pixels.release()

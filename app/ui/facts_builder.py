@@ -14,14 +14,14 @@ def facts_of(session: Session) -> Facts:
     """The facts of the frame that begins."""
     picture, document = session.picture, session.document
     shown = picture.shown
-    stats = picture.stats
+    stats, comparison = picture.stats, session.companions.comparison
     return Facts(
         stats=stats,
         picture=None if shown is None else shown.glo,
         picture_size=(0, 0) if shown is None else shown.size,
         frame_ms=tuple(session.frame_ms),
         pass_ms=_pass_ms(session),
-        cursor=session.cursor.facts,
+        cursor=session.companions.cursor.facts,
         title=document.title,
         path=document.path,
         unsaved=document.unsaved,
@@ -29,12 +29,17 @@ def facts_of(session: Session) -> Facts:
         redo=document.history.redo_label,
         history=document.history.entries,
         recent=session.settings.existing_recent(),
-        scenes=session.gallery.entries,
+        scenes=session.companions.gallery.entries,
         messages=session.messages.messages(),
         shader_error=picture.shader_error,
         recovery=None if session.recovery is None else session.recovery.path,
         asks_to_quit=session.asks_to_quit,
-        rays=session.overlay.rays,
+        curves=comparison.curves,
+        reference_progress=comparison.progress,
+        compare_text=comparison.text,
+        compare_stale=comparison.is_stale,
+        rays=session.companions.overlay.rays,
+        job=session.companions.exports.job,
         exposure_ev=picture.exposure_ev,
         delta_s=session.delta_s,
         framebuffer_scale=session.framebuffer_scale,

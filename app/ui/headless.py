@@ -28,6 +28,10 @@ def _nothing() -> None:
     pass
 
 
+def _not_finished(_take_picture: Callable[[], np.ndarray]) -> None:
+    pass
+
+
 class HeadlessInterface:
     """An interface of `size` pixels whose frame is `draw()`.
 
@@ -42,7 +46,7 @@ class HeadlessInterface:
         size: tuple[int, int] = (1280, 720),
         prepare: Callable[[], None] = _nothing,
         rendered: Callable[[], None] = _nothing,
-        finished: Callable[[], None] = _nothing,
+        finished: Callable[[Callable[[], np.ndarray]], None] = _not_finished,
         preferences: Callable[[], Preferences] = Preferences,
     ) -> None:
         self.size = size
@@ -93,7 +97,7 @@ class HeadlessInterface:
         self._host.render()
         self._no_framebuffer.use()
         self._rendered()
-        self._finished()
+        self._finished(self.screenshot)
 
     def screenshot(self) -> np.ndarray:
         """The last frame, uint8 (height, width, 3), top row first."""

@@ -51,7 +51,6 @@ class LivePicture:
         self._make_engine = make_engine or _live_engine
         self.engine: LiveEngine | None = self._make_engine(context)
         self._display = Display(context)
-        self._replaced: list[Display] = []
         self._sampler = SamplePicture(context)
         self._exposure = AutoExposure()
         self._size = (0, 0)
@@ -83,9 +82,6 @@ class LivePicture:
     def resize(self, size: tuple[int, int]) -> None:
         """Size of the shown texture from now on. Only between frames: imgui still draws the texture of the last call."""
         self._size = size
-        for display in self._replaced:
-            display.release()
-        self._replaced.clear()
 
     def give_up(self) -> None:
         """Do without an engine until `restart`; the last picture stays."""
@@ -104,16 +100,13 @@ class LivePicture:
         if self.engine is None:
             self.restart()
             return
-        try:
-            display = Display(self._context)
-        except ShaderError as error:
-            self._display_error = str(error)
-            return
-        self._display_error = None
-        self._replaced.append(self._display)
-        self._display = display
         with self._guarded():
             self.engine.rebuild()
+        try:
+            self._display.reload()
+            self._display_error = None
+        except ShaderError as error:
+            self._display_error = str(error)
 
     def new_scene(self) -> None:
         """Another scene: its exposure is found at once."""

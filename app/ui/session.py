@@ -15,23 +15,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.cli_options import shipped_scenes
 from app.errors import UserError
 from app.gpu.shader_watch import ShaderWatch
 from app.ui import requests, session_requests
 from app.ui.autosave import Autosave, Recovery, recoveries
 from app.ui.crash_log import write_crash
-from app.ui.cursor_facts import Cursor
+from app.ui.companions import Companions
 from app.ui.document import Document
+from app.ui.export import write_codes
 from app.ui.facts import Facts
-from app.ui.gallery import Gallery
 from app.ui.live_picture import EngineError, LivePicture
 from app.ui.message_box import MessageBox
 from app.ui.preferences import Settings, config_dir, load_settings, save_settings
-from app.ui.ray_overlay import RayOverlay
 from app.ui.state import Selection, State
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from app.gpu.context import Context
     from app.live.engine import LiveEngine
     from app.model.scene import Scene
@@ -62,9 +62,9 @@ class Session:
         self.autosave = Autosave(config_dir())
         self.recovery: Recovery | None = next(iter(recoveries(config_dir())), None)
         self.picture = LivePicture(context, make_engine)
-        self.cursor = Cursor()
-        self.overlay = RayOverlay(context)
-        self.gallery = Gallery(context, config_dir(), shipped_scenes())
+        self.companions = Companions(context, config_dir())
+        self.window_picture: Path | None = None
+        """Where a picture of the whole window is to be written once this frame is drawn."""
         self.interface_scale = self.framebuffer_scale = 1.0
         self.asks_to_quit = False
         self.wants_to_close = False
@@ -97,7 +97,7 @@ class Session:
         if self._watch.changed():
             self.reload_shaders()
         if self._may_make_thumbnails():
-            self.gallery.step()
+            self.companions.gallery.step()
 
     def frame(self, draw: Draw, budget_s: float = DEFAULT_BUDGET_S) -> None:
         """Draw the interface with `draw`, within imgui's frame, and answer it; the engine works for about `budget_s`."""
@@ -122,10 +122,11 @@ class Session:
     def wait_s(self) -> float:
         """Seconds the window may sleep when no event comes; 0 while anything moves."""
         state = self.state
-        if self.gallery.is_busy and self._may_make_thumbnails():
+        if self.companions.gallery.is_busy and self._may_make_thumbnails():
             return THUMBNAIL_S
         moves = (
             state.interacting
+            or self.companions.is_busy
             or self.messages.is_fading
             or (state.display.auto_exposure and self.picture.is_settling)
             or (state.playing and self.picture.engine is not None and not self.picture.stats.converged)
@@ -161,9 +162,10 @@ class Session:
         self.engine_s = 0.0
         if self.state.preferences.panels.start_page:  # which covers the picture
             return
+        left = self._work_beside(budget_s)
         started = self._clock()
         try:
-            self.picture.advance(self.state, budget_s)
+            self.picture.advance(self.state, left)
         except EngineError as error:
             self._renderer_stopped(error)
             return
@@ -175,14 +177,28 @@ class Session:
         self._told = problem
         now = self._clock()
         try:
-            self.picture.show(self.state, now, self.delta_s)
-            self.cursor.update(self.state, self.picture, now)
-            self.overlay.update(self.state)
+            self.picture.show(self.state, now, self.delta_s, self.companions.comparison)
+            self.companions.look(self.state, self.picture, now)
         except UserError as error:
             self.messages.tell(sentence(str(error)), is_error=True)
         except Exception as error:  # a bug, or the device is lost
             self.picture.give_up()
             self._renderer_stopped(error)
+
+    def _work_beside(self, budget_s: float) -> float:
+        """Exports and comparison; returns the time that is left."""
+        try:
+            return self.companions.work(self.state, self.picture, budget_s)
+        except Exception as error:  # a bug in a side line must not stop the picture
+            self.companions.exports.cancel()
+            self.save_from_crash("exporting or comparing", error)
+            self.messages.tell(f"Comparing or exporting failed by a fault of the program ({_brief(error)}).", is_error=True)
+            self.state = replace(self.state, compare=replace(self.state.compare, mode="off", plot=False))
+            return budget_s
+        finally:
+            for text, is_error in self.companions.told:
+                self.messages.tell(sentence(text), is_error)
+            self.companions.told.clear()
 
     def _renderer_stopped(self, error: Exception) -> None:
         self.save_from_crash("rendering", error)
@@ -248,6 +264,15 @@ class Session:
         if path is not None:
             self.settings = self.settings.opened(path)
 
+    def write_window_picture(self, path: Path, codes: np.ndarray) -> None:
+        """Write the whole window, uint8 (h, w, 3), as a PNG."""
+        try:
+            write_codes(path, codes)
+        except UserError as error:
+            self.messages.tell(sentence(str(error)), is_error=True)
+        else:
+            self.messages.tell(f"Saved {path.name}.")
+
     def close(self) -> None:
         """The end in good order: settings are remembered, nothing is left to recover."""
         self.autosave.close()
@@ -257,8 +282,7 @@ class Session:
 
     def release(self) -> None:
         """Free what the device holds."""
-        self.gallery.release()
-        self.overlay.release()
+        self.companions.release()
         self.picture.release()
 
 

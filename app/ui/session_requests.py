@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from app.atomic import check_writable
 from app.errors import UserError
 from app.model.scene import Diffuse
 from app.model.scene_defaults import bounds_of
@@ -153,6 +154,24 @@ def _reload_shaders(session: Session, _request: requests.ReloadShaders) -> None:
     session.reload_shaders()
 
 
+def _export(session: Session, request: requests.Screenshot | requests.Bake | requests.Animate) -> None:
+    if isinstance(request, requests.Screenshot) and request.with_interface and not request.spectral:
+        if request.path.suffix.lower() != ".png":
+            raise UserError(f"cannot write {request.path.name}: a picture of the whole window is a .png")
+        check_writable(request.path)
+        session.window_picture = request.path
+        return
+    session.companions.export(request, session.state, session.picture)
+
+
+def _cancel_job(session: Session, _request: requests.CancelJob) -> None:
+    session.companions.cancel_export()
+
+
+def _compute_reference(session: Session, _request: requests.ComputeReference) -> None:
+    session.companions.comparison.restart()
+
+
 def _copy_material(session: Session, request: requests.CopyMaterial) -> None:
     thing = session.state.scene.objects[request.index]
     session.state = replace(session.state, clipboard=thing.material)
@@ -182,6 +201,11 @@ _HANDLERS: dict[type, Callable] = {
     requests.FrameSelection: _frame_selection,
     requests.Retrace: _retrace,
     requests.ReloadShaders: _reload_shaders,
+    requests.Screenshot: _export,
+    requests.Bake: _export,
+    requests.Animate: _export,
+    requests.CancelJob: _cancel_job,
+    requests.ComputeReference: _compute_reference,
     requests.CopyMaterial: _copy_material,
     requests.Notice: _notice,
     requests.DismissMessage: _dismiss,

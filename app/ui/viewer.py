@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from app.ui.headless import HeadlessInterface
 from app.ui.pace import Pace
@@ -39,9 +42,12 @@ class Viewer:
         """imgui has drawn; the screen has not been waited for."""
         self.pace.note(time.perf_counter() - self._drawn_at - self.session.engine_s)
 
-    def finished(self) -> None:
-        """The frame is on the screen."""
+    def finished(self, take_picture: Callable[[], np.ndarray]) -> None:
+        """The frame is on the screen; `take_picture` gives it as uint8 (h, w, 3), top row first."""
         self.session.finished()
+        if self.session.window_picture is not None:
+            path, self.session.window_picture = self.session.window_picture, None
+            self.session.write_window_picture(path, take_picture())
 
     def wait_s(self) -> float:
         """Seconds the window may sleep."""

@@ -44,8 +44,8 @@ class Guest(Protocol):
     def rendered(self) -> None:
         """The frame is drawn, and not yet on the screen."""
 
-    def finished(self) -> None:
-        """After the frame is on the screen."""
+    def finished(self, take_picture: Callable[[], np.ndarray]) -> None:
+        """After the frame is on the screen; `take_picture` is `Window.screenshot`."""
 
     def wait_s(self) -> float:
         """Seconds that the window may sleep when no event comes; 0 for the next frame at once."""
@@ -181,7 +181,7 @@ class Window:
             self.context.finish()
         guest.rendered()
         glfw.swap_buffers(self._handle)
-        guest.finished()
+        guest.finished(self.screenshot)
 
     def screenshot(self) -> np.ndarray:
         """The last frame, interface and all, uint8 (height, width, 3), top row first."""

@@ -1,0 +1,116 @@
+"""A whole viewer without a window: real engine, real panels, a synthetic hand, sizes that suit a test."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from app.gpu.context import Context
+from app.live.engine import Budget, LiveEngine
+from app.model.scene import Dielectric, Diffuse
+from app.ui.headless import HeadlessInterface
+from app.ui.projection import View
+from app.ui.session import Session
+from app.ui.state import Selection
+from app.ui.viewer import headless_viewer
+
+PHOTONS = 1 << 14
+SIZE = (760, 500)
+CELLS = 40
+"""Of a grid over the picture in which the caustic is looked for."""
+SAMPLES = 4
+"""Camera samples a pixel: what is compared is the same to the bit with any number."""
+
+
+class Hands:
+    """A viewer and what a user does with it."""
+
+    def __init__(self, session: Session, interface: HeadlessInterface, photons: int) -> None:
+        self.session, self.interface = session, interface
+        self._photons = photons
+
+    @property
+    def engine(self) -> LiveEngine:
+        engine = self.session.picture.engine
+        assert engine is not None, [message.text for message in self.session.messages.messages()]
+        return engine
+
+    @property
+    def rays_traced(self) -> int:
+        return self.session.picture.stats.rays_traced
+
+    def settle(self, patience_s: float = 60.0) -> np.ndarray:
+        """Frames until nothing is left to do; returns the linear picture (h, w, 3)."""
+        self.interface.frame(2)
+        deadline = time.monotonic() + patience_s
+        while not self.session.picture.stats.converged:
+            self.interface.frame()
+            assert time.monotonic() < deadline, f"not converged after {patience_s} s: {self.session.picture.stats}"
+        return self.picture()
+
+    def picture(self) -> np.ndarray:
+        """The linear picture (h, w, 3) as it is."""
+        texture = self.engine.picture
+        assert texture is not None
+        return np.frombuffer(texture.read(), np.float32).reshape(texture.height, texture.width, 4)[..., :3].copy()
+
+    def glass(self) -> int:
+        """Index of the first glass."""
+        return next(i for i, o in enumerate(self.session.state.scene.objects) if isinstance(o.material, Dielectric))
+
+    def receiver(self) -> int:
+        """Index of the first receiver."""
+        return next(i for i, o in enumerate(self.session.state.scene.objects) if isinstance(o.material, Diffuse))
+
+    def caustic_place(self, share: float = 0.5) -> tuple[float, float]:
+        """Where on the screen the light that came through the glass lands: its middle, or another percentile along its length."""
+        photons = self.engine.stored_photons(100_000)
+        state = self.session.state
+        mine = (photons.source == self.glass()) & (photons.receiver == self.receiver())
+        view = View.of(state.camera, state.viewport_size[0] / state.viewport_size[1])
+        seen, depth = view.project(photons.position[mine])
+        inside = (depth > 0) & ((seen > 0.1) & (seen < 0.9)).all(axis=1)
+        assert inside.sum() > 50, "the caustic is not in view"
+        seen, flux = seen[inside], photons.flux_w[mine][inside]
+        cells = np.floor(seen * CELLS).astype(int) @ [1, CELLS]
+        brightness = np.bincount(cells, flux, CELLS * CELLS)
+        seen = seen[brightness[cells] > 0.3 * brightness.max()]  # the caustic itself, not stray light
+        # A photon itself, not a mean of places, which may lie beside a bent caustic; and none that glass hides.
+        ordered = seen[np.argsort(seen[:, 0])]
+        for at in ordered[int(share * (len(ordered) - 1)) :]:
+            hit = self.engine.pick(float(at[0]), float(at[1]))
+            if hit is not None and hit.object_index == self.receiver():
+                return self.interface.find("Picture").at(float(at[0]), float(at[1]))
+        raise AssertionError("the caustic is hidden by glass")
+
+
+def small_engine(photons: int) -> type[LiveEngine]:
+    """Makes engines of sizes that converge within seconds on the software renderer."""
+
+    def make(context: Context) -> LiveEngine:
+        engine = LiveEngine(context, Budget(1 << 13, photons, photons, 64 << 20))
+        engine._eye.target_samples = SAMPLES
+        return engine
+
+    return make  # type: ignore[return-value]
+
+
+@contextmanager
+def viewer(context: Context, scene: Path, photons: int = PHOTONS, size: tuple[int, int] = SIZE, refine: bool = False) -> Iterator[Hands]:
+    """A viewer of `scene`; `photons` is the target."""
+    session = Session(context, scene, make_engine=small_engine(photons))
+    session.companions.gallery.release()
+    preferences = replace(session.state.preferences, target_photons=photons, refine_when_still=refine)
+    session.state = replace(session.state, preferences=preferences, selection=Selection())
+    interface = headless_viewer(context, session, size)
+    try:
+        yield Hands(session, interface, photons)
+    finally:
+        interface.release()
+        session.autosave.close()
+        session.release()
