@@ -1,0 +1,69 @@
+"""A real window: on a virtual X server where there is no other, from the command line as a user would; and what is said where there is none."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run(tmp_path: Path, *arguments: str, display: bool) -> subprocess.CompletedProcess[str]:
+    """`spectrasplat ARGUMENTS` with a virtual screen or without any."""
+    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    command = [sys.executable, "-P", "-m", "app", *arguments]
+    if display:
+        assert shutil.which("xvfb-run"), "install xvfb and xauth ('apt-get install xvfb xauth'): the window cannot be tested without"
+        command = ["xvfb-run", "-a", "-s", "-screen 0 1400x900x24", *command]
+    return subprocess.run(
+        command, cwd=tmp_path, env=environment | {"SPECTRASPLAT_CONFIG": str(tmp_path / "config"), "PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+def test_the_window_shows_interface_and_caustic(tmp_path: Path, theme: str) -> None:
+    done = run(tmp_path, "view", "prism", "--size", "1000x700", "--theme", theme, "--screenshot", "window.png", "--after", "5", display=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == str(tmp_path / "window.png")
+    picture = np.asarray(Image.open(tmp_path / "window.png").convert("RGB")).astype(int)
+    assert picture.shape == (700, 1000, 3)
+    # The panels on the left have the theme's neutral grey …
+    left = picture[300:600, 20:120]
+    grey = np.median(left)
+    assert (grey < 60) if theme == "dark" else (grey > 180)
+    # … and the picture holds the colours of the spectrum.
+    spread = picture.max(axis=2) - picture.min(axis=2)
+    strong = picture[spread > 90]
+    assert len(strong) > 1000
+    for channel in range(3):
+        assert (strong.argmax(axis=1) == channel).mean() > 0.05
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["config", "window.png"]  # no imgui.ini
+
+
+def test_without_a_display_one_sentence_names_the_way_out(tmp_path: Path) -> None:
+    done = run(tmp_path, "view", display=False)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1 and "spectrasplat render" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["view", "nosuch"], "scene 'nosuch' is neither a file nor shipped"),
+        (["view", "--theme", "blue"], "--theme 'blue' is unknown"),
+        (["view", "--size", "10"], "--size '10' is not WIDTHxHEIGHT"),
+        (["view", "--after", "3"], "--after says when the --screenshot is taken"),
+        (["view", "--screenshot", "x.jpg"], "must end in .png"),
+    ],
+)
+def test_wrong_options_are_told_before_a_window_is_opened(tmp_path: Path, arguments: list[str], told: str) -> None:
+    done = run(tmp_path, *arguments, display=False)
+    assert done.returncode == 2 and told in done.stderr and done.stderr.count("\n") == 1
