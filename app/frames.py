@@ -16,7 +16,6 @@ import numpy as np
 
 from app.gpu.context import Context
 from app.gpu.scene_buffers import GpuSpace, SceneBuffers
-from app.gpu.splat_tables import SplatTables
 from app.light_half import LightHalf, spectral_axis
 from app.light_plan import LightPlan
 from app.live.difference import redo
@@ -78,10 +77,7 @@ class _FramedLight(LightHalf):
         spans = [limits.get(i, [(0.0, 1.0)]) for i in range(len(self.scene.lights))]
         if spans != self._spans:
             self.tables.release()
-            channels = "xyz" if self.bin_edges_nm is None else self.bin_edges_nm.tolist()
-            spectra = [light.spectral_power for light in self.scene.lights]
-            self._tables = SplatTables.build(self.context.ctx, self.buffers.axis, spectra, self.reflectances, spans, channels)
-            self._spans = spans
+            self._spans, self._tables = spans, self._tables_of(spans)
 
     def _divided(self, plan: LightPlan) -> LightPlan:
         needs = [s.counts[plan.index] for s in self.surveys if plan.index in s.counts]

@@ -18,6 +18,7 @@ from app.gpu import records
 from app.gpu.context import Context
 from app.gpu.gain_buffers import GainBuffers
 from app.gpu.map_atlas import MapAtlas
+from app.gpu.reindex import ReindexBuffer, Reindexing, Spans
 from app.gpu.scene_buffers import SceneBuffers
 from app.gpu.splat_tables import SplatTables
 from app.light_maps import LightMaps
@@ -50,6 +51,20 @@ class LightStats:
     footprints_dropped: int = 0
     dropped_w: float = 0.0
     """Flux of those photons, splatted as one texel each."""
+
+
+@dataclass(frozen=True)
+class ShownTables:
+    """The spectra as splats see them, and which wavelengths belong to which paths."""
+
+    tables: SplatTables
+    reindex: ReindexBuffer | None
+
+    def release(self) -> None:
+        """Free both."""
+        self.tables.release()
+        if self.reindex is not None:
+            self.reindex.release()
 
 
 @dataclass(frozen=True)
@@ -90,15 +105,16 @@ class LightHalf:
         batch = settings.batch or DEFAULT_BATCH * (1 if context.is_software else 4)
         batch = max(min(batch, _largest_batch(context, features)), self.least_batch)
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
-        self.variables = SpectralVariables.build(context.ctx, buffers.variable_table)
+        self.variables = SpectralVariables.build(context.ctx, buffers.variables)
         self.gains = GainBuffers(context.ctx, scene, buffers.receivers, buffers.space, buffers.axis) if features.local_gain else None
         self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
         self.maps: LightMaps | None = None
         self.splat_part = 1 << 30
         """Photons splatted without a pause."""
         self._shown_spectra: Sequence[Spectrum] = [light.spectral_power for light in scene.lights]
-        self._tables: SplatTables | None = None
-        self._spans: list[list[tuple[float, float]]] = []
+        self._reindexing = Reindexing.of(buffers.axis.glasses[0], buffers.axis.glasses[0]) if features.reindexed else None
+        self._tables: ShownTables | None = None
+        self._spans: Spans = []
 
     def prepare(self) -> None:
         """Pilots and maps, once for a scene. Afterwards `layout` and `atlas` exist, and `features` are those of the maps too."""
@@ -195,12 +211,17 @@ class LightHalf:
                 self._tables.release()
             self._spans, self._tables = spans, self._tables_of(spans)
 
-    def _tables_of(self, spans: list[list[tuple[float, float]]]) -> SplatTables:
+    def _tables_of(self, spans: Spans, width: int | None = None) -> ShownTables:
         channels = "xyz" if self.bin_edges_nm is None else self.bin_edges_nm.tolist()
-        return SplatTables.build(self.context.ctx, self.buffers.axis, self._shown_spectra, self.reflectances, spans, channels)
+        ctx, spectra, reindexing = self.context.ctx, self._shown_spectra, self._reindexing
+        if reindexing is None:
+            return ShownTables(SplatTables.build(ctx, self.buffers.axis, spectra, self.reflectances, spans, channels, width), None)
+        shown = reindexing.spans(spans, self.buffers.axis, spectra)
+        tables = SplatTables.build(ctx, reindexing.axis, spectra, self.reflectances, shown, channels, width)
+        return ShownTables(tables, ReindexBuffer(ctx, reindexing, spans, shown, spectra, tables.classes))
 
     @property
-    def tables(self) -> SplatTables:
+    def tables(self) -> ShownTables:
         """The spectral tables of the plan that was begun."""
         assert self._tables is not None
         return self._tables
@@ -277,19 +298,21 @@ class LightHalf:
         photons: moderngl.Buffer,
         count: int,
         coarsening: float = 1.0,
-        tables: SplatTables | None = None,
+        tables: ShownTables | None = None,
         maps: LightMaps | None = None,
         stride: int = 1,
     ) -> Iterator[None]:
         """Add every `stride`-th photon record to the maps, with footprints `coarsening` times as wide, pausing after every `splat_part` of them.
 
         `count`: of those that are added. `tables` of another plan than the one begun, `maps` of another layout than the light half's own."""
-        maps = maps or self._maps
+        maps, tables = maps or self._maps, tables or self.tables
         smoothing = self.settings.smoothing * coarsening
         for start in range(0, count, self.splat_part):
             started = time.perf_counter()
             part = min(self.splat_part, count - start)
-            maps.splatter.run(photons, part, self.variables, tables or self.tables, maps.atlas, maps.receivers, smoothing, self.gains, start * stride, stride)
+            maps.splatter.run(
+                photons, part, self.variables, tables.tables, maps.atlas, maps.receivers, smoothing, self.gains, start * stride, stride, tables.reindex
+            )  # fmt: skip
             if self.context.is_software:
                 self.context.finish()
             self.stats.splat_seconds += time.perf_counter() - started

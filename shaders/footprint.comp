@@ -18,6 +18,9 @@ layout(std140, binding = 0) uniform Parameters {
     float x_reference;
     uint stride;
     uint unused;
+    float y_scale;
+    float y_offset;
+    vec2 unused2;
 };
 layout(std430, binding = 0) readonly buffer Photons { PhotonRecord photons[]; };
 layout(std430, binding = 1) writeonly buffer Splats { SplatRecord splats[]; };
@@ -31,6 +34,14 @@ layout(std430, binding = 7) buffer Commands { uint draw_words[20]; uint count_dr
 #ifdef LOCAL_GAIN
 layout(std430, binding = 9) readonly buffer GainBoxes { GainBox gain_boxes[]; };
 layout(std430, binding = 10) readonly buffer Gains { float gains[]; };
+#endif
+
+#ifdef REINDEXED
+struct TracedBand {
+    vec4 range;  // the band's ends as traced, the ends of its light's spectrum in the coordinate that is shown
+    vec4 side;  // 1 for the first band, 1 for the last one
+};
+layout(std430, binding = 11) readonly buffer TracedBands { TracedBand traced_bands[]; };
 #endif
 
 #define RECEIVER_CHARTS 1u
@@ -124,9 +135,9 @@ float mean_throughput(PhotonRecord photon) {
 #endif
 }
 
-// Whether the photon has only a part of its table's band. One of no width stands for all of it.
+// Whether the photon has another range than its table's band: a part of it, or what a local gain put there. One of no width stands for all of it.
 bool is_cut(PhotonRecord photon, vec4 band) {
-    return photon.x_hi > photon.x_lo && photon.x_hi - photon.x_lo < band.y - band.x - 1e-5;
+    return photon.x_hi > photon.x_lo && any(greaterThan(abs(vec2(photon.x_lo, photon.x_hi) - band.xy), vec2(1e-5)));
 }
 
 SplatRecord small_splat(PhotonRecord photon, Footprint f, vec4 band) {
@@ -343,44 +354,72 @@ void main() {
 #endif
     Placement place = placements[at];
 
+    uint light = photon.light_and_source & 255u;
+    uint band = (photon.light_and_source >> 8u) & 255u;
+    uint table = (light * classes + receiver.reflectance_class) * bands + band;
+    vec4 table_band = table_bands[table];
+
     vec3 to_lo = vec3(0.0);
     vec3 to_hi = vec3(0.0);
 #if GROUPS > 0
-    // The path belongs to the glass it was traced through; what is shown may have another dispersion, followed to first order.
+#if GROUPS > 3
+#define ALL_GROUPS(what) what(0) what(1) what(2) what(3)
+#elif GROUPS > 2
+#define ALL_GROUPS(what) what(0) what(1) what(2)
+#elif GROUPS > 1
+#define ALL_GROUPS(what) what(0) what(1)
+#else
+#define ALL_GROUPS(what) what(0)
+#endif
+    // The path belongs to the glass it was traced through.
+    float x_traced = photon.x_anchor;
+#ifdef REINDEXED
+    // What a path is depends on the one index only: its interval of that stays, and which wavelengths have it now depends on
+    // the glass that is shown and on the local gain. y is affine in the index.
+    float v_traced = spectral_variable(traced_row, x_traced);
+    vec2 v_ends = vec2(spectral_variable(traced_row, photon.x_lo), spectral_variable(traced_row, photon.x_hi));
+    float grown = 1.0;
+#ifdef LOCAL_GAIN
+    vec3 to_reference = photon.dposition_dvar0.xyz * ((x_reference - y_offset) / y_scale - v_traced);
+    grown = max(local_gain(photon.receiver, photon.position + to_reference), 1e-3);
+#endif
+    TracedBand traced = traced_bands[table];
+    bool is_line = photon.x_hi <= photon.x_lo;
+    bvec2 whole = lessThan(abs(vec2(photon.x_lo, photon.x_hi) - traced.range.xy), vec2(1e-6));
+    vec2 y = x_reference + (y_offset + y_scale * v_ends - x_reference) / grown;
+    vec2 y_in = clamp(y, traced.range.z, traced.range.w);
+    // The outermost bands reach to the ends of the light's spectrum, the others to their neighbours.
+    if (is_line || (whole.x && traced.side.x > 0.0 && y.y > traced.range.z)) y_in.x = traced.range.z;
+    if (is_line || (whole.y && traced.side.y > 0.0 && y.x < traced.range.w)) y_in.y = traced.range.w;
+    bool carries = is_line || y_in.y > y_in.x;
+    if (grown == 1.0 && carries) {
+        // To the last digit those of the table, or the photon would pass for a cut one.
+        y_in = mix(y_in, table_band.xy, whole);
+    }
+    vec2 v_path = (x_reference + grown * (y_in - x_reference) - y_offset) / y_scale;
+    to_lo = photon.dposition_dvar0.xyz * (v_path.x - v_traced);
+    to_hi = photon.dposition_dvar0.xyz * (v_path.y - v_traced);
+    photon.x_lo = y_in.x;
+    photon.x_hi = y_in.y;
+    photon.x_anchor = clamp(x_reference + (y_offset + y_scale * v_traced - x_reference) / grown, y_in.x, y_in.y);
+#else
 #ifdef LOCAL_GAIN
     // Displacements grow about where the light of the reference wavelength lands, the same place for all bands of a path.
     vec3 to_reference = vec3(0.0);
-#define ADD_REFERENCE(g) to_reference += photon.dposition_dvar##g.xyz * (spectral_variable(uint(g), x_reference) - spectral_variable(traced_row + uint(g), photon.x_anchor));
-    ADD_REFERENCE(0)
-#if GROUPS > 1
-    ADD_REFERENCE(1)
-#endif
-#if GROUPS > 2
-    ADD_REFERENCE(2)
-#endif
-#if GROUPS > 3
-    ADD_REFERENCE(3)
-#endif
-    float gain = local_gain(photon.receiver, photon.position + to_reference);
+#define ADD_REFERENCE(g) to_reference += photon.dposition_dvar##g.xyz * (spectral_variable(uint(g), x_reference) - spectral_variable(traced_row + uint(g), x_traced));
+    ALL_GROUPS(ADD_REFERENCE)
 #endif
 #define ADD_GROUP(g) { \
-        float anchor = spectral_variable(traced_row + uint(g), photon.x_anchor); \
+        float anchor = spectral_variable(traced_row + uint(g), x_traced); \
         to_lo += photon.dposition_dvar##g.xyz * (spectral_variable(uint(g), photon.x_lo) - anchor); \
         to_hi += photon.dposition_dvar##g.xyz * (spectral_variable(uint(g), photon.x_hi) - anchor); \
     }
-    ADD_GROUP(0)
-#if GROUPS > 1
-    ADD_GROUP(1)
-#endif
-#if GROUPS > 2
-    ADD_GROUP(2)
-#endif
-#if GROUPS > 3
-    ADD_GROUP(3)
-#endif
+    ALL_GROUPS(ADD_GROUP)
 #ifdef LOCAL_GAIN
+    float gain = local_gain(photon.receiver, photon.position + to_reference);
     to_lo = mix(to_reference, to_lo, gain);
     to_hi = mix(to_reference, to_hi, gain);
+#endif
 #endif
 #endif
     vec3 middle = 0.5 * (to_lo + to_hi);
@@ -397,18 +436,16 @@ void main() {
         unusual_w[i].y += photon.flux_w;
     }
 
-    uint light = photon.light_and_source & 255u;
-    uint band = (photon.light_and_source >> 8u) & 255u;
-    uint table = (light * classes + receiver.reflectance_class) * bands + band;
     uint layer = table * uint(TARGETS);
-    vec4 table_band = table_bands[table];
-
     bool inside = contains(place.rect, f.centre, 0.0);
     Placement drawn_in = place;
     choose_level(drawn_in, f, photon, middle, sweep);
     SplatRecord fine = splat_of(photon, f, layer, table_band);
     fine.rect = drawn_in.rect;
     bool drawn = touches(drawn_in.rect, fine.centre, half_extent(fine));
+#ifdef REINDEXED
+    drawn = drawn && carries;
+#endif
     if (!drawn) {
         fine.kind = 0u;
     }
@@ -433,6 +470,11 @@ void main() {
             if (!touches(outer.rect, coarse.centre, half_extent(coarse))) {
                 coarse.kind = 0u;
             }
+#ifdef REINDEXED
+            if (!carries) {
+                coarse.kind = 0u;
+            }
+#endif
         }
     }
     mark_edge(coarse);

@@ -77,7 +77,7 @@ class Rig:
         self._trace = TracePass(context, variant.features, self._buffers, work.batch, light.settings.max_depth)
         self._splatter = Splatter(ctx, variant.features)
         self._atlas = MapAtlas(ctx, light.layout.size, light.layout.placements, variant.features.targets)
-        self._variables = SpectralVariables.build(ctx, self._buffers.variable_table)
+        self._variables = SpectralVariables.build(ctx, self._buffers.variables)
         spans = {plan.index: [(band.x_lo, band.x_hi) for band in plan.bands] for plan in light.plans}
         channels = "xyz" if variant.bins is None else np.linspace(380.0, 780.0, variant.bins + 1).tolist()
         spectra = [lamp.spectral_power for lamp in scene.lights]

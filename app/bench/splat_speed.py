@@ -40,6 +40,7 @@ class _Features:
     targets: int = 1
     point_spectrum: bool = False
     local_gain: bool = False
+    reindexed: bool = False
 
 
 def measure(ctx: moderngl.Context, pixels: float, count: int = 1 << 17) -> dict[str, float]:

@@ -306,6 +306,8 @@ class SceneBuffers:
         rows.append(np.array([power.at(x)[:, 3] for power in self.light_power]).reshape(-1, SAMPLES))
         counts = np.cumsum([0] + [len(r) for r in rows])
         self.layout = SpectraLayout(*counts[:5].tolist(), rows=int(counts[5]))
+        self.variables = variables
+        """Each spectral group's variable over x, float64 (groups, SAMPLES)."""
         self.variable_table = variables.astype("f4")
         self.media = media
         self._spectra = spectra_texture(self.ctx, np.concatenate(rows) if counts[5] else np.ones((1, SAMPLES)))

@@ -66,19 +66,21 @@ class SplatTables:
         reflectances: Sequence[np.ndarray | None],
         bands: Sequence[Sequence[tuple[float, float]]],
         channels: Channels = "xyz",
+        width: int | None = None,
     ) -> SplatTables:
         """Tables for the lights' spectra under each reflectance (401,) or None.
 
         `bands[light]`: (x_lo, x_hi) of its bands; a band of no width stands for a line. Lights with fewer
         bands than others are padded with empty ones. `channels`: "xyz" stores X, Y, Z (lm) and radiant W;
-        else ascending wavelengths in nm, the edges of the bins, and each bin's W, four bins a target.
+        else ascending wavelengths in nm, the edges of the bins, and each bin's W, four bins a target. `width`: samples along xi,
+        None for what a finished picture needs.
         """
         import moderngl
 
         band_count = max(len(of_light) for of_light in bands)
         columns = 4 if channels == "xyz" else 4 * -(-(len(channels) - 1) // 4)
         targets = columns // 4
-        width = WIDTH_WITH_LINES if any(light.lines for light in lights) else WIDTH
+        width = width or (WIDTH_WITH_LINES if any(light.lines for light in lights) else WIDTH)
         shape = (len(lights), len(reflectances), band_count)
         texels = np.zeros((*shape, targets, len(SIGMAS), width, 4), np.float32)
         integrals = np.zeros((*shape, targets, 4), np.float32)

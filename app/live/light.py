@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.gpu.gain_buffers import GainBuffers
-from app.gpu.splat_tables import SplatTables
-from app.light_half import LightHalf, RoundOf
+from app.gpu.reindex import Reindexing, Spans
+from app.light_half import LightHalf, RoundOf, ShownTables
 from app.light_maps import LightMaps
 from app.live.difference import shown_glasses
 from app.live.store import PhotonStore
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 QUICK = 5
 """Pixels to a texel's side in the maps that answer a drag."""
+QUICK_WIDTH = 128
+"""Samples of their spectral tables."""
 SOLO_WIDTH_NM = 4.0
 """Standard deviation of the window that a single wavelength is seen through."""
 SOLO_GAIN_NM = 100.0
@@ -41,15 +43,24 @@ class Stored:
     """The stored photons of one pass, with the spectral tables of its plan."""
 
     store: PhotonStore
-    spans: list[list[tuple[float, float]]]
-    tables: SplatTables
+    spans: Spans
     pass_photons: int
     """Photons the pass was asked for: the weight that its records carry."""
+    tables: ShownTables | None = None
+    """Made when they are needed: an edit that is followed by the next one needs only the quick ones."""
+    quick_tables: ShownTables | None = None
+
+    def forget_tables(self) -> None:
+        """They show another glass or light than what is wanted now."""
+        for tables in (self.tables, self.quick_tables):
+            if tables is not None:
+                tables.release()
+        self.tables = self.quick_tables = None
 
     def release(self) -> None:
         """Free photons and tables."""
         self.store.clear()
-        self.tables.release()
+        self.forget_tables()
 
 
 class LiveLight(LightHalf):
@@ -70,6 +81,8 @@ class LiveLight(LightHalf):
         """What the maps are laid out for."""
         self.judged_view: object = None
         """The view for which `refit` last looked whether the maps fit."""
+        self._changed: dict[Dispersion, Dispersion] = {}
+        """Glasses that are shown otherwise than they were traced."""
         self._running: Stored | None = None
         self._older: Stored | None = None
         self._quick: LightMaps | None = None
@@ -86,7 +99,27 @@ class LiveLight(LightHalf):
         # Its tables stay with it: the new plan gets its own.
         self._tables, self._spans = None, []
         super().begin(photons, seed)
-        self._running = Stored(PhotonStore(self.context.ctx, self.capacity_bytes), self._spans, self.tables, photons)
+        self._running = Stored(PhotonStore(self.context.ctx, self.capacity_bytes), self._spans, photons, self._tables)
+        self._tables = None
+
+    @property
+    def tables(self) -> ShownTables:
+        """Of the pass that runs."""
+        if self._running is None:
+            return super().tables
+        return self._full_tables(self._running)
+
+    def _full_tables(self, bundle: Stored) -> ShownTables:
+        if bundle.tables is None:
+            bundle.tables = self._tables_of(bundle.spans)
+        return bundle.tables
+
+    def _quick_tables(self, bundle: Stored) -> ShownTables:
+        if bundle.tables is not None:
+            return bundle.tables
+        if bundle.quick_tables is None:
+            bundle.quick_tables = self._tables_of(bundle.spans, QUICK_WIDTH)
+        return bundle.quick_tables
 
     def keep(self, batch: Batch, of: RoundOf) -> None:
         """Store the batch."""
@@ -123,15 +156,35 @@ class LiveLight(LightHalf):
         glasses = shown_glasses(self.scene, inputs.scene)
         if glasses is None:
             raise ValueError("these photons cannot follow the scene: it must be traced")
-        self._show_variables({a: b for a, b in glasses.items() if a != b})
-        self._show_gains(inputs)
+        changed = {a: b for a, b in glasses.items() if a != b}
         spectra = [light.spectral_power if inputs.solo_nm is None else solo(light.spectral_power, inputs.solo_nm) for light in inputs.scene.lights]
-        if spectra != self._shown_spectra:
-            self._shown_spectra = spectra
+        stale = spectra != self._shown_spectra
+        self._shown_spectra = spectra
+        self._show_gains(inputs)
+        if changed != self._changed:
+            self._changed = changed
+            stale = self._show_glass(changed) or stale
+        if stale:
             for bundle in self._bundles:
-                bundle.tables.release()
-                bundle.tables = self._tables_of(bundle.spans)
-            self._tables = self._running.tables if self._running else None
+                bundle.forget_tables()
+
+    def _show_glass(self, changed: dict[Dispersion, Dispersion]) -> bool:
+        """Follow an edit of n(λ); True where the spectral tables follow too."""
+        self.first_order = bool(changed)
+        table, axis = self.buffers.variables, self.buffers.axis
+        self.variables.release()
+        if self.features.reindexed:
+            (traced,) = axis.glasses
+            reindexing = Reindexing.of(traced, changed.get(traced, traced))
+            if reindexing is not None:
+                self._reindexing = reindexing
+                self.variables = SpectralVariables.build(self.context.ctx, table)
+                return True
+            self._reindexing = Reindexing.of(traced, traced)
+        groups = self.buffers.groups
+        shown = replace(groups, glasses=tuple(changed.get(glass, glass) for glass in groups.glasses)).variables(axis)
+        self.variables = SpectralVariables.build(self.context.ctx, shown, table if changed else None)
+        return self.features.reindexed
 
     def fit_to(self, inputs: LiveInputs) -> None:
         """Maps laid out for the camera and picture size of `inputs`; empty, to be filled from the stored photons."""
@@ -190,7 +243,7 @@ class LiveLight(LightHalf):
             store.drop_unfinished()
         share = store.rounds / store.rounds_of_pass
         for slab in store.of_rounds(0, store.rounds):
-            yield from self.splat_steps(slab.buffer, slab.count, 1.0 if of_running else share**-0.5, bundle.tables)
+            yield from self.splat_steps(slab.buffer, slab.count, 1.0 if of_running else share**-0.5, self._full_tables(bundle))
             yield
         maps.photon_weight = bundle.pass_photons * share
 
@@ -210,8 +263,9 @@ class LiveLight(LightHalf):
         # Records follow a space-filling curve over the lattice: every so manieth is nearly a lattice again.
         stride = max(1, sum(slab.count for slab in slabs) // photons)
         share = rounds / bundle.store.rounds_of_pass / stride
+        tables = self._quick_tables(bundle)
         for slab in slabs:
-            for _ in self.splat_steps(slab.buffer, -(-slab.count // stride), share**-0.5, bundle.tables, self._quick, stride):
+            for _ in self.splat_steps(slab.buffer, -(-slab.count // stride), share**-0.5, tables, self._quick, stride):
                 pass
         self._quick.photon_weight = bundle.pass_photons * share
         return self._quick

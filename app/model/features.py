@@ -66,6 +66,8 @@ class Features:
     """RGBA32F accumulation targets."""
     local_gain: bool = False
     """The dispersion brush scales spectral displacements on some receiver."""
+    reindexed: bool = False
+    """Photons stand for intervals of the one index that disperses, and carry whatever wavelengths an edit puts there."""
     anchor_weights: bool = False
     """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
 
@@ -127,9 +129,21 @@ class Features:
             charts=any(isinstance(o.material, Diffuse) and not is_flat(o) for o in scene.objects),
             nested_windows=any(isinstance(o.material, Diffuse) and is_flat(o) for o in scene.objects),
             targets=-(-settings.bins // 4) if settings.bins else 1,
+            reindexed=_reindexed(scene, settings, groups, coloured=absorbing or coloured_mirror),
             local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
             anchor_weights=settings.anchor_weights,
         )
+
+
+def _reindexed(scene: Scene, settings: RenderSettings, groups: int, *, coloured: bool) -> bool:
+    """Whether an edit of the dispersion, or the brush, moves wavelengths between paths: where n alone says what a path is and weighs."""
+    from app.model.spectral_tables import SpectralAxis
+
+    edited = settings.anchor_weights or (settings.local_gain and any(o.local_dispersion for o in scene.objects))
+    if not edited or groups != 1 or coloured or settings.method != "srd":
+        return False
+    (turning,) = SpectralAxis.build([o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)]).turning_nm
+    return len(turning) == 2
 
 
 def dispersive_materials(scene: Scene) -> list[int]:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from app.gpu.gain_buffers import GainBuffers
     from app.gpu.map_atlas import MapAtlas
+    from app.gpu.reindex import ReindexBuffer
     from app.gpu.splat_tables import SplatTables
 
 WORKGROUP, LIST_WORKGROUP = 64, 256
@@ -70,6 +71,9 @@ PARAMETERS = Struct(
         Field("x_reference", "float", "spectral coordinate whose landing point a local gain leaves alone"),
         Field("stride", "uint", "step from one photon to the next that is splatted"),
         Field("unused", "uint", ""),
+        Field("y_scale", "float", "reindexed: coordinate of the tables = y_offset + y_scale · the path's variable"),
+        Field("y_offset", "float", ""),
+        Field("unused2", "vec2", ""),
     ),
 )
 
@@ -83,14 +87,18 @@ class SpectralVariables:
     samples: int
     traced_row: int = 0
     """First row of the traced ones."""
+    base: tuple[float, ...] = ()
+    """What is subtracted from each group's rows: only differences count, and they keep more digits."""
 
     @classmethod
     def build(cls, ctx: moderngl.Context, shown: np.ndarray, traced: np.ndarray | None = None) -> SpectralVariables:
-        """`shown`, `traced`: float (groups, samples), `traced` None where the photons' glass is the one shown."""
+        """`shown`, `traced`: float64 (groups, samples), `traced` None where the photons' glass is the one shown."""
         if not shown.size:
             return cls(ctx.buffer(reserve=16), 2)
-        rows = shown if traced is None else np.concatenate([shown, traced])
-        return cls(ctx.buffer(np.ascontiguousarray(rows, np.float32)), shown.shape[1], 0 if traced is None else len(shown))
+        base = (shown if traced is None else traced)[:, shown.shape[1] // 2, None]
+        rows = shown - base if traced is None else np.concatenate([shown - base, traced - base])
+        row = 0 if traced is None else len(shown)
+        return cls(ctx.buffer(np.ascontiguousarray(rows, np.float32)), shown.shape[1], row, tuple(base[:, 0].tolist()))
 
     def release(self) -> None:
         self.buffer.release()
@@ -113,6 +121,8 @@ class SplatFeatures(Protocol):
     def charts(self) -> bool: ...
     @property
     def local_gain(self) -> bool: ...
+    @property
+    def reindexed(self) -> bool: ...
 
 
 def splat_defines(features: SplatFeatures) -> dict[str, int]:
@@ -142,8 +152,7 @@ class Footprints:
             "FLAG_FOOTPRINT_DROPPED": f"{FLAG_FOOTPRINT_DROPPED}u",
         }
         structs = (photon_record(groups), PLACEMENT, RECEIVER, SPLAT, GAIN_BOX)
-        if features.local_gain:
-            defines["LOCAL_GAIN"] = 1
+        defines |= {name: 1 for name, on in {"LOCAL_GAIN": features.local_gain, "REINDEXED": features.reindexed}.items() if on}
         self._program = shader.compute(ctx, "footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
         self._unusual = ctx.buffer(np.zeros((group, 2), np.float32))
@@ -170,11 +179,17 @@ class Footprints:
         extent_limit: float,
         gains: GainBuffers | None = None,
         stride: int = 1,
+        reindex: ReindexBuffer | None = None,
     ) -> None:
         """Fill slots [0, count * slots_per_photon) from photons first, first + stride, … (`count` of them)."""
         values = PARAMETERS.zeros(1)
-        x_reference = 0.0 if gains is None else gains.x_reference
-        values[0] = (first, count, tables.classes, tables.bands, variables.samples, tables.rows, smoothing, extent_limit, variables.traced_row, x_reference, stride, 0)
+        x_reference = gains.x_reference if gains is not None else 0.0
+        scale, offset = 1.0, 0.0
+        if reindex is not None:
+            scale, x_reference = reindex.reindexing.scale, reindex.reindexing.y_reference
+            offset = reindex.reindexing.y(variables.base[0])
+            reindex.bind()
+        values[0] = (first, count, tables.classes, tables.bands, variables.samples, tables.rows, smoothing, extent_limit, variables.traced_row, x_reference, stride, 0, scale, offset, (0.0, 0.0))
         self._parameters.write(values.tobytes())
         self._parameters.bind_to_uniform_block(0)
         for binding, buffer in enumerate(

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from app.gpu.gain_buffers import GainBuffers
     from app.gpu.map_atlas import MapAtlas
+    from app.gpu.reindex import ReindexBuffer
     from app.gpu.splat_tables import SplatTables
 
 GROUP = 1 << 15
@@ -90,11 +91,13 @@ class Splatter:
         gains: GainBuffers | None = None,
         start: int = 0,
         stride: int = 1,
+        reindex: ReindexBuffer | None = None,
     ) -> None:
         """Deposit the `count` photons start, start + stride, … of `photons` (photon_record(groups)).
 
         `variables`: each group's variable at equally spaced x; `receivers`: RECEIVER records; `smoothing`: standard deviation
-        of a footprint in lattice spacings; `gains`: the brush's, where the features have it.
+        of a footprint in lattice spacings; `gains`: the brush's, `reindex`: which
+        wavelengths the paths carry, where the features have them.
         """
         chunk = int(np.clip(atlas.size[0] * atlas.size[1] // FLUSH_SHARE, SMALLEST_CHUNK, CHUNK))
         group = min(GROUP, chunk)
@@ -102,7 +105,7 @@ class Splatter:
             part = min(group, count - done)
             first = start + done * stride
             self._ctx.memory_barrier()
-            self._footprints.run(photons, first, part, variables, tables, atlas, receivers, smoothing, EXTENT_LIMIT, gains, stride)
+            self._footprints.run(photons, first, part, variables, tables, atlas, receivers, smoothing, EXTENT_LIMIT, gains, stride, reindex)
             self._ctx.memory_barrier()
             self.draw(tables, atlas)
             atlas.pending += part

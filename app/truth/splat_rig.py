@@ -30,6 +30,7 @@ class SplatFeatures:
     targets: int = 1
     point_spectrum: bool = False
     local_gain: bool = False
+    reindexed: bool = False
 
 
 @dataclass
