@@ -82,6 +82,11 @@ offer_osmesa() {
         apt_install libosmesa6 || true
 }
 
+# The viewer's window is tested on a virtual screen.
+offer_xvfb() {
+    { command -v xvfb-run && command -v Xvfb && command -v xauth; } >/dev/null 2>&1 || apt_install xvfb xauth || true
+}
+
 # Compile the tree builder ahead of time, so that the first picture does not wait for it.
 warm_caches() {
     "$venv_python" -P -m app.model.bvh --warm >/dev/null 2>&1 || true
@@ -122,7 +127,7 @@ set_up() {
             make_venv
         fi
         install_packages "$extras"
-        [ -z "$extras" ] || offer_osmesa
+        [ -z "$extras" ] || { offer_osmesa; offer_xvfb; }
         warm_caches
         printf '%s' "$key" >"$stamp"
     fi

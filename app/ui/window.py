@@ -69,7 +69,7 @@ class Guest(Protocol):
         """The window may close now."""
 
 
-class _Loader:
+class GlfwLoader:
     """Finds OpenGL's functions through GLFW, however it made its context (GLX, EGL, WGL)."""
 
     def load(self, name: str) -> int:
@@ -96,7 +96,7 @@ class Window:
         place = place or WindowPlace()
         self._handle = _create(place, visible)
         glfw.make_context_current(self._handle)
-        self.context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=_Loader()), "window")
+        self.context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=GlfwLoader()), "window")
         # A GPU waits for the screen; on the processor waiting would be time taken from the photons.
         glfw.swap_interval(0 if self.context.is_software else 1)
         self._screen = self.context.ctx.detect_framebuffer(0)
