@@ -79,14 +79,16 @@ class Reindexing:
 
         `traced`: in the coordinate of `axis`, photons' own. A band wholly beyond the spectrum keeps its interval, in which there is no light.
         """
+        edges = np.array([edge for bands in traced for edge in bands])
+        indices = iter(self.offset + self.scale * self.traced.index(axis.nm_of_x(edges)))
         shown: Spans = []
         for bands, (low, high) in zip(traced, self.supports(lights), strict=True):
             row = []
             for k, (lo, hi) in enumerate(bands):
+                a, b = (float(y) for y in next(indices))
                 if hi - lo < 1e-9:
                     row.append((low, high))
                     continue
-                a, b = (self.y(float(self.traced.index(axis.nm_of_x(x)))) for x in (lo, hi))
                 a = low if k == 0 and (b > low) else a
                 b = high if k == len(bands) - 1 and (a < high) else b
                 overlaps = a < high and b > low

@@ -246,7 +246,7 @@ class LiveEngine:
             return
         self._set_maps(maps)
         took = time.perf_counter() - started
-        self._quick_photons = int(np.clip(self._quick_photons * np.clip(seconds / max(took, 1e-4), 0.5, 2.0), 1 << 10, 1 << 24))
+        self._quick_photons = int(np.clip(self._quick_photons * np.clip(seconds / max(took, 1e-4), 0.5, 2.0), 1 << 12, 1 << 24))
         self._restart_eye(same_view=False)
 
     def _only_camera_besides(self, wanted: LiveInputs) -> bool:

@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from app.model.scene import Scene
     from app.model.settings import RenderSettings
 
-QUICK = 5
+QUICK = 8
 """Pixels to a texel's side in the maps that answer a drag."""
-QUICK_WIDTH = 128
+QUICK_WIDTH = 64
 """Samples of their spectral tables."""
 SOLO_WIDTH_NM = 4.0
 """Standard deviation of the window that a single wavelength is seen through."""
