@@ -79,9 +79,16 @@ class LivePicture:
         problem = self._display_error or self.problem
         return problem if problem is not None and _SHADER_FILE.search(problem) else None
 
-    def resize(self, size: tuple[int, int]) -> None:
-        """Size of the shown texture from now on. Only between frames: imgui still draws the texture of the last call."""
-        self._size = size
+    def resize(self, state: State, other: Other | None = None) -> None:
+        """Give the shown texture the size of `state`'s viewport, for the frame that begins.
+
+        Only between frames: a texture that imgui is about to draw must not be made anew.
+        """
+        if state.viewport_size == self._size:
+            return
+        self._size = state.viewport_size
+        if self.radiance is not None:
+            self._develop(state, self.radiance, other)
 
     def give_up(self) -> None:
         """Do without an engine until `restart`; the last picture stays."""
@@ -131,13 +138,16 @@ class LivePicture:
             return
         started = time.perf_counter()
         self._expose(state, radiance, now_s, delta_s)
-        texture = other.picture if other is not None else None
-        self.shown = self._display.run(radiance, state.display, self.exposure_ev, self._size, texture, state.compare)
+        self._develop(state, radiance, other)
         self.magnified = None
         if state.display.magnifier and state.hover is not None:
             pixel = pixel_of(state.hover, radiance.size)
             self.magnified = self._display.magnify(radiance, pixel, state.display, self.exposure_ev)
         self.display_s = time.perf_counter() - started
+
+    def _develop(self, state: State, radiance: moderngl.Texture, other: Other | None) -> None:
+        texture = other.picture if other is not None else None
+        self.shown = self._display.run(radiance, state.display, self.exposure_ev, self._size, texture, state.compare)
 
     def _expose(self, state: State, radiance: moderngl.Texture, now_s: float, delta_s: float) -> None:
         if not state.display.auto_exposure:

@@ -93,7 +93,7 @@ class Session:
         now = self._clock()
         self.delta_s = min(max(now - self._last_start, 1e-4), 0.25)
         self._frame_started = self._last_start = now
-        self.picture.resize(self.state.viewport_size)
+        self.picture.resize(self.state, self.companions.comparison)
         if self._watch.changed():
             self.reload_shaders()
         if self._may_make_thumbnails():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +13,6 @@ from app.ui.pace import Pace
 from app.ui.session import Draw, Session
 from app.ui.shell import draw_interface
 from app.ui.state import Preferences
-
-if TYPE_CHECKING:
-    from app.gpu.context import Context
 
 
 class Viewer:
@@ -78,10 +74,9 @@ class Viewer:
         return self.session.wants_to_close
 
 
-def headless_viewer(context: Context, session: Session, size: tuple[int, int] = (1280, 720), draw: Draw = draw_interface) -> HeadlessInterface:
-    """`session` in a windowless interface of `size` pixels. The session stays the caller's to release."""
-    viewer = Viewer(session, draw)
+def headless_viewer(viewer: Viewer, size: tuple[int, int] = (1280, 720)) -> HeadlessInterface:
+    """`viewer` in a windowless interface of `size` pixels. Its session stays the caller's to release."""
     return HeadlessInterface(
-        context, viewer.draw, size, prepare=viewer.prepare, rendered=viewer.rendered, finished=viewer.finished,
+        viewer.session.context, viewer.draw, size, prepare=viewer.prepare, rendered=viewer.rendered, finished=viewer.finished,
         preferences=lambda: viewer.preferences,
     )  # fmt: skip

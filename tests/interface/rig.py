@@ -9,15 +9,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from imgui_bundle import imgui
 
 from app.gpu.context import Context
 from app.live.engine import Budget, LiveEngine
 from app.model.scene import Dielectric, Diffuse
 from app.ui.headless import HeadlessInterface
 from app.ui.projection import View
-from app.ui.session import Session
+from app.ui.session import Draw, Session
+from app.ui.shell import draw_interface
 from app.ui.state import Selection
-from app.ui.viewer import headless_viewer
+from app.ui.viewer import Viewer, headless_viewer
 
 PHOTONS = 1 << 14
 SIZE = (760, 500)
@@ -30,9 +32,10 @@ SAMPLES = 4
 class Hands:
     """A viewer and what a user does with it."""
 
-    def __init__(self, session: Session, interface: HeadlessInterface, photons: int) -> None:
-        self.session, self.interface = session, interface
-        self._photons = photons
+    escape = imgui.Key.escape
+
+    def __init__(self, viewer: Viewer, interface: HeadlessInterface) -> None:
+        self.session, self.pace, self.interface = viewer.session, viewer.pace, interface
 
     @property
     def engine(self) -> LiveEngine:
@@ -106,15 +109,18 @@ def small_engine(photons: int) -> type[LiveEngine]:
 
 
 @contextmanager
-def viewer(context: Context, scene: Path, photons: int = PHOTONS, size: tuple[int, int] = SIZE, refine: bool = False) -> Iterator[Hands]:
+def viewer(
+    context: Context, scene: Path, photons: int = PHOTONS, size: tuple[int, int] = SIZE, refine: bool = False, draw: Draw = draw_interface
+) -> Iterator[Hands]:
     """A viewer of `scene`; `photons` is the target."""
     session = Session(context, scene, make_engine=small_engine(photons))
     session.companions.gallery.release()
     preferences = replace(session.state.preferences, target_photons=target(photons), refine_when_still=refine)
     session.state = replace(session.state, preferences=preferences, selection=Selection())
-    interface = headless_viewer(context, session, size)
+    guest = Viewer(session, draw)
+    interface = headless_viewer(guest, size)
     try:
-        yield Hands(session, interface, photons)
+        yield Hands(guest, interface)
     finally:
         interface.release()
         session.autosave.close()

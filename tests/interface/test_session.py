@@ -93,8 +93,11 @@ def test_shown_texture_stays_valid_in_the_frame_in_which_the_size_changes(rig: R
     rig.session.frame(lambda state, _facts: replace(state, viewport_size=(128, 72)))
     assert rig.session.picture.shown is before  # imgui has yet to draw it
     rig.session.prepare()
-    rig.session.frame(lambda state, _facts: replace(state, viewport_size=(128, 72)))
-    assert rig.session.picture.shown is not None and rig.session.picture.shown.size == (128, 72)
+    resized = rig.session.picture.shown
+    assert resized is not None and resized.size == (128, 72)
+    drawn: list[int | None] = []
+    rig.session.frame(lambda state, facts: drawn.append(facts.picture) or replace(state, viewport_size=(128, 72)))
+    assert rig.session.picture.shown is resized and drawn == [resized.glo]
 
 
 def test_edits_are_undone_one_by_one_and_a_drag_is_one_step(rig: Rig) -> None:
