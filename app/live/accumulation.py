@@ -37,6 +37,10 @@ class Accumulation:
         """The target is reached."""
         return self.begun and self.number > 0 and self.photons >= self.largest and self.light.stats.photons >= self.target
 
+    def aim_at(self, target: int, largest: int) -> None:
+        """Another target; passes become no coarser for it."""
+        self.target, self.largest = target, max(largest, self.photons)
+
     def steps(self) -> Iterator[None]:
         """Everything from here to the target, pausing often."""
         while not self.is_done:

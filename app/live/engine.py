@@ -79,7 +79,7 @@ class LiveEngine:
     def __init__(self, context: Context, budget: Budget | None = None) -> None:
         self.context = context
         self.budget = budget or Budget.of(context)
-        self.target_photons = 32_000_000
+        self._target_photons = 32_000_000
         self.refine_when_still = True
         """Trace again with the new glass once nothing changes, where the picture followed an edit to first order only."""
         self.playing = True
@@ -106,6 +106,24 @@ class LiveEngine:
         self._times = {"trace": 0.0, "splat": 0.0, "eye": 0.0}
         self._history: list[tuple[float, int, float]] = []
         self._published_photons = 0.0
+
+    @property
+    def target_photons(self) -> int:
+        """Photons after which nothing more is traced."""
+        return self._target_photons
+
+    @target_photons.setter
+    def target_photons(self, photons: int) -> None:
+        self._target_photons = photons
+        if self._shown is not None and photons != self._shown.accumulation.target:
+            accumulation = self._shown.accumulation
+            accumulation.aim_at(photons, self._largest)
+            if self._job is None and not accumulation.is_done:
+                self._job = accumulation.steps()
+
+    @property
+    def _largest(self) -> int:
+        return min(self.budget.largest_photons, max(self._target_photons, self.budget.first_photons))
 
     # ---- what is wanted ----------------------------------------------------------------------
 
@@ -292,7 +310,7 @@ class LiveEngine:
             for _ in light.preparing():
                 yield None
             light.show(wanted)
-            largest = min(self.budget.largest_photons, max(self.target_photons, self.budget.first_photons))
+            largest = self._largest
             first = min(self.budget.first_photons, largest)
             shown = Shown(wanted, light, Accumulation(light, first, largest, self.target_photons, wanted.seed, lambda: None))
             published: list[bool] = []
@@ -364,6 +382,11 @@ class LiveEngine:
     def picture(self) -> moderngl.Texture | None:
         """RGBA32F, linear Rec.709 radiance (lm/(sr unit²) for white), top row first; None before the first."""
         return self._eye.picture
+
+    @property
+    def picture_version(self) -> int:
+        """Changes whenever the picture does."""
+        return self._eye.version
 
     @property
     def inputs(self) -> LiveInputs | None:

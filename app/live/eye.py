@@ -51,6 +51,8 @@ class LiveEye:
         self.picture: moderngl.Texture | None = None
         """RGBA32F, linear Rec.709, top row first; None before the first sample."""
         self.shown_samples = 0
+        self.version = 0
+        """Counts what was published."""
         self.scale = 1.0
         self._wanted_scale = 1.0
 
@@ -144,6 +146,7 @@ class LiveEye:
         self._average.run(-(-sums.width // 8), -(-sums.height // 8))
         self._context.ctx.memory_barrier()
         self.shown_samples, self.scale = self._taken, self._wanted_scale
+        self.version += 1
 
     def release(self) -> None:
         """Free everything."""

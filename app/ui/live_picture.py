@@ -57,6 +57,8 @@ class LivePicture:
         self._display_error: str | None = None
         self.stats = LiveStats(renderer=context.renderer, is_software=context.is_software)
         """The engine's, as of the last frame."""
+        self._developed: tuple[object, ...] | None = None
+        """What `shown` was made of."""
         self.shown: moderngl.Texture | None = None
         """RGBA8, sRGB codes, row 0 on top."""
         self.magnified: moderngl.Texture | None = None
@@ -111,6 +113,7 @@ class LivePicture:
             self.engine.rebuild()
         try:
             self._display.reload()
+            self._developed = None
             self._display_error = None
         except ShaderError as error:
             self._display_error = str(error)
@@ -147,6 +150,11 @@ class LivePicture:
 
     def _develop(self, state: State, radiance: moderngl.Texture, other: Other | None) -> None:
         texture = other.picture if other is not None else None
+        version = self.engine.picture_version if self.engine is not None else -1
+        key = (id(radiance), version, state.display, self.exposure_ev, self._size, state.compare)
+        if texture is None and self.shown is not None and key == self._developed:
+            return
+        self._developed = None if texture is not None else key
         self.shown = self._display.run(radiance, state.display, self.exposure_ev, self._size, texture, state.compare)
 
     def _expose(self, state: State, radiance: moderngl.Texture, now_s: float, delta_s: float) -> None:

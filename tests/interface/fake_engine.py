@@ -23,6 +23,7 @@ class FakeEngine:
     problem: str | None = None
     inputs: LiveInputs | None = None
     picture: moderngl.Texture | None = None
+    picture_version: int = 0
     stats: LiveStats = LiveStats()
     hit: PickHit | None = None
     photons: StoredPhotons | None = None
@@ -49,6 +50,7 @@ class FakeEngine:
             self.picture = self.context.ctx.texture(size, 4, dtype="f4")
         grey = np.full((size[1], size[0], 4), 0.1 * abs(self.inputs.camera.position[2]), "f4")
         self.picture.write(grey.tobytes())
+        self.picture_version += 1
         self.stats = replace(self.stats, photons=self.stats.photons + 1000, converged=self.advanced > 5)
 
     def pick(self, x: float, y: float) -> PickHit | None:
