@@ -41,6 +41,8 @@ DEFAULT_BUDGET_S = 0.03
 FRAMES_REMEMBERED = 120
 IDLE_S = 0.5
 """How long the window may sleep when nothing moves: shaders on disk are looked at then."""
+LAYOUT_FRAMES = 3
+"""Frames until docked windows have their sizes: maps fitted to another view would have to be made anew."""
 THUMBNAIL_S = 0.1
 """How long it may sleep while thumbnails are made."""
 
@@ -75,6 +77,7 @@ class Session:
         self._watch = ShaderWatch(clock=clock)
         self._dropped: list[Path] = []
         self._was_interacting = False
+        self._frames = 0
         self._told: str | None = None
         self._frame_started = self._last_start = clock()
         self.delta_s = 1 / 60
@@ -160,7 +163,8 @@ class Session:
     def _work(self, budget_s: float) -> None:
         """Let the engine work and show its picture."""
         self.engine_s = 0.0
-        if self.state.preferences.panels.start_page:  # which covers the picture
+        self._frames += 1
+        if self._frames <= LAYOUT_FRAMES or self.state.preferences.panels.start_page:  # which covers the picture
             return
         left = self._work_beside(budget_s)
         started = self._clock()

@@ -19,7 +19,7 @@ from app.ui.crash_log import FILE_NAME
 from app.ui.facts import Facts
 from app.ui.live_picture import LivePicture
 from app.ui.preferences import config_dir
-from app.ui.session import Session
+from app.ui.session import LAYOUT_FRAMES, Session
 from app.ui.state import Selection, State
 from tests.interface.fake_engine import FakeEngine
 
@@ -44,6 +44,11 @@ class Rig:
         self.session.frame(draw)
         self.session.finished()
         return self.session.state
+
+    def settle(self) -> None:
+        """Frames until the layout is done and the engine works."""
+        for _ in range(LAYOUT_FRAMES + 1):
+            self.frame()
 
     def ask(self, *asked: requests.Request) -> State:
         """A frame with requests and one more, whose facts tell what came of them."""
@@ -71,7 +76,7 @@ def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def rig(gl: Context, config: Path) -> Iterator[Rig]:
     rig = Rig(Session(gl, make_engine=FakeEngine))
-    rig.frame()
+    rig.settle()
     yield rig
     rig.session.autosave.close()
     rig.session.release()
@@ -284,6 +289,7 @@ def test_copy_material_and_frame_selection(rig: Rig) -> None:
 
 def test_settings_reach_the_engine_and_the_next_session(gl: Context, config: Path) -> None:
     rig = Rig(Session(gl, make_engine=FakeEngine))
+    rig.settle()
     rig.frame(lambda s: replace(s, playing=False, preferences=replace(s.preferences, theme="light", target_photons=5_000_000)))
     assert rig.engine.playing is False and rig.engine.target_photons == 5_000_000
     rig.session.close()

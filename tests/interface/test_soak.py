@@ -1,0 +1,85 @@
+"""Random work on the real viewer for a long time: no exception, no OpenGL error, memory stays flat, undo leads back to the first picture."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.gpu.context import Context
+from app.paths import assets_dir
+from app.ui.crash_log import FILE_NAME
+from app.ui.preferences import config_dir
+from app.ui.state import State
+from tests.interface.rig import Hands, viewer
+from tests.interface.soak import Guard, Hand, device_objects, resident_bytes
+
+WARM = 0.4
+"""Share of the actions after which every panel was open and every cache is full."""
+GROWTH_BYTES = 96 << 20
+SAME = 1e-5
+
+
+def soak(gl: Context, folder: Path, actions: int, seed: int) -> None:
+    """`actions` random actions, and back to the start."""
+    guard = Guard(folder)
+    with viewer(gl, assets_dir() / "scenes" / "prism.toml", photons=1 << 12, size=(1100, 800), draw=guard.draw) as hands:
+        first = hands.settle()
+        start = hands.session.state
+        hands.pace.frame_s = 0.006  # the picture may lag behind; the hand does not wait for it
+        hand = Hand(hands, seed)
+        resident = 0
+        for number in range(actions):
+            hand.act()
+            crash = config_dir() / FILE_NAME
+            assert not crash.exists(), f"action {number}: {hand.log[-20:]}\n{crash.read_text()}"
+            gl.check(f"action {number}: {hand.log[-1]}")
+            if number == int(WARM * actions):
+                resident = resident_bytes()
+        # It did work: scenes were edited, and the host was asked for things.
+        assert guard.answered > 5 and len(guard.labels) > 5, (guard.answered, guard.labels)
+        grown = resident_bytes() - resident
+        back = undo_everything(hands, start)
+        assert hands.session.state.scene is start.scene
+        assert float(np.abs(back - first).max() / first.max()) < SAME
+        assert grown < GROWTH_BYTES, f"{grown >> 20} MiB more after {actions} actions"
+
+
+def undo_everything(hands: Hands, start: State) -> np.ndarray:
+    """Undo to the start of the history; what undo does not cover (camera, display, panels) is set back."""
+    hands.interface.key(hands.escape)
+    hands.interface.key(hands.escape)
+    session = hands.session
+    while session.document.history.undo_label is not None:
+        session.show_scene(session.document.history.undo())
+        hands.interface.frame()
+    session.state = replace(start, scene=session.state.scene)
+    return hands.settle()
+
+
+@pytest.fixture
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Everything that is written goes here."""
+    monkeypatch.setenv("SPECTRASPLAT_CONFIG", str(tmp_path / "config"))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_150_random_actions(gl: Context, own_folder: Path) -> None:
+    soak(gl, own_folder, 150, seed=1)
+
+
+@pytest.mark.slow
+def test_2000_random_actions(gl: Context, own_folder: Path) -> None:
+    soak(gl, own_folder, 2000, seed=2)
+
+
+def test_a_closed_viewer_leaves_nothing_on_the_device(gl: Context, own_folder: Path) -> None:
+    before = device_objects()
+    with viewer(gl, assets_dir() / "scenes" / "prism.toml", photons=1 << 12) as hands:
+        hands.settle()
+        assert device_objects() > before
+    assert device_objects() == before
