@@ -1,6 +1,6 @@
-"""The scenes of the start page with their thumbnails, which another process renders one by one.
+"""The scenes of the start page with their thumbnails, which another process renders one by one where they lack one.
 
-A thumbnail is kept in the config folder under a name made of the scene's content, so it is rendered once. The process
+Shipped scenes come with a picture. Any other thumbnail is kept in the config folder under a name made of the scene's content, so it is rendered once. The process
 runs at the lowest priority: neither its start nor a broken scene can hold up the interface.
 """
 
@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app import __version__
+from app.paths import assets_dir
 from app.ui.facts import SceneEntry
 
 if TYPE_CHECKING:
@@ -66,8 +67,9 @@ class Gallery:
             self._look_after(self._job)
         elif self._waiting:
             index = self._waiting.pop(0)
-            target = self._thumbnail(self.entries[index].path)
-            if not self._show(index, target):
+            path = self.entries[index].path
+            target = self._thumbnail(path)
+            if not (self._show(index, _shipped_picture(path)) or self._show(index, target)):
                 self._start(index, target)
 
     def _start(self, index: int, target: Path) -> None:
@@ -105,6 +107,7 @@ class Gallery:
 
         try:
             with Image.open(path) as image:
+                image.thumbnail((2 * SIZE[0], 2 * SIZE[1]))
                 rgba = image.convert("RGBA")
         except (OSError, ValueError):
             return False
@@ -130,6 +133,12 @@ class Gallery:
             texture.release()
         self._textures.clear()
         self._waiting.clear()
+
+
+def _shipped_picture(scene: Path) -> Path:
+    """The picture that comes with a shipped scene; perhaps there is none."""
+    assets = assets_dir()
+    return assets / "gallery" / f"{scene.stem}.png" if scene.parent == assets / "scenes" else Path()
 
 
 def _entry(name: str, path: Path) -> SceneEntry:
