@@ -233,6 +233,18 @@ def bench_speed() -> None:
         print(line, flush=True)
 
 
+@app.command("bench-view")
+def bench_view(
+    scene: Annotated[Text, typer.Argument(metavar="[SCENE]", help="Default: the default scene.")] = None,
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Of the viewport; default: 960x540, on a GPU 1920x1080.")] = None,
+    seconds: Annotated[Text, typer.Option(metavar="S", help="For each phase; default: 6.")] = None,
+) -> None:
+    """Measure the viewer's frame times: accumulating, orbiting, dragging the dispersion."""
+    from app.cli_bench_view import BenchViewRequest, bench_view_command
+
+    raise typer.Exit(bench_view_command(BenchViewRequest(scene, size, seconds)))
+
+
 def _print(content: object) -> None:
     """Print text as it is, and rich's tables in colour where the terminal has it."""
     if isinstance(content, str):

@@ -240,14 +240,14 @@ class LiveEngine:
             shown.light.show(wanted)
             shown_before, self._inputs = self._inputs, wanted
             if looks_other(shown_before, wanted):
-                self._look_at(wanted)
+                self._look_at(wanted, shown.light)
             self._answer_quickly(0.4 * budget_s)
             self._job = shown.accumulation.after_edit()
             return
         elif cost == Redo.LOOK:
             if self._building is None:
                 if wanted.scene is not self._inputs.scene:
-                    self._look_at(wanted)
+                    self._look_at(wanted, shown.light)
                 self._inputs = wanted
             else:
                 self._inputs = replace(self._inputs, camera=wanted.camera, width=wanted.width, height=wanted.height)
@@ -327,6 +327,16 @@ class LiveEngine:
         yield shown
 
     def _swap(self, built: Shown) -> None:
+        # What does not compile (or fit) leaves everything as it was: the programs of the eye come first.
+        picker = None
+        try:
+            picker = Picker(self.context, built.light.buffers)
+            self._look_at(built.traced, built.light)
+        except BaseException:
+            if picker is not None:
+                picker.release()
+            built.light.release()
+            raise
         before, self._shown = self._shown, built
         self._building, self._job = None, built.steps
         self._inputs, self._being_built = built.traced, None
@@ -335,16 +345,14 @@ class LiveEngine:
             before.light.release()
         if self._picker is not None:
             self._picker.release()
-        self._picker = Picker(self.context, built.light.buffers)
-        self._look_at(built.traced)
+        self._picker = picker
         self._publish_maps()
         # What was wished for meanwhile is looked at in the next frame.
         self._urgent = self._wanted is not built.traced
 
-    def _look_at(self, inputs: LiveInputs) -> None:
-        assert self._shown is not None
+    def _look_at(self, inputs: LiveInputs, light: LiveLight) -> None:
         scene = replace(solo_scene(inputs.scene, inputs.solo_nm), camera=inputs.camera)
-        self._eye.look_at(self._shown.light.buffers, scene, self._shown.light.reflectances)
+        self._eye.look_at(light.buffers, scene, light.reflectances)
 
     # ---- light -------------------------------------------------------------------------------
 

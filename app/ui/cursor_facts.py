@@ -34,9 +34,10 @@ class Cursor:
             self.facts = None
             self._key = ()
             return
-        key = (state.hover, state.camera, id(state.scene), state.viewport_size)
+        inputs = picture.engine.inputs
+        key = (state.hover, state.camera, id(inputs and inputs.scene), state.viewport_size)
         if key != self._key:
-            self._hit = picture.engine.pick(*state.hover)
+            self._hit = picture.pick(state.hover)
             self._key = key
         before = self.facts
         self.facts = self._look(state, picture)
@@ -52,17 +53,18 @@ class Cursor:
             picture.pixel(state.hover) or (0.0, 0.0, 0.0),
             magnified=None if picture.magnified is None else picture.magnified.glo,
         )
-        if hit is None:
+        index = None if hit is None else picture.object_in(state.scene, hit.object_index)
+        if hit is None or index is None:
             return facts
         return replace(
-            facts, object_index=hit.object_index, position=hit.position, normal=hit.normal, is_receiver=hit.is_receiver
+            facts, object_index=index, position=hit.position, normal=hit.normal, is_receiver=hit.is_receiver
         )  # fmt: skip
 
     def _take_spectrum(self, state: State, picture: LivePicture, before: CursorFacts | None, now_s: float) -> None:
         assert self.facts is not None and self._hit is not None and picture.engine is not None
         key = (*self._key, picture.stats.photons, state.physical, state.smoothing)
         if key == self._spectrum_key or now_s - self._spectrum_s < SPECTRUM_S:
-            if before is not None and before.object_index == self._hit.object_index:
+            if before is not None and before.object_index == self.facts.object_index:
                 self.facts = replace(self.facts, spectrum_nm=before.spectrum_nm, spectrum=before.spectrum)
             return
         found = picture.engine.caustic_spectrum(self._hit.object_index, np.asarray(self._hit.position, float))

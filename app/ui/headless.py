@@ -96,6 +96,7 @@ class HeadlessInterface:
         self._framebuffer.clear(0.0, 0.0, 0.0, 1.0)
         self._host.render()
         self._no_framebuffer.use()
+        self._context.finish()
         self._rendered()
         self._finished(self.screenshot)
 
@@ -125,9 +126,14 @@ class HeadlessInterface:
     # The mouse
 
     def move(self, where: str | Point) -> None:
-        """Put the cursor on a control or a place (pixels from the top left)."""
-        imgui.get_io().add_mouse_pos_event(*self._point(where))
+        """Put the cursor on a control or a place (pixels from the top left), and draw a frame."""
+        self.put_mouse(self._point(where))
         self.frame()
+
+    def put_mouse(self, place: Point) -> None:
+        """Put the cursor on a place, seen by the next frame."""
+        self._host.make_current()
+        imgui.get_io().add_mouse_pos_event(*place)
 
     def press(self, button: int = 0) -> None:
         """Press a mouse button: 0 left, 1 right, 2 middle."""

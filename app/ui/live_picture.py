@@ -19,6 +19,7 @@ from app.live.stats import LiveStats
 from app.passes.display import Display
 from app.passes.sample_picture import SamplePicture
 from app.ui.auto_exposure import AutoExposure
+from app.ui.shown_scene import index_in
 from app.ui.state import State
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
     from app.gpu.context import Context
     from app.live.engine import LiveEngine
+    from app.model.scene import Scene
+    from app.passes.pick import PickHit
 
 
 class EngineError(RuntimeError):
@@ -54,7 +57,7 @@ class LivePicture:
         self._sampler = SamplePicture(context)
         self._exposure = AutoExposure()
         self._size = (0, 0)
-        self._display_error: str | None = None
+        self._reload_error: str | None = None
         self.stats = LiveStats(renderer=context.renderer, is_software=context.is_software)
         """The engine's, as of the last frame."""
         self._developed: tuple[object, ...] | None = None
@@ -78,7 +81,7 @@ class LivePicture:
     @property
     def shader_error(self) -> str | None:
         """A shader on disk that does not compile, with file and line; the last good programs go on."""
-        problem = self._display_error or self.problem
+        problem = self._reload_error or self.problem
         return problem if problem is not None and _SHADER_FILE.search(problem) else None
 
     def resize(self, state: State, other: Other | None = None) -> None:
@@ -109,14 +112,14 @@ class LivePicture:
         if self.engine is None:
             self.restart()
             return
-        with self._guarded():
-            self.engine.rebuild()
+        self._reload_error = None
         try:
+            with self._guarded():
+                self.engine.rebuild()
             self._display.reload()
             self._developed = None
-            self._display_error = None
         except ShaderError as error:
-            self._display_error = str(error)
+            self._reload_error = str(error)
 
     def new_scene(self) -> None:
         """Another scene: its exposure is found at once."""
@@ -164,6 +167,15 @@ class LivePicture:
         measured = self._exposure.follow(lambda: self._sampler.run(radiance), now_s, delta_s)
         self.exposure_ev = measured + state.scene.render.exposure_ev
 
+    def pick(self, place: tuple[float, float]) -> PickHit | None:
+        """First surface at a place of the picture, 0..1 from the top left; its object is one of the scene that is shown."""
+        return self.engine.pick(*place) if self.engine is not None else None
+
+    def object_in(self, scene: Scene, index: int) -> int | None:
+        """Index in `scene` of object `index` of the scene that is shown; None for one that is no longer there."""
+        inputs = self.engine.inputs if self.engine is not None else None
+        return None if inputs is None else index_in(scene, inputs.scene, index)
+
     @property
     def is_settling(self) -> bool:
         """The exposure is still on its way."""
@@ -200,7 +212,7 @@ class _Guard:
         pass
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _trace: object) -> None:
-        if isinstance(error, Exception):
+        if isinstance(error, Exception) and not isinstance(error, ShaderError):
             self._owner.give_up()
             raise EngineError(str(error) or type(error).__name__) from error
 

@@ -27,6 +27,7 @@ from app.ui.facts import Facts
 from app.ui.live_picture import EngineError, LivePicture
 from app.ui.message_box import MessageBox
 from app.ui.preferences import Settings, config_dir, load_settings, save_settings
+from app.ui.sentences import brief, sentence, words
 from app.ui.state import Selection, State
 
 if TYPE_CHECKING:
@@ -118,6 +119,10 @@ class Session:
         self._work(budget_s)
         self._was_interacting = self.state.interacting
 
+    def wait_for_layout(self) -> None:
+        """The window's size has changed before anything was made for it: leave the engine alone for some frames more."""
+        self._frames = 0
+
     def finished(self) -> None:
         """After the frame is on the screen."""
         self.frame_ms.append(1000.0 * (self._clock() - self._frame_started))
@@ -158,7 +163,7 @@ class Session:
             self.messages.tell(sentence(str(error)), is_error=True)
         except Exception as error:  # a bug: the work and the window outlive it
             self.save_from_crash(f"{type(request).__name__}", error)
-            self.messages.tell(f"{_words(request)} failed by a fault of the program ({_brief(error)}); your work is kept.", is_error=True)
+            self.messages.tell(f"{words(request)} failed by a fault of the program ({brief(error)}); your work is kept.", is_error=True)
 
     def _work(self, budget_s: float) -> None:
         """Let the engine work and show its picture."""
@@ -196,7 +201,7 @@ class Session:
         except Exception as error:  # a bug in a side line must not stop the picture
             self.companions.exports.cancel()
             self.save_from_crash("exporting or comparing", error)
-            self.messages.tell(f"Comparing or exporting failed by a fault of the program ({_brief(error)}).", is_error=True)
+            self.messages.tell(f"Comparing or exporting failed by a fault of the program ({brief(error)}).", is_error=True)
             self.state = replace(self.state, compare=replace(self.state.compare, mode="off", plot=False))
             return budget_s
         finally:
@@ -206,7 +211,7 @@ class Session:
 
     def _renderer_stopped(self, error: Exception) -> None:
         self.save_from_crash("rendering", error)
-        self.messages.tell(f"The renderer stopped ({_brief(error)}). Your work is kept; press F5 to try again.", is_error=True)
+        self.messages.tell(f"The renderer stopped ({brief(error)}). Your work is kept; press F5 to try again.", is_error=True)
 
     # What requests use
 
@@ -293,24 +298,3 @@ class Session:
 def _first_state(scene: Scene, settings: Settings, welcome: bool) -> State:
     state = State(scene=scene, camera=scene.camera, preferences=settings.preferences)
     return state.with_panels(start_page=welcome)
-
-
-def _words(request: requests.Request) -> str:
-    """ "SelectAt" → "Select at"."""
-    name = type(request).__name__
-    words = "".join(f" {c.lower()}" if c.isupper() else c for c in name).strip()
-    return words.capitalize()
-
-
-def sentence(text: str) -> str:
-    """A `UserError`'s text as it stands on its own."""
-    text = " ".join(text.split())
-    # A file's or an object's name stays as it is written.
-    start = text[:1].upper() if text.split(" ")[0].isalpha() else text[:1]
-    return f"{start}{text[1:]}{'' if text.endswith(('.', '?', '!')) else '.'}"
-
-
-def _brief(error: BaseException) -> str:
-    cause = error.__cause__ or error
-    text = " ".join(str(cause).split())
-    return f"{type(cause).__name__}: {text[:160]}" if text else type(cause).__name__

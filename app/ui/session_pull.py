@@ -11,6 +11,7 @@ from app.model.colorimetry import rgb709_to_xyz
 from app.ui.projection import View
 from app.ui.pull import PullPhotons, begin_pull
 from app.ui.requests import BeginPull, Pull
+from app.ui.shown_scene import has_same_objects
 
 if TYPE_CHECKING:
     from app.ui.session import Session
@@ -23,7 +24,10 @@ RADIUS = 0.01
 def begin_pull_at(session: Session, request: BeginPull) -> Pull:
     """What lies at the pixel of `request`. Raises `UserError` with the reason where there is nothing to pull."""
     engine, state = session.picture.engine, session.state
-    hit = None if engine is None else engine.pick(request.x, request.y)
+    hit = session.picture.pick((request.x, request.y))
+    inputs = None if engine is None else engine.inputs
+    if inputs is not None and not has_same_objects(state.scene, inputs.scene):
+        raise UserError("the picture is being made anew; try again in a moment")
     if engine is None or hit is None or not hit.is_receiver:
         raise UserError("there is no caustic here; take hold of a coloured part of one")
     stored = engine.stored_photons(PHOTONS)

@@ -86,15 +86,16 @@ def _recover(session: Session, request: requests.Recover) -> None:
 
 
 def _select_at(session: Session, request: requests.SelectAt) -> None:
-    engine = session.picture.engine
-    hit = None if engine is None else engine.pick(request.x, request.y)
-    if hit is None:
+    picture, scene = session.picture, session.state.scene
+    hit = picture.pick((request.x, request.y))
+    chosen = None if hit is None else picture.object_in(scene, hit.object_index)
+    if hit is None or chosen is None:
         session.state = replace(session.state, selection=Selection())
         return
-    chosen = hit.object_index
-    if not request.itself and isinstance(session.state.scene.objects[chosen].material, Diffuse):
-        source = _source_at(session, np.asarray(hit.position), chosen)
-        chosen = chosen if source is None else source
+    if not request.itself and isinstance(scene.objects[chosen].material, Diffuse):
+        source = _source_at(session, np.asarray(hit.position), hit.object_index)
+        found = None if source is None else picture.object_in(scene, source)
+        chosen = chosen if found is None else found
     session.state = replace(session.state, selection=Selection("object", chosen))
 
 

@@ -1,0 +1,230 @@
+"""How fast the viewer answers: frame times while light gathers, while walking round and while the dispersion is dragged.
+
+The whole interface is drawn without a window and worked by a synthetic hand, so that the figures can be had on any machine, again
+and again. Every frame is finished on the device before its time is taken; no screen is waited for.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.errors import UserError
+from app.model.scene import Dielectric
+from app.passes.sample_picture import SamplePicture
+from app.ui.headless import HeadlessInterface
+from app.ui.session import Session
+from app.ui.state import Selection
+from app.ui.viewer import Viewer, headless_viewer
+
+if TYPE_CHECKING:
+    from app.gpu.context import Context
+
+ORBIT_PX = 3.0
+"""Of the mouse in a frame."""
+PATIENCE_S = 120.0
+NUDGES = 8
+"""Single inputs whose answers are timed."""
+_CHROME = (1.85, 1.6)
+"""Window over viewport, first guess."""
+
+
+@dataclass(frozen=True)
+class Phase:
+    """What was measured while one thing was done."""
+
+    name: str
+    frame_ms: np.ndarray
+    photons_per_second: float
+    rays_traced: int
+    scale: float
+    """Side of the picture shown in motion over the side asked for, on average."""
+
+    @property
+    def line(self) -> str:
+        """For the table."""
+        median, worst = np.percentile(self.frame_ms, [50, 95])
+        return (
+            f"{self.name:<24} {median:8.1f} ms {worst:8.1f} ms {1000 / median:8.1f} /s {self.photons_per_second / 1e6:8.3f} M/s "
+            f"{self.rays_traced:>12,} {100 * self.scale:6.0f} %"
+        )
+
+
+def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) -> Iterator[str]:
+    """Lines of the report, as they are measured: `seconds` for each phase, a viewport of `size` pixels."""
+    bench = _Bench(context, scene, size)
+    try:
+        yield f"{scene.stem}, viewport {bench.viewport[0]}×{bench.viewport[1]}, {context.renderer}"
+        yield f"first picture after {bench.wait_for_picture():.2f} s"
+        yield f"{'':<24} {'median':>11} {'95 %':>11} {'frames':>11} {'photons':>12} {'rays traced':>12} {'side':>8}"
+        yield bench.phase("accumulating", seconds, bench.rest).line
+        with bench.holding_middle_button():
+            yield bench.phase("orbiting", seconds, bench.orbit).line
+        for _ in range(30):
+            bench.interface.frame()
+        with bench.holding_gain():
+            yield bench.phase("dragging dispersion", seconds, bench.drag_gain).line
+        bench.pause()
+        yield f"input to picture: camera {bench.latency(bench.nudge_camera):.0f} ms, dispersion {bench.latency(bench.nudge_gain):.0f} ms (median of {NUDGES})"
+        yield f"device memory {bench.session.picture.stats.bytes / 2**20:.0f} MiB"
+    finally:
+        bench.release()
+
+
+class _Bench:
+    """A viewer and the hand that works it."""
+
+    def __init__(self, context: Context, scene: Path, size: tuple[int, int]) -> None:
+        self._context = context
+        self.session = Session(context, scene)
+        self.session.companions.gallery.release()
+        self.viewer = Viewer(self.session)
+        objects = self.session.state.scene.objects
+        glass = next((i for i, o in enumerate(objects) if isinstance(o.material, Dielectric)), None)
+        if glass is None:
+            raise UserError(f"{scene}: nothing in it is glass, so there is no dispersion to drag")
+        self._glass = glass
+        self.session.state = replace(self.session.state, selection=Selection("object", glass)).with_panels(start_page=False)
+        self.interface = self._fitted(size)
+        self._sampler = SamplePicture(context)
+        self._turn = 0
+
+    def release(self) -> None:
+        """Free everything."""
+        self._sampler.release()
+        self.interface.release()
+        self.session.autosave.close()
+        self.session.release()
+
+    @property
+    def viewport(self) -> tuple[int, int]:
+        """Pixels."""
+        return self.session.state.viewport_size
+
+    def _fitted(self, size: tuple[int, int]) -> HeadlessInterface:
+        """An interface whose viewport has `size`: panels take their share of the window."""
+        window = (round(size[0] * _CHROME[0]), round(size[1] * _CHROME[1]))
+        for _ in range(6):
+            interface = headless_viewer(self.viewer, window)
+            interface.frame(2)  # before the engine starts
+            got = self.viewport
+            if abs(got[0] - size[0]) <= 2 and abs(got[1] - size[1]) <= 2:
+                break
+            self.session.wait_for_layout()
+            interface.release()
+            window = (window[0] + size[0] - got[0], window[1] + size[1] - got[1])
+        else:
+            interface = headless_viewer(self.viewer, window)
+        return interface
+
+    def wait_for_picture(self) -> float:
+        """Seconds until the first picture in full size."""
+        started = time.perf_counter()
+        while self.session.picture.stats.camera_samples < 1 or self.session.picture.stats.resolution_scale < 1:
+            self.interface.frame()
+            if time.perf_counter() - started > PATIENCE_S:
+                raise UserError(f"no picture after {PATIENCE_S:.0f} s")
+        return time.perf_counter() - started
+
+    def phase(self, name: str, seconds: float, act: Callable[[], None]) -> Phase:
+        """Frames for `seconds`, with `act` before each."""
+        times, scales = [], []
+        before = self.session.picture.stats
+        started = time.perf_counter()
+        while time.perf_counter() - started < seconds:
+            act()
+            self.interface.frame()
+            times.append(self.session.frame_ms[-1])
+            scales.append(self.session.picture.stats.resolution_scale)
+        elapsed = time.perf_counter() - started
+        rays = self.session.picture.stats.rays_traced - before.rays_traced
+        return Phase(name, np.array(times), rays / elapsed, rays, float(np.mean(scales)))
+
+    def rest(self) -> None:
+        """Do nothing."""
+
+    def holding_middle_button(self) -> _Held:
+        """The viewport is held to orbit."""
+        return _Held(self.interface, self.interface.find("Picture").centre, 2)
+
+    def orbit(self) -> None:
+        """Turn a little, in a slow circle of the mouse."""
+        self._turn += 1
+        x, y = self.interface.find("Picture").centre
+        angle = 0.05 * self._turn
+        self.interface.put_mouse((x + ORBIT_PX / 0.05 * math.sin(angle), y + 0.3 * ORBIT_PX / 0.05 * (1 - math.cos(angle))))
+
+    def holding_gain(self) -> _Held:
+        """The slider of the dispersion gain is held."""
+        return _Held(self.interface, self.interface.find("Dispersion gain").at(0.1), 0)
+
+    def drag_gain(self) -> None:
+        """Move the slider to and fro."""
+        self._turn += 1
+        self.interface.put_mouse(self.interface.find("Dispersion gain").at(0.25 + 0.15 * math.sin(0.1 * self._turn)))
+
+    def pause(self) -> None:
+        """Let everything come to rest, with what has been traced."""
+        self.session.state = replace(
+            self.session.state, playing=False, preferences=replace(self.session.state.preferences, refine_when_still=False)
+        )
+        deadline = time.perf_counter() + PATIENCE_S
+        while not self.session.picture.stats.converged and time.perf_counter() < deadline:
+            self.interface.frame()
+
+    def nudge_camera(self) -> None:
+        """Step aside by a hundredth."""
+        state = self.session.state
+        x, y, z = state.camera.position
+        self.session.state = replace(state, camera=replace(state.camera, position=(x + 0.01 * abs(z) + 1e-3, y, z)))
+
+    def nudge_gain(self) -> None:
+        """A little more dispersion."""
+        from app.ui import edits
+
+        state = self.session.state
+        material = state.scene.objects[self._glass].material
+        assert isinstance(material, Dielectric)
+        gain = material.dispersion.gain
+        self.session.state = replace(state, scene=edits.set_dispersion_gain(state.scene, self._glass, min(gain * 1.07, 10.0)))
+
+    def latency(self, nudge: Callable[[], None]) -> float:
+        """Median milliseconds from a single input to the end of the first frame whose picture is another one."""
+        found = []
+        for _ in range(NUDGES):
+            self.pause()
+            before = self._look()
+            nudge()
+            spent = 0.0
+            for _ in range(60):
+                self.interface.frame()
+                spent += self.session.frame_ms[-1]
+                if not np.array_equal(self._look(), before):
+                    break
+            found.append(spent)
+        return float(np.median(found))
+
+    def _look(self) -> np.ndarray:
+        radiance = self.session.picture.radiance
+        assert radiance is not None
+        return self._sampler.run(radiance)
+
+
+class _Held:
+    """A mouse button that is down within a block."""
+
+    def __init__(self, interface: HeadlessInterface, place: tuple[float, float], button: int) -> None:
+        self._interface, self._place, self._button = interface, place, button
+
+    def __enter__(self) -> None:
+        self._interface.move(self._place)
+        self._interface.press(self._button)
+
+    def __exit__(self, *_exception: object) -> None:
+        self._interface.let_go(self._button)

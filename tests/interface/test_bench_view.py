@@ -1,0 +1,30 @@
+"""The command that measures the viewer: its phases do what they say."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.bench import viewer_speed
+from app.gpu.context import Context
+from app.paths import assets_dir
+
+
+def test_walking_round_and_dragging_the_dispersion_trace_nothing(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(viewer_speed, "NUDGES", 1)
+    bench = viewer_speed._Bench(gl, assets_dir() / "scenes" / "prism.toml", (640, 400))
+    assert abs(bench.viewport[0] - 640) <= 2 and abs(bench.viewport[1] - 400) <= 2
+    bench.wait_for_picture()
+    resting = bench.phase("accumulating", 0.5, bench.rest)
+    camera = bench.session.state.camera
+    with bench.holding_middle_button():
+        orbiting = bench.phase("orbiting", 0.3, bench.orbit)
+    assert bench.session.state.camera != camera
+    with bench.holding_gain():
+        dragging = bench.phase("dragging dispersion", 0.4, bench.drag_gain)
+    gain = bench.session.state.scene.objects[bench._glass].material.dispersion.gain
+    assert gain != 1.0
+    assert resting.rays_traced > 0
+    assert orbiting.rays_traced == dragging.rays_traced == 0
+    assert len(dragging.frame_ms) > 2 and "ms" in dragging.line
+    assert 0 < bench.latency(bench.nudge_camera) < 5000
+    bench.release()

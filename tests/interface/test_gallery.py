@@ -1,0 +1,98 @@
+"""Thumbnails of the start page: rendered once by another process, kept, and never in the way."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from app.gpu.context import Context
+from app.ui.gallery import Gallery
+
+MAKE = "import sys; from PIL import Image; Image.new('RGB', (32, 18), (255, 0, 0)).save(sys.argv[1])"
+
+
+class Renderer:
+    """Plays the process that renders; counts its calls."""
+
+    def __init__(self, code: str = MAKE) -> None:
+        self.code, self.calls = code, 0
+
+    def __call__(self, scene: Path, output: Path) -> subprocess.Popen[bytes]:
+        self.calls += 1
+        return subprocess.Popen([sys.executable, "-c", self.code, str(output)], stderr=subprocess.DEVNULL)
+
+
+@pytest.fixture
+def scenes(tmp_path: Path) -> dict[str, Path]:
+    first, second = tmp_path / "one.toml", tmp_path / "two.toml"
+    first.write_text('# White light through\n# a prism.\n\nname = "the prism"\n')
+    second.write_text("name = ")
+    return {"one": first, "two": second}
+
+
+def finish(gallery: Gallery) -> None:
+    deadline = time.monotonic() + 20
+    while gallery.is_busy:
+        gallery.step()
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def test_titles_and_descriptions_come_from_the_files(gl: Context, tmp_path: Path, scenes: dict[str, Path]) -> None:
+    gallery = Gallery(gl, tmp_path, scenes, Renderer())
+    assert [(e.title, e.description, e.thumbnail) for e in gallery.entries] == [
+        ("The prism", "White light through a prism.", None),
+        ("two", "", None),
+    ]
+    gallery.release()
+
+
+def test_thumbnails_are_rendered_once_and_again_when_the_scene_changes(gl: Context, tmp_path: Path, scenes: dict[str, Path]) -> None:
+    renderer = Renderer()
+    for calls in (2, 2):
+        gallery = Gallery(gl, tmp_path, scenes, renderer)
+        finish(gallery)
+        assert renderer.calls == calls
+        assert all(e.thumbnail is not None and e.thumbnail_size == (32, 18) for e in gallery.entries)
+        gallery.release()
+    scenes["one"].write_text('name = "another"\n')
+    gallery = Gallery(gl, tmp_path, scenes, renderer)
+    finish(gallery)
+    assert renderer.calls == 3
+    gallery.release()
+
+
+def test_a_scene_that_fails_has_no_thumbnail_and_leaves_nothing(gl: Context, tmp_path: Path, scenes: dict[str, Path]) -> None:
+    gallery = Gallery(gl, tmp_path, scenes, Renderer("raise SystemExit(2)"))
+    finish(gallery)
+    assert all(entry.thumbnail is None for entry in gallery.entries)
+    assert list((tmp_path / "thumbnails").iterdir()) == []
+    gallery.release()
+
+
+def test_closing_ends_the_process(gl: Context, tmp_path: Path, scenes: dict[str, Path]) -> None:
+    gallery = Gallery(gl, tmp_path, scenes, Renderer("import time; time.sleep(60)"))
+    gallery.step()
+    assert gallery._job is not None
+    process = gallery._job.process
+    gallery.release()
+    assert process.poll() is not None
+
+
+@pytest.mark.slow
+def test_a_shipped_scene_really_gets_one(gl: Context, tmp_path: Path) -> None:
+    from app.cli_options import shipped_scenes
+
+    gallery = Gallery(gl, tmp_path, {"prism": shipped_scenes()["prism"]})
+    while gallery.is_busy:
+        gallery.step()
+        time.sleep(0.05)
+    assert gallery.entries[0].thumbnail_size == (320, 180)
+    path = next((tmp_path / "thumbnails").iterdir())
+    assert Image.open(path).convert("L").getextrema()[1] > 200
+    gallery.release()

@@ -1,0 +1,90 @@
+"""Shaders on disk: a mistake keeps the last good programs and names file and line; mended, the picture follows."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from imgui_bundle import imgui
+
+from app import paths
+from app.gpu import shader_watch
+from app.gpu.context import Context
+from app.paths import assets_dir
+from app.ui.facts_builder import facts_of
+from tests.interface.rig import Hands, viewer
+
+PATIENCE = 400
+"""Frames."""
+
+
+@pytest.fixture
+def shaders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the shaders that may be broken."""
+    folder = tmp_path / "shaders"
+    shutil.copytree(paths.shaders_dir(), folder)
+    monkeypatch.setattr(paths, "shaders_dir", lambda: folder)
+    monkeypatch.setattr(shader_watch, "INTERVAL_S", 0.0)
+    return folder
+
+
+@pytest.fixture
+def hands(gl: Context, shaders: Path) -> Iterator[Hands]:
+    with viewer(gl, assets_dir() / "scenes" / "prism.toml", photons=1 << 12, size=(600, 420)) as hands:
+        hands.settle()
+        yield hands
+
+
+def edit(file: Path, old: str, new: str) -> None:
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+
+
+def frames_until_error_is(hands: Hands, present: bool) -> str | None:
+    """Frames until a shader error is shown, or is gone."""
+    for _ in range(PATIENCE):
+        hands.interface.frame()
+        told = facts_of(hands.session).shader_error
+        if (told is not None) == present:
+            return told
+    raise AssertionError(f"shader error still {told!r}")
+
+
+def test_a_mistake_is_shown_with_file_and_line_and_the_picture_stays(hands: Hands, shaders: Path) -> None:
+    before = hands.picture()
+    edit(shaders / "eye.comp", "void main()\n{", "void main()\n{\n    this is no GLSL;")
+    line = (shaders / "eye.comp").read_text().splitlines().index("    this is no GLSL;") + 1
+    told = frames_until_error_is(hands, present=True)
+    assert told is not None and f"eye.comp:{line}" in told
+    hands.settle()
+    assert np.array_equal(hands.picture(), before)
+    edit(shaders / "eye.comp", "    this is no GLSL;\n", "")
+    frames_until_error_is(hands, present=False)
+    assert np.abs(hands.settle() - before).max() <= 1e-5 * before.max()
+
+
+def test_a_change_on_disk_shows_in_the_picture(hands: Hands, shaders: Path) -> None:
+    hands.interface.frame(2)
+    place = hands.interface.find("Picture").at(0.9, 0.6)
+    row, column = int(place[1]), int(place[0])
+    before = hands.interface.screenshot()[row, column]
+    edit(shaders / "display.comp", "vec4(colour, 1.0)", "vec4(1.0 - colour, 1.0)")
+    hands.interface.frame(4)
+    assert facts_of(hands.session).shader_error is None
+    assert not np.array_equal(hands.interface.screenshot()[row, column], before)
+
+
+def test_f5_compiles_from_disk(hands: Hands, shaders: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shader_watch, "INTERVAL_S", 1e9)
+    hands.session._watch = shader_watch.ShaderWatch()
+    edit(shaders / "display.comp", "void main()\n{", "void main()\n{\n    this is no GLSL;")
+    hands.interface.frame(5)
+    assert facts_of(hands.session).shader_error is None
+    hands.interface.key(imgui.Key.f5)
+    hands.interface.frame()
+    told = facts_of(hands.session).shader_error
+    assert told is not None and "display.comp:" in told

@@ -1,0 +1,102 @@
+"""Small parts of the viewer's host: pace, messages, crash log, sentences."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from app.model.scene_file import load_scene
+from app.paths import assets_dir
+from app.ui import requests
+from app.ui.crash_log import FILE_NAME, MAX_BYTES, write_crash
+from app.ui.message_box import MAX_MESSAGES, NOTICE_S, MessageBox
+from app.ui.pace import GPU_SHARE, LEAST_SHARE, SOFTWARE_FRAME_S, Pace
+from app.ui.sentences import brief, sentence, words
+from app.ui.shown_scene import has_same_objects, index_in
+
+
+class Clock:
+    """Stands until it is moved."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def test_the_engine_gets_what_the_rest_of_a_frame_leaves() -> None:
+    pace = Pace(is_software=True)
+    for _ in range(100):
+        pace.note(0.015)
+    assert pace.budget_s == pytest.approx(SOFTWARE_FRAME_S - 0.015)
+    for _ in range(100):
+        pace.note(3.0)  # however slow the interface is, the light goes on
+    assert pace.budget_s == pytest.approx(LEAST_SHARE * SOFTWARE_FRAME_S)
+
+
+def test_a_gpu_keeps_to_the_screen() -> None:
+    assert Pace(is_software=False, refresh_s=1 / 144).budget_s == pytest.approx(GPU_SHARE / 144)
+
+
+def test_notices_fade_and_errors_stay() -> None:
+    clock = Clock()
+    box = MessageBox(clock)
+    box.tell("Saved\nmine.toml.")
+    box.tell("No.", is_error=True)
+    assert [m.text for m in box.messages()] == ["Saved mine.toml.", "No."]
+    assert box.is_fading
+    clock.now = NOTICE_S + 1
+    assert [m.text for m in box.messages()] == ["No."]
+    assert not box.is_fading
+    box.close("No.")
+    assert box.messages() == ()
+
+
+def test_a_message_that_is_said_again_is_shown_once_and_too_many_push_out_the_oldest() -> None:
+    box = MessageBox(Clock())
+    for number in range(MAX_MESSAGES + 3):
+        box.tell(f"Message {number}", is_error=True)
+        box.tell(f"Message {number}", is_error=True)
+    texts = [m.text for m in box.messages()]
+    assert texts == [f"Message {n}" for n in range(3, MAX_MESSAGES + 3)]
+
+
+def test_crash_log_names_action_and_traceback_and_stays_small(tmp_path: Path) -> None:
+    try:
+        raise ZeroDivisionError("a fault")
+    except ZeroDivisionError as error:
+        path = write_crash(tmp_path / "new", "Save", error, "llvmpipe")
+        assert path == tmp_path / "new" / FILE_NAME
+        text = path.read_text()
+        assert "while: Save" in text and "a fault" in text and "llvmpipe" in text and "test_ui_host_parts" in text
+        path.write_bytes(b"x" * (3 * MAX_BYTES))
+        write_crash(tmp_path / "new", "Open", error, "llvmpipe")
+    assert path.stat().st_size < MAX_BYTES + 5000
+    assert "while: Open" in path.read_text()
+
+
+def test_a_crash_log_that_cannot_be_written_is_no_second_crash(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    assert write_crash(tmp_path / "file" / "folder", "Save", ValueError(), "llvmpipe") is None
+
+
+def test_sentences() -> None:
+    assert sentence("the scene has no file yet") == "The scene has no file yet."
+    assert sentence("prism.toml is broken.") == "prism.toml is broken."
+    assert words(requests.SelectAt(0, 0)) == "Select at"
+    error = RuntimeError("outer")
+    error.__cause__ = ValueError("inner  fault")
+    assert brief(error) == "ValueError: inner fault"
+    assert brief(KeyError()) == "KeyError"
+
+
+def test_an_object_of_a_picture_that_lags_behind_is_found_again() -> None:
+    shown = load_scene(assets_dir() / "scenes" / "default.toml")
+    prism, diamond, table = shown.objects
+    edited = replace(shown, objects=(replace(prism, name="other"), diamond, table))
+    assert [index_in(edited, shown, i) for i in range(3)] == [0, 1, 2]
+    deleted = replace(shown, objects=(diamond, replace(table, object_to_world=2 * table.object_to_world)))
+    assert [index_in(deleted, shown, i) for i in (0, 1, 2, 7)] == [None, 0, 1, None]
+    assert has_same_objects(edited, shown) and not has_same_objects(deleted, shown)
