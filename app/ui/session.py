@@ -19,8 +19,8 @@ from app.errors import UserError
 from app.gpu.shader_watch import ShaderWatch
 from app.ui import requests, session_requests
 from app.ui.autosave import Autosave, Recovery, recoveries
-from app.ui.crash_log import write_crash
 from app.ui.companions import Companions
+from app.ui.crash_log import write_crash
 from app.ui.document import Document
 from app.ui.export import write_codes
 from app.ui.facts import Facts
