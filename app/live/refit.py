@@ -1,7 +1,7 @@
 """Whether the maps still fit what the camera sees.
 
 Walking round traces nothing and keeps what is accumulated, so maps are only fitted again where that shows: the
-camera has come so near that texels are larger than pixels, or it looks beside the fine window at light that only
+window has another size, the camera has come so near that texels are larger than pixels, or it looks beside the fine window at light that only
 the coarse one holds.
 """
 
@@ -37,6 +37,8 @@ def wants_new_maps(light: LiveLight, inputs: LiveInputs) -> bool:
     if light.judged_view == key:
         return False
     light.judged_view = key
+    if (inputs.width, inputs.height) != (light.settings.width, light.settings.height):
+        return True
     now, then = light.layout, layout_for(light, inputs)
     return any(_pays(now, then, receiver) for receiver in range(len(now.receivers)))
 

@@ -225,7 +225,7 @@ def test_launches_accumulate_and_repeat_bit_for_bit(gl, monkeypatch):
     first = eye.read_rgb()
     eye.run(ABOVE, 40, 30, 8, sample_offset=8)
     both = eye.read_rgb()
-    monkeypatch.setattr("app.passes.eye._TARGET_SECONDS", 0.0)  # the fewest rows a dispatch
+    eye.dispatch_seconds = 0.0  # the fewest rows a dispatch
     eye.run(ABOVE, 40, 30, 8)
     assert np.array_equal(eye.read_rgb(), first)
     eye.run(ABOVE, 40, 30, 8, sample_offset=8)
@@ -244,12 +244,12 @@ def test_rows_of_a_dispatch_stay_within_the_picture(gl):
     eye.scene.release()
 
 
-def test_a_stop_keeps_what_is_there(gl, monkeypatch):
+def test_a_stop_keeps_what_is_there(gl):
     eye = eye_pass(gl, [floor()], background=(3, 3, 3), camera=ABOVE)
     seen = []
     eye.run(ABOVE, 32, 32, 1)
     whole = eye.read_rgb()
-    monkeypatch.setattr("app.passes.eye._TARGET_SECONDS", 0.0)
+    eye.dispatch_seconds = 0.0
     eye._rows_a_dispatch = 8
     assert not eye.run(ABOVE, 32, 32, 4, sample_offset=1, progress=seen.append, cancelled=lambda: len(seen) >= 6)
     assert seen == sorted(seen) and len(seen) == 6
