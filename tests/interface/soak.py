@@ -205,9 +205,12 @@ def resident_bytes() -> int:
     return pages * os.sysconf("SC_PAGE_SIZE")
 
 
-def device_objects() -> int:
+DATA = (moderngl.Texture, moderngl.Buffer, moderngl.Framebuffer, moderngl.VertexArray)
+PROGRAMS = (moderngl.Program, moderngl.ComputeShader)
+
+
+def device_objects(kinds: tuple[type, ...] = DATA + PROGRAMS) -> int:
     """OpenGL objects that are alive."""
     gc.collect()
-    kinds = (moderngl.Texture, moderngl.Buffer, moderngl.Program, moderngl.ComputeShader, moderngl.Framebuffer, moderngl.VertexArray)
     alive = [o for o in gc.get_objects() if isinstance(o, kinds) and not isinstance(o.mglo, moderngl.InvalidObject)]
     return sum(o.glo != 0 for o in alive)  # 0 is the context's own framebuffer
