@@ -30,7 +30,7 @@ from app.model.spectral_tables import SpectralAxis
 from app.model.spectrum import Spectrum
 from app.passes.emission_domain import EmissionDomain, emission_domain
 from app.passes.footprint import SpectralVariables
-from app.passes.map_layout import MapLayout, check_map_receiver, layout_maps
+from app.passes.map_layout import COARSE_TILE_MAX, FINE_TILE_MAX, MapLayout, check_map_receiver, layout_maps
 from app.passes.pilot import Pilot, landings_of, pilot_steps
 from app.passes.splat import Splatter
 from app.passes.trace import Batch, FluxTally, LatticeSlice, TracePass
@@ -92,6 +92,8 @@ class RoundOf:
 class LightHalf:
     """Owns the light half's passes and the caustic maps of one scene."""
 
+    tile_max = (FINE_TILE_MAX, COARSE_TILE_MAX)
+    """Longest sides of the maps' fine and coarse windows, texels."""
     least_batch = SMALLEST_BATCH
     """With fewer rays in flight the plan would depend on the batch."""
 
@@ -141,13 +143,14 @@ class LightHalf:
         """Maps fitted to where light lands and to what `camera` sees of it; empty."""
         if self.maps is not None:
             self.maps.release()
-        self.maps = self.maps_for(camera, self.settings.width, self.settings.height)
+        self.maps = self.maps_for(camera, self.settings.width, self.settings.height, self.tile_max)
         self.features = self.maps.features
 
-    def maps_for(self, camera: Camera, width: int, height: int) -> LightMaps:
-        """Maps fitted to what `camera` sees in a picture of `width` × `height`; the caller's to release."""
+    def maps_for(self, camera: Camera, width: int, height: int, tile_max: tuple[int, int] = (FINE_TILE_MAX, COARSE_TILE_MAX)) -> LightMaps:
+        """Maps fitted to what `camera` sees in a picture of `width` × `height`; the caller's to release. `tile_max`: see `layout_maps`."""
         seen = replace(self.scene, camera=camera)
-        layout = layout_maps(seen, self.buffers, landings_of(self.pilots.values()), (width, height), self.reflectance_class, self.map_receiver)
+        landings = landings_of(self.pilots.values())
+        layout = layout_maps(seen, self.buffers, landings, (width, height), self.reflectance_class, self.map_receiver, tile_max=tile_max)
         return LightMaps(self.context.ctx, layout, self.features)
 
     @property

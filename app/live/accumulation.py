@@ -64,9 +64,8 @@ class Accumulation:
         for _ in self.light.pass_steps(self.number, self.photons, first_round):
             yield
 
-    def after_edit(self) -> Iterator[None]:
-        """Show the stored photons as they now are, then go on tracing: a pass that was running continues with the round it was in."""
-        yield from self.show_stored()
+    def resumed(self) -> Iterator[None]:
+        """Go on tracing after `show_stored`: a pass that was running continues with the round it was in."""
         if self.number > 0:
             # Of the finished passes only the first is stored: the others are due again.
             self.number = 1

@@ -94,6 +94,8 @@ class LiveEngine:
         self._shown: Shown | None = None
         self._building: Iterator[Shown] | None = None
         self._being_built: LiveInputs | None = None
+        self._repair: Iterator[None] | None = None
+        """Splats that are due again; goes before the job."""
         self._job: Iterator[None] | None = None
         self._maps: CausticMaps | None = None
         self._picker: Picker | None = None
@@ -103,6 +105,7 @@ class LiveEngine:
         self._retrace = False
         self._rays_before = 0
         self._quick_photons = 1 << 13
+        self._shows_quick_maps = False
         self._times = {"trace": 0.0, "splat": 0.0, "eye": 0.0}
         self._history: list[tuple[float, int, float]] = []
         self._published_photons = 0.0
@@ -178,7 +181,7 @@ class LiveEngine:
     def _work(self, deadline: float, budget_s: float) -> None:
         if self._building is not None:
             self._build(deadline - (EYE_SHARE * budget_s if self._maps is not None and self._eye.owes_picture else 0.0))
-        elif self._job is not None and self.playing and not self._interacting_with_camera:
+        elif self._has_work and not self._answering:
             eye_waits = not self._eye.is_done
             self._run_job(deadline - (EYE_SHARE * budget_s if eye_waits else 0.0))
         if self._maps is not None and self._inputs is not None:
@@ -189,9 +192,13 @@ class LiveEngine:
                 self._restart_eye(same_view=True)
 
     @property
-    def _interacting_with_camera(self) -> bool:
-        """A dragged camera gets the whole budget."""
-        return self._interacting and self._eye.owes_picture
+    def _has_work(self) -> bool:
+        return self._repair is not None or (self._job is not None and self.playing)
+
+    @property
+    def _answering(self) -> bool:
+        """A drag gets the whole budget: what its next step throws away is not begun."""
+        return self._interacting and (self._eye.owes_picture or self._shows_quick_maps)
 
     def _follow(self, budget_s: float) -> None:
         """Bring what is shown nearer to what is wanted."""
@@ -218,7 +225,12 @@ class LiveEngine:
             self._eye.pause()
             self._maps = None
             shown.light.fit_to(wanted)
-            self._job = shown.accumulation.after_edit()
+            self._show_again(shown)
+
+    def _show_again(self, shown: Shown) -> None:
+        """The stored photons are splatted again, also where nothing is traced any more; then tracing goes on."""
+        self._repair = shown.accumulation.show_stored()
+        self._job = shown.accumulation.resumed()
 
     def _fits_badly(self, light: LiveLight, wanted: LiveInputs, still: bool) -> bool:
         """Whether maps should be laid out anew: they are only a first answer, or the camera has come near."""
@@ -242,7 +254,7 @@ class LiveEngine:
             if looks_other(shown_before, wanted):
                 self._look_at(wanted, shown.light)
             self._answer_quickly(0.4 * budget_s)
-            self._job = shown.accumulation.after_edit()
+            self._show_again(shown)
             return
         elif cost == Redo.LOOK:
             if self._building is None:
@@ -263,6 +275,7 @@ class LiveEngine:
         if maps is None:
             return
         self._set_maps(maps)
+        self._shows_quick_maps = True
         took = time.perf_counter() - started
         self._quick_photons = int(np.clip(self._quick_photons * np.clip(seconds / max(took, 1e-4), 0.5, 2.0), 1 << 12, 1 << 24))
         self._restart_eye(same_view=False)
@@ -338,7 +351,7 @@ class LiveEngine:
             built.light.release()
             raise
         before, self._shown = self._shown, built
-        self._building, self._job = None, built.steps
+        self._building, self._repair, self._job = None, None, built.steps
         self._inputs, self._being_built = built.traced, None
         if before is not None:
             self._rays_before += before.light.trace.rays_traced
@@ -357,13 +370,17 @@ class LiveEngine:
     # ---- light -------------------------------------------------------------------------------
 
     def _run_job(self, deadline: float) -> None:
-        assert self._shown is not None and self._job is not None
+        assert self._shown is not None
         stats = self._shown.light.stats
         before = stats.trace_seconds, stats.splat_seconds, stats.photons
         while time.perf_counter() < deadline:
-            if next(self._job, self) is self:
-                self._job = None
+            if self._repair is not None:
+                if next(self._repair, self) is self:
+                    self._repair = None
+            elif self._job is None or not self.playing:
                 break
+            elif next(self._job, self) is self:
+                self._job = None
         stats = self._shown.light.stats
         traced = max(stats.trace_seconds - before[0], 0.0)
         splatted = max(stats.splat_seconds - before[1], 0.0)
@@ -378,6 +395,7 @@ class LiveEngine:
         maps = self._shown.light.maps
         assert maps is not None
         self._set_maps(maps)
+        self._shows_quick_maps = False
         self._restart_eye(same_view=not self._interacting and self._eye.scale == 1.0)
 
     def _set_maps(self, maps: LightMaps) -> None:
@@ -432,7 +450,7 @@ class LiveEngine:
     @property
     def is_idle(self) -> bool:
         """Nothing is left to do until an input changes."""
-        waits = self._building is not None or self._urgent or (self._job is not None and self.playing)
+        waits = self._building is not None or self._urgent or self._has_work
         refines = self._shown is not None and self.refine_when_still and self._shown.light.first_order
         return self._wanted is None or not (waits or refines or not self._eye.is_done)
 
@@ -470,4 +488,4 @@ class LiveEngine:
             self._picker.release()
         self._eye.release()
         shader.forget_programs(self.context.ctx)
-        self._shown = self._job = self._maps = self._picker = None
+        self._shown = self._job = self._repair = self._maps = self._picker = None

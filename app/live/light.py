@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 QUICK = 8
 """Pixels to a texel's side in the maps that answer a drag."""
+QUICK_TILE_MAX = (384, 192)
+"""Longest sides of their windows, texels."""
 QUICK_WIDTH = 64
 """Samples of their spectral tables."""
 SOLO_WIDTH_NM = 4.0
@@ -70,6 +72,7 @@ class LiveLight(LightHalf):
     """
 
     least_batch = 1024
+    tile_max = QUICK_TILE_MAX
 
     def __init__(self, context: Context, scene: Scene, settings: RenderSettings, features: Features, buffers: SceneBuffers, capacity_bytes: int) -> None:
         super().__init__(context, scene, settings, features, buffers)
@@ -190,6 +193,7 @@ class LiveLight(LightHalf):
         """Maps laid out for the camera and picture size of `inputs`; empty, to be filled from the stored photons."""
         self.view = inputs.camera
         self.is_coarse = False
+        self.tile_max = LightHalf.tile_max
         self.settings = replace(self.settings, width=inputs.width, height=inputs.height)
         quick, self._quick = self._quick, None
         for maps in (quick, self.maps):
@@ -256,7 +260,7 @@ class LiveLight(LightHalf):
         if bundle is None or not bundle.store.rounds:
             return None
         if self._quick is None:
-            self._quick = self.maps_for(self.view, *quick_size(self.settings.width, self.settings.height))
+            self._quick = self.maps_for(self.view, *quick_size(self.settings.width, self.settings.height), tile_max=QUICK_TILE_MAX)
         self._quick.clear()
         rounds = bundle.store.first_rounds(photons)
         slabs = bundle.store.of_rounds(0, rounds)

@@ -100,8 +100,9 @@ def layout_maps(
     reflectance_class: dict[int, int],
     map_receiver: int | None = None,
     max_side: int = 4096,
+    tile_max: tuple[int, int] = (FINE_TILE_MAX, COARSE_TILE_MAX),
 ) -> MapLayout:
-    """Fit windows and charts.
+    """Fit windows and charts; `tile_max`: longest sides of fine and coarse windows, texels.
 
     `picture`: (width, height) whose camera decides resolution and what is in view; with `map_receiver`
     that receiver's one window has exactly this size instead and the camera is ignored.
@@ -119,7 +120,7 @@ def layout_maps(
             if receiver == map_receiver:
                 windows = [_with_aspect(windows[-1] if landed is None else _extent_of_light(frame, extent, landed), picture)]
             for level, window in enumerate(windows):
-                largest = COARSE_TILE_MAX if level else FINE_TILE_MAX
+                largest = tile_max[1] if level else tile_max[0]
                 size = picture if receiver == map_receiver else _tile_size(scene.camera, buffers, frame, window, picture, largest)
                 sizes += [(-(-size[0] // step), -(-size[1] // step)) for step in LEVEL_STEPS]
             plans.append((receiver, frame, windows, None))
