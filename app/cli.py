@@ -112,7 +112,7 @@ def animate(
     scene: SceneArgument,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="A movie (.mp4), or a folder for numbered PNGs, which can be resumed.")],
     turntable: Annotated[bool, typer.Option("--turntable", help="Turn the camera once about its target; what happens when nothing else is asked for.")] = False,
-    keys: Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Keys of any parameter: [[keys]] with time_s, parameter, value, interpolation.")] = None,
+    keys: Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Keys of any parameter: tables named keys with time_s, parameter, value, interpolation.")] = None,
     ranges: Annotated[list[str] | None, typer.Option("--set", metavar="P=A:B", help="Let a parameter go from A to B, for example objects.prism.dispersion_gain=0:3; may be repeated.")] = None,
     frames: Annotated[Text, typer.Option(metavar="N", help="Pictures in all; default: 120, or as many as the keys last.")] = None,
     fps: Annotated[Text, typer.Option(metavar="F", help="Pictures a second; default: 24.")] = None,
