@@ -73,6 +73,8 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "triangle tree": (features.tree, f"about {_size(triangles * (TRIANGLE.stride + _NODE // 2))}"),
         "half-space solids": (features.convex_solids, f"{planes} planes, {_size(planes * _TEXEL)}: each ray walks through all"),
         "charts": (features.charts, f"{len(curved)} receiver(s) with a placement a facet"),
+        "local gain": (features.local_gain, "eight voxels a photon"),
+        "photons by index": (features.reindexed, "32 B a band"),
         "nested windows": (features.nested_windows, f"{SPLAT.stride} B a photon: a splat for each window"),
         "spectral bins": (features.targets > 1, f"{sizes.texel} B a texel instead of {_TEXEL}"),
     }

@@ -36,6 +36,8 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "half-space solids": ("intersect_solid", "planes", "solids", "SOLID_COUNT"),
     "charts": ("RECEIVER_CHARTS", "PLACED_CHART"),
     "nested windows": ("only_fine", "outer"),
+    "local gain": ("gain_boxes", "local_gain"),
+    "photons by index": ("traced_bands", "v_path"),
     "spectral bins": ("define TARGETS [2-9]", "define TARGETS 1[0-9]"),
 }
 """By `explain`'s names. Names that only this feature uses; one with a space is a pattern for a line."""

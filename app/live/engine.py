@@ -41,6 +41,8 @@ STILL_S = 0.5
 """Without a change for so long, what was only approximated is done properly."""
 CALM_S = 0.12
 """Without a change for so long, a coarse picture is replaced by a full one."""
+ANSWER_S = 0.03
+"""What a coarse picture may take beyond a frame's budget."""
 EYE_SHARE = 0.4
 """Of a frame, where photons are traced as well."""
 
@@ -185,7 +187,9 @@ class LiveEngine:
             eye_waits = not self._eye.is_done
             self._run_job(deadline - (EYE_SHARE * budget_s if eye_waits else 0.0))
         if self._maps is not None and self._inputs is not None:
-            end = max(deadline, time.perf_counter() + 0.25 * budget_s) if self._eye.owes_picture else deadline
+            # A coarse picture that is owed is finished in this frame: what was moved must be seen to move.
+            owed = ANSWER_S if self._eye.is_coarse else 0.25 * budget_s
+            end = max(deadline, time.perf_counter() + owed) if self._eye.owes_picture else deadline
             self._times["eye"] += self._eye.advance(end, one_sample=self._interacting)
             calm = not self._interacting and time.perf_counter() - self._changed_at > CALM_S
             if calm and self._eye.is_coarse and not self._eye.owes_picture:

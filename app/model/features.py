@@ -223,6 +223,8 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
         ("half-space solids", features.convex_solids, names(solids) if features.convex_solids else "no convex faceted solid"),
         ("charts", features.charts, f"{sum(not is_flat(o) for o in diffuse)} curved receiver(s)" if features.charts else "all receivers are flat"),
         ("nested windows", features.nested_windows, "flat receivers may get a fine window inside a coarse one" if features.nested_windows else "no receiver has two windows"),
+        ("local gain", features.local_gain, "the dispersion brush was used on a receiver" if features.local_gain else "no receiver was painted on"),
+        ("photons by index", features.reindexed, "an edit or the brush may move wavelengths between paths" if features.reindexed else "every path keeps its wavelengths"),
         ("spectral bins", features.targets > 1, f"{features.targets} targets" if features.targets > 1 else "XYZ in one target"),
         ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
     ]

@@ -138,6 +138,12 @@ def splat_defines(features: SplatFeatures) -> dict[str, int]:
     return counts | {name: 1 for name, on in switches.items() if on}
 
 
+def footprint_defines(features: SplatFeatures) -> dict[str, int]:
+    """Defines of footprint.comp."""
+    switches = {"LOCAL_GAIN": features.local_gain, "REINDEXED": features.reindexed}
+    return splat_defines(features) | {"GROUPS": features.spectral_groups} | {name: 1 for name, on in switches.items() if on}
+
+
 class Footprints:
     """Owns the splat record buffer and the counts of what could not be drawn as asked."""
 
@@ -145,14 +151,12 @@ class Footprints:
         """`group`: the most photons one dispatch covers."""
         self._ctx = ctx
         groups = features.spectral_groups
-        defines = splat_defines(features) | {
+        defines = footprint_defines(features) | {
             "WORKGROUP": WORKGROUP,
-            "GROUPS": groups,
             "NONE": f"{NONE}u",
             "FLAG_FOOTPRINT_DROPPED": f"{FLAG_FOOTPRINT_DROPPED}u",
         }
         structs = (photon_record(groups), PLACEMENT, RECEIVER, SPLAT, GAIN_BOX)
-        defines |= {name: 1 for name, on in {"LOCAL_GAIN": features.local_gain, "REINDEXED": features.reindexed}.items() if on}
         self._program = shader.compute(ctx, "footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
         self._unusual = ctx.buffer(np.zeros((group, 2), np.float32))

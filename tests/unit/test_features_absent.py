@@ -19,16 +19,17 @@ from app.model.features import Features, explain
 from app.model.scene_file import load_scene
 from app.model.settings import RenderSettings
 from app.passes.eye import EYE_LIGHT, EYE_PARAMETERS
-from app.passes.footprint import SPLAT, splat_defines
+from app.passes.footprint import SPLAT, footprint_defines, splat_defines
 from app.static_costs import RecordSizes, static_costs
 
 EVERYTHING = Features(
     spectral_groups=2, merged_groups=True, spectral_weights=True, footprints=True, point_spectrum=False, random_wavelength=False, even_wavelengths=False, band_cuts=True,
     dielectrics=True, mirrors=True, smooth_normals=True, normal_derivatives=True, absorption=True, medium_stack=True, tree=True,
     loose_triangles=True, convex_solids=True, charts=True, nested_windows=True, targets=2,
+    local_gain=True, reindexed=True,
 )  # fmt: skip
 WITHOUT = {
-    "spectral columns": {"spectral_groups": 0, "merged_groups": False, "band_cuts": False},
+    "spectral columns": {"spectral_groups": 0, "merged_groups": False, "band_cuts": False, "local_gain": False, "reindexed": False},
     "shared spectral variable": {"merged_groups": False},
     "weights over the band": {"spectral_weights": False, "spectral_groups": 0, "merged_groups": False, "band_cuts": False},
     "band cuts": {"band_cuts": False},
@@ -44,6 +45,8 @@ WITHOUT = {
     "charts": {"charts": False},
     "nested windows": {"nested_windows": False},
     "spectral bins": {"targets": 1},
+    "local gain": {"local_gain": False},
+    "photons by index": {"reindexed": False},
 }
 
 
@@ -58,7 +61,7 @@ def sources(features: Features) -> list[shader.Source]:
     splat = splat_defines(features) | {"GROUPS": features.spectral_groups}
     eye = light | {"LAYER_BEAUTY": 1}
     made = [shader.load_source("trace.comp", light, structs), shader.load_source("emit.comp", light | {"LIGHT_POINT": 1}, structs)]
-    made.append(shader.load_source("footprint.comp", splat, (photon, records.PLACEMENT, records.RECEIVER, SPLAT)))
+    made.append(shader.load_source("footprint.comp", footprint_defines(features), (photon, records.PLACEMENT, records.RECEIVER, SPLAT, records.GAIN_BOX)))
     draws = {"splat_small.frag": "SMALL", "splat_swept.frag": "SWEPT"} | ({"splat_cut.frag": "CUT"} if features.band_cuts else {})
     for fragment, kind in draws.items():
         made += [shader.load_source(name, splat | {kind: 1}, (SPLAT,)) for name in ("splat.vert", fragment)]
