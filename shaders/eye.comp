@@ -11,6 +11,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/lookup.glsl"
 #include "lib/random.glsl"
 #include "lib/optics.glsl"
+#include "lib/surface.glsl"
 #ifdef HAS_DIELECTRIC
 // All that medium.glsl needs to know of a ray.
 struct RayRecord {
@@ -125,56 +126,6 @@ void add_emission(EyePath path, float far, bool met, inout vec4 radiance[TARGETS
 #endif
 }
 
-// The geometric normal, turned against the ray.
-vec3 facing_geometric(Hit hit, vec3 direction)
-{
-    return dot(direction, hit.normal_g) < 0.0 ? hit.normal_g : -hit.normal_g;
-}
-
-// Unit normal a specular surface shades with, turned against the ray.
-vec3 facing_normal(Hit hit, vec3 direction)
-{
-    vec3 normal_g = facing_geometric(hit, direction);
-#if defined(SMOOTH_NORMALS) && defined(LOOSE_TRIANGLES)
-#ifdef CONVEX_SOLIDS
-    if ((hit.primitive & PLANE_BIT) != 0u) return normal_g;
-#endif
-    uint first = triangle_at(hit.primitive).normals;
-    if (first == NONE) return normal_g;
-    vec3 normal = normalize((1.0 - hit.bary.x - hit.bary.y) * corner_normal(first)
-                            + hit.bary.x * corner_normal(first + 1u) + hit.bary.y * corner_normal(first + 2u));
-    normal = dot(normal, normal_g) < 0.0 ? -normal : normal;
-    // Where the interpolated normal turns away from the ray the geometric one is the judge.
-    return dot(direction, normal) < -1e-4 ? normal : normal_g;
-#else
-    return normal_g;
-#endif
-}
-
-// Reflected by the shading normal, or by the geometric one where that would lead into the surface.
-vec3 reflected_direction(Hit hit, vec3 direction, vec3 normal)
-{
-    vec3 normal_g = facing_geometric(hit, direction);
-    vec3 turned = reflect_direction(direction, normal, dot(direction, normal));
-    return normalize(dot(turned, normal_g) > 0.0 ? turned : reflect_direction(direction, normal_g, dot(direction, normal_g)));
-}
-
-// On the surface as exactly as its own coordinates can say.
-vec3 hit_position(EyePath path, Hit hit)
-{
-    vec3 position = path.position + hit.distance * path.direction;
-    if (hit.primitive == NONE) return position;
-#ifdef CONVEX_SOLIDS
-    if ((hit.primitive & PLANE_BIT) != 0u) {
-        vec4 plane = planes[hit.primitive & ~PLANE_BIT];
-        return position - plane.xyz * (dot(position, plane.xyz) - plane.w);
-    }
-#endif
-#ifdef LOOSE_TRIANGLES
-    position = triangle_at(hit.primitive).vertex + hit.bary.x * triangle_at(hit.primitive).edge1 + hit.bary.y * triangle_at(hit.primitive).edge2;
-#endif
-    return position;
-}
 #endif
 
 #if defined(LAYER_BEAUTY) && defined(HAS_DIELECTRIC)
@@ -204,23 +155,18 @@ void cross_glass(inout EyePath path, Hit hit, vec3 position, out EyePath mirrore
     vec3 normal = facing_normal(hit, path.direction);
     float theta = dot(path.direction, normal);
     float eta_it = medium_index(crossing.before, p.x_eye) / medium_index(crossing.after, p.x_eye);
-    float cosine2 = transmitted_cosine2(theta, eta_it);
-    float reflectance = fresnel_reflectance(theta, eta_it, cosine2);
-    mirrored.direction = reflected_direction(hit, path.direction, normal);
-    for (int t = 0; t < TARGETS; ++t) mirrored.weight[t] *= reflectance;
-    if (cosine2 <= 0.0) {
-        path = mirrored;
+    float reflectance = fresnel_reflectance(theta, eta_it, transmitted_cosine2(theta, eta_it));
+    bool total;
+    vec3 onward = refracted_direction(hit, path.direction, normal, eta_it, total);
+    mirrored.direction = total ? onward : reflected_direction(hit, path.direction, normal);
+    if (total) {
+        path.direction = onward;
+        path.origin = mirrored.origin;
         for (int t = 0; t < TARGETS; ++t) mirrored.weight[t] = vec4(0.0);
         return;
     }
-    vec3 normal_g = facing_geometric(hit, path.direction);
-    vec3 refracted = refract_direction(path.direction, normal, theta, eta_it, sqrt(cosine2));
-    if (dot(refracted, normal_g) >= 0.0) {
-        // Bent back out of the surface: the geometric normal is the judge.
-        float theta_g = dot(path.direction, normal_g);
-        refracted = refract_direction(path.direction, normal_g, theta_g, eta_it, sqrt(max(transmitted_cosine2(theta_g, eta_it), 1e-12)));
-    }
-    path.direction = normalize(refracted);
+    for (int t = 0; t < TARGETS; ++t) mirrored.weight[t] *= reflectance;
+    path.direction = onward;
     path.medium = beyond;
     for (int t = 0; t < TARGETS; ++t) path.weight[t] *= 1.0 - reflectance;
 }
@@ -256,7 +202,7 @@ void main()
         bool goes_on = false;
 #ifdef LAYER_BEAUTY
         add_emission(path, hit.distance, met, radiance);
-        vec3 position = hit_position(path, hit);
+        vec3 position = surface_point(hit, path.position, path.direction);
 #else
         vec3 position = path.position + hit.distance * path.direction;
 #endif

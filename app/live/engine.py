@@ -25,7 +25,7 @@ from app.live.eye import LiveEye, solo_scene
 from app.live.inputs import LiveInputs, Redo
 from app.live.light import LiveLight, quick_size
 from app.live.near import StoredPhotons, caustic_spectrum, reach_of, world_photons
-from app.live.refit import wants_new_maps
+from app.live.refit import is_judged, wants_new_maps
 from app.live.stats import LiveStats
 from app.model.features import Features
 from app.model.settings import RenderSettings
@@ -456,7 +456,8 @@ class LiveEngine:
         """Nothing is left to do until an input changes."""
         waits = self._building is not None or self._urgent or self._has_work
         refines = self._shown is not None and self.refine_when_still and self._shown.light.first_order
-        return self._wanted is None or not (waits or refines or not self._eye.is_done)
+        unjudged = self._shown is not None and self._wanted is not None and not is_judged(self._shown.light, self._wanted)
+        return self._wanted is None or not (waits or refines or unjudged or not self._eye.is_done)
 
     def pick(self, x: float, y: float) -> PickHit | None:
         """First surface at (x, y) of the picture, 0 to 1 from its top left corner; None beyond everything."""

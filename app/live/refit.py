@@ -31,12 +31,16 @@ def layout_for(light: LiveLight, inputs: LiveInputs) -> MapLayout:
     return layout_maps(seen, light.buffers, landings_of(light.pilots.values()), (inputs.width, inputs.height), light.reflectance_class)
 
 
+def is_judged(light: LiveLight, inputs: LiveInputs) -> bool:
+    """Whether `wants_new_maps` has looked at this view."""
+    return light.judged_view == (inputs.camera, inputs.width, inputs.height)
+
+
 def wants_new_maps(light: LiveLight, inputs: LiveInputs) -> bool:
     """Whether new maps would show more of what the camera of `inputs` sees."""
-    key = (inputs.camera, inputs.width, inputs.height)
-    if light.judged_view == key:
+    if is_judged(light, inputs):
         return False
-    light.judged_view = key
+    light.judged_view = (inputs.camera, inputs.width, inputs.height)
     if (inputs.width, inputs.height) != (light.settings.width, light.settings.height):
         return True
     now, then = light.layout, layout_for(light, inputs)

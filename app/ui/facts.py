@@ -28,7 +28,7 @@ class CursorFacts:
     spectrum_nm: np.ndarray | None = None
     """Bin centres, when a spectrum was asked for (`Panels.spectrum`)."""
     spectrum: np.ndarray | None = None
-    """Irradiance of each bin by the caustic, W/unit²/nm."""
+    """Shape of the caustic's spectrum there: irradiance of each bin over that of the brightest."""
     magnified: int | None = None
     """Texture id of the magnifier's picture."""
 
