@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 QUICK = 8
 """Pixels to a texel's side in the maps that answer a drag."""
-QUICK_TILE_MAX = (384, 192)
+QUICK_TILE_MAX = (288, 144)
 """Longest sides of their windows, texels."""
 QUICK_WIDTH = 64
 """Samples of their spectral tables."""
