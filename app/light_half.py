@@ -30,7 +30,13 @@ from app.model.spectral_tables import SpectralAxis
 from app.model.spectrum import Spectrum
 from app.passes.emission_domain import EmissionDomain, emission_domain
 from app.passes.footprint import SpectralVariables
-from app.passes.map_layout import COARSE_TILE_MAX, FINE_TILE_MAX, MapLayout, check_map_receiver, layout_maps
+from app.passes.map_layout import (
+    COARSE_TILE_MAX,
+    FINE_TILE_MAX,
+    MapLayout,
+    check_map_receiver,
+    layout_maps,
+)
 from app.passes.pilot import Pilot, landings_of, pilot_steps
 from app.passes.splat import Splatter
 from app.passes.trace import Batch, FluxTally, LatticeSlice, TracePass

@@ -10,7 +10,17 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from app.bench import report_style as style
-from app.bench.plots import ASKED_RATIO, BASELINE, Series, draw_ratio_arrow, draw_series, is_lower_bound, label_ends, scene_series, set_limits
+from app.bench.plots import (
+    ASKED_RATIO,
+    BASELINE,
+    Series,
+    draw_ratio_arrow,
+    draw_series,
+    is_lower_bound,
+    label_ends,
+    scene_series,
+    set_limits,
+)
 from app.bench.report_text import ratio_text
 from app.bench.results import BenchResult, SceneResult
 

@@ -15,7 +15,14 @@ from app.bench import report_text as text
 from app.bench.metrics import EPSILON_SHARE, lit_mean
 from app.bench.plots import BASELINE, is_lower_bound
 from app.bench.report_html import Html, element, figure, table
-from app.bench.results import EARLY_SHARE, OTHER_MEASURES, STAGES, Curve, Point, SceneResult
+from app.bench.results import (
+    EARLY_SHARE,
+    OTHER_MEASURES,
+    STAGES,
+    Curve,
+    Point,
+    SceneResult,
+)
 
 
 def section(scene: SceneResult, anchor: str, curve_svgs: Mapping[str, Html], directory: Path) -> Html:

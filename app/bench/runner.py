@@ -16,7 +16,15 @@ from app.bench.claims import claims_of, ratios_of
 from app.bench.curves import complete_curve, photons_at_time
 from app.bench.metrics import Truth
 from app.bench.rendering import MethodRig, NothingToMeasure, Rendering
-from app.bench.results import EARLY_SHARE, OTHER_MEASURES, BenchSettings, Curve, ReferenceInfo, Sample, SceneResult
+from app.bench.results import (
+    EARLY_SHARE,
+    OTHER_MEASURES,
+    BenchSettings,
+    Curve,
+    ReferenceInfo,
+    Sample,
+    SceneResult,
+)
 from app.bench.store import Store
 from app.bench.truth_picture import make_truth, truth_key
 from app.errors import UserError

@@ -17,7 +17,13 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from app.gpu.glsl_conditionals import DEFINE, Line, Unit, directive_of, resolve_conditionals
+from app.gpu.glsl_conditionals import (
+    DEFINE,
+    Line,
+    Unit,
+    directive_of,
+    resolve_conditionals,
+)
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _FUNCTION = re.compile(r"\s*(?:\w+\s+)*?\w+\s+(\w+)\s*\(([^)]*)\)\s*\{")

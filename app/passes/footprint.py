@@ -15,12 +15,12 @@ import numpy as np
 from app.gpu import shader
 from app.gpu.records import (
     FLAG_FOOTPRINT_DROPPED,
+    GAIN_BOX,
     NONE,
     PLACEMENT,
     RECEIVER,
     photon_record,
 )
-from app.gpu.records import GAIN_BOX
 from app.gpu.schema import Field, Struct
 
 if TYPE_CHECKING:

@@ -13,7 +13,12 @@ import pytest
 from app.bench import features_cost, features_report
 from app.bench.feature_rig import Rig, Work, map_difference
 from app.bench.feature_variants import DISPERSION, Trial, Variant, trials
-from app.bench.symbol_proof import FEATURE_SYMBOLS, compiled_sources, program_texts, prove
+from app.bench.symbol_proof import (
+    FEATURE_SYMBOLS,
+    compiled_sources,
+    program_texts,
+    prove,
+)
 from app.errors import UserError
 from app.gpu.context import Context
 from app.gpu.scene_buffers import SceneBuffers

@@ -11,7 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from app.bench.results import BenchResult, Claim, Curve, Point, ReferenceInfo, Sample, SceneResult
+from app.bench.results import (
+    BenchResult,
+    Claim,
+    Curve,
+    Point,
+    ReferenceInfo,
+    Sample,
+    SceneResult,
+)
 
 # Seconds per photon, variance at 1000 photons, its exponent, bias².
 METHODS = {

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from app.bench.claims import claims_of, ratios_of
-from app.bench.curves import complete_curve, error_at_time, photons_at_time, points_by, speed_up, tail_slope, time_to_error
+from app.bench.curves import (
+    complete_curve,
+    error_at_time,
+    photons_at_time,
+    points_by,
+    speed_up,
+    tail_slope,
+    time_to_error,
+)
 from app.bench.metrics import Truth
 from app.bench.results import Claim, Curve, Point, ReferenceInfo, Sample, SceneResult
 

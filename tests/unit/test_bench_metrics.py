@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.bench.metrics import Truth, bias_variance, flip, measure, relmse_of_difference, relmse_raw
+from app.bench.metrics import (
+    Truth,
+    bias_variance,
+    flip,
+    measure,
+    relmse_of_difference,
+    relmse_raw,
+)
 
 SHAPE = (12, 20, 3)
 

@@ -12,7 +12,14 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from app.bench import plots, report, report_pictures, report_plots, report_style, report_text
+from app.bench import (
+    plots,
+    report,
+    report_pictures,
+    report_plots,
+    report_style,
+    report_text,
+)
 from app.bench.metrics import EPSILON_SHARE
 from app.bench.report_html import Html, element
 from app.bench.report_overview import overview

@@ -21,7 +21,14 @@ from app.bench.store import Store
 from app.errors import UserError
 from app.model.catalogue import find
 from app.model.mesh import make_mesh
-from app.model.scene import Camera, Dielectric, Diffuse, RenderDefaults, Scene, SceneObject
+from app.model.scene import (
+    Camera,
+    Dielectric,
+    Diffuse,
+    RenderDefaults,
+    Scene,
+    SceneObject,
+)
 
 WIDTH, HEIGHT = 8, 6
 SETTINGS = BenchSettings(3.0, 3, ("stochastic", "srd"), (WIDTH, HEIGHT))
