@@ -9,26 +9,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from app.errors import UserError
 from app.gpu import shader
-from app.gpu.scene_buffers import SceneBuffers
-from app.light_half import spectral_axis
 from app.light_maps import LightMaps
-from app.live.accumulation import Accumulation
+from app.live.building import Budget, Shown, build
 from app.live.difference import looks_other, redo
 from app.live.eye import LiveEye, solo_scene
 from app.live.inputs import LiveInputs, Redo
-from app.live.light import LiveLight, quick_size
+from app.live.light import LiveLight
 from app.live.near import StoredPhotons, caustic_spectrum, reach_of, world_photons
 from app.live.refit import is_judged, wants_new_maps
 from app.live.stats import LiveStats
-from app.model.features import Features
-from app.model.settings import RenderSettings
 from app.passes.eye import CausticMaps
 from app.passes.pick import Picker, PickHit
 
@@ -36,6 +32,7 @@ if TYPE_CHECKING:
     import moderngl
 
     from app.gpu.context import Context
+    from app.gpu.scene_buffers import SceneBuffers
 
 STILL_S = 0.5
 """Without a change for so long, what was only approximated is done properly."""
@@ -45,34 +42,6 @@ ANSWER_S = 0.03
 """What a coarse picture may take beyond a frame's budget."""
 EYE_SHARE = 0.4
 """Of a frame, where photons are traced as well."""
-
-
-@dataclass(frozen=True)
-class Budget:
-    """Sizes that depend on the device."""
-
-    batch: int
-    first_photons: int
-    largest_photons: int
-    store_bytes: int
-
-    @staticmethod
-    def of(context: Context) -> Budget:
-        """A software renderer answers in small steps; a GPU takes millions at a time."""
-        if context.is_software:
-            return Budget(1 << 14, 1 << 14, 1 << 22, 256 << 20)
-        return Budget(1 << 18, 1 << 20, 1 << 25, 1 << 30)
-
-
-@dataclass
-class Shown:
-    """A light half and how far it has come."""
-
-    traced: LiveInputs
-    light: LiveLight
-    accumulation: Accumulation
-    steps: Iterator[None] = field(default_factory=lambda: iter(()))
-    """What is left of the accumulation."""
 
 
 class LiveEngine:
@@ -301,7 +270,7 @@ class LiveEngine:
         if wanted is None:
             return
         self._being_built = wanted
-        self._building = self._build_steps(wanted)
+        self._building = build(self.context, self.budget, wanted, self._largest, self._target_photons, self._publish_maps)
 
     def _build(self, deadline: float) -> None:
         assert self._building is not None
@@ -310,38 +279,6 @@ class LiveEngine:
             if built is not None:
                 self._swap(built)
                 return
-
-    def _build_steps(self, wanted: LiveInputs) -> Iterator[Shown | None]:
-        """Everything for a scene that photons must be traced for, up to its first picture; None while it is not done."""
-        width, height = quick_size(wanted.width, wanted.height)
-        settings = RenderSettings(
-            width=width, height=height, method=wanted.method, seed=wanted.seed, smoothing=wanted.smoothing,
-            max_depth=wanted.scene.render.max_depth, batch=self.budget.batch, local_gain=wanted.local_gain, anchor_weights=True,
-        )  # fmt: skip
-        scene = replace(wanted.scene, camera=wanted.camera)
-        features = Features.of(scene, settings)
-        buffers = SceneBuffers(self.context.ctx, scene, features, spectral_axis(scene, features))
-        light = LiveLight(self.context, scene, settings, features, buffers, self.budget.store_bytes)
-        try:
-            yield None
-            for _ in light.preparing():
-                yield None
-            light.show(wanted)
-            largest = self._largest
-            first = min(self.budget.first_photons, largest)
-            shown = Shown(wanted, light, Accumulation(light, first, largest, self.target_photons, wanted.seed, lambda: None))
-            published: list[bool] = []
-            shown.accumulation.publish = lambda: published.append(True)
-            steps = shown.accumulation.steps()
-            while not published:
-                next(steps, None)
-                yield None
-            shown.accumulation.publish = self._publish_maps
-            shown.steps = steps
-        except BaseException:  # also when the generator is closed because nobody wants this scene any more
-            light.release()
-            raise
-        yield shown
 
     def _swap(self, built: Shown) -> None:
         # What does not compile (or fit) leaves everything as it was: the programs of the eye come first.
