@@ -123,6 +123,8 @@ class Facts:
     """How far the picture that compare modes show is, 0 to 1; None where none was begun."""
     compare_text: str = ""
     """What that picture is and how good, or why there is none: one or two sentences."""
+    compare_ready: bool = False
+    """There is a picture to compare with."""
     compare_stale: bool = False
     """The scene or the view has changed since it was begun."""
     rays: tuple[RayLine, ...] = ()

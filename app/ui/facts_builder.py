@@ -37,6 +37,7 @@ def facts_of(session: Session) -> Facts:
         curves=comparison.curves,
         reference_progress=comparison.progress,
         compare_text=comparison.text,
+        compare_ready=comparison.picture is not None,
         compare_stale=comparison.is_stale,
         rays=session.companions.overlay.rays,
         job=session.companions.exports.job,

@@ -103,7 +103,9 @@ def badges(state: State, facts: Facts) -> list[Badge]:
         told.append(Badge("First order", "Photons were traced through a glass of another dispersion; the picture follows the edit to first order until they are traced again (Ctrl+R)."))
     if state.solo_nm is not None:
         told.append(Badge(f"Only {state.solo_nm:.0f} nm", "The light of a single wavelength is shown. L goes back to all of it.", False))
-    if state.compare.holding:
+    if (state.compare.mode in ("wipe", "error") or state.compare.holding) and not facts.compare_ready:
+        told.append(Badge("Nothing to compare with yet", "The other picture is being computed; the compare panel shows how far it is."))
+    elif state.compare.holding:
         told.append(Badge("Reference", "Shown while C is held down.", False))
     if not state.playing:
         told.append(Badge("Paused", "No photons are added. Space goes on.", False))

@@ -12,12 +12,12 @@ from imgui_bundle import imgui
 from app.gpu.context import Context
 from app.live.stats import LiveStats
 from app.model.scene import Diffuse
-from app.ui import camera_controls, viewport
+from app.ui import camera_controls, viewport, viewport_tools
 from app.ui.facts import CursorFacts, Facts, RayLine
 from app.ui.headless import HeadlessInterface
 from app.ui.projection import View
 from app.ui.requests import BeginPull, Notice, Pull, SelectAt
-from app.ui.state import Brush, Selection, State
+from app.ui.state import Brush, Compare, Selection, State
 from tests.interface.panel_rig import receiver_of, scene_state
 
 SIZE = (640, 400)
@@ -382,3 +382,11 @@ def test_rays_are_drawn_in_their_colour_and_behind_the_camera_not_at_all(rig) ->
     rig.facts = replace(rig.facts, rays=(RayLine(550.0, np.stack([b, behind])),))
     rig.frame()  # cut where it passes the camera
     assert (rig.screenshot()[..., 1].astype(int) - rig.screenshot()[..., 0] > 100).any()
+
+
+def test_a_comparison_that_is_not_there_yet_is_told() -> None:
+    state = replace(scene_state(), compare=Compare(mode="wipe"))
+    told = [badge.text for badge in viewport_tools.badges(state, Facts())]
+    assert "Nothing to compare with yet" in told
+    told = [badge.text for badge in viewport_tools.badges(state, Facts(compare_ready=True))]
+    assert "Nothing to compare with yet" not in told
