@@ -117,6 +117,8 @@ class LightHalf:
         self.gains = GainBuffers(context.ctx, scene, buffers.receivers, buffers.space, buffers.axis) if features.local_gain else None
         self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
         self.maps: LightMaps | None = None
+        self.waits = context.is_software
+        """Wait for the device at every pause: times are then what the work took, and a budget is kept."""
         self.splat_part = 1 << 30
         """Photons splatted without a pause."""
         self._shown_spectra: Sequence[Spectrum] = [light.spectral_power for light in scene.lights]
@@ -290,6 +292,8 @@ class LightHalf:
             except StopIteration as finished:
                 batch: Batch = finished.value
                 break
+            if self.waits and not self.context.is_software:  # there the queue's length is read at every step, which waits
+                self.context.finish()
             self.stats.trace_seconds += time.perf_counter() - started
             yield
             started = time.perf_counter()
@@ -322,7 +326,7 @@ class LightHalf:
             maps.splatter.run(
                 photons, part, self.variables, tables.tables, maps.atlas, maps.receivers, smoothing, self.gains, start * stride, stride, tables.reindex
             )  # fmt: skip
-            if self.context.is_software:
+            if self.waits:
                 self.context.finish()
             self.stats.splat_seconds += time.perf_counter() - started
             if start + part < count:

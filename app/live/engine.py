@@ -276,6 +276,9 @@ class LiveEngine:
         assert self._building is not None
         while time.perf_counter() < deadline:
             built = next(self._building, None)
+            if not self.context.is_software:
+                # What is only queued keeps no deadline.
+                self.context.finish()
             if built is not None:
                 self._swap(built)
                 return

@@ -77,6 +77,7 @@ class LiveLight(LightHalf):
     def __init__(self, context: Context, scene: Scene, settings: RenderSettings, features: Features, buffers: SceneBuffers, capacity_bytes: int) -> None:
         super().__init__(context, scene, settings, features, buffers)
         self.capacity_bytes = capacity_bytes
+        self.waits = True
         self.splat_part = 1 << 12 if context.is_software else 1 << 18
         self.first_order = False
         """What is shown has another dispersion than what was traced."""
