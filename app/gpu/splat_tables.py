@@ -114,7 +114,8 @@ def _by_target(values: np.ndarray, targets: int) -> np.ndarray:
     return values.reshape(len(values), targets, 4).transpose(1, 0, 2)
 
 
-_KEPT_TABLES = 8
+_KEPT_BYTES = 24 << 20
+"""Of blurred spectra that are kept for the next plan with the same bands."""
 _blurred: dict[tuple[int | bytes, ...], tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
 
@@ -156,9 +157,9 @@ class _Source:
         parts = (self.smooth.at(np.linspace(0.0, 1.0, FINEST + 1)), self.line_x, self.line_energy, edges)
         key = (width, *(part.tobytes() for part in parts))
         if key not in _blurred:
-            while len(_blurred) >= _KEPT_TABLES:
-                _blurred.pop(next(iter(_blurred)))
             _blurred[key] = self._blur(edges, width)
+            while len(_blurred) > 1 and sum(table.nbytes for table, _, _ in _blurred.values()) > _KEPT_BYTES:
+                _blurred.pop(next(iter(_blurred)))
         return _blurred[key]
 
     def _blur(self, edges: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
