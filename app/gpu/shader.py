@@ -112,6 +112,8 @@ def load_source(
     source = Source(name, "\n".join(line.text for line in kept) + "\n", tuple((line.file, line.number) for line in kept), len(lines))
     if _kept:
         _sources[asked] = source
+        while len(_sources) > 2 * KEPT_PROGRAMS:
+            _sources.pop(next(iter(_sources)))
     return source
 
 
