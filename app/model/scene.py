@@ -15,6 +15,7 @@ import numpy as np
 from app.model.glass import Dispersion
 from app.model.mesh import Mesh
 from app.model.spectrum import Spectrum
+from app.model.texture import Environment, Texture
 
 Vec3 = tuple[float, float, float]
 
@@ -99,6 +100,8 @@ class Diffuse:
 
     reflectance_rgb: Vec3 = (0.8, 0.8, 0.8)
     reflectance: np.ndarray | None = None
+    texture: Texture | None = None
+    """Multiplies `reflectance_rgb` by the mesh's texture coordinates; never beside `reflectance`."""
 
 
 @dataclass(frozen=True)
@@ -159,6 +162,8 @@ class Scene:
     objects: tuple[SceneObject, ...]
     background_rgb: Vec3 = (0.0, 0.0, 0.0)
     """Linear Rec.709 radiance seen where a camera ray leaves the scene (lights nothing)."""
+    environment: Environment | None = None
+    """Seen instead of `background_rgb`."""
     render: RenderDefaults = RenderDefaults()
     notes: tuple[str, ...] = ()
     """What was assumed while loading, one sentence each; shown to the user."""

@@ -18,6 +18,8 @@ class RenderSettings:
     seconds: float | None = None
     seed: int = 1
     method: str = "srd"
+    eye_method: str | None = None
+    """The camera's method where it differs from the light's `method`."""
     layer: str = "beauty"
     """"beauty", "caustic" or "map:RECEIVER"."""
     bins: int | None = None
