@@ -83,6 +83,29 @@ def rgb709_to_xyz(rgb: np.ndarray) -> np.ndarray:
     return np.asarray(rgb) @ rgb709_to_xyz_matrix().T
 
 
+@cache
+def daylight_per_lumen() -> np.ndarray:
+    """Spectral density of D65 whose K_m Σ S ȳ is 1 (a luminance of 1 lm/(sr unit²), say): float64 (401,), read-only."""
+    daylight = illuminant_table()["D65"]
+    return _frozen(daylight / (K_M * (daylight @ cmf_xyz()[:, 1])))
+
+
+@cache
+def rgb_basis() -> np.ndarray:
+    """Reflectances of Rec.709 red, green and blue: float64 (401, 3) on `VISIBLE_NM`, in [0, 1], read-only.
+
+    They sum to 1 at every wavelength, and `rgb_basis() @ rgb` under D65 has exactly the linear colour `rgb`, so
+    `(rgb_basis() @ rgb) * daylight_per_lumen()` is the spectrum of a radiance `rgb`. Linear, unlike
+    `rgb_partition`, whose three curves do not show the primaries: that one is for exponents (transmittance).
+
+    I. Mallett, C. Yuksel: Spectral Primary Decomposition for Rendering with sRGB Reflectance, EGSR 2019; this table
+    is our own solution of their problem, baked by assets/spectra/bake_rgb_basis.py.
+    """
+    values = np.loadtxt(assets_dir() / "spectra" / "rgb_basis_1nm.csv", delimiter=",")[:, 1:]
+    # The file's fifteen digits leave the sum a hair from 1; greys are to be flat.
+    return _frozen(values / values.sum(axis=1, keepdims=True))
+
+
 _BLUE_EDGE_NM, _BLUE_WIDTH_NM = 489.5, 8.0
 _RED_EDGE_NM, _RED_WIDTH_NM = 592.0, 3.0
 
