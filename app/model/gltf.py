@@ -124,7 +124,7 @@ class _Reader:
         name = self.document.path.stem
         notes = tuple(dict.fromkeys(self.notes))
         background, render = read_scene_extras(self.document)
-        return Scene(name, camera, lights, tuple(self.objects), background, render, notes), self.origins
+        return Scene(name, camera, lights, tuple(self.objects), background, render=render, notes=notes), self.origins
 
     # -- structure ------------------------------------------------------------------------
 

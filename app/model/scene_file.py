@@ -98,7 +98,7 @@ def _scene_from_table(table: SceneTable) -> Scene:
     table.finish("a scene")
     if not (table.has("camera") or table.has("lights")):
         _add_table(objects, notes)
-    return Scene(name, camera, lights, tuple(objects), background, render, tuple(notes))
+    return Scene(name, camera, lights, tuple(objects), background, render=render, notes=tuple(notes))
 
 
 def _read_lights(table: SceneTable, around: Surroundings, notes: list[str]) -> tuple[Light, ...]:
