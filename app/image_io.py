@@ -90,7 +90,7 @@ def read_image(path: Path | str) -> Picture:
         raise UserError(f"cannot read {path}: there is no such file; check the name")
     try:
         return reader(path)
-    except (OSError, ValueError, RuntimeError, KeyError) as error:
+    except (OSError, EOFError, ValueError, RuntimeError, KeyError) as error:
         raise UserError(f"cannot read {path}: it is not a whole {suffix[1:].upper()} picture ({error}); write it again") from error
 
 

@@ -1,0 +1,234 @@
+"""Environments: the pictures hang where the conventions say, and skies are those of the standard."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.errors import UserError
+from app.image_io import write_image
+from app.model.cie_sky import SKY_TYPES, relative_luminance
+from app.model.environment import (
+    direction_of,
+    from_map,
+    gradient,
+    horizontal_illuminance,
+    sky,
+    up_and_rotation,
+    world_to_local,
+)
+from app.model.texture import Environment
+from tests.unit.picture_bytes import hdr_file
+
+
+def looked_up(environment: Environment, direction: tuple[float, float, float]) -> np.ndarray:
+    """Texel seen in a world direction, by the words of `texture.Environment`."""
+    x, y, z = environment.world_to_local @ np.array(direction) / np.linalg.norm(direction)
+    height, width = environment.rgb.shape[:2]
+    u, v = 0.5 - math.atan2(y, x) / (2.0 * math.pi), math.acos(max(-1.0, min(1.0, z))) / math.pi
+    return environment.rgb[min(int(v * height), height - 1), int(u * width) % width]
+
+
+def numbered_map(path: Path, width: int = 16, height: int = 8) -> Path:
+    """A picture whose red is the column and whose green is the row."""
+    rgb = np.zeros((height, width, 3), np.float32)
+    rgb[..., 0], rgb[..., 1] = np.arange(width), np.arange(height)[:, None]
+    write_image(path, rgb)
+    return path
+
+
+# -- how a picture hangs ------------------------------------------------------------------
+
+
+def test_the_middle_of_a_map_lies_at_x_and_its_left_at_y(tmp_path: Path) -> None:
+    environment = from_map(numbered_map(tmp_path / "a.npy"))
+    assert environment.kind == "map" and environment.source == str((tmp_path / "a.npy").resolve())
+    assert looked_up(environment, (1.0, -1e-6, 0.0))[0] == 8 and looked_up(environment, (1.0, 1e-6, 0.0))[0] == 7
+    assert looked_up(environment, (-1e-6, 1.0, 0.0))[0] == 3 and looked_up(environment, (1e-6, -1.0, 0.0))[0] == 11
+    assert looked_up(environment, (-1.0, 1e-6, 0.0))[0] == 0 and looked_up(environment, (-1.0, -1e-6, 0.0))[0] == 15
+    assert looked_up(environment, (0.01, 0.0, 1.0))[1] == 0 and looked_up(environment, (0.01, 0.0, -1.0))[1] == 7
+
+
+def test_rotation_is_anticlockwise_from_above(tmp_path: Path) -> None:
+    environment = from_map(numbered_map(tmp_path / "a.npy"), rotation_deg=90.0)
+    # What was seen along x is now seen along y.
+    assert looked_up(environment, (1e-6, 1.0, 0.0))[0] == 8
+
+
+@pytest.mark.parametrize("up", [(0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (-2.0, 0.0, 0.0), (0.3, -0.5, -0.8)])
+def test_up_is_up_and_the_frame_a_rotation(up: tuple[float, float, float]) -> None:
+    for angle in (0.0, 33.0, -170.0):
+        matrix = world_to_local(up, angle)
+        np.testing.assert_allclose(matrix @ matrix.T, np.eye(3), atol=1e-14)
+        assert np.linalg.det(matrix) == pytest.approx(1.0, abs=1e-13)
+        np.testing.assert_allclose(matrix @ np.array(up) / np.linalg.norm(up), (0.0, 0.0, 1.0), atol=1e-14)
+        again_up, again_angle = up_and_rotation(Environment(np.zeros((1, 2, 3), np.float32), matrix))
+        assert again_angle == pytest.approx(angle, abs=1e-9)
+        np.testing.assert_allclose(world_to_local(again_up, again_angle), matrix, atol=1e-14)
+
+
+def test_up_y_shows_x_where_up_z_does() -> None:
+    """glTF's world: y up; the middle of the picture stays at x and its left lies at -z."""
+    np.testing.assert_allclose(world_to_local((0.0, 1.0, 0.0)), [(1, 0, 0), (0, 0, -1), (0, 1, 0)], atol=1e-15)
+
+
+def test_direction_of_undoes_the_lookup() -> None:
+    environment = Environment(np.zeros((1, 2, 3), np.float32), world_to_local((0.2, 0.9, 0.1), 40.0))
+    u, v = np.random.default_rng(4).random((2, 500))
+    x, y, z = environment.world_to_local @ direction_of(environment, u, v).T
+    np.testing.assert_allclose(0.5 - np.arctan2(y, x) / (2.0 * np.pi), u, atol=1e-12)
+    np.testing.assert_allclose(np.arccos(z) / np.pi, v, atol=1e-7)
+
+
+# -- maps ---------------------------------------------------------------------------------
+
+
+def test_a_single_bright_texel_survives_and_intensity_scales_it(tmp_path: Path) -> None:
+    rgbe = np.full((16, 32, 4), 128, np.uint8)
+    rgbe[3, 20] = (255, 240, 200, 148)
+    (tmp_path / "sun.hdr").write_bytes(hdr_file(rgbe.tobytes(), 32, 16))
+    environment = from_map(tmp_path / "sun.hdr", intensity=3.0)
+    assert environment.rgb.dtype == np.float32 and environment.rgb.shape == (16, 32, 3)
+    np.testing.assert_allclose(environment.rgb[3, 20], 3.0 * 4096.0 * np.array([255, 240, 200]), rtol=1e-6)
+    assert np.median(environment.rgb) == pytest.approx(1.5)
+
+
+def test_a_map_that_is_not_two_to_one_is_told(tmp_path: Path) -> None:
+    notes: list[str] = []
+    from_map(numbered_map(tmp_path / "a.npy", 16, 9), notes=notes)
+    assert len(notes) == 1 and "16 × 9" in notes[0] and "stretched" in notes[0]
+    from_map(numbered_map(tmp_path / "b.npy"), notes=notes)
+    assert len(notes) == 1
+
+
+@pytest.mark.parametrize("size", [(5000, 40), (8192, 60), (64, 3000)])
+def test_a_large_map_is_averaged_by_area(tmp_path: Path, size: tuple[int, int]) -> None:
+    width, height = size
+    rgb = np.random.default_rng(6).random((height, width, 3)).astype(np.float32)
+    rgb[height // 2, width // 3] = 1e6
+    write_image(tmp_path / "a.npy", rgb)
+    notes: list[str] = []
+    environment = from_map(tmp_path / "a.npy", notes=notes)
+    assert environment.rgb.shape == (min(height, 2048), min(width, 4096), 3)
+    assert "averaged down" in notes[-1]
+    np.testing.assert_allclose(environment.rgb.mean(axis=(0, 1), dtype=float), rgb.mean(axis=(0, 1), dtype=float), rtol=1e-6)
+    # The first texel is the mean over its share of the source, weights by hand.
+    step_x, step_y = max(1.0, width / 4096), max(1.0, height / 2048)
+    across, down = ([1.0] * int(s) + ([s - int(s)] if s > int(s) else []) for s in (step_x, step_y))
+    block = rgb[: len(down), : len(across)].astype(float)
+    expected = np.einsum("y,x,yxc->c", down, across, block) / (step_x * step_y)
+    np.testing.assert_allclose(environment.rgb[0, 0], expected, rtol=1e-5)
+
+
+def test_impossible_numbers_are_refused(tmp_path: Path) -> None:
+    path = numbered_map(tmp_path / "a.npy")
+    for arguments, expected in (
+        ({"intensity": -1.0}, "the intensity is -1"),
+        ({"intensity": math.inf}, "the intensity is inf"),
+        ({"intensity": 1e38}, "out of range"),
+        ({"up": (0.0, 0.0, 0.0)}, "up must be a direction"),
+        ({"rotation_deg": math.nan}, "rotation_deg a finite number"),
+    ):
+        with pytest.raises(UserError, match=expected):
+            from_map(path, **arguments)
+
+
+# -- gradients ----------------------------------------------------------------------------
+
+
+def test_a_gradient_meets_its_three_colours_and_has_no_edge() -> None:
+    environment = gradient((1.0, 2.0, 30.0), (4.0, 5.0, 6.0), (0.5, 0.25, 0.0), intensity=2.0)
+    rgb = environment.rgb.astype(float)
+    assert environment.kind == "gradient" and rgb.shape[0] >= 256 and np.ptp(rgb, axis=1).max() == 0.0
+    np.testing.assert_allclose(rgb[0, 0], (2.0, 4.0, 60.0), rtol=1e-3)
+    np.testing.assert_allclose(rgb[-1, 0], (1.0, 0.5, 0.0), atol=1e-3)
+    half = len(rgb) // 2
+    np.testing.assert_allclose(rgb[half - 1 : half + 1, 0], np.tile([8.0, 10.0, 12.0], (2, 1)), rtol=1e-3)
+    assert (np.diff(rgb[:half, 0, 2]) < 0.0).all(), "monotonous from the zenith to the horizon"
+    # The slope has no step: second differences stay of the order of the first squared, horizon included.
+    assert np.abs(np.diff(rgb[:, 0], n=2, axis=0)).max() < 3e-3 * np.ptp(rgb)
+
+
+def test_a_gradient_refuses_what_is_no_radiance() -> None:
+    with pytest.raises(UserError, match="horizon must be three radiances of 0 or more"):
+        gradient((1.0, 1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, 1.0))
+
+
+# -- skies --------------------------------------------------------------------------------
+
+
+def test_the_overcast_sky_is_three_times_as_bright_at_the_zenith() -> None:
+    """Type 1 replaces Moon and Spencer's (1 + 2 sin γ)/3: it keeps the 1/3 at the horizon and stays within 0.055 above 20°."""
+    elevation = np.radians(np.linspace(0.0, 90.0, 91))
+    towards = np.stack([np.cos(elevation), 0.0 * elevation, np.sin(elevation)], axis=1)
+    found = relative_luminance(1, towards, np.array([0.0, 0.6, 0.8]))
+    assert found[0] == pytest.approx(1.0 / 3.0, abs=5e-3)
+    np.testing.assert_allclose(found[20:], (1.0 + 2.0 * np.sin(elevation[20:])) / 3.0, atol=0.055)
+    assert found[30] == pytest.approx((1.0 + 4.0 * math.exp(-1.4)) / (1.0 + 4.0 * math.exp(-0.7)), rel=1e-12)
+
+
+@pytest.mark.parametrize("sky_type", SKY_TYPES)
+def test_every_type_is_one_at_the_zenith_and_positive(sky_type: int) -> None:
+    sun = np.array([math.cos(0.5), 0.0, math.sin(0.5)])
+    assert relative_luminance(sky_type, np.array([0.0, 0.0, 1.0]), sun) == pytest.approx(1.0, rel=1e-14)
+    rgb = sky(30.0, 0.0, 2.5, sky_type).rgb
+    assert rgb.min() > 0.0 and np.isfinite(rgb).all()
+    np.testing.assert_allclose(rgb[0].mean(), 2.5, rtol=0.01)
+
+
+def test_the_clear_sky_against_numbers_worked_by_hand() -> None:
+    """Type 12, sun 30° high: at the sun's place f(0) = 1 + 10 (1 − e^(−3π/2)) + 0.45 and φ(60°) = 1 − e^(−0.64)."""
+    angle = math.radians(30.0)
+    sun = np.array([math.cos(angle), 0.0, math.sin(angle)])
+    tail = math.exp(-1.5 * math.pi)
+    toward = (1.0 + 10.0 * (1.0 - tail) + 0.45) * (1.0 - math.exp(-0.64))
+    zenith = (1.0 + 10.0 * (math.exp(-math.pi) - tail) + 0.45 * 0.25) * (1.0 - math.exp(-0.32))
+    assert relative_luminance(12, sun, sun) == pytest.approx(toward / zenith, rel=1e-12)
+
+
+def test_the_bright_side_is_where_the_sun_is() -> None:
+    for azimuth in (0.0, 90.0, -135.0):
+        for up in ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)):
+            environment = sky(25.0, azimuth, up=up)
+            row, column = divmod(int(environment.rgb[..., 1].argmax()), environment.rgb.shape[1])
+            height, width = environment.rgb.shape[:2]
+            brightest = direction_of(environment, (column + 0.5) / width, (row + 0.5) / height)
+            a = math.radians(azimuth)
+            expected = np.array([math.cos(a), math.sin(a), math.tan(math.radians(25.0))]) @ world_to_local(up)
+            # The luminance's peak lies a little below the sun, towards the brighter horizon.
+            assert brightest @ expected / np.linalg.norm(expected) > math.cos(math.radians(4.0))
+
+
+def test_the_ground_is_lit_by_the_sky() -> None:
+    """Under the uniform sky the illuminance is π L, so that a ground of reflectance ρ has the luminance ρ L."""
+    environment = sky(40.0, 0.0, 7.0, 5, (0.1, 0.2, 0.4))
+    half = environment.rgb.shape[0] // 2
+    np.testing.assert_allclose(environment.rgb[:half], 7.0, rtol=1e-6)
+    np.testing.assert_allclose(environment.rgb[half:], np.broadcast_to([0.7, 1.4, 2.8], (half, environment.rgb.shape[1], 3)), rtol=1e-6)
+
+
+def test_the_horizontal_illuminance_of_an_overcast_sky() -> None:
+    """7π/9 of the zenith's luminance for Moon and Spencer's law, which the rows hold here."""
+    height = 400
+    sine = np.cos(0.5 * np.pi * (np.arange(height) + 0.5) / height)
+    assert horizontal_illuminance(np.tile((1.0 + 2.0 * sine) / 3.0, (8, 1)).T) == pytest.approx(7.0 * np.pi / 9.0, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ({"sky_type": 0}, "type 0 is not known"),
+        ({"sky_type": 16}, "type 16 is not known"),
+        ({"sun_elevation_deg": -1.0}, "must stand at 0 to 90 degrees"),
+        ({"sun_elevation_deg": math.nan}, "must stand at 0 to 90 degrees"),
+        ({"sun_azimuth_deg": math.inf}, "sun_azimuth_deg is inf"),
+        ({"luminance": -1.0}, "luminance is -1"),
+        ({"ground": (0.5, 0.5, 1.5)}, "ground must be a reflectance"),
+    ],
+)
+def test_impossible_skies_are_refused(arguments: dict, expected: str) -> None:
+    with pytest.raises(UserError, match=expected):
+        sky(**arguments)

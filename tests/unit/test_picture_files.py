@@ -1,0 +1,202 @@
+"""Picture files: what each format holds comes out linear and whole, and what is damaged is refused in one sentence."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from app.errors import UserError
+from app.image_io import write_image
+from app.model.picture_files import read_picture
+from tests.unit.picture_bytes import (
+    HEADER,
+    hdr_file,
+    new_rows,
+    old_rows,
+    radiance_of,
+    random_rgbe,
+)
+
+
+def write(path: Path, content: bytes) -> Path:
+    path.write_bytes(content)
+    return path
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(UserError) as caught:
+        read_picture(path)
+    sentence = str(caught.value)
+    assert "\n" not in sentence and path.name in sentence
+    return sentence
+
+
+# -- Radiance -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("encode", [new_rows, old_rows, lambda rgbe: rgbe.tobytes()], ids=["new", "old", "flat"])
+@pytest.mark.parametrize("size", [(64, 32), (700, 3), (5, 4)])
+def test_every_coding_gives_the_same_pixels(tmp_path: Path, encode, size: tuple[int, int]) -> None:
+    if encode is new_rows and size[0] < 8:
+        pytest.skip("new-style rows have at least eight pixels")
+    rgbe = random_rgbe(*size)
+    rgb, notes = read_picture(write(tmp_path / "a.hdr", hdr_file(encode(rgbe), *size)))
+    assert rgb.dtype == np.float32 and notes == ()
+    np.testing.assert_array_equal(rgb, radiance_of(rgbe))
+
+
+def test_a_sun_of_one_pixel_survives_beside_the_dark(tmp_path: Path) -> None:
+    rgbe = np.zeros((4, 8, 4), np.uint8)
+    rgbe[..., :] = (128, 128, 128, 110)
+    rgbe[1, 5] = (200, 180, 160, 150)
+    rgbe[2, 2] = (255, 255, 255, 255)
+    rgbe[3, 3] = (7, 8, 9, 0)
+    rgb, _ = read_picture(write(tmp_path / "sun.pic", hdr_file(rgbe.tobytes(), 8, 4)))
+    np.testing.assert_allclose(rgb[1, 5], np.array([200, 180, 160]) * 2.0**14, rtol=1e-7)
+    np.testing.assert_allclose(rgb[0, 0], 2.0**-19, rtol=1e-7)
+    assert rgb[2, 2, 0] == np.float32(255.0 * 2.0**119)
+    assert (rgb[3, 3] == 0.0).all()
+
+
+def test_exposure_lines_are_divided_out_and_foreign_primaries_told(tmp_path: Path) -> None:
+    rgbe = random_rgbe(16, 2)
+    header = HEADER + b"EXPOSURE=2.0\nSOFTWARE=x\nEXPOSURE= 4\nPRIMARIES=0.7 0.3 0.2 0.7 0.1 0.05 0.33 0.33\n"
+    rgb, notes = read_picture(write(tmp_path / "a.hdr", hdr_file(new_rows(rgbe), 16, 2, header)))
+    np.testing.assert_allclose(rgb, radiance_of(rgbe) / 8.0, rtol=1e-7)
+    assert len(notes) == 1 and "primaries" in notes[0]
+
+
+@pytest.mark.parametrize("encode", [new_rows, old_rows, lambda rgbe: rgbe.tobytes()], ids=["new", "old", "flat"])
+def test_a_truncated_file_is_told_with_its_row(tmp_path: Path, encode) -> None:
+    whole = hdr_file(encode(random_rgbe(40, 20)), 40, 20)
+    rows = set()
+    for keep in np.linspace(len(HEADER) + 20, len(whole) - 1, 25).astype(int):
+        sentence = refusal(write(tmp_path / "cut.hdr", whole[:keep]))
+        assert "the file ends in row" in sentence and "of 20; copy or export it again" in sentence
+        rows.add(sentence)
+    assert len(rows) > 10
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"", "is not a Radiance picture"),
+        (b"GIF89a", "is not a Radiance picture"),
+        (HEADER + b"\nno size\n", "the line that gives its size is missing"),
+        (hdr_file(b"", 4, 4, axes=("+Y", "+X")), "its pixels run '+Y +X'"),
+        (hdr_file(b"", 4, 4, axes=("+X", "-Y")), "its pixels run '+X -Y'"),
+        (hdr_file(b"", 0, 4), "each side must be 1 to 65536"),
+        (hdr_file(b"", 60_000, 60_000), "more than 64 million"),
+        (hdr_file(b"", 4, 4, b"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n"), "its format is '32-bit_rle_xyze'"),
+        (hdr_file(b"", 4, 4, HEADER + b"EXPOSURE=0\n"), "its EXPOSURE is '0'"),
+        (hdr_file(b"", 4, 4, HEADER + b"EXPOSURE=bright\n"), "its EXPOSURE is 'bright'"),
+        (hdr_file(bytes([2, 2, 0, 9]) + bytes(99), 10, 1), "holds a run that leaves its row"),
+        (hdr_file(bytes([2, 2, 0, 10, 128 + 11, 7]) + bytes(99), 10, 1), "holds a run that leaves its row"),
+        (hdr_file(bytes([2, 2, 0, 10, 0, 7]) + bytes(99), 10, 1), "holds a run that leaves its row"),
+        (hdr_file(bytes([1, 1, 1, 3]) + bytes(99), 10, 1), "holds a run that leaves its row"),
+        (hdr_file(bytes([9, 9, 9, 99, 1, 1, 1, 200]), 10, 1), "holds a run that leaves its row"),
+    ],
+)
+def test_what_is_no_radiance_picture_is_refused(tmp_path: Path, content: bytes, expected: str) -> None:
+    assert expected in refusal(write(tmp_path / "bad.hdr", content))
+
+
+# -- 8 bit --------------------------------------------------------------------------------
+
+
+def saved(image: Image.Image, format: str, **options) -> bytes:
+    buffer = io.BytesIO()
+    image.save(buffer, format, **options)
+    return buffer.getvalue()
+
+
+def test_png_levels_are_decoded_from_srgb(tmp_path: Path) -> None:
+    levels = np.arange(256, dtype=np.uint8).reshape(16, 16)
+    rgb, notes = read_picture(write(tmp_path / "a.png", saved(Image.fromarray(levels), "PNG")))
+    assert rgb.shape == (16, 16, 3) and rgb.dtype == np.float32 and notes == ()
+    assert rgb[0, 0, 0] == 0.0 and rgb[15, 15, 2] == 1.0
+    # IEC 61966-2-1: level 188 is the middle grey of 0.5029, level 10 lies on the straight part.
+    assert rgb[11, 12, 1] == pytest.approx(((188 / 255 + 0.055) / 1.055) ** 2.4, rel=1e-6)
+    assert rgb[0, 10, 0] == pytest.approx(10 / 255 / 12.92, rel=1e-6)
+
+
+def test_row_zero_is_the_top_and_palettes_work(tmp_path: Path) -> None:
+    picture = np.zeros((4, 6, 3), np.uint8)
+    picture[0] = (255, 0, 0)
+    palette = Image.fromarray(picture).convert("P")
+    for name, image in (("rgb", Image.fromarray(picture)), ("palette", palette)):
+        rgb, _ = read_picture(write(tmp_path / f"{name}.png", saved(image, "PNG")))
+        assert (rgb[0] == (1.0, 0.0, 0.0)).all() and (rgb[1:] == 0.0).all()
+
+
+def test_transparency_is_told_only_where_there_is_some(tmp_path: Path) -> None:
+    solid = np.full((2, 2, 4), 255, np.uint8)
+    assert read_picture(write(tmp_path / "a.png", saved(Image.fromarray(solid), "PNG")))[1] == ()
+    solid[0, 0, 3] = 254
+    assert "transparency" in read_picture(write(tmp_path / "b.png", saved(Image.fromarray(solid), "PNG")))[1][0]
+
+
+def test_a_photograph_is_turned_as_its_camera_says(tmp_path: Path) -> None:
+    image = Image.fromarray(np.full((8, 16, 3), 128, np.uint8))
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    rgb, _ = read_picture(write(tmp_path / "a.jpg", saved(image, "JPEG", exif=exif)))
+    assert rgb.shape == (16, 8, 3) and abs(float(rgb.mean()) - 0.2159) < 0.01
+
+
+def test_damaged_and_mistaken_8_bit_files_are_refused(tmp_path: Path) -> None:
+    noise = np.random.default_rng(1).integers(0, 256, (40, 40, 3)).astype(np.uint8)
+    for format, suffix in (("PNG", ".png"), ("JPEG", ".jpg")):
+        whole = saved(Image.fromarray(noise), format)
+        assert "the picture is damaged" in refusal(write(tmp_path / f"cut{suffix}", whole[: len(whole) // 2]))
+        for content in (b"", b"nothing of the kind", whole[:2]):
+            assert "neither a PNG nor a JPEG" in refusal(write(tmp_path / f"bad{suffix}", content))
+    grey16 = Image.fromarray(np.full((4, 4), 40_000, np.uint16))
+    assert "more than 8 bits" in refusal(write(tmp_path / "deep.png", saved(grey16, "PNG")))
+    assert "more than 64 million" in refusal(write(tmp_path / "huge.png", saved(Image.new("1", (9000, 9000)), "PNG")))
+
+
+# -- floating point -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".exr"])
+def test_floating_point_pictures_come_back_and_noise_is_clamped(tmp_path: Path, suffix: str) -> None:
+    rgb = np.random.default_rng(2).random((6, 9, 3)).astype(np.float32)
+    write_image(tmp_path / f"a{suffix}", rgb)
+    np.testing.assert_array_equal(read_picture(tmp_path / f"a{suffix}")[0], rgb)
+    rgb[0, 0] = (1000.0, -0.9, -0.5)
+    write_image(tmp_path / f"b{suffix}", rgb)
+    again, notes = read_picture(tmp_path / f"b{suffix}")
+    assert again.min() == 0.0 and "2 slightly negative values (down to -0.9) were set to 0" in notes[0]
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".exr"])
+def test_values_that_are_no_light_are_counted(tmp_path: Path, suffix: str) -> None:
+    rgb = np.ones((4, 4, 3), np.float32)
+    rgb[0, 0, :2] = np.nan
+    rgb[1, 1, 2] = np.inf
+    write_image(tmp_path / f"a{suffix}", rgb)
+    assert "2 values are not a number and 1 infinite" in refusal(tmp_path / f"a{suffix}")
+    rgb = np.ones((4, 4, 3), np.float32)
+    rgb[2, :, 1] = -0.01
+    write_image(tmp_path / f"b{suffix}", rgb)
+    assert "4 values are negative (down to -0.01)" in refusal(tmp_path / f"b{suffix}")
+    write_image(tmp_path / f"c{suffix}", np.full((2, 2, 3), -1e-9))
+    assert "12 values are negative" in refusal(tmp_path / f"c{suffix}"), "all-negative has no bright value to be noise of"
+
+
+def test_missing_empty_and_unknown_files_are_refused(tmp_path: Path) -> None:
+    for suffix in (".hdr", ".png", ".exr", ".npy", ".jpeg"):
+        assert "there is no such file" in refusal(tmp_path / f"gone{suffix}")
+    np.save(tmp_path / "empty.npy", np.zeros((0, 4, 3), np.float32))
+    assert "the picture is empty (4 × 0 pixels)" in refusal(tmp_path / "empty.npy")
+    for suffix in (".exr", ".npy"):
+        assert "it is not a whole" in refusal(write(tmp_path / f"bad{suffix}", b""))
+        assert "it is not a whole" in refusal(write(tmp_path / f"bad{suffix}", b"nothing of the kind"))
+    assert "'.tif' is not a picture format" in refusal(write(tmp_path / "a.tif", b"II*"))
+    (tmp_path / "folder.png").mkdir()
+    assert "cannot read" in refusal(tmp_path / "folder.png")
