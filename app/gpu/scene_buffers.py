@@ -16,6 +16,7 @@ from app.gpu import bindings
 from app.gpu.records import NONE
 from app.gpu.scene_texels import SceneTexels, spectra_texture, tree_texels
 from app.gpu.schema import Field, Struct
+from app.gpu.texture_store import textured_objects
 from app.model.bvh import build_bvh
 from app.model.colorimetry import VISIBLE_NM, rgb_partition
 from app.model.features import (
@@ -66,7 +67,7 @@ OBJECT = Struct(
         Field("receiver", "uint", "receiver index, or NONE"),
         Field("group", "uint", "spectral group of the glass, or NONE"),
         Field("first_triangle", "uint", "global source index of its first triangle"),
-        Field("reserved", "uint", ""),
+        Field("texture", "uint", "its picture in the texture store, or NONE"),
         Field("colour", "vec4", "linear Rec.709 reflectance (diffuse, mirror) or n_d in w (dielectric)"),
     ),
     texels=True,
@@ -158,8 +159,12 @@ class SceneBuffers:
         self.space = GpuSpace.of(scene)
         self.groups = Groups.of(scene, features)
         self.receivers = [i for i, o in enumerate(scene.objects) if isinstance(o.material, Diffuse)]
+        self.traced_glasses = [o.material.dispersion if isinstance(o.material, Dielectric) else None for o in scene.objects]
+        """Each object's glass as the records number it, whatever `scene` is replaced by to be shown."""
         self.first_triangle = np.cumsum([0] + [len(o.mesh.triangles) for o in scene.objects])
         self.world_meshes = [o.mesh.transformed(o.object_to_world) for o in scene.objects]
+        self.corner_turn = np.tile(np.arange(3), (self.first_triangle[-1], 1))
+        """int (T, 3): which of its own corners each triangle's first, second and third are on the GPU; T counts all objects' triangles."""
         self._buffers: dict[int, moderngl.Buffer] = {}
         self._sections: dict[str, np.ndarray] = {}
         self.defines = bindings.SCENE_DEFINES | {"SPECTRAL_SAMPLES": SAMPLES}
@@ -231,6 +236,7 @@ class SceneBuffers:
             return
         all_corners = np.concatenate(corners).astype("f4")
         turned = _best_corner_first(all_corners)
+        self.corner_turn[np.concatenate(source)] = turned[..., 0]
         all_corners = np.take_along_axis(all_corners, turned, axis=1)
         order = np.arange(len(all_corners))
         if self.features.tree:
@@ -262,8 +268,10 @@ class SceneBuffers:
         nm = self.axis.nm_of_x(x)
         stack_bits = _stack_bits(self.scene) if self.features.medium_stack else {}
         records = OBJECT.zeros(len(self.scene.objects))
-        for name in ("medium", "weight_row", "stack_bit", "receiver", "group"):
+        for name in ("medium", "weight_row", "stack_bit", "receiver", "group", "texture"):
             records[name] = NONE
+        textured = textured_objects(self.scene)
+        records["texture"][textured] = np.arange(len(textured))
         for index, (record, item) in enumerate(zip(records, self.scene.objects, strict=True)):
             record["first_triangle"] = self.first_triangle[index]
             material = item.material
@@ -300,7 +308,7 @@ class SceneBuffers:
 
         index_rows = index_table(self.axis, media, SAMPLES) if media else np.ones((0, SAMPLES))
         variables = self.groups.variables(self.axis)
-        slopes = [self._slope(glass, variables, x) for glass in media]
+        slopes = [index_slope(self.groups, self.groups.glasses.index(g) if g in self.groups.glasses else None, self.axis, variables) for g in media]
         rows = [np.asarray(index_rows, float), np.array(slopes).reshape(-1, SAMPLES), variables, np.array(weights).reshape(-1, SAMPLES)]
         self.light_power: list[CumulativeSpectrum] = [cumulative(self.axis, light.spectral_power) for light in self.scene.lights]
         rows.append(np.array([power.at(x)[:, 3] for power in self.light_power]).reshape(-1, SAMPLES))
@@ -320,15 +328,16 @@ class SceneBuffers:
             "STACK_OBJECTS": "uint[](" + ", ".join(f"{o}u" for o in (self.stack_objects or [0])) + ")",
         }
 
-    def _slope(self, glass: Dispersion, variables: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """dn/dvar of a glass with respect to its group's variable, over x: 1 where n is the variable."""
-        if not self.groups.count or glass not in self.groups.glasses:
-            return np.zeros(SAMPLES)
-        variable = variables[self.groups.group[self.groups.glasses.index(glass)]]
-        n = glass.index(self.axis.nm_of_x(x))
-        if np.array_equal(n, variable):
-            return np.ones(SAMPLES)
-        return np.gradient(n, variable, edge_order=2)
+
+def index_slope(groups: Groups, glass: int | None, axis: SpectralAxis, variables: np.ndarray) -> np.ndarray:
+    """dn/dvar over x of a glass (its number in `groups`) with respect to its group's variable: 1 where n is the variable, 0 without a group."""
+    if glass is None or not groups.count:
+        return np.zeros(SAMPLES)
+    variable = variables[groups.group[glass]]
+    n = groups.glasses[glass].index(axis.nm_of_x(np.linspace(0.0, 1.0, SAMPLES)))
+    if np.array_equal(n, variable):
+        return np.ones(SAMPLES)
+    return np.gradient(n, variable, edge_order=2)
 
 
 def _best_corner_first(corners: np.ndarray) -> np.ndarray:
