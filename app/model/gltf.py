@@ -122,9 +122,9 @@ class _Reader:
             )
             self.notes.append("No camera in the file: one that sees the objects was added.")
         name = self.document.path.stem
+        background, environment, render = read_scene_extras(self.document, self.notes)
         notes = tuple(dict.fromkeys(self.notes))
-        background, render = read_scene_extras(self.document)
-        return Scene(name, camera, lights, tuple(self.objects), background, render=render, notes=notes), self.origins
+        return Scene(name, camera, lights, tuple(self.objects), background, environment, render, notes), self.origins
 
     # -- structure ------------------------------------------------------------------------
 

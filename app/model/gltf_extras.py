@@ -1,4 +1,4 @@
-"""What of a scene glTF has no place for, kept under `extras.spectrasplat`: the brush's dabs, background, render defaults.
+"""What of a scene glTF has no place for, kept under `extras.spectrasplat`: the brush's dabs, what lies behind, render defaults.
 
 Materials and lights keep theirs in `gltf_materials` and `gltf`; other programs' extras are left alone.
 """
@@ -6,15 +6,19 @@ Materials and lights keep theirs in `gltf_materials` and `gltf`; other programs'
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from app.model.gltf_document import GltfDocument
 from app.model.gltf_materials import EXTRAS
 from app.model.scene import Dab, Material, RenderDefaults, Scene, Vec3
 from app.model.scene_dabs import KEY, describe_dabs, read_dabs
-from app.model.scene_render import read_background, read_render
+from app.model.scene_environment import KEY as ENVIRONMENT
+from app.model.scene_environment import environment_values, read_surroundings
+from app.model.scene_render import read_render
 from app.model.scene_save import render_values
 from app.model.scene_table import SceneTable
+from app.model.texture import Environment
 
 _SCENE = "scene"
 
@@ -36,18 +40,26 @@ def write_node_dabs(node: dict[str, Any], dabs: Mapping[int, Sequence[Dab]]) -> 
     _keep(node, KEY, told or None)
 
 
-def read_scene_extras(document: GltfDocument) -> tuple[Vec3, RenderDefaults]:
-    """Background and render defaults; those of an empty scene file where there are none."""
+def read_scene_extras(document: GltfDocument, notes: list[str]) -> tuple[Vec3, Environment | None, RenderDefaults]:
+    """Background, environment and render defaults; those of an empty scene file where there are none."""
     values = _own(document.json).get(_SCENE, {})
     table = SceneTable(values if isinstance(values, dict) else {}, document.path, f"extras.{EXTRAS}.{_SCENE}")
-    return read_background(table), read_render(table.table("render"))
+    background, environment = read_surroundings(table, notes)
+    return background, environment, read_render(table.table("render"))
 
 
-def write_scene_extras(json: dict[str, Any], scene: Scene) -> None:
-    """Keep background and render defaults where they are not the usual ones."""
-    usual = (0.0, 0.0, 0.0), RenderDefaults()
-    told = {"background": list(scene.background_rgb), "render": render_values(scene.render)}
-    _keep(json, _SCENE, None if (scene.background_rgb, scene.render) == usual else told)
+def write_scene_extras(json: dict[str, Any], scene: Scene, path: Path) -> None:
+    """Keep background or environment, and render defaults, where they are not the usual ones, for a file at `path`.
+
+    An environment's map stays in a file of its own, named relative to `path`.
+    """
+    usual = (0.0, 0.0, 0.0), None, RenderDefaults()
+    told: dict[str, Any] = {"render": render_values(scene.render)}
+    if scene.environment is None:
+        told["background"] = list(scene.background_rgb)
+    else:
+        told[ENVIRONMENT] = environment_values(scene.environment, path)
+    _keep(json, _SCENE, None if (scene.background_rgb, scene.environment, scene.render) == usual else told)
 
 
 def _own(entry: Mapping[str, Any]) -> dict[str, Any]:

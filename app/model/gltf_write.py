@@ -41,17 +41,18 @@ def save_gltf(scene: Scene, path: str | os.PathLike[str], original: str | os.Pat
     if original is None:
         asset = {"version": "2.0", "generator": "SpectraSplat"}
         document = GltfDocument(path, {"asset": asset, "scene": 0, "scenes": [{"nodes": []}]})
-        _Writer(document, None, Origins()).write(scene)
+        _Writer(document, path, None, Origins()).write(scene)
     else:
         document = open_document(original)
         before, origins = read_scene(document)
-        _Writer(document, before, origins).write(scene)
+        _Writer(document, path, before, origins).write(scene)
     save_document(document, path)
 
 
 class _Writer:
-    def __init__(self, document: GltfDocument, before: Scene | None, origins: Origins) -> None:
+    def __init__(self, document: GltfDocument, path: Path, before: Scene | None, origins: Origins) -> None:
         self.document = document
+        self.path = path
         self.json = document.json = copy.deepcopy(document.json)
         self.origins = origins
         self.old = {o.name: o for o in before.objects} if before else {}
@@ -76,7 +77,7 @@ class _Writer:
                 write_node_dabs(entry, {0: item.local_dispersion})
                 self._add_node(entry, item.object_to_world)
         self._lights(scene)
-        write_scene_extras(self.json, scene)
+        write_scene_extras(self.json, scene, self.path)
         if scene.camera != self.old_camera or self.origins.camera is None:
             self._camera(scene.camera)
         self._close_buffer()

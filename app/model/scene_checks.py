@@ -17,18 +17,21 @@ MAX_SIZE_RATIO = 1e12
 def check_scene(scene: Scene, file_name: str) -> list[str]:
     """Notes about `scene`; raises UserError for one that cannot give a picture.
 
-    Errors: no objects, no light, no receiver, objects of absurdly different size, a light
-    inside glass, a laser line outside a glass's data. Notes: glasses whose data are clamped, or unusual.
+    Errors: no objects, no light and no receiver unless there is an environment to see by, a texture without
+    texture coordinates, objects of absurdly different size, a light inside glass, a laser line outside a
+    glass's data. Notes: glasses whose data are clamped, or unusual.
     """
     if not scene.objects:
         raise UserError(f"{file_name}: the scene holds no objects; add one with [[objects]]")
-    if not scene.lights:
+    if not scene.lights and scene.environment is None:
         raise UserError(f"{file_name}: the scene holds no light; add one with [[lights]]")
-    if not any(isinstance(o.material, Diffuse) for o in scene.objects):
+    if scene.environment is None and not any(isinstance(o.material, Diffuse) for o in scene.objects):
         raise UserError(
             f"{file_name}: nothing receives the light; add a diffuse object, "
             'such as [[objects]] shape = "plane", material = "diffuse"'
         )
+    for item in scene.objects:
+        check_texture(item, file_name)
     _check_sizes(scene, file_name)
     glasses = [o for o in scene.objects if isinstance(o.material, Dielectric)]
     for light in scene.lights:
@@ -104,6 +107,19 @@ def _size(item: SceneObject) -> float:
     vertices = item.mesh.vertices
     extent = vertices.max(axis=0) - vertices.min(axis=0)
     return float(np.linalg.norm(np.abs(item.object_to_world[:3, :3]) @ extent))
+
+
+def check_texture(item: SceneObject, file_name: str) -> None:
+    """Raise UserError for a texture on a mesh that does not say where it goes."""
+    if not isinstance(item.material, Diffuse) or item.material.texture is None:
+        return
+    if item.mesh.uv is None:
+        raise UserError(
+            f"{file_name}: object '{item.name}' has a texture, but its mesh no texture coordinates; export it with "
+            "UVs, use a shape that has them (plane, disc, box, slab, sphere), or leave the texture out"
+        )
+    if not np.isfinite(item.mesh.uv).all():
+        raise UserError(f"{file_name}: object '{item.name}' has texture coordinates that are not finite; export its mesh again")
 
 
 def check_outside(light: Light, glasses: Sequence[SceneObject], file_name: str) -> None:

@@ -16,6 +16,7 @@ from app.errors import UserError
 from app.model.colorimetry import VISIBLE_NM, rgb_partition
 from app.model.glass import Dispersion
 from app.model.scene import Absorption, Black, Dielectric, Diffuse, Material, Mirror
+from app.model.scene_pictures import picture_name
 from app.model.spectrum import Spectrum, blackbody, illuminant, illuminant_names
 
 _SAME = 1e-9
@@ -69,12 +70,19 @@ def _equal(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def describe_material(material: Material) -> dict[str, Any]:
-    """The keys of a material table that give this material."""
+    """The keys of a material table that give this material.
+
+    A texture is told by its absolute path, or by a name of its content where it has no file: who writes a scene
+    file makes one (`scene_save`).
+    """
     if isinstance(material, Mirror):
         return {"kind": "mirror", "reflectance": list(material.reflectance_rgb)}
     if isinstance(material, Black):
         return {"kind": "black"}
     if isinstance(material, Diffuse):
+        if material.texture is not None:
+            texture = {"file": material.texture.source or picture_name(material.texture.rgb), "wrap": material.texture.wrap}
+            return {"kind": "diffuse", "colour": list(material.reflectance_rgb), "texture": texture}
         if material.reflectance is None:
             return {"kind": "diffuse", "colour": list(material.reflectance_rgb)}
         return {"kind": "diffuse", "reflectance": {"nm": VISIBLE_NM.tolist(), "values": material.reflectance.tolist()}}

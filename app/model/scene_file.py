@@ -30,11 +30,13 @@ from app.model.scene_defaults import (
     default_table,
     surroundings_of,
 )
+from app.model.scene_environment import read_surroundings
 from app.model.scene_lights import Surroundings, read_light
 from app.model.scene_materials import DEFAULT_GLASS, read_materials
 from app.model.scene_objects import MESH_SUFFIXES, ObjectReader, load_checked_mesh
-from app.model.scene_render import read_background, read_render
+from app.model.scene_render import read_render
 from app.model.scene_table import SceneTable
+from app.model.scene_textures import TextureReader
 
 GLTF_SUFFIXES = (".glb", ".gltf")
 
@@ -82,27 +84,31 @@ def _read_toml(path: Path) -> dict[str, Any]:
 def _scene_from_table(table: SceneTable) -> Scene:
     name = table.string("name", table.file.stem)
     table.string("units", "units")  # a label for people; every length is in it
-    background = read_background(table)
+    notes: list[str] = []
+    background, environment = read_surroundings(table, notes)
     render = read_render(table.table("render"))
-    materials = read_materials(table)
-    reader = ObjectReader(materials)
+    textures = TextureReader()
+    reader = ObjectReader(read_materials(table, textures), textures)
     objects = [item for entry in table.tables("objects") for item in reader.read(entry)]
     if not objects:
         table.given(("camera", "lights"))
         table.finish("a scene")  # a misspelt [[object]] is the likelier mistake
         table.fail("objects", "is missing or empty; add at least one [[objects]]")
-    notes = list(reader.notes)
+    notes += textures.notes + reader.notes
     around = surroundings_of(objects)
-    lights = _read_lights(table, around, notes)
+    lights = _read_lights(table, around, notes, dark_without=environment is None or _has_diffuse(objects))
     camera = _read_camera(table, around, notes)
     table.finish("a scene")
-    if not (table.has("camera") or table.has("lights")):
+    if environment is None and not (table.has("camera") or table.has("lights")):
         _add_table(objects, notes)
-    return Scene(name, camera, lights, tuple(objects), background, render=render, notes=tuple(notes))
+    return Scene(name, camera, lights, tuple(objects), background, environment, render, tuple(notes))
 
 
-def _read_lights(table: SceneTable, around: Surroundings, notes: list[str]) -> tuple[Light, ...]:
+def _read_lights(table: SceneTable, around: Surroundings, notes: list[str], dark_without: bool) -> tuple[Light, ...]:
+    """The lights; a sun where none are given and nothing would be seen without (an environment shows glass and mirrors)."""
     if not table.has("lights"):
+        if not dark_without:
+            return ()
         notes.append("No lights given: a white sun from behind on the left was added.")
         return (default_light(),)
     lights = tuple(read_light(entry, i, around) for i, entry in enumerate(table.tables("lights")))
@@ -122,9 +128,13 @@ def _read_camera(table: SceneTable, around: Surroundings, notes: list[str]) -> C
 
 def _add_table(objects: list[SceneObject], notes: list[str]) -> None:
     """A receiver for a file that gives neither camera nor lights nor anything diffuse."""
-    if not any(isinstance(o.material, Diffuse) for o in objects):
+    if not _has_diffuse(objects):
         objects.append(default_table(objects))
         notes.append("Nothing diffuse given: a light-grey table was put below the objects.")
+
+
+def _has_diffuse(objects: list[SceneObject]) -> bool:
+    return any(isinstance(o.material, Diffuse) for o in objects)
 
 
 def _scene_around_mesh(path: Path) -> Scene:

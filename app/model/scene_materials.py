@@ -13,6 +13,7 @@ from app.model.colorimetry import VISIBLE_NM, attenuation_from_colour
 from app.model.glass import Dispersion
 from app.model.scene import Absorption, Black, Dielectric, Diffuse, Material, Mirror
 from app.model.scene_table import SceneTable
+from app.model.scene_textures import TextureReader
 from app.model.spectrum import read_csv
 
 KINDS = ("glass", "mirror", "diffuse", "black")
@@ -27,12 +28,13 @@ _FITS_WITH_RANGE = ("sellmeier", "cauchy", "formula")
 _SPECTRUM_SOURCES = ("csv", "nm")
 
 
-def read_materials(table: SceneTable) -> dict[str, Material]:
-    """All of [materials.NAME] by name."""
-    return {name: read_material(entry) for name, entry in table.named_tables("materials").items()}
+def read_materials(table: SceneTable, textures: TextureReader | None = None) -> dict[str, Material]:
+    """All of [materials.NAME] by name; `textures` reads their pictures, each once."""
+    textures = textures or TextureReader()
+    return {name: read_material(entry, textures) for name, entry in table.named_tables("materials").items()}
 
 
-def read_object_material(table: SceneTable, named: dict[str, Material]) -> Material:
+def read_object_material(table: SceneTable, named: dict[str, Material], textures: TextureReader | None = None) -> Material:
     """The material of one object: `glass = "…"`, `material = "NAME"`, `material = {…}` or the default glass.
 
     "mirror", "diffuse" and "black" are known without being defined. The object's `priority`
@@ -49,7 +51,7 @@ def read_object_material(table: SceneTable, named: dict[str, Material]) -> Mater
     elif key == "material":
         inner = table.table(key)
         assert inner is not None
-        material = read_material(inner)
+        material = read_material(inner, textures)
     else:
         material = Dielectric(_catalogue(table, key or "", table.string("glass", DEFAULT_GLASS)))
     if table.has(GAIN):
@@ -63,14 +65,14 @@ def read_object_material(table: SceneTable, named: dict[str, Material]) -> Mater
     return material
 
 
-def read_material(table: SceneTable) -> Material:
+def read_material(table: SceneTable, textures: TextureReader | None = None) -> Material:
     """One material table of any kind ('glass' unless it says otherwise)."""
     kind = table.choice("kind", KINDS, "glass")
     material: Material
     if kind == "mirror":
         material = Mirror(table.colour("reflectance", (1.0, 1.0, 1.0)))
     elif kind == "diffuse":
-        material = _read_diffuse(table)
+        material = _read_diffuse(table, textures or TextureReader())
     elif kind == "black":
         material = Black()
     else:
@@ -83,8 +85,11 @@ def _priority(table: SceneTable) -> int:
     return table.integer("priority", 0, at_least=-MAX_PRIORITY, at_most=MAX_PRIORITY)
 
 
-def _read_diffuse(table: SceneTable) -> Diffuse:
+def _read_diffuse(table: SceneTable, textures: TextureReader) -> Diffuse:
     key = table.one_of(("colour", "reflectance"), "the colour")
+    if table.one_of(("reflectance", "texture"), "the colour") == "texture":
+        # Beside a picture the colour is a factor, so that nothing given leaves the picture as it is.
+        return Diffuse(table.colour("colour", (1.0, 1.0, 1.0)), texture=textures.read(table))
     if key != "reflectance":
         return Diffuse(table.colour("colour", (0.8, 0.8, 0.8)))
     inner = table.table(key)

@@ -19,6 +19,7 @@ from app.model.scene import Dielectric, Material, SceneObject
 from app.model.scene_dabs import read_dabs
 from app.model.scene_materials import read_object_material
 from app.model.scene_table import SceneTable
+from app.model.scene_textures import TextureReader
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl")
 INLINE = "inline"
@@ -28,15 +29,16 @@ INLINE = "inline"
 class ObjectReader:
     """Reads [[objects]] one by one; equal descriptions share one `Mesh`."""
 
-    def __init__(self, materials: dict[str, Material]) -> None:
+    def __init__(self, materials: dict[str, Material], textures: TextureReader) -> None:
         self._materials = materials
+        self._textures = textures
         self._meshes: dict[str, Mesh] = {}
         self._names: set[str] = set()
         self.notes: list[str] = []
 
     def read(self, table: SceneTable) -> list[SceneObject]:
         """The object of one table, or its instances."""
-        material = read_object_material(table, self._materials)
+        material = read_object_material(table, self._materials, self._textures)
         mesh = self._read_mesh(table, solid=isinstance(material, Dielectric))
         base = read_placement(table)
         rest = table.number("rests_at_z", None)

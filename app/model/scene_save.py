@@ -19,11 +19,14 @@ import numpy as np
 from app.errors import UserError
 from app.model.mesh import Mesh
 from app.model.mesh_recipes import recipe_of
-from app.model.scene import Camera, Light, RenderDefaults, Scene, SceneObject
+from app.model.scene import Camera, Diffuse, Light, RenderDefaults, Scene, SceneObject
 from app.model.scene_dabs import KEY as DABS
 from app.model.scene_dabs import describe_dabs
 from app.model.scene_describe import describe_material, describe_spectrum
+from app.model.scene_environment import KEY as ENVIRONMENT
+from app.model.scene_environment import environment_values
 from app.model.scene_objects import INLINE
+from app.model.scene_pictures import picture_file, relative_name
 
 INLINE_TRIANGLES = 64
 """Flat meshes of no more triangles than this go into the scene file itself."""
@@ -40,7 +43,8 @@ _POWER_KEY = {
 def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     """Write `scene` to the TOML file `path`, whole or not at all.
 
-    Meshes without a description go to PLY files in the folder `<stem>_meshes` beside it.
+    Meshes without a description go to PLY files in the folder `<stem>_meshes` beside it, pictures
+    without a file to `<stem>_pictures`.
     Raises UserError when something cannot be written.
     """
     from app.atomic import atomic_output, check_writable
@@ -53,10 +57,13 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
 
 
 def scene_text(scene: Scene, path: Path) -> str:
-    """The TOML text of `scene` as it would stand in `path`; writes PLY files where it must."""
-    parts = [toml_block("", {"name": scene.name, "background": list(scene.background_rgb)})]
+    """The TOML text of `scene` as it would stand in `path`; writes PLY and picture files where it must."""
+    behind = {"background": list(scene.background_rgb)} if scene.environment is None else {}
+    parts = [toml_block("", {"name": scene.name} | behind | ({} if scene.lights else {"lights": []}))]
     parts.append(toml_block("[camera]", camera_values(scene.camera)))
     parts.append(toml_block("[render]", render_values(scene.render)))
+    if scene.environment is not None:
+        parts.append(toml_block(f"[{ENVIRONMENT}]", environment_values(scene.environment, path)))
     parts += [toml_block("[[lights]]", light_values(light)) for light in scene.lights]
     materials: dict[str, dict[str, Any]] = {}
     objects = [
@@ -131,7 +138,7 @@ def _groups(objects: tuple[SceneObject, ...]) -> list[list[SceneObject]]:
 def _objects(group: list[SceneObject], materials: dict[str, dict[str, Any]], path: Path) -> dict[str, Any]:
     first = group[0]
     values: dict[str, Any] = {"name": first.name} if len(group) == 1 else {}
-    values |= _mesh(first.mesh, path) | _material(first, materials)
+    values |= _mesh(first.mesh, path) | _material(first, materials, path)
     if len(group) > 1:
         values["instances"] = [{"name": item.name, "matrix": _matrix(item)} | _dabs(item) for item in group]
         return values
@@ -148,9 +155,12 @@ def _matrix(item: SceneObject) -> list[float]:
     return [float(v) for v in item.object_to_world.ravel()]
 
 
-def _material(item: SceneObject, materials: dict[str, dict[str, Any]]) -> dict[str, Any]:
+def _material(item: SceneObject, materials: dict[str, dict[str, Any]], path: Path) -> dict[str, Any]:
     """`glass = …` where that says it all, else `material = …` naming an entry of `materials`."""
     values = describe_material(item.material)
+    texture = item.material.texture if isinstance(item.material, Diffuse) else None
+    if texture is not None:
+        values["texture"] = {"file": picture_file(texture.rgb, texture.source, path), "wrap": texture.wrap}
     if set(values) == {"glass"}:
         return values
     for name, known in materials.items():
@@ -171,7 +181,7 @@ def _mesh(mesh: Mesh, path: Path) -> dict[str, Any]:
         values = dict(recipe)
         for key in ("mesh", "heights"):
             if isinstance(values.get(key), str):
-                values[key] = _relative(values[key], path.parent)
+                values[key] = relative_name(values[key], path.parent)
         return values
     if mesh.corner_normals is None and mesh.uv is None and len(mesh.triangles) <= INLINE_TRIANGLES:
         return {"shape": INLINE, "vertices": mesh.vertices.tolist(), "triangles": mesh.triangles.tolist()}
@@ -184,7 +194,7 @@ def _mesh(mesh: Mesh, path: Path) -> dict[str, Any]:
         raise UserError(f"cannot write the meshes of {path}: {folder} cannot be made ({error.strerror}); choose another name") from error
     target = folder / f"{_file_stem(mesh)}.ply"
     save_ply(mesh, target)
-    return {"mesh": _relative(str(target), path.parent)}
+    return {"mesh": relative_name(str(target), path.parent)}
 
 
 def _file_stem(mesh: Mesh) -> str:
@@ -197,13 +207,6 @@ def _file_stem(mesh: Mesh) -> str:
             digest.update(more.tobytes())
     plain = "".join(c if c.isalnum() else "_" for c in mesh.name)[:40]
     return f"{plain}_{digest.hexdigest()[:12]}"
-
-
-def _relative(target: str, folder: Path) -> str:
-    try:
-        return Path(os.path.relpath(target, folder.resolve())).as_posix()
-    except ValueError:  # another drive
-        return Path(target).as_posix()
 
 
 # -- TOML ---------------------------------------------------------------------------------

@@ -1,0 +1,122 @@
+"""The [environment] table of a scene file: what lies beyond everything, read and told again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.errors import UserError
+from app.model.environment import (
+    DEFAULT_SKY_TYPE,
+    Z_UP,
+    from_map,
+    gradient,
+    sky,
+    up_and_rotation,
+)
+from app.model.scene_pictures import picture_file
+from app.model.scene_render import read_background
+from app.model.scene_table import SceneTable, Vec3
+from app.model.texture import Environment
+
+KEY = "environment"
+KINDS = ("map", "gradient", "sky", "constant")
+_BLACK = (0.0, 0.0, 0.0)
+
+
+def read_surroundings(table: SceneTable, notes: list[str]) -> tuple[Vec3, Environment | None]:
+    """Background (linear Rec.709 radiance) and environment of a scene's table; black and None where neither is given.
+
+    What was assumed goes to `notes`. Raises UserError for both at once and for anything that is not understood.
+    """
+    if table.one_of(("background", KEY), "what lies behind everything") != KEY:
+        return read_background(table), None
+    inner = table.table(KEY)
+    assert inner is not None
+    kind = inner.choice("kind", KINDS)
+    background, environment = _BLACK, None
+    if kind == "constant":
+        background = _read_constant(inner)
+    elif kind == "map":
+        environment = _read_map(inner, notes)
+    elif kind == "gradient":
+        environment = _read_gradient(inner)
+    else:
+        environment = _read_sky(inner)
+    inner.finish(f"an environment of kind '{kind}'")
+    return background, environment
+
+
+def _read_constant(table: SceneTable) -> Vec3:
+    """`colour` (0 to 1) or `radiance`, times `intensity`."""
+    key = table.one_of(("colour", "radiance"), "the radiance")
+    if key is None:
+        table.raw("colour")  # blames a misspelt key, or says that this one is missing
+    r, g, b = table.colour("colour") if key == "colour" else _radiance(table, "radiance")
+    intensity = _intensity(table)
+    return intensity * r, intensity * g, intensity * b
+
+
+def _read_map(table: SceneTable, notes: list[str]) -> Environment:
+    path = table.existing_file("file")
+    rotation_deg = table.number("rotation_deg", 0.0)
+    try:
+        return from_map(path, _intensity(table), rotation_deg, _up(table), notes)
+    except UserError as error:
+        table.fail("file", f"cannot be used: {error}")
+
+
+def _read_gradient(table: SceneTable) -> Environment:
+    zenith, horizon = _radiance(table, "zenith"), _radiance(table, "horizon")
+    nadir = _radiance(table, "nadir") if table.has("nadir") else horizon
+    return gradient(zenith, horizon, nadir, _up(table), _intensity(table))
+
+
+def _read_sky(table: SceneTable) -> Environment:
+    return sky(
+        sun_elevation_deg=table.number("sun_elevation_deg", 45.0, at_least=0.0, at_most=90.0),
+        sun_azimuth_deg=table.number("sun_azimuth_deg", 0.0),
+        luminance=table.number("luminance", 1.0, at_least=0.0),
+        sky_type=table.integer("type", DEFAULT_SKY_TYPE, at_least=1, at_most=15),
+        ground=table.colour("ground", (0.2, 0.2, 0.2)),
+        up=_up(table),
+    )
+
+
+def _intensity(table: SceneTable) -> float:
+    return table.number("intensity", 1.0, at_least=0.0)
+
+
+def _up(table: SceneTable) -> Vec3:
+    return table.unit_vector("up", Z_UP)
+
+
+def _radiance(table: SceneTable, key: str) -> Vec3:
+    """Linear Rec.709 in lm/(sr unit²), 0 or more: three numbers, one for a grey, or an sRGB "#rrggbb"."""
+    value = table.raw(key)
+    if isinstance(value, str):
+        return table.colour(key)
+    if not isinstance(value, list):
+        return (table.number(key, at_least=0.0),) * 3
+    r, g, b = table.vector(key)
+    if min(r, g, b) < 0.0:
+        table.fail(key, "must be three radiances of 0 or more")
+    return r, g, b
+
+
+def environment_values(environment: Environment, scene_path: Path) -> dict[str, Any]:
+    """The [environment] table that gives `environment` when read from `scene_path`.
+
+    A picture without a file, or without a description, is written beside the scene (`scene_pictures`).
+    """
+    told = dict(environment.parameters)
+    if environment.kind == "map" and told and environment.source and Path(environment.source).is_file():
+        return {"kind": "map", "file": picture_file(environment.rgb, environment.source, scene_path)} | told
+    if environment.kind != "map" and told:
+        return {"kind": environment.kind} | told
+    # The values stand as they are: an intensity was multiplied in already.
+    up, rotation_deg = up_and_rotation(environment)
+    name = picture_file(np.asarray(environment.rgb), None, scene_path)
+    return {"kind": "map", "file": name, "rotation_deg": rotation_deg, "up": list(up)}
