@@ -8,7 +8,7 @@ that near a pole, where a round footprint covers many columns, one look-up still
 
 from __future__ import annotations
 
-from weakref import WeakKeyDictionary
+import weakref
 
 import numpy as np
 
@@ -101,11 +101,14 @@ def _running_mean(row: _Array, columns: float) -> _Array:
     return (up_to(middle + 0.5 * columns) - up_to(middle - 0.5 * columns)) / columns
 
 
-_kept: WeakKeyDictionary[object, list[_Array]] = WeakKeyDictionary()
+_kept: dict[tuple[int, bool], tuple[weakref.ref[_Array], list[_Array]]] = {}
 
 
-def kept_levels(owner: object, rgb: _Array, *, on_sphere: bool) -> list[_Array]:
-    """The levels of `rgb`, worked out once in the life of the scene value `owner` it belongs to."""
-    if owner not in _kept:
-        _kept[owner] = environment_levels(rgb) if on_sphere else texture_levels(rgb)
-    return _kept[owner]
+def kept_levels(rgb: _Array, *, on_sphere: bool) -> list[_Array]:
+    """The levels of `rgb`, worked out once in the life of the array: edits of a scene leave its pictures as they are."""
+    key = id(rgb), on_sphere
+    if key not in _kept:
+        levels = environment_levels(rgb) if on_sphere else texture_levels(rgb)
+        # Without level 0, which may be `rgb` itself and would then live for ever.
+        _kept[key] = weakref.ref(rgb, lambda _: _kept.pop(key, None)), levels[1:]
+    return [np.asarray(rgb, np.float32), *_kept[key][1]]

@@ -79,7 +79,10 @@ def _level_row(height: int, level: int) -> int:
 class TextureStore:
     """Owns the textures and the records; where a scene has no pictures nothing is made and no symbol defined."""
 
-    def __init__(self, ctx: moderngl.Context, scene: Scene, first_triangle: np.ndarray, corner_turn: np.ndarray, max_side: int | None = None, as_image: bool | None = None) -> None:
+    def __init__(
+        self, ctx: moderngl.Context, scene: Scene, first_triangle: np.ndarray, corner_turn: np.ndarray,
+        max_side: int | None = None, as_image: bool | None = None,
+    ) -> None:  # fmt: skip
         """`first_triangle`, `corner_turn`: as in `SceneBuffers`. `max_side`: of a texture, None for what the device allows;
         `as_image` chooses how shaders read texels (None: what suits the renderer).
 
@@ -97,14 +100,19 @@ class TextureStore:
         self.structs: tuple[Struct, ...] = (PICTURE,) if self._sources else ()
         if self._sources:
             self._pictures = self._packed()
-            self._fill(scene, first_triangle, corner_turn)
+            try:
+                self._fill(scene, first_triangle, corner_turn)
+            except UserError:
+                self.release()
+                raise
 
     def follow(self, scene: Scene, first_triangle: np.ndarray, corner_turn: np.ndarray) -> bool:
         """Take over an edited scene that shows the same pictures, without packing them again; the defines may change.
 
         False, and nothing done, where its pictures are others: then a new store is needed.
         """
-        if [id(s.rgb) for s in _sources(scene)] != [id(s.rgb) for s in self._sources]:
+        sources = _sources(scene)
+        if len(sources) != len(self._sources) or not all(_same_picture(a.owner, b.owner) for a, b in zip(sources, self._sources, strict=True)):
             return False
         if self._sources:
             self._fill(scene, first_triangle, corner_turn)
@@ -146,7 +154,7 @@ class TextureStore:
             raise UserError(remedy)
         texels = np.zeros((size[1], size[0], 4), np.float32)
         for tile, source in zip(self._tiles, self._sources, strict=True):
-            levels = kept_levels(source.owner, source.rgb, on_sphere=isinstance(source.owner, Environment))
+            levels = kept_levels(source.rgb, on_sphere=isinstance(source.owner, Environment))
             for k, level in enumerate(levels):
                 x, y = (tile.x, tile.y) if k == 0 else (tile.x + levels[0].shape[1], tile.y + _level_row(len(levels[0]), k))
                 texels[y : y + level.shape[0], x : x + level.shape[1], :3] = level
@@ -169,11 +177,13 @@ class TextureStore:
             self._describe(records[-1], scene.environment)
             records[-1]["repeats"] = 1, 0
             records[-1]["corners"] = NONE
+        texels = _in_rows(corners, self._max_side, scene.objects[textured[0]]) if textured else None
+        # Nothing is refused from here on, so that a refused edit leaves the store as it was.
         for old in (self._records, self._corners):
             if old is not None:
                 old.release()
         self._records = self.ctx.buffer(np.ascontiguousarray(records))
-        self._corners = self._corner_texture(corners, scene.objects[textured[0]]) if textured else None
+        self._corners = None if texels is None else _texture(self.ctx, texels)
         self.defines = {"TEXTURE_COUNT": len(textured)}
         switches = {"HAS_TEXTURES": textured, "HAS_ENVIRONMENT_MAP": scene.environment is not None, "TEXTURES_IMAGE": self._as_image}
         self.defines |= {name: 1 for name, on in switches.items() if on}
@@ -184,14 +194,6 @@ class TextureStore:
         record["origin"] = self._tiles[place].x, self._tiles[place].y
         record["size"] = width, height
         record["levels"] = level_count(width, height)
-
-    def _corner_texture(self, corners: Sequence[np.ndarray], first: SceneObject) -> moderngl.Texture:
-        rows = -(-sum(map(len, corners)) // ROW_TEXELS)
-        if rows > self._max_side:
-            raise UserError(f"object '{first.name}': the textured objects have more triangles than this device's textures hold; simplify their meshes")
-        image = np.zeros((rows * ROW_TEXELS, 4), np.float32)
-        image[: sum(map(len, corners))] = np.concatenate(corners)
-        return _texture(self.ctx, image.reshape(rows, ROW_TEXELS, 4))
 
 
 def _sources(scene: Scene) -> list[_Source]:
@@ -225,6 +227,17 @@ def _corner_texels(item: SceneObject, turn: np.ndarray, *, repeats: bool) -> np.
     texels[:, 0, 2:] = uv[:, 1] - uv[:, 0]
     texels[:, 1, :2] = uv[:, 2] - uv[:, 0]
     return texels.reshape(-1, 4)
+
+
+def _in_rows(corners: Sequence[np.ndarray], max_side: int, first: SceneObject) -> np.ndarray:
+    """float32 (rows, ROW_TEXELS, 4): one after the other. Raises `UserError` where they are too many."""
+    count = sum(map(len, corners))
+    rows = -(-count // ROW_TEXELS)
+    if rows > max_side:
+        raise UserError(f"object '{first.name}': textured objects have more triangles than this device's textures hold; simplify their meshes")
+    image = np.zeros((rows * ROW_TEXELS, 4), np.float32)
+    image[:count] = np.concatenate(corners)
+    return image.reshape(rows, ROW_TEXELS, 4)
 
 
 def _texture(ctx: moderngl.Context, texels: np.ndarray) -> moderngl.Texture:

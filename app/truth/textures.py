@@ -62,7 +62,7 @@ def patch_axes(side_s: Array, side_t: Array) -> tuple[Array, Array, Array]:
 
 def filter_plan(longer: Array, shorter: Array) -> tuple[Array, Array]:
     """Level and number of look-ups for a patch with these axes in texels."""
-    width = np.maximum(np.maximum(shorter, longer / MAX_TAPS), 1.0)
+    width = np.maximum(np.maximum(shorter, longer / (MAX_TAPS * ROUND_RATIO)), 1.0)
     taps = np.clip(np.ceil(longer / (ROUND_RATIO * width)), 1, MAX_TAPS)
     return np.maximum(np.log2(width) + LEVEL_BIAS, 0.0), taps
 

@@ -20,7 +20,7 @@ layout(binding = UNIT_PICTURES) uniform sampler2D picture_texels;
 
 // Look-ups along the longer axis at most; a longer patch is read from a coarser level.
 const float MAX_TAPS = 8.0;
-// A patch up to this much longer than wide is one look-up.
+// A patch up to this much longer than wide is one look-up, and so much of a longer one falls to each.
 const float ROUND_RATIO = 1.25;
 // Interpolation between texels widens what a texel averages, so texels may be this much smaller than the patch.
 const float LEVEL_BIAS = -0.35;
@@ -74,7 +74,7 @@ void patch_axes(float ss, float st, float tt, out float longer, out float shorte
 // How a patch with these axes (texels of level 0) is read: from which level, with how many look-ups.
 void filter_plan(float longer, float shorter, out float level, out float taps)
 {
-    float width = max(max(shorter, longer / MAX_TAPS), 1.0);
+    float width = max(max(shorter, longer / (MAX_TAPS * ROUND_RATIO)), 1.0);
     taps = clamp(ceil(longer / (ROUND_RATIO * width)), 1.0, MAX_TAPS);
     level = max(log2(width) + LEVEL_BIAS, 0.0);
 }
