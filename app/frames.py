@@ -189,7 +189,7 @@ class FrameRenderer:
             yield _LIGHT_SHARE * step.fraction
         light.finish()
         self.traces += 1
-        self._eye = EyePass(self._context, buffers, self._settings.layer, light.reflectances, light.bin_edges_nm)
+        self._eye = EyePass(self._context, buffers, self._settings.layer, light.reflectances, light.map_channels)
 
     def _photons(self, scene: Scene) -> int:
         return self._settings.photons or scene.render.photons

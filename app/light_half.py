@@ -18,6 +18,7 @@ from app.gpu import records
 from app.gpu.context import Context
 from app.gpu.gain_buffers import GainBuffers
 from app.gpu.map_atlas import MapAtlas
+from app.gpu.map_channels import MapChannels, hats
 from app.gpu.reindex import ReindexBuffer, Reindexing, Spans
 from app.gpu.scene_buffers import SceneBuffers
 from app.gpu.splat_tables import SplatTables
@@ -116,6 +117,9 @@ class LightHalf:
         self.variables = SpectralVariables.build(context.ctx, buffers.variables)
         self.gains = GainBuffers(context.ctx, scene, buffers.receivers, buffers.space, buffers.axis) if features.local_gain else None
         self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
+        edges = None if settings.bins is None else tuple(np.linspace(380.0, 780.0, settings.bins + 1).tolist())
+        self.map_channels = hats(buffers.axis, features.map_hats) if features.map_hats else MapChannels(edges)
+        """What the maps' channels stand for."""
         self.maps: LightMaps | None = None
         self.waits = context.is_software
         """Wait for the device at every pause: times are then what the work took, and a budget is kept."""
@@ -144,7 +148,6 @@ class LightHalf:
         yield
         shows_map = self.settings.layer.startswith("map:")
         self.map_receiver = check_map_receiver(self.scene, self.buffers, self.settings.layer[4:]) if shows_map else None
-        self.bin_edges_nm = None if self.settings.bins is None else np.linspace(380.0, 780.0, self.settings.bins + 1)
         self.lay_out(self.scene.camera)
 
     def lay_out(self, camera: Camera) -> None:
@@ -160,6 +163,11 @@ class LightHalf:
         landings = landings_of(self.pilots.values())
         layout = layout_maps(seen, self.buffers, landings, (width, height), self.reflectance_class, self.map_receiver, tile_max=tile_max)
         return LightMaps(self.context.ctx, layout, self.features)
+
+    @property
+    def bin_edges_nm(self) -> np.ndarray | None:
+        """Edges of the bins that a spectral picture asks for."""
+        return None if self.map_channels.edges_nm is None else np.array(self.map_channels.edges_nm)
 
     @property
     def _maps(self) -> LightMaps:
@@ -223,7 +231,7 @@ class LightHalf:
             self._spans, self._tables = spans, self._tables_of(spans)
 
     def _tables_of(self, spans: Spans, width: int | None = None) -> ShownTables:
-        channels = "xyz" if self.bin_edges_nm is None else self.bin_edges_nm.tolist()
+        channels = self.map_channels
         ctx, spectra, reindexing = self.context.ctx, self._shown_spectra, self._reindexing
         if reindexing is None:
             return ShownTables(SplatTables.build(ctx, self.buffers.axis, spectra, self.reflectances, spans, channels, width), None)

@@ -190,7 +190,7 @@ def _eye_layer(
     context: Context, scene: Scene, settings: RenderSettings, buffers: SceneBuffers, light: LightHalf, progress: Progress, cancelled: Cancelled
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """The camera's picture and, where asked for, its spectral bins."""
-    eye = EyePass(context, buffers, settings.layer, light.reflectances, light.bin_edges_nm)
+    eye = EyePass(context, buffers, settings.layer, light.reflectances, light.map_channels)
     maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
     try:
         # A stop asked for while tracing still wants a picture: only the first sample is owed then.

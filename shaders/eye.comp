@@ -1,8 +1,7 @@
-// The eye half: one camera sample a pixel and dispatch, added to the sums. A ray runs through glass and over
-// mirrors to the first diffuse surface, which shows direct light (shadow rays stop at anything, glass too)
-// plus the caustic map (all light that came by way of glass or mirrors): nothing counts twice.
-// Glass is drawn plausibly: one ray refracted at every surface, weighted by Fresnel, totally reflected
-// where it must be, and one reflection at the first surface it meets; refractive indices are those of the d line.
+// The eye half: one camera sample a pixel and dispatch, added to the sums. A ray runs through glass and over mirrors with the
+// columns of its pixel (Igehy 1999) and of its spectrum (Elek et al. 2014) to the first diffuse surface, light or environment,
+// and looks up along its spectral sweep what is there. Where glass splits it, both parts are followed while they are strong; of the weak rest
+// one is chosen by chance.
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "lib/intersect.glsl"
@@ -12,163 +11,230 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/random.glsl"
 #include "lib/optics.glsl"
 #include "lib/surface.glsl"
-#ifdef HAS_DIELECTRIC
+
 // All that medium.glsl needs to know of a ray.
 struct RayRecord {
     uint inside_mask;
     uint inside_object;
 };
 #include "lib/medium.glsl"
-#endif
 
 layout(std430, binding = BIND_PARAMETERS) readonly restrict buffer Parameters { EyeParameters p; };
 layout(std430, binding = BIND_LIGHTS) readonly restrict buffer Lights { EyeLight lights[]; };
-// Per light and reflectance class: the light's own quantity in every channel.
-layout(std430, binding = BIND_LIGHT_CHANNELS) readonly restrict buffer LightChannels { vec4 light_channels[]; };
-// Per object: reflectance, or absorption coefficient (1/GPU unit); then the background.
-layout(std430, binding = BIND_MATERIAL_CHANNELS) readonly restrict buffer MaterialChannels { vec4 material_channels[]; };
+// Per object: reflectance in linear Rec.709; number of its absorption row, or -1.
+layout(std430, binding = BIND_OBJECT_COLOURS) readonly restrict buffer ObjectColours { vec4 object_colours[]; };
+#ifdef RANDOM_WAVELENGTH
+layout(std430, binding = BIND_CELL_CDF) readonly restrict buffer CellCdf { float cell_cdf[]; };
+#endif
+layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallbacks[4]; };
 layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
 
-const float INVERSE_PI = 0.31830988618;
-
-struct EyePath {
-    vec3 position;
-    vec3 direction;
-    RayOrigin origin;
-    float travelled;          // GPU units from the camera
-    vec4 weight[TARGETS];
-#ifdef HAS_DIELECTRIC
-    RayRecord medium;
+#ifdef HAS_IMAGES
+#include "lib/textures.glsl"
 #endif
-};
 
-// A map's channels are XYZ (lm) where the picture's are linear Rec.709, else the same bins.
-vec4 map_to_channels(vec4 texel)
-{
-#ifdef RGB_CHANNELS
-    return vec4(dot(p.red_of_xyz.xyz, texel.xyz), dot(p.green_of_xyz.xyz, texel.xyz), dot(p.blue_of_xyz.xyz, texel.xyz), 0.0);
-#else
-    return texel;
-#endif
-}
+#define FELL_COLUMNS 0
+#define FELL_DEPTH 1
+#define FELL_STACK 2
+#define FELL_CUT 3
 
-vec4 light_of(uint light, uint reflectance_class, int target)
-{
-    return light_channels[(light * uint(CLASSES) + reflectance_class) * uint(TARGETS) + uint(target)];
-}
+#include "eye/path.glsl"
+#include "eye/emission.glsl"
+#include "eye/footprint.glsl"
+#include "eye/receiver.glsl"
+#include "eye/taps.glsl"
+#include "eye/crossing.glsl"
 
-// Two numbers for a light's extent: a Kronecker sequence over the samples, shifted by pixel and light.
-vec2 light_point(uint light, uint pixel_key)
+EyePath camera_path(uvec2 pixel)
 {
-    uint key = hash_combine(pixel_key, light);
-    return vec2(kronecker(p.sample_index, PLASTIC_1, key), kronecker(p.sample_index, PLASTIC_2, hash_pcg(key)));
-}
-
-// Irradiance of every channel from all lights, on the side of a surface that `normal` faces.
-void add_direct(vec3 position, vec3 normal, RayOrigin origin, uint reflectance_class, uint pixel_key, inout vec4 irradiance[TARGETS])
-{
-    for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
-        LightSample s = sample_light(lights[i], position, light_point(i, pixel_key));
-        float gain = s.gain * max(dot(s.toward, normal), 0.0);
-        if (gain > 0.0) {
-            // Up to the light, less a hair so that a surface the light lies on does not hide it.
-            gain = intersect_any(position, s.toward, s.distance * 0.99999, origin) ? 0.0 : gain;
-            for (int t = 0; t < TARGETS; ++t)
-                irradiance[t] += gain * light_of(i, reflectance_class, t);
-        }
+    vec2 place = picture_point(pixel, p.within_pixel, p.size);
+    CameraRay ray = camera_ray(p.position, p.forward, p.half_right, p.half_up, p.orthographic != 0u, place);
+    EyePath path;
+    path.position = ray.position;
+    path.direction = ray.direction;
+    path.origin = RayOrigin(NONE, NONE, false, p.inside_mask);
+    path.medium = RayRecord(p.inside_mask, p.inside_object);
+    for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
+    vec3 right = p.half_right * (2.0 * p.pixel_scale / float(p.size.x)), up = p.half_up * (2.0 * p.pixel_scale / float(p.size.y));
+    if (p.orthographic != 0u) {
+        path.dposition[0] = right;
+        path.dposition[1] = up;
+    } else {
+        // Derivative of the normalised direction.
+        float scale = inversesqrt(dot(p.forward + place.x * p.half_right + place.y * p.half_up, p.forward + place.x * p.half_right + place.y * p.half_up));
+        path.ddirection[0] = scale * (right - dot(right, ray.direction) * ray.direction);
+        path.ddirection[1] = scale * (up - dot(up, ray.direction) * ray.direction);
     }
-}
-
-// Radiance a diffuse surface sends back along the path.
-void add_diffuse(EyePath path, Hit hit, vec3 position, uint pixel_key, inout vec4 radiance[TARGETS])
-{
-    uint receiver = object_at(hit.object).receiver;
-    uint source = triangle_at(hit.primitive).source;
-    uint reflectance_class = receivers[receiver].reflectance_class;
-    float facing = dot(path.direction, hit.normal_g);
-    vec4 irradiance[TARGETS];
-    for (int t = 0; t < TARGETS; ++t) irradiance[t] = vec4(0.0);
-
-    uint placement;
-    vec2 texel;
-    if (find_texel(receiver, source, position, placement, texel)) {
-        float pixel = p.pixel_size + p.pixel_angle * (path.travelled + hit.distance);
-        // Texels larger than pixels are interpolated, smaller ones weighed by their share of the sample.
-        bool magnified = texel_size(placement) > pixel * inversesqrt(max(abs(facing), 1e-3));
-        vec2 box = magnified ? vec2(1.0) : texel_box(placement, path.direction, hit.normal_g, p.sample_side * pixel);
-        for (int t = 0; t < TARGETS; ++t)
-            irradiance[t] = p.map_scale * map_to_channels(caustic_irradiance(t, placement, texel, box));
-    }
-#ifdef LAYER_BEAUTY
-    vec3 normal = facing < 0.0 ? hit.normal_g : -hit.normal_g;
-    add_direct(position, normal, RayOrigin(hit.primitive, hit.object, facing > 0.0, 0u), reflectance_class, pixel_key, irradiance);
+    path.band = vec3(0.0, 0.5, 1.0);
+    path.weight = vec3(1.0);
+    path.gain = 1.0;
+    path.share = 1.0;
+    path.key = 0u;
+    path.depth = 0;
+    path.narrowed = false;
+    path.recut = false;
+#ifdef COLOURED_MIRRORS
+    path.tint = vec3(1.0);
 #endif
-    for (int t = 0; t < TARGETS; ++t) {
-        // Other classes than 0 are folded into the map and into `light_of` already.
-        vec4 reflectance = reflectance_class == 0u ? material_channels[hit.object * uint(TARGETS) + uint(t)] : vec4(1.0);
-        radiance[t] += path.weight[t] * reflectance * INVERSE_PI * irradiance[t];
-    }
-}
-
-#ifdef LAYER_BEAUTY
-// The background, where nothing was met, and the lights that can be seen.
-void add_emission(EyePath path, float far, bool met, inout vec4 radiance[TARGETS])
-{
-    for (int t = 0; t < TARGETS; ++t)
-        radiance[t] += met ? vec4(0.0) : path.weight[t] * material_channels[uint(OBJECT_COUNT * TARGETS + t)];
-#ifdef VISIBLE_LIGHTS
-    for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
-        float seen = lights[i].measure > 0.0 ? light_seen(lights[i], path.position, path.direction, far) : 0.0;
-        if (seen > 0.0)
-            for (int t = 0; t < TARGETS; ++t)
-                radiance[t] += path.weight[t] * seen * light_of(i, 0u, t);
-    }
-#endif
-}
-
-#endif
-
-#if defined(LAYER_BEAUTY) && defined(HAS_DIELECTRIC)
-// One glass surface: the path goes on refracted (or totally reflected); what is reflected besides is left in
-// `mirrored`, whose weight says whether it is worth following.
-void cross_glass(inout EyePath path, Hit hit, vec3 position, out EyePath mirrored)
-{
-    bool entering = dot(path.direction, hit.normal_g) < 0.0;
 #ifdef ABSORPTION
-    uint filling = ray_medium(path.medium);
-    if (filling != NONE)
-        for (int t = 0; t < TARGETS; ++t)
-            path.weight[t] *= exp(-material_channels[filling * uint(TARGETS) + uint(t)] * hit.distance);
+    for (int i = 0; i < ABSORBERS; ++i) path.lengths[i] = 0.0;
 #endif
+    return path;
+}
+
+#ifdef EYE_SPECULAR
+#ifdef HAS_DIELECTRIC
+// A number for a choice at this depth: a Kronecker sequence over a pixel's samples, one irrational a depth.
+float choice(EyePath path, uint pixel_key)
+{
+    const uint generators[8] = uint[](1779033703u, 3144134277u, 2773480763u, 1359893119u, 2600822925u, 528734635u, 1541459225u, 3418070365u);
+    uint generator = path.depth < 8 ? generators[path.depth] : hash_pcg(uint(path.depth)) | 1u;
+    return kronecker(p.sample_index, generator, hash_combine(pixel_key, path.key + uint(path.depth) * 2654435769u));
+}
+
+// One glass surface. Returns true where `path` goes on; what must wait is put on the stack.
+void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key, inout EyePath waiting[STACK], inout int waits)
+{
+    bool entering = dot(whole.direction, hit.normal_g) < 0.0;
     Crossing crossing = cross_boundary(path.medium, hit.object, entering);
-    path.position = position;
-    path.travelled += hit.distance;
-    mirrored = path;
-    mirrored.origin = RayOrigin(hit.primitive, hit.object, !entering, path.medium.inside_mask);
-    path.origin = RayOrigin(hit.primitive, hit.object, entering, crossing.mask_after);
     RayRecord beyond = RayRecord(crossing.mask_after, crossing.object_after);
+    RayOrigin origin_beyond = RayOrigin(hit.primitive, hit.object, entering, crossing.mask_after);
+    RayOrigin origin_back = RayOrigin(hit.primitive, hit.object, !entering, path.medium.inside_mask);
     if (!crossing.changes) {
         path.medium = beyond;
-        for (int t = 0; t < TARGETS; ++t) mirrored.weight[t] = vec4(0.0);
+        path.origin = origin_beyond;
         return;
     }
-    vec3 normal = facing_normal(hit, path.direction);
-    float theta = dot(path.direction, normal);
-    float eta_it = medium_index(crossing.before, p.x_eye) / medium_index(crossing.after, p.x_eye);
-    float reflectance = fresnel_reflectance(theta, eta_it, transmitted_cosine2(theta, eta_it));
-    bool total;
-    vec3 onward = refracted_direction(hit, path.direction, normal, eta_it, total);
-    mirrored.direction = total ? onward : reflected_direction(hit, path.direction, normal);
-    if (total) {
-        path.direction = onward;
-        path.origin = mirrored.origin;
-        for (int t = 0; t < TARGETS; ++t) mirrored.weight[t] = vec4(0.0);
+    vec3 n_i, n_t;
+    crossing_indices(crossing, path.band, n_i, n_t);
+#ifdef HAS_DISPERSION
+    if (!path.narrowed && (n_i.x != n_i.z || n_t.x != n_t.z)) {
+        // A reflection off the outside of glass knows no wavelength but in its strength: it stays whole. What goes on is one band.
+        EyePath mirrored = path;
+        Facing facing = facing_of(hit, path);
+        float theta = dot(path.direction, facing.normal);
+        vec3 eta3 = n_i / n_t;
+        vec3 cosine2 = transmitted_cosine2(vec3(theta), eta3);
+        bool splits = all(greaterThan(cosine2, vec3(0.0))) && waits < STACK;
+        if (splits) {
+            vec3 reflectance = fresnel_reflectance(vec3(theta), eta3, cosine2);
+            mirrored.weight *= reflectance;
+            mirrored.share *= reflectance.y;
+            mirrored.origin = origin_back;
+            mirrored.key = hash_combine(mirrored.key, 1u);
+            reflect_path(mirrored, facing);
+            waiting[waits++] = mirrored;
+        }
+        narrow(path, pixel_key);
+        crossing_indices(crossing, path.band, n_i, n_t);
+        if (splits) {
+            cosine2 = transmitted_cosine2(vec3(theta), n_i / n_t);
+            path.weight *= 1.0 - fresnel_reflectance(vec3(theta), n_i / n_t, cosine2);
+            path.share *= 1.0 - fresnel_reflectance(theta, n_i.y / n_t.y, cosine2.y);
+            if (refract_path(path, facing, crossing, n_i.y, n_t.y)) {
+                path.medium = beyond;
+                path.origin = origin_beyond;
+            } else {
+                reflect_path(path, facing);
+                path.origin = origin_back;
+            }
+            return;
+        }
+    }
+#endif
+    Facing facing = facing_of(hit, path);
+    vec3 theta3 = thetas(path, facing);
+    vec3 cosine2 = transmitted_cosine2(theta3, n_i / n_t);
+#if SPECTRAL_GROUPS > 0
+    bvec3 passes = greaterThan(cosine2, vec3(0.0));
+    if (path.narrowed && any(passes) && !all(passes) && !path.recut && waits < STACK && path.band.z - path.band.x > MIN_CUT_BAND) {
+        float at = cut_of(path, facing, crossing, passes);
+        if (min(at - path.band.x, path.band.z - at) > 0.01 * MIN_CUT_BAND && cut_is_near(whole, at, hit.distance)) {
+            // Both parts meet this surface again, each from its own start and anchored in its own middle.
+            float part = (at - path.band.x) / (path.band.z - path.band.x);
+            whole.recut = true;
+            EyePath other = whole;
+            anchor_at(other, at, whole.band.z);
+            other.share *= 1.0 - part;
+            other.key = hash_combine(whole.key, 6u);
+            waiting[waits++] = other;
+            anchor_at(whole, whole.band.x, at);
+            whole.share *= part;
+            whole.key = hash_combine(whole.key, 5u);
+            path = whole;
+            return;
+        }
+        atomicAdd(fallbacks[FELL_CUT], 1u);
+    }
+#endif
+    path.recut = false;
+    vec3 reflectance = fresnel_reflectance(theta3, n_i / n_t, cosine2);
+    bool total = cosine2.y <= 0.0;
+    float likely = total ? 1.0 : dot(reflectance, vec3(0.25, 0.5, 0.25));
+    bool reflects = total;
+    if (!total) {
+        bool strong = path.depth <= 1 || min(path.share * likely, path.share * (1.0 - likely)) > p.split_threshold;
+        if (strong && waits < STACK) {
+            EyePath mirrored = path;
+            mirrored.weight *= reflectance;
+            mirrored.share *= likely;
+            mirrored.origin = origin_back;
+            mirrored.key = hash_combine(path.key, 1u);
+            reflect_path(mirrored, facing);
+            if (mirrored.weight.y > 0.0) waiting[waits++] = mirrored;
+            path.weight *= 1.0 - reflectance;
+            path.share *= 1.0 - likely;
+        } else {
+            if (strong) atomicAdd(fallbacks[FELL_STACK], 1u);
+            reflects = choice(path, pixel_key) < likely;
+            path.weight *= (reflects ? reflectance : 1.0 - reflectance) / (reflects ? likely : 1.0 - likely);
+            path.key = hash_combine(path.key, reflects ? 3u : 4u);
+        }
+    } else {
+        path.weight *= reflectance;
+    }
+    if (!reflects && refract_path(path, facing, crossing, n_i.y, n_t.y)) {
+        path.medium = beyond;
+        path.origin = origin_beyond;
+    } else {
+        reflect_path(path, facing);
+        path.origin = origin_back;
+    }
+}
+#endif
+
+// A surface that throws the path on.
+void meet_surface(inout EyePath path, Hit hit, uint kind, uint pixel_key, inout EyePath waiting[STACK], inout int waits)
+{
+    EyePath whole = path;
+#ifdef ABSORPTION
+    uint filling = ray_medium(path.medium);
+    int absorber = filling == NONE ? -1 : int(object_colours[filling].w);
+    for (int i = 0; i < ABSORBERS; ++i)
+        if (i == absorber) path.lengths[i] += hit.distance;
+#endif
+    transfer_columns(path, hit.normal_g, hit.distance);
+    if (!columns_hold(path)) atomicAdd(fallbacks[FELL_COLUMNS], 1u);
+    path.position = surface_point(hit, whole.position, whole.direction);
+    path.depth += 1;
+#ifdef HAS_MIRROR
+    if (kind == KIND_MIRROR) {
+        reflect_path(path, facing_of(hit, path));
+        path.origin = RayOrigin(hit.primitive, hit.object, dot(path.direction, hit.normal_g) < 0.0, path.origin.inside_mask);
+        path.recut = false;
+        vec3 colour = object_colours[hit.object].rgb;
+#ifdef COLOURED_MIRRORS
+        path.tint *= colour;
+#else
+        path.weight *= colour.g;
+#endif
+        path.share *= max(colour.r, max(colour.g, colour.b));
         return;
     }
-    for (int t = 0; t < TARGETS; ++t) mirrored.weight[t] *= reflectance;
-    path.direction = onward;
-    path.medium = beyond;
-    for (int t = 0; t < TARGETS; ++t) path.weight[t] *= 1.0 - reflectance;
+#endif
+#ifdef HAS_DIELECTRIC
+    cross_glass(path, whole, hit, pixel_key, waiting, waits);
+#endif
 }
 #endif
 
@@ -177,67 +243,69 @@ void main()
     uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, p.first_row);
     if (pixel.x >= p.size.x || pixel.y >= p.size.y) return;
     uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
-    CameraRay ray = camera_ray(p.position, p.forward, p.half_right, p.half_up, p.orthographic != 0u, picture_point(pixel, p.within_pixel, p.size));
-
-    EyePath path;
-    path.position = ray.position;
-    path.direction = ray.direction;
-    path.origin = RayOrigin(NONE, NONE, false, 0u);
-    path.travelled = 0.0;
+    EyePath path = camera_path(pixel);
     vec4 radiance[TARGETS];
-    for (int t = 0; t < TARGETS; ++t) {
-        path.weight[t] = vec4(1.0);
-        radiance[t] = vec4(0.0);
-    }
-#ifdef HAS_DIELECTRIC
-    path.medium = RayRecord(p.inside_mask, p.inside_object);
-    path.origin.inside_mask = p.inside_mask;
-    EyePath waiting;
-    bool waits = false, branched = false;
+    for (int t = 0; t < TARGETS; ++t) radiance[t] = vec4(0.0);
+#ifdef EYE_SPECULAR
+    EyePath waiting[STACK];
+    int waits = 0;
 #endif
+    bool goes_on = true;
     for (int event = 0; event < MAX_EVENTS; ++event) {
         Hit hit;
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
         uint kind = met ? object_at(hit.object).kind : NONE;
-        bool goes_on = false;
-#ifdef LAYER_BEAUTY
-        add_emission(path, hit.distance, met, radiance);
-        vec3 position = surface_point(hit, path.position, path.direction);
-#else
-        vec3 position = path.position + hit.distance * path.direction;
+        int taps = 1;
+#ifdef SPECTRAL_SWEEP
+        if (path.narrowed) taps = taps_of(path, met ? hit.distance : FAR_DISTANCE);
 #endif
-        if (kind == KIND_DIFFUSE) add_diffuse(path, hit, position, pixel_key, radiance);
-#if defined(LAYER_BEAUTY) && defined(HAS_MIRROR)
-        if (kind == KIND_MIRROR) {
-            vec3 normal = facing_normal(hit, path.direction);
-            path.direction = reflected_direction(hit, path.direction, normal);
-            path.origin = RayOrigin(hit.primitive, hit.object, dot(path.direction, hit.normal_g) < 0.0, path.origin.inside_mask);
-            path.position = position;
-            path.travelled += hit.distance;
-            for (int t = 0; t < TARGETS; ++t) path.weight[t] *= material_channels[hit.object * uint(TARGETS) + uint(t)];
-            goes_on = true;
-        }
+#if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
+        if (!path.recut) {
+            vec2 width = sample_width(path);
+            float step_x = (path.band.z - path.band.x) / float(taps);
+            for (int i = 0; i < taps; ++i) {
+                vec3 position = path.position, direction = path.direction;
+#ifdef SPECTRAL_SWEEP
+                if (taps > 1) ray_at(path, path.band.x + (float(i) + 0.5) * step_x, position, direction);
 #endif
-#if defined(LAYER_BEAUTY) && defined(HAS_DIELECTRIC)
-        if (kind == KIND_DIELECTRIC) {
-            EyePath mirrored;
-            cross_glass(path, hit, position, mirrored);
-            goes_on = true;
-            if (!branched && mirrored.weight[0].x > 0.0) {
-                waiting = mirrored;
-                waits = true;
-                branched = true;
+                add_lights(radiance, path, position, direction, met ? hit.distance : FAR_DISTANCE, width, path.band.x + float(i) * step_x, path.band.x + float(i + 1) * step_x);
             }
         }
-        if (waits && (!goes_on || event == MAX_EVENTS - 1 - REFLECTION_EVENTS)) {
-            // The refracted path has ended (or used its share of events): follow the reflection.
-            path = waiting;
-            waits = false;
+#endif
+        goes_on = false;
+        if (!met || kind == KIND_DIFFUSE) {
+#ifdef SPECTRAL_SWEEP
+            if (taps > 1) add_swept_end(radiance, path, met, hit, pixel_key, taps);
+            else
+#endif
+            add_end(radiance, path, met, hit, pixel_key);
+        }
+#ifdef EYE_SPECULAR
+        else if (kind != KIND_BLACK) {
+            goes_on = path.depth < MAX_DEPTH;
+            if (goes_on) {
+                meet_surface(path, hit, kind, pixel_key, waiting, waits);
+            } else {
+                // Light that would still be caught inside: as if it left here.
+                atomicAdd(fallbacks[FELL_DEPTH], 1u);
+                add_sky(radiance, path, path.direction, vec3(0.0), path.band.x, path.band.z);
+            }
+        }
+        if (!goes_on && waits > 0) {
+            path = waiting[--waits];
             goes_on = true;
         }
 #endif
         if (!goes_on) break;
     }
+#ifdef EYE_SPECULAR
+    if (goes_on) waiting[min(waits++, STACK - 1)] = path;
+    while (waits > 0) {
+        atomicAdd(fallbacks[FELL_DEPTH], 1u);
+        path = waiting[--waits];
+        add_sky(radiance, path, path.direction, vec3(0.0), path.band.x, path.band.z);
+    }
+#endif
     for (int t = 0; t < TARGETS; ++t) {
         vec4 sum = imageLoad(picture[t], ivec2(pixel));
         imageStore(picture[t], ivec2(pixel), sum + radiance[t]);

@@ -11,13 +11,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.model.colorimetry import K_M, VISIBLE_NM, cmf_xyz
+from app.gpu.map_channels import MapChannels
+from app.model.colorimetry import VISIBLE_NM
 from app.model.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative
-from app.model.spectrum import Spectrum, cmf_at
+from app.model.spectrum import Spectrum
 
 if TYPE_CHECKING:
     import moderngl
@@ -33,8 +34,6 @@ WIDTH, WIDTH_WITH_LINES = 512, 1024
 FINEST = 512
 """Cells of a band for the sharpest row."""
 DENSITY_CELLS, CUMULATIVE_SAMPLES = 1024, 2049
-
-Channels = Literal["xyz"] | Sequence[float]
 
 
 @dataclass(frozen=True)
@@ -65,21 +64,19 @@ class SplatTables:
         lights: Sequence[Spectrum],
         reflectances: Sequence[np.ndarray | None],
         bands: Sequence[Sequence[tuple[float, float]]],
-        channels: Channels = "xyz",
+        channels: MapChannels = MapChannels(),
         width: int | None = None,
     ) -> SplatTables:
         """Tables for the lights' spectra under each reflectance (401,) or None.
 
         `bands[light]`: (x_lo, x_hi) of its bands; a band of no width stands for a line. Lights with fewer
-        bands than others are padded with empty ones. `channels`: "xyz" stores X, Y, Z (lm) and radiant W;
-        else ascending wavelengths in nm, the edges of the bins, and each bin's W, four bins a target. `width`: samples along xi,
-        None for what a finished picture needs.
+        bands than others are padded with empty ones. `channels`: X, Y, Z (lm) and radiant W, what follows them, or bins (W), four a target.
+        `width`: samples along xi, None for what a finished picture needs.
         """
         import moderngl
 
         band_count = max(len(of_light) for of_light in bands)
-        columns = 4 if channels == "xyz" else 4 * -(-(len(channels) - 1) // 4)
-        targets = columns // 4
+        targets = channels.targets
         width = width or (WIDTH_WITH_LINES if any(light.lines for light in lights) else WIDTH)
         shape = (len(lights), len(reflectances), band_count)
         texels = np.zeros((*shape, targets, len(SIGMAS), width, 4), np.float32)
@@ -89,7 +86,7 @@ class SplatTables:
         running = np.zeros((*shape[:2], targets, CUMULATIVE_SAMPLES, 4), np.float32)
         for i, light in enumerate(lights):
             for j, reflectance in enumerate(reflectances):
-                source = _Source.of(axis, light, reflectance, channels, columns)
+                source = _Source.of(axis, light, reflectance, channels)
                 density[i, j] = _by_target(source.density(), targets)
                 running[i, j] = _by_target(source.cumulative(np.linspace(0.0, 1.0, CUMULATIVE_SAMPLES)), targets)
                 edges = np.array(bands[i], np.float64)
@@ -127,15 +124,17 @@ class _Source:
     line_x: np.ndarray
     line_energy: np.ndarray
     """float64 (lines, columns)."""
+    brightness: slice
+    """Columns that say where in a band its light is: Y, or all bins."""
 
     @classmethod
-    def of(cls, axis: SpectralAxis, light: Spectrum, reflectance: np.ndarray | None, channels: Channels, columns: int) -> _Source:
+    def of(cls, axis: SpectralAxis, light: Spectrum, reflectance: np.ndarray | None, channels: MapChannels) -> _Source:
         folded = np.ones(401) if reflectance is None else np.asarray(reflectance, np.float64)
-        smooth = cumulative(axis, Spectrum(light.density * folded), _cell_weights(channels, columns))
+        smooth = cumulative(axis, Spectrum(light.density * folded), channels.cell_weights())
         line_nm, power = np.array(light.lines, np.float64).reshape(-1, 2).T
-        weights = _line_weights(line_nm, channels, columns)
+        weights = channels.line_weights(line_nm)
         energy = (power * np.interp(line_nm, VISIBLE_NM, folded))[:, None] * weights
-        return cls(smooth, np.atleast_1d(axis.x_of_nm(line_nm)), energy)
+        return cls(smooth, np.atleast_1d(axis.x_of_nm(line_nm)), energy, slice(1, 2) if channels.edges_nm is None else slice(None))
 
     def cumulative(self, x: np.ndarray) -> np.ndarray:
         """Energy up to and with each x: (n, columns)."""
@@ -178,13 +177,12 @@ class _Source:
                 row[:, band * columns : (band + 1) * columns] += _kernel(width, sigma, np.array([place]), sigma) * energy
         energies = finest.sum(axis=0)
         places = (np.arange(len(finest)) + 0.5) / len(finest)
-        weight_channel = 1 if columns == 4 else slice(None)
-        weights = finest[..., weight_channel].reshape(len(finest), len(edges), -1).sum(axis=-1)
+        weights = finest[..., self.brightness].reshape(len(finest), len(edges), -1).sum(axis=-1)
         moments, totals = places @ weights, weights.sum(axis=0)
         for band, place, energy in lines:
             energies[band] += energy
-            moments[band] += place * np.sum(energy[weight_channel])
-            totals[band] += np.sum(energy[weight_channel])
+            moments[band] += place * np.sum(energy[self.brightness])
+            totals[band] += np.sum(energy[self.brightness])
         lit = totals > 0.0
         mean = np.where(lit, moments / np.where(lit, totals, 1.0), 0.5)
         return rows, energies, mean
@@ -200,32 +198,6 @@ class _Source:
                 elif lo < x <= hi or (x == 0.0 and lo == 0.0):
                     found.append((band, (x - lo) / (hi - lo), energy))
         return found
-
-
-def _cell_weights(channels: Channels, columns: int) -> np.ndarray:
-    """Channel weights of each 1 nm cell: (401, columns)."""
-    if channels == "xyz":
-        return np.column_stack([K_M * cmf_xyz(), np.ones(401)])
-    cell_lo = np.maximum(VISIBLE_NM - 0.5, VISIBLE_NM[0])
-    cell_hi = np.minimum(VISIBLE_NM + 0.5, VISIBLE_NM[-1])
-    edges = np.asarray(channels, np.float64)
-    overlap = np.minimum(cell_hi[:, None], edges[1:]) - np.maximum(cell_lo[:, None], edges[:-1])
-    weights = np.zeros((401, columns))
-    weights[:, : len(edges) - 1] = np.clip(overlap, 0.0, None) / (cell_hi - cell_lo)[:, None]
-    return weights
-
-
-def _line_weights(line_nm: np.ndarray, channels: Channels, columns: int) -> np.ndarray:
-    """Channel weights at exact wavelengths: (lines, columns)."""
-    if channels == "xyz":
-        return np.column_stack([K_M * cmf_at(line_nm), np.ones(len(line_nm))])
-    edges = np.asarray(channels, np.float64)
-    weights = np.zeros((len(line_nm), columns))
-    at = np.searchsorted(edges, line_nm, side="right") - 1
-    at = np.where(line_nm == edges[-1], len(edges) - 2, at)
-    inside = (at >= 0) & (at < len(edges) - 1)
-    weights[np.flatnonzero(inside), at[inside]] = 1.0
-    return weights
 
 
 def _cells(sigma: float) -> int:

@@ -10,7 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.model.scene import Black, Dielectric, Diffuse, Mirror, Scene, SceneObject
+from app.model.camera_rays import camera_frame
+from app.model.scene import (
+    Black,
+    Camera,
+    Dielectric,
+    Diffuse,
+    Mirror,
+    Scene,
+    SceneObject,
+)
 from app.model.settings import RenderSettings
 
 MAX_GROUPS = 4
@@ -18,6 +27,9 @@ MAX_GROUPS = 4
 
 MAX_LOOSE_TRIANGLES = 24
 """Up to so many triangles a plain loop beats a tree."""
+
+MAP_HATS = 8
+"""Spectral channels of a caustic map that is seen through dispersive glass."""
 
 MAX_SOLID_PLANES = 96
 """A convex solid of more faces goes to the tree."""
@@ -27,6 +39,8 @@ MAX_SOLID_PLANES = 96
 class Features:
     """The compile-time choices of one rendering."""
 
+    method: str
+    """How wavelengths are sampled."""
     spectral_groups: int
     """Spectral columns carried by every photon (0: nothing disperses, or the method needs none)."""
     merged_groups: bool
@@ -68,6 +82,12 @@ class Features:
     """The dispersion brush scales spectral displacements on some receiver."""
     reindexed: bool = False
     """Photons stand for intervals of the one index that disperses, and carry whatever wavelengths an edit puts there."""
+    eye_specular: bool = False
+    """The camera may see glass or a mirror: its rays go on behind them."""
+    eye_disperses: bool = False
+    """The camera may see through glass that disperses: its rays carry a band of the spectrum, and look up along their sweep."""
+    map_hats: int = 0
+    """Spectral channels of the caustic maps beside XYZ, for light whose dispersion the eye's adds to."""
     anchor_weights: bool = False
     """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
 
@@ -107,8 +127,11 @@ class Features:
         absorbing = any(o.material.absorption is not None for o in dielectrics)
         smooth = any(o.mesh.corner_normals is not None for o in scene.objects if isinstance(o.material, Dielectric | Mirror))
         footprints = settings.method != "stochastic-point"
+        eye_specular, eye_disperses = eye_needs(scene, settings)
+        hats = MAP_HATS if eye_disperses and settings.layer == "beauty" and not settings.bins and scene.lights and _has_receivers(scene) else 0
         coloured_mirror = any(isinstance(o.material, Mirror) and len(set(o.material.reflectance_rgb)) > 1 for o in scene.objects)
         return Features(
+            method=settings.method,
             spectral_groups=groups,
             merged_groups=groups > 0 and (settings.method == "srd-lambda" or len(dispersive) > MAX_GROUPS),
             spectral_weights=not single and (groups > 0 or absorbing or coloured_mirror),
@@ -128,7 +151,10 @@ class Features:
             convex_solids=len(loose) < len(scene.objects),
             charts=any(isinstance(o.material, Diffuse) and not is_flat(o) for o in scene.objects),
             nested_windows=any(isinstance(o.material, Diffuse) and is_flat(o) for o in scene.objects),
-            targets=-(-settings.bins // 4) if settings.bins else 1,
+            targets=-(-settings.bins // 4) if settings.bins else 1 + -(-hats // 4),
+            eye_specular=eye_specular,
+            eye_disperses=eye_disperses,
+            map_hats=hats,
             reindexed=_reindexed(scene, settings, groups, coloured=absorbing or coloured_mirror),
             local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
             anchor_weights=settings.anchor_weights,
@@ -144,6 +170,38 @@ def _reindexed(scene: Scene, settings: RenderSettings, groups: int, *, coloured:
         return False
     (turning,) = SpectralAxis.build([o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)]).turning_nm
     return len(turning) == 2
+
+
+def eye_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:
+    """Whether the camera may see glass or mirrors, and whether it may see through glass that disperses."""
+    if settings.layer != "beauty":
+        return False, False
+    mirrors = any(isinstance(o.material, Mirror) for o in scene.objects)
+    glass = [o for o in scene.objects if isinstance(o.material, Dielectric)]
+    if not (settings.any_view or mirrors):
+        # What is refracted or reflected first must be seen first; all else follows from it.
+        seen = [o for o in glass if in_view(o, scene.camera, settings.width / settings.height)]
+        glass = glass if seen else []
+    return bool(glass) or mirrors, any(isinstance(o.material, Dielectric) and o.material.dispersion.is_dispersive for o in glass)
+
+
+def in_view(item: SceneObject, camera: Camera, aspect: float) -> bool:
+    """Whether the camera may see the object's bounding box: False only where one side of the view leaves out all of it."""
+    right, up, forward = camera_frame(camera)
+    low, high = world_bounds(item)
+    corners = np.array(np.meshgrid(*zip(low, high, strict=True), indexing="ij")).reshape(3, 8).T - np.array(camera.position)
+    x, y, depth = corners @ right, corners @ up, corners @ forward
+    if camera.kind == "orthographic":
+        half = 0.5 * camera.vertical_extent
+        outside = [x > half * aspect, x < -half * aspect, y > half, y < -half, depth < 0.0]
+    else:
+        half = np.tan(np.radians(0.5 * camera.vertical_fov_deg))
+        outside = [x > half * aspect * depth, x < -half * aspect * depth, y > half * depth, y < -half * depth, depth < 0.0]
+    return not any(side.all() for side in outside)
+
+
+def _has_receivers(scene: Scene) -> bool:
+    return any(isinstance(o.material, Diffuse) for o in scene.objects)
 
 
 def dispersive_materials(scene: Scene) -> list[int]:
@@ -225,6 +283,10 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
         ("nested windows", features.nested_windows, "flat receivers may get a fine window inside a coarse one" if features.nested_windows else "no receiver has two windows"),
         ("local gain", features.local_gain, "the dispersion brush was used on a receiver" if features.local_gain else "no receiver was painted on"),
         ("photons by index", features.reindexed, "an edit or the brush may move wavelengths between paths" if features.reindexed else "every path keeps its wavelengths"),
+        ("eye refraction", features.eye_specular, "the camera may see glass or mirrors" if features.eye_specular else "no glass and no mirror is in view"),
+        ("eye spectral taps", features.eye_disperses, "the camera may see through dispersive glass" if features.eye_disperses else
+         ("no dispersive glass is in view" if glasses else "nothing disperses")),
+        ("spectral maps", features.map_hats > 0, f"{features.map_hats} channels beside XYZ: light and eye disperse" if features.map_hats else "no caustic is seen through dispersive glass"),
         ("spectral bins", features.targets > 1, f"{features.targets} targets" if features.targets > 1 else "XYZ in one target"),
         ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
     ]

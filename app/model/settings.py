@@ -37,5 +37,7 @@ class RenderSettings:
     anchor_weights: bool = False
     """Take Fresnel's weights at a band's anchor for the whole band (the viewer: an edit of the dispersion then leaves every photon's
     weight). The weights of a band's ends differ from it by less than a thousandth."""
+    any_view: bool = False
+    """The camera may go anywhere (viewer, animation): what a scene needs is not judged by what its camera sees."""
     tally: bool = False
     """Also sum up what the maps hold, for `--stats`."""

@@ -16,72 +16,43 @@ import numpy as np
 
 from app.gpu import bindings, shader
 from app.gpu.context import Context
+from app.gpu.map_channels import MapChannels
 from app.gpu.records import NONE, PLACEMENT, RECEIVER
 from app.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
-from app.gpu.schema import Field, Struct
+from app.gpu.texture_store import PICTURE, TextureStore, place_defines
 from app.model.camera_rays import camera_frame
 from app.model.colorimetry import xyz_to_rgb709_matrix
-from app.model.scene import Camera, Dielectric, Diffuse, Light, Mirror
+from app.model.scene import Camera, Dielectric, Diffuse, Mirror
 from app.model.scene_checks import contains
-from app.passes.emission_domain import orthonormal_frame
+from app.passes.eye_records import (
+    EYE_LIGHT,
+    EYE_PARAMETERS,
+    has_extent,
+    light_record,
+)
+from app.passes.eye_tables import EMISSION_CELLS, EyeTables
 from app.passes.present import Channels
 
-D_LINE_NM = 587.5618
-"""The eye's rays have one wavelength."""
-
-MAX_EVENTS = 24
-"""Surfaces a camera path may meet in a scene with glass or mirrors."""
-REFLECTION_EVENTS = 8
-"""Of those, kept back for the reflection at the first glass surface."""
+MAX_DEPTH = 48
+"""Surfaces that one camera path may meet."""
+MAX_EVENTS = 160
+"""Surfaces that all paths of a sample may meet together."""
+STACK = 6
+"""Paths of a sample that may wait while another is followed."""
+SPLIT_THRESHOLD = 0.03
+"""Share of a sample's power above which both parts of a split path are followed."""
+MOST_TAPS = 16
+TAPS_PER_PIXEL = 0.7
+TINT_STEPS = 24
+"""Stretches that the whole spectrum is cut into behind coloured glass."""
 
 _TARGET_SECONDS = 0.15
 """What one dispatch may take; rows are divided to fit."""
 _GROUP = 8
-
-EYE_LIGHT = Struct(
-    "EyeLight",
-    (
-        Field("position", "vec3", "GPU space"),
-        Field("kind", "uint", "0 point or spot, 1 directional, 2 collimated, 3 area"),
-        Field("axis", "vec3", "unit, propagation"),
-        Field("is_disc", "uint"),
-        Field("half_u", "vec3", "centre to rim, GPU units; directional: tangent of the angular radius"),
-        Field("measure", "float", "area: GPU units²; directional: radiance per irradiance (0: no extent); else 0"),
-        Field("half_v", "vec3", "as half_u, across it"),
-        Field("reserved", "float", ""),
-        Field("cone", "vec2", "inner and outer half angle, rad"),
-        Field("reserved2", "vec2", ""),
-    ),
-)
-EYE_PARAMETERS = Struct(
-    "EyeParameters",
-    (
-        Field("position", "vec3", "camera, GPU space"),
-        Field("orthographic", "uint"),
-        Field("forward", "vec3", "unit"),
-        Field("first_row", "uint", "row of this dispatch's first pixels"),
-        Field("half_right", "vec3", "picture's middle to its right border"),
-        Field("sample_index", "uint", "counts the samples of a pixel"),
-        Field("half_up", "vec3", "picture's middle to its upper border"),
-        Field("seed", "uint"),
-        Field("red_of_xyz", "vec4", "row of the XYZ to linear Rec.709 matrix"),
-        Field("green_of_xyz", "vec4"),
-        Field("blue_of_xyz", "vec4"),
-        Field("size", "uvec2", "picture, pixels"),
-        Field("within_pixel", "vec2", "this sample's place in its pixel, 0 to 1"),
-        Field("pixel_size", "float", "GPU units a pixel covers at the camera (orthographic)"),
-        Field("pixel_angle", "float", "and how that grows with distance (pinhole)"),
-        Field("map_scale", "float", "factor on the caustic maps: one over the passes in them"),
-        Field("x_eye", "float", "spectral coordinate of the eye's rays"),
-        Field("sample_side", "float", "side of a sample's share of its pixel, pixels"),
-        Field("unused", "float", "", 3),
-        Field("inside_mask", "uint", "solids the camera stands in, bits of the medium stack"),
-        Field("inside_object", "uint", "solid outside the stack it stands in, or NONE"),
-        Field("reserved", "uvec2", ""),
-    ),
-)
-_LIGHT_KINDS = {"point": 0, "spot": 0, "directional": 1, "collimated": 2, "area": 3}
-_BIND_LIGHTS, _BIND_LIGHT_CHANNELS, _BIND_MATERIAL_CHANNELS, _BIND_RECEIVERS, _BIND_PLACEMENTS = range(8, 13)
+_BIND_LIGHTS, _BIND_OBJECT_COLOURS, _BIND_CELL_CDF, _BIND_RECEIVERS, _BIND_PLACEMENTS, _BIND_PICTURES, _BIND_COUNTERS = range(8, 15)
+_UNIT_EMISSION, _UNIT_PICTURES = 10, 11
+FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut")
+"""What the shader counts, in its order."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +60,7 @@ class CausticMaps:
     """The light half's result, as the eye reads it."""
 
     textures: Sequence[moderngl.Texture]
-    """RGBA32F, energy per texel: XYZ and W, or four bins each."""
+    """RGBA32F, energy per texel: XYZ and W with spectral hats after them, or four bins each."""
     receivers: moderngl.Buffer
     """RECEIVER records."""
     placements: moderngl.Buffer
@@ -107,28 +78,47 @@ class EyePass:
         scene: SceneBuffers,
         layer: str = "beauty",
         reflectances: Sequence[np.ndarray | None] = (None,),
-        bin_edges_nm: Sequence[float] | None = None,
+        maps: MapChannels = MapChannels(),
+        pictures: TextureStore | None = None,
     ) -> None:
         """`layer`: "beauty", or "caustic" (the maps on what is seen directly, no other light).
 
         `reflectances`: reflectance classes as the splat tables were built with; the first is
-        None, the others (401,) are folded into the maps. `bin_edges_nm`: None for XYZ maps.
+        None, the others (401,) are folded into the maps. `maps`: what their channels are; those of a picture in bins are its own.
+        `pictures`: textures and environment of `scene.scene`, the caller's; None makes them. The camera's method is that of `scene.features`.
         """
         if reflectances[0] is not None:
             raise ValueError("reflectance class 0 must be None: it stands for receivers whose maps hold plain irradiance")
         self.context = context
         self.scene = scene
-        self.channels = Channels(None if bin_edges_nm is None else tuple(float(e) for e in bin_edges_nm))
+        self.channels = Channels(maps.edges_nm)
         self._ctx = context.ctx
-        self._buffers = self._fixed_buffers(reflectances)
+        self._tables = EyeTables.build(self._ctx, scene, self.channels, reflectances, maps)
+        self._owns_pictures = pictures is None
+        self.pictures = pictures or TextureStore(self._ctx, scene.scene, scene.first_triangle, scene.corner_turn)
+        lights = EYE_LIGHT.zeros(max(1, len(scene.scene.lights)))
+        for i, light in enumerate(scene.scene.lights):
+            lights[i] = light_record(light, scene)
+        self._lights = self._ctx.buffer(lights.tobytes())
+        self._counters = self._ctx.buffer(bytes(4 * len(FALLBACKS)))
         self._parameters_buffer = self._ctx.buffer(reserve=EYE_PARAMETERS.stride)
         self._empty: CausticMaps | None = None
         self._pictures: list[moderngl.Texture] = []
         self._samples_of_row = np.zeros(0, int)
         self._rows_a_dispatch = 0
+        self._map_targets = maps.targets
         self.dispatch_seconds = _TARGET_SECONDS
         """What one dispatch should take; rows are divided to fit."""
-        self._program = shader.compute(self._ctx, "eye.comp", self._defines(layer, len(reflectances)), (*SCENE_STRUCTS, EYE_LIGHT, EYE_PARAMETERS, RECEIVER, PLACEMENT))
+        features = scene.features
+        self.disperses = layer != "caustic" and features.eye_disperses
+        """Samples differ in the stretch of the spectrum they see."""
+        self.fixed_bands = {"regular-7": 7, "regular-16": 16}.get(features.method) if features.point_spectrum else (1 if features.merged_groups else None)
+        self.bands = self.fixed_bands or 1
+        """Stretches the spectrum is cut into; a picture is whole after that many samples."""
+        self.most_taps = MOST_TAPS
+        self.split_threshold = SPLIT_THRESHOLD
+        structs = (*SCENE_STRUCTS, EYE_LIGHT, EYE_PARAMETERS, RECEIVER, PLACEMENT, *([PICTURE] if self.pictures.structs else []))
+        self._program = shader.compute(self._ctx, "eye.comp", self._defines(layer, maps), structs)
 
     def run(
         self,
@@ -172,14 +162,24 @@ class EyePass:
 
     def _bind(self, maps: CausticMaps) -> None:
         self.scene.bind()
-        for binding, buffer in self._buffers.items():
+        tables = self._tables
+        tables.spectra.use(bindings.UNIT_SPECTRA)
+        tables.emission.use(_UNIT_EMISSION)
+        self.pictures.bind(_BIND_PICTURES, _UNIT_PICTURES)
+        buffers = (self._lights, tables.object_colours, tables.cell_cdf, maps.receivers, maps.placements)
+        for binding, buffer in zip((_BIND_LIGHTS, _BIND_OBJECT_COLOURS, _BIND_CELL_CDF, _BIND_RECEIVERS, _BIND_PLACEMENTS), buffers, strict=True):
             buffer.bind_to_storage_buffer(binding)
-        maps.receivers.bind_to_storage_buffer(_BIND_RECEIVERS)
-        maps.placements.bind_to_storage_buffer(_BIND_PLACEMENTS)
+        self._counters.bind_to_storage_buffer(_BIND_COUNTERS)
         self._parameters_buffer.bind_to_storage_buffer(bindings.PARAMETERS)
-        for unit, (texture, picture) in enumerate(zip(maps.textures, self._pictures, strict=True)):
+        for unit, texture in enumerate(maps.textures):
             texture.use(location=unit)
+        for unit, picture in enumerate(self._pictures):
             picture.bind_to_image(unit, read=True, write=True)
+
+    @property
+    def fallbacks(self) -> dict[str, int]:
+        """How often, since the pass was made, a path lost its columns, was left at its greatest depth, could not wait, or kept a band that should have been cut."""
+        return dict(zip(FALLBACKS, np.frombuffer(self._counters.read(), "u4").tolist(), strict=True))
 
     @property
     def sums(self) -> Sequence[moderngl.Texture]:
@@ -201,8 +201,11 @@ class EyePass:
 
     def release(self) -> None:
         """Free every buffer, texture and program."""
-        for owned in (*self._buffers.values(), *self._pictures, self._parameters_buffer, self._program):
-            shader.release(owned)
+        for owned in (self._tables, self._lights, self._counters, *self._pictures, self._parameters_buffer):
+            owned.release()
+        shader.release(self._program)
+        if self._owns_pictures:
+            self.pictures.release()
         if self._empty is not None:
             for owned in (*self._empty.textures, self._empty.receivers, self._empty.placements):
                 owned.release()
@@ -214,51 +217,57 @@ class EyePass:
     def _size(self) -> tuple[int, int]:
         return self._pictures[0].size if self._pictures else (0, 0)
 
-    def _defines(self, layer: str, classes: int) -> dict[str, int | float | str]:
-        scene = self.scene.scene
+    def _defines(self, layer: str, maps: MapChannels) -> dict[str, int | float | str]:
+        scene, features = self.scene.scene, self.scene.features
         beauty = layer != "caustic"
-        specular = beauty and any(isinstance(o.material, Dielectric | Mirror) for o in scene.objects)
-        defines = self.scene.features.defines() | bindings.SCENE_DEFINES | self.scene.defines
+        specular = beauty and features.eye_specular
+        defines = features.defines() | bindings.SCENE_DEFINES | self.scene.defines | self._tables.defines
+        defines |= self.pictures.defines | place_defines(_BIND_PICTURES, _UNIT_PICTURES)
+        # A method that follows single wavelengths has no columns for them; nor has a scene where nothing disperses.
+        groups = features.spectral_groups if specular and features.eye_disperses else 0
         defines |= {
             "TARGETS": self.channels.targets,
+            "MAP_TARGETS": maps.targets,
+            "SPECTRAL_GROUPS": groups,
             "BIND_LIGHTS": _BIND_LIGHTS,
-            "BIND_LIGHT_CHANNELS": _BIND_LIGHT_CHANNELS,
-            "BIND_MATERIAL_CHANNELS": _BIND_MATERIAL_CHANNELS,
+            "BIND_OBJECT_COLOURS": _BIND_OBJECT_COLOURS,
+            "BIND_CELL_CDF": _BIND_CELL_CDF,
+            "BIND_COUNTERS": _BIND_COUNTERS,
             "BIND_RECEIVERS": _BIND_RECEIVERS,
             "BIND_PLACEMENTS": _BIND_PLACEMENTS,
-            "CLASSES": classes,
+            "UNIT_EMISSION": _UNIT_EMISSION,
+            "EMISSION_CELLS": EMISSION_CELLS,
+            "TINT_STEPS": TINT_STEPS,
+            "TAPS_PER_PIXEL": TAPS_PER_PIXEL,
+            "BIN_TARGET": maps.first_target,
+            "BIN_OVERLAP": 1 if maps.edges_nm is not None else 0,
             "LIGHT_COUNT": len(scene.lights),
-            "OBJECT_COUNT": len(scene.objects),
+            "MAX_DEPTH": MAX_DEPTH,
             "MAX_EVENTS": MAX_EVENTS if specular else 1,
-            "REFLECTION_EVENTS": REFLECTION_EVENTS,
+            "STACK": STACK,
         }
+        coloured = any(isinstance(o.material, Mirror) and len(set(o.material.reflectance_rgb)) > 1 for o in scene.objects)
+        absorbs = any(isinstance(o.material, Dielectric) and o.material.absorption is not None for o in scene.objects)
         switches = {
             "LAYER_BEAUTY": beauty,
+            "EYE_SPECULAR": specular,
+            "HAS_DISPERSION": specular and features.eye_disperses,
+            "SPECTRAL_SWEEP": groups > 0,
+            "RANDOM_WAVELENGTH": features.random_wavelength,
+            "EVEN_WAVELENGTHS": features.even_wavelengths,
             "RGB_CHANNELS": self.channels.edges_nm is None,
-            "VISIBLE_LIGHTS": beauty and any(_has_extent(light) for light in scene.lights),
+            "MAP_BINS": maps.count > 0,
+            "HAS_RECEIVERS": any(isinstance(o.material, Diffuse) for o in scene.objects),
+            "VISIBLE_LIGHTS": beauty and any(has_extent(light) for light in scene.lights),
+            "COLOURED_MIRRORS": specular and coloured,
+            "ABSORPTION": specular and absorbs,
+            "SPECTRALLY_TINTED": specular and (coloured or absorbs),
+            "NORMAL_DERIVATIVES": features.smooth_normals,
+            "HAS_IMAGES": bool(self.pictures.structs),
         }
+        for name in switches:
+            defines.pop(name, None)
         return defines | {name: 1 for name, on in switches.items() if on}
-
-    def _fixed_buffers(self, reflectances: Sequence[np.ndarray | None]) -> dict[int, moderngl.Buffer]:
-        scene, channels, space = self.scene.scene, self.channels, self.scene.space
-        lights = EYE_LIGHT.zeros(max(1, len(scene.lights)))
-        light_channels = np.zeros((len(lights), len(reflectances), 4 * channels.targets), np.float32)
-        for i, light in enumerate(scene.lights):
-            lights[i] = _light_record(light, self.scene)
-            # Intensity over distance² in GPU units needs the square of the scale; the other kinds are free of lengths.
-            unit = space.scale**2 if light.kind in ("point", "spot") else 1.0
-            for c, reflectance in enumerate(reflectances):
-                light_channels[i, c] = unit * channels.of_light(light.spectral_power, reflectance)
-        materials = np.zeros((len(scene.objects) + 1, 4 * channels.targets), np.float32)
-        for row, item in zip(materials, scene.objects, strict=False):
-            match item.material:
-                case Diffuse() | Mirror():
-                    row[:] = channels.of_reflectance(item.material.reflectance_rgb)
-                case Dielectric(absorption=absorption) if absorption is not None:
-                    row[:] = channels.of_absorption(absorption.coefficient) / space.scale
-        materials[-1] = channels.of_background(scene.background_rgb)
-        tables = {_BIND_LIGHTS: lights, _BIND_LIGHT_CHANNELS: light_channels, _BIND_MATERIAL_CHANNELS: materials}
-        return {binding: self._ctx.buffer(np.ascontiguousarray(data).tobytes()) for binding, data in tables.items()}
 
     def _parameters(self, camera: Camera, width: int, height: int, map_scale: float, seed: int) -> np.ndarray:
         space = self.scene.space
@@ -275,9 +284,15 @@ class EyePass:
         for name, row in zip(("red_of_xyz", "green_of_xyz", "blue_of_xyz"), xyz_to_rgb709_matrix(), strict=True):
             parameters[name][0, :3] = row
         parameters["size"] = width, height
-        parameters["pixel_size" if orthographic else "pixel_angle"] = 2.0 * half_height / height
+        parameters["pixel_scale"] = 1.0
+        parameters["background"][0, :3] = self.scene.scene.background_rgb
+        environment = self.scene.scene.environment
+        if environment is not None:
+            for name, column in zip(("sky_x", "sky_y", "sky_z"), np.asarray(environment.world_to_local, float).T, strict=True):
+                parameters[name] = column
+        parameters["bands"], parameters["dithered"] = self.bands, self.bands > 1
+        parameters["most_taps"], parameters["split_threshold"] = self.most_taps, self.split_threshold
         parameters["map_scale"] = map_scale
-        parameters["x_eye"] = self.scene.axis.x_of_nm(D_LINE_NM)
         parameters["inside_object"] = NONE
         for index, item in enumerate(self.scene.scene.objects):
             if isinstance(item.material, Dielectric) and contains(item, np.array(camera.position)):
@@ -335,7 +350,7 @@ class EyePass:
         if self._empty is None:
             receivers = RECEIVER.zeros(max(1, len(self.scene.receivers)))
             receivers["placement"] = NONE
-            textures = [self._ctx.texture((1, 1), 4, bytes(16), dtype="f4") for _ in range(self.channels.targets)]
+            textures = [self._ctx.texture((1, 1), 4, bytes(16), dtype="f4") for _ in range(self._map_targets)]
             self._empty = CausticMaps(textures, self._ctx.buffer(receivers.tobytes()), self._ctx.buffer(reserve=PLACEMENT.stride))
         return self._empty
 
@@ -350,28 +365,3 @@ def _pixel_lattice(samples: int, offset: int) -> np.ndarray:
     shift = (0.5 + offset * np.array([0.7548776662466927, 0.5698402909980532])) % 1.0
     index = np.arange(samples)
     return np.column_stack([(index + shift[0]) / samples, (index * golden + shift[1]) % 1.0])
-
-
-def _has_extent(light: Light) -> bool:
-    return light.kind == "area" or (light.kind == "directional" and light.angular_diameter_deg > 0)
-
-
-def _light_record(light: Light, scene: SceneBuffers) -> np.void:
-    record = EYE_LIGHT.zeros(1)[0]
-    axis = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
-    tangent, bitangent = orthonormal_frame(axis, None if light.tangent is None else np.asarray(light.tangent))
-    record["position"] = scene.space.to_gpu(np.array(light.position))
-    record["kind"] = _LIGHT_KINDS[light.kind]
-    record["axis"] = axis
-    record["is_disc"] = light.shape == "disc" or light.kind == "directional"
-    half = np.array([light.radius, light.radius] if light.shape == "disc" else [0.5 * light.width, 0.5 * light.height]) * scene.space.scale
-    if light.kind == "directional":
-        radius = np.radians(0.5 * light.angular_diameter_deg)
-        half = np.full(2, np.tan(radius))
-        record["measure"] = 1.0 / (np.pi * np.sin(radius) ** 2) if radius > 0 else 0.0
-    elif light.kind == "area":
-        record["measure"] = half[0] * half[1] * (np.pi if light.shape == "disc" else 4.0)
-    record["half_u"], record["half_v"] = tangent * half[0], bitangent * half[1]
-    angles = (light.inner_half_angle_deg, light.outer_half_angle_deg)
-    record["cone"] = np.radians(angles) if light.kind == "spot" else (4.0, 4.0)
-    return record

@@ -15,11 +15,9 @@ from app.model.colorimetry import (
     K_M,
     VISIBLE_NM,
     cmf_xyz,
-    illuminant_table,
-    rgb_partition,
+    rgb_basis,
     xyz_to_rgb709,
 )
-from app.model.spectrum import Spectrum
 
 
 @dataclass(frozen=True)
@@ -39,41 +37,15 @@ class Channels:
         """Groups of four channels, as the caustic map has them."""
         return -(-self.count // 4)
 
-    def of_light(self, spectrum: Spectrum, reflectance: np.ndarray | None) -> np.ndarray:
-        """Channels (4·targets,) of a light reflected by `reflectance` (401,), None for white."""
-        reflected = spectrum
-        if reflectance is not None:
-            lines = tuple((nm, power * float(np.interp(nm, VISIBLE_NM, reflectance))) for nm, power in spectrum.lines)
-            reflected = Spectrum(spectrum.density * reflectance, lines)
-        if self.edges_nm is None:
-            return self._padded(xyz_to_rgb709(reflected.xyz()))
-        bins = reflected.density @ self._cell_shares()
-        for nm, power in reflected.lines:
-            index = int(np.searchsorted(self.edges_nm, nm, side="right")) - 1
-            index = self.count - 1 if nm == self.edges_nm[-1] else index
-            if 0 <= index < self.count:
-                bins[index] += power
-        return self._padded(bins)
+    def observer(self) -> np.ndarray:
+        """What a watt at each nanometre adds to each channel: float64 (401, 4·targets)."""
+        weights = np.zeros((len(VISIBLE_NM), 4 * self.targets))
+        weights[:, : self.count] = xyz_to_rgb709(K_M * cmf_xyz()) if self.edges_nm is None else self._cell_shares()
+        return weights
 
     def of_reflectance(self, rgb: tuple[float, float, float]) -> np.ndarray:
         """Factors (4·targets,) of a surface with linear Rec.709 reflectance `rgb`."""
-        return self._padded(np.asarray(rgb, float) if self.edges_nm is None else self._mean(rgb_partition() @ np.asarray(rgb, float)))
-
-    def of_absorption(self, coefficient: np.ndarray) -> np.ndarray:
-        """Absorption coefficients (4·targets,) that stand for α(λ) (401,), in the same unit."""
-        if self.edges_nm is not None:
-            return self._padded(self._mean(coefficient))
-        # Inverse of `attenuation_from_colour`: exact for glass given by a colour up to the blend of the basis.
-        basis = rgb_partition()
-        return self._padded(np.linalg.lstsq(basis, coefficient, rcond=None)[0].clip(min=0.0))
-
-    def of_background(self, rgb: tuple[float, float, float]) -> np.ndarray:
-        """Radiance (4·targets,) of a background: in bins, D65 tinted by `rgb`."""
-        if self.edges_nm is None:
-            return self._padded(np.asarray(rgb, float))
-        daylight = illuminant_table()["D65"]
-        per_lumen = daylight / (K_M * (daylight @ cmf_xyz()[:, 1]))
-        return self._padded((per_lumen * (rgb_partition() @ np.asarray(rgb, float))) @ self._cell_shares())
+        return self._padded(np.asarray(rgb, float) if self.edges_nm is None else self._mean(rgb_basis() @ np.asarray(rgb, float)))
 
     def to_rgb709(self, values: np.ndarray) -> np.ndarray:
         """(…, ≥ count) channel sums → linear Rec.709 float32 (…, 3), negatives kept."""

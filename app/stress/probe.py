@@ -112,7 +112,7 @@ def probe(context: Context, scene: Scene, settings: RenderSettings = SMALL) -> P
         light.finish()
         if light.watched != light.stats.splats:
             raise RuntimeError(f"{light.watched} of {light.stats.splats} photon records were seen")
-        eye = EyePass(context, light.buffers, settings.layer, light.reflectances, light.bin_edges_nm)
+        eye = EyePass(context, light.buffers, settings.layer, light.reflectances, light.map_channels)
         try:
             maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
             eye.run(scene.camera, settings.width, settings.height, settings.spp or 1, 0, maps, settings.seed)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import moderngl
 import numpy as np
 
+from app.gpu.map_channels import MapChannels
 from app.gpu.map_atlas import MapAtlas, Tile, pack, placement_rows
 from app.gpu.records import NONE, RECEIVER, photon_record
 from app.gpu.splat_tables import SplatTables
@@ -42,7 +43,7 @@ class Rig:
     size: tuple[int, int] = (64, 64)
     light: spectrum.Spectrum = field(default_factory=lambda: spectrum.illuminant("D65"))
     bands: Sequence[tuple[float, float]] = WHOLE_BAND
-    channels: str | Sequence[float] = "xyz"
+    channels: MapChannels = MapChannels()
     axis: SpectralAxis = field(default_factory=lambda: SpectralAxis.build([]))
     coarse: tuple[tuple[int, int], np.ndarray, float] | None = None
     """Size, rows (2, 4) and texel area of a coarser window."""

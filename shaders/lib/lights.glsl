@@ -52,23 +52,44 @@ LightSample sample_light(EyeLight light, vec3 position, vec2 unit)
     return s;
 }
 
+// Share of a box of half width `blur` at `offset` from the middle of a stretch of half width `half_side`, its edges straightened; over all
+// offsets it sums up to the stretch.
+float stretch_seen(float offset, float half_side, float blur)
+{
+    float reach = max(half_side, blur);
+    return min(half_side / reach, 1.0) * clamp((reach + blur - abs(offset)) / max(2.0 * blur, 1e-9 * half_side), 0.0, 1.0);
+}
+
+// The same for a disc of radius 1 and a round blur; a disc much smaller than its blur is a cone with the disc's volume.
+float disc_seen(float offset, float blur)
+{
+    float reach = max(1.0, blur);
+    float amount = blur > 1.0 ? 0.75 / (blur * blur) : 1.0 / (1.0 + blur * blur / 3.0);
+    return amount * clamp((reach + blur - offset) / max(2.0 * blur, 1e-9), 0.0, 1.0);
+}
+
 // Radiance per unit of the light's own quantity that a ray meets within `far`: discs and
 // rectangles from their front, the sun's disc where nothing else is met (far = 1e30).
-float light_seen(EyeLight light, vec3 position, vec3 direction, float far)
+// `width`: diameter of what the ray stands for, GPU units at its start and more of them per unit of distance: a light's edge is as soft.
+float light_seen(EyeLight light, vec3 position, vec3 direction, float far, vec2 width)
 {
     if (light.kind == LIGHT_KIND_DIRECTIONAL) {
         float along = -dot(direction, light.axis);
-        vec3 off = direction + along * light.axis;
+        vec3 off = (direction + along * light.axis) / max(along, 1e-9);
         // half_u is as long as the tangent of the disc's angular radius.
-        bool within = along > 0.0 && dot(off, off) < along * along * dot(light.half_u, light.half_u);
-        return within && far >= 1e30 ? light.measure : 0.0;
+        float radius = length(light.half_u);
+        float seen = along > 0.0 && far >= 1e30 ? disc_seen(length(off) / radius, 0.5 * width.y / radius) : 0.0;
+        return seen * light.measure;
     }
     float facing = dot(direction, light.axis);
     float distance = dot(light.position - position, light.axis) / facing;
+    if (light.kind != LIGHT_KIND_AREA || facing >= 0.0 || distance <= 0.0 || distance >= far) return 0.0;
     vec3 off = position + distance * direction - light.position;
-    vec2 at = vec2(dot(off, light.half_u) / dot(light.half_u, light.half_u), dot(off, light.half_v) / dot(light.half_v, light.half_v));
-    bool within = light.is_disc != 0u ? dot(at, at) <= 1.0 : max(abs(at.x), abs(at.y)) <= 1.0;
-    return light.kind == LIGHT_KIND_AREA && facing < 0.0 && distance > 0.0 && distance < far && within ? 1.0 : 0.0;
+    vec2 size = vec2(length(light.half_u), length(light.half_v));
+    vec2 at = vec2(dot(off, light.half_u), dot(off, light.half_v)) / size;
+    float blur = 0.5 * (width.x + distance * width.y);
+    return light.is_disc != 0u ? disc_seen(length(at) / size.x, blur / size.x)
+                               : stretch_seen(at.x, size.x, blur) * stretch_seen(at.y, size.y, blur);
 }
 
 #endif

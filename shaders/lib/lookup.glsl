@@ -8,7 +8,7 @@
 
 layout(std430, binding = BIND_RECEIVERS) readonly restrict buffer Receivers { Receiver receivers[]; };
 layout(std430, binding = BIND_PLACEMENTS) readonly restrict buffer Placements { Placement placements[]; };
-layout(binding = 0) uniform sampler2D caustic_map[TARGETS];
+layout(binding = 0) uniform sampler2D caustic_map[MAP_TARGETS];
 
 // Where `position` (GPU space) on triangle `source` of a receiver lies in the atlas: the finest window that
 // holds it. False where no map covers it.
@@ -55,8 +55,9 @@ vec2 texel_box(uint placement, vec3 direction, vec3 normal, float side)
 
 // Irradiance, the map's unit per scene unit²: the mean of the map's texels over a box with these sides
 // (at most one texel), so that a pixel's samples together weigh every texel by its share of the pixel.
-// A side of one texel is bilinear interpolation.
-vec4 caustic_irradiance(int target, uint placement, vec2 texel, vec2 box)
+// A side of one texel is bilinear interpolation. `map` is one of `caustic_map`, by a constant index: a software renderer takes
+// a computed one from a lane that may be asleep.
+vec4 caustic_irradiance(sampler2D map, uint placement, vec2 texel, vec2 box)
 {
     ivec2 low = ivec2(floor(placements[placement].rect.xy)), high = ivec2(ceil(placements[placement].rect.zw)) - 1;
     float per_area = 1.0 / placements[placement].texel_area;
@@ -68,8 +69,8 @@ vec4 caustic_irradiance(int target, uint placement, vec2 texel, vec2 box)
     // Clamped, so that the border keeps its own value instead of fading into the neighbouring tile.
     a = clamp(a, low, high);
     b = clamp(b, low, high);
-    vec4 below = mix(texelFetch(caustic_map[target], a, 0), texelFetch(caustic_map[target], ivec2(b.x, a.y), 0), share.x);
-    vec4 above = mix(texelFetch(caustic_map[target], ivec2(a.x, b.y), 0), texelFetch(caustic_map[target], b, 0), share.x);
+    vec4 below = mix(texelFetch(map, a, 0), texelFetch(map, ivec2(b.x, a.y), 0), share.x);
+    vec4 above = mix(texelFetch(map, ivec2(a.x, b.y), 0), texelFetch(map, b, 0), share.x);
     return mix(below, above, share.y) * per_area;
 }
 

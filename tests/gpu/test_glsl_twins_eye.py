@@ -101,7 +101,7 @@ def test_lights_as_a_point_and_as_a_ray_see_them(gl, kind: int) -> None:
         assert not got["seen"].any()
 
 
-LOOKUP = {"TARGETS": 1, "CHARTS": 1, "NESTED_WINDOWS": 1, "BIND_RECEIVERS": 8, "BIND_PLACEMENTS": 9, "NONE": f"{NONE}u"}
+LOOKUP = {"MAP_TARGETS": 1, "CHARTS": 1, "NESTED_WINDOWS": 1, "BIND_RECEIVERS": 8, "BIND_PLACEMENTS": 9, "NONE": f"{NONE}u"}
 
 
 def test_the_finest_window_that_holds_a_place_is_found(gl) -> None:
@@ -182,7 +182,7 @@ def test_a_look_up_is_the_mean_over_its_box(gl) -> None:
     box = as_f32(rng.uniform(0.01, 1.5, (COUNT, 2)))
     texture = gl.ctx.texture((24, 20), 4, texels, dtype="f4")
     outputs = {"value": "vec4"}
-    body = "value = caustic_irradiance(0, row, texel, box);"
+    body = "value = caustic_irradiance(caustic_map[0], row, texel, box);"
     got = evaluate(
         gl.ctx, ["lib/lookup.glsl"], body, {"texel": texel, "box": box}, outputs, LOOKUP, [RECEIVER, PLACEMENT],
         {8: RECEIVER.zeros(1), 9: placements}, [lambda: texture.use(0)],

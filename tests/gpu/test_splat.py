@@ -140,7 +140,7 @@ def test_throughput_over_the_band(rig: Rig) -> None:
 def test_bins_hold_their_own_light_and_sum_to_all(gl) -> None:
     features = SplatFeatures(targets=2)
     edges = np.linspace(380.0, 780.0, 6)
-    rig = Rig(gl.ctx, features, channels=tuple(edges))
+    rig = Rig(gl.ctx, features, channels=MapChannels(tuple(float(e) for e in edges)))
     image = rig.draw(photons(features, [[32.0, 32.0]], [1.0, 0.0], [0.0, 1.0], [10.0, 0.0])).sum(axis=(0, 1))
     cells = np.append(VISIBLE_NM - 0.5, 780.5)
     cells[0], cells[-1] = 380.0, 780.0

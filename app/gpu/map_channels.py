@@ -1,0 +1,107 @@
+"""What the channels of a caustic map stand for.
+
+A picture in colour needs the map's XYZ only, unless the camera sees it through glass that disperses: then every
+wavelength is looked up at another place, and the map holds coarse spectra beside XYZ. Their bins overlap by half (hats), so that a
+pure colour between two of them is a mixture of both and no step shows. A spectral picture asks for the bins it wants.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.model.colorimetry import K_M, VISIBLE_NM, cmf_xyz
+from app.model.scene import Light
+from app.model.spectral_tables import SpectralAxis
+from app.model.spectrum import Spectrum, cmf_at
+
+
+@dataclass(frozen=True)
+class MapChannels:
+    """XYZ and W; the same with spectral hats after them; or bins with edges."""
+
+    edges_nm: tuple[float, ...] | None = None
+    """Ascending edges of the bins that a spectral picture asks for."""
+    hats_nm: tuple[float, ...] = ()
+    """Ascending peaks of the hats that follow XYZ and W; the first and the last one's flat sides reach on."""
+
+    @property
+    def count(self) -> int:
+        """Spectral channels: bins or hats."""
+        return len(self.edges_nm) - 1 if self.edges_nm is not None else len(self.hats_nm)
+
+    @property
+    def first_target(self) -> int:
+        """Target of the first spectral channel."""
+        return 0 if self.edges_nm is not None else 1
+
+    @property
+    def targets(self) -> int:
+        """RGBA32F targets of the map."""
+        return self.first_target + -(-self.count // 4)
+
+    @property
+    def columns(self) -> int:
+        """Channels of the map, unused ones counted."""
+        return 4 * self.targets
+
+    def cell_weights(self) -> np.ndarray:
+        """What each nanometre cell adds to each channel: float64 (401, columns)."""
+        if self.edges_nm is not None:
+            weights = np.zeros((len(VISIBLE_NM), self.columns))
+            low, high = np.maximum(VISIBLE_NM - 0.5, VISIBLE_NM[0]), np.minimum(VISIBLE_NM + 0.5, VISIBLE_NM[-1])
+            edges = np.asarray(self.edges_nm, np.float64)
+            overlap = np.minimum(high[:, None], edges[1:]) - np.maximum(low[:, None], edges[:-1])
+            weights[:, : self.count] = np.clip(overlap, 0.0, None) / (high - low)[:, None]
+            return weights
+        return self._padded(np.column_stack([K_M * cmf_xyz(), np.ones(len(VISIBLE_NM))]), VISIBLE_NM)
+
+    def line_weights(self, line_nm: np.ndarray) -> np.ndarray:
+        """The same at exact wavelengths: (lines, columns)."""
+        if self.edges_nm is None:
+            return self._padded(np.column_stack([K_M * cmf_at(line_nm), np.ones(len(line_nm))]), line_nm)
+        edges = np.asarray(self.edges_nm, np.float64)
+        weights = np.zeros((len(line_nm), self.columns))
+        at = np.searchsorted(edges, line_nm, side="right") - 1
+        at = np.where(line_nm == edges[-1], len(edges) - 2, at)
+        inside = (at >= 0) & (at < len(edges) - 1)
+        weights[np.flatnonzero(inside), at[inside]] = 1.0
+        return weights
+
+    def coordinate(self, axis: SpectralAxis, x: np.ndarray) -> np.ndarray:
+        """Where on the row of spectral channels x lies: channel k is touched from k − 1 (hats; bins: k) to k + 1."""
+        marks = self.edges_nm if self.edges_nm is not None else self.hats_nm
+        if len(marks) < 2:
+            return np.zeros_like(x)
+        return np.interp(axis.nm_of_x(x), marks, np.arange(len(marks)))
+
+    def spectra(self, lights: Sequence[Light]) -> list[Spectrum]:
+        """Spectral density of one watt in each spectral channel: the lights' own, within it."""
+        power = np.sum([light.spectral_power.density for light in lights], axis=0) if lights else np.zeros(len(VISIBLE_NM))
+        lines = [line for light in lights for line in light.spectral_power.lines]
+        line_nm, line_power = np.array(lines, float).reshape(-1, 2).T
+        first = 4 * self.first_target
+        cells, at_lines = self.cell_weights()[:, first : first + self.count], self.line_weights(line_nm)[:, first : first + self.count]
+        spectra = []
+        for k in range(self.count):
+            density, weights = power * cells[:, k], line_power * at_lines[:, k]
+            total = float(density.sum() + weights.sum())
+            if total <= 0.0:
+                density, weights, total = cells[:, k], np.zeros(len(line_nm)), max(float(cells[:, k].sum()), 1e-30)
+            kept = tuple((float(nm), float(w / total)) for nm, w in zip(line_nm, weights, strict=True) if w > 0.0)
+            spectra.append(Spectrum(density / total, kept))
+        return spectra
+
+    def _padded(self, xyzw: np.ndarray, nm: np.ndarray) -> np.ndarray:
+        weights = np.zeros((len(nm), self.columns))
+        weights[:, :4] = xyzw
+        for k in range(self.count):
+            weights[:, 4 + k] = np.interp(nm, self.hats_nm, np.eye(self.count)[k])
+        return weights
+
+
+def hats(axis: SpectralAxis, count: int) -> MapChannels:
+    """XYZ, W and `count` hats, evenly spaced where the indices change."""
+    return MapChannels(hats_nm=tuple(float(nm) for nm in axis.nm_of_x(np.linspace(0.0, 1.0, count))))

@@ -1,0 +1,125 @@
+// A camera path: a ray with its pixel columns and, where the scene disperses, one spectral column a group of glasses,
+// and what it has lost on its way. It stands for the whole spectrum until it is first bent by glass that disperses;
+// from there on for one band of it (`narrow`).
+#ifndef EYE_PATH_GLSL
+#define EYE_PATH_GLSL
+
+#define SPATIAL 2
+#define COLUMNS_HELD (SPATIAL + SPECTRAL_GROUPS)
+// A column longer than this (GPU units, the glass is about 1) has left the linear regime for good.
+#define COLUMN_LIMIT 1e4
+
+struct EyePath {
+    vec3 position;
+    vec3 direction;
+    RayOrigin origin;
+    RayRecord medium;
+    vec3 dposition[COLUMNS_HELD];   // of the two sides of a pixel, then of each group's variable
+    vec3 ddirection[COLUMNS_HELD];
+    vec3 band;                      // its lowest wavelength, the one it is traced at, its highest: as x
+    vec3 weight;                    // throughput at these
+    float gain;                     // one over the probability of all choices made
+    float share;                    // throughput as far as branches are worth following
+    uint key;                       // says which branch this is
+    int depth;                      // surfaces met
+    bool narrowed;                  // stands for one band
+    bool recut;                     // its band was cut before the surface ahead, and is not again
+#ifdef COLOURED_MIRRORS
+    vec3 tint;                      // coefficients of the reflectance basis
+#endif
+#ifdef ABSORPTION
+    float lengths[ABSORBERS];       // way through each absorbing glass, GPU units
+#endif
+};
+
+// Change of group g's variable from the path's own wavelength to x.
+#if SPECTRAL_GROUPS > 0
+float variable_step(uint g, float x, float x_anchor)
+{
+    return spectral_row(uint(VARIABLE_ROW) + g, x) - spectral_row(uint(VARIABLE_ROW) + g, x_anchor);
+}
+#endif
+
+// The path's ray at the wavelength x, as the spectral columns see it.
+void ray_at(EyePath path, float x, out vec3 position, out vec3 direction)
+{
+    position = path.position;
+    direction = path.direction;
+#if SPECTRAL_GROUPS > 0
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+        float change = variable_step(uint(g), x, path.band.y);
+        position += change * path.dposition[SPATIAL + g];
+        direction += change * path.ddirection[SPATIAL + g];
+    }
+    direction = normalize(direction);
+#endif
+}
+
+// Weights at other wavelengths of the same band.
+vec3 weights_at(EyePath path, vec3 x)
+{
+    vec3 below = clamp((x - path.band.x) / max(path.band.y - path.band.x, 1e-9), 0.0, 1.0);
+    vec3 above = clamp((x - path.band.y) / max(path.band.z - path.band.y, 1e-9), 0.0, 1.0);
+    return mix(mix(vec3(path.weight.x), vec3(path.weight.y), below), vec3(path.weight.z), above);
+}
+
+// From here on the path stands for one band only; all others have their turn in other samples.
+void narrow(inout EyePath path, uint pixel_key)
+{
+    path.narrowed = true;
+#ifdef RANDOM_WAVELENGTH
+    // One of the table's cells, by how bright it looks.
+#ifdef EVEN_WAVELENGTHS
+    float u = kronecker(p.sample_index, GOLDEN, hash_combine(pixel_key, 77u));
+#else
+    float u = unit_float(hash_combine(hash_combine(pixel_key, 77u), p.sample_index));
+#endif
+    uint low = 0u, high = uint(EMISSION_CELLS);
+    while (high - low > 1u) {
+        uint middle = (low + high) / 2u;
+        if (cell_cdf[middle] <= u) low = middle;
+        else high = middle;
+    }
+    path.gain /= max(cell_cdf[low + 1u] - cell_cdf[low], 1e-9);
+    vec3 band = (float(low) + vec3(0.0, 0.5, 1.0)) / float(EMISSION_CELLS);
+#else
+    // Neighbouring pixels begin with different bands, so that what is still missing shows as grain and not as a tint.
+    uint band_number = (p.sample_index + (p.dithered != 0u ? hash_combine(pixel_key, 78u) : 0u)) % p.bands;
+    vec3 band = (float(band_number) + vec3(0.0, 0.5, 1.0)) / float(p.bands);
+    path.gain *= float(p.bands);
+#endif
+    path.weight = weights_at(path, band);
+    path.band = band;
+}
+
+// The same path anchored in the middle of a part of its band.
+void anchor_at(inout EyePath path, float lo, float hi)
+{
+    vec3 band = vec3(lo, 0.5 * (lo + hi), hi);
+    path.weight = weights_at(path, band);
+    ray_at(path, band.y, path.position, path.direction);
+    path.band = band;
+}
+
+// Column c carried to a surface at `distance` whose geometric normal is `normal_g`.
+void transfer_columns(inout EyePath path, vec3 normal_g, float distance)
+{
+    for (int c = 0; c < COLUMNS_HELD; ++c)
+        path.dposition[c] = transfer_column(path.dposition[c], path.ddirection[c], path.direction, normal_g, distance);
+}
+
+// Columns that are not finite, or longer than anything, are dropped: the path goes on as a single ray.
+bool columns_hold(inout EyePath path)
+{
+    float largest = 0.0;
+    for (int c = 0; c < COLUMNS_HELD; ++c)
+        largest = max(largest, max(dot(path.dposition[c], path.dposition[c]), dot(path.ddirection[c], path.ddirection[c])));
+    // Not (x < limit) is also true for NaN, which max() may lose: the sum keeps it.
+    float all = 0.0;
+    for (int c = 0; c < COLUMNS_HELD; ++c) all += dot(path.dposition[c] + path.ddirection[c], vec3(1.0));
+    if (largest < COLUMN_LIMIT * COLUMN_LIMIT && !isnan(all) && !isinf(all)) return true;
+    for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
+    return false;
+}
+
+#endif

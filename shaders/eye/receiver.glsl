@@ -1,0 +1,212 @@
+// What a diffuse surface sends back: direct light, whose shadow rays stop at anything, glass too, and the caustic map,
+// which holds all light that came by way of glass or mirrors. Nothing counts twice.
+#ifndef EYE_RECEIVER_GLSL
+#define EYE_RECEIVER_GLSL
+
+const float INVERSE_PI = 0.31830988618;
+
+// One place on a diffuse surface, as a stretch [lo, hi] of the path's spectrum sees it.
+struct Seen {
+    vec3 position;
+    vec3 direction;      // of the ray that found it
+    vec3 dposition[3];   // what it is averaged over: a sample's two sides, and the way from this stretch to the next
+    vec3 normal_g;
+    uint primitive;
+    uint object;
+    uint source;         // triangle
+    vec3 reflectance;    // coefficients of the reflectance basis
+};
+
+Seen seen_on(EyePath path, Hit hit, Triangle facet, vec3 position, vec3 direction)
+{
+    Seen seen;
+    seen.position = position;
+    seen.direction = direction;
+    seen.normal_g = hit.normal_g;
+    seen.primitive = hit.primitive;
+    seen.object = hit.object;
+    seen.source = facet.source;
+    for (int c = 0; c < 2; ++c)
+        seen.dposition[c] = p.sample_side * transfer_column(path.dposition[c], path.ddirection[c], path.direction, hit.normal_g, hit.distance);
+    seen.dposition[2] = vec3(0.0);
+    seen.reflectance = object_colours[hit.object].rgb;
+    return seen;
+}
+
+#ifdef HAS_TEXTURES
+void apply_texture(inout Seen seen, Triangle facet)
+{
+    uint number = object_at(seen.object).texture;
+    if (number == NONE) return;
+    Picture record = pictures[number];
+    vec3 gradient_u, gradient_v;
+    uv_gradients(record, seen.source, facet.edge1, facet.edge2, gradient_u, gradient_v);
+    vec2 uv;
+    vec3 along = seen.position - facet.vertex;
+    hit_uv(record, seen.source, vec2(0.0), uv);
+    uv += vec2(dot(gradient_u, along), dot(gradient_v, along));
+    vec2 columns[3];
+    for (int c = 0; c < 3; ++c) columns[c] = vec2(dot(gradient_u, seen.dposition[c]), dot(gradient_v, seen.dposition[c]));
+    vec2 ds, dt;
+    box_of_three(columns[0], columns[1], columns[2], ds, dt);
+    seen.reflectance *= texture_filtered(record, uv, ds, dt);
+}
+#endif
+
+// Two numbers for a light's extent: a Kronecker sequence over the samples, shifted by pixel and light.
+vec2 light_point(uint light, uint pixel_key)
+{
+    uint key = hash_combine(pixel_key, light);
+    return vec2(kronecker(p.sample_index, PLASTIC_1, key), kronecker(p.sample_index, PLASTIC_2, hash_pcg(key)));
+}
+
+// Irradiance from one light, as a factor on its own quantity, before anything is in the way.
+float unshadowed(uint light, Seen seen, uint pixel_key, out LightSample s)
+{
+    s = sample_light(lights[light], seen.position, light_point(light, pixel_key));
+    vec3 normal = dot(seen.direction, seen.normal_g) < 0.0 ? seen.normal_g : -seen.normal_g;
+    return s.gain * max(dot(s.toward, normal), 0.0);
+}
+
+bool hidden_from(LightSample s, Seen seen)
+{
+    RayOrigin origin = RayOrigin(seen.primitive, seen.object, dot(seen.direction, seen.normal_g) > 0.0, 0u);
+    // Up to the light, less a hair so that a surface the light lies on does not hide it.
+    return intersect_any(seen.position, s.toward, s.distance * 0.99999, origin);
+}
+
+// Lights, as bits, that a place is hidden from; those past the 32nd are asked for every time.
+uint shadows_at(Seen seen, uint pixel_key)
+{
+    uint hidden = 0u;
+    for (uint i = 0u; i < uint(min(LIGHT_COUNT, 32)); ++i) {
+        LightSample s;
+        if (unshadowed(i, seen, pixel_key, s) > 0.0 && hidden_from(s, seen)) hidden |= 1u << i;
+    }
+    return hidden;
+}
+
+// `known`: lights, as bits, for which `hidden` says whether they are; the others are found out.
+void add_direct(inout vec4 radiance[TARGETS], EyePath path, Seen seen, float lo, float hi, uint pixel_key, uint known, uint hidden)
+{
+    uint reflectance_class = receivers[object_at(seen.object).receiver].reflectance_class;
+    for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
+        LightSample s;
+        float gain = unshadowed(i, seen, pixel_key, s);
+        if (gain <= 0.0) continue;
+        uint bit = i < 32u ? 1u << i : 0u;
+        bool shadowed = (known & bit) != 0u ? (hidden & bit) != 0u : hidden_from(s, seen);
+        if (shadowed) continue;
+        uint row = uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT);
+        // Other classes than 0 have their reflectance in the light's own row.
+        if (reflectance_class == 0u) add_colour(radiance, path, row, seen.reflectance * (INVERSE_PI * gain), lo, hi);
+        else add_spectrum(radiance, path, row + 2u + reflectance_class, INVERSE_PI * gain, lo, hi);
+    }
+}
+
+// A map's channels are XYZ (lm) where the picture's are linear Rec.709, else the same bins.
+vec4 map_to_channels(vec4 texel)
+{
+#ifdef RGB_CHANNELS
+    return vec4(dot(p.red_of_xyz.xyz, texel.xyz), dot(p.green_of_xyz.xyz, texel.xyz), dot(p.blue_of_xyz.xyz, texel.xyz), 0.0);
+#else
+    return texel;
+#endif
+}
+
+// Irradiance of the map's targets `first` to `last`.
+void caustic_values(uint placement, vec2 texel, vec2 box, out vec4 values[MAP_TARGETS], const int first, const int last)
+{
+#if MAP_TARGETS > 0
+    if (0 >= first && 0 <= last) values[0] = caustic_irradiance(caustic_map[0], placement, texel, box);
+#endif
+#if MAP_TARGETS > 1
+    if (1 >= first && 1 <= last) values[1] = caustic_irradiance(caustic_map[1], placement, texel, box);
+#endif
+#if MAP_TARGETS > 2
+    if (2 >= first && 2 <= last) values[2] = caustic_irradiance(caustic_map[2], placement, texel, box);
+#endif
+#if MAP_TARGETS > 3
+    if (3 >= first && 3 <= last) values[3] = caustic_irradiance(caustic_map[3], placement, texel, box);
+#endif
+#if MAP_TARGETS > 4
+    if (4 >= first && 4 <= last) values[4] = caustic_irradiance(caustic_map[4], placement, texel, box);
+#endif
+#if MAP_TARGETS > 5
+    if (5 >= first && 5 <= last) values[5] = caustic_irradiance(caustic_map[5], placement, texel, box);
+#endif
+#if MAP_TARGETS > 6
+    if (6 >= first && 6 <= last) values[6] = caustic_irradiance(caustic_map[6], placement, texel, box);
+#endif
+#if MAP_TARGETS > 7
+    if (7 >= first && 7 <= last) values[7] = caustic_irradiance(caustic_map[7], placement, texel, box);
+#endif
+#if MAP_TARGETS > 8
+    if (8 >= first && 8 <= last) values[8] = caustic_irradiance(caustic_map[8], placement, texel, box);
+#endif
+}
+
+#ifndef RGB_CHANNELS
+// Mean over each bin of a reflectance given by its coefficients.
+vec4 bin_reflectance(vec3 colour, int target)
+{
+    return colour.r * emission_until(uint(REFLECTANCE_ROW), target, EMISSION_CELLS) + colour.g * emission_until(uint(REFLECTANCE_ROW + 1), target, EMISSION_CELLS)
+         + colour.b * emission_until(uint(REFLECTANCE_ROW + 2), target, EMISSION_CELLS);
+}
+#endif
+
+#ifdef MAP_BINS
+// The caustic's own dispersion meets the eye's: every spectral channel of the map that [lo, hi] touches is read by itself.
+void add_caustic_bins(inout vec4 radiance[TARGETS], EyePath path, Seen seen, uint placement, vec2 texel, vec2 box, float reflectance, float lo, float hi)
+{
+    float first = spectral_row(uint(BIN_ROW), lo), last = spectral_row(uint(BIN_ROW), hi);
+    int from = int(floor(first)), to = max(from, int(ceil(last)) - BIN_OVERLAP);
+    float factor = p.map_scale * INVERSE_PI * reflectance;
+    vec4 values[MAP_TARGETS];
+    caustic_values(placement, texel, box, values, BIN_TARGET, MAP_TARGETS - 1);
+    for (int t = 0; t < MAP_TARGETS - BIN_TARGET; ++t) {
+        if (4 * t + 3 < from || 4 * t > to) continue;
+        vec4 watts = values[BIN_TARGET + t];
+        for (int c = 0; c < 4; ++c)
+            if (4 * t + c >= from && 4 * t + c <= to) add_spectrum(radiance, path, uint(BIN_SPECTRUM_ROW + 4 * t + c), factor * watts[c], lo, hi);
+    }
+}
+#endif
+
+void add_caustic(inout vec4 radiance[TARGETS], EyePath path, Seen seen, float lo, float hi)
+{
+    uint placement;
+    vec2 texel;
+    uint receiver = object_at(seen.object).receiver;
+    if (!find_texel(receiver, seen.source, seen.position, placement, texel)) return;
+    // Texels larger than pixels are interpolated, smaller ones weighed by their share of the sample.
+    vec3 row_u = placements[placement].row_u.xyz, row_v = placements[placement].row_v.xyz;
+    vec2 box = vec2(0.0);
+    for (int c = 0; c < 3; ++c) box += vec2(pow(dot(row_u, seen.dposition[c]), 2.0), pow(dot(row_v, seen.dposition[c]), 2.0));
+    box = sqrt(box);
+    vec2 pixel = box / p.sample_side;
+    if (pixel.x * pixel.y < 1.0) box = vec2(1.0);
+    bool plain = receivers[receiver].reflectance_class == 0u;
+#ifdef MAP_BINS
+    if (path.narrowed) {
+        float x = 0.5 * (lo + hi);
+        float reflectance = plain ? dot(seen.reflectance, vec3(spectral_row(uint(BASIS_ROW), x), spectral_row(uint(BASIS_ROW + 1), x), spectral_row(uint(BASIS_ROW + 2), x))) : 1.0;
+        add_caustic_bins(radiance, path, seen, placement, texel, box, reflectance, lo, hi);
+        return;
+    }
+#endif
+    vec4 factors[TARGETS], values[MAP_TARGETS];
+    channel_factors(path, factors);
+    caustic_values(placement, texel, box, values, 0, TARGETS - 1);
+    for (int t = 0; t < TARGETS; ++t) {
+        vec4 reflectance = vec4(1.0);
+#ifdef RGB_CHANNELS
+        if (plain) reflectance.rgb = seen.reflectance;
+#else
+        if (plain) reflectance = bin_reflectance(seen.reflectance, t);
+#endif
+        radiance[t] += factors[t] * (p.map_scale * INVERSE_PI) * reflectance * map_to_channels(values[t]);
+    }
+}
+
+#endif
