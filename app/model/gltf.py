@@ -1,6 +1,6 @@
 """Opens a .glb or .gltf file directly as a scene: geometry, transforms, camera, lights and glass.
 
-Coordinates stay as they are (y is up, one unit is one metre). What the file lacks is fitted
+Coordinates stay as they are (y is up, one unit is one metre), but for those of textures, which run down in glTF. What the file lacks is fitted
 to its bounds and said in `Scene.notes`, and so is everything that is passed over.
 """
 
@@ -26,6 +26,7 @@ from app.model.gltf_materials import (
     VOLUME,
     read_gltf_material,
 )
+from app.model.gltf_textures import GltfTextures, turned_over
 from app.model.mesh import Mesh, make_mesh
 from app.model.mesh_health import examine, repair
 from app.model.scene import (
@@ -64,6 +65,8 @@ class Origins:
     lights: dict[str, int] = field(default_factory=dict)
     """Light -> node."""
     camera: int | None = None
+    textures: dict[str, int] = field(default_factory=dict)
+    """Content of a texture (`gltf_textures.texture_key`) -> its number."""
 
 
 def load_gltf(path: str | os.PathLike[str]) -> Scene:
@@ -92,6 +95,8 @@ class _Reader:
         self.camera: Camera | None = None
         self._meshes: dict[str, Mesh | None] = {}
         self._materials: dict[int | None, Material] = {}
+        self._textures = GltfTextures(document, self.notes)
+        self.origins.textures = self._textures.numbers
         self._names: set[str] = set()
 
     def read(self) -> tuple[Scene, Origins]:
@@ -104,13 +109,16 @@ class _Reader:
             self.notes.append("Animations and skins are not played (they are kept when saving).")
         upright = [replace(o, object_to_world=Y_UP_TO_Z_UP @ o.object_to_world) for o in self.objects]
         around = surroundings_of(upright)
-        if not any(isinstance(o.material, Diffuse) for o in self.objects):
+        background, environment, render = read_scene_extras(self.document, self.notes)
+        receives = any(isinstance(o.material, Diffuse) for o in self.objects)
+        # An environment shows glass and mirrors without a light and without anything it falls on.
+        if environment is None and not receives:
             table = default_table(upright)
             matrix = Y_UP_TO_Z_UP.T @ table.object_to_world
             self.objects.append(replace(table, name=self._unique("table"), object_to_world=matrix))
             self.notes.append("Nothing diffuse in the file: a light-grey table was put below the objects.")
         lights = self._read_lights(Surroundings(Y_UP_TO_Z_UP[:3, :3].T @ around.centre, around.radius))
-        if not lights:
+        if not lights and (environment is None or receives):
             sun = default_light()
             lights = (replace(sun, name=self._unique(sun.name), direction=_turned(sun.direction)),)
             self.notes.append("No light in the file: a white sun from behind on the left was added.")
@@ -122,7 +130,6 @@ class _Reader:
             )
             self.notes.append("No camera in the file: one that sees the objects was added.")
         name = self.document.path.stem
-        background, environment, render = read_scene_extras(self.document, self.notes)
         notes = tuple(dict.fromkeys(self.notes))
         return Scene(name, camera, lights, tuple(self.objects), background, environment, render, notes), self.origins
 
@@ -203,7 +210,7 @@ class _Reader:
             mesh = self._mesh(node["mesh"], number, primitive, entry)
             if mesh is None:
                 continue
-            material = self._material(primitive.get("material"))
+            material = self._wearable(self._material(primitive.get("material")), mesh, label)
             name = self._unique(label)
             matrix = world.copy()
             matrix.setflags(write=False)
@@ -213,8 +220,15 @@ class _Reader:
 
     def _material(self, index: int | None) -> Material:
         if index not in self._materials:
-            self._materials[index] = read_gltf_material(self.document, index, self.notes)
+            self._materials[index] = read_gltf_material(self.document, index, self._textures, self.notes)
         return self._materials[index]
+
+    def _wearable(self, material: Material, mesh: Mesh, label: str) -> Material:
+        """`material`, without its texture where the mesh cannot say where it goes."""
+        if not isinstance(material, Diffuse) or material.texture is None or mesh.uv is not None:
+            return material
+        self.notes.append(f"node '{label}' has no texture coordinates; its texture is not shown (it is kept when saving).")
+        return replace(material, texture=None)
 
     def _mesh(self, index: int, number: int, primitive: dict[str, Any], entry: dict[str, Any]) -> Mesh | None:
         """One primitive as a repaired mesh; None when it has no triangles.
@@ -249,7 +263,7 @@ class _Reader:
             positions,
             triangles,
             None if normals is None else normals[triangles],
-            None if uv is None else uv[triangles],
+            None if uv is None else turned_over(uv)[triangles],
             source=where,
         )
         solid = isinstance(self._material(primitive.get("material")), Dielectric)

@@ -104,6 +104,13 @@ class GltfDocument:
             raise self.fail(f"{label} promises {count} elements, more than bufferViews[{index}] holds; export the file again")
         return np.ndarray((count, width), dtype, data, start + offset, (stride, dtype.itemsize))
 
+    def view_bytes(self, index: Any) -> bytes:
+        """All bytes of a buffer view, such as an image's file."""
+        length = self.item("bufferViews", index).get("byteLength")
+        if not isinstance(length, int) or length < 1:
+            raise self.fail(f"bufferViews[{index}] is not valid; export the file again")
+        return self._view(f"bufferViews[{index}]", index, 0, np.dtype("u1"), length, 1).tobytes()
+
     def buffer(self, index: Any) -> bytes:
         """Bytes of a buffer: the BIN chunk, a data URI, or a file beside this one."""
         entry = self.item("buffers", index)

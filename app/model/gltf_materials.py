@@ -14,6 +14,7 @@ from typing import Any
 from app.model import catalogue, glass
 from app.model.colorimetry import attenuation_from_colour
 from app.model.gltf_document import GltfDocument
+from app.model.gltf_textures import GltfTextures
 from app.model.scene import Absorption, Black, Dielectric, Diffuse, Material, Mirror
 from app.model.scene_describe import describe_material
 from app.model.scene_materials import read_material
@@ -23,27 +24,26 @@ TRANSMISSION, VOLUME, IOR, DISPERSION = (f"KHR_materials_{n}" for n in ("transmi
 EXTRAS = "spectrasplat"
 _GLASS_EXTENSIONS = (TRANSMISSION, VOLUME, IOR, DISPERSION)
 _MIRROR_ROUGHNESS = 0.2
+_BASE_COLOUR = "baseColorTexture"
 
 
-def read_gltf_material(document: GltfDocument, index: int | None, notes: list[str]) -> Material:
+def read_gltf_material(document: GltfDocument, index: int | None, textures: GltfTextures, notes: list[str]) -> Material:
     """Material `index` of the document, None being glTF's default; what was assumed goes to `notes`."""
     if index is None:
         return Diffuse((0.8, 0.8, 0.8))
     values = document.item("materials", index)
     label = f"material '{values.get('name', index)}'"
     where = f"{document.path.name}: materials[{index}]"
-    if "Texture" in str([key for key in _all_keys(values)]):
-        notes.append(f"{label}: its textures are not shown, only its factors (they are kept when saving).")
     extras = values.get("extras") if isinstance(values.get("extras"), dict) else {}
     own = extras.get(EXTRAS) if isinstance(extras.get(EXTRAS), dict) else {}
     if "material" in own:
         table = SceneTable(own["material"], document.path, f"materials[{index}].extras.{EXTRAS}.material")
-        return read_material(table)
+        return _with_textures_told(read_material(table), values, label, notes)
     named = own.get("glass", extras.get("glass"))
     extensions = values.get("extensions", {})
     if named is not None:
         dispersion = catalogue.find(str(named), f"{where}.extras.glass")
-        return Dielectric(dispersion, _absorption(extensions, where))
+        return _with_textures_told(Dielectric(dispersion, _absorption(extensions, where)), values, label, notes)
     pbr = values.get("pbrMetallicRoughness", {})
     rgb = tuple(min(1.0, max(0.0, float(c))) for c in (*pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)),)[:3])
     roughness = float(pbr.get("roughnessFactor", 1.0))
@@ -51,12 +51,21 @@ def read_gltf_material(document: GltfDocument, index: int | None, notes: list[st
     if transmission >= 0.5:
         if roughness > 0.1:
             notes.append(f"{label}: its roughness {roughness:g} is taken as polished glass.")
-        return _glass(document, values, label, where, notes)
+        return _with_textures_told(_glass(document, values, label, where, notes), values, label, notes)
     if transmission > 0.0:
         notes.append(f"{label}: transmission {transmission:g} is less than one half and is taken as opaque.")
     if float(pbr.get("metallicFactor", 1.0)) >= 0.5 and roughness <= _MIRROR_ROUGHNESS:
-        return Mirror(rgb)
-    return Diffuse(rgb)
+        return _with_textures_told(Mirror(rgb), values, label, notes)
+    return _with_textures_told(Diffuse(rgb, texture=textures.base_colour(values, label)), values, label, notes)
+
+
+def _with_textures_told(material: Material, values: dict[str, Any], label: str, notes: list[str]) -> Material:
+    """`material`, after a note on the textures it does not show."""
+    shown = {_BASE_COLOUR} if isinstance(material, Diffuse) else set()
+    if any("Texture" in key for key in _all_keys(values) if key not in shown):
+        others = "other " if getattr(material, "texture", None) is not None else ""
+        notes.append(f"{label}: its {others}textures are not shown, only its factors (they are kept when saving).")
+    return material
 
 
 def _all_keys(values: Any) -> list[str]:
@@ -88,11 +97,12 @@ def _absorption(extensions: dict[str, Any], where: str) -> Absorption | None:
     return Absorption(attenuation_from_colour(colour, distance, f"{where}.extensions.{VOLUME}.attenuationDistance"))
 
 
-def write_gltf_material(values: dict[str, Any], material: Material, thickness: float) -> set[str]:
+def write_gltf_material(values: dict[str, Any], material: Material, thickness: float, texture: int | None) -> set[str]:
     """Make the glTF material `values` show `material`, leaving what else it holds; returns extensions used.
 
     Other viewers get the nearest they can show; `extras.spectrasplat.material` keeps the exact
-    values where glTF has no word for them. `thickness` (scene units) is for their volume look.
+    values where glTF has no word for them. `thickness` (scene units) is for their volume look. `texture`:
+    number of the document's texture that a diffuse material wears, if any.
     """
     pbr = values.setdefault("pbrMetallicRoughness", {})
     extensions = {k: v for k, v in values.pop("extensions", {}).items() if k not in _GLASS_EXTENSIONS}
@@ -109,6 +119,8 @@ def write_gltf_material(values: dict[str, Any], material: Material, thickness: f
     else:
         rgb, roughness = (0.0, 0.0, 0.0) if isinstance(material, Black) else material.reflectance_rgb, 1.0
     pbr |= {"baseColorFactor": [*map(float, rgb), 1.0], "metallicFactor": metallic, "roughnessFactor": roughness}
+    if isinstance(material, Diffuse):
+        _wear(pbr, texture)
     exact = not isinstance(material, (Mirror, Diffuse)) or getattr(material, "reflectance", None) is not None
     if exact:
         own["material"] = describe_material(material)
@@ -118,6 +130,14 @@ def write_gltf_material(values: dict[str, Any], material: Material, thickness: f
         if content:
             values[key] = content
     return set(extensions)
+
+
+def _wear(pbr: dict[str, Any], texture: int | None) -> None:
+    """Set or remove the base colour texture; what else its entry says stays where the texture does."""
+    if texture is None:
+        pbr.pop(_BASE_COLOUR, None)
+    elif pbr.get(_BASE_COLOUR, {}).get("index") != texture:
+        pbr[_BASE_COLOUR] = {"index": texture}
 
 
 def _glass_extensions(material: Dielectric, thickness: float) -> dict[str, Any]:

@@ -20,9 +20,10 @@ from app.model.gltf import LIGHTS, Origins, open_document, read_scene
 from app.model.gltf_document import GltfDocument, save_document
 from app.model.gltf_extras import write_node_dabs, write_scene_extras
 from app.model.gltf_materials import EXTRAS, write_gltf_material
+from app.model.gltf_textures import TextureWriter, turned_over
 from app.model.mesh import Mesh
 from app.model.mesh_health import weld_map
-from app.model.scene import Camera, Light, Material, Scene, SceneObject
+from app.model.scene import Camera, Diffuse, Light, Material, Scene, SceneObject
 from app.model.scene_describe import describe_material
 from app.model.scene_save import light_values
 
@@ -59,6 +60,7 @@ class _Writer:
         self.old_lights = {light.name: light for light in before.lights} if before else {}
         self.old_camera = before.camera if before else None
         self._data = bytearray()
+        self._textures = TextureWriter(self.json, self._view, origins.textures)
         self._materials: dict[str, int] = {}
         self._meshes: dict[tuple[int, int], int] = {}
         self._geometry: dict[int, dict[str, Any]] = {}
@@ -156,7 +158,7 @@ class _Writer:
             if mesh.corner_normals is not None:
                 columns.append(mesh.corner_normals.reshape(-1, 3))
             if mesh.uv is not None:
-                columns.append(mesh.uv.reshape(-1, 2))
+                columns.append(turned_over(mesh.uv).reshape(-1, 2))
             # glTF holds float32: rounding first welds what it cannot tell apart.
             rows = np.hstack(columns).astype("<f4")
             kept, number = weld_map(rows.astype(np.float64))
@@ -205,7 +207,9 @@ class _Writer:
 
     def _write_material(self, values: dict[str, Any], item: SceneObject) -> None:
         low, high = item.mesh.bounds()
-        self._used |= write_gltf_material(values, item.material, float((high - low).min()) or 1e-3)
+        texture = item.material.texture if isinstance(item.material, Diffuse) else None
+        number = None if texture is None else self._textures.number(texture)
+        self._used |= write_gltf_material(values, item.material, float((high - low).min()) or 1e-3, number)
 
     # -- lights and camera ----------------------------------------------------------------
 
@@ -310,15 +314,20 @@ class _Writer:
         entry["matrix"] = np.linalg.solve(above, world).T.ravel().tolist()
 
     def _accessor(self, values: np.ndarray, kind: str, target: int, bounds: bool = False) -> int:
-        self._data += b"\0" * (-len(self._data) % 4)
-        view = {"buffer": -1, "byteOffset": len(self._data), "byteLength": values.nbytes, "target": target}
-        self._data += np.ascontiguousarray(values).tobytes()
+        view = self._view(np.ascontiguousarray(values).tobytes(), target=target)
         component = 5126 if values.dtype.kind == "f" else 5125
-        entry = {"bufferView": self._append("bufferViews", view), "componentType": component}
+        entry = {"bufferView": view, "componentType": component}
         entry |= {"count": len(values), "type": kind}
         if bounds:
             entry |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
         return self._append("accessors", entry)
+
+    def _view(self, data: bytes, **more: int) -> int:
+        """Number of a new buffer view that holds `data`."""
+        self._data += b"\0" * (-len(self._data) % 4)
+        view = {"buffer": -1, "byteOffset": len(self._data), "byteLength": len(data)} | more
+        self._data += data
+        return self._append("bufferViews", view)
 
     def _close_buffer(self) -> None:
         """Put new bytes behind the GLB's own chunk, or into a buffer of their own."""

@@ -34,9 +34,11 @@ class Mesh:
     corner_normals: np.ndarray | None = None
     """float64 (T, 3, 3), unit outward normal at each corner (zero where unknown); None = flat shading."""
     uv: np.ndarray | None = None
-    """float64 (T, 3, 2), texture coordinates at each corner."""
+    """float64 (T, 3, 2), texture coordinates at each corner: u to the right, v up, (0, 0) a picture's lower left."""
     source: str | None = None
     """Path of the file it came from, None for a primitive."""
+    uv_unwraps: bool = True
+    """Whether `uv` may lay out the charts of a caustic map; not where it was made for pictures and stretches or repeats."""
 
     def corners(self) -> np.ndarray:
         """Corner positions, float64 (T, 3, 3)."""
@@ -132,6 +134,7 @@ def make_mesh(
     corner_normals: np.ndarray | None = None,
     uv: np.ndarray | None = None,
     source: str | None = None,
+    uv_unwraps: bool = True,
 ) -> Mesh:
     """A checked `Mesh` from array-likes; every array is copied, normals are normalised.
 
@@ -172,6 +175,7 @@ def make_mesh(
         corner_normals=None if normals is None else _frozen(normals),
         uv=None if coordinates is None else _frozen(coordinates),
         source=source,
+        uv_unwraps=uv_unwraps,
     )
 
 

@@ -16,6 +16,7 @@ from app.model.primitives_check import count, in_range, positive
 from app.model.primitives_gem import brilliant
 from app.model.primitives_lens import doublet, lens
 from app.model.primitives_round import ellipsoid, solid_of_revolution, sphere, torus
+from app.model.primitives_uv import with_box_uv
 from app.model.primitives_water import height_field, rippled_water
 
 __all__ = [
@@ -38,15 +39,15 @@ __all__ = [
 
 
 def box(size: tuple[float, float, float] = (1.0, 1.0, 1.0), name: str = "box") -> Mesh:
-    """A box of edge lengths `size` along x, y, z."""
+    """A box of edge lengths `size` along x, y, z; every face shows the whole of a picture (`primitives_uv`)."""
     x, y, z = (positive("box", f"size along {axis}", s) for axis, s in zip("xyz", size, strict=True))
-    return _extruded(name, _rectangle(x, y), z)
+    return with_box_uv(_extruded(name, _rectangle(x, y), z))
 
 
 def slab(width: float = 1.0, height: float = 1.0, thickness: float = 0.1, name: str = "slab") -> Mesh:
-    """A plane-parallel plate: `width` along x, `height` along y, `thickness` along z."""
+    """A plane-parallel plate: `width` along x, `height` along y, `thickness` along z; pictures as on a `box`."""
     outline = _rectangle(positive("slab", "width", width), positive("slab", "height", height))
-    return _extruded(name, outline, positive("slab", "thickness", thickness))
+    return with_box_uv(_extruded(name, outline, positive("slab", "thickness", thickness)))
 
 
 def prism(apex_angle_deg: float = 60.0, side: float = 1.0, length: float = 1.0, name: str = "prism") -> Mesh:
@@ -80,12 +81,16 @@ def plane(width: float = 1.0, height: float = 1.0, name: str = "plane") -> Mesh:
 
 
 def disc(radius: float = 0.5, segments: int = 96, name: str = "disc") -> Mesh:
-    """An open flat disc in z = 0 facing +z: the regular polygon of `segments` corners inscribed in the circle."""
+    """An open flat disc in z = 0 facing +z: the regular polygon of `segments` corners inscribed in the circle.
+
+    A picture's square is the one round the circle.
+    """
     segments = count("disc", "segments", segments, 3, 1 << 16)
     angle = 2.0 * np.pi * np.arange(segments) / segments
     radius = positive("disc", "radius", radius)
     vertices = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(segments)], axis=1)
-    return make_mesh(name, vertices, _fan(np.arange(segments)))
+    triangles = _fan(np.arange(segments))
+    return make_mesh(name, vertices, triangles, uv=(0.5 + vertices[:, :2] / (2.0 * radius))[triangles], uv_unwraps=False)
 
 
 def _rectangle(width: float, height: float) -> np.ndarray:

@@ -14,15 +14,18 @@ import numpy as np
 from app.errors import UserError
 from app.model.mesh import Mesh, make_mesh, normalised
 from app.model.primitives_check import MAX_TRIANGLES, count, in_range, positive
+from app.model.primitives_uv import globe_uv
 
 
 def sphere(radius: float = 0.5, triangles: int = 20_480, name: str = "sphere") -> Mesh:
     """A sphere of about `triangles` faces (20 f² for a whole f); vertices and normals are exact.
 
-    The solid is inscribed: its volume falls short by O(1/triangles).
+    The solid is inscribed: its volume falls short by O(1/triangles). A picture goes round it as a map of the
+    world does round a globe, its middle at +x and its upper edge at +z.
     """
     directions, faces = _icosphere(count("sphere", "triangles", triangles, 20))
-    return make_mesh(name, positive("sphere", "radius", radius) * directions, faces, directions[faces])
+    vertices = positive("sphere", "radius", radius) * directions
+    return make_mesh(name, vertices, faces, directions[faces], globe_uv(directions, faces), uv_unwraps=False)
 
 
 def ellipsoid(
@@ -31,7 +34,8 @@ def ellipsoid(
     """An ellipsoid of `semi_axes` along x, y, z; as `sphere`, with the exact normals of the quadric."""
     axes = np.array([positive("ellipsoid", f"semi-axis along {a}", s) for a, s in zip("xyz", semi_axes, strict=True)])
     directions, faces = _icosphere(count("ellipsoid", "triangles", triangles, 20))
-    return make_mesh(name, directions * axes, faces, normalised(directions / axes)[faces])
+    normals = normalised(directions / axes)[faces]
+    return make_mesh(name, directions * axes, faces, normals, globe_uv(directions, faces), uv_unwraps=False)
 
 
 def torus(

@@ -153,7 +153,7 @@ _HIDDEN = {"name", "names", "gradient"}
 def _parameters(shape: str) -> dict[str, tuple[str, bool]]:
     """Key -> (annotation, required) of a shape, in the order of its function."""
     if shape == INLINE:
-        return {"vertices": ("rows3", True), "triangles": ("rows3", True)}
+        return {"vertices": ("rows3", True), "triangles": ("rows3", True), "uv": ("rows2", False)}
     signature = inspect.signature(_function(shape))
     keys = {
         key: (str(parameter.annotation), parameter.default is inspect.Parameter.empty)
@@ -181,8 +181,8 @@ def _shape_recipe(table: SceneTable) -> dict[str, Any]:
 def _read_parameter(table: SceneTable, key: str, annotation: str) -> Any:
     if annotation == "part":
         return table.choice(key, ("front", "back"))
-    if annotation == "rows3":
-        return [list(row) for row in table.rows(key, 3, at_least=1)]
+    if annotation in ("rows2", "rows3"):
+        return [list(row) for row in table.rows(key, int(annotation[-1]), at_least=1)]
     if key == "profile":
         return [list(row) for row in table.rows(key, 2, at_least=3)]
     if key == "heights":
@@ -228,13 +228,16 @@ def _make_shape(recipe: dict[str, Any]) -> Mesh:
     return made
 
 
-def _inline_mesh(vertices: list[list[float]], triangles: list[list[float]]) -> Mesh:
+def _inline_mesh(vertices: list[list[float]], triangles: list[list[float]], uv: list[list[float]] | None = None) -> Mesh:
     from app.model.mesh import make_mesh
 
     indices = np.array(triangles)
     if np.any(indices != np.floor(indices)):
         raise UserError("triangles must hold whole numbers, counted from 0")
-    return make_mesh("mesh", np.array(vertices), indices.astype(np.int64))
+    if uv is not None and len(uv) != 3 * len(triangles):
+        raise UserError(f"uv has {len(uv)} rows for {len(triangles)} triangles; give one for each corner, three a triangle")
+    corners = None if uv is None else np.array(uv).reshape(-1, 3, 2)
+    return make_mesh("mesh", np.array(vertices), indices.astype(np.int64), uv=corners, uv_unwraps=False)
 
 
 def _load_heights(heights: Any) -> np.ndarray:

@@ -45,9 +45,14 @@ def picture_name(rgb: np.ndarray) -> str:
     return f"picture_{digest.hexdigest()[:12]}"
 
 
+def nearest_levels(rgb: np.ndarray) -> np.ndarray:
+    """The sRGB levels uint8 (H, W, 3) nearest to `rgb`, clipped."""
+    return np.rint(255.0 * srgb_oetf(np.clip(rgb, 0.0, 1.0))).astype(np.uint8)
+
+
 def eight_bit_levels(rgb: np.ndarray) -> np.ndarray | None:
     """The sRGB levels uint8 (H, W, 3) whose decoding is exactly `rgb`, or None."""
-    levels = np.rint(255.0 * srgb_oetf(np.clip(rgb, 0.0, 1.0))).astype(np.uint8)
+    levels = nearest_levels(rgb)
     decoded = srgb_eotf(np.arange(256) / 255.0).astype(np.float32)
     return levels if np.array_equal(decoded[levels], rgb) else None
 

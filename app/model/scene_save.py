@@ -183,8 +183,9 @@ def _mesh(mesh: Mesh, path: Path) -> dict[str, Any]:
             if isinstance(values.get(key), str):
                 values[key] = relative_name(values[key], path.parent)
         return values
-    if mesh.corner_normals is None and mesh.uv is None and len(mesh.triangles) <= INLINE_TRIANGLES:
-        return {"shape": INLINE, "vertices": mesh.vertices.tolist(), "triangles": mesh.triangles.tolist()}
+    if mesh.corner_normals is None and len(mesh.triangles) <= INLINE_TRIANGLES:
+        uv = {} if mesh.uv is None else {"uv": mesh.uv.reshape(-1, 2).tolist()}
+        return {"shape": INLINE, "vertices": mesh.vertices.tolist(), "triangles": mesh.triangles.tolist()} | uv
     from app.model.mesh_io import save_ply
 
     folder = path.parent / f"{path.stem}_meshes"

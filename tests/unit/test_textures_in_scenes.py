@@ -253,3 +253,70 @@ def test_a_plane_shows_the_whole_picture_once_the_right_way_up() -> None:
     plane = primitives.plane(4.0, 2.0)
     corners, uv = plane.corners().reshape(-1, 3), plane.uv.reshape(-1, 2)
     np.testing.assert_allclose(uv, corners[:, :2] / (4.0, 2.0) + 0.5)
+
+
+@pytest.mark.parametrize("mesh", [primitives.box((1.0, 2.0, 0.5)), primitives.slab(3.0, 2.0, 0.1)], ids=["box", "slab"])
+def test_every_face_of_a_box_shows_the_whole_picture_from_outside(mesh) -> None:
+    normals, corners = mesh.face_normals(), mesh.corners()
+    for direction in np.concatenate([np.eye(3), -np.eye(3)]):
+        face = normals @ direction > 0.9
+        assert face.sum() == 2
+        uv, points = mesh.uv[face], corners[face]
+        assert {tuple(pair) for pair in uv.reshape(-1, 2)} == {(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)}
+        # Not mirrored: u, v and the outward normal are right-handed on every triangle.
+        d1, d2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+        assert (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0] > 0.0).all()
+        if abs(direction[2]) < 0.5:
+            np.testing.assert_allclose(uv[..., 1], points[..., 2] / np.ptp(points[..., 2]) + 0.5)
+
+
+def test_a_disc_cuts_its_circle_out_of_the_picture() -> None:
+    disc = primitives.disc(0.25, 12)
+    np.testing.assert_allclose(disc.uv, disc.corners()[..., :2] / 0.5 + 0.5, atol=1e-15)
+
+
+def test_a_globe_has_its_map_the_right_way_round() -> None:
+    for mesh, axes in ((primitives.sphere(2.0, 2_000), (2.0, 2.0, 2.0)), (primitives.ellipsoid((1.0, 2.0, 3.0), 2_000), (1.0, 2.0, 3.0))):
+        direction = mesh.corners() / axes
+        # v is the latitude; u the azimuth up to whole turns, continuous within each triangle.
+        np.testing.assert_allclose(mesh.uv[..., 1], 1.0 - np.arccos(np.clip(direction[..., 2], -1.0, 1.0)) / np.pi, atol=1e-7)
+        level = np.hypot(direction[..., 0], direction[..., 1])
+        away = level > 1e-9
+        azimuth = (mesh.uv[..., 0][away] - 0.5) * 2.0 * np.pi
+        np.testing.assert_allclose(np.cos(azimuth), direction[..., 0][away] / level[away], atol=1e-9)
+        assert np.ptp(mesh.uv[..., 0], axis=1).max() <= 0.5 + 1e-9
+        # Middle of the picture at +x, the right of it towards +y, seen from outside.
+        d1, d2 = mesh.uv[:, 1] - mesh.uv[:, 0], mesh.uv[:, 2] - mesh.uv[:, 0]
+        equator = np.abs(direction[..., 2]).max(axis=1) < 0.9
+        assert (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0] > 0.0)[equator].all()
+
+
+@pytest.mark.parametrize("mesh", [primitives.box((1.0, 2.0, 0.5)), primitives.sphere(1.0, 320), primitives.disc(1.0)], ids=["box", "sphere", "disc"])
+def test_pictures_on_primitives_leave_their_charts_alone(mesh) -> None:
+    from app.model.charts import build_charts
+
+    atlas, bare = (build_charts(m, total_texels=40_000) for m in (mesh, replace(mesh, uv=None)))
+    assert not atlas.from_own_uv
+    np.testing.assert_array_equal(atlas.rects, bare.rects)
+    np.testing.assert_array_equal(atlas.rows, bare.rows)
+
+
+INLINE = '[[objects]]\nname = "quad"\nshape = "inline"\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\ntriangles = [[0, 1, 2]]\n'
+
+
+def test_inline_triangles_may_have_texture_coordinates(folder: Path) -> None:
+    text = LIGHT + BALL + INLINE + 'material = { kind = "diffuse", texture = "poster.png" }\n'
+    scene = load(folder, text + "uv = [[0, 0], [2, 0], [0, 3]]\n")
+    np.testing.assert_array_equal(scene.objects[1].mesh.uv, [[(0, 0), (2, 0), (0, 3)]])
+    np.testing.assert_array_equal(again(scene, folder / "copy.toml").objects[1].mesh.uv, scene.objects[1].mesh.uv)
+    assert "uv has 2 rows for 1 triangles" in refusal(folder, text + "uv = [[0, 0], [2, 0]]\n")
+    assert "no texture coordinates" in refusal(folder, text)
+
+
+def test_a_mesh_without_a_description_keeps_its_texture_coordinates(folder: Path) -> None:
+    scene = load(folder, LIGHT + BALL + TABLE + 'material = { kind = "diffuse", texture = "poster.png" }')
+    for mesh in (primitives.box((1.0, 2.0, 3.0)), primitives.sphere(1.0, 80)):
+        item = replace(scene.objects[1], mesh=mesh)
+        back = again(replace(scene, objects=(scene.objects[0], item)), folder / "copy.toml").objects[1].mesh
+        np.testing.assert_array_equal(back.uv, mesh.uv)
+        np.testing.assert_array_equal(back.corners(), mesh.corners())
