@@ -1,0 +1,193 @@
+"""The eye reference's samples, round by round, and the picture they have made so far.
+
+PARTS independent scramblings of one quasi-random sequence run side by side, a thread each, every pixel with a shift
+of its own: the picture converges faster than random and still knows its own error. `eye_reference` is the way in.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.errors import UserError
+from app.model.colorimetry import xyz_to_rgb709
+from app.model.scene import Scene
+from app.truth.photon_run import (
+    PARTS,
+    RELMSE_EPSILON,
+    TALLY_SIZE,
+    Cancelled,
+    Progress,
+)
+
+if TYPE_CHECKING:
+    from app.truth.spectral_caustic import SpectralCaustic
+
+MAX_DEPTH = 256
+_ROUND_SECONDS = 0.5
+_CHECK_SHARE = 0.1
+"""Share of the time that may pass until the error is worked out again."""
+_LAST_SAMPLE = 2**31
+_BLACK_SAMPLES = 256
+
+
+@dataclass(frozen=True)
+class EyePicture:
+    """What the camera sees and what is known of its error; row 0 on top."""
+
+    xyz: np.ndarray
+    """float64 (H, W, 3): CIE XYZ, the mean over each pixel; Y in lm/(sr unit²)."""
+    variance: np.ndarray
+    """float64 (H, W, 3): of `xyz` as an estimate, from PARTS independent pictures; the caustic's own error is not in it."""
+    samples: int
+    """Of each pixel."""
+    seconds: float
+    """Time spent tracing."""
+    lost: dict[str, float]
+    """Share of paths given up: "depth" (too many events) and "numeric" (nothing met inside a solid)."""
+
+    def rgb(self) -> np.ndarray:
+        """Linear Rec.709, float64 (H, W, 3)."""
+        return xyz_to_rgb709(self.xyz)
+
+    @cached_property
+    def relmse(self) -> float:
+        """The picture's own error, mean[var/(R² + ε)] as `ReferencePicture.relmse` has it; 0 for a black picture."""
+        epsilon = RELMSE_EPSILON * self.xyz.mean() ** 2
+        return float(np.mean(self.variance / (self.xyz**2 + epsilon))) if epsilon > 0.0 else 0.0
+
+    def is_within(self, target_relmse: float) -> bool:
+        """Whether the error is known to be no larger; blackness is believed after many samples only."""
+        return self.relmse <= target_relmse and (bool(self.xyz.any()) or self.samples >= _BLACK_SAMPLES)
+
+
+class EyeRun:
+    """Samples of one picture, added round by round; `picture()` at any time."""
+
+    def __init__(
+        self, scene: Scene, width: int, height: int, max_depth: int = MAX_DEPTH, seed: int = 1, caustic: SpectralCaustic | None = None
+    ) -> None:
+        """Raises UserError where numba is missing or solids nest beyond reach."""
+        try:
+            from app.truth import (
+                eye_kernel,
+                eye_lights,
+                eye_scene,
+                eye_start,
+                photon_kernel,
+                photon_scene,
+                spectral_caustic,
+            )
+        except ImportError as error:
+            raise UserError(f"the eye's reference renderer needs numba ({error}); install it with: pip install numba") from error
+        self._kernel = eye_kernel
+        photons, centre = photon_scene.photon_scene(scene)
+        self._scene = eye_scene.with_upsampled_mirrors(photons, scene)
+        self._camera = photon_scene.eye(scene.camera, width, height, centre)
+        self._start = eye_start.camera_start(scene, photons)
+        self._lights = eye_lights.eye_lights(scene.lights, centre)
+        self._pictures = eye_scene.pictures(scene, photons, centre)
+        self._tables = caustic.tables if caustic else spectral_caustic.no_caustic(scene)
+        self._spectra = eye_scene.spectra(scene, caustic.plan.bins if caustic else 1)
+        self._sequences = [photon_kernel.scrambled(seed, part) for part in range(PARTS)]
+        self._max_depth = max_depth
+        self.sums = np.zeros((PARTS, height, width, 3))
+        self.units = np.zeros(PARTS, np.int64)
+        """Samples of a pixel by each part."""
+        self.tallies = np.zeros((PARTS, TALLY_SIZE))
+        self.seconds = 0.0
+        self._next = 1
+
+    unit = 1
+    """Samples of a pixel in a part's smallest step."""
+
+    @property
+    def samples(self) -> int:
+        """Samples of every pixel so far."""
+        return int(self.units.sum())
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether the sequence has no fresh points left."""
+        return int(self.units.max()) >= _LAST_SAMPLE
+
+    def advance(self, samples_left: int | None = None, seconds_left: float | None = None) -> None:
+        """One round of all parts, about half a second or what is left. An interrupt keeps the parts that were finished."""
+        count = self._next
+        if samples_left is not None:
+            count = min(count, max(1, -(-samples_left // PARTS)))
+        started = time.perf_counter()
+        with ThreadPoolExecutor(min(PARTS, os.cpu_count() or 1)) as pool:
+            jobs: list[Future] = []
+            try:
+                jobs = [pool.submit(self._trace_part, part, count) for part in range(PARTS)]
+                for job in jobs:
+                    job.result()
+            finally:
+                for job in jobs:
+                    job.cancel()
+        took = time.perf_counter() - started
+        self.seconds += took
+        wanted = _ROUND_SECONDS if seconds_left is None else min(_ROUND_SECONDS, max(seconds_left - took, 1e-3))
+        if count == self._next and took < 0.6 * wanted:
+            self._next = 2 * count
+        while self._next > 1 and took * self._next / count > 1.5 * wanted:
+            self._next //= 2
+
+    def picture(self) -> EyePicture:
+        """What has been gathered; black without variance before the first round."""
+        return summed_eye(self.sums, self.units, self.tallies, self.seconds)
+
+    def _trace_part(self, part: int, count: int) -> None:
+        self._kernel.trace_eye(
+            self._scene, self._camera, self._lights, self._spectra, self._pictures, self._tables, self._start,
+            self._sequences[part], int(self.units[part]), count, self._max_depth, self.sums[part], self.tallies[part],
+        )  # fmt: skip
+        self.units[part] += count
+
+
+def summed_eye(sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, seconds: float) -> EyePicture:
+    """The picture from the sums (PARTS, H, W, 3) and tallies (PARTS, TALLY_SIZE) of parts with `units` (PARTS,) samples a pixel."""
+    total = max(int(units.sum()), 1)
+    mean = sums.sum(axis=0) / total
+    variance = np.zeros_like(mean)
+    used = np.flatnonzero(units)
+    if len(used) > 1:
+        for part in used:
+            variance += units[part] / total * (sums[part] / units[part] - mean) ** 2
+        variance /= len(used) - 1
+    lost = tallies.sum(axis=0)[:2] / (total * mean.shape[0] * mean.shape[1])
+    return EyePicture(mean, variance, int(units.sum()), seconds, {"depth": float(lost[0]), "numeric": float(lost[1])})
+
+
+def continue_eye_run(
+    run: EyeRun, samples: int | None, seconds: float | None, target_relmse: float | None, progress: Progress, cancelled: Cancelled
+) -> EyePicture:
+    """Add rounds to `run` up to the first limit; `samples` counts all of the run's, `seconds` from now on."""
+    if samples is None and seconds is None and target_relmse is None:
+        raise ValueError("a reference needs a limit: samples, seconds or target_relmse")
+    started = time.perf_counter()
+    checked, error, enough = -1.0, np.inf, False
+    while True:
+        spent = time.perf_counter() - started
+        reached = [0.0]
+        if samples is not None:
+            reached.append(run.samples / samples)
+        if seconds is not None:
+            reached.append(spent / seconds)
+        if target_relmse is not None and run.samples:
+            if checked < 0.0 or spent - checked > _CHECK_SHARE * spent:
+                picture = run.picture()
+                checked, error, enough = spent, picture.relmse, picture.is_within(target_relmse)
+            reached.append(1.0 if enough else min(target_relmse / max(error, target_relmse), 0.99))
+        done = max(reached)
+        progress(min(done, 1.0), f"{run.samples} samples a pixel" + (f", relMSE {error:.1e}" if np.isfinite(error) else ""))
+        if done >= 1.0 or run.exhausted or cancelled():
+            return run.picture()
+        run.advance(None if samples is None else samples - run.samples, None if seconds is None else seconds - spent)
