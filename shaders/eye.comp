@@ -2,7 +2,14 @@
 // columns of its pixel (Igehy 1999) and of its spectrum (Elek et al. 2014) to the first diffuse surface, light or environment,
 // and looks up along its spectral sweep what is there. Where glass splits it, both parts are followed while they are strong; of the weak rest
 // one is chosen by chance.
+//
+// Where the scene shows glass or mirrors this is two programs: one for what is seen directly, which lists the pixels that meet something
+// specular first (LISTS_SPECULAR), and one for the listed ones (EYE_SPECULAR), which holds all that is dear.
+#ifdef EYE_SPECULAR
+layout(local_size_x = 64) in;
+#else
 layout(local_size_x = 8, local_size_y = 8) in;
+#endif
 
 #include "lib/intersect.glsl"
 #include "lib/camera.glsl"
@@ -27,11 +34,19 @@ layout(std430, binding = BIND_OBJECT_COLOURS) readonly restrict buffer ObjectCol
 layout(std430, binding = BIND_CELL_CDF) readonly restrict buffer CellCdf { float cell_cdf[]; };
 #endif
 layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallbacks[4]; };
+#if defined(LISTS_SPECULAR) || defined(EYE_SPECULAR)
+// Groups to be dispatched (x, 1, 1), how many pixels are listed, and their numbers.
+layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_groups[3]; uint listed_count; uint listed[]; };
+#endif
 layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
 
 #ifdef HAS_IMAGES
 #include "lib/textures.glsl"
 #endif
+
+// An `if` whose body is left out where no ray takes it: a software renderer runs both sides of an `if` for all rays, but ends a loop
+// that none is in.
+#define WHEN(condition) for (bool wanted = (condition); wanted; wanted = false)
 
 #define FELL_COLUMNS 0
 #define FELL_DEPTH 1
@@ -39,6 +54,15 @@ layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
 #define FELL_CUT 3
 
 #include "eye/path.glsl"
+
+// What a sample has found so far, and the paths that wait while another is followed. Global: an array handed from function to function is
+// copied there and back by some drivers.
+vec4 radiance[TARGETS];
+#ifdef EYE_SPECULAR
+EyePath waiting[STACK];
+int waits;
+#endif
+
 #include "eye/emission.glsl"
 #include "eye/footprint.glsl"
 #include "eye/receiver.glsl"
@@ -93,7 +117,7 @@ float choice(EyePath path, uint pixel_key)
 }
 
 // One glass surface. Returns true where `path` goes on; what must wait is put on the stack.
-void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key, inout EyePath waiting[STACK], inout int waits)
+void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key)
 {
     bool entering = dot(whole.direction, hit.normal_g) < 0.0;
     Crossing crossing = cross_boundary(path.medium, hit.object, entering);
@@ -108,7 +132,8 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key, ino
     vec3 n_i, n_t;
     crossing_indices(crossing, path.band, n_i, n_t);
 #ifdef HAS_DISPERSION
-    if (!path.narrowed && (n_i.x != n_i.z || n_t.x != n_t.z)) {
+    bool begins = !path.narrowed && (n_i.x != n_i.z || n_t.x != n_t.z), done = false;
+    WHEN(begins) {
         // A reflection off the outside of glass knows no wavelength but in its strength: it stays whole. What goes on is one band.
         EyePath mirrored = path;
         Facing facing = facing_of(hit, path);
@@ -138,16 +163,19 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key, ino
                 reflect_path(path, facing);
                 path.origin = origin_back;
             }
-            return;
+            done = true;
         }
     }
+    if (done) return;
 #endif
     Facing facing = facing_of(hit, path);
     vec3 theta3 = thetas(path, facing);
     vec3 cosine2 = transmitted_cosine2(theta3, n_i / n_t);
 #if SPECTRAL_GROUPS > 0
     bvec3 passes = greaterThan(cosine2, vec3(0.0));
-    if (path.narrowed && any(passes) && !all(passes) && !path.recut && waits < STACK && path.band.z - path.band.x > MIN_CUT_BAND) {
+    bool may_cut = path.narrowed && any(passes) && !all(passes) && !path.recut && waits < STACK && path.band.z - path.band.x > MIN_CUT_BAND;
+    bool cut = false;
+    WHEN(may_cut) {
         float at = cut_of(path, facing, crossing, passes);
         if (min(at - path.band.x, path.band.z - at) > 0.01 * MIN_CUT_BAND && cut_is_near(whole, at, hit.distance)) {
             // Both parts meet this surface again, each from its own start and anchored in its own middle.
@@ -162,10 +190,12 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key, ino
             whole.share *= part;
             whole.key = hash_combine(whole.key, 5u);
             path = whole;
-            return;
+            cut = true;
+        } else {
+            atomicAdd(fallbacks[FELL_CUT], 1u);
         }
-        atomicAdd(fallbacks[FELL_CUT], 1u);
     }
+    if (cut) return;
 #endif
     path.recut = false;
     vec3 reflectance = fresnel_reflectance(theta3, n_i / n_t, cosine2);
@@ -174,7 +204,8 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key, ino
     bool reflects = total;
     if (!total) {
         bool strong = path.depth <= 1 || min(path.share * likely, path.share * (1.0 - likely)) > p.split_threshold;
-        if (strong && waits < STACK) {
+        bool room = waits < STACK;
+        WHEN(strong && room) {
             EyePath mirrored = path;
             mirrored.weight *= reflectance;
             mirrored.share *= likely;
@@ -184,7 +215,8 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key, ino
             if (mirrored.weight.y > 0.0) waiting[waits++] = mirrored;
             path.weight *= 1.0 - reflectance;
             path.share *= 1.0 - likely;
-        } else {
+        }
+        if (!(strong && room)) {
             if (strong) atomicAdd(fallbacks[FELL_STACK], 1u);
             reflects = choice(path, pixel_key) < likely;
             path.weight *= (reflects ? reflectance : 1.0 - reflectance) / (reflects ? likely : 1.0 - likely);
@@ -204,7 +236,7 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key, ino
 #endif
 
 // A surface that throws the path on.
-void meet_surface(inout EyePath path, Hit hit, uint kind, uint pixel_key, inout EyePath waiting[STACK], inout int waits)
+void meet_surface(inout EyePath path, Hit hit, uint kind, uint pixel_key)
 {
     EyePath whole = path;
 #ifdef ABSORPTION
@@ -218,7 +250,7 @@ void meet_surface(inout EyePath path, Hit hit, uint kind, uint pixel_key, inout 
     path.position = surface_point(hit, whole.position, whole.direction);
     path.depth += 1;
 #ifdef HAS_MIRROR
-    if (kind == KIND_MIRROR) {
+    WHEN(kind == KIND_MIRROR) {
         reflect_path(path, facing_of(hit, path));
         path.origin = RayOrigin(hit.primitive, hit.object, dot(path.direction, hit.normal_g) < 0.0, path.origin.inside_mask);
         path.recut = false;
@@ -229,32 +261,43 @@ void meet_surface(inout EyePath path, Hit hit, uint kind, uint pixel_key, inout 
         path.weight *= colour.g;
 #endif
         path.share *= max(colour.r, max(colour.g, colour.b));
-        return;
     }
 #endif
 #ifdef HAS_DIELECTRIC
-    cross_glass(path, whole, hit, pixel_key, waiting, waits);
+    WHEN(kind == KIND_DIELECTRIC) cross_glass(path, whole, hit, pixel_key);
 #endif
 }
 #endif
 
 void main()
 {
+#ifdef EYE_SPECULAR
+    if (gl_GlobalInvocationID.x >= listed_count) return;
+    uint number = listed[gl_GlobalInvocationID.x];
+    uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
+#else
     uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, p.first_row);
     if (pixel.x >= p.size.x || pixel.y >= p.size.y) return;
+#endif
     uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
     EyePath path = camera_path(pixel);
-    vec4 radiance[TARGETS];
     for (int t = 0; t < TARGETS; ++t) radiance[t] = vec4(0.0);
 #ifdef EYE_SPECULAR
-    EyePath waiting[STACK];
-    int waits = 0;
+    waits = 0;
 #endif
     bool goes_on = true;
     for (int event = 0; event < MAX_EVENTS; ++event) {
         Hit hit;
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
         uint kind = met ? object_at(hit.object).kind : NONE;
+#ifdef LISTS_SPECULAR
+        if (kind == KIND_MIRROR || kind == KIND_DIELECTRIC) {
+            uint place = atomicAdd(listed_count, 1u);
+            atomicMax(listed_groups[0], place / 64u + 1u);
+            listed[place] = pixel.y * p.size.x + pixel.x;
+            return;
+        }
+#endif
         int taps = 1;
 #ifdef SPECTRAL_SWEEP
         if (path.narrowed) taps = taps_of(path, met ? hit.distance : FAR_DISTANCE);
@@ -268,30 +311,26 @@ void main()
 #ifdef SPECTRAL_SWEEP
                 if (taps > 1) ray_at(path, path.band.x + (float(i) + 0.5) * step_x, position, direction);
 #endif
-                add_lights(radiance, path, position, direction, met ? hit.distance : FAR_DISTANCE, width, path.band.x + float(i) * step_x, path.band.x + float(i + 1) * step_x);
+                add_lights(path, path.band.x + float(i) * step_x, path.band.x + float(i + 1) * step_x, position, direction, met ? hit.distance : FAR_DISTANCE, width);
             }
         }
+#endif
+        bool ends = !met || kind == KIND_DIFFUSE;
+        WHEN(ends && taps == 1) add_end(path, met, hit, pixel_key);
+#ifdef SPECTRAL_SWEEP
+        WHEN(ends && taps > 1) add_swept_end(path, met, hit, pixel_key, taps);
 #endif
         goes_on = false;
-        if (!met || kind == KIND_DIFFUSE) {
-#ifdef SPECTRAL_SWEEP
-            if (taps > 1) add_swept_end(radiance, path, met, hit, pixel_key, taps);
-            else
-#endif
-            add_end(radiance, path, met, hit, pixel_key);
-        }
 #ifdef EYE_SPECULAR
-        else if (kind != KIND_BLACK) {
-            goes_on = path.depth < MAX_DEPTH;
-            if (goes_on) {
-                meet_surface(path, hit, kind, pixel_key, waiting, waits);
-            } else {
-                // Light that would still be caught inside: as if it left here.
-                atomicAdd(fallbacks[FELL_DEPTH], 1u);
-                add_sky(radiance, path, path.direction, vec3(0.0), path.band.x, path.band.z);
-            }
+        bool specular = !ends && kind != KIND_BLACK;
+        goes_on = specular && path.depth < MAX_DEPTH;
+        WHEN(goes_on) meet_surface(path, hit, kind, pixel_key);
+        WHEN(specular && !goes_on) {
+            // Light that would still be caught inside: as if it left here.
+            atomicAdd(fallbacks[FELL_DEPTH], 1u);
+            add_sky(path, stretch_of(path, path.band.x, path.band.z), path.direction, vec3(0.0));
         }
-        if (!goes_on && waits > 0) {
+        WHEN(!goes_on && waits > 0) {
             path = waiting[--waits];
             goes_on = true;
         }
@@ -303,7 +342,7 @@ void main()
     while (waits > 0) {
         atomicAdd(fallbacks[FELL_DEPTH], 1u);
         path = waiting[--waits];
-        add_sky(radiance, path, path.direction, vec3(0.0), path.band.x, path.band.z);
+        add_sky(path, stretch_of(path, path.band.x, path.band.z), path.direction, vec3(0.0));
     }
 #endif
     for (int t = 0; t < TARGETS; ++t) {

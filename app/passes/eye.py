@@ -49,8 +49,11 @@ TINT_STEPS = 24
 _TARGET_SECONDS = 0.15
 """What one dispatch may take; rows are divided to fit."""
 _GROUP = 8
-_BIND_LIGHTS, _BIND_OBJECT_COLOURS, _BIND_CELL_CDF, _BIND_RECEIVERS, _BIND_PLACEMENTS, _BIND_PICTURES, _BIND_COUNTERS = range(8, 15)
+_NOTHING_LISTED = np.array([0, 1, 1, 0], "u4").tobytes()
+_BIND_LIGHTS, _BIND_OBJECT_COLOURS, _BIND_CELL_CDF, _BIND_RECEIVERS, _BIND_PLACEMENTS, _BIND_PICTURES, _BIND_COUNTERS, _BIND_LISTED = range(8, 16)
 _UNIT_EMISSION, _UNIT_PICTURES = 10, 11
+_BEYOND_ONLY = ("HAS_DISPERSION", "SPECTRAL_SWEEP", "RANDOM_WAVELENGTH", "EVEN_WAVELENGTHS", "COLOURED_MIRRORS", "ABSORPTION", "SPECTRALLY_TINTED", "NORMAL_DERIVATIVES")
+"""What only rays beyond glass and mirrors need."""
 FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut")
 """What the shader counts, in its order."""
 
@@ -118,7 +121,16 @@ class EyePass:
         self.most_taps = MOST_TAPS
         self.split_threshold = SPLIT_THRESHOLD
         structs = (*SCENE_STRUCTS, EYE_LIGHT, EYE_PARAMETERS, RECEIVER, PLACEMENT, *([PICTURE] if self.pictures.structs else []))
-        self._program = shader.compute(self._ctx, "eye.comp", self._defines(layer, maps), structs)
+        defines = self._defines(layer, maps)
+        beyond = defines.pop("EYE_SPECULAR", None)
+        self._listed: moderngl.Buffer | None = None
+        self._beyond: moderngl.ComputeShader | None = None
+        if beyond:
+            self._beyond = shader.compute(self._ctx, "eye.comp", defines | {"EYE_SPECULAR": 1}, structs)
+            plain = {name: value for name, value in defines.items() if name not in _BEYOND_ONLY} | {"SPECTRAL_GROUPS": 0, "LISTS_SPECULAR": 1, "MAX_EVENTS": 1}
+            self._program = shader.compute(self._ctx, "eye.comp", plain, structs)
+        else:
+            self._program = shader.compute(self._ctx, "eye.comp", defines, structs)
 
     def run(
         self,
@@ -170,6 +182,8 @@ class EyePass:
         for binding, buffer in zip((_BIND_LIGHTS, _BIND_OBJECT_COLOURS, _BIND_CELL_CDF, _BIND_RECEIVERS, _BIND_PLACEMENTS), buffers, strict=True):
             buffer.bind_to_storage_buffer(binding)
         self._counters.bind_to_storage_buffer(_BIND_COUNTERS)
+        if self._listed is not None:
+            self._listed.bind_to_storage_buffer(_BIND_LISTED)
         self._parameters_buffer.bind_to_storage_buffer(bindings.PARAMETERS)
         for unit, texture in enumerate(maps.textures):
             texture.use(location=unit)
@@ -203,7 +217,11 @@ class EyePass:
         """Free every buffer, texture and program."""
         for owned in (self._tables, self._lights, self._counters, *self._pictures, self._parameters_buffer):
             owned.release()
-        shader.release(self._program)
+        for program in (self._program, self._beyond):
+            if program is not None:
+                shader.release(program)
+        if self._listed is not None:
+            self._listed.release()
         if self._owns_pictures:
             self.pictures.release()
         if self._empty is not None:
@@ -233,6 +251,7 @@ class EyePass:
             "BIND_OBJECT_COLOURS": _BIND_OBJECT_COLOURS,
             "BIND_CELL_CDF": _BIND_CELL_CDF,
             "BIND_COUNTERS": _BIND_COUNTERS,
+            "BIND_LISTED": _BIND_LISTED,
             "BIND_RECEIVERS": _BIND_RECEIVERS,
             "BIND_PLACEMENTS": _BIND_PLACEMENTS,
             "UNIT_EMISSION": _UNIT_EMISSION,
@@ -308,6 +327,9 @@ class EyePass:
                 picture.release()
             self._pictures = [self._ctx.texture((width, height), 4, dtype="f4") for _ in range(self.channels.targets)]
             self._rows_a_dispatch = min(height, 64)
+            if self._listed is not None:
+                self._listed.release()
+            self._listed = self._ctx.buffer(reserve=16 + 4 * width * (-(-height // _GROUP) * _GROUP)) if self._beyond is not None else None
         zeros = bytes(width * height * 16)
         for picture in self._pictures:
             picture.write(zeros)
@@ -323,8 +345,13 @@ class EyePass:
             self._parameters_buffer.write(parameters.tobytes())
             start = time.perf_counter()
             # Groups that overlap the next band would add its rows twice, so bands are whole groups.
+            if self._listed is not None:
+                self._listed.write(_NOTHING_LISTED)
             self._program.run(-(-width // _GROUP), -(-rows // _GROUP))
             self._ctx.memory_barrier()
+            if self._beyond is not None and self._listed is not None:
+                self._beyond.run_indirect(self._listed)
+                self._ctx.memory_barrier()
             self._ctx.finish()
             elapsed = time.perf_counter() - start
             self._samples_of_row[row : row + rows] += 1

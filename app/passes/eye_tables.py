@@ -137,12 +137,12 @@ def _emission(
         return sums
 
     white = Spectrum(daylight_per_lumen())
-    rows = [running(white, column) for column in basis.T]
-    defines = {"WHITE_ROW": 0, "LIGHT_ROW": len(rows), "ROWS_PER_LIGHT": 3 + len(reflectances) - 1}
+    rows = [running(white), *(running(white, column) for column in basis.T)]
+    defines = {"WHITE_ROW": 0, "LIGHT_ROW": len(rows), "ROWS_PER_LIGHT": 4 + len(reflectances) - 1}
     for light in scene.lights:
         # Intensity over distance² in GPU units needs the square of the scale; the other kinds are free of lengths.
         unit = scale**2 if light.kind in ("point", "spot") else 1.0
-        rows += [unit * running(light.spectral_power, column) for column in basis.T]
+        rows += [unit * running(light.spectral_power), *(unit * running(light.spectral_power, column) for column in basis.T)]
         rows += [unit * running(light.spectral_power, reflectance) for reflectance in reflectances[1:]]
     defines["BIN_SPECTRUM_ROW"] = len(rows)
     rows += [running(spectrum) for spectrum in maps.spectra(scene.lights)]

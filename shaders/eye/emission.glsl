@@ -31,23 +31,41 @@ float transmitted(EyePath path, float x)
     return kept;
 }
 
-// Stretches that [lo, hi] is cut into, since a path lets through more of one than of another.
-int spectral_steps(EyePath path, float lo, float hi)
+// A stretch of a path's band, which a look stands for: its ends as cells of the table, and what the path lets through in its middle.
+struct Stretch {
+    float lo;
+    float hi;
+    int cell_lo;
+    int cell_hi;
+    float through;
+    int steps;      // parts that differ in what the path lets through
+};
+
+Stretch stretch_of(EyePath path, float lo, float hi)
 {
+    Stretch stretch;
+    stretch.lo = lo;
+    stretch.hi = hi;
+    stretch.cell_lo = emission_cell(lo);
+    stretch.cell_hi = emission_cell(hi);
+    stretch.through = path.gain * transmitted(path, 0.5 * (lo + hi));
 #ifdef SPECTRALLY_TINTED
-    return max(1, int(ceil((hi - lo) * float(TINT_STEPS))));
+    stretch.steps = max(1, int(ceil((hi - lo) * float(TINT_STEPS))));
 #else
-    return path.weight.x == path.weight.z ? 1 : max(1, int(ceil((hi - lo) * 4.0)));
+    stretch.steps = path.weight.x == path.weight.z ? 1 : max(1, int(ceil((hi - lo) * 4.0)));
 #endif
+    return stretch;
 }
 
 // Adds a light whose spectrum is that of `row`, `factor` times.
-void add_spectrum(inout vec4 radiance[TARGETS], EyePath path, uint row, float factor, float lo, float hi)
+void add_spectrum(EyePath path, Stretch stretch, uint row, float factor)
 {
-    int steps = spectral_steps(path, lo, hi);
-    float step_x = (hi - lo) / float(steps);
-    for (int s = 0; s < steps; ++s) {
-        float a = lo + float(s) * step_x, b = s + 1 == steps ? hi : a + step_x;
+    WHEN(stretch.steps == 1)
+        for (int t = 0; t < TARGETS; ++t)
+            radiance[t] += factor * stretch.through * (emission_until(row, t, stretch.cell_hi) - emission_until(row, t, stretch.cell_lo));
+    float step_x = (stretch.hi - stretch.lo) / float(stretch.steps);
+    for (int s = 0; s < stretch.steps && stretch.steps > 1; ++s) {
+        float a = stretch.lo + float(s) * step_x, b = s + 1 == stretch.steps ? stretch.hi : a + step_x;
         float amount = factor * path.gain * transmitted(path, 0.5 * (a + b));
         int cell_a = emission_cell(a), cell_b = emission_cell(b);
         for (int t = 0; t < TARGETS; ++t)
@@ -55,32 +73,29 @@ void add_spectrum(inout vec4 radiance[TARGETS], EyePath path, uint row, float fa
     }
 }
 
-// The same for a colour: rows `row` to `row` + 2 hold the light times the three functions of the reflectance basis.
-void add_colour(inout vec4 radiance[TARGETS], EyePath path, uint row, vec3 colour, float lo, float hi)
+// The same under a colour: `row` holds the light itself, the three after it the light times the functions of the reflectance basis.
+void add_colour(EyePath path, Stretch stretch, uint row, vec3 colour)
 {
-    int steps = spectral_steps(path, lo, hi);
-    float step_x = (hi - lo) / float(steps);
-    for (int s = 0; s < steps; ++s) {
-        float a = lo + float(s) * step_x, b = s + 1 == steps ? hi : a + step_x;
-        vec3 amount = colour * (path.gain * transmitted(path, 0.5 * (a + b)));
-        int cell_a = emission_cell(a), cell_b = emission_cell(b);
-        for (int t = 0; t < TARGETS; ++t)
-            radiance[t] += amount.r * (emission_until(row, t, cell_b) - emission_until(row, t, cell_a))
-                         + amount.g * (emission_until(row + 1u, t, cell_b) - emission_until(row + 1u, t, cell_a))
-                         + amount.b * (emission_until(row + 2u, t, cell_b) - emission_until(row + 2u, t, cell_a));
-    }
+    bool grey = colour.r == colour.g && colour.g == colour.b;
+    WHEN(grey) add_spectrum(path, stretch, row, colour.r);
+    for (uint c = grey ? 3u : 0u; c < 3u; ++c) add_spectrum(path, stretch, row + 1u + c, c == 0u ? colour.r : (c == 1u ? colour.g : colour.b));
 }
 
 // Factor on every channel of light whose spectrum is no longer known: that of white light along the same path.
-void channel_factors(EyePath path, out vec4 factors[TARGETS])
+void channel_factors(EyePath path, Stretch stretch, out vec4 factors[TARGETS])
 {
-    vec4 white[TARGETS];
-    for (int t = 0; t < TARGETS; ++t) factors[t] = vec4(0.0);
-    add_colour(factors, path, uint(WHITE_ROW), vec3(1.0), path.band.x, path.band.z);
-    for (int t = 0; t < TARGETS; ++t) {
-        white[t] = vec4(0.0);
-        for (uint c = 0u; c < 3u; ++c) white[t] += emission_until(uint(WHITE_ROW) + c, t, EMISSION_CELLS);
-        factors[t] /= max(white[t], vec4(1e-20));
+    bool whole = stretch.steps == 1 && !path.narrowed;
+    for (int t = 0; t < TARGETS; ++t) factors[t] = vec4(stretch.through);
+    WHEN(!whole) {
+        float step_x = (stretch.hi - stretch.lo) / float(stretch.steps);
+        for (int t = 0; t < TARGETS; ++t) {
+            vec4 kept = vec4(0.0);
+            for (int s = 0; s < stretch.steps; ++s) {
+                float a = stretch.lo + float(s) * step_x, b = s + 1 == stretch.steps ? stretch.hi : a + step_x;
+                kept += path.gain * transmitted(path, 0.5 * (a + b)) * (emission_until(uint(WHITE_ROW), t, emission_cell(b)) - emission_until(uint(WHITE_ROW), t, emission_cell(a)));
+            }
+            factors[t] = kept / max(emission_until(uint(WHITE_ROW), t, EMISSION_CELLS), vec4(1e-20));
+        }
     }
 }
 

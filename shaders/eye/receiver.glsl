@@ -87,20 +87,18 @@ uint shadows_at(Seen seen, uint pixel_key)
 }
 
 // `known`: lights, as bits, for which `hidden` says whether they are; the others are found out.
-void add_direct(inout vec4 radiance[TARGETS], EyePath path, Seen seen, float lo, float hi, uint pixel_key, uint known, uint hidden)
+void add_direct(EyePath path, Seen seen, Stretch stretch, uint pixel_key, uint known, uint hidden)
 {
     uint reflectance_class = receivers[object_at(seen.object).receiver].reflectance_class;
     for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
         LightSample s;
         float gain = unshadowed(i, seen, pixel_key, s);
-        if (gain <= 0.0) continue;
         uint bit = i < 32u ? 1u << i : 0u;
-        bool shadowed = (known & bit) != 0u ? (hidden & bit) != 0u : hidden_from(s, seen);
-        if (shadowed) continue;
+        bool shadowed = (known & hidden & bit) != 0u;
+        WHEN(gain > 0.0 && (known & bit) == 0u) shadowed = hidden_from(s, seen);
         uint row = uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT);
         // Other classes than 0 have their reflectance in the light's own row.
-        if (reflectance_class == 0u) add_colour(radiance, path, row, seen.reflectance * (INVERSE_PI * gain), lo, hi);
-        else add_spectrum(radiance, path, row + 2u + reflectance_class, INVERSE_PI * gain, lo, hi);
+        WHEN(gain > 0.0 && !shadowed) add_colour(path, stretch, reflectance_class == 0u ? row : row + 3u + reflectance_class, (reflectance_class == 0u ? seen.reflectance : vec3(1.0)) * (INVERSE_PI * gain));
     }
 }
 
@@ -155,25 +153,8 @@ vec4 bin_reflectance(vec3 colour, int target)
 }
 #endif
 
-#ifdef MAP_BINS
-// The caustic's own dispersion meets the eye's: every spectral channel of the map that [lo, hi] touches is read by itself.
-void add_caustic_bins(inout vec4 radiance[TARGETS], EyePath path, Seen seen, uint placement, vec2 texel, vec2 box, float reflectance, float lo, float hi)
-{
-    float first = spectral_row(uint(BIN_ROW), lo), last = spectral_row(uint(BIN_ROW), hi);
-    int from = int(floor(first)), to = max(from, int(ceil(last)) - BIN_OVERLAP);
-    float factor = p.map_scale * INVERSE_PI * reflectance;
-    vec4 values[MAP_TARGETS];
-    caustic_values(placement, texel, box, values, BIN_TARGET, MAP_TARGETS - 1);
-    for (int t = 0; t < MAP_TARGETS - BIN_TARGET; ++t) {
-        if (4 * t + 3 < from || 4 * t > to) continue;
-        vec4 watts = values[BIN_TARGET + t];
-        for (int c = 0; c < 4; ++c)
-            if (4 * t + c >= from && 4 * t + c <= to) add_spectrum(radiance, path, uint(BIN_SPECTRUM_ROW + 4 * t + c), factor * watts[c], lo, hi);
-    }
-}
-#endif
-
-void add_caustic(inout vec4 radiance[TARGETS], EyePath path, Seen seen, float lo, float hi)
+// Irradiance by what glass and mirrors threw here.
+void add_caustic(EyePath path, Seen seen, Stretch stretch)
 {
     uint placement;
     vec2 texel;
@@ -182,30 +163,42 @@ void add_caustic(inout vec4 radiance[TARGETS], EyePath path, Seen seen, float lo
     // Texels larger than pixels are interpolated, smaller ones weighed by their share of the sample.
     vec3 row_u = placements[placement].row_u.xyz, row_v = placements[placement].row_v.xyz;
     vec2 box = vec2(0.0);
-    for (int c = 0; c < 3; ++c) box += vec2(pow(dot(row_u, seen.dposition[c]), 2.0), pow(dot(row_v, seen.dposition[c]), 2.0));
-    box = sqrt(box);
-    vec2 pixel = box / p.sample_side;
-    if (pixel.x * pixel.y < 1.0) box = vec2(1.0);
-    bool plain = receivers[receiver].reflectance_class == 0u;
-#ifdef MAP_BINS
-    if (path.narrowed) {
-        float x = 0.5 * (lo + hi);
-        float reflectance = plain ? dot(seen.reflectance, vec3(spectral_row(uint(BASIS_ROW), x), spectral_row(uint(BASIS_ROW + 1), x), spectral_row(uint(BASIS_ROW + 2), x))) : 1.0;
-        add_caustic_bins(radiance, path, seen, placement, texel, box, reflectance, lo, hi);
-        return;
+    for (int c = 0; c < 3; ++c) {
+        vec2 side = vec2(dot(row_u, seen.dposition[c]), dot(row_v, seen.dposition[c]));
+        box += side * side;
     }
+    box = sqrt(box);
+    if (box.x * box.y < p.sample_side * p.sample_side) box = vec2(1.0);
+    bool plain = receivers[receiver].reflectance_class == 0u;
+    float scale = p.map_scale * INVERSE_PI;
+#ifdef MAP_BINS
+    // The caustic's own dispersion meets the eye's: every spectral channel that the stretch touches is read by itself.
+    WHEN(path.narrowed) {
+        float x = 0.5 * (stretch.lo + stretch.hi);
+        float first = spectral_row(uint(BIN_ROW), stretch.lo), last = spectral_row(uint(BIN_ROW), stretch.hi);
+        int from = int(floor(first)), to = max(from, int(ceil(last)) - BIN_OVERLAP);
+        float factor = scale * (plain ? dot(seen.reflectance, vec3(spectral_row(uint(BASIS_ROW), x), spectral_row(uint(BASIS_ROW + 1), x), spectral_row(uint(BASIS_ROW + 2), x))) : 1.0);
+        vec4 watts[MAP_TARGETS];
+        caustic_values(placement, texel, box, watts, BIN_TARGET, MAP_TARGETS - 1);
+        bool lit = false;
+        for (int t = BIN_TARGET; t < MAP_TARGETS; ++t) lit = lit || any(notEqual(watts[t], vec4(0.0)));
+        for (int k = from; k <= to && lit; ++k) add_spectrum(path, stretch, uint(BIN_SPECTRUM_ROW + k), factor * watts[BIN_TARGET + (k >> 2)][k & 3]);
+    }
+    WHEN(!path.narrowed)
 #endif
-    vec4 factors[TARGETS], values[MAP_TARGETS];
-    channel_factors(path, factors);
-    caustic_values(placement, texel, box, values, 0, TARGETS - 1);
-    for (int t = 0; t < TARGETS; ++t) {
-        vec4 reflectance = vec4(1.0);
+    {
+        vec4 factors[TARGETS], values[MAP_TARGETS];
+        channel_factors(path, stretch, factors);
+        caustic_values(placement, texel, box, values, 0, TARGETS - 1);
+        for (int t = 0; t < TARGETS; ++t) {
+            vec4 reflectance = vec4(1.0);
 #ifdef RGB_CHANNELS
-        if (plain) reflectance.rgb = seen.reflectance;
+            if (plain) reflectance.rgb = seen.reflectance;
 #else
-        if (plain) reflectance = bin_reflectance(seen.reflectance, t);
+            if (plain) reflectance = bin_reflectance(seen.reflectance, t);
 #endif
-        radiance[t] += factors[t] * (p.map_scale * INVERSE_PI) * reflectance * map_to_channels(values[t]);
+            radiance[t] += factors[t] * scale * reflectance * map_to_channels(values[t]);
+        }
     }
 }
 

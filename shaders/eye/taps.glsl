@@ -24,22 +24,22 @@ vec3 sky_colour(vec3 direction, vec3 ddirection[3])
 }
 
 #ifdef LAYER_BEAUTY
-void add_sky(inout vec4 radiance[TARGETS], EyePath path, vec3 direction, vec3 sweep, float lo, float hi)
+void add_sky(EyePath path, Stretch stretch, vec3 direction, vec3 sweep)
 {
     vec3 columns[3];
     columns[0] = p.sample_side * path.ddirection[0];
     columns[1] = p.sample_side * path.ddirection[1];
     columns[2] = sweep;
-    add_colour(radiance, path, uint(WHITE_ROW), sky_colour(direction, columns), lo, hi);
+    add_colour(path, stretch, uint(WHITE_ROW), sky_colour(direction, columns));
 }
 
 #ifdef VISIBLE_LIGHTS
 // Lights that can be seen over the distance `far`; edges are as soft as what the ray stands for is wide.
-void add_lights(inout vec4 radiance[TARGETS], EyePath path, vec3 position, vec3 direction, float far, vec2 width, float lo, float hi)
+void add_lights(EyePath path, float lo, float hi, vec3 position, vec3 direction, float far, vec2 width)
 {
     for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
         float seen = lights[i].measure > 0.0 ? light_seen(lights[i], position, direction, far, width) : 0.0;
-        if (seen > 0.0) add_colour(radiance, path, uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), vec3(seen), lo, hi);
+        WHEN(seen > 0.0) add_colour(path, stretch_of(path, lo, hi), uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), vec3(seen));
     }
 }
 
@@ -68,98 +68,113 @@ int taps_of(EyePath path, float distance)
 #endif
 
 // A path that has met nothing, or a diffuse surface, seen at its own wavelength: all of its band at once.
-void add_end(inout vec4 radiance[TARGETS], EyePath path, bool met, Hit hit, uint pixel_key)
+void add_end(EyePath path, bool met, Hit hit, uint pixel_key)
 {
-    if (!met) {
+    Stretch stretch = stretch_of(path, path.band.x, path.band.z);
 #ifdef LAYER_BEAUTY
-        add_sky(radiance, path, path.direction, vec3(0.0), path.band.x, path.band.z);
+    WHEN(!met) add_sky(path, stretch, path.direction, vec3(0.0));
 #endif
-        return;
-    }
 #ifdef HAS_RECEIVERS
-    Triangle facet = triangle_at(hit.primitive);
-    vec3 position = path.position + hit.distance * path.direction;
+    WHEN(met) {
+        Triangle facet = triangle_at(hit.primitive);
 #ifdef LAYER_BEAUTY
-    position = surface_point(hit, path.position, path.direction);
+        vec3 position = surface_point(hit, path.position, path.direction);
+#else
+        vec3 position = path.position + hit.distance * path.direction;
 #endif
-    Seen seen = seen_on(path, hit, facet, position, path.direction);
+        Seen seen = seen_on(path, hit, facet, position, path.direction);
 #ifdef HAS_TEXTURES
-    apply_texture(seen, facet);
+        apply_texture(seen, facet);
 #endif
-    add_caustic(radiance, path, seen, path.band.x, path.band.z);
+        add_caustic(path, seen, stretch);
 #ifdef LAYER_BEAUTY
-    add_direct(radiance, path, seen, path.band.x, path.band.z, pixel_key, 0u, 0u);
+        add_direct(path, seen, stretch, pixel_key, 0u, 0u);
 #endif
+    }
 #endif
 }
 
 #ifdef SPECTRAL_SWEEP
-// The same path, whose colours end in different places. Where both ends of the sweep meet the same facet as its middle, so does what
+#ifdef HAS_RECEIVERS
+// A place on `facet` that a colour of the path sees.
+Seen swept_place(EyePath path, Hit hit, Triangle facet, vec3 position, vec3 direction, vec3 dp, vec3 dd)
+{
+    vec3 at = position + hit.distance * direction;
+    Seen seen = seen_on(path, hit, facet, at, direction);
+    vec3 sweep = dp + hit.distance * dd;
+    seen.dposition[2] = sweep - (dot(sweep, hit.normal_g) / dot(direction, hit.normal_g)) * direction;
+#ifdef HAS_TEXTURES
+    apply_texture(seen, facet);
+#endif
+    return seen;
+}
+#endif
+
+// A path whose colours end in different places. Where both ends of the sweep meet the same facet as its middle, so does what
 // lies between; else every look finds out for itself.
-void add_swept_end(inout vec4 radiance[TARGETS], EyePath path, bool met, Hit hit, uint pixel_key, int taps)
+void add_swept_end(EyePath path, bool met, Hit hit, uint pixel_key, int taps)
 {
     vec3 p_lo, d_lo, p_hi, d_hi;
     ray_at(path, path.band.x, p_lo, d_lo);
     ray_at(path, path.band.z, p_hi, d_hi);
-    vec3 dp = (p_hi - p_lo) / float(taps), dd = (d_hi - d_lo) / float(taps);
-    float step_x = (path.band.z - path.band.x) / float(taps);
+    bool alike = true;
+    int direct_every = 1;
 #ifdef HAS_RECEIVERS
     Hit hit_lo, hit_hi;
     bool met_lo = intersect_closest(p_lo, d_lo, FAR_DISTANCE, path.origin, hit_lo), met_hi = intersect_closest(p_hi, d_hi, FAR_DISTANCE, path.origin, hit_hi);
-    bool alike = met_lo == met && met_hi == met && (!met || (hit_lo.primitive == hit.primitive && hit_hi.primitive == hit.primitive));
+    alike = met_lo == met && met_hi == met && (!met || (hit_lo.primitive == hit.primitive && hit_hi.primitive == hit.primitive));
     uint known = 0u, hidden = 0u;
-    Triangle facet;
-    if (met) facet = triangle_at(hit.primitive);
+    Triangle facet = triangle_at(met ? hit.primitive : 0u);
 #ifdef LAYER_BEAUTY
-    if (alike && met) {
+    WHEN(alike && met) {
         uint hidden_lo = shadows_at(seen_on(path, hit, facet, p_lo + hit_lo.distance * d_lo, d_lo), pixel_key);
         hidden = shadows_at(seen_on(path, hit, facet, p_hi + hit_hi.distance * d_hi, d_hi), pixel_key);
         known = ~(hidden ^ hidden_lo);
+        // Direct light on a plain surface changes little along a sweep.
+        if (known == 0xffffffffu && object_at(hit.object).texture == NONE) direct_every = max(1, taps / 3);
     }
 #endif
-#else
-    const bool alike = true;
 #endif
+#ifndef HAS_ENVIRONMENT_MAP
+    // The same all round.
+    if (!met && alike) taps = 1;
+#endif
+    vec3 dp = (p_hi - p_lo) / float(taps), dd = (d_hi - d_lo) / float(taps);
+    float step_x = (path.band.z - path.band.x) / float(taps), direct_from = path.band.x;
     for (int i = 0; i < taps; ++i) {
         float lo = path.band.x + float(i) * step_x, hi = i + 1 == taps ? path.band.z : lo + step_x;
         vec3 position, direction;
         ray_at(path, 0.5 * (lo + hi), position, direction);
-        Hit found = hit;
-        bool ends = met;
+        Stretch stretch = stretch_of(path, lo, hi);
+        bool ends = met, dark = false;
 #ifdef HAS_RECEIVERS
-        if (!alike) {
+        Hit found = hit;
+        WHEN(!alike) {
             ends = intersect_closest(position, direction, FAR_DISTANCE, path.origin, found);
             uint kind = ends ? object_at(found.object).kind : NONE;
-            if (kind == KIND_BLACK) continue;
+            dark = kind == KIND_BLACK;
             if (kind == KIND_MIRROR || kind == KIND_DIELECTRIC) {
                 // This colour goes on where the middle one ended: it is given what that one sees.
                 ends = met;
                 found = hit;
-            } else if (ends) {
-                facet = triangle_at(found.primitive);
             }
+            if (ends) facet = triangle_at(found.primitive);
         }
-        if (ends) {
-            if (alike || found.primitive == hit.primitive) {
-                facet = triangle_at(hit.primitive);
-                found.distance = dot(hit.normal_g, facet.vertex - position) / dot(hit.normal_g, direction);
-            }
-            vec3 at = position + found.distance * direction;
-            Seen seen = seen_on(path, found, facet, at, direction);
-            vec3 sweep = dp + found.distance * dd;
-            seen.dposition[2] = sweep - (dot(sweep, found.normal_g) / dot(direction, found.normal_g)) * direction;
-#ifdef HAS_TEXTURES
-            apply_texture(seen, facet);
-#endif
-            add_caustic(radiance, path, seen, lo, hi);
+        WHEN(ends && !dark) {
+            if (found.primitive == hit.primitive) found.distance = dot(hit.normal_g, facet.vertex - position) / dot(hit.normal_g, direction);
+            Seen seen = swept_place(path, found, facet, position, direction, dp, dd);
+            add_caustic(path, seen, stretch);
 #ifdef LAYER_BEAUTY
-            add_direct(radiance, path, seen, lo, hi, pixel_key, alike ? known : 0u, hidden);
+            WHEN((i + 1) % direct_every == 0 || i + 1 == taps) {
+                if (direct_every > 1) stretch = stretch_of(path, direct_from, hi);
+                add_direct(path, seen, stretch, pixel_key, alike ? known : 0u, hidden);
+                direct_from = hi;
+            }
 #endif
-            continue;
         }
 #endif
 #ifdef LAYER_BEAUTY
-        add_sky(radiance, path, direction, dd, lo, hi);
+        WHEN(!ends && !dark) add_sky(path, stretch, direction, dd);
 #endif
     }
 }
