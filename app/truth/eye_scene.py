@@ -84,9 +84,14 @@ def sees_beyond(scene: Scene) -> bool:
     return scene.environment is not None or any(v > 0.0 for v in scene.background_rgb)
 
 
+def line_wavelengths(scene: Scene) -> list[float]:
+    """Of the lights' lines, nm, ascending, each once."""
+    return sorted({nm for light in scene.lights for nm, power in light.spectral_power.lines if power > 0.0})
+
+
 def spectra(scene: Scene, bins: int) -> Spectra:
     """The scene's wavelengths, most where its light is seen; `bins` of the caustic over the 401 cells (at least 1)."""
-    lines = sorted({nm for light in scene.lights for nm, power in light.spectral_power.lines if power > 0.0})
+    lines = line_wavelengths(scene)
     line_nm = np.array(lines, float)
     start = np.concatenate([np.maximum(VISIBLE_NM - 0.5, VISIBLE_NM[0]), line_nm])
     width = np.concatenate([np.minimum(VISIBLE_NM + 0.5, VISIBLE_NM[-1]) - start[:401], np.zeros(len(lines))])
