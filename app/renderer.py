@@ -196,6 +196,9 @@ def _eye_layer(
         # A stop asked for while tracing still wants a picture: only the first sample is owed then.
         samples = settings.spp or DEFAULT_SAMPLES
         stop_at_once = cancelled()
+        if not stop_at_once:
+            # Every stretch of the spectrum has its turn equally often.
+            samples = -(-samples // bands) * bands if (bands := eye.choose_bands(scene.camera, settings.width, settings.height, samples, maps)) > 1 else samples
         eye.run(
             scene.camera, settings.width, settings.height, 1 if stop_at_once else samples, 0, maps, settings.seed,
             lambda fraction: progress(0.9 + 0.1 * fraction, "looking"), None if stop_at_once else cancelled,

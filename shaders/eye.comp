@@ -113,7 +113,7 @@ float choice(EyePath path, uint pixel_key)
 {
     const uint generators[8] = uint[](1779033703u, 3144134277u, 2773480763u, 1359893119u, 2600822925u, 528734635u, 1541459225u, 3418070365u);
     uint generator = path.depth < 8 ? generators[path.depth] : hash_pcg(uint(path.depth)) | 1u;
-    return kronecker(p.sample_index, generator, hash_combine(pixel_key, path.key + uint(path.depth) * 2654435769u));
+    return kronecker(p.draw_index, generator, hash_combine(pixel_key, path.key + uint(path.depth) * 2654435769u));
 }
 
 // One glass surface. Returns true where `path` goes on; what must wait is put on the stack.

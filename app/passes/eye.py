@@ -46,6 +46,11 @@ TAPS_PER_PIXEL = 0.7
 TINT_STEPS = 24
 """Stretches that the whole spectrum is cut into behind coloured glass."""
 
+_PILOT_COLUMNS = 64
+"""Of the grid of pixels that tells how many bands are needed."""
+_BAND_CHOICES = (1, 2, 4, 8, 16, 32)
+_BAND_TOLERANCE = 0.08
+"""Over the root of the samples: mean relative change of the pixels that change at all, up to which half as many bands do."""
 _TARGET_SECONDS = 0.15
 """What one dispatch may take; rows are divided to fit."""
 _GROUP = 8
@@ -166,11 +171,45 @@ class EyePass:
         parameters = self._parameters(camera, width, height, maps.scale, seed)
         parameters["sample_side"] = 1.0 / np.sqrt(samples + sample_offset)
         for index, place in enumerate(_pixel_lattice(samples, sample_offset)):
-            parameters["sample_index"] = sample_offset + index
+            parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
             parameters["within_pixel"] = place
             for share in self._add_sample(parameters, width, height, maps):
                 yield (index + share) / samples
         self.context.check("the eye pass")
+
+    def choose_bands(self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None) -> int:
+        """Cut the spectrum into as few bands as the picture lets one: doubled until a coarse grid of the picture's own pixels changes no more
+        than so many samples of each of its pixels would still be off by.
+
+        Sets and returns `bands`; what was summed up is forgotten. A method that prescribes its bands keeps them."""
+        if not self.disperses or self.fixed_bands is not None or self.scene.features.random_wavelength:
+            return self.bands
+        for _ in self.choosing_bands(camera, width, height, samples, maps):
+            pass
+        return self.bands
+
+    def choosing_bands(self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None) -> Iterator[float]:
+        """`choose_bands`, pausing after every band of rows."""
+        maps = maps or self._no_maps()
+        columns = min(width, _PILOT_COLUMNS)
+        rows = max(1, round(columns * height / width))
+        coarser = None
+        tolerance = _BAND_TOLERANCE / np.sqrt(samples)
+        for bands in (b for b in _BAND_CHOICES if b <= max(samples, 1)):
+            self._clear(columns, rows)
+            parameters = self._parameters(camera, columns, rows, maps.scale, 1)
+            parameters["bands"], parameters["dithered"], parameters["sample_side"] = bands, 0, 1.0
+            parameters["pixel_scale"] = columns / width
+            parameters["within_pixel"] = 0.5
+            for number in range(bands):
+                parameters["sample_index"] = number
+                yield from self._add_sample(parameters, columns, rows, maps)
+            finer = self._read().astype(np.float64)
+            if coarser is not None and _band_error(coarser, finer) < tolerance:
+                break
+            self.bands = bands
+            coarser = finer
+        self._clear(columns, rows)
 
     def _bind(self, maps: CausticMaps) -> None:
         self.scene.bind()
@@ -392,3 +431,13 @@ def _pixel_lattice(samples: int, offset: int) -> np.ndarray:
     shift = (0.5 + offset * np.array([0.7548776662466927, 0.5698402909980532])) % 1.0
     index = np.arange(samples)
     return np.column_stack([(index + shift[0]) / samples, (index * golden + shift[1]) % 1.0])
+
+
+def _band_error(coarser: np.ndarray, finer: np.ndarray) -> float:
+    """Mean relative difference of two pictures (H, W, C) over the pixels in which they differ."""
+    difference = np.abs(coarser - finer).sum(axis=-1)
+    size = np.abs(finer).sum(axis=-1)
+    floor = 1e-2 * size.mean() + 1e-30
+    relative = difference / (size + floor)
+    touched = relative > 1e-4
+    return float(np.minimum(relative[touched], 1.0).mean()) if touched.any() else 0.0

@@ -32,7 +32,7 @@ EYE_PARAMETERS = Struct(
         Field("forward", "vec3", "unit"),
         Field("first_row", "uint", "row of this dispatch's first pixels"),
         Field("half_right", "vec3", "picture's middle to its right border"),
-        Field("sample_index", "uint", "counts the samples of a pixel"),
+        Field("sample_index", "uint", "counts the samples of a pixel: which stretch of the spectrum this one sees"),
         Field("half_up", "vec3", "picture's middle to its upper border"),
         Field("seed", "uint"),
         Field("red_of_xyz", "vec4", "row of the XYZ to linear Rec.709 matrix"),
@@ -53,7 +53,8 @@ EYE_PARAMETERS = Struct(
         Field("dithered", "uint", "whether pixels begin with different bands"),
         Field("most_taps", "uint", "looks along one sweep at most"),
         Field("split_threshold", "float", "share of a path's power above which both of its parts are followed"),
-        Field("reserved", "uvec2", ""),
+        Field("draw_index", "uint", "counts them too: which numbers it draws"),
+        Field("reserved", "uint", ""),
     ),
 )
 _LIGHT_KINDS = {"point": 0, "spot": 0, "directional": 1, "collimated": 2, "area": 3}

@@ -70,9 +70,9 @@ void narrow(inout EyePath path, uint pixel_key)
 #ifdef RANDOM_WAVELENGTH
     // One of the table's cells, by how bright it looks.
 #ifdef EVEN_WAVELENGTHS
-    float u = kronecker(p.sample_index, GOLDEN, hash_combine(pixel_key, 77u));
+    float u = kronecker(p.draw_index, 2654435769u, hash_combine(pixel_key, 77u));
 #else
-    float u = unit_float(hash_combine(hash_combine(pixel_key, 77u), p.sample_index));
+    float u = unit_float(hash_combine(hash_combine(pixel_key, 77u), p.draw_index));
 #endif
     uint low = 0u, high = uint(EMISSION_CELLS);
     while (high - low > 1u) {

@@ -57,7 +57,7 @@ void apply_texture(inout Seen seen, Triangle facet)
 vec2 light_point(uint light, uint pixel_key)
 {
     uint key = hash_combine(pixel_key, light);
-    return vec2(kronecker(p.sample_index, PLASTIC_1, key), kronecker(p.sample_index, PLASTIC_2, hash_pcg(key)));
+    return vec2(kronecker(p.draw_index, PLASTIC_1, key), kronecker(p.draw_index, PLASTIC_2, hash_pcg(key)));
 }
 
 // Irradiance from one light, as a factor on its own quantity, before anything is in the way.
