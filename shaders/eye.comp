@@ -116,7 +116,7 @@ float choice(EyePath path, uint pixel_key)
     return kronecker(p.draw_index, generator, hash_combine(pixel_key, path.key + uint(path.depth) * 2654435769u));
 }
 
-// One glass surface. Returns true where `path` goes on; what must wait is put on the stack.
+// One glass surface: `path` goes on, the other part is put on the stack or, if weak, one of them is chosen.
 void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key)
 {
     bool entering = dot(whole.direction, hit.normal_g) < 0.0;
@@ -129,55 +129,35 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key)
         path.origin = origin_beyond;
         return;
     }
-    vec3 n_i, n_t;
-    crossing_indices(crossing, path.band, n_i, n_t);
-#ifdef HAS_DISPERSION
-    bool begins = !path.narrowed && (n_i.x != n_i.z || n_t.x != n_t.z), done = false;
-    WHEN(begins) {
-        // A reflection off the outside of glass knows no wavelength but in its strength: it stays whole. What goes on is one band.
-        EyePath mirrored = path;
-        Facing facing = facing_of(hit, path);
-        float theta = dot(path.direction, facing.normal);
-        vec3 eta3 = n_i / n_t;
-        vec3 cosine2 = transmitted_cosine2(vec3(theta), eta3);
-        bool splits = all(greaterThan(cosine2, vec3(0.0))) && waits < STACK;
-        if (splits) {
-            vec3 reflectance = fresnel_reflectance(vec3(theta), eta3, cosine2);
-            mirrored.weight *= reflectance;
-            mirrored.share *= reflectance.y;
-            mirrored.origin = origin_back;
-            mirrored.key = hash_combine(mirrored.key, 1u);
-            reflect_path(mirrored, facing);
-            waiting[waits++] = mirrored;
-        }
-        narrow(path, pixel_key);
-        crossing_indices(crossing, path.band, n_i, n_t);
-        if (splits) {
-            cosine2 = transmitted_cosine2(vec3(theta), n_i / n_t);
-            path.weight *= 1.0 - fresnel_reflectance(vec3(theta), n_i / n_t, cosine2);
-            path.share *= 1.0 - fresnel_reflectance(theta, n_i.y / n_t.y, cosine2.y);
-            if (refract_path(path, facing, crossing, n_i.y, n_t.y)) {
-                path.medium = beyond;
-                path.origin = origin_beyond;
-            } else {
-                reflect_path(path, facing);
-                path.origin = origin_back;
-            }
-            done = true;
-        }
-    }
-    if (done) return;
-#endif
     Facing facing = facing_of(hit, path);
-    vec3 theta3 = thetas(path, facing);
-    vec3 cosine2 = transmitted_cosine2(theta3, n_i / n_t);
+    EyePath mirrored = path;
+    vec3 n_i, n_t, theta3, cosine2, reflectance, mirror_weight;
+    bool begins = false;
+    for (int round = 0; round < 2; ++round) {
+        crossing_indices(crossing, path.band, n_i, n_t);
+        theta3 = thetas(path, facing);
+        cosine2 = transmitted_cosine2(theta3, n_i / n_t);
+        reflectance = fresnel_reflectance(theta3, n_i / n_t, cosine2);
+        mirror_weight = begins ? mirror_weight : reflectance;
+#ifdef HAS_DISPERSION
+        // What is reflected off the outside of glass knows no wavelength but in its strength: it stays whole. What goes on is one band.
+        if (round == 1 || path.narrowed || (n_i.x == n_i.z && n_t.x == n_t.z)) break;
+        begins = all(greaterThan(cosine2, vec3(0.0)));
+        narrow(path, pixel_key);
+        if (!begins) mirrored = path;
+#else
+        break;
+#endif
+    }
 #if SPECTRAL_GROUPS > 0
     bvec3 passes = greaterThan(cosine2, vec3(0.0));
     bool may_cut = path.narrowed && any(passes) && !all(passes) && !path.recut && waits < STACK && path.band.z - path.band.x > MIN_CUT_BAND;
     bool cut = false;
     WHEN(may_cut) {
         float at = cut_of(path, facing, crossing, passes);
-        if (min(at - path.band.x, path.band.z - at) > 0.01 * MIN_CUT_BAND && cut_is_near(whole, at, hit.distance)) {
+        cut = min(at - path.band.x, path.band.z - at) > 0.01 * MIN_CUT_BAND && cut_is_near(whole, at, hit.distance);
+        if (!cut) atomicAdd(fallbacks[FELL_CUT], 1u);
+        WHEN(cut) {
             // Both parts meet this surface again, each from its own start and anchored in its own middle.
             float part = (at - path.band.x) / (path.band.z - path.band.x);
             whole.recut = true;
@@ -190,48 +170,37 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key)
             whole.share *= part;
             whole.key = hash_combine(whole.key, 5u);
             path = whole;
-            cut = true;
-        } else {
-            atomicAdd(fallbacks[FELL_CUT], 1u);
         }
     }
     if (cut) return;
 #endif
-    path.recut = false;
-    vec3 reflectance = fresnel_reflectance(theta3, n_i / n_t, cosine2);
-    bool total = cosine2.y <= 0.0;
+    path.recut = mirrored.recut = false;
+    bool total = cosine2.y <= 0.0, reflects = total;
     float likely = total ? 1.0 : dot(reflectance, vec3(0.25, 0.5, 0.25));
-    bool reflects = total;
-    if (!total) {
-        bool strong = path.depth <= 1 || min(path.share * likely, path.share * (1.0 - likely)) > p.split_threshold;
-        bool room = waits < STACK;
-        WHEN(strong && room) {
-            EyePath mirrored = path;
-            mirrored.weight *= reflectance;
-            mirrored.share *= likely;
-            mirrored.origin = origin_back;
-            mirrored.key = hash_combine(path.key, 1u);
-            reflect_path(mirrored, facing);
-            if (mirrored.weight.y > 0.0) waiting[waits++] = mirrored;
-            path.weight *= 1.0 - reflectance;
-            path.share *= 1.0 - likely;
-        }
-        if (!(strong && room)) {
-            if (strong) atomicAdd(fallbacks[FELL_STACK], 1u);
-            reflects = choice(path, pixel_key) < likely;
-            path.weight *= (reflects ? reflectance : 1.0 - reflectance) / (reflects ? likely : 1.0 - likely);
-            path.key = hash_combine(path.key, reflects ? 3u : 4u);
-        }
-    } else {
-        path.weight *= reflectance;
+    bool strong = !total && (begins || path.depth <= 1 || min(path.share * likely, path.share * (1.0 - likely)) > p.split_threshold);
+    bool splits = strong && waits < STACK;
+    if (strong && !splits) atomicAdd(fallbacks[FELL_STACK], 1u);
+    WHEN(splits && mirror_weight.y > 0.0) {
+        mirrored.weight *= mirror_weight;
+        mirrored.share *= likely;
+        mirrored.origin = origin_back;
+        mirrored.key = hash_combine(mirrored.key, 1u);
+        reflect_path(mirrored, facing);
+        waiting[waits++] = mirrored;
     }
-    if (!reflects && refract_path(path, facing, crossing, n_i.y, n_t.y)) {
-        path.medium = beyond;
-        path.origin = origin_beyond;
+    if (!total && !splits) {
+        reflects = choice(path, pixel_key) < likely;
+        path.weight *= (reflects ? reflectance : 1.0 - reflectance) / (reflects ? likely : 1.0 - likely);
+        path.key = hash_combine(path.key, reflects ? 3u : 4u);
     } else {
-        reflect_path(path, facing);
-        path.origin = origin_back;
+        path.weight *= total ? reflectance : 1.0 - reflectance;
+        path.share *= total ? 1.0 : 1.0 - likely;
     }
+    bool through = false;
+    WHEN(!reflects) through = refract_path(path, facing, crossing, n_i.y, n_t.y);
+    if (through) path.medium = beyond;
+    path.origin = through ? origin_beyond : origin_back;
+    WHEN(!through) reflect_path(path, facing);
 }
 #endif
 
@@ -316,10 +285,7 @@ void main()
         }
 #endif
         bool ends = !met || kind == KIND_DIFFUSE;
-        WHEN(ends && taps == 1) add_end(path, met, hit, pixel_key);
-#ifdef SPECTRAL_SWEEP
-        WHEN(ends && taps > 1) add_swept_end(path, met, hit, pixel_key, taps);
-#endif
+        WHEN(ends) add_end(path, met, hit, pixel_key, taps);
         goes_on = false;
 #ifdef EYE_SPECULAR
         bool specular = !ends && kind != KIND_BLACK;

@@ -75,19 +75,9 @@ bool hidden_from(LightSample s, Seen seen)
     return intersect_any(seen.position, s.toward, s.distance * 0.99999, origin);
 }
 
-// Lights, as bits, that a place is hidden from; those past the 32nd are asked for every time.
-uint shadows_at(Seen seen, uint pixel_key)
-{
-    uint hidden = 0u;
-    for (uint i = 0u; i < uint(min(LIGHT_COUNT, 32)); ++i) {
-        LightSample s;
-        if (unshadowed(i, seen, pixel_key, s) > 0.0 && hidden_from(s, seen)) hidden |= 1u << i;
-    }
-    return hidden;
-}
-
-// `known`: lights, as bits, for which `hidden` says whether they are; the others are found out.
-void add_direct(EyePath path, Seen seen, Stretch stretch, uint pixel_key, uint known, uint hidden)
+// Adds the direct light of one place. `known`: lights, as bits, for which `hidden` says whether they are; the others, and those past the
+// 32nd, are found out, and `hidden` is what was found. With `only_shadows` nothing is added.
+void add_direct(EyePath path, Seen seen, Stretch stretch, uint pixel_key, uint known, inout uint hidden, bool only_shadows)
 {
     uint reflectance_class = receivers[object_at(seen.object).receiver].reflectance_class;
     for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
@@ -96,9 +86,11 @@ void add_direct(EyePath path, Seen seen, Stretch stretch, uint pixel_key, uint k
         uint bit = i < 32u ? 1u << i : 0u;
         bool shadowed = (known & hidden & bit) != 0u;
         WHEN(gain > 0.0 && (known & bit) == 0u) shadowed = hidden_from(s, seen);
+        hidden = shadowed ? hidden | bit : hidden & ~bit;
         uint row = uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT);
         // Other classes than 0 have their reflectance in the light's own row.
-        WHEN(gain > 0.0 && !shadowed) add_colour(path, stretch, reflectance_class == 0u ? row : row + 3u + reflectance_class, (reflectance_class == 0u ? seen.reflectance : vec3(1.0)) * (INVERSE_PI * gain));
+        WHEN(gain > 0.0 && !shadowed && !only_shadows)
+            add_colour(path, stretch, reflectance_class == 0u ? row : row + 3u + reflectance_class, (reflectance_class == 0u ? seen.reflectance : vec3(1.0)) * (INVERSE_PI * gain));
     }
 }
 

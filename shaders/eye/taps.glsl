@@ -67,117 +67,108 @@ int taps_of(EyePath path, float distance)
 }
 #endif
 
-// A path that has met nothing, or a diffuse surface, seen at its own wavelength: all of its band at once.
-void add_end(EyePath path, bool met, Hit hit, uint pixel_key)
+// A path that has met nothing, or a diffuse surface. Without a sweep that is one look. Of a sweep, both ends look first where they arrive: if it is
+// the facet that the path's own wavelength met, so does all between; else every look finds out for itself.
+void add_end(EyePath path, bool met, Hit hit, uint pixel_key, int taps)
 {
-    Stretch stretch = stretch_of(path, path.band.x, path.band.z);
-#ifdef LAYER_BEAUTY
-    WHEN(!met) add_sky(path, stretch, path.direction, vec3(0.0));
-#endif
-#ifdef HAS_RECEIVERS
-    WHEN(met) {
-        Triangle facet = triangle_at(hit.primitive);
-#ifdef LAYER_BEAUTY
-        vec3 position = surface_point(hit, path.position, path.direction);
-#else
-        vec3 position = path.position + hit.distance * path.direction;
-#endif
-        Seen seen = seen_on(path, hit, facet, position, path.direction);
-#ifdef HAS_TEXTURES
-        apply_texture(seen, facet);
-#endif
-        add_caustic(path, seen, stretch);
-#ifdef LAYER_BEAUTY
-        add_direct(path, seen, stretch, pixel_key, 0u, 0u);
-#endif
-    }
-#endif
-}
-
-#ifdef SPECTRAL_SWEEP
-#ifdef HAS_RECEIVERS
-// A place on `facet` that a colour of the path sees.
-Seen swept_place(EyePath path, Hit hit, Triangle facet, vec3 position, vec3 direction, vec3 dp, vec3 dd)
-{
-    vec3 at = position + hit.distance * direction;
-    Seen seen = seen_on(path, hit, facet, at, direction);
-    vec3 sweep = dp + hit.distance * dd;
-    seen.dposition[2] = sweep - (dot(sweep, hit.normal_g) / dot(direction, hit.normal_g)) * direction;
-#ifdef HAS_TEXTURES
-    apply_texture(seen, facet);
-#endif
-    return seen;
-}
-#endif
-
-// A path whose colours end in different places. Where both ends of the sweep meet the same facet as its middle, so does what
-// lies between; else every look finds out for itself.
-void add_swept_end(EyePath path, bool met, Hit hit, uint pixel_key, int taps)
-{
-    vec3 p_lo, d_lo, p_hi, d_hi;
-    ray_at(path, path.band.x, p_lo, d_lo);
-    ray_at(path, path.band.z, p_hi, d_hi);
-    bool alike = true;
-    int direct_every = 1;
-#ifdef HAS_RECEIVERS
-    Hit hit_lo, hit_hi;
-    bool met_lo = intersect_closest(p_lo, d_lo, FAR_DISTANCE, path.origin, hit_lo), met_hi = intersect_closest(p_hi, d_hi, FAR_DISTANCE, path.origin, hit_hi);
-    alike = met_lo == met && met_hi == met && (!met || (hit_lo.primitive == hit.primitive && hit_hi.primitive == hit.primitive));
-    uint known = 0u, hidden = 0u;
-    Triangle facet = triangle_at(met ? hit.primitive : 0u);
-#ifdef LAYER_BEAUTY
-    WHEN(alike && met) {
-        uint hidden_lo = shadows_at(seen_on(path, hit, facet, p_lo + hit_lo.distance * d_lo, d_lo), pixel_key);
-        hidden = shadows_at(seen_on(path, hit, facet, p_hi + hit_hi.distance * d_hi, d_hi), pixel_key);
-        known = ~(hidden ^ hidden_lo);
-        // Direct light on a plain surface changes little along a sweep.
-        if (known == 0xffffffffu && object_at(hit.object).texture == NONE) direct_every = max(1, taps / 3);
-    }
-#endif
-#endif
-#ifndef HAS_ENVIRONMENT_MAP
-    // The same all round.
-    if (!met && alike) taps = 1;
-#endif
-    vec3 dp = (p_hi - p_lo) / float(taps), dd = (d_hi - d_lo) / float(taps);
+    vec3 dp = vec3(0.0), dd = vec3(0.0);
     float step_x = (path.band.z - path.band.x) / float(taps), direct_from = path.band.x;
-    for (int i = 0; i < taps; ++i) {
-        float lo = path.band.x + float(i) * step_x, hi = i + 1 == taps ? path.band.z : lo + step_x;
-        vec3 position, direction;
-        ray_at(path, 0.5 * (lo + hi), position, direction);
-        Stretch stretch = stretch_of(path, lo, hi);
-        bool ends = met, dark = false;
+    bool alike = true;
+    int first = 0, direct_every = 1;
+    uint known = 0u, hidden = 0u, hidden_lo = 0u;
+#ifdef SPECTRAL_SWEEP
+    if (taps > 1) {
+        vec3 p_lo, d_lo, p_hi, d_hi;
+        ray_at(path, path.band.x, p_lo, d_lo);
+        ray_at(path, path.band.z, p_hi, d_hi);
+        dp = (p_hi - p_lo) / float(taps);
+        dd = (d_hi - d_lo) / float(taps);
 #ifdef HAS_RECEIVERS
+        first = -2;
+#endif
+    }
+#ifndef HAS_ENVIRONMENT_MAP
+#ifndef HAS_RECEIVERS
+    // The same all round.
+    taps = 1;
+    step_x = path.band.z - path.band.x;
+#endif
+#endif
+#endif
+    for (int i = first; i < taps; ++i) {
+        float lo = path.band.x + float(max(i, 0)) * step_x, hi = i + 1 == taps ? path.band.z : lo + step_x;
+        vec3 position = path.position, direction = path.direction;
         Hit found = hit;
-        WHEN(!alike) {
+        bool ends = met, dark = false;
+#ifdef SPECTRAL_SWEEP
+        if (taps > 1) ray_at(path, i == -2 ? path.band.x : (i == -1 ? path.band.z : 0.5 * (lo + hi)), position, direction);
+#ifdef HAS_RECEIVERS
+        WHEN(i < 0 || !alike) {
             ends = intersect_closest(position, direction, FAR_DISTANCE, path.origin, found);
             uint kind = ends ? object_at(found.object).kind : NONE;
+            alike = alike && ends == met && (!met || found.primitive == hit.primitive);
             dark = kind == KIND_BLACK;
             if (kind == KIND_MIRROR || kind == KIND_DIELECTRIC) {
                 // This colour goes on where the middle one ended: it is given what that one sees.
                 ends = met;
                 found = hit;
             }
-            if (ends) facet = triangle_at(found.primitive);
         }
+#endif
+#endif
+#ifdef HAS_RECEIVERS
         WHEN(ends && !dark) {
-            if (found.primitive == hit.primitive) found.distance = dot(hit.normal_g, facet.vertex - position) / dot(hit.normal_g, direction);
-            Seen seen = swept_place(path, found, facet, position, direction, dp, dd);
-            add_caustic(path, seen, stretch);
+            Triangle facet = triangle_at(found.primitive);
+            vec3 at;
+            if (taps > 1) {
+                if (found.primitive == hit.primitive) found.distance = dot(hit.normal_g, facet.vertex - position) / dot(hit.normal_g, direction);
+                at = position + found.distance * direction;
+            } else {
 #ifdef LAYER_BEAUTY
-            WHEN((i + 1) % direct_every == 0 || i + 1 == taps) {
+                at = surface_point(found, position, direction);
+#else
+                at = position + found.distance * direction;
+#endif
+            }
+            Seen seen = seen_on(path, found, facet, at, direction);
+            vec3 sweep = dp + found.distance * dd;
+            seen.dposition[2] = sweep - (dot(sweep, found.normal_g) / dot(direction, found.normal_g)) * direction;
+            Stretch stretch = stretch_of(path, lo, hi);
+            WHEN(i >= 0) {
+#ifdef HAS_TEXTURES
+                apply_texture(seen, facet);
+#endif
+                add_caustic(path, seen, stretch);
+            }
+#ifdef LAYER_BEAUTY
+            // Direct light on a plain surface changes little along a sweep: a look stands for several.
+            bool due = i < 0 || (i + 1) % direct_every == 0 || i + 1 == taps;
+            WHEN(due) {
                 if (direct_every > 1) stretch = stretch_of(path, direct_from, hi);
-                add_direct(path, seen, stretch, pixel_key, alike ? known : 0u, hidden);
-                direct_from = hi;
+                add_direct(path, seen, stretch, pixel_key, i < 0 ? 0u : known, hidden, i < 0);
+                direct_from = i < 0 ? direct_from : hi;
             }
 #endif
         }
 #endif
 #ifdef LAYER_BEAUTY
-        WHEN(!ends && !dark) add_sky(path, stretch, direction, dd);
+        WHEN(!ends && !dark && i >= 0) add_sky(path, stretch_of(path, lo, hi), direction, dd);
+#ifdef SPECTRAL_SWEEP
+        if (i == -2) hidden_lo = hidden;
+        if (i == -1) {
+            known = alike && met ? ~(hidden ^ hidden_lo) : 0u;
+            if (known == 0xffffffffu && object_at(hit.object).texture == NONE) direct_every = max(1, taps / 3);
+#ifndef HAS_ENVIRONMENT_MAP
+            // The same all round.
+            if (alike && !met) {
+                taps = 1;
+                step_x = path.band.z - path.band.x;
+            }
+#endif
+        }
+#endif
 #endif
     }
 }
-#endif
 
 #endif
