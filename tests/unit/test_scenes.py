@@ -26,6 +26,7 @@ def shipped(name: str) -> Scene:
 def test_the_collection_is_complete() -> None:
     names = {path.stem for path in SCENES}
     wanted = {"default", "prism", "prism_case", "ball", "ball_plain", "brilliant", "lens", "achromat", "amici", "water", "wine_glass"}
+    wanted |= {"brilliant_studio", "prism_edge", "lens_text", "ball_caustic"}
     assert wanted <= names
 
 
@@ -37,7 +38,7 @@ def test_a_scene_loads_and_can_be_rendered(path: Path) -> None:
     scene = load_scene(path)
     solids = [o for o in scene.objects if isinstance(o.material, Dielectric)]
     assert solids and all(o.mesh.is_closed and o.mesh.volume() > 0.0 for o in solids)
-    assert any(isinstance(o.material, Diffuse) for o in scene.objects)
+    assert scene.environment is not None or any(isinstance(o.material, Diffuse) for o in scene.objects)
     # Every glass stands in the picture.
     forward = np.subtract(scene.camera.target, scene.camera.position)
     forward /= np.linalg.norm(forward)
@@ -188,3 +189,87 @@ def test_the_wine_reaches_into_the_wall_and_the_glass_has_priority() -> None:
     assert wine.material.absorption is not None
     inner = glass.mesh.vertices[np.hypot(*glass.mesh.vertices[:, :2].T) > 0.5]
     assert np.ptp(wine.mesh.vertices[:, 2]) < np.ptp(inner[:, 2])
+
+
+def test_the_studio_lights_the_brilliant_alone() -> None:
+    """Values from 0.05 to 50, whatever the coding: the reader is ours, the file was written by a script."""
+    scene = shipped("brilliant_studio")
+    assert scene.lights == () and len(scene.objects) == 1 and scene.environment is not None and scene.notes == (
+        "diamond: data reach from 226 to 760 nm; above 760 nm the nearest value is used.",
+    )
+    rgb = scene.environment.rgb
+    assert rgb.shape == (512, 1024, 3)
+    assert rgb.min() == pytest.approx(0.05, rel=0.02) and rgb.max() == pytest.approx(50.0, rel=0.01)
+
+
+def test_the_page_is_print_under_a_lens_and_upright() -> None:
+    page = next(o for o in shipped("lens_text").objects if o.name == "page")
+    ink = 1.0 - page.material.texture.rgb[..., 0]
+    assert 0.03 < ink.mean() < 0.2
+    # The heading stands at the top left: row 0 is the top, and v = 1 lies at +y.
+    height, width = ink.shape
+    assert ink[: height // 8, : width // 2].mean() > 2.0 * ink[-height // 8 :].mean()
+    assert page.mesh.uv[page.mesh.corners()[..., 1] > 0.0][:, 1].min() == 1.0
+
+
+def _through_prism(scene: Scene, wavelength_nm: float, angle_rad: float) -> float | None:
+    """x on the cards of the camera's level ray `angle_rad` left of y, refracted twice by the prism, or None when it is not."""
+    prism = next(o for o in scene.objects if o.name == "prism")
+    n = float(prism.material.dispersion.index(wavelength_nm))
+    planes = prism.mesh.transformed(prism.object_to_world).convex_planes
+    point, direction = np.array(scene.camera.position), np.array([-math.sin(angle_rad), math.cos(angle_rad), 0.0])
+    for ratio in (1.0 / n, n):
+        facing = planes[:, :3] @ direction
+        distance = (planes[:, 3] - planes[:, :3] @ point) / np.where(np.abs(facing) < 1e-12, np.nan, facing)
+        entering = ratio < 1.0
+        face = int(np.nanargmax(np.where(facing < 0.0, distance, -np.inf)) if entering else np.nanargmin(np.where(facing > 0.0, distance, np.inf)))
+        point = point + distance[face] * direction
+        if (planes[:, :3] @ point > planes[:, 3] + 1e-9).any():
+            return None
+        normal = planes[face, :3] * -np.sign(facing[face])
+        cosine = direction @ normal
+        transmitted = 1.0 - ratio**2 * (1.0 - cosine**2)
+        if transmitted < 0.0:
+            return None
+        direction = ratio * direction - (ratio * cosine + math.sqrt(transmitted)) * normal
+    return float(point[0] + direction[0] * (3.0 - point[1]) / direction[1])
+
+
+def test_the_prisms_fringe_is_as_wide_as_promised_and_the_edge_in_its_middle() -> None:
+    """Where each wavelength puts the cards' edge, by bisection over the camera's rays: 20 to 60 pixels of 480 apart."""
+    scene = shipped("prism_edge")
+    cards = {o.name: o.mesh.transformed(o.object_to_world).bounds() for o in scene.objects if o.name != "prism"}
+    edge = cards["black card"][1][0]
+    assert cards["white card"][0][0] == edge == pytest.approx(_through_prism(scene, 587.5618, 0.0), abs=5e-3)
+    seen = {}
+    for nm in (430.0, 587.5618, 680.0):
+        low, high = math.radians(-8.0), math.radians(8.0)
+        assert _through_prism(scene, nm, low) > edge > _through_prism(scene, nm, high)
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if _through_prism(scene, nm, middle) > edge else (low, middle)
+        seen[nm] = low
+    forward = np.subtract(scene.camera.target, scene.camera.position)
+    axis = math.atan2(-forward[0], forward[1])
+    pixels = 135.0 / math.tan(math.radians(0.5 * scene.camera.vertical_fov_deg))
+    at = {nm: pixels * math.tan(axis - angle) for nm, angle in seen.items()}
+    assert at[680.0] < at[587.5618] < at[430.0] and 20.0 < at[430.0] - at[680.0] < 60.0
+    # The lamp is too high for what passes the prism to reach the part of the cards the camera sees.
+    direction = scene.lights[0].direction
+    prism = next(o for o in scene.objects if o.name == "prism")
+    top = prism.mesh.transformed(prism.object_to_world).bounds()[1]
+    assert top[2] + (3.0 - top[1]) * direction[2] / direction[1] < -5.0 * math.tan(math.radians(0.5 * scene.camera.vertical_fov_deg))
+
+
+def test_all_of_the_beam_meets_the_ball_before_its_caustic() -> None:
+    scene = shipped("ball_caustic")
+    ball, light = scene.objects[0], scene.lights[0]
+    centre = ball.object_to_world[:3, 3]
+    away = np.subtract(centre, light.position)
+    miss = np.linalg.norm(np.cross(away, light.direction))
+    assert miss + light.radius < 0.75
+    # The caustic falls on the far side, within the ball's width of the line of sight and beyond.
+    toward = away @ np.array(light.direction) * np.array(light.direction) + light.position
+    landing = toward + np.array(light.direction) * (toward[2] / -light.direction[2])
+    sight = np.subtract(centre, scene.camera.position)[:2]
+    assert (landing[:2] - centre[:2]) @ sight > 0.0
