@@ -13,27 +13,27 @@ from app.truth.eye_kernel import on_plane, texel_of
 from app.truth.eye_optics import (
     AIR,
     choice,
+    lean,
     scatter,
     sobol_next,
     sobol_start,
     transmitted,
 )
 from app.truth.photon_emit import emit, search
-from app.truth.photon_intersect import STACK_SIZE, compiled, nearest
-from app.truth.photon_kernel import DIMENSIONS, _mixed, _unit
+from app.truth.photon_intersect import nearest
+from app.truth.photon_kernel import _mixed, _unit
 from app.truth.photon_scene import BLACK, DIFFUSE
 
 
-@compiled
-def land(scene, domain, colour, band_of, side, sequence, first, count, share, max_depth, points, watts, ends):
+@lean
+def land(scene, domain, colour, band_of, side, sequence, first, count, share, max_depth, points, watts, ends, scratch):
     """Trace photons [first, first + count) of a domain and note those that land after glass or a mirror: their number.
 
     `band_of` int32 (A,): bin of each atom of `colour`; `side` (O, 2): number of a receiver's front and back (−1: not counted);
     `share`: factor on every weight. Fills `points` (count, 3), `watts` (count,) and `ends` int32 (count, 4): side, bin,
     and the cell of the domain they came from (row, column).
     """
-    stack, stack_distance = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)
-    state, shift = np.empty(DIMENSIONS, np.uint32), np.zeros(DIMENSIONS, np.uint32)
+    stack, stack_distance, state, shift = scratch.stack, scratch.stack_distance, scratch.state, scratch.shift
     sobol_start(sequence, first, state)
     landed = 0
     for i in range(first, first + count):
@@ -78,7 +78,7 @@ def land(scene, domain, colour, band_of, side, sequence, first, count, share, ma
     return landed
 
 
-@compiled
+@lean
 def gather(tables, points, watts, ends, count, sums, part):
     """Add landed photons to `sums` (float64, as `CausticTables.irradiance`, but W a texel) and to `part` (W of all bins a texel).
 

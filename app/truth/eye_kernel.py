@@ -19,6 +19,7 @@ from app.truth.eye_optics import (
     camera_ray,
     choice,
     inlined,
+    lean,
     scatter,
     sobol_next,
     sobol_start,
@@ -26,7 +27,7 @@ from app.truth.eye_optics import (
 )
 from app.truth.eye_scene import beyond, picture_at
 from app.truth.photon_emit import search
-from app.truth.photon_intersect import STACK_SIZE, blocked, compiled, nearest
+from app.truth.photon_intersect import blocked, nearest
 from app.truth.photon_kernel import DIMENSIONS, _mixed, _unit
 from app.truth.photon_scene import BLACK, DIFFUSE
 
@@ -224,12 +225,11 @@ def sample(scene, lights, spectra, pictures, tables, start, px, py, pz, dx, dy, 
             xyz[c] += found * spectra.response[atom, c]
 
 
-@compiled
-def trace_eye(scene, camera, lights, spectra, pictures, tables, start, sequence, first, count, max_depth, sums, tally):
+@lean
+def trace_eye(scene, camera, lights, spectra, pictures, tables, start, sequence, first, count, max_depth, sums, tally, scratch):
     """Add samples [first, first + count) of every pixel to `sums` (H, W, 3), XYZ of each: divide by their number."""
-    stack, stack_distance = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)
-    beginning, state, shift = np.empty(DIMENSIONS, np.uint32), np.empty(DIMENSIONS, np.uint32), np.empty(DIMENSIONS, np.uint32)
-    xyz = np.zeros(3)
+    stack, stack_distance, xyz = scratch.stack, scratch.stack_distance, scratch.xyz
+    beginning, state, shift = scratch.beginning, scratch.state, scratch.shift
     sobol_start(sequence, first, beginning)
     for row in range(camera.height):
         for column in range(camera.width):
@@ -252,15 +252,14 @@ def trace_eye(scene, camera, lights, spectra, pictures, tables, start, sequence,
                 xyz[c] = 0.0
 
 
-@compiled
-def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, points, which):
+@lean
+def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, points, which, scratch):
     """Where `count` camera paths spread over the picture end on sides of receivers, for fitting windows: the number found.
 
     `side` (O, 2) as in `CausticTables`; fills `points` (count, 4): place, and length of the way there; `which` (count, 2):
     side, events on the way.
     """
-    stack, stack_distance = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)
-    state, shift = np.empty(DIMENSIONS, np.uint32), np.zeros(DIMENSIONS, np.uint32)
+    stack, stack_distance, state, shift = scratch.stack, scratch.stack_distance, scratch.state, scratch.shift
     sobol_start(sequence, 0, state)
     found = 0
     for i in range(count):

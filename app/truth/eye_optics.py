@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from app.truth.photon_intersect import STACK_SIZE
 from app.truth.photon_kernel import (
     _AIR,
     DIMENSIONS,
@@ -29,13 +31,47 @@ from app.truth.photon_scene import MIRROR
 AIR = _AIR
 
 
-def inlined(function: Callable) -> Callable:
-    """`compiled`, and put into its callers: the scene's some hundred array fields are not handed over at every call."""
-    options = {"nogil": True, "error_model": "numpy", "forceinline": True}
+_LEAN = {"nogil": True, "error_model": "numpy", "_nrt": False}
+
+
+def lean(function: Callable) -> Callable:
+    """`compiled` without counting references: a scene is some sixty arrays, and counting them took 60 % of a path's time.
+
+    Nothing may be allocated inside: scratch comes from the caller.
+    """
     try:
-        return njit(cache=True, **options)(function)
+        return njit(cache=True, **_LEAN)(function)
     except RuntimeError:  # numba: no folder for the cache
-        return njit(**options)(function)
+        return njit(**_LEAN)(function)
+
+
+def inlined(function: Callable) -> Callable:
+    """`lean`, and put into its callers: arrays are not handed over at every call."""
+    try:
+        return njit(cache=True, forceinline=True, **_LEAN)(function)
+    except RuntimeError:
+        return njit(forceinline=True, **_LEAN)(function)
+
+
+class Scratch(NamedTuple):
+    """Working memory of one thread."""
+
+    stack: np.ndarray
+    """int64 (STACK_SIZE,)."""
+    stack_distance: np.ndarray
+    """float64 (STACK_SIZE,)."""
+    beginning: np.ndarray
+    state: np.ndarray
+    shift: np.ndarray
+    """uint32 (DIMENSIONS,): a first point of the sequence, the present one, and what is added to it (all zero at first)."""
+    xyz: np.ndarray
+    """float64 (3,)."""
+
+
+def scratch() -> Scratch:
+    """Fresh working memory."""
+    words = [np.zeros(DIMENSIONS, np.uint32) for _ in range(3)]
+    return Scratch(np.zeros(STACK_SIZE, np.int64), np.zeros(STACK_SIZE), *words, np.zeros(3))
 
 
 FIRST_CHOICE = 5

@@ -78,6 +78,7 @@ class EyeRun:
             from app.truth import (
                 eye_kernel,
                 eye_lights,
+                eye_optics,
                 eye_scene,
                 eye_start,
                 photon_kernel,
@@ -86,7 +87,7 @@ class EyeRun:
             )
         except ImportError as error:
             raise UserError(f"the eye's reference renderer needs numba ({error}); install it with: pip install numba") from error
-        self._kernel = eye_kernel
+        self._kernel, self._scratch = eye_kernel, eye_optics.scratch
         photons, centre = photon_scene.photon_scene(scene)
         self._scene = eye_scene.with_upsampled_mirrors(photons, scene)
         self._camera = photon_scene.eye(scene.camera, width, height, centre)
@@ -147,7 +148,7 @@ class EyeRun:
     def _trace_part(self, part: int, count: int) -> None:
         self._kernel.trace_eye(
             self._scene, self._camera, self._lights, self._spectra, self._pictures, self._tables, self._start,
-            self._sequences[part], int(self.units[part]), count, self._max_depth, self.sums[part], self.tallies[part],
+            self._sequences[part], int(self.units[part]), count, self._max_depth, self.sums[part], self.tallies[part], self._scratch(),
         )  # fmt: skip
         self.units[part] += count
 

@@ -188,10 +188,22 @@ def _coordinates(scene: Scene, photons: PhotonScene, centre: np.ndarray, texture
 
 
 @inlined
-def _texel(pictures, first, width, height, repeats, x, y):
+def _texel(first, width, height, repeats, x, y):
+    """Number of the texel in column x and row y, wherever these lie."""
     if repeats:
-        return pictures.rgb[first + (y % height) * width + x % width]
-    return pictures.rgb[first + min(max(y, 0), height - 1) * width + min(max(x, 0), width - 1)]
+        return first + (y % height) * width + x % width
+    return first + min(max(y, 0), height - 1) * width + min(max(x, 0), width - 1)
+
+
+@inlined
+def _blend(rgb, a, b, c, d, fx, fy):
+    """Between four texels: a and b above, c and d below."""
+    wa, wb, wc, wd = (1.0 - fx) * (1.0 - fy), fx * (1.0 - fy), (1.0 - fx) * fy, fx * fy
+    return (
+        wa * rgb[a, 0] + wb * rgb[b, 0] + wc * rgb[c, 0] + wd * rgb[d, 0],
+        wa * rgb[a, 1] + wb * rgb[b, 1] + wc * rgb[c, 1] + wd * rgb[d, 1],
+        wa * rgb[a, 2] + wb * rgb[b, 2] + wc * rgb[c, 2] + wd * rgb[d, 2],
+    )  # fmt: skip
 
 
 @inlined
@@ -200,18 +212,12 @@ def picture_at(pictures, which, u, v):
     first, width, height, repeats = pictures.size[which, 0], pictures.size[which, 1], pictures.size[which, 2], pictures.size[which, 3] != 0
     x, y = u * width - 0.5, (1.0 - v) * height - 0.5
     x0, y0 = math.floor(x), math.floor(y)
-    fx, fy = x - x0, y - y0
     column, row = int(x0), int(y0)
-    a = _texel(pictures, first, width, height, repeats, column, row)
-    b = _texel(pictures, first, width, height, repeats, column + 1, row)
-    c = _texel(pictures, first, width, height, repeats, column, row + 1)
-    d = _texel(pictures, first, width, height, repeats, column + 1, row + 1)
-    wa, wb, wc, wd = (1.0 - fx) * (1.0 - fy), fx * (1.0 - fy), (1.0 - fx) * fy, fx * fy
-    return (
-        wa * a[0] + wb * b[0] + wc * c[0] + wd * d[0],
-        wa * a[1] + wb * b[1] + wc * c[1] + wd * d[1],
-        wa * a[2] + wb * b[2] + wc * c[2] + wd * d[2],
-    )  # fmt: skip
+    a = _texel(first, width, height, repeats, column, row)
+    b = _texel(first, width, height, repeats, column + 1, row)
+    c = _texel(first, width, height, repeats, column, row + 1)
+    d = _texel(first, width, height, repeats, column + 1, row + 1)
+    return _blend(pictures.rgb, a, b, c, d, x - x0, y - y0)
 
 
 @inlined
@@ -220,8 +226,7 @@ def beyond(pictures, dx, dy, dz):
     which = pictures.size.shape[0] - 1
     first, width, height = pictures.size[which, 0], pictures.size[which, 1], pictures.size[which, 2]
     if width == 1 and height == 1:
-        rgb = pictures.rgb[first]
-        return float(rgb[0]), float(rgb[1]), float(rgb[2])
+        return float(pictures.rgb[first, 0]), float(pictures.rgb[first, 1]), float(pictures.rgb[first, 2])
     m = pictures.to_local
     lx = m[0, 0] * dx + m[0, 1] * dy + m[0, 2] * dz
     ly = m[1, 0] * dx + m[1, 1] * dy + m[1, 2] * dz
@@ -230,14 +235,7 @@ def beyond(pictures, dx, dy, dz):
     # The angle from both of its sides: acos alone loses the directions near the poles.
     y = math.atan2(math.sqrt(lx * lx + ly * ly), lz) / math.pi * height - 0.5
     x0, y0 = math.floor(x), math.floor(y)
-    fx, fy = x - x0, y - y0
     left, right = int(x0) % width, (int(x0) + 1) % width
     top, bottom = max(int(y0), 0), min(int(y0) + 1, height - 1)
-    a, b = pictures.rgb[first + top * width + left], pictures.rgb[first + top * width + right]
-    c, d = pictures.rgb[first + bottom * width + left], pictures.rgb[first + bottom * width + right]
-    wa, wb, wc, wd = (1.0 - fx) * (1.0 - fy), fx * (1.0 - fy), (1.0 - fx) * fy, fx * fy
-    return (
-        wa * a[0] + wb * b[0] + wc * c[0] + wd * d[0],
-        wa * a[1] + wb * b[1] + wc * c[1] + wd * d[1],
-        wa * a[2] + wb * b[2] + wc * c[2] + wd * d[2],
-    )  # fmt: skip
+    above, below = first + top * width, first + bottom * width
+    return _blend(pictures.rgb, above + left, above + right, below + left, below + right, x - x0, y - y0)

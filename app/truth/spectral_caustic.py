@@ -29,6 +29,7 @@ from app.truth.caustic_windows import (
     within,
 )
 from app.truth.eye_kernel import CausticTables
+from app.truth.eye_optics import scratch
 from app.truth.eye_scene import line_wavelengths
 from app.truth.eye_start import camera_start
 from app.truth.photon_emission import Domain
@@ -146,7 +147,7 @@ class _Build:
         points, which = np.empty((_PILOT, 4)), np.empty((_PILOT, 2), np.int32)
         found = eye_kernel.seen_points(
             self.photons, self.camera, camera_start(self.scene, self.photons), scrambled(self.plan.seed, PARTS + 1, 0),
-            _PILOT, _PILOT_NM, self.plan.max_depth, self.planes.side, points, which,
+            _PILOT, _PILOT_NM, self.plan.max_depth, self.planes.side, points, which, scratch(),
         )  # fmt: skip
         return Seen(points[:found, :3], points[:found, 3], which[:found, 0])
 
@@ -154,7 +155,7 @@ class _Build:
         found = Landed(np.empty((count, 3)), np.empty(count), np.empty((count, 4), np.int32))
         landed = caustic_kernel.land(
             self.photons, self.domains[d], self.colours[d], self.bands[d], self.planes.side, scrambled(self.plan.seed, part, d),
-            first, count, share, self.plan.max_depth, *found,
+            first, count, share, self.plan.max_depth, *found, scratch(),
         )  # fmt: skip
         return Landed(*(values[:landed] for values in found))
 

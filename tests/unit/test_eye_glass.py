@@ -30,7 +30,7 @@ from app.model.scene import (
 )
 from app.model.spectrum import Spectrum, laser
 from app.model.texture import Texture
-from app.truth import eye_answers
+from app.truth import eye_answers, photon_run
 from app.truth.direct_view import seen_directly
 from app.truth.eye_reference import render_eye_reference
 from app.truth.eye_run import EyePicture, EyeRun
@@ -192,6 +192,11 @@ def caustic_scene(*more: SceneObject) -> Scene:
     return scene_of(light, prism, plate(size=8.0), *more, camera=camera)
 
 
+@pytest.fixture(autouse=True)
+def short_pilot(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(photon_run, "_PILOT_PHOTONS", 1 << 14)
+
+
 PLAN = CausticPlan(photons=1 << 18, bins=40)
 
 
@@ -227,14 +232,14 @@ def busy_scene() -> Scene:
 
 
 def test_nested_and_smooth_glass_throws_the_light_references_light() -> None:
-    """Both tracers' loops are written apart. Sums over what is seen directly agree to 1 %, blocks to 8 % of the brightest (a focus of few texels)."""
+    """Both tracers' loops are written apart. Sums over what is seen directly agree to 2 %, blocks to 8 % of the brightest (a focus of few texels)."""
     scene = busy_scene()
-    caustic = build_caustic(scene, 36, 24, replace(PLAN, photons=1 << 19, texel_size=0.02))
+    caustic = build_caustic(scene, 36, 24, replace(PLAN, photons=1 << 18, texel_size=0.02))
     lit, dark = (render_eye_reference(scene, 36, 24, samples=256, caustic=c).xyz for c in (caustic, None))
     seen = seen_directly(scene, 36, 24)[..., None]
-    light = render_reference(scene, 36, 24, photons=1 << 20).xyz() * seen
+    light = render_reference(scene, 36, 24, photons=1 << 19).xyz() * seen
     mine = (lit - dark) * seen
-    np.testing.assert_allclose(mine.sum(axis=(0, 1)), light.sum(axis=(0, 1)), rtol=0.01)
+    np.testing.assert_allclose(mine.sum(axis=(0, 1)), light.sum(axis=(0, 1)), rtol=0.02)
     blocks = [p.reshape(6, 4, 9, 4, 3).mean(axis=(1, 3)) for p in (mine, light)]
     np.testing.assert_allclose(blocks[0], blocks[1], atol=0.08 * blocks[1].max())
 
@@ -244,18 +249,18 @@ def test_a_caustic_behind_a_pane_of_air_is_the_same() -> None:
     pane = place(primitives.box((8.0, 8.0, 0.02)), Dielectric(constant_index(1.0)), (0.0, 0.0, 3.4))
     scene, behind = caustic_scene(), caustic_scene(pane)
     caustic = build_caustic(scene, 24, 16, PLAN)
-    straight = render_eye_reference(scene, 24, 16, samples=2048, caustic=caustic)
+    straight = render_eye_reference(scene, 24, 16, samples=1024, caustic=caustic)
     through = EyeRun(behind, 24, 16, caustic=replace(caustic, tables=caustic.tables._replace(side=np.vstack([caustic.tables.side, [[-1, -1]]]).astype(np.int32))))
-    while through.samples < 2048:
+    while through.samples < 1024:
         through.advance()
     picture = through.picture()
     # The pane is below the camera and above the beam, so it hides nothing that is lit.
-    # A caustic has dark places where few samples find light, so blocks are compared: to 2 % of the brightest.
+    # A caustic has dark places where few samples find light, so blocks are compared: to 3 % of the brightest.
     blocks = [p.xyz.reshape(8, 2, 12, 2, 3).mean(axis=(1, 3)) for p in (picture, straight)]
-    np.testing.assert_allclose(blocks[0], blocks[1], atol=0.02 * blocks[1].max())
+    np.testing.assert_allclose(blocks[0], blocks[1], atol=0.03 * blocks[1].max())
     error = np.sqrt((picture.variance + straight.variance).sum(axis=(0, 1)))
     total = straight.xyz.sum(axis=(0, 1))
-    assert (error < 0.01 * total).all()
+    assert (error < 0.015 * total).all()
     assert (np.abs(picture.xyz.sum(axis=(0, 1)) - total) < 4.5 * error).all()
 
 
