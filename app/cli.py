@@ -16,7 +16,7 @@ from typer.core import TyperGroup
 from app import __version__
 from app import cli_options as options
 from app.errors import UserError
-from app.model.settings import METHODS
+from app.model.settings import EYE_METHODS, METHODS
 
 
 class _Interrupted(Exception):
@@ -90,6 +90,7 @@ def render(
     seconds: Annotated[Text, typer.Option(metavar="S", help="Emit photons for this long instead.")] = None,
     seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
     method: Annotated[Text, typer.Option(metavar="NAME", help=f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.")] = None,
+    eye_method: Annotated[Text, typer.Option("--eye-method", metavar="NAME", help=f"The same for the camera's rays: {', '.join(EYE_METHODS)}; default: as --method.")] = None,
     layer: Annotated[Text, typer.Option(metavar="LAYER", help="beauty (default), caustic, or map:RECEIVER.")] = None,
     bins: Annotated[Text, typer.Option(metavar="N", help=f"Keep {options.MIN_BINS} to {options.MAX_BINS} spectral bins (written to .exr).")] = None,
     exposure: Annotated[Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than automatic; .png only.")] = None,
@@ -102,7 +103,7 @@ def render(
     from app.cli_render import RenderRequest, render_command
 
     request = RenderRequest(
-        scene, output, size, photons, seconds, seed, method, layer, bins, exposure, max_depth, spp, batch, stats
+        scene, output, size, photons, seconds, seed, method, eye_method, layer, bins, exposure, max_depth, spp, batch, stats
     )
     raise typer.Exit(render_command(request))
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from app.errors import UserError, nearest_names, suggestion
 from app.model.scene import Diffuse, Scene
-from app.model.settings import METHODS
+from app.model.settings import EYE_METHODS, METHODS
 from app.paths import assets_dir
 
 MAX_SIDE_PX = 16384
@@ -109,6 +109,14 @@ def parse_method(text: str) -> str:
     if text not in METHODS:
         hint = suggestion(text, METHODS)
         raise UserError(f"--method '{text}' is unknown{hint or ','} known are {', '.join(METHODS)}")
+    return text
+
+
+def parse_eye_method(text: str) -> str:
+    """One of those that camera rays may follow."""
+    if text not in EYE_METHODS:
+        hint = suggestion(text, EYE_METHODS)
+        raise UserError(f"--eye-method '{text}' is unknown{hint or ','} known are {', '.join(EYE_METHODS)}")
     return text
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,6 +27,17 @@ Progress = Callable[[float, str], None]
 Cancelled = Callable[[], bool]
 
 
+@dataclass(frozen=True)
+class EyeStats:
+    """What the eye half did."""
+
+    samples: int = 0
+    """A pixel."""
+    bands: int = 1
+    """Stretches of the spectrum that samples took turns in."""
+    fallbacks: Mapping[str, int] = field(default_factory=dict)
+
+
 @dataclass
 class RenderStats:
     """What was done, for the summary line and `--stats`."""
@@ -40,6 +51,7 @@ class RenderStats:
     atlas_size: tuple[int, int] = (0, 0)
     bytes: int = 0
     map_flux_w: float = 0.0
+    eye: EyeStats = EyeStats()
 
     @property
     def photons(self) -> int:
@@ -65,6 +77,7 @@ class RenderStats:
             "fall-backs          " + ", ".join(f"{name} {count}" for name, count in tally.fallbacks.items())
             + f", splat_footprint_dropped {self.light.footprints_dropped} ({self.light.dropped_w / max(tally.ended['deposited'], 1e-300):.1e} of what was deposited)",
             "bands × points      " + ", ".join(f"{name} {count} × {self.light.light_points[name]}" for name, count in self.light.bands.items()),
+            f"eye                 {self.eye.samples} samples a pixel in {self.eye.bands} bands; " + ", ".join(f"{name} {count}" for name, count in self.eye.fallbacks.items()),
             f"maps                {self.atlas_size[0]}×{self.atlas_size[1]} texels, buffers {self.bytes / 2**20:.0f} MiB",
             f"seconds             prepare {self.prepare_seconds:.2f}, emit and trace {self.light.trace_seconds:.2f}, "
             f"splat {self.light.splat_seconds:.2f}, eye {self.eye_seconds:.2f}, all {self.seconds:.2f}",
@@ -123,7 +136,7 @@ def _render(context: Context, scene: Scene, settings: RenderSettings, progress: 
         if settings.layer.startswith("map:"):
             rgb, spectral = _map_layer(light)
         else:
-            rgb, spectral = _eye_layer(context, scene, settings, buffers, light, progress, cancelled)
+            rgb, spectral = _eye_layer(context, scene, settings, buffers, light, stats, progress, cancelled)
         stats.eye_seconds = time.perf_counter() - eye_started
         stats.seconds = time.perf_counter() - started
         if settings.tally:
@@ -186,11 +199,21 @@ def _map_layer(light: LightHalf) -> tuple[np.ndarray, np.ndarray | None]:
     return channels.to_rgb709(texels), channels.to_spectral(texels)
 
 
+def eye_features(scene: Scene, settings: RenderSettings) -> Features:
+    """What the camera's rays need: those of its own method, where it has one."""
+    method = settings.eye_method or settings.method
+    return Features.of(scene, replace(settings, method="stochastic" if method == "stochastic-point" else method))
+
+
 def _eye_layer(
-    context: Context, scene: Scene, settings: RenderSettings, buffers: SceneBuffers, light: LightHalf, progress: Progress, cancelled: Cancelled
+    context: Context, scene: Scene, settings: RenderSettings, buffers: SceneBuffers, light: LightHalf, stats: RenderStats, progress: Progress, cancelled: Cancelled
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """The camera's picture and, where asked for, its spectral bins."""
-    eye = EyePass(context, buffers, settings.layer, light.reflectances, light.map_channels)
+    own = None
+    if (settings.eye_method or settings.method) != settings.method:
+        features = eye_features(scene, settings)
+        own = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+    eye = EyePass(context, own or buffers, settings.layer, light.reflectances, light.map_channels)
     maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
     try:
         # A stop asked for while tracing still wants a picture: only the first sample is owed then.
@@ -198,11 +221,15 @@ def _eye_layer(
         stop_at_once = cancelled()
         if not stop_at_once:
             # Every stretch of the spectrum has its turn equally often.
-            samples = -(-samples // bands) * bands if (bands := eye.choose_bands(scene.camera, settings.width, settings.height, samples, maps)) > 1 else samples
+            bands = eye.choose_bands(scene.camera, settings.width, settings.height, samples, maps)
+            samples = -(-samples // bands) * bands
         eye.run(
             scene.camera, settings.width, settings.height, 1 if stop_at_once else samples, 0, maps, settings.seed,
             lambda fraction: progress(0.9 + 0.1 * fraction, "looking"), None if stop_at_once else cancelled,
         )
+        stats.eye = EyeStats(eye.samples_taken, eye.bands, eye.fallbacks if settings.tally else {})
         return eye.read_rgb(), eye.read_spectral() if light.bin_edges_nm is not None else None
     finally:
         eye.release()
+        if own is not None:
+            own.release()

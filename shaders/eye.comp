@@ -267,25 +267,11 @@ void main()
             return;
         }
 #endif
-        int taps = 1;
-#ifdef SPECTRAL_SWEEP
-        if (path.narrowed) taps = taps_of(path, met ? hit.distance : FAR_DISTANCE);
-#endif
 #if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
-        if (!path.recut) {
-            vec2 width = sample_width(path);
-            float step_x = (path.band.z - path.band.x) / float(taps);
-            for (int i = 0; i < taps; ++i) {
-                vec3 position = path.position, direction = path.direction;
-#ifdef SPECTRAL_SWEEP
-                if (taps > 1) ray_at(path, path.band.x + (float(i) + 0.5) * step_x, position, direction);
-#endif
-                add_lights(path, path.band.x + float(i) * step_x, path.band.x + float(i + 1) * step_x, position, direction, met ? hit.distance : FAR_DISTANCE, width);
-            }
-        }
+        WHEN(!path.recut) add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
         bool ends = !met || kind == KIND_DIFFUSE;
-        WHEN(ends) add_end(path, met, hit, pixel_key, taps);
+        WHEN(ends) add_end(path, met, hit, pixel_key);
         goes_on = false;
 #ifdef EYE_SPECULAR
         bool specular = !ends && kind != KIND_BLACK;

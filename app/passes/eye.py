@@ -242,7 +242,7 @@ class EyePass:
     @property
     def samples_taken(self) -> int:
         """Samples that every pixel has."""
-        return int(self._samples_of_row.min(initial=0))
+        return int(self._samples_of_row.min()) if len(self._samples_of_row) else 0
 
     def read_rgb(self) -> np.ndarray:
         """Linear Rec.709 radiance, float32 (H, W, 3), lm/(sr unit²) per channel of white; row 0 on top."""

@@ -34,10 +34,8 @@ Seen seen_on(EyePath path, Hit hit, Triangle facet, vec3 position, vec3 directio
 }
 
 #ifdef HAS_TEXTURES
-void apply_texture(inout Seen seen, Triangle facet)
+void apply_texture(inout Seen seen, Triangle facet, uint number)
 {
-    uint number = object_at(seen.object).texture;
-    if (number == NONE) return;
     Picture record = pictures[number];
     vec3 gradient_u, gradient_v;
     uv_gradients(record, seen.source, facet.edge1, facet.edge2, gradient_u, gradient_v);
@@ -145,13 +143,9 @@ vec4 bin_reflectance(vec3 colour, int target)
 }
 #endif
 
-// Irradiance by what glass and mirrors threw here.
-void add_caustic(EyePath path, Seen seen, Stretch stretch)
+// Irradiance by what glass and mirrors threw at a place of a map.
+void add_caustic_at(EyePath path, Seen seen, Stretch stretch, uint receiver, uint placement, vec2 texel)
 {
-    uint placement;
-    vec2 texel;
-    uint receiver = object_at(seen.object).receiver;
-    if (!find_texel(receiver, seen.source, seen.position, placement, texel)) return;
     // Texels larger than pixels are interpolated, smaller ones weighed by their share of the sample.
     vec3 row_u = placements[placement].row_u.xyz, row_v = placements[placement].row_v.xyz;
     vec2 box = vec2(0.0);
@@ -192,6 +186,16 @@ void add_caustic(EyePath path, Seen seen, Stretch stretch)
             radiance[t] += factors[t] * scale * reflectance * map_to_channels(values[t]);
         }
     }
+}
+
+// Irradiance by what glass and mirrors threw here, where a map covers it.
+void add_caustic(EyePath path, Seen seen, Stretch stretch)
+{
+    uint placement;
+    vec2 texel;
+    uint receiver = object_at(seen.object).receiver;
+    bool covered = find_texel(receiver, seen.source, seen.position, placement, texel);
+    WHEN(covered) add_caustic_at(path, seen, stretch, receiver, placement, texel);
 }
 
 #endif

@@ -3,6 +3,22 @@
 #ifndef EYE_TAPS_GLSL
 #define EYE_TAPS_GLSL
 
+#ifdef SPECTRAL_SWEEP
+// Sweep of the path over the distance ahead, in widths of a pixel: how many looks it needs.
+int taps_of(EyePath path, float distance)
+{
+    vec3 p_lo, d_lo, p_hi, d_hi;
+    ray_at(path, path.band.x, p_lo, d_lo);
+    ray_at(path, path.band.z, p_hi, d_hi);
+    float reach = min(distance, 1e4);
+    vec3 sweep = (p_hi - p_lo) + reach * (d_hi - d_lo);
+    sweep -= dot(sweep, path.direction) * path.direction;
+    vec3 side_s = path.dposition[0] + reach * path.ddirection[0], side_t = path.dposition[1] + reach * path.ddirection[1];
+    float pixel = sqrt(max(length(cross(side_s, side_t)), 1e-20));
+    return clamp(int(ceil(length(sweep) / pixel * TAPS_PER_PIXEL)), 1, int(p.most_taps));
+}
+#endif
+
 // Radiance from infinitely far away, as coefficients of the reflectance basis.
 vec3 sky_colour(vec3 direction, vec3 ddirection[3])
 {
@@ -34,43 +50,55 @@ void add_sky(EyePath path, Stretch stretch, vec3 direction, vec3 sweep)
 }
 
 #ifdef VISIBLE_LIGHTS
-// Lights that can be seen over the distance `far`; edges are as soft as what the ray stands for is wide.
-void add_lights(EyePath path, float lo, float hi, vec3 position, vec3 direction, float far, vec2 width)
-{
-    for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
-        float seen = lights[i].measure > 0.0 ? light_seen(lights[i], position, direction, far, width) : 0.0;
-        WHEN(seen > 0.0) add_colour(path, stretch_of(path, lo, hi), uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), vec3(seen));
-    }
-}
-
 // Diameter of what a sample stands for: where its ray starts (GPU units), and how that grows with distance.
 vec2 sample_width(EyePath path)
 {
     return p.sample_side * sqrt(vec2(length(cross(path.dposition[0], path.dposition[1])), length(cross(path.ddirection[0], path.ddirection[1]))));
 }
+
+// Lights that can be seen over the distance `far`; edges are as soft as what the ray stands for is wide.
+void add_lights(EyePath path, float far)
+{
+    vec2 width = sample_width(path), sweep = vec2(0.0);
+    int taps = 1;
+#ifdef SPECTRAL_SWEEP
+    if (path.narrowed) {
+        vec3 p_lo, d_lo, p_hi, d_hi;
+        ray_at(path, path.band.x, p_lo, d_lo);
+        ray_at(path, path.band.z, p_hi, d_hi);
+        sweep = vec2(distance(p_lo, p_hi), distance(d_lo, d_hi));
+        taps = taps_of(path, far);
+    }
+#endif
+    // Few rays come near a light: only they look along their sweep.
+    bool near = false;
+    for (uint i = 0u; i < uint(LIGHT_COUNT); ++i)
+        near = near || (lights[i].measure > 0.0 && light_seen(lights[i], path.position, path.direction, far, 2.0 * (width + sweep)) > 0.0);
+    float step_x = (path.band.z - path.band.x) / float(taps);
+    for (int tap = 0; tap < taps && near; ++tap) {
+        vec3 position = path.position, direction = path.direction;
+#ifdef SPECTRAL_SWEEP
+        if (taps > 1) ray_at(path, path.band.x + (float(tap) + 0.5) * step_x, position, direction);
+#endif
+        Stretch stretch = stretch_of(path, path.band.x + float(tap) * step_x, path.band.x + float(tap + 1) * step_x);
+        for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
+            float seen = lights[i].measure > 0.0 ? light_seen(lights[i], position, direction, far, width + sweep / float(taps)) : 0.0;
+            WHEN(seen > 0.0) add_spectrum(path, stretch, uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), seen);
+        }
+    }
+}
 #endif
 #endif
 
-#ifdef SPECTRAL_SWEEP
-// Sweep of the path over the distance ahead, in widths of a pixel: how many looks it needs.
-int taps_of(EyePath path, float distance)
-{
-    vec3 p_lo, d_lo, p_hi, d_hi;
-    ray_at(path, path.band.x, p_lo, d_lo);
-    ray_at(path, path.band.z, p_hi, d_hi);
-    float reach = min(distance, 1e4);
-    vec3 sweep = (p_hi - p_lo) + reach * (d_hi - d_lo);
-    sweep -= dot(sweep, path.direction) * path.direction;
-    vec3 side_s = path.dposition[0] + reach * path.ddirection[0], side_t = path.dposition[1] + reach * path.ddirection[1];
-    float pixel = sqrt(max(length(cross(side_s, side_t)), 1e-20));
-    return clamp(int(ceil(length(sweep) / pixel * TAPS_PER_PIXEL)), 1, int(p.most_taps));
-}
-#endif
 
 // A path that has met nothing, or a diffuse surface. Without a sweep that is one look. Of a sweep, both ends look first where they arrive: if it is
 // the facet that the path's own wavelength met, so does all between; else every look finds out for itself.
-void add_end(EyePath path, bool met, Hit hit, uint pixel_key, int taps)
+void add_end(EyePath path, bool met, Hit hit, uint pixel_key)
 {
+    int taps = 1;
+#ifdef SPECTRAL_SWEEP
+    if (path.narrowed) taps = taps_of(path, met ? hit.distance : FAR_DISTANCE);
+#endif
     vec3 dp = vec3(0.0), dd = vec3(0.0);
     float step_x = (path.band.z - path.band.x) / float(taps), direct_from = path.band.x;
     bool alike = true;
@@ -136,7 +164,8 @@ void add_end(EyePath path, bool met, Hit hit, uint pixel_key, int taps)
             Stretch stretch = stretch_of(path, lo, hi);
             WHEN(i >= 0) {
 #ifdef HAS_TEXTURES
-                apply_texture(seen, facet);
+                uint texture = object_at(seen.object).texture;
+                WHEN(texture != NONE) apply_texture(seen, facet, texture);
 #endif
                 add_caustic(path, seen, stretch);
             }
