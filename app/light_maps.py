@@ -9,6 +9,7 @@ import moderngl
 import numpy as np
 
 from app.gpu.map_atlas import MapAtlas
+from app.gpu.records import RECEIVER
 from app.gpu.shader import Releasable
 from app.model.features import Features
 from app.passes.accumulate import LevelsFold, SeamFold, copy_texture
@@ -26,7 +27,7 @@ class LightMaps:
         self.features = replace(features, nested_windows=any(len(windows) > 1 for windows in layout.windows.values()))
         self.splatter = Splatter(ctx, self.features)
         self.atlas = MapAtlas(ctx, layout.size, layout.placements, features.targets)
-        self.receivers = ctx.buffer(np.ascontiguousarray(layout.receivers).tobytes())
+        self.receivers = ctx.buffer(np.ascontiguousarray(layout.receivers if len(layout.receivers) else RECEIVER.zeros(1)).tobytes())
         self.photon_weight = 0.0
         """What was deposited is energy times this."""
         self._resolved = [ctx.texture(self.atlas.size, 4, dtype="f4") for _ in range(features.targets)]

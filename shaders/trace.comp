@@ -221,7 +221,9 @@ void main()
             photon.x_hi = ray.x_hi;
             photon.throughput = ray.throughput;
             photon.x_anchor = ray.x_anchor;
+#ifdef LOOSE_TRIANGLES
             photon.triangle = facet.source;
+#endif
             photon.receiver = thing.receiver;
             photon.photon_id = ray.photon_id;
             photon.light_and_source = ray.light_and_source;

@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "spectral columns": ("variable_step", "index_ratio_derivative", "medium_slope", "dposition_dvar0", "spectral_variable", "VARIABLE_ROW"),
     "shared spectral variable": ("SLOPE_ROW",),
-    "weights over the band": ("crossing_indices",),
+    "weights over the band": (r"crossing_indices\(crossing, x3", r"cosine2\.x <= 0\.0"),
     "band cuts": ("anchor_at", "passes_x", "MIN_CUT_BAND", "FELL_BAND", "is_cut", "energy_below"),
-    "spatial columns": ("transfer_column", "reflect_column", "refract_column", "ddirection"),
+    "spatial columns": (r"ray\.dposition\[c\]\.xyz = transfer_column", r"photon\.dposition_ds = ray", r"ray\.ddirection\[0\]\.xyz = "),
     "refraction": ("refract_direction", "fresnel_reflectance", "transmitted_cosine2", "medium_index", "cross_boundary", "cross_glass", "INDEX_ROW"),
-    "mirrors": ("KIND_MIRROR",),
-    "interpolated normals": ("corner_normal", "smooth_facet", "summed", "NORMALS_AT"),
-    "normal derivatives": ("barycentric_gradients", "normalised_derivative", "normal_columns", "dsummed"),
-    "absorption": ("medium_weight_row", "alpha", "filling"),
+    "mirrors": (r"\(kind == KIND_MIRROR\) ",),
+    "interpolated normals": ("corner_normal", "smooth_facet", "summed", "NORMALS_AT", "normalised_derivative", "dsummed"),
+    "normal derivatives": ("normal_columns",),
+    "absorption": ("medium_weight_row", "alpha", "filling", "ABSORPTION_ROW"),
     "medium stack": ("medium_of", "stack_objects", "STACK_OBJECTS", "mask_before"),
     "triangle tree": ("intersect_tree", "box_entry", "LEAF_BIT", "TREE_AT", "TREE_STACK"),
     "half-space solids": ("intersect_solid", "planes", "solids", "SOLID_COUNT"),
@@ -38,9 +38,13 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "nested windows": ("only_fine", "outer"),
     "local gain": ("gain_boxes", "local_gain"),
     "photons by index": ("traced_bands", "v_path"),
+    "eye refraction": ("meet_surface", "reflect_path", "Facing", "waiting", "waits", "listed"),
+    "eye spectral taps": ("narrow", "taps_of", "thetas", "cut_of"),
+    "spectral maps": ("BIN_ROW", "BIN_SPECTRUM_ROW", "BIN_TARGET"),
     "spectral bins": ("define TARGETS [2-9]", "define TARGETS 1[0-9]"),
 }
-"""By `explain`'s names. Names that only this feature uses; one with a space is a pattern for a line."""
+"""By `explain`'s names. Names that only this feature uses; one with a space is a pattern for a line, where the eye, whose rays always carry
+a pixel's columns and weights over a band, uses a name that in the light half belongs to a feature."""
 _PHOTONS = 4096
 
 

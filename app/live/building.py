@@ -57,7 +57,7 @@ def build(
     width, height = quick_size(wanted.width, wanted.height)
     settings = RenderSettings(
         width=width, height=height, method=wanted.method, seed=wanted.seed, smoothing=wanted.smoothing,
-        max_depth=wanted.scene.render.max_depth, batch=budget.batch, local_gain=wanted.local_gain, anchor_weights=True,
+        max_depth=wanted.scene.render.max_depth, batch=budget.batch, local_gain=wanted.local_gain, anchor_weights=True, any_view=True,
     )  # fmt: skip
     scene = replace(wanted.scene, camera=wanted.camera)
     features = Features.of(scene, settings)

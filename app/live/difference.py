@@ -14,7 +14,14 @@ import numpy as np
 
 from app.live.inputs import LiveInputs, Redo
 from app.model.glass import Dispersion
-from app.model.scene import Dielectric, Diffuse, Light, Scene, SceneObject
+from app.model.scene import (
+    Dielectric,
+    Diffuse,
+    Light,
+    Material,
+    Scene,
+    SceneObject,
+)
 
 SAME_INDEX = 1e-6
 """Difference in n_d up to which a glass keeps the paths."""
@@ -62,7 +69,8 @@ def _scene(old: Scene, new: Scene) -> Redo:
             cost = max(cost, _objects(a, b))
         elif item.name == "lights":
             cost = max(cost, _lights(a, b))
-        elif item.name == "background_rgb":
+        elif item.name in ("background_rgb", "environment"):
+            # They light nothing. Environments are compared by identity: a new one is another one.
             cost = max(cost, Redo.LOOK if a != b else Redo.NOTHING)
         elif item.name == "render":
             cost = max(cost, Redo.BUILD if a.max_depth != b.max_depth else Redo.NOTHING)
@@ -94,8 +102,10 @@ def _object(old: SceneObject, new: SceneObject) -> Redo:
     if type(a) is not type(b):
         return Redo.BUILD
     if isinstance(a, Diffuse) and isinstance(b, Diffuse):
-        if a.reflectance is None and b.reflectance is None:
-            return max(cost, Redo.LOOK if a.reflectance_rgb != b.reflectance_rgb else Redo.NOTHING)
+        if a.reflectance is None and b.reflectance is None and (a.texture is None) == (b.texture is None):
+            # Another picture is only looked at; whether there is one, the objects' records on the device know.
+            same = a.reflectance_rgb == b.reflectance_rgb and a.texture is b.texture
+            return max(cost, Redo.NOTHING if same else Redo.LOOK)
         return Redo.BUILD
     if isinstance(a, Dielectric) and isinstance(b, Dielectric):
         same_absorption = a.absorption is b.absorption or (
@@ -163,10 +173,19 @@ def _light(old: Light, new: Light) -> Redo:
 
 
 def looks_other(old: LiveInputs, new: LiveInputs) -> bool:
-    """Whether colours or lights that the eye sees directly differ: its rays follow n_d, so a dispersion alone changes nothing there."""
-    if old.solo_nm != new.solo_nm or old.scene.background_rgb != new.scene.background_rgb:
+    """Whether what the eye sees without the maps differs: colours, lights, what lies behind everything, glass that bends its own rays otherwise."""
+    a, b = old.scene, new.scene
+    if old.solo_nm != new.solo_nm or a.background_rgb != b.background_rgb or a.environment is not b.environment:
         return True
-    if old.scene.lights is not new.scene.lights and any(a is not b for a, b in zip(old.scene.lights, new.scene.lights, strict=True)):
+    if a.lights is not b.lights and any(x is not y for x, y in zip(a.lights, b.lights, strict=True)):
         return True
-    pairs = zip(old.scene.objects, new.scene.objects, strict=True)
-    return any(a.material is not b.material and not (isinstance(a.material, Dielectric) and isinstance(b.material, Dielectric)) for a, b in pairs)
+    return any(_material_looks_other(x.material, y.material) for x, y in zip(a.objects, b.objects, strict=True))
+
+
+def _material_looks_other(old: Material, new: Material) -> bool:
+    if old is new:
+        return False
+    if isinstance(old, Dielectric) and isinstance(new, Dielectric):
+        # The rest of a glass is traced anew before it is looked at.
+        return old.dispersion != new.dispersion
+    return True

@@ -77,6 +77,8 @@ class LiveEngine:
         self._rays_before = 0
         self._quick_photons = 1 << 13
         self._shows_quick_maps = False
+        self._maps_wait = False
+        """Better maps are there, but the eye is within a cycle of bands."""
         self._times = {"trace": 0.0, "splat": 0.0, "eye": 0.0}
         self._history: list[tuple[float, int, float]] = []
         self._published_photons = 0.0
@@ -160,6 +162,8 @@ class LiveEngine:
             owed = ANSWER_S if self._eye.is_coarse else 0.25 * budget_s
             end = max(deadline, time.perf_counter() + owed) if self._eye.owes_picture else deadline
             self._times["eye"] += self._eye.advance(end, one_sample=self._interacting)
+            if self._last_maps_wait and not self._eye.is_within_cycle:
+                self._publish_maps()
             calm = not self._interacting and time.perf_counter() - self._changed_at > CALM_S
             if calm and self._eye.is_coarse and not self._eye.owes_picture:
                 self._restart_eye(same_view=True)
@@ -220,7 +224,6 @@ class LiveEngine:
             else:
                 self._urgent = wanted is not self._being_built
             cost = Redo.LOOK if self._only_camera_besides(wanted) else Redo.NOTHING
-        same_size = (wanted.width, wanted.height) == (self._inputs.width, self._inputs.height)
         if cost == Redo.SPLAT:
             shown.light.show(wanted)
             shown_before, self._inputs = self._inputs, wanted
@@ -238,7 +241,7 @@ class LiveEngine:
                 self._inputs = replace(self._inputs, camera=wanted.camera, width=wanted.width, height=wanted.height)
         else:
             return
-        self._restart_eye(same_view=False, resized=not same_size)
+        self._restart_eye(same_view=False)
 
     def _answer_quickly(self, seconds: float) -> None:
         """As many stored photons as can be splatted in about `seconds`, in coarse maps of their own, as the picture for now."""
@@ -257,12 +260,13 @@ class LiveEngine:
         assert self._inputs is not None
         return wanted.camera != self._inputs.camera or (wanted.width, wanted.height) != (self._inputs.width, self._inputs.height)
 
-    def _restart_eye(self, *, same_view: bool, resized: bool = False) -> None:
+    def _restart_eye(self, *, same_view: bool, finer_maps: bool = False) -> None:
         if self._maps is None or self._inputs is None:
             return
         # One coarse answer now; `advance` asks again in full size when things are still.
         seconds = None if same_view else 0.012 if self.context.is_software else 0.004
-        self._eye.restart(self._inputs.camera, self._inputs.width, self._inputs.height, self._maps, seconds=seconds, same_view=same_view)
+        view = self._inputs.camera, self._inputs.width, self._inputs.height
+        self._eye.restart(*view, self._maps, seconds=seconds, same_view=same_view, finer_maps=finer_maps)
 
     # ---- building ----------------------------------------------------------------------------
 
@@ -295,7 +299,7 @@ class LiveEngine:
             built.light.release()
             raise
         before, self._shown = self._shown, built
-        self._building, self._repair, self._job = None, None, built.steps
+        self._building, self._repair, self._job, self._maps_wait = None, None, built.steps, False
         self._inputs, self._being_built = built.traced, None
         if before is not None:
             self._rays_before += before.light.trace.rays_traced
@@ -309,7 +313,7 @@ class LiveEngine:
 
     def _look_at(self, inputs: LiveInputs, light: LiveLight) -> None:
         scene = replace(solo_scene(inputs.scene, inputs.solo_nm), camera=inputs.camera)
-        self._eye.look_at(light.buffers, scene, light.reflectances)
+        self._eye.look_at(light.buffers, scene, light.reflectances, light.map_channels)
 
     # ---- light -------------------------------------------------------------------------------
 
@@ -334,13 +338,22 @@ class LiveEngine:
         self._history.append((time.perf_counter(), max(stats.photons - before[2], 0), traced + splatted))
 
     def _publish_maps(self) -> None:
-        """The maps as they are become what the eye looks at."""
+        """The maps as they are become what the eye looks at; more photons of the same kind wait until it has seen every band of the spectrum."""
         assert self._shown is not None
-        maps = self._shown.light.maps
+        maps, number = self._shown.light.maps, self._shown.accumulation.number
         assert maps is not None
+        splatted_anew = self._shows_quick_maps or self._repair is not None
+        self._maps_wait = number > 1 and not splatted_anew and not self._interacting and self._eye.is_within_cycle
+        if self._maps_wait:
+            return
         self._set_maps(maps)
         self._shows_quick_maps = False
-        self._restart_eye(same_view=not self._interacting and self._eye.scale == 1.0)
+        self._restart_eye(same_view=not self._interacting and self._eye.scale == 1.0, finer_maps=number <= 1 or splatted_anew)
+
+    @property
+    def _last_maps_wait(self) -> bool:
+        """Maps wait that no further photons will replace."""
+        return self._maps_wait and self._job is None and self._repair is None and not self._shows_quick_maps
 
     def _set_maps(self, maps: LightMaps) -> None:
         self._maps = CausticMaps(maps.resolved_textures(), maps.receivers, maps.atlas.placements, maps.scale)
@@ -367,7 +380,9 @@ class LiveEngine:
     def stats(self) -> LiveStats:
         """This moment's."""
         context, eye = self.context, self._eye
-        common = LiveStats(renderer=context.renderer, is_software=context.is_software, camera_samples=float(eye.shown_samples), resolution_scale=eye.scale)
+        common = LiveStats(
+            renderer=context.renderer, is_software=context.is_software, camera_samples=float(eye.shown_samples), resolution_scale=eye.scale,
+            eye_bands=eye.shown_bands, eye_fallbacks=eye.fallbacks)  # fmt: skip
         if self._shown is None:
             return common
         light = self._shown.light
@@ -394,7 +409,7 @@ class LiveEngine:
     @property
     def is_idle(self) -> bool:
         """Nothing is left to do until an input changes."""
-        waits = self._building is not None or self._urgent or self._has_work
+        waits = self._building is not None or self._urgent or self._has_work or self._last_maps_wait
         refines = self._shown is not None and self.refine_when_still and self._shown.light.first_order
         unjudged = self._shown is not None and self._wanted is not None and not is_judged(self._shown.light, self._wanted)
         return self._wanted is None or not (waits or refines or unjudged or not self._eye.is_done)

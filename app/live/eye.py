@@ -2,6 +2,10 @@
 
 A picture is published when every pixel has a whole sample. While something moves the picture is as small as one
 sample in the time that is left asks for; once still it starts over in full size and is refined.
+
+Where glass disperses, a sample of a fine picture sees one band of the spectrum only, and such a picture is whole after as many
+samples as there are bands; before that it has grain in all colours. So one sample of the whole spectrum, coarser
+along it but smooth, comes first, alone in motion; pictures of bands are shown after whole cycles only.
 """
 
 from __future__ import annotations
@@ -15,7 +19,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.gpu import shader
-from app.passes.eye import CausticMaps, EyePass
+from app.gpu.map_channels import MapChannels
+from app.gpu.texture_store import TextureStore
+from app.passes.eye import MOST_TAPS, CausticMaps, EyePass
 
 if TYPE_CHECKING:
     import moderngl
@@ -29,8 +35,11 @@ SCALES = (1.0, 0.5, 1 / 3, 0.25, 1 / 6, 0.125)
 DISPATCH_SECONDS = 0.008
 SETTLED = 8
 """Samples at most that a better map waits for before its picture replaces the one shown."""
+MOVING_TAPS = 8
+"""Looks along one spectral sweep at most, in a picture that must be there at once."""
 _FIRST_RATE = 0.5e6
 """Pixels per second before anything was measured: slow, so that the first picture comes at once."""
+_RATE_BLEND = 0.3
 
 
 class LiveEye:
@@ -40,97 +49,202 @@ class LiveEye:
         self._context = context
         self.target_samples = target_samples
         self._pass: EyePass | None = None
+        self._pictures: TextureStore | None = None
         self._average = shader.compute(context.ctx, "average.comp")
         self._steps: Iterator[float] | None = None
+        self._choosing: Iterator[float] | None = None
         self._maps: CausticMaps | None = None
         self._camera: Camera | None = None
         self._size = (0, 0)
+        self._is_quick = False
+        """The picture that runs is an answer to a movement."""
+        self._is_smooth = False
+        """It is the one sample of the whole spectrum that comes before bands."""
+        self._bands: int | None = None
+        """Stretches of the spectrum that this view of this scene needs; None until that is found out."""
+        self._bands_view: object = None
         self._taken = 0
-        self._publish_from = 1
-        self._rate = _FIRST_RATE
+        self._publish_from = self._settled = 1
+        """Samples from which on this picture replaces the one shown, and those that it has."""
+        self._owes = False
+        self._shows_whole = False
+        """What is shown is no answer to a movement and no mere first sample."""
+        self._rates: dict[bool, float] = {}
+        """Pixels per second, of quick pictures and of others."""
         self.picture: moderngl.Texture | None = None
         """RGBA32F, linear Rec.709, top row first; None before the first sample."""
         self.shown_samples = 0
+        self.shown_bands = 1
+        """Stretches of the spectrum that the shown picture is made of."""
+        self.fallbacks: dict[str, int] = {}
+        """What `EyePass.fallbacks` counted up to the shown picture."""
         self.version = 0
         """Counts what was published."""
         self.scale = 1.0
         self._wanted_scale = 1.0
 
-    def look_at(self, buffers: SceneBuffers, scene: Scene, reflectances: list[np.ndarray | None]) -> None:
-        """Take the scene as it is shown: `buffers` hold its geometry, `scene` its colours and lights."""
+    def look_at(self, buffers: SceneBuffers, scene: Scene, reflectances: list[np.ndarray | None], maps: MapChannels) -> None:
+        """Take the scene as it is shown: `buffers` hold its geometry, `scene` its colours, glass, lights and pictures; `maps` is what caustic maps hold.
+
+        Raises `ShaderError`, and `UserError` where pictures do not fit the device; then everything stays as it was."""
         shown = copy.copy(buffers)
         shown.scene = scene
-        before, self._pass = self._pass, EyePass(self._context, shown, "beauty", reflectances)
+        kept, before = self._pictures, self._pass
+        pictures = self._store_of(shown)
+        try:
+            self._pass = EyePass(self._context, shown, "beauty", reflectances, maps, pictures)
+        except BaseException:
+            if pictures is not kept:
+                pictures.release()
+            elif before is not None:
+                kept.follow(before.scene.scene, before.scene.first_triangle, before.scene.corner_turn)
+            raise
+        self._pictures = pictures
         self._pass.dispatch_seconds = DISPATCH_SECONDS
-        self._steps = None
+        self._steps = self._choosing = self._bands = None
         if before is not None:
             before.release()
+        if kept is not None and kept is not pictures:
+            kept.release()
 
-    def restart(self, camera: Camera, width: int, height: int, maps: CausticMaps, *, seconds: float | None = None, same_view: bool = False) -> None:
+    def _store_of(self, shown: SceneBuffers) -> TextureStore:
+        """The textures and the environment on the device: those that are there, unless others are shown."""
+        place = shown.scene, shown.first_triangle, shown.corner_turn
+        if self._pictures is not None and self._pictures.follow(*place):
+            return self._pictures
+        return TextureStore(self._context.ctx, *place)
+
+    def restart(
+        self, camera: Camera, width: int, height: int, maps: CausticMaps, *,
+        seconds: float | None = None, same_view: bool = False, finer_maps: bool = False,
+    ) -> None:  # fmt: skip
         """Start over. `seconds`: be done with one sample in about that time, however small the picture.
 
-        `same_view`: only the maps are better: what is shown stays until the new picture is as smooth.
-        """
+        `same_view`: only the maps are better: what is shown stays until the new picture is as smooth. `finer_maps`: so much
+        better that more bands of the spectrum may be told apart in them."""
+        assert self._pass is not None
         scale = 1.0
         if seconds is not None:
-            scale = next((s for s in SCALES if s * s * width * height <= self._rate * seconds), SCALES[-1])
+            rate = self._rates.get(True, 0.5 * self._rates.get(False, _FIRST_RATE))
+            scale = next((s for s in SCALES if s * s * width * height <= rate * seconds), SCALES[-1])
         self._camera, self._maps = camera, maps
         self._size = max(8, round(width * scale)), max(8, round(height * scale))
         keeps = same_view and self.scale == scale == 1.0
-        self._publish_from = max(1, min(self.shown_samples, SETTLED)) if keeps else 1
-        self._wanted_scale = scale
-        self._taken = 0
-        self._steps = None
+        self._wanted_scale, self._is_quick = scale, seconds is not None
+        view = camera, width, height
+        if finer_maps or view != self._bands_view:
+            self._bands = None
+        self._bands_view = view
+        self._settled = max(1, min(self.shown_samples, SETTLED)) if keeps else 1
+        self._owes = True
+        self._begin(smooth=not self._is_quick and self._needed_bands != 1 and not (keeps and self._shows_whole))
 
     def pause(self) -> None:
         """Leave the maps alone, which are about to go; what is shown stays until `restart`."""
-        self._maps = self._steps = None
+        self._maps = self._steps = self._choosing = None
 
     @property
     def is_coarse(self) -> bool:
-        """The picture asked for last is smaller than what is wanted."""
-        return self._wanted_scale < 1.0
+        """The picture asked for last is less than what is wanted."""
+        return self._wanted_scale < 1.0 or (self._is_quick and self._needed_bands != 1)
 
     @property
     def owes_picture(self) -> bool:
         """Nothing of what was asked for last is shown yet."""
-        return self._maps is not None and self._taken < self._publish_from
+        return self._maps is not None and self._owes
+
+    @property
+    def is_within_cycle(self) -> bool:
+        """Part of the bands of the first whole picture since `restart` are there: with other maps they would be lost."""
+        begun = self._maps is not None and not (self._is_quick or self._is_smooth) and self._cycle > 1
+        return begun and self._taken < self._publish_from
 
     @property
     def is_done(self) -> bool:
         """Every sample is taken, in full size."""
-        return self._maps is None or (self._taken >= self.target_samples and self.scale == 1.0)
+        return self._maps is None or not (self.is_coarse or self._is_smooth or self._choosing or self._taken < self._target)
 
     def advance(self, deadline: float, *, one_sample: bool = False) -> float:
         """Take samples until `deadline` (`time.perf_counter`), `one_sample` not beyond the next published one; returns the seconds it took."""
         started = now = time.perf_counter()
         published = False
-        while now < deadline and self._taken < self.target_samples and not (published and one_sample):
+        while now < deadline and (self._choosing is not None or self._taken < self._target) and not (published and one_sample):
             published = self._step()
             now = time.perf_counter()
         return now - started
 
+    # ---- bands of the spectrum ---------------------------------------------------------------
+
+    @property
+    def _needed_bands(self) -> int | None:
+        """Of a fine picture; None while nobody knows."""
+        assert self._pass is not None
+        if not self._pass.disperses or self._pass.scene.features.random_wavelength:
+            return 1
+        return self._pass.fixed_bands or self._bands
+
+    @property
+    def _cycle(self) -> int:
+        """Samples after which the picture that runs is whole."""
+        return 1 if self._is_quick or self._is_smooth else self._needed_bands or 1
+
+    @property
+    def _target(self) -> int:
+        return 1 if self._is_smooth else self.target_samples + -self.target_samples % self._cycle
+
+    def _begin(self, *, smooth: bool) -> None:
+        """Forget the samples; ask for the number of bands where it is needed first."""
+        assert self._pass is not None and self._camera is not None and self._maps is not None
+        self._is_smooth = smooth
+        self._taken = 0
+        self._steps = self._choosing = None
+        self._publish_from = 1 if smooth else self._settled + -self._settled % self._cycle
+        if not (smooth or self._is_quick) and self._needed_bands is None:
+            self._pass.most_taps = MOST_TAPS
+            self._choosing = self._pass.choosing_bands(self._camera, *self._size, self.target_samples, self._maps)
+
+    # ---- samples -----------------------------------------------------------------------------
+
     def _step(self) -> bool:
         """One dispatch; whether it completed a picture that was published."""
+        if self._choosing is not None:
+            if next(self._choosing, None) is None:
+                assert self._pass is not None
+                self._bands = self._pass.bands
+                self._begin(smooth=False)
+            return False
+        if self._dispatch():
+            return False
+        self._steps = None
+        self._taken += 1
+        if self._taken < self._publish_from or self._taken % self._cycle:
+            return False
+        self._publish()
+        if self._is_smooth:
+            # The picture of bands replaces it in its own time.
+            self._settled = 1
+            self._begin(smooth=False)
+        return True
+
+    def _dispatch(self) -> bool:
+        """A band of rows of one sample; False when the sample has them all."""
         assert self._pass is not None and self._camera is not None and self._maps is not None
         width, height = self._size
         if self._steps is None:
+            self._pass.bands = self._cycle
+            self._pass.most_taps = MOVING_TAPS if self._is_quick or self._is_smooth else MOST_TAPS
             self._steps = self._pass.samples(self._camera, width, height, 1, self._taken, self._maps)
             self._share = 0.0
         started = time.perf_counter()
         share = next(self._steps, None)
-        if share is not None:
-            seconds = time.perf_counter() - started
-            pixels = (share - self._share) * width * height
-            self._share = share
-            if seconds > 1e-4:
-                self._rate += 0.2 * (pixels / seconds - self._rate)
+        if share is None:
             return False
-        self._steps = None
-        self._taken += 1
-        if self._taken < self._publish_from:
-            return False
-        self._publish()
+        seconds = time.perf_counter() - started
+        pixels = (share - self._share) * width * height
+        self._share = share
+        if seconds > 1e-4:
+            rate = self._rates.setdefault(self._is_quick, pixels / seconds)
+            self._rates[self._is_quick] = rate + _RATE_BLEND * (pixels / seconds - rate)
         return True
 
     def _publish(self) -> None:
@@ -145,23 +259,25 @@ class LiveEye:
         self._average["scale"].value = 1.0 / self._taken
         self._average.run(-(-sums.width // 8), -(-sums.height // 8))
         self._context.ctx.memory_barrier()
-        self.shown_samples, self.scale = self._taken, self._wanted_scale
+        self.shown_samples, self.shown_bands, self.scale = self._taken, self._cycle, self._wanted_scale
+        self._shows_whole, self._owes = not (self._is_quick or self._is_smooth), False
+        self.fallbacks = self._pass.fallbacks
         self.version += 1
 
     def release(self) -> None:
         """Free everything."""
         shader.release(self._average)
-        for owned in (self._pass, self.picture):
+        for owned in (self._pass, self._pictures, self.picture):
             if owned is not None:
                 owned.release()
-        self._pass = self.picture = None
+        self._pass = self._pictures = self.picture = None
 
 
 def solo_scene(scene: Scene, wavelength_nm: float | None) -> Scene:
-    """`scene` as seen in the light of one wavelength: lights narrowed, background dark; itself for None."""
+    """`scene` as seen in the light of one wavelength: lights narrowed, what lies behind everything dark; itself for None."""
     if wavelength_nm is None:
         return scene
     from app.live.light import solo
 
     lights = tuple(replace(light, spectral_power=solo(light.spectral_power, wavelength_nm)) for light in scene.lights)
-    return replace(scene, lights=lights, background_rgb=(0.0, 0.0, 0.0))
+    return replace(scene, lights=lights, background_rgb=(0.0, 0.0, 0.0), environment=None)

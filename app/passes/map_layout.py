@@ -14,7 +14,7 @@ import numpy as np
 
 from app.errors import UserError
 from app.gpu.map_atlas import Tile, pack, placement_rows
-from app.gpu.records import NONE, RECEIVER
+from app.gpu.records import NONE, PLACEMENT, RECEIVER
 from app.gpu.scene_buffers import SceneBuffers
 from app.model.camera_rays import camera_rays
 from app.model.features import is_flat
@@ -181,7 +181,7 @@ def _place(scene: Scene, buffers: SceneBuffers, plans, tiles: list[Tile], size: 
             placements.append(placement_rows(own[0], rows, atlas.texel_area, atlas.triangle_rects))
             count += len(atlas.rows)
             charts[receiver] = atlas
-    return MapLayout(size, np.concatenate(placements), receivers, tile_of, {r: w for r, _, w, _ in plans}, charts, tuple(folds))
+    return MapLayout(size, np.concatenate(placements) if placements else PLACEMENT.zeros(1), receivers, tile_of, {r: w for r, _, w, _ in plans}, charts, tuple(folds))
 
 
 def _extent(points: np.ndarray) -> Window:

@@ -44,21 +44,55 @@ def sample_light(lights: Array, position: Array, uniform: Array) -> tuple[Array,
     )
 
 
-def light_seen(lights: Array, position: Array, direction: Array, far: Array) -> Array:
-    """Radiance per unit of the light's quantity that a ray meets within `far`: (N,)."""
+def stretch_seen(offset: Array, half_side: Array, blur: Array) -> Array:
+    """How much of a stretch of half width `half_side` a soft look at `offset` from its middle sees: (N,).
+
+    A trapezoid over `offset` whose sides are 2 `blur` wide; its area is the stretch's, however wide the look."""
+    offset, half_side, blur = np.broadcast_arrays(np.abs(offset), half_side, blur)
+    # Up to `foot` something is seen, from `top` inwards all that ever is.
+    foot = np.maximum(half_side, blur) + blur
+    top = np.where(blur > half_side, 0.0, half_side - blur)
+    height = np.where(blur > half_side, half_side / np.maximum(blur, 1e-300), 1.0)
+    return height * _falling(offset, top, foot)
+
+
+def disc_seen(offset: Array, blur: Array) -> Array:
+    """The same for a disc of radius 1 and a round look: a frustum of the disc's volume, a cone where the look is wider: (N,)."""
+    offset, blur = np.broadcast_arrays(offset, blur)
+    foot, top = np.maximum(1.0, blur) + blur, np.maximum(1.0 - blur, 0.0)
+    # Volume of a frustum of height 1: π/3 (foot² + foot top + top²); it should be the disc's π.
+    return 3.0 / (foot**2 + foot * top + top**2) * _falling(offset, top, foot)
+
+
+def light_seen(lights: Array, position: Array, direction: Array, far: Array, width: Array) -> Array:
+    """Radiance per unit of the light's quantity that a ray meets within `far`: (N,).
+
+    `width` (N, 2): diameter of what the ray stands for, at its start and per unit of distance: edges are as soft."""
     light = _Fields(lights)
     kind = lights["kind"]
-    # The sun's disc: directions towards it whose angle to its middle has a smaller tangent than its rim.
+    # The sun: tangent of the angle to its middle, in radii.
     cosine = -dot(direction, light.axis)
-    sine = np.linalg.norm(np.cross(direction, light.axis), axis=-1)
-    in_sun = (cosine > 0.0) & (sine < cosine * np.linalg.norm(light.half_u, axis=-1))
-    sun = np.where(in_sun & (far >= FAR * (1.0 - 1e-6)), light.measure, 0.0)
+    tangent = np.linalg.norm(np.cross(direction, light.axis), axis=-1) / np.maximum(cosine, 1e-9)
+    radius = np.maximum(np.linalg.norm(light.half_u, axis=-1), 1e-300)
+    before = (cosine > 0.0) & (far >= FAR * (1.0 - 1e-6))
+    sun = np.where(before, light.measure * disc_seen(np.minimum(tangent / radius, 1e6), 0.5 * width[:, 1] / radius), 0.0)
     facing = dot(direction, light.axis)
-    safe = np.where(facing == 0.0, 1.0, facing)
-    distance = dot(light.position - position, light.axis) / safe
-    on_light, _ = _aperture(light, position + distance[:, None] * direction)
-    seen = on_light & (facing < 0.0) & (distance > 0.0) & (distance < far)
-    return np.where(kind == DIRECTIONAL, sun, np.where((kind == AREA) & seen, 1.0, 0.0))
+    distance = dot(light.position - position, light.axis) / np.where(facing == 0.0, 1.0, facing)
+    off = position + distance[:, None] * direction - light.position
+    size_u, size_v = radius, np.maximum(np.linalg.norm(light.half_v, axis=-1), 1e-300)
+    u, v = dot(off, light.half_u) / size_u, dot(off, light.half_v) / size_v
+    blur = 0.5 * np.maximum(width[:, 0] + distance * width[:, 1], 0.0)
+    disc = disc_seen(np.hypot(u, v) / size_u, blur / size_u)
+    rectangle = stretch_seen(u, size_u, blur) * stretch_seen(v, size_v, blur)
+    ahead = (kind == AREA) & (facing < 0.0) & (distance > 0.0) & (distance < far)
+    return np.where(kind == DIRECTIONAL, sun, np.where(ahead, np.where(light.is_disc, disc, rectangle), 0.0))
+
+
+def _falling(offset: Array, top: Array, foot: Array) -> Array:
+    """1 up to `top`, 0 from `foot` on, straight between; a step where both are the same."""
+    span = foot - top
+    slope = np.where(span > 0.0, (foot - offset) / np.where(span > 0.0, span, 1.0), np.where(offset < foot, 1.0, 0.0))
+    return np.clip(slope, 0.0, 1.0)
 
 
 class _Fields:

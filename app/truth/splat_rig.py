@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import moderngl
 import numpy as np
 
-from app.gpu.map_channels import MapChannels
 from app.gpu.map_atlas import MapAtlas, Tile, pack, placement_rows
+from app.gpu.map_channels import MapChannels
 from app.gpu.records import NONE, RECEIVER, photon_record
 from app.gpu.splat_tables import SplatTables
 from app.model import spectrum

@@ -13,7 +13,7 @@ from app.truth.optics import unit
 
 COVERS = {
     "camera.glsl": ("camera_ray", "picture_point"),
-    "lights.glsl": ("sample_light", "light_seen"),
+    "lights.glsl": ("sample_light", "light_seen", "disc_seen", "stretch_seen"),
     "lookup.glsl": ("find_texel", "texel_size", "texel_box", "caustic_irradiance"),
 }
 COUNT = 2048
@@ -75,17 +75,21 @@ def test_lights_as_a_point_and_as_a_ray_see_them(gl, kind: int) -> None:
         aim = rng.uniform(-1.5, 1.5, (COUNT, 1)) * records["half_u"] + rng.uniform(-1.5, 1.5, (COUNT, 1)) * records["half_v"] - records["axis"]
     direction = as_f32(unit(aim.astype(float)))
     far = as_f32(np.where(rng.random(COUNT) < 0.7, 1e30, rng.uniform(0, 3, COUNT)))
+    # A third of the rays are sharp; the others' widths reach from a hair to more than the light.
+    size = np.linalg.norm(records["half_u"], axis=1)
+    width = rng.choice([0.0, 1.0, 1.0], (COUNT, 1)) * 10.0 ** rng.uniform(-3, 0.7, (COUNT, 2)) * size[:, None]
+    width = as_f32(np.where(size[:, None] > 0.0, width, 0.0))
     body = """
     LightSample s = sample_light(lights[row], position, unit);
     toward = s.toward; distance = s.distance; gain = s.gain;
-    seen = light_seen(lights[row], position, direction, far);
+    seen = light_seen(lights[row], position, direction, far, width);
     """
     declared = "layout(std430, binding = 8) readonly buffer Lights { EyeLight lights[]; };"
-    inputs = {"position": position, "unit": uniform, "direction": direction, "far": far}
+    inputs = {"position": position, "unit": uniform, "direction": direction, "far": far, "width": width}
     outputs = {"toward": "vec3", "distance": "float", "gain": "float", "seen": "float"}
     got = evaluate(gl.ctx, ["lib/lights.glsl"], body, inputs, outputs, structs=[EYE_LIGHT], buffers={8: records}, declarations=declared)
     toward, distance, gain = lights.sample_light(records, position, uniform)
-    seen = lights.light_seen(records, position, direction, far)
+    seen = lights.light_seen(records, position, direction, far, width)
     near = distance > 0.05
     assert near.mean() > 0.3
     assert np.abs(got["toward"] - toward)[near].max() < 3e-5
@@ -99,6 +103,30 @@ def test_lights_as_a_point_and_as_a_ray_see_them(gl, kind: int) -> None:
         assert 0.02 < (seen > 0).mean() < 0.9
     else:
         assert not got["seen"].any()
+
+
+def soft_amounts(gl, body: str, offset: np.ndarray, blur: float) -> np.ndarray:
+    """What a soft look at the offsets sees, by the shader."""
+    inputs = {"offset": offset, "blur": np.full(len(offset), blur)}
+    declared = "layout(std430, binding = 8) readonly buffer Lights { EyeLight lights[]; };"
+    got = evaluate(gl.ctx, ["lib/lights.glsl"], body, inputs, {"seen": "float"}, structs=[EYE_LIGHT], buffers={8: EYE_LIGHT.zeros(1)}, declarations=declared)
+    return got["seen"]
+
+
+@pytest.mark.parametrize("blur", [0.0, 0.01, 0.3, 0.99, 1.0, 1.01, 3.0, 40.0])
+def test_a_soft_look_keeps_what_the_light_sends(gl, blur: float) -> None:
+    """Summed over all offsets it is the disc's area, or the stretch's length, however wide the look: no light is lost in small far lamps."""
+    edge = max(1.0, blur) + blur
+    offset = as_f32((np.arange(COUNT) + 0.5) / COUNT * 1.05 * edge)
+    step = 1.05 * edge / COUNT
+    disc = soft_amounts(gl, "seen = disc_seen(offset, blur);", offset, blur)
+    stretch = soft_amounts(gl, "seen = stretch_seen(offset, 0.7, 0.7 * blur);", 0.7 * offset, blur)
+    # A sharp edge falls between two of 2048 places; the trapezoids themselves are summed up exactly enough.
+    room = 2.0 * step if blur == 0.0 else 1e-3
+    assert 2.0 * np.pi * (disc * offset).sum() * step == pytest.approx(np.pi, rel=room)
+    assert 2.0 * stretch.sum() * 0.7 * step == pytest.approx(1.4, rel=room)
+    assert (np.diff(disc) <= 1e-7).all() and (np.diff(stretch) <= 1e-7).all()
+    assert disc[-1] == stretch[-1] == 0.0
 
 
 LOOKUP = {"MAP_TARGETS": 1, "CHARTS": 1, "NESTED_WINDOWS": 1, "BIND_RECEIVERS": 8, "BIND_PLACEMENTS": 9, "NONE": f"{NONE}u"}
