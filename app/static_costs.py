@@ -76,6 +76,9 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "local gain": (features.local_gain, "eight voxels a photon"),
         "photons by index": (features.reindexed, "32 B a band"),
         "nested windows": (features.nested_windows, f"{SPLAT.stride} B a photon: a splat for each window"),
+        "eye refraction": (features.eye_specular, "a second program; 4 B a pixel list what it has to do"),
+        "eye spectral taps": (features.eye_disperses, f"{features.spectral_groups} column(s) a camera ray; looks along each sweep"),
+        "spectral maps": (features.map_hats > 0, f"{features.map_hats * _TEXEL // 4} B a texel"),
         "spectral bins": (features.targets > 1, f"{sizes.texel} B a texel instead of {_TEXEL}"),
     }
     return {name: words for name, (included, words) in told.items() if included}

@@ -15,7 +15,7 @@ import numpy as np
 
 from app.bench.feature_variants import Variant
 from app.gpu.map_atlas import MapAtlas
-from app.gpu.map_channels import MapChannels
+from app.gpu.map_channels import MapChannels, hats
 from app.gpu.scene_buffers import SceneBuffers
 from app.gpu.splat_tables import SplatTables
 from app.passes.footprint import SpectralVariables
@@ -80,7 +80,8 @@ class Rig:
         self._atlas = MapAtlas(ctx, light.layout.size, light.layout.placements, variant.features.targets)
         self._variables = SpectralVariables.build(ctx, self._buffers.variables)
         spans = {plan.index: [(band.x_lo, band.x_hi) for band in plan.bands] for plan in light.plans}
-        channels = MapChannels(None if variant.bins is None else tuple(np.linspace(380.0, 780.0, variant.bins + 1).tolist()))
+        edges = None if variant.bins is None else tuple(np.linspace(380.0, 780.0, variant.bins + 1).tolist())
+        channels = hats(light.buffers.axis, variant.features.map_hats) if edges is None and variant.features.map_hats else MapChannels(edges)
         spectra = [lamp.spectral_power for lamp in scene.lights]
         self._tables = SplatTables.build(
             ctx, light.buffers.axis, spectra, light.reflectances, [spans.get(i, [(0.0, 1.0)]) for i in range(len(spectra))], channels

@@ -50,6 +50,7 @@ class Trial:
     """Both splat photons of like footprints, so that the splat's times say something about the feature."""
 
 
+_EYE = ("eye refraction", "eye spectral taps")
 DISPERSION = "dispersion in all"
 """Columns, weights and cuts together: what a scene without dispersion does not pay."""
 
@@ -120,8 +121,14 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             return None, None, "cannot be left out here: light would end there"
         case "interpolated normals" | "charts":
             return None, None, "cannot be left out here: light would land elsewhere"
+        case "spectral maps":
+            return asked, Variant(scene, replace(base, targets=1, map_hats=0)), "against XYZ alone"
+        case "spectral bins" if base.map_hats:
+            return None, None, "these are the spectral maps' channels"
         case "spectral bins":
             return asked, Variant(scene, replace(base, targets=1)), "against XYZ"
+        case _ if name in _EYE:
+            return None, None, "part of the picture; here only the map is drawn"
         case _:
             return None, None, "has no code of its own"
 
@@ -162,6 +169,10 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
             return Variant(scene, replace(base, targets=FORCED_BINS // 4), FORCED_BINS), asked, f"{FORCED_BINS} bins in {FORCED_BINS // 4} targets"
         case "shared spectral variable":
             return None, None, "cannot be forced in: light would be drawn another way"
+        case "spectral maps":
+            return None, None, "cannot be forced in: the channels are those of glass that the camera sees"
+        case _ if name in _EYE:
+            return None, None, "part of the picture; here only the map is drawn"
         case "half-space solids" | "absorption" | "medium stack" | "triangle tree":
             return None, None, "nothing in the scene to put it to"
         case _:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "spectral columns": ("variable_step", "index_ratio_derivative", "medium_slope", "dposition_dvar0", "spectral_variable", "VARIABLE_ROW"),
     "shared spectral variable": ("SLOPE_ROW",),
-    "weights over the band": (r"crossing_indices\(crossing, x3", r"cosine2\.x <= 0\.0"),
+    "weights over the band": (r"crossing_indices\(crossing, x3",),
     "band cuts": ("anchor_at", "passes_x", "MIN_CUT_BAND", "FELL_BAND", "is_cut", "energy_below"),
     "spatial columns": (r"ray\.dposition\[c\]\.xyz = transfer_column", r"photon\.dposition_ds = ray", r"ray\.ddirection\[0\]\.xyz = "),
     "refraction": ("refract_direction", "fresnel_reflectance", "transmitted_cosine2", "medium_index", "cross_boundary", "cross_glass", "INDEX_ROW"),
@@ -39,7 +39,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "local gain": ("gain_boxes", "local_gain"),
     "photons by index": ("traced_bands", "v_path"),
     "eye refraction": ("meet_surface", "reflect_path", "Facing", "waiting", "waits", "listed"),
-    "eye spectral taps": ("narrow", "taps_of", "thetas", "cut_of"),
+    "eye spectral taps": (r"narrow\(path, pixel_key\)", "taps_of", "cut_of"),
     "spectral maps": ("BIN_ROW", "BIN_SPECTRUM_ROW", "BIN_TARGET"),
     "spectral bins": ("define TARGETS [2-9]", "define TARGETS 1[0-9]"),
 }

@@ -70,8 +70,8 @@ def released(light: LightHalf) -> None:
 @pytest.mark.parametrize(
     ("name", "absent"),
     [
-        ("plain ball", {"spectral columns", "weights over the band", "band cuts", "absorption", "medium stack", "spectral bins", "mirrors", "half-space solids"}),
-        ("box of flint", {"interpolated normals", "normal derivatives", "triangle tree", "absorption", "medium stack", "spectral bins"}),
+        ("plain ball", {"eye spectral taps", "spectral maps", "spectral columns", "weights over the band", "band cuts", "absorption", "medium stack", "spectral bins", "mirrors", "half-space solids"}),
+        ("box of flint", {"interpolated normals", "normal derivatives", "triangle tree", "absorption", "medium stack", "local gain"}),
         ("nested", {"half-space solids", "mirrors", "charts"}),
     ],
 )

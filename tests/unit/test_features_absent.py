@@ -15,26 +15,32 @@ from app import paths
 from app.bench.symbol_proof import FEATURE_SYMBOLS, occurring, program_texts, prove
 from app.gpu import records, shader
 from app.gpu.scene_buffers import SCENE_STRUCTS
+from app.gpu.texture_store import PICTURE
 from app.model.features import Features, explain
 from app.model.scene_file import load_scene
 from app.model.settings import RenderSettings
-from app.passes.eye import EYE_LIGHT, EYE_PARAMETERS
+from app.passes.eye import _BEYOND_ONLY as BEYOND_ONLY
+from app.passes.eye_records import EYE_LIGHT, EYE_PARAMETERS
 from app.passes.footprint import SPLAT, footprint_defines, splat_defines
 from app.static_costs import RecordSizes, static_costs
 
 EVERYTHING = Features(
-    spectral_groups=2, merged_groups=True, spectral_weights=True, footprints=True, point_spectrum=False, random_wavelength=False, even_wavelengths=False, band_cuts=True,
+    method="srd", spectral_groups=2, merged_groups=True, spectral_weights=True, footprints=True, point_spectrum=False, random_wavelength=False, even_wavelengths=False, band_cuts=True,
     dielectrics=True, mirrors=True, smooth_normals=True, normal_derivatives=True, absorption=True, medium_stack=True, tree=True,
-    loose_triangles=True, convex_solids=True, charts=True, nested_windows=True, targets=2,
-    local_gain=True, reindexed=True,
+    loose_triangles=True, convex_solids=True, charts=True, nested_windows=True, targets=3,
+    local_gain=True, reindexed=True, eye_specular=True, eye_disperses=True, map_hats=8,
 )  # fmt: skip
+PLAIN_EYE = {"eye_disperses": False, "map_hats": 0}
+"""What the camera sees disperses nothing: the eye carries the spectrum in the same way as the light half."""
 WITHOUT = {
-    "spectral columns": {"spectral_groups": 0, "merged_groups": False, "band_cuts": False, "local_gain": False, "reindexed": False},
+    "spectral columns": {"spectral_groups": 0, "merged_groups": False, "band_cuts": False, "local_gain": False, "reindexed": False, **PLAIN_EYE},
     "shared spectral variable": {"merged_groups": False},
     "weights over the band": {"spectral_weights": False, "spectral_groups": 0, "merged_groups": False, "band_cuts": False},
-    "band cuts": {"band_cuts": False},
+    "band cuts": {"band_cuts": False, **PLAIN_EYE},
     "spatial columns": {"footprints": False, "spectral_groups": 0, "merged_groups": False, "band_cuts": False, "normal_derivatives": False},
-    "refraction": {"dielectrics": False, "absorption": False, "band_cuts": False, "spectral_weights": False, "spectral_groups": 0, "merged_groups": False},
+    "refraction": {
+        "dielectrics": False, "absorption": False, "band_cuts": False, "spectral_weights": False, "spectral_groups": 0, "merged_groups": False, **PLAIN_EYE,
+    },
     "mirrors": {"mirrors": False},
     "interpolated normals": {"smooth_normals": False, "normal_derivatives": False},
     "normal derivatives": {"normal_derivatives": False},
@@ -44,10 +50,13 @@ WITHOUT = {
     "half-space solids": {"convex_solids": False},
     "charts": {"charts": False},
     "nested windows": {"nested_windows": False},
-    "spectral bins": {"targets": 1},
+    "spectral bins": {"targets": 1, "map_hats": 0},
     "local gain": {"local_gain": False},
     "photons by index": {"reindexed": False},
-}
+    "eye refraction": {"eye_specular": False, **PLAIN_EYE},
+    "eye spectral taps": PLAIN_EYE,
+    "spectral maps": {"map_hats": 0},
+}  # fmt: skip
 
 
 def sources(features: Features) -> list[shader.Source]:
@@ -59,14 +68,33 @@ def sources(features: Features) -> list[shader.Source]:
     numbers |= {"STACK_SIZE": 1, "STACK_OBJECTS": "uint[](0u)", "SOLID_COUNT": 1, "PLANE_COUNT": 6, "TRIANGLE_COUNT": 9}
     light = features.defines() | numbers
     splat = splat_defines(features) | {"GROUPS": features.spectral_groups}
-    eye = light | {"LAYER_BEAUTY": 1}
     made = [shader.load_source("trace.comp", light, structs), shader.load_source("emit.comp", light | {"LIGHT_POINT": 1}, structs)]
     made.append(shader.load_source("footprint.comp", footprint_defines(features), (photon, records.PLACEMENT, records.RECEIVER, SPLAT, records.GAIN_BOX)))
     draws = {"splat_small.frag": "SMALL", "splat_swept.frag": "SWEPT"} | ({"splat_cut.frag": "CUT"} if features.band_cuts else {})
     for fragment, kind in draws.items():
         made += [shader.load_source(name, splat | {kind: 1}, (SPLAT,)) for name in ("splat.vert", fragment)]
-    made.append(shader.load_source("eye.comp", eye, (*SCENE_STRUCTS, EYE_LIGHT, EYE_PARAMETERS, records.RECEIVER, records.PLACEMENT)))
-    return made
+    return made + eye_sources(features, light)
+
+
+def eye_sources(features: Features, light: dict[str, int | float | str], images: dict[str, int] | None = None) -> list[shader.Source]:
+    """The eye's one program, or two where it sees glass or mirrors; `light`: symbols of the scene, `images`: of the texture store."""
+    single = features.spectral_groups if features.eye_specular and features.eye_disperses else 0
+    rows = ("WHITE_ROW", "LIGHT_ROW", "ROWS_PER_LIGHT", "BIN_ROW", "BIN_SPECTRUM_ROW", "REFLECTANCE_ROW", "BASIS_ROW", "ABSORPTION_ROW")
+    eye = light | dict.fromkeys(rows, 1) | {"TARGETS": 1, "MAP_TARGETS": features.targets, "SPECTRAL_GROUPS": single, "ABSORBERS": 1, "EMISSION_CELLS": 1023}
+    eye |= {"BIN_TARGET": 1, "BIN_OVERLAP": 0, "STACK": 6, "MAX_DEPTH": 48, "MAX_EVENTS": 160, "LIGHT_COUNT": 1, "TINT_STEPS": 24, "TAPS_PER_PIXEL": 0.7}
+    switches = {
+        "LAYER_BEAUTY": True, "RGB_CHANNELS": True, "HAS_RECEIVERS": True, "VISIBLE_LIGHTS": True, "MAP_BINS": features.map_hats > 0,
+        "EYE_SPECULAR": features.eye_specular, "HAS_DISPERSION": features.eye_disperses, "SPECTRAL_SWEEP": single > 0,
+        "ABSORPTION": features.absorption and features.eye_specular, "NORMAL_DERIVATIVES": features.smooth_normals, **(images or {}),
+    }  # fmt: skip
+    for name in switches:
+        eye.pop(name, None)
+    eye |= {name: 1 for name, on in switches.items() if on}
+    structs = (*SCENE_STRUCTS, EYE_LIGHT, EYE_PARAMETERS, records.RECEIVER, records.PLACEMENT, *([PICTURE] if images else []))
+    if not eye.pop("EYE_SPECULAR", None):
+        return [shader.load_source("eye.comp", eye, structs)]
+    direct = {name: value for name, value in eye.items() if name not in BEYOND_ONLY} | {"SPECTRAL_GROUPS": 0, "LISTS_SPECULAR": 1, "MAX_EVENTS": 1}
+    return [shader.load_source("eye.comp", eye | {"EYE_SPECULAR": 1}, structs), shader.load_source("eye.comp", direct, structs)]
 
 
 def scene_features(name: str) -> Features:
@@ -84,8 +112,8 @@ def test_symbols_come_and_go_with_their_feature(feature: str) -> None:
 
 
 SHIPPED = {
-    "ball_plain": ("spectral columns", "weights over the band", "band cuts", "absorption", "medium stack", "spectral bins", "mirrors", "charts"),
-    "prism": ("interpolated normals", "normal derivatives", "triangle tree", "absorption", "medium stack", "spectral bins", "mirrors", "charts"),
+    "ball_plain": ("eye spectral taps", "spectral maps", "spectral columns", "weights over the band", "band cuts", "absorption", "medium stack", "spectral bins", "mirrors", "charts"),
+    "prism": ("interpolated normals", "normal derivatives", "triangle tree", "absorption", "medium stack", "mirrors", "charts"),
     "brilliant": ("interpolated normals", "normal derivatives", "triangle tree", "absorption", "medium stack"),
 }
 
@@ -109,6 +137,22 @@ def test_a_scene_without_dispersion_has_no_spectral_code_nor_columns() -> None:
     plain, carrying = RecordSizes.of(features), RecordSizes.of(forced)
     assert (carrying.ray - plain.ray, carrying.photon - plain.photon) == (32, 16)
     assert (plain.columns, carrying.columns) == (2, 3)
+
+
+IMAGES = {"HAS_IMAGES": 1, "TEXTURE_COUNT": 1, "BIND_PICTURES": 13, "UNIT_PICTURES": 11, "UNIT_CORNERS": 12}
+PICTURED = {"HAS_TEXTURES": ("apply_texture", "texture_filtered", "uv_gradients", "pictures"), "HAS_ENVIRONMENT_MAP": ("environment_radiance", "pictures", "box_of_three")}
+
+
+def test_pictures_are_looked_up_only_where_there_are_any() -> None:
+    light = EVERYTHING.defines() | {"TREE_AT": 0, "TREE_STACK": 9, "NORMALS_AT": 0, "INDEX_ROW": 0, "SLOPE_ROW": 1, "VARIABLE_ROW": 2, "STACK_SIZE": 1}
+    light |= {"STACK_OBJECTS": "uint[](0u)", "SOLID_COUNT": 1, "PLANE_COUNT": 6, "TRIANGLE_COUNT": 9}
+    names = {name for symbols in PICTURED.values() for name in symbols}
+    assert all(occurring(source.text, sorted(names)) == () for source in eye_sources(EVERYTHING, light))
+    for kind, symbols in PICTURED.items():
+        for source in eye_sources(EVERYTHING, light, IMAGES | {kind: 1}):
+            assert set(symbols) <= set(occurring(source.text, symbols)), (kind, source.text.splitlines()[0])
+            others = names - set(symbols) - {"box_of_three"}
+            assert occurring(source.text, sorted(others)) == (), kind
 
 
 def test_what_is_in_tells_its_bytes_and_what_is_out_tells_none() -> None:
