@@ -92,14 +92,14 @@ def set_material(scene: Scene, index: int, material: Material) -> Scene:
 
 
 def set_diffuse_colour(scene: Scene, index: int, rgb: Vec3) -> Scene:
-    """Linear Rec.709 reflectance, 0 to 1, of a diffuse object or a mirror; a spectral reflectance gives way to it."""
+    """Linear Rec.709 reflectance, 0 to 1, of a diffuse object or a mirror; a spectral reflectance gives way to it, a texture is tinted by it."""
     item = scene.objects[index]
     if not all(math.isfinite(c) and 0.0 <= c <= 1.0 for c in rgb):
         raise UserError(f"'{item.name}': every channel of a reflectance must lie between 0 and 1")
     colour = (float(rgb[0]), float(rgb[1]), float(rgb[2]))
     match item.material:
         case Diffuse():
-            material: Material = Diffuse(colour)
+            material: Material = Diffuse(colour, texture=item.material.texture)
         case Mirror():
             material = Mirror(colour)
         case _:

@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 
 from app.ui import requests, theme
 from app.ui.facts import Facts
-from app.ui.panels import file_browser, widgets
+from app.ui.panels import file_browser, picture_choice, widgets
 from app.ui.state import State
 
 OPENABLE = (".toml", ".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -47,7 +47,9 @@ def open_file(state: State, facts: Facts) -> State:
 
 
 def open_path(state: State, facts: Facts, path: Path) -> State:
-    """Open `path`; asks first when work would be lost."""
+    """Open `path`; asks first when work would be lost. A picture becomes part of the scene instead."""
+    if picture_choice.is_picture(path):
+        return picture_choice.dropped(state, path)
     return _unless_unsaved(state, facts, requests.Open(path))
 
 
@@ -67,6 +69,7 @@ def save_as(state: State, facts: Facts) -> State:
 def draw_dialogs(state: State, facts: Facts) -> State:
     """Draw what is open and carry its answers on."""
     file_browser.draw()
+    state = picture_choice.answers(state)
     chosen = file_browser.take("open")
     if chosen is not None:
         state = open_path(state, facts, chosen)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from imgui_bundle import imgui
 
@@ -15,14 +17,16 @@ from app.model.scene import (
     SceneObject,
     Vec3,
 )
-from app.ui import edits, theme
+from app.ui import edit_surroundings, edits, theme
 from app.ui.facts import Facts
-from app.ui.panels import outliner, widgets
+from app.ui.panels import outliner, picture_choice, widgets
+from app.ui.panels.surroundings_rows import draw_surroundings
 from app.ui.state import State
 
 _KINDS: dict[str, type] = {"Glass": Dielectric, "Diffuse": Diffuse, "Mirror": Mirror, "Black": Black}
 _NEW_GLASS = "N-BK7"
 _UNITS = "units"
+_WRAPS = {"repeat": "Repeats", "clamp": "Its border goes on"}
 
 _keeps_proportions = {"on": True}
 """Whether the three scales move together: memory of the interface."""
@@ -32,15 +36,15 @@ def draw_inspector(state: State, facts: Facts) -> State:
     """Draw the panel's contents."""
     selection = state.selection
     if selection.kind == "object" and selection.index < len(state.scene.objects):
-        return _object(state, selection.index)
+        return _object(state, facts, selection.index)
     if selection.kind == "light" and selection.index < len(state.scene.lights):
         from app.ui.panels.light_panel import draw_light
 
         return draw_light(state, facts)
-    return _scene(state)
+    return _scene(state, facts)
 
 
-def _object(state: State, index: int) -> State:
+def _object(state: State, facts: Facts, index: int) -> State:
     thing = state.scene.objects[index]
     with theme.heading():
         imgui.text_unformatted(f"{outliner.icon_of(thing)}  {thing.name}")
@@ -50,7 +54,7 @@ def _object(state: State, index: int) -> State:
     if widgets.section("Placement"):
         state = _place(state, index)
     if widgets.section("Material"):
-        state = _material(state, index)
+        state = _material(state, facts, index)
     if widgets.section("Mesh", is_open=False):
         _mesh(thing)
     return state
@@ -96,7 +100,7 @@ def _in_proportion(before: Vec3, after: Vec3) -> Vec3:
     return (before[0] * factor, before[1] * factor, before[2] * factor)
 
 
-def _material(state: State, index: int) -> State:
+def _material(state: State, facts: Facts, index: int) -> State:
     thing = state.scene.objects[index]
     material = thing.material
     kind = next(name for name, made in _KINDS.items() if isinstance(material, made))
@@ -107,7 +111,10 @@ def _material(state: State, index: int) -> State:
         return edits.attempt(state, f"Make {thing.name} {wanted.lower()}", edits.set_material, index, _fresh(wanted))
     if isinstance(material, Dielectric):
         return _glass(state, material)
-    if isinstance(material, Diffuse | Mirror):
+    if isinstance(material, Diffuse):
+        state = _texture(state, facts, index, material)
+        return _colour(state, index, material)
+    if isinstance(material, Mirror):
         return _colour(state, index, material)
     widgets.hint("Absorbs all light that meets it.")
     return state
@@ -129,9 +136,31 @@ def _glass(state: State, material: Dielectric) -> State:
     return state
 
 
+def _texture(state: State, facts: Facts, index: int, material: Diffuse) -> State:
+    """The picture that the surface wears."""
+    thing = state.scene.objects[index]
+    worn = material.texture
+    can = thing.mesh.uv is not None
+    name = "None" if worn is None else Path(worn.source).name if worn.source else "From the scene's file"
+    tip = "A picture laid on the surface (.png, .jpg, .exr). Click to choose one." if can else "This mesh has no texture coordinates to lay a picture on."
+    pressed = widgets.file_field("Picture", name, tip=tip, enabled=can, clear_tip="" if worn is None else "Back to the plain colour.")
+    if pressed is None:
+        return edits.attempt(state, f"Picture of {thing.name}", edit_surroundings.clear_texture, index)
+    if pressed:
+        picture_choice.ask_texture(state, facts, index)
+    if worn is not None:
+        changed, wrap = widgets.combo("Beyond its edge", _WRAPS, worn.wrap, tip="What lies where the picture ends.")
+        if changed:
+            state = edits.attempt(state, f"Picture of {thing.name}", edit_surroundings.set_texture_wrap, index, wrap)
+    return state
+
+
 def _colour(state: State, index: int, material: Diffuse | Mirror) -> State:
     thing = state.scene.objects[index]
-    changed, rgb, active = widgets.colour("Reflectance", material.reflectance_rgb, tip="Share of light reflected, linear Rec.709, 0 to 1.")
+    tip = "Share of light reflected, linear Rec.709, 0 to 1."
+    if isinstance(material, Diffuse) and material.texture is not None:
+        tip += " The picture is multiplied by it."
+    changed, rgb, active = widgets.colour("Reflectance", material.reflectance_rgb, tip=tip)
     if isinstance(material, Diffuse) and material.reflectance is not None:
         widgets.hint("A measured spectral reflectance is in use; choosing a colour replaces it.")
     if changed:
@@ -153,7 +182,7 @@ def _mesh(thing: SceneObject) -> None:
     widgets.read_out("Closed", "yes" if mesh.is_closed else "no", tip="Glass must be closed: light needs an inside.")
 
 
-def _scene(state: State) -> State:
+def _scene(state: State, facts: Facts) -> State:
     scene = state.scene
     with theme.heading():
         imgui.text_unformatted(scene.name)
@@ -163,10 +192,6 @@ def _scene(state: State) -> State:
         widgets.read_out("Objects", str(len(scene.objects)), tip="Number of objects.")
         widgets.read_out("Lights", str(len(scene.lights)), tip="Number of lights.")
         widgets.read_out("Triangles", f"{triangles:,}", tip="Triangles of all objects.")
-        changed, rgb, active = widgets.colour("Background", scene.background_rgb, tip="Radiance behind everything, lm/(sr unit²). Lights nothing.")
-        if changed:
-            state = edits.attempt(state, "Background", edits.set_background, rgb)
-        state = widgets.holding(state, active)
         depth_changed, depth, active = widgets.slider(
             "Longest path", scene.render.max_depth, 1, 64, unit="events", format="%.0f", reset=64,
             tip="Refractions and reflections after which a photon is given up.",
@@ -174,6 +199,8 @@ def _scene(state: State) -> State:
         if depth_changed and round(depth) != scene.render.max_depth:
             state = edits.attempt(state, "Longest path", edits.set_render_defaults, max_depth=round(depth))
         state = widgets.holding(state, active)
+    if widgets.section("Environment"):
+        state = draw_surroundings(state, facts)
     if scene.notes and widgets.section("Notes"):
         for note in scene.notes:
             widgets.hint(note)

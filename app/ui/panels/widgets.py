@@ -17,6 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as icons
 
 from app.model.scene import Vec3
 from app.ui import item_rects, theme
@@ -33,7 +34,7 @@ from app.ui.panels.rows import (
 from app.ui.state import State
 
 __all__ = [
-    "FloatResult", "beside", "button", "colour", "combo", "drag", "error", "hint", "holding", "menu_button", "note", "read_out",
+    "FloatResult", "beside", "button", "colour", "combo", "drag", "error", "file_field", "hint", "holding", "menu_button", "note", "read_out",
     "reciprocal_slider", "section", "slider", "text_field", "toggle", "tooltip", "vec3",
 ]  # fmt: skip
 
@@ -213,6 +214,29 @@ def text_field(label: str, value: str, *, tip: str) -> tuple[bool, str]:
     return done and text != value, text
 
 
+def file_field(label: str, name: str, *, tip: str, enabled: bool = True, clear_tip: str = "") -> bool | None:
+    """A file's name in the row's field, to be clicked for another one: True. With `clear_tip` a small button behind it takes the file away: None."""
+    begin_row(label)
+    style = imgui.get_style()
+    room = imgui.get_content_region_avail().x
+    side = imgui.get_frame_height()
+    width = room - (side + style.item_inner_spacing.x if clear_tip else 0.0)
+    imgui.begin_disabled(not enabled)
+    imgui.push_style_var(imgui.StyleVar_.button_text_align, ImVec2(0.0, 0.5))
+    imgui.push_style_color(imgui.Col_.button, imgui.get_style_color_vec4(imgui.Col_.frame_bg))
+    pressed = imgui.button(f"{_fitting(f'{icons.ICON_FA_FOLDER_OPEN}  {name}', width - 2 * style.frame_padding.x)}##{label}", ImVec2(width, 0.0))
+    imgui.pop_style_color()
+    imgui.pop_style_var()
+    imgui.end_disabled()
+    explain(label, tip)
+    if not clear_tip:
+        return pressed
+    imgui.same_line(0.0, style.item_inner_spacing.x)
+    cleared = imgui.button(f"{icons.ICON_FA_XMARK}##clear {label}", ImVec2(side, 0.0))
+    explain(f"Clear {label}", clear_tip)
+    return None if cleared else pressed
+
+
 def read_out(label: str, text: str, *, tip: str) -> None:
     """A value that cannot be edited, in the row layout."""
     begin_row(label)
@@ -293,6 +317,15 @@ def _notch(share: float) -> None:
     drawing = imgui.get_window_draw_list()
     drawing.add_line(ImVec2(x, high.y - length), ImVec2(x, high.y), tint, 1.5)
     drawing.add_line(ImVec2(x, low.y), ImVec2(x, low.y + length), tint, 1.5)
+
+
+def _fitting(text: str, width: float) -> str:
+    """`text`, or as much of its beginning as there is room for."""
+    if imgui.calc_text_size(text).x <= width:
+        return text
+    while text and imgui.calc_text_size(text + "…").x > width:
+        text = text[:-1]
+    return text + "…"
 
 
 def _encode(linear: float) -> float:
