@@ -99,11 +99,13 @@ class FrameRenderer:
 
         Where light changes, `shader.keep_programs` on the context spares compiling every frame's programs."""
         self._context = context
-        self._settings = settings
         self._shown: LiveInputs | None = None
         self._buffers: SceneBuffers | None = None
         self.light: LightHalf | None = None
         self._eye: EyePass | None = None
+        moves = any(s.camera != stages[0].camera for s in stages)
+        # Light is traced once for all views, so no single one may decide what the programs leave out.
+        self._settings = settings = replace(settings, any_view=settings.any_view or moves)
         self._view, self._map_settings = _map_view([s.camera for s in stages], settings)
         self._unsurveyed = self._distinct(stages)
         self._surveys: list[_Survey] = []
@@ -121,9 +123,14 @@ class FrameRenderer:
         if self._settings.layer.startswith("map:"):
             return
         assert self.light is not None and self._eye is not None
-        light, settings = self.light, self._settings
+        light, settings, eye = self.light, self._settings, self._eye
         maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
-        for share in self._eye.samples(stage.camera, settings.width, settings.height, settings.spp or DEFAULT_SAMPLES, 0, maps, settings.seed):
+        samples = _whole_cycles(eye, settings.spp or DEFAULT_SAMPLES)
+        # For every frame anew: a frame is a function of its own stage, whatever was drawn before it.
+        if _chooses_bands(eye):
+            for _ in eye.choosing_bands(stage.camera, settings.width, settings.height, samples, maps):
+                yield _LIGHT_SHARE
+        for share in eye.samples(stage.camera, settings.width, settings.height, samples, 0, maps, settings.seed):
             yield _LIGHT_SHARE + (1.0 - _LIGHT_SHARE) * share
 
     def run(self, stage: Stage) -> np.ndarray:
@@ -207,6 +214,17 @@ class FrameRenderer:
         light = _FramedLight(self._context, scene, self._map_settings, features, buffers)
         light.view = self._view
         return light, buffers
+
+
+def _whole_cycles(eye: EyePass, samples: int) -> int:
+    """`samples` or a few more, in which every band of the spectrum has its turn equally often, however many bands a frame chooses:
+    all frames then have as many samples, and what stands still in them stays."""
+    cycle = eye.fixed_bands or (1 << (samples.bit_length() - 1) if _chooses_bands(eye) else 1)
+    return -(-samples // cycle) * cycle
+
+
+def _chooses_bands(eye: EyePass) -> bool:
+    return eye.disperses and eye.fixed_bands is None and not eye.scene.features.random_wavelength
 
 
 def lit(stage: Stage) -> Scene:

@@ -40,6 +40,8 @@ CALM_S = 0.12
 """Without a change for so long, a coarse picture is replaced by a full one."""
 ANSWER_S = 0.03
 """What a coarse picture may take beyond a frame's budget."""
+LOOK_S = 0.02
+"""What a coarse picture should take on a software renderer."""
 EYE_SHARE = 0.4
 """Of a frame, where photons are traced as well."""
 
@@ -263,8 +265,9 @@ class LiveEngine:
     def _restart_eye(self, *, same_view: bool, finer_maps: bool = False) -> None:
         if self._maps is None or self._inputs is None:
             return
-        # One coarse answer now; `advance` asks again in full size when things are still.
-        seconds = None if same_view else 0.012 if self.context.is_software else 0.004
+        # One coarse answer now; `advance` asks again in full size when things are still. Where photons are splatted again, they want time too.
+        software = LOOK_S if not self._shows_quick_maps else 0.6 * LOOK_S
+        seconds = None if same_view else software if self.context.is_software else 0.004
         view = self._inputs.camera, self._inputs.width, self._inputs.height
         self._eye.restart(*view, self._maps, seconds=seconds, same_view=same_view, finer_maps=finer_maps)
 
@@ -356,7 +359,8 @@ class LiveEngine:
         return self._maps_wait and self._job is None and self._repair is None and not self._shows_quick_maps
 
     def _set_maps(self, maps: LightMaps) -> None:
-        self._maps = CausticMaps(maps.resolved_textures(), maps.receivers, maps.atlas.placements, maps.scale)
+        assert self._shown is not None
+        self._maps = CausticMaps(self._shown.light.eye_textures(maps), maps.receivers, maps.atlas.placements, maps.scale)
         self._published_photons = maps.photon_weight
 
     # ---- what there is -----------------------------------------------------------------------

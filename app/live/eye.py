@@ -4,8 +4,8 @@ A picture is published when every pixel has a whole sample. While something move
 sample in the time that is left asks for; once still it starts over in full size and is refined.
 
 Where glass disperses, a sample of a fine picture sees one band of the spectrum only, and such a picture is whole after as many
-samples as there are bands; before that it has grain in all colours. So one sample of the whole spectrum, coarser
-along it but smooth, comes first, alone in motion; pictures of bands are shown after whole cycles only.
+samples as there are bands; before that it has grain in all colours. So samples of the whole spectrum, coarser
+along it but smooth, come first, in motion alone; pictures of bands are shown after whole cycles only.
 """
 
 from __future__ import annotations
@@ -37,6 +37,10 @@ SETTLED = 8
 """Samples at most that a better map waits for before its picture replaces the one shown."""
 MOVING_TAPS = 8
 """Looks along one spectral sweep at most, in a picture that must be there at once."""
+BANDED_SAMPLES = 16
+"""Samples whose error the number of bands is fitted to: a still picture shall be whole within seconds, so not to all that it gets in the end."""
+SMOOTH_SHARE = 1 / 4
+"""Samples of the whole spectrum that come before bands, over the number of these: edges are smooth while the bands are awaited."""
 _FIRST_RATE = 0.5e6
 """Pixels per second before anything was measured: slow, so that the first picture comes at once."""
 _RATE_BLEND = 0.3
@@ -59,7 +63,7 @@ class LiveEye:
         self._is_quick = False
         """The picture that runs is an answer to a movement."""
         self._is_smooth = False
-        """It is the one sample of the whole spectrum that comes before bands."""
+        """Its samples are of the whole spectrum: the picture until there are bands."""
         self._bands: int | None = None
         """Stretches of the spectrum that this view of this scene needs; None until that is found out."""
         self._bands_view: object = None
@@ -67,6 +71,8 @@ class LiveEye:
         self._publish_from = self._settled = 1
         """Samples from which on this picture replaces the one shown, and those that it has."""
         self._owes = False
+        self._shows_other = False
+        """What is shown is of another scene than the one that is looked at."""
         self._shows_whole = False
         """What is shown is no answer to a movement and no mere first sample."""
         self._rates: dict[bool, float] = {}
@@ -102,6 +108,7 @@ class LiveEye:
         self._pictures = pictures
         self._pass.dispatch_seconds = DISPATCH_SECONDS
         self._steps = self._choosing = self._bands = None
+        self._shows_other = True
         if before is not None:
             before.release()
         if kept is not None and kept is not pictures:
@@ -128,16 +135,19 @@ class LiveEye:
             rate = self._rates.get(True, 0.5 * self._rates.get(False, _FIRST_RATE))
             scale = next((s for s in SCALES if s * s * width * height <= rate * seconds), SCALES[-1])
         self._camera, self._maps = camera, maps
-        self._size = max(8, round(width * scale)), max(8, round(height * scale))
-        keeps = same_view and self.scale == scale == 1.0
+        self._size = (width, height) if scale == 1.0 else (_side(width * scale), _side(height * scale))
+        keeps = same_view and self.scale == scale == 1.0 and not self._shows_other
         self._wanted_scale, self._is_quick = scale, seconds is not None
         view = camera, width, height
         if finer_maps or view != self._bands_view:
             self._bands = None
         self._bands_view = view
-        self._settled = max(1, min(self.shown_samples, SETTLED)) if keeps else 1
         self._owes = True
-        self._begin(smooth=not self._is_quick and self._needed_bands != 1 and not (keeps and self._shows_whole))
+        smooth = not self._is_quick and self._needed_bands != 1 and not (keeps and self._shows_whole)
+        self._settled = 1
+        if keeps and not (smooth and self._needed_bands is None):
+            self._settled = max(1, min(self.shown_samples, self._smooth_samples if smooth else SETTLED))
+        self._begin(smooth=smooth)
 
     def pause(self) -> None:
         """Leave the maps alone, which are about to go; what is shown stays until `restart`."""
@@ -190,7 +200,14 @@ class LiveEye:
 
     @property
     def _target(self) -> int:
-        return 1 if self._is_smooth else self.target_samples + -self.target_samples % self._cycle
+        """Samples after which the picture that runs is finished."""
+        if self._is_smooth:
+            return 1 if self._needed_bands is None else self._smooth_samples
+        return self.target_samples + -self.target_samples % self._cycle
+
+    @property
+    def _smooth_samples(self) -> int:
+        return max(1, int(SMOOTH_SHARE * (self._needed_bands or 1)))
 
     def _begin(self, *, smooth: bool) -> None:
         """Forget the samples; ask for the number of bands where it is needed first."""
@@ -198,10 +215,10 @@ class LiveEye:
         self._is_smooth = smooth
         self._taken = 0
         self._steps = self._choosing = None
-        self._publish_from = 1 if smooth else self._settled + -self._settled % self._cycle
+        self._publish_from = self._settled + -self._settled % self._cycle
         if not (smooth or self._is_quick) and self._needed_bands is None:
             self._pass.most_taps = MOST_TAPS
-            self._choosing = self._pass.choosing_bands(self._camera, *self._size, self.target_samples, self._maps)
+            self._choosing = self._pass.choosing_bands(self._camera, *self._size, BANDED_SAMPLES, self._maps)
 
     # ---- samples -----------------------------------------------------------------------------
 
@@ -211,7 +228,9 @@ class LiveEye:
             if next(self._choosing, None) is None:
                 assert self._pass is not None
                 self._bands = self._pass.bands
-                self._begin(smooth=False)
+                again = not self._shows_whole and self._smooth_samples > self.shown_samples
+                self._settled = self.shown_samples + 1 if again else self._settled
+                self._begin(smooth=again)
             return False
         if self._dispatch():
             return False
@@ -220,7 +239,7 @@ class LiveEye:
         if self._taken < self._publish_from or self._taken % self._cycle:
             return False
         self._publish()
-        if self._is_smooth:
+        if self._is_smooth and self._taken >= self._target:
             # The picture of bands replaces it in its own time.
             self._settled = 1
             self._begin(smooth=False)
@@ -260,7 +279,8 @@ class LiveEye:
         self._average.run(-(-sums.width // 8), -(-sums.height // 8))
         self._context.ctx.memory_barrier()
         self.shown_samples, self.shown_bands, self.scale = self._taken, self._cycle, self._wanted_scale
-        self._shows_whole, self._owes = not (self._is_quick or self._is_smooth), False
+        self._shows_whole, self._shows_other = not (self._is_quick or self._is_smooth), False
+        self._owes = False
         self.fallbacks = self._pass.fallbacks
         self.version += 1
 
@@ -271,6 +291,12 @@ class LiveEye:
             if owned is not None:
                 owned.release()
         self._pass = self._pictures = self.picture = None
+
+
+def _side(pixels: float) -> int:
+    """Whole pixels of a picture in motion. Mesa's software renderer compiles its programs once more for textures whose side is a power of two."""
+    side = max(9, round(pixels))
+    return side + 1 if side & (side - 1) == 0 else side
 
 
 def solo_scene(scene: Scene, wavelength_nm: float | None) -> Scene:

@@ -9,23 +9,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.gpu.gain_buffers import GainBuffers
+from app.gpu.map_channels import MapChannels
 from app.gpu.reindex import Reindexing, Spans
 from app.light_half import LightHalf, RoundOf, ShownTables
 from app.light_maps import LightMaps
 from app.live.difference import shown_glasses
+from app.live.spectrum_guess import SpectrumGuess
 from app.live.store import PhotonStore
 from app.model.colorimetry import VISIBLE_NM
 from app.model.spectrum import Spectrum
 from app.passes.footprint import SpectralVariables
+from app.passes.map_layout import layout_maps
+from app.passes.pilot import landings_of
 from app.passes.trace import Batch
 
 if TYPE_CHECKING:
+    import moderngl
+
     from app.gpu.context import Context
     from app.gpu.scene_buffers import SceneBuffers
     from app.live.inputs import LiveInputs
     from app.model.features import Features
     from app.model.glass import Dispersion
-    from app.model.scene import Scene
+    from app.model.scene import Camera, Scene
     from app.model.settings import RenderSettings
 
 QUICK = 8
@@ -90,6 +96,7 @@ class LiveLight(LightHalf):
         self._running: Stored | None = None
         self._older: Stored | None = None
         self._quick: LightMaps | None = None
+        self._guess: SpectrumGuess | None = None
         self.is_coarse = True
         """The maps are those of a first answer: `fit_to` makes proper ones."""
 
@@ -119,11 +126,41 @@ class LiveLight(LightHalf):
         return bundle.tables
 
     def _quick_tables(self, bundle: Stored) -> ShownTables:
-        if bundle.tables is not None:
+        if bundle.tables is not None and not self.features.map_hats:
             return bundle.tables
         if bundle.quick_tables is None:
-            bundle.quick_tables = self._tables_of(bundle.spans, QUICK_WIDTH)
+            # In colour only, like the maps that they are for.
+            channels = self.map_channels
+            self.map_channels = MapChannels(channels.edges_nm)
+            try:
+                bundle.quick_tables = self._tables_of(bundle.spans, QUICK_WIDTH)
+            finally:
+                self.map_channels = channels
         return bundle.quick_tables
+
+    @property
+    def _quick_features(self) -> Features:
+        return replace(self.features, map_hats=0, targets=1) if self.features.map_hats else self.features
+
+    def maps_for(
+        self, camera: Camera, width: int, height: int, tile_max: tuple[int, int] = LightHalf.tile_max, features: Features | None = None
+    ) -> LightMaps:
+        """As in `LightHalf`; `features` that the maps' channels follow, where they are not the light half's own."""
+        seen = replace(self.scene, camera=camera)
+        layout = layout_maps(seen, self.buffers, landings_of(self.pilots.values()), (width, height), self.reflectance_class, tile_max=tile_max)
+        # Mesa's software renderer compiles what reads a texture once more, for seconds, where a side becomes a power of two.
+        size = tuple(side + (side & (side - 1) == 0) for side in layout.size)
+        return LightMaps(self.context.ctx, replace(layout, size=size), features or self.features)
+
+    def eye_textures(self, maps: LightMaps) -> list[moderngl.Texture]:
+        """`maps`, this light half's, as `map_channels` says: what was splatted in colour only gets a likely spectrum."""
+        textures = maps.resolved_textures()
+        if maps is not self._quick or not self.features.map_hats:
+            return textures
+        if self._guess is None:
+            self._guess = SpectrumGuess(self.context.ctx, self.map_channels, self.scene.lights, maps.atlas.size)
+        self._guess.run(textures[0])
+        return [*textures, *self._guess.textures]
 
     def keep(self, batch: Batch, of: RoundOf) -> None:
         """Store the batch."""
@@ -196,11 +233,10 @@ class LiveLight(LightHalf):
         self.is_coarse = False
         self.tile_max = LightHalf.tile_max
         self.settings = replace(self.settings, width=inputs.width, height=inputs.height)
-        quick, self._quick = self._quick, None
-        for maps in (quick, self.maps):
-            if maps is not None:
-                maps.release()
-        self.maps = None
+        for owned in (self._quick, self._guess, self.maps):
+            if owned is not None:
+                owned.release()
+        self._quick = self._guess = self.maps = None
         self.lay_out(self.view)
 
     def _show_variables(self, changed: dict[Dispersion, Dispersion]) -> None:
@@ -218,9 +254,9 @@ class LiveLight(LightHalf):
         wanted = inputs.local_gain and self.features.spectral_groups > 0 and any(o.local_dispersion for o in inputs.scene.objects)
         if wanted != self.features.local_gain:
             self.features = replace(self.features, local_gain=wanted)
-            for maps in (self._maps, self._quick):
-                if maps is not None:
-                    maps.take(self.features)
+            self._maps.take(self.features)
+            if self._quick is not None:
+                self._quick.take(self._quick_features)
             if self.gains is not None:
                 self.gains.release()
                 self.gains = None
@@ -261,7 +297,7 @@ class LiveLight(LightHalf):
         if bundle is None or not bundle.store.rounds:
             return None
         if self._quick is None:
-            self._quick = self.maps_for(self.view, *quick_size(self.settings.width, self.settings.height), tile_max=QUICK_TILE_MAX)
+            self._quick = self.maps_for(self.view, *quick_size(self.settings.width, self.settings.height), QUICK_TILE_MAX, self._quick_features)
         self._quick.clear()
         rounds = bundle.store.first_rounds(photons)
         slabs = bundle.store.of_rounds(0, rounds)
@@ -291,8 +327,9 @@ class LiveLight(LightHalf):
         for bundle in self._bundles:
             bundle.release()
         self._tables = self._running = self._older = None
-        if self._quick is not None:
-            self._quick.release()
+        for owned in (self._quick, self._guess):
+            if owned is not None:
+                owned.release()
         super().release()
         self.buffers.release()
 

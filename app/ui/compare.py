@@ -274,7 +274,9 @@ class _DirectPicture:
         features = Features.of(scene, settings)
         self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
         reflectances, _ = reflectance_classes(scene, self._buffers)
+        # Without maps, and for what is seen directly alone: there one band of the spectrum is exact.
         self._eye = EyePass(context, self._buffers, "beauty", reflectances)
+        self._eye.bands = 1
         self._eye.dispatch_seconds = DISPATCH_SECONDS
         self._steps: Iterator[float] | None = self._eye.samples(scene.camera, inputs.width, inputs.height, DIRECT_SAMPLES, 0, None, inputs.seed)
         self._rgb: np.ndarray | None = None

@@ -33,6 +33,10 @@ _COUNTERS = {
     "footprint_dropped": ("Footprint dropped", "The derivatives of the path overflowed: the photon keeps its light and becomes a point."),
     "shading_normal": ("Flat normal used", "The smooth normal would have sent light to the wrong side: the facet's own was taken."),
     "band_cut": ("Spectrum split", "Part of a photon's spectrum is totally reflected: the photon was split in two there."),
+    "columns_dropped": ("Derivatives dropped", "They overflowed on a camera ray's path: it goes on as a single ray."),
+    "depth_reached": ("Path too long", "Camera rays caught inside glass: what is left of them sees the environment."),
+    "stack_full": ("No room to split", "Glass split a camera ray more often than there is room for: one part was chosen by chance."),
+    "band_uncut": ("Spectrum not split", "Part of a camera ray's band is totally reflected, but too near its end or too far to tell where."),
     "queue_overflow": ("Queue full", "Photons that found no room among those in flight."),
 }
 """What the engine counts -> its name on the screen, and what it means."""
@@ -148,16 +152,18 @@ def _numbers(state: State, stats: LiveStats) -> None:
         ("Rate", f"{numbers.count(stats.photons_per_second)}/s", "Emitted photons per second of trace and splat time."),
         ("Stored", numbers.count(stats.photons_stored), "Photon records kept, to be splatted again after an edit of dispersion."),
         ("Rays traced", numbers.count(stats.rays_traced), "Rays emitted since the start. Stands still when photons are only splatted again."),
-        ("Samples", f"{stats.camera_samples:.1f} a pixel", "Camera samples of the shown picture."),
+        ("Samples", _samples(stats), "Camera samples of the shown picture; where glass disperses, bands of the spectrum that they are divided over."),
         ("Resolution", f"{stats.resolution_scale:.0%}", "Side of the shown picture over the viewport's: less while something moves."),
         ("Memory", numbers.size(stats.bytes), "GPU memory held by maps, photons and scene."),
     ]  # fmt: skip
     _table("##numbers", lines)
     dropped = [(_named(k), numbers.count(v), _tip(k)) for k, v in stats.fallbacks.items() if v]
     lost = [(_named(k), numbers.percent(v), _tip(k)) for k, v in stats.lost.items() if v]
+    looked = [(_named(k), numbers.count(v), _tip(k)) for k, v in stats.eye_fallbacks.items() if v]
     bands = [(name, f"{n} bands", "Spectral bands of this light.") for name, n in sorted(stats.bands.items())]
     for title, tip, told in (
         ("Fall-backs", "Photons that took a simpler way.", dropped),
+        ("Camera rays' fall-backs", "Camera rays that took a simpler way, since the scene was last made.", looked),
         ("Where light ended", "Shares of the emitted flux.", lost),
         ("Spectral bands", "How finely each light's spectrum is divided.", bands),
     ):
@@ -168,6 +174,11 @@ def _numbers(state: State, stats: LiveStats) -> None:
     if stats.renderer:
         widgets.hint(stats.renderer + (" (software)" if stats.is_software else ""))
         widgets.tooltip("What draws: the graphics driver's name.")
+
+
+def _samples(stats: LiveStats) -> str:
+    bands = f", {stats.eye_bands} bands" if stats.eye_bands > 1 else ""
+    return f"{stats.camera_samples:.0f} a pixel{bands}"
 
 
 def _table(identity: str, lines: list[tuple[str, str, str]]) -> None:
