@@ -96,6 +96,8 @@ def draw() -> None:
     shown, stays = imgui.begin_popup_modal(title, True, imgui.WindowFlags_.no_saved_settings)
     if shown:
         _contents(question)
+        if _browser.question is None:
+            imgui.close_current_popup()  # one that is merely not drawn any more eats the next click
         imgui.end_popup()
     if not stays or (imgui.is_key_pressed(imgui.Key.escape) and _browser.confirming is None):
         _browser.question = None
