@@ -197,18 +197,19 @@ def doctor() -> None:
 def bench(
     scenes: Annotated[list[str] | None, typer.Argument(metavar="[SCENE]...", help="Scenes to measure; default: every shipped one that holds glass.")] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder for results.json, plots and report.html.")] = None,
-    seconds: Annotated[Text, typer.Option(metavar="S", help="Photon time of each method's and seed's largest rendering; default: 3.")] = None,
+    seconds: Annotated[Text, typer.Option(metavar="S", help="Photon time of each method's and seed's largest rendering; default: 3, with --eye 20.")] = None,
     seeds: Annotated[Text, typer.Option(metavar="N", help="Independent repeats; default: 5.")] = None,
     methods: Annotated[Text, typer.Option(metavar="A,B", help="Methods to compare; default: all.")] = None,
     size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: 480 wide, in the scene's aspect.")] = None,
     reference_seconds: Annotated[Text, typer.Option("--reference-seconds", metavar="S", help="Time added to each scene's cached reference; default: 60.")] = None,
     features: Annotated[Text, typer.Option(metavar="SCENE", help="Measure instead what each feature of the programs costs in this scene.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Begin anew instead of going on from what DIR holds.")] = False,
+    eye: Annotated[bool, typer.Option("--eye", help="Measure the camera's half, by samples a pixel, instead of the light's by photons.")] = False,
 ) -> None:
     """Measure every method's error against its run time, and write a report."""
     from app.cli_bench import BenchRequest, bench_command
 
-    request = BenchRequest(tuple(scenes or ()), output, seconds, seeds, methods, size, reference_seconds, features, fresh)
+    request = BenchRequest(tuple(scenes or ()), output, seconds, seeds, methods, size, reference_seconds, features, fresh, eye)
     raise typer.Exit(bench_command(request, _print))
 
 

@@ -12,16 +12,20 @@ from typing import TYPE_CHECKING, Any
 
 from app import __version__
 from app import cli_options as options
-from app.bench.results import BenchResult, BenchSettings
+from app.bench.results import DEFAULT_METHODS, BenchResult, BenchSettings
 from app.errors import UserError, suggestion
-from app.model.settings import METHODS
+from app.model.settings import EYE_METHODS, METHODS
 
 if TYPE_CHECKING:
     from app.model.scene import Scene
 
 INTERRUPTED = 130
 MAX_SEEDS = 1000
-MAX_PHOTON_SECONDS = 3600.0
+MAX_SECONDS = 3600.0
+EYE_SECONDS = 20.0
+"""Time of the largest rendering where the eye is measured and nothing else was asked for: the talk's stochastic picture had as much."""
+EYE_SCENES = ("prism_edge", "lens_text", "brilliant_studio", "ball_caustic")
+"""Shipped scenes that are about what is seen through glass; `bench --eye` without names measures these."""
 
 
 @dataclass(frozen=True)
@@ -37,16 +41,19 @@ class BenchRequest:
     reference_seconds: str | None = None
     features: str | None = None
     fresh: bool = False
+    eye: bool = False
 
 
 def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
     """Run the bench; returns the exit code. Raises `UserError`."""
     if request.features is not None:
+        if request.eye:
+            raise UserError("--features and --eye exclude each other: give one of them")
         return _features(request)
     if request.output is None:
         raise UserError("bench needs a folder for what it finds: give one with -o DIR")
     settings = parse_settings(request)
-    scenes = load_scenes(request.scenes)
+    scenes = load_scenes(request.scenes or (EYE_SCENES if request.eye else ()))
 
     from app.bench.machine import machine
     from app.bench.runner import run_bench
@@ -72,6 +79,8 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
 def parse_settings(request: BenchRequest) -> BenchSettings:
     """The options checked, with defaults where nothing was said."""
     asked: dict[str, Any] = {}
+    if request.eye:
+        asked |= {"half": "eye", "seconds": EYE_SECONDS, "methods": tuple(name for name in DEFAULT_METHODS if name in EYE_METHODS)}
     if request.seconds is not None:
         asked["seconds"] = _seconds("--seconds", request.seconds)
     if request.reference_seconds is not None:
@@ -79,7 +88,7 @@ def parse_settings(request: BenchRequest) -> BenchSettings:
     if request.seeds is not None:
         asked["seeds"] = options.parse_integer("--seeds", request.seeds, 1, MAX_SEEDS)
     if request.methods is not None:
-        asked["methods"] = parse_methods(request.methods)
+        asked["methods"] = parse_methods(request.methods, EYE_METHODS if request.eye else METHODS)
     if request.size is not None:
         asked["size"] = options.parse_size(request.size)
         options.check_picture_memory(*asked["size"], None)
@@ -91,19 +100,20 @@ def _seconds(option: str, text: str) -> float:
         value = float(text)
     except ValueError:
         raise UserError(f"{option} '{text}' is not a number, give one, for example 3") from None
-    if not 0.0 < value <= MAX_PHOTON_SECONDS:
-        raise UserError(f"{option} {text} is out of range: give more than 0 and at most {MAX_PHOTON_SECONDS:.0f}")
+    if not 0.0 < value <= MAX_SECONDS:
+        raise UserError(f"{option} {text} is out of range: give more than 0 and at most {MAX_SECONDS:.0f}")
     return value
 
 
-def parse_methods(text: str) -> tuple[str, ...]:
-    """Names parted by commas; "regular" stands for both of its kinds."""
+def parse_methods(text: str, known: Sequence[str] = METHODS) -> tuple[str, ...]:
+    """Names among `known`, parted by commas; "regular" stands for both of its kinds."""
     names: list[str] = []
     for part in (part.strip() for part in text.split(",")):
         for name in ("regular-7", "regular-16") if part == "regular" else (part,):
-            if name not in METHODS:
-                hint = suggestion(name, METHODS)
-                raise UserError(f"--methods '{name}' is unknown{hint or ','} known are {', '.join(METHODS)}")
+            if name not in known:
+                hint = suggestion(name, known)
+                what = "is a method of the light half alone" if name in METHODS else "is unknown"
+                raise UserError(f"--methods '{name}' {what}{hint or ','} known are {', '.join(known)}")
             if name not in names:
                 names.append(name)
     return tuple(names)
@@ -135,7 +145,7 @@ def repeat_command(scenes: Sequence[str], request: BenchRequest) -> str:
         "--size": request.size,
         "--reference-seconds": request.reference_seconds,
     }
-    words = ["spectrasplat", "bench", *(request.scenes or scenes), "-o", request.output.name if request.output else ""]
+    words = ["spectrasplat", "bench", *(["--eye"] if request.eye else []), *(request.scenes or scenes), "-o", request.output.name if request.output else ""]
     for option, value in given.items():
         words += [] if value is None else [option, value]
     return shlex.join(words)

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from app.bench.curves import error_at_time, points_by, speed_up
-from app.bench.results import PHOTON_STAGES, Claim, Curve, Point, SceneResult
+from app.bench.halves import HALVES
+from app.bench.results import Claim, Curve, Point, SceneResult
 
-ASKED_SPEED_UP = 30.0
-"""`stochastic` must take at least this many times longer: 2 minutes against 60 in Elek et al. 2014."""
 EARLY_SECONDS = 0.1
 LATE_SECONDS = 3.0
 STRONG_ABBE = 40.0
 """Flints and stronger: below this `srd` must beat `srd-lambda`."""
-_COMPARED_SECONDS = (0.1, 1.0)
 
 
 def claims_of(scene: SceneResult) -> list[Claim]:
@@ -26,7 +24,7 @@ def claims_of(scene: SceneResult) -> list[Claim]:
     stochastic = curves.get("stochastic")
     if stochastic is not None:
         claims.append(_speed_up_claim(scene, srd, stochastic))
-        if scene.seconds >= LATE_SECONDS:
+        if scene.half == "light" and scene.seconds >= LATE_SECONDS:
             claims.append(_first_picture_claim(scene, srd, stochastic))
     linear = curves.get("srd-lambda")
     if linear is not None and 0.0 < scene.strongest_abbe < STRONG_ABBE:
@@ -44,8 +42,8 @@ def ratios_of(curves: Sequence[Curve], measure: str = "relmse") -> dict[str, flo
 
 
 def _speed_up_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> Claim:
-    end = stochastic.points[-1]
-    asked = f"at most 1/{ASKED_SPEED_UP:.0f} of the time of stochastic to its error at the end ({end.relmse:.3g} after {end.seconds:.2f} s)"
+    end, half = stochastic.points[-1], HALVES[scene.half]
+    asked = f"at most 1/{half.asked_ratio:.0f} of the time of stochastic to its error at the end ({end.relmse:.3g} after {end.seconds:.2f} s)"
     reached = speed_up(srd.points, stochastic.points)
     if reached is None:
         last = srd.points[-1]
@@ -53,13 +51,13 @@ def _speed_up_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> Claim:
         measured = f"not reached in {last.seconds:.2f} s: srd ends at {last.relmse:.3g}, {times:.2g} times that"
         return Claim("time to equal error", asked, measured, False, reason(scene, srd))
     measured = f"{'at least ' if reached.at_once else ''}{reached.seconds:.3g} times sooner" if reached.seconds >= 1.0 else f"{1.0 / reached.seconds:.3g} times later"
-    holds = reached.seconds >= ASKED_SPEED_UP
+    holds = reached.seconds >= half.asked_ratio
     why = ""
     if not holds and reached.at_once:
         first = srd.points[0]
-        why = f"srd's smallest rendering ({first.photons:,} photons, {first.seconds:.3f} s) is already as good: {_stage_shares(srd, first)}; longer runs would tell more"
+        why = f"srd's smallest rendering ({first.photons:,} {half.units}, {first.seconds:.3f} s) is already as good: {_stage_shares(scene, srd, first)}; longer runs would tell more"
     elif not holds:
-        why = f"short by a factor of {ASKED_SPEED_UP / reached.seconds:.2g}; {reason(scene, srd)}"
+        why = f"short by a factor of {half.asked_ratio / reached.seconds:.2g}; {reason(scene, srd)}"
     return Claim("time to equal error", asked, measured, holds, why)
 
 
@@ -71,7 +69,7 @@ def _first_picture_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> C
     early = error_at_time(srd.points, EARLY_SECONDS)
     if early is None:
         first = srd.points[0]
-        why = f"even {first.photons:,} photons take {first.seconds:.2f} s: {_stage_shares(srd, first)}"
+        why = f"even {first.photons:,} photons take {first.seconds:.2f} s: {_stage_shares(scene, srd, first)}"
         return Claim("first picture", asked, f"no picture before {first.seconds:.2f} s, then relMSE {first.relmse:.3g}", False, why)
     holds = early < late
     why = "" if holds else f"{early / max(late, 1e-30):.2g} times stochastic's; {reason(scene, srd, EARLY_SECONDS)}"
@@ -81,12 +79,12 @@ def _first_picture_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> C
 def _index_claim(scene: SceneResult, srd: Curve, linear: Curve) -> Claim:
     """Smaller error than the column by wavelength, at every time compared."""
     common = min(srd.points[-1].seconds, linear.points[-1].seconds)
-    times = sorted({t for t in _COMPARED_SECONDS if t < common} | {common})
+    times = sorted({t for t in HALVES[scene.half].compared_seconds if t < common} | {common})
     pairs = [(t, error_at_time(srd.points, t), error_at_time(linear.points, t)) for t in times]
     compared = [(t, a, b) for t, a, b in pairs if a is not None and b is not None]
     asked = f"smaller error than srd-lambda at equal time, the strongest glass being {scene.strongest_glass} (V_d {scene.strongest_abbe:.1f})"
     if not compared:
-        return Claim("index against wavelength", asked, "no time at which both have a picture", False, _stage_shares(srd, srd.points[0]))
+        return Claim("index against wavelength", asked, "no time at which both have a picture", False, _stage_shares(scene, srd, srd.points[0]))
     measured = ", ".join(f"at {t:.2g} s {a:.3g} against {b:.3g} ({b / max(a, 1e-30):.2g}×)" for t, a, b in compared)
     lost = [t for t, a, b in compared if not a < b]
     why = "" if not lost else f"not at {', '.join(f'{t:.2g} s' for t in lost)}; {reason(scene, srd)}"
@@ -102,24 +100,26 @@ def reason(scene: SceneResult, curve: Curve, seconds: float | None = None) -> st
     total = point.bias2 + point.variance
     if total > 0.0 and len({s.seed for s in curve.samples}) > 1:
         share = point.bias2 / total
-        cause = "footprints, bands and texels blur it, which only finer lattices reduce" if share > 0.5 else "noise, which more photons reduce"
+        half = HALVES[scene.half]
+        cause = half.bias_cause if share > 0.5 else half.noise_cause
         parts.append(f"{100 * share:.0f} % of {curve.method}'s error at {point.seconds:.2g} s is bias² and {100 * (1 - share):.0f} % variance, so mostly {cause}")
-        parts += _texel_share(scene, point) if share > 0.5 else []
-    parts.append(_stage_shares(curve, point))
+        parts += _common_share(scene, point) if share > 0.5 else []
+    parts.append(_stage_shares(scene, curve, point))
     return "; ".join(parts)
 
 
-def _texel_share(scene: SceneResult, point: Point) -> list[str]:
-    """How much of a bias² remains without footprints and bands, as far as `stochastic-point` tells."""
-    bare = next((curve.points[-1] for curve in scene.curves if curve.method == "stochastic-point" and curve.points), None)
+def _common_share(scene: SceneResult, point: Point) -> list[str]:
+    """How much of a bias² all methods have, as far as the half's bare method tells."""
+    half = HALVES[scene.half]
+    bare = next((curve.points[-1] for curve in scene.curves if curve.method == half.bare_method and curve.points), None)
     if bare is None or bare.bias2 < 0.1 * point.bias2:
         return []
     share = min(100.0 * bare.bias2 / point.bias2, 100.0)
-    return [f"{share:.0f} % of that bias² is found in stochastic-point too, which has neither footprints nor bands: the texels of the maps, common to all methods"]
+    return [f"{share:.0f} % of that bias² is found in {half.bare_method} too, {half.bare_text}"]
 
 
-def _stage_shares(curve: Curve, point: Point) -> str:
+def _stage_shares(scene: SceneResult, curve: Curve, point: Point) -> str:
     samples = [s for s in curve.samples if s.photons == point.photons]
-    spent = {stage: sum(s.seconds.get(stage, 0.0) for s in samples) for stage in PHOTON_STAGES}
+    spent = {stage: sum(s.seconds.get(stage, 0.0) for s in samples) for stage in HALVES[scene.half].counted}
     total = sum(spent.values()) or 1.0
     return "its time is " + ", ".join(f"{100 * seconds / total:.0f} % {stage}" for stage, seconds in spent.items())

@@ -104,8 +104,8 @@ def error_at_time(points: Sequence[Point], seconds: float) -> float | None:
     return float(np.exp(np.interp(np.log(seconds), [np.log(p.seconds) for p in order], [_log(p.relmse) for p in order])))
 
 
-def photons_at_time(points: Sequence[Point], seconds: float) -> int:
-    """Photons that take about `seconds`: in proportion beyond the last point, at least those of the first."""
+def budget_at_time(points: Sequence[Point], seconds: float) -> int:
+    """Photons or samples that take about `seconds`: in proportion beyond the last point, at least those of the first."""
     order = sorted(points, key=lambda p: p.seconds)
     if seconds > order[-1].seconds:
         return int(order[-1].photons * seconds / order[-1].seconds)

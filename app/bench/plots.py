@@ -16,6 +16,7 @@ import numpy as np
 
 from app.bench import report_style as style
 from app.bench.curves import speed_up, time_to_error
+from app.bench.halves import HALVES
 from app.bench.report_text import number, ratio_text, superscript
 from app.bench.results import Curve, SceneResult
 
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ASKED_RATIO = 30.0
-"""`srd` is asked to need at most 1/30 of the time of `stochastic`."""
 BASELINE = "stochastic"
 
 
@@ -56,21 +55,22 @@ def scene_series(scene: SceneResult, abscissa: str) -> list[Series]:
 
 
 def error_against(scene: SceneResult, abscissa: str) -> Figure:
-    """relMSE of all methods over "seconds" (photon time) or "photons"; bands over seeds, dotted the reference's own error."""
+    """relMSE of all methods over "seconds" (photon or eye time) or "photons" (or samples); bands over seeds, dotted the reference's own error."""
     figure = style.new_figure(6.6, 4.5)
     axes = figure.add_axes((0.105, 0.125, 0.70, 0.735))
     drawn = scene_series(scene, abscissa)
-    what = "photon time" if abscissa == "seconds" else "photons"
+    half = HALVES[scene.half]
+    what = half.time if abscissa == "seconds" else half.unit
     seeds = "one seed" if scene.seeds == 1 else f"{scene.seeds} seeds; band: least to largest"
     style.title(axes, f"{scene.scene}: error against {what}", f"{scene.size[0]}×{scene.size[1]}, {seeds}")
     axes.set_ylabel("relMSE (dimensionless)")
     if not drawn:
-        axes.set_xlabel("photon time (s)" if abscissa == "seconds" else "photons")
+        axes.set_xlabel(axis_name(scene.half, abscissa))
         axes.text(0.5, 0.5, "no finished points yet", ha="center", color=style.MUTED, transform=axes.transAxes)
         axes.set(xticks=[], yticks=[])
         return figure
     own = scene.reference.relmse if scene.reference is not None else 0.0
-    set_limits(axes, [drawn], [own], abscissa)
+    set_limits(axes, [drawn], [own], abscissa, scene.half)
     for one in drawn:
         draw_series(axes, one)
     _draw_reference_error(axes, own)
@@ -80,7 +80,7 @@ def error_against(scene: SceneResult, abscissa: str) -> Figure:
     return figure
 
 
-def set_limits(axes: Axes, groups: Sequence[Sequence[Series]], own_errors: Sequence[float], abscissa: str) -> None:
+def set_limits(axes: Axes, groups: Sequence[Sequence[Series]], own_errors: Sequence[float], abscissa: str, half: str = "light") -> None:
     """Logarithmic axes around all that is positive, with ticks that read as plain numbers."""
     everything = [one for group in groups for one in group]
     x = np.concatenate([one.x for one in everything])
@@ -95,10 +95,16 @@ def set_limits(axes: Axes, groups: Sequence[Sequence[Series]], own_errors: Seque
     axes.set_yscale("log")
     axes.set_xlim(float(x.min()) / 1.25, float(x.max()) * 1.12)
     axes.set_ylim(float(least) / 1.8, float(largest) * 1.6)
-    axes.set_xlabel("photon time (s)" if abscissa == "seconds" else "photons")
+    axes.set_xlabel(axis_name(half, abscissa))
     _ticks(axes, abscissa)
     axes.grid(True, which="major", color=style.GRID, lw=0.7)
     axes.set_axisbelow(True)
+
+
+def axis_name(half: str, abscissa: str) -> str:
+    """"photon time (s)", "camera samples a pixel" and so on."""
+    named = HALVES[half]
+    return f"{named.time} (s)" if abscissa == "seconds" else named.unit
 
 
 def _ticks(axes: Axes, abscissa: str) -> None:

@@ -1,4 +1,5 @@
-"""One method in one scene, ready to render again and again: what the bench times, and nothing else.
+"""One method in one scene, ready to render again and again: what the bench times, and nothing else. This is the light half's; the
+eye half's is `eye_rendering`.
 
 Programs, buffers, pilot and maps are made once. Then each rendering starts from nothing with one lattice of the
 photons asked for. Times are wall clock between points where the device has finished, on software and GPU alike; on
@@ -8,7 +9,10 @@ a GPU the wait after every slice costs a little, which the figures then contain.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -33,7 +37,7 @@ _TRIAL_GROWTH = 4
 
 
 class NothingToMeasure(UserError):
-    """The scene's caustic layer is black."""
+    """The scene's caustic layer is black, or the eye sees nothing that methods differ in."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +45,44 @@ class Rendering:
     """A picture and what it took."""
 
     xyz: np.ndarray
-    """float64 (H, W, 3), linear XYZ of the caustic layer, row 0 on top."""
+    """float64 (H, W, 3), linear XYZ of the layer that is measured, row 0 on top."""
     seconds: dict[str, float]
-    """"plan", "trace", "splat", "resolve", "eye"."""
+    """The light half's: "plan", "trace", "splat", "resolve", "eye"; the eye half's: "bands", "looks"."""
     emitted: int
+    """Photons, or samples a pixel, that there really were."""
     splats: int
+    """0 for the eye half."""
+
+
+class Rig(Protocol):
+    """What the runner needs of one method in one scene."""
+
+    setup_seconds: dict[str, float]
+    buffers_mib: float
+
+    def render(self, budget: int, seed: int) -> Rendering:
+        """One rendering from nothing of about `budget` photons, or camera samples a pixel."""
+
+    def budgets(self, seconds: float, count: int) -> list[int]:
+        """Ascending, `count` at most: evenly spaced in the logarithm, the largest takes about `seconds`."""
+
+    def fitting(self, budget: int) -> int:
+        """The largest budget up to this one that can be rendered exactly."""
+
+    def release(self) -> None:
+        """Free everything on the device."""
+
+
+@contextmanager
+def light_rigs(context: Context, scene: Scene, methods: Sequence[str], width: int, height: int, progress: Callable[[str], None]) -> Iterator[dict[str, Rig]]:
+    """The light half's rigs by method, freed at the end. Raises `NothingToMeasure`."""
+    rigs: dict[str, Rig] = {}
+    with ExitStack() as stack:
+        for method in methods:
+            progress(f"preparing {method}")
+            rigs[method] = rig = MethodRig(context, scene, method, width, height)
+            stack.callback(rig.release)
+        yield rigs
 
 
 class MethodRig:
@@ -102,6 +139,10 @@ class MethodRig:
             took = self._photon_seconds(int(smallest))
         smallest = min(smallest, largest)
         return sorted({int(round(n)) for n in np.geomspace(smallest, largest, count)})
+
+    def fitting(self, budget: int) -> int:
+        """Any number of photons has its lattice."""
+        return budget
 
     def release(self) -> None:
         """Free everything on the device."""

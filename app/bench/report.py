@@ -1,6 +1,6 @@
 """Writes what a bench run has found: plots as PNG and SVG, and one page that stands alone.
 
-    DIR/plots/SCENE_error_time.png .svg    DIR/plots/SCENE_error_photons.png .svg
+    DIR/plots/SCENE_error_time.png .svg    DIR/plots/SCENE_error_photons.png .svg (the eye half: _samples)
     DIR/plots/overview.png .svg            DIR/plots/scenes.png .svg (the README's figure)
     DIR/report.html
 
@@ -14,6 +14,7 @@ from pathlib import Path
 
 from app.atomic import atomic_output
 from app.bench import report_scene, report_sections, report_style
+from app.bench.halves import HALVES
 from app.bench.plots import error_against
 from app.bench.report_html import Html, page
 from app.bench.report_overview import overview, small_multiples
@@ -57,9 +58,9 @@ def readme_plot(result: BenchResult, stem: Path) -> None:
 
 
 def _curve_plots(scene: SceneResult, name: str, plots: Path) -> dict[str, Html]:
-    """Error over time and over photons: saved, and as SVG for the page."""
-    drawn = {}
-    for abscissa, ending, words in (("seconds", "time", "photon time"), ("photons", "photons", "photons")):
+    """Error over time and over photons or samples: saved, and as SVG for the page."""
+    drawn, half = {}, HALVES[scene.half]
+    for abscissa, ending, words in (("seconds", "time", half.time), ("photons", half.units, half.unit)):
         document = report_style.save(error_against(scene, abscissa), plots / f"{name}_error_{ending}")
         drawn[abscissa] = report_scene.inlined(document, f"{name}-{ending}", f"{scene.scene}: relMSE of each method against {words}, logarithmic axes")
     return drawn

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from app.bench import report_style as style
+from app.bench.halves import HALVES
 from app.bench.plots import (
-    ASKED_RATIO,
     BASELINE,
     Series,
+    axis_name,
     draw_ratio_arrow,
     draw_series,
     is_lower_bound,
@@ -40,14 +41,15 @@ def overview(result: BenchResult) -> Figure:
     figure = style.new_figure(8.6, height)
     axes = figure.add_axes((0.27, 0.92 / height, 0.705, 1 - 1.6 / height))
     ratios = [r for s in scenes for r in s.time_to_equal_error.values() if r > 0 and math.isfinite(r)]
-    left, right = min([0.5, *ratios]) / 2.2, max([ASKED_RATIO * 2, *ratios]) * 2.2
+    asked = HALVES[result.settings.half].asked_ratio
+    left, right = min([0.5, *ratios]) / 2.2, max([asked * 2, *ratios]) * 2.2
     axes.set_xscale("log")
     axes.set_xlim(left, right)
     axes.set_ylim(-0.6, max(len(scenes), 1) - 0.4)
-    axes.axvspan(ASKED_RATIO, right, color=style.WASH, lw=0, zorder=0)
-    axes.axvline(ASKED_RATIO, color=style.INK, lw=1.2, zorder=2)
+    axes.axvspan(asked, right, color=style.WASH, lw=0, zorder=0)
+    axes.axvline(asked, color=style.INK, lw=1.2, zorder=2)
     axes.axvline(1.0, color=style.MUTED, lw=0.8, ls=(0.0, (3.0, 2.0)), zorder=1)
-    notes = [(right, "asked of srd: at most 1/30 of the time", style.INK), (1.0, "as fast as stochastic", style.MUTED)]
+    notes = [(right, f"asked of srd: at most 1/{asked:.0f} of the time", style.INK), (1.0, "as fast as stochastic", style.MUTED)]
     if any(_ratio(scene, curve.method) is None for scene in scenes for curve in scene.curves if curve.method != BASELINE):
         notes.append((left * _NEVER_PLACE, "never", style.MUTED))
     for x, text, colour in notes:
@@ -128,7 +130,7 @@ def small_multiples(result: BenchResult) -> Figure:
     chosen = sorted(result.scenes, key=lambda s: -s.time_to_equal_error.get("srd", -1.0))
     panels = [(s, [one for one in scene_series(s, "seconds") if one.method in _MULTIPLES_METHODS]) for s in chosen]
     panels = [(scene, drawn) for scene, drawn in panels if drawn]
-    columns = min(3, max(len(panels), 1))
+    columns = 2 if len(panels) == 4 else min(3, max(len(panels), 1))
     rows = max(math.ceil(len(panels) / columns), 1)
     width, height = 2.75 * columns + 1.75, 2.3 * rows + 0.75
     figure = style.new_figure(width, height)
@@ -137,10 +139,10 @@ def small_multiples(result: BenchResult) -> Figure:
     for axes in grid.flat[len(panels) :]:
         axes.set_visible(False)
     for index, (axes, (scene, drawn)) in enumerate(zip(grid.flat, panels, strict=False)):
-        set_limits(axes, [group for _, group in panels], [], "seconds")
+        set_limits(axes, [group for _, group in panels], [], "seconds", scene.half)
         lowest, leftmost = index + columns >= len(panels), index % columns == 0
         last = index % columns == columns - 1 or index == len(panels) - 1
-        axes.set(xlabel="photon time (s)" if lowest else "", ylabel="relMSE" if leftmost else "")
+        axes.set(xlabel=axis_name(scene.half, "seconds") if lowest else "", ylabel="relMSE" if leftmost else "")
         axes.tick_params(labelbottom=lowest)
         _draw_panel(axes, scene, drawn, named=last)
     return figure

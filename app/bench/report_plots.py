@@ -1,4 +1,4 @@
-"""Two plots of one scene that explain a curve: its bias and variance, and where its photon time goes.
+"""Two plots of one scene that explain a curve: its bias and variance, and where its time goes.
 
 Figures are to be made and saved inside `report_style.plot_style()`.
 """
@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.bench import report_style as style
-from app.bench.plots import Series, scene_series, set_limits
+from app.bench.halves import HALVES, Half
+from app.bench.plots import Series, axis_name, scene_series, set_limits
 from app.bench.report_text import count
-from app.bench.results import STAGES, Curve, Sample, SceneResult
+from app.bench.results import Curve, Sample, SceneResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +24,7 @@ _PANELS_A_ROW = 6
 
 
 def bias_and_variance(scene: SceneResult) -> Figure | None:
-    """A panel for each method: variance (solid) and bias² (ink, dots) against photon time; None where one seed cannot tell them apart."""
+    """A panel for each method: variance (solid) and bias² (ink, dots) against time; None where one seed cannot tell them apart."""
     drawn = {one.method: one for one in scene_series(scene, "seconds")}
     parts = {curve.method: _parts(curve) for curve in scene.curves if curve.method in drawn}
     if not any(np.any(bias2 > 0) or np.any(variance > 0) for _, bias2, variance in parts.values()):
@@ -39,8 +40,8 @@ def bias_and_variance(scene: SceneResult) -> Figure | None:
     for axes in grid.flat[len(names) :]:
         axes.set_visible(False)
     for index, (axes, name) in enumerate(zip(grid.flat, names, strict=False)):
-        set_limits(axes, [everything], [], "seconds")
-        axes.set(xlabel="photon time (s)", ylabel="share of relMSE" if index % columns == 0 else "")
+        set_limits(axes, [everything], [], "seconds", scene.half)
+        axes.set(xlabel=axis_name(scene.half, "seconds"), ylabel="share of relMSE" if index % columns == 0 else "")
         axes.set_title(name, loc="left", fontsize=9.5, color=style.method_style(name).colour, pad=4,
                        fontweight="bold" if name == "srd" else "normal")  # fmt: skip
         _draw_parts(axes, name, *parts[name])
@@ -49,7 +50,7 @@ def bias_and_variance(scene: SceneResult) -> Figure | None:
 
 
 def _parts(curve: Curve) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Photon seconds, bias² and variance of the points that are finite, by rising number of photons."""
+    """Seconds, bias² and variance of the points that are finite, by rising number of photons."""
     order = sorted(curve.points, key=lambda p: p.photons)
     rows = [(p.seconds, p.bias2, p.variance) for p in order if p.seconds > 0 and math.isfinite(p.bias2 + p.variance)]
     seconds, bias2, variance = np.array(rows, float).reshape(-1, 3).T
@@ -83,16 +84,17 @@ def largest_samples(curve: Curve) -> list[Sample]:
     return [sample for sample in curve.samples if sample.photons == most]
 
 
-def stage_seconds(samples: list[Sample]) -> dict[str, float]:
-    """Mean seconds of each photon stage over `samples`; empty when there are none."""
+def stage_seconds(samples: list[Sample], half: str) -> dict[str, float]:
+    """Mean seconds of each stage of the half over `samples`; empty when there are none."""
     if not samples:
         return {}
-    return {stage: float(np.mean([max(sample.seconds.get(stage, 0.0), 0.0) for sample in samples])) for stage in STAGES}
+    return {stage: float(np.mean([max(sample.seconds.get(stage, 0.0), 0.0) for sample in samples])) for stage in HALVES[half].stages}
 
 
 def time_by_stage(scene: SceneResult) -> Figure | None:
-    """Stacked bars: microseconds of trace, splat and resolve for each photon at the largest budget; None without samples."""
-    rows = [(curve.method, samples, stage_seconds(samples)) for curve in scene.curves if (samples := largest_samples(curve))]
+    """Stacked bars: time by stage for each photon or sample at the largest budget; None without samples."""
+    half = HALVES[scene.half]
+    rows = [(curve.method, samples, stage_seconds(samples, half.key)) for curve in scene.curves if (samples := largest_samples(curve))]
     rows = [row for row in rows if sum(row[2].values()) > 0 and row[1][0].photons > 0]
     if not rows:
         return None
@@ -101,12 +103,12 @@ def time_by_stage(scene: SceneResult) -> Figure | None:
     height = 1.2 + 0.36 * len(rows)
     figure = style.new_figure(6.6, height)
     axes = figure.add_axes((0.185, 0.5 / height, 0.55, 1 - 1.15 / height))
-    longest = max(sum(stages.values()) / samples[0].photons for _, samples, stages in rows) * 1e6
+    longest = max(sum(stages.values()) / samples[0].photons for _, samples, stages in rows) * half.tick[0]
     for place, (method, samples, stages) in enumerate(rows):
-        _draw_bar(axes, place, samples, stages, longest)
+        _draw_bar(axes, place, samples, stages, longest, half)
         axes.text(-0.02, place, method, transform=axes.get_yaxis_transform(), ha="right", va="center", color=style.method_style(method).colour,
                   fontweight="bold" if method == "srd" else "normal")  # fmt: skip
-    axes.set(xlim=(0, longest * 1.02), ylim=(-0.6, len(rows) - 0.4), yticks=[], xlabel="photon time for each photon (µs)")
+    axes.set(xlim=(0, longest * 1.02), ylim=(-0.6, len(rows) - 0.4), yticks=[], xlabel=f"{half.time} for each {half.each} ({half.tick[1]})")
     axes.spines["left"].set_visible(False)
     axes.grid(True, axis="x", color=style.GRID, lw=0.7)
     axes.set_axisbelow(True)
@@ -114,23 +116,24 @@ def time_by_stage(scene: SceneResult) -> Figure | None:
     return figure
 
 
-def _draw_bar(axes: Axes, place: int, samples: list[Sample], stages: dict[str, float], longest_us: float) -> None:
+def _draw_bar(axes: Axes, place: int, samples: list[Sample], stages: dict[str, float], longest: float, half: Half) -> None:
     photons, total = samples[0].photons, sum(stages.values())
     start = 0.0
-    for stage in STAGES:
-        length = stages[stage] / photons * 1e6
+    for stage in half.stages:
+        length = stages[stage] / photons * half.tick[0]
         axes.barh(place, length, left=start, height=0.62, color=style.STAGE_COLOURS[stage], lw=0)
-        if length > 0.11 * longest_us:
-            ink = style.PAPER if stage == "trace" else style.ON_LIGHT_BAR
+        if length > 0.11 * longest:
+            ink = style.PAPER if stage in ("trace", "looks") else style.ON_LIGHT_BAR
             axes.text(start + length / 2, place, f"{100 * stages[stage] / total:.0f} %", ha="center", va="center", fontsize=8, color=ink)
         start += length
-    axes.text(1.02, place, f"{total:.2g} s, {count(photons)} photons", transform=axes.get_yaxis_transform(), va="center", fontsize=8, color=style.MUTED)
+    axes.text(1.02, place, f"{total:.2g} s, {count(photons)} {half.units}", transform=axes.get_yaxis_transform(), va="center", fontsize=8, color=style.MUTED)
 
 
 def _stage_key(axes: Axes, scene: SceneResult) -> None:
     from matplotlib.patches import Patch
 
-    style.title(axes, f"{scene.scene}: where the photon time goes", " ")
-    handles = [Patch(color=style.STAGE_COLOURS[stage], label="emission and trace" if stage == "trace" else stage) for stage in STAGES]
+    half = HALVES[scene.half]
+    style.title(axes, f"{scene.scene}: where the {half.time} goes", " ")
+    handles = [Patch(color=style.STAGE_COLOURS[stage], label=half.stage_names.get(stage, stage)) for stage in half.stages]
     axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(-0.02, 0.985), ncols=3, frameon=False, fontsize=8, handlelength=1.0,
                 columnspacing=1.4, borderaxespad=0.0)  # fmt: skip

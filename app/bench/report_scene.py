@@ -12,13 +12,12 @@ import numpy as np
 from app.bench import report_pictures as pictures
 from app.bench import report_plots, report_style
 from app.bench import report_text as text
+from app.bench.halves import HALVES
 from app.bench.metrics import EPSILON_SHARE, lit_mean
 from app.bench.plots import BASELINE, is_lower_bound
 from app.bench.report_html import Html, element, figure, table
 from app.bench.results import (
-    EARLY_SHARE,
     OTHER_MEASURES,
-    STAGES,
     Curve,
     Point,
     SceneResult,
@@ -48,10 +47,13 @@ def section(scene: SceneResult, anchor: str, curve_svgs: Mapping[str, Html], dir
 
 def _setting(scene: SceneResult) -> str:
     glass = f"strongest glass {scene.strongest_glass} (Abbe number {scene.strongest_abbe:.1f})" if scene.strongest_abbe > 0 else "no dispersion"
-    parts = [f"{scene.size[0]}×{scene.size[1]} pixels", text.seeds_text(scene.seeds), f"{scene.seconds:g} s of photon time", glass]
+    half = HALVES[scene.half]
+    parts = [f"{scene.size[0]}×{scene.size[1]} pixels", text.seeds_text(scene.seeds), f"{scene.seconds:g} s of {half.time}", glass]
     if scene.reference is not None:
         own = scene.reference
-        parts.append(f"reference: {own.method}, {text.count(own.photons)} photons in {own.seconds:.0f} s")
+        parts.append(f"reference: {own.method}, {text.count(own.photons)} {half.unit} in {own.seconds:.0f} s")
+        if own.caustic_photons:
+            parts.append(f"its caustic: {text.count(own.caustic_photons)} photons, relMSE about {text.number(own.caustic_relmse)}")
         parts.append(f"its own relMSE {text.number(own.relmse)}, its key {own.key[:12]}")
     return "; ".join(parts) + "."
 
@@ -66,7 +68,7 @@ def _curves(scene: SceneResult) -> list[Curve]:
 
 
 def _ends(curve: Curve) -> tuple[Point, Point] | None:
-    """The points of the fewest and of the most photons."""
+    """The points of the smallest and of the largest budget."""
     if not curve.points:
         return None
     order = sorted(curve.points, key=lambda point: point.photons)
@@ -75,6 +77,7 @@ def _ends(curve: Curve) -> tuple[Point, Point] | None:
 
 def _speed_table(scene: SceneResult) -> Html:
     rows = []
+    half = HALVES[scene.half]
     compared = any(curve.method == BASELINE and curve.points for curve in scene.curves)
     for curve in _curves(scene):
         ends, ratio = _ends(curve), scene.time_to_equal_error.get(curve.method)
@@ -90,7 +93,7 @@ def _speed_table(scene: SceneResult) -> Html:
             f"{text.number(last.relmse_low)} to {text.number(last.relmse_high)}", f"{last.seconds:.3g}", text.count(last.photons),
         ])  # fmt: skip
     return table(
-        ("method", "time ratio", "relMSE, shortest run", "relMSE, longest run", "over seeds", "photon s", "photons"), rows,
+        ("method", "time ratio", "relMSE, shortest run", "relMSE, longest run", "over seeds", f"{half.time.split()[0]} s", half.units), rows,
         "Time ratio: time of stochastic over time of the method, to the error that stochastic ends with; above 1 the method is faster.",
     )  # fmt: skip
 
@@ -114,9 +117,9 @@ def _bias_figure(scene: SceneResult, anchor: str) -> Html | None:
     drawn = report_plots.bias_and_variance(scene)
     if drawn is None:
         return None
-    svg = inlined(report_style.svg_text(drawn), f"{anchor}-bias", f"{scene.scene}: bias squared and variance of each method against photon time")
+    svg = inlined(report_style.svg_text(drawn), f"{anchor}-bias", f"{scene.scene}: bias squared and variance of each method against {HALVES[scene.half].time}")
     caption = (
-        "relMSE told apart: variance is what differs between seeds, bias² what all seeds share, such as footprints and bands that are too wide. "
+        "relMSE told apart: variance is what differs between seeds, bias² what all seeds share, such as columns and bands that are too wide. "
         "A hollow triangle means that no bias could be detected there."
     )
     return figure(svg, caption)
@@ -146,27 +149,29 @@ def _stage_figure(scene: SceneResult, anchor: str) -> Html | None:
     drawn = report_plots.time_by_stage(scene)
     if drawn is None:
         return None
-    svg = inlined(report_style.svg_text(drawn), f"{anchor}-stages", f"{scene.scene}: photon time by stage for each method")
-    return figure(svg, "At the largest budget of each method, mean over seeds; emission is counted in the trace.", "half")
+    svg = inlined(report_style.svg_text(drawn), f"{anchor}-stages", f"{scene.scene}: {HALVES[scene.half].time} by stage for each method")
+    return figure(svg, "At the largest budget of each method, mean over seeds.", "half")
 
 
 def _cost_table(scene: SceneResult) -> Html:
+    half, is_light = HALVES[scene.half], scene.half == "light"
     rows = []
     for curve in _curves(scene):
         samples = report_plots.largest_samples(curve)
-        stages = report_plots.stage_seconds(samples)
+        stages = report_plots.stage_seconds(samples, half.key)
         total = sum(stages.values())
-        plan = _mean([s.seconds["plan"] for s in samples if "plan" in s.seconds])
-        splats = _mean([s.splats / s.photons for s in samples if s.photons > 0])
-        setup = [text.number(curve.setup_seconds.get(part)) for part in ("buffers", "compile", "pilot")]
+        seconds = [curve.setup_seconds.get(part) for part in half.setup]
+        seconds += [_mean([s.seconds[stage] for s in samples if stage in s.seconds]) for stage in half.uncounted]
+        splats = [text.number(_mean([s.splats / s.photons for s in samples if s.photons > 0]))] if is_light else []
         rows.append([
-            _name(curve.method), *setup, text.number(plan), *(text.number(stages.get(stage)) for stage in STAGES),
-            f"{text.count(samples[0].photons / total)}/s" if total > 0 else "–", text.number(splats), text.number(curve.buffers_mib or None, 3),
+            _name(curve.method), *(text.number(value) for value in (*seconds, *(stages.get(stage) for stage in half.stages))),
+            f"{text.count(samples[0].photons / total)}/s" if total > 0 else "–", *splats, text.number(curve.buffers_mib or None, 3),
         ])  # fmt: skip
+    headings = [f"{name} s" for name in (*half.setup, *half.uncounted, *half.stages)]
+    uncounted = ", ".join((*half.setup, *half.uncounted))
     return table(
-        ("method", "buffers s", "compile s", "pilot s", "plan s", "trace s", "splat s", "resolve s", "photons", "splats a photon", "buffers MiB"), rows,
-        "Set-up once per scene (buffers: tree and uploads), the plan of bands once a rendering, and the stages of the longest run. "
-        "Set-up and plan are not in photon time.",
+        ("method", *headings, half.units, *(["splats a photon"] if is_light else []), "buffers MiB"), rows,
+        f"Not in {half.time}: {uncounted} (set-up once per scene; buffers are tree and uploads). Stages are those of the longest run.",
     )  # fmt: skip
 
 
@@ -192,15 +197,15 @@ def _pictures(scene: SceneResult, directory: Path) -> Html:
     names = ["reference", *methods]
     errors = {name: pictures.signed_error(found[name], reference) for name in methods if name in found}
     limit = pictures.error_limit(list(errors.values()))
-    early = f"{EARLY_SHARE * scene.equal_time:.2g} s"
 
     def crop(name: str) -> Html:
         return _image(pictures.toned(window.of(found[name]), exposure), f"{scene.scene}, {name}: part of the picture", "crop")
 
-    rows = [_picture_row(f"{scene.equal_time:.2g} s, part", names, {n: (crop(n), _numbers(scene, n, found)) for n in names if n in found})]
-    if any(f"{name} early" in found for name in methods):
-        shown = {n: (crop(f"{n} early"), _numbers(scene, f"{n} early", found)) for n in methods if f"{n} early" in found}
-        rows.insert(0, _picture_row(f"{early}, part", names, shown | {"reference": (crop("reference"), None)}))
+    rows = []
+    for ending, share in reversed(HALVES[scene.half].pictures):
+        shown = {n: (crop(n + ending), _numbers(scene, n + ending, found)) for n in methods if n + ending in found}
+        if shown or not ending:
+            rows.append(_picture_row(f"{share * scene.equal_time:.2g} s, part", names, shown | {"reference": (crop("reference"), None)}))
     whole = {name: (_whole(scene, name, found[name], window, exposure), None) for name in names if name in found}
     rows.append(_picture_row(f"{scene.equal_time:.2g} s, whole", names, whole))
     maps = {name: (_image(pictures.error_map(error, limit), f"{scene.scene}, {name}: signed error", None), None) for name, error in errors.items()}
@@ -242,7 +247,7 @@ def _numbers(scene: SceneResult, name: str, found: Mapping[str, np.ndarray]) -> 
     flip = metrics.get("flip", math.nan)
     lines = [f"relMSE {text.number(relmse)}{note}", f"HDR-FLIP {flip:.3f}" if math.isfinite(flip) else "HDR-FLIP not measured"]
     if sample is not None:
-        lines.append(f"{sample.photon_seconds:.2g} s, {text.count(sample.photons)} photons")
+        lines.append(f"{sample.photon_seconds:.2g} s, {text.count(sample.photons)} {HALVES[scene.half].units}")
     return element("div", [(line, element("br")) for line in lines], cls="numbers")
 
 

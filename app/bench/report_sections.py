@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from app.bench import report_text as text
+from app.bench.halves import HALVES
 from app.bench.report_html import Html, element, figure
+from app.bench.report_prose import PROSE
 from app.bench.report_style import by_rank
 from app.bench.results import BenchResult
 
@@ -22,7 +24,7 @@ def header(result: BenchResult) -> Html:
     }
     return element(
         "header",
-        element("p", "SpectraSplat bench", cls="muted"),
+        element("p", f"SpectraSplat bench: the {result.settings.half} half", cls="muted"),
         element("h1", "Error against run time"),
         [element("p", sentence, cls="lead") for sentence in text.headline(result)],
         element("dl", [element("div", element("dt", key), element("dd", value)) for key, value in facts.items()], cls="facts"),
@@ -34,7 +36,7 @@ def header(result: BenchResult) -> Html:
 def _effort(result: BenchResult) -> str:
     settings = result.settings
     return (
-        f"{settings.seconds:g} s of photon time for each method's longest rendering, {text.seeds_text(settings.seeds)}, "
+        f"{settings.seconds:g} s of {HALVES[settings.half].time} for each method's longest rendering, {text.seeds_text(settings.seeds)}, "
         f"{len(result.scenes)} scene{'' if len(result.scenes) == 1 else 's'}"
     )
 
@@ -60,22 +62,23 @@ def claims(result: BenchResult, overview_svg: Html) -> Html:
         "section",
         element("h2", "Claims", id="claims", cls="flow"),
         element("div", body, cls="wide") if rows else element("p", "No claim could be judged: it takes srd and a method to compare it with."),
-        figure(overview_svg, text.sentence(text.METRICS["time to equal error"]), "most"),
+        figure(overview_svg, text.sentence(PROSE[result.settings.half].metrics["time to equal error"]), "most"),
     )
 
 
 def definitions(result: BenchResult) -> Html:
     """The protocol in short; every method and every metric."""
     used = by_rank(sorted({curve.method for scene in result.scenes for curve in scene.curves}))
-    described = {name: text.METHODS.get(name, "Not described.") for name in used}
+    prose = PROSE[result.settings.half]
+    described = {name: prose.methods.get(name, "Not described.") for name in used}
     return element(
         "section",
         element("h2", "How it was measured", id="method"),
-        element("ul", [element("li", sentence) for sentence in text.PROTOCOL]),
+        element("ul", [element("li", sentence) for sentence in prose.protocol]),
         element(
             "div",
-            element("div", element("h3", "Methods"), _terms(described), element("h3", "Stages of photon time"), _terms(text.STAGES)),
-            element("div", element("h3", "Metrics"), _terms(text.METRICS)),
+            element("div", element("h3", "Methods"), _terms(described), element("h3", f"Stages of {HALVES[result.settings.half].time}"), _terms(prose.stages)),
+            element("div", element("h3", "Metrics"), _terms(prose.metrics)),
             cls="two",
         ),
     )
@@ -102,5 +105,5 @@ def limits(result: BenchResult) -> Html:
         element("h3", "Doubts about the measurement"),
         element("ul", doubts) if doubts else element("p", sound),
         element("h3", "What this does not cover"),
-        _terms(text.NOT_COVERED),
+        _terms(PROSE[result.settings.half].not_covered),
     )

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 PAPER, INK, MUTED, GRID, WASH = "#fefefe", "#1c1e21", "#5b6068", "#e2e4e7", "#f3f4f6"
 ON_LIGHT_BAR = "#1d2023"
-STAGE_COLOURS = {"trace": "#5f7a94", "splat": "#b9c6d2", "resolve": "#e0b46a"}
+STAGE_COLOURS = {"trace": "#5f7a94", "splat": "#b9c6d2", "resolve": "#e0b46a", "looks": "#6d8f80", "bands": "#d8a878"}
 
 PALETTE = {
     "paper": (PAPER, "#15171a"), "ink": (INK, "#e9eaec"), "muted": (MUTED, "#a4aab3"),
@@ -35,7 +35,7 @@ PALETTE = {
     "progressive": ("#4d7f5f", "#86bf9b"),
     "other-1": ("#8a6d3b", "#c9a96b"), "other-2": ("#2f8080", "#6fc0c0"), "other-3": ("#7d4c4c", "#c48d8d"),
     "trace": (STAGE_COLOURS["trace"], "#5b7690"), "splat": (STAGE_COLOURS["splat"], "#93a5b6"),
-    "resolve": (STAGE_COLOURS["resolve"], "#c79a52"), "on-light-bar": (ON_LIGHT_BAR, "#101214"),
+    "resolve": (STAGE_COLOURS["resolve"], "#c79a52"), "looks": (STAGE_COLOURS["looks"], "#67897a"), "bands": (STAGE_COLOURS["bands"], "#bd8f60"), "on-light-bar": (ON_LIGHT_BAR, "#101214"),
     "good": ("#1f6f43", "#6fcf97"), "bad": ("#a3241b", "#ff8a80"),
 }  # fmt: skip
 """Name: (on paper, on a dark screen). Every colour on paper occurs once: it is the key for the exchange."""

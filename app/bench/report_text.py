@@ -1,4 +1,4 @@
-"""What the bench report says in words: numbers as people read them, the protocol, definitions, warnings and limits.
+"""What the bench report says in words: numbers as people read them, warnings, findings and limits.
 
 Plain text only; `report_html` escapes it.
 """
@@ -9,64 +9,11 @@ import itertools
 import math
 import statistics
 
+from app.bench.halves import HALVES
 from app.bench.results import BenchResult, Claim, Curve, SceneResult
-
-METHODS = {
-    "srd": "The default. Each photon carries spectral ray differentials by refractive index, one column for each dispersive glass, "
-    "and leaves an anisotropic Gaussian swept along its spectrum, drawn in closed form. As many spectral bands as the measured "
-    "error of a chord asks for.",
-    "srd-lambda": "The published method (Elek et al. 2014): one column by wavelength, one anchor in the middle of the band.",
-    "stochastic": "One random wavelength a photon, spatial footprint. The baseline: unbiased in wavelength, noisy in colour.",
-    "stochastic-even": "The same with wavelengths from a low-discrepancy sequence instead of chance: the usual answer at its best.",
-    "stochastic-point": "One random wavelength a photon, one texel. Unbiased light tracing.",
-    "regular-7": "Seven fixed wavelengths a photon path, a splat each. Shows banding where the spectrum is spread wider than a footprint.",
-    "regular-16": "Sixteen fixed wavelengths a photon path, a splat each.",
-    "progressive": "The default made consistent: anchors and kernels change from pass to pass so that the bias goes to zero.",
-}
-
-METRICS = {
-    "relMSE": "mean over pixels and over X, Y, Z of (I − R)² / (R² + ε), I the picture, R the reference, ε = 10⁻² · (mean of R over the lit pixels)². "
-    "The reference's own variance is taken off.",
-    "relMSE trimmed": "the same without the 0.1 % of pixels with the largest error: what single fireflies cannot sway.",
-    "relMSE, ε of the whole picture": "the same with ε from the mean of R over all pixels: where most of a picture is dark, that ε is small and a faint blur over the edge of a shadow weighs most.",
-    "bias² and variance": "relMSE told apart over n seeds: bias² = mean[((Ī − R)² − Var/n) / (R² + ε)] with Ī the mean picture, "
-    "variance = mean[Var / (R² + ε)]. An estimate of bias² at or below zero means that no bias could be detected.",
-    "SMAPE": "mean of |I − R| / (|I| + |R| + √ε), 0 to 1.",
-    "Δu'v'": "mean distance in CIE 1976 u'v' over the pixels that the reference lights: chromatic noise that luminance hides.",
-    "nRMSE": "root mean square error over the root mean square of the reference, the reference's variance taken off.",
-    "HDR-FLIP": "mean perceived difference over a range of exposures (Andersson et al. 2021), 0 to 1, on linear Rec.709; of the equal-time pictures alone.",
-    "energy": "sum of the picture over sum of the reference; 1 is right.",
-    "tail slope": "exponent of relMSE against photons over the curve's second half, with its 95 % confidence interval. "
-    "Pure noise of independent photons gives −1; a bias floor bends it towards 0.",
-    "time to equal error": "time that stochastic needs for its longest rendering, over the time that the method needs to reach the same mean error, "
-    "read off the curves by log-log interpolation. ≥ marks a method whose shortest rendering is already better.",
-}
 
 MEASURES = {"relmse_whole": "relMSE, ε of the whole picture", "relmse_trimmed": "relMSE trimmed", "nrmse": "nRMSE", "smape": "SMAPE", "chroma": "Δu'v'"}
 """Names of `results.OTHER_MEASURES` as the reader sees them."""
-
-STAGES = {
-    "trace": "emission and tracing of photons",
-    "splat": "footprints and drawing into the caustic maps",
-    "resolve": "putting the maps together (display, not photon time)",
-}
-
-PROTOCOL = (
-    "One process and one OpenGL context; all methods share emission, tracing, accumulation and display and use the same seeds. "
-    "They differ in sampling and splat alone, so a difference between curves is a difference between methods.",
-    "Every point is an independent rendering from nothing with one photon budget; budgets rise in equal ratios. Methods take turns "
-    "within a seed, so that disturbances of the machine reach all alike.",
-    "Photon time is trace + splat + resolve. Not in it: set-up of the scene (tree, uploads, compilation, pilot photons), "
-    "the plan of spectral bands before each rendering (all listed by themselves), and the camera's pass, which is the same for every method.",
-    "Errors are taken on linear XYZ of the caustic layer before tone mapping and gamut clipping, against a reference that shares no "
-    "splat code: random wavelength, one photon one pixel.",
-)
-
-NOT_COVERED = {
-    "other machines": "Times hold for the machine above. Ratios move where tracing and drawing differ in speed, as between a CPU and a GPU.",
-    "the view": "Errors are those of the pixels the camera sees; light that falls elsewhere costs time and earns nothing here, for every method alike.",
-    "one scene setting": "Each scene was measured at one picture size and one camera; a finer picture shows the bias of footprints sooner.",
-}
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 BUSY_SHARE = 0.9
@@ -97,7 +44,7 @@ def number(value: float | None, digits: int = 2) -> str:
 
 
 def count(value: float) -> str:
-    """A number of photons: 16.4 M, 250 k."""
+    """A number of photons or samples: 16.4 M, 250 k."""
     for unit, suffix in ((1e9, " G"), (1e6, " M"), (1e3, " k")):
         if value >= unit:
             return f"{value / unit:.3g}{suffix}"
@@ -137,9 +84,10 @@ def warnings_of(scene: SceneResult) -> list[str]:
         told.append("Where a debiased error is zero or below, the picture cannot be told from the reference; the plots show a hollow triangle on the floor.")
     busy = [curve.method for curve in scene.curves if _times_fall(curve)]
     if busy:
+        half = HALVES[scene.half]
         told.append(
-            f"Photon time does not rise with the number of photons for {', '.join(busy)}: the machine was busy with other work, so times and time ratios "
-            "here are rough. Errors against photons are not touched by that."
+            f"{sentence(half.time)} does not rise with the number of {half.unit} for {', '.join(busy)}: the machine was busy with other work, so times and time ratios "
+            f"here are rough. Errors against {half.units} are not touched by that."
         )
     unfinished = [curve.method for curve in scene.curves if not curve.points]
     if unfinished:
@@ -152,7 +100,7 @@ def warnings_of(scene: SceneResult) -> list[str]:
 
 
 def _times_fall(curve: Curve) -> bool:
-    """Whether more photons once took clearly less time."""
+    """Whether a larger budget once took clearly less time."""
     seconds = [point.seconds for point in sorted(curve.points, key=lambda point: point.photons)]
     return any(later < BUSY_SHARE * earlier for earlier, later in itertools.pairwise(seconds))
 
@@ -164,9 +112,10 @@ def headline(result: BenchResult) -> list[str]:
     ratios = sorted(r for s in compared if (r := s.time_to_equal_error.get("srd", 0.0)) > 0 and math.isfinite(r))
     told = []
     if compared:
-        enough = sum(ratio >= 30 for ratio in ratios)
+        asked = HALVES[result.settings.half].asked_ratio
+        enough = sum(ratio >= asked for ratio in ratios)
         told.append(
-            f"srd reached the error that stochastic ends with in at most 1/30 of its time in {enough} of {len(compared)} "
+            f"srd reached the error that stochastic ends with in at most 1/{asked:.0f} of its time in {enough} of {len(compared)} "
             f"scene{'' if len(compared) == 1 else 's'}{_range_of(ratios)}."
         )
         if len(ratios) < len(compared):

@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import msgspec
 
-PHOTON_STAGES = ("trace", "splat")
-"""Stages whose sum is photon time: emission and tracing; footprints and drawing."""
-STAGES = (*PHOTON_STAGES, "resolve")
-"""And putting the maps together for the picture: part of display, the same for every method, shown but not counted."""
+from app.bench.halves import COUNTED_STAGES
 
 DEFAULT_METHODS = ("stochastic", "stochastic-even", "stochastic-point", "regular-7", "regular-16", "srd-lambda", "srd")
 
 OTHER_MEASURES = ("relmse_whole", "relmse_trimmed", "nrmse", "smape", "chroma")
 """Measures beside relMSE by which times to equal error are told, so that no conclusion hangs on one."""
-
-EARLY_SHARE = 0.1
-"""The early pictures are made after this share of the photon time given."""
 
 
 class BenchSettings(msgspec.Struct, frozen=True):
@@ -29,6 +23,9 @@ class BenchSettings(msgspec.Struct, frozen=True):
     """Width and height in pixels; None: 480 wide, in each scene's own aspect."""
     reference_seconds: float = 60.0
     """Most time that one run spends on a scene's reference; what earlier runs made is used as well."""
+    half: str = "light"
+    """Which half of the renderer is measured, a key of `halves.HALVES`. Below, what is said of photons and photon time holds for
+    camera samples a pixel and eye time where it is the eye's."""
 
 
 class Sample(msgspec.Struct, frozen=True):
@@ -40,7 +37,7 @@ class Sample(msgspec.Struct, frozen=True):
     emitted: int
     splats: int
     seconds: dict[str, float]
-    """By stage: `STAGES`; and, not counted, "plan" (bands and spectral tables, once before a rendering) and
+    """By stage: `Half.stages`; and, not counted, the light half's "plan" (bands and spectral tables, once before a rendering) and
     "eye" (display, the same for every method)."""
     metrics: dict[str, float]
     """relmse, relmse_raw (the reference's own variance left in), relmse_trimmed, relmse_whole (ε from the whole picture's mean),
@@ -48,7 +45,7 @@ class Sample(msgspec.Struct, frozen=True):
 
     @property
     def photon_seconds(self) -> float:
-        return sum(self.seconds.get(stage, 0.0) for stage in PHOTON_STAGES)
+        return sum(seconds for stage, seconds in self.seconds.items() if stage in COUNTED_STAGES)
 
 
 class Point(msgspec.Struct, frozen=True):
@@ -73,7 +70,7 @@ class Curve(msgspec.Struct):
     method: str
     setup_seconds: dict[str, float]
     """Once per scene and not in photon time: "buffers" (tree and uploads), "compile", "pilot", "warm-up" (a small
-    rendering, in which drivers finish compiling)."""
+    rendering, in which drivers finish compiling); "light half" (the caustic maps that all eyes look up)."""
     samples: list[Sample]
     budgets: list[int] = []
     """Photons of each point, from the rate that a first trial had; the same for every seed."""
@@ -95,6 +92,10 @@ class ReferenceInfo(msgspec.Struct):
     relMSE reported."""
     key: str
     """Hash of scene content, camera and size: the cache's key."""
+    caustic_photons: int = 0
+    """Photons of the caustic that the eye's reference looks up; 0: there is none in it."""
+    caustic_relmse: float = 0.0
+    """The caustic's own error on its receivers, about; it is not part of `relmse`."""
 
 
 class Claim(msgspec.Struct):
@@ -130,13 +131,15 @@ class SceneResult(msgspec.Struct):
     """Lowest V_d in the scene; 0 when nothing disperses."""
     pictures: dict[str, str] = {}
     """Files beside results.json, .npy of XYZ float32 (H, W, 3): "reference", "METHOD" (after
-    `equal_time` of photon time) and "METHOD early" (after `EARLY_SHARE` of it)."""
+    `equal_time` of photon time) and "METHOD early" and the like (after a share of it, see `Half.pictures`)."""
     equal_time: float = 0.0
     """Photon seconds for which the pictures named by a method alone were made."""
     picture_samples: dict[str, Sample] = {}
     """What each of `pictures` but the reference took and how far off it is, by the same name; "flip" among its metrics."""
     reference_too_coarse: bool = False
     """The reference's own error is more than a tenth of the smallest error reported."""
+    half: str = "light"
+    """As in the settings."""
     complete: bool = False
     """Every method has had every seed, and the pictures are made."""
 

@@ -6,42 +6,36 @@ to seed, so that what disturbs the machine hits all alike. After every method an
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from app.bench import metrics
 from app.bench.claims import claims_of, ratios_of
-from app.bench.curves import complete_curve, photons_at_time
+from app.bench.curves import budget_at_time, complete_curve
+from app.bench.halves import HALVES
 from app.bench.metrics import Truth
-from app.bench.rendering import MethodRig, NothingToMeasure, Rendering
+from app.bench.rendering import NothingToMeasure, Rendering, Rig
 from app.bench.results import (
-    EARLY_SHARE,
     OTHER_MEASURES,
     BenchSettings,
     Curve,
-    ReferenceInfo,
     Sample,
     SceneResult,
 )
 from app.bench.store import Store
-from app.bench.truth_picture import make_truth, truth_key
+from app.bench.subjects import SUBJECTS, Progress, Subject
 from app.errors import UserError
 from app.gpu.context import Context
 from app.model.scene import Dielectric, Scene
 
 POINTS = 10
-"""Photon budgets a curve."""
+"""Budgets a curve."""
 DEFAULT_WIDTH = 480
 _REFERENCE_SHARE = 0.15
 """Of a scene's progress bar."""
 _COARSE_SHARE = 0.1
 """The reference's own error should be at most this times the smallest error reported."""
-
-Progress = Callable[[float, str], None]
-TruthMaker = Callable[[Scene, int, int, float, Progress], tuple[Truth, ReferenceInfo]]
-KeyMaker = Callable[[Scene, int, int], str]
 
 
 def run_bench(
@@ -50,10 +44,10 @@ def run_bench(
     store: Store,
     progress: Progress,
     skipped: Callable[[str], None] | None = None,
-    truth_maker: TruthMaker = make_truth,
-    key_maker: KeyMaker = truth_key,
+    subject: Subject | None = None,
 ) -> None:
     """Measure every scene by name that `store` does not hold yet; a KeyboardInterrupt loses one method's seed at most.
+    `subject`: what is measured; None: the half that the store's settings name.
 
     Raises `UserError` when a scene has changed since `store` was begun, and where there is nothing to measure, unless
     `skipped` takes the reason."""
@@ -62,7 +56,7 @@ def run_bench(
             progress((done + fraction) / len(scenes), f"{name}: {text}")
 
         try:
-            _SceneBench(context, name, scene, store, share, truth_maker, key_maker).run()
+            _SceneBench(context, name, scene, store, share, subject or SUBJECTS[store.result.settings.half]).run()
         except NothingToMeasure as reason:
             if skipped is None:
                 raise
@@ -79,11 +73,11 @@ def picture_size(scene: Scene, settings: BenchSettings) -> tuple[int, int]:
 class _SceneBench:
     """One scene's measurements."""
 
-    def __init__(self, context: Context, name: str, scene: Scene, store: Store, progress: Progress, truth_maker: TruthMaker, key_maker: KeyMaker) -> None:
-        self._context, self._scene, self._store, self._progress, self._truth_maker = context, scene, store, progress, truth_maker
+    def __init__(self, context: Context, name: str, scene: Scene, store: Store, progress: Progress, subject: Subject) -> None:
+        self._context, self._scene, self._store, self._progress, self._subject = context, scene, store, progress, subject
         self._settings = store.result.settings
         self._size = picture_size(scene, self._settings)
-        key = key_maker(scene, *self._size)
+        key = subject.key(scene, *self._size)
         earlier = store.scene(name)
         if earlier is not None and earlier.reference is not None and earlier.reference.key != key:
             raise UserError(f"scene '{name}' has changed since {store.path} was made: give --fresh to begin anew, or another -o")
@@ -94,7 +88,8 @@ class _SceneBench:
         result, settings = self._result, self._settings
         if result.complete:
             return
-        with self._rigs() as rigs:
+        make = self._subject.rigs
+        with make(self._context, self._scene, settings.methods, *self._size, lambda text: self._progress(0.0, text)) as rigs:
             self._truth = self._reference()
             self._set_budgets(rigs)
             for number in range(settings.seeds):
@@ -116,7 +111,7 @@ class _SceneBench:
         kept = store.load_truth(result.scene)
         if kept is not None and result.reference is not None and kept.xyz.shape[:2] == (self._size[1], self._size[0]):
             return kept
-        truth, result.reference = self._truth_maker(
+        truth, result.reference = self._subject.truth(
             self._scene, *self._size, self._settings.reference_seconds, lambda fraction, text: self._progress(_REFERENCE_SHARE * fraction, f"reference {text}")
         )
         # What was measured against another reference cannot be gone on from.
@@ -127,19 +122,8 @@ class _SceneBench:
         store.save()
         return truth
 
-    @contextmanager
-    def _rigs(self) -> Iterator[dict[str, MethodRig]]:
-        """Every method, ready to render."""
-        rigs: dict[str, MethodRig] = {}
-        with ExitStack() as stack:
-            for method in self._settings.methods:
-                self._progress(0.0, f"preparing {method}")
-                rig = rigs[method] = MethodRig(self._context, self._scene, method, *self._size)
-                stack.callback(rig.release)
-            yield rigs
-
-    def _set_budgets(self, rigs: dict[str, MethodRig]) -> None:
-        """Photon budgets of the methods that have none yet."""
+    def _set_budgets(self, rigs: Mapping[str, Rig]) -> None:
+        """Budgets of the methods that have none yet."""
         for method, rig in rigs.items():
             if all(curve.method != method for curve in self._result.curves):
                 self._progress(_REFERENCE_SHARE, f"trying {method}")
@@ -149,7 +133,7 @@ class _SceneBench:
     def _curve(self, method: str) -> Curve:
         return next(curve for curve in self._result.curves if curve.method == method)
 
-    def _measure_seed(self, rig: MethodRig, curve: Curve, seed: int, done: float) -> None:
+    def _measure_seed(self, rig: Rig, curve: Curve, seed: int, done: float) -> None:
         """All budgets of one method and seed, unless results.json has them already."""
         store, result, truth = self._store, self._result, self._truth
         if any(sample.seed == seed for sample in curve.samples):
@@ -158,11 +142,11 @@ class _SceneBench:
         if earlier is None:
             raise UserError(f"{store.directory}/partial has lost what going on with '{result.scene}' needs: give --fresh to begin anew")
         sums, samples = earlier, []
-        for i, photons in enumerate(curve.budgets):
+        for i, budget in enumerate(curve.budgets):
             step = (1.0 - _REFERENCE_SHARE) / (self._settings.seeds * len(self._settings.methods))
             self._progress(_REFERENCE_SHARE + (1.0 - _REFERENCE_SHARE) * done + step * i / len(curve.budgets), f"{curve.method}, seed {seed} of {self._settings.seeds}")
-            rendering = rig.render(photons, seed)
-            samples.append(self._sample(rendering, curve.method, photons, seed))
+            rendering = rig.render(budget, seed)
+            samples.append(self._sample(rendering, curve.method, budget, seed))
             sums[i] += rendering.xyz - truth.xyz
         store.save_sums(result.scene, curve.method, seed, sums)
         curve.samples.extend(samples)
@@ -171,10 +155,10 @@ class _SceneBench:
         store.save()
         store.drop_sums(result.scene, curve.method, seed - 1)
 
-    def _sample(self, rendering: Rendering, method: str, photons: int, seed: int) -> Sample:
+    def _sample(self, rendering: Rendering, method: str, budget: int, seed: int) -> Sample:
         if not np.isfinite(rendering.xyz).all():
-            raise RuntimeError(f"{method} gave a picture with numbers that are not finite ({self._result.scene}, {photons} photons, seed {seed})")
-        return Sample(photons, seed, rendering.emitted, rendering.splats, rendering.seconds, metrics.measure(rendering.xyz, self._truth))
+            raise RuntimeError(f"{method} gave a picture with numbers that are not finite ({self._result.scene}, {budget} {HALVES[self._result.half].units}, seed {seed})")
+        return Sample(budget, seed, rendering.emitted, rendering.splats, rendering.seconds, metrics.measure(rendering.xyz, self._truth))
 
     def _judge(self) -> None:
         """What all curves so far say about each other."""
@@ -186,14 +170,15 @@ class _SceneBench:
         assert result.reference is not None
         result.reference_too_coarse = bool(errors) and result.reference.relmse > _COARSE_SHARE * min(errors)
 
-    def _make_pictures(self, method: str, rig: MethodRig) -> None:
-        """Pictures at equal photon time, with FLIP."""
+    def _make_pictures(self, method: str, rig: Rig) -> None:
+        """Pictures at equal time, with FLIP."""
         result = self._result
         points = self._curve(method).points
-        for name, seconds in ((method, self._settings.seconds), (f"{method} early", EARLY_SHARE * self._settings.seconds)):
-            photons = photons_at_time(points, seconds)
-            rendering = rig.render(photons, 1)
-            sample = self._sample(rendering, method, photons, 1)
+        for ending, share in HALVES[result.half].pictures:
+            name = f"{method}{ending}"
+            budget = rig.fitting(budget_at_time(points, share * self._settings.seconds))
+            rendering = rig.render(budget, 1)
+            sample = self._sample(rendering, method, budget, 1)
             look = metrics.flip(rendering.xyz, self._truth)
             if look is not None:
                 sample.metrics["flip"] = look
@@ -208,5 +193,5 @@ def _empty_result(name: str, scene: Scene, size: tuple[int, int], settings: Benc
         name, scene.name, size, settings.seeds, settings.seconds, None, [],
         strongest_glass="" if strongest is None else strongest.name,
         strongest_abbe=0.0 if strongest is None else abs(strongest.V_d),
-        equal_time=settings.seconds,
+        equal_time=settings.seconds, half=settings.half,
     )

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from app.bench.curves import error_at_time
+from app.bench.halves import HALVES
 from app.bench.results import Curve, SceneResult
 
 if TYPE_CHECKING:
     from rich.table import Table
-
-_TIMES_S = (0.1, 1.0)
 
 
 def scene_table(scene: SceneResult) -> Table:
@@ -21,10 +20,11 @@ def scene_table(scene: SceneResult) -> Table:
     own = "" if scene.reference is None else f", reference's own relMSE {scene.reference.relmse:.2g}"
     table = Table(title=f"{scene.scene}, {width}×{height}, {scene.seeds} seed{'s' * (scene.seeds != 1)}{own}", title_justify="left")
     table.add_column("method")
-    times = [t for t in _TIMES_S if t < scene.seconds]
+    half = HALVES[scene.half]
+    times = [t for t in half.compared_seconds if t < scene.seconds]
     for t in times:
         table.add_column(f"relMSE at {t:g} s", justify="right")
-    for name in ("at the end", "after", "photons", "bias² share", "slope", "time to equal error"):
+    for name in ("at the end", "after", half.units, "bias² share", "slope", "time to equal error"):
         table.add_column(name, justify="right")
     for curve in scene.curves:
         if curve.points:

@@ -1,17 +1,25 @@
-"""The reference of a scene, from the independent renderer of `app.truth`, as the bench measures against it."""
+"""The references of a scene's two halves, from the independent renderers of `app.truth`, as the bench measures against them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from app.bench.metrics import Truth
 from app.bench.results import ReferenceInfo
-from app.model.scene import Scene
+from app.model.scene import Diffuse, Scene
+
+if TYPE_CHECKING:
+    from app.truth.spectral_caustic import CausticPlan
 
 Progress = Callable[[float, str], None]
 TARGET_RELMSE = 1e-5
 """Good enough for any method's error; time usually ends sooner."""
 METHOD = "photon tracing in float64: random wavelength, one photon one pixel, no footprint, no splat or map code shared"
+EYE_METHOD = "camera paths in float64: one random wavelength each, Fresnel by chance, textures looked up at points, no column, no map and no shader code shared"
+_TRIAL_CAUSTIC = 1 << 22
+"""Photons by which a caustic's error is estimated: it falls as one over their number."""
 
 
 def make_truth(scene: Scene, width: int, height: int, seconds: float, progress: Progress) -> tuple[Truth, ReferenceInfo]:
@@ -30,3 +38,42 @@ def truth_key(scene: Scene, width: int, height: int) -> str:
     from app.truth import photon_reference
 
     return photon_reference.scene_key(scene, width, height, scene.render.max_depth)
+
+
+def make_eye_truth(scene: Scene, width: int, height: int, seconds: float, progress: Progress) -> tuple[Truth, ReferenceInfo]:
+    """The same for all that the camera sees. Raises UserError where the caustic falls on a curved receiver."""
+    from app.truth import eye_reference
+
+    plan = caustic_plan(scene)
+    picture = eye_reference.cached_eye_reference(
+        scene, width, height, target_relmse=TARGET_RELMSE, seconds=seconds, caustic=plan, progress=progress, cancelled=lambda: False
+    )
+    truth = Truth(picture.xyz, picture.variance)
+    info = ReferenceInfo(EYE_METHOD, picture.samples, picture.seconds, truth.own_relmse, eye_truth_key(scene, width, height))
+    if plan is not None:
+        info.caustic_photons, info.caustic_relmse = plan.photons, _caustic_error(scene, width, height, plan)
+    return truth, info
+
+
+def eye_truth_key(scene: Scene, width: int, height: int) -> str:
+    """Hash of everything that the eye's reference depends on."""
+    from app.truth import eye_reference
+
+    return eye_reference.eye_scene_key(scene, width, height, eye_reference.MAX_DEPTH, caustic_plan(scene))
+
+
+def caustic_plan(scene: Scene) -> CausticPlan | None:
+    """How the caustic of the eye's reference is made; None where there is no light or nothing that it could fall on."""
+    from app.truth.spectral_caustic import CausticPlan
+
+    if not scene.lights or not any(isinstance(o.material, Diffuse) for o in scene.objects):
+        return None
+    return CausticPlan(max_depth=scene.render.max_depth)
+
+
+def _caustic_error(scene: Scene, width: int, height: int, plan: CausticPlan) -> float:
+    """relMSE of the caustic itself, told from a smaller one of the same windows: the picture's own variance does not hold it."""
+    from app.truth.spectral_caustic import build_caustic
+
+    trial = replace(plan, photons=min(_TRIAL_CAUSTIC, plan.photons))
+    return build_caustic(scene, width, height, trial).relmse * trial.photons / plan.photons

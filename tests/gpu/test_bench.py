@@ -12,9 +12,10 @@ import pytest
 
 from app.__main__ import main
 from app.bench import runner
+from app.bench.halves import LIGHT
 from app.bench.metrics import Truth, measure
 from app.bench.rendering import MethodRig
-from app.bench.results import STAGES, BenchResult
+from app.bench.results import BenchResult
 from app.cli_options import find_scene
 from app.errors import UserError
 from app.model.colorimetry import rgb709_to_xyz
@@ -43,7 +44,7 @@ def test_a_rig_renders_what_render_does_again_and_again(gl: Any, prism: Scene) -
     assert np.allclose(first.xyz, picture, rtol=1e-4, atol=1e-5 * picture.max())
     assert np.allclose(again.xyz, first.xyz, rtol=1e-5, atol=1e-6 * picture.max())  # nothing is left of the rendering between
     assert not np.allclose(other.xyz, first.xyz, rtol=0.05, atol=1e-3 * picture.max())
-    assert set(first.seconds) == {"plan", *STAGES, "eye"} and all(seconds > 0.0 for seconds in first.seconds.values())
+    assert set(first.seconds) == {"plan", *LIGHT.stages, "eye"} and all(seconds > 0.0 for seconds in first.seconds.values())
     assert 0.5 * 3000 < first.emitted < 2 * 3000 and other.emitted < first.emitted and first.splats > 0
     assert set(rig.setup_seconds) == {"buffers", "compile", "pilot", "warm-up"} and rig.buffers_mib > 1.0
     assert budgets == sorted(set(budgets)) and 1 <= len(budgets) <= 4 and budgets[-1] >= 64

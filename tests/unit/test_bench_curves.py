@@ -7,9 +7,9 @@ import pytest
 
 from app.bench.claims import claims_of, ratios_of
 from app.bench.curves import (
+    budget_at_time,
     complete_curve,
     error_at_time,
-    photons_at_time,
     points_by,
     speed_up,
     tail_slope,
@@ -97,9 +97,9 @@ def test_errors_and_photons_at_a_time() -> None:
     assert error_at_time(points, 0.1) == pytest.approx(10.0)
     assert error_at_time(points, 1e-3) is None
     assert error_at_time(points, 1e3) == pytest.approx(points[-1].relmse)
-    assert photons_at_time(points, 0.1) == pytest.approx(0.1 * RATE, abs=1)
-    assert photons_at_time(points, 10.0) == pytest.approx(10.0 * RATE, rel=1e-6)
-    assert photons_at_time(points, 1e-4) == pytest.approx(points[0].photons, abs=1)
+    assert budget_at_time(points, 0.1) == pytest.approx(0.1 * RATE, abs=1)
+    assert budget_at_time(points, 10.0) == pytest.approx(10.0 * RATE, rel=1e-6)
+    assert budget_at_time(points, 1e-4) == pytest.approx(points[0].photons, abs=1)
     zero = [Point(1, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0), *points]
     assert error_at_time(zero, 0.01) == pytest.approx(1e-12)
 

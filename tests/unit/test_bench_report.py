@@ -23,6 +23,7 @@ from app.bench import (
 from app.bench.metrics import EPSILON_SHARE
 from app.bench.report_html import Html, element
 from app.bench.report_overview import overview
+from app.bench.report_prose import PROSE
 from app.bench.results import BenchResult, Claim, Curve, Point, SceneResult
 from app.errors import UserError
 from tests.unit.bench_synthetic import METHODS, synthetic_result, synthetic_scene
@@ -114,7 +115,7 @@ def test_page_stands_alone_and_holds_everything(written: tuple[BenchResult, Path
         told += [scene.scene, scene.title, scene.strongest_glass]
         told += [text for claim in scene.claims for text in (claim.name, claim.asked, claim.measured, claim.why)]
         told += [curve.method for curve in scene.curves]
-    told += [*report_text.METRICS, *(report_text.METHODS[name] for name in METHODS)]
+    told += [*PROSE["light"].metrics, *(PROSE["light"].methods[name] for name in METHODS)]
     for words in told:
         assert words in page.text, words
     assert "61×" in page.text and "17×" in page.text

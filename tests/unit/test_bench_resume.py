@@ -6,7 +6,8 @@ The rigs are made up: pictures are the truth with a bias and noise that depend o
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import msgspec
@@ -18,6 +19,7 @@ from app.bench.metrics import Truth
 from app.bench.rendering import NothingToMeasure, Rendering
 from app.bench.results import BenchResult, BenchSettings, ReferenceInfo, SceneResult
 from app.bench.store import Store
+from app.bench.subjects import Subject
 from app.errors import UserError
 from app.model.catalogue import find
 from app.model.mesh import make_mesh
@@ -42,14 +44,21 @@ class Rigs:
         self.rendered: list[tuple[str, int, int]] = []
         self.stop_at = -1
         self.released = 0
+        self.refuses = False
 
-    def __call__(self, _context: object, _scene: Scene, method: str, width: int, height: int) -> Rig:
+    @contextmanager
+    def make(self, _context: object, _scene: Scene, methods: tuple[str, ...], width: int, height: int, progress: Callable[[str], None]) -> Iterator[dict[str, Rig]]:
         assert (width, height) == (WIDTH, HEIGHT)
-        return Rig(self, method)
+        if self.refuses:
+            raise NothingToMeasure("nothing")
+        progress(f"preparing {methods[0]}")
+        rigs = {method: Rig(self, method) for method in methods}
+        yield rigs
+        self.released += len(rigs)
 
 
 class Rig:
-    """Stands where `MethodRig` stands."""
+    """Stands where `MethodRig` and `EyeRig` stand."""
 
     setup_seconds = {"buffers": 0.1}
     buffers_mib = 1.0
@@ -71,8 +80,11 @@ class Rig:
         seconds = {"plan": 0.01, "trace": photons / 2e5, "splat": photons / 4e5, "resolve": 0.01, "eye": 0.2}
         return Rendering(xyz, seconds, photons, photons // 2)
 
+    def fitting(self, budget: int) -> int:
+        return budget
+
     def release(self) -> None:
-        self._rigs.released += 1
+        """Owns nothing."""
 
 
 def truth_picture() -> np.ndarray:
@@ -93,7 +105,7 @@ class Bench:
 
     def run(self, settings: BenchSettings = SETTINGS, key: str = "key", fresh: bool = False, names: tuple[str, ...] = ("one", "two")) -> BenchResult:
         store = Store(self.directory, BenchResult("0", "today", "command", dict(MACHINE), [], settings), fresh)
-        runner.run_bench(None, dict.fromkeys(names, glass_scene()), store, lambda f, t: self.told.append((f, t)), self.skipped, self._truth, lambda *_: key)  # type: ignore[arg-type]
+        runner.run_bench(None, dict.fromkeys(names, glass_scene()), store, lambda f, t: self.told.append((f, t)), self.skipped, Subject(self.rigs.make, self._truth, lambda *_: key))  # type: ignore[arg-type]
         return store.result
 
     def _truth(self, _scene: Scene, width: int, height: int, seconds: float, progress: Callable[[float, str], None]) -> tuple[Truth, ReferenceInfo]:
@@ -108,10 +120,8 @@ class Bench:
 
 @pytest.fixture
 def rigs(monkeypatch: pytest.MonkeyPatch) -> Rigs:
-    made = Rigs()
-    monkeypatch.setattr(runner, "MethodRig", made)
     monkeypatch.setattr(runner, "POINTS", 4)
-    return made
+    return Rigs()
 
 
 def comparable(scene: SceneResult) -> dict[str, object]:
@@ -243,11 +253,8 @@ def test_pictures_that_are_not_finite_are_no_result(tmp_path: Path, rigs: Rigs, 
         Bench(tmp_path, rigs).run()
 
 
-def test_a_black_scene_is_an_error_by_name_and_skipped_among_all(tmp_path: Path, rigs: Rigs, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: object) -> None:
-        raise NothingToMeasure("nothing")
-
-    monkeypatch.setattr(runner, "MethodRig", refuse)
+def test_a_black_scene_is_an_error_by_name_and_skipped_among_all(tmp_path: Path, rigs: Rigs) -> None:
+    rigs.refuses = True
     bench = Bench(tmp_path, rigs)
     with pytest.raises(UserError, match="nothing"):
         bench.run()

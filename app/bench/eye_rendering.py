@@ -1,0 +1,160 @@
+"""One method of the eye half in one scene, ready to look again and again: what `bench --eye` times, and nothing else.
+
+All methods look up the same caustic maps, which are made once and cost nothing here: they differ in how camera rays
+sample the spectrum. A rendering starts from nothing; what `srd` needs to choose the bands of its spectrum counts.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+
+import numpy as np
+
+from app.bench.rendering import NothingToMeasure, Rendering, Rig
+from app.gpu.context import Context
+from app.gpu.map_channels import MapChannels
+from app.gpu.scene_buffers import SceneBuffers
+from app.light_half import LightHalf, spectral_axis
+from app.model.colorimetry import rgb709_to_xyz
+from app.model.features import Features
+from app.model.scene import Diffuse, Scene
+from app.model.settings import RenderSettings
+from app.passes.eye import CausticMaps, EyePass
+
+LIGHT_PHOTONS = 1 << 20
+"""Photons of the caustic maps, traced by `srd`: its maps of the shipped scenes change no more that a pixel could show."""
+LIGHT_SEED = 1
+_TRIAL_SHARE = 0.25
+"""A trial this long, as a share of the time given, tells the rate of the longest rendering."""
+
+
+class SharedLight:
+    """The caustic maps that all eyes of a scene look up; none where the scene has no light or nothing that light could fall on."""
+
+    def __init__(self, context: Context, scene: Scene, width: int, height: int, progress: Callable[[str], None], photons: int = LIGHT_PHOTONS) -> None:
+        self.maps: CausticMaps | None = None
+        self.channels = MapChannels()
+        self.reflectances: Sequence[np.ndarray | None] = (None,)
+        self.seconds = 0.0
+        self._light: LightHalf | None = None
+        if not scene.lights or not any(isinstance(o.material, Diffuse) for o in scene.objects):
+            return
+        started = time.perf_counter()
+        settings = _settings(scene, "srd", width, height)
+        features = Features.of(scene, settings)
+        self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+        self._light = light = LightHalf(context, scene, settings, features, self._buffers)
+        light.prepare()
+        light.begin(photons, LIGHT_SEED)
+
+        def told(done: float) -> bool:
+            progress(f"light half, {100.0 * done:.0f} %")
+            return True
+
+        light.run_pass(0, photons, told)
+        light.finish()
+        self.channels, self.reflectances = light.map_channels, light.reflectances
+        self.maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
+        context.finish()
+        context.check("the light half of the bench")
+        self.seconds = time.perf_counter() - started
+
+    def release(self) -> None:
+        """Free everything on the device."""
+        if self._light is not None:
+            self._light.release()
+            self._buffers.release()
+
+
+class EyeRig:
+    """Owns the eye's buffers and programs for one scene, method and picture size; the maps are `light`'s."""
+
+    def __init__(self, context: Context, scene: Scene, method: str, width: int, height: int, light: SharedLight) -> None:
+        """Raises `NothingToMeasure` where the camera cannot see through dispersive glass: all methods are the same then."""
+        self._context, self._scene, self._size, self._light = context, scene, (width, height), light
+        features = Features.of(scene, _settings(scene, method, width, height))
+        if not features.eye_disperses:
+            raise NothingToMeasure(f"scene '{scene.name}': the camera sees nothing through glass that disperses, so the eye's methods do not differ and there is nothing to measure")
+        started = time.perf_counter()
+        self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+        buffered = self._finished()
+        self._eye = EyePass(context, self._buffers, "beauty", light.reflectances, light.channels)
+        # Drivers put off part of the compiling until a program runs.
+        self._eye.run(scene.camera, width, height, 1, 0, light.maps)
+        compiled = self._finished()
+        self.setup_seconds = {"light half": light.seconds, "buffers": buffered - started, "compile": compiled - buffered}
+        self.buffers_mib = self._buffers.bytes / 2**20
+
+    def render(self, budget: int, seed: int) -> Rendering:
+        """One picture from nothing: bands chosen for `budget` samples a pixel, then that many, rounded up to a multiple of the bands."""
+        started = self._finished()
+        bands = self._choose_bands(budget)
+        chosen = self._finished()
+        samples = -(-budget // bands) * bands
+        self._eye.run(self._scene.camera, *self._size, samples, 0, self._light.maps, seed)
+        looked = self._finished()
+        xyz = rgb709_to_xyz(self._eye.read_rgb().astype(np.float64))
+        return Rendering(xyz, {"bands": chosen - started, "looks": looked - chosen}, samples, 0)
+
+    def fitting(self, budget: int) -> int:
+        """The largest multiple of the bands that `budget` samples are given; the smallest where that is none."""
+        bands = self._choose_bands(budget)
+        return max(budget // bands, 1) * bands
+
+    def budgets(self, seconds: float, count: int) -> list[int]:
+        """Sample counts, about `count`: evenly spaced in the logarithm as far as whole multiples of the bands allow, the largest takes about `seconds`."""
+        samples = 1
+        while (took := self._seconds(samples))[1] < _TRIAL_SHARE * seconds:
+            samples *= 2
+        bands_s, all_s, taken = took
+        largest = max(taken * max(seconds - bands_s, 0.0) / (all_s - bands_s), 1.0)
+        found: set[int] = set()
+        for steps in (count, 2 * count):
+            if len(found) < count:
+                found |= {self.fitting(round(n)) for n in np.geomspace(1.0, largest, steps)}
+        return _thinned(sorted(found), count)
+
+    def release(self) -> None:
+        """Free everything on the device."""
+        self._eye.release()
+        self._buffers.release()
+
+    def _seconds(self, budget: int) -> tuple[float, float, int]:
+        """Seconds of choosing the bands and of all, and the samples taken."""
+        rendering = self.render(budget, 0)
+        return rendering.seconds["bands"], sum(rendering.seconds.values()), rendering.emitted
+
+    def _choose_bands(self, samples: int) -> int:
+        return self._eye.choose_bands(self._scene.camera, *self._size, samples, self._light.maps)
+
+    def _finished(self) -> float:
+        self._context.finish()
+        return time.perf_counter()
+
+
+@contextmanager
+def eye_rigs(context: Context, scene: Scene, methods: Sequence[str], width: int, height: int, progress: Callable[[str], None]) -> Iterator[dict[str, Rig]]:
+    """The eye half's rigs by method, freed at the end. Raises `NothingToMeasure`."""
+    rigs: dict[str, Rig] = {}
+    with ExitStack() as stack:
+        progress("preparing the light half")
+        light = SharedLight(context, scene, width, height, progress)
+        stack.callback(light.release)
+        for method in methods:
+            progress(f"preparing {method}")
+            rigs[method] = rig = EyeRig(context, scene, method, width, height, light)
+            stack.callback(rig.release)
+        yield rigs
+
+
+def _settings(scene: Scene, method: str, width: int, height: int) -> RenderSettings:
+    return RenderSettings(width=width, height=height, method=method, max_depth=scene.render.max_depth)
+
+
+def _thinned(counts: list[int], most: int) -> list[int]:
+    """At most `most` of ascending counts, evenly spread over the list, both ends kept."""
+    if len(counts) <= most:
+        return counts
+    return [counts[round(i)] for i in np.linspace(0, len(counts) - 1, most)]

@@ -1,0 +1,43 @@
+"""What is measured of a scene: for each half of the renderer where its rigs and its reference come from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+
+from app.bench.eye_rendering import eye_rigs
+from app.bench.metrics import Truth
+from app.bench.rendering import Rig, light_rigs
+from app.bench.results import ReferenceInfo
+from app.bench.truth_picture import (
+    eye_truth_key,
+    make_eye_truth,
+    make_truth,
+    truth_key,
+)
+from app.gpu.context import Context
+from app.model.scene import Scene
+
+Progress = Callable[[float, str], None]
+RigMaker = Callable[[Context, Scene, Sequence[str], int, int, Callable[[str], None]], AbstractContextManager[Mapping[str, Rig]]]
+TruthMaker = Callable[[Scene, int, int, float, Progress], tuple[Truth, ReferenceInfo]]
+KeyMaker = Callable[[Scene, int, int], str]
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One half's rigs and reference."""
+
+    rigs: RigMaker
+    """(context, scene, methods, width, height, progress) → every method's rig, as long as the context lasts."""
+    truth: TruthMaker
+    """(scene, width, height, seconds, progress) → the reference, with so many seconds added to what is kept of it."""
+    key: KeyMaker
+    """(scene, width, height) → hash of everything that the reference depends on."""
+
+
+SUBJECTS = {
+    "light": Subject(light_rigs, make_truth, truth_key),
+    "eye": Subject(eye_rigs, make_eye_truth, eye_truth_key),
+}
