@@ -33,7 +33,8 @@ _TRIAL_SHARE = 0.25
 class SharedLight:
     """The caustic maps that all eyes of a scene look up; none where the scene has no light or nothing that light could fall on."""
 
-    def __init__(self, context: Context, scene: Scene, width: int, height: int, progress: Callable[[str], None], photons: int = LIGHT_PHOTONS) -> None:
+    def __init__(self, context: Context, scene: Scene, width: int, height: int, progress: Callable[[str], None], photons: int | None = None) -> None:
+        photons = photons or LIGHT_PHOTONS
         self.maps: CausticMaps | None = None
         self.channels = MapChannels()
         self.reflectances: Sequence[np.ndarray | None] = (None,)

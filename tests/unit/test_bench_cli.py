@@ -15,6 +15,7 @@ from app.__main__ import main
 from app.bench import runner, screen
 from app.bench.results import BenchSettings, Curve, Point, Sample, SceneResult
 from app.errors import UserError
+from app.model.settings import EYE_METHODS
 
 
 class FakeContext:
@@ -79,6 +80,8 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
         (["prism", "-o", "out", "--reference-seconds", "0"], "--reference-seconds 0 is out of range"),
         (["prism", "-o", "out", "--size", "64"], "--size '64' is not WIDTHxHEIGHT"),
         (["prism", "-o", "out", "--size", "16384x16384", "--seeds", "1"], ""),
+        (["prism", "-o", "out", "--eye", "--methods", "stochastic-point"], "--methods 'stochastic-point' is a method of the light half alone"),
+        (["--eye", "--features", "prism"], "--features and --eye exclude each other"),
         (["--features", "prism", "ball"], "'bench --features prism' without further scenes"),
         (["--features", "nowhere"], "neither a file nor shipped"),
     ],
@@ -131,6 +134,16 @@ def test_defaults_are_all_scenes_with_glass_and_all_methods(seen: Seen, tmp_path
     assert seen.settings == BenchSettings() and len(BenchSettings().methods) == 7
     assert {"prism", "brilliant", "ball_plain", "wine_glass"} <= set(seen.scenes) and len(seen.scenes) >= 6
     assert shlex.split(seen.command)[2 : 2 + len(seen.scenes)] == seen.scenes
+
+
+def test_the_eye_has_its_own_defaults(seen: Seen, tmp_path: Path) -> None:
+    assert main(["bench", "--eye", "-o", str(tmp_path)]) == 0
+    methods = ("stochastic", "stochastic-even", "regular-7", "regular-16", "srd-lambda", "srd")
+    assert seen.settings == BenchSettings(20.0, methods=methods, half="eye") and set(methods) == set(EYE_METHODS)
+    assert seen.scenes == ["prism_edge", "lens_text", "brilliant_studio", "ball_caustic"]
+    assert shlex.split(seen.command)[:4] == ["spectrasplat", "bench", "--eye", "prism_edge"]
+    assert main(["bench", "--eye", "prism", "-o", str(tmp_path / "other"), "--seconds", "2", "--methods", "srd"]) == 0
+    assert seen.settings == BenchSettings(2.0, methods=("srd",), half="eye") and seen.scenes == ["prism"]
 
 
 def test_ctrl_c_says_what_is_kept_and_reports_it(seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -37,26 +37,6 @@ SETTINGS = BenchSettings(3.0, 3, ("stochastic", "srd"), (WIDTH, HEIGHT))
 MACHINE = {"processor": "p", "renderer": "r", "program": "hash"}
 
 
-class Rigs:
-    """Makes made-up rigs, counts what they render, and interrupts at the rendering that `stop_at` names."""
-
-    def __init__(self) -> None:
-        self.rendered: list[tuple[str, int, int]] = []
-        self.stop_at = -1
-        self.released = 0
-        self.refuses = False
-
-    @contextmanager
-    def make(self, _context: object, _scene: Scene, methods: tuple[str, ...], width: int, height: int, progress: Callable[[str], None]) -> Iterator[dict[str, Rig]]:
-        assert (width, height) == (WIDTH, HEIGHT)
-        if self.refuses:
-            raise NothingToMeasure("nothing")
-        progress(f"preparing {methods[0]}")
-        rigs = {method: Rig(self, method) for method in methods}
-        yield rigs
-        self.released += len(rigs)
-
-
 class Rig:
     """Stands where `MethodRig` and `EyeRig` stand."""
 
@@ -85,6 +65,28 @@ class Rig:
 
     def release(self) -> None:
         """Owns nothing."""
+
+
+class Rigs:
+    """Makes made-up rigs, counts what they render, and interrupts at the rendering that `stop_at` names."""
+
+    rig = Rig
+
+    def __init__(self) -> None:
+        self.rendered: list[tuple[str, int, int]] = []
+        self.stop_at = -1
+        self.released = 0
+        self.refuses = False
+
+    @contextmanager
+    def make(self, _context: object, _scene: Scene, methods: tuple[str, ...], width: int, height: int, progress: Callable[[str], None]) -> Iterator[dict[str, Rig]]:
+        assert (width, height) == (WIDTH, HEIGHT)
+        if self.refuses:
+            raise NothingToMeasure("nothing")
+        progress(f"preparing {methods[0]}")
+        rigs = {method: self.rig(self, method) for method in methods}
+        yield rigs
+        self.released += len(rigs)
 
 
 def truth_picture() -> np.ndarray:
