@@ -147,8 +147,12 @@ class LiveEngine:
             self._changed_at, self._urgent = started, True
         self._interacting = interacting
         try:
+            waited = self._urgent and self._finishes_answer
             self._follow(budget_s)
             self._work(deadline, budget_s)
+            if waited and not self._finishes_answer and time.perf_counter() < deadline - 0.5 * budget_s:
+                self._follow(budget_s)
+                self._work(deadline, budget_s)
         except (shader.ShaderError, UserError) as error:
             self._building = self._being_built = None
             self.problem = str(error)
@@ -179,6 +183,11 @@ class LiveEngine:
         """A drag gets the whole budget: what its next step throws away is not begun."""
         return self._interacting and (self._eye.owes_picture or self._shows_quick_maps)
 
+    @property
+    def _finishes_answer(self) -> bool:
+        """Where not even the smallest picture fits a frame, one that has begun is finished first: else nothing would be seen to move."""
+        return self._interacting and self._eye.is_coarse and self._eye.owes_picture
+
     def _follow(self, budget_s: float) -> None:
         """Bring what is shown nearer to what is wanted."""
         wanted, shown = self._wanted, self._shown
@@ -196,6 +205,8 @@ class LiveEngine:
             self._retrace = False
             if self._building is None:
                 self._start_building(wanted)
+            return
+        if self._urgent and self._finishes_answer:
             return
         if self._urgent:
             self._urgent = False

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from app.gpu.scene_buffers import SceneBuffers
     from app.model.scene import Camera, Scene
 
-SCALES = (1.0, 0.5, 1 / 3, 0.25, 1 / 6, 0.125)
+SCALES = (1.0, 0.5, 1 / 3, 0.25, 1 / 6, 0.125, 1 / 12)
 """Sides of a picture in motion over the side asked for."""
 DISPATCH_SECONDS = 0.008
 SETTLED = 8
