@@ -55,7 +55,7 @@ def _speed_up_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> Claim:
     why = ""
     if not holds and reached.at_once:
         first = srd.points[0]
-        why = f"srd's smallest rendering ({first.photons:,} {half.units}, {first.seconds:.3f} s) is already as good: {_stage_shares(scene, srd, first)}; longer runs would tell more"
+        why = f"srd's smallest rendering ({half.amount(first.photons)}, {first.seconds:.3f} s) is already as good: {_stage_shares(scene, srd, first)}; longer runs would tell more"
     elif not holds:
         why = f"short by a factor of {half.asked_ratio / reached.seconds:.2g}; {reason(scene, srd)}"
     return Claim("time to equal error", asked, measured, holds, why)
@@ -69,7 +69,7 @@ def _first_picture_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> C
     early = error_at_time(srd.points, EARLY_SECONDS)
     if early is None:
         first = srd.points[0]
-        why = f"even {first.photons:,} photons take {first.seconds:.2f} s: {_stage_shares(scene, srd, first)}"
+        why = f"even {HALVES[scene.half].amount(first.photons)} take {first.seconds:.2f} s: {_stage_shares(scene, srd, first)}"
         return Claim("first picture", asked, f"no picture before {first.seconds:.2f} s, then relMSE {first.relmse:.3g}", False, why)
     holds = early < late
     why = "" if holds else f"{early / max(late, 1e-30):.2g} times stochastic's; {reason(scene, srd, EARLY_SECONDS)}"

@@ -50,6 +50,10 @@ class Half:
     bare_text: str
     """Why a part of `srd`'s bias² is found there too."""
 
+    def amount(self, budget: int) -> str:
+        """"1 sample", "2,048 photons"."""
+        return f"{budget:,} {self.each if budget == 1 else self.units}"
+
 
 LIGHT = Half(
     "light", "photons", "photons", "photon", "photon time",
