@@ -53,6 +53,11 @@ layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
 #define FELL_STACK 2
 #define FELL_CUT 3
 
+// Which of its turns a pixel's dispersed sample takes, and whether this sample took one. A picture in colour counts them beside its sums, since
+// where glass fills a pixel in part only some samples are dispersed, and all bands must have had as many.
+uint turn = 0u;
+bool took_turn = false;
+
 #include "eye/path.glsl"
 
 // What a sample has found so far, and the paths that wait while another is followed. Global: an array handed from function to function is
@@ -97,8 +102,12 @@ EyePath camera_path(uvec2 pixel)
     path.depth = 0;
     path.narrowed = false;
     path.recut = false;
-#ifdef COLOURED_MIRRORS
-    path.tint = vec3(1.0);
+#ifdef SPECTRAL_SWEEP
+    for (int end = 0; end < 2; ++end) {
+        path.end_position[end] = path.position;
+        path.end_direction[end] = path.direction;
+    }
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) path.end_step[g] = vec2(0.0);
 #endif
 #ifdef ABSORPTION
     for (int i = 0; i < ABSORBERS; ++i) path.lengths[i] = 0.0;
@@ -154,7 +163,7 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key)
     bool may_cut = path.narrowed && any(passes) && !all(passes) && !path.recut && waits < STACK && path.band.z - path.band.x > MIN_CUT_BAND;
     bool cut = false;
     WHEN(may_cut) {
-        float at = cut_of(path, facing, crossing, passes);
+        float at = cut_of(path, theta3, crossing, passes);
         cut = min(at - path.band.x, path.band.z - at) > 0.01 * MIN_CUT_BAND && cut_is_near(whole, at, hit.distance);
         if (!cut) atomicAdd(fallbacks[FELL_CUT], 1u);
         WHEN(cut) {
@@ -193,11 +202,11 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key)
         path.weight *= (reflects ? reflectance : 1.0 - reflectance) / (reflects ? likely : 1.0 - likely);
         path.key = hash_combine(path.key, reflects ? 3u : 4u);
     } else {
-        path.weight *= total ? reflectance : 1.0 - reflectance;
+        path.weight *= total ? vec3(1.0) : 1.0 - reflectance;
         path.share *= total ? 1.0 : 1.0 - likely;
     }
     bool through = false;
-    WHEN(!reflects) through = refract_path(path, facing, crossing, n_i.y, n_t.y);
+    WHEN(!reflects) through = refract_path(path, facing, crossing, n_i, n_t);
     if (through) path.medium = beyond;
     path.origin = through ? origin_beyond : origin_back;
     WHEN(!through) reflect_path(path, facing);
@@ -217,6 +226,9 @@ void meet_surface(inout EyePath path, Hit hit, uint kind, uint pixel_key)
     transfer_columns(path, hit.normal_g, hit.distance);
     if (!columns_hold(path)) atomicAdd(fallbacks[FELL_COLUMNS], 1u);
     path.position = surface_point(hit, whole.position, whole.direction);
+#ifdef SPECTRAL_SWEEP
+    WHEN(path.narrowed) transfer_ends(path, hit.normal_g);
+#endif
     path.depth += 1;
 #ifdef HAS_MIRROR
     WHEN(kind == KIND_MIRROR) {
@@ -224,8 +236,12 @@ void meet_surface(inout EyePath path, Hit hit, uint kind, uint pixel_key)
         path.origin = RayOrigin(hit.primitive, hit.object, dot(path.direction, hit.normal_g) < 0.0, path.origin.inside_mask);
         path.recut = false;
         vec3 colour = object_colours[hit.object].rgb;
-#ifdef COLOURED_MIRRORS
-        path.tint *= colour;
+#ifdef ABSORPTION
+        // A coloured mirror lets through like a glass of its own, once a reflection.
+        int mirror = int(object_colours[hit.object].w);
+        for (int i = 0; i < ABSORBERS; ++i)
+            if (i == mirror) path.lengths[i] += 1.0;
+        if (mirror < 0) path.weight *= colour.g;
 #else
         path.weight *= colour.g;
 #endif
@@ -250,6 +266,11 @@ void main()
 #endif
     uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
     EyePath path = camera_path(pixel);
+#ifdef RGB_CHANNELS
+    turn = p.counts_turns != 0u ? uint(imageLoad(picture[0], ivec2(pixel)).w) : p.sample_index;
+#else
+    turn = p.sample_index;
+#endif
     for (int t = 0; t < TARGETS; ++t) radiance[t] = vec4(0.0);
 #ifdef EYE_SPECULAR
     waits = 0;
@@ -296,6 +317,9 @@ void main()
         path = waiting[--waits];
         add_sky(path, stretch_of(path, path.band.x, path.band.z), path.direction, vec3(0.0));
     }
+#endif
+#ifdef RGB_CHANNELS
+    radiance[0].w = took_turn ? 1.0 : 0.0;
 #endif
     for (int t = 0; t < TARGETS; ++t) {
         vec4 sum = imageLoad(picture[t], ivec2(pixel));

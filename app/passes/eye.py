@@ -39,11 +39,13 @@ MAX_EVENTS = 160
 """Surfaces that all paths of a sample may meet together."""
 STACK = 6
 """Paths of a sample that may wait while another is followed."""
-SPLIT_THRESHOLD = 0.03
+SPLIT_THRESHOLD = 0.004
 """Share of a sample's power above which both parts of a split path are followed."""
-MOST_TAPS = 16
+MOST_TAPS = 24
+"""Looks along one sweep."""
 TAPS_PER_PIXEL = 0.7
-TINT_STEPS = 24
+"""Of one sample; between two looks colours are not told apart, so the more samples there are, the closer they lie."""
+TINT_STEPS = 48
 """Stretches that the whole spectrum is cut into behind coloured glass."""
 
 _PILOT_COLUMNS = 64
@@ -57,7 +59,7 @@ _GROUP = 8
 _NOTHING_LISTED = np.array([0, 1, 1, 0], "u4").tobytes()
 _BIND_LIGHTS, _BIND_OBJECT_COLOURS, _BIND_CELL_CDF, _BIND_RECEIVERS, _BIND_PLACEMENTS, _BIND_PICTURES, _BIND_COUNTERS, _BIND_LISTED = range(8, 16)
 _UNIT_EMISSION, _UNIT_PICTURES = 10, 11
-_BEYOND_ONLY = ("HAS_DISPERSION", "SPECTRAL_SWEEP", "RANDOM_WAVELENGTH", "EVEN_WAVELENGTHS", "COLOURED_MIRRORS", "ABSORPTION", "SPECTRALLY_TINTED", "NORMAL_DERIVATIVES")
+_BEYOND_ONLY = ("HAS_DISPERSION", "SPECTRAL_SWEEP", "RANDOM_WAVELENGTH", "EVEN_WAVELENGTHS", "MAP_BINS", "ABSORPTION", "NORMAL_DERIVATIVES")
 """What only rays beyond glass and mirrors need."""
 FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut")
 """What the shader counts, in its order."""
@@ -170,6 +172,7 @@ class EyePass:
         maps = maps or self._no_maps()
         parameters = self._parameters(camera, width, height, maps.scale, seed)
         parameters["sample_side"] = 1.0 / np.sqrt(samples + sample_offset)
+        parameters["taps_per_pixel"] = TAPS_PER_PIXEL * (samples + sample_offset) ** 0.25
         for index, place in enumerate(_pixel_lattice(samples, sample_offset)):
             parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
             parameters["within_pixel"] = place
@@ -195,11 +198,14 @@ class EyePass:
         rows = max(1, round(columns * height / width))
         coarser = None
         tolerance = _BAND_TOLERANCE / np.sqrt(samples)
-        for bands in (b for b in _BAND_CHOICES if b <= max(samples, 1)):
+        # Every band's own samples must be enough to smooth an outline.
+        most = max(1, samples // 4 if samples >= 16 else samples // 2)
+        for bands in (b for b in _BAND_CHOICES if b <= most):
             self._clear(columns, rows)
             parameters = self._parameters(camera, columns, rows, maps.scale, 1)
-            parameters["bands"], parameters["dithered"], parameters["sample_side"] = bands, 0, 1.0
+            parameters["bands"], parameters["dithered"], parameters["counts_turns"], parameters["sample_side"] = bands, 0, 0, 1.0
             parameters["pixel_scale"] = columns / width
+            parameters["taps_per_pixel"] = TAPS_PER_PIXEL * samples**0.25
             parameters["within_pixel"] = 0.5
             for number in range(bands):
                 parameters["sample_index"] = number
@@ -296,8 +302,8 @@ class EyePass:
             "UNIT_EMISSION": _UNIT_EMISSION,
             "EMISSION_CELLS": EMISSION_CELLS,
             "TINT_STEPS": TINT_STEPS,
-            "TAPS_PER_PIXEL": TAPS_PER_PIXEL,
             "BIN_TARGET": maps.first_target,
+            "BIN_COUNT": maps.count,
             "BIN_OVERLAP": 1 if maps.edges_nm is not None else 0,
             "LIGHT_COUNT": len(scene.lights),
             "MAX_DEPTH": MAX_DEPTH,
@@ -314,12 +320,10 @@ class EyePass:
             "RANDOM_WAVELENGTH": features.random_wavelength,
             "EVEN_WAVELENGTHS": features.even_wavelengths,
             "RGB_CHANNELS": self.channels.edges_nm is None,
-            "MAP_BINS": maps.count > 0,
+            "MAP_BINS": specular and features.eye_disperses and maps.count > 0,
             "HAS_RECEIVERS": any(isinstance(o.material, Diffuse) for o in scene.objects),
             "VISIBLE_LIGHTS": beauty and any(has_extent(light) for light in scene.lights),
-            "COLOURED_MIRRORS": specular and coloured,
-            "ABSORPTION": specular and absorbs,
-            "SPECTRALLY_TINTED": specular and (coloured or absorbs),
+            "ABSORPTION": specular and (coloured or absorbs),
             "NORMAL_DERIVATIVES": features.smooth_normals,
             "HAS_IMAGES": bool(self.pictures.structs),
         }
@@ -348,7 +352,7 @@ class EyePass:
         if environment is not None:
             for name, column in zip(("sky_x", "sky_y", "sky_z"), np.asarray(environment.world_to_local, float).T, strict=True):
                 parameters[name] = column
-        parameters["bands"], parameters["dithered"] = self.bands, self.bands > 1
+        parameters["bands"], parameters["dithered"], parameters["counts_turns"] = self.bands, self.bands > 1, 1
         parameters["most_taps"], parameters["split_threshold"] = self.most_taps, self.split_threshold
         parameters["map_scale"] = map_scale
         parameters["inside_object"] = NONE

@@ -54,7 +54,9 @@ EYE_PARAMETERS = Struct(
         Field("most_taps", "uint", "looks along one sweep at most"),
         Field("split_threshold", "float", "share of a path's power above which both of its parts are followed"),
         Field("draw_index", "uint", "counts them too: which numbers it draws"),
-        Field("reserved", "uint", ""),
+        Field("counts_turns", "uint", "whether pixels count their own dispersed samples instead"),
+        Field("taps_per_pixel", "float", "looks along a sweep, for every pixel it is long"),
+        Field("unused", "float", "", 3),
     ),
 )
 _LIGHT_KINDS = {"point": 0, "spot": 0, "directional": 1, "collimated": 2, "area": 3}

@@ -18,7 +18,14 @@ from app.gpu.scene_buffers import SAMPLES, SceneBuffers, index_slope
 from app.gpu.scene_texels import spectra_texture
 from app.model.colorimetry import VISIBLE_NM, daylight_per_lumen, rgb_basis
 from app.model.glass import Dispersion
-from app.model.scene import Dielectric, Diffuse, Mirror, Scene
+from app.model.scene import (
+    Absorption,
+    Dielectric,
+    Diffuse,
+    Material,
+    Mirror,
+    Scene,
+)
 from app.model.spectral_tables import SpectralAxis, cumulative, index_table
 from app.model.spectrum import Spectrum
 from app.passes.present import Channels
@@ -48,7 +55,7 @@ class EyeTables:
         shown = scene.scene
         glasses = _shown_media(scene)
         axis = _axis(scene, list(glasses.values()))
-        absorptions = _absorptions(shown)
+        absorptions = _absorptions(shown, scene.space.scale)
         spectra, defines = _spectra(scene, glasses, axis, absorptions, maps)
         emission, rows = _emission(shown, axis, channels, reflectances, maps, scene.space.scale)
         colours = np.zeros((len(shown.objects), 4), "f4")
@@ -56,8 +63,9 @@ class EyeTables:
         for row, item in zip(colours, shown.objects, strict=True):
             if isinstance(item.material, Diffuse | Mirror):
                 row[:3] = item.material.reflectance_rgb
-            elif isinstance(item.material, Dielectric) and item.material.absorption is not None:
-                row[3] = next(i for i, a in enumerate(absorptions) if np.array_equal(a, item.material.absorption.coefficient))
+            coefficient = _absorption(item.material, scene.space.scale)
+            if coefficient is not None:
+                row[3] = next(i for i, known in enumerate(absorptions) if np.array_equal(known, coefficient))
         return cls(
             spectra_texture(ctx, spectra),
             _texture(ctx, emission),
@@ -89,15 +97,23 @@ def _axis(scene: SceneBuffers, shown: list[Dispersion]) -> SpectralAxis:
     return SpectralAxis.build(shown if by_glass else [])
 
 
-def _absorptions(scene: Scene) -> list[np.ndarray]:
-    """Distinct absorption coefficients (401,), in the order of the objects."""
+def _absorptions(scene: Scene, scale: float) -> list[np.ndarray]:
+    """Distinct absorption coefficients (401,) of glasses, 1/GPU unit, and of coloured mirrors, a reflection, in the order of the objects."""
     distinct: list[np.ndarray] = []
     for item in scene.objects:
-        if isinstance(item.material, Dielectric) and item.material.absorption is not None:
-            coefficient = item.material.absorption.coefficient
-            if not any(np.array_equal(coefficient, known) for known in distinct):
-                distinct.append(coefficient)
+        coefficient = _absorption(item.material, scale)
+        if coefficient is not None and not any(np.array_equal(coefficient, known) for known in distinct):
+            distinct.append(coefficient)
     return distinct
+
+
+def _absorption(material: Material, scale: float) -> np.ndarray | None:
+    match material:
+        case Dielectric(absorption=Absorption(coefficient=coefficient)):
+            return coefficient / scale
+        case Mirror(reflectance_rgb=rgb) if len(set(rgb)) > 1:
+            return -np.log(np.maximum(rgb_basis() @ np.asarray(rgb, float), 1e-30))
+    return None
 
 
 def _spectra(
@@ -113,7 +129,7 @@ def _spectra(
         "INDEX_ROW": np.asarray(index_table(axis, list(glasses.values()), SAMPLES), float),
         "SLOPE_ROW": np.array(slopes).reshape(-1, SAMPLES),
         "VARIABLE_ROW": variables,
-        "ABSORPTION_ROW": np.array([np.interp(nm, VISIBLE_NM, a) / scene.space.scale for a in absorptions]).reshape(-1, SAMPLES),
+        "ABSORPTION_ROW": np.array([np.interp(nm, VISIBLE_NM, a) for a in absorptions]).reshape(-1, SAMPLES),
         "BASIS_ROW": np.array([np.interp(nm, VISIBLE_NM, column) for column in rgb_basis().T]),
         "BIN_ROW": maps.coordinate(axis, x)[None],
     }

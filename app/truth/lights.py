@@ -57,11 +57,13 @@ def stretch_seen(offset: Array, half_side: Array, blur: Array) -> Array:
 
 
 def disc_seen(offset: Array, blur: Array) -> Array:
-    """The same for a disc of radius 1 and a round look: a frustum of the disc's volume, a cone where the look is wider: (N,)."""
+    """The same for a disc of radius 1 and a round look: a frustum of height 1 and the disc's volume, or a cone where none has it: (N,)."""
     offset, blur = np.broadcast_arrays(offset, blur)
-    foot, top = np.maximum(1.0, blur) + blur, np.maximum(1.0 - blur, 0.0)
-    # Volume of a frustum of height 1: π/3 (foot² + foot top + top²); it should be the disc's π.
-    return 3.0 / (foot**2 + foot * top + top**2) * _falling(offset, top, foot)
+    # Volume of a frustum between radii m - b and m + b: π (m² + b²/3); of a cone of foot 2b and height h: 4π h b²/3.
+    frustum = 3.0 - blur**2 > 3.0 * blur**2
+    middle = np.where(frustum, np.sqrt(np.maximum(1.0 - blur**2 / 3.0, 0.0)), blur)
+    height = np.where(frustum, 1.0, 3.0 / (4.0 * np.maximum(blur, 0.5) ** 2))
+    return height * _falling(offset, middle - blur, middle + blur)
 
 
 def light_seen(lights: Array, position: Array, direction: Array, far: Array, width: Array) -> Array:

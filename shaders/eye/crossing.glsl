@@ -12,6 +12,9 @@ struct Facing {
     vec3 normal;
     vec3 normal_g;
     bool is_smooth;   // the shading normal is interpolated
+#ifdef SPECTRAL_SWEEP
+    vec3 end_normal[2];
+#endif
 #ifdef NORMAL_DERIVATIVES
     vec3 columns[COLUMNS_HELD];
 #endif
@@ -23,6 +26,9 @@ Facing facing_of(Hit hit, EyePath path)
     facing.normal_g = facing_geometric(hit, path.direction);
     facing.normal = facing_normal(hit, path.direction);
     facing.is_smooth = false;
+#ifdef SPECTRAL_SWEEP
+    facing.end_normal[0] = facing.end_normal[1] = facing.normal;
+#endif
 #ifdef NORMAL_DERIVATIVES
     for (int c = 0; c < COLUMNS_HELD; ++c) facing.columns[c] = vec3(0.0);
     if (all(equal(facing.normal, facing.normal_g)) || (hit.primitive & PLANE_BIT) != 0u) return facing;
@@ -39,6 +45,13 @@ Facing facing_of(Hit hit, EyePath path)
         vec3 dsummed = dot(gradient_u, dp) * (n1 - n0) + dot(gradient_v, dp) * (n2 - n0);
         facing.columns[c] = side * normalised_derivative(summed, dsummed);
     }
+#ifdef SPECTRAL_SWEEP
+    for (int end = 0; end < 2; ++end) {
+        vec3 off = path.narrowed ? path.end_position[end] - path.position : vec3(0.0);
+        vec3 normal = summed + dot(gradient_u, off) * (n1 - n0) + dot(gradient_v, off) * (n2 - n0);
+        facing.end_normal[end] = side * normal * inversesqrt(max(dot(normal, normal), 1e-12));
+    }
+#endif
 #endif
     return facing;
 }
@@ -53,6 +66,9 @@ Facing facing_of(Hit hit, EyePath path)
 void use_geometric(inout Facing facing)
 {
     facing.normal = facing.normal_g;
+#ifdef SPECTRAL_SWEEP
+    facing.end_normal[0] = facing.end_normal[1] = facing.normal_g;
+#endif
 #ifdef NORMAL_DERIVATIVES
     for (int c = 0; c < COLUMNS_HELD; ++c) facing.columns[c] = vec3(0.0);
 #endif
@@ -68,13 +84,17 @@ void reflect_path(inout EyePath path, Facing facing)
     for (int c = 0; c < COLUMNS_HELD; ++c)
         path.ddirection[c] = reflect_column(path.direction, path.ddirection[c], facing.normal, NORMAL_COLUMN(facing, c), theta);
     path.direction = normalize(reflect_direction(path.direction, facing.normal, theta));
+#ifdef SPECTRAL_SWEEP
+    for (int end = 0; end < 2; ++end)
+        path.end_direction[end] = normalize(reflect_direction(path.end_direction[end], facing.end_normal[end], dot(path.end_direction[end], facing.end_normal[end])));
+#endif
 }
 
 #ifdef HAS_DIELECTRIC
 // False where the geometric normal, which had to judge, transmits nothing.
-bool refract_path(inout EyePath path, Facing facing, Crossing crossing, float n_i, float n_t)
+bool refract_path(inout EyePath path, Facing facing, Crossing crossing, vec3 n_i3, vec3 n_t3)
 {
-    float eta_it = n_i / n_t;
+    float n_i = n_i3.y, n_t = n_t3.y, eta_it = n_i / n_t;
     float theta = dot(path.direction, facing.normal);
     float omega = sqrt(max(transmitted_cosine2(theta, eta_it), 1e-12));
     if (dot(refract_direction(path.direction, facing.normal, theta, eta_it, omega), facing.normal_g) >= 0.0) {
@@ -92,6 +112,16 @@ bool refract_path(inout EyePath path, Facing facing, Crossing crossing, float n_
         path.ddirection[c] = refract_column(path.direction, path.ddirection[c], facing.normal, NORMAL_COLUMN(facing, c), theta, eta_it, omega, deta_it);
     }
     path.direction = normalize(refract_direction(path.direction, facing.normal, theta, eta_it, omega));
+#ifdef SPECTRAL_SWEEP
+    for (int end = 0; end < 2; ++end) {
+        float eta_end = (end == 0 ? n_i3.x : n_i3.z) / (end == 0 ? n_t3.x : n_t3.z);
+        float theta_end = dot(path.end_direction[end], facing.end_normal[end]);
+        float cosine2 = transmitted_cosine2(theta_end, eta_end);
+        vec3 position_l, direction_l;
+        linear_end(path, end, position_l, direction_l);
+        path.end_direction[end] = cosine2 > 0.0 && theta_end < 0.0 ? normalize(refract_direction(path.end_direction[end], facing.end_normal[end], theta_end, eta_end, sqrt(cosine2))) : direction_l;
+    }
+#endif
     return true;
 }
 
@@ -99,13 +129,10 @@ bool refract_path(inout EyePath path, Facing facing, Crossing crossing, float n_
 vec3 thetas(EyePath path, Facing facing)
 {
     vec3 theta = vec3(dot(path.direction, facing.normal));
-#if SPECTRAL_GROUPS > 0
+#ifdef SPECTRAL_SWEEP
     if (path.narrowed) {
-        for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-            float slope = dot(path.ddirection[SPATIAL + g], facing.normal) + dot(path.direction, NORMAL_COLUMN(facing, SPATIAL + g));
-            theta.x += slope * variable_step(uint(g), path.band.x, path.band.y);
-            theta.z += slope * variable_step(uint(g), path.band.z, path.band.y);
-        }
+        theta.x = dot(path.end_direction[0], facing.end_normal[0]);
+        theta.z = dot(path.end_direction[1], facing.end_normal[1]);
         theta.xz = clamp(theta.xz, -1.0, -1e-6);
     }
 #endif
@@ -114,17 +141,16 @@ vec3 thetas(EyePath path, Facing facing)
 
 #if SPECTRAL_GROUPS > 0
 // The wavelength within the path's band where total internal reflection sets in; `passes` says where it transmits.
-float cut_of(EyePath path, Facing facing, Crossing crossing, bvec3 passes)
+float cut_of(EyePath path, vec3 theta, Crossing crossing, bvec3 passes)
 {
     bool low_side = passes.x != passes.y;
     float a = low_side ? path.band.x : path.band.y, b = low_side ? path.band.y : path.band.z;
+    float from = a, theta_a = low_side ? theta.x : theta.y, slope = ((low_side ? theta.y : theta.z) - theta_a) / max(b - a, 1e-9);
     bool passes_a = low_side ? passes.x : passes.y;
     for (int i = 0; i < 18; ++i) {
-        float x = 0.5 * (a + b), theta_x = dot(path.direction, facing.normal);
-        for (int g = 0; g < SPECTRAL_GROUPS; ++g)
-            theta_x += (dot(path.ddirection[SPATIAL + g], facing.normal) + dot(path.direction, NORMAL_COLUMN(facing, SPATIAL + g))) * variable_step(uint(g), x, path.band.y);
+        float x = 0.5 * (a + b);
         float eta_x = medium_index(crossing.before, x) / medium_index(crossing.after, x);
-        bool passes_x = transmitted_cosine2(clamp(theta_x, -1.0, -1e-6), eta_x) > 0.0;
+        bool passes_x = transmitted_cosine2(clamp(theta_a + slope * (x - from), -1.0, -1e-6), eta_x) > 0.0;
         a = passes_x == passes_a ? x : a;
         b = passes_x == passes_a ? b : x;
     }

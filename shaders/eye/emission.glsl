@@ -25,9 +25,6 @@ float transmitted(EyePath path, float x)
         if (path.lengths[i] > 0.0) depth += path.lengths[i] * spectral_row(uint(ABSORPTION_ROW + i), x);
     kept *= exp(-depth);
 #endif
-#ifdef COLOURED_MIRRORS
-    kept *= dot(path.tint, vec3(spectral_row(uint(BASIS_ROW), x), spectral_row(uint(BASIS_ROW + 1), x), spectral_row(uint(BASIS_ROW + 2), x)));
-#endif
     return kept;
 }
 
@@ -49,7 +46,7 @@ Stretch stretch_of(EyePath path, float lo, float hi)
     stretch.cell_lo = emission_cell(lo);
     stretch.cell_hi = emission_cell(hi);
     stretch.through = path.gain * transmitted(path, 0.5 * (lo + hi));
-#ifdef SPECTRALLY_TINTED
+#ifdef ABSORPTION
     stretch.steps = max(1, int(ceil((hi - lo) * float(TINT_STEPS))));
 #else
     stretch.steps = path.weight.x == path.weight.z ? 1 : max(1, int(ceil((hi - lo) * 4.0)));

@@ -8,6 +8,8 @@
 #define COLUMNS_HELD (SPATIAL + SPECTRAL_GROUPS)
 // A column longer than this (GPU units, the glass is about 1) has left the linear regime for good.
 #define COLUMN_LIMIT 1e4
+// An end of a band that arrives farther off (GPU units) is beyond the facet for good.
+#define END_LIMIT 1.0
 
 struct EyePath {
     vec3 position;
@@ -24,11 +26,14 @@ struct EyePath {
     int depth;                      // surfaces met
     bool narrowed;                  // stands for one band
     bool recut;                     // its band was cut before the surface ahead, and is not again
-#ifdef COLOURED_MIRRORS
-    vec3 tint;                      // coefficients of the reflectance basis
+#ifdef SPECTRAL_SWEEP
+    // The rays at both ends of the band, by way of the same facets: what columns, being first derivatives, leave out of the sweep.
+    vec3 end_position[2];
+    vec3 end_direction[2];
+    vec2 end_step[SPECTRAL_GROUPS]; // change of each group's variable from the path's own wavelength to the ends
 #endif
 #ifdef ABSORPTION
-    float lengths[ABSORBERS];       // way through each absorbing glass, GPU units
+    float lengths[ABSORBERS];       // way through each absorbing glass, GPU units; reflections by each coloured mirror
 #endif
 };
 
@@ -40,17 +45,46 @@ float variable_step(uint g, float x, float x_anchor)
 }
 #endif
 
-// The path's ray at the wavelength x, as the spectral columns see it.
+#ifdef SPECTRAL_SWEEP
+// Where the columns alone put an end's ray.
+void linear_end(EyePath path, int end, out vec3 position, out vec3 direction)
+{
+    position = path.position;
+    direction = path.direction;
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+        position += path.end_step[g][end] * path.dposition[SPATIAL + g];
+        direction += path.end_step[g][end] * path.ddirection[SPATIAL + g];
+    }
+    direction = normalize(direction);
+}
+
+// Steps to the ends of the band.
+void set_steps(inout EyePath path)
+{
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g)
+        path.end_step[g] = vec2(variable_step(uint(g), path.band.x, path.band.y), variable_step(uint(g), path.band.z, path.band.y));
+}
+#endif
+
+// The path's ray at the wavelength x: along the spectral columns, and off them by the share of an end's own deviation that a second
+// derivative would have there. So it is exact in the middle, where it also has the columns' slope, and at both ends.
 void ray_at(EyePath path, float x, out vec3 position, out vec3 direction)
 {
     position = path.position;
     direction = path.direction;
-#if SPECTRAL_GROUPS > 0
+#ifdef SPECTRAL_SWEEP
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
         float change = variable_step(uint(g), x, path.band.y);
         position += change * path.dposition[SPATIAL + g];
         direction += change * path.ddirection[SPATIAL + g];
     }
+    int end = x < path.band.y ? 0 : 1;
+    vec3 end_position, end_direction;
+    linear_end(path, end, end_position, end_direction);
+    float reach = (x - path.band.y) / max(0.5 * (path.band.z - path.band.x), 1e-9);
+    float share = reach * reach;
+    position += share * ((end == 0 ? path.end_position[0] : path.end_position[1]) - end_position);
+    direction = normalize(direction) + share * ((end == 0 ? path.end_direction[0] : path.end_direction[1]) - end_direction);
     direction = normalize(direction);
 #endif
 }
@@ -84,12 +118,20 @@ void narrow(inout EyePath path, uint pixel_key)
     vec3 band = (float(low) + vec3(0.0, 0.5, 1.0)) / float(EMISSION_CELLS);
 #else
     // Neighbouring pixels begin with different bands, so that what is still missing shows as grain and not as a tint.
-    uint band_number = (p.sample_index + (p.dithered != 0u ? hash_combine(pixel_key, 78u) : 0u)) % p.bands;
+    uint band_number = (turn + (p.dithered != 0u ? hash_combine(pixel_key, 78u) : 0u)) % p.bands;
+    took_turn = true;
     vec3 band = (float(band_number) + vec3(0.0, 0.5, 1.0)) / float(p.bands);
     path.gain *= float(p.bands);
 #endif
     path.weight = weights_at(path, band);
     path.band = band;
+#ifdef SPECTRAL_SWEEP
+    set_steps(path);
+    for (int end = 0; end < 2; ++end) {
+        path.end_position[end] = path.position;
+        path.end_direction[end] = path.direction;
+    }
+#endif
 }
 
 // The same path anchored in the middle of a part of its band.
@@ -97,8 +139,14 @@ void anchor_at(inout EyePath path, float lo, float hi)
 {
     vec3 band = vec3(lo, 0.5 * (lo + hi), hi);
     path.weight = weights_at(path, band);
-    ray_at(path, band.y, path.position, path.direction);
+    EyePath before = path;
+    ray_at(before, band.y, path.position, path.direction);
     path.band = band;
+#ifdef SPECTRAL_SWEEP
+    ray_at(before, lo, path.end_position[0], path.end_direction[0]);
+    ray_at(before, hi, path.end_position[1], path.end_direction[1]);
+    set_steps(path);
+#endif
 }
 
 // Column c carried to a surface at `distance` whose geometric normal is `normal_g`.
@@ -107,6 +155,24 @@ void transfer_columns(inout EyePath path, vec3 normal_g, float distance)
     for (int c = 0; c < COLUMNS_HELD; ++c)
         path.dposition[c] = transfer_column(path.dposition[c], path.ddirection[c], path.direction, normal_g, distance);
 }
+
+#ifdef SPECTRAL_SWEEP
+// The ends carried to the plane of a facet that the path has met at its own wavelength; an end that cannot get there, or only far away,
+// is where the columns say.
+void transfer_ends(inout EyePath path, vec3 normal_g)
+{
+    for (int end = 0; end < 2; ++end) {
+        vec3 position = path.end_position[end], direction = path.end_direction[end];
+        float slope = dot(direction, normal_g), distance = dot(path.position - position, normal_g) / slope;
+        vec3 arrived = position + distance * direction, off = arrived - path.position;
+        bool holds = slope * dot(path.direction, normal_g) > 0.0 && distance >= 0.0 && dot(off, off) < END_LIMIT * END_LIMIT;
+        vec3 position_l, direction_l;
+        linear_end(path, end, position_l, direction_l);
+        path.end_position[end] = holds ? arrived : position_l;
+        path.end_direction[end] = holds ? direction : direction_l;
+    }
+}
+#endif
 
 // Columns that are not finite, or longer than anything, are dropped: the path goes on as a single ray.
 bool columns_hold(inout EyePath path)
@@ -119,6 +185,12 @@ bool columns_hold(inout EyePath path)
     for (int c = 0; c < COLUMNS_HELD; ++c) all += dot(path.dposition[c] + path.ddirection[c], vec3(1.0));
     if (largest < COLUMN_LIMIT * COLUMN_LIMIT && !isnan(all) && !isinf(all)) return true;
     for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
+#ifdef SPECTRAL_SWEEP
+    for (int end = 0; end < 2; ++end) {
+        path.end_position[end] = path.position;
+        path.end_direction[end] = path.direction;
+    }
+#endif
     return false;
 }
 

@@ -165,10 +165,33 @@ void add_caustic_at(EyePath path, Seen seen, Stretch stretch, uint receiver, uin
         int from = int(floor(first)), to = max(from, int(ceil(last)) - BIN_OVERLAP);
         float factor = scale * (plain ? dot(seen.reflectance, vec3(spectral_row(uint(BASIS_ROW), x), spectral_row(uint(BASIS_ROW + 1), x), spectral_row(uint(BASIS_ROW + 2), x))) : 1.0);
         vec4 watts[MAP_TARGETS];
-        caustic_values(placement, texel, box, watts, BIN_TARGET, MAP_TARGETS - 1);
+        caustic_values(placement, texel, box, watts, 0, MAP_TARGETS - 1);
+        // Coarse spectra make a pure colour duller. What they lack of the map's own XYZ, or have too much, is shared out over the spectrum
+        // as they are: where nothing is swept all of it is there again.
+        vec4 whole[TARGETS];
+        float whole_sum = 0.0, part_sum = 0.0;
+        for (int t = 0; t < TARGETS; ++t) whole[t] = vec4(0.0);
         bool lit = false;
         for (int t = BIN_TARGET; t < MAP_TARGETS; ++t) lit = lit || any(notEqual(watts[t], vec4(0.0)));
-        for (int k = from; k <= to && lit; ++k) add_spectrum(path, stretch, uint(BIN_SPECTRUM_ROW + k), factor * watts[BIN_TARGET + (k >> 2)][k & 3]);
+        for (int k = 0; k < BIN_COUNT && lit; ++k) {
+            float watt = watts[BIN_TARGET + (k >> 2)][k & 3];
+            uint row = uint(BIN_SPECTRUM_ROW + k);
+            bool within = k >= from && k <= to;
+            for (int t = 0; t < TARGETS; ++t) {
+                vec4 all = emission_until(row, t, EMISSION_CELLS);
+                vec4 part = within ? emission_until(row, t, stretch.cell_hi) - emission_until(row, t, stretch.cell_lo) : vec4(0.0);
+                whole[t] += watt * all;
+                whole_sum += watt * dot(abs(all), vec4(1.0));
+                part_sum += watt * dot(abs(part), vec4(1.0));
+            }
+            WHEN(within && watt != 0.0) add_spectrum(path, stretch, row, factor * watt);
+        }
+#ifdef RGB_CHANNELS
+        WHEN(lit) {
+            vec4 lacking = map_to_channels(watts[0]) - whole[0];
+            radiance[0] += factor * stretch.through * (part_sum / max(whole_sum, 1e-30)) * lacking;
+        }
+#endif
     }
     WHEN(!path.narrowed)
 #endif

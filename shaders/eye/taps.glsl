@@ -7,15 +7,13 @@
 // Sweep of the path over the distance ahead, in widths of a pixel: how many looks it needs.
 int taps_of(EyePath path, float distance)
 {
-    vec3 p_lo, d_lo, p_hi, d_hi;
-    ray_at(path, path.band.x, p_lo, d_lo);
-    ray_at(path, path.band.z, p_hi, d_hi);
+    vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1], d_hi = path.end_direction[1];
     float reach = min(distance, 1e4);
     vec3 sweep = (p_hi - p_lo) + reach * (d_hi - d_lo);
     sweep -= dot(sweep, path.direction) * path.direction;
     vec3 side_s = path.dposition[0] + reach * path.ddirection[0], side_t = path.dposition[1] + reach * path.ddirection[1];
     float pixel = sqrt(max(length(cross(side_s, side_t)), 1e-20));
-    return clamp(int(ceil(length(sweep) / pixel * TAPS_PER_PIXEL)), 1, int(p.most_taps));
+    return clamp(int(ceil(length(sweep) / pixel * p.taps_per_pixel)), 1, int(p.most_taps));
 }
 #endif
 
@@ -63,9 +61,7 @@ void add_lights(EyePath path, float far)
     int taps = 1;
 #ifdef SPECTRAL_SWEEP
     if (path.narrowed) {
-        vec3 p_lo, d_lo, p_hi, d_hi;
-        ray_at(path, path.band.x, p_lo, d_lo);
-        ray_at(path, path.band.z, p_hi, d_hi);
+        vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1], d_hi = path.end_direction[1];
         sweep = vec2(distance(p_lo, p_hi), distance(d_lo, d_hi));
         taps = taps_of(path, far);
     }
@@ -106,9 +102,7 @@ void add_end(EyePath path, bool met, Hit hit, uint pixel_key)
     uint known = 0u, hidden = 0u, hidden_lo = 0u;
 #ifdef SPECTRAL_SWEEP
     if (taps > 1) {
-        vec3 p_lo, d_lo, p_hi, d_hi;
-        ray_at(path, path.band.x, p_lo, d_lo);
-        ray_at(path, path.band.z, p_hi, d_hi);
+        vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1], d_hi = path.end_direction[1];
         dp = (p_hi - p_lo) / float(taps);
         dd = (d_hi - d_lo) / float(taps);
 #ifdef HAS_RECEIVERS

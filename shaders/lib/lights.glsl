@@ -60,12 +60,14 @@ float stretch_seen(float offset, float half_side, float blur)
     return min(half_side / reach, 1.0) * clamp((reach + blur - abs(offset)) / max(2.0 * blur, 1e-9 * half_side), 0.0, 1.0);
 }
 
-// The same for a disc of radius 1 and a round blur; a disc much smaller than its blur is a cone with the disc's volume.
+// The same for a disc of radius 1 and a round look. The rim moves inwards as it softens, so that the disc's volume stays and its middle
+// is as bright as it is; where the look is wider than that allows, a cone of the disc's volume.
 float disc_seen(float offset, float blur)
 {
-    float reach = max(1.0, blur);
-    float amount = blur > 1.0 ? 0.75 / (blur * blur) : 1.0 / (1.0 + blur * blur / 3.0);
-    return amount * clamp((reach + blur - offset) / max(2.0 * blur, 1e-9), 0.0, 1.0);
+    bool narrow = blur < 0.8660254;
+    float rim = narrow ? sqrt(1.0 - blur * blur * (1.0 / 3.0)) : blur;
+    float height = narrow ? 1.0 : 0.75 / (blur * blur);
+    return height * clamp((rim + blur - offset) / max(2.0 * blur, 1e-9), 0.0, 1.0);
 }
 
 // Radiance per unit of the light's own quantity that a ray meets within `far`: discs and
