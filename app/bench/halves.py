@@ -86,7 +86,7 @@ EYE = Half(
     bias_cause="straight columns within wide bands, few places within a pixel and the caustic maps, of which more samples cure the first two alone",
     noise_cause="noise, which more samples reduce",
     bare_method="stochastic",
-    bare_text="which has neither columns nor bands: places within a pixel and caustic maps, common to all methods",
+    bare_text="which has neither columns nor bands: places within a pixel, caustic maps and the noise of the reference's caustic, common to all methods",
 )  # fmt: skip
 
 HALVES = {half.key: half for half in (LIGHT, EYE)}
