@@ -54,6 +54,7 @@ class Accumulation:
                 self.publish()
                 return
             self.number += 1
+            yield from self.light.settling()
             self.publish()
             yield
             if self.photons < self.largest:
@@ -78,4 +79,5 @@ class Accumulation:
         """Splat the stored photons and publish them."""
         if self.light.photons_stored:
             yield from self.light.splat_stored()
+            yield from self.light.settling()
             self.publish()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -18,15 +19,18 @@ from app.live.spectrum_guess import SpectrumGuess
 from app.live.store import PhotonStore
 from app.model.colorimetry import VISIBLE_NM
 from app.model.spectrum import Spectrum
+from app.passes.accumulate import Accumulate
 from app.passes.footprint import SpectralVariables
 from app.passes.map_layout import layout_maps
 from app.passes.pilot import landings_of
+from app.passes.splat import CHUNK, FLUSH_SHARE
 from app.passes.trace import Batch
 
 if TYPE_CHECKING:
     import moderngl
 
     from app.gpu.context import Context
+    from app.gpu.map_atlas import MapAtlas
     from app.gpu.scene_buffers import SceneBuffers
     from app.live.inputs import LiveInputs
     from app.model.features import Features
@@ -40,6 +44,8 @@ QUICK_TILE_MAX = (288, 144)
 """Longest sides of their windows, texels."""
 QUICK_WIDTH = 64
 """Samples of their spectral tables."""
+FLUSH_AHEAD = 0.9
+"""Of the photons after which a splat pass sums its maps up by itself."""
 SOLO_WIDTH_NM = 4.0
 """Standard deviation of the window that a single wavelength is seen through."""
 SOLO_GAIN_NM = 100.0
@@ -97,6 +103,7 @@ class LiveLight(LightHalf):
         self._older: Stored | None = None
         self._quick: LightMaps | None = None
         self._guess: SpectrumGuess | None = None
+        self._accumulate = Accumulate(context.ctx)
         self.is_coarse = True
         """The maps are those of a first answer: `fit_to` makes proper ones."""
 
@@ -239,17 +246,6 @@ class LiveLight(LightHalf):
         self._quick = self._guess = self.maps = None
         self.lay_out(self.view)
 
-    def _show_variables(self, changed: dict[Dispersion, Dispersion]) -> None:
-        self.variables.release()
-        self.first_order = bool(changed)
-        if not changed:
-            self.variables = SpectralVariables.build(self.context.ctx, self.buffers.variable_table)
-            return
-        groups = self.buffers.groups
-        shown = replace(groups, glasses=tuple(changed.get(glass, glass) for glass in groups.glasses))
-        table = shown.variables(self.buffers.axis).astype("f4")
-        self.variables = SpectralVariables.build(self.context.ctx, table, self.buffers.variable_table)
-
     def _show_gains(self, inputs: LiveInputs) -> None:
         wanted = inputs.local_gain and self.features.spectral_groups > 0 and any(o.local_dispersion for o in inputs.scene.objects)
         if wanted != self.features.local_gain:
@@ -267,6 +263,32 @@ class LiveLight(LightHalf):
             self.gains = GainBuffers(self.context.ctx, inputs.scene, buffers.receivers, buffers.space, buffers.axis)
         else:
             self.gains.update(inputs.scene)
+
+    def splat_steps(
+        self, photons: moderngl.Buffer, count: int, coarsening: float = 1.0, tables: ShownTables | None = None,
+        maps: LightMaps | None = None, stride: int = 1,
+    ) -> Iterator[None]:  # fmt: skip
+        """As in `LightHalf`; maps of several textures are summed up one by one before it has to be, as all together take longer than a frame."""
+        atlas = (maps or self._maps).atlas
+        if atlas.targets > 1 and atlas.pending + count >= FLUSH_AHEAD * min(CHUNK, atlas.size[0] * atlas.size[1] / FLUSH_SHARE):
+            yield from self._summing(atlas)
+        yield from super().splat_steps(photons, count, coarsening, tables, maps, stride)
+
+    def settling(self) -> Iterator[None]:
+        """Sum up what is pending, so that the maps can be shown at once."""
+        if self._maps.atlas.pending:
+            yield from self._summing(self._maps.atlas)
+
+    def _summing(self, atlas: MapAtlas) -> Iterator[None]:
+        """`atlas.flush` with pauses."""
+        for scratch, total in zip(atlas.scratch_textures, atlas.total_textures, strict=True):
+            started = time.perf_counter()
+            self._accumulate.run(scratch, total)
+            if self.waits:
+                self.context.finish()
+            self.stats.splat_seconds += time.perf_counter() - started
+            yield
+        atlas.pending = 0
 
     def splat_stored(self, *, of_running: bool = False) -> Iterator[None]:
         """Empty maps, then the stored photons as they are shown now, pausing after every slab.
@@ -330,6 +352,7 @@ class LiveLight(LightHalf):
         for owned in (self._quick, self._guess):
             if owned is not None:
                 owned.release()
+        self._accumulate.release()
         super().release()
         self.buffers.release()
 
