@@ -26,8 +26,13 @@ struct RayRecord {
 };
 #include "lib/medium.glsl"
 
-layout(std430, binding = BIND_PARAMETERS) readonly restrict buffer Parameters { EyeParameters p; };
+layout(std140, binding = BIND_PARAMETERS) uniform Parameters { EyeParameters p; };
+// Every ray asks all lights: constants to all, where they fit a uniform block.
+#ifdef LIGHTS_IN_STORAGE
 layout(std430, binding = BIND_LIGHTS) readonly restrict buffer Lights { EyeLight lights[]; };
+#else
+layout(std140, binding = BIND_LIGHTS) uniform Lights { EyeLight lights[LIGHT_COUNT + 1]; };
+#endif
 // Per object: reflectance in linear Rec.709; number of its absorption row, or -1.
 layout(std430, binding = BIND_OBJECT_COLOURS) readonly restrict buffer ObjectColours { vec4 object_colours[]; };
 #ifdef RANDOM_WAVELENGTH

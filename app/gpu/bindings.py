@@ -8,8 +8,8 @@ RAYS_IN, RAYS_OUT, OUTCOMES, PHOTON_SLOTS, INDICES, COUNTS, STATE, PHOTONS = ran
 
 UNIT_SCENE, UNIT_SPECTRA = 14, 15
 """Texture units of the scene; a pass is free to use 0-13 as it likes."""
-IMAGE_SCENE = 8
-"""Image unit of the scene on llvmpipe; a pass is free to use 0-7 as it likes."""
+IMAGE_SCENE, IMAGE_SPECTRA = 8, 9
+"""Image units of the scene on llvmpipe; a pass is free to use 0-7 and those from 10 on as it likes."""
 
 SCENE_DEFINES = {
     "BIND_SOLIDS": SOLIDS,
@@ -17,6 +17,7 @@ SCENE_DEFINES = {
     "UNIT_SCENE": UNIT_SCENE,
     "UNIT_SPECTRA": UNIT_SPECTRA,
     "IMAGE_SCENE": IMAGE_SCENE,
+    "IMAGE_SPECTRA": IMAGE_SPECTRA,
     "BIND_PARAMETERS": PARAMETERS,
 }
 """Bindings 0-7 hold the scene; a pass is free to use 8-15 as it likes."""

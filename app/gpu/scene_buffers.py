@@ -170,14 +170,14 @@ class SceneBuffers:
         self.defines = bindings.SCENE_DEFINES | {"SPECTRAL_SAMPLES": SAMPLES}
         self._pack_geometry()
         self._pack_objects()
-        self._texels = SceneTexels(ctx, self._sections)
+        self.texels = SceneTexels(ctx, self._sections)
         self._sections.clear()
-        self.defines |= self._texels.defines
+        self.defines |= self.texels.defines
 
     def bind(self) -> None:
         """Bind every scene texture and buffer to its place."""
-        self._texels.bind()
-        self._spectra.use(bindings.UNIT_SPECTRA)
+        self.texels.bind()
+        self.texels.bind_spectra(self._spectra)
         for binding, buffer in self._buffers.items():
             if self._in_storage:
                 buffer.bind_to_storage_buffer(binding)
@@ -186,7 +186,7 @@ class SceneBuffers:
 
     def release(self) -> None:
         """Free buffers and textures."""
-        self._texels.release()
+        self.texels.release()
         self._spectra.release()
         for buffer in self._buffers.values():
             buffer.release()
@@ -195,7 +195,7 @@ class SceneBuffers:
     @property
     def bytes(self) -> int:
         """GPU memory held."""
-        pixels = (self._texels.texture, 16), (self._spectra, 8)
+        pixels = (self.texels.texture, 16), (self._spectra, 8)
         return sum(buffer.size for buffer in self._buffers.values()) + sum(t.width * t.height * size for t, size in pixels)
 
     def _pack_geometry(self) -> None:

@@ -60,6 +60,18 @@ class SceneTexels:
         else:
             self.texture.use(bindings.UNIT_SCENE)
 
+    def bind_spectra(self, spectra: moderngl.Texture) -> None:
+        """Bind tables made by `spectra_texture` as these shaders read them."""
+        if self._as_image:
+            spectra.bind_to_image(bindings.IMAGE_SPECTRA, read=True, write=False)
+        else:
+            spectra.use(bindings.UNIT_SPECTRA)
+
+    @property
+    def as_image(self) -> bool:
+        """Whether shaders read images instead of textures."""
+        return self._as_image
+
     def release(self) -> None:
         """Free the texture."""
         self.texture.release()

@@ -106,10 +106,11 @@ class EyePass:
         self._tables = EyeTables.build(self._ctx, scene, self.channels, reflectances, maps)
         self._owns_pictures = pictures is None
         self.pictures = pictures or TextureStore(self._ctx, scene.scene, scene.first_triangle, scene.corner_turn)
-        lights = EYE_LIGHT.zeros(max(1, len(scene.scene.lights)))
+        lights = EYE_LIGHT.zeros(len(scene.scene.lights) + 1)
         for i, light in enumerate(scene.scene.lights):
             lights[i] = light_record(light, scene)
         self._lights = self._ctx.buffer(lights.tobytes())
+        self._lights_in_storage = lights.nbytes > self._ctx.info["GL_MAX_UNIFORM_BLOCK_SIZE"]
         self._counters = self._ctx.buffer(bytes(4 * len(FALLBACKS)))
         self._parameters_buffer = self._ctx.buffer(reserve=EYE_PARAMETERS.stride)
         self._empty: CausticMaps | None = None
@@ -220,16 +221,23 @@ class EyePass:
     def _bind(self, maps: CausticMaps) -> None:
         self.scene.bind()
         tables = self._tables
-        tables.spectra.use(bindings.UNIT_SPECTRA)
-        tables.emission.use(_UNIT_EMISSION)
+        self.scene.texels.bind_spectra(tables.spectra)
+        if self.scene.texels.as_image:
+            tables.emission.bind_to_image(_UNIT_EMISSION, read=True, write=False)
+        else:
+            tables.emission.use(_UNIT_EMISSION)
         self.pictures.bind(_BIND_PICTURES, _UNIT_PICTURES)
-        buffers = (self._lights, tables.object_colours, tables.cell_cdf, maps.receivers, maps.placements)
-        for binding, buffer in zip((_BIND_LIGHTS, _BIND_OBJECT_COLOURS, _BIND_CELL_CDF, _BIND_RECEIVERS, _BIND_PLACEMENTS), buffers, strict=True):
+        if self._lights_in_storage:
+            self._lights.bind_to_storage_buffer(_BIND_LIGHTS)
+        else:
+            self._lights.bind_to_uniform_block(_BIND_LIGHTS)
+        buffers = (tables.object_colours, tables.cell_cdf, maps.receivers, maps.placements)
+        for binding, buffer in zip((_BIND_OBJECT_COLOURS, _BIND_CELL_CDF, _BIND_RECEIVERS, _BIND_PLACEMENTS), buffers, strict=True):
             buffer.bind_to_storage_buffer(binding)
         self._counters.bind_to_storage_buffer(_BIND_COUNTERS)
         if self._listed is not None:
             self._listed.bind_to_storage_buffer(_BIND_LISTED)
-        self._parameters_buffer.bind_to_storage_buffer(bindings.PARAMETERS)
+        self._parameters_buffer.bind_to_uniform_block(bindings.PARAMETERS)
         for unit, texture in enumerate(maps.textures):
             texture.use(location=unit)
         for unit, picture in enumerate(self._pictures):
@@ -325,6 +333,7 @@ class EyePass:
             "VISIBLE_LIGHTS": beauty and any(has_extent(light) for light in scene.lights),
             "ABSORPTION": specular and (coloured or absorbs),
             "NORMAL_DERIVATIVES": features.smooth_normals,
+            "LIGHTS_IN_STORAGE": self._lights_in_storage,
             "HAS_IMAGES": bool(self.pictures.structs),
         }
         for name in switches:

@@ -3,7 +3,11 @@
 #ifndef EYE_EMISSION_GLSL
 #define EYE_EMISSION_GLSL
 
+#ifdef SCENE_IMAGE
+layout(rgba32f, binding = UNIT_EMISSION) uniform readonly restrict image2D emission_table;
+#else
 layout(binding = UNIT_EMISSION) uniform sampler2D emission_table;
+#endif
 
 int emission_cell(float x)
 {
@@ -12,7 +16,11 @@ int emission_cell(float x)
 
 vec4 emission_until(uint row, int target, int cell)
 {
+#ifdef SCENE_IMAGE
+    return imageLoad(emission_table, ivec2(cell, int(row) * TARGETS + target));
+#else
     return texelFetch(emission_table, ivec2(cell, int(row) * TARGETS + target), 0);
+#endif
 }
 
 // What a path lets through at the wavelength x.

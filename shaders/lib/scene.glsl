@@ -18,7 +18,11 @@ layout(rgba32ui, binding = IMAGE_SCENE) uniform readonly restrict uimage2D scene
 layout(binding = UNIT_SCENE) uniform usampler2D scene_texels;
 #endif
 // One spectral table a row; a texel holds two neighbouring samples.
+#ifdef SCENE_IMAGE
+layout(rg32f, binding = IMAGE_SPECTRA) uniform readonly restrict image2D spectra;
+#else
 layout(binding = UNIT_SPECTRA) uniform sampler2D spectra;
+#endif
 #ifdef CONVEX_SOLIDS
 // Every ray walks through the same planes: constants to all, where they fit a uniform block.
 #ifdef SOLIDS_IN_STORAGE
@@ -67,7 +71,11 @@ float spectral_row(uint row, float x)
 {
     float at = clamp(x, 0.0, 1.0) * float(SPECTRAL_SAMPLES - 1);
     int cell = min(int(at), SPECTRAL_SAMPLES - 2);
+#ifdef SCENE_IMAGE
+    vec2 ends = imageLoad(spectra, ivec2(cell, int(row))).xy;
+#else
     vec2 ends = texelFetch(spectra, ivec2(cell, int(row)), 0).xy;
+#endif
     return mix(ends.x, ends.y, at - float(cell));
 }
 

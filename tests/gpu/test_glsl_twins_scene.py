@@ -55,7 +55,7 @@ class Scene:
         defines = {**bindings.SCENE_DEFINES, **texels.defines, **COMMON, **(STACK if stack else {})}
         structs: tuple[Struct, ...] = (*SCENE_STRUCTS, ray_record(0))
         try:
-            return evaluate(self.ctx, [include], body, inputs, outputs, defines, structs, binders=[texels.bind, lambda: spectra.use(bindings.UNIT_SPECTRA)])
+            return evaluate(self.ctx, [include], body, inputs, outputs, defines, structs, binders=[texels.bind, lambda: texels.bind_spectra(spectra)])
         finally:
             texels.release()
             spectra.release()
