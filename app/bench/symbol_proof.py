@@ -30,7 +30,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "mirrors": (r"\(kind == KIND_MIRROR\) ",),
     "interpolated normals": ("corner_normal", "smooth_facet", "summed", "NORMALS_AT", "normalised_derivative", "dsummed"),
     "normal derivatives": ("normal_columns",),
-    "absorption": ("medium_weight_row", "alpha", "filling", "ABSORPTION_ROW"),
+    "absorption": ("medium_weight_row", "alpha"),
     "medium stack": ("medium_of", "stack_objects", "STACK_OBJECTS", "mask_before"),
     "triangle tree": ("intersect_tree", "box_entry", "LEAF_BIT", "TREE_AT", "TREE_STACK"),
     "half-space solids": ("intersect_solid", "planes", "solids", "SOLID_COUNT"),

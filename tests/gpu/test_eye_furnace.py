@@ -25,9 +25,6 @@ NEAR = Camera((0.3, -2.6, 1.1), (0, 0, 0), vertical_fov_deg=32.0)
 SIZE = (24, 24)
 
 
-LOSSY = pytest.mark.xfail(strict=True, reason="a band end that transmits where the anchor reflects totally, and is not cut, is lost")
-
-
 @cache
 def ball(radius: float, triangles: int = 5120) -> Mesh:
     return primitives.sphere(radius, triangles)
@@ -59,10 +56,10 @@ def covered(gl, objects: list[SceneObject]) -> np.ndarray:
 
 @pytest.mark.parametrize(("name", "sky", "bands"), [
     ("ball", "map", 1), ("ball", "background", 4), ("prism", "background", 1), ("slab", "background", 4),
-    ("brilliant", "map", 4), pytest.param("brilliant", "background", 1, marks=LOSSY), ("nested", "background", 1),
+    ("brilliant", "map", 4), ("brilliant", "background", 1), ("nested", "background", 1),
 ])  # fmt: skip
 def test_clear_glass_vanishes_in_a_closed_white_room(gl, name: str, sky: str, bands: int) -> None:
-    """The mean to 1e-3, no pixel off by more than 1 % at 64 samples: chance moves light between branches, and every branch ends in white.
+    """The mean to 1e-3 (one band: 2e-5), no pixel off by more than 1 % at 64 samples: chance moves light between branches, and every branch ends in white.
 
     With several bands the bands' samples lie at different places of a pixel. Where glass covers only a part of it, or reflects more and more
     toward its rim, they do not see the same share of it, and what is left at 64 samples is colour grain; the mean is as good.
@@ -80,16 +77,16 @@ def test_clear_glass_vanishes_in_a_closed_white_room(gl, name: str, sky: str, ba
     assert (share == 1.0).mean() > 0.05 and outline.any()
     assert np.abs(rgb.mean(axis=(0, 1)) - 1.0).max() < 1e-3
     if bands == 1:
-        assert off.max() < 0.01
+        assert off.max() < 0.01 and np.abs(rgb.mean(axis=(0, 1)) - 1.0).max() < 2e-5
     else:
         assert np.quantile(off[share == 1.0], 0.9) < 0.01
-        assert off[~outline].max() < 0.08 and off.max() < 0.25 and np.abs(rgb[outline].mean(axis=0) - 1.0).max() < 0.02
+        assert off[~outline].max() < 0.05 and off.max() < 0.15 and np.abs(rgb[outline].mean(axis=0) - 1.0).max() < 0.02
     assert fallbacks["columns_dropped"] == 0 or name == "brilliant"
 
 
 def test_a_loss_of_two_per_cent_a_surface_would_be_seen(gl, monkeypatch, tmp_path) -> None:
     """The mutant: what goes on through a surface is 2 % too weak. The mean falls short by twenty times its tolerance."""
-    mutate(monkeypatch, tmp_path, "eye.comp", "path.weight *= total ? reflectance : 1.0 - reflectance;", "path.weight *= total ? reflectance : 0.98 - reflectance;")
+    mutate(monkeypatch, tmp_path, "eye.comp", "vec3(1.0) : 1.0 - reflectance;", "vec3(1.0) : 0.98 - reflectance;")
     rgb = render(gl, solids("slab"), background=(1, 1, 1), camera=NEAR, size=SIZE, samples=16)
     assert 1.0 - rgb[8:16, 8:16].mean() > 0.02
 

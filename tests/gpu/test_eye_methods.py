@@ -69,12 +69,13 @@ WAYS = [("srd", 8, 64, 0.01), ("srd", 32, 64, 0.01), ("srd-lambda", 16, 64, 0.01
 
 @pytest.mark.parametrize(("method", "bands", "samples", "own"), WAYS, ids=[f"{way[0]}-{way[1]}" for way in WAYS])
 def test_methods_agree_with_random_wavelengths(gl, drawn, method: str, bands: int | None, samples: int, own: float) -> None:
-    """To three standard errors and the method's own error. One band, linear in n, is 4 % off and two are 2 %: both would be found."""
+    """To three standard errors and the method's own error. One band is 3.2 % off for its third derivatives: that would be found."""
     mean, error = drawn
     assert error < 0.006
     colour = float(np.sqrt(np.mean((mean - mean.mean(axis=-1, keepdims=True)) ** 2) / np.mean(mean**2)))
     assert colour > 0.2  # the scene disperses enough that a mistake would show
     assert difference(seen(gl, method, samples, bands), mean) < 3.0 * error + own
+    assert 3.0 * error + 0.01 < 0.028
 
 
 @pytest.mark.parametrize("bands", [1, 4])
@@ -126,8 +127,8 @@ def test_a_caustic_behind_matched_glass_keeps_its_light(behind_panes) -> None:
         assert abs(int(through[..., channel].sum(axis=0).argmax()) - int(plain[..., channel].sum(axis=0).argmax())) <= 1
 
 
-@pytest.mark.xfail(strict=True, reason="eight overlapping hats smear pure colours: 20 % of a sharp spectrum's")
 def test_a_caustic_behind_matched_glass_has_its_colours(behind_panes) -> None:
+    """What coarse spectra lack of XYZ is given back: without it they were 20 % off here."""
     assert difference(*behind_panes) < 0.02
 
 

@@ -81,7 +81,7 @@ def eye_sources(features: Features, light: dict[str, int | float | str], images:
     single = features.spectral_groups if features.eye_specular and features.eye_disperses else 0
     rows = ("WHITE_ROW", "LIGHT_ROW", "ROWS_PER_LIGHT", "BIN_ROW", "BIN_SPECTRUM_ROW", "REFLECTANCE_ROW", "BASIS_ROW", "ABSORPTION_ROW")
     eye = light | dict.fromkeys(rows, 1) | {"TARGETS": 1, "MAP_TARGETS": features.targets, "SPECTRAL_GROUPS": single, "ABSORBERS": 1, "EMISSION_CELLS": 1023}
-    eye |= {"BIN_TARGET": 1, "BIN_OVERLAP": 0, "STACK": 6, "MAX_DEPTH": 48, "MAX_EVENTS": 160, "LIGHT_COUNT": 1, "TINT_STEPS": 24, "TAPS_PER_PIXEL": 0.7}
+    eye |= {"BIN_TARGET": 1, "BIN_OVERLAP": 0, "STACK": 6, "MAX_DEPTH": 48, "MAX_EVENTS": 160, "LIGHT_COUNT": 1, "TINT_STEPS": 48, "BIN_COUNT": features.map_hats}
     switches = {
         "LAYER_BEAUTY": True, "RGB_CHANNELS": True, "HAS_RECEIVERS": True, "VISIBLE_LIGHTS": True, "MAP_BINS": features.map_hats > 0,
         "EYE_SPECULAR": features.eye_specular, "HAS_DISPERSION": features.eye_disperses, "SPECTRAL_SWEEP": single > 0,
