@@ -50,11 +50,11 @@ def measure_faults(context: Context) -> Iterator[Measurement]:
     """Each fault, through an OBJ file. A hole lets rays in and out that no medium can follow: what is lost there only has to be told."""
     clean = {}
     for smooth in (False, True):
-        scene = stage(*tilted(solid("solid", _solid(smooth), FLINT)), lights=[SUN])
+        scene = stage(*tilted(solid("solid", sound_solid(smooth), FLINT)), lights=[SUN])
         base = probe(context, scene, CAUSTIC)
         clean[smooth] = base, picture_error(probe(context, scene, replace(CAUSTIC, seed=2)).picture, base.picture)
     for number, fault in enumerate(FAULTS, 1):
-        mesh, notes = through_file(fault.spoil(_solid(fault.smooth)), fault.smooth)
+        mesh, notes = through_file(fault.spoil(sound_solid(fault.smooth)), fault.smooth)
         found = probe(context, stage(*tilted(solid("solid", mesh, FLINT)), lights=[SUN]), CAUSTIC)
         base, noise = clean[fault.smooth]
         errors = {"picture": picture_error(found.picture, base.picture), "energy": energy_error(found.picture, base.picture)}
@@ -82,7 +82,8 @@ def _obj(mesh: Mesh, normals: bool) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _solid(smooth: bool) -> Mesh:
+def sound_solid(smooth: bool) -> Mesh:
+    """The sound solid that faults are made in."""
     return sphere(0.5, 1280) if smooth else box()
 
 

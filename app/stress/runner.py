@@ -72,10 +72,16 @@ class StressResult:
 
 
 def all_cases() -> tuple[Case, ...]:
-    """The synthetic cases, then those of whole scenes, then the sweep over shipped scenes."""
-    from app.stress import optics_cases, path_cases, scene_cases, splat_cases
+    """The synthetic cases of the light, those of the eye, then those of whole scenes, then the sweep over shipped scenes."""
+    from app.stress import (
+        eye_cases,
+        optics_cases,
+        path_cases,
+        scene_cases,
+        splat_cases,
+    )
 
-    modules = (optics_cases, path_cases, splat_cases, scene_cases)
+    modules = (optics_cases, path_cases, splat_cases, eye_cases, scene_cases)
     return tuple(case for module in modules for case in module.CASES) + scene_cases.default_sweeps()
 
 
