@@ -22,7 +22,7 @@ from app.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
 from app.gpu.texture_store import PICTURE, TextureStore, place_defines
 from app.model.camera_rays import camera_frame
 from app.model.colorimetry import xyz_to_rgb709_matrix
-from app.model.scene import Camera, Dielectric, Diffuse, Mirror
+from app.model.scene import Black, Camera, Dielectric, Diffuse, Mirror
 from app.model.scene_checks import contains
 from app.passes.eye_records import (
     EYE_LIGHT,
@@ -51,7 +51,7 @@ TINT_STEPS = 48
 _PILOT_COLUMNS = 64
 """Of the grid of pixels that tells how many bands are needed."""
 _BAND_CHOICES = (1, 2, 4, 8, 16, 32)
-_BAND_TOLERANCE = 0.08
+_BAND_TOLERANCE = 0.05
 """Over the root of the samples: mean relative change of the pixels that change at all, up to which half as many bands do."""
 _TARGET_SECONDS = 0.15
 """What one dispatch may take; rows are divided to fit."""
@@ -59,7 +59,7 @@ _GROUP = 8
 _NOTHING_LISTED = np.array([0, 1, 1, 0], "u4").tobytes()
 _BIND_LIGHTS, _BIND_OBJECT_COLOURS, _BIND_CELL_CDF, _BIND_RECEIVERS, _BIND_PLACEMENTS, _BIND_PICTURES, _BIND_COUNTERS, _BIND_LISTED = range(8, 16)
 _UNIT_EMISSION, _UNIT_PICTURES = 10, 11
-_BEYOND_ONLY = ("HAS_DISPERSION", "SPECTRAL_SWEEP", "RANDOM_WAVELENGTH", "EVEN_WAVELENGTHS", "MAP_BINS", "ABSORPTION", "NORMAL_DERIVATIVES")
+BEYOND_ONLY = ("HAS_DISPERSION", "SPECTRAL_SWEEP", "RANDOM_WAVELENGTH", "EVEN_WAVELENGTHS", "MAP_BINS", "ABSORPTION", "NORMAL_DERIVATIVES")
 """What only rays beyond glass and mirrors need."""
 FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut")
 """What the shader counts, in its order."""
@@ -135,7 +135,7 @@ class EyePass:
         self._beyond: moderngl.ComputeShader | None = None
         if beyond:
             self._beyond = shader.compute(self._ctx, "eye.comp", defines | {"EYE_SPECULAR": 1}, structs)
-            plain = {name: value for name, value in defines.items() if name not in _BEYOND_ONLY} | {"SPECTRAL_GROUPS": 0, "LISTS_SPECULAR": 1, "MAX_EVENTS": 1}
+            plain = {name: value for name, value in defines.items() if name not in BEYOND_ONLY} | {"SPECTRAL_GROUPS": 0, "LISTS_SPECULAR": 1, "MAX_EVENTS": 1}
             self._program = shader.compute(self._ctx, "eye.comp", plain, structs)
         else:
             self._program = shader.compute(self._ctx, "eye.comp", defines, structs)
@@ -197,11 +197,12 @@ class EyePass:
         maps = maps or self._no_maps()
         columns = min(width, _PILOT_COLUMNS)
         rows = max(1, round(columns * height / width))
-        coarser = None
         tolerance = _BAND_TOLERANCE / np.sqrt(samples)
         # Every band's own samples must be enough to smooth an outline.
         most = max(1, samples // 4 if samples >= 16 else samples // 2)
-        for bands in (b for b in _BAND_CHOICES if b <= most):
+        choices = [b for b in _BAND_CHOICES if b <= most]
+        pictures: list[np.ndarray] = []
+        for bands in choices:
             self._clear(columns, rows)
             parameters = self._parameters(camera, columns, rows, maps.scale, 1)
             parameters["bands"], parameters["dithered"], parameters["counts_turns"], parameters["sample_side"] = bands, 0, 0, 1.0
@@ -211,11 +212,13 @@ class EyePass:
             for number in range(bands):
                 parameters["sample_index"] = number
                 yield from self._add_sample(parameters, columns, rows, maps)
-            finer = self._read().astype(np.float64)
-            if coarser is not None and _band_error(coarser, finer) < tolerance:
+            pictures.append(self._read().astype(np.float64))
+        # Two pictures may agree by chance: all finer ones must, too.
+        self.bands = choices[-1]
+        for bands, coarser, finer in reversed(list(zip(choices, pictures, pictures[1:], strict=False))):
+            if _band_error(coarser, finer) >= tolerance:
                 break
             self.bands = bands
-            coarser = finer
         self._clear(columns, rows)
 
     def _bind(self, maps: CausticMaps) -> None:
@@ -329,7 +332,7 @@ class EyePass:
             "EVEN_WAVELENGTHS": features.even_wavelengths,
             "RGB_CHANNELS": self.channels.edges_nm is None,
             "MAP_BINS": specular and features.eye_disperses and maps.count > 0,
-            "HAS_RECEIVERS": any(isinstance(o.material, Diffuse) for o in scene.objects),
+            "HAS_RECEIVERS": any(isinstance(o.material, Diffuse | Black) for o in scene.objects),
             "VISIBLE_LIGHTS": beauty and any(has_extent(light) for light in scene.lights),
             "ABSORPTION": specular and (coloured or absorbs),
             "NORMAL_DERIVATIVES": features.smooth_normals,

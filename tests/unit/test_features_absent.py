@@ -19,7 +19,7 @@ from app.gpu.texture_store import PICTURE
 from app.model.features import Features, explain
 from app.model.scene_file import load_scene
 from app.model.settings import RenderSettings
-from app.passes.eye import _BEYOND_ONLY as BEYOND_ONLY
+from app.passes.eye import BEYOND_ONLY
 from app.passes.eye_records import EYE_LIGHT, EYE_PARAMETERS
 from app.passes.footprint import SPLAT, footprint_defines, splat_defines
 from app.static_costs import RecordSizes, static_costs
