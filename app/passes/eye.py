@@ -48,8 +48,8 @@ TAPS_PER_PIXEL = 0.7
 TINT_STEPS = 48
 """Stretches that the whole spectrum is cut into behind coloured glass."""
 
-_PILOT_COLUMNS = 64
-"""Of the grid of pixels that tells how many bands are needed."""
+_PILOT_COLUMNS = 60
+"""Of the grid of pixels that tells how many bands are needed. llvmpipe compiles a program anew for sides that are powers of two."""
 _BAND_CHOICES = (1, 2, 4, 8, 16, 32)
 _BAND_TOLERANCE = 0.05
 """Over the root of the samples: mean relative change of the pixels that change at all, up to which half as many bands do."""
@@ -186,17 +186,18 @@ class EyePass:
         than so many samples of each of its pixels would still be off by.
 
         Sets and returns `bands`; what was summed up is forgotten. A method that prescribes its bands keeps them."""
-        if not self.disperses or self.fixed_bands is not None or self.scene.features.random_wavelength:
-            return self.bands
         for _ in self.choosing_bands(camera, width, height, samples, maps):
             pass
         return self.bands
 
     def choosing_bands(self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None) -> Iterator[float]:
         """`choose_bands`, pausing after every band of rows."""
+        if not self.disperses or self.fixed_bands is not None or self.scene.features.random_wavelength:
+            return
         maps = maps or self._no_maps()
         columns = min(width, _PILOT_COLUMNS)
         rows = max(1, round(columns * height / width))
+        rows += rows & (rows - 1) == 0
         tolerance = _BAND_TOLERANCE / np.sqrt(samples)
         # Every band's own samples must be enough to smooth an outline.
         most = max(1, samples // 4 if samples >= 16 else samples // 2)

@@ -149,7 +149,7 @@ def _emission(
         weights = observer if reflectance is None else observer * np.asarray(reflectance)[:, None]
         sums = cumulative(axis, spectrum, weights).at(x)
         # All of the spectrum is between the first sample and the last, a line at 380 nm too.
-        sums[0], sums[-1] = 0.0, cumulative(axis, spectrum, weights).at(1.0)
+        sums[0] = 0.0
         return sums
 
     white = Spectrum(daylight_per_lumen())

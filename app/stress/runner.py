@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from app.errors import UserError, suggestion
+from app.gpu import shader
 from app.gpu.context import Context
 from app.stress.case import Case, Measurement
 
@@ -103,8 +104,17 @@ def choose(cases: Sequence[Case], names: str | None) -> tuple[Case, ...]:
 def run(result: StressResult, cases: Iterable[Case], context: Context, progress: Progress, keep: Keep) -> bool:
     """Measure `cases` into `result`; False when Ctrl-C stopped it.
 
-    `keep(result)` is called after every case, so that what is done outlives whatever comes next.
+    `keep(result)` is called after every case, so that what is done outlives whatever comes next. Cases share compiled programs: a sweep
+    renders one scene many times, and a software renderer compiles longer than it renders.
     """
+    shader.keep_programs(context.ctx)
+    try:
+        return _run(result, cases, context, progress, keep)
+    finally:
+        shader.forget_programs(context.ctx)
+
+
+def _run(result: StressResult, cases: Iterable[Case], context: Context, progress: Progress, keep: Keep) -> bool:
     chosen = tuple(cases)
     steps, done = max(sum(case.steps for case in chosen), 1), 0
     started = time.perf_counter()

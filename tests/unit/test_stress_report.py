@@ -23,6 +23,8 @@ from app.stress.table import summary, table
 class NoContext:
     """Stands for a `Context` that made-up cases never touch."""
 
+    ctx = None
+
     def check(self, _where: str) -> None:
         """Nothing was drawn."""
 
