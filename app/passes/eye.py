@@ -51,6 +51,8 @@ TINT_STEPS = 48
 _PILOT_COLUMNS = 60
 """Of the grid of pixels that tells how many bands are needed. llvmpipe compiles a program anew for sides that are powers of two."""
 _BAND_CHOICES = (1, 2, 4, 8, 16, 32)
+_LEAST_BANDS = 4
+"""Where there are samples enough."""
 _BAND_TOLERANCE = 0.05
 """Over the root of the samples: mean relative change of the pixels that change at all, up to which half as many bands do."""
 _TARGET_SECONDS = 0.15
@@ -201,7 +203,8 @@ class EyePass:
         tolerance = _BAND_TOLERANCE / np.sqrt(samples)
         # Every band's own samples must be enough to smooth an outline.
         most = max(1, samples // 4 if samples >= 16 else samples // 2)
-        choices = [b for b in _BAND_CHOICES if b <= most]
+        # A band meets the facets that its own middle meets. Rims of a pixel's width slip through the grid, so some bands are always due.
+        choices = [b for b in _BAND_CHOICES if min(samples // 4, _LEAST_BANDS) <= b <= most]
         pictures: list[np.ndarray] = []
         for bands in choices:
             self._clear(columns, rows)

@@ -13,7 +13,9 @@ int taps_of(EyePath path, float distance)
     sweep -= dot(sweep, path.direction) * path.direction;
     vec3 side_s = path.dposition[0] + reach * path.ddirection[0], side_t = path.dposition[1] + reach * path.ddirection[1];
     float pixel = sqrt(max(length(cross(side_s, side_t)), 1e-20));
-    return clamp(int(ceil(length(sweep) / pixel * p.taps_per_pixel)), 1, int(p.most_taps));
+    float pixels = length(sweep) / pixel;
+    // A sweep that shows at all has two ends.
+    return clamp(int(ceil(pixels * p.taps_per_pixel)), pixels > 0.2 ? 2 : 1, int(p.most_taps));
 }
 #endif
 
