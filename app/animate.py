@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import astuple
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from app.frames import FrameRenderer
 from app.gpu.context import Context
+from app.model.scene import Diffuse, Scene
 from app.model.settings import RenderSettings
 from app.movie import Frames, Sink
 from app.tone_map import auto_exposure, tone_map_8bit
@@ -63,6 +65,7 @@ def description(animation: Animation, settings: RenderSettings, fps: float, phot
         "content": scene_key(start.scene, settings.width, settings.height, settings.max_depth),
         "dabs": repr([item.local_dispersion for item in start.scene.objects]),
         "background": list(start.scene.background_rgb),
+        "pictures": _pictures(start.scene),
         "camera": list(astuple(start.camera)),
         "exposure_ev": start.exposure_ev,
         "solo_nm": start.solo_nm,
@@ -75,3 +78,13 @@ def description(animation: Animation, settings: RenderSettings, fps: float, phot
         "frames": len(animation.times_s),
         "tracks": [list(astuple(track)) for track in animation.tracks],
     }
+
+
+def _pictures(scene: Scene) -> list[str]:
+    """Hashes of the environment and of every texture, which `scene_key` does not know."""
+    found = [item.material.texture for item in scene.objects if isinstance(item.material, Diffuse)]
+    hashes = ["" if t is None else hashlib.sha256(np.ascontiguousarray(t.rgb).tobytes() + t.wrap.encode()).hexdigest() for t in found]
+    if scene.environment is not None:
+        turned = np.asarray(scene.environment.world_to_local, float).tobytes()
+        hashes.append(hashlib.sha256(np.ascontiguousarray(scene.environment.rgb).tobytes() + turned).hexdigest())
+    return hashes
