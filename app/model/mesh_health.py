@@ -171,7 +171,7 @@ def repair(
     if turned:
         notes.append(f"{label}: its normals pointed away from its faces' outside; they were turned")
     notes += _warnings(label, health) if solid else []
-    return make_mesh(mesh.name, mesh.vertices, mesh.triangles, mesh.corner_normals, mesh.uv, mesh.source), tuple(notes)
+    return make_mesh(mesh.name, mesh.vertices, mesh.triangles, mesh.corner_normals, mesh.uv, mesh.source, mesh.uv_unwraps), tuple(notes)
 
 
 def _warnings(label: str, health: MeshHealth) -> list[str]:

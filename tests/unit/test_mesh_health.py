@@ -34,7 +34,7 @@ def test_good_solid_has_no_faults() -> None:
 
 
 def test_open_mesh_is_counted_and_told() -> None:
-    opened = replace(BOX, triangles=BOX.triangles[1:])
+    opened = replace(BOX, triangles=BOX.triangles[1:], uv=BOX.uv[1:])
     assert examine(opened).boundary_edges == 3
     mesh, notes = repair(opened)
     assert notes == ("open mesh 'box': 3 boundary edges; the side is decided by the face normals",)
