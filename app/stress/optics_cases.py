@@ -217,6 +217,7 @@ CASES = (
         "margin to the critical angle (rad)",
         measure_tir_margin,
         steps=5,
+        shares_programs=False,
     ),
     Case(
         "grazing",
@@ -226,6 +227,7 @@ CASES = (
         "degrees from grazing",
         measure_grazing,
         steps=4,
+        shares_programs=False,
     ),
     Case(
         "index-matched",
@@ -235,5 +237,6 @@ CASES = (
         "|eta − 1|",
         measure_index_matched,
         steps=7,
+        shares_programs=False,
     ),
 )
