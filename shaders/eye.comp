@@ -35,7 +35,7 @@ layout(std140, binding = BIND_LIGHTS) uniform Lights { EyeLight lights[LIGHT_COU
 #endif
 // Per object: reflectance in linear Rec.709; number of its absorption row, or -1.
 layout(std430, binding = BIND_OBJECT_COLOURS) readonly restrict buffer ObjectColours { vec4 object_colours[]; };
-#ifdef RANDOM_WAVELENGTH
+#ifdef HAS_DISPERSION
 layout(std430, binding = BIND_CELL_CDF) readonly restrict buffer CellCdf { float cell_cdf[]; };
 #endif
 layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallbacks[4]; };

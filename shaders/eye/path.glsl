@@ -81,7 +81,7 @@ void ray_at(EyePath path, float x, out vec3 position, out vec3 direction)
     int end = x < path.band.y ? 0 : 1;
     vec3 end_position, end_direction;
     linear_end(path, end, end_position, end_direction);
-    float reach = (x - path.band.y) / max(0.5 * (path.band.z - path.band.x), 1e-9);
+    float reach = (x - path.band.y) / max(abs((end == 0 ? path.band.x : path.band.z) - path.band.y), 1e-9);
     float share = reach * reach;
     position += share * ((end == 0 ? path.end_position[0] : path.end_position[1]) - end_position);
     direction = normalize(direction) + share * ((end == 0 ? path.end_direction[0] : path.end_direction[1]) - end_direction);
@@ -121,6 +121,16 @@ void narrow(inout EyePath path, uint pixel_key)
     uint band_number = (turn + (p.dithered != 0u ? hash_combine(pixel_key, 78u) : 0u)) % p.bands;
     took_turn = true;
     vec3 band = (float(band_number) + vec3(0.0, 0.5, 1.0)) / float(p.bands);
+    // Traced where half of what looks bright in the band lies on either side: what only this one wavelength decides, such as which facet is
+    // met, is then right for most of what is seen.
+    uint low = uint(band.x * float(EMISSION_CELLS) + 0.5), high = uint(band.z * float(EMISSION_CELLS) + 0.5);
+    float half_way = 0.5 * (cell_cdf[low] + cell_cdf[high]);
+    while (high - low > 1u) {
+        uint middle = (low + high) / 2u;
+        if (cell_cdf[middle] <= half_way) low = middle;
+        else high = middle;
+    }
+    band.y = clamp((float(low) + 0.5) / float(EMISSION_CELLS), mix(band.x, band.z, 0.1), mix(band.x, band.z, 0.9));
     path.gain *= float(p.bands);
 #endif
     path.weight = weights_at(path, band);

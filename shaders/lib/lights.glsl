@@ -64,9 +64,9 @@ float stretch_seen(float offset, float half_side, float blur)
 // is as bright as it is; where the look is wider than that allows, a cone of the disc's volume.
 float disc_seen(float offset, float blur)
 {
-    bool narrow = blur < 0.8660254;
-    float rim = narrow ? sqrt(1.0 - blur * blur * (1.0 / 3.0)) : blur;
-    float height = narrow ? 1.0 : 0.75 / (blur * blur);
+    bool slight = blur < 0.8660254;
+    float rim = slight ? sqrt(1.0 - blur * blur * (1.0 / 3.0)) : blur;
+    float height = slight ? 1.0 : 0.75 / (blur * blur);
     return height * clamp((rim + blur - offset) / max(2.0 * blur, 1e-9), 0.0, 1.0);
 }
 
