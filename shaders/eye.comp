@@ -31,7 +31,7 @@ layout(std140, binding = BIND_PARAMETERS) uniform Parameters { EyeParameters p; 
 #ifdef LIGHTS_IN_STORAGE
 layout(std430, binding = BIND_LIGHTS) readonly restrict buffer Lights { EyeLight lights[]; };
 #else
-layout(std140, binding = BIND_LIGHTS) uniform Lights { EyeLight lights[LIGHT_COUNT + 1]; };
+layout(std140, binding = BIND_LIGHTS) uniform Lights { EyeLight lights[LIGHT_ROOM]; };
 #endif
 // Per object: reflectance in linear Rec.709; number of its absorption row, or -1.
 layout(std430, binding = BIND_OBJECT_COLOURS) readonly restrict buffer ObjectColours { vec4 object_colours[]; };

@@ -175,6 +175,8 @@ class EyePass:
         maps = maps or self._no_maps()
         parameters = self._parameters(camera, width, height, maps.scale, seed)
         parameters["sample_side"] = 1.0 / np.sqrt(samples + sample_offset)
+        # Where samples are of one band each, fewer of them share a pixel in that band.
+        parameters["band_side"] = min(1.0, np.sqrt(self.bands / (samples + sample_offset)))
         parameters["taps_per_pixel"] = TAPS_PER_PIXEL * (samples + sample_offset) ** 0.25
         for index, place in enumerate(_pixel_lattice(samples, sample_offset)):
             parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
@@ -203,13 +205,12 @@ class EyePass:
         tolerance = _BAND_TOLERANCE / np.sqrt(samples)
         # Every band's own samples must be enough to smooth an outline.
         most = max(1, samples // 4 if samples >= 16 else samples // 2)
-        # A band meets the facets that its own middle meets. Rims of a pixel's width slip through the grid, so some bands are always due.
-        choices = [b for b in _BAND_CHOICES if min(samples // 4, _LEAST_BANDS) <= b <= most]
+        choices = [b for b in _BAND_CHOICES if b <= most]
         pictures: list[np.ndarray] = []
         for bands in choices:
             self._clear(columns, rows)
             parameters = self._parameters(camera, columns, rows, maps.scale, 1)
-            parameters["bands"], parameters["dithered"], parameters["counts_turns"], parameters["sample_side"] = bands, 0, 0, 1.0
+            parameters["bands"], parameters["dithered"], parameters["counts_turns"], parameters["sample_side"], parameters["band_side"] = bands, 0, 0, 1.0, 1.0
             parameters["pixel_scale"] = columns / width
             parameters["taps_per_pixel"] = TAPS_PER_PIXEL * samples**0.25
             parameters["within_pixel"] = 0.5
@@ -218,11 +219,12 @@ class EyePass:
                 yield from self._add_sample(parameters, columns, rows, maps)
             pictures.append(self._read().astype(np.float64))
         # Two pictures may agree by chance: all finer ones must, too.
-        self.bands = choices[-1]
-        for bands, coarser, finer in reversed(list(zip(choices, pictures, pictures[1:], strict=False))):
-            if _band_error(coarser, finer) >= tolerance:
-                break
-            self.bands = bands
+        errors = [_band_error(coarser, finer) for coarser, finer in zip(pictures, pictures[1:], strict=False)]
+        enough = next((i for i in range(len(errors) + 1) if all(e < tolerance for e in errors[i:])), len(errors))
+        # A band meets the facets that its own middle meets, and rims of a pixel's width slip through the grid: where colours part at all,
+        # some bands are due.
+        parted = max(errors, default=0.0) > tolerance / 8
+        self.bands = max(choices[enough], min(choices[-1], _LEAST_BANDS) if parted else 1)
         self._clear(columns, rows)
 
     def _bind(self, maps: CausticMaps) -> None:
@@ -321,6 +323,7 @@ class EyePass:
             "BIN_COUNT": maps.count,
             "BIN_OVERLAP": 1 if maps.edges_nm is not None else 0,
             "LIGHT_COUNT": len(scene.lights),
+            "LIGHT_ROOM": len(scene.lights) + 1,
             "MAX_DEPTH": MAX_DEPTH,
             "MAX_EVENTS": MAX_EVENTS if specular else 1,
             "STACK": STACK,

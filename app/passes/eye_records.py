@@ -56,7 +56,8 @@ EYE_PARAMETERS = Struct(
         Field("draw_index", "uint", "counts them too: which numbers it draws"),
         Field("counts_turns", "uint", "whether pixels count their own dispersed samples instead"),
         Field("taps_per_pixel", "float", "looks along a sweep, for every pixel it is long"),
-        Field("unused", "float", "", 3),
+        Field("band_side", "float", "side of the share of its pixel that a sample of one band has, pixels"),
+        Field("unused2", "uvec2", ""),
     ),
 )
 _LIGHT_KINDS = {"point": 0, "spot": 0, "directional": 1, "collimated": 2, "area": 3}

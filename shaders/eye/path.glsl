@@ -89,6 +89,12 @@ void ray_at(EyePath path, float x, out vec3 position, out vec3 direction)
 #endif
 }
 
+// Side of the share of its pixel that a sample of this path has, pixels.
+float sample_side(EyePath path)
+{
+    return path.narrowed ? p.band_side : p.sample_side;
+}
+
 // Weights at other wavelengths of the same band.
 vec3 weights_at(EyePath path, vec3 x)
 {

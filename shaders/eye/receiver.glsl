@@ -27,7 +27,7 @@ Seen seen_on(EyePath path, Hit hit, Triangle facet, vec3 position, vec3 directio
     seen.object = hit.object;
     seen.source = facet.source;
     for (int c = 0; c < 2; ++c)
-        seen.dposition[c] = p.sample_side * transfer_column(path.dposition[c], path.ddirection[c], path.direction, hit.normal_g, hit.distance);
+        seen.dposition[c] = sample_side(path) * transfer_column(path.dposition[c], path.ddirection[c], path.direction, hit.normal_g, hit.distance);
     seen.dposition[2] = vec3(0.0);
     seen.reflectance = object_colours[hit.object].rgb;
     return seen;
@@ -102,36 +102,46 @@ vec4 map_to_channels(vec4 texel)
 #endif
 }
 
-// Irradiance of the map's targets `first` to `last`.
+// Texels that a look at a map averages across and down at most; what it covers beyond is met by the pixel's other samples.
+#define MOST_TEXELS 4
+
+// Irradiance of the map's targets `first` to `last`: their mean over a box of this many texels.
 void caustic_values(uint placement, vec2 texel, vec2 box, out vec4 values[MAP_TARGETS], const int first, const int last)
 {
+    ivec2 looks = clamp(ivec2(ceil(box)), ivec2(1), ivec2(MOST_TEXELS));
+    vec2 part = box / vec2(looks), corner = texel - 0.5 * (box - part);
+    float share = 1.0 / float(looks.x * looks.y);
+    for (int t = 0; t < MAP_TARGETS; ++t) values[t] = vec4(0.0);
+    for (int i = 0; i < looks.x * looks.y; ++i) {
+        vec2 at = corner + part * vec2(i % looks.x, i / looks.x);
 #if MAP_TARGETS > 0
-    if (0 >= first && 0 <= last) values[0] = caustic_irradiance(caustic_map[0], placement, texel, box);
+    if (0 >= first && 0 <= last) values[0] += share * caustic_irradiance(caustic_map[0], placement, at, part);
 #endif
 #if MAP_TARGETS > 1
-    if (1 >= first && 1 <= last) values[1] = caustic_irradiance(caustic_map[1], placement, texel, box);
+    if (1 >= first && 1 <= last) values[1] += share * caustic_irradiance(caustic_map[1], placement, at, part);
 #endif
 #if MAP_TARGETS > 2
-    if (2 >= first && 2 <= last) values[2] = caustic_irradiance(caustic_map[2], placement, texel, box);
+    if (2 >= first && 2 <= last) values[2] += share * caustic_irradiance(caustic_map[2], placement, at, part);
 #endif
 #if MAP_TARGETS > 3
-    if (3 >= first && 3 <= last) values[3] = caustic_irradiance(caustic_map[3], placement, texel, box);
+    if (3 >= first && 3 <= last) values[3] += share * caustic_irradiance(caustic_map[3], placement, at, part);
 #endif
 #if MAP_TARGETS > 4
-    if (4 >= first && 4 <= last) values[4] = caustic_irradiance(caustic_map[4], placement, texel, box);
+    if (4 >= first && 4 <= last) values[4] += share * caustic_irradiance(caustic_map[4], placement, at, part);
 #endif
 #if MAP_TARGETS > 5
-    if (5 >= first && 5 <= last) values[5] = caustic_irradiance(caustic_map[5], placement, texel, box);
+    if (5 >= first && 5 <= last) values[5] += share * caustic_irradiance(caustic_map[5], placement, at, part);
 #endif
 #if MAP_TARGETS > 6
-    if (6 >= first && 6 <= last) values[6] = caustic_irradiance(caustic_map[6], placement, texel, box);
+    if (6 >= first && 6 <= last) values[6] += share * caustic_irradiance(caustic_map[6], placement, at, part);
 #endif
 #if MAP_TARGETS > 7
-    if (7 >= first && 7 <= last) values[7] = caustic_irradiance(caustic_map[7], placement, texel, box);
+    if (7 >= first && 7 <= last) values[7] += share * caustic_irradiance(caustic_map[7], placement, at, part);
 #endif
 #if MAP_TARGETS > 8
-    if (8 >= first && 8 <= last) values[8] = caustic_irradiance(caustic_map[8], placement, texel, box);
+    if (8 >= first && 8 <= last) values[8] += share * caustic_irradiance(caustic_map[8], placement, at, part);
 #endif
+    }
 }
 
 #ifndef RGB_CHANNELS
@@ -154,7 +164,8 @@ void add_caustic_at(EyePath path, Seen seen, Stretch stretch, uint receiver, uin
         box += side * side;
     }
     box = sqrt(box);
-    if (box.x * box.y < p.sample_side * p.sample_side) box = vec2(1.0);
+    float side = sample_side(path);
+    if (box.x * box.y < side * side) box = vec2(1.0);
     bool plain = receivers[receiver].reflectance_class == 0u;
     float scale = p.map_scale * INVERSE_PI;
 #ifdef MAP_BINS
@@ -181,8 +192,11 @@ void add_caustic_at(EyePath path, Seen seen, Stretch stretch, uint receiver, uin
                 vec4 all = emission_until(row, t, EMISSION_CELLS);
                 vec4 part = within ? emission_until(row, t, stretch.cell_hi) - emission_until(row, t, stretch.cell_lo) : vec4(0.0);
                 whole[t] += watt * all;
-                whole_sum += watt * dot(abs(all), vec4(1.0));
-                part_sum += watt * dot(abs(part), vec4(1.0));
+#ifdef RGB_CHANNELS
+                // Luminance, which no wavelength has less than none of.
+                whole_sum += watt * dot(all.rgb, vec3(0.2126, 0.7152, 0.0722));
+                part_sum += watt * dot(part.rgb, vec3(0.2126, 0.7152, 0.0722));
+#endif
             }
             WHEN(within && watt != 0.0) add_spectrum(path, stretch, row, factor * watt);
         }

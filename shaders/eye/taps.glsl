@@ -43,8 +43,8 @@ vec3 sky_colour(vec3 direction, vec3 ddirection[3])
 void add_sky(EyePath path, Stretch stretch, vec3 direction, vec3 sweep)
 {
     vec3 columns[3];
-    columns[0] = p.sample_side * path.ddirection[0];
-    columns[1] = p.sample_side * path.ddirection[1];
+    columns[0] = sample_side(path) * path.ddirection[0];
+    columns[1] = sample_side(path) * path.ddirection[1];
     columns[2] = sweep;
     add_colour(path, stretch, uint(WHITE_ROW), sky_colour(direction, columns));
 }
@@ -53,7 +53,7 @@ void add_sky(EyePath path, Stretch stretch, vec3 direction, vec3 sweep)
 // Diameter of what a sample stands for: where its ray starts (GPU units), and how that grows with distance.
 vec2 sample_width(EyePath path)
 {
-    return p.sample_side * sqrt(vec2(length(cross(path.dposition[0], path.dposition[1])), length(cross(path.ddirection[0], path.ddirection[1]))));
+    return sample_side(path) * sqrt(vec2(length(cross(path.dposition[0], path.dposition[1])), length(cross(path.ddirection[0], path.ddirection[1]))));
 }
 
 // Lights that can be seen over the distance `far`; edges are as soft as what the ray stands for is wide.

@@ -78,7 +78,7 @@ def test_methods_agree_with_random_wavelengths(gl, drawn, method: str, bands: in
     assert 3.0 * error + 0.01 < 0.028
 
 
-@pytest.mark.parametrize("bands", [1, 4])
+@pytest.mark.parametrize("bands", [1, 2])
 def test_a_column_of_the_wrong_sign_is_noticed(gl, drawn, monkeypatch, tmp_path, bands: int) -> None:
     mean, error = drawn
     right = difference(seen(gl, "srd", 64, bands), mean)

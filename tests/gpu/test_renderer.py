@@ -77,10 +77,12 @@ def scene_of(tmp_path: Path, shape: str = "prism") -> Scene:
 @pytest.mark.parametrize("name", SCENES)
 def test_flux_closes_in_every_shipped_scene(gl, name: str) -> None:
     result = render(load_scene(assets_dir() / "scenes" / f"{name}.toml"), SMALL, context=gl)
-    assert result.stats.light.tally.emitted > 0.0
-    assert result.stats.light.tally.ended["deposited"] > 0.0
+    # The one has no light, the other's lamp throws nothing through the glass onto what is there.
+    throws = name not in ("brilliant_studio", "prism_edge")
+    assert (result.stats.light.tally.emitted > 0.0) == throws
+    assert (result.stats.light.tally.ended["deposited"] > 0.0) == throws
     assert result.stats.light.tally.imbalance < 1e-4
-    assert result.stats.light.tally.ended["lost_numeric"] < 2e-4 * result.stats.light.tally.emitted
+    assert result.stats.light.tally.ended["lost_numeric"] <= 2e-4 * result.stats.light.tally.emitted
     assert result.stats.light.tally.fallbacks["queue_overflow"] == 0
     assert np.isfinite(result.rgb).all()
     assert result.rgb.max() > 0.0

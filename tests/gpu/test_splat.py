@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from app.gpu.map_atlas import MapAtlas, pack, placement_rows
+from app.gpu.map_channels import MapChannels
 from app.gpu.records import FLAG_FOOTPRINT_DROPPED, RECEIVER
 from app.model import spectrum
 from app.model.charts import build_charts
