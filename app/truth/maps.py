@@ -39,22 +39,6 @@ def texel_of(placement: np.void, position: Array) -> Array:
     return rows[:, :3] @ position + rows[:, 3]
 
 
-def texel_size(placement: np.void) -> float:
-    """Side of a square of one texel's area, GPU units."""
-    rows = np.stack([placement["row_u"], placement["row_v"]]).astype(np.float64)[:, :3]
-    return float(1.0 / np.sqrt(np.prod(np.linalg.norm(rows, axis=1))))
-
-
-def texel_box(placement: np.void, direction: Array, normal: Array, side: float) -> Array:
-    """Standard sides (2,) in texels of a sample that is `side` wide across the ray, laid along the ray onto the surface.
-
-    The sample's second moment across the ray, (I - d dᵀ), moves with P = I - d nᵀ / (d·n)."""
-    along_ray = np.eye(3) - np.outer(direction, normal) / (direction @ normal)
-    moment = along_ray @ (np.eye(3) - np.outer(direction, direction)) @ along_ray.T
-    rows = np.stack([placement["row_u"], placement["row_v"]]).astype(np.float64)[:, :3]
-    return side * np.sqrt(np.einsum("ri,ij,rj->r", rows, moment, rows))
-
-
 def caustic_irradiance(texels: Array, placement: np.void, texel: Array, box: Array) -> Array:
     """Mean over a box (sides (2,), at most one texel) about `texel` (2,) of a map (H, W, channels), over the texels'
     area. Beyond the placement's rectangle the map repeats its border."""

@@ -36,23 +36,6 @@ bool find_texel(uint receiver, uint source, vec3 position, out uint placement, o
     return false;
 }
 
-// Length of a texel's side, GPU units (maps are near enough square).
-float texel_size(uint placement)
-{
-    return inversesqrt(length(placements[placement].row_u.xyz) * length(placements[placement].row_v.xyz));
-}
-
-// Sides in texels of the box on the map that a sample of side `side` (GPU units, across the ray) covers.
-vec2 texel_box(uint placement, vec3 direction, vec3 normal, float side)
-{
-    float facing = max(abs(dot(direction, normal)), 1e-3);
-    vec3 level = cross(direction, normal);
-    vec3 across = dot(level, level) > 1e-8 ? normalize(level) : normalize(cross(direction, abs(direction.x) < 0.5 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0)));
-    vec3 along = cross(normal, across) / facing;
-    vec3 row_u = placements[placement].row_u.xyz, row_v = placements[placement].row_v.xyz;
-    return side * vec2(length(vec2(dot(row_u, across), dot(row_u, along))), length(vec2(dot(row_v, across), dot(row_v, along))));
-}
-
 // Irradiance, the map's unit per scene unit²: the mean of the map's texels over a box with these sides
 // (at most one texel), so that a pixel's samples together weigh every texel by its share of the pixel.
 // A side of one texel is bilinear interpolation. `map` is one of `caustic_map`, by a constant index: a software renderer takes

@@ -14,7 +14,7 @@ from app.truth.optics import unit
 COVERS = {
     "camera.glsl": ("camera_ray", "picture_point"),
     "lights.glsl": ("sample_light", "light_seen", "disc_seen", "stretch_seen"),
-    "lookup.glsl": ("find_texel", "texel_size", "texel_box", "caustic_irradiance"),
+    "lookup.glsl": ("find_texel", "caustic_irradiance"),
 }
 COUNT = 2048
 
@@ -168,35 +168,6 @@ def test_the_finest_window_that_holds_a_place_is_found(gl) -> None:
     assert np.abs(got["texel"] - texel)[both].max() < 3e-5
     assert set(placement[both]) == {0, 1, 2, 4, 5, 6}
     assert not got["found"][receiver == 2].any()
-
-
-def surface_placements(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Placements whose rows lie in a surface, and its normals."""
-    placements = PLACEMENT.zeros(COUNT)
-    normal = unit(rng.normal(size=(COUNT, 3)))
-    first = unit(np.cross(normal, rng.normal(size=(COUNT, 3))))
-    placements["row_u"][:, :3] = first * rng.uniform(5, 500, (COUNT, 1))
-    placements["row_v"][:, :3] = np.cross(normal, first) * rng.uniform(5, 500, (COUNT, 1))
-    return placements, as_f32(normal)
-
-
-def test_the_size_of_texels_and_of_samples_on_the_map(gl) -> None:
-    rng = np.random.default_rng(21)
-    placements, normal = surface_placements(rng)
-    direction = unit(rng.normal(size=(COUNT, 3)))
-    direction[:100] = -normal[:100]
-    direction = as_f32(direction)
-    facing = np.abs(np.sum(direction * normal, axis=1))
-    side = as_f32(rng.uniform(1e-3, 0.1, COUNT))
-    body = "size = texel_size(row); box = texel_box(row, d, n, side);"
-    inputs = {"d": direction, "n": normal, "side": side}
-    got = evaluate(gl.ctx, ["lib/lookup.glsl"], body, inputs, {"size": "float", "box": "vec2"}, LOOKUP, [RECEIVER, PLACEMENT], {8: RECEIVER.zeros(1), 9: placements})
-    size = np.array([maps.texel_size(p) for p in placements])
-    assert (np.abs(got["size"] - size) / size).max() < 1e-6
-    clear = facing > 0.02
-    box = np.array([maps.texel_box(*row) for row in zip(placements[clear], unit(direction)[clear], unit(normal)[clear], side[clear], strict=True)])
-    assert (np.abs(got["box"][clear] - box) / box).max() < 2e-5
-    assert np.isfinite(got["box"]).all()
 
 
 def test_a_look_up_is_the_mean_over_its_box(gl) -> None:
