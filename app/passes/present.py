@@ -1,8 +1,7 @@
 """What the channels of a picture mean: linear Rec.709, or watts in spectral bins.
 
-The eye's shader multiplies and adds channels and knows nothing else about them. Here lights,
-reflectances, absorption and the background become numbers per channel, and the sums that come
-back become linear Rec.709.
+The eye's shader adds up channels and knows nothing else about them. Here is what a watt of each wavelength adds to
+them, and how the sums that come back become linear Rec.709.
 """
 
 from __future__ import annotations

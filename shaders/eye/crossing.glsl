@@ -11,7 +11,6 @@
 struct Facing {
     vec3 normal;
     vec3 normal_g;
-    bool is_smooth;   // the shading normal is interpolated
 #ifdef SPECTRAL_SWEEP
     vec3 end_normal[2];
 #endif
@@ -25,7 +24,6 @@ Facing facing_of(Hit hit, EyePath path)
     Facing facing;
     facing.normal_g = facing_geometric(hit, path.direction);
     facing.normal = facing_normal(hit, path.direction);
-    facing.is_smooth = false;
 #ifdef SPECTRAL_SWEEP
     facing.end_normal[0] = facing.end_normal[1] = facing.normal;
 #endif
@@ -34,7 +32,6 @@ Facing facing_of(Hit hit, EyePath path)
     if (all(equal(facing.normal, facing.normal_g)) || (hit.primitive & PLANE_BIT) != 0u) return facing;
     Triangle facet = triangle_at(hit.primitive);
     if (facet.normals == NONE) return facing;
-    facing.is_smooth = true;
     vec3 gradient_u, gradient_v;
     barycentric_gradients(facet.edge1, facet.edge2, gradient_u, gradient_v);
     vec3 n0 = corner_normal(facet.normals), n1 = corner_normal(facet.normals + 1u), n2 = corner_normal(facet.normals + 2u);
