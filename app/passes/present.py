@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.gpu.map_channels import MapChannels
 from app.model.colorimetry import (
     K_M,
     VISIBLE_NM,
@@ -63,11 +64,8 @@ class Channels:
         return xyz_to_rgb709(xyz).astype(np.float32)
 
     def _cell_shares(self) -> np.ndarray:
-        """Share of each nanometre cell in each bin, (401, bins); the end cells are cut to 380–780 nm."""
-        low, high = np.maximum(VISIBLE_NM - 0.5, VISIBLE_NM[0]), np.minimum(VISIBLE_NM + 0.5, VISIBLE_NM[-1])
-        edges = np.asarray(self.edges_nm, float)
-        overlap = np.minimum(high[:, None], edges[1:]) - np.maximum(low[:, None], edges[:-1])
-        return np.clip(overlap, 0.0, None) / (high - low)[:, None]
+        """Share of each nanometre cell in each bin, (401, bins)."""
+        return MapChannels(self.edges_nm).cell_weights()[:, : self.count]
 
     def _mean(self, spectral: np.ndarray) -> np.ndarray:
         """Mean over each bin of a function on `VISIBLE_NM`."""
