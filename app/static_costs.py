@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from app.gpu.mip_chain import level_count
 from app.gpu.records import photon_record, ray_record
 from app.gpu.scene_buffers import SAMPLES, TRIANGLE
 from app.model.features import Features, is_convex_solid, overlapping_solids
 from app.model.scene import Dielectric, Diffuse, Mirror, Scene
+from app.model.texture import Environment, Texture
 from app.passes.footprint import SPLAT
 
 _TEXEL = 16
@@ -58,20 +60,22 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
     absorbing = sum(isinstance(o.material, Dielectric) and o.material.absorption is not None for o in scene.objects)
     mirrors = sum(isinstance(o.material, Mirror) for o in scene.objects)
     curved = [o for o in scene.objects if isinstance(o.material, Diffuse)]
+    worn = {id(o.material.texture.rgb): o.material.texture for o in scene.objects if isinstance(o.material, Diffuse) and o.material.texture is not None}
+    beyond = scene.environment
     told = {
         "spectral columns": (features.spectral_groups > 0, f"{sizes.ray - unspectral.ray} B a ray, {sizes.photon - unspectral.photon} B a photon"),
-        "shared spectral variable": (features.merged_groups, f"one look-up of the slope a refraction, {_size(row * len(glasses))}"),
+        "shared spectral variable": (features.merged_groups, f"one look-up of the slope a refraction, {size_words(row * len(glasses))}"),
         "weights over the band": (features.spectral_weights, "Fresnel and indices at 3 wavelengths instead of 1"),
         "band cuts": (features.band_cuts, "one program more; a cut ray becomes two"),
         "spatial columns": (features.footprints, f"{sizes.ray - unspatial.ray} B a ray"),
-        "refraction": (features.dielectrics, f"{_size(row * len(glasses))} of indices; two children a surface"),
-        "mirrors": (features.mirrors, f"{_size(row * mirrors)} of reflectances"),
-        "interpolated normals": (features.smooth_normals, f"{3 * _TEXEL} B a facet, {_size(3 * _TEXEL * smooth)}"),
+        "refraction": (features.dielectrics, f"{size_words(row * len(glasses))} of indices; two children a surface"),
+        "mirrors": (features.mirrors, f"{size_words(row * mirrors)} of reflectances"),
+        "interpolated normals": (features.smooth_normals, f"{3 * _TEXEL} B a facet, {size_words(3 * _TEXEL * smooth)}"),
         "normal derivatives": (features.normal_derivatives, "one more vector a column and surface"),
-        "absorption": (features.absorption, f"3 look-ups a flight, {_size(row * absorbing)}"),
+        "absorption": (features.absorption, f"3 look-ups a flight, {size_words(row * absorbing)}"),
         "medium stack": (features.medium_stack, f"{len(overlapping_solids(scene))} bit(s) of a ray's mask"),
-        "triangle tree": (features.tree, f"about {_size(triangles * (TRIANGLE.stride + _NODE // 2))}"),
-        "half-space solids": (features.convex_solids, f"{planes} planes, {_size(planes * _TEXEL)}: each ray walks through all"),
+        "triangle tree": (features.tree, f"about {size_words(triangles * (TRIANGLE.stride + _NODE // 2))}"),
+        "half-space solids": (features.convex_solids, f"{planes} planes, {size_words(planes * _TEXEL)}: each ray walks through all"),
         "charts": (features.charts, f"{len(curved)} receiver(s) with a placement a facet"),
         "local gain": (features.local_gain, "eight voxels a photon"),
         "photons by index": (features.reindexed, "32 B a band"),
@@ -79,10 +83,19 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "eye refraction": (features.eye_specular, "a second program; 4 B a pixel list what it has to do"),
         "eye spectral taps": (features.eye_disperses, f"{features.spectral_groups} column(s) a camera ray; looks along each sweep"),
         "spectral maps": (features.map_hats > 0, f"{features.map_hats * _TEXEL // 4} B a texel"),
+        "textures": (bool(worn), f"about {size_words(sum(map(picture_bytes, worn.values())))}"),
+        "environment map": (beyond is not None, f"about {size_words(picture_bytes(beyond))}" if beyond is not None else ""),
         "spectral bins": (features.targets > 1, f"{sizes.texel} B a texel instead of {_TEXEL}"),
     }
     return {name: words for name, (included, words) in told.items() if included}
 
 
-def _size(count: int) -> str:
+def picture_bytes(picture: Texture | Environment) -> int:
+    """What a picture takes on the device, its smaller copies in a column beside it (`TextureStore`); packing several adds a little."""
+    height, width = picture.rgb.shape[:2]
+    return _TEXEL * height * (width + (max(width // 2, 1) if level_count(width, height) > 1 else 0))
+
+
+def size_words(count: int) -> str:
+    """Bytes for people."""
     return f"{count} B" if count < 2048 else f"{count / 1024:.0f} KiB" if count < 1 << 21 else f"{count / (1 << 20):.1f} MiB"

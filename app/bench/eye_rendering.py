@@ -22,6 +22,7 @@ from app.model.features import Features
 from app.model.scene import Diffuse, Scene
 from app.model.settings import RenderSettings
 from app.passes.eye import CausticMaps, EyePass
+from app.passes.spectrum_choice import Spectrum
 
 LIGHT_PHOTONS = 1 << 22
 """Photons of the caustic maps, traced by `srd`. In `ball_caustic` twice 2^20 photons change the picture by a relMSE of 2.6e-4, twice 2^18 by ten
@@ -85,16 +86,18 @@ class EyeRig:
         self._eye = EyePass(context, self._buffers, "beauty", light.reflectances, light.channels)
         # Drivers put off part of the compiling until a program runs.
         self._eye.run(scene.camera, width, height, 1, 0, light.maps)
+        if self._eye.chooses:
+            self._eye.may_be_single, self._eye.spectrum = True, Spectrum(single=True)
+            self._eye.run(scene.camera, width, height, 1, 0, light.maps)
         compiled = self._finished()
         self.setup_seconds = {"light half": light.seconds, "buffers": buffered - started, "compile": compiled - buffered}
         self.buffers_mib = self._buffers.bytes / 2**20
 
     def render(self, budget: int, seed: int) -> Rendering:
-        """One picture from nothing: bands chosen for `budget` samples a pixel, then that many, rounded up to a multiple of the bands."""
+        """One picture from nothing: the way to sample the spectrum chosen for `budget` samples a pixel, then those, or what they buy in that way."""
         started = self._finished()
-        bands = self._choose_bands(budget)
+        samples = self._choose(budget).samples(budget)
         chosen = self._finished()
-        samples = -(-budget // bands) * bands
         self._eye.run(self._scene.camera, *self._size, samples, 0, self._light.maps, seed)
         looked = self._finished()
         xyz = rgb709_to_xyz(self._eye.read_rgb().astype(np.float64))
@@ -102,7 +105,7 @@ class EyeRig:
 
     def fitting(self, budget: int) -> int:
         """The largest multiple of the bands that `budget` samples are given; the smallest where that is none."""
-        bands = self._choose_bands(budget)
+        bands = self._choose(budget).bands
         return max(budget // bands, 1) * bands
 
     def budgets(self, seconds: float, count: int) -> list[int]:
@@ -127,10 +130,11 @@ class EyeRig:
     def _seconds(self, budget: int) -> tuple[float, float, int]:
         """Seconds of choosing the bands and of all, and the samples taken."""
         rendering = self.render(budget, 0)
-        return rendering.seconds["bands"], sum(rendering.seconds.values()), rendering.emitted
+        taken = budget if self._choose(budget).single else rendering.emitted
+        return rendering.seconds["bands"], sum(rendering.seconds.values()), taken
 
-    def _choose_bands(self, samples: int) -> int:
-        return self._eye.choose_bands(self._scene.camera, *self._size, samples, self._light.maps)
+    def _choose(self, samples: int) -> Spectrum:
+        return self._eye.choose_spectrum(self._scene.camera, *self._size, samples, self._light.maps)
 
     def _finished(self) -> float:
         self._context.finish()

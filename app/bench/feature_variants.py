@@ -50,7 +50,7 @@ class Trial:
     """Both splat photons of like footprints, so that the splat's times say something about the feature."""
 
 
-_EYE = ("eye refraction", "eye spectral taps")
+_EYE = ("eye refraction", "eye spectral taps", "textures", "environment map")
 DISPERSION = "dispersion in all"
 """Columns, weights and cuts together: what a scene without dispersion does not pay."""
 

@@ -73,7 +73,7 @@ _LIGHT_NOT_COVERED = {
 
 _EYE_METHODS = {
     "srd": "The default. Each camera ray carries spectral ray differentials by refractive index, one column for each dispersive glass, and looks "
-    "up what lies along its spectrum with filtered taps. As many bands of the spectrum, taken in turn, as the picture itself asks for.",
+    "up what lies along its spectrum with filtered taps. A band is cut where its colours part; as many bands, or single wavelengths, as a pilot of the picture asks for.",
     "srd-lambda": "The method as published (Elek et al. 2014): one column by wavelength, the whole spectrum from one anchor.",
     "stochastic": "One random wavelength a camera path. The baseline: unbiased in wavelength, noisy in colour.",
     "stochastic-even": "The same with wavelengths from a low-discrepancy sequence instead of chance: the usual answer at its best.",

@@ -82,7 +82,7 @@ def warnings_of(scene: SceneResult) -> list[str]:
         told.append("The reference's own error is above a tenth of the smallest error reported.")
     if scene.reference is not None and least > 0 and scene.reference.caustic_relmse > REFERENCE_SHARE * least:
         told.append(
-            f"The caustic that the reference looks up has a noise of its own (relMSE about {number(scene.reference.caustic_relmse)} where it falls), "
+            f"The caustic that the reference looks up has a noise of its own that adds about {number(scene.reference.caustic_relmse)} to the picture's relMSE, "
             "above a tenth of the smallest error reported. It is not taken off: where the caustic is seen it counts as bias of every method."
         )
     if any(p.relmse <= 0 for c in scene.curves for p in c.points):

@@ -72,5 +72,3 @@ class Case:
     """Severities it will yield."""
     logarithmic: bool = True
     """Whether the axis is logarithmic."""
-    shares_programs: bool = True
-    """Whether programs may be kept from one rendering to the next: all that it builds are given back with `shader.release`."""

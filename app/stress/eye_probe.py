@@ -31,6 +31,7 @@ from app.model.scene import Camera, Scene, SceneObject
 from app.model.settings import RenderSettings
 from app.model.texture import Environment
 from app.passes.eye import EyePass
+from app.passes.spectrum_choice import Spectrum
 from app.stress.case import Measurement
 from app.stress.probe import nonfinite
 
@@ -107,9 +108,9 @@ def look_with(eye: EyePass, camera: Camera, settings: RenderSettings = LOOK, ban
     """The same with a pass that is there already."""
     samples = settings.spp or 1
     if bands is not None:
-        eye.bands = bands
+        eye.spectrum = Spectrum(bands)
     else:
-        bands = eye.choose_bands(camera, settings.width, settings.height, samples)
+        bands = eye.choose_spectrum(camera, settings.width, settings.height, samples).bands
     before = eye.fallbacks
     samples = -(-samples // bands) * bands
     eye.run(camera, settings.width, settings.height, samples, seed=settings.seed)

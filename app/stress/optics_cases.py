@@ -217,7 +217,6 @@ CASES = (
         "margin to the critical angle (rad)",
         measure_tir_margin,
         steps=5,
-        shares_programs=False,
     ),
     Case(
         "grazing",
@@ -227,7 +226,6 @@ CASES = (
         "degrees from grazing",
         measure_grazing,
         steps=4,
-        shares_programs=False,
     ),
     Case(
         "index-matched",
@@ -237,6 +235,5 @@ CASES = (
         "|eta − 1|",
         measure_index_matched,
         steps=7,
-        shares_programs=False,
     ),
 )

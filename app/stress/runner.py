@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from app.errors import UserError, suggestion
@@ -104,26 +104,21 @@ def choose(cases: Sequence[Case], names: str | None) -> tuple[Case, ...]:
 def run(result: StressResult, cases: Iterable[Case], context: Context, progress: Progress, keep: Keep) -> bool:
     """Measure `cases` into `result`; False when Ctrl-C stopped it.
 
-    `keep(result)` is called after every case, so that what is done outlives whatever comes next.
+    `keep(result)` is called after every case, so that what is done outlives whatever comes next. Cases share compiled
+    programs: a sweep renders one scene many times, and a software renderer compiles longer than it renders.
     """
-    with ExitStack() as kept:
-        return _run(result, cases, context, progress, keep, kept)
+    shader.keep_programs(context.ctx)
+    try:
+        return _run(result, cases, context, progress, keep)
+    finally:
+        shader.forget_programs(context.ctx)
 
 
-def _run(result: StressResult, cases: Iterable[Case], context: Context, progress: Progress, keep: Keep, kept: ExitStack) -> bool:
-    """`run`. Cases share compiled programs: a sweep renders one scene many times, and a software renderer compiles longer than it renders."""
-    sharing = False
+def _run(result: StressResult, cases: Iterable[Case], context: Context, progress: Progress, keep: Keep) -> bool:
     chosen = tuple(cases)
     steps, done = max(sum(case.steps for case in chosen), 1), 0
     started = time.perf_counter()
     for case in chosen:
-        if sharing != case.shares_programs:
-            sharing = case.shares_programs
-            if sharing:
-                shader.keep_programs(context.ctx)
-                kept.callback(shader.forget_programs, context.ctx)
-            else:
-                kept.close()
         found = CaseResult(case)
         result.cases.append(found)
         try:

@@ -79,8 +79,8 @@ def land(scene, domain, colour, band_of, side, sequence, first, count, share, ma
 
 
 @lean
-def gather(tables, points, watts, ends, count, sums, part):
-    """Add landed photons to `sums` (float64, as `CausticTables.irradiance`, but W a texel) and to `part` (W of all bins a texel).
+def gather(tables, points, watts, ends, count, sums):
+    """Add landed photons to `sums` (as `CausticTables.irradiance`, but W a texel).
 
     A photon counts in the finest window that holds it; returns the power beyond all windows.
     """
@@ -94,7 +94,6 @@ def gather(tables, points, watts, ends, count, sums, part):
             if texel >= 0:
                 held = True
                 sums[tables.first[at, window] + texel * tables.bins + ends[i, 1]] += watts[i]
-                part[tables.first[at, window] // tables.bins + texel] += watts[i]
                 break
         if not held:
             outside += watts[i]

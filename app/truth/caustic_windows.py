@@ -1,7 +1,7 @@
 """Where the spectral caustic is counted: the planes of flat receivers, and windows of texels on them.
 
 Each side of a receiver that is both lit by glass or mirrors and seen gets two windows: a coarse one over all that the camera
-sees of it, and a fine one over nearly all the light in there. Where they overlap only the fine one counts.
+sees of it, and a fine one over nearly all the light where it looks most. Where they overlap only the fine one counts.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from app.truth.eye_kernel import CausticTables
 from app.truth.photon_emission import frame_of
 from app.truth.photon_scene import PhotonScene
 
-TEXELS_A_PIXEL = 3.0
-"""Side of a pixel in texels of a fine window, where the plan says nothing else."""
+TEXELS_A_PIXEL = 2.0
+"""Side of a pixel in texels of a fine window, where the plan says nothing else: more would blur less, and share out the photons more thinly."""
 _FLAT = 1e-6
 """Share of a receiver's size that its corners may leave a plane."""
 _SPREAD = 0.005
-"""Of the pilot's power beyond each side of a fine window."""
+"""Of the looks, and of the power where these end, beyond each side of a fine window: a lens shows some of a floor as far as it goes."""
 _MARGIN_SEEN, _MARGIN_LIT = 0.1, 0.05
 """Shares of their sizes by which windows are larger than what the pilots found."""
 _COARSE = 0.05
@@ -109,10 +109,11 @@ def no_caustic(scene: Scene) -> CausticTables:
 def fit_windows(planes: Planes, seen: Seen, lit: Landed, bins: int, texel_at: Callable[[float], float], max_texels: int) -> tuple[CausticTables, np.ndarray]:
     """Tables of zeros over what both pilots found, and which sides have any, bool (S,) (at least one).
 
-    `texel_at`: size of a fine texel at a distance along the camera's way; beyond `max_texels` of all fine windows they grow.
+    `texel_at`: size of a fine texel at a distance along the camera's way; where all fine windows together had more than `max_texels`,
+    each has the share that it has of the looks.
     """
     count = len(planes.owner)
-    low, high, texel = np.zeros((count, 2, 2)), np.ones((count, 2, 2)), np.ones(count)
+    low, high, texel, looks = np.zeros((count, 2, 2)), np.ones((count, 2, 2)), np.ones(count), np.zeros(count)
     wanted = np.zeros(count, bool)
     for side in range(count):
         from_camera = seen.side == side
@@ -126,14 +127,19 @@ def fit_windows(planes: Planes, seen: Seen, lit: Landed, bins: int, texel_at: Ca
         if not inside.any():
             continue
         wanted[side] = True
+        often = np.array([_quantiles(places[:, axis], np.ones(len(places))) for axis in range(2)])
+        often_low, often_high = _grown(often[:, 0], often[:, 1], _MARGIN_SEEN, planes.extent[side])
+        looked_at = inside & np.all((landed >= often_low) & (landed <= often_high), axis=1)
+        inside = looked_at if looked_at.any() else inside
         box = np.array([_quantiles(landed[inside, axis], watts[inside]) for axis in range(2)])
         low[side, 1], high[side, 1] = _grown(box[:, 0], box[:, 1], _MARGIN_LIT, np.array([low[side, 0], high[side, 0]]))
         near = np.all((places >= low[side, 1]) & (places <= high[side, 1]), axis=1)
         distance = seen.distance[from_camera]
         texel[side] = texel_at(float(np.median(distance[near] if near.any() else distance)))
+        looks[side] = max(int(near.sum()), 1)
     span = np.maximum(high - low, 1e-300)
-    total = float(np.sum(np.prod(span[wanted, 1], axis=1) / texel[wanted] ** 2))
-    texel *= math.sqrt(max(total / max_texels, 1.0))
+    asked = np.where(wanted, np.prod(span[:, 1], axis=1) / texel**2, 0.0)
+    texel *= np.sqrt(np.divide(asked, _shared(asked, looks, max_texels), out=np.ones(count), where=wanted))
     size = np.zeros((count, 2, 2), np.int64)
     for side in np.flatnonzero(wanted):
         size[side, 1] = np.maximum(np.ceil(span[side, 1] / texel[side] - 1e-9), 1)
@@ -172,6 +178,19 @@ def _tables(side: np.ndarray, frame: np.ndarray, low: np.ndarray, texels_per_uni
     return CausticTables(
         side, np.ascontiguousarray(frame), low, texels_per_unit, size, first[:-1].reshape(len(size), 2).copy(), np.zeros(int(first[-1]), np.float32), bins
     )
+
+
+def _shared(asked: np.ndarray, weight: np.ndarray, most: float) -> np.ndarray:
+    """What each gets of `most` in all: as much as `asked` for, or a share by `weight` of what those leave that ask for less than theirs."""
+    if asked.sum() <= most:
+        return asked
+    content = asked <= 0.0
+    while True:
+        fair = (most - asked[content].sum()) * weight / weight[~content].sum()
+        less = ~content & (asked <= fair)
+        if not less.any():
+            return np.where(content, asked, fair)
+        content |= less
 
 
 def _grown(low: np.ndarray, high: np.ndarray, share: float, limit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,54 +12,44 @@ Pictures are kept by the content of their scene beside those of `photon_referenc
 
 from __future__ import annotations
 
-import hashlib
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from app.model.scene import Diffuse, Scene
-from app.truth.eye_run import (
-    MAX_DEPTH,
-    EyePicture,
-    EyeRun,
-    continue_eye_run,
-    summed_eye,
-)
-from app.truth.photon_reference import _load, _path, _save, scene_key
-from app.truth.photon_run import Cancelled, Progress
+from app.truth.content_key import ContentKey
+from app.truth.eye_run import MAX_DEPTH, EyePicture, EyeRun, summed_eye
+from app.truth.kept import kept_path, load_kept, save_kept
+from app.truth.photon_reference import scene_key
+from app.truth.photon_run import TALLY_SIZE
+from app.truth.rounds import PARTS, Cancelled, Progress, continue_run
 
 if TYPE_CHECKING:
     from app.truth.spectral_caustic import CausticPlan, SpectralCaustic
 
 EYE_REFERENCE_VERSION = 1
 """Grows whenever the same scene would give another picture."""
+CAUSTIC_VERSION = 2
+"""Grows whenever the same plan would give another caustic."""
 _SEED = 1
+_CAUSTIC_SHARE = 0.5
+"""Of the progress bar, where there is a caustic to be made."""
 
 
 def eye_scene_key(scene: Scene, width: int, height: int, max_depth: int, caustic: CausticPlan | None) -> str:
     """SHA-256 over everything the picture depends on, textures and what lies beyond included; names and notes do not count."""
-    digest = hashlib.sha256(scene_key(scene, width, height, max_depth).encode())
-
-    def add(label: str, *values: object) -> None:
-        digest.update(f"\n{label}:".encode())
-        for value in values:
-            if isinstance(value, np.ndarray):
-                digest.update(f"{value.dtype.str}{value.shape}".encode())
-                digest.update(np.ascontiguousarray(value))
-            else:
-                digest.update(f"{value!r};".encode())
-
-    add("eye", EYE_REFERENCE_VERSION, None if caustic is None else astuple(caustic))
+    key = ContentKey(scene_key(scene, width, height, max_depth))
+    key.add("eye", EYE_REFERENCE_VERSION, None if caustic is None else (CAUSTIC_VERSION, *astuple(caustic)))
     if scene.environment is None:
-        add("background", *(float(v) for v in scene.background_rgb))
+        key.add("background", *(float(v) for v in scene.background_rgb))
     else:
-        add("environment", scene.environment.rgb, np.asarray(scene.environment.world_to_local, float))
+        key.add("environment", scene.environment.rgb, np.asarray(scene.environment.world_to_local, float))
     for index, item in enumerate(scene.objects):
         if isinstance(item.material, Diffuse) and item.material.texture is not None:
-            add("texture", index, item.material.texture.rgb, item.material.texture.wrap, item.mesh.uv)
-    return digest.hexdigest()
+            key.add("texture", index, item.material.texture.rgb, item.material.texture.wrap, item.mesh.uv)
+    return key.hexdigest()
 
 
 def render_eye_reference(
@@ -83,7 +73,7 @@ def render_eye_reference(
     without numba or where too many solids nest.
     """
     progress(0.0, "preparing")
-    return continue_eye_run(EyeRun(scene, width, height, max_depth, seed, caustic), samples, seconds, target_relmse, progress, cancelled)
+    return continue_run(EyeRun(scene, width, height, max_depth, seed, caustic), samples, seconds, target_relmse, progress, cancelled)
 
 
 def cached_eye_reference(
@@ -102,32 +92,48 @@ def cached_eye_reference(
 ) -> EyePicture:
     """The stored picture where it is good enough, otherwise what is stored and more samples, stored again.
 
-    Limits as in `render_eye_reference`; `samples` counts those that are stored, `seconds` only the time spent now. The
-    caustic is given as a plan and made only when samples are needed (the same plan gives the same caustic). A damaged
+    Limits as in `render_eye_reference`; `samples` counts those that are stored, `seconds` only the time spent now, the
+    caustic's not counted. That is given as a plan and loaded, or made, only when samples are needed. A damaged
     file is ignored; a folder that cannot be written costs only the saving; an interrupt stores what is done.
     """
-    path = _path(eye_scene_key(scene, width, height, max_depth, caustic), folder)
-    stored = _load(path, (height, width))
+    path = kept_path(eye_scene_key(scene, width, height, max_depth, caustic), folder)
+    shapes = {"sums": (PARTS, height, width, 3), "units": (PARTS,), "tallies": (PARTS, TALLY_SIZE), "seconds": ()}
+    stored = load_kept(path, shapes if caustic is None else shapes | {"caustic_photons": (), "caustic_relmse": ()})
+    looked_up = None if stored is None or caustic is None else (int(stored["caustic_photons"]), float(stored["caustic_relmse"]))
     if stored is not None:
         picture = summed_eye(stored["sums"], stored["units"], stored["tallies"], float(stored["seconds"]))
         if (samples is not None and picture.samples >= samples) or (target_relmse is not None and picture.is_within(target_relmse)):
-            return picture
+            return _with_caustic(picture, looked_up)
     progress(0.0, "preparing")
-    run = EyeRun(scene, width, height, max_depth, _SEED, _built(scene, width, height, caustic, progress))
+    tables = None
+    if caustic is not None:
+        tables, noise = _caustic(scene, width, height, max_depth, caustic, folder, progress)
+        looked_up = looked_up or (tables.photons, noise)
+    run = EyeRun(scene, width, height, max_depth, _SEED, tables)
     if stored is not None:
         run.sums[:], run.units[:], run.tallies[:] = stored["sums"], stored["units"], stored["tallies"]
         run.seconds = float(stored["seconds"])
     before = run.samples
+    begin = 0.0 if caustic is None else _CAUSTIC_SHARE
     try:
-        return continue_eye_run(run, samples, seconds, target_relmse, progress, cancelled)
+        picture = continue_run(run, samples, seconds, target_relmse, lambda done, text: progress(begin + (1.0 - begin) * done, text), cancelled)
     finally:
-        if path is not None and run.samples > before:
-            _save(path, run)
+        if run.samples > before:
+            more = {} if looked_up is None else {"caustic_photons": looked_up[0], "caustic_relmse": looked_up[1]}
+            save_kept(path, sums=run.sums, units=run.units, tallies=run.tallies, seconds=run.seconds, **more)
+    return _with_caustic(picture, looked_up)
 
 
-def _built(scene: Scene, width: int, height: int, plan: CausticPlan | None, progress: Progress) -> SpectralCaustic | None:
-    if plan is None:
-        return None
-    from app.truth.spectral_caustic import build_caustic
+def _with_caustic(picture: EyePicture, looked_up: tuple[int, float] | None) -> EyePicture:
+    return picture if looked_up is None else replace(picture, caustic_photons=looked_up[0], caustic_relmse=looked_up[1])
 
-    return build_caustic(scene, width, height, plan, progress)
+
+def _caustic(
+    scene: Scene, width: int, height: int, max_depth: int, plan: CausticPlan, folder: Path | None, progress: Progress
+) -> tuple[SpectralCaustic, float]:
+    """The caustic as far as `plan` asks for, and the noise it leaves in the picture."""
+    from app.truth.caustic_cache import CachedCaustic
+
+    any_number = replace(plan, photons=0, target_relmse=0.0)
+    key = eye_scene_key(scene, width, height, max_depth, any_number)
+    return CachedCaustic(scene, width, height, max_depth, plan, key, folder).grown(lambda done, text: progress(_CAUSTIC_SHARE * done, text))

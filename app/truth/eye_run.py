@@ -6,9 +6,6 @@ of its own: the picture converges faster than random and still knows its own err
 
 from __future__ import annotations
 
-import os
-import time
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -18,21 +15,13 @@ import numpy as np
 from app.errors import UserError
 from app.model.colorimetry import xyz_to_rgb709
 from app.model.scene import Scene
-from app.truth.photon_run import (
-    PARTS,
-    RELMSE_EPSILON,
-    TALLY_SIZE,
-    Cancelled,
-    Progress,
-)
+from app.truth.photon_run import RELMSE_EPSILON, TALLY_SIZE
+from app.truth.rounds import PARTS, Pace, trace_parts
 
 if TYPE_CHECKING:
     from app.truth.spectral_caustic import SpectralCaustic
 
 MAX_DEPTH = 256
-_ROUND_SECONDS = 0.5
-_CHECK_SHARE = 0.1
-"""Share of the time that may pass until the error is worked out again."""
 _LAST_SAMPLE = 2**31
 _BLACK_SAMPLES = 256
 
@@ -51,6 +40,10 @@ class EyePicture:
     """Time spent tracing."""
     lost: dict[str, float]
     """Share of paths given up: "depth" (too many events) and "numeric" (nothing met inside a solid)."""
+    caustic_photons: int = 0
+    """Of the caustic that was looked up, where `cached_eye_reference` made it."""
+    caustic_relmse: float = 0.0
+    """What its noise adds to the picture's own error, about."""
 
     def rgb(self) -> np.ndarray:
         """Linear Rec.709, float64 (H, W, 3)."""
@@ -103,15 +96,19 @@ class EyeRun:
         """Samples of a pixel by each part."""
         self.tallies = np.zeros((PARTS, TALLY_SIZE))
         self.seconds = 0.0
-        self._next = 1
-
-    unit = 1
-    """Samples of a pixel in a part's smallest step."""
+        self._pace = Pace()
 
     @property
     def samples(self) -> int:
         """Samples of every pixel so far."""
         return int(self.units.sum())
+
+    amount = samples
+
+    @property
+    def amount_words(self) -> str:
+        """Samples for people."""
+        return f"{self.samples} samples a pixel"
 
     @property
     def exhausted(self) -> bool:
@@ -120,26 +117,12 @@ class EyeRun:
 
     def advance(self, samples_left: int | None = None, seconds_left: float | None = None) -> None:
         """One round of all parts, about half a second or what is left. An interrupt keeps the parts that were finished."""
-        count = self._next
+        count = self._pace.units
         if samples_left is not None:
             count = min(count, max(1, -(-samples_left // PARTS)))
-        started = time.perf_counter()
-        with ThreadPoolExecutor(min(PARTS, os.cpu_count() or 1)) as pool:
-            jobs: list[Future] = []
-            try:
-                jobs = [pool.submit(self._trace_part, part, count) for part in range(PARTS)]
-                for job in jobs:
-                    job.result()
-            finally:
-                for job in jobs:
-                    job.cancel()
-        took = time.perf_counter() - started
+        took = trace_parts(self._trace_part, count)
         self.seconds += took
-        wanted = _ROUND_SECONDS if seconds_left is None else min(_ROUND_SECONDS, max(seconds_left - took, 1e-3))
-        if count == self._next and took < 0.6 * wanted:
-            self._next = 2 * count
-        while self._next > 1 and took * self._next / count > 1.5 * wanted:
-            self._next //= 2
+        self._pace.learn(count, took, seconds_left)
 
     def picture(self) -> EyePicture:
         """What has been gathered; black without variance before the first round."""
@@ -165,30 +148,3 @@ def summed_eye(sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, seconds
         variance /= len(used) - 1
     lost = tallies.sum(axis=0)[:2] / (total * mean.shape[0] * mean.shape[1])
     return EyePicture(mean, variance, int(units.sum()), seconds, {"depth": float(lost[0]), "numeric": float(lost[1])})
-
-
-def continue_eye_run(
-    run: EyeRun, samples: int | None, seconds: float | None, target_relmse: float | None, progress: Progress, cancelled: Cancelled
-) -> EyePicture:
-    """Add rounds to `run` up to the first limit; `samples` counts all of the run's, `seconds` from now on."""
-    if samples is None and seconds is None and target_relmse is None:
-        raise ValueError("a reference needs a limit: samples, seconds or target_relmse")
-    started = time.perf_counter()
-    checked, error, enough = -1.0, np.inf, False
-    while True:
-        spent = time.perf_counter() - started
-        reached = [0.0]
-        if samples is not None:
-            reached.append(run.samples / samples)
-        if seconds is not None:
-            reached.append(spent / seconds)
-        if target_relmse is not None and run.samples:
-            if checked < 0.0 or spent - checked > _CHECK_SHARE * spent:
-                picture = run.picture()
-                checked, error, enough = spent, picture.relmse, picture.is_within(target_relmse)
-            reached.append(1.0 if enough else min(target_relmse / max(error, target_relmse), 0.99))
-        done = max(reached)
-        progress(min(done, 1.0), f"{run.samples} samples a pixel" + (f", relMSE {error:.1e}" if np.isfinite(error) else ""))
-        if done >= 1.0 or run.exhausted or cancelled():
-            return run.picture()
-        run.advance(None if samples is None else samples - run.samples, None if seconds is None else seconds - spent)

@@ -111,7 +111,7 @@ def evaluate(
         ctx.finish()
         raw = np.frombuffer(held[_BIND_OUT].read(), np.uint32)
     finally:
-        kernel.release()
+        shader.release(kernel)
         for buffer in held.values():
             buffer.release()
     results = {}

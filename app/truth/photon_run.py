@@ -6,10 +6,6 @@ picture converges faster than random and still knows its own error. `photon_refe
 
 from __future__ import annotations
 
-import os
-import time
-from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -19,13 +15,12 @@ import numpy as np
 from app.errors import UserError
 from app.model.colorimetry import rgb709_to_xyz, rgb709_to_xyz_matrix
 from app.model.scene import Scene
+from app.truth.rounds import PARTS, Pace, trace_parts
 
 if TYPE_CHECKING:
     from app.truth.photon_emission import Domain
     from app.truth.photon_scene import Colours
 
-PARTS = 8
-"""Independent randomisations; also the most threads that are of use."""
 TALLY = ("emitted", "deposited", "direct", "absorbed", "escaped", "lost_depth", "lost_numeric")
 """What the first numbers of a tally are, W."""
 TALLY_SIZE = 9
@@ -38,14 +33,8 @@ _PILOT_BLOCK = 8
 """Pixels a side over which the pilot's brightness is averaged."""
 _MOST_A_UNIT = 16
 """Points of the most important domain in a unit; every domain has at least one."""
-_ROUND_SECONDS = 0.5
-_CHECK_SHARE = 0.1
-"""Share of the time that may pass until the error is worked out again."""
 _LAST_POINT = 2**31
 _BLACK_PHOTONS = 1 << 20
-
-Progress = Callable[[float, str], None]
-Cancelled = Callable[[], bool]
 
 
 @dataclass(frozen=True)
@@ -123,7 +112,7 @@ class ReferenceRun:
         self.seconds = 0.0
         self._domains, self._points = self._aimed(domains)
         self._sequences = [[photon_kernel.scrambled(seed, part, d) for d in range(len(domains))] for part in range(PARTS)]
-        self._next_units = max(1, 1024 // max(self.unit, 1))
+        self._pace = Pace(max(1, 1024 // max(self.unit, 1)))
 
     @property
     def unit(self) -> int:
@@ -135,6 +124,13 @@ class ReferenceRun:
         """Photons so far."""
         return int(self.units.sum()) * self.unit
 
+    amount = photons
+
+    @property
+    def amount_words(self) -> str:
+        """Photons for people."""
+        return f"{self.photons / 1e6:.1f} M photons"
+
     @property
     def exhausted(self) -> bool:
         """Whether the sequence has no fresh points left, or there is nothing to trace."""
@@ -142,27 +138,13 @@ class ReferenceRun:
 
     def advance(self, photons_left: int | None = None, seconds_left: float | None = None) -> None:
         """One round of all parts, about half a second or what is left. An interrupt keeps the parts that were finished."""
-        units = self._next_units
+        units = self._pace.units
         if photons_left is not None:
             units = min(units, max(1, -(-photons_left // (self.unit * PARTS))))
         units = min(units, _LAST_POINT // max(self._points))
-        started = time.perf_counter()
-        with ThreadPoolExecutor(min(PARTS, os.cpu_count() or 1)) as pool:
-            jobs: list[Future] = []
-            try:
-                jobs = [pool.submit(self._trace_part, part, units) for part in range(PARTS)]
-                for job in jobs:
-                    job.result()
-            finally:
-                for job in jobs:
-                    job.cancel()
-        took = time.perf_counter() - started
+        took = trace_parts(self._trace_part, units)
         self.seconds += took
-        wanted = _ROUND_SECONDS if seconds_left is None else min(_ROUND_SECONDS, max(seconds_left - took, 1e-3))
-        if units == self._next_units and took < 0.6 * wanted:
-            self._next_units = 2 * units
-        while self._next_units > 1 and took * self._next_units / units > 1.5 * wanted:
-            self._next_units //= 2
+        self._pace.learn(units, took, seconds_left)
 
     def picture(self) -> ReferencePicture:
         """What has been gathered; black without variance before the first round."""
@@ -210,38 +192,6 @@ class ReferenceRun:
                 self._max_depth, picture, np.zeros(TALLY_SIZE), weight, importance[d],
             )  # fmt: skip
         return picture, importance
-
-
-def continue_run(
-    run: ReferenceRun,
-    photons: int | None,
-    seconds: float | None,
-    target_relmse: float | None,
-    progress: Progress,
-    cancelled: Cancelled,
-) -> ReferencePicture:
-    """Add rounds to `run` up to the first limit; `photons` counts all of the run's, `seconds` from now on."""
-    if photons is None and seconds is None and target_relmse is None:
-        raise ValueError("a reference needs a limit: photons, seconds or target_relmse")
-    started = time.perf_counter()
-    checked, error, enough = -1.0, np.inf, False
-    while True:
-        spent = time.perf_counter() - started
-        reached = [0.0]
-        if photons is not None:
-            reached.append(run.photons / photons)
-        if seconds is not None:
-            reached.append(spent / seconds)
-        if target_relmse is not None and run.photons:
-            if checked < 0.0 or spent - checked > _CHECK_SHARE * spent:
-                picture = run.picture()
-                checked, error, enough = spent, picture.relmse, picture.is_within(target_relmse)
-            reached.append(1.0 if enough else min(target_relmse / max(error, target_relmse), 0.99))
-        done = max(reached)
-        progress(min(done, 1.0), f"{run.photons / 1e6:.1f} M photons" + (f", relMSE {error:.1e}" if np.isfinite(error) else ""))
-        if done >= 1.0 or run.exhausted or cancelled():
-            return run.picture()
-        run.advance(None if photons is None else photons - run.photons, None if seconds is None else seconds - spent)
 
 
 def summed(sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, unit: int, seconds: float) -> ReferencePicture:

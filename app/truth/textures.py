@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 Array = np.ndarray
-MAX_TAPS, ROUND_RATIO, LEVEL_BIAS = 8, 1.25, -0.35
+MAX_TAPS, ROUND_RATIO, LEVEL_BIAS, SKY_WIDER = 8, 1.25, -0.8, 1.366
 
 
 def level_by_overlaps(rgb: Array, level: int, on_sphere: bool = False) -> Array:
@@ -103,7 +103,7 @@ def environment_radiance(levels: Sequence[Array], direction: Array, ddirection_d
     """(N, channels) of an environment's levels about unit directions (N, 3) over patches with sides (N, 3)."""
     longer, shorter, axis = patch_axes(ddirection_ds, ddirection_dt)
     per_rad = levels[0].shape[0] / np.pi
-    level, taps = filter_plan(longer * per_rad, shorter * per_rad)
+    level, taps = filter_plan(SKY_WIDER * longer * per_rad, SKY_WIDER * shorter * per_rad)
     return _looked_up(levels, level, taps, lambda share: environment_place(direction + share[:, None] * axis), (True, False))
 
 

@@ -70,7 +70,6 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     monkeypatch.setattr(runner, "POINTS", 3)
     monkeypatch.setattr(eye_rendering, "LIGHT_PHOTONS", PHOTONS)
     monkeypatch.setattr(truth_picture, "caustic_plan", lambda _: CausticPlan(1 << 16))
-    monkeypatch.setattr(truth_picture, "_TRIAL_CAUSTIC", 1 << 14)
     monkeypatch.setattr("app.bench.machine.program_hash", lambda: "as it is")  # an editor may be at work
     out = tmp_path / "out"
     arguments = ["bench", "--eye", "prism_edge", "-o", str(out), "--seconds", "0.4", "--seeds", "2", "--methods", "stochastic,srd", "--size", f"{WIDTH}x{HEIGHT}"]

@@ -21,6 +21,7 @@ from app.bench.store import Store
 from app.bench.subjects import SUBJECTS, Subject
 from app.errors import UserError
 from app.model.scene import Diffuse, Scene
+from app.passes.spectrum_choice import Spectrum
 from tests.unit.bench_synthetic import synthetic_result, synthetic_scene
 from tests.unit.test_bench_curves import curve, law, scene
 from tests.unit.test_bench_report import assert_stands_alone
@@ -90,12 +91,11 @@ class CountedRig(EyeRig):
     def __init__(self, most_bands: int, a_sample_s: float = 0.05) -> None:
         self._most, self._sample_s = most_bands, a_sample_s
 
-    def _choose_bands(self, samples: int) -> int:
-        return min(self._most, 1 << (max(samples, 1).bit_length() - 1))
+    def _choose(self, samples: int) -> Spectrum:
+        return Spectrum(min(self._most, 1 << (max(samples, 1).bit_length() - 1)))
 
     def render(self, budget: int, seed: int) -> Rendering:
-        bands = self._choose_bands(budget)
-        samples = -(-budget // bands) * bands
+        bands, samples = self._choose(budget).bands, self._choose(budget).samples(budget)
         return Rendering(np.zeros((1, 1, 3)), {"bands": 0.01 * (2 * bands - 1), "looks": self._sample_s * samples}, samples, 0)
 
 
@@ -104,7 +104,7 @@ def test_budgets_are_whole_multiples_of_their_bands(most_bands: int, seconds: fl
     rig = CountedRig(most_bands)
     budgets = rig.budgets(seconds, 10)
     assert budgets == sorted(set(budgets)) and budgets[0] == 1 and len(budgets) <= 10
-    assert all(n % rig._choose_bands(n) == 0 and rig.fitting(n) == n and rig.render(n, 1).emitted == n for n in budgets)
+    assert all(n % rig._choose(n).bands == 0 and rig.fitting(n) == n and rig.render(n, 1).emitted == n for n in budgets)
     if seconds > 1.0:
         assert len(budgets) >= 7
         assert sum(rig.render(budgets[-1], 1).seconds.values()) == pytest.approx(seconds, rel=0.2)
@@ -176,7 +176,7 @@ def test_a_caustic_is_planned_where_light_may_fall() -> None:
 
     ball = load_scene(find_scene("ball_plain"))
     plan = truth_picture.caustic_plan(ball)
-    assert plan is not None and plan.max_depth == ball.render.max_depth and plan.photons == 1 << 26
+    assert plan is not None and plan.max_depth == ball.render.max_depth and 0.0 < plan.target_relmse <= 1e-4
     assert truth_picture.caustic_plan(replace(ball, lights=())) is None
     bare = replace(ball, objects=tuple(o for o in ball.objects if not isinstance(o.material, Diffuse)))
     assert isinstance(bare, Scene) and truth_picture.caustic_plan(bare) is None

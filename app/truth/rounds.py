@@ -1,0 +1,118 @@
+"""How references grow: rounds of PARTS independent parts, a thread each, of about half a second, up to a limit."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+PARTS = 8
+"""Independent randomisations; also the most threads that are of use."""
+_ROUND_SECONDS = 0.5
+_CHECK_SHARE = 0.1
+"""Share of the time that may pass until the error is worked out again."""
+
+Progress = Callable[[float, str], None]
+Cancelled = Callable[[], bool]
+
+
+class Estimate(Protocol):
+    """A picture that knows its own error."""
+
+    @property
+    def relmse(self) -> float:
+        """Its error."""
+
+    def is_within(self, target_relmse: float) -> bool:
+        """Whether that is known to be no larger."""
+
+
+EstimateT = TypeVar("EstimateT", bound=Estimate)
+EstimateT_co = TypeVar("EstimateT_co", bound=Estimate, covariant=True)
+
+
+class Run(Protocol[EstimateT_co]):
+    """Something that grows by rounds."""
+
+    @property
+    def amount(self) -> int:
+        """Photons, or samples a pixel, so far."""
+
+    @property
+    def amount_words(self) -> str:
+        """The same for people."""
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether nothing can be added."""
+
+    def advance(self, amount_left: int | None, seconds_left: float | None) -> None:
+        """One round, or what is left."""
+
+    def picture(self) -> EstimateT_co:
+        """What has been gathered."""
+
+
+@dataclass
+class Pace:
+    """How many units a part does in a round, so that rounds take about half a second."""
+
+    units: int = 1
+
+    def learn(self, units: int, took_s: float, seconds_left: float | None) -> None:
+        """A round of `units` took `took_s`; `seconds_left` counted from its start."""
+        wanted = _ROUND_SECONDS if seconds_left is None else min(_ROUND_SECONDS, max(seconds_left - took_s, 1e-3))
+        if units == self.units and took_s < 0.6 * wanted:
+            self.units = 2 * units
+        while self.units > 1 and took_s * self.units / units > 1.5 * wanted:
+            self.units //= 2
+
+
+def trace_parts(trace_part: Callable[[int, int], None], units: int) -> float:
+    """`trace_part(part, units)` for every part, side by side; seconds it took. An interrupt keeps the parts that were finished."""
+    started = time.perf_counter()
+    with ThreadPoolExecutor(min(PARTS, os.cpu_count() or 1)) as pool:
+        jobs: list[Future] = []
+        try:
+            jobs = [pool.submit(trace_part, part, units) for part in range(PARTS)]
+            for job in jobs:
+                job.result()
+        finally:
+            for job in jobs:
+                job.cancel()
+    return time.perf_counter() - started
+
+
+def continue_run(
+    run: Run[EstimateT], amount: int | None, seconds: float | None, target_relmse: float | None, progress: Progress, cancelled: Cancelled
+) -> EstimateT:
+    """Add rounds to `run` up to the first limit; `amount` counts all of the run's, `seconds` from now on.
+
+    What was done when `cancelled()` turned true is kept. Raises ValueError without any limit.
+    """
+    if amount is None and seconds is None and target_relmse is None:
+        raise ValueError("a reference needs a limit: an amount, seconds or target_relmse")
+    started = time.perf_counter()
+    checked, error, enough = -1.0, np.inf, False
+    while True:
+        spent = time.perf_counter() - started
+        reached = [0.0]
+        if amount is not None:
+            reached.append(run.amount / amount)
+        if seconds is not None:
+            reached.append(spent / seconds)
+        if target_relmse is not None and run.amount:
+            if checked < 0.0 or spent - checked > _CHECK_SHARE * spent:
+                picture = run.picture()
+                checked, error, enough = spent, picture.relmse, picture.is_within(target_relmse)
+            reached.append(1.0 if enough else min(target_relmse / max(error, target_relmse), 0.99))
+        done = max(reached)
+        progress(min(done, 1.0), run.amount_words + (f", relMSE {error:.1e}" if np.isfinite(error) else ""))
+        if done >= 1.0 or run.exhausted or cancelled():
+            return run.picture()
+        run.advance(None if amount is None else amount - run.amount, None if seconds is None else seconds - spent)
