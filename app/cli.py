@@ -140,7 +140,7 @@ def view(
     size: Annotated[Text, typer.Option(metavar="WxH", help="Of the window; default: as it was last.")] = None,
     theme: Annotated[Text, typer.Option(metavar="NAME", help="dark or light; default: as it was last.")] = None,
     screenshot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Write a picture of the window and close.")] = None,
-    after: Annotated[Text, typer.Option(metavar="S", help="Seconds until --screenshot; default: 10.")] = None,
+    after: Annotated[Text, typer.Option(metavar="S", help="Seconds from the first picture until --screenshot; default: 10.")] = None,
 ) -> None:
     """Open the viewer: edit dispersion and caustics on the screen."""
     from app.cli_view import ViewRequest, view_command

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 THEMES = ("dark", "light")
 DEFAULT_AFTER_S = 10.0
+LONGEST_WAIT_S = 120.0
+"""For the first picture."""
+_ENGINE_WAIT_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ def _run(window: Window, scene: Path | None, theme: str | None, screenshot: tupl
         if screenshot is None:
             window.run(viewer)
         else:
-            _take_screenshot(window, viewer, *screenshot)
+            _take_screenshot(window, viewer, session, *screenshot)
     except Exception as error:
         raise _rescued(session, error) from error
     if screenshot is None:
@@ -87,14 +90,27 @@ def _run(window: Window, scene: Path | None, theme: str | None, screenshot: tupl
         session.release()
 
 
-def _take_screenshot(window: Window, viewer: Viewer, path: Path, after_s: float) -> None:
-    """Let the picture gather light for `after_s` seconds, then write the window to `path`."""
+def _take_screenshot(window: Window, viewer: Viewer, session: Session, path: Path, after_s: float) -> None:
+    """Let the picture gather light for `after_s` seconds, then write the window to `path`.
+
+    They count from the first picture on: a driver may compile for longer than that. What has none is written as it is after `LONGEST_WAIT_S`.
+    """
     from PIL import Image
 
     from app.atomic import atomic_output
 
-    deadline = time.monotonic() + after_s
-    window.run(viewer, until=lambda: time.monotonic() >= deadline)
+    begun = time.monotonic()
+    first: list[float] = []
+
+    def is_due() -> bool:
+        now, engine = time.monotonic(), session.picture.engine
+        # The start page has no engine.
+        waits_until = begun + (LONGEST_WAIT_S if engine is not None else _ENGINE_WAIT_S)
+        if not first and ((engine is not None and engine.picture is not None) or now > waits_until):
+            first.append(now)
+        return bool(first) and now >= first[0] + after_s
+
+    window.run(viewer, until=is_due)
     with atomic_output(path) as temporary:
         Image.fromarray(window.screenshot()).save(temporary)
     print(path.resolve())

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
+    from app.model.features import Features
     from app.model.glass import Dispersion
 
 _QUANTITY = {
@@ -163,7 +164,16 @@ def _compiled(scene: Scene) -> list[RenderableType]:
     table = _table("Compiled into the programs", ("part", False), ("", False), ("why", False), ("costs", False))
     for name, included, reason in explain(scene, features):
         table.add_row(name, "in" if included else "out", reason, costs.get(name, ""))
-    return [table, f"{RecordSizes.of(features).words()} What each part costs in time: bench --features."]
+    return [table, f"{RecordSizes.of(features).words()} What each part costs in time: bench --features.", _look_ups_table(scene, features)]
+
+
+def _look_ups_table(scene: Scene, features: Features) -> Table:
+    from app.inspect_eye import look_ups
+
+    table = _table("Looked up by camera rays", ("what", False), ("content", False), ("how", False), ("memory", False))
+    for row in look_ups(scene, features):
+        table.add_row(*row)
+    return table
 
 
 def _gain_words(glass: Dispersion) -> str:
@@ -183,7 +193,8 @@ def describe_material(material: Material) -> str:
     if isinstance(material, Diffuse):
         if material.reflectance is not None:
             return "diffuse, spectral reflectance"
-        return f"diffuse {_colour(material.reflectance_rgb)}"
+        picture = "" if material.texture is None else ", wears a picture"
+        return f"diffuse {_colour(material.reflectance_rgb)}{picture}"
     if isinstance(material, Black):
         return "black"
     return f"mirror {_colour(material.reflectance_rgb)}"

@@ -257,6 +257,7 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
     solids = [o.name for o in scene.objects if is_convex_solid(o)]
     touching = [scene.objects[i].name for i in overlapping_solids(scene)]
     diffuse = [o for o in scene.objects if isinstance(o.material, Diffuse)]
+    worn = [o.name for o in diffuse if isinstance(o.material, Diffuse) and o.material.texture is not None]
     black = sum(isinstance(o.material, Black) for o in scene.objects)
 
     def names(items: list[str]) -> str:
@@ -287,6 +288,14 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
         ("eye spectral taps", features.eye_disperses, "the camera may see through dispersive glass" if features.eye_disperses else
          ("no dispersive glass is in view" if glasses else "nothing disperses")),
         ("spectral maps", features.map_hats > 0, f"{features.map_hats} channels beside XYZ: light and eye disperse" if features.map_hats else "no caustic is seen through dispersive glass"),
-        ("spectral bins", features.targets > 1, f"{features.targets} targets" if features.targets > 1 else "XYZ in one target"),
+        ("spectral bins", features.targets > 1, _target_words(features)),
+        ("textures", bool(worn), f"on {names(worn)}" if worn else "no surface wears a picture"),
+        ("environment map", scene.environment is not None, f"a {scene.environment.kind} lies beyond" if scene.environment is not None else "one colour lies beyond"),
         ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
     ]
+
+
+def _target_words(features: Features) -> str:
+    if features.targets == 1:
+        return "XYZ in one target"
+    return f"{features.targets} targets" + (": XYZ and the spectral maps' channels" if features.map_hats else "")

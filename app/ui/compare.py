@@ -20,6 +20,7 @@ from app.live.inputs import LiveInputs, Redo
 from app.model.features import Features
 from app.model.settings import RenderSettings
 from app.passes.eye import EyePass
+from app.passes.spectrum_choice import Spectrum
 from app.ui.error_curves import ErrorCurves
 from app.ui.facts import ErrorCurve
 from app.ui.panels.methods import METHOD_NAMES
@@ -276,7 +277,7 @@ class _DirectPicture:
         reflectances, _ = reflectance_classes(scene, self._buffers)
         # Without maps, and for what is seen directly alone: there one band of the spectrum is exact.
         self._eye = EyePass(context, self._buffers, "beauty", reflectances)
-        self._eye.bands = 1
+        self._eye.spectrum = Spectrum()
         self._eye.dispatch_seconds = DISPATCH_SECONDS
         self._steps: Iterator[float] | None = self._eye.samples(scene.camera, inputs.width, inputs.height, DIRECT_SAMPLES, 0, None, inputs.seed)
         self._rgb: np.ndarray | None = None

@@ -86,9 +86,9 @@ def duplicate_light(scene: Scene, index: int) -> Scene:
 
 
 def delete_light(scene: Scene, index: int) -> Scene:
-    """Without light `index`. Raises UserError for the last one."""
-    if len(scene.lights) == 1:
-        raise UserError(f"'{scene.lights[index].name}' is the only light; add another before deleting it")
+    """Without light `index`. Raises UserError for the last one where there is no environment to see by."""
+    if len(scene.lights) == 1 and scene.environment is None:
+        raise UserError(f"'{scene.lights[index].name}' is the only light; add another or an environment before deleting it")
     return replace(scene, lights=scene.lights[:index] + scene.lights[index + 1 :])
 
 

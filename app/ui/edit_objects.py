@@ -70,14 +70,15 @@ def duplicate(scene: Scene, index: int) -> Scene:
 
 
 def delete(scene: Scene, index: int) -> Scene:
-    """Without object `index`. Raises UserError for the last one, and for the last that receives light."""
+    """Without object `index`. Raises UserError for the last one, and for the last that receives light where no environment is seen instead."""
     rest = scene.objects[:index] + scene.objects[index + 1 :]
     name = scene.objects[index].name
     if not rest:
         raise UserError(f"'{name}' is the only object; add another before deleting it")
-    if not any(isinstance(o.material, Diffuse) for o in rest):
-        raise UserError(f"'{name}' is the only surface that receives light; add another diffuse object before deleting it")
-    return replace(scene, objects=rest)
+    without = replace(scene, objects=rest)
+    if _shows_nothing(without):
+        raise UserError(f"'{name}' is the only surface that receives light; add another diffuse object or an environment before deleting it")
+    return without
 
 
 def set_material(scene: Scene, index: int, material: Material) -> Scene:
@@ -85,8 +86,8 @@ def set_material(scene: Scene, index: int, material: Material) -> Scene:
     item = scene.objects[index]
     dabs = item.local_dispersion if isinstance(material, Diffuse) else ()
     changed = _replaced(scene, index, replace(item, material=material, local_dispersion=dabs))
-    if not any(isinstance(o.material, Diffuse) for o in changed.objects):
-        raise UserError(f"'{item.name}' is the only surface that receives light; make another object diffuse before changing it")
+    if _shows_nothing(changed):
+        raise UserError(f"'{item.name}' is the only surface that receives light; make another object diffuse or add an environment before changing it")
     check_scene(changed, scene.name)
     return changed
 
@@ -165,6 +166,11 @@ def clear_dabs(scene: Scene, index: int | None = None) -> Scene:
 
 def _free_name(scene: Scene, index: int, name: str) -> str:
     return checked_name(name, [o.name for i, o in enumerate(scene.objects) if i != index], "object")
+
+
+def _shows_nothing(scene: Scene) -> bool:
+    """Nothing receives light, and there is no environment to be seen (as `check_scene` has it)."""
+    return scene.environment is None and not any(isinstance(o.material, Diffuse) for o in scene.objects)
 
 
 def _replaced(scene: Scene, index: int, item: SceneObject) -> Scene:

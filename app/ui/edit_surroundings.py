@@ -43,11 +43,14 @@ def surroundings_kind(scene: Scene) -> str:
 
 
 def set_surroundings_kind(scene: Scene, kind: str) -> Scene:
-    """A plain background, a first gradient or a first sky as bright as suits the scene's lights. A map wants a file: `set_environment_map`."""
+    """A plain background, a first gradient or a first sky as bright as suits the scene's lights. A map wants a file: `set_environment_map`.
+
+    Raises UserError where the environment is all that there is to be seen.
+    """
     if kind == surroundings_kind(scene):
         return scene
     if kind == "constant":
-        return replace(scene, environment=None)
+        return _without_environment(scene)
     if kind not in ("gradient", "sky"):
         raise UserError(f"'{kind}' is no kind of environment that can be made without a file; choose constant, gradient or sky")
     level = _usual_radiance(scene)
@@ -147,6 +150,14 @@ def clear_texture(scene: Scene, index: int) -> Scene:
 
 
 # -- parts ----------------------------------------------------------------------------------
+
+
+def _without_environment(scene: Scene) -> Scene:
+    if not scene.lights:
+        raise UserError("the environment is the scene's only light; add a light before taking it away")
+    if not any(isinstance(o.material, Diffuse) for o in scene.objects):
+        raise UserError("nothing in the scene receives light, so the environment is all there is to see; add a diffuse object before taking it away")
+    return replace(scene, environment=None)
 
 
 def _of_kind(scene: Scene, kind: str) -> Environment:

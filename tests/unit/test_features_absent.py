@@ -140,7 +140,7 @@ def test_a_scene_without_dispersion_has_no_spectral_code_nor_columns() -> None:
 
 
 IMAGES = {"HAS_IMAGES": 1, "TEXTURE_COUNT": 1, "BIND_PICTURES": 13, "UNIT_PICTURES": 11, "UNIT_CORNERS": 12}
-PICTURED = {"HAS_TEXTURES": ("apply_texture", "texture_filtered", "uv_gradients", "pictures"), "HAS_ENVIRONMENT_MAP": ("environment_radiance", "pictures", "box_of_three")}
+PICTURED = {"HAS_TEXTURES": ("painted", "texture_filtered", "uv_gradients", "pictures"), "HAS_ENVIRONMENT_MAP": ("environment_radiance", "pictures", "box_of_three")}
 
 
 def test_pictures_are_looked_up_only_where_there_are_any() -> None:
@@ -168,6 +168,7 @@ def test_the_proof_fails_where_a_program_carries_what_it_should_not(monkeypatch:
     included = dict.fromkeys(FEATURE_SYMBOLS, False)
     # Comments and guarded code left in, as in a text whose conditions only the driver resolves.
     monkeypatch.setattr(shader, "lean", lambda lines: lines)
+    monkeypatch.setattr(shader, "_kept", {})  # nor a text that an earlier test had made
     told = {p.feature: p.holds for p in prove(program_texts(sources(features)), included)}
     assert not told["triangle tree"] and not told["normal derivatives"] and not told["medium stack"]
 

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import io
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from rich.console import Console
 
+from app.cli_options import find_scene
+from app.gpu.texture_store import _sources
+from app.inspect_eye import LookUp, look_ups
 from app.inspect_report import inspect_text, light_flux
-from app.model.scene import Scene
+from app.model.features import Features
+from app.model.scene import Dielectric, Diffuse, Scene
 from app.model.scene_file import load_scene
+from app.model.settings import RenderSettings
+from app.static_costs import picture_bytes, size_words
 
 SCENE = """
 [[objects]]
@@ -113,3 +120,47 @@ def test_spectra_and_fluxes_in_words(tmp_path: Path, light: str, words: str, lum
     assert (flux is None) == (lumen is None)
     if flux is not None:
         assert flux[0] == pytest.approx(lumen, rel=1e-12)
+
+
+def looked_up(value: Scene, **settings: object) -> dict[str, LookUp]:
+    return {row.what: row for row in look_ups(value, Features.of(value, RenderSettings(**settings)))}  # type: ignore[arg-type]
+
+
+def test_pictures_are_listed_with_size_filter_and_memory() -> None:
+    text = said(load_scene(find_scene("lens_text")))
+    assert "wears a picture" in row(text, "page") and " in " in row(text, "textures") and "on page" in row(text, "textures")
+    # 1024 rows of 1024 + 512 texels of 16 bytes.
+    assert "text.png, 1024 × 1024, 11 level(s), on page" in row(text, "texture") and "about 24.0 MiB" in row(text, "texture")
+    assert " out " in row(text, "environment map") and "left out" in row(text, "background")
+    studio = said(load_scene(find_scene("brilliant_studio")))
+    assert "map studio.hdr, 1024 × 512, 11 level(s)" in row(studio, "environment  │") and "about 12.0 MiB" in row(studio, "environment map")
+    assert " out " in row(studio, "textures") and "there is no light" in row(studio, "caustic maps")
+
+
+@pytest.mark.parametrize("name", ["lens_text", "brilliant_studio"])
+def test_memory_told_is_what_is_packed(name: str) -> None:
+    (source,) = _sources(load_scene(find_scene(name)))
+    assert picture_bytes(source.owner) == pytest.approx(16 * math.prod(source.cell), rel=0.02)  # a row a level more
+    assert size_words(picture_bytes(source.owner)) in said(load_scene(find_scene(name)))
+
+
+def test_what_the_maps_hold_comes_with_the_reason(tmp_path: Path) -> None:
+    value = scene(tmp_path)
+    maps = looked_up(value)["caustic maps"]
+    assert maps.content.startswith("XYZ and W, hats at 380, ") and maps.content.count(",") == 8 and maps.memory == "48 B a texel"
+    away = replace(value, camera=replace(value.camera, target=tuple(2 * p - t for p, t in zip(value.camera.position, value.camera.target, strict=True))))
+    assert looked_up(away)["caustic maps"] == LookUp("caustic maps", "XYZ and W", "no spectra: caustics are seen directly", "16 B a texel")
+    assert looked_up(away)["spectrum"].content == "one stretch"
+    bare = replace(value, objects=tuple(o for o in value.objects if not isinstance(o.material, Diffuse)))
+    assert looked_up(bare)["caustic maps"].how == "nothing diffuse receives light"
+
+
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [("srd", "bands"), ("srd-lambda", "one band"), ("regular-7", "7 wavelengths in turn"), ("regular-16", "16 wavelengths in turn"), ("stochastic", "one wavelength a sample behind glass")],
+)
+def test_every_method_samples_the_spectrum_its_own_way(tmp_path: Path, method: str, words: str) -> None:
+    value = scene(tmp_path)
+    assert looked_up(value, method=method)["spectrum"].content == words
+    plain = replace(value, objects=tuple(o for o in value.objects if not isinstance(o.material, Dielectric)))
+    assert looked_up(plain, method=method)["spectrum"].content == "one stretch"

@@ -13,7 +13,7 @@ from app.errors import UserError
 from app.live.difference import redo
 from app.live.inputs import LiveInputs, Redo
 from app.model.environment import direction_of
-from app.model.scene import Diffuse, Scene
+from app.model.scene import Black, Diffuse, Scene
 from app.model.scene_file import load_scene
 from app.model.scene_save import save_scene
 from app.paths import assets_dir
@@ -48,6 +48,20 @@ def table_of(scene: Scene) -> int:
 def cost(before: Scene, after: Scene) -> Redo:
     old, new = (LiveInputs(s, s.camera, 64, 36) for s in (before, after))
     return redo(old, old, new)
+
+
+def test_where_an_environment_is_seen_neither_receiver_nor_light_is_needed(scene: Scene, tmp_path: Path) -> None:
+    """Every way to do without them gives a scene that can be saved and opened again; without the environment all are refused."""
+    scene = edits.delete_light(scene, 1)
+    sky, table = surroundings.set_surroundings_kind(scene, "sky"), table_of(scene)
+    for edit, arguments in ((edits.delete, [table]), (edits.set_material, [table, Black()]), (edits.delete_light, [0])):
+        with pytest.raises(UserError, match="only .* environment"):
+            edit(scene, *arguments)
+        bare = edit(sky, *arguments)
+        save_scene(bare, tmp_path / "bare.toml")
+        assert len(load_scene(tmp_path / "bare.toml").objects) == len(bare.objects)
+        with pytest.raises(UserError, match="before taking it away"):
+            surroundings.set_surroundings_kind(bare, "constant")
 
 
 def test_kinds_come_and_go(scene: Scene) -> None:
