@@ -127,8 +127,8 @@ class FrameRenderer:
         maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
         samples = _whole_cycles(eye, settings.spp or DEFAULT_SAMPLES)
         # For every frame anew: a frame is a function of its own stage, whatever was drawn before it.
-        if _chooses_bands(eye):
-            for _ in eye.choosing_bands(stage.camera, settings.width, settings.height, samples, maps):
+        if eye.chooses:
+            for _ in eye.choosing_spectrum(stage.camera, settings.width, settings.height, samples, maps):
                 yield _LIGHT_SHARE
         for share in eye.samples(stage.camera, settings.width, settings.height, samples, 0, maps, settings.seed):
             yield _LIGHT_SHARE + (1.0 - _LIGHT_SHARE) * share
@@ -219,12 +219,8 @@ class FrameRenderer:
 def _whole_cycles(eye: EyePass, samples: int) -> int:
     """`samples` or a few more, in which every band of the spectrum has its turn equally often, however many bands a frame chooses:
     all frames then have as many samples, and what stands still in them stays."""
-    cycle = eye.fixed_bands or (1 << (samples.bit_length() - 1) if _chooses_bands(eye) else 1)
+    cycle = eye.fixed_bands or (1 << (samples.bit_length() - 1) if eye.chooses else 1)
     return -(-samples // cycle) * cycle
-
-
-def _chooses_bands(eye: EyePass) -> bool:
-    return eye.disperses and eye.fixed_bands is None and not eye.scene.features.random_wavelength
 
 
 def lit(stage: Stage) -> Scene:

@@ -17,6 +17,7 @@ from app.model.scene import Scene
 from app.model.settings import RenderSettings
 from app.passes.eye import CausticMaps, EyePass
 from app.passes.present import Channels
+from app.passes.spectrum_choice import Spectrum
 
 FIRST_PASS_PHOTONS = 1 << 17
 """Photons of a timed rendering's first pass, which finds out how fast the scene goes."""
@@ -33,8 +34,8 @@ class EyeStats:
 
     samples: int = 0
     """A pixel."""
-    bands: int = 1
-    """Stretches of the spectrum that samples took turns in."""
+    spectrum: Spectrum = Spectrum()
+    """How samples saw it."""
     fallbacks: Mapping[str, int] = field(default_factory=dict)
 
 
@@ -77,7 +78,7 @@ class RenderStats:
             "fall-backs          " + ", ".join(f"{name} {count}" for name, count in tally.fallbacks.items())
             + f", splat_footprint_dropped {self.light.footprints_dropped} ({self.light.dropped_w / max(tally.ended['deposited'], 1e-300):.1e} of what was deposited)",
             "bands × points      " + ", ".join(f"{name} {count} × {self.light.light_points[name]}" for name, count in self.light.bands.items()),
-            f"eye                 {self.eye.samples} samples a pixel in {self.eye.bands} bands; " + ", ".join(f"{name} {count}" for name, count in self.eye.fallbacks.items()),
+            f"eye                 {self.eye.samples} samples a pixel, {self.eye.spectrum.words}; " + ", ".join(f"{name} {count}" for name, count in self.eye.fallbacks.items()),
             f"maps                {self.atlas_size[0]}×{self.atlas_size[1]} texels, buffers {self.bytes / 2**20:.0f} MiB",
             f"seconds             prepare {self.prepare_seconds:.2f}, emit and trace {self.light.trace_seconds:.2f}, "
             f"splat {self.light.splat_seconds:.2f}, eye {self.eye_seconds:.2f}, all {self.seconds:.2f}",
@@ -221,13 +222,13 @@ def _eye_layer(
         stop_at_once = cancelled()
         if not stop_at_once:
             # Every stretch of the spectrum has its turn equally often.
-            bands = eye.choose_bands(scene.camera, settings.width, settings.height, samples, maps)
-            samples = -(-samples // bands) * bands
+            eye.may_be_single = True
+            samples = eye.choose_spectrum(scene.camera, settings.width, settings.height, samples, maps).samples(samples)
         eye.run(
             scene.camera, settings.width, settings.height, 1 if stop_at_once else samples, 0, maps, settings.seed,
             lambda fraction: progress(0.9 + 0.1 * fraction, "looking"), None if stop_at_once else cancelled,
         )
-        stats.eye = EyeStats(eye.samples_taken, eye.bands, eye.fallbacks if settings.tally else {})
+        stats.eye = EyeStats(eye.samples_taken, eye.spectrum, eye.fallbacks if settings.tally else {})
         return eye.read_rgb(), eye.read_spectral() if light.bin_edges_nm is not None else None
     finally:
         eye.release()

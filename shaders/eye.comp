@@ -73,15 +73,47 @@ EyePath waiting[STACK];
 int waits;
 #endif
 
+#ifdef EYE_SPECULAR
+// Ends of paths are looked at together, when there are that many or no path is left: a software renderer, and a GPU, looks at those of
+// neighbouring pixels side by side then.
+struct PathEnd {
+    EyePath path;
+    Hit hit;
+    bool met;
+    bool alike;
+};
+PathEnd ended[ENDS_HELD];
+#endif
+
 #include "eye/emission.glsl"
 #include "eye/footprint.glsl"
 #include "eye/receiver.glsl"
 #include "eye/taps.glsl"
 #include "eye/crossing.glsl"
+#if defined(EYE_SPECULAR) && defined(SPECTRAL_SWEEP)
+#include "eye/cuts.glsl"
+#endif
 
-EyePath camera_path(uvec2 pixel)
+// Looks of one sample at what is seen directly, which costs little, lie round the sample's own place within its share of the pixel. Those that
+// meet something specular go on as one of them, chosen by chance; as the sample itself where all of them do.
+#define THE_SAMPLE 4u
+const vec2 direct_look[5] = vec2[](vec2(-0.125, -0.375), vec2(0.375, -0.125), vec2(0.125, 0.375), vec2(-0.375, 0.125), vec2(0.0));
+
+vec2 place_of_look(uint look)
 {
-    vec2 place = picture_point(pixel, p.within_pixel, p.size);
+    return p.within_pixel + p.sample_side * direct_look[look];
+}
+
+// A listed pixel: its number, the look that goes on, and of how many it is one.
+const uint LISTED_BITS = 27u;
+uint listed_entry(uint number, uint look, uint count)
+{
+    return number | (look << LISTED_BITS) | ((count - 1u) << (LISTED_BITS + 3u));
+}
+
+EyePath camera_path(uvec2 pixel, uint look, float gain)
+{
+    vec2 place = picture_point(pixel, place_of_look(look), p.size);
     CameraRay ray = camera_ray(p.position, p.forward, p.half_right, p.half_up, p.orthographic != 0u, place);
     EyePath path;
     path.position = ray.position;
@@ -101,12 +133,14 @@ EyePath camera_path(uvec2 pixel)
     }
     path.band = vec3(0.0, 0.5, 1.0);
     path.weight = vec3(1.0);
-    path.gain = 1.0;
+    path.gain = gain;
     path.share = 1.0;
     path.key = 0u;
     path.depth = 0;
     path.narrowed = false;
     path.recut = false;
+    path.sound = true;
+    path.cuts = 0;
 #ifdef SPECTRAL_SWEEP
     for (int end = 0; end < 2; ++end) {
         path.end_position[end] = path.position;
@@ -163,26 +197,20 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key)
         break;
 #endif
     }
-#if SPECTRAL_GROUPS > 0
+#ifdef SPECTRAL_SWEEP
     bvec3 passes = greaterThan(cosine2, vec3(0.0));
-    bool may_cut = path.narrowed && any(passes) && !all(passes) && !path.recut && waits < STACK && path.band.z - path.band.x > MIN_CUT_BAND;
+    bool may_cut = path.narrowed && any(passes) && !all(passes) && !path.recut;
     bool cut = false;
     WHEN(may_cut) {
-        float at = cut_of(path, theta3, crossing, passes);
-        cut = min(at - path.band.x, path.band.z - at) > 0.01 * MIN_CUT_BAND && cut_is_near(whole, at, hit.distance);
-        if (!cut) atomicAdd(fallbacks[FELL_CUT], 1u);
+        float at = cell_border(cut_of(path, theta3, crossing, passes));
+        cut = may_cut_at(path, at);
+        bool near = cut && (whole.sound || cut_is_near(whole, at, hit.distance));
+        if (cut && !near) atomicAdd(fallbacks[FELL_CUT], 1u);
+        cut = near;
         WHEN(cut) {
-            // Both parts meet this surface again, each from its own start and anchored in its own middle.
-            float part = (at - path.band.x) / (path.band.z - path.band.x);
+            // Both parts meet this surface again, each from its own start.
             whole.recut = true;
-            EyePath other = whole;
-            anchor_at(other, at, whole.band.z);
-            other.share *= 1.0 - part;
-            other.key = hash_combine(whole.key, 6u);
-            waiting[waits++] = other;
-            anchor_at(whole, whole.band.x, at);
-            whole.share *= part;
-            whole.key = hash_combine(whole.key, 5u);
+            cut_band(whole, at, pixel_key);
             path = whole;
         }
     }
@@ -232,6 +260,7 @@ void meet_surface(inout EyePath path, Hit hit, uint kind, uint pixel_key)
     if (!columns_hold(path)) atomicAdd(fallbacks[FELL_COLUMNS], 1u);
     path.position = surface_point(hit, whole.position, whole.direction);
 #ifdef SPECTRAL_SWEEP
+    path.sound = path.sound && !is_curved(hit);
     WHEN(path.narrowed) transfer_ends(path, hit.normal_g);
 #endif
     path.depth += 1;
@@ -259,18 +288,45 @@ void meet_surface(inout EyePath path, Hit hit, uint kind, uint pixel_key)
 }
 #endif
 
+#ifdef EYE_SPECULAR
+// Light that would still be caught inside: as if it left here.
+void leave_here(EyePath path)
+{
+    atomicAdd(fallbacks[FELL_DEPTH], 1u);
+#ifdef LAYER_BEAUTY
+    add_sky(path, stretch_of(path, path.band.x, path.band.z), path.direction, vec3(0.0));
+#endif
+}
+#else
+// What a camera ray meets that nothing specular is in the way of.
+void see_directly(EyePath path, bool met, Hit hit, uint kind, uint pixel_key)
+{
+#if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
+    add_lights(path, met ? hit.distance : FAR_DISTANCE);
+#endif
+    WHEN(!met || kind == KIND_DIFFUSE) add_end(path, met, hit, true, pixel_key);
+}
+#endif
+
 void main()
 {
 #ifdef EYE_SPECULAR
     if (gl_GlobalInvocationID.x >= listed_count) return;
-    uint number = listed[gl_GlobalInvocationID.x];
+    uint entry = listed[gl_GlobalInvocationID.x], number = bitfieldExtract(entry, 0, int(LISTED_BITS)), look = bitfieldExtract(entry, int(LISTED_BITS), 3);
+    float gain = float((entry >> (LISTED_BITS + 3u)) + 1u) / float(p.direct_looks);
     uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
 #else
     uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, p.first_row);
     if (pixel.x >= p.size.x || pixel.y >= p.size.y) return;
 #endif
     uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
-    EyePath path = camera_path(pixel);
+#ifndef LISTS_SPECULAR
+#ifndef EYE_SPECULAR
+    uint look = THE_SAMPLE;
+    float gain = 1.0;
+#endif
+    EyePath path = camera_path(pixel, look, gain);
+#endif
 #ifdef RGB_CHANNELS
     turn = p.counts_turns != 0u ? uint(imageLoad(picture[0], ivec2(pixel)).w) : p.sample_index;
 #else
@@ -280,48 +336,68 @@ void main()
 #ifdef EYE_SPECULAR
     waits = 0;
 #endif
-    bool goes_on = true;
-    for (int event = 0; event < MAX_EVENTS; ++event) {
+#ifdef LISTS_SPECULAR
+    uint specular_looks = 0u, chosen = THE_SAMPLE, draw = hash_combine(pixel_key, p.draw_index);
+    for (uint k = 0u; k < p.direct_looks; ++k) {
+        EyePath path = camera_path(pixel, p.direct_looks == 1u ? THE_SAMPLE : k, 1.0 / float(p.direct_looks));
         Hit hit;
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
         uint kind = met ? object_at(hit.object).kind : NONE;
-#ifdef LISTS_SPECULAR
         if (kind == KIND_MIRROR || kind == KIND_DIELECTRIC) {
-            uint place = atomicAdd(listed_count, 1u);
-            atomicMax(listed_groups[0], place / 64u + 1u);
-            listed[place] = pixel.y * p.size.x + pixel.x;
-            return;
+            specular_looks += 1u;
+            // Each of them as likely: the newest of c with 1 / c.
+            draw = hash_pcg(draw);
+            if (unit_float(draw) * float(specular_looks) < 1.0) chosen = k;
+        } else {
+            see_directly(path, met, hit, kind, pixel_key);
         }
+    }
+    WHEN(specular_looks > 0u) {
+        uint place = atomicAdd(listed_count, 1u);
+        atomicMax(listed_groups[0], place / 64u + 1u);
+        listed[place] = listed_entry(pixel.y * p.size.x + pixel.x, specular_looks == p.direct_looks ? THE_SAMPLE : chosen, specular_looks);
+    }
+#elif defined(EYE_SPECULAR)
+    int events = 0;
+    bool goes_on = true;
+    while (goes_on) {
+        int found = 0;
+        for (; goes_on && found < ENDS_HELD && events < MAX_EVENTS; ++events) {
+            Hit hit;
+            bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
+            uint kind = met ? object_at(hit.object).kind : NONE;
+            bool ends = !met || kind == KIND_DIFFUSE, alike = true;
+#ifdef SPECTRAL_SWEEP
+            bool asks = path.narrowed && (ends || (path.sound && kind != KIND_BLACK && asked < MOST_ASKED));
+            if (asks) asks = sweep_pixels(path, met ? hit.distance : FAR_DISTANCE) > (ends ? LEAST_SWEEP : LEAST_CUT_SWEEP * sample_side(path));
+            bool parts = false;
+            WHEN(asks) parts = cut_where_ways_part(path, met, ends, hit, pixel_key, alike);
+            if (parts) continue;
 #endif
 #if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
-        WHEN(!path.recut) add_lights(path, met ? hit.distance : FAR_DISTANCE);
+            WHEN(!path.recut) add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
-        bool ends = !met || kind == KIND_DIFFUSE;
-        WHEN(ends) add_end(path, met, hit, pixel_key);
-        goes_on = false;
-#ifdef EYE_SPECULAR
-        bool specular = !ends && kind != KIND_BLACK;
-        goes_on = specular && path.depth < MAX_DEPTH;
-        WHEN(goes_on) meet_surface(path, hit, kind, pixel_key);
-        WHEN(specular && !goes_on) {
-            // Light that would still be caught inside: as if it left here.
-            atomicAdd(fallbacks[FELL_DEPTH], 1u);
-            add_sky(path, stretch_of(path, path.band.x, path.band.z), path.direction, vec3(0.0));
+            WHEN(ends) ended[found++] = PathEnd(path, hit, met, alike);
+            bool specular = !ends && kind != KIND_BLACK;
+            goes_on = specular && path.depth < MAX_DEPTH;
+            WHEN(goes_on) meet_surface(path, hit, kind, pixel_key);
+            WHEN(specular && !goes_on) leave_here(path);
+            WHEN(!goes_on && waits > 0) {
+                path = waiting[--waits];
+                goes_on = true;
+            }
         }
-        WHEN(!goes_on && waits > 0) {
-            path = waiting[--waits];
-            goes_on = true;
+        for (int e = 0; e < found; ++e) add_end(ended[e].path, ended[e].met, ended[e].hit, ended[e].alike, pixel_key);
+        WHEN(goes_on && events >= MAX_EVENTS) {
+            leave_here(path);
+            while (waits > 0) leave_here(waiting[--waits]);
+            goes_on = false;
         }
-#endif
-        if (!goes_on) break;
     }
-#ifdef EYE_SPECULAR
-    if (goes_on) waiting[min(waits++, STACK - 1)] = path;
-    while (waits > 0) {
-        atomicAdd(fallbacks[FELL_DEPTH], 1u);
-        path = waiting[--waits];
-        add_sky(path, stretch_of(path, path.band.x, path.band.z), path.direction, vec3(0.0));
-    }
+#else
+    Hit hit;
+    bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
+    see_directly(path, met, hit, met ? object_at(hit.object).kind : NONE, pixel_key);
 #endif
 #ifdef RGB_CHANNELS
     radiance[0].w = took_turn ? 1.0 : 0.0;

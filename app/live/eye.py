@@ -22,6 +22,7 @@ from app.gpu import shader
 from app.gpu.map_channels import MapChannels
 from app.gpu.texture_store import TextureStore
 from app.passes.eye import MOST_TAPS, CausticMaps, EyePass
+from app.passes.spectrum_choice import Spectrum
 
 if TYPE_CHECKING:
     import moderngl
@@ -218,7 +219,7 @@ class LiveEye:
         self._publish_from = self._settled + -self._settled % self._cycle
         if not (smooth or self._is_quick) and self._needed_bands is None:
             self._pass.most_taps = MOST_TAPS
-            self._choosing = self._pass.choosing_bands(self._camera, *self._size, BANDED_SAMPLES, self._maps)
+            self._choosing = self._pass.choosing_spectrum(self._camera, *self._size, BANDED_SAMPLES, self._maps)
 
     # ---- samples -----------------------------------------------------------------------------
 
@@ -227,7 +228,7 @@ class LiveEye:
         if self._choosing is not None:
             if next(self._choosing, None) is None:
                 assert self._pass is not None
-                self._bands = self._pass.bands
+                self._bands = self._pass.spectrum.bands
                 again = not self._shows_whole and self._smooth_samples > self.shown_samples
                 self._settled = self.shown_samples + 1 if again else self._settled
                 self._begin(smooth=again)
@@ -250,7 +251,7 @@ class LiveEye:
         assert self._pass is not None and self._camera is not None and self._maps is not None
         width, height = self._size
         if self._steps is None:
-            self._pass.bands = self._cycle
+            self._pass.spectrum = Spectrum(self._cycle)
             self._pass.most_taps = MOVING_TAPS if self._is_quick or self._is_smooth else MOST_TAPS
             self._steps = self._pass.samples(self._camera, width, height, 1, self._taken, self._maps)
             self._spent_s = 0.0

@@ -8,7 +8,7 @@ Samples form a lattice inside the pixel that later launches refine (box filter).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 
 import moderngl
@@ -32,6 +32,12 @@ from app.passes.eye_records import (
 )
 from app.passes.eye_tables import EMISSION_CELLS, EyeTables
 from app.passes.present import Channels
+from app.passes.spectrum_choice import (
+    Look,
+    Spectrum,
+    choosing_spectrum,
+    grid_of,
+)
 
 MAX_DEPTH = 48
 """Surfaces that one camera path may meet."""
@@ -39,22 +45,23 @@ MAX_EVENTS = 160
 """Surfaces that all paths of a sample may meet together."""
 STACK = 6
 """Paths of a sample that may wait while another is followed."""
+ENDS_HELD = 8
+"""Paths' ends of a sample that are looked at together."""
 SPLIT_THRESHOLD = 0.004
 """Share of a sample's power above which both parts of a split path are followed."""
+CUT_THRESHOLD = 0.004
+"""The same for the parts of a cut band."""
 MOST_TAPS = 24
 """Looks along one sweep."""
-TAPS_PER_PIXEL = 0.7
+TAPS_PER_PIXEL = 1.2
 """Of one sample; between two looks colours are not told apart, so the more samples there are, the closer they lie."""
+DIRECT_LOOKS = 4
+"""Of one sample at what is seen directly: outlines and textures there cost a tenth of what glass costs …"""
+DIRECT_LOOKS_UNTIL = 16
+"""… and with more samples than these they are smooth as they are."""
 TINT_STEPS = 48
 """Stretches that the whole spectrum is cut into behind coloured glass."""
 
-_PILOT_COLUMNS = 60
-"""Of the grid of pixels that tells how many bands are needed. llvmpipe compiles a program anew for sides that are powers of two."""
-_BAND_CHOICES = (1, 2, 4, 8, 16, 32)
-_LEAST_BANDS = 4
-"""Where there are samples enough."""
-_BAND_TOLERANCE = 0.05
-"""Over the root of the samples: mean relative change of the pixels that change at all, up to which half as many bands do."""
 _TARGET_SECONDS = 0.15
 """What one dispatch may take; rows are divided to fit."""
 _GROUP = 8
@@ -125,18 +132,25 @@ class EyePass:
         features = scene.features
         self.disperses = layer != "caustic" and features.eye_disperses
         """Samples differ in the stretch of the spectrum they see."""
-        self.fixed_bands = {"regular-7": 7, "regular-16": 16}.get(features.method) if features.point_spectrum else (1 if features.merged_groups else None)
-        self.bands = self.fixed_bands or 1
-        """Stretches the spectrum is cut into; a picture is whole after that many samples."""
+        self.fixed_bands = {"regular-7": 7, "regular-16": 16, "srd-lambda": 1}.get(features.method)
+        """What the method prescribes."""
+        self.spectrum = Spectrum(self.fixed_bands or 1)
+        """How samples see the spectrum; one of `single` wavelengths needs `may_be_single`."""
+        self.may_be_single = False
+        """Where bands serve a scene badly, wavelengths may be taken one by one. That takes a program of its own, which is compiled when it is needed."""
         self.most_taps = MOST_TAPS
+        self.direct_looks = DIRECT_LOOKS if self.chooses else 1
+        """Of a sample, at what is seen directly, while a pixel has few samples."""
         self.split_threshold = SPLIT_THRESHOLD
         structs = (*SCENE_STRUCTS, EYE_LIGHT, EYE_PARAMETERS, RECEIVER, PLACEMENT, *([PICTURE] if self.pictures.structs else []))
         defines = self._defines(layer, maps)
         beyond = defines.pop("EYE_SPECULAR", None)
         self._listed: moderngl.Buffer | None = None
         self._beyond: moderngl.ComputeShader | None = None
+        self._single: moderngl.ComputeShader | None = None
+        self._beyond_source = (defines | {"EYE_SPECULAR": 1}, structs)
         if beyond:
-            self._beyond = shader.compute(self._ctx, "eye.comp", defines | {"EYE_SPECULAR": 1}, structs)
+            self._beyond = shader.compute(self._ctx, "eye.comp", *self._beyond_source)
             plain = {name: value for name, value in defines.items() if name not in BEYOND_ONLY} | {"SPECTRAL_GROUPS": 0, "LISTS_SPECULAR": 1, "MAX_EVENTS": 1}
             self._program = shader.compute(self._ctx, "eye.comp", plain, structs)
         else:
@@ -176,8 +190,9 @@ class EyePass:
         parameters = self._parameters(camera, width, height, maps.scale, seed)
         parameters["sample_side"] = 1.0 / np.sqrt(samples + sample_offset)
         # Where samples are of one band each, fewer of them share a pixel in that band.
-        parameters["band_side"] = min(1.0, np.sqrt(self.bands / (samples + sample_offset)))
+        parameters["band_side"] = min(1.0, np.sqrt(self.spectrum.bands / (samples + sample_offset)))
         parameters["taps_per_pixel"] = TAPS_PER_PIXEL * (samples + sample_offset) ** 0.25
+        parameters["direct_looks"] = 1 if self.spectrum.single or samples + sample_offset > DIRECT_LOOKS_UNTIL else self.direct_looks
         for index, place in enumerate(_pixel_lattice(samples, sample_offset)):
             parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
             parameters["within_pixel"] = place
@@ -185,47 +200,52 @@ class EyePass:
                 yield (index + share) / samples
         self.context.check("the eye pass")
 
-    def choose_bands(self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None) -> int:
-        """Cut the spectrum into as few bands as the picture lets one: doubled until a coarse grid of the picture's own pixels changes no more
-        than so many samples of each of its pixels would still be off by.
+    @property
+    def chooses(self) -> bool:
+        """`choose_spectrum` has something to choose: the method leaves it open."""
+        return self.disperses and self.fixed_bands is None and not self.scene.features.random_wavelength
 
-        Sets and returns `bands`; what was summed up is forgotten. A method that prescribes its bands keeps them."""
-        for _ in self.choosing_bands(camera, width, height, samples, maps):
+    def choose_spectrum(self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None) -> Spectrum:
+        """Sample the spectrum in the way that leaves the least error after so many samples, as far as a coarse grid of the picture's own
+        pixels tells.
+
+        Sets and returns `spectrum`; what was summed up is forgotten. A method that prescribes its way keeps it."""
+        for _ in self.choosing_spectrum(camera, width, height, samples, maps):
             pass
-        return self.bands
+        return self.spectrum
 
-    def choosing_bands(self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None) -> Iterator[float]:
-        """`choose_bands`, pausing after every band of rows."""
-        if not self.disperses or self.fixed_bands is not None or self.scene.features.random_wavelength:
+    def choosing_spectrum(self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None) -> Iterator[float]:
+        """`choose_spectrum`, pausing after every band of rows."""
+        if not self.chooses:
             return
-        maps = maps or self._no_maps()
-        columns = min(width, _PILOT_COLUMNS)
-        rows = max(1, round(columns * height / width))
-        rows += rows & (rows - 1) == 0
-        tolerance = _BAND_TOLERANCE / np.sqrt(samples)
-        # Every band's own samples must be enough to smooth an outline.
-        most = max(1, samples // 4 if samples >= 16 else samples // 2)
-        choices = [b for b in _BAND_CHOICES if b <= most]
-        pictures: list[np.ndarray] = []
-        for bands in choices:
-            self._clear(columns, rows)
-            parameters = self._parameters(camera, columns, rows, maps.scale, 1)
-            parameters["bands"], parameters["dithered"], parameters["counts_turns"], parameters["sample_side"], parameters["band_side"] = bands, 0, 0, 1.0, 1.0
-            parameters["pixel_scale"] = columns / width
-            parameters["taps_per_pixel"] = TAPS_PER_PIXEL * samples**0.25
-            parameters["within_pixel"] = 0.5
-            for number in range(bands):
-                parameters["sample_index"] = number
-                yield from self._add_sample(parameters, columns, rows, maps)
-            pictures.append(self._read().astype(np.float64))
-        # Two pictures may agree by chance: all finer ones must, too.
-        errors = [_band_error(coarser, finer) for coarser, finer in zip(pictures, pictures[1:], strict=False)]
-        enough = next((i for i in range(len(errors) + 1) if all(e < tolerance for e in errors[i:])), len(errors))
-        # A band meets the facets that its own middle meets, and rims of a pixel's width slip through the grid: where colours part at all,
-        # some bands are due.
-        parted = max(errors, default=0.0) > tolerance / 8
-        self.bands = max(choices[enough], min(choices[-1], _LEAST_BANDS) if parted else 1)
+        looks = choosing_spectrum(samples, self.may_be_single)
+        picture: np.ndarray | None = None
+        while True:
+            try:
+                look = looks.send(picture)
+            except StopIteration as stop:
+                self.spectrum = stop.value
+                break
+            picture = yield from self._coarse_picture(look, camera, width, height, samples, maps or self._no_maps())
+        self._clear(*self._size)
+
+    def _coarse_picture(self, look: Look, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps) -> Generator[float, None, np.ndarray]:
+        """Few pixels of the picture, each as large as the picture's own."""
+        columns, rows = grid_of(width, height)
         self._clear(columns, rows)
+        self.spectrum = look.spectrum
+        parameters = self._parameters(camera, columns, rows, maps.scale, look.seed)
+        parameters["dithered"], parameters["counts_turns"], parameters["sample_side"], parameters["band_side"] = 0, 0, 1.0, 1.0
+        parameters["pixel_scale"] = columns / width
+        parameters["taps_per_pixel"] = TAPS_PER_PIXEL * samples**0.25
+        # Within the picture's pixel, which is a small part of the grid's.
+        parameters["within_pixel"] = 0.5 + (look.place - 0.5) * columns / width
+        for number in range(look.spectrum.bands):
+            parameters["sample_index"] = parameters["draw_index"] = number
+            yield from self._add_sample(parameters, columns, rows, maps)
+        picture = self._read().astype(np.float64)
+        # Beside a picture in colour, turns are counted.
+        return picture[..., :3] if self.channels.edges_nm is None else picture
 
     def _bind(self, maps: CausticMaps) -> None:
         self.scene.bind()
@@ -279,7 +299,7 @@ class EyePass:
         """Free every buffer, texture and program."""
         for owned in (self._tables, self._lights, self._counters, *self._pictures, self._parameters_buffer):
             owned.release()
-        for program in (self._program, self._beyond):
+        for program in (self._program, self._beyond, self._single):
             if program is not None:
                 shader.release(program)
         if self._listed is not None:
@@ -327,6 +347,8 @@ class EyePass:
             "MAX_DEPTH": MAX_DEPTH,
             "MAX_EVENTS": MAX_EVENTS if specular else 1,
             "STACK": STACK,
+            "CUT_THRESHOLD": CUT_THRESHOLD,
+            "ENDS_HELD": ENDS_HELD,
         }
         coloured = any(isinstance(o.material, Mirror) and len(set(o.material.reflectance_rgb)) > 1 for o in scene.objects)
         absorbs = any(isinstance(o.material, Dielectric) and o.material.absorption is not None for o in scene.objects)
@@ -371,9 +393,11 @@ class EyePass:
         if environment is not None:
             for name, column in zip(("sky_x", "sky_y", "sky_z"), np.asarray(environment.world_to_local, float).T, strict=True):
                 parameters[name] = column
-        parameters["bands"], parameters["dithered"], parameters["counts_turns"] = self.bands, self.bands > 1, 1
+        bands = self.spectrum.bands
+        parameters["bands"], parameters["dithered"], parameters["counts_turns"] = bands, bands > 1, 1
         parameters["most_taps"], parameters["split_threshold"] = self.most_taps, self.split_threshold
         parameters["map_scale"] = map_scale
+        parameters["direct_looks"] = 1
         parameters["inside_object"] = NONE
         for index, item in enumerate(self.scene.scene.objects):
             if isinstance(item.material, Dielectric) and contains(item, np.array(camera.position)):
@@ -411,8 +435,8 @@ class EyePass:
                 self._listed.write(_NOTHING_LISTED)
             self._program.run(-(-width // _GROUP), -(-rows // _GROUP))
             self._ctx.memory_barrier()
-            if self._beyond is not None and self._listed is not None:
-                self._beyond.run_indirect(self._listed)
+            if self._listed is not None:
+                self._program_beyond().run_indirect(self._listed)
                 self._ctx.memory_barrier()
             self._ctx.finish()
             elapsed = time.perf_counter() - start
@@ -422,6 +446,17 @@ class EyePass:
             most = min(4 * self._rows_a_dispatch, -(-height // _GROUP) * _GROUP)
             self._rows_a_dispatch = int(np.clip(fitting // _GROUP * _GROUP, _GROUP, max(_GROUP, most)))
             yield row / height
+
+    def _program_beyond(self) -> moderngl.ComputeShader:
+        """What follows rays beyond glass and mirrors."""
+        assert self._beyond is not None
+        if not self.spectrum.single:
+            return self._beyond
+        if self._single is None:
+            defines, structs = self._beyond_source
+            alone = {name: value for name, value in defines.items() if name != "SPECTRAL_SWEEP"}
+            self._single = shader.compute(self._ctx, "eye.comp", alone | {"SPECTRAL_GROUPS": 0, "RANDOM_WAVELENGTH": 1, "EVEN_WAVELENGTHS": 1}, structs)
+        return self._single
 
     def _read(self) -> np.ndarray:
         if not self._pictures:
@@ -445,22 +480,13 @@ class EyePass:
 
 
 def _pixel_lattice(samples: int, offset: int) -> np.ndarray:
-    """(samples, 2) places in a pixel: a golden-ratio lattice, shifted from launch to launch.
+    """(samples, 2) places in a pixel: ordered as in a golden-ratio lattice, shifted from launch to launch.
 
-    Every row and every column of the pixel cut into `samples` holds one sample, so that edges of
-    any slant are filtered well.
+    Every row and every column of the pixel cut into `samples` holds one sample, so that edges of any slant are filtered well,
+    and the first launch's lie about the pixel's middle, so that the picture does not move.
     """
     golden = 0.6180339887498949
     shift = (0.5 + offset * np.array([0.7548776662466927, 0.5698402909980532])) % 1.0
     index = np.arange(samples)
-    return np.column_stack([(index + shift[0]) / samples, (index * golden + shift[1]) % 1.0])
-
-
-def _band_error(coarser: np.ndarray, finer: np.ndarray) -> float:
-    """Mean relative difference of two pictures (H, W, C) over the pixels in which they differ."""
-    difference = np.abs(coarser - finer).sum(axis=-1)
-    size = np.abs(finer).sum(axis=-1)
-    floor = 1e-2 * size.mean() + 1e-30
-    relative = difference / (size + floor)
-    touched = relative > 1e-4
-    return float(np.minimum(relative[touched], 1.0).mean()) if touched.any() else 0.0
+    rank = np.argsort(np.argsort((0.5 + index * golden) % 1.0))
+    return (np.column_stack([index, rank]) + shift) / samples

@@ -57,7 +57,8 @@ EYE_PARAMETERS = Struct(
         Field("counts_turns", "uint", "whether pixels count their own dispersed samples instead"),
         Field("taps_per_pixel", "float", "looks along a sweep, for every pixel it is long"),
         Field("band_side", "float", "side of the share of its pixel that a sample of one band has, pixels"),
-        Field("unused2", "uvec2", ""),
+        Field("direct_looks", "uint", "of one sample, at what is seen directly"),
+        Field("unused2", "uint", ""),
     ),
 )
 _LIGHT_KINDS = {"point": 0, "spot": 0, "directional": 1, "collimated": 2, "area": 3}

@@ -56,7 +56,7 @@ class EyeTables:
         glasses = _shown_media(scene)
         axis = _axis(scene, list(glasses.values()))
         absorptions = _absorptions(shown, scene.space.scale)
-        spectra, defines = _spectra(scene, glasses, axis, absorptions, maps)
+        spectra, defines = _spectra(scene, glasses, axis, absorptions, channels, maps)
         emission, rows = _emission(shown, axis, channels, reflectances, maps, scene.space.scale)
         colours = np.zeros((len(shown.objects), 4), "f4")
         colours[:, 3] = -1.0
@@ -70,7 +70,7 @@ class EyeTables:
             spectra_texture(ctx, spectra),
             _texture(ctx, emission),
             ctx.buffer(colours.tobytes()),
-            ctx.buffer(_cell_cdf(axis).astype("f4").tobytes()),
+            ctx.buffer(_cell_cdf(axis, channels).astype("f4").tobytes()),
             defines | rows,
             axis,
         )
@@ -117,7 +117,7 @@ def _absorption(material: Material, scale: float) -> np.ndarray | None:
 
 
 def _spectra(
-    scene: SceneBuffers, glasses: dict[Dispersion, Dispersion], axis: SpectralAxis, absorptions: list[np.ndarray], maps: MapChannels
+    scene: SceneBuffers, glasses: dict[Dispersion, Dispersion], axis: SpectralAxis, absorptions: list[np.ndarray], channels: Channels, maps: MapChannels
 ) -> tuple[np.ndarray, dict[str, int]]:
     """Rows over x as `lib/scene.glsl` reads them, and where they begin."""
     x = np.linspace(0.0, 1.0, SAMPLES)
@@ -132,6 +132,7 @@ def _spectra(
         "ABSORPTION_ROW": np.array([np.interp(nm, VISIBLE_NM, a) for a in absorptions]).reshape(-1, SAMPLES),
         "BASIS_ROW": np.array([np.interp(nm, VISIBLE_NM, column) for column in rgb_basis().T]),
         "BIN_ROW": maps.coordinate(axis, x)[None],
+        "QUANTILE_ROW": np.interp(x, _cell_cdf(axis, channels), np.linspace(0.0, 1.0, EMISSION_CELLS + 1))[None],
     }
     starts = np.cumsum([0] + [len(rows) for rows in sections.values()])
     defines = dict(zip(sections, starts.tolist(), strict=False))
@@ -178,10 +179,16 @@ def _texture(ctx: moderngl.Context, rows: np.ndarray) -> moderngl.Texture:
     return texture
 
 
-def _cell_cdf(axis: SpectralAxis) -> np.ndarray:
-    """Running probability of the cells of x that random wavelengths are drawn from: what daylight adds to X + Y + Z there."""
+def _cell_cdf(axis: SpectralAxis, channels: Channels) -> np.ndarray:
+    """How much of what looks bright lies below each border of the cells of x: what daylight adds to X + Y + Z there, or evenly to all bins.
+
+    Random wavelengths are drawn by it, and looks along a sweep shared out."""
     x = np.linspace(0.0, 1.0, EMISSION_CELLS + 1)
-    seen = cumulative(axis, Spectrum(daylight_per_lumen())).at(x)[:, :3].sum(axis=1)
+    if channels.edges_nm is None:
+        seen = cumulative(axis, Spectrum(daylight_per_lumen())).at(x)[:, :3].sum(axis=1)
+    else:
+        white = daylight_per_lumen()
+        seen = cumulative(axis, Spectrum(white), (channels.observer().sum(axis=1) / white)[:, None] * np.ones(4)).at(x)[:, 0]
     # No cell is impossible: another light may be brighter there.
     mixed = 0.98 * seen / seen[-1] + 0.02 * x
     mixed[0], mixed[-1] = 0.0, 1.0

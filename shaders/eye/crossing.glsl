@@ -2,8 +2,6 @@
 #ifndef EYE_CROSSING_GLSL
 #define EYE_CROSSING_GLSL
 
-// Narrower bands are not cut at total internal reflection.
-#define MIN_CUT_BAND 1e-4
 // GPU units that a cut may move a ray's start.
 #define MAX_MOVED_START 0.01
 
@@ -18,6 +16,16 @@ struct Facing {
     vec3 columns[COLUMNS_HELD];
 #endif
 };
+
+// Whether the surface there has a normal of its own at every place.
+bool is_curved(Hit hit)
+{
+#ifdef NORMAL_DERIVATIVES
+    return (hit.primitive & PLANE_BIT) == 0u && triangle_at(hit.primitive).normals != NONE;
+#else
+    return false;
+#endif
+}
 
 Facing facing_of(Hit hit, EyePath path)
 {
@@ -154,12 +162,12 @@ float cut_of(EyePath path, vec3 theta, Crossing crossing, bvec3 passes)
     return 0.5 * (a + b);
 }
 
-// Whether anchoring the parts [x, at] and [at, z] of the band in their middles leaves a path's start where it is known to be clear.
+// Whether anchoring the parts [x, at] and [at, z] of the band leaves a path's start where it is known to be clear.
 bool cut_is_near(EyePath whole, float at, float distance)
 {
     vec3 low, high, unused;
-    ray_at(whole, 0.5 * (whole.band.x + at), low, unused);
-    ray_at(whole, 0.5 * (at + whole.band.z), high, unused);
+    ray_at(whole, anchor_of(whole, whole.band.x, at), low, unused);
+    ray_at(whole, anchor_of(whole, at, whole.band.z), high, unused);
     low -= whole.position;
     high -= whole.position;
     float allowed = min(MAX_MOVED_START, 0.1 * distance);

@@ -36,6 +36,9 @@ float transmitted(EyePath path, float x)
     return kept;
 }
 
+// Stretches that the whole spectrum is cut into where Fresnel's reflectance varies over it.
+#define WEIGHT_STEPS 16
+
 // A stretch of a path's band, which a look stands for: its ends as cells of the table, and what the path lets through in its middle.
 struct Stretch {
     float lo;
@@ -57,7 +60,7 @@ Stretch stretch_of(EyePath path, float lo, float hi)
 #ifdef ABSORPTION
     stretch.steps = max(1, int(ceil((hi - lo) * float(TINT_STEPS))));
 #else
-    stretch.steps = path.weight.x == path.weight.z ? 1 : max(1, int(ceil((hi - lo) * 4.0)));
+    stretch.steps = path.weight.x == path.weight.z ? 1 : max(1, int(ceil((hi - lo) * float(WEIGHT_STEPS))));
 #endif
     return stretch;
 }

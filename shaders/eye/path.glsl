@@ -26,6 +26,8 @@ struct EyePath {
     int depth;                      // surfaces met
     bool narrowed;                  // stands for one band
     bool recut;                     // its band was cut before the surface ahead, and is not again
+    bool sound;                     // its band's ends have kept to its own facets: it met flat ones only
+    int cuts;                       // of its band, where ways parted
 #ifdef SPECTRAL_SWEEP
     // The rays at both ends of the band, by way of the same facets: what columns, being first derivatives, leave out of the sweep.
     vec3 end_position[2];
@@ -92,7 +94,11 @@ void ray_at(EyePath path, float x, out vec3 position, out vec3 direction)
 // Side of the share of its pixel that a sample of this path has, pixels.
 float sample_side(EyePath path)
 {
+#ifdef LISTS_SPECULAR
+    return p.sample_side * inversesqrt(float(p.direct_looks));
+#else
     return path.narrowed ? p.band_side : p.sample_side;
+#endif
 }
 
 // Weights at other wavelengths of the same band.
@@ -102,6 +108,20 @@ vec3 weights_at(EyePath path, vec3 x)
     vec3 above = clamp((x - path.band.y) / max(path.band.z - path.band.y, 1e-9), 0.0, 1.0);
     return mix(mix(vec3(path.weight.x), vec3(path.weight.y), below), vec3(path.weight.z), above);
 }
+
+#if defined(HAS_DISPERSION) && !defined(RANDOM_WAVELENGTH)
+// How much of what looks bright in the whole spectrum lies below either end of a band.
+vec2 brightness_of(vec3 band)
+{
+    return vec2(cell_cdf[int(band.x * float(EMISSION_CELLS) + 0.5)], cell_cdf[int(band.z * float(EMISSION_CELLS) + 0.5)]);
+}
+
+// The wavelength below which `share` of a band of this brightness lies.
+float quantile(vec2 brightness, float share)
+{
+    return spectral_row(uint(QUANTILE_ROW), mix(brightness.x, brightness.y, share));
+}
+#endif
 
 // From here on the path stands for one band only; all others have their turn in other samples.
 void narrow(inout EyePath path, uint pixel_key)
@@ -129,14 +149,7 @@ void narrow(inout EyePath path, uint pixel_key)
     vec3 band = (float(band_number) + vec3(0.0, 0.5, 1.0)) / float(p.bands);
     // Traced where half of what looks bright in the band lies on either side: what only this one wavelength decides, such as which facet is
     // met, is then right for most of what is seen.
-    uint low = uint(band.x * float(EMISSION_CELLS) + 0.5), high = uint(band.z * float(EMISSION_CELLS) + 0.5);
-    float half_way = 0.5 * (cell_cdf[low] + cell_cdf[high]);
-    while (high - low > 1u) {
-        uint middle = (low + high) / 2u;
-        if (cell_cdf[middle] <= half_way) low = middle;
-        else high = middle;
-    }
-    band.y = clamp((float(low) + 0.5) / float(EMISSION_CELLS), mix(band.x, band.z, 0.1), mix(band.x, band.z, 0.9));
+    band.y = clamp(quantile(brightness_of(band), 0.5), mix(band.x, band.z, 0.1), mix(band.x, band.z, 0.9));
     path.gain *= float(p.bands);
 #endif
     path.weight = weights_at(path, band);
@@ -150,13 +163,20 @@ void narrow(inout EyePath path, uint pixel_key)
 #endif
 }
 
-// The same path anchored in the middle of a part of its band.
+// The wavelength that a part of a band is traced at: the band's own, where that lies in it, else the part's middle. What the path lets through,
+// which bends at its own wavelength, is then the same function in the parts as in the whole, and all branches together stay one.
+float anchor_of(EyePath path, float lo, float hi)
+{
+    return path.band.y > lo && path.band.y < hi ? path.band.y : 0.5 * (lo + hi);
+}
+
+// The same path for a part of its band.
 void anchor_at(inout EyePath path, float lo, float hi)
 {
-    vec3 band = vec3(lo, 0.5 * (lo + hi), hi);
-    path.weight = weights_at(path, band);
+    vec3 band = vec3(lo, anchor_of(path, lo, hi), hi);
     EyePath before = path;
-    ray_at(before, band.y, path.position, path.direction);
+    path.weight = weights_at(before, band);
+    if (band.y != path.band.y) ray_at(before, band.y, path.position, path.direction);
     path.band = band;
 #ifdef SPECTRAL_SWEEP
     ray_at(before, lo, path.end_position[0], path.end_direction[0]);

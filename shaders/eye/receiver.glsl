@@ -34,20 +34,34 @@ Seen seen_on(EyePath path, Hit hit, Triangle facet, vec3 position, vec3 directio
 }
 
 #ifdef HAS_TEXTURES
-void apply_texture(inout Seen seen, Triangle facet, uint number)
+// How a facet's texture lies on it.
+struct Paint {
+    uint picture;
+    vec3 origin;       // of the gradients, GPU space
+    vec2 uv;           // there
+    vec3 gradient_u;
+    vec3 gradient_v;
+};
+
+Paint paint_of(uint picture, uint source, Triangle facet)
 {
-    Picture record = pictures[number];
-    vec3 gradient_u, gradient_v;
-    uv_gradients(record, seen.source, facet.edge1, facet.edge2, gradient_u, gradient_v);
-    vec2 uv;
-    vec3 along = seen.position - facet.vertex;
-    hit_uv(record, seen.source, vec2(0.0), uv);
-    uv += vec2(dot(gradient_u, along), dot(gradient_v, along));
+    Paint paint;
+    paint.picture = picture;
+    paint.origin = facet.vertex;
+    hit_uv(pictures[picture], source, vec2(0.0), paint.uv);
+    uv_gradients(pictures[picture], source, facet.edge1, facet.edge2, paint.gradient_u, paint.gradient_v);
+    return paint;
+}
+
+// Reflectance of a painted place, averaged over what a look is averaged over.
+vec3 painted(Paint paint, Seen seen)
+{
+    vec3 along = seen.position - paint.origin;
     vec2 columns[3];
-    for (int c = 0; c < 3; ++c) columns[c] = vec2(dot(gradient_u, seen.dposition[c]), dot(gradient_v, seen.dposition[c]));
+    for (int c = 0; c < 3; ++c) columns[c] = vec2(dot(paint.gradient_u, seen.dposition[c]), dot(paint.gradient_v, seen.dposition[c]));
     vec2 ds, dt;
     box_of_three(columns[0], columns[1], columns[2], ds, dt);
-    seen.reflectance *= texture_filtered(record, uv, ds, dt);
+    return texture_filtered(pictures[paint.picture], paint.uv + vec2(dot(paint.gradient_u, along), dot(paint.gradient_v, along)), ds, dt);
 }
 #endif
 
@@ -73,24 +87,77 @@ bool hidden_from(LightSample s, Seen seen)
     return intersect_any(seen.position, s.toward, s.distance * 0.99999, origin);
 }
 
-// Adds the direct light of one place. `known`: lights, as bits, for which `hidden` says whether they are; the others, and those past the
-// 32nd, are found out, and `hidden` is what was found. With `only_shadows` nothing is added.
-void add_direct(EyePath path, Seen seen, Stretch stretch, uint pixel_key, uint known, inout uint hidden, bool only_shadows)
+// Lights whose direct light is known all along a sweep, from both of its ends; the first ones, as many as there is room for.
+#define STEADY_LIGHTS 8
+#define STEADY_ROOM (LIGHT_COUNT < STEADY_LIGHTS ? LIGHT_ROOM : STEADY_LIGHTS)
+// Deviation from a straight line in the middle, as a share, up to which it is one.
+#define STEADY_TOLERANCE 0.01
+
+struct Steady {
+    uint lights;                // as bits
+    float gains[2 * STEADY_ROOM];
+    vec3 from;                  // the sweep's beginning …
+    vec3 along;                 // … and its way over its square
+};
+
+// Adds the direct light of one place; that of `steady` lights as their ends have it.
+void add_direct(EyePath path, Seen seen, Stretch stretch, uint pixel_key, Steady steady)
 {
     uint reflectance_class = receivers[object_at(seen.object).receiver].reflectance_class;
+    float share = clamp(dot(seen.position - steady.from, steady.along), 0.0, 1.0);
     for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
-        LightSample s;
-        float gain = unshadowed(i, seen, pixel_key, s);
-        uint bit = i < 32u ? 1u << i : 0u;
-        bool shadowed = (known & hidden & bit) != 0u;
-        WHEN(gain > 0.0 && (known & bit) == 0u) shadowed = hidden_from(s, seen);
-        hidden = shadowed ? hidden | bit : hidden & ~bit;
+        bool known = i < uint(STEADY_ROOM) && (steady.lights & (1u << (i & 31u))) != 0u;
+        float gain = 0.0;
+        if (known) gain = mix(steady.gains[2u * i], steady.gains[2u * i + 1u], share);
+        WHEN(!known) {
+            LightSample s;
+            gain = unshadowed(i, seen, pixel_key, s);
+            WHEN(gain > 0.0) gain = hidden_from(s, seen) ? 0.0 : gain;
+        }
         uint row = uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT);
         // Other classes than 0 have their reflectance in the light's own row.
-        WHEN(gain > 0.0 && !shadowed && !only_shadows)
+        WHEN(gain > 0.0)
             add_colour(path, stretch, reflectance_class == 0u ? row : row + 3u + reflectance_class, (reflectance_class == 0u ? seen.reflectance : vec3(1.0)) * (INVERSE_PI * gain));
     }
 }
+
+Steady no_steady_lights()
+{
+    Steady steady;
+    steady.lights = 0u;
+    steady.from = steady.along = vec3(0.0);
+    return steady;
+}
+
+#ifdef SPECTRAL_SWEEP
+// What both ends of a sweep over one facet, and its middle `seen`, tell of the direct light between them.
+Steady steady_lights(Seen seen, vec3 lo, vec3 hi, uint pixel_key)
+{
+    Steady steady = no_steady_lights();
+    vec3 way = hi - lo, middle = seen.position;
+    steady.from = lo;
+    steady.along = way / max(dot(way, way), 1e-20);
+    float share = clamp(dot(middle - lo, steady.along), 0.0, 1.0);
+    for (uint i = 0u; i < uint(min(LIGHT_COUNT, STEADY_LIGHTS)); ++i) {
+        float gains[3];
+        bool hidden[2];
+        LightSample s;
+        gains[2] = unshadowed(i, seen, pixel_key, s);
+        for (int end = 0; end < 2; ++end) {
+            seen.position = end == 0 ? lo : hi;
+            gains[end] = unshadowed(i, seen, pixel_key, s);
+            hidden[end] = false;
+            WHEN(gains[end] > 0.0) hidden[end] = hidden_from(s, seen);
+        }
+        seen.position = middle;
+        bool straight = abs(gains[2] - mix(gains[0], gains[1], share)) <= STEADY_TOLERANCE * max(gains[0], gains[1]);
+        if (hidden[0] == hidden[1] && (straight || hidden[0])) steady.lights |= 1u << i;
+        steady.gains[2u * i] = hidden[0] ? 0.0 : gains[0];
+        steady.gains[2u * i + 1u] = hidden[1] ? 0.0 : gains[1];
+    }
+    return steady;
+}
+#endif
 
 // A map's channels are XYZ (lm) where the picture's are linear Rec.709, else the same bins.
 vec4 map_to_channels(vec4 texel)
@@ -176,14 +243,21 @@ void add_caustic_at(EyePath path, Seen seen, Stretch stretch, uint receiver, uin
         int from = int(floor(first)), to = max(from, int(ceil(last)) - BIN_OVERLAP);
         float factor = scale * (plain ? dot(seen.reflectance, vec3(spectral_row(uint(BASIS_ROW), x), spectral_row(uint(BASIS_ROW + 1), x), spectral_row(uint(BASIS_ROW + 2), x))) : 1.0);
         vec4 watts[MAP_TARGETS];
-        caustic_values(placement, texel, box, watts, 0, MAP_TARGETS - 1);
+        caustic_values(placement, texel, box, watts, 0, BIN_TARGET > 0 ? 0 : MAP_TARGETS - 1);
+        bool lit = BIN_TARGET == 0 || any(notEqual(watts[0], vec4(0.0)));
+        // Where XYZ are dark, so is every channel.
+#if BIN_TARGET > 0
+        WHEN(lit) {
+            vec4 rest[MAP_TARGETS];
+            caustic_values(placement, texel, box, rest, 1, MAP_TARGETS - 1);
+            for (int t = 1; t < MAP_TARGETS; ++t) watts[t] = rest[t];
+        }
+#endif
         // Coarse spectra make a pure colour duller. What they lack of the map's own XYZ, or have too much, is shared out over the spectrum
         // as they are: where nothing is swept all of it is there again.
         vec4 whole[TARGETS];
         float whole_sum = 0.0, part_sum = 0.0;
         for (int t = 0; t < TARGETS; ++t) whole[t] = vec4(0.0);
-        bool lit = false;
-        for (int t = BIN_TARGET; t < MAP_TARGETS; ++t) lit = lit || any(notEqual(watts[t], vec4(0.0)));
         for (int k = 0; k < BIN_COUNT && lit; ++k) {
             float watt = watts[BIN_TARGET + (k >> 2)][k & 3];
             uint row = uint(BIN_SPECTRUM_ROW + k);

@@ -4,8 +4,17 @@
 #define EYE_TAPS_GLSL
 
 #ifdef SPECTRAL_SWEEP
-// Sweep of the path over the distance ahead, in widths of a pixel: how many looks it needs.
-int taps_of(EyePath path, float distance)
+// Where the look number `tap` of so many begins: each stands for as much of what looks bright, and looks in the midst of it.
+float tap_border(EyePath path, vec2 brightness, float tap, int taps)
+{
+    return tap <= 0.0 ? path.band.x : (tap >= float(taps) ? path.band.z : clamp(quantile(brightness, tap / float(taps)), path.band.x, path.band.z));
+}
+
+// A sweep shorter than this, in widths of a pixel, does not show.
+#define LEAST_SWEEP 0.2
+
+// Sweep of the path over the distance ahead, in widths of a pixel.
+float sweep_pixels(EyePath path, float distance)
 {
     vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1], d_hi = path.end_direction[1];
     float reach = min(distance, 1e4);
@@ -13,9 +22,14 @@ int taps_of(EyePath path, float distance)
     sweep -= dot(sweep, path.direction) * path.direction;
     vec3 side_s = path.dposition[0] + reach * path.ddirection[0], side_t = path.dposition[1] + reach * path.ddirection[1];
     float pixel = sqrt(max(length(cross(side_s, side_t)), 1e-20));
-    float pixels = length(sweep) / pixel;
-    // A sweep that shows at all has two ends.
-    return clamp(int(ceil(pixels * p.taps_per_pixel)), pixels > 0.2 ? 2 : 1, int(p.most_taps));
+    return length(sweep) / pixel;
+}
+
+// Looks that this sweep needs: where it shows at all, one for either half; the fewer, the less of the sample the path is.
+int taps_of(EyePath path, float distance)
+{
+    float pixels = sweep_pixels(path, distance);
+    return clamp(int(min(ceil(pixels * p.taps_per_pixel), float(p.most_taps)) * sqrt(min(path.share, 1.0)) + 0.99), pixels > LEAST_SWEEP ? 2 : 1, int(p.most_taps));
 }
 #endif
 
@@ -67,20 +81,26 @@ void add_lights(EyePath path, float far)
         sweep = vec2(distance(p_lo, p_hi), distance(d_lo, d_hi));
         taps = taps_of(path, far);
     }
+    vec2 brightness = brightness_of(path.band);
 #endif
     // Few rays come near a light: only they look along their sweep.
     bool near = false;
     for (uint i = 0u; i < uint(LIGHT_COUNT); ++i)
         near = near || (lights[i].measure > 0.0 && light_seen(lights[i], path.position, path.direction, far, 2.0 * (width + sweep)) > 0.0);
-    float step_x = (path.band.z - path.band.x) / float(taps);
     for (int tap = 0; tap < taps && near; ++tap) {
         vec3 position = path.position, direction = path.direction;
+        float lo = path.band.x, hi = path.band.z, part = 1.0;
 #ifdef SPECTRAL_SWEEP
-        if (taps > 1) ray_at(path, path.band.x + (float(tap) + 0.5) * step_x, position, direction);
+        if (taps > 1) {
+            lo = tap_border(path, brightness, float(tap), taps);
+            hi = tap_border(path, brightness, float(tap + 1), taps);
+            part = (hi - lo) / (path.band.z - path.band.x);
+            ray_at(path, tap_border(path, brightness, float(tap) + 0.5, taps), position, direction);
+        }
 #endif
-        Stretch stretch = stretch_of(path, path.band.x + float(tap) * step_x, path.band.x + float(tap + 1) * step_x);
+        Stretch stretch = stretch_of(path, lo, hi);
         for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
-            float seen = lights[i].measure > 0.0 ? light_seen(lights[i], position, direction, far, width + sweep / float(taps)) : 0.0;
+            float seen = lights[i].measure > 0.0 ? light_seen(lights[i], position, direction, far, width + sweep * part) : 0.0;
             WHEN(seen > 0.0) add_spectrum(path, stretch, uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), seen);
         }
     }
@@ -89,109 +109,163 @@ void add_lights(EyePath path, float far)
 #endif
 
 
-// A path that has met nothing, or a diffuse surface. Without a sweep that is one look. Of a sweep, both ends look first where they arrive: if it is
-// the facet that the path's own wavelength met, so does all between; else every look finds out for itself.
-void add_end(EyePath path, bool met, Hit hit, uint pixel_key)
+#ifdef SPECTRAL_SWEEP
+// Where the rays of a band arrive on one facet: a parabola with the columns' slope, through both ends.
+struct Trace {
+    vec3 middle;
+    vec3 columns[SPECTRAL_GROUPS];
+    float anchors[SPECTRAL_GROUPS];  // of the groups' variables, at the middle
+    vec3 lo;
+    vec3 hi;
+    vec3 bends[2];                   // of both ends, off the columns
+};
+
+vec3 arrival(vec3 position, vec3 direction, Hit hit, vec3 middle)
+{
+    return position + dot(hit.normal_g, middle - position) / dot(hit.normal_g, direction) * direction;
+}
+
+Trace trace_of(EyePath path, Hit hit)
+{
+    Trace trace;
+    trace.middle = path.position + hit.distance * path.direction;
+    trace.lo = arrival(path.end_position[0], path.end_direction[0], hit, trace.middle);
+    trace.hi = arrival(path.end_position[1], path.end_direction[1], hit, trace.middle);
+    trace.bends[0] = trace.lo - trace.middle;
+    trace.bends[1] = trace.hi - trace.middle;
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+        trace.columns[g] = transfer_column(path.dposition[SPATIAL + g], path.ddirection[SPATIAL + g], path.direction, hit.normal_g, hit.distance);
+        trace.anchors[g] = spectral_row(uint(VARIABLE_ROW) + g, path.band.y);
+        trace.bends[0] -= path.end_step[g].x * trace.columns[g];
+        trace.bends[1] -= path.end_step[g].y * trace.columns[g];
+    }
+    return trace;
+}
+
+vec3 arrival_at(EyePath path, Trace trace, float x)
+{
+    bool below = x < path.band.y;
+    float reach = (x - path.band.y) / max(abs((below ? path.band.x : path.band.z) - path.band.y), 1e-9);
+    vec3 at = trace.middle + reach * reach * (below ? trace.bends[0] : trace.bends[1]);
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) at += (spectral_row(uint(VARIABLE_ROW) + g, x) - trace.anchors[g]) * trace.columns[g];
+    return at;
+}
+#endif
+
+// A path that has met nothing, or a diffuse surface. Without a sweep that is one look. Where all of a sweep ends on the facet that the path's own
+// wavelength met (`alike`), its looks are of that; else every look finds out for itself.
+void add_end(EyePath path, bool met, Hit hit, bool alike, uint pixel_key)
 {
     int taps = 1;
 #ifdef SPECTRAL_SWEEP
     if (path.narrowed) taps = taps_of(path, met ? hit.distance : FAR_DISTANCE);
+#ifndef HAS_ENVIRONMENT_MAP
+    // The same all round.
+    if (alike && !met) taps = 1;
 #endif
-    vec3 dp = vec3(0.0), dd = vec3(0.0);
-    float step_x = (path.band.z - path.band.x) / float(taps), direct_from = path.band.x;
-    bool alike = true;
-    int first = 0, direct_every = 1;
-    uint known = 0u, hidden = 0u, hidden_lo = 0u;
-#ifdef SPECTRAL_SWEEP
-    if (taps > 1) {
-        vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1], d_hi = path.end_direction[1];
-        dp = (p_hi - p_lo) / float(taps);
-        dd = (d_hi - d_lo) / float(taps);
+    vec2 brightness = brightness_of(path.band);
+    float per_x = 1.0 / (path.band.z - path.band.x), hi = path.band.x;
+    vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1], d_hi = path.end_direction[1];
+#else
+    float hi = path.band.x;
+#endif
 #ifdef HAS_RECEIVERS
-        first = -2;
+    Seen seen;
+    Triangle facet;
+#ifdef HAS_TEXTURES
+    uint texture = NONE;
+    Paint paint;
+#endif
+    WHEN(met) {
+        facet = triangle_at(hit.primitive);
+#ifdef LAYER_BEAUTY
+        vec3 at = surface_point(hit, path.position, path.direction);
+#else
+        vec3 at = path.position + hit.distance * path.direction;
+#endif
+        seen = seen_on(path, hit, facet, at, path.direction);
+#ifdef HAS_TEXTURES
+        texture = object_at(hit.object).texture;
+        WHEN(texture != NONE) paint = paint_of(texture, facet.source, facet);
 #endif
     }
-#ifndef HAS_ENVIRONMENT_MAP
-#ifndef HAS_RECEIVERS
-    // The same all round.
-    taps = 1;
-    step_x = path.band.z - path.band.x;
-#endif
-#endif
-#endif
-    for (int i = first; i < taps; ++i) {
-        float lo = path.band.x + float(max(i, 0)) * step_x, hi = i + 1 == taps ? path.band.z : lo + step_x;
-        vec3 position = path.position, direction = path.direction;
-        Hit found = hit;
-        bool ends = met, dark = false;
+    Steady steady = no_steady_lights();
 #ifdef SPECTRAL_SWEEP
-        if (taps > 1) ray_at(path, i == -2 ? path.band.x : (i == -1 ? path.band.z : 0.5 * (lo + hi)), position, direction);
+    Trace trace;
+    bool traced = taps > 1 && alike && met;
+    WHEN(traced) {
+        trace = trace_of(path, hit);
+#ifdef LAYER_BEAUTY
+        steady = steady_lights(seen, trace.lo, trace.hi, pixel_key);
+#endif
+    }
+#endif
+#endif
+    for (int i = 0; i < taps; ++i) {
+        float lo = hi, part = 1.0;
+        vec3 direction = path.direction;
+        bool ends = met;
+        hi = path.band.z;
+#ifdef SPECTRAL_SWEEP
+        vec3 position = path.position;
+        float x = path.band.y;
+        if (taps > 1) {
+            x = tap_border(path, brightness, float(i) + 0.5, taps);
+            hi = tap_border(path, brightness, float(i + 1), taps);
+            part = (hi - lo) * per_x;
+        }
 #ifdef HAS_RECEIVERS
-        WHEN(i < 0 || !alike) {
-            ends = intersect_closest(position, direction, FAR_DISTANCE, path.origin, found);
-            uint kind = ends ? object_at(found.object).kind : NONE;
-            alike = alike && ends == met && (!met || found.primitive == hit.primitive);
-            dark = kind == KIND_BLACK;
-            if (kind == KIND_MIRROR || kind == KIND_DIELECTRIC) {
-                // This colour goes on where the middle one ended: it is given what that one sees.
-                ends = met;
-                found = hit;
-            }
+        WHEN(traced) {
+            seen.position = arrival_at(path, trace, x);
+            seen.dposition[2] = part * (trace.hi - trace.lo);
         }
 #endif
-#endif
+        WHEN(taps > 1 && !(alike && met)) {
+            ray_at(path, x, position, direction);
 #ifdef HAS_RECEIVERS
-        WHEN(ends && !dark) {
-            Triangle facet = triangle_at(found.primitive);
-            vec3 at;
-            if (taps > 1) {
-                if (found.primitive == hit.primitive) found.distance = dot(hit.normal_g, facet.vertex - position) / dot(hit.normal_g, direction);
-                at = position + found.distance * direction;
-            } else {
-#ifdef LAYER_BEAUTY
-                at = surface_point(found, position, direction);
-#else
-                at = position + found.distance * direction;
-#endif
-            }
-            Seen seen = seen_on(path, found, facet, at, direction);
-            vec3 sweep = dp + found.distance * dd;
-            seen.dposition[2] = sweep - (dot(sweep, found.normal_g) / dot(direction, found.normal_g)) * direction;
-            Stretch stretch = stretch_of(path, lo, hi);
-            WHEN(i >= 0) {
+            WHEN(!alike) {
+                Hit found;
+                ends = intersect_closest(position, direction, FAR_DISTANCE, path.origin, found);
+                uint kind = ends ? object_at(found.object).kind : NONE;
+                if (kind == KIND_MIRROR || kind == KIND_DIELECTRIC) {
+                    // This colour goes on where the middle one ended: it is given what that one sees.
+                    ends = met;
+                    found = hit;
+                    if (met) found.distance = dot(hit.normal_g, path.position + hit.distance * path.direction - position) / dot(hit.normal_g, direction);
+                }
+                WHEN(ends) {
+                    facet = triangle_at(found.primitive);
+                    seen = seen_on(path, found, facet, position + found.distance * direction, direction);
+                    vec3 sweep = part * (p_hi - p_lo + found.distance * (d_hi - d_lo));
+                    seen.dposition[2] = sweep - (dot(sweep, found.normal_g) / dot(direction, found.normal_g)) * direction;
 #ifdef HAS_TEXTURES
-                uint texture = object_at(seen.object).texture;
-                WHEN(texture != NONE) apply_texture(seen, facet, texture);
+                    texture = object_at(found.object).texture;
+                    WHEN(texture != NONE) paint = paint_of(texture, facet.source, facet);
 #endif
-                add_caustic(path, seen, stretch);
-            }
-#ifdef LAYER_BEAUTY
-            // Direct light on a plain surface changes little along a sweep: a look stands for several.
-            bool due = i < 0 || (i + 1) % direct_every == 0 || i + 1 == taps;
-            WHEN(due) {
-                if (direct_every > 1) stretch = stretch_of(path, direct_from, hi);
-                add_direct(path, seen, stretch, pixel_key, i < 0 ? 0u : known, hidden, i < 0);
-                direct_from = i < 0 ? direct_from : hi;
+                }
             }
 #endif
         }
 #endif
+        Stretch stretch = stretch_of(path, lo, hi);
+#ifdef HAS_RECEIVERS
+        WHEN(ends && object_at(seen.object).kind == KIND_DIFFUSE) {
+#ifdef HAS_TEXTURES
+            WHEN(texture != NONE) seen.reflectance = object_colours[seen.object].rgb * painted(paint, seen);
+#endif
+            add_caustic(path, seen, stretch);
 #ifdef LAYER_BEAUTY
-        WHEN(!ends && !dark && i >= 0) add_sky(path, stretch_of(path, lo, hi), direction, dd);
+            add_direct(path, seen, stretch, pixel_key, steady);
+#endif
+        }
+#endif
+#ifdef LAYER_BEAUTY
 #ifdef SPECTRAL_SWEEP
-        if (i == -2) hidden_lo = hidden;
-        if (i == -1) {
-            known = alike && met ? ~(hidden ^ hidden_lo) : 0u;
-            if (known == 0xffffffffu && object_at(hit.object).texture == NONE) direct_every = max(1, taps / 3);
-#ifndef HAS_ENVIRONMENT_MAP
-            // The same all round.
-            if (alike && !met) {
-                taps = 1;
-                step_x = path.band.z - path.band.x;
-            }
+        vec3 turn_of_look = part * (d_hi - d_lo);
+#else
+        vec3 turn_of_look = vec3(0.0);
 #endif
-        }
-#endif
+        WHEN(!ends) add_sky(path, stretch, direction, turn_of_look);
 #endif
     }
 }

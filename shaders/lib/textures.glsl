@@ -22,8 +22,11 @@ layout(binding = UNIT_PICTURES) uniform sampler2D picture_texels;
 const float MAX_TAPS = 8.0;
 // A patch up to this much longer than wide is one look-up, and so much of a longer one falls to each.
 const float ROUND_RATIO = 1.25;
-// Interpolation between texels widens what a texel averages, so texels may be this much smaller than the patch.
-const float LEVEL_BIAS = -0.35;
+// Interpolation between texels widens what a texel averages, so texels are this much smaller than the patch: the second moment of what is
+// averaged is then the patch's own.
+const float LEVEL_BIAS = -0.8;
+// Texels of the sky are as wide as high only near its horizon; its patches are taken as this much wider, so that none aliases near a pole.
+const float SKY_WIDER = 1.366;
 // No column is longer than this many texels (or radians): squares must stay finite.
 const float LONGEST = 1e8;
 
@@ -172,7 +175,7 @@ vec3 environment_radiance(vec3 direction, vec3 ddirection_ds, vec3 ddirection_dt
     float longer, shorter, level, taps;
     vec2 mixing;
     patch_axes(dot(side_s, side_s), dot(side_s, side_t), dot(side_t, side_t), longer, shorter, mixing);
-    filter_plan(longer * texels_per_rad, shorter * texels_per_rad, level, taps);
+    filter_plan(SKY_WIDER * longer * texels_per_rad, SKY_WIDER * shorter * texels_per_rad, level, taps);
     vec3 along = (mixing.x * side_s + mixing.y * side_t) / taps;
     direction -= 0.5 * (taps - 1.0) * along;
 

@@ -45,6 +45,8 @@ width = 6.0
 height = 6.0
 material = {{ kind = "diffuse", colour = 0.8 }}
 """
+LIGHT_ALONE = "--layer map:floor"
+"""Where only the light's balance is asked for: no camera's picture, and so none of its programs."""
 SLAB = '[[objects]]\nshape = "slab"\nwidth = 1.0\nheight = 1.0\nthickness = 1.0\nposition = [0.0, 0.0, 2.5]\nmaterial = {{ n_d = 1.5{} }}\n'
 PRISM = '[[objects]]\nname = "prism"\nshape = "prism"\nglass = "N-SF11"\nrests_at_z = 0.01\n'
 
@@ -227,7 +229,7 @@ def test_water_in_a_glass(render: Render) -> None:
     hollow = '[[objects]]\nname = "air"\nshape = "box"\nsize = [0.8, 0.8, 0.6]\nposition = [0, 0, 1]\nmaterial = { n_d = 1.0, priority = 3 }\n'
     water = '[[objects]]\nname = "water"\nshape = "box"\nsize = [0.8, 0.8, 0.6]\nposition = [0, 0, 1]\nmaterial = { n_d = 1.333, priority = 3 }\n'
     for inner, index in ((hollow, 1.0), (water, 1.333)):
-        render(beam(outer + inner), "--stats")
+        render(beam(outer + inner), f"{LIGHT_ALONE} --stats")
         assert share(render, "deposited") == pytest.approx(stack_transmittance(1.0, 1.6, index, 1.6, 1.0), abs=0.005)
 
 
@@ -235,7 +237,7 @@ def test_overlap_belongs_to_the_higher_priority(render: Render) -> None:
     lower = '[[objects]]\nname = "a"\nshape = "slab"\nthickness = 0.6\nposition = [0, 0, 0.8]\nmaterial = {{ n_d = 1.5, priority = {} }}\n'
     upper = '[[objects]]\nname = "b"\nshape = "slab"\nthickness = 0.6\nposition = [0, 0, 1.2]\nmaterial = {{ n_d = 2.4, priority = {} }}\n'
     for first, second in ((1, 2), (2, 1), (0, 0)):  # one interface between the two, wherever it lies
-        render(beam(lower.format(first) + upper.format(second)), "--stats")
+        render(beam(lower.format(first) + upper.format(second)), f"{LIGHT_ALONE} --stats")
         assert share(render, "deposited") == pytest.approx(stack_transmittance(1.0, 2.4, 1.5, 1.0), abs=0.005)
 
 
@@ -244,7 +246,7 @@ def test_a_cemented_doublet_has_three_surfaces(render: Render) -> None:
         '[[objects]]\nshape = "doublet"\npart = "{}"\nradius1 = 3.0\nradius2 = -3.0\nradius3 = -30.0\nthickness1 = 0.2\n'
         'thickness2 = 0.1\ndiameter = 0.9\ntriangles = 8000\nglass = "{}"\nposition = [0, 0, 1]\n'
     )
-    render(beam(part.format("front", "N-BK7") + part.format("back", "F2")), "--stats")
+    render(beam(part.format("front", "N-BK7") + part.format("back", "F2")), f"{LIGHT_ALONE} --stats")
     assert share(render, "deposited") == pytest.approx(stack_transmittance(1.0, 1.5168, 1.62, 1.0), rel=0.01)
     assert share(render, "lost_numeric") < 1e-4
 

@@ -181,7 +181,7 @@ def test_a_broken_shader_keeps_the_last_good_programs(gl, display, monkeypatch, 
     import shutil
 
     from app import paths
-    from app.gpu.shader import ShaderError
+    from app.gpu.shader import ShaderError, drop_programs
 
     picture = flat(gl, 0.25)
     before = codes(display.run(picture, Settings(), 0.0, (40, 10))).copy()
@@ -189,10 +189,12 @@ def test_a_broken_shader_keeps_the_last_good_programs(gl, display, monkeypatch, 
     source = tmp_path / "shaders" / "display.comp"
     monkeypatch.setattr(paths, "shaders_dir", lambda: tmp_path / "shaders")
     source.write_text(source.read_text().replace("void main()", "void main() oops"))
+    drop_programs(gl.ctx)  # as the viewer does before; tests share programs too
     with pytest.raises(ShaderError, match=r"display\.comp:\d+"):
         display.reload()
     assert (codes(display.run(picture, Settings(), 0.0, (40, 10))) == before).all()
     source.write_text(source.read_text().replace("void main() oops", "void main()").replace("vec4(colour, 1.0)", "vec4(0.0, colour.gb, 1.0)"))
+    drop_programs(gl.ctx)
     display.reload()
     assert codes(display.run(picture, Settings(), 0.0, (40, 10)))[..., 0].max() == 0
     picture.release()

@@ -18,6 +18,7 @@ from app.model.scene import Camera, Diffuse, Light, Mirror, Scene, SceneObject
 from app.model.settings import RenderSettings
 from app.model.texture import Environment
 from app.passes.eye import EyePass
+from app.passes.spectrum_choice import Spectrum
 from app.truth.gpu_paths import glass
 from tests.gpu.eye_rig import WHITE, at, quad
 from tests.gpu.test_invariance import moved
@@ -47,7 +48,7 @@ def scene() -> Scene:
 def begun(gl, question: Scene) -> EyePass:
     features = Features.of(question, RenderSettings(any_view=True))
     eye = EyePass(gl, SceneBuffers(gl.ctx, question, features, spectral_axis(question, features)))
-    eye.bands = BANDS
+    eye.spectrum = Spectrum(BANDS)
     return eye
 
 

@@ -19,6 +19,7 @@ from app.model.primitives_lens import lens
 from app.model.scene import Camera, Diffuse, Light, SceneObject
 from app.model.spectrum import illuminant
 from app.passes.eye import TAPS_PER_PIXEL
+from app.passes.spectrum_choice import Spectrum
 from app.truth import eye_answers, glasses
 from app.truth.glasses import C_NM, D_NM, F_NM
 from app.truth.gpu_paths import extruded, glass
@@ -47,7 +48,7 @@ def wavelengths(edges_nm: tuple[float, ...]) -> np.ndarray:
 def seen_edges(gl: Context, objects: list[SceneObject], light: Light, camera: Camera, edges_nm: tuple[float, ...], bands: int) -> np.ndarray:
     """Height of the edge between white above and black below in each bin, in half pictures: +1 is the upper border."""
     eye = eye_pass(gl, objects, [light], camera=camera, channels=MapChannels(edges_nm))
-    eye.bands, eye.most_taps = bands, MANY_TAPS
+    eye.spectrum, eye.most_taps = Spectrum(bands), MANY_TAPS
     assert eye.run(camera, *SIZE, 8)
     rows = eye.read_spectral().astype(float).mean(axis=1)
     # llvmpipe ends an invocation's loops after 65,535 rounds, which so many looks may come near: about a sample in a thousand, counted as depth.

@@ -17,6 +17,7 @@ from app.model.scene import Camera, Dielectric, Diffuse, Light, Scene, SceneObje
 from app.model.settings import RenderSettings
 from app.model.spectrum import illuminant
 from app.model.texture import Environment
+from app.passes.spectrum_choice import Spectrum
 from app.renderer import render as render_scene
 from app.truth.gpu_paths import extruded, glass
 from tests.gpu.eye_rig import at, eye_pass, horizontal, released
@@ -43,7 +44,7 @@ def seen(gl, method: str, samples: int, bands: int | None = None, seed: int = 1,
     prism = SceneObject("prism", UPRIGHT, glass("N-SF11"))
     eye = eye_pass(gl, [prism], camera=BEFORE, environment=Environment(stripes()), method=method, channels=channels)
     if bands is not None:
-        eye.bands = bands
+        eye.spectrum = Spectrum(bands)
     eye.run(BEFORE, *SIZE, samples, seed=seed)
     rgb = eye.read_rgb().astype(float)
     released(eye)
@@ -155,7 +156,7 @@ def test_light_and_eye_half_agree_on_a_lamp_behind_a_slab(gl) -> None:
         patch = maps[row - side // 20 : row + side // 20, column - side // 20 : column + side // 20].astype(float).mean(axis=(0, 1))
         camera = Camera((x, y, 1e-3), (0.12, 0.0, 3.0), up=(0, 1, 0), vertical_fov_deg=24.0)
         eye = eye_pass(gl, [slab, paper], [lamp], camera=camera, channels=MapChannels(EDGES_NM), split_threshold=1e-4)
-        eye.bands = 8
+        eye.spectrum = Spectrum(8)
         eye.run(camera, 48, 48, 32)
         radiance = eye.read_spectral().astype(float)
         released(eye)

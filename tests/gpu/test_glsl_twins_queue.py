@@ -53,7 +53,7 @@ class Queue:
 
     def release(self) -> None:
         for owned in (*self.programs.values(), *self.buffers.values()):
-            owned.release()
+            shader.release(owned)
 
 
 def random_outcomes(count: int, seed: int) -> np.ndarray:

@@ -95,7 +95,7 @@ def run(gl, declarations: str, body: str, known: tuple[Struct, ...], storage: di
     gl.ctx.finish()
     results = {binding: buffer.read() for binding, buffer in held.items()}
     for owned in (kernel, *held.values(), *([block] if block is not None else [])):
-        owned.release()
+        shader.release(owned)
     return results
 
 

@@ -40,12 +40,12 @@ def patches(ratio: float, width_texels: float, rng: np.random.Generator) -> tupl
     return as_f32(along), as_f32(across)
 
 
-@pytest.mark.parametrize(("make", "limit"), [(noise, 0.25), (natural, 0.14)], ids=["noise", "natural"])
+@pytest.mark.parametrize(("make", "limit"), [(noise, 0.42), (natural, 0.18)], ids=["noise", "natural"])
 @pytest.mark.parametrize("ratio", [1.0, 2.0, 4.0, 8.0])
 def test_a_patch_shows_its_mean(gl, make, limit: float, ratio: float) -> None:
     """A look-up averages with a kernel about as wide as the patch but of another shape, and one that hangs on where texels lie. At white
-    noise that leaves 0.10 to 0.24 standard deviations of the picture (the means themselves spread by 0.46 to 0.16), at a natural
-    picture 0.08 to 0.13 (0.87 to 0.70); `ratio` look-ups side by side err apart, so that their mean errs by 1/√ratio of it."""
+    noise that leaves up to 0.38 standard deviations of the picture (the means themselves spread by 0.46 to 0.16), at a natural
+    picture up to 0.16 (0.87 to 0.70): as sharp as the patch, at the price of some grain, which a pixel's samples average out; `ratio` look-ups side by side err apart, so that their mean errs by 1/√ratio of it."""
     rng = np.random.default_rng(int(ratio))
     rgb = make()
     store = store_of(gl, scene_of(Texture(rgb)))

@@ -1,0 +1,110 @@
+"""How the camera's pass samples the spectrum of a picture: in how many bands, or wavelength by wavelength.
+
+A pilot looks at a coarse grid of the picture's own pixels and weighs what each way leaves: chance, which falls with the
+samples, and what one band's middle decides for all of it, which does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+import numpy as np
+
+LEAST_SAMPLES = 8
+"""With fewer, a pilot would cost more than it brings: one band."""
+MOST_BANDS = 32
+SAMPLES_A_BAND = 8
+"""That every band must keep, to smooth an outline."""
+_COLUMNS = 50
+"""Of a pilot's picture."""
+SINGLE_SPEED = 4
+"""Samples of one wavelength that take about as long as one of a band: three to eight, as the scene has it."""
+_SURE = 2.0
+"""Standard errors that a bias must be known to be there by."""
+_MOST = 10.0
+"""Most that one pixel counts, as a squared relative error: a few bright ones must not speak for the picture."""
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """How samples see the spectrum."""
+
+    bands: int = 1
+    """Stretches the spectrum is cut into; a sample is of one of them, and a picture is whole after that many."""
+    single: bool = False
+    """Samples are of one random wavelength each, without columns."""
+
+    @property
+    def words(self) -> str:
+        """For a summary."""
+        if self.single:
+            return "of one wavelength each"
+        return "of the whole spectrum" if self.bands == 1 else f"in {self.bands} bands"
+
+    def samples(self, budget: int) -> int:
+        """Samples a pixel that a budget of so many of one band buys, whole turns of the bands: as many or a few more, and more of single wavelengths."""
+        return SINGLE_SPEED * budget if self.single else -(-budget // self.bands) * self.bands
+
+
+@dataclass(frozen=True)
+class Look:
+    """One picture that the pilot asks for."""
+
+    spectrum: Spectrum
+    seed: int = 1
+    place: float = 0.5
+    """In each pixel, across and down."""
+
+
+Looks = Generator[Look, np.ndarray, Spectrum]
+
+
+def choosing_spectrum(samples: int, may_be_single: bool) -> Looks:
+    """Yields pictures it wants, is sent them (H, W, C), and returns what is best for `samples` samples a pixel."""
+    chosen = Spectrum()
+    if samples < LEAST_SAMPLES:
+        return chosen
+    coarse = (yield Look(chosen, 1)), (yield Look(chosen, 2))
+    moved = yield Look(chosen, 3, place=0.85)
+    variance = 0.5 * difference(coarse[0], moved)
+    # Twice as many bands, as long as that changes more than the noise that remains anyway.
+    while True:
+        finer = Spectrum(2 * chosen.bands)
+        pictures = (yield Look(finer, 4)), (yield Look(finer, 5))
+        bias = sure_bias(coarse, pictures)
+        if bias <= variance / samples or finer.bands > MOST_BANDS or finer.bands * SAMPLES_A_BAND > samples:
+            break
+        chosen, coarse = finer, pictures
+    if may_be_single and bias > variance / samples:
+        alone = variance + difference(coarse[0], (yield Look(Spectrum(single=True))))
+        if alone / (SINGLE_SPEED * samples) < variance / samples + bias:
+            return Spectrum(single=True)
+    return chosen
+
+
+def difference(a: np.ndarray, b: np.ndarray) -> float:
+    """Mean squared relative difference of two pictures (H, W, C) of equal standing, chance included."""
+    return float(np.minimum(_relative(a - b, a - b, (a, b)), _MOST).mean())
+
+
+def sure_bias(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> float:
+    """Squared relative difference of what two ways of sampling expect, from two independent pictures (H, W, C) each; chance cancels in the
+    product of both differences. Less what it may be by accident, and never below 0."""
+    product = np.clip(_relative(a[0] - b[0], a[1] - b[1], (*a, *b)), -_MOST, _MOST)
+    error = product.std() / np.sqrt(product.size)
+    return max(float(product.mean() - _SURE * error), 0.0)
+
+
+def grid_of(width: int, height: int) -> tuple[int, int]:
+    """Columns and rows of the pilot's pictures. llvmpipe compiles a program anew for sides that are powers of two."""
+    columns = min(width, _COLUMNS)
+    rows = max(1, round(columns * height / width))
+    return columns, rows + (rows & (rows - 1) == 0)
+
+
+def _relative(first: np.ndarray, second: np.ndarray, pictures: tuple[np.ndarray, ...]) -> np.ndarray:
+    """Product of two differences (H, W, C) over the square of the pixel, (H, W); a tenth of the mean counts as dark."""
+    size = sum(np.abs(picture).sum(axis=-1) for picture in pictures) / len(pictures)
+    floor = 0.1 * np.mean(size) + 1e-30
+    return (first * second).sum(axis=-1) * first.shape[-1] / (size**2 + floor**2)
