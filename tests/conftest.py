@@ -1,11 +1,39 @@
-"""Shared fixtures: strict floating point everywhere, and one headless OpenGL context."""
+"""Shared fixtures: strict floating point everywhere, and one headless OpenGL context; how many processes share the tests."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
+
+PROCESS_BYTES = 3 << 30
+"""Memory that one process of the tests may come to need, mostly for compiled programs that are kept (1.7 GB were seen)."""
+MOST_PROCESSES = 4
+"""More would wait for the longest files, and crowd a graphics card that all share."""
+
+
+def usable_cores() -> int:
+    """Cores this process may run on."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+if "PYTEST_XDIST_WORKER_COUNT" in os.environ:
+    # A software renderer takes a thread for every core, and every process would. Set before the driver is loaded.
+    os.environ.setdefault("LP_NUM_THREADS", str(max(usable_cores() // int(os.environ["PYTEST_XDIST_WORKER_COUNT"]), 1)))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """One process a core, as memory allows: compiling and Python take one thread. None (0) where there is nothing to share out."""
+    files = {argument.split("::")[0] for argument in config.args}
+    if len(files) == 1 and Path(*files).is_file():
+        return 0
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    workers = min(usable_cores(), memory // PROCESS_BYTES, MOST_PROCESSES)
+    return workers if workers > 1 else 0
 
 
 @pytest.fixture(autouse=True)
@@ -17,11 +45,18 @@ def strict_floating_point() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def gl():
-    """The session's OpenGL 4.3 context (`app.gpu.context.Context`); `gl.ctx` is moderngl's."""
+    """The session's OpenGL 4.3 context (`app.gpu.context.Context`); `gl.ctx` is moderngl's.
+
+    Tests share compiled programs, as a viewer's edits and a stress run's cases do: most of what they draw are variants of
+    a few scenes, and a software renderer compiles longer than it draws.
+    """
+    from app.gpu import shader
     from app.gpu.context import create_context
 
     context = create_context()
+    shader.keep_programs(context.ctx)
     yield context
+    shader.forget_programs(context.ctx)
     context.release()
 
 

@@ -102,12 +102,12 @@ def test_a_moved_checkout_gets_a_new_environment(machine: Machine, tmp_path: Pat
 
 @pytest.mark.parametrize("script", ["test", ".ci/run"])
 def test_tests_pass_their_arguments_on(machine: Machine, script: str) -> None:
-    assert machine.call(script, "-k", "two words").stdout == "tests: -k two words\n"
+    assert machine.call(script, "-k", "two words").stdout == "tests: -n auto --dist loadfile --no-loadscope-reorder -k two words\n"
     assert f"--editable {machine.root}[test]" in machine.log.read_text()
 
 
 def test_all_takes_the_marks_away(machine: Machine) -> None:
-    assert machine.call("test", "--all", "-x").stdout == "tests: -m  -x\n"
+    assert machine.call("test", "--all", "-x").stdout == "tests: -n auto --dist loadfile --no-loadscope-reorder -m  -x\n"
 
 
 def test_no_python(machine: Machine) -> None:
@@ -150,4 +150,4 @@ def test_without_opengl_the_program_runs_and_the_tests_do_not(machine: Machine) 
     done = machine.call("test", NO_OPENGL="1")
     assert (done.returncode, done.stdout) == (2, "")
     assert "run 'sudo apt-get install libegl1 libgl1 libgl1-mesa-dri'" in done.stderr
-    assert machine.call("test").stdout == "tests:\n"  # once it is there, it is found
+    assert machine.call("test").stdout == "tests: -n auto --dist loadfile --no-loadscope-reorder\n"  # once it is there, it is found
