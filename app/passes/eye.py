@@ -480,13 +480,13 @@ class EyePass:
 
 
 def _pixel_lattice(samples: int, offset: int) -> np.ndarray:
-    """(samples, 2) places in a pixel: ordered as in a golden-ratio lattice, shifted from launch to launch.
+    """(samples, 2) places in a pixel: ordered as in a golden-ratio lattice, shifted as a whole from launch to launch.
 
     Every row and every column of the pixel cut into `samples` holds one sample, so that edges of any slant are filtered well,
     and the first launch's lie about the pixel's middle, so that the picture does not move.
     """
     golden = 0.6180339887498949
-    shift = (0.5 + offset * np.array([0.7548776662466927, 0.5698402909980532])) % 1.0
+    shift = offset * np.array([0.7548776662466927, 0.5698402909980532])
     index = np.arange(samples)
     rank = np.argsort(np.argsort((0.5 + index * golden) % 1.0))
-    return (np.column_stack([index, rank]) + shift) / samples
+    return ((np.column_stack([index, rank]) + 0.5) / samples + shift) % 1.0
