@@ -53,7 +53,7 @@ def _setting(scene: SceneResult) -> str:
         own = scene.reference
         parts.append(f"reference: {own.method}, {text.count(own.photons)} {half.unit} in {own.seconds:.0f} s")
         if own.caustic_photons:
-            parts.append(f"its caustic: {text.count(own.caustic_photons)} photons, whose noise adds about {text.number(own.caustic_relmse)}")
+            parts.append(f"its caustic: {text.count(own.caustic_photons)} photons, whose noise is about {text.number(own.caustic_relmse)} of its relMSE")
         parts.append(f"its own relMSE {text.number(own.relmse)}, its key {own.key[:12]}")
     return "; ".join(parts) + "."
 

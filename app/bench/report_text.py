@@ -80,11 +80,6 @@ def warnings_of(scene: SceneResult) -> list[str]:
         )
     elif scene.reference_too_coarse:
         told.append("The reference's own error is above a tenth of the smallest error reported.")
-    if scene.reference is not None and least > 0 and scene.reference.caustic_relmse > REFERENCE_SHARE * least:
-        told.append(
-            f"The caustic that the reference looks up has a noise of its own that adds about {number(scene.reference.caustic_relmse)} to the picture's relMSE, "
-            "above a tenth of the smallest error reported. It is not taken off: where the caustic is seen it counts as bias of every method."
-        )
     if any(p.relmse <= 0 for c in scene.curves for p in c.points):
         told.append("Where a debiased error is zero or below, the picture cannot be told from the reference; the plots show a hollow triangle on the floor.")
     busy = [curve.method for curve in scene.curves if _times_fall(curve)]

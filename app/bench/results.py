@@ -95,7 +95,7 @@ class ReferenceInfo(msgspec.Struct):
     caustic_photons: int = 0
     """Photons of the caustic that the eye's reference looks up; 0: there is none in it."""
     caustic_relmse: float = 0.0
-    """What the caustic's noise adds to the picture's relMSE, about; it is not part of `relmse`."""
+    """What the caustic's noise adds to the picture's relMSE, about: a part of `relmse`."""
 
 
 class Claim(msgspec.Struct):

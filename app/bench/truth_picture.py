@@ -19,8 +19,9 @@ METHOD = "photon tracing in float64: random wavelength, one photon one pixel, no
 EYE_METHOD = "camera paths in float64: one random wavelength each, Fresnel by chance, textures looked up at points, no column, no map and no shader code shared"
 CAUSTIC_RELMSE = 3e-5
 """What the caustic's noise may add to the picture's error …"""
-CAUSTIC_PHOTONS = 1 << 29
-"""… unless it takes more than these: 25 minutes on two cores, once a scene and size."""
+CAUSTIC_PHOTONS = 1 << 27
+"""… unless it takes more than these: ten minutes on two cores, once a scene and size. What noise is left is known pixel by pixel, and
+subtracted as the camera paths' is."""
 
 
 def make_truth(scene: Scene, width: int, height: int, seconds: float, progress: Progress) -> tuple[Truth, ReferenceInfo]:

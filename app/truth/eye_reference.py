@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 EYE_REFERENCE_VERSION = 1
 """Grows whenever the same scene would give another picture."""
-CAUSTIC_VERSION = 2
+CAUSTIC_VERSION = 3
 """Grows whenever the same plan would give another caustic."""
 _SEED = 1
 _CAUSTIC_SHARE = 0.5
@@ -101,7 +101,7 @@ def cached_eye_reference(
     stored = load_kept(path, shapes if caustic is None else shapes | {"caustic_photons": (), "caustic_relmse": ()})
     looked_up = None if stored is None or caustic is None else (int(stored["caustic_photons"]), float(stored["caustic_relmse"]))
     if stored is not None:
-        picture = summed_eye(stored["sums"], stored["units"], stored["tallies"], float(stored["seconds"]))
+        picture = summed_eye(stored["sums"], stored["units"], stored["tallies"], float(stored["seconds"]), caustic is not None)
         if (samples is not None and picture.samples >= samples) or (target_relmse is not None and picture.is_within(target_relmse)):
             return _with_caustic(picture, looked_up)
     progress(0.0, "preparing")

@@ -33,7 +33,7 @@ class EyePicture:
     xyz: np.ndarray
     """float64 (H, W, 3): CIE XYZ, the mean over each pixel; Y in lm/(sr unit²)."""
     variance: np.ndarray
-    """float64 (H, W, 3): of `xyz` as an estimate, from PARTS independent pictures; the caustic's own error is not in it."""
+    """float64 (H, W, 3): of `xyz` as an estimate, from PARTS independent pictures, or two where the caustic's halves are told apart."""
     samples: int
     """Of each pixel."""
     seconds: float
@@ -43,7 +43,7 @@ class EyePicture:
     caustic_photons: int = 0
     """Of the caustic that was looked up, where `cached_eye_reference` made it."""
     caustic_relmse: float = 0.0
-    """What its noise adds to the picture's own error, about."""
+    """What its noise adds to the picture's own error, about: a part of `variance`."""
 
     def rgb(self) -> np.ndarray:
         """Linear Rec.709, float64 (H, W, 3)."""
@@ -66,7 +66,9 @@ class EyeRun:
     def __init__(
         self, scene: Scene, width: int, height: int, max_depth: int = MAX_DEPTH, seed: int = 1, caustic: SpectralCaustic | None = None
     ) -> None:
-        """Raises UserError where numba is missing or solids nest beyond reach."""
+        """Even and odd parts look up one half each of the caustic's photons, so that the picture's variance holds the caustic's too.
+
+        Raises UserError where numba is missing or solids nest beyond reach."""
         try:
             from app.truth import (
                 eye_kernel,
@@ -87,7 +89,7 @@ class EyeRun:
         self._start = eye_start.camera_start(scene, photons)
         self._lights = eye_lights.eye_lights(scene.lights, centre)
         self._pictures = eye_scene.pictures(scene, photons, centre)
-        self._tables = caustic.tables if caustic else spectral_caustic.no_caustic(scene)
+        self._tables = [caustic.half(number).tables for number in range(2)] if caustic else [spectral_caustic.no_caustic(scene)]
         self._spectra = eye_scene.spectra(scene, caustic.plan.bins if caustic else 1)
         self._sequences = [photon_kernel.scrambled(seed, part) for part in range(PARTS)]
         self._max_depth = max_depth
@@ -126,25 +128,29 @@ class EyeRun:
 
     def picture(self) -> EyePicture:
         """What has been gathered; black without variance before the first round."""
-        return summed_eye(self.sums, self.units, self.tallies, self.seconds)
+        return summed_eye(self.sums, self.units, self.tallies, self.seconds, len(self._tables) > 1)
 
     def _trace_part(self, part: int, count: int) -> None:
         self._kernel.trace_eye(
-            self._scene, self._camera, self._lights, self._spectra, self._pictures, self._tables, self._start,
+            self._scene, self._camera, self._lights, self._spectra, self._pictures, self._tables[part % len(self._tables)], self._start,
             self._sequences[part], int(self.units[part]), count, self._max_depth, self.sums[part], self.tallies[part], self._scratch(),
         )  # fmt: skip
         self.units[part] += count
 
 
-def summed_eye(sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, seconds: float) -> EyePicture:
-    """The picture from the sums (PARTS, H, W, 3) and tallies (PARTS, TALLY_SIZE) of parts with `units` (PARTS,) samples a pixel."""
+def summed_eye(sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, seconds: float, halves: bool = False) -> EyePicture:
+    """The picture from the sums (PARTS, H, W, 3) and tallies (PARTS, TALLY_SIZE) of parts with `units` (PARTS,) samples a pixel.
+
+    `halves`: even parts have one thing in common, the caustic they looked up, and so have odd ones: two independent pictures."""
     total = max(int(units.sum()), 1)
     mean = sums.sum(axis=0) / total
     variance = np.zeros_like(mean)
+    if halves:
+        sums, units = (np.stack([values[half::2].sum(axis=0) for half in range(2)]) for values in (sums, units))
     used = np.flatnonzero(units)
     if len(used) > 1:
         for part in used:
             variance += units[part] / total * (sums[part] / units[part] - mean) ** 2
         variance /= len(used) - 1
     lost = tallies.sum(axis=0)[:2] / (total * mean.shape[0] * mean.shape[1])
-    return EyePicture(mean, variance, int(units.sum()), seconds, {"depth": float(lost[0]), "numeric": float(lost[1])})
+    return EyePicture(mean, variance, total if used.size else 0, seconds, {"depth": float(lost[0]), "numeric": float(lost[1])})

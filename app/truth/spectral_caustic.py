@@ -90,7 +90,8 @@ class SpectralCaustic:
 
     def half(self, number: int) -> SpectralCaustic:
         """The caustic by the photons of one half alone."""
-        return SpectralCaustic(self.plan, self.tables._replace(irradiance=self.halves[number]), self.halves, self.photons // _HALVES, self.landed_w, self.outside_w)
+        alone = self.halves[number]
+        return SpectralCaustic(self.plan, self.tables._replace(irradiance=alone), np.broadcast_to(alone, self.halves.shape), self.photons // _HALVES, self.landed_w, self.outside_w)
 
     @cached_property
     def relmse(self) -> float:

@@ -233,13 +233,6 @@ def test_reference_warning_begins_at_a_tenth(tmp_path: Path) -> None:
         assert any("times the smallest error" in told for told in report_text.warnings_of(scene)) is warned
 
 
-def test_noise_of_the_references_caustic_is_told_from_a_tenth_on(tmp_path: Path) -> None:
-    scene = synthetic_scene(tmp_path, "x")
-    for share, warned in ((0.0, False), (0.099, False), (0.101, True)):
-        scene.reference.caustic_relmse = share * report_text.smallest_error(scene)
-        assert any("noise of its own" in told for told in report_text.warnings_of(scene)) is warned
-
-
 def test_busy_machine_is_told(tmp_path: Path) -> None:
     for factor, told in ((0.95, False), (0.85, True)):
         scene = made_of([Point(n, s, 1e-3, 1e-3, 1e-3, 0.0, 1e-3) for n, s in ((1000, 1.0), (2000, factor), (4000, 2.0))], tmp_path)

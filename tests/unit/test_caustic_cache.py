@@ -13,6 +13,9 @@ from app.model.scene import Camera, Dielectric, Light, Scene
 from app.truth import caustic_cache, photon_run, spectral_caustic
 from app.truth.caustic_cache import CachedCaustic, picture_noise
 from app.truth.eye_reference import cached_eye_reference, render_eye_reference
+from app.truth.eye_run import summed_eye
+from app.truth.photon_run import TALLY_SIZE
+from app.truth.rounds import PARTS
 from app.truth.spectral_caustic import CausticPlan, CausticRun, build_caustic
 from tests.unit.eye_scenes import D65, FLINT, place, plate, scene_of
 
@@ -135,3 +138,16 @@ def test_what_does_not_fit_is_made_anew(scene: Scene, tmp_path: Path, rounds: li
     rounds.clear()
     kept(moved, PLAN, tmp_path).grown(quiet)
     assert rounds[0] == 0
+
+
+def test_what_halves_of_the_caustic_have_apart_is_in_the_variance() -> None:
+    """Parts that look up one half of the photons share its error: 8 parts without noise of their own are two pictures, not 8."""
+    error = np.array([0.3, -0.3])
+    sums = np.stack([np.full((1, 1, 3), 4.0 * (1.0 + error[part % 2])) for part in range(PARTS)])
+    units, tallies = np.full(PARTS, 4), np.zeros((PARTS, TALLY_SIZE))
+    picture = summed_eye(sums, units, tallies, 1.0, halves=True)
+    assert picture.samples == 4 * PARTS
+    np.testing.assert_allclose(picture.xyz, 1.0)
+    np.testing.assert_allclose(picture.variance, 0.3**2)  # of a mean of two that are 0.6 apart
+    apart = summed_eye(sums, units, tallies, 1.0)
+    np.testing.assert_allclose(apart.variance, 0.3**2 / (PARTS - 1))
