@@ -71,6 +71,13 @@ vec4 radiance[TARGETS];
 #ifdef EYE_SPECULAR
 EyePath waiting[STACK];
 int waits;
+// What this event adds to them, put there in one place: storing a path at an index takes a compiler long.
+EyePath aside;
+bool sets_aside;
+#ifdef SPECTRAL_SWEEP
+// Where this event cuts the path's band; negative: nowhere.
+float cut_at;
+#endif
 #endif
 
 #ifdef EYE_SPECULAR
@@ -209,9 +216,9 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key)
         cut = near;
         WHEN(cut) {
             // Both parts meet this surface again, each from its own start.
-            whole.recut = true;
-            cut_band(whole, at, pixel_key);
             path = whole;
+            path.recut = true;
+            cut_at = at;
         }
     }
     if (cut) return;
@@ -228,7 +235,8 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key)
         mirrored.origin = origin_back;
         mirrored.key = hash_combine(mirrored.key, 1u);
         reflect_path(mirrored, facing);
-        waiting[waits++] = mirrored;
+        aside = mirrored;
+        sets_aside = true;
     }
     if (!total && !splits) {
         reflects = choice(path, pixel_key) < likely;
@@ -288,16 +296,7 @@ void meet_surface(inout EyePath path, Hit hit, uint kind, uint pixel_key)
 }
 #endif
 
-#ifdef EYE_SPECULAR
-// Light that would still be caught inside: as if it left here.
-void leave_here(EyePath path)
-{
-    atomicAdd(fallbacks[FELL_DEPTH], 1u);
-#ifdef LAYER_BEAUTY
-    add_sky(path, stretch_of(path, path.band.x, path.band.z), path.direction, vec3(0.0));
-#endif
-}
-#else
+#ifndef EYE_SPECULAR
 // What a camera ray meets that nothing specular is in the way of.
 void see_directly(EyePath path, bool met, Hit hit, uint kind, uint pixel_key)
 {
@@ -362,37 +361,40 @@ void main()
     bool goes_on = true;
     while (goes_on) {
         int found = 0;
-        for (; goes_on && found < ENDS_HELD && events < MAX_EVENTS; ++events) {
+        for (; goes_on && found < ENDS_HELD; ++events) {
             Hit hit;
             bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
             uint kind = met ? object_at(hit.object).kind : NONE;
-            bool ends = !met || kind == KIND_DIFFUSE, alike = true;
+            bool ends = !met || kind == KIND_DIFFUSE, alike = true, parts = false, tired = events >= MAX_EVENTS;
+            sets_aside = false;
 #ifdef SPECTRAL_SWEEP
-            bool asks = path.narrowed && (ends || (path.sound && kind != KIND_BLACK && asked < MOST_ASKED));
+            cut_at = -1.0;
+            bool asks = path.narrowed && !tired && (ends || (path.sound && kind != KIND_BLACK && asked < MOST_ASKED));
             if (asks) asks = sweep_pixels(path, met ? hit.distance : FAR_DISTANCE) > (ends ? LEAST_SWEEP : LEAST_CUT_SWEEP * sample_side(path));
-            bool parts = false;
-            WHEN(asks) parts = cut_where_ways_part(path, met, ends, hit, pixel_key, alike);
-            if (parts) continue;
+            WHEN(asks) cut_at = where_ways_part(path, met, ends, hit, alike);
+            parts = cut_at >= 0.0;
 #endif
+            WHEN(!parts) {
 #if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
-            WHEN(!path.recut) add_lights(path, met ? hit.distance : FAR_DISTANCE);
+                WHEN(!path.recut) add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
-            WHEN(ends) ended[found++] = PathEnd(path, hit, met, alike);
-            bool specular = !ends && kind != KIND_BLACK;
-            goes_on = specular && path.depth < MAX_DEPTH;
-            WHEN(goes_on) meet_surface(path, hit, kind, pixel_key);
-            WHEN(specular && !goes_on) leave_here(path);
+                // Light that would still be caught inside is as if it left here.
+                bool specular = !ends && kind != KIND_BLACK, leaves = specular && (tired || path.depth >= MAX_DEPTH);
+                if (leaves) atomicAdd(fallbacks[FELL_DEPTH], 1u);
+                WHEN(ends || leaves) ended[found++] = PathEnd(path, hit, met && ends, alike || leaves);
+                goes_on = specular && !leaves;
+                WHEN(goes_on) meet_surface(path, hit, kind, pixel_key);
+            }
+#ifdef SPECTRAL_SWEEP
+            WHEN(cut_at >= 0.0) cut_band(path, cut_at, pixel_key);
+#endif
+            WHEN(sets_aside) waiting[waits++] = aside;
             WHEN(!goes_on && waits > 0) {
                 path = waiting[--waits];
                 goes_on = true;
             }
         }
         for (int e = 0; e < found; ++e) add_end(ended[e].path, ended[e].met, ended[e].hit, ended[e].alike, pixel_key);
-        WHEN(goes_on && events >= MAX_EVENTS) {
-            leave_here(path);
-            while (waits > 0) leave_here(waiting[--waits]);
-            goes_on = false;
-        }
     }
 #else
     Hit hit;

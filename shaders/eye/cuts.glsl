@@ -38,8 +38,8 @@ float share_below(EyePath path, float at)
     return clamp((cell_cdf[emission_cell(at)] - brightness.x) / max(brightness.y - brightness.x, 1e-9), 0.05, 0.95);
 }
 
-// Both parts of a cut band set out again from the path's last surface (`anchor_at`): `path` is one, the other waits. Of weak parts one is chosen
-// by chance.
+// Both parts of a cut band set out again from the path's last surface (`anchor_at`): `path` is one, the other is set aside. Of weak parts one is
+// chosen by chance.
 void cut_band(inout EyePath path, float at, uint pixel_key)
 {
     float below = share_below(path, at);
@@ -47,17 +47,19 @@ void cut_band(inout EyePath path, float at, uint pixel_key)
     bool takes_low = true;
     WHEN(!both) takes_low = unit_float(hash_combine(hash_combine(pixel_key, path.key + uint(path.depth + path.cuts) * 2654435769u), p.draw_index)) < below;
     path.cuts += 1;
-    EyePath other = path;
-    WHEN(both) {
-        anchor_at(other, at, path.band.z);
-        other.share *= 1.0 - below;
-        other.key = hash_combine(path.key, 6u);
-        waiting[waits++] = other;
-        path.share *= below;
+    EyePath whole = path;
+    // What waits first, then what goes on.
+    for (int part = both ? 0 : 1; part < 2; ++part) {
+        bool low = part == 0 ? !takes_low : takes_low;
+        float share = low ? below : 1.0 - below;
+        path = whole;
+        path.key = hash_combine(whole.key, part == 0 ? 6u : (takes_low ? 5u : 7u));
+        if (both) path.share *= share;
+        else path.gain /= share;
+        anchor_at(path, low ? whole.band.x : at, low ? at : whole.band.z);
+        WHEN(part == 0) aside = path;
     }
-    if (!both) path.gain /= takes_low ? below : 1.0 - below;
-    path.key = hash_combine(path.key, takes_low ? 5u : 7u);
-    anchor_at(path, takes_low ? path.band.x : at, takes_low ? at : path.band.z);
+    sets_aside = both;
 }
 
 // Whether the ray at the wavelength x meets what the path's own ray met. `ends`: the path ends there; colours that end elsewhere, or in
@@ -85,9 +87,9 @@ float sooner(vec3 position, vec3 direction, vec3 normal_a, vec3 on_a, vec3 norma
     return dot(normal_b, on_b - position) / dot(normal_b, direction) - dot(normal_a, on_a - position) / dot(normal_a, direction);
 }
 
-// Asks both ends, and cuts the band where the way of one of them parts from the middle's. True where it did: the path then sets out again.
+// Asks both ends; where the way of one of them parts from the middle's, the wavelength where it does, else a negative one.
 // `alike`: whether all of the band ends on the facet, or in the nothing, that its middle ends in.
-bool cut_where_ways_part(inout EyePath path, bool met, bool ends, Hit hit, uint pixel_key, out bool alike)
+float where_ways_part(EyePath path, bool met, bool ends, Hit hit, out bool alike)
 {
     alike = true;
     bool parts = false, bisects = true;
@@ -132,9 +134,7 @@ bool cut_where_ways_part(inout EyePath path, bool met, bool ends, Hit hit, uint 
         }
     }
     float at = cell_border(0.5 * (along + parted));
-    bool cut = parts && path.sound && path.cuts < MOST_CUTS && may_cut_at(path, at);
-    WHEN(cut) cut_band(path, at, pixel_key);
-    return cut;
+    return parts && path.sound && path.cuts < MOST_CUTS && may_cut_at(path, at) ? at : -1.0;
 }
 
 #endif
