@@ -29,6 +29,7 @@ from tests.interface.rig import small_engine, target
 
 SIZE = (900, 600)
 PHOTONS = 1 << 13
+WATCHDOG_S = 300.0
 
 
 class Flow:
@@ -104,6 +105,8 @@ class Flow:
 
     def run(self, ctx: imgui.test_engine.TestContext) -> None:
         """The flow itself."""
+        # The engine gives a test a minute, which suits an interface; here a software renderer makes four pictures.
+        ctx.engine_io.config_watchdog_warning = ctx.engine_io.config_watchdog_kill_test = WATCHDOG_S
         self.picture(ctx, "start")
         ctx.item_click("//Outliner/object 0/###row")
         ctx.yield_(2)

@@ -25,7 +25,7 @@ PHOTONS = 1 << 14
 SIZE = (760, 500)
 CELLS = 40
 """Of a grid over the picture in which the caustic is looked for."""
-SAMPLES = 4
+SAMPLES = 1
 """Camera samples a pixel: what is compared is the same to the bit with any number."""
 
 

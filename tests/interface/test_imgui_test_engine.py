@@ -21,7 +21,7 @@ def test_select_edit_undo_redo(tmp_path: Path) -> None:
         env=os.environ | {"SPECTRASPLAT_CONFIG": str(tmp_path)},
         capture_output=True,
         text=True,
-        timeout=180,
+        timeout=400,
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
