@@ -19,18 +19,28 @@ from app.gpu.context import Context
 from app.gpu.map_channels import MapChannels
 from app.gpu.records import NONE, PLACEMENT, RECEIVER
 from app.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
-from app.gpu.texture_store import PICTURE, TextureStore, place_defines
+from app.gpu.texture_store import PICTURE, TextureStore
 from app.model.camera_rays import camera_frame
 from app.model.colorimetry import xyz_to_rgb709_matrix
-from app.model.scene import Black, Camera, Dielectric, Diffuse, Mirror
+from app.model.scene import Camera, Dielectric
 from app.model.scene_checks import contains
-from app.passes.eye_records import (
-    EYE_LIGHT,
-    EYE_PARAMETERS,
-    has_extent,
-    light_record,
+from app.passes.eye_programs import (
+    BIND_CELL_CDF,
+    BIND_COUNTERS,
+    BIND_LIGHTS,
+    BIND_LISTED,
+    BIND_OBJECT_COLOURS,
+    BIND_PICTURES,
+    BIND_PLACEMENTS,
+    BIND_RECEIVERS,
+    UNIT_EMISSION,
+    UNIT_PICTURES,
+    direct_defines,
+    eye_defines,
+    single_defines,
 )
-from app.passes.eye_tables import EMISSION_CELLS, EyeTables
+from app.passes.eye_records import EYE_LIGHT, EYE_PARAMETERS, light_record
+from app.passes.eye_tables import EyeTables
 from app.passes.present import Channels
 from app.passes.spectrum_choice import (
     Look,
@@ -39,18 +49,8 @@ from app.passes.spectrum_choice import (
     grid_of,
 )
 
-MAX_DEPTH = 48
-"""Surfaces that one camera path may meet."""
-MAX_EVENTS = 160
-"""Surfaces that all paths of a sample may meet together."""
-STACK = 6
-"""Paths of a sample that may wait while another is followed."""
-ENDS_HELD = 8
-"""Paths' ends of a sample that are looked at together."""
 SPLIT_THRESHOLD = 0.004
 """Share of a sample's power above which both parts of a split path are followed."""
-CUT_THRESHOLD = 0.004
-"""The same for the parts of a cut band."""
 MOST_TAPS = 24
 """Looks along one sweep."""
 TAPS_PER_PIXEL = 1.2
@@ -59,17 +59,11 @@ DIRECT_LOOKS = 4
 """Of one sample at what is seen directly: outlines and textures there cost a tenth of what glass costs …"""
 DIRECT_LOOKS_UNTIL = 16
 """… and with more samples than these they are smooth as they are."""
-TINT_STEPS = 48
-"""Stretches that the whole spectrum is cut into behind coloured glass."""
 
 _TARGET_SECONDS = 0.15
 """What one dispatch may take; rows are divided to fit."""
 _GROUP = 8
 _NOTHING_LISTED = np.array([0, 1, 1, 0], "u4").tobytes()
-_BIND_LIGHTS, _BIND_OBJECT_COLOURS, _BIND_CELL_CDF, _BIND_RECEIVERS, _BIND_PLACEMENTS, _BIND_PICTURES, _BIND_COUNTERS, _BIND_LISTED = range(8, 16)
-_UNIT_EMISSION, _UNIT_PICTURES = 10, 11
-BEYOND_ONLY = ("HAS_DISPERSION", "SPECTRAL_SWEEP", "RANDOM_WAVELENGTH", "EVEN_WAVELENGTHS", "MAP_BINS", "ABSORPTION", "NORMAL_DERIVATIVES")
-"""What only rays beyond glass and mirrors need."""
 FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut")
 """What the shader counts, in its order."""
 
@@ -143,18 +137,16 @@ class EyePass:
         """Of a sample, at what is seen directly, while a pixel has few samples."""
         self.split_threshold = SPLIT_THRESHOLD
         structs = (*SCENE_STRUCTS, EYE_LIGHT, EYE_PARAMETERS, RECEIVER, PLACEMENT, *([PICTURE] if self.pictures.structs else []))
-        defines = self._defines(layer, maps)
-        beyond = defines.pop("EYE_SPECULAR", None)
+        shown = eye_defines(scene, self.channels, layer, maps) | self._tables.defines | self.pictures.defines
+        shown |= {name: 1 for name, on in (("LIGHTS_IN_STORAGE", self._lights_in_storage), ("HAS_IMAGES", bool(self.pictures.structs))) if on}
         self._listed: moderngl.Buffer | None = None
         self._beyond: moderngl.ComputeShader | None = None
         self._single: moderngl.ComputeShader | None = None
-        self._beyond_source = (defines | {"EYE_SPECULAR": 1}, structs)
-        if beyond:
-            self._beyond = shader.compute(self._ctx, "eye.comp", *self._beyond_source)
-            plain = {name: value for name, value in defines.items() if name not in BEYOND_ONLY} | {"SPECTRAL_GROUPS": 0, "LISTS_SPECULAR": 1, "MAX_EVENTS": 1}
-            self._program = shader.compute(self._ctx, "eye.comp", plain, structs)
-        else:
-            self._program = shader.compute(self._ctx, "eye.comp", defines, structs)
+        self._source = (shown, structs)
+        if "EYE_SPECULAR" in shown:
+            self._beyond = shader.compute(self._ctx, "eye.comp", shown, structs)
+            shown = direct_defines(shown)
+        self._program = shader.compute(self._ctx, "eye.comp", shown, structs)
 
     def run(
         self,
@@ -252,20 +244,20 @@ class EyePass:
         tables = self._tables
         self.scene.texels.bind_spectra(tables.spectra)
         if self.scene.texels.as_image:
-            tables.emission.bind_to_image(_UNIT_EMISSION, read=True, write=False)
+            tables.emission.bind_to_image(UNIT_EMISSION, read=True, write=False)
         else:
-            tables.emission.use(_UNIT_EMISSION)
-        self.pictures.bind(_BIND_PICTURES, _UNIT_PICTURES)
+            tables.emission.use(UNIT_EMISSION)
+        self.pictures.bind(BIND_PICTURES, UNIT_PICTURES)
         if self._lights_in_storage:
-            self._lights.bind_to_storage_buffer(_BIND_LIGHTS)
+            self._lights.bind_to_storage_buffer(BIND_LIGHTS)
         else:
-            self._lights.bind_to_uniform_block(_BIND_LIGHTS)
+            self._lights.bind_to_uniform_block(BIND_LIGHTS)
         buffers = (tables.object_colours, tables.cell_cdf, maps.receivers, maps.placements)
-        for binding, buffer in zip((_BIND_OBJECT_COLOURS, _BIND_CELL_CDF, _BIND_RECEIVERS, _BIND_PLACEMENTS), buffers, strict=True):
+        for binding, buffer in zip((BIND_OBJECT_COLOURS, BIND_CELL_CDF, BIND_RECEIVERS, BIND_PLACEMENTS), buffers, strict=True):
             buffer.bind_to_storage_buffer(binding)
-        self._counters.bind_to_storage_buffer(_BIND_COUNTERS)
+        self._counters.bind_to_storage_buffer(BIND_COUNTERS)
         if self._listed is not None:
-            self._listed.bind_to_storage_buffer(_BIND_LISTED)
+            self._listed.bind_to_storage_buffer(BIND_LISTED)
         self._parameters_buffer.bind_to_uniform_block(bindings.PARAMETERS)
         for unit, texture in enumerate(maps.textures):
             texture.use(location=unit)
@@ -316,61 +308,6 @@ class EyePass:
     @property
     def _size(self) -> tuple[int, int]:
         return self._pictures[0].size if self._pictures else (0, 0)
-
-    def _defines(self, layer: str, maps: MapChannels) -> dict[str, int | float | str]:
-        scene, features = self.scene.scene, self.scene.features
-        beauty = layer != "caustic"
-        specular = beauty and features.eye_specular
-        defines = features.defines() | bindings.SCENE_DEFINES | self.scene.defines | self._tables.defines
-        defines |= self.pictures.defines | place_defines(_BIND_PICTURES, _UNIT_PICTURES)
-        # A method that follows single wavelengths has no columns for them; nor has a scene where nothing disperses.
-        groups = features.spectral_groups if specular and features.eye_disperses else 0
-        defines |= {
-            "TARGETS": self.channels.targets,
-            "MAP_TARGETS": maps.targets,
-            "SPECTRAL_GROUPS": groups,
-            "BIND_LIGHTS": _BIND_LIGHTS,
-            "BIND_OBJECT_COLOURS": _BIND_OBJECT_COLOURS,
-            "BIND_CELL_CDF": _BIND_CELL_CDF,
-            "BIND_COUNTERS": _BIND_COUNTERS,
-            "BIND_LISTED": _BIND_LISTED,
-            "BIND_RECEIVERS": _BIND_RECEIVERS,
-            "BIND_PLACEMENTS": _BIND_PLACEMENTS,
-            "UNIT_EMISSION": _UNIT_EMISSION,
-            "EMISSION_CELLS": EMISSION_CELLS,
-            "TINT_STEPS": TINT_STEPS,
-            "BIN_TARGET": maps.first_target,
-            "BIN_COUNT": maps.count,
-            "BIN_OVERLAP": 1 if maps.edges_nm is not None else 0,
-            "LIGHT_COUNT": len(scene.lights),
-            "LIGHT_ROOM": len(scene.lights) + 1,
-            "MAX_DEPTH": MAX_DEPTH,
-            "MAX_EVENTS": MAX_EVENTS if specular else 1,
-            "STACK": STACK,
-            "CUT_THRESHOLD": CUT_THRESHOLD,
-            "ENDS_HELD": ENDS_HELD,
-        }
-        coloured = any(isinstance(o.material, Mirror) and len(set(o.material.reflectance_rgb)) > 1 for o in scene.objects)
-        absorbs = any(isinstance(o.material, Dielectric) and o.material.absorption is not None for o in scene.objects)
-        switches = {
-            "LAYER_BEAUTY": beauty,
-            "EYE_SPECULAR": specular,
-            "HAS_DISPERSION": specular and features.eye_disperses,
-            "SPECTRAL_SWEEP": groups > 0,
-            "RANDOM_WAVELENGTH": features.random_wavelength,
-            "EVEN_WAVELENGTHS": features.even_wavelengths,
-            "RGB_CHANNELS": self.channels.edges_nm is None,
-            "MAP_BINS": specular and features.eye_disperses and maps.count > 0,
-            "HAS_RECEIVERS": any(isinstance(o.material, Diffuse | Black) for o in scene.objects),
-            "VISIBLE_LIGHTS": beauty and any(has_extent(light) for light in scene.lights),
-            "ABSORPTION": specular and (coloured or absorbs),
-            "NORMAL_DERIVATIVES": features.smooth_normals,
-            "LIGHTS_IN_STORAGE": self._lights_in_storage,
-            "HAS_IMAGES": bool(self.pictures.structs),
-        }
-        for name in switches:
-            defines.pop(name, None)
-        return defines | {name: 1 for name, on in switches.items() if on}
 
     def _parameters(self, camera: Camera, width: int, height: int, map_scale: float, seed: int) -> np.ndarray:
         space = self.scene.space
@@ -453,9 +390,8 @@ class EyePass:
         if not self.spectrum.single:
             return self._beyond
         if self._single is None:
-            defines, structs = self._beyond_source
-            alone = {name: value for name, value in defines.items() if name != "SPECTRAL_SWEEP"}
-            self._single = shader.compute(self._ctx, "eye.comp", alone | {"SPECTRAL_GROUPS": 0, "RANDOM_WAVELENGTH": 1, "EVEN_WAVELENGTHS": 1}, structs)
+            shown, structs = self._source
+            self._single = shader.compute(self._ctx, "eye.comp", single_defines(shown), structs)
         return self._single
 
     def _read(self) -> np.ndarray:

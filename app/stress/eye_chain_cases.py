@@ -17,7 +17,7 @@ from app.model.primitives import box
 from app.model.primitives_gem import brilliant
 from app.model.primitives_round import ellipsoid, sphere
 from app.model.scene import Camera, Mirror, SceneObject
-from app.passes.eye import MAX_DEPTH
+from app.passes.eye_programs import MAX_DEPTH
 from app.stress.case import Case, Measurement
 from app.stress.eye_probe import (
     LOOK,

@@ -25,7 +25,7 @@ from app.model.scene import (
 )
 from app.model.spectrum import illuminant
 from app.model.texture import Environment, Texture
-from app.passes.eye import TINT_STEPS
+from app.passes.eye_programs import TINT_STEPS
 from app.stress.case import Case, Measurement
 from app.stress.eye_probe import (
     CHANCE,

@@ -15,7 +15,7 @@ from app.model.features import Features
 from app.model.scene import Scene
 from app.model.scene_file import load_scene
 from app.model.settings import RenderSettings
-from app.passes import eye as eye_module
+from app.passes import eye_programs
 from app.passes.eye import EyePass
 from app.passes.spectrum_choice import Spectrum
 from app.paths import assets_dir
@@ -64,7 +64,7 @@ def test_parted_colours_go_their_own_ways(gl, edge: Scene, drawn, monkeypatch, t
 
 def test_a_part_chosen_by_chance_stands_for_both(gl, edge: Scene, monkeypatch) -> None:
     both = picture(gl, edge, 64)
-    monkeypatch.setattr(eye_module, "CUT_THRESHOLD", 2.0)
+    monkeypatch.setattr(eye_programs, "CUT_THRESHOLD", 2.0)
     chosen = np.mean([picture(gl, edge, 64, seed=seed) for seed in (1, 2)], axis=0)
     one = picture(gl, edge, 64, seed=3)
     assert error(one, chosen) > 0.0, "nothing was left to chance"

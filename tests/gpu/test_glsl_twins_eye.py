@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.gpu.records import NONE, PLACEMENT, RECEIVER
-from app.passes.eye import EYE_LIGHT
+from app.passes.eye_records import EYE_LIGHT
 from app.truth import camera, lights, maps
 from app.truth.glsl_function import as_f32, evaluate
 from app.truth.optics import unit

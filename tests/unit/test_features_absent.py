@@ -19,7 +19,7 @@ from app.gpu.texture_store import PICTURE
 from app.model.features import Features, explain
 from app.model.scene_file import load_scene
 from app.model.settings import RenderSettings
-from app.passes.eye import BEYOND_ONLY
+from app.passes.eye_programs import direct_defines
 from app.passes.eye_records import EYE_LIGHT, EYE_PARAMETERS
 from app.passes.footprint import SPLAT, footprint_defines, splat_defines
 from app.static_costs import RecordSizes, static_costs
@@ -91,10 +91,8 @@ def eye_sources(features: Features, light: dict[str, int | float | str], images:
         eye.pop(name, None)
     eye |= {name: 1 for name, on in switches.items() if on}
     structs = (*SCENE_STRUCTS, EYE_LIGHT, EYE_PARAMETERS, records.RECEIVER, records.PLACEMENT, *([PICTURE] if images else []))
-    if not eye.pop("EYE_SPECULAR", None):
-        return [shader.load_source("eye.comp", eye, structs)]
-    direct = {name: value for name, value in eye.items() if name not in BEYOND_ONLY} | {"SPECTRAL_GROUPS": 0, "LISTS_SPECULAR": 1, "MAX_EVENTS": 1}
-    return [shader.load_source("eye.comp", eye | {"EYE_SPECULAR": 1}, structs), shader.load_source("eye.comp", direct, structs)]
+    programs = [eye, direct_defines(eye)] if "EYE_SPECULAR" in eye else [eye]
+    return [shader.load_source("eye.comp", defines, structs) for defines in programs]
 
 
 def scene_features(name: str) -> Features:
