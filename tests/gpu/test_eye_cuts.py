@@ -57,7 +57,7 @@ def drawn(gl, edge: Scene) -> np.ndarray:
 def test_parted_colours_go_their_own_ways(gl, edge: Scene, drawn, monkeypatch, tmp_path) -> None:
     """One band, cut, has what single wavelengths have. A band that is never cut does not, however many samples it gets."""
     cut = error(picture(gl, edge, 32), drawn)
-    mutate(monkeypatch, tmp_path, "eye/cuts.glsl", "bool cut = parts && path.sound", "bool cut = false && parts && path.sound")
+    mutate(monkeypatch, tmp_path, "eye/cuts.glsl", "return parts && path.sound", "return false && parts && path.sound")
     whole = error(picture(gl, edge, 32), drawn)
     assert cut < 1.2e-3 and whole > 1.5 * cut, (cut, whole)
 
@@ -75,7 +75,7 @@ def test_a_part_chosen_by_chance_stands_for_both(gl, edge: Scene, monkeypatch) -
 def test_a_part_that_is_lost_is_noticed(gl, edge: Scene, monkeypatch, tmp_path) -> None:
     """Seeds and all else alike: what differs is the lost light."""
     right = picture(gl, edge, 32)
-    mutate(monkeypatch, tmp_path, "eye/cuts.glsl", "waiting[waits++] = other;", "")
+    mutate(monkeypatch, tmp_path, "eye/cuts.glsl", "sets_aside = both;", "sets_aside = false;")
     lost = picture(gl, edge, 32)
     assert error(lost, right) > 2e-4 and lost.sum() < right.sum()
 
