@@ -40,8 +40,8 @@ layout(std430, binding = BIND_CELL_CDF) readonly restrict buffer CellCdf { float
 #endif
 layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallbacks[4]; };
 #if defined(LISTS_SPECULAR) || defined(EYE_SPECULAR)
-// Groups to be dispatched (x, 1, 1), how many pixels are listed, and their numbers.
-layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_groups[3]; uint listed_count; uint listed[]; };
+// How many pixels are listed, and what is to be known of them.
+layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_count; uint listed[]; };
 #endif
 layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
 
@@ -310,8 +310,9 @@ void see_directly(EyePath path, bool met, Hit hit, uint kind, uint pixel_key)
 void main()
 {
 #ifdef EYE_SPECULAR
-    if (gl_GlobalInvocationID.x >= listed_count) return;
-    uint entry = listed[gl_GlobalInvocationID.x], number = bitfieldExtract(entry, 0, int(LISTED_BITS)), look = bitfieldExtract(entry, int(LISTED_BITS), 3);
+    uint at_listed = p.first_listed + gl_GlobalInvocationID.x;
+    if (at_listed >= listed_count) return;
+    uint entry = listed[at_listed], number = bitfieldExtract(entry, 0, int(LISTED_BITS)), look = bitfieldExtract(entry, int(LISTED_BITS), 3);
     float gain = float((entry >> (LISTED_BITS + 3u)) + 1u) / float(p.direct_looks);
     uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
 #else
@@ -352,9 +353,7 @@ void main()
         }
     }
     WHEN(specular_looks > 0u) {
-        uint place = atomicAdd(listed_count, 1u);
-        atomicMax(listed_groups[0], place / 64u + 1u);
-        listed[place] = listed_entry(pixel.y * p.size.x + pixel.x, specular_looks == p.direct_looks ? THE_SAMPLE : chosen, specular_looks);
+        listed[atomicAdd(listed_count, 1u)] = listed_entry(pixel.y * p.size.x + pixel.x, specular_looks == p.direct_looks ? THE_SAMPLE : chosen, specular_looks);
     }
 #elif defined(EYE_SPECULAR)
     int events = 0;

@@ -70,7 +70,6 @@ def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) ->
             bench.interface.frame()
         with bench.holding_gain():
             yield bench.phase("dragging dispersion", seconds, bench.drag_gain).line
-        bench.pause()
         yield f"input to picture: camera {bench.latency(bench.nudge_camera):.0f} ms, dispersion {bench.latency(bench.nudge_gain):.0f} ms (median of {NUDGES})"
         yield f"device memory {bench.session.picture.stats.bytes / 2**20:.0f} MiB"
     finally:
@@ -195,7 +194,12 @@ class _Bench:
         self.session.state = replace(state, scene=edits.set_dispersion_gain(state.scene, self._glass, min(gain * 1.07, 10.0)))
 
     def latency(self, nudge: Callable[[], None]) -> float:
-        """Median milliseconds from a single input to the end of the first frame whose picture is another one."""
+        """Median milliseconds from a single input to the end of the first frame whose picture is another one.
+
+        Pictures are finished after one camera sample from now on: what is timed begins at rest."""
+        engine = self.session.picture.engine
+        assert engine is not None
+        engine.camera_samples = 1
         found = []
         for _ in range(NUDGES):
             self.pause()

@@ -104,4 +104,4 @@ class MapChannels:
 
 def hats(axis: SpectralAxis, count: int) -> MapChannels:
     """XYZ, W and `count` hats, evenly spaced where the indices change."""
-    return MapChannels(hats_nm=tuple(float(nm) for nm in axis.nm_of_x(np.linspace(0.0, 1.0, count))))
+    return MapChannels(hats_nm=tuple(float(nm) for nm in axis.nm_of_samples(count)))

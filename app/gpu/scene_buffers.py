@@ -122,7 +122,7 @@ class Groups:
     def variables(self, axis: SpectralAxis) -> np.ndarray:
         """var_g over x, float64 (count, SAMPLES): n of the glass, or a shared variable."""
         x = np.linspace(0.0, 1.0, SAMPLES)
-        nm = axis.nm_of_x(x)
+        nm = axis.nm_of_samples(SAMPLES)
         rows = []
         for g in range(self.count):
             members = [glass for glass, owner in zip(self.glasses, self.group, strict=True) if owner == g]
@@ -265,7 +265,7 @@ class SceneBuffers:
         media: list[Dispersion] = []
         weights: list[np.ndarray] = []
         x = np.linspace(0.0, 1.0, SAMPLES)
-        nm = self.axis.nm_of_x(x)
+        nm = self.axis.nm_of_samples(SAMPLES)
         stack_bits = _stack_bits(self.scene) if self.features.medium_stack else {}
         records = OBJECT.zeros(len(self.scene.objects))
         for name in ("medium", "weight_row", "stack_bit", "receiver", "group", "texture"):
@@ -334,7 +334,7 @@ def index_slope(groups: Groups, glass: int | None, axis: SpectralAxis, variables
     if glass is None or not groups.count:
         return np.zeros(SAMPLES)
     variable = variables[groups.group[glass]]
-    n = groups.glasses[glass].index(axis.nm_of_x(np.linspace(0.0, 1.0, SAMPLES)))
+    n = groups.glasses[glass].index(axis.nm_of_samples(SAMPLES))
     if np.array_equal(n, variable):
         return np.ones(SAMPLES)
     return np.gradient(n, variable, edge_order=2)

@@ -387,6 +387,15 @@ class LiveEngine:
         return self._eye.version
 
     @property
+    def camera_samples(self) -> int:
+        """A still picture is finished after so many a pixel."""
+        return self._eye.target_samples
+
+    @camera_samples.setter
+    def camera_samples(self, samples: int) -> None:
+        self._eye.target_samples = samples
+
+    @property
     def inputs(self) -> LiveInputs | None:
         """What the picture shows, or is about to."""
         return self._inputs

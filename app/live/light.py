@@ -11,6 +11,7 @@ import numpy as np
 
 from app.gpu.gain_buffers import GainBuffers
 from app.gpu.map_channels import MapChannels
+from app.gpu.portion import Portion
 from app.gpu.reindex import Reindexing, Spans
 from app.light_half import LightHalf, RoundOf, ShownTables
 from app.light_maps import LightMaps
@@ -19,7 +20,7 @@ from app.live.spectrum_guess import SpectrumGuess
 from app.live.store import PhotonStore
 from app.model.colorimetry import VISIBLE_NM
 from app.model.spectrum import Spectrum
-from app.passes.accumulate import Accumulate
+from app.passes.accumulate import ROWS, Accumulate
 from app.passes.footprint import SpectralVariables
 from app.passes.map_layout import layout_maps
 from app.passes.pilot import landings_of
@@ -46,6 +47,10 @@ QUICK_WIDTH = 64
 """Samples of their spectral tables."""
 FLUSH_AHEAD = 0.9
 """Of the photons after which a splat pass sums its maps up by itself."""
+FIRST_SUMMED = 256
+"""Rows of a map that are summed up at first, before it is known how long they take."""
+SUMMING_SECONDS = 0.01
+"""What one piece of it may take."""
 SOLO_WIDTH_NM = 4.0
 """Standard deviation of the window that a single wavelength is seen through."""
 SOLO_GAIN_NM = 100.0
@@ -281,13 +286,21 @@ class LiveLight(LightHalf):
 
     def _summing(self, atlas: MapAtlas) -> Iterator[None]:
         """`atlas.flush` with pauses."""
+        width, height = atlas.size
+        portion = Portion(FIRST_SUMMED, ROWS, -(-height // ROWS) * ROWS)
         for scratch, total in zip(atlas.scratch_textures, atlas.total_textures, strict=True):
-            started = time.perf_counter()
-            self._accumulate.run(scratch, total)
-            if self.waits:
-                self.context.finish()
-            self.stats.splat_seconds += time.perf_counter() - started
-            yield
+            row = 0
+            while row < height:
+                started = time.perf_counter()
+                rows = min(portion.units, height - row)
+                self._accumulate.run_rows(scratch, total, row, rows)
+                if self.waits:
+                    self.context.finish()
+                took = time.perf_counter() - started
+                portion.learn(rows, took, SUMMING_SECONDS)
+                self.stats.splat_seconds += took
+                row += rows
+                yield
         atlas.pending = 0
 
     def splat_stored(self, *, of_running: bool = False) -> Iterator[None]:

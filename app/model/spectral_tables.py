@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -49,15 +50,7 @@ class SpectralAxis:
     def build(cls, dispersions: Sequence[Dispersion]) -> SpectralAxis:
         """The axis for all materials of a scene; non-dispersive and repeated ones do not count."""
         seen = {(d.kind, d.coefficients, d.range_nm, d.gain): d for d in dispersions if d.is_dispersive}
-        glasses = tuple(seen.values())
-        if not glasses:
-            return cls((), (), _HI_NM - _LO_NM, 1.0, False)
-        turning = tuple(_turning_points(glass) for glass in glasses)
-        speed = sum(np.abs(glass.derivative(_FINE_NM)) for glass in glasses)
-        stands_still = bool(np.any(speed <= 0.0)) or any(len(t) > 2 for t in turning)
-        variation = [_variation(g, t, np.array(_HI_NM)) for g, t in zip(glasses, turning, strict=True)]
-        monotone = len(glasses) == 1 and not stands_still
-        return cls(glasses, turning, float(sum(variation)), FILL if stands_still else 0.0, monotone)
+        return _axis_of(tuple(seen.values()))
 
     def x_of_nm(self, wavelength_nm: np.ndarray | float) -> np.ndarray:
         """x of wavelengths (clamped to 380–780 nm), float64, same shape."""
@@ -92,10 +85,35 @@ class SpectralAxis:
                 break
         return wavelength
 
+    def nm_of_samples(self, count: int) -> np.ndarray:
+        """Wavelengths of `count` equally spaced x from 0 to 1, float64 (count,); kept, so not to be written to."""
+        if count not in self._sampled:
+            wavelengths = self.nm_of_x(np.linspace(0.0, 1.0, count))
+            wavelengths.setflags(write=False)
+            self._sampled[count] = wavelengths
+        return self._sampled[count]
+
+    @cached_property
+    def _sampled(self) -> dict[int, np.ndarray]:
+        return {}
+
     def _slope(self, wavelength_nm: np.ndarray) -> np.ndarray:
         """dx/dλ, per nm."""
         speed = sum(np.abs(glass.derivative(wavelength_nm)) for glass in self.glasses) * 1e-3
         return self.fill / (_HI_NM - _LO_NM) + (1.0 - self.fill) * speed / self.total
+
+
+@lru_cache(maxsize=16)
+def _axis_of(glasses: tuple[Dispersion, ...]) -> SpectralAxis:
+    """Kept, as every edit of a glass asks for it several times."""
+    if not glasses:
+        return SpectralAxis((), (), _HI_NM - _LO_NM, 1.0, False)
+    turning = tuple(_turning_points(glass) for glass in glasses)
+    speed = sum(np.abs(glass.derivative(_FINE_NM)) for glass in glasses)
+    stands_still = bool(np.any(speed <= 0.0)) or any(len(t) > 2 for t in turning)
+    variation = [_variation(g, t, np.array(_HI_NM)) for g, t in zip(glasses, turning, strict=True)]
+    monotone = len(glasses) == 1 and not stands_still
+    return SpectralAxis(glasses, turning, float(sum(variation)), FILL if stands_still else 0.0, monotone)
 
 
 def _turning_points(glass: Dispersion) -> np.ndarray:
@@ -103,9 +121,8 @@ def _turning_points(glass: Dispersion) -> np.ndarray:
     sign = np.sign(glass.derivative(_FINE_NM))
     moving = np.flatnonzero(sign)
     turns = []
-    for left, right in zip(moving[:-1], moving[1:], strict=True):
-        if sign[left] == sign[right]:
-            continue
+    turned = np.flatnonzero(sign[moving[:-1]] != sign[moving[1:]])
+    for left, right in zip(moving[turned], moving[turned + 1], strict=True):
         lo, hi = _FINE_NM[left], _FINE_NM[right]
         for _ in range(50):
             middle = 0.5 * (lo + hi)
@@ -130,7 +147,7 @@ def index_table(axis: SpectralAxis, dispersions: Sequence[Dispersion], samples: 
     visible range; at the wavelength where one of several glasses is clamped n has a kink, and
     the error there may reach a quarter of that glass's step from sample to sample.
     """
-    wavelength = axis.nm_of_x(np.linspace(0.0, 1.0, samples))
+    wavelength = axis.nm_of_samples(samples)
     rows = [dispersion.index(wavelength) for dispersion in dispersions]
     return np.array(rows, dtype=np.float32).reshape(len(rows), samples)
 

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from app.gpu.map_atlas import Tile
     from app.model.charts import ChartAtlas
 
-_SIDE, _GROUP = 16, 64
+ROWS = 16
+"""Of a group, and its columns."""
+_GROUP = 64
 
 
 class Accumulate:
@@ -23,15 +25,19 @@ class Accumulate:
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
-        self._program = shader.compute(ctx, "accumulate.comp", {"SIDE": _SIDE})
+        self._program = shader.compute(ctx, "accumulate.comp", {"SIDE": ROWS})
 
     def run(self, scratch: moderngl.Texture, total: moderngl.Texture) -> None:
         """Both RGBA32F and of one size."""
+        self.run_rows(scratch, total, 0, total.height)
+
+    def run_rows(self, scratch: moderngl.Texture, total: moderngl.Texture, first: int, rows: int) -> None:
+        """The same for some rows of them, a multiple of `ROWS` but for the last."""
         self._ctx.memory_barrier()
         scratch.bind_to_image(0, read=True, write=True)
         total.bind_to_image(1, read=True, write=True)
-        width, height = total.size
-        self._program.run(-(-width // _SIDE), -(-height // _SIDE))
+        self._program["first_row"].value = first
+        self._program.run(-(-total.width // ROWS), -(-rows // ROWS))
         self._ctx.memory_barrier()
 
     def release(self) -> None:

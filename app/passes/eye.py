@@ -1,6 +1,6 @@
 """The camera's pass: pictures of the scene from the caustic maps and the lights.
 
-One dispatch adds one camera sample to every pixel of a band of rows, so that no dispatch takes
+A dispatch adds one camera sample to the pixels of a band of rows, or to some of those that see glass or mirrors there, so that none takes
 long on a software renderer: between two of them there is time for progress and for a stop.
 Samples form a lattice inside the pixel that later launches refine (box filter).
 """
@@ -17,6 +17,7 @@ import numpy as np
 from app.gpu import bindings, shader
 from app.gpu.context import Context
 from app.gpu.map_channels import MapChannels
+from app.gpu.portion import Portion
 from app.gpu.records import NONE, PLACEMENT, RECEIVER
 from app.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
 from app.gpu.texture_store import PICTURE, TextureStore
@@ -63,7 +64,9 @@ DIRECT_LOOKS_UNTIL = 16
 _TARGET_SECONDS = 0.15
 """What one dispatch may take; rows are divided to fit."""
 _GROUP = 8
-_NOTHING_LISTED = np.array([0, 1, 1, 0], "u4").tobytes()
+_LISTED_GROUP = 64
+_FIRST_ROWS, _FIRST_LISTED = 16, 1024
+_NOTHING_LISTED = bytes(4)
 FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut")
 """What the shader counts, in its order."""
 
@@ -119,7 +122,9 @@ class EyePass:
         self._empty: CausticMaps | None = None
         self._pictures: list[moderngl.Texture] = []
         self._samples_of_row = np.zeros(0, int)
-        self._rows_a_dispatch = 0
+        self._rows = self._pixels = Portion(1, 1, 1)
+        self._within_rows = False
+        """Some listed pixels of a band of rows have this sample, others are still to get it."""
         self._map_targets = maps.targets
         self.dispatch_seconds = _TARGET_SECONDS
         """What one dispatch should take; rows are divided to fit."""
@@ -165,17 +170,19 @@ class EyePass:
         `sample_offset` is the number of samples already there; 0 starts anew. `maps` None shows
         direct light only. `progress` gets the share done, 0 to 1.
         """
+        stops = False
         for share in self.samples(camera, width, height, samples, sample_offset, maps, seed):
             if progress is not None:
                 progress(share)
-            if cancelled is not None and cancelled():
+            stops = stops or (cancelled is not None and cancelled())
+            if stops and not self._within_rows:
                 return False
         return True
 
     def samples(
         self, camera: Camera, width: int, height: int, samples: int, sample_offset: int = 0, maps: CausticMaps | None = None, seed: int = 1
     ) -> Iterator[float]:
-        """`run`, pausing after every band of rows with the share done: whoever draws meanwhile may bind what it likes."""
+        """`run`, pausing after every dispatch with the share done: whoever draws meanwhile may bind what it likes."""
         if sample_offset == 0 or self._size != (width, height):
             self._clear(width, height)
         maps = maps or self._no_maps()
@@ -207,7 +214,7 @@ class EyePass:
         return self.spectrum
 
     def choosing_spectrum(self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None) -> Iterator[float]:
-        """`choose_spectrum`, pausing after every band of rows."""
+        """`choose_spectrum`, pausing after every dispatch."""
         if not self.chooses:
             return
         looks = choosing_spectrum(samples, self.may_be_single)
@@ -349,40 +356,58 @@ class EyePass:
             for picture in self._pictures:
                 picture.release()
             self._pictures = [self._ctx.texture((width, height), 4, dtype="f4") for _ in range(self.channels.targets)]
-            self._rows_a_dispatch = min(height, 64)
+            self._rows = Portion(_FIRST_ROWS, _GROUP, -(-height // _GROUP) * _GROUP)
+            self._pixels = Portion(_FIRST_LISTED, _LISTED_GROUP, max(width * height, _LISTED_GROUP))
             if self._listed is not None:
                 self._listed.release()
-            self._listed = self._ctx.buffer(reserve=16 + 4 * width * (-(-height // _GROUP) * _GROUP)) if self._beyond is not None else None
+            self._listed = self._ctx.buffer(reserve=4 + 4 * width * (-(-height // _GROUP) * _GROUP)) if self._beyond is not None else None
         zeros = bytes(width * height * 16)
         for picture in self._pictures:
             picture.write(zeros)
         self._samples_of_row = np.zeros(height, int)
+        self._within_rows = False
 
     def _add_sample(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
-        """Dispatch one sample, yielding the share of rows done after each band of rows."""
+        """Dispatch one sample, yielding the share done after each dispatch: a band of rows, or some of its listed pixels."""
         row = 0
         while row < height:
-            rows = min(self._rows_a_dispatch, height - row)
-            parameters["first_row"] = row
-            self._bind(maps)
-            self._parameters_buffer.write(parameters.tobytes())
-            start = time.perf_counter()
             # Groups that overlap the next band would add its rows twice, so bands are whole groups.
+            rows = min(self._rows.units, height - row)
+            parameters["first_row"] = row
             if self._listed is not None:
                 self._listed.write(_NOTHING_LISTED)
-            self._program.run(-(-width // _GROUP), -(-rows // _GROUP))
-            self._ctx.memory_barrier()
-            if self._listed is not None:
-                self._program_beyond().run_indirect(self._listed)
-                self._ctx.memory_barrier()
-            self._ctx.finish()
-            elapsed = time.perf_counter() - start
+            self._rows.learn(rows, self._dispatch(self._program, parameters, maps, -(-width // _GROUP), -(-rows // _GROUP)), self.dispatch_seconds)
+            for share in self._follow_listed(parameters, maps):
+                self._within_rows = True
+                yield (row + share * rows) / height
+            self._within_rows = False
             self._samples_of_row[row : row + rows] += 1
             row += rows
-            fitting = rows * self.dispatch_seconds / max(elapsed, 1e-4)
-            most = min(4 * self._rows_a_dispatch, -(-height // _GROUP) * _GROUP)
-            self._rows_a_dispatch = int(np.clip(fitting // _GROUP * _GROUP, _GROUP, max(_GROUP, most)))
             yield row / height
+
+    def _follow_listed(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
+        """Follow what the listed pixels of a band of rows see, yielding the share done after each dispatch but the last."""
+        if self._listed is None:
+            return
+        count, done = int(np.frombuffer(self._listed.read(4), "u4")[0]), 0
+        while done < count:
+            pixels = min(self._pixels.units, count - done)
+            parameters["first_listed"] = done
+            took = self._dispatch(self._program_beyond(), parameters, maps, -(-pixels // _LISTED_GROUP), 1)
+            self._pixels.learn(pixels, took, self.dispatch_seconds)
+            done += pixels
+            if done < count:
+                yield done / count
+
+    def _dispatch(self, program: moderngl.ComputeShader, parameters: np.ndarray, maps: CausticMaps, groups_x: int, groups_y: int) -> float:
+        """Run a program to its end; seconds it took."""
+        self._bind(maps)
+        self._parameters_buffer.write(parameters.tobytes())
+        start = time.perf_counter()
+        program.run(groups_x, groups_y)
+        self._ctx.memory_barrier()
+        self._ctx.finish()
+        return time.perf_counter() - start
 
     def _program_beyond(self) -> moderngl.ComputeShader:
         """What follows rays beyond glass and mirrors."""

@@ -58,7 +58,7 @@ EYE_PARAMETERS = Struct(
         Field("taps_per_pixel", "float", "looks along a sweep, for every pixel it is long"),
         Field("band_side", "float", "side of the share of its pixel that a sample of one band has, pixels"),
         Field("direct_looks", "uint", "of one sample, at what is seen directly"),
-        Field("unused2", "uint", ""),
+        Field("first_listed", "uint", "of the listed pixels, this dispatch's first"),
     ),
 )
 _LIGHT_KINDS = {"point": 0, "spot": 0, "directional": 1, "collimated": 2, "area": 3}

@@ -121,7 +121,7 @@ def _spectra(
 ) -> tuple[np.ndarray, dict[str, int]]:
     """Rows over x as `lib/scene.glsl` reads them, and where they begin."""
     x = np.linspace(0.0, 1.0, SAMPLES)
-    nm = axis.nm_of_x(x)
+    nm = axis.nm_of_samples(SAMPLES)
     groups = replace(scene.groups, glasses=tuple(glasses[g] for g in scene.groups.glasses))
     variables = groups.variables(axis)
     slopes = [index_slope(groups, scene.groups.glasses.index(g) if g in scene.groups.glasses else None, axis, variables) for g in glasses]

@@ -139,7 +139,7 @@ def test_only_whole_cycles_of_bands_are_shown_and_smooth_samples_before(engine: 
     assert told[0][1] == 1 and told[-1][1] > 1, told
     assert all(samples % bands == 0 for samples, bands in told)
     samples, bands = told[-1]
-    assert samples >= engine._eye.target_samples > samples - bands
+    assert samples >= engine.camera_samples > samples - bands
     # After bands came into view nothing of the whole spectrum replaces them unless the maps became finer.
     rgb, mask = picture(engine), in_glass(engine, (SIZE[1], SIZE[0]))
     assert np.abs(rgb[mask][:, 0] - rgb[mask][:, 2]).max() > 0.1 * WHITE  # fringes

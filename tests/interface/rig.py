@@ -102,7 +102,7 @@ def small_engine(photons: int) -> type[LiveEngine]:
 
     def make(context: Context) -> LiveEngine:
         engine = LiveEngine(context, Budget(1 << 13, photons, photons, 64 << 20))
-        engine._eye.target_samples = SAMPLES
+        engine.camera_samples = SAMPLES
         return engine
 
     return make  # type: ignore[return-value]

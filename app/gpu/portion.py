@@ -1,0 +1,30 @@
+"""How much work a dispatch is given, so that it takes about the time it should."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+_GROWTH = 4
+"""Most by which a portion grows at a time."""
+_LEAST_S = 1e-4
+"""Times shorter than this are mostly the dispatch itself."""
+
+
+@dataclass
+class Portion:
+    """Units of work of one dispatch; `learn` from what they took."""
+
+    units: int
+    whole: int
+    """They come in multiples of these …"""
+    most: int
+    """… and are no more than these, unless one multiple is."""
+
+    def learn(self, units: int, took_s: float, wanted_s: float) -> None:
+        """A dispatch of `units` took `took_s` and should have taken `wanted_s`.
+
+        A rest that was less than a whole portion tells little, unless it took too long."""
+        if units < self.units and took_s < wanted_s:
+            return
+        fitting = int(units * wanted_s / max(took_s, _LEAST_S)) // self.whole * self.whole
+        self.units = max(self.whole, min(fitting, _GROWTH * self.units, self.most))
