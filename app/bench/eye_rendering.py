@@ -130,7 +130,7 @@ class EyeRig:
     def _seconds(self, budget: int) -> tuple[float, float, int]:
         """Seconds of choosing the bands and of all, and the samples taken."""
         rendering = self.render(budget, 0)
-        taken = budget if self._eye.spectrum.single else rendering.emitted
+        taken = budget if self._choose(budget).single else rendering.emitted
         return rendering.seconds["bands"], sum(rendering.seconds.values()), taken
 
     def _choose(self, samples: int) -> Spectrum:

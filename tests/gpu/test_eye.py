@@ -177,7 +177,7 @@ def test_rows_of_a_dispatch_stay_within_the_picture(gl):
     """They once grew fourfold with every quick sample, until after some 500 of them they were no number any more."""
     eye = eye_pass(gl, [floor()])
     eye.run(ABOVE, 16, 12, 6)
-    assert 8 <= eye._rows_a_dispatch <= 16
+    assert 8 <= eye._rows.units <= 16
     released(eye)
 
 
@@ -187,7 +187,7 @@ def test_a_stop_keeps_what_is_there(gl):
     eye.run(ABOVE, 32, 32, 1)
     whole = eye.read_rgb()
     eye.dispatch_seconds = 0.0
-    eye._rows_a_dispatch = 8
+    eye._rows.units = 8
     assert not eye.run(ABOVE, 32, 32, 4, sample_offset=1, progress=seen.append, cancelled=lambda: len(seen) >= 6)
     assert seen == sorted(seen) and len(seen) == 6
     assert np.array_equal(eye.read_rgb(), whole)

@@ -25,6 +25,7 @@ GROWTH_BYTES = 96 << 20
 MORE_OBJECTS = 30
 """Of textures, buffers and the like at the end over those at the start: an overlay or a magnifier may have been used since."""
 SAME = 1e-5
+BLURRED = 0.04
 
 
 def soak(gl: Context, folder: Path, actions: int, seed: int) -> None:
@@ -49,9 +50,12 @@ def soak(gl: Context, folder: Path, actions: int, seed: int) -> None:
         back = undo_everything(hands, start)
         assert hands.session.state.scene is start.scene
         assert hands.session.state.viewport_size == start.viewport_size
-        difference = np.abs(back - first) / first.max()
-        # In dispersive glass the number of bands depends on when it was found out: there samples may differ, elsewhere nothing.
-        assert float(np.quantile(difference, 0.97)) < SAME and float(difference.max()) < 0.05
+        # Maps stay as they were laid out for a view on the way as long as others would not be much finer (refit.PAYS): then a
+        # caustic's edges are blurred otherwise. All else is the same.
+        difference = np.abs(back - first)
+        assert float(np.median(difference)) < SAME * float(first.max())
+        assert float(difference.mean()) < BLURRED * float(first.mean())
+        assert float(back.sum()) == pytest.approx(float(first.sum()), rel=0.1 * BLURRED)
         assert device_objects(DATA) <= objects + MORE_OBJECTS
         assert actions < LONG or grown < GROWTH_BYTES, f"{grown >> 20} MiB more after {actions} actions"
 
