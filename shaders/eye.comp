@@ -108,7 +108,7 @@ const vec2 direct_look[5] = vec2[](vec2(-0.125, -0.375), vec2(0.375, -0.125), ve
 
 vec2 place_of_look(uint look)
 {
-    return p.within_pixel + p.sample_side * direct_look[look];
+    return p.within_pixel + p.sample_side * vec2(p.pixel_width, p.pixel_height) * direct_look[look];
 }
 
 // A listed pixel: its number, the look that goes on, and of how many it is one.
@@ -128,7 +128,7 @@ EyePath camera_path(uvec2 pixel, uint look, float gain)
     path.origin = RayOrigin(NONE, NONE, false, p.inside_mask);
     path.medium = RayRecord(p.inside_mask, p.inside_object);
     for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
-    vec3 right = p.half_right * (2.0 * p.pixel_scale / float(p.size.x)), up = p.half_up * (2.0 * p.pixel_scale / float(p.size.y));
+    vec3 right = p.half_right * (2.0 * p.pixel_width / float(p.size.x)), up = p.half_up * (2.0 * p.pixel_height / float(p.size.y));
     if (p.orthographic != 0u) {
         path.dposition[0] = right;
         path.dposition[1] = up;

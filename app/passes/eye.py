@@ -188,6 +188,9 @@ class EyePass:
         maps = maps or self._no_maps()
         parameters = self._parameters(camera, width, height, maps.scale, seed)
         parameters["sample_side"] = 1.0 / np.sqrt(samples + sample_offset)
+        if (samples, sample_offset) == (2, 0):
+            # Two squares of half a pixel's area do not fill it: what is small and bright would count twice, or not at all. Two halves do.
+            parameters["pixel_width"], parameters["pixel_height"] = 0.5**0.5, 2.0**0.5
         # Where samples are of one band each, fewer of them share a pixel in that band.
         parameters["band_side"] = min(1.0, np.sqrt(self.spectrum.bands / (samples + sample_offset)))
         parameters["taps_per_pixel"] = TAPS_PER_PIXEL * (samples + sample_offset) ** 0.25
@@ -235,7 +238,7 @@ class EyePass:
         self.spectrum = look.spectrum
         parameters = self._parameters(camera, columns, rows, maps.scale, look.seed)
         parameters["dithered"], parameters["counts_turns"], parameters["sample_side"], parameters["band_side"] = 0, 0, 1.0, 1.0
-        parameters["pixel_scale"] = columns / width
+        parameters["pixel_width"] = parameters["pixel_height"] = columns / width
         parameters["taps_per_pixel"] = TAPS_PER_PIXEL * samples**0.25
         # Within the picture's pixel, which is a small part of the grid's.
         parameters["within_pixel"] = 0.5 + (look.place - 0.5) * columns / width
@@ -331,7 +334,7 @@ class EyePass:
         for name, row in zip(("red_of_xyz", "green_of_xyz", "blue_of_xyz"), xyz_to_rgb709_matrix(), strict=True):
             parameters[name][0, :3] = row
         parameters["size"] = width, height
-        parameters["pixel_scale"] = 1.0
+        parameters["pixel_width"] = parameters["pixel_height"] = 1.0
         parameters["background"][0, :3] = self.scene.scene.background_rgb
         environment = self.scene.scene.environment
         if environment is not None:
@@ -444,8 +447,10 @@ def _pixel_lattice(samples: int, offset: int) -> np.ndarray:
     """(samples, 2) places in a pixel: ordered as in a golden-ratio lattice, shifted as a whole from launch to launch.
 
     Every row and every column of the pixel cut into `samples` holds one sample, so that edges of any slant are filtered well,
-    and the first launch's lie about the pixel's middle, so that the picture does not move.
+    and the first launch's lie about the pixel's middle, so that the picture does not move. Two lie in the middle of its halves.
     """
+    if (samples, offset) == (2, 0):
+        return np.array([[0.25, 0.5], [0.75, 0.5]])
     golden = 0.6180339887498949
     shift = offset * np.array([0.7548776662466927, 0.5698402909980532])
     index = np.arange(samples)

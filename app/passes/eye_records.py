@@ -44,7 +44,7 @@ EYE_PARAMETERS = Struct(
         Field("sky_y", "vec3"),
         Field("sample_side", "float", "side of a sample's share of its pixel, pixels"),
         Field("sky_z", "vec3"),
-        Field("pixel_scale", "float", "side of a pixel whose columns rays carry, in pixels of this picture"),
+        Field("pixel_width", "float", "of a pixel whose columns rays carry, in pixels of this picture"),
         Field("size", "uvec2", "picture, pixels"),
         Field("within_pixel", "vec2", "this sample's place in its pixel, 0 to 1"),
         Field("inside_mask", "uint", "solids the camera stands in, bits of the medium stack"),
@@ -59,6 +59,9 @@ EYE_PARAMETERS = Struct(
         Field("band_side", "float", "side of the share of its pixel that a sample of one band has, pixels"),
         Field("direct_looks", "uint", "of one sample, at what is seen directly"),
         Field("first_listed", "uint", "of the listed pixels, this dispatch's first"),
+        Field("pixel_height", "float", "as pixel_width"),
+        Field("unused2", "float", ""),
+        Field("unused3", "vec2", ""),
     ),
 )
 _LIGHT_KINDS = {"point": 0, "spot": 0, "directional": 1, "collimated": 2, "area": 3}

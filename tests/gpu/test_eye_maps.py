@@ -22,6 +22,7 @@ from tests.gpu.eye_rig import (
     floor_points,
     horizontal,
     point_light_radiance,
+    released,
     render,
     white_texels,
 )
@@ -89,6 +90,19 @@ def test_small_texels_are_averaged_by_the_pixel_and_keep_their_energy(gl):
     # The samples' shares of the pixel do not quite tile it: one texel of 64 is weighed to a tenth.
     assert rgb.sum() * pixel_area * np.pi / REFLECTANCE == pytest.approx(3.0, rel=0.1)
     assert np.count_nonzero(rgb) == 1 and rgb[31 - 100 // 8, 37 // 8] > 0
+
+
+@pytest.mark.parametrize("samples", [1, 2])
+def test_few_samples_fill_the_pixel(gl, samples: int) -> None:
+    """Pixels of 2 by 2 texels: a bright one counts once, wherever in its pixel it lies."""
+    eye = eye_pass(gl, [floor()])
+    for x, y in ((37, 40), (36, 40), (37, 41), (36, 41)):
+        lumens = np.zeros((64, 64))
+        lumens[y, x] = 3.0
+        eye.run(ABOVE, 32, 32, samples, maps=flat_maps(gl, eye.scene, [(-2, -2, 4.0, 0, 0, 64)], white_texels(lumens)))
+        rgb = eye.read_rgb()[..., 1]
+        assert rgb.sum() * (4 / 32) ** 2 * np.pi / REFLECTANCE == pytest.approx(3.0, rel=0.01), (x, y)
+    released(eye)
 
 
 def test_samples_weigh_texels_by_their_share_of_the_pixel(gl):
