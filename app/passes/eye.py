@@ -188,9 +188,8 @@ class EyePass:
         maps = maps or self._no_maps()
         parameters = self._parameters(camera, width, height, maps.scale, seed)
         parameters["sample_side"] = 1.0 / np.sqrt(samples + sample_offset)
-        if (samples, sample_offset) == (2, 0):
-            # Two squares of half a pixel's area do not fill it: what is small and bright would count twice, or not at all. Two halves do.
-            parameters["pixel_width"], parameters["pixel_height"] = 0.5**0.5, 2.0**0.5
+        if _is_in_strips(samples, sample_offset):
+            parameters["pixel_width"], parameters["pixel_height"] = samples**-0.5, samples**0.5
         # Where samples are of one band each, fewer of them share a pixel in that band.
         parameters["band_side"] = min(1.0, np.sqrt(self.spectrum.bands / (samples + sample_offset)))
         parameters["taps_per_pixel"] = TAPS_PER_PIXEL * (samples + sample_offset) ** 0.25
@@ -443,14 +442,20 @@ class EyePass:
         return self._empty
 
 
+def _is_in_strips(samples: int, offset: int) -> bool:
+    """Whether samples share the pixel in upright strips. Two or three squares of the same area do not fill it: what is small and bright, and
+    letters, would count twice or not at all. With more, outlines want different heights."""
+    return offset == 0 and samples in (2, 3)
+
+
 def _pixel_lattice(samples: int, offset: int) -> np.ndarray:
     """(samples, 2) places in a pixel: ordered as in a golden-ratio lattice, shifted as a whole from launch to launch.
 
     Every row and every column of the pixel cut into `samples` holds one sample, so that edges of any slant are filtered well,
-    and the first launch's lie about the pixel's middle, so that the picture does not move. Two lie in the middle of its halves.
+    and the first launch's lie about the pixel's middle, so that the picture does not move.
     """
-    if (samples, offset) == (2, 0):
-        return np.array([[0.25, 0.5], [0.75, 0.5]])
+    if _is_in_strips(samples, offset):
+        return np.column_stack([(np.arange(samples) + 0.5) / samples, np.full(samples, 0.5)])
     golden = 0.6180339887498949
     shift = offset * np.array([0.7548776662466927, 0.5698402909980532])
     index = np.arange(samples)
