@@ -163,7 +163,7 @@ EyePath camera_path(uvec2 pixel, uint look, float gain)
 
 #ifdef EYE_SPECULAR
 #ifdef HAS_DIELECTRIC
-// A number for a choice at this depth: a Kronecker sequence over a pixel's samples, one irrational a depth.
+// A number for a choice at this depth: a Kronecker sequence over a pixel's samples, one irrational a depth (the first is the wavelength's).
 float choice(EyePath path, uint pixel_key)
 {
     const uint generators[8] = uint[](1779033703u, 3144134277u, 2773480763u, 1359893119u, 2600822925u, 528734635u, 1541459225u, 3418070365u);

@@ -8,6 +8,8 @@
 #define COLUMNS_HELD (SPATIAL + SPECTRAL_GROUPS)
 // A column longer than this (GPU units, the glass is about 1) has left the linear regime for good.
 #define COLUMN_LIMIT 1e4
+// Of the sequence of single wavelengths: the fraction of the square root of 2.
+#define WAVELENGTH_GENERATOR 1779033703u
 // An end of a band that arrives farther off (GPU units) is beyond the facet for good.
 #define END_LIMIT 1.0
 
@@ -130,7 +132,8 @@ void narrow(inout EyePath path, uint pixel_key)
 #ifdef RANDOM_WAVELENGTH
     // One of the table's cells, by how bright it looks.
 #ifdef EVEN_WAVELENGTHS
-    float u = kronecker(p.draw_index, 2654435769u, hash_combine(pixel_key, 77u));
+    // Not by the golden ratio: the places in a pixel go by that, and each height would have a colour of its own.
+    float u = kronecker(p.draw_index, WAVELENGTH_GENERATOR, hash_combine(pixel_key, 77u));
 #else
     float u = unit_float(hash_combine(hash_combine(pixel_key, 77u), p.draw_index));
 #endif

@@ -134,6 +134,18 @@ def test_places_in_a_pixel_are_even_in_one_launch_and_over_many() -> None:
     assert box_discrepancy(still) > 0.05
 
 
+def test_single_wavelengths_are_even_over_the_places_in_a_pixel() -> None:
+    """Of camera samples: with the places' own ratio every height in the pixel had a colour of its own, and more samples did not help."""
+    shader = (paths.shaders_dir() / "eye" / "path.glsl").read_text()
+    (generator,) = re.findall(r"#define WAVELENGTH_GENERATOR (\d+)u", shader)
+    for samples in (64, 204, 1024):
+        places = _pixel_lattice(samples, 0)
+        for of_wavelength, even in ((int(generator), True), (GOLDEN, False)):
+            colour = kronecker(np.arange(samples), of_wavelength, 0)
+            worst = max(box_discrepancy(np.column_stack([colour, places[:, axis]])) for axis in range(2))
+            assert (worst < 2.5 * samples**-0.75) is even, (samples, of_wavelength, worst)
+
+
 THRESHOLD = 0.3
 LATTICES = 3
 
