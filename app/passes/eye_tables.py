@@ -56,7 +56,8 @@ class EyeTables:
         glasses = _shown_media(scene)
         axis = _axis(scene, list(glasses.values()))
         absorptions = _absorptions(shown, scene.space.scale)
-        spectra, defines = _spectra(scene, glasses, axis, absorptions, channels, maps)
+        cell_cdf = _cell_cdf(axis, channels)
+        spectra, defines = _spectra(scene, glasses, axis, absorptions, cell_cdf, maps)
         emission, rows = _emission(shown, axis, channels, reflectances, maps, scene.space.scale)
         colours = np.zeros((len(shown.objects), 4), "f4")
         colours[:, 3] = -1.0
@@ -70,7 +71,7 @@ class EyeTables:
             spectra_texture(ctx, spectra),
             _texture(ctx, emission),
             ctx.buffer(colours.tobytes()),
-            ctx.buffer(_cell_cdf(axis, channels).astype("f4").tobytes()),
+            ctx.buffer(cell_cdf.astype("f4").tobytes()),
             defines | rows,
             axis,
         )
@@ -117,7 +118,7 @@ def _absorption(material: Material, scale: float) -> np.ndarray | None:
 
 
 def _spectra(
-    scene: SceneBuffers, glasses: dict[Dispersion, Dispersion], axis: SpectralAxis, absorptions: list[np.ndarray], channels: Channels, maps: MapChannels
+    scene: SceneBuffers, glasses: dict[Dispersion, Dispersion], axis: SpectralAxis, absorptions: list[np.ndarray], cell_cdf: np.ndarray, maps: MapChannels
 ) -> tuple[np.ndarray, dict[str, int]]:
     """Rows over x as `lib/scene.glsl` reads them, and where they begin."""
     x = np.linspace(0.0, 1.0, SAMPLES)
@@ -132,7 +133,7 @@ def _spectra(
         "ABSORPTION_ROW": np.array([np.interp(nm, VISIBLE_NM, a) for a in absorptions]).reshape(-1, SAMPLES),
         "BASIS_ROW": np.array([np.interp(nm, VISIBLE_NM, column) for column in rgb_basis().T]),
         "BIN_ROW": maps.coordinate(axis, x)[None],
-        "QUANTILE_ROW": np.interp(x, _cell_cdf(axis, channels), np.linspace(0.0, 1.0, EMISSION_CELLS + 1))[None],
+        "QUANTILE_ROW": np.interp(x, cell_cdf, np.linspace(0.0, 1.0, EMISSION_CELLS + 1))[None],
     }
     starts = np.cumsum([0] + [len(rows) for rows in sections.values()])
     defines = dict(zip(sections, starts.tolist(), strict=False))
