@@ -62,7 +62,7 @@ install_packages() {
 
 # Without OpenGL the program still starts, tells what is missing, and can search glasses.
 check_opengl() {
-    local try='from app.gpu.context import create_context; create_context().release()'
+    local try='from spectrasplat.gpu.context import create_context; create_context().release()'
     # Word splitting of the package list is meant.
     # shellcheck disable=SC2086
     if "$venv_python" -P -c "$try" >/dev/null 2>&1 ||
@@ -89,7 +89,7 @@ offer_xvfb() {
 
 # Compile the tree builder ahead of time, so that the first picture does not wait for it.
 warm_caches() {
-    "$venv_python" -P -m app.model.bvh --warm >/dev/null 2>&1 || true
+    "$venv_python" -P -m spectrasplat.model.geometry.bvh --warm >/dev/null 2>&1 || true
 }
 
 is_installed() {

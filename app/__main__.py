@@ -10,7 +10,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from app.errors import UserError
+from .base.errors import UserError
 
 USER_ERROR = 2
 INTERRUPTED = 130
@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    from app.cli import run
+    from .commands.program import run
 
     return run(sys.argv[1:] if arguments is None else list(arguments))
 

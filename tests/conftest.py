@@ -45,13 +45,13 @@ def strict_floating_point() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def gl():
-    """The session's OpenGL 4.3 context (`app.gpu.context.Context`); `gl.ctx` is moderngl's.
+    """The session's OpenGL 4.3 context (`spectrasplat.gpu.context.Context`); `gl.ctx` is moderngl's.
 
     Tests share compiled programs, as a viewer's edits and a stress run's cases do: most of what they draw are variants of
     a few scenes, and a software renderer compiles longer than it draws.
     """
-    from app.gpu import shader
-    from app.gpu.context import create_context
+    from spectrasplat.gpu import shader
+    from spectrasplat.gpu.context import create_context
 
     context = create_context()
     shader.keep_programs(context.ctx)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from app.bench.curves import error_at_time, points_by, speed_up
-from app.bench.halves import HALVES
-from app.bench.results import Claim, Curve, Point, SceneResult
+from .curves import error_at_time, points_by, speed_up
+from .measured_passes import HALVES
+from .results import Claim, Curve, Point, SceneResult
 
 EARLY_SECONDS = 0.1
 LATE_SECONDS = 3.0

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from app.bench.metrics import Truth, bias_variance
-from app.bench.results import Curve, Point, Sample
+from ..reference.metrics import Truth, bias_variance
+from .results import Curve, Point, Sample
 
 SMALLEST_ERROR = 1e-12
 """Stands for 0 in logarithms."""

@@ -8,10 +8,10 @@ import platform
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.paths import shaders_dir
+from ..base.paths import shaders_dir
 
 if TYPE_CHECKING:
-    from app.gpu.context import Context
+    from ..gpu.context import Context
 
 _MEASURING = ("light_half.py", "renderer.py", "gpu/*.py", "model/*.py", "passes/*.py", "bench/metrics.py", "bench/eye_rendering.py", "bench/rendering.py", "bench/runner.py")
 """Sources beside the shaders whose change changes a picture, its time or its error."""

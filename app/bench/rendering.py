@@ -16,16 +16,16 @@ from typing import Protocol
 
 import numpy as np
 
-from app.errors import UserError
-from app.gpu.context import Context
-from app.gpu.scene_buffers import SceneBuffers
-from app.light_half import LightHalf, spectral_axis
-from app.model.colorimetry import rgb709_to_xyz
-from app.model.features import Features
-from app.model.scene import Scene
-from app.model.settings import RenderSettings
-from app.passes.eye import CausticMaps, EyePass
-from app.renderer import DEFAULT_SAMPLES
+from ..base.errors import UserError
+from ..gpu.context import Context
+from ..gpu.scene_buffers import SceneBuffers
+from ..model.features import Features
+from ..model.optics.colorimetry import rgb709_to_xyz
+from ..model.scene import Scene
+from ..model.settings import RenderSettings
+from ..passes.camera import CausticMaps, EyePass
+from ..render.light_pass import LightHalf, spectral_axis
+from ..render.still import DEFAULT_SAMPLES
 
 WARM_UP_PHOTONS = 2048
 SMALLEST_BUDGET = 128

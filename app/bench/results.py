@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from app.bench.halves import COUNTED_STAGES
+from .measured_passes import COUNTED_STAGES
 
 DEFAULT_METHODS = ("stochastic", "stochastic-even", "stochastic-point", "regular-7", "regular-16", "srd-lambda", "srd")
 

@@ -10,24 +10,18 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from app.bench import metrics
-from app.bench.claims import claims_of, ratios_of
-from app.bench.curves import budget_at_time, complete_curve
-from app.bench.halves import HALVES
-from app.bench.metrics import Truth
-from app.bench.rendering import NothingToMeasure, Rendering, Rig
-from app.bench.results import (
-    OTHER_MEASURES,
-    BenchSettings,
-    Curve,
-    Sample,
-    SceneResult,
-)
-from app.bench.store import Store
-from app.bench.subjects import SUBJECTS, Progress, Subject
-from app.errors import UserError
-from app.gpu.context import Context
-from app.model.scene import Dielectric, Scene
+from ..base.errors import UserError
+from ..gpu.context import Context
+from ..model.scene import Dielectric, Scene
+from ..reference import metrics
+from ..reference.metrics import Truth
+from .claims import claims_of, ratios_of
+from .curves import budget_at_time, complete_curve
+from .measured_passes import HALVES
+from .rendering import NothingToMeasure, Rendering, Rig
+from .results import OTHER_MEASURES, BenchSettings, Curve, Sample, SceneResult
+from .store import Store
+from .subjects import SUBJECTS, Progress, Subject
 
 POINTS = 10
 """Budgets a curve."""

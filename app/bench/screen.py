@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from app.bench.curves import error_at_time
-from app.bench.halves import HALVES
-from app.bench.results import Curve, SceneResult
+from .curves import error_at_time
+from .measured_passes import HALVES
+from .results import Curve, SceneResult
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -16,21 +16,28 @@ from pathlib import Path
 
 import numpy as np
 
-from app.bench import splat_speed
-from app.gpu.context import Context, create_context
-from app.gpu.scene_buffers import SceneBuffers
-from app.light_half import spectral_axis
-from app.model import primitives_round
-from app.model.bvh import build_bvh
-from app.model.catalogue import find
-from app.model.features import Features
-from app.model.glass import constant
-from app.model.primitives import plane
-from app.model.scene import Camera, Dielectric, Diffuse, Light, Scene, SceneObject
-from app.model.settings import RenderSettings
-from app.model.spectrum import illuminant
-from app.passes.emission_domain import emission_domain
-from app.passes.trace import Band, LatticeSlice, TracePass
+from ..gpu.context import Context, create_context
+from ..gpu.scene_buffers import SceneBuffers
+from ..model.features import Features
+from ..model.geometry import primitives_round
+from ..model.geometry.bvh import build_bvh
+from ..model.geometry.primitives import plane
+from ..model.optics.catalogue import find
+from ..model.optics.glass import constant
+from ..model.optics.spectrum import illuminant
+from ..model.scene import (
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Scene,
+    SceneObject,
+)
+from ..model.settings import RenderSettings
+from ..passes.emission_domain import emission_domain
+from ..passes.trace import Band, LatticeSlice, TracePass
+from ..render.light_pass import spectral_axis
+from . import splat_speed
 
 TRIANGLES = 81_920
 LATTICE = 1 << 16
@@ -110,7 +117,7 @@ def _tree_seconds() -> float:
 
 
 def _render_command(*arguments: str) -> list[str]:
-    return [sys.executable, "-m", "app", "render", *arguments]
+    return [sys.executable, "-m", "spectrasplat", "render", *arguments]
 
 
 def _warm_start_seconds() -> float:
@@ -129,7 +136,7 @@ def _resident_bytes() -> tuple[int, float]:
     """Peak resident memory of a 1280×720 rendering with 1 M photons, and its seconds."""
     script = (
         "import resource, sys\n"
-        "from app.__main__ import main\n"
+        "from spectrasplat.__main__ import main\n"
         "code = main(sys.argv[1:])\n"
         "print('peak', resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
         "sys.exit(code)\n"

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.gpu import shader
-from app.gpu.map_atlas import MapAtlas, pack, placement_rows
-from app.gpu.records import RECEIVER, photon_record
-from app.gpu.splat_tables import SplatTables
-from app.model import spectrum
-from app.model.spectral_tables import SpectralAxis
-from app.passes.footprint import SpectralVariables
-from app.passes.splat import Splatter
+from ..gpu import shader
+from ..gpu.records import RECEIVER, photon_record
+from ..gpu.splat_tables import SplatTables
+from ..model.optics import spectrum
+from ..model.optics.spectral_tables import SpectralAxis
+from ..passes.footprint import SpectralVariables
+from ..passes.map_atlas import MapAtlas, pack, placement_rows
+from ..passes.splat import Splatter
 
 if TYPE_CHECKING:
     import moderngl

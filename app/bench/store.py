@@ -13,10 +13,10 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from app.atomic import atomic_output, check_writable
-from app.bench.metrics import Truth
-from app.bench.results import BenchResult, BenchSettings, SceneResult
-from app.errors import UserError
+from ..base.atomic import atomic_output, check_writable
+from ..base.errors import UserError
+from ..reference.metrics import Truth
+from .results import BenchResult, BenchSettings, SceneResult
 
 RESULTS = "results.json"
 PICTURES = "pictures"

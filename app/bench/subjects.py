@@ -6,18 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
-from app.bench.eye_rendering import eye_rigs
-from app.bench.metrics import Truth
-from app.bench.rendering import Rig, light_rigs
-from app.bench.results import ReferenceInfo
-from app.bench.truth_picture import (
-    eye_truth_key,
-    make_eye_truth,
-    make_truth,
-    truth_key,
-)
-from app.gpu.context import Context
-from app.model.scene import Scene
+from ..gpu.context import Context
+from ..model.scene import Scene
+from ..reference.metrics import Truth
+from .camera_rendering import eye_rigs
+from .reference_picture import eye_truth_key, make_eye_truth, make_truth, truth_key
+from .rendering import Rig, light_rigs
+from .results import ReferenceInfo
 
 Progress = Callable[[float, str], None]
 RigMaker = Callable[[Context, Scene, Sequence[str], int, int, Callable[[str], None]], AbstractContextManager[Mapping[str, Rig]]]

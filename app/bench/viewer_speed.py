@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.errors import UserError
-from app.model.scene import Dielectric
-from app.passes.sample_picture import SamplePicture
-from app.ui.headless import HeadlessInterface
-from app.ui.session import Session
-from app.ui.state import Selection
-from app.ui.viewer import Viewer, headless_viewer
+from ..base.errors import UserError
+from ..edit.state import Selection
+from ..model.scene import Dielectric
+from ..passes.sample_picture import SamplePicture
+from ..ui.headless import HeadlessInterface
+from ..ui.session import Session
+from ..ui.viewer import Viewer, headless_viewer
 
 if TYPE_CHECKING:
-    from app.gpu.context import Context
+    from ..gpu.context import Context
 
 ORBIT_PX = 3.0
 """Of the mouse in a frame."""
@@ -185,7 +185,7 @@ class _Bench:
 
     def nudge_gain(self) -> None:
         """A little more dispersion."""
-        from app.ui import edits
+        from ..edit import edits
 
         state = self.session.state
         material = state.scene.objects[self._glass].material

@@ -11,8 +11,8 @@ import os
 import sys
 from typing import TYPE_CHECKING, Literal
 
-from app.errors import UserError, suggestion
-from app.gpu.limits import Limits
+from ..base.errors import UserError, suggestion
+from .limits import Limits
 
 if TYPE_CHECKING:
     import moderngl
@@ -140,7 +140,7 @@ def _create_egl() -> Context:
 def _create_osmesa() -> Context:
     import moderngl
 
-    from app.gpu.osmesa import OSMesaLoader
+    from .osmesa import OSMesaLoader
 
     try:
         loader = OSMesaLoader(*GL_VERSION)

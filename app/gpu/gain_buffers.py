@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.gpu.records import GAIN_BOX
-from app.model.glass import LINE_D_NM
-from app.model.local_dispersion import GainGrid
+from ..model.local_dispersion import GainGrid
+from ..model.optics.glass import LINE_D_NM
+from .records import GAIN_BOX
 
 if TYPE_CHECKING:
     import moderngl
 
-    from app.gpu.scene_buffers import GpuSpace
-    from app.model.scene import Scene, SceneObject
-    from app.model.spectral_tables import SpectralAxis
+    from ..model.optics.spectral_tables import SpectralAxis
+    from ..model.scene import Scene, SceneObject
+    from .scene_buffers import GpuSpace
 
 _BIND_BOXES, _BIND_GAINS = 9, 10
 

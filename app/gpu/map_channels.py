@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.model.colorimetry import K_M, VISIBLE_NM, cmf_xyz
-from app.model.scene import Light
-from app.model.spectral_tables import SpectralAxis
-from app.model.spectrum import Spectrum, cmf_at
+from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz
+from ..model.optics.spectral_tables import SpectralAxis
+from ..model.optics.spectrum import Spectrum, cmf_at
+from ..model.scene import Light
 
 
 @dataclass(frozen=True)

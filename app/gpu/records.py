@@ -8,7 +8,7 @@ Flux stays in watts of the scene; only lengths are scaled.
 
 from __future__ import annotations
 
-from app.gpu.schema import Field, Struct
+from .schema import Field, Struct
 
 NONE = 0xFFFFFFFF
 """Index that means 'there is none'."""

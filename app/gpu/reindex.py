@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.model.glass import LINE_D_NM, Dispersion, with_gain
-from app.model.spectral_tables import SpectralAxis
+from ..model.optics.glass import LINE_D_NM, Dispersion, with_gain
+from ..model.optics.spectral_tables import SpectralAxis
 
 if TYPE_CHECKING:
     import moderngl
 
-    from app.model.spectrum import Spectrum
+    from ..model.optics.spectrum import Spectrum
 
 Spans = list[list[tuple[float, float]]]
 """Ends of each light's bands in some spectral coordinate, ascending."""

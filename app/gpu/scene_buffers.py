@@ -11,15 +11,8 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from app.errors import UserError
-from app.gpu import bindings
-from app.gpu.records import NONE
-from app.gpu.scene_texels import SceneTexels, spectra_texture, tree_texels
-from app.gpu.schema import Field, Struct
-from app.gpu.texture_store import textured_objects
-from app.model.bvh import build_bvh
-from app.model.colorimetry import VISIBLE_NM, rgb_partition
-from app.model.features import (
+from ..base.errors import UserError
+from ..model.features import (
     MAX_GROUPS,
     Features,
     dispersive_materials,
@@ -27,14 +20,16 @@ from app.model.features import (
     overlapping_solids,
     world_bounds,
 )
-from app.model.glass import Dispersion
-from app.model.scene import Black, Dielectric, Diffuse, Mirror, Scene
-from app.model.spectral_tables import (
-    CumulativeSpectrum,
-    SpectralAxis,
-    cumulative,
-    index_table,
-)
+from ..model.geometry.bvh import build_bvh
+from ..model.optics.colorimetry import VISIBLE_NM, rgb_partition
+from ..model.optics.glass import Dispersion
+from ..model.optics.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative, index_table
+from ..model.scene import Black, Dielectric, Diffuse, Mirror, Scene
+from . import bindings
+from .records import NONE
+from .scene_texels import SceneTexels, spectra_texture, tree_texels
+from .schema import Field, Struct
+from .texture_store import textured_objects
 
 SAMPLES = 1025
 """Equally spaced samples of every spectral table over x in [0, 1]; linear interpolation errs below 2e-7 in n."""

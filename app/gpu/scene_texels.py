@@ -14,8 +14,8 @@ from collections.abc import Mapping
 import moderngl
 import numpy as np
 
-from app.errors import UserError
-from app.gpu import bindings
+from ..base.errors import UserError
+from . import bindings
 
 ROW_TEXELS = 4096
 """Texels a row of the scene's texture (shaders/lib/scene.glsl knows it as shift and mask)."""

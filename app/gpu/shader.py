@@ -17,10 +17,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from app import paths
-from app.gpu.glsl_conditionals import Line
-from app.gpu.lean_source import lean
-from app.gpu.schema import Struct
+from ..base import paths
+from .dead_code import lean
+from .glsl_conditionals import Line
+from .schema import Struct
 
 if TYPE_CHECKING:
     import moderngl

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from app import paths
+from ..base import paths
 
 INTERVAL_S = 0.5
 SUFFIXES = (".glsl", ".comp", ".vert", ".frag")

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.gpu.map_channels import MapChannels
-from app.model.colorimetry import VISIBLE_NM
-from app.model.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative
-from app.model.spectrum import Spectrum
+from ..model.optics.colorimetry import VISIBLE_NM
+from ..model.optics.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative
+from ..model.optics.spectrum import Spectrum
+from .map_channels import MapChannels
 
 if TYPE_CHECKING:
     import moderngl

@@ -14,14 +14,14 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from app.errors import UserError
-from app.gpu import map_atlas
-from app.gpu.map_atlas import Tile
-from app.gpu.mip_chain import kept_levels, level_count
-from app.gpu.records import NONE
-from app.gpu.schema import Field, Struct
-from app.model.scene import Diffuse, Scene, SceneObject
-from app.model.texture import Environment, Texture
+from ..base.errors import UserError
+from ..model.scene import Diffuse, Scene, SceneObject
+from ..model.texture import Environment, Texture
+from ..passes import map_atlas
+from ..passes.map_atlas import Tile
+from .mip_chain import kept_levels, level_count
+from .records import NONE
+from .schema import Field, Struct
 
 PICTURE = Struct(
     "Picture",

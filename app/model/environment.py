@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.errors import UserError
-from app.model.cie_sky import SKY_TYPES, relative_luminance
-from app.model.placement import frame_from_z, rotation_about
-from app.model.texture import Environment
+from ..base.errors import UserError
+from .optics.cie_sky import SKY_TYPES, relative_luminance
+from .placement import frame_from_z, rotation_about
+from .texture import Environment
 
 Vec3 = tuple[float, float, float]
 
@@ -40,7 +40,7 @@ def from_map(
     the world's x (`world_to_local` says what happens where `up` is x). A picture larger than MAX_WIDTH × MAX_HEIGHT is averaged down.
     What was assumed goes to `notes`. Raises UserError for a picture that cannot be read or an impossible number.
     """
-    from app.model.picture_files import read_picture
+    from .io.picture_files import read_picture
 
     path = Path(path).resolve()
     if not (math.isfinite(intensity) and intensity >= 0.0):

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.model.camera_rays import camera_frame
-from app.model.scene import (
+from .camera_rays import camera_frame
+from .scene import (
     Black,
     Camera,
     Dielectric,
@@ -20,7 +20,7 @@ from app.model.scene import (
     Scene,
     SceneObject,
 )
-from app.model.settings import RenderSettings
+from .settings import RenderSettings
 
 MAX_GROUPS = 4
 """Spectral columns a photon may carry; further dispersive materials share the last one."""
@@ -163,7 +163,7 @@ class Features:
 
 def _reindexed(scene: Scene, settings: RenderSettings, groups: int, *, coloured: bool) -> bool:
     """Whether an edit of the dispersion, or the brush, moves wavelengths between paths: where n alone says what a path is and weighs."""
-    from app.model.spectral_tables import SpectralAxis
+    from .optics.spectral_tables import SpectralAxis
 
     edited = settings.anchor_weights or (settings.local_gain and any(o.local_dispersion for o in scene.objects))
     if not edited or groups != 1 or coloured or settings.method != "srd":

@@ -15,8 +15,8 @@ from functools import cached_property
 
 import numpy as np
 
-from app.model.features import is_flat
-from app.model.scene import Dab, SceneObject
+from .features import is_flat
+from .scene import Dab, SceneObject
 
 MIN_LOG2_GAIN = -6.0
 MAX_LOG2_GAIN = math.log2(10.0)

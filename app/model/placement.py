@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from app.model.scene_table import SceneTable, Vec3
+from .io.scene_table import SceneTable, Vec3
 
 PLACEMENT_KEYS = (
     "position", "scale", "rotation_deg", "axis", "angle_deg", "z_axis", "x_axis", "matrix",

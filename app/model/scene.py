@@ -12,10 +12,10 @@ from typing import Literal
 
 import numpy as np
 
-from app.model.glass import Dispersion
-from app.model.mesh import Mesh
-from app.model.spectrum import Spectrum
-from app.model.texture import Environment, Texture
+from .geometry.mesh import Mesh
+from .optics.glass import Dispersion
+from .optics.spectrum import Spectrum
+from .texture import Environment, Texture
 
 Vec3 = tuple[float, float, float]
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.model.scene import Camera
-from app.model.scene_lights import Surroundings
-from app.model.scene_table import SceneTable
+from .io.scene_table import SceneTable
+from .scene import Camera
+from .scene_lights import Surroundings
 
 
 def read_camera(table: SceneTable, around: Surroundings) -> Camera:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.errors import UserError
-from app.model.mesh import Mesh
-from app.model.scene import Dielectric, Diffuse, Light, Scene, SceneObject
+from ..base.errors import UserError
+from .geometry.mesh import Mesh
+from .scene import Dielectric, Diffuse, Light, Scene, SceneObject
 
 MAX_SIZE_RATIO = 1e12
 """Largest to smallest object."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from app.model.scene import Dab, Diffuse, Material
-from app.model.scene_table import SceneTable
+from .io.scene_table import SceneTable
+from .scene import Dab, Diffuse, Material
 
 KEY = "local_dispersion"
 MAX_DAB_LOG2 = 60.0

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.model.mesh_recipes import note_recipe
-from app.model.primitives import plane
-from app.model.scene import Camera, Diffuse, Light, SceneObject
-from app.model.scene_lights import DEFAULT_ILLUMINANCE, Surroundings, default_direction
-from app.model.spectrum import illuminant
+from .geometry.mesh_recipes import note_recipe
+from .geometry.primitives import plane
+from .optics.spectrum import illuminant
+from .scene import Camera, Diffuse, Light, SceneObject
+from .scene_lights import DEFAULT_ILLUMINANCE, Surroundings, default_direction
 
 SUN_DIAMETER_DEG = 0.53
 

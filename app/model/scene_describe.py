@@ -12,12 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from app.errors import UserError
-from app.model.colorimetry import VISIBLE_NM, rgb_partition
-from app.model.glass import Dispersion
-from app.model.scene import Absorption, Black, Dielectric, Diffuse, Material, Mirror
-from app.model.scene_pictures import picture_name
-from app.model.spectrum import Spectrum, blackbody, illuminant, illuminant_names
+from ..base.errors import UserError
+from .io.scene_pictures import picture_name
+from .optics.colorimetry import VISIBLE_NM, rgb_partition
+from .optics.glass import Dispersion
+from .optics.spectrum import Spectrum, blackbody, illuminant, illuminant_names
+from .scene import (
+    Absorption,
+    Black,
+    Dielectric,
+    Diffuse,
+    Material,
+    Mirror,
+)
 
 _SAME = 1e-9
 """Relative difference below which two curves are one."""
@@ -101,7 +108,7 @@ def _describe_glass(material: Dielectric) -> dict[str, Any]:
 def _describe_dispersion(dispersion: Dispersion) -> dict[str, Any]:
     if dispersion.gain != 1.0:
         return _describe_dispersion(replace(dispersion, gain=1.0)) | {"dispersion_gain": dispersion.gain}
-    from app.model import catalogue
+    from .optics import catalogue
 
     try:
         if catalogue.find(dispersion.name) == dispersion:

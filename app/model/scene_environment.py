@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from app.errors import UserError
-from app.model.environment import (
+from ..base.errors import UserError
+from .environment import (
     DEFAULT_SKY_TYPE,
     Z_UP,
     from_map,
@@ -16,10 +16,10 @@ from app.model.environment import (
     sky,
     up_and_rotation,
 )
-from app.model.scene_pictures import picture_file
-from app.model.scene_render import read_background
-from app.model.scene_table import SceneTable, Vec3
-from app.model.texture import Environment
+from .io.scene_pictures import picture_file
+from .io.scene_table import SceneTable, Vec3
+from .scene_render import read_background
+from .texture import Environment
 
 KEY = "environment"
 KINDS = ("map", "gradient", "sky", "constant")

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.errors import UserError
-from app.model import spectrum as spectra
-from app.model.scene import Light
-from app.model.scene_table import SceneTable
-from app.model.spectrum import Spectrum
+from ..base.errors import UserError
+from .io.scene_table import SceneTable
+from .optics import spectrum as spectra
+from .optics.spectrum import Spectrum
+from .scene import Light
 
 KINDS = ("point", "spot", "directional", "collimated", "area")
 

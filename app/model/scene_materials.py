@@ -7,14 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.errors import suggestion
-from app.model import glass
-from app.model.colorimetry import VISIBLE_NM, attenuation_from_colour
-from app.model.glass import Dispersion
-from app.model.scene import Absorption, Black, Dielectric, Diffuse, Material, Mirror
-from app.model.scene_table import SceneTable
-from app.model.scene_textures import TextureReader
-from app.model.spectrum import read_csv
+from ..base.errors import suggestion
+from .io.scene_table import SceneTable
+from .optics import glass
+from .optics.colorimetry import VISIBLE_NM, attenuation_from_colour
+from .optics.glass import Dispersion
+from .optics.spectrum import read_csv
+from .scene import (
+    Absorption,
+    Black,
+    Dielectric,
+    Diffuse,
+    Material,
+    Mirror,
+)
+from .scene_textures import TextureReader
 
 KINDS = ("glass", "mirror", "diffuse", "black")
 DEFAULT_GLASS = "N-BK7"
@@ -104,7 +111,7 @@ def _read_diffuse(table: SceneTable, textures: TextureReader) -> Diffuse:
 
 def _rgb_under_white(reflectance: np.ndarray) -> tuple[float, float, float]:
     """Linear Rec.709 of a reflectance (401,) under D65, clipped to [0, 1]."""
-    from app.model.spectrum import Spectrum, illuminant, xyz_to_rgb709
+    from .optics.spectrum import Spectrum, illuminant, xyz_to_rgb709
 
     white = illuminant("D65")
     seen = Spectrum(white.density * reflectance).xyz() / white.luminous()
@@ -171,7 +178,7 @@ def _read_range(table: SceneTable) -> tuple[float, float] | None:
 
 
 def _catalogue(table: SceneTable, key: str, name: str) -> Dispersion:
-    from app.model import catalogue
+    from .optics import catalogue
 
     return catalogue.find(name, table.where(key))
 

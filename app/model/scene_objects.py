@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from app.errors import UserError
-from app.model.mesh import Mesh
-from app.model.mesh_recipes import note_recipe
-from app.model.placement import read_placement
-from app.model.scene import Dielectric, Material, SceneObject
-from app.model.scene_dabs import read_dabs
-from app.model.scene_materials import read_object_material
-from app.model.scene_table import SceneTable
-from app.model.scene_textures import TextureReader
+from ..base.errors import UserError
+from .geometry.mesh import Mesh
+from .geometry.mesh_recipes import note_recipe
+from .io.scene_table import SceneTable
+from .placement import read_placement
+from .scene import Dielectric, Material, SceneObject
+from .scene_dabs import read_dabs
+from .scene_materials import read_object_material
+from .scene_textures import TextureReader
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl")
 INLINE = "inline"
@@ -103,13 +103,13 @@ class ObjectReader:
 
 def load_checked_mesh(path: Path, smooth: bool | float | None, notes: list[str]) -> Mesh:
     """A mesh file, repaired where that is safe; what was found goes to `notes`."""
-    from app.model.mesh_io import load_mesh
+    from .io.mesh_io import load_mesh
 
     return _checked(load_mesh(path, smooth), notes)
 
 
 def _checked(mesh: Mesh, notes: list[str]) -> Mesh:
-    from app.model.mesh_health import examine, repair
+    from .geometry.mesh_health import examine, repair
 
     mesh, found = repair(mesh, examine(mesh))
     notes.extend(found)
@@ -164,7 +164,7 @@ def _parameters(shape: str) -> dict[str, tuple[str, bool]]:
 
 
 def _function(shape: str) -> Callable[..., Any]:
-    from app.model import primitives
+    from .geometry import primitives
 
     return getattr(primitives, _FUNCTION.get(shape, shape))
 
@@ -229,7 +229,7 @@ def _make_shape(recipe: dict[str, Any]) -> Mesh:
 
 
 def _inline_mesh(vertices: list[list[float]], triangles: list[list[float]], uv: list[list[float]] | None = None) -> Mesh:
-    from app.model.mesh import make_mesh
+    from .geometry.mesh import make_mesh
 
     indices = np.array(triangles)
     if np.any(indices != np.floor(indices)):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from app.model.scene import RenderDefaults, Vec3
-from app.model.scene_table import SceneTable
+from .io.scene_table import SceneTable
+from .scene import RenderDefaults, Vec3
 
 MAX_PICTURE_SIDE = 16384
 MAX_DEPTH = 4096

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.errors import UserError
-from app.model.picture_files import read_picture
-from app.model.scene_table import SceneTable
-from app.model.texture import Texture
+from ..base.errors import UserError
+from .io.picture_files import read_picture
+from .io.scene_table import SceneTable
+from .texture import Texture
 
 WRAPS = ("repeat", "clamp")
 _ABOVE_ONE = 1e-3

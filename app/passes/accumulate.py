@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.gpu import shader
+from ..gpu import shader
 
 if TYPE_CHECKING:
     import moderngl
 
-    from app.gpu.map_atlas import Tile
-    from app.model.charts import ChartAtlas
+    from ..model.geometry.charts import ChartAtlas
+    from .map_atlas import Tile
 
 ROWS = 16
 """Of a group, and its columns."""
@@ -25,7 +25,7 @@ class Accumulate:
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
-        self._program = shader.compute(ctx, "accumulate.comp", {"SIDE": ROWS})
+        self._program = shader.compute(ctx, "light/accumulate.comp", {"SIDE": ROWS})
 
     def run(self, scratch: moderngl.Texture, total: moderngl.Texture) -> None:
         """Both RGBA32F and of one size."""
@@ -70,8 +70,8 @@ class SeamFold:
         self._fill_buffer = _uints(ctx, fill, 4)
         self._source_buffer = _uints(ctx, sources, 2)
         self._ratio_buffer = ctx.buffer(np.concatenate([*ratios, np.ones(1)]).astype(np.float32))
-        self._gather = shader.compute(ctx, "seam_fold.comp", {"WORKGROUP": _GROUP})
-        self._fill = shader.compute(ctx, "seam_fold.comp", {"WORKGROUP": _GROUP, "FILL": 1})
+        self._gather = shader.compute(ctx, "light/seam_fold.comp", {"WORKGROUP": _GROUP})
+        self._fill = shader.compute(ctx, "light/seam_fold.comp", {"WORKGROUP": _GROUP, "FILL": 1})
 
     def run(self, total: Sequence[moderngl.Texture], resolved: Sequence[moderngl.Texture]) -> None:
         """All RGBA32F and of the atlas size; `total` stays as it is."""
@@ -101,7 +101,7 @@ class LevelsFold:
         """`folds`: (wide tile, fine tile) in the order in which they are added up."""
         self._ctx = ctx
         self._folds = folds
-        self._program = shader.compute(ctx, "levels_fold.comp")
+        self._program = shader.compute(ctx, "light/levels_fold.comp")
 
     def run(self, maps: Sequence[moderngl.Texture]) -> None:
         """RGBA32F textures of the atlas size."""

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Literal
 import moderngl
 import numpy as np
 
-from app.colour_maps import ERROR, FALSE_COLOUR, glsl_table
-from app.gpu import shader
-from app.gpu.schema import Field, Struct
-from app.ui.state import Compare
-from app.ui.state import Display as Settings
+from ..base.colour_maps import ERROR, FALSE_COLOUR, glsl_table
+from ..edit.state import Compare
+from ..edit.state import Display as Settings
+from ..gpu import shader
+from ..gpu.schema import Field, Struct
 
 if TYPE_CHECKING:
-    from app.gpu.context import Context
+    from ..gpu.context import Context
 
 DISPLAY_PARAMETERS = Struct(
     "DisplayParameters",
@@ -175,7 +175,7 @@ class Display:
         return self._programs[variant]
 
     def _compiled(self, variant: _Variant) -> moderngl.ComputeShader:
-        return shader.compute(self._ctx, "display.comp", variant.defines(), [DISPLAY_PARAMETERS])
+        return shader.compute(self._ctx, "display/display.comp", variant.defines(), [DISPLAY_PARAMETERS])
 
     def _output(self, name: str, size: tuple[int, int]) -> moderngl.Texture:
         texture = self._outputs.get(name)

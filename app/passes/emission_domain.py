@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.gpu.records import MASK_SIZE
-from app.gpu.scene_buffers import GpuSpace
-from app.model.scene import Light, Scene
+from ..gpu.records import MASK_SIZE
+from ..gpu.scene_buffers import GpuSpace
+from ..model.scene import Light, Scene
 
 _COARSE_ANGLE = 0.15
 """Triangles that look larger than this from the light (rad, or of the unit sphere) are subdivided before projection."""

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from app.gpu import shader
-from app.gpu.records import (
+from ..gpu import shader
+from ..gpu.records import (
     FLAG_FOOTPRINT_DROPPED,
     GAIN_BOX,
     NONE,
@@ -21,15 +21,15 @@ from app.gpu.records import (
     RECEIVER,
     photon_record,
 )
-from app.gpu.schema import Field, Struct
+from ..gpu.schema import Field, Struct
 
 if TYPE_CHECKING:
     import moderngl
 
-    from app.gpu.gain_buffers import GainBuffers
-    from app.gpu.map_atlas import MapAtlas
-    from app.gpu.reindex import ReindexBuffer
-    from app.gpu.splat_tables import SplatTables
+    from ..gpu.gain_buffers import GainBuffers
+    from ..gpu.reindex import ReindexBuffer
+    from ..gpu.splat_tables import SplatTables
+    from .map_atlas import MapAtlas
 
 WORKGROUP, LIST_WORKGROUP = 64, 256
 VERTICES = (3, 6, 6, 6)
@@ -105,7 +105,7 @@ class SpectralVariables:
 
 
 class SplatFeatures(Protocol):
-    """What decides the programs' variant (a part of `app.model.features.Features`)."""
+    """What decides the programs' variant (a part of `spectrasplat.model.features.Features`)."""
 
     @property
     def spectral_groups(self) -> int: ...
@@ -157,7 +157,7 @@ class Footprints:
             "FLAG_FOOTPRINT_DROPPED": f"{FLAG_FOOTPRINT_DROPPED}u",
         }
         structs = (photon_record(groups), PLACEMENT, RECEIVER, SPLAT, GAIN_BOX)
-        self._program = shader.compute(ctx, "footprint.comp", defines, structs)
+        self._program = shader.compute(ctx, "light/footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
         self._unusual = ctx.buffer(np.zeros((group, 2), np.float32))
         self.commands = ctx.buffer(np.zeros(21, np.uint32))
@@ -168,7 +168,7 @@ class Footprints:
         self.splats = ctx.buffer(reserve=self.capacity * SPLAT.stride)
         self.lists = ctx.buffer(reserve=len(VERTICES) * self.capacity * 4)
         """Slots of kinds 1 to 4, `capacity` each."""
-        self._list = shader.compute(ctx, "splat_list.comp", {"WORKGROUP": LIST_WORKGROUP}, (SPLAT,))
+        self._list = shader.compute(ctx, "light/splat_list.comp", {"WORKGROUP": LIST_WORKGROUP}, (SPLAT,))
 
     def run(
         self,

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.errors import UserError
-from app.gpu.map_atlas import Tile, pack, placement_rows
-from app.gpu.records import NONE, PLACEMENT, RECEIVER
-from app.gpu.scene_buffers import SceneBuffers
-from app.model.camera_rays import camera_rays
-from app.model.features import is_flat
-from app.model.scene import Camera, Diffuse, Scene
+from ..base.errors import UserError
+from ..gpu.records import NONE, PLACEMENT, RECEIVER
+from ..gpu.scene_buffers import SceneBuffers
+from ..model.camera_rays import camera_rays
+from ..model.features import is_flat
+from ..model.scene import Camera, Diffuse, Scene
+from .map_atlas import Tile, pack, placement_rows
 
 if TYPE_CHECKING:
-    from app.model.charts import ChartAtlas
+    from ..model.geometry.charts import ChartAtlas
 
 FINE_TILE_MAX = 2048
 COARSE_TILE_MAX = 768
@@ -127,7 +127,7 @@ def layout_maps(
         else:
             lit = landed is not None or receiver == map_receiver
             side = int(np.clip(picture[0], 256, 1024)) if lit else 64
-            from app.model.charts import build_charts
+            from ..model.geometry.charts import build_charts
 
             atlas = build_charts(buffers.world_meshes[object_index], total_texels=side * side)
             sizes.append((atlas.width, atlas.height))

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.gpu.context import Context
-from app.gpu.scene_buffers import SceneBuffers
-from app.model.camera_rays import camera_frame
-from app.model.glass import LINE_D_NM
-from app.model.scene import Camera, Diffuse, Vec3
-from app.passes.ray_paths import Path, RayPaths
+from ..gpu.context import Context
+from ..gpu.scene_buffers import SceneBuffers
+from ..model.camera_rays import camera_frame
+from ..model.optics.glass import LINE_D_NM
+from ..model.scene import Camera, Diffuse, Vec3
+from .ray_paths import Path, RayPaths
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.gpu.records import MAX_BANDS
-from app.model.scene import Light, Scene
-from app.passes.emission_domain import EmissionDomain
-from app.passes.map_layout import Landings
-from app.passes.trace import Band, FluxTally, LatticeSlice, TracePass
+from ..gpu.records import MAX_BANDS
+from ..model.scene import Light, Scene
+from .emission_domain import EmissionDomain
+from .map_layout import Landings
+from .trace import Band, FluxTally, LatticeSlice, TracePass
 
 PHOTONS = 4096
 PLACES = (0.02, 0.25, 0.75, 0.98)

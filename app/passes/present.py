@@ -10,14 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.gpu.map_channels import MapChannels
-from app.model.colorimetry import (
-    K_M,
-    VISIBLE_NM,
-    cmf_xyz,
-    rgb_basis,
-    xyz_to_rgb709,
-)
+from ..gpu.map_channels import MapChannels
+from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, rgb_basis, xyz_to_rgb709
 
 
 @dataclass(frozen=True)

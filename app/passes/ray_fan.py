@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.gpu.context import Context
-from app.gpu.scene_buffers import SceneBuffers
-from app.model.features import world_bounds
-from app.model.glass import LINE_D_NM
-from app.model.scene import Light, SceneObject
-from app.passes.emission_domain import orthonormal_frame
-from app.passes.ray_paths import Path, RayPaths
-from app.ui.facts import RayLine
+from ..gpu.context import Context
+from ..gpu.scene_buffers import SceneBuffers
+from ..model.features import world_bounds
+from ..model.optics.glass import LINE_D_NM
+from ..model.scene import Light, SceneObject
+from ..ui.view_model import RayLine
+from .emission_domain import orthonormal_frame
+from .ray_paths import Path, RayPaths
 
 _LEAST_BEND = 1e-3
 """Sine of the least deviation that names a plane."""

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.gpu import bindings, shader
-from app.gpu.context import Context
-from app.gpu.records import NONE
-from app.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
-from app.gpu.schema import Field, Struct
-from app.model.scene import Dielectric
-from app.model.scene_checks import contains
+from ..gpu import bindings, shader
+from ..gpu.context import Context
+from ..gpu.records import NONE
+from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
+from ..gpu.schema import Field, Struct
+from ..model.scene import Dielectric
+from ..model.scene_checks import contains
 
 MAX_SEGMENTS = 24
 _MAX_POINTS = MAX_SEGMENTS + 1
@@ -80,7 +80,7 @@ class RayPaths:
         # Without glass no slopes are asked for, and with it only indices are.
         defines |= {"BIND_STARTS": _BIND_STARTS, "BIND_PATHS": _BIND_PATHS, "BIND_POINTS": _BIND_POINTS, "MAX_POINTS": _MAX_POINTS}
         structs = (*SCENE_STRUCTS, PATH_PARAMETERS, PATH_START, PATH_END)
-        self._program = shader.compute(context.ctx, "ray_paths.comp", defines, structs)
+        self._program = shader.compute(context.ctx, "camera/ray_paths.comp", defines, structs)
         self._parameters = context.ctx.buffer(reserve=PATH_PARAMETERS.stride)
         self._room = 0
         self._inside: tuple[bytes, int, int] | None = None

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.gpu import shader
-from app.gpu.schema import Field, Struct
-from app.passes.footprint import (
+from ..gpu import shader
+from ..gpu.schema import Field, Struct
+from .footprint import (
     SPLAT,
     VERTICES,
     Footprints,
@@ -25,10 +25,10 @@ from app.passes.footprint import (
 if TYPE_CHECKING:
     import moderngl
 
-    from app.gpu.gain_buffers import GainBuffers
-    from app.gpu.map_atlas import MapAtlas
-    from app.gpu.reindex import ReindexBuffer
-    from app.gpu.splat_tables import SplatTables
+    from ..gpu.gain_buffers import GainBuffers
+    from ..gpu.reindex import ReindexBuffer
+    from ..gpu.splat_tables import SplatTables
+    from .map_atlas import MapAtlas
 
 GROUP = 1 << 15
 """Photons turned to splats and drawn at a time."""
@@ -66,15 +66,15 @@ class Splatter:
         corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(slots, dtype=np.uint32)[:, None]
         self._indices = ctx.buffer(corners)
         classes = {
-            1: ("splat_small.frag", {"SMALL": 1}),
-            2: ("splat_swept.frag", {"SWEPT": 1}),
-            4: ("splat_swept.frag", {"SWEPT": 1, "EDGE": 1, "CLIPPED": 1}),
+            1: ("light/splat_small.frag", {"SMALL": 1}),
+            2: ("light/splat_swept.frag", {"SWEPT": 1}),
+            4: ("light/splat_swept.frag", {"SWEPT": 1, "EDGE": 1, "CLIPPED": 1}),
         }
         if features.band_cuts and not features.point_spectrum:
-            classes[3] = ("splat_cut.frag", {"CUT": 1, "CLIPPED": 1})
+            classes[3] = ("light/splat_cut.frag", {"CUT": 1, "CLIPPED": 1})
         self._draws: dict[int, moderngl.VertexArray] = {}
         for kind, (fragment, chosen) in sorted(classes.items()):
-            program = shader.program(ctx, "splat.vert", fragment, defines | chosen | {"FIRST_OF_KIND": f"{(kind - 1) * self._footprints.capacity}u"}, (SPLAT,))
+            program = shader.program(ctx, "light/splat.vert", fragment, defines | chosen | {"FIRST_OF_KIND": f"{(kind - 1) * self._footprints.capacity}u"}, (SPLAT,))
             corners_shared = VERTICES[kind - 1] == 6
             self._draws[kind] = ctx.vertex_array(program, [], index_buffer=self._indices if corners_shared else None)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
@@ -119,7 +119,7 @@ class Splatter:
         """Add the splats of the last group of photons to the atlas's scratch textures."""
         import moderngl
 
-        from app.gpu.splat_tables import CUMULATIVE_SAMPLES, DENSITY_CELLS
+        from ..gpu.splat_tables import CUMULATIVE_SAMPLES, DENSITY_CELLS
 
         ctx = self._ctx
         values = PARAMETERS.zeros(1)

@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 import moderngl
 import numpy as np
 
-from app.gpu import bindings, records, shader
-from app.gpu.context import Context
-from app.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
-from app.model.features import Features
-from app.passes.emission_domain import EmissionDomain
-from app.passes.lattice_order import morton_order
+from ..gpu import bindings, records, shader
+from ..gpu.context import Context
+from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
+from ..model.features import Features
+from .emission_domain import EmissionDomain
+from .lattice_order import morton_order
 
 RAY_ROOM = 3
 """Rays in flight per lattice point of a batch: splitting rarely passes 1.5."""
@@ -136,7 +136,7 @@ class TracePass:
         self._structs = structs
         self._emit: dict[str, moderngl.ComputeShader] = {}
         self._orders: dict[tuple[int, int, int], moderngl.Buffer] = {}
-        self._trace = shader.compute(ctx, "trace.comp", defines, (*structs, records.TRACE_PARAMETERS))
+        self._trace = shader.compute(ctx, "light/trace.comp", defines, (*structs, records.TRACE_PARAMETERS))
         queue = {name: shader.compute(ctx, f"queue_{name}.comp", defines, structs) for name in ("count", "scan", "scatter", "gather", "advance")}
         self._count, self._scan, self._scatter, self._gather, self._advance = queue.values()
 
@@ -300,7 +300,7 @@ class TracePass:
                 defines["RANDOM_WAVELENGTH"] = 1
                 if self._features.even_wavelengths:
                     defines["EVEN_WAVELENGTHS"] = 1
-            self._emit[kind] = shader.compute(self.context.ctx, "emit.comp", defines, (*self._structs, records.EMIT_PARAMETERS))
+            self._emit[kind] = shader.compute(self.context.ctx, "light/emit.comp", defines, (*self._structs, records.EMIT_PARAMETERS))
         return self._emit[kind]
 
     def _read_state(self) -> np.void:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from app.gpu.context import Context
+from ..gpu.context import Context
 
 FLUX_CLOSURE = 1e-4
 """Largest |emitted − everything that ended| / emitted."""

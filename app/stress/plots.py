@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from app.bench.report_style import PALETTE, new_figure
-from app.bench.report_text import superscript
-from app.stress.runner import CaseResult
+from ..bench.report.style import PALETTE, new_figure
+from ..bench.report.text import superscript
+from .runner import CaseResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

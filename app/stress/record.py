@@ -7,9 +7,9 @@ import math
 from pathlib import Path
 from typing import Any
 
-from app.atomic import atomic_output
-from app.stress.case import FLUX_CLOSURE, Measurement
-from app.stress.runner import CaseResult, StressResult
+from ..base.atomic import atomic_output
+from .case import FLUX_CLOSURE, Measurement
+from .runner import CaseResult, StressResult
 
 
 def write_json(result: StressResult, path: Path) -> None:

@@ -6,13 +6,13 @@ import html
 import math
 from pathlib import Path
 
-from app.atomic import atomic_output
-from app.bench.report_html import Html, element, figure, page, table
-from app.bench.report_style import inline_svg, plot_style, svg_text
-from app.stress.case import FLUX_CLOSURE, Measurement
-from app.stress.plots import case_plot
-from app.stress.runner import CaseResult, StressResult
-from app.stress.table import summary
+from ..base.atomic import atomic_output
+from ..bench.report.html import Html, element, figure, page, table
+from ..bench.report.style import inline_svg, plot_style, svg_text
+from .case import FLUX_CLOSURE, Measurement
+from .plots import case_plot
+from .runner import CaseResult, StressResult
+from .table import summary
 
 
 def write_html(result: StressResult, path: Path) -> None:

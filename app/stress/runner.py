@@ -12,10 +12,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from app.errors import UserError, suggestion
-from app.gpu import shader
-from app.gpu.context import Context
-from app.stress.case import Case, Measurement
+from ..base.errors import UserError, suggestion
+from ..gpu import shader
+from ..gpu.context import Context
+from .case import Case, Measurement
 
 Progress = Callable[[float, str], None]
 Keep = Callable[["StressResult"], None]
@@ -74,13 +74,7 @@ class StressResult:
 
 def all_cases() -> tuple[Case, ...]:
     """The synthetic cases of the light, those of the eye, then those of whole scenes, then the sweep over shipped scenes."""
-    from app.stress import (
-        eye_cases,
-        optics_cases,
-        path_cases,
-        scene_cases,
-        splat_cases,
-    )
+    from .cases import camera_cases, optics_cases, path_cases, scene_cases, splat_cases
 
     modules = (optics_cases, path_cases, splat_cases, eye_cases, scene_cases)
     return tuple(case for module in modules for case in module.CASES) + scene_cases.default_sweeps()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from app.stress.case import Measurement
-from app.stress.runner import CaseResult, StressResult
+from .case import Measurement
+from .runner import CaseResult, StressResult
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.tone_map import auto_exposure
+from ..base.tone_map import auto_exposure
 
 MEASURE_S = 0.25
 """Time between two measurements: the picture is read back for each."""

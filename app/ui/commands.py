@@ -10,11 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
-from app.model.scene import Dielectric
-from app.ui import requests, view_commands
-from app.ui.facts import Facts
-from app.ui.panels import dialogs
-from app.ui.state import State, Tool
+from ..edit import requests
+from ..edit.state import State, Tool
+from ..model.scene import Dielectric
+from . import view_commands
+from .panels import dialogs
+from .view_model import Facts
 
 Act = Callable[[State, Facts], State]
 
@@ -39,13 +40,13 @@ def _ask(*what: requests.Request) -> Act:
 
 
 def _duplicate(state: State, _facts: Facts) -> State:
-    from app.ui.panels import outliner
+    from .panels import outliner
 
     return outliner.duplicate(state, state.selection)
 
 
 def _delete(state: State, _facts: Facts) -> State:
-    from app.ui.panels import outliner
+    from .panels import outliner
 
     return outliner.delete(state, state.selection)
 
@@ -59,7 +60,7 @@ def _copy_material(state: State, _facts: Facts) -> State:
 
 
 def _paste_material(state: State, _facts: Facts) -> State:
-    from app.ui.panels import outliner
+    from .panels import outliner
 
     return outliner.paste_material(state, state.selection)
 

@@ -13,28 +13,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.gpu.scene_buffers import SceneBuffers
-from app.light_half import reflectance_classes, spectral_axis
-from app.live.difference import redo
-from app.live.inputs import LiveInputs, Redo
-from app.model.features import Features
-from app.model.settings import RenderSettings
-from app.passes.eye import EyePass
-from app.passes.spectrum_choice import Spectrum
-from app.ui.error_curves import ErrorCurves
-from app.ui.facts import ErrorCurve
-from app.ui.panels.methods import METHOD_NAMES
-from app.ui.reference_thread import ReferenceThread, Snapshot
+from ..gpu.scene_buffers import SceneBuffers
+from ..model.features import Features
+from ..model.settings import RenderSettings
+from ..passes.camera import EyePass
+from ..passes.spectrum_choice import Spectrum
+from ..render.light_pass import reflectance_classes, spectral_axis
+from ..render.viewer.inputs import LiveInputs, Redo
+from ..render.viewer.invalidation import redo
+from .error_curves import ErrorCurves
+from .panels.methods import METHOD_NAMES
+from .reference_thread import ReferenceThread, Snapshot
+from .view_model import ErrorCurve
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     import moderngl
 
-    from app.gpu.context import Context
-    from app.live.engine import LiveEngine
-    from app.model.scene import Scene
-    from app.ui.state import Compare, State
+    from ..edit.state import Compare, State
+    from ..gpu.context import Context
+    from ..model.scene import Scene
+    from ..render.viewer.engine import LiveEngine
 
 REFERENCE = "reference"
 STAND_IN = "stochastic-even"
@@ -303,7 +303,7 @@ class _DirectPicture:
 
 def _lit(inputs: LiveInputs) -> Scene:
     """The scene as its camera sees it, with the light of one wavelength only where `solo_nm` says so."""
-    from app.live.eye import solo_scene
+    from ..render.viewer.live_camera import solo_scene
 
     return replace(solo_scene(inputs.scene, inputs.solo_nm), camera=inputs.camera)
 
@@ -316,7 +316,7 @@ def _read(picture: moderngl.Texture) -> np.ndarray:
 
 
 def _engine(context: Context) -> LiveEngine:
-    from app.live.engine import Budget, LiveEngine
+    from ..render.viewer.engine import Budget, LiveEngine
 
     # It is never edited, so it need not store photons to show them again.
     return LiveEngine(context, replace(Budget.of(context), store_bytes=1 << 20))

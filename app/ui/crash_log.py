@@ -11,7 +11,7 @@ import sys
 import traceback
 from pathlib import Path
 
-from app import __version__
+from .. import __version__
 
 FILE_NAME = "crash.log"
 MAX_BYTES = 256 * 1024

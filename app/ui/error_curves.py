@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.bench.metrics import Truth, relmse_raw
-from app.model.colorimetry import rgb709_to_xyz
-from app.ui.facts import ErrorCurve
+from ..model.optics.colorimetry import rgb709_to_xyz
+from ..reference.metrics import Truth, relmse_raw
+from .view_model import ErrorCurve
 
 MAX_PIXELS = 1 << 16
 GROWTH = 1.3

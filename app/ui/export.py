@@ -10,22 +10,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.atomic import atomic_output, check_writable
-from app.cli_options import MAX_SIDE_PX, check_picture_memory
-from app.errors import UserError
-from app.image_io import check_suffix, write_image
-from app.model.settings import RenderSettings
-from app.passes.display import Display
-from app.ui import requests
-from app.ui.facts import JobFacts
-from app.ui.parameters import Stage
-from app.ui.state import Display as Look
-from app.ui.state import State
+from ..base.atomic import atomic_output, check_writable
+from ..base.errors import UserError
+from ..base.image_io import check_suffix, write_image
+from ..commands.options import MAX_SIDE_PX, check_picture_memory
+from ..edit import requests
+from ..edit.parameters import Stage
+from ..edit.state import Display as Look
+from ..edit.state import State
+from ..model.settings import RenderSettings
+from ..passes.display import Display
+from .view_model import JobFacts
 
 if TYPE_CHECKING:
     import moderngl
 
-    from app.gpu.context import Context
+    from ..gpu.context import Context
 
 SPECTRAL_BINS = 20
 LEAST_PHOTONS = 1_000_000
@@ -187,7 +187,7 @@ def _settings(state: State, size: tuple[int, int], photons: int, **changes: obje
 
 
 def _spectral(context: Context, path: Path, stage: Stage, state: State, photons: int) -> Iterator[float]:
-    from app.frames import FrameRenderer
+    from ..render.frames import FrameRenderer
 
     if check_suffix(path) != ".exr":
         raise UserError(f"cannot write {path}: spectral channels need an .exr")
@@ -209,7 +209,7 @@ def _spectral(context: Context, path: Path, stage: Stage, state: State, photons:
 
 
 def _bake(context: Context, request: requests.Bake, stage: Stage, state: State) -> Iterator[float]:
-    from app import bake
+    from ..render import bake
 
     bake.check_output(request.path)
     bake.check_receiver(stage.scene, request.receiver)
@@ -219,9 +219,9 @@ def _bake(context: Context, request: requests.Bake, stage: Stage, state: State) 
 
 
 def _animate(context: Context, request: requests.Animate, stage: Stage, state: State) -> tuple[Iterator[float], int]:
-    from app.animate import description, render_animation
-    from app.movie import open_sink
-    from app.ui import animation
+    from ..base.movie import open_sink
+    from ..edit import animation
+    from ..render.animate import description, render_animation
 
     if request.kind == "turntable":
         made = animation.turntable(stage, request.frames or 1, request.fps)

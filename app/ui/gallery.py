@@ -18,14 +18,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app import __version__
-from app.paths import assets_dir
-from app.ui.facts import SceneEntry
+from .. import __version__
+from ..base.paths import assets_dir
+from .view_model import SceneEntry
 
 if TYPE_CHECKING:
     import moderngl
 
-    from app.gpu.context import Context
+    from ..gpu.context import Context
 
 SIZE = (320, 180)
 PHOTONS = "400k"
@@ -159,7 +159,7 @@ def _entry(name: str, path: Path) -> SceneEntry:
 def _render(scene: Path, output: Path) -> subprocess.Popen[bytes]:
     """Start rendering a thumbnail."""
     size = f"{SIZE[0]}x{SIZE[1]}"
-    command = [sys.executable, "-P", "-m", "app", "render", str(scene), "-o", str(output)]
+    command = [sys.executable, "-P", "-m", "spectrasplat", "render", str(scene), "-o", str(output)]
     command += ["--size", size, "--photons", PHOTONS, "--spp", "4"]
     # One thread: the others belong to the window.
     environment = os.environ | {"LP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}

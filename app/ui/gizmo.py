@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from imgui_bundle import imgui, imguizmo
 
-from app.errors import UserError
-from app.model.scene import Scene
-from app.ui import item_rects, placing
-from app.ui.placing import Operation
-from app.ui.projection import View
-from app.ui.state import Selection, State
+from ..base.errors import UserError
+from ..edit import placing
+from ..edit.placing import Operation
+from ..edit.projection import View
+from ..edit.state import Selection, State
+from ..model.scene import Scene
+from . import item_rects
 
 _IM = imguizmo.im_guizmo
 _OPERATIONS = {"move": _IM.OPERATION.translate, "rotate": _IM.OPERATION.rotate, "scale": _IM.OPERATION.scale}

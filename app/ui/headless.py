@@ -13,11 +13,11 @@ from typing import Self
 import numpy as np
 from imgui_bundle import imgui
 
-from app.gpu.context import Context
-from app.ui import theme
-from app.ui.imgui_host import ImguiHost
-from app.ui.item_rects import ItemRect, Recorder, recording
-from app.ui.state import Preferences
+from ..edit.state import Preferences
+from ..gpu.context import Context
+from . import theme
+from .imgui_host import ImguiHost
+from .item_rects import ItemRect, Recorder, recording
 
 Point = tuple[float, float]
 FRAME_S = 1 / 60

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 from imgui_bundle import imgui, implot
 
-from app.ui import theme
+from . import theme
 
 GLSL_VERSION = "#version 430"
 

@@ -11,7 +11,7 @@ from typing import Literal
 
 from imgui_bundle import imgui
 
-from app.ui import theme
+from . import theme
 
 VIEWPORT = "Viewport"
 _DOCKSPACE = "SpectraSplat dock"

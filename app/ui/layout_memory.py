@@ -6,9 +6,9 @@ from contextlib import suppress
 
 from imgui_bundle import imgui
 
-from app.atomic import atomic_output
-from app.errors import UserError
-from app.ui.preferences import layout_file
+from ..base.atomic import atomic_output
+from ..base.errors import UserError
+from ..edit.preferences import layout_file
 
 
 def load() -> None:

@@ -14,21 +14,21 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from app.gpu.shader import ShaderError
-from app.live.stats import LiveStats
-from app.passes.display import Display
-from app.passes.sample_picture import SamplePicture
-from app.ui.auto_exposure import AutoExposure
-from app.ui.shown_scene import index_in
-from app.ui.state import State
+from ..edit.state import State
+from ..gpu.shader import ShaderError
+from ..passes.display import Display
+from ..passes.sample_picture import SamplePicture
+from ..render.viewer.stats import LiveStats
+from .auto_exposure import AutoExposure
+from .shown_scene import index_in
 
 if TYPE_CHECKING:
     import moderngl
 
-    from app.gpu.context import Context
-    from app.live.engine import LiveEngine
-    from app.model.scene import Scene
-    from app.passes.pick import PickHit
+    from ..gpu.context import Context
+    from ..model.scene import Scene
+    from ..passes.pick import PickHit
+    from ..render.viewer.engine import LiveEngine
 
 
 class EngineError(RuntimeError):
@@ -223,6 +223,6 @@ def pixel_of(place: tuple[float, float], size: tuple[int, int]) -> tuple[int, in
 
 
 def _live_engine(context: Context) -> LiveEngine:
-    from app.live.engine import LiveEngine
+    from ..render.viewer.engine import LiveEngine
 
     return LiveEngine(context)

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from app.ui.facts import Message
+from .view_model import Message
 
 NOTICE_S = 6.0
 """A notice is gone after this long."""

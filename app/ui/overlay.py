@@ -12,9 +12,9 @@ from functools import lru_cache
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from app.ui.facts import RayLine
-from app.ui.panels.spectral_colour import spectral_srgb
-from app.ui.projection import View
+from ..edit.projection import View
+from .panels.spectral_colour import spectral_srgb
+from .view_model import RayLine
 
 Colour = tuple[float, float, float, float]
 NEAR = 1e-3

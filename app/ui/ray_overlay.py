@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.model.scene import Dielectric
-from app.ui.facts import RayLine
-from app.ui.state import State
+from ..edit.state import State
+from ..model.scene import Dielectric
+from .view_model import RayLine
 
 if TYPE_CHECKING:
-    from app.gpu.context import Context
-    from app.gpu.scene_buffers import SceneBuffers
-    from app.model.scene import Scene
-    from app.passes.ray_fan import RayFan
+    from ..gpu.context import Context
+    from ..gpu.scene_buffers import SceneBuffers
+    from ..model.scene import Scene
+    from ..passes.ray_fan import RayFan
 
 FIRST_NM, LAST_NM = 400.0, 700.0
 
@@ -52,11 +52,11 @@ class RayOverlay:
         self._fan = self._buffers = self._scene = None
 
     def _fan_of(self, scene: Scene) -> RayFan:
-        from app.gpu.scene_buffers import SceneBuffers
-        from app.light_half import spectral_axis
-        from app.model.features import Features
-        from app.model.settings import RenderSettings
-        from app.passes.ray_fan import RayFan
+        from ..gpu.scene_buffers import SceneBuffers
+        from ..model.features import Features
+        from ..model.settings import RenderSettings
+        from ..passes.ray_fan import RayFan
+        from ..render.light_pass import spectral_axis
 
         if self._fan is None or scene is not self._scene:
             self.release()

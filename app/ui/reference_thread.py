@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.errors import UserError
+from ..base.errors import UserError
 
 if TYPE_CHECKING:
-    from app.model.scene import Scene
-    from app.truth.photon_run import ReferencePicture
+    from ..model.scene import Scene
+    from ..reference.photon_run import ReferencePicture
 
 TARGET_RELMSE = 2e-4
 MAX_SECONDS = 900.0
@@ -101,8 +101,8 @@ class ReferenceThread:
             self.problem = f"the reference renderer failed ({type(error).__name__}: {error})"
 
     def _compute(self) -> None:
-        from app.truth.direct_view import seen_directly
-        from app.truth.photon_run import ReferenceRun
+        from ..reference.direct_view import seen_directly
+        from ..reference.photon_run import ReferenceRun
 
         width, height = self._size
         directly = seen_directly(self._scene, width, height)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.ui import requests
+from ..edit import requests
 
 MAX_REASON = 160
 

@@ -15,27 +15,28 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.errors import UserError
-from app.gpu.shader_watch import ShaderWatch
-from app.ui import requests, session_requests
-from app.ui.autosave import Autosave, Recovery, recoveries
-from app.ui.companions import Companions
-from app.ui.crash_log import write_crash
-from app.ui.document import Document
-from app.ui.export import write_codes
-from app.ui.facts import Facts
-from app.ui.live_picture import EngineError, LivePicture
-from app.ui.message_box import MessageBox
-from app.ui.preferences import Settings, config_dir, load_settings, save_settings
-from app.ui.sentences import brief, sentence, words
-from app.ui.state import Selection, State
+from ..base.errors import UserError
+from ..edit import requests
+from ..edit.autosave import Autosave, Recovery, recoveries
+from ..edit.document import Document
+from ..edit.preferences import Settings, config_dir, load_settings, save_settings
+from ..edit.state import Selection, State
+from ..gpu.shader_watch import ShaderWatch
+from . import session_requests
+from .background_jobs import Companions
+from .crash_log import write_crash
+from .export import write_codes
+from .live_picture import EngineError, LivePicture
+from .message_box import MessageBox
+from .sentences import brief, sentence, words
+from .view_model import Facts
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from app.gpu.context import Context
-    from app.live.engine import LiveEngine
-    from app.model.scene import Scene
+    from ..gpu.context import Context
+    from ..model.scene import Scene
+    from ..render.viewer.engine import LiveEngine
 
 Draw = Callable[[State, Facts], State]
 DEFAULT_BUDGET_S = 0.03
@@ -105,7 +106,7 @@ class Session:
 
     def frame(self, draw: Draw, budget_s: float = DEFAULT_BUDGET_S) -> None:
         """Draw the interface with `draw`, within imgui's frame, and answer it; the engine works for about `budget_s`."""
-        from app.ui.facts_builder import facts_of
+        from .view_model_builder import facts_of
 
         facts = facts_of(self)
         before = replace(self.state, interacting=False, hover=None, requests=())
@@ -264,7 +265,7 @@ class Session:
     def _with_dropped(self, state: State, facts: Facts) -> State:
         if not self._dropped:
             return state
-        from app.ui.panels import dialogs
+        from .panels import dialogs
 
         path, self._dropped = self._dropped[0], []
         return dialogs.open_path(state, facts, path)

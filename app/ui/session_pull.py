@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.errors import UserError
-from app.model.colorimetry import rgb709_to_xyz
-from app.ui.projection import View
-from app.ui.pull import PullPhotons, begin_pull
-from app.ui.requests import BeginPull, Pull
-from app.ui.shown_scene import has_same_objects
+from ..base.errors import UserError
+from ..edit.projection import View
+from ..edit.pull import PullPhotons, begin_pull
+from ..edit.requests import BeginPull, Pull
+from ..model.optics.colorimetry import rgb709_to_xyz
+from .shown_scene import has_same_objects
 
 if TYPE_CHECKING:
-    from app.ui.session import Session
+    from .session import Session
 
 PHOTONS = 400_000
 RADIUS = 0.01

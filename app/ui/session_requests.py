@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.atomic import check_writable
-from app.errors import UserError
-from app.model.scene import Diffuse
-from app.model.scene_defaults import bounds_of
-from app.ui import camera_controls, requests
-from app.ui.caustic_source import source_at
-from app.ui.document import Document
-from app.ui.state import Selection
+from ..base.atomic import check_writable
+from ..base.errors import UserError
+from ..edit import camera_controls, requests
+from ..edit.document import Document
+from ..edit.state import Selection
+from ..model.scene import Diffuse
+from ..model.scene_defaults import bounds_of
+from .caustic_source import source_at
 
 if TYPE_CHECKING:
-    from app.ui.session import Session
+    from .session import Session
 
 PICK_PHOTONS = 400_000
 """Stored photons that are asked whose caustic lies at a point."""
@@ -106,7 +106,7 @@ def _source_at(session: Session, position: np.ndarray, receiver: int) -> int | N
 
 
 def _begin_pull(session: Session, request: requests.BeginPull) -> None:
-    from app.ui.session_pull import begin_pull_at
+    from .session_pull import begin_pull_at
 
     session.state = replace(session.state, pull=begin_pull_at(session, request))
 

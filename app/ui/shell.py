@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
-from app.ui import item_rects, layout, shortcuts, theme
-from app.ui.facts import Facts
-from app.ui.layout import Docked, Place
-from app.ui.panels import (
+from ..edit.state import State
+from . import item_rects, layout, shortcuts, theme
+from .layout import Docked, Place
+from .panels import (
     about,
     dialogs,
     help_list,
@@ -28,24 +28,24 @@ from app.ui.panels import (
     timing,
     view_panel,
 )
-from app.ui.panels.abbe import draw_abbe
-from app.ui.panels.brush_panel import draw_brush
-from app.ui.panels.dispersion import draw_dispersion
-from app.ui.state import State
-from app.ui.viewport import draw_viewport
+from .panels.abbe import draw_abbe
+from .panels.brush_panel import draw_brush
+from .panels.dispersion import draw_dispersion
+from .view_model import Facts
+from .viewport import draw_viewport
 
 Draw = Callable[[State, Facts], State]
 
 
 def _draw_compare(state: State, facts: Facts) -> State:
     # Panels that are seldom open are loaded when they are: the window comes up sooner.
-    from app.ui.panels.compare_panel import draw_compare
+    from .panels.compare_panel import draw_compare
 
     return draw_compare(state, facts)
 
 
 def _draw_export(state: State, facts: Facts) -> State:
-    from app.ui.panels.export_panel import draw_export
+    from .panels.export_panel import draw_export
 
     return draw_export(state, facts)
 

@@ -7,9 +7,9 @@ from functools import cache
 
 from imgui_bundle import imgui
 
-from app.ui.commands import COMMANDS, PANELS, VIEWS, Command
-from app.ui.facts import Facts
-from app.ui.state import State
+from ..edit.state import State
+from .commands import COMMANDS, PANELS, VIEWS, Command
+from .view_model import Facts
 
 COMPARE_KEY = imgui.Key.c
 """Held down, the viewport shows the reference."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.model.scene import Scene
+from ..model.scene import Scene
 
 
 def index_in(scene: Scene, shown: Scene, index: int) -> int | None:

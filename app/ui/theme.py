@@ -14,8 +14,8 @@ from pathlib import Path
 import imgui_bundle
 from imgui_bundle import imgui, implot
 
-from app.ui.palette import DARK, LIGHT, Colour, Palette
-from app.ui.state import Preferences
+from ..edit.state import Preferences
+from .palette import DARK, LIGHT, Colour, Palette
 
 FONT_SIZE = 15.0
 """Height of the text in logical pixels, before `Preferences.ui_scale` and the screen's scale."""

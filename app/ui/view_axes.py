@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from app.ui import item_rects, theme
-from app.ui.camera_controls import look_along
-from app.ui.panels.rows import tooltip
-from app.ui.projection import View
-from app.ui.state import State
+from ..edit.camera_controls import look_along
+from ..edit.projection import View
+from ..edit.state import State
+from . import item_rects, theme
+from .panels.rows import tooltip
 
 RADIUS_EM = 2.7
 """Of the whole ornament, text heights."""

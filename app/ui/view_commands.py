@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 
-from app.ui.facts import Facts
-from app.ui.requests import FrameSelection, Notice
-from app.ui.state import Panels, Selection, State
+from ..edit.requests import FrameSelection, Notice
+from ..edit.state import Panels, Selection, State
+from .view_model import Facts
 
 _NOT_HIDDEN = ("start_page", "shortcuts", "about")
 """Windows that "Hide panels" leaves alone."""

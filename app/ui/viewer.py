@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from app.ui.headless import HeadlessInterface
-from app.ui.pace import Pace
-from app.ui.session import Draw, Session
-from app.ui.shell import draw_interface
-from app.ui.state import Preferences
+from ..edit.state import Preferences
+from .headless import HeadlessInterface
+from .pace import Pace
+from .session import Draw, Session
+from .shell import draw_interface
 
 
 class Viewer:

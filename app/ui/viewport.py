@@ -11,16 +11,16 @@ from dataclasses import replace
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from app.ui import item_rects, overlay, theme
-from app.ui.facts import Facts
-from app.ui.gizmo import Gizmo
-from app.ui.overlay import Canvas
-from app.ui.projection import View
-from app.ui.state import State
-from app.ui.view_axes import draw_axes
-from app.ui.viewport_hand import Hand, Mouse
-from app.ui.viewport_marks import draw_lights, draw_magnifier, draw_marks, draw_wipe
-from app.ui.viewport_tools import MARGIN_EM, badges, draw_badges, draw_toolbar
+from ..edit.projection import View
+from ..edit.state import State
+from . import item_rects, overlay, theme
+from .gizmo import Gizmo
+from .overlay import Canvas
+from .view_axes import draw_axes
+from .view_model import Facts
+from .viewport_input import Hand, Mouse
+from .viewport_marks import draw_lights, draw_magnifier, draw_marks, draw_wipe
+from .viewport_tools import MARGIN_EM, badges, draw_badges, draw_toolbar
 
 LEAST_SIDE = 64
 """Pixels of the picture, however small the window."""

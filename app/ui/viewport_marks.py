@@ -8,14 +8,15 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
-from app.ui import brush as brushes
-from app.ui import item_rects, placing, pull, theme
-from app.ui.facts import CursorFacts, Facts
-from app.ui.overlay import Canvas, box_corners, draw_box, draw_outlined
-from app.ui.panels.methods import METHOD_NAMES
-from app.ui.panels.rows import tooltip
-from app.ui.panels.spectral_colour import colour_of_nm
-from app.ui.state import Brush, Selection, State
+from ..edit import brush as brushes
+from ..edit import placing, pull
+from ..edit.state import Brush, Selection, State
+from . import item_rects, theme
+from .overlay import Canvas, box_corners, draw_box, draw_outlined
+from .panels.methods import METHOD_NAMES
+from .panels.rows import tooltip
+from .panels.spectral_colour import colour_of_nm
+from .view_model import CursorFacts, Facts
 
 _RING_COLOURS = {"widen": (1.0, 0.84, 0.45, 0.95), "narrow": (0.55, 0.80, 1.0, 0.95), "erase": (1.0, 0.55, 0.50, 0.95)}
 _MAGNIFIER_EM = 11.0

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
-from app.ui import item_rects, theme
-from app.ui.commands import command
-from app.ui.facts import Facts
-from app.ui.gizmo import Gizmo
-from app.ui.panels.brush_panel import NOT_PHYSICAL
-from app.ui.panels.rows import tooltip
-from app.ui.state import State, Tool
+from ..edit.state import State, Tool
+from . import item_rects, theme
+from .commands import command
+from .gizmo import Gizmo
+from .panels.brush_panel import NOT_PHYSICAL
+from .panels.rows import tooltip
+from .view_model import Facts
 
 MARGIN_EM = 0.6
 _BUTTON_EM = 1.9

@@ -19,12 +19,12 @@ from imgui_bundle import imgui  # before glfw: it brings the GLFW that both then
 
 import glfw  # isort: skip
 
-from app.errors import UserError
-from app.gpu.context import GL_VERSION, GL_VERSION_CODE, Context
-from app.ui import theme
-from app.ui.imgui_host import ImguiHost
-from app.ui.preferences import WindowPlace
-from app.ui.state import Preferences
+from ..base.errors import UserError
+from ..edit.preferences import WindowPlace
+from ..edit.state import Preferences
+from ..gpu.context import GL_VERSION, GL_VERSION_CODE, Context
+from . import theme
+from .imgui_host import ImguiHost
 
 SETTLE_FRAMES = 3
 """Frames drawn after an event before waiting again: imgui's layout and hovering need two."""

@@ -13,10 +13,9 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parents[1]))
 
-from app.model.environment import direction_of  # noqa: E402
-from app.model.texture import Environment  # noqa: E402
+from spectrasplat.model.environment import direction_of
+from spectrasplat.model.texture import Environment
 
 WIDTH, HEIGHT = 1024, 512
 SAMPLES = 4

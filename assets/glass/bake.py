@@ -18,7 +18,6 @@ import numpy as np
 import yaml
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent.parent))
 
 VISIBLE_UM = (0.38, 0.78)
 LEAST_COVER_UM = 0.2
@@ -156,7 +155,7 @@ def ice(data: Path) -> dict[str, Any]:
 
 def bake() -> dict[str, Any]:
     """The whole catalogue as plain values."""
-    from app.model.catalogue import search_key
+    from spectrasplat.model.optics.catalogue import search_key
 
     data = database()
     makers: dict[str, dict[str, Any]] = {"Materials": {"ice": ice(data)}}

@@ -11,15 +11,23 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parents[1]))
 
-from app.model import catalogue, primitives  # noqa: E402
-from app.model.colorimetry import attenuation_from_colour  # noqa: E402
-from app.model.gltf_write import save_gltf  # noqa: E402
-from app.model.mesh import Mesh, make_mesh, normalised  # noqa: E402
-from app.model.mesh_io import save_ply  # noqa: E402
-from app.model.scene import Absorption, Camera, Dielectric, Diffuse, Light, Scene, SceneObject  # noqa: E402
-from app.model.spectrum import illuminant  # noqa: E402
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.geometry.mesh import Mesh, make_mesh, normalised
+from spectrasplat.model.io.gltf_write import save_gltf
+from spectrasplat.model.io.mesh_io import save_ply
+from spectrasplat.model.optics import catalogue
+from spectrasplat.model.optics.colorimetry import attenuation_from_colour
+from spectrasplat.model.optics.spectrum import illuminant
+from spectrasplat.model.scene import (
+    Absorption,
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Scene,
+    SceneObject,
+)
 
 
 def trefoil_knot(radius: float = 0.5, tube: float = 0.13, along: int = 168, around: int = 20) -> Mesh:

@@ -1,4 +1,4 @@
-"""Bakes the three reflectances that every RGB of this program is a mixture of (`app.model.colorimetry.rgb_basis`).
+"""Bakes the three reflectances that every RGB of this program is a mixture of (`spectrasplat.model.optics.colorimetry.rgb_basis`).
 
 A reflectance that is linear in RGB can be filtered before or after it is made a spectrum, which no
 non-linear fit allows, and one whose basis sums to 1 leaves greys flat. Among all such bases the
@@ -18,14 +18,8 @@ from scipy.sparse import block_diag, bmat, csc_matrix, diags, eye, hstack
 from scipy.sparse.linalg import splu
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parents[1]))
 
-from app.model.colorimetry import (  # noqa: E402
-    VISIBLE_NM,
-    cmf_xyz,
-    illuminant_table,
-    xyz_to_rgb709_matrix,
-)
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM, cmf_xyz, illuminant_table, xyz_to_rgb709_matrix
 
 COUNT = len(VISIBLE_NM)
 ROUNDS = 200

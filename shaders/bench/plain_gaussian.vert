@@ -1,4 +1,4 @@
-// The yardstick of `app.bench.splat_speed`: one colourless Gaussian a photon, drawn as plainly as can be.
+// The yardstick of `spectrasplat.bench.splat_speed`: one colourless Gaussian a photon, drawn as plainly as can be.
 layout(location = 0) uniform vec2 atlas_size;
 layout(std430, binding = 0) readonly buffer Photons { PhotonRecord photons[]; };
 noperspective out vec2 at;

@@ -6,8 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-
-from app import paths
+from spectrasplat.base import paths
 
 
 def mutate(monkeypatch: pytest.MonkeyPatch, folder: Path, file: str, old: str, new: str) -> None:

@@ -9,18 +9,17 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
-
-from app.animate import description, render_animation
-from app.errors import UserError
-from app.frames import FrameRenderer
-from app.gpu import shader
-from app.model.scene_file import load_scene
-from app.model.settings import RenderSettings
-from app.movie import Frames, Movie
-from app.paths import assets_dir
-from app.renderer import render
-from app.ui.animation import Track, keyed, turntable
-from app.ui.parameters import Stage, apply
+from spectrasplat.base.errors import UserError
+from spectrasplat.base.movie import Frames, Movie
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit.animation import Track, keyed, turntable
+from spectrasplat.edit.parameters import Stage, apply
+from spectrasplat.gpu import shader
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.render.animate import description, render_animation
+from spectrasplat.render.frames import FrameRenderer
+from spectrasplat.render.still import render
 
 SMALL = RenderSettings(width=96, height=54, photons=20_000, spp=2)
 GAIN = "objects.prism.dispersion_gain"

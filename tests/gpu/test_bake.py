@@ -8,16 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.bake import bake, placement_path
-from app.errors import UserError
-from app.frames import FrameRenderer
-from app.image_io import read_image
-from app.model.scene import Scene
-from app.model.scene_file import load_scene
-from app.model.settings import RenderSettings
-from app.paths import assets_dir
-from app.ui.parameters import Stage
+from spectrasplat.base.errors import UserError
+from spectrasplat.base.image_io import read_image
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit.parameters import Stage
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.scene import Scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.render.bake import bake, placement_path
+from spectrasplat.render.frames import FrameRenderer
 
 SETTINGS = RenderSettings(width=96, height=64, photons=60_000)
 

@@ -9,20 +9,19 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-
-from app.__main__ import main
-from app.bench import runner
-from app.bench.halves import LIGHT
-from app.bench.metrics import Truth, measure
-from app.bench.rendering import MethodRig
-from app.bench.results import BenchResult
-from app.cli_options import find_scene
-from app.errors import UserError
-from app.model.colorimetry import rgb709_to_xyz
-from app.model.scene import Scene
-from app.model.scene_file import load_scene
-from app.model.settings import RenderSettings
-from app.renderer import render
+from spectrasplat.__main__ import main
+from spectrasplat.base.errors import UserError
+from spectrasplat.bench import runner
+from spectrasplat.bench.measured_passes import LIGHT
+from spectrasplat.bench.rendering import MethodRig
+from spectrasplat.bench.results import BenchResult
+from spectrasplat.commands.options import find_scene
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics.colorimetry import rgb709_to_xyz
+from spectrasplat.model.scene import Scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.reference.metrics import Truth, measure
+from spectrasplat.render.still import render
 
 WIDTH, HEIGHT = 64, 36
 
@@ -72,7 +71,7 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     """Two methods against the real reference of one second, through the command line."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(runner, "POINTS", 3)
-    monkeypatch.setattr("app.bench.machine.program_hash", lambda: "as it is")  # an editor may be at work
+    monkeypatch.setattr("spectrasplat.bench.machine.program_hash", lambda: "as it is")  # an editor may be at work
     out = tmp_path / "out"
     arguments = ["bench", "prism", "-o", str(out), "--seconds", "0.2", "--seeds", "2", "--methods", "stochastic,srd", "--size", f"{WIDTH}x{HEIGHT}"]
     assert main([*arguments, "--reference-seconds", "1"]) == 0
@@ -88,6 +87,6 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     assert {"time to equal error"} == {claim.name for claim in scene.claims} and "time to equal error" in shown
     assert (out / "report.html").stat().st_size > 10_000 and (out / "plots" / "overview.svg").exists()
     before = (out / "results.json").read_bytes()
-    monkeypatch.setattr("app.bench.report.write_report", lambda *_: None)
+    monkeypatch.setattr("spectrasplat.bench.report.report.write_report", lambda *_: None)
     assert main([*arguments, "--reference-seconds", "1"]) == 0  # all is there already
     assert (out / "results.json").read_bytes() == before

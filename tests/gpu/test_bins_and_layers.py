@@ -13,12 +13,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-import app.renderer
-from app.__main__ import main
-from app.image_io import Picture, channel_name, read_image
-from app.model.colorimetry import K_M, VISIBLE_NM, cmf_xyz, xyz_to_rgb709
-from app.paths import assets_dir
+import spectrasplat.render.still
+from spectrasplat.__main__ import main
+from spectrasplat.base.image_io import Picture, channel_name, read_image
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, xyz_to_rgb709
 
 Render = Callable[..., Picture]
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -64,7 +63,7 @@ def render(gl, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
 
     The function's `said` then holds stdout, its `notes` stderr.
     """
-    monkeypatch.setattr(app.renderer, "render", functools.partial(app.renderer.render, context=gl))
+    monkeypatch.setattr(spectrasplat.render.still, "render", functools.partial(spectrasplat.render.still.render, context=gl))
 
     def call(scene: str | Path, options: str = "", suffix: str = ".npy") -> Picture:
         output = tmp_path / f"out{suffix}"

@@ -14,17 +14,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference.path_check import ReferenceScene
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.geometry.primitives import box
+from spectrasplat.model.geometry.primitives_lens import doublet
+from spectrasplat.model.geometry.primitives_round import sphere
+from spectrasplat.model.optics.spectrum import constant
+from spectrasplat.model.scene import Diffuse, Light, Mirror, SceneObject
+from spectrasplat.reference.optics import unit
+from spectrasplat.stress.rigs.gpu_paths import REFRACTED, extruded, glass, placed, trace_light
 
-from app.gpu.context import Context
-from app.model.mesh import make_mesh
-from app.model.primitives import box
-from app.model.primitives_lens import doublet
-from app.model.primitives_round import sphere
-from app.model.scene import Diffuse, Light, Mirror, SceneObject
-from app.model.spectrum import constant
-from app.truth.gpu_paths import REFRACTED, extruded, glass, placed, trace_light
-from app.truth.optics import unit
-from app.truth.path_check import ReferenceScene
 from tests.gpu.mutants import mutate
 
 NM = 580.0
@@ -156,13 +156,13 @@ MUTANTS = {
     "sign of the index before": ("lib/medium.glsl", "derivative += medium_slope", "derivative -= medium_slope", "point"),
     "another glass's slope": ("lib/medium.glsl", "object_at(crossing.before).group == g", "true", "doublet"),
     "no slope of the medium": ("lib/medium.glsl", "return spectral_row(uint(SLOPE_ROW) + object_at(object).medium, x);", "return 1.0;", "by wavelength"),
-    "flat normals": ("trace.comp", "sign_n * normalised_derivative(summed, dsummed)", "vec3(0.0)", "inner reflections"),
-    "normal not turned inside": ("trace.comp", "float sign_n = entering ? 1.0 : -1.0", "float sign_n = 1.0", "beam"),
+    "flat normals": ("light/trace.comp", "sign_n * normalised_derivative(summed, dsummed)", "vec3(0.0)", "inner reflections"),
+    "normal not turned inside": ("light/trace.comp", "float sign_n = entering ? 1.0 : -1.0", "float sign_n = 1.0", "beam"),
     "mirror forgets the normal": ("lib/optics.glsl", "(dtheta * normal + theta * dnormal)", "(dtheta * normal)", "mirror ball"),
-    "position follows the shading normal": ("trace.comp", "ray.direction, hit.normal_g, hit.distance)", "ray.direction, normal, hit.distance)", "sun"),
-    "axes swapped": ("emit.comp", "ddirection_ds = p.spacing.x * to_world(dx)", "ddirection_ds = p.spacing.x * to_world(dy)", "spot"),
+    "position follows the shading normal": ("light/trace.comp", "ray.direction, hit.normal_g, hit.distance)", "ray.direction, normal, hit.distance)", "sun"),
+    "axes swapped": ("light/emit.comp", "ddirection_ds = p.spacing.x * to_world(dx)", "ddirection_ds = p.spacing.x * to_world(dy)", "spot"),
     "flat map": ("lib/emission.glsl", "k - q.x * q.x / (4.0 * k)", "k", "disc"),
-    "tilted sun's plane": ("emit.comp", "dposition_ds = p.spacing.x * p.tangent", "dposition_ds = 1.01 * p.spacing.x * p.tangent", "sun"),
+    "tilted sun's plane": ("light/emit.comp", "dposition_ds = p.spacing.x * p.tangent", "dposition_ds = 1.01 * p.spacing.x * p.tangent", "sun"),
     "lowest priority": ("lib/medium.glsl", "stack_objects[findMSB(mask)]", "stack_objects[findLSB(mask)]", "overlapping"),
 }
 

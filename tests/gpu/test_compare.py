@@ -7,13 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from app.live.engine import Budget, LiveEngine
-from app.model.scene_file import load_scene
-from app.paths import assets_dir
-from app.truth.direct_view import seen_directly
-from app.ui.compare import Comparison
-from app.ui.state import Compare, State
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit.state import Compare, State
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.reference.direct_view import seen_directly
+from spectrasplat.render.viewer.engine import Budget, LiveEngine
+from spectrasplat.ui.compare import Comparison
 
 SIZE = (64, 36)
 
@@ -105,8 +104,8 @@ def test_another_method_runs_beside_in_its_own_engine(gl, state: State, running:
 
 
 def test_without_a_reference_another_method_stands_in(gl, state: State, running: LiveEngine, comparison: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
-    from app.errors import UserError
-    from app.truth import photon_run
+    from spectrasplat.base.errors import UserError
+    from spectrasplat.reference import photon_run
 
     def missing(*_args, **_kwargs) -> None:
         raise UserError("the reference renderer needs numba")

@@ -10,11 +10,10 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.gpu import context as context_module
-from app.gpu.context import Context, create_context
-from app.gpu.limits import NEEDED, Limits
+from spectrasplat.base.errors import UserError
+from spectrasplat.gpu import context as context_module
+from spectrasplat.gpu.context import Context, create_context
+from spectrasplat.gpu.limits import NEEDED, Limits
 
 DOUBLE = """
 #version 430 core
@@ -25,7 +24,7 @@ void main() { value[gl_GlobalInvocationID.x] *= 2.0; }
 
 OSMESA_SMOKE = f'''
 import numpy as np
-from app.gpu.context import create_context
+from spectrasplat.gpu.context import create_context
 with create_context() as gl:
     values = gl.ctx.buffer(np.arange(256, dtype="f4").tobytes())
     values.bind_to_storage_buffer(0)
@@ -157,7 +156,7 @@ class TestFailures:
         monkeypatch.delenv("SPECTRASPLAT_BACKEND", raising=False)
         monkeypatch.setattr(context_module, "_first_loadable", lambda names: None)
         monkeypatch.setattr(
-            "app.gpu.osmesa.load_library", lambda: (_ for _ in ()).throw(OSError("not there"))
+            "spectrasplat.gpu.osmesa.load_library", lambda: (_ for _ in ()).throw(OSError("not there"))
         )
         with pytest.raises(UserError, match="libegl1 libgl1 libgl1-mesa-dri"):
             create_context()

@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from app import tone_map
-from app.colour_maps import ERROR, FALSE_COLOUR, sample
-from app.passes.display import ERROR_FLOOR, ERROR_RANGE, Display
-from app.truth import tone
-from app.truth.glsl_function import as_f32, evaluate
-from app.ui.state import Compare
-from app.ui.state import Display as Settings
+from reference import tone
+from spectrasplat.base import tone_map
+from spectrasplat.base.colour_maps import ERROR, FALSE_COLOUR, sample
+from spectrasplat.edit.state import Compare
+from spectrasplat.edit.state import Display as Settings
+from spectrasplat.passes.display import ERROR_FLOOR, ERROR_RANGE, Display
+from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {
     "tone.glsl": (
@@ -180,13 +179,13 @@ def test_the_magnifier_shows_the_pixels_about_a_pixel_top_row_first(gl, display)
 def test_a_broken_shader_keeps_the_last_good_programs(gl, display, monkeypatch, tmp_path) -> None:
     import shutil
 
-    from app import paths
-    from app.gpu.shader import ShaderError, drop_programs
+    from spectrasplat.base import paths
+    from spectrasplat.gpu.shader import ShaderError, drop_programs
 
     picture = flat(gl, 0.25)
     before = codes(display.run(picture, Settings(), 0.0, (40, 10))).copy()
     shutil.copytree(paths.shaders_dir(), tmp_path / "shaders")
-    source = tmp_path / "shaders" / "display.comp"
+    source = tmp_path / "shaders" / "display/display.comp"
     monkeypatch.setattr(paths, "shaders_dir", lambda: tmp_path / "shaders")
     source.write_text(source.read_text().replace("void main()", "void main() oops"))
     drop_programs(gl.ctx)  # as the viewer does before; tests share programs too

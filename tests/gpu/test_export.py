@@ -7,17 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app import tone_map
-from app.errors import UserError
-from app.image_io import read_image
-from app.model.scene_file import load_scene
-from app.passes.display import Display
-from app.paths import assets_dir
-from app.ui.export import Exports, Shown
-from app.ui.requests import Animate, Bake, Screenshot
-from app.ui.state import Display as Look
-from app.ui.state import Key, State
+from spectrasplat.base import tone_map
+from spectrasplat.base.errors import UserError
+from spectrasplat.base.image_io import read_image
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit.requests import Animate, Bake, Screenshot
+from spectrasplat.edit.state import Display as Look
+from spectrasplat.edit.state import Key, State
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.passes.display import Display
+from spectrasplat.ui.export import Exports, Shown
 
 SIZE = (64, 36)
 
@@ -71,7 +70,7 @@ def test_a_png_is_what_is_on_the_screen_and_an_exr_what_is_behind_it(exports: Ex
 
 
 def test_a_spectral_screenshot_adds_up_to_its_colours(exports: Exports, state: State, shown: Shown, tmp_path: Path, monkeypatch) -> None:
-    from app.ui import export
+    from spectrasplat.ui import export
 
     monkeypatch.setattr(export, "LEAST_PHOTONS", 20_000)
     assert exports.begin(Screenshot(tmp_path / "s.exr", spectral=True), state, shown) is None

@@ -9,24 +9,19 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-
-from app.bench import features_cost, features_report
-from app.bench.feature_rig import Rig, Work, map_difference
-from app.bench.feature_variants import DISPERSION, Trial, Variant, trials
-from app.bench.symbol_proof import (
-    FEATURE_SYMBOLS,
-    compiled_sources,
-    program_texts,
-    prove,
-)
-from app.errors import UserError
-from app.gpu.context import Context
-from app.gpu.scene_buffers import SceneBuffers
-from app.light_half import LightHalf, spectral_axis
-from app.model.features import Features, explain
-from app.model.scene import Scene
-from app.model.scene_file import load_scene
-from app.model.settings import RenderSettings
+from spectrasplat.base.errors import UserError
+from spectrasplat.bench.features import cost as features_cost
+from spectrasplat.bench.features import report as features_report
+from spectrasplat.bench.features.rig import Rig, Work, map_difference
+from spectrasplat.bench.features.symbol_proof import FEATURE_SYMBOLS, compiled_sources, program_texts, prove
+from spectrasplat.bench.features.variants import DISPERSION, Trial, Variant, trials
+from spectrasplat.gpu.context import Context
+from spectrasplat.gpu.scene_buffers import SceneBuffers
+from spectrasplat.model.features import Features, explain
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.scene import Scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.render.light_pass import LightHalf, spectral_axis
 
 LAMP = '[[lights]]\nname = "lamp"\nkind = "point"\nposition = [0.4, 0.2, 6]\nspectrum = "D65"\nintensity_cd = 100\n'
 FLOOR = '[[objects]]\nname = "floor"\nshape = "plane"\nwidth = 20\nheight = 20\nposition = [0, 0, -2]\nmaterial = { kind = "diffuse", colour = 0.5 }\n'
@@ -78,7 +73,7 @@ def released(light: LightHalf) -> None:
 def test_running_programs_lack_what_the_scene_does_not_need(gl: Context, tmp_path: Path, name: str, absent: set[str]) -> None:
     scene = scene_of(tmp_path, name)
     sources = compiled_sources(gl, scene, settings_of(scene))
-    assert {"emit.comp", "trace.comp", "footprint.comp", "splat.vert", "splat_swept.frag", "eye.comp"} <= {s.name for s in sources}
+    assert {"light/emit.comp", "light/trace.comp", "light/footprint.comp", "light/splat.vert", "light/splat_swept.frag", "camera/camera.comp"} <= {s.name for s in sources}
     light = begun(gl, scene)
     included = {feature: inside for feature, inside, _ in explain(scene, light.features)}
     released(light)
@@ -150,7 +145,7 @@ def test_a_scene_without_dispersion_traces_faster_than_with_columns_forced(gl: C
     The smallest cost this can tell from none is the half-width of the interval of two equal programs,
     measured beside it (about 5 % on a busy machine).
     """
-    from app import paths
+    from spectrasplat.base import paths
 
     scene = load_scene(paths.assets_dir() / "scenes" / "ball_plain.toml")
     light = begun(gl, scene)

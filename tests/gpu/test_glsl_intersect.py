@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.gpu import bindings
-from app.gpu.records import NONE
-from app.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, SOLID, TRIANGLE
-from app.gpu.scene_texels import SceneTexels, tree_texels
-from app.model import bvh
-from app.truth import optics
-from app.truth.glsl_function import as_f32, evaluate
+from spectrasplat.gpu import bindings
+from spectrasplat.gpu.records import NONE
+from spectrasplat.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, SOLID, TRIANGLE
+from spectrasplat.gpu.scene_texels import SceneTexels, tree_texels
+from spectrasplat.model.geometry import bvh
+from spectrasplat.reference import optics
+from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {"intersect.glsl": ("try_triangle", "intersect_tree", "intersect_solid", "intersect", "hit_triangle", "intersect_closest")}
 BODY = """

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.gpu import bindings
-from app.gpu.records import NONE, ray_record
-from app.gpu.scene_buffers import OBJECT, SCENE_STRUCTS
-from app.gpu.scene_texels import SceneTexels, spectra_texture
-from app.truth import optics
-from app.truth.glsl_function import as_f32, evaluate
+from spectrasplat.gpu import bindings
+from spectrasplat.gpu.records import NONE, ray_record
+from spectrasplat.gpu.scene_buffers import OBJECT, SCENE_STRUCTS
+from spectrasplat.gpu.scene_texels import SceneTexels, spectra_texture
+from spectrasplat.reference import optics
+from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COUNT = 4096
 WORD = 2**32

@@ -10,15 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-
-from app.gpu import bindings
-from app.gpu.records import NONE
-from app.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, TRIANGLE
-from app.gpu.scene_texels import SceneTexels, tree_texels
-from app.model.bvh import build_bvh
-from app.model.primitives_round import sphere
-from app.truth.glsl_function import as_f32, evaluate
-from app.truth.optics import dot, unit
+from spectrasplat.gpu import bindings
+from spectrasplat.gpu.records import NONE
+from spectrasplat.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, TRIANGLE
+from spectrasplat.gpu.scene_texels import SceneTexels, tree_texels
+from spectrasplat.model.geometry.bvh import build_bvh
+from spectrasplat.model.geometry.primitives_round import sphere
+from spectrasplat.reference.optics import dot, unit
+from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {"intersect.glsl": ("intersect_any",)}
 

@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from app.model.mesh import Mesh, make_mesh
-from app.model.scene import (
+from spectrasplat.model.geometry.mesh import Mesh, make_mesh
+from spectrasplat.model.optics.spectrum import Spectrum, illuminant
+from spectrasplat.model.scene import (
     Camera,
     Diffuse,
     Light,
@@ -23,10 +23,9 @@ from app.model.scene import (
     Scene,
     SceneObject,
 )
-from app.model.settings import RenderSettings
-from app.model.spectrum import Spectrum, illuminant
-from app.renderer import render
-from app.truth.gpu_paths import extruded, glass
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.render.still import render
+from spectrasplat.stress.rigs.gpu_paths import extruded, glass
 
 EXACT, SAME_RAYS, OTHER_LATTICE = 1e-6, 3e-3, 0.03
 ENERGY = 0.004
@@ -127,7 +126,7 @@ def dented(mesh: Mesh) -> Mesh:
 
 
 def ball(mesh: Mesh) -> Mesh:
-    from app.model.primitives_round import sphere
+    from spectrasplat.model.geometry.primitives_round import sphere
 
     return sphere(0.5, 2000)
 

@@ -10,20 +10,22 @@ from functools import cache
 
 import numpy as np
 import pytest
-
-from app.gpu.context import Context
-from app.model.mesh import Mesh
-from app.model.primitives_lens import lens
-from app.model.primitives_round import ellipsoid
-from app.model.primitives_round import sphere as sphere_mesh
-from app.model.scene import Diffuse, Light, Mirror, SceneObject
-from app.model.spectrum import constant
-from app.truth import glasses
-from app.truth.curved_meshes import mirror_arc
-from app.truth.far_field import OutgoingRays, outgoing
-from app.truth.glasses import C_NM, D_NM, F_NM
-from app.truth.glsl_function import evaluate
-from app.truth.gpu_paths import (
+from reference.curved_meshes import mirror_arc
+from reference.far_field import OutgoingRays, outgoing
+from reference.surfaces import Plane, sphere
+from reference.tracer import AIR, Index, make_ray, through
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.geometry.mesh import Mesh
+from spectrasplat.model.geometry.primitives_lens import lens
+from spectrasplat.model.geometry.primitives_round import ellipsoid
+from spectrasplat.model.geometry.primitives_round import sphere as sphere_mesh
+from spectrasplat.model.optics.spectrum import constant
+from spectrasplat.model.scene import Diffuse, Light, Mirror, SceneObject
+from spectrasplat.reference import glasses
+from spectrasplat.reference.glasses import C_NM, D_NM, F_NM
+from spectrasplat.reference.optics import dot
+from spectrasplat.stress.rigs.glsl_function import evaluate
+from spectrasplat.stress.rigs.gpu_paths import (
     MIRRORED,
     REFLECTED,
     REFRACTED,
@@ -33,9 +35,6 @@ from app.truth.gpu_paths import (
     trace_beam,
     trace_light,
 )
-from app.truth.optics import dot
-from app.truth.surfaces import Plane, sphere
-from app.truth.tracer import AIR, Index, make_ray, through
 
 N_BK7_D = float(glasses.index("N-BK7", D_NM))
 LINES = (F_NM, D_NM, C_NM)

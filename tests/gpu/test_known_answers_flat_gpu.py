@@ -9,20 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.gpu.context import Context
-from app.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
-from app.light_half import spectral_axis
-from app.model.features import Features
-from app.model.primitives import box, slab
-from app.model.scene import Camera, Diffuse, Light, Scene
-from app.model.settings import RenderSettings
-from app.model.spectrum import constant
-from app.truth import glasses
-from app.truth.far_field import outgoing
-from app.truth.glasses import C_NM, D_NM, F_NM
-from app.truth.glsl_function import evaluate
-from app.truth.gpu_paths import (
+from reference.far_field import outgoing
+from spectrasplat.gpu.context import Context
+from spectrasplat.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
+from spectrasplat.model.features import Features
+from spectrasplat.model.geometry.primitives import box, slab
+from spectrasplat.model.optics.spectrum import constant
+from spectrasplat.model.scene import Camera, Diffuse, Light, Scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.reference import glasses
+from spectrasplat.reference.glasses import C_NM, D_NM, F_NM
+from spectrasplat.reference.optics import dot
+from spectrasplat.render.light_pass import spectral_axis
+from spectrasplat.stress.rigs.glsl_function import evaluate
+from spectrasplat.stress.rigs.gpu_paths import (
     REFLECTED,
     REFRACTED,
     extruded,
@@ -32,7 +32,7 @@ from app.truth.gpu_paths import (
     trace_beam,
     trace_light,
 )
-from app.truth.optics import dot
+
 from tests.gpu.mutants import mutate
 
 N_BK7_D = float(glasses.index("N-BK7", D_NM))

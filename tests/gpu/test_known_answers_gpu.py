@@ -12,19 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.gpu.context import Context
-from app.model.mesh import Mesh
-from app.model.primitives import slab
-from app.model.primitives_round import sphere as sphere_mesh
-from app.passes.emission_domain import orthonormal_frame
-from app.truth import glasses
-from app.truth.far_field import outgoing
-from app.truth.glasses import C_NM, D_NM, F_NM
-from app.truth.gpu_paths import Photons, extruded, glass, screen, trace_beam
-from app.truth.optics import dot, unit
-from app.truth.surfaces import Plane, sphere
-from app.truth.tracer import (
+from reference.far_field import outgoing
+from reference.surfaces import Plane, sphere
+from reference.tracer import (
     AIR,
     RECEIVER,
     Index,
@@ -34,6 +24,16 @@ from app.truth.tracer import (
     through,
     trace,
 )
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.geometry.mesh import Mesh
+from spectrasplat.model.geometry.primitives import slab
+from spectrasplat.model.geometry.primitives_round import sphere as sphere_mesh
+from spectrasplat.passes.emission_domain import orthonormal_frame
+from spectrasplat.reference import glasses
+from spectrasplat.reference.glasses import C_NM, D_NM, F_NM
+from spectrasplat.reference.optics import dot, unit
+from spectrasplat.stress.rigs.gpu_paths import Photons, extruded, glass, screen, trace_beam
+
 from tests.gpu.mutants import mutate
 
 APEX = np.pi / 3

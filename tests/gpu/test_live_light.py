@@ -8,20 +8,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from app.gpu.context import Context
-from app.gpu.scene_buffers import SceneBuffers
-from app.light_half import spectral_axis
-from app.light_plan import LightPlan
-from app.live.difference import redo
-from app.live.inputs import LiveInputs, Redo
-from app.live.light import LiveLight
-from app.model.features import Features
-from app.model.glass import with_gain
-from app.model.scene import Dab, Dielectric, Diffuse, Scene
-from app.model.scene_file import load_scene
-from app.model.settings import RenderSettings
-from app.paths import assets_dir
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.gpu.context import Context
+from spectrasplat.gpu.scene_buffers import SceneBuffers
+from spectrasplat.model.features import Features
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics.glass import with_gain
+from spectrasplat.model.scene import Dab, Dielectric, Diffuse, Scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.render.light_pass import spectral_axis
+from spectrasplat.render.light_plan import LightPlan
+from spectrasplat.render.viewer.inputs import LiveInputs, Redo
+from spectrasplat.render.viewer.invalidation import redo
+from spectrasplat.render.viewer.live_light import LiveLight
 
 SIZE = (160, 90)
 PHOTONS = 20_000

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.gpu import context, osmesa
+from spectrasplat.gpu import context, osmesa
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = """
@@ -43,7 +42,7 @@ def picture(backend: str, folder: Path) -> np.ndarray:
     output = folder / f"{backend}.npy"
     options = "--size 64x36 --photons 10k --spp 1 --seed 3".split()
     done = subprocess.run(
-        [sys.executable, "-m", "app", "render", str(folder / "scene.toml"), "-o", str(output), *options],
+        [sys.executable, "-m", "spectrasplat", "render", str(folder / "scene.toml"), "-o", str(output), *options],
         cwd=ROOT,
         env={**os.environ, "SPECTRASPLAT_BACKEND": backend},
         capture_output=True,

@@ -9,17 +9,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.gpu.scene_buffers import SceneBuffers
-from app.light_half import spectral_axis
-from app.model import glass, primitives
-from app.model.camera_rays import camera_frame
-from app.model.features import Features
-from app.model.mesh import make_mesh
-from app.model.scene import Camera, Dielectric, Diffuse, Mirror, Scene, SceneObject
-from app.model.scene_file import load_scene
-from app.model.settings import RenderSettings
-from app.passes.pick import Picker
+from spectrasplat.gpu.scene_buffers import SceneBuffers
+from spectrasplat.model.camera_rays import camera_frame
+from spectrasplat.model.features import Features
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics import glass
+from spectrasplat.model.scene import (
+    Camera,
+    Dielectric,
+    Diffuse,
+    Mirror,
+    Scene,
+    SceneObject,
+)
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes.pick import Picker
+from spectrasplat.render.light_pass import spectral_axis
 
 SIZE = (160, 90)
 PINHOLE = Camera(position=(1.0, -6.0, 3.5), target=(0.3, 0.2, 0.0), vertical_fov_deg=28.0)

@@ -8,16 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.gpu import bindings
-from app.gpu.records import NONE
-from app.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, TRIANGLE, SceneBuffers
-from app.gpu.scene_texels import SceneTexels
-from app.light_half import spectral_axis
-from app.model import glass, primitives_round, spectrum
-from app.model.features import Features
-from app.model.mesh import make_mesh
-from app.model.scene import (
+from reference import tracer
+from reference.tracer import Body, Index, TriangleList
+from spectrasplat.gpu import bindings
+from spectrasplat.gpu.records import NONE
+from spectrasplat.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, TRIANGLE, SceneBuffers
+from spectrasplat.gpu.scene_texels import SceneTexels
+from spectrasplat.model.features import Features
+from spectrasplat.model.geometry import primitives_round
+from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics import glass, spectrum
+from spectrasplat.model.scene import (
     Black,
     Camera,
     Dielectric,
@@ -27,13 +29,12 @@ from app.model.scene import (
     Scene,
     SceneObject,
 )
-from app.model.scene_file import load_scene
-from app.model.settings import RenderSettings
-from app.passes.ray_fan import RayFan
-from app.passes.ray_paths import RayPaths
-from app.truth import optics, tracer
-from app.truth.glsl_function import as_f32, evaluate
-from app.truth.tracer import Body, Index, TriangleList
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes.ray_fan import RayFan
+from spectrasplat.passes.ray_paths import RayPaths
+from spectrasplat.reference import optics
+from spectrasplat.render.light_pass import spectral_axis
+from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {"surface.glsl": ("facing_geometric", "facing_normal", "reflected_direction", "refracted_direction", "surface_point")}
 SCENES = Path(__file__).parents[2] / "assets" / "scenes"

@@ -16,14 +16,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-import app.gpu
-import app.passes
-from app import paths
-from app.gpu import shader
-from app.gpu.records import photon_record, ray_record
-from app.gpu.schema import Struct
-from app.passes import footprint, splat
+import spectrasplat.gpu
+import spectrasplat.passes
+from spectrasplat.base import paths
+from spectrasplat.gpu import shader
+from spectrasplat.gpu.records import photon_record, ray_record
+from spectrasplat.gpu.schema import Struct
+from spectrasplat.passes import footprint, splat
 
 ONE = 0x3F800000
 """Bits of 1.0: words just above are ordinary floats, so that no driver flushes them."""
@@ -35,7 +34,7 @@ _BITS = {"float": ("floatBitsToUint", "uintBitsToFloat"), "vec": ("floatBitsToUi
 def structs() -> list[Struct]:
     """Every struct of app/gpu and app/passes, and the records whose size the scene decides."""
     found: dict[tuple[str, int], Struct] = {}
-    for package in (app.gpu, app.passes):
+    for package in (spectrasplat.gpu, spectrasplat.passes):
         for module in pkgutil.iter_modules(package.__path__):
             for value in vars(importlib.import_module(f"{package.__name__}.{module.name}")).values():
                 if isinstance(value, Struct):
@@ -140,7 +139,7 @@ def test_records_packed_as_texels_lie_as_in_a_buffer(gl, struct: Struct) -> None
 
 
 _BLOCK = re.compile(r"layout\(std140,[^)]*\)\s*uniform\s+(\w+)\s*\{([^}]*)\}")
-HAND_WRITTEN = {"footprint.comp": footprint.PARAMETERS, "splat.vert": splat.PARAMETERS, "splat_swept.frag": splat.PARAMETERS, "splat_cut.frag": splat.PARAMETERS, "splat_small.frag": splat.PARAMETERS}
+HAND_WRITTEN = {"light/footprint.comp": footprint.PARAMETERS, "light/splat.vert": splat.PARAMETERS, "light/splat_swept.frag": splat.PARAMETERS, "light/splat_cut.frag": splat.PARAMETERS, "light/splat_small.frag": splat.PARAMETERS}
 """Shaders whose parameter block lists its members itself: it must be this struct."""
 
 
@@ -176,7 +175,7 @@ def test_all_structs_are_found() -> None:
     names = {struct.name for struct in STRUCTS}
     assert {"PhotonRecord", "RayRecord", "Outcome", "ChunkCount", "QueueState", "EmitParameters", "TraceParameters", "Placement", "Receiver"} <= names
     assert {"Triangle", "Solid", "Object", "EyeLight", "EyeParameters", "SplatRecord", "FootprintParameters", "DrawParameters"} <= names
-    declared = "".join(file.read_text() for file in (Path(app.__path__[0])).rglob("*.py") if file.name != "schema.py")
+    declared = "".join(file.read_text() for file in (Path(spectrasplat.__path__[0])).rglob("*.py") if file.name != "schema.py")
     assert set(re.findall(r'Struct\(\s*"(\w+)"', declared)) <= names
 
 

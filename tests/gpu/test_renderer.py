@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.model.mesh import make_mesh
-from app.model.scene import Scene
-from app.model.scene_file import load_scene
-from app.model.settings import METHODS, RenderSettings
-from app.model.spectrum import Spectrum
-from app.paths import assets_dir
-from app.renderer import render
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics.spectrum import Spectrum
+from spectrasplat.model.scene import Scene
+from spectrasplat.model.settings import METHODS, RenderSettings
+from spectrasplat.render.still import render
 
 SCENES = sorted(p.stem for p in (assets_dir() / "scenes").glob("*.toml"))
 SMALL = RenderSettings(width=96, height=54, photons=20_000, spp=2)

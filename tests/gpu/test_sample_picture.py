@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from app.gpu.context import Context
-from app.passes.sample_picture import LATTICE, SamplePicture
+from spectrasplat.gpu.context import Context
+from spectrasplat.passes.sample_picture import LATTICE, SamplePicture
 
 
 def test_lattice_takes_the_middles_of_its_cells(gl: Context) -> None:

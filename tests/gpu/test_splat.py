@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.gpu.map_atlas import MapAtlas, pack, placement_rows
-from app.gpu.map_channels import MapChannels
-from app.gpu.records import FLAG_FOOTPRINT_DROPPED, RECEIVER
-from app.model import spectrum
-from app.model.charts import build_charts
-from app.model.colorimetry import K_M, VISIBLE_NM, cmf_xyz
-from app.model.primitives import box
-from app.passes.accumulate import SeamFold
-from app.truth.splat_reference import splat_image
-from app.truth.splat_rig import Rig, SplatFeatures, photons
+from reference.splat_reference import splat_image
+from spectrasplat.gpu.map_channels import MapChannels
+from spectrasplat.gpu.records import FLAG_FOOTPRINT_DROPPED, RECEIVER
+from spectrasplat.model.geometry.charts import build_charts
+from spectrasplat.model.geometry.primitives import box
+from spectrasplat.model.optics import spectrum
+from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz
+from spectrasplat.passes.accumulate import SeamFold
+from spectrasplat.passes.map_atlas import MapAtlas, pack, placement_rows
+from spectrasplat.stress.rigs.splat_rig import Rig, SplatFeatures, photons
 
 PLAIN = SplatFeatures()
 CUTS = SplatFeatures(band_cuts=True)

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from spectrasplat.gpu import scene_buffers
+from spectrasplat.reference import optics
+from spectrasplat.stress import judging
+from spectrasplat.stress.case import Case
+from spectrasplat.stress.cases import optics_cases, path_cases, splat_cases
 
-from app.gpu import scene_buffers
-from app.stress import judging, optics_cases, path_cases, splat_cases
-from app.stress.case import Case
-from app.truth import optics
 from tests.gpu.mutants import mutate
 
 CASES = {case.name: case for case in (*optics_cases.CASES, *path_cases.CASES, *splat_cases.CASES)}
@@ -45,11 +46,11 @@ MUTANTS = {
     "wrong sign of dispersion when leaving": (
         "gem-bands", "lib/medium.glsl", "derivative += medium_slope(crossing.before, x)", "derivative -= medium_slope(crossing.before, x)", "band ends",
     ),
-    "overflow not seen": ("overflow", "footprint.comp", "bool accident = !(", "bool accident = false && !(", ""),
-    "lost footprints not counted": ("overflow", "footprint.comp", "atomicAdd(count_dropped, 1u);", "", "photons were degraded but only 0 fall-backs counted"),
-    "dropped columns not counted": ("far-screen", "trace.comp", "outcome.what |= FELL_FOOTPRINT;", "", "flags not counted"),
-    "brightness capped": ("collapse", "splat_small.frag", "share * splat_colour[g]", "min(share, 0.9) * splat_colour[g]", "energy"),
-    "rounding of the total lost": ("one-texel", "accumulate.comp", "imageStore(scratch, at, kept_out);", "imageStore(scratch, at, vec4(0.0));", "energy in the texel"),
+    "overflow not seen": ("overflow", "light/footprint.comp", "bool accident = !(", "bool accident = false && !(", ""),
+    "lost footprints not counted": ("overflow", "light/footprint.comp", "atomicAdd(count_dropped, 1u);", "", "photons were degraded but only 0 fall-backs counted"),
+    "dropped columns not counted": ("far-screen", "light/trace.comp", "outcome.what |= FELL_FOOTPRINT;", "", "flags not counted"),
+    "brightness capped": ("collapse", "light/splat_small.frag", "share * splat_colour[g]", "min(share, 0.9) * splat_colour[g]", "energy"),
+    "rounding of the total lost": ("one-texel", "light/accumulate.comp", "imageStore(scratch, at, kept_out);", "imageStore(scratch, at, vec4(0.0));", "energy in the texel"),
     "facets that do not overlap": ("slivers", "lib/intersect.glsl", "#define EDGE_ERROR 5e-7", "#define EDGE_ERROR -1e-4", "light leaked"),
 }  # fmt: skip
 SLOW_MUTANTS = ("rounding of the total lost", "facets that do not overlap")

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.__main__ import main
-from app.gpu import records
-from app.model.primitives import box
-from app.stress import contact_cases, probe, sweep_cases
-from app.stress.probe import WatchedLight, with_photons
-from app.stress.scene_parts import (
+from spectrasplat.__main__ import main
+from spectrasplat.gpu import records
+from spectrasplat.model.geometry.primitives import box
+from spectrasplat.stress.cases import contact_cases, sweep_cases
+from spectrasplat.stress.rigs import probe
+from spectrasplat.stress.rigs.probe import WatchedLight, with_photons
+from spectrasplat.stress.rigs.scene_parts import (
     BEAM,
     FLINT,
     brighter,

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.gpu.records import OUTCOME, photon_record, ray_record
-from app.gpu.schema import Field, Struct
-from app.truth.glsl_function import evaluate
+from spectrasplat.gpu.records import OUTCOME, photon_record, ray_record
+from spectrasplat.gpu.schema import Field, Struct
+from spectrasplat.stress.rigs.glsl_function import evaluate
 
 MIXED = Struct(
     "Mixed",

@@ -15,17 +15,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-
-from app.gpu.context import Context
-from app.model.mesh import Mesh
-from app.model.primitives_lens import lens
-from app.model.primitives_round import ellipsoid
-from app.model.primitives_round import sphere as sphere_mesh
-from app.model.scene import Mirror
-from app.truth import glasses
-from app.truth.curved_meshes import mirror_arc
-from app.truth.glasses import D_NM
-from app.truth.gpu_paths import (
+from reference.curved_meshes import mirror_arc
+from reference.surfaces import Plane, Quadric, sphere
+from reference.tracer import (
+    AIR,
+    Index,
+    Ray,
+    make_ray,
+    onto,
+    through,
+)
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.geometry.mesh import Mesh
+from spectrasplat.model.geometry.primitives_lens import lens
+from spectrasplat.model.geometry.primitives_round import ellipsoid
+from spectrasplat.model.geometry.primitives_round import sphere as sphere_mesh
+from spectrasplat.model.scene import Mirror
+from spectrasplat.reference import glasses
+from spectrasplat.reference.glasses import D_NM
+from spectrasplat.stress.rigs.gpu_paths import (
     MIRRORED,
     REFRACTED,
     Photons,
@@ -34,8 +42,6 @@ from app.truth.gpu_paths import (
     screen,
     trace_beam,
 )
-from app.truth.surfaces import Plane, Quadric, sphere
-from app.truth.tracer import AIR, Index, Ray, make_ray, onto, through
 
 N = Index(float(glasses.index("N-BK7", D_NM)), np.array([0.0, 0.0, 1.0]))
 

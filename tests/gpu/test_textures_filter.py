@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from reference import textures as twin
+from spectrasplat.gpu import mip_chain
+from spectrasplat.model.texture import Texture
+from spectrasplat.stress.rigs.glsl_function import as_f32
 from test_textures_gpu import COUNT, picture, run, scene_of, store_of
-
-from app.gpu import mip_chain
-from app.model.texture import Texture
-from app.truth import textures as twin
-from app.truth.glsl_function import as_f32
 
 SIDE = 128
 

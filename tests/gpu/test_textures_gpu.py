@@ -9,21 +9,27 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.gpu import mip_chain, shader
-from app.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
-from app.gpu.texture_store import PICTURE, TextureStore, place_defines
-from app.model import primitives
-from app.model.features import Features
-from app.model.mesh import Mesh, make_mesh
-from app.model.scene import Camera, Dielectric, Diffuse, Light, Scene, SceneObject
-from app.model.settings import RenderSettings
-from app.model.spectrum import illuminant
-from app.model.texture import Environment, Texture
-from app.renderer import spectral_axis
-from app.truth import textures as twin
-from app.truth.glsl_function import as_f32, evaluate
+from reference import textures as twin
+from spectrasplat.base.errors import UserError
+from spectrasplat.gpu import mip_chain, shader
+from spectrasplat.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
+from spectrasplat.gpu.texture_store import PICTURE, TextureStore, place_defines
+from spectrasplat.model.features import Features
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.geometry.mesh import Mesh, make_mesh
+from spectrasplat.model.optics.spectrum import illuminant
+from spectrasplat.model.scene import (
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Scene,
+    SceneObject,
+)
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.model.texture import Environment, Texture
+from spectrasplat.render.still import spectral_axis
+from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {
     "textures.glsl": (
@@ -205,7 +211,7 @@ def turned_scene() -> tuple[Scene, np.ndarray]:
 
 
 def _glass():
-    from app.model import catalogue
+    from spectrasplat.model.optics import catalogue
 
     return catalogue.find("N-BK7", "test")
 

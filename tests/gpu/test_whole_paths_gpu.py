@@ -13,13 +13,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.gpu.context import Context
-from app.model import glass as dispersion
-from app.model.colorimetry import VISIBLE_NM
-from app.model.primitives import box
-from app.model.primitives_round import sphere
-from app.model.scene import (
+from reference.path_check import ReferenceScene
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.geometry.primitives import box
+from spectrasplat.model.geometry.primitives_round import sphere
+from spectrasplat.model.optics import glass as dispersion
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM
+from spectrasplat.model.optics.spectrum import constant
+from spectrasplat.model.scene import (
     Absorption,
     Dielectric,
     Diffuse,
@@ -27,9 +28,8 @@ from app.model.scene import (
     Mirror,
     SceneObject,
 )
-from app.model.spectrum import constant
-from app.truth import glasses
-from app.truth.gpu_paths import (
+from spectrasplat.reference import glasses
+from spectrasplat.stress.rigs.gpu_paths import (
     CUT_HIGH,
     CUT_LOW,
     REFRACTED,
@@ -39,7 +39,7 @@ from app.truth.gpu_paths import (
     placed,
     trace_light,
 )
-from app.truth.path_check import ReferenceScene
+
 from tests.gpu.mutants import mutate
 
 BAND = (579.0, 581.0)
@@ -151,10 +151,10 @@ def test_position_and_throughput_at_three_wavelengths(gl, name: str) -> None:
 
 
 MUTANTS = {
-    "one coefficient for the band": ("trace.comp", "exp(-alpha * hit.distance)", "vec3(exp(-alpha.y * hit.distance))", "absorption"),
-    "flux not absorbed": ("trace.comp", "ray.flux_w *= kept.y", "ray.flux_w *= 1.0", "absorption without dispersion"),
+    "one coefficient for the band": ("light/trace.comp", "exp(-alpha * hit.distance)", "vec3(exp(-alpha.y * hit.distance))", "absorption"),
+    "flux not absorbed": ("light/trace.comp", "ray.flux_w *= kept.y", "ray.flux_w *= 1.0", "absorption without dispersion"),
     "absorption of the lower priority": ("lib/medium.glsl", "stack_objects[findMSB(mask)]", "stack_objects[findLSB(mask)]", "nested, the outer decides"),
-    "grey mirror": ("trace.comp", "child.throughput *= kept;", "child.throughput *= kept.y;", "coloured mirror"),
+    "grey mirror": ("light/trace.comp", "child.throughput *= kept;", "child.throughput *= kept.y;", "coloured mirror"),
     "one polarisation": ("lib/optics.glsl", "0.5 * (rs * rs + rp * rp)", "rs * rs", "steep Fresnel"),
     "covered surface is an event": ("lib/medium.glsl", "crossing.before != crossing.after", "true", "nested, the outer decides"),
 }
@@ -218,6 +218,6 @@ def test_cut_bands_against_exact_paths(gl) -> None:
     ids=["position stays", "direction stays", "anchored at the end"],
 )
 def test_mutants_of_cuts_are_caught(gl, old: str, new: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    mutate(monkeypatch, tmp_path, "trace.comp", old, new)
+    mutate(monkeypatch, tmp_path, "light/trace.comp", old, new)
     with pytest.raises(AssertionError):
         cuts_agree(gl)

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.model.camera_rays import camera_frame
+from spectrasplat.model.features import Features
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics.spectrum import laser
+from spectrasplat.model.scene import Dielectric
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.render.still import RenderResult, render
 
-from app.model.camera_rays import camera_frame
-from app.model.features import Features
-from app.model.scene import Dielectric
-from app.model.scene_file import load_scene
-from app.model.settings import RenderSettings
-from app.model.spectrum import laser
-from app.paths import assets_dir
-from app.renderer import RenderResult, render
 from tests.image.metrics import LUMINANCE, normalised_rmse, relative_mse
 
 SCENE = assets_dir() / "scenes" / "prism_case.toml"

@@ -18,13 +18,13 @@ from imgui_bundle.immapp import testing
 import glfw  # isort: skip
 import moderngl
 import numpy as np
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.scene import Dielectric
+from spectrasplat.ui import theme
+from spectrasplat.ui.session import Session
+from spectrasplat.ui.viewer import Viewer
+from spectrasplat.ui.window import GlfwLoader
 
-from app.gpu.context import Context
-from app.model.scene import Dielectric
-from app.ui import theme
-from app.ui.session import Session
-from app.ui.viewer import Viewer
-from app.ui.window import GlfwLoader
 from tests.interface.rig import small_engine, target
 
 SIZE = (900, 600)

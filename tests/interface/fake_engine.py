@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 
 import moderngl
 import numpy as np
-
-from app.gpu.context import Context
-from app.live.inputs import LiveInputs, Redo
-from app.live.near import StoredPhotons
-from app.live.stats import LiveStats
-from app.passes.pick import PickHit
+from spectrasplat.gpu.context import Context
+from spectrasplat.passes.pick import PickHit
+from spectrasplat.render.viewer.inputs import LiveInputs, Redo
+from spectrasplat.render.viewer.photon_queries import StoredPhotons
+from spectrasplat.render.viewer.stats import LiveStats
 
 
 @dataclass

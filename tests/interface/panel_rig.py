@@ -6,14 +6,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from imgui_bundle import imgui
-
-from app.gpu.context import Context
-from app.model.scene import Dielectric, Diffuse
-from app.model.scene_file import load_scene
-from app.paths import assets_dir
-from app.ui.facts import Facts
-from app.ui.headless import HeadlessInterface
-from app.ui.state import Selection, State
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit.state import Selection, State
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.scene import Dielectric, Diffuse
+from spectrasplat.ui.headless import HeadlessInterface
+from spectrasplat.ui.view_model import Facts
 
 Draw = Callable[[State, Facts], State]
 

@@ -10,16 +10,15 @@ from pathlib import Path
 
 import numpy as np
 from imgui_bundle import imgui
-
-from app.gpu.context import Context
-from app.live.engine import Budget, LiveEngine
-from app.model.scene import Dielectric, Diffuse
-from app.ui.headless import HeadlessInterface
-from app.ui.projection import View
-from app.ui.session import Draw, Session
-from app.ui.shell import draw_interface
-from app.ui.state import Selection
-from app.ui.viewer import Viewer, headless_viewer
+from spectrasplat.edit.projection import View
+from spectrasplat.edit.state import Selection
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.scene import Dielectric, Diffuse
+from spectrasplat.render.viewer.engine import Budget, LiveEngine
+from spectrasplat.ui.headless import HeadlessInterface
+from spectrasplat.ui.session import Draw, Session
+from spectrasplat.ui.shell import draw_interface
+from spectrasplat.ui.viewer import Viewer, headless_viewer
 
 PHOTONS = 1 << 14
 SIZE = (760, 500)

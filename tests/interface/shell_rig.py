@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.gpu.context import Context
-from app.ui.facts import Facts
-from app.ui.headless import HeadlessInterface
-from app.ui.panels import dialogs
-from app.ui.requests import Request
-from app.ui.shell import draw_interface
-from app.ui.state import State
+from spectrasplat.edit.requests import Request
+from spectrasplat.edit.state import State
+from spectrasplat.gpu.context import Context
+from spectrasplat.ui.headless import HeadlessInterface
+from spectrasplat.ui.panels import dialogs
+from spectrasplat.ui.shell import draw_interface
+from spectrasplat.ui.view_model import Facts
+
 from tests.interface.panel_rig import scene_state
 
 SETTLED = 8

@@ -11,11 +11,11 @@ from pathlib import Path
 import moderngl
 import numpy as np
 from imgui_bundle import imgui
+from spectrasplat.edit import requests
+from spectrasplat.edit.state import Panels, Selection, State
+from spectrasplat.ui.shell import draw_interface
+from spectrasplat.ui.view_model import Facts
 
-from app.ui import requests
-from app.ui.facts import Facts
-from app.ui.shell import draw_interface
-from app.ui.state import Panels, Selection, State
 from tests.interface.rig import Hands
 
 Key = imgui.Key

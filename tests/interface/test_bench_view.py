@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import pytest
-
-from app.bench import viewer_speed
-from app.gpu.context import Context
-from app.paths import assets_dir
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.bench import viewer_speed
+from spectrasplat.gpu.context import Context
 
 
 def test_walking_round_and_dragging_the_dispersion_trace_nothing(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import pytest
 from PIL import Image
-
-from app.gpu.context import Context
-from app.ui.gallery import Gallery
+from spectrasplat.gpu.context import Context
+from spectrasplat.ui.gallery import Gallery
 
 MAKE = "import sys; from PIL import Image; Image.new('RGB', (32, 18), (255, 0, 0)).save(sys.argv[1])"
 
@@ -86,7 +85,7 @@ def test_closing_ends_the_process(gl: Context, tmp_path: Path, scenes: dict[str,
 
 @pytest.mark.slow
 def test_a_shipped_scene_really_gets_one(gl: Context, tmp_path: Path) -> None:
-    from app.cli_options import shipped_scenes
+    from spectrasplat.commands.options import shipped_scenes
 
     gallery = Gallery(gl, tmp_path, {"prism": shipped_scenes()["prism"]})
     while gallery.is_busy:

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from imgui_bundle import imgui
-
-from app.gpu.context import Context
-from app.ui import item_rects
-from app.ui.headless import HeadlessInterface
+from spectrasplat.gpu.context import Context
+from spectrasplat.ui import item_rects
+from spectrasplat.ui.headless import HeadlessInterface
 
 
 @dataclass

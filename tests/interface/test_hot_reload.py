@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from imgui_bundle import imgui
+from spectrasplat.base import paths
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.gpu import shader_watch
+from spectrasplat.gpu.context import Context
+from spectrasplat.ui.view_model_builder import facts_of
 
-from app import paths
-from app.gpu import shader_watch
-from app.gpu.context import Context
-from app.paths import assets_dir
-from app.ui.facts_builder import facts_of
 from tests.interface.rig import Hands, viewer
 
 PATIENCE = 400
@@ -56,13 +56,13 @@ def frames_until_error_is(hands: Hands, present: bool) -> str | None:
 
 def test_a_mistake_is_shown_with_file_and_line_and_the_picture_stays(hands: Hands, shaders: Path) -> None:
     before = hands.picture()
-    edit(shaders / "eye.comp", "void main()\n{", "void main()\n{\n    this is no GLSL;")
-    line = (shaders / "eye.comp").read_text().splitlines().index("    this is no GLSL;") + 1
+    edit(shaders / "camera/camera.comp", "void main()\n{", "void main()\n{\n    this is no GLSL;")
+    line = (shaders / "camera/camera.comp").read_text().splitlines().index("    this is no GLSL;") + 1
     told = frames_until_error_is(hands, present=True)
     assert told is not None and f"eye.comp:{line}" in told
     hands.settle()
     assert np.array_equal(hands.picture(), before)
-    edit(shaders / "eye.comp", "    this is no GLSL;\n", "")
+    edit(shaders / "camera/camera.comp", "    this is no GLSL;\n", "")
     frames_until_error_is(hands, present=False)
     assert np.abs(hands.settle() - before).max() <= 1e-5 * before.max()
 
@@ -72,7 +72,7 @@ def test_a_change_on_disk_shows_in_the_picture(hands: Hands, shaders: Path) -> N
     place = hands.interface.find("Picture").at(0.9, 0.6)
     row, column = int(place[1]), int(place[0])
     before = hands.interface.screenshot()[row, column]
-    edit(shaders / "display.comp", "vec4(colour, 1.0)", "vec4(1.0 - colour, 1.0)")
+    edit(shaders / "display/display.comp", "vec4(colour, 1.0)", "vec4(1.0 - colour, 1.0)")
     hands.interface.frame(4)
     assert facts_of(hands.session).shader_error is None
     assert not np.array_equal(hands.interface.screenshot()[row, column], before)
@@ -81,7 +81,7 @@ def test_a_change_on_disk_shows_in_the_picture(hands: Hands, shaders: Path) -> N
 def test_f5_compiles_from_disk(hands: Hands, shaders: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shader_watch, "INTERVAL_S", 1e9)
     hands.session._watch = shader_watch.ShaderWatch()
-    edit(shaders / "display.comp", "void main()\n{", "void main()\n{\n    this is no GLSL;")
+    edit(shaders / "display/display.comp", "void main()\n{", "void main()\n{\n    this is no GLSL;")
     hands.interface.frame(5)
     assert facts_of(hands.session).shader_error is None
     hands.interface.key(imgui.Key.f5)

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from app.paths import assets_dir
+from spectrasplat.base.paths import assets_dir
 
 ROOT = Path(__file__).resolve().parents[2]
 

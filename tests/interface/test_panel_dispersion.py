@@ -10,24 +10,17 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 from panel_rig import PanelRig, scene_state
-
-from app.gpu.context import Context
-from app.model import catalogue, glass
-from app.model.glass import LINE_D_NM, Dispersion
-from app.model.scene import Diffuse
-from app.ui import edits
-from app.ui.panels import abbe, dispersion, glass_picker, index_curve
-from app.ui.panels.abbe import N_D_RANGE, V_D_RANGE, draw_abbe
-from app.ui.panels.dispersion import draw_dispersion
-from app.ui.panels.glass_values import (
-    CONTROL_NM,
-    base_name,
-    own_numbers,
-    with_abbe,
-    with_point,
-)
-from app.ui.panels.index_curve import draw_index_curve
-from app.ui.state import Selection
+from spectrasplat.edit import edits
+from spectrasplat.edit.state import Selection
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.optics import catalogue, glass
+from spectrasplat.model.optics.glass import LINE_D_NM, Dispersion
+from spectrasplat.model.scene import Diffuse
+from spectrasplat.ui.panels import abbe, dispersion, glass_picker, index_curve
+from spectrasplat.ui.panels.abbe import N_D_RANGE, V_D_RANGE, draw_abbe
+from spectrasplat.ui.panels.dispersion import draw_dispersion
+from spectrasplat.ui.panels.glass_values import CONTROL_NM, base_name, own_numbers, with_abbe, with_point
+from spectrasplat.ui.panels.index_curve import draw_index_curve
 
 N_SF11 = "Schott N-SF11"
 

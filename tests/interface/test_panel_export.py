@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 from panel_rig import PanelRig, scene_state
-
-from app.ui import requests
-from app.ui.facts import ErrorCurve, Facts, JobFacts
-from app.ui.panels import export_panel, file_browser
-from app.ui.panels.compare_panel import draw_compare
-from app.ui.panels.export_panel import draw_export
-from app.ui.state import Compare, Key, State
+from spectrasplat.edit import requests
+from spectrasplat.edit.state import Compare, Key, State
+from spectrasplat.ui.panels import export_panel, file_browser
+from spectrasplat.ui.panels.compare_panel import draw_compare
+from spectrasplat.ui.panels.export_panel import draw_export
+from spectrasplat.ui.view_model import ErrorCurve, Facts, JobFacts
 
 
 def with_browser(state: State, facts: Facts) -> State:

@@ -9,14 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from panel_rig import PanelRig, receiver_of, scene_state
-
-from app.gpu.context import Context
-from app.model.scene import Dab
-from app.ui import edits
-from app.ui.panels import light_panel, light_spectrum
-from app.ui.panels.brush_panel import draw_brush
-from app.ui.panels.light_panel import angles_of, direction_of, draw_light
-from app.ui.panels.light_spectrum import LAMPS
+from spectrasplat.edit import edits
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.scene import Dab
+from spectrasplat.ui.panels import light_panel, light_spectrum
+from spectrasplat.ui.panels.brush_panel import draw_brush
+from spectrasplat.ui.panels.light_panel import angles_of, direction_of, draw_light
+from spectrasplat.ui.panels.light_spectrum import LAMPS
 
 
 @pytest.fixture(autouse=True)

@@ -8,19 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from spectrasplat.base.errors import UserError
+from spectrasplat.edit import requests
+from spectrasplat.edit.preferences import config_dir
+from spectrasplat.edit.state import Selection, State
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.scene import Camera, Dielectric, Diffuse
+from spectrasplat.passes.pick import PickHit
+from spectrasplat.render.viewer.photon_queries import StoredPhotons
+from spectrasplat.ui.crash_log import FILE_NAME
+from spectrasplat.ui.live_picture import LivePicture
+from spectrasplat.ui.session import LAYOUT_FRAMES, Session
+from spectrasplat.ui.view_model import Facts
 
-from app.errors import UserError
-from app.gpu.context import Context
-from app.live.near import StoredPhotons
-from app.model.scene import Camera, Dielectric, Diffuse
-from app.passes.pick import PickHit
-from app.ui import requests
-from app.ui.crash_log import FILE_NAME
-from app.ui.facts import Facts
-from app.ui.live_picture import LivePicture
-from app.ui.preferences import config_dir
-from app.ui.session import LAYOUT_FRAMES, Session
-from app.ui.state import Selection, State
 from tests.interface.fake_engine import FakeEngine
 
 Edit = Callable[[State], State]
@@ -180,7 +180,7 @@ def test_a_bug_in_a_request_is_logged_and_the_work_autosaved(rig: Rig, config: P
     def bug(*_arguments: object) -> None:
         raise ZeroDivisionError("a fault")
 
-    monkeypatch.setattr("app.ui.session_requests.source_at", bug)
+    monkeypatch.setattr("spectrasplat.ui.session_requests.source_at", bug)
     rig.engine.hit = _hit(rig, Diffuse)
     rig.ask(requests.SelectAt(0.5, 0.5))
     assert any("a fault" in message.text and message.is_error for message in rig.facts.messages)
@@ -220,14 +220,14 @@ def test_a_shader_error_is_shown_as_one(rig: Rig) -> None:
     rig.frame()
     rig.frame()
     assert rig.facts.shader_error == rig.engine.problem
-    assert not any("trace.comp" in message.text for message in rig.facts.messages)
+    assert not any("light/trace.comp" in message.text for message in rig.facts.messages)
 
 
 def test_recovery_after_a_crash(gl: Context, rig: Rig, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rig.rename("lost and found")
     session = rig.session
     session.autosave.write_now(session.document.scene, session.document.title, session.document.source)
-    monkeypatch.setattr("app.ui.autosave._is_held", lambda _path: False)  # as if that process were gone
+    monkeypatch.setattr("spectrasplat.edit.autosave._is_held", lambda _path: False)  # as if that process were gone
     second = Rig(Session(gl, make_engine=FakeEngine))
     second.frame()
     assert second.facts.recovery == session.autosave.path and second.session.state.preferences.panels.start_page
@@ -309,7 +309,7 @@ def test_idle_costs_nothing_once_converged(rig: Rig) -> None:
 
 
 def test_no_request_is_without_an_answer() -> None:
-    from app.ui import session_requests
+    from spectrasplat.ui import session_requests
 
     asked = set(requests.Request.__args__)
     assert asked <= set(session_requests._HANDLERS)

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 from imgui_bundle import imgui
+from spectrasplat.edit import requests
+from spectrasplat.edit.state import Panels, Selection, State
+from spectrasplat.gpu.context import Context
+from spectrasplat.ui.commands import COMMANDS, PANELS, VIEWS, command
+from spectrasplat.ui.shortcuts import chord, listed
+from spectrasplat.ui.view_model import Facts
 
-from app.gpu.context import Context
-from app.ui import requests
-from app.ui.commands import COMMANDS, PANELS, VIEWS, command
-from app.ui.facts import Facts
-from app.ui.shortcuts import chord, listed
-from app.ui.state import Panels, Selection, State
 from tests.interface.panel_rig import scene_state
 from tests.interface.shell_rig import ShellRig
 

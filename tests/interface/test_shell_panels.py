@@ -9,14 +9,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from imgui_bundle import imgui
+from spectrasplat.edit import edits, requests
+from spectrasplat.edit.state import Panels, Preferences, Selection
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.scene import Diffuse
+from spectrasplat.render.viewer.stats import LiveStats
+from spectrasplat.ui.panels.view_panel import SWEEP_NM_PER_S
+from spectrasplat.ui.view_model import (
+    CursorFacts,
+    Facts,
+    HistoryEntry,
+    JobFacts,
+    Message,
+    SceneEntry,
+)
 
-from app.gpu.context import Context
-from app.live.stats import LiveStats
-from app.model.scene import Diffuse
-from app.ui import edits, requests
-from app.ui.facts import CursorFacts, Facts, HistoryEntry, JobFacts, Message, SceneEntry
-from app.ui.panels.view_panel import SWEEP_NM_PER_S
-from app.ui.state import Panels, Preferences, Selection
 from tests.interface.panel_rig import scene_state
 from tests.interface.shell_rig import ShellRig
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from spectrasplat.gpu.context import Context
+from spectrasplat.ui import theme
+from spectrasplat.ui.palette import DARK, LIGHT, Colour, Palette
 
-from app.gpu.context import Context
-from app.ui import theme
-from app.ui.palette import DARK, LIGHT, Colour, Palette
 from tests.interface.shell_rig import ShellRig
 
 SIGNS = "λμµ°²₂₁−×ΔΣ≤≥·…–—→±½√∞αβη"

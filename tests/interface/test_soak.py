@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit.preferences import config_dir
+from spectrasplat.edit.state import State
+from spectrasplat.gpu.context import Context
+from spectrasplat.ui import layout
+from spectrasplat.ui.crash_log import FILE_NAME
 
-from app.gpu.context import Context
-from app.paths import assets_dir
-from app.ui import layout
-from app.ui.crash_log import FILE_NAME
-from app.ui.preferences import config_dir
-from app.ui.state import State
 from tests.interface.rig import Hands, viewer
 from tests.interface.soak import DATA, Guard, Hand, device_objects, resident_bytes
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from imgui_bundle import imgui
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit.state import Brush, Selection
+from spectrasplat.gpu.context import Context
 
-from app.gpu.context import Context
-from app.paths import assets_dir
-from app.ui.state import Brush, Selection
 from tests.interface.rig import Hands, viewer
 
 SAME = 1e-5

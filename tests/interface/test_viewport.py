@@ -8,16 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from imgui_bundle import imgui
+from spectrasplat.edit import camera_controls
+from spectrasplat.edit.projection import View
+from spectrasplat.edit.requests import BeginPull, Notice, Pull, SelectAt
+from spectrasplat.edit.state import Brush, Compare, Selection, State
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.scene import Diffuse
+from spectrasplat.render.viewer.stats import LiveStats
+from spectrasplat.ui import viewport, viewport_tools
+from spectrasplat.ui.headless import HeadlessInterface
+from spectrasplat.ui.view_model import CursorFacts, Facts, RayLine
 
-from app.gpu.context import Context
-from app.live.stats import LiveStats
-from app.model.scene import Diffuse
-from app.ui import camera_controls, viewport, viewport_tools
-from app.ui.facts import CursorFacts, Facts, RayLine
-from app.ui.headless import HeadlessInterface
-from app.ui.projection import View
-from app.ui.requests import BeginPull, Notice, Pull, SelectAt
-from app.ui.state import Brush, Compare, Selection, State
 from tests.interface.panel_rig import receiver_of, scene_state
 
 SIZE = (640, 400)
@@ -225,7 +226,7 @@ def test_the_gizmo_snaps_with_ctrl_and_scales_about_the_middle(gl) -> None:
 
 
 def _middle(state: State, index: int) -> np.ndarray:
-    from app.model.features import world_bounds
+    from spectrasplat.model.features import world_bounds
 
     return world_bounds(state.scene.objects[index]).mean(axis=0)
 
@@ -328,7 +329,7 @@ def test_pulling_a_colour_moves_it_under_the_cursor(gl, local) -> None:
             rig.frame(2)
         item = rig.state.scene.objects[pull.receiver_index]
         if local:
-            from app.model.local_dispersion import gain_at
+            from spectrasplat.model.local_dispersion import gain_at
 
             assert set(rig.labels) == {"Pull colour locally"}
             own = np.linalg.solve(item.object_to_world, np.append(pull.reference, 1.0))[:3]

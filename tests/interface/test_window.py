@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 def run(tmp_path: Path, *arguments: str, display: bool) -> subprocess.CompletedProcess[str]:
     """`spectrasplat ARGUMENTS` with a virtual screen or without any."""
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    command = [sys.executable, "-P", "-m", "app", *arguments]
+    command = [sys.executable, "-P", "-m", "spectrasplat", *arguments]
     if display:
         assert shutil.which("xvfb-run"), "install xvfb and xauth ('apt-get install xvfb xauth'): the window cannot be tested without"
         command = ["xvfb-run", "-a", "-s", "-screen 0 1400x900x24", *command]

@@ -5,17 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from app.gpu.context import Context
-from app.gpu.scene_buffers import SceneBuffers
-from app.light_half import spectral_axis
-from app.model.features import Features
-from app.model.mesh import Mesh, make_mesh
-from app.model.scene import Camera, Dielectric, Diffuse, Light, Scene, SceneObject
-from app.model.settings import RenderSettings
-from app.passes.emission_domain import emission_domain
-from app.passes.trace import Band, LatticeSlice, TracePass
-from app.truth.gpu_paths import glass, screen
+from spectrasplat.gpu.context import Context
+from spectrasplat.gpu.scene_buffers import SceneBuffers
+from spectrasplat.model.features import Features
+from spectrasplat.model.geometry.mesh import Mesh, make_mesh
+from spectrasplat.model.scene import (
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Scene,
+    SceneObject,
+)
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes.emission_domain import emission_domain
+from spectrasplat.passes.trace import Band, LatticeSlice, TracePass
+from spectrasplat.render.light_pass import spectral_axis
+from spectrasplat.stress.rigs.gpu_paths import glass, screen
 
 BATCH = 1 << 16
 

@@ -15,20 +15,19 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-
-from app.gpu.context import Context
-from app.gpu.scene_buffers import SceneBuffers
-from app.light_half import LightHalf, spectral_axis
-from app.model.colorimetry import K_M, cmf_xyz
-from app.model.features import Features
-from app.model.mesh import make_mesh
-from app.model.scene import Camera, Diffuse, Light, Scene, SceneObject
-from app.model.settings import RenderSettings
-from app.model.spectrum import illuminant
-from app.passes.map_layout import plane_frame
-from app.truth import optics
-from app.truth.glasses import index
-from app.truth.gpu_paths import extruded, glass, screen
+from spectrasplat.gpu.context import Context
+from spectrasplat.gpu.scene_buffers import SceneBuffers
+from spectrasplat.model.features import Features
+from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.optics.colorimetry import K_M, cmf_xyz
+from spectrasplat.model.optics.spectrum import illuminant
+from spectrasplat.model.scene import Camera, Diffuse, Light, Scene, SceneObject
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes.map_layout import plane_frame
+from spectrasplat.reference import optics
+from spectrasplat.reference.glasses import index
+from spectrasplat.render.light_pass import LightHalf, spectral_axis
+from spectrasplat.stress.rigs.gpu_paths import extruded, glass, screen
 
 ALPHA = 1e-4
 SIZE = (24, 16)

@@ -15,12 +15,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.model import primitives
-from app.model.colorimetry import rgb709_to_xyz
-from app.model.glass import sellmeier
-from app.model.primitives_round import sphere
-from app.model.scene import (
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.geometry.primitives_round import sphere
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics.colorimetry import rgb709_to_xyz
+from spectrasplat.model.optics.glass import sellmeier
+from spectrasplat.model.optics.spectrum import blackbody, illuminant
+from spectrasplat.model.scene import (
     Absorption,
     Camera,
     Dielectric,
@@ -30,12 +32,9 @@ from app.model.scene import (
     Scene,
     SceneObject,
 )
-from app.model.scene_file import load_scene
-from app.model.settings import RenderSettings
-from app.model.spectrum import blackbody, illuminant
-from app.paths import assets_dir
-from app.renderer import render
-from app.truth.photon_reference import render_reference
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.reference.photon_reference import render_reference
+from spectrasplat.render.still import render
 
 WIDTH, HEIGHT, BLOCK = 96, 64, 8
 SEEDS, PHOTONS, REFERENCE_PHOTONS = 4, 150_000, 250_000

@@ -9,19 +9,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from spectrasplat.gpu.scene_buffers import SceneBuffers
+from spectrasplat.model.features import Features
+from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.optics.spectrum import constant
+from spectrasplat.model.scene import Camera, Diffuse, Light, Scene, SceneObject
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes.emission_domain import emission_domain
+from spectrasplat.passes.trace import Band, LatticeSlice, TracePass
+from spectrasplat.reference import optics
+from spectrasplat.reference.glasses import index
+from spectrasplat.render.light_pass import spectral_axis
+from spectrasplat.stress.rigs.gpu_paths import glass, screen
 
-from app.gpu.scene_buffers import SceneBuffers
-from app.light_half import spectral_axis
-from app.model.features import Features
-from app.model.mesh import make_mesh
-from app.model.scene import Camera, Diffuse, Light, Scene, SceneObject
-from app.model.settings import RenderSettings
-from app.model.spectrum import constant
-from app.passes.emission_domain import emission_domain
-from app.passes.trace import Band, LatticeSlice, TracePass
-from app.truth import optics
-from app.truth.glasses import index
-from app.truth.gpu_paths import glass, screen
 from tests.statistical.emitted import BATCH, box
 
 PASSES = 4

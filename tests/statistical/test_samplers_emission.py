@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from spectrasplat.model.optics.spectrum import constant
+from spectrasplat.model.scene import Light
+from spectrasplat.reference.optics import unit
 
-from app.model.scene import Light
-from app.model.spectrum import constant
-from app.truth.optics import unit
 from tests.statistical.chi_square import ALPHA, chi_square, smallest_tilt, thinned
 from tests.statistical.emitted import Emitted, box, emit
 

@@ -11,14 +11,14 @@ import re
 
 import numpy as np
 import pytest
+from spectrasplat.base import paths
+from spectrasplat.gpu.records import TRACE_PARAMETERS, ray_record
+from spectrasplat.passes.camera import _pixel_lattice
+from spectrasplat.reference.emission_maps import GOLDEN, PLASTIC, lattice_point
+from spectrasplat.reference.random_numbers import hash_combine, hash_pcg, kronecker, unit_float
+from spectrasplat.render.light_plan import _SHIFT_GENERATORS
+from spectrasplat.stress.rigs.glsl_function import evaluate
 
-from app import paths
-from app.gpu.records import TRACE_PARAMETERS, ray_record
-from app.light_plan import _SHIFT_GENERATORS
-from app.passes.eye import _pixel_lattice
-from app.truth.emission_maps import GOLDEN, PLASTIC, lattice_point
-from app.truth.glsl_function import evaluate
-from app.truth.random_numbers import hash_combine, hash_pcg, kronecker, unit_float
 from tests.statistical.chi_square import (
     ALPHA,
     box_discrepancy,
@@ -152,7 +152,7 @@ LATTICES = 3
 
 def survives_source() -> str:
     """The tracer's roulette as it stands in trace.comp, with the parameters it reads."""
-    text = (paths.shaders_dir() / "trace.comp").read_text()
+    text = (paths.shaders_dir() / "light/trace.comp").read_text()
     softness = re.search(r"#define SURVIVOR_SOFTNESS .*", text)[0]
     function = re.search(r"^bool survives\(.*?^}", text, re.MULTILINE | re.DOTALL)[0]
     return f"{softness}\nTraceParameters p = TraceParameters(64u, {THRESHOLD}, 0u, {LATTICES}u);\n{function}"

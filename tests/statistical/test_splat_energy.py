@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.truth.splat_rig import Rig, SplatFeatures, photons
+from spectrasplat.stress.rigs.splat_rig import Rig, SplatFeatures, photons
 
 FEATURES = SplatFeatures()
 TILES, SIDE = 15, 96

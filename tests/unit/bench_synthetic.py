@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-
-from app.bench.results import (
+from spectrasplat.bench.results import (
     BenchResult,
     Claim,
     Curve,
@@ -58,7 +57,7 @@ def synthetic_curve(method: str, difficulty: float, seeds: int, longest_s: float
 
 def synthetic_pictures(directory: Path, scene: str, methods: Sequence[str], rng: np.random.Generator) -> dict[str, str]:
     """A curved spectrum on black, with noise and blur that suit each method; XYZ float32 files."""
-    from app.model.spectrum import cmf_xyz
+    from spectrasplat.model.optics.spectrum import cmf_xyz
 
     (directory / "pictures").mkdir(parents=True, exist_ok=True)
     y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]] / SIZE[1]

@@ -9,11 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.model.scene_file import load_scene
-from app.paths import assets_dir
-from app.ui.animation import (
+from spectrasplat.base.errors import UserError
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit.animation import (
     Track,
     keyed,
     parse_range,
@@ -22,14 +20,9 @@ from app.ui.animation import (
     turntable,
     with_turntable,
 )
-from app.ui.parameters import (
-    Stage,
-    apply,
-    apply_all,
-    paths,
-    value_of,
-)
-from app.ui.state import Key
+from spectrasplat.edit.parameters import Stage, apply, apply_all, paths, value_of
+from spectrasplat.edit.state import Key
+from spectrasplat.model.io.scene_file import load_scene
 
 GAIN = "objects.prism.dispersion_gain"
 

@@ -7,9 +7,8 @@ import os
 from pathlib import Path
 
 import pytest
-
-from app.atomic import atomic_output, check_writable
-from app.errors import UserError
+from spectrasplat.base.atomic import atomic_output, check_writable
+from spectrasplat.base.errors import UserError
 
 
 def test_file_appears_when_the_block_succeeds(tmp_path: Path) -> None:

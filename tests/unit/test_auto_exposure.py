@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.tone_map import auto_exposure
-from app.ui.auto_exposure import ARRIVED_EV, DEADBAND_EV, MEASURE_S, AutoExposure
+from spectrasplat.base.tone_map import auto_exposure
+from spectrasplat.ui.auto_exposure import ARRIVED_EV, DEADBAND_EV, MEASURE_S, AutoExposure
 
 GREY = np.full((9, 16, 3), 0.5, np.float32)
 

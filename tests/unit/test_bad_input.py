@@ -22,8 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-
-from app.__main__ import main
+from spectrasplat.__main__ import main
 
 ROOT = Path(__file__).resolve().parents[2]
 OLD = b"the picture of yesterday"
@@ -269,9 +268,9 @@ def contents(folder: Path) -> dict[str, bytes | None]:
 
 
 def use_renderer(monkeypatch: pytest.MonkeyPatch, render: Callable[..., Any]) -> None:
-    module = ModuleType("app.renderer")
+    module = ModuleType("spectrasplat.render.still")
     module.render = render  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "app.renderer", module)
+    monkeypatch.setitem(sys.modules, "spectrasplat.render.still", module)
 
 
 def grey_picture(_scene: object, settings: Any, **_: object) -> SimpleNamespace:
@@ -387,8 +386,7 @@ def test_opengl_missing_or_too_old(
     problem: str | None, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     import moderngl
-
-    from app.gpu import context, osmesa
+    from spectrasplat.gpu import context, osmesa
 
     def no_library(*_: object) -> None:
         raise OSError("libOSMesa.so.8 is not installed")
@@ -444,7 +442,7 @@ def test_no_space_left_is_told_as_such(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def program(*arguments: str) -> list[str]:
-    return [sys.executable, "-m", "app", *arguments]
+    return [sys.executable, "-m", "spectrasplat", *arguments]
 
 
 def test_the_program_itself(tmp_path: Path) -> None:

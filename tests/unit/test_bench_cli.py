@@ -9,13 +9,12 @@ from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
-
-from app import cli_bench
-from app.__main__ import main
-from app.bench import runner, screen
-from app.bench.results import BenchSettings, Curve, Point, Sample, SceneResult
-from app.errors import UserError
-from app.model.settings import EYE_METHODS
+from spectrasplat.__main__ import main
+from spectrasplat.base.errors import UserError
+from spectrasplat.bench import runner, screen
+from spectrasplat.bench.results import BenchSettings, Curve, Point, Sample, SceneResult
+from spectrasplat.commands import bench as cli_bench
+from spectrasplat.model.settings import EYE_METHODS
 
 
 class FakeContext:
@@ -58,9 +57,9 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
     def report(_result: object, directory: Path) -> None:
         found.reported = directory
 
-    monkeypatch.setattr("app.gpu.context.create_context", FakeContext)
+    monkeypatch.setattr("spectrasplat.gpu.context.create_context", FakeContext)
     monkeypatch.setattr(runner, "run_bench", run)
-    monkeypatch.setattr("app.bench.report.write_report", report)
+    monkeypatch.setattr("spectrasplat.bench.report.report.write_report", report)
     return found
 
 
@@ -89,7 +88,7 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
 def test_mistakes_are_one_sentence(arguments: list[str], told: str, seen: Seen, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
     if not told:  # depends on the machine
-        monkeypatch.setattr("app.cli_options.memory_bytes", lambda: 1 << 30)
+        monkeypatch.setattr("spectrasplat.commands.options.memory_bytes", lambda: 1 << 30)
         told = "choose a smaller one"
     assert main(["bench", *arguments]) == 2
     error = capsys.readouterr().err
@@ -165,8 +164,8 @@ def test_features_has_its_own_command(monkeypatch: pytest.MonkeyPatch, tmp_path:
     asked = []
     stand_in = ModuleType("features_cost")
     stand_in.command = lambda scene, output: asked.append((scene.name, output)) or 0  # type: ignore[attr-defined]
-    monkeypatch.setattr("app.bench.features_cost", stand_in, raising=False)
-    monkeypatch.setitem(__import__("sys").modules, "app.bench.features_cost", stand_in)
+    monkeypatch.setattr("spectrasplat.bench.features.cost", stand_in, raising=False)
+    monkeypatch.setitem(__import__("sys").modules, "spectrasplat.bench.features.cost", stand_in)
     assert main(["bench", "--features", "ball_plain", "-o", str(tmp_path)]) == 0
     assert main(["bench", "--features", "prism"]) == 0
     assert asked == [("ball without dispersion", tmp_path), ("prism", None)]

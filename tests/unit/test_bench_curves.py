@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.bench.claims import claims_of, ratios_of
-from app.bench.curves import (
+from spectrasplat.bench.claims import claims_of, ratios_of
+from spectrasplat.bench.curves import (
     budget_at_time,
     complete_curve,
     error_at_time,
@@ -15,8 +14,15 @@ from app.bench.curves import (
     tail_slope,
     time_to_error,
 )
-from app.bench.metrics import Truth
-from app.bench.results import Claim, Curve, Point, ReferenceInfo, Sample, SceneResult
+from spectrasplat.bench.results import (
+    Claim,
+    Curve,
+    Point,
+    ReferenceInfo,
+    Sample,
+    SceneResult,
+)
+from spectrasplat.reference.metrics import Truth
 
 BUDGETS = [int(n) for n in np.geomspace(1000, 200_000, 10)]
 RATE = 60_000.0

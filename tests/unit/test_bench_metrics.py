@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.bench.metrics import (
+from spectrasplat.reference.metrics import (
     Truth,
     bias_variance,
     flip,

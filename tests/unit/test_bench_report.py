@@ -11,21 +11,31 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-
-from app.bench import (
-    plots,
-    report,
-    report_pictures,
-    report_plots,
-    report_style,
-    report_text,
+from spectrasplat.base.errors import UserError
+from spectrasplat.bench.report import (
+    curve_plots as plots,
 )
-from app.bench.metrics import EPSILON_SHARE
-from app.bench.report_html import Html, element
-from app.bench.report_overview import overview
-from app.bench.report_prose import PROSE
-from app.bench.results import BenchResult, Claim, Curve, Point, SceneResult
-from app.errors import UserError
+from spectrasplat.bench.report import (
+    pictures as report_pictures,
+)
+from spectrasplat.bench.report import (
+    plots as report_plots,
+)
+from spectrasplat.bench.report import (
+    report,
+)
+from spectrasplat.bench.report import (
+    style as report_style,
+)
+from spectrasplat.bench.report import (
+    text as report_text,
+)
+from spectrasplat.bench.report.html import Html, element
+from spectrasplat.bench.report.overview import overview
+from spectrasplat.bench.report.prose import PROSE
+from spectrasplat.bench.results import BenchResult, Claim, Curve, Point, SceneResult
+from spectrasplat.reference.metrics import EPSILON_SHARE
+
 from tests.unit.bench_synthetic import METHODS, synthetic_result, synthetic_scene
 
 
@@ -257,7 +267,7 @@ def test_same_result_gives_the_same_svg_and_both_themes_read_well(tmp_path: Path
 
 def contrast(first: str, second: str) -> float:
     """Contrast ratio of two colours (WCAG 2.1)."""
-    from app.tone_map import luminance, srgb_eotf
+    from spectrasplat.base.tone_map import luminance, srgb_eotf
 
     levels = [float(luminance(srgb_eotf(np.array([int(c[i : i + 2], 16) for i in (1, 3, 5)]) / 255))) + 0.05 for c in (first, second)]
     return max(levels) / min(levels)

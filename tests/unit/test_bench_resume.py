@@ -13,17 +13,15 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-
-from app.bench import metrics, runner
-from app.bench.metrics import Truth
-from app.bench.rendering import NothingToMeasure, Rendering
-from app.bench.results import BenchResult, BenchSettings, ReferenceInfo, SceneResult
-from app.bench.store import Store
-from app.bench.subjects import Subject
-from app.errors import UserError
-from app.model.catalogue import find
-from app.model.mesh import make_mesh
-from app.model.scene import (
+from spectrasplat.base.errors import UserError
+from spectrasplat.bench import runner
+from spectrasplat.bench.rendering import NothingToMeasure, Rendering
+from spectrasplat.bench.results import BenchResult, BenchSettings, ReferenceInfo, SceneResult
+from spectrasplat.bench.store import Store
+from spectrasplat.bench.subjects import Subject
+from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.optics.catalogue import find
+from spectrasplat.model.scene import (
     Camera,
     Dielectric,
     Diffuse,
@@ -31,6 +29,8 @@ from app.model.scene import (
     Scene,
     SceneObject,
 )
+from spectrasplat.reference import metrics
+from spectrasplat.reference.metrics import Truth
 
 WIDTH, HEIGHT = 8, 6
 SETTINGS = BenchSettings(3.0, 3, ("stochastic", "srd"), (WIDTH, HEIGHT))

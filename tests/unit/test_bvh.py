@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.model import bvh
-from app.model.bvh import MAX_DEPTH, MAX_LEAF, Bvh, build_bvh
+from spectrasplat.base.errors import UserError
+from spectrasplat.model.geometry import bvh
+from spectrasplat.model.geometry.bvh import MAX_DEPTH, MAX_LEAF, Bvh, build_bvh
 
 
 def soup(count: int, size: float = 0.1, seed: int = 1) -> np.ndarray:
@@ -272,8 +271,8 @@ def test_wrong_input_is_refused(triangles: np.ndarray) -> None:
 
 
 def test_a_missing_numba_is_told_in_a_sentence(monkeypatch) -> None:
-    monkeypatch.delattr("app.model.bvh_build", raising=False)
-    monkeypatch.setitem(sys.modules, "app.model.bvh_build", None)
+    monkeypatch.delattr("spectrasplat.model.geometry.bvh_build", raising=False)
+    monkeypatch.setitem(sys.modules, "spectrasplat.model.geometry.bvh_build", None)
     with pytest.raises(UserError, match="needs numba.*pip install numba"):
         build_bvh(soup(10), use_cache=False)
 
@@ -284,11 +283,11 @@ def test_the_builder_compiles_where_no_cache_folder_can_be_written() -> None:
 import numpy as np
 from numba.core import caching
 caching.CacheImpl._locator_classes = []
-from app.model import bvh_build
+from spectrasplat.model import bvh_build
 half_area = bvh_build._half_area(np.array([0.0, 0.0, 0.0, 1.0, 2.0, 3.0]))
 assert half_area == 11.0, half_area
 """
-    subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(bvh.__file__).parents[2])
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(bvh.__file__).parents[3])
 
 
 def test_build_time_is_told(capsys) -> None:

@@ -7,16 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.model import primitives
-from app.model.scene import Camera, Dielectric, Light, Scene
-from app.truth import caustic_cache, photon_run, spectral_caustic
-from app.truth.caustic_cache import CachedCaustic, picture_noise
-from app.truth.eye_reference import cached_eye_reference, render_eye_reference
-from app.truth.eye_run import summed_eye
-from app.truth.photon_run import TALLY_SIZE
-from app.truth.rounds import PARTS
-from app.truth.spectral_caustic import CausticPlan, CausticRun, build_caustic
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.scene import Camera, Dielectric, Light, Scene
+from spectrasplat.reference import caustic_cache, photon_run, spectral_caustic
+from spectrasplat.reference.camera_reference import cached_eye_reference, render_eye_reference
+from spectrasplat.reference.camera_run import summed_eye
+from spectrasplat.reference.caustic_cache import CachedCaustic, picture_noise
+from spectrasplat.reference.photon_run import TALLY_SIZE
+from spectrasplat.reference.rounds import PARTS
+from spectrasplat.reference.spectral_caustic import CausticPlan, CausticRun, build_caustic
 from tests.unit.eye_scenes import D65, FLINT, place, plate, scene_of
 
 SIZE = 24, 16

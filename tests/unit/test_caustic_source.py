@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.ui.caustic_source import source_at
+from spectrasplat.ui.caustic_source import source_at
 
 TABLE, LEFT_GLASS, RIGHT_GLASS, WALL = 0, 1, 2, 3
 

@@ -4,14 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.truth.caustic_windows import (
-    Landed,
-    Planes,
-    Seen,
-    _shared,
-    fit_windows,
-)
+from spectrasplat.reference.caustic_windows import Landed, Planes, Seen, _shared, fit_windows
 
 RNG = np.random.default_rng(4)
 PAGE, FLOOR = 0, 1

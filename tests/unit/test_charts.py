@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.model import primitives
-from app.model.charts import ChartAtlas, build_charts
-from app.model.mesh import Mesh, make_mesh
+from spectrasplat.base.errors import UserError
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.geometry.charts import ChartAtlas, build_charts
+from spectrasplat.model.geometry.mesh import Mesh, make_mesh
 
 MESHES = {
     "box": primitives.box((1.0, 2.0, 0.5)),

@@ -13,13 +13,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from app import __version__, cli_options
-from app.__main__ import main
-from app.errors import UserError
-from app.model.mesh import make_mesh
-from app.model.scene import Black, Camera, Diffuse, RenderDefaults, Scene, SceneObject
-from app.model.settings import RenderSettings
+from spectrasplat import __version__
+from spectrasplat.__main__ import main
+from spectrasplat.base.errors import UserError
+from spectrasplat.commands import options as cli_options
+from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.scene import (
+    Black,
+    Camera,
+    Diffuse,
+    RenderDefaults,
+    Scene,
+    SceneObject,
+)
+from spectrasplat.model.settings import RenderSettings
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -45,7 +52,7 @@ class FakeResult:
 
 
 class FakeRenderer:
-    """Stands where `app.renderer` stands and remembers what it was asked."""
+    """Stands where `spectrasplat.render.still` stands and remembers what it was asked."""
 
     def __init__(self) -> None:
         self.settings: RenderSettings | None = None
@@ -82,11 +89,11 @@ def small_scene() -> Scene:
 def renderer(monkeypatch: pytest.MonkeyPatch) -> FakeRenderer:
     """A renderer and a scene reader that need neither OpenGL nor files."""
     fake = FakeRenderer()
-    render_module, scene_module = ModuleType("app.renderer"), ModuleType("app.model.scene_file")
+    render_module, scene_module = ModuleType("spectrasplat.render.still"), ModuleType("spectrasplat.model.io.scene_file")
     render_module.render = fake.render  # type: ignore[attr-defined]
     scene_module.load_scene = lambda path: small_scene()  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "app.renderer", render_module)
-    monkeypatch.setitem(sys.modules, "app.model.scene_file", scene_module)
+    monkeypatch.setitem(sys.modules, "spectrasplat.render.still", render_module)
+    monkeypatch.setitem(sys.modules, "spectrasplat.model.io.scene_file", scene_module)
     return fake
 
 
@@ -269,7 +276,7 @@ class TestRender:
         def fail(*_: object, **__: object) -> None:
             raise UserError("light 'sun' lies\ninside glass")
 
-        monkeypatch.setattr(sys.modules["app.renderer"], "render", fail)
+        monkeypatch.setattr(sys.modules["spectrasplat.render.still"], "render", fail)
         output = tmp_path / "out.npy"
         output.write_text("old")
         told = complaint(capsys, "render", scene_path, "-o", output)
@@ -396,7 +403,7 @@ class TestProgram:
         def fail(_arguments: object) -> int:
             raise error
 
-        monkeypatch.setattr("app.cli.run", fail)
+        monkeypatch.setattr("spectrasplat.commands.program.run", fail)
         assert main(["doctor"]) == code
         assert capsys.readouterr().err == told
 
@@ -404,7 +411,7 @@ class TestProgram:
         def fail(_arguments: object) -> int:
             raise ZeroDivisionError
 
-        monkeypatch.setattr("app.cli.run", fail)
+        monkeypatch.setattr("spectrasplat.commands.program.run", fail)
         with pytest.raises(ZeroDivisionError):
             main(["doctor"])
 
@@ -414,7 +421,7 @@ class TestProgram:
         os.close(reader)
         try:
             done = subprocess.run(
-                [sys.executable, "-m", "app", *arguments],
+                [sys.executable, "-m", "spectrasplat", *arguments],
                 cwd=ROOT,
                 stdout=writer,
                 stderr=subprocess.PIPE,
@@ -428,7 +435,7 @@ class TestProgram:
     def test_start_imports_nothing_heavy(self) -> None:
         # The warm start to the first picture has a budget of 3 s.
         code = (
-            "import sys; from app.__main__ import main; main(['render', 'x', '-o', 'x.jpg']);"
+            "import sys; from spectrasplat.__main__ import main; main(['render', 'x', '-o', 'x.jpg']);"
             "heavy = {'colour', 'scipy', 'matplotlib', 'numba', 'trimesh', 'OpenEXR', 'imgui_bundle', 'glfw'};"
             "print(sorted(heavy & set(sys.modules)))"
         )

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-from app.__main__ import main
+from spectrasplat.__main__ import main
 
 GAIN = "objects.prism.dispersion_gain"
 CASES = {

@@ -7,10 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-from app.__main__ import main
-from app.stress import runner
-from app.stress.case import Case, Measurement
+from spectrasplat.__main__ import main
+from spectrasplat.stress import runner
+from spectrasplat.stress.case import Case, Measurement
 
 
 def made_up(*measurements: Measurement, fails: BaseException | None = None) -> tuple[Case, ...]:

@@ -7,12 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
-from app import doctor
-from app.__main__ import main
-from app.doctor import Check
-from app.errors import UserError
-from app.gpu.limits import NEEDED
+from spectrasplat.__main__ import main
+from spectrasplat.base.errors import UserError
+from spectrasplat.commands import doctor
+from spectrasplat.commands.doctor import Check
+from spectrasplat.gpu.limits import NEEDED
 
 REAL_REQUIREMENTS = doctor.requirements
 
@@ -130,7 +129,7 @@ def test_osmesa_is_optional(monkeypatch: pytest.MonkeyPatch) -> None:
     def load() -> None:
         raise OSError("none")
 
-    monkeypatch.setattr("app.gpu.osmesa.load_library", load)
+    monkeypatch.setattr("spectrasplat.gpu.osmesa.load_library", load)
     assert found("OSMesa").state == "optional"
 
 

@@ -7,11 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.image_io import write_image
-from app.model.cie_sky import SKY_TYPES, relative_luminance
-from app.model.environment import (
+from spectrasplat.base.errors import UserError
+from spectrasplat.base.image_io import write_image
+from spectrasplat.model.environment import (
     direction_of,
     from_map,
     gradient,
@@ -20,7 +18,9 @@ from app.model.environment import (
     up_and_rotation,
     world_to_local,
 )
-from app.model.texture import Environment
+from spectrasplat.model.optics.cie_sky import SKY_TYPES, relative_luminance
+from spectrasplat.model.texture import Environment
+
 from tests.unit.picture_bytes import hdr_file
 
 

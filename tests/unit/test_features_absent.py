@@ -10,19 +10,18 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
-from app import paths
-from app.bench.symbol_proof import FEATURE_SYMBOLS, occurring, program_texts, prove
-from app.gpu import records, shader
-from app.gpu.scene_buffers import SCENE_STRUCTS
-from app.gpu.texture_store import PICTURE
-from app.model.features import Features, explain
-from app.model.scene_file import load_scene
-from app.model.settings import RenderSettings
-from app.passes.eye_programs import direct_defines
-from app.passes.eye_records import EYE_LIGHT, EYE_PARAMETERS
-from app.passes.footprint import SPLAT, footprint_defines, splat_defines
-from app.static_costs import RecordSizes, static_costs
+from spectrasplat.base import paths
+from spectrasplat.bench.features.static_costs import RecordSizes, static_costs
+from spectrasplat.bench.features.symbol_proof import FEATURE_SYMBOLS, occurring, program_texts, prove
+from spectrasplat.gpu import records, shader
+from spectrasplat.gpu.scene_buffers import SCENE_STRUCTS
+from spectrasplat.gpu.texture_store import PICTURE
+from spectrasplat.model.features import Features, explain
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes.camera_programs import direct_defines
+from spectrasplat.passes.camera_records import EYE_LIGHT, EYE_PARAMETERS
+from spectrasplat.passes.footprint import SPLAT, footprint_defines, splat_defines
 
 EVERYTHING = Features(
     method="srd", spectral_groups=2, merged_groups=True, spectral_weights=True, footprints=True, point_spectrum=False, random_wavelength=False, even_wavelengths=False, band_cuts=True,
@@ -68,11 +67,11 @@ def sources(features: Features) -> list[shader.Source]:
     numbers |= {"STACK_SIZE": 1, "STACK_OBJECTS": "uint[](0u)", "SOLID_COUNT": 1, "PLANE_COUNT": 6, "TRIANGLE_COUNT": 9}
     light = features.defines() | numbers
     splat = splat_defines(features) | {"GROUPS": features.spectral_groups}
-    made = [shader.load_source("trace.comp", light, structs), shader.load_source("emit.comp", light | {"LIGHT_POINT": 1}, structs)]
-    made.append(shader.load_source("footprint.comp", footprint_defines(features), (photon, records.PLACEMENT, records.RECEIVER, SPLAT, records.GAIN_BOX)))
-    draws = {"splat_small.frag": "SMALL", "splat_swept.frag": "SWEPT"} | ({"splat_cut.frag": "CUT"} if features.band_cuts else {})
+    made = [shader.load_source("light/trace.comp", light, structs), shader.load_source("light/emit.comp", light | {"LIGHT_POINT": 1}, structs)]
+    made.append(shader.load_source("light/footprint.comp", footprint_defines(features), (photon, records.PLACEMENT, records.RECEIVER, SPLAT, records.GAIN_BOX)))
+    draws = {"light/splat_small.frag": "SMALL", "light/splat_swept.frag": "SWEPT"} | ({"light/splat_cut.frag": "CUT"} if features.band_cuts else {})
     for fragment, kind in draws.items():
-        made += [shader.load_source(name, splat | {kind: 1}, (SPLAT,)) for name in ("splat.vert", fragment)]
+        made += [shader.load_source(name, splat | {kind: 1}, (SPLAT,)) for name in ("light/splat.vert", fragment)]
     return made + eye_sources(features, light)
 
 
@@ -92,7 +91,7 @@ def eye_sources(features: Features, light: dict[str, int | float | str], images:
     eye |= {name: 1 for name, on in switches.items() if on}
     structs = (*SCENE_STRUCTS, EYE_LIGHT, EYE_PARAMETERS, records.RECEIVER, records.PLACEMENT, *([PICTURE] if images else []))
     programs = [eye, direct_defines(eye)] if "EYE_SPECULAR" in eye else [eye]
-    return [shader.load_source("eye.comp", defines, structs) for defines in programs]
+    return [shader.load_source("camera/camera.comp", defines, structs) for defines in programs]
 
 
 def scene_features(name: str) -> Features:

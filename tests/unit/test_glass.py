@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from app import glass_report
-from app.errors import UserError
-from app.model import catalogue, glass
-from app.model.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
+from spectrasplat.base.errors import UserError
+from spectrasplat.commands import glass_report
+from spectrasplat.model.optics import catalogue, glass
+from spectrasplat.model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
 
 VISIBLE = np.arange(380.0, 780.5, 1.0)
 
@@ -254,14 +253,14 @@ def test_an_impossible_gain_is_refused(gain: float) -> None:
 
 
 def test_distinct_gains_are_distinct_glasses_to_the_renderer() -> None:
-    from app.gpu.scene_buffers import Groups
-    from app.model import primitives
-    from app.model.features import Features, dispersive_materials
-    from app.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
-    from app.model.scene_defaults import default_light
-    from app.model.settings import RenderSettings
-    from app.model.spectral_tables import SpectralAxis
-    from app.truth.photon_reference import scene_key
+    from spectrasplat.gpu.scene_buffers import Groups
+    from spectrasplat.model.features import Features, dispersive_materials
+    from spectrasplat.model.geometry import primitives
+    from spectrasplat.model.optics.spectral_tables import SpectralAxis
+    from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
+    from spectrasplat.model.scene_defaults import default_light
+    from spectrasplat.model.settings import RenderSettings
+    from spectrasplat.reference.photon_reference import scene_key
 
     def scene(*gains: float) -> Scene:
         plain = catalogue.find("N-SF11")
@@ -281,11 +280,11 @@ def test_distinct_gains_are_distinct_glasses_to_the_renderer() -> None:
 
 
 def test_the_float64_references_follow_a_gain() -> None:
-    from app.model import primitives
-    from app.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
-    from app.model.scene_defaults import default_light
-    from app.truth.path_check import ReferenceScene
-    from app.truth.photon_scene import TABLE_NM, photon_scene
+    from reference.path_check import ReferenceScene
+    from spectrasplat.model.geometry import primitives
+    from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
+    from spectrasplat.model.scene_defaults import default_light
+    from spectrasplat.reference.photon_scene import TABLE_NM, photon_scene
 
     item = SceneObject("box", primitives.box(), Dielectric(glass.with_gain(catalogue.find("N-BK7"), 2.5)))
     floor = SceneObject("floor", primitives.plane(), Diffuse())

@@ -13,14 +13,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.model import catalogue, glass, primitives
-from app.model.colorimetry import VISIBLE_NM, attenuation_from_colour
-from app.model.gltf import load_gltf
-from app.model.gltf_document import open_document
-from app.model.gltf_write import save_gltf
-from app.model.scene import (
+from spectrasplat.base.errors import UserError
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.io.gltf import load_gltf
+from spectrasplat.model.io.gltf_document import open_document
+from spectrasplat.model.io.gltf_write import save_gltf
+from spectrasplat.model.optics import catalogue, glass
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM, attenuation_from_colour
+from spectrasplat.model.optics.spectrum import blackbody, illuminant, laser, xyz_to_rgb709
+from spectrasplat.model.scene import (
     Absorption,
     Black,
     Camera,
@@ -33,8 +34,7 @@ from app.model.scene import (
     Scene,
     SceneObject,
 )
-from app.model.scene_describe import describe_material
-from app.model.spectrum import blackbody, illuminant, laser, xyz_to_rgb709
+from spectrasplat.model.scene_describe import describe_material
 
 POSITIONS = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], dtype="<f4")
 FACES = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])

@@ -12,18 +12,17 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-
-from app.errors import UserError
-from app.model import primitives
-from app.model.environment import sky
-from app.model.gltf import load_gltf
-from app.model.gltf_write import save_gltf
-from app.model.picture_files import read_picture
-from app.model.scene import Camera, Diffuse, Light, Scene, SceneObject
-from app.model.scene_file import load_scene
-from app.model.scene_save import save_scene
-from app.model.spectrum import illuminant
-from app.model.texture import Texture
+from spectrasplat.base.errors import UserError
+from spectrasplat.model.environment import sky
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.io.gltf import load_gltf
+from spectrasplat.model.io.gltf_write import save_gltf
+from spectrasplat.model.io.picture_files import read_picture
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.io.scene_save import save_scene
+from spectrasplat.model.optics.spectrum import illuminant
+from spectrasplat.model.scene import Camera, Diffuse, Light, Scene, SceneObject
+from spectrasplat.model.texture import Texture
 
 LEVELS = np.random.default_rng(3).integers(0, 256, (4, 6, 3)).astype(np.uint8)
 
@@ -223,8 +222,8 @@ def test_an_environment_survives_in_the_extras(tmp_path: Path) -> None:
     np.testing.assert_array_equal(back.environment.rgb, scene.environment.rgb)
     np.testing.assert_allclose(back.environment.world_to_local, scene.environment.world_to_local, atol=1e-15)
     # With nothing diffuse an environment needs neither a lamp nor a table.
-    from app.model import catalogue
-    from app.model.scene import Dielectric
+    from spectrasplat.model.optics import catalogue
+    from spectrasplat.model.scene import Dielectric
 
     glass = replace(scene.objects[3], material=Dielectric(catalogue.find("N-SF11")))
     save_gltf(replace(scene, objects=(glass,), lights=()), tmp_path / "ball.glb")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.image_io import channel_name, check_suffix, read_image, write_image
+from spectrasplat.base.errors import UserError
+from spectrasplat.base.image_io import channel_name, check_suffix, read_image, write_image
 
 
 @pytest.fixture

@@ -9,16 +9,15 @@ from pathlib import Path
 
 import pytest
 from rich.console import Console
-
-from app.cli_options import find_scene
-from app.gpu.texture_store import _sources
-from app.inspect_eye import LookUp, look_ups
-from app.inspect_report import inspect_text, light_flux
-from app.model.features import Features
-from app.model.scene import Dielectric, Diffuse, Scene
-from app.model.scene_file import load_scene
-from app.model.settings import RenderSettings
-from app.static_costs import picture_bytes, size_words
+from spectrasplat.bench.features.static_costs import picture_bytes, size_words
+from spectrasplat.commands.inspect_camera import LookUp, look_ups
+from spectrasplat.commands.inspect_report import inspect_text, light_flux
+from spectrasplat.commands.options import find_scene
+from spectrasplat.gpu.texture_store import _sources
+from spectrasplat.model.features import Features
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.scene import Dielectric, Diffuse, Scene
+from spectrasplat.model.settings import RenderSettings
 
 SCENE = """
 [[objects]]

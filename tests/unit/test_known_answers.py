@@ -11,11 +11,18 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-
-from app.truth import glasses, optics
-from app.truth.glasses import C_NM, D_NM, F_NM
-from app.truth.surfaces import Plane, Quadric, sphere
-from app.truth.tracer import AIR, Index, Ray, make_ray, onto, refracted, through
+from reference.surfaces import Plane, Quadric, sphere
+from reference.tracer import (
+    AIR,
+    Index,
+    Ray,
+    make_ray,
+    onto,
+    refracted,
+    through,
+)
+from spectrasplat.reference import glasses, optics
+from spectrasplat.reference.glasses import C_NM, D_NM, F_NM
 
 N_BK7_D = float(glasses.index("N-BK7", D_NM))
 BALL = sphere((0.0, 0.0, 0.0), 1.0)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.passes.lattice_order import GOLDEN, morton_order
+from spectrasplat.passes.lattice_order import GOLDEN, morton_order
 
 
 @pytest.mark.parametrize(("points", "stride", "lattice"), [(1, 1, 1), (1000, 1, 1000), (4096, 3, 12_288), (777, 5, 3885), (20_000, 1, 65_536)])

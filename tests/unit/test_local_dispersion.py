@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 import pytest
-
-from app.model import primitives
-from app.model.local_dispersion import (
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.local_dispersion import (
     MAX_FLAT_SIDE,
     MAX_VOLUME_SIDE,
     GainGrid,
@@ -16,7 +15,7 @@ from app.model.local_dispersion import (
     gain_at,
     plane_of,
 )
-from app.model.scene import Dab, Diffuse, SceneObject
+from spectrasplat.model.scene import Dab, Diffuse, SceneObject
 
 
 def strokes(count: int, seed: int = 3, spread: float = 1.0, flat: bool = True) -> tuple[Dab, ...]:
@@ -116,7 +115,7 @@ def test_a_growing_grid_is_bit_for_bit_the_one_built_anew(flat: bool) -> None:
 
 
 def test_a_stroke_inside_the_box_computes_only_what_it_touches(monkeypatch: pytest.MonkeyPatch) -> None:
-    from app.model import local_dispersion
+    from spectrasplat.model import local_dispersion
 
     grid = GainGrid.build(strokes(30), flat=True)
     count = 0

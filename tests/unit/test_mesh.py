@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.model import primitives
-from app.model.mesh import make_mesh
+from spectrasplat.base.errors import UserError
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.geometry.mesh import make_mesh
 
 TRIANGLE = np.array([(0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
 

@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.model import primitives
-from app.model.mesh import Mesh, make_mesh
-from app.model.mesh_health import examine, repair, weld_map
+from spectrasplat.base.errors import UserError
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.geometry.mesh import Mesh, make_mesh
+from spectrasplat.model.geometry.mesh_health import examine, repair, weld_map
 
 BOX = primitives.box()
 

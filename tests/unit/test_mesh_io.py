@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.model import primitives
-from app.model.mesh import Mesh
-from app.model.mesh_health import examine, repair
-from app.model.mesh_io import load_mesh, save_ply
+from spectrasplat.base.errors import UserError
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.geometry.mesh import Mesh
+from spectrasplat.model.geometry.mesh_health import examine, repair
+from spectrasplat.model.io.mesh_io import load_mesh, save_ply
 
 TETRAHEDRON_OBJ = """# comment
 v 0 0 0

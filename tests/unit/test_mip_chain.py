@@ -6,9 +6,8 @@ import gc
 
 import numpy as np
 import pytest
-
-from app.gpu import mip_chain
-from app.truth.textures import level_by_overlaps
+from reference.textures import level_by_overlaps
+from spectrasplat.gpu import mip_chain
 
 SIZES = [(8, 16), (7, 12), (9, 9), (5, 33), (1, 11), (13, 1), (1, 1)]
 

@@ -12,12 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.model import primitives
-from app.model.colorimetry import K_M, xyz_to_rgb709
-from app.model.glass import constant as constant_index
-from app.model.primitives_round import sphere
-from app.model.scene import (
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.geometry.primitives_round import sphere
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics.colorimetry import K_M, xyz_to_rgb709
+from spectrasplat.model.optics.glass import constant as constant_index
+from spectrasplat.model.optics.spectrum import cmf_at, constant, laser
+from spectrasplat.model.scene import (
     Absorption,
     Black,
     Camera,
@@ -29,12 +31,9 @@ from app.model.scene import (
     Scene,
     SceneObject,
 )
-from app.model.scene_file import load_scene
-from app.model.scene_lights import spot_solid_angle_sr
-from app.model.spectrum import cmf_at, constant, laser
-from app.paths import assets_dir
-from app.truth import photon_emission, photon_emit, photon_kernel, photon_run
-from app.truth.photon_reference import cached_reference, render_reference, scene_key
+from spectrasplat.model.scene_lights import spot_solid_angle_sr
+from spectrasplat.reference import photon_emission, photon_emit, photon_kernel, photon_run
+from spectrasplat.reference.photon_reference import cached_reference, render_reference, scene_key
 
 N_SLAB = 1.5168
 SINK = Mirror((0.0, 0.0, 0.0))

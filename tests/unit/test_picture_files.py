@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from spectrasplat.base.errors import UserError
+from spectrasplat.base.image_io import write_image
+from spectrasplat.model.io.picture_files import read_picture
 
-from app.errors import UserError
-from app.image_io import write_image
-from app.model.picture_files import read_picture
 from tests.unit.picture_bytes import (
     HEADER,
     hdr_file,

@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.model import primitives
-from app.model.mesh import Mesh, make_mesh
+from spectrasplat.base.errors import UserError
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.geometry.mesh import Mesh, make_mesh
 
 SOLIDS = [
     primitives.box((1.0, 2.0, 3.0)),

@@ -5,8 +5,7 @@ from __future__ import annotations
 import io
 
 import pytest
-
-from app.progress import ProgressReporter
+from spectrasplat.base.progress import ProgressReporter
 
 
 class Clock:

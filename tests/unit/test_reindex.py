@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.gpu.reindex import Reindexing
-from app.model.catalogue import find
-from app.model.glass import LINE_D_NM, Dispersion, constant, from_abbe, with_gain
-from app.model.spectral_tables import SpectralAxis
-from app.model.spectrum import illuminant, laser
+from spectrasplat.gpu.reindex import Reindexing
+from spectrasplat.model.optics.catalogue import find
+from spectrasplat.model.optics.glass import LINE_D_NM, Dispersion, constant, from_abbe, with_gain
+from spectrasplat.model.optics.spectral_tables import SpectralAxis
+from spectrasplat.model.optics.spectrum import illuminant, laser
 
 D65 = illuminant("D65")
 FLINT = find("N-SF11")

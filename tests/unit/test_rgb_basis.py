@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.model.colorimetry import (
+from spectrasplat.model.optics.colorimetry import (
     K_M,
     VISIBLE_NM,
     cmf_xyz,

@@ -22,7 +22,7 @@ case "$*" in
     *"-m venv"*) mkdir -p "${@: -1}/bin"; cp "$0" "${@: -1}/bin/python"; echo "${@: -1}" >"${@: -1}/bin/activate" ;;
     *"-m pip"*) exit "${NO_NETWORK:-0}" ;;
     *create_context*) exit "${NO_OPENGL:-0}" ;;
-    *"-m app "*) echo "program: ${all#*-m app }" ;;
+    *"-m spectrasplat "*) echo "program: ${all#*-m spectrasplat }" ;;
     *"-m pytest"*) echo "tests:${all#*-m pytest}" ;;
 esac
 """
@@ -69,10 +69,10 @@ def machine(tmp_path: Path) -> Machine:
 def test_first_run_sets_up_and_the_second_starts_at_once(machine: Machine) -> None:
     first = machine.call("run", "render", "prism", "-o", "a b.png")
     assert first.stdout == "program: render prism -o a b.png\n", first.stderr
-    assert "-m pip install" in machine.log.read_text() and "app.model.bvh --warm" in machine.log.read_text()
+    assert "-m pip install" in machine.log.read_text() and "spectrasplat.model.geometry.bvh --warm" in machine.log.read_text()
     second = machine.call("run", "doctor")
     assert (second.stdout, second.stderr) == ("program: doctor\n", "")
-    assert machine.log.read_text() == "python -P -m app doctor\n"
+    assert machine.log.read_text() == "python -P -m spectrasplat doctor\n"
 
 
 def test_without_arguments_the_default_scene_is_rendered(machine: Machine) -> None:

@@ -7,13 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.model.scene import Black, Dab, Dielectric, Diffuse, Mirror, Scene
-from app.model.scene_checks import contains
-from app.model.scene_file import load_scene
-from app.model.scene_lights import spot_solid_angle_sr
-from app.model.scene_save import save_scene
+from spectrasplat.base.errors import UserError
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.io.scene_save import save_scene
+from spectrasplat.model.scene import (
+    Black,
+    Dab,
+    Dielectric,
+    Diffuse,
+    Mirror,
+    Scene,
+)
+from spectrasplat.model.scene_checks import contains
+from spectrasplat.model.scene_lights import spot_solid_angle_sr
 
 THREE_LINES = '[[objects]]\nshape = "sphere"\nglass = "N-SF11"\n'
 FLOOR = '[[objects]]\nshape = "plane"\nwidth = 9.0\nheight = 9.0\nmaterial = "diffuse"\nposition = [0, 0, -2]\n'
@@ -53,8 +59,8 @@ def test_three_lines_make_a_scene_whose_caustic_is_in_view(tmp_path: Path) -> No
 
 
 def test_a_bare_mesh_becomes_glass_on_a_table(tmp_path: Path) -> None:
-    from app.model.mesh_io import save_ply
-    from app.model.primitives import box
+    from spectrasplat.model.geometry.primitives import box
+    from spectrasplat.model.io.mesh_io import save_ply
 
     save_ply(box((1.0, 1.0, 1.0)), tmp_path / "block.ply")
     scene = load_scene(tmp_path / "block.ply")
@@ -230,9 +236,9 @@ def test_inside_and_outside_by_winding_number(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (2.0, -0.5, 1.0)])
 def test_counting_crossings_is_the_winding_number(scale: tuple[float, float, float]) -> None:
-    from app.model import primitives
-    from app.model.scene import SceneObject
-    from app.model.scene_checks import _winding
+    from spectrasplat.model.geometry import primitives
+    from spectrasplat.model.scene import SceneObject
+    from spectrasplat.model.scene_checks import _winding
 
     matrix = np.diag((*scale, 1.0))
     matrix[:3, 3] = (0.5, 0.25, -1.0)
@@ -349,8 +355,8 @@ def assert_same(one: Scene, two: Scene) -> None:
 
 
 def test_a_saved_scene_loads_as_itself(tmp_path: Path) -> None:
-    from app.model.mesh_io import save_ply
-    from app.model.primitives import box
+    from spectrasplat.model.geometry.primitives import box
+    from spectrasplat.model.io.mesh_io import save_ply
 
     save_ply(box(), tmp_path / "block.ply")
     scene = load(tmp_path, RICH)
@@ -368,7 +374,7 @@ def test_a_saved_scene_loads_as_itself(tmp_path: Path) -> None:
 def test_meshes_without_a_description_are_saved_as_triangles(tmp_path: Path) -> None:
     from dataclasses import replace
 
-    from app.model.primitives import box, sphere
+    from spectrasplat.model.geometry.primitives import box, sphere
 
     scene = load(tmp_path, THREE_LINES)
     ball, table = scene.objects

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.model.features import Features, dispersive_materials
-from app.model.scene import Black, Dielectric, Diffuse, Scene
-from app.model.scene_file import load_scene
-from app.model.settings import RenderSettings
-from app.paths import assets_dir
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.model.features import Features, dispersive_materials
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.scene import Black, Dielectric, Diffuse, Scene
+from spectrasplat.model.settings import RenderSettings
 
 SCENES = sorted((assets_dir() / "scenes").glob("*.toml"))
 LINES_NM = {"F": 486.1327, "d": 587.5618, "C": 656.2725}

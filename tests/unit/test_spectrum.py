@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.model import catalogue, glass
-from app.model import spectrum as sp
-from app.model.glass import Dispersion
-from app.model.spectral_tables import SpectralAxis, cumulative, index_table
-from app.model.spectrum import K_M, VISIBLE_NM, Spectrum
+from spectrasplat.base.errors import UserError
+from spectrasplat.model.optics import catalogue, glass
+from spectrasplat.model.optics import spectrum as sp
+from spectrasplat.model.optics.glass import Dispersion
+from spectrasplat.model.optics.spectral_tables import SpectralAxis, cumulative, index_table
+from spectrasplat.model.optics.spectrum import K_M, VISIBLE_NM, Spectrum
 
 
 def _xy(spectrum: Spectrum) -> np.ndarray:

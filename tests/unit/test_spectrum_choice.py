@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.passes.spectrum_choice import (
+from spectrasplat.passes.spectrum_choice import (
     LEAST_SAMPLES,
     SAMPLES_A_BAND,
     SINGLE_SPEED,

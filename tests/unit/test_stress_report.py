@@ -10,14 +10,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-from app.errors import UserError
-from app.stress.case import Case, Measurement
-from app.stress.plots import case_plot, drawn_names
-from app.stress.record import number, write_json
-from app.stress.report import html_text
-from app.stress.runner import StressResult, all_cases, choose, run
-from app.stress.table import summary, table
+from spectrasplat.base.errors import UserError
+from spectrasplat.stress.case import Case, Measurement
+from spectrasplat.stress.plots import case_plot, drawn_names
+from spectrasplat.stress.record import number, write_json
+from spectrasplat.stress.report import html_text
+from spectrasplat.stress.runner import StressResult, all_cases, choose, run
+from spectrasplat.stress.table import summary, table
 
 
 class NoContext:

@@ -8,15 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-
-from app.errors import UserError
-from app.image_io import write_image
-from app.model import primitives
-from app.model.environment import sky, world_to_local
-from app.model.scene import Diffuse, Scene
-from app.model.scene_file import load_scene
-from app.model.scene_save import save_scene
-from app.model.texture import Environment, Texture
+from spectrasplat.base.errors import UserError
+from spectrasplat.base.image_io import write_image
+from spectrasplat.model.environment import sky, world_to_local
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.io.scene_save import save_scene
+from spectrasplat.model.scene import Diffuse, Scene
+from spectrasplat.model.texture import Environment, Texture
 
 BALL = '[[objects]]\nshape = "sphere"\nglass = "N-SF11"\n'
 TABLE = '[[objects]]\nname = "table"\nshape = "plane"\nwidth = 9.0\nheight = 9.0\nposition = [0, 0, -2]\n'
@@ -67,7 +66,7 @@ def test_a_texture_is_read_with_its_factor_and_wrap(folder: Path) -> None:
 
 
 def test_one_picture_is_read_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from app.model import scene_textures
+    from spectrasplat.model import scene_textures
 
     reads = []
     read = scene_textures.read_picture
@@ -293,7 +292,7 @@ def test_a_globe_has_its_map_the_right_way_round() -> None:
 
 @pytest.mark.parametrize("mesh", [primitives.box((1.0, 2.0, 0.5)), primitives.sphere(1.0, 320), primitives.disc(1.0)], ids=["box", "sphere", "disc"])
 def test_pictures_on_primitives_leave_their_charts_alone(mesh) -> None:
-    from app.model.charts import build_charts
+    from spectrasplat.model.geometry.charts import build_charts
 
     atlas, bare = (build_charts(m, total_texels=40_000) for m in (mesh, replace(mesh, uv=None)))
     assert not atlas.from_own_uv

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.model.colorimetry import VISIBLE_NM, cmf_xyz, rgb709_to_xyz, xyz_to_rgb709
-from app.tone_map import (
+from spectrasplat.base.tone_map import (
     NOT_FINITE_RGB,
     auto_exposure,
     luminance,
@@ -15,6 +13,7 @@ from app.tone_map import (
     to_display,
     tone_map_8bit,
 )
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM, cmf_xyz, rgb709_to_xyz, xyz_to_rgb709
 
 
 def spectral_locus(low_nm: float = 410.0, high_nm: float = 690.0) -> np.ndarray:

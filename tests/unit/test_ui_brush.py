@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from app.model import glass
-from app.model.local_dispersion import gain_at
-from app.model.mesh import make_mesh
-from app.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
-from app.ui import brush as brushes
-from app.ui.state import Brush
+from spectrasplat.edit import brush as brushes
+from spectrasplat.edit.state import Brush
+from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.local_dispersion import gain_at
+from spectrasplat.model.optics import glass
+from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
 
 BRUSH = Brush(radius=0.2, strength=1.0, falloff=0.5)
 CORNERS = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])

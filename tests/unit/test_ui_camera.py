@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from app.model.scene import Camera
-from app.ui import camera_controls as controls
-from app.ui.projection import View
+from spectrasplat.edit import camera_controls as controls
+from spectrasplat.edit.projection import View
+from spectrasplat.model.scene import Camera
 
 PINHOLE = Camera(position=(1.5, -6.6, 5.4), target=(1.35, 0.3, 0.05), vertical_fov_deg=30.0)
 ORTHOGRAPHIC = replace(PINHOLE, kind="orthographic", vertical_extent=3.0)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from app.model.colorimetry import VISIBLE_NM, illuminant_table
-from app.ui.chromaticity import colour_facts
+from spectrasplat.edit.chromaticity import colour_facts
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM, illuminant_table
 
 
 @pytest.mark.parametrize("wavelength", [450.0, 486.0, 520.0, 589.0, 640.0])

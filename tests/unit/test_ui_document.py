@@ -9,14 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.model.mesh_io import save_ply
-from app.model.primitives import sphere
-from app.model.scene import Dielectric, Scene
-from app.paths import assets_dir
-from app.ui.autosave import Autosave, recoveries
-from app.ui.document import Document
+from spectrasplat.base.errors import UserError
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit.autosave import Autosave, recoveries
+from spectrasplat.edit.document import Document
+from spectrasplat.model.geometry.primitives import sphere
+from spectrasplat.model.io.mesh_io import save_ply
+from spectrasplat.model.scene import Dielectric, Scene
 
 SCENE = '[[objects]]\nshape = "box"\nname = "block"\nglass = "N-SF11"\n'
 
@@ -72,7 +71,7 @@ def test_a_failed_save_leaves_the_document_unsaved_and_where_it_was(file: Path, 
 
 
 def test_a_save_that_breaks_halfway_keeps_the_old_file(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from app.model import scene_save
+    from spectrasplat.model.io import scene_save
 
     document = Document.open(file)
     edited(document)
@@ -102,7 +101,7 @@ def test_starting_points_are_never_written_back_to(tmp_path: Path) -> None:
 def test_a_glb_keeps_what_is_not_ours(file: Path, tmp_path: Path) -> None:
     import json
 
-    from app.model.gltf_document import open_document, save_document
+    from spectrasplat.model.io.gltf_document import open_document, save_document
 
     glb = Document.open(file).save(tmp_path / "a.glb")
     document = open_document(glb)
@@ -170,10 +169,10 @@ def test_a_crash_leaves_a_recovery_and_recovering_belongs_to_the_old_file(file: 
 import os
 from dataclasses import replace
 from pathlib import Path
-from app.model.mesh import make_mesh
-from app.model.primitives import sphere
-from app.ui.autosave import Autosave
-from app.ui.document import Document
+from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.geometry.primitives import sphere
+from spectrasplat.edit.autosave import Autosave
+from spectrasplat.edit.document import Document
 document = Document.open(Path({str(file)!r}))
 ball = sphere(0.5)
 bare = make_mesh("scan", ball.vertices, ball.triangles, ball.corner_normals)

@@ -8,10 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.model import catalogue, glass
-from app.model.scene import (
+from spectrasplat.base.errors import UserError
+from spectrasplat.edit import edits
+from spectrasplat.edit.requests import Notice
+from spectrasplat.edit.state import State
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.io.scene_save import save_scene
+from spectrasplat.model.optics import catalogue, glass
+from spectrasplat.model.optics.spectrum import illuminant
+from spectrasplat.model.scene import (
     Black,
     Camera,
     Dab,
@@ -22,15 +27,9 @@ from app.model.scene import (
     Scene,
     SceneObject,
 )
-from app.model.scene_defaults import bounds_of, default_light
-from app.model.scene_file import load_scene
-from app.model.scene_lights import KINDS
-from app.model.scene_objects import make_shape
-from app.model.scene_save import save_scene
-from app.model.spectrum import illuminant
-from app.ui import edits
-from app.ui.requests import Notice
-from app.ui.state import State
+from spectrasplat.model.scene_defaults import bounds_of, default_light
+from spectrasplat.model.scene_lights import KINDS
+from spectrasplat.model.scene_objects import make_shape
 
 BLOCK, MIRROR, FLOOR = 0, 1, 2
 

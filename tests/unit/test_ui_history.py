@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-
-from app.model import primitives
-from app.model.scene import Camera, Diffuse, Scene, SceneObject
-from app.model.scene_defaults import default_light
-from app.ui.history import MAX_STEPS, History
+from spectrasplat.edit.history import MAX_STEPS, History
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
+from spectrasplat.model.scene_defaults import default_light
 
 START = Scene("s", Camera((0, -3, 1), (0, 0, 0)), (default_light(),), (SceneObject("floor", primitives.plane(), Diffuse()),))
 

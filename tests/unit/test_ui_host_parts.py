@@ -6,15 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
-from app.model.scene_file import load_scene
-from app.paths import assets_dir
-from app.ui import requests
-from app.ui.crash_log import FILE_NAME, MAX_BYTES, write_crash
-from app.ui.message_box import MAX_MESSAGES, NOTICE_S, MessageBox
-from app.ui.pace import GPU_SHARE, LEAST_SHARE, SOFTWARE_FRAME_S, Pace
-from app.ui.sentences import brief, sentence, words
-from app.ui.shown_scene import has_same_objects, index_in
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit import requests
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.ui.crash_log import FILE_NAME, MAX_BYTES, write_crash
+from spectrasplat.ui.message_box import MAX_MESSAGES, NOTICE_S, MessageBox
+from spectrasplat.ui.pace import GPU_SHARE, LEAST_SHARE, SOFTWARE_FRAME_S, Pace
+from spectrasplat.ui.sentences import brief, sentence, words
+from spectrasplat.ui.shown_scene import has_same_objects, index_in
 
 
 class Clock:

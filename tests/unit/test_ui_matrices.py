@@ -6,10 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.model.placement import read_placement
-from app.model.scene_table import SceneTable
-from app.ui.matrices import (
+from spectrasplat.edit.matrices import (
     compose,
     decompose,
     rotation_matrix,
@@ -17,6 +14,8 @@ from app.ui.matrices import (
     with_rotation,
     with_scale,
 )
+from spectrasplat.model.io.scene_table import SceneTable
+from spectrasplat.model.placement import read_placement
 
 SHEARED = np.array([(1.0, 0.7, 0, 3), (0, 2.0, 0.2, 4), (0.1, 0, 1.5, 5), (0, 0, 0, 1)])
 

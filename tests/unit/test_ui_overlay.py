@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from app.model.scene import Camera
-from app.ui.overlay import Canvas, box_corners, mixed_srgb
-from app.ui.panels.spectral_colour import spectral_srgb
-from app.ui.projection import View
+from spectrasplat.edit.projection import View
+from spectrasplat.model.scene import Camera
+from spectrasplat.ui.overlay import Canvas, box_corners, mixed_srgb
+from spectrasplat.ui.panels.spectral_colour import spectral_srgb
 
 CAMERA = Camera((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), vertical_fov_deg=90.0)
 

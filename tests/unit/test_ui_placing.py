@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from app.model.features import world_bounds
-from app.model.scene_file import load_scene
-from app.paths import assets_dir
-from app.ui import gizmo, placing
-from app.ui.state import Selection
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit import placing
+from spectrasplat.edit.state import Selection
+from spectrasplat.model.features import world_bounds
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.ui import gizmo
 
 SCENE = load_scene(assets_dir() / "scenes" / "prism.toml")
 PRISM, SLIT, ROOM = Selection("object", 0), Selection("light", 0), Selection("light", 1)

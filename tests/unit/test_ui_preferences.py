@@ -6,9 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
-from app.errors import UserError
-from app.ui.preferences import (
+from spectrasplat.base.errors import UserError
+from spectrasplat.edit.preferences import (
     MAX_RECENT,
     Settings,
     WindowPlace,
@@ -17,7 +16,7 @@ from app.ui.preferences import (
     load_settings,
     save_settings,
 )
-from app.ui.state import Panels, Preferences
+from spectrasplat.edit.state import Panels, Preferences
 
 
 @pytest.fixture(autouse=True)

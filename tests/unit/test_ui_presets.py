@@ -8,14 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.model import catalogue, glass
-from app.model.scene import Absorption, Camera, Dielectric, Diffuse, Scene
-from app.model.scene_file import load_scene
-from app.paths import assets_dir
-from app.ui import edits, presets
-from app.ui.own_presets import OwnPresets, load_own_presets, save_own_presets
+from spectrasplat.base.errors import UserError
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit import edits, presets
+from spectrasplat.edit.own_presets import OwnPresets, load_own_presets, save_own_presets
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics import catalogue, glass
+from spectrasplat.model.scene import Absorption, Camera, Dielectric, Diffuse, Scene
 
 
 @pytest.fixture(scope="module")

@@ -6,15 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from app.errors import UserError
-from app.model import glass
-from app.model.colorimetry import VISIBLE_NM, cmf_xyz
-from app.model.glass import LINE_D_NM, with_gain
-from app.model.local_dispersion import gain_at
-from app.model.mesh import make_mesh
-from app.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
-from app.ui import pull as pulling
+from spectrasplat.base.errors import UserError
+from spectrasplat.edit import pull as pulling
+from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.local_dispersion import gain_at
+from spectrasplat.model.optics import glass
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM, cmf_xyz
+from spectrasplat.model.optics.glass import LINE_D_NM, with_gain
+from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
 
 FLINT = glass.from_abbe(1.78, 25.0, "flint")
 CROWN = glass.from_abbe(1.52, 64.0, "crown")

@@ -12,21 +12,16 @@ from functools import cache
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
-from app.errors import UserError
-from app.model import catalogue
-from app.model.catalogue import MAKER_ORDER, Entry
-from app.ui import edits, item_rects, theme
-from app.ui.facts import Facts
-from app.ui.panels import widgets
-from app.ui.panels.glass_picker import apply_glass, remark
-from app.ui.panels.glass_values import (
-    abbe_text,
-    glasses_of,
-    own_numbers,
-    selected_glass,
-    with_abbe,
-)
-from app.ui.state import State
+from ...base.errors import UserError
+from ...edit import edits
+from ...edit.state import State
+from ...model.optics import catalogue
+from ...model.optics.catalogue import MAKER_ORDER, Entry
+from .. import item_rects, theme
+from ..view_model import Facts
+from . import widgets
+from .glass_picker import apply_glass, remark
+from .glass_values import abbe_text, glasses_of, own_numbers, selected_glass, with_abbe
 
 V_D_RANGE, N_D_RANGE = (15.0, 100.0), (1.4, 2.1)
 """What is shown at first: nearly all glasses."""

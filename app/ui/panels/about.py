@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app import __version__
-from app.paths import assets_dir
-from app.ui import theme
-from app.ui.facts import Facts
-from app.ui.panels import widgets
-from app.ui.state import State
+from ... import __version__
+from ...base.paths import assets_dir
+from ...edit.state import State
+from .. import theme
+from ..view_model import Facts
+from . import widgets
 
 
 def draw_about(state: State, facts: Facts) -> State:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.model.colorimetry import rgb_partition
-from app.model.scene import Absorption, Dielectric, Vec3
-from app.ui import edits
-from app.ui.panels import widgets
-from app.ui.state import State
+from ...edit import edits
+from ...edit.state import State
+from ...model.optics.colorimetry import rgb_partition
+from ...model.scene import Absorption, Dielectric, Vec3
+from . import widgets
 
 _FIRST_COLOUR, _FIRST_DISTANCE = (0.55, 0.85, 0.75), 1.0
 """What a glass starts with when it is tinted: bottle green."""

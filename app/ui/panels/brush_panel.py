@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from app.model.local_dispersion import dab_weight
-from app.model.scene import Dab, Diffuse
-from app.ui import edits, theme
-from app.ui.facts import Facts
-from app.ui.panels import widgets
-from app.ui.panels.rows import begin_row
-from app.ui.state import Brush, State
+from ...edit import edits
+from ...edit.state import Brush, State
+from ...model.local_dispersion import dab_weight
+from ...model.scene import Dab, Diffuse
+from .. import theme
+from ..view_model import Facts
+from . import widgets
+from .rows import begin_row
 
 NOT_PHYSICAL = "Not physical: local gain"
 """What every picture with brushed dispersion is labelled."""

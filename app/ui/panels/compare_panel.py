@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 from imgui_bundle import imgui, implot
 
-from app.colour_maps import ERROR, sample
-from app.model.settings import METHODS
-from app.ui import theme
-from app.ui.facts import ErrorCurve, Facts
-from app.ui.panels import rows, widgets
-from app.ui.panels.methods import METHOD_NAMES, METHOD_TIPS
-from app.ui.requests import ComputeReference
-from app.ui.state import Compare, State
+from ...base.colour_maps import ERROR, sample
+from ...edit.requests import ComputeReference
+from ...edit.state import Compare, State
+from ...model.settings import METHODS
+from .. import theme
+from ..view_model import ErrorCurve, Facts
+from . import rows, widgets
+from .methods import METHOD_NAMES, METHOD_TIPS
 
 MODES = {"off": "Picture alone", "hold": "Hold C to see it", "wipe": "Wipe", "error": "Error map"}
 MODE_TIPS = {

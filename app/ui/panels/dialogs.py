@@ -11,10 +11,11 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from app.ui import requests, theme
-from app.ui.facts import Facts
-from app.ui.panels import file_browser, picture_choice, widgets
-from app.ui.state import State
+from ...edit import requests
+from ...edit.state import State
+from .. import theme
+from ..view_model import Facts
+from . import file_browser, picture_choice, widgets
 
 OPENABLE = (".toml", ".glb", ".gltf", ".obj", ".ply", ".stl")
 SAVEABLE = (".toml", ".glb")

@@ -8,17 +8,19 @@ from dataclasses import dataclass, replace
 
 from imgui_bundle import ImVec2, imgui
 
-from app.errors import UserError
-from app.model import glass
-from app.model.glass import Dispersion
-from app.model.scene import Dielectric, SceneObject
-from app.model.scene_materials import MAX_PRIORITY
-from app.ui import edits, presets, theme
-from app.ui.facts import Facts
-from app.ui.panels import widgets
-from app.ui.panels.absorption_rows import draw_absorption
-from app.ui.panels.glass_picker import POPUP, draw_glass_picker
-from app.ui.panels.glass_values import (
+from ...base.errors import UserError
+from ...edit import edits, presets
+from ...edit.state import State
+from ...model.optics import glass
+from ...model.optics.glass import Dispersion
+from ...model.scene import Dielectric, SceneObject
+from ...model.scene_materials import MAX_PRIORITY
+from .. import theme
+from ..view_model import Facts
+from . import widgets
+from .absorption_rows import draw_absorption
+from .glass_picker import POPUP, draw_glass_picker
+from .glass_values import (
     abbe_text,
     as_sold,
     base_name,
@@ -31,8 +33,7 @@ from app.ui.panels.glass_values import (
     shown_name,
     with_abbe,
 )
-from app.ui.panels.index_curve import draw_index_curve
-from app.ui.state import State
+from .index_curve import draw_index_curve
 
 MOST_GAIN = 10.0
 

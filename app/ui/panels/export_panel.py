@@ -8,11 +8,11 @@ from typing import Literal
 
 from imgui_bundle import imgui
 
-from app.model.scene import Diffuse
-from app.ui.facts import Facts
-from app.ui.panels import file_browser, keys_editor, rows, widgets
-from app.ui.requests import Animate, Bake, CancelJob, Screenshot
-from app.ui.state import State
+from ...edit.requests import Animate, Bake, CancelJob, Screenshot
+from ...edit.state import State
+from ...model.scene import Diffuse
+from ..view_model import Facts
+from . import file_browser, keys_editor, rows, widgets
 
 SIZES = {
     "viewport": "As the viewport",

@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 from imgui_bundle import imgui
 
-from app.colour_maps import FALSE_COLOUR
-from app.ui import theme
-from app.ui.panels import rows
+from ...base.colour_maps import FALSE_COLOUR
+from .. import theme
+from . import rows
 
 _STEPS = 48
 

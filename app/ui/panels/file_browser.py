@@ -15,8 +15,8 @@ from pathlib import Path
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from app.ui import item_rects, theme
-from app.ui.panels import widgets
+from .. import item_rects, theme
+from . import widgets
 
 
 @dataclass(frozen=True)

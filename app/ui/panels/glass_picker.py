@@ -11,14 +11,15 @@ from functools import lru_cache
 
 from imgui_bundle import ImVec2, imgui
 
-from app.model import catalogue, glass
-from app.model.catalogue import Entry
-from app.model.scene import Scene
-from app.ui import edits, item_rects, theme
-from app.ui.facts import Facts
-from app.ui.panels import widgets
-from app.ui.panels.glass_values import abbe_text, selected_glass
-from app.ui.state import State
+from ...edit import edits
+from ...edit.state import State
+from ...model.optics import catalogue, glass
+from ...model.optics.catalogue import Entry
+from ...model.scene import Scene
+from .. import item_rects, theme
+from ..view_model import Facts
+from . import widgets
+from .glass_values import abbe_text, selected_glass
 
 POPUP = "Choose a glass"
 """Name for `imgui.open_popup`."""

@@ -11,12 +11,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from app.errors import UserError
-from app.model import catalogue, glass
-from app.model.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM, Dispersion
-from app.model.scene import Dielectric, Scene, SceneObject
-from app.ui import edits
-from app.ui.state import State
+from ...base.errors import UserError
+from ...edit import edits
+from ...edit.state import State
+from ...model.optics import catalogue, glass
+from ...model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM, Dispersion
+from ...model.scene import Dielectric, Scene, SceneObject
 
 LINE_G_NM = 435.8343
 """Mercury's blue line g, nm, for partial dispersion."""

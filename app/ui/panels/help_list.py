@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app.ui import item_rects, shortcuts, theme
-from app.ui.facts import Facts
-from app.ui.panels import widgets
-from app.ui.state import State
+from ...edit.state import State
+from .. import item_rects, shortcuts, theme
+from ..view_model import Facts
+from . import widgets
 
 _search = {"text": ""}
 """What is typed in the search field: memory of the interface."""

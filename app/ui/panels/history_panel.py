@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app.ui import item_rects, theme
-from app.ui.facts import Facts
-from app.ui.panels import widgets
-from app.ui.requests import GoTo
-from app.ui.state import State
+from ...edit.requests import GoTo
+from ...edit.state import State
+from .. import item_rects, theme
+from ..view_model import Facts
+from . import widgets
 
 
 def draw_history(state: State, facts: Facts) -> State:

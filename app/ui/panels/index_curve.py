@@ -8,22 +8,17 @@ from functools import lru_cache
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
-from app.errors import UserError
-from app.model import glass
-from app.model.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM, Dispersion
-from app.ui import edits, item_rects, theme
-from app.ui.facts import Facts
-from app.ui.panels import widgets
-from app.ui.panels.glass_values import (
-    CONTROL_NM,
-    as_sold,
-    natural,
-    selected_glass,
-    with_point,
-)
-from app.ui.panels.rows import begin_row
-from app.ui.panels.spectral_colour import colour_of_nm, draw_strip
-from app.ui.state import State
+from ...base.errors import UserError
+from ...edit import edits
+from ...edit.state import State
+from ...model.optics import glass
+from ...model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM, Dispersion
+from .. import item_rects, theme
+from ..view_model import Facts
+from . import widgets
+from .glass_values import CONTROL_NM, as_sold, natural, selected_glass, with_point
+from .rows import begin_row
+from .spectral_colour import colour_of_nm, draw_strip
 
 _CURVE_NM = np.linspace(380.0, 780.0, 161)
 _LINES = {LINE_F_NM: "F", LINE_D_NM: "d", LINE_C_NM: "C"}

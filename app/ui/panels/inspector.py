@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 from imgui_bundle import imgui
 
-from app.model import catalogue
-from app.model.scene import (
+from ...edit import edits, environments
+from ...edit.state import State
+from ...model.optics import catalogue
+from ...model.scene import (
     Black,
     Dielectric,
     Diffuse,
@@ -17,11 +19,10 @@ from app.model.scene import (
     SceneObject,
     Vec3,
 )
-from app.ui import edit_surroundings, edits, theme
-from app.ui.facts import Facts
-from app.ui.panels import outliner, picture_choice, widgets
-from app.ui.panels.surroundings_rows import draw_surroundings
-from app.ui.state import State
+from .. import theme
+from ..view_model import Facts
+from . import outliner, picture_choice, widgets
+from .environment_rows import draw_surroundings
 
 _KINDS: dict[str, type] = {"Glass": Dielectric, "Diffuse": Diffuse, "Mirror": Mirror, "Black": Black}
 _NEW_GLASS = "N-BK7"
@@ -38,7 +39,7 @@ def draw_inspector(state: State, facts: Facts) -> State:
     if selection.kind == "object" and selection.index < len(state.scene.objects):
         return _object(state, facts, selection.index)
     if selection.kind == "light" and selection.index < len(state.scene.lights):
-        from app.ui.panels.light_panel import draw_light
+        from .light_panel import draw_light
 
         return draw_light(state, facts)
     return _scene(state, facts)

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from app.model.scene import Scene
-from app.ui import item_rects, theme
-from app.ui.facts import Facts
-from app.ui.panels import widgets
-from app.ui.parameters import Parameter, Stage, parts, paths, value_of
-from app.ui.state import Key, State
+from ...edit.parameters import Parameter, Stage, parts, paths, value_of
+from ...edit.state import Key, State
+from ...model.scene import Scene
+from .. import item_rects, theme
+from ..view_model import Facts
+from . import widgets
 
 MAX_TIME_S = 3600.0
 _VIEW = tuple(f"camera.{field}.{axis}" for field in ("position", "target") for axis in "xyz")

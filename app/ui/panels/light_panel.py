@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.model.scene import Light, Vec3
-from app.model.scene_defaults import surroundings_of
-from app.model.scene_lights import POWER_KEYS
-from app.ui import edits
-from app.ui.facts import Facts
-from app.ui.panels import widgets
-from app.ui.panels.light_spectrum import draw_spectrum_choice
-from app.ui.state import State
+from ...edit import edits
+from ...edit.state import State
+from ...model.scene import Light, Vec3
+from ...model.scene_defaults import surroundings_of
+from ...model.scene_lights import POWER_KEYS
+from ..view_model import Facts
+from . import widgets
+from .light_spectrum import draw_spectrum_choice
 
 _KINDS = {
     "directional": "Sun (directional)",

@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from app.model.colorimetry import VISIBLE_NM
-from app.model.spectrum import Spectrum, illuminant_names
-from app.ui import edits, item_rects, presets, theme
-from app.ui.panels import widgets
-from app.ui.panels.rows import begin_row
-from app.ui.panels.spectral_colour import colour_of_nm
-from app.ui.state import State
+from ...edit import edits, presets
+from ...edit.state import State
+from ...model.optics.colorimetry import VISIBLE_NM
+from ...model.optics.spectrum import Spectrum, illuminant_names
+from .. import item_rects, theme
+from . import widgets
+from .rows import begin_row
+from .spectral_colour import colour_of_nm
 
 _KINDS = {
     "illuminant": "Standard illuminant",

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from app.ui import commands, item_rects, layout, theme
-from app.ui.commands import Command
-from app.ui.facts import Facts
-from app.ui.panels import dialogs, outliner, widgets
-from app.ui.panels.methods import METHOD_NAMES, METHOD_TIPS
-from app.ui.state import Panels, State
+from ...edit.state import Panels, State
+from .. import commands, item_rects, layout, theme
+from ..commands import Command
+from ..view_model import Facts
+from . import dialogs, outliner, widgets
+from .methods import METHOD_NAMES, METHOD_TIPS
 
 _SCALES = (0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.0)
 

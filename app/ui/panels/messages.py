@@ -5,11 +5,11 @@ from __future__ import annotations
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from app.ui import item_rects, theme
-from app.ui.facts import Facts, Message
-from app.ui.panels import status_bar, widgets
-from app.ui.requests import DismissMessage, ReloadShaders
-from app.ui.state import State
+from ...edit.requests import DismissMessage, ReloadShaders
+from ...edit.state import State
+from .. import item_rects, theme
+from ..view_model import Facts, Message
+from . import status_bar, widgets
 
 _FADE_FROM_S, _FADE_S = 4.5, 1.5
 _BARE = (

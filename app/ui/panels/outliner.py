@@ -7,13 +7,21 @@ from dataclasses import replace
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from app.model.scene import Black, Dielectric, Diffuse, Light, Material, SceneObject
-from app.model.scene_lights import KINDS
-from app.ui import edits, item_rects, theme
-from app.ui.facts import Facts
-from app.ui.panels import widgets
-from app.ui.requests import CopyMaterial, FrameSelection
-from app.ui.state import Selection, State
+from ...edit import edits
+from ...edit.requests import CopyMaterial, FrameSelection
+from ...edit.state import Selection, State
+from ...model.scene import (
+    Black,
+    Dielectric,
+    Diffuse,
+    Light,
+    Material,
+    SceneObject,
+)
+from ...model.scene_lights import KINDS
+from .. import item_rects, theme
+from ..view_model import Facts
+from . import widgets
 
 _SEARCH_FROM = 12
 """A scene of more things than this gets a search field."""

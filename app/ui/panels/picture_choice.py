@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app.model.scene import Diffuse, Scene
-from app.ui import edit_surroundings, edits
-from app.ui.facts import Facts
-from app.ui.panels import file_browser
-from app.ui.requests import Notice
-from app.ui.state import State
+from ...edit import edits, environments
+from ...edit.requests import Notice
+from ...edit.state import State
+from ...model.scene import Diffuse, Scene
+from ..view_model import Facts
+from . import file_browser
 
 _ENVIRONMENT = "environment"
 _TEXTURE = "texture"

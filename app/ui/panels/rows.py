@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app.ui import item_rects, theme
+from .. import item_rects, theme
 
 _LABEL_EM, _LABEL_SHARE = 8.4, 0.42
 _LEAST_FIELD_EM = 4.5

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import imgui, implot
 
-from app.ui import theme
-from app.ui.chromaticity import ColourFacts, colour_facts
-from app.ui.facts import CursorFacts, Facts
-from app.ui.panels import numbers, rows, spectral_colour, widgets
-from app.ui.state import State
+from ...edit.chromaticity import ColourFacts, colour_facts
+from ...edit.state import State
+from .. import theme
+from ..view_model import CursorFacts, Facts
+from . import numbers, rows, spectral_colour, widgets
 
 
 def draw_spectrum(state: State, facts: Facts) -> State:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app.ui import theme
-from app.ui.panels import rows, spectral_colour
+from .. import theme
+from . import rows, spectral_colour
 
 LOW_NM, HIGH_NM = 380.0, 780.0
 """Ends of the strip."""

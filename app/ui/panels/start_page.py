@@ -5,11 +5,11 @@ from __future__ import annotations
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from app.ui import item_rects, theme
-from app.ui.facts import Facts, SceneEntry
-from app.ui.panels import dialogs, widgets
-from app.ui.requests import Recover
-from app.ui.state import State
+from ...edit.requests import Recover
+from ...edit.state import State
+from .. import item_rects, theme
+from ..view_model import Facts, SceneEntry
+from . import dialogs, widgets
 
 _CARD_EM, _GAP_EM = 17.0, 1.1
 _ASPECT = 9 / 16

@@ -7,11 +7,11 @@ from dataclasses import replace
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from app.ui import item_rects, theme
-from app.ui.facts import Facts
-from app.ui.panels import numbers, rows, widgets
-from app.ui.requests import CancelJob
-from app.ui.state import State
+from ...edit.requests import CancelJob
+from ...edit.state import State
+from .. import item_rects, theme
+from ..view_model import Facts
+from . import numbers, rows, widgets
 
 _FLAGS = (
     imgui.WindowFlags_.no_decoration

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import imgui, implot
 
-from app.live.stats import LiveStats
-from app.ui import theme
-from app.ui.facts import Facts
-from app.ui.panels import numbers, rows, widgets
-from app.ui.requests import Retrace
-from app.ui.state import State
+from ...edit.requests import Retrace
+from ...edit.state import State
+from ...render.viewer.stats import LiveStats
+from .. import theme
+from ..view_model import Facts
+from . import numbers, rows, widgets
 
 PASSES = {
     "trace": "Photons through the glass, to the receivers.",

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from app.model.scene import Camera
-from app.ui import view_commands
-from app.ui.facts import Facts
-from app.ui.panels import false_colour, spectrum_strip, widgets
-from app.ui.panels.methods import METHOD_NAMES, METHOD_TIPS
-from app.ui.state import Display, Preferences, State
+from ...edit.state import Display, Preferences, State
+from ...model.scene import Camera
+from .. import view_commands
+from ..view_model import Facts
+from . import false_colour, spectrum_strip, widgets
+from .methods import METHOD_NAMES, METHOD_TIPS
 
 SWEEP_NM = (400.0, 700.0)
 """What the sweep runs through: where the eye sees something."""

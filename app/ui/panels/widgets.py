@@ -19,9 +19,10 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
-from app.model.scene import Vec3
-from app.ui import item_rects, theme
-from app.ui.panels.rows import (
+from ...edit.state import State
+from ...model.scene import Vec3
+from .. import item_rects, theme
+from .rows import (
     begin_row,
     beside,
     double_clicked,
@@ -31,7 +32,6 @@ from app.ui.panels.rows import (
     tooltip,
     words,
 )
-from app.ui.state import State
 
 __all__ = [
     "FloatResult", "beside", "button", "colour", "combo", "drag", "error", "file_field", "hint", "holding", "menu_button", "note", "read_out",

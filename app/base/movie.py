@@ -1,0 +1,186 @@
+"""Where finished frames go: an MP4, or a folder of numbered PNGs that can be resumed."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from .atomic import atomic_output, check_writable
+from .errors import UserError
+
+MANIFEST = "animation.json"
+_DIGITS = 4
+
+
+class Sink(Protocol):
+    """Takes frames in their order."""
+
+    def has(self, index: int) -> bool:
+        """Whether the frame is there already."""
+
+    def write(self, index: int, codes: np.ndarray) -> None:
+        """Take a frame, uint8 (H, W, 3) sRGB, row 0 on top."""
+
+    def close(self) -> None:
+        """Make what was written usable."""
+
+
+class Movie:
+    """An H.264 MP4 by ffmpeg, which `imageio-ffmpeg` brings along; appears when it is closed."""
+
+    def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
+        """Raises `UserError` where the place cannot be written or there is no ffmpeg."""
+        check_writable(path)
+        self._path, self._size = path, size
+        self._output = atomic_output(path)
+        temporary = self._output.__enter__()
+        # A group of its own: Ctrl-C is for us, and the movie is finished then.
+        command = [_ffmpeg(), *_arguments(size, fps), "-y", str(temporary)]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True)
+        self.frames = 0
+
+    def has(self, index: int) -> bool:
+        """A movie cannot be resumed."""
+        return False
+
+    def write(self, index: int, codes: np.ndarray) -> None:
+        """Append a frame; raises `UserError` when ffmpeg has given up."""
+        width, height = self._size
+        if codes.shape != (height, width, 3) or codes.dtype != np.uint8:
+            raise ValueError(f"a frame is uint8 {(height, width, 3)}, got {codes.dtype} {codes.shape}")
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(np.ascontiguousarray(codes).data)
+        except OSError as error:
+            raise self._given_up() from error
+        self.frames += 1
+
+    def close(self) -> None:
+        """Finish the file; without a frame nothing appears. Raises `UserError` when ffmpeg has failed."""
+        if self._process.returncode is not None:
+            return
+        if not self.frames:
+            self._given_up()
+            return
+        _, told = self._process.communicate()
+        if self._process.returncode:
+            raise self._given_up(told)
+        self._output.__exit__(None, None, None)
+
+    def _given_up(self, told: bytes | None = None) -> UserError:
+        """Leave nothing behind; what is to be said about it."""
+        if told is None:
+            _, told = self._process.communicate()
+        stop = UserError(f"cannot write {self._path}: {_last_line(told)}")
+        self._output.__exit__(UserError, stop, None)
+        return stop
+
+
+class Frames:
+    """A folder of `0000.png`, …; frames that are there are kept when the same animation goes on."""
+
+    def __init__(self, folder: Path, description: Mapping[str, object], overwrite: bool = False) -> None:
+        """`description` says what is drawn: a folder with frames of anything else is refused, or emptied of them by `overwrite`."""
+        if folder.exists() and not folder.is_dir():
+            raise UserError(f"cannot write {folder}: it is a file; give a folder, or a name that ends in .mp4")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UserError(f"cannot write {folder}: {error.strerror}; choose another place") from error
+        check_writable(folder / "frame.png")
+        self._folder = folder
+        self._manifest = folder / MANIFEST
+        self.description = dict(description)
+        if overwrite:
+            self._empty()
+        stored = self._stored()
+        if stored is None and any(folder.glob("*.png")):
+            raise UserError(f"{folder} holds pictures of something else: choose another folder, or replace its frames with --overwrite")
+        self.base_ev: float | None = None
+        if stored is not None:
+            self.base_ev = stored.pop("base_ev", None)
+            if stored != json.loads(json.dumps(self.description)):
+                raise UserError(f"{folder} holds frames of another animation: choose another folder, or replace them with --overwrite")
+        self._save()
+
+    def fix_exposure(self, base_ev: float) -> None:
+        """Remember the exposure that all frames share, also for a later call that goes on."""
+        self.base_ev = base_ev
+        self._save()
+
+    def has(self, index: int) -> bool:
+        """Whether the frame is there."""
+        return self.base_ev is not None and self.path(index).is_file()
+
+    def path(self, index: int) -> Path:
+        """Of a frame."""
+        return self._folder / f"{index:0{_DIGITS}}.png"
+
+    def write(self, index: int, codes: np.ndarray) -> None:
+        """Write a frame, whole or not at all."""
+        from PIL import Image
+
+        with atomic_output(self.path(index)) as temporary:
+            Image.fromarray(codes).save(temporary, format="PNG", compress_level=6)
+
+    def close(self) -> None:
+        """Nothing is pending."""
+
+    def _stored(self) -> dict | None:
+        try:
+            stored = json.loads(self._manifest.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return stored if isinstance(stored, dict) else None
+
+    def _save(self) -> None:
+        with atomic_output(self._manifest) as temporary:
+            temporary.write_text(json.dumps(self.description | {"base_ev": self.base_ev}, indent=1) + "\n", encoding="utf-8")
+
+    def _empty(self) -> None:
+        """Remove the frames of an earlier animation and nothing else."""
+        if self._stored() is not None:
+            for frame in self._folder.glob("*.png"):
+                if frame.stem.isdigit():
+                    frame.unlink()
+        self._manifest.unlink(missing_ok=True)
+
+
+def _arguments(size: tuple[int, int], fps: float) -> list[str]:
+    width, height = size
+    return [
+        "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:g}", "-i", "-",
+        # Players want even sides; an odd one gets a black line. Colours are told, so that they come out as they are.
+        "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv",
+        "-c:v", "libx264", "-preset", "medium", "-crf", "16", "-pix_fmt", "yuv420p",
+        "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1", "-movflags", "+faststart", "-f", "mp4",
+    ]  # fmt: skip
+
+
+def _ffmpeg() -> str:
+    import imageio_ffmpeg
+
+    try:
+        return imageio_ffmpeg.get_ffmpeg_exe()
+    except RuntimeError as error:
+        raise UserError("no ffmpeg was found to write an MP4: install one, or give a folder for a sequence of PNGs") from error
+
+
+def _last_line(told: bytes) -> str:
+    lines = [line for line in told.decode(errors="replace").splitlines() if line.strip()]
+    return f"ffmpeg says '{lines[-1].strip()}'" if lines else "ffmpeg ended without a word"
+
+
+def open_sink(path: Path, size: tuple[int, int], fps: float, description: Mapping[str, object], overwrite: bool = False) -> Movie | Frames:
+    """The sink that `path` asks for: a `.mp4`, or a folder (a name without a suffix). Raises `UserError`."""
+    if path.suffix.lower() == ".mp4":
+        return Movie(path, size, fps)
+    if path.suffix and not os.path.isdir(path):
+        raise UserError(f"cannot write {path}: the suffix '{path.suffix}' is not an animation; use .mp4, or a folder for PNGs")
+    return Frames(path, description, overwrite)

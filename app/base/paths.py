@@ -1,0 +1,35 @@
+"""Where the program's own files lie: beside `pyproject.toml` in a checkout, in the wheel otherwise."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import platformdirs
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+@cache
+def _data_root() -> Path:
+    checkout = _PACKAGE.parent
+    if (checkout / "pyproject.toml").is_file() and (checkout / "shaders").is_dir():
+        return checkout
+    return _PACKAGE
+
+
+def shaders_dir() -> Path:
+    """Folder of GLSL sources."""
+    return _data_root() / "shaders"
+
+
+def assets_dir() -> Path:
+    """Folder of scenes, glass tables and meshes."""
+    return _data_root() / "assets"
+
+
+def cache_dir() -> Path:
+    """The user's cache folder for baked trees and tables (created on demand)."""
+    path = Path(platformdirs.user_cache_dir("spectrasplat", appauthor=False))
+    path.mkdir(parents=True, exist_ok=True)
+    return path

@@ -1,0 +1,167 @@
+"""One method of the eye half in one scene, ready to look again and again: what `bench --eye` times, and nothing else.
+
+All methods look up the same caustic maps, which are made once and cost nothing here: they differ in how camera rays
+sample the spectrum. A rendering starts from nothing; what `srd` needs to choose the bands of its spectrum counts.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+
+import numpy as np
+
+from ..gpu.context import Context
+from ..gpu.map_channels import MapChannels
+from ..gpu.scene_buffers import SceneBuffers
+from ..model.features import Features
+from ..model.optics.colorimetry import rgb709_to_xyz
+from ..model.scene import Diffuse, Scene
+from ..model.settings import RenderSettings
+from ..passes.camera import CausticMaps, EyePass
+from ..passes.spectrum_choice import Spectrum
+from ..render.light_pass import LightHalf, spectral_axis
+from .rendering import NothingToMeasure, Rendering, Rig
+
+LIGHT_PHOTONS = 1 << 22
+"""Photons of the caustic maps, traced by `srd`. In `ball_caustic` twice 2^20 photons change the picture by a relMSE of 2.6e-4, twice 2^18 by ten
+times that: with so many more, the maps' own error is far below what the eye's methods reach in the time."""
+LIGHT_SEED = 1
+_TRIAL_SHARE = 0.25
+"""A trial this long, as a share of the time given, tells the rate of the longest rendering."""
+
+
+class SharedLight:
+    """The caustic maps that all eyes of a scene look up; none where the scene has no light or nothing that light could fall on."""
+
+    def __init__(self, context: Context, scene: Scene, width: int, height: int, progress: Callable[[str], None], photons: int | None = None) -> None:
+        photons = photons or LIGHT_PHOTONS
+        self.maps: CausticMaps | None = None
+        self.channels = MapChannels()
+        self.reflectances: Sequence[np.ndarray | None] = (None,)
+        self.seconds = 0.0
+        self._light: LightHalf | None = None
+        if not scene.lights or not any(isinstance(o.material, Diffuse) for o in scene.objects):
+            return
+        started = time.perf_counter()
+        settings = _settings(scene, "srd", width, height)
+        features = Features.of(scene, settings)
+        self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+        self._light = light = LightHalf(context, scene, settings, features, self._buffers)
+        light.prepare()
+        light.begin(photons, LIGHT_SEED)
+
+        def told(done: float) -> bool:
+            progress(f"light half, {100.0 * done:.0f} %")
+            return True
+
+        light.run_pass(0, photons, told)
+        light.finish()
+        self.channels, self.reflectances = light.map_channels, light.reflectances
+        self.maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
+        context.finish()
+        context.check("the light half of the bench")
+        self.seconds = time.perf_counter() - started
+
+    def release(self) -> None:
+        """Free everything on the device."""
+        if self._light is not None:
+            self._light.release()
+            self._buffers.release()
+
+
+class EyeRig:
+    """Owns the eye's buffers and programs for one scene, method and picture size; the maps are `light`'s."""
+
+    def __init__(self, context: Context, scene: Scene, method: str, width: int, height: int, light: SharedLight) -> None:
+        """Raises `NothingToMeasure` where the camera cannot see through dispersive glass: all methods are the same then."""
+        self._context, self._scene, self._size, self._light = context, scene, (width, height), light
+        features = Features.of(scene, _settings(scene, method, width, height))
+        if not features.eye_disperses:
+            raise NothingToMeasure(f"scene '{scene.name}': the camera sees nothing through glass that disperses, so the eye's methods do not differ and there is nothing to measure")
+        started = time.perf_counter()
+        self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+        buffered = self._finished()
+        self._eye = EyePass(context, self._buffers, "beauty", light.reflectances, light.channels)
+        # Drivers put off part of the compiling until a program runs.
+        self._eye.run(scene.camera, width, height, 1, 0, light.maps)
+        if self._eye.chooses:
+            self._eye.may_be_single, self._eye.spectrum = True, Spectrum(single=True)
+            self._eye.run(scene.camera, width, height, 1, 0, light.maps)
+        compiled = self._finished()
+        self.setup_seconds = {"light half": light.seconds, "buffers": buffered - started, "compile": compiled - buffered}
+        self.buffers_mib = self._buffers.bytes / 2**20
+
+    def render(self, budget: int, seed: int) -> Rendering:
+        """One picture from nothing: the way to sample the spectrum chosen for `budget` samples a pixel, then those, or what they buy in that way."""
+        started = self._finished()
+        samples = self._choose(budget).samples(budget)
+        chosen = self._finished()
+        self._eye.run(self._scene.camera, *self._size, samples, 0, self._light.maps, seed)
+        looked = self._finished()
+        xyz = rgb709_to_xyz(self._eye.read_rgb().astype(np.float64))
+        return Rendering(xyz, {"bands": chosen - started, "looks": looked - chosen}, samples, 0)
+
+    def fitting(self, budget: int) -> int:
+        """The largest multiple of the bands that `budget` samples are given; the smallest where that is none."""
+        bands = self._choose(budget).bands
+        return max(budget // bands, 1) * bands
+
+    def budgets(self, seconds: float, count: int) -> list[int]:
+        """Sample counts, about `count`: evenly spaced in the logarithm as far as whole multiples of the bands allow, the largest takes about `seconds`."""
+        samples = 1
+        while (took := self._seconds(samples))[1] < _TRIAL_SHARE * seconds:
+            samples *= 2
+        # Few samples fit into the time, so a moment's disturbance of the trial would cost the curve its end: the better of two counts.
+        bands_s, all_s, taken = min(took, self._seconds(samples), key=lambda one: one[1])
+        largest = max(taken * max(seconds - bands_s, 0.0) / (all_s - bands_s), 1.0)
+        found: set[int] = set()
+        for steps in (count, 2 * count):
+            if len(found) < count:
+                found |= {self.fitting(round(n)) for n in np.geomspace(1.0, largest, steps)}
+        return _thinned(sorted(found), count)
+
+    def release(self) -> None:
+        """Free everything on the device."""
+        self._eye.release()
+        self._buffers.release()
+
+    def _seconds(self, budget: int) -> tuple[float, float, int]:
+        """Seconds of choosing the bands and of all, and the samples taken."""
+        rendering = self.render(budget, 0)
+        taken = budget if self._choose(budget).single else rendering.emitted
+        return rendering.seconds["bands"], sum(rendering.seconds.values()), taken
+
+    def _choose(self, samples: int) -> Spectrum:
+        return self._eye.choose_spectrum(self._scene.camera, *self._size, samples, self._light.maps)
+
+    def _finished(self) -> float:
+        self._context.finish()
+        return time.perf_counter()
+
+
+@contextmanager
+def eye_rigs(context: Context, scene: Scene, methods: Sequence[str], width: int, height: int, progress: Callable[[str], None]) -> Iterator[dict[str, Rig]]:
+    """The eye half's rigs by method, freed at the end. Raises `NothingToMeasure`."""
+    rigs: dict[str, Rig] = {}
+    with ExitStack() as stack:
+        progress("preparing the light half")
+        light = SharedLight(context, scene, width, height, progress)
+        stack.callback(light.release)
+        for method in methods:
+            progress(f"preparing {method}")
+            rigs[method] = rig = EyeRig(context, scene, method, width, height, light)
+            stack.callback(rig.release)
+        yield rigs
+
+
+def _settings(scene: Scene, method: str, width: int, height: int) -> RenderSettings:
+    return RenderSettings(width=width, height=height, method=method, max_depth=scene.render.max_depth)
+
+
+def _thinned(counts: list[int], most: int) -> list[int]:
+    """At most `most` of ascending counts, evenly spread over the list, both ends kept."""
+    if len(counts) <= most:
+        return counts
+    return [counts[round(i)] for i in np.linspace(0, len(counts) - 1, most)]

@@ -1,0 +1,230 @@
+"""`bench --features SCENE`: what each compile-time feature costs here, and that what is left out is absent.
+
+Each feature's two programs take turns in one process over the same lattice, so a ratio compares
+neighbours in time; its median over the turns is reported with the interval that holds the true median.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from math import comb
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from ... import __version__
+from ...base.errors import UserError
+from ...model.features import Features, explain
+from ...model.settings import RenderSettings
+from ...render.light_pass import LightHalf, spectral_axis
+from .rig import Rig, Work, map_difference
+from .static_costs import RecordSizes, static_costs
+from .symbol_proof import compiled_sources, program_texts, prove
+from .variants import Trial, Variant, trials
+
+if TYPE_CHECKING:
+    from ...gpu.context import Context
+    from ...model.scene import Scene
+
+REPEATS = 9
+MAP_TOLERANCE = 1e-2
+"""Two programs that must draw the same map may differ by this share of its energy. Most agree to the last bit; a Gaussian
+from a table and one in closed form differ by 3e-3, the sum of coarse bins and the radiant power of XYZ maps by 5e-3."""
+_TARGET_SECONDS = 0.4
+"""Time of one traced and splatted lattice: long against the clock, short against the patience."""
+_PHOTONS = (2048, 1 << 16)
+
+
+class Percent(msgspec.Struct, frozen=True):
+    """A cost, % of the time without the feature, and the interval of the median."""
+
+    median: float
+    low: float
+    high: float
+
+
+class FeatureCost(msgspec.Struct, frozen=True):
+    """One feature in one scene."""
+
+    feature: str
+    included: bool
+    reason: str
+    bytes: str
+    """What it adds to records and tables; empty where it is out."""
+    trace: Percent | None
+    splat: Percent | None
+    """None where there is nothing to compare."""
+    map_difference: float | None
+    """Σ|a − b| / Σ|a| of the maps with and without, where they must agree."""
+    note: str
+
+
+class ProgramSize(msgspec.Struct, frozen=True):
+    """One compiled text."""
+
+    name: str
+    lines: int
+    flattened_lines: int
+    features: list[str]
+    """Whose symbols occur in it."""
+
+
+class Absence(msgspec.Struct, frozen=True):
+    """The proof for one feature."""
+
+    feature: str
+    included: bool
+    symbols: tuple[str, ...]
+    programs: tuple[str, ...]
+    """Where any of the symbols occurs."""
+    holds: bool
+
+
+class FeatureReport(msgspec.Struct):
+    """One run."""
+
+    version: str
+    date: str
+    scene: str
+    renderer: str
+    clock: str
+    photons: int
+    repeats: int
+    trace_seconds: float
+    splat_seconds: float
+    """Of the scene as it is."""
+    records: str
+    costs: list[FeatureCost]
+    programs: list[ProgramSize]
+    proof: list[Absence]
+    complete: bool = True
+
+
+def command(scene: Scene, output: Path | None) -> int:
+    """Measure, print and (with `output`, a folder) write features.json and features.html; returns the exit code.
+
+    1 where a feature that is out left a trace in a program, or a forced one changed the map. Raises
+    `UserError` where no light meets glass or a mirror.
+    """
+    from ...base.progress import ProgressReporter
+    from ...gpu.context import create_context
+    from . import report as features_report
+
+    if output is not None:
+        features_report.check(output)
+    report = None
+    try:
+        with create_context() as context, ProgressReporter("features") as progress:
+            for report, share in measure(context, scene):
+                progress(share, f"{len(report.costs)} features")
+    finally:
+        # Also after Ctrl-C: what is measured is told.
+        if report is not None:
+            features_report.show(report)
+            if output is not None:
+                features_report.write(report, output)
+    assert report is not None
+    return 0 if all(p.holds for p in report.proof) and all(agrees(c) for c in report.costs) else 1
+
+
+def agrees(cost: FeatureCost) -> bool:
+    """Whether a pair that must draw the same map did."""
+    return cost.map_difference is None or cost.map_difference <= MAP_TOLERANCE
+
+
+def measure(context: Context, scene: Scene, repeats: int = REPEATS, seconds: float = _TARGET_SECONDS) -> Iterator[tuple[FeatureReport, float]]:
+    """(the report so far, share done) after the proof and after each feature."""
+    settings = RenderSettings(width=scene.render.width, height=scene.render.height, max_depth=scene.render.max_depth)
+    features = Features.of(scene, settings)
+    report = FeatureReport(
+        __version__, datetime.now(UTC).isoformat(timespec="seconds"), scene.name, context.renderer,
+        "processor time" if context.is_software else "wall clock", 0, repeats, 0.0, 0.0, "", [], [], [], complete=False,
+    )  # fmt: skip
+    light = _begun(context, scene, settings, features)
+    try:
+        features = light.features
+        asked = trials(scene, features)
+        report.records = RecordSizes.of(features).words()
+        _prove(report, context, scene, settings, features)
+        if not light.plans:
+            raise UserError(f"scene '{scene.name}': no light meets glass or a mirror, so no feature costs anything; name a scene with a caustic")
+        work = _calibrated(report, light, seconds, context)
+        told = static_costs(scene, features)
+        for index, trial in enumerate(asked):
+            report.costs.append(cost_of(trial, told.get(trial.feature, ""), context, work, repeats))
+            report.complete = index + 1 == len(asked)
+            yield report, (index + 1) / len(asked)
+    finally:
+        light.release()
+        light.buffers.release()
+
+
+def _prove(report: FeatureReport, context: Context, scene: Scene, settings: RenderSettings, features: Features) -> None:
+    texts = program_texts(compiled_sources(context, scene, settings))
+    report.programs = [ProgramSize(t.name, t.lines, t.flattened_lines, sorted(t.found)) for t in texts]
+    included = {name: inside for name, inside, _ in explain(scene, features)}
+    report.proof = [Absence(p.feature, p.included, p.symbols, p.programs, p.holds) for p in prove(texts, included)]
+
+
+def _begun(context: Context, scene: Scene, settings: RenderSettings, features: Features) -> LightHalf:
+    from ...gpu.scene_buffers import SceneBuffers
+
+    buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+    light = LightHalf(context, scene, settings, features, buffers)
+    light.prepare()
+    light.begin(scene.render.photons, settings.seed)
+    return light
+
+
+def _calibrated(report: FeatureReport, light: LightHalf, seconds: float, context: Context) -> Work:
+    """Work of about `seconds` for the scene as it is; its costs go to the report."""
+    whole = light.scene.render.photons
+    photons, work = _PHOTONS[0], Work.of(light, whole, _PHOTONS[0])
+    for attempt in range(2):
+        rig = Rig(context, Variant(light.scene, light.features), work)
+        rig.run()
+        cost = rig.run()
+        rig.release()
+        report.photons, report.trace_seconds, report.splat_seconds = photons, cost.trace, cost.splat
+        if attempt == 0:
+            photons = int(np.clip(photons * seconds / max(cost.trace + cost.splat, 1e-6), *_PHOTONS))
+            work = Work.of(light, whole, photons)
+    return work
+
+
+def cost_of(trial: Trial, bytes_told: str, context: Context, work: Work, repeats: int) -> FeatureCost:
+    """Time and measure one trial: its two programs in turns, `repeats` times."""
+    if trial.carried is None or trial.absent is None:
+        return FeatureCost(trial.feature, trial.included, trial.reason, bytes_told, None, None, None, trial.note)
+    rigs = [Rig(context, variant, work) for variant in (trial.carried, trial.absent)]
+    try:
+        for rig in rigs:
+            rig.run()  # compiles
+        difference = map_difference(*(rig.map() for rig in reversed(rigs))) if trial.same_map else None
+        ratios = np.empty((repeats, 2))
+        for turn in range(repeats):
+            # With and without, without and with: a drift of the machine's speed cancels.
+            first = turn % 2
+            costs = {index: rigs[index].run() for index in (first, 1 - first)}
+            ratios[turn] = costs[0].trace / costs[1].trace, costs[0].splat / costs[1].splat
+    finally:
+        for rig in rigs:
+            rig.release()
+    trace, splat = (percent_of(ratios[:, stage]) for stage in range(2))
+    return FeatureCost(trial.feature, trial.included, trial.reason, bytes_told, trace, splat if trial.same_splats else None, difference, trial.note)
+
+
+def percent_of(ratios: np.ndarray) -> Percent:
+    """Ratios with : without as a cost in percent; the interval holds the true median with 95 % at least.
+
+    Without the k outermost of n at each end it misses with 2 P(at most k of n coins show heads), whatever the distribution;
+    fewer than six ratios cannot promise that much and give their extremes.
+    """
+    ordered = 100.0 * (np.sort(ratios) - 1.0)
+    count, dropped = len(ordered), 0
+    while 2 * sum(comb(count, heads) for heads in range(dropped + 2)) <= 0.05 * 2**count:
+        dropped += 1
+    return Percent(float(np.median(ordered)), float(ordered[dropped]), float(ordered[-1 - dropped]))

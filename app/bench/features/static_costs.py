@@ -1,0 +1,101 @@
+"""What each feature of a scene adds to what is stored and moved, in bytes: facts that need no measuring.
+
+`inspect` shows them; what a feature costs in time is measured by `bench --features`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from ...gpu.mip_chain import level_count
+from ...gpu.records import photon_record, ray_record
+from ...gpu.scene_buffers import SAMPLES, TRIANGLE
+from ...model.features import Features, is_convex_solid, overlapping_solids
+from ...model.scene import Dielectric, Diffuse, Mirror, Scene
+from ...model.texture import Environment, Texture
+from ...passes.footprint import SPLAT
+
+_TEXEL = 16
+"""Bytes of an RGBA32F or RGBA32UI texel."""
+_NODE = 4 * _TEXEL
+
+
+@dataclass(frozen=True)
+class RecordSizes:
+    """Bytes per record, and derivative columns a ray carries."""
+
+    ray: int
+    photon: int
+    splats_per_photon: int
+    texel: int
+    columns: int
+
+    @staticmethod
+    def of(features: Features) -> RecordSizes:
+        """The sizes under `features`."""
+        columns = features.defines()["COLUMNS"]
+        slots = (2 if features.nested_windows else 1) * SPLAT.stride
+        return RecordSizes(ray_record(columns).stride, photon_record(features.spectral_groups).stride, slots, features.targets * _TEXEL, columns)
+
+    def words(self) -> str:
+        """One line for people."""
+        return (
+            f"A ray is {self.ray} bytes with {self.columns} derivative column(s), a photon record {self.photon}, "
+            f"its splats {self.splats_per_photon}, a map's texel {self.texel}."
+        )
+
+
+def static_costs(scene: Scene, features: Features) -> dict[str, str]:
+    """By `explain`'s names: what the features that are in add. Those that are out, or add nothing, are not listed."""
+    sizes = RecordSizes.of(features)
+    unspectral = RecordSizes.of(replace(features, spectral_groups=0))
+    unspatial = RecordSizes.of(replace(features, footprints=False))
+    specular = [o for o in scene.objects if isinstance(o.material, Dielectric | Mirror)]
+    loose = [o for o in scene.objects if not is_convex_solid(o)]
+    triangles = sum(len(o.mesh.triangles) for o in loose)
+    smooth = sum(len(o.mesh.triangles) for o in specular if o.mesh.corner_normals is not None)
+    planes = sum(len(o.mesh.convex_planes) for o in scene.objects if is_convex_solid(o))
+    row = SAMPLES * 8
+    glasses = {o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)}
+    absorbing = sum(isinstance(o.material, Dielectric) and o.material.absorption is not None for o in scene.objects)
+    mirrors = sum(isinstance(o.material, Mirror) for o in scene.objects)
+    curved = [o for o in scene.objects if isinstance(o.material, Diffuse)]
+    worn = {id(o.material.texture.rgb): o.material.texture for o in scene.objects if isinstance(o.material, Diffuse) and o.material.texture is not None}
+    beyond = scene.environment
+    told = {
+        "spectral columns": (features.spectral_groups > 0, f"{sizes.ray - unspectral.ray} B a ray, {sizes.photon - unspectral.photon} B a photon"),
+        "shared spectral variable": (features.merged_groups, f"one look-up of the slope a refraction, {size_words(row * len(glasses))}"),
+        "weights over the band": (features.spectral_weights, "Fresnel and indices at 3 wavelengths instead of 1"),
+        "band cuts": (features.band_cuts, "one program more; a cut ray becomes two"),
+        "spatial columns": (features.footprints, f"{sizes.ray - unspatial.ray} B a ray"),
+        "refraction": (features.dielectrics, f"{size_words(row * len(glasses))} of indices; two children a surface"),
+        "mirrors": (features.mirrors, f"{size_words(row * mirrors)} of reflectances"),
+        "interpolated normals": (features.smooth_normals, f"{3 * _TEXEL} B a facet, {size_words(3 * _TEXEL * smooth)}"),
+        "normal derivatives": (features.normal_derivatives, "one more vector a column and surface"),
+        "absorption": (features.absorption, f"3 look-ups a flight, {size_words(row * absorbing)}"),
+        "medium stack": (features.medium_stack, f"{len(overlapping_solids(scene))} bit(s) of a ray's mask"),
+        "triangle tree": (features.tree, f"about {size_words(triangles * (TRIANGLE.stride + _NODE // 2))}"),
+        "half-space solids": (features.convex_solids, f"{planes} planes, {size_words(planes * _TEXEL)}: each ray walks through all"),
+        "charts": (features.charts, f"{len(curved)} receiver(s) with a placement a facet"),
+        "local gain": (features.local_gain, "eight voxels a photon"),
+        "photons by index": (features.reindexed, "32 B a band"),
+        "nested windows": (features.nested_windows, f"{SPLAT.stride} B a photon: a splat for each window"),
+        "eye refraction": (features.eye_specular, "a second program; 4 B a pixel list what it has to do"),
+        "eye spectral taps": (features.eye_disperses, f"{features.spectral_groups} column(s) a camera ray; looks along each sweep"),
+        "spectral maps": (features.map_hats > 0, f"{features.map_hats * _TEXEL // 4} B a texel"),
+        "textures": (bool(worn), f"about {size_words(sum(map(picture_bytes, worn.values())))}"),
+        "environment map": (beyond is not None, f"about {size_words(picture_bytes(beyond))}" if beyond is not None else ""),
+        "spectral bins": (features.targets > 1, f"{sizes.texel} B a texel instead of {_TEXEL}"),
+    }
+    return {name: words for name, (included, words) in told.items() if included}
+
+
+def picture_bytes(picture: Texture | Environment) -> int:
+    """What a picture takes on the device, its smaller copies in a column beside it (`TextureStore`); packing several adds a little."""
+    height, width = picture.rgb.shape[:2]
+    return _TEXEL * height * (width + (max(width // 2, 1) if level_count(width, height) > 1 else 0))
+
+
+def size_words(count: int) -> str:
+    """Bytes for people."""
+    return f"{count} B" if count < 2048 else f"{count / 1024:.0f} KiB" if count < 1 << 21 else f"{count / (1 << 20):.1f} MiB"

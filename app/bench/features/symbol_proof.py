@@ -1,0 +1,111 @@
+"""Proof that what a scene does not need is absent: its symbols are not in the text that was compiled.
+
+Every program of a small rendering is recorded as it is handed to the driver, then searched for the names
+that a feature alone uses. The names are kept true by a test: each must occur in some program where its
+feature is in.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from ...gpu.dead_code import words
+from ...gpu.shader import Source, recorded
+
+if TYPE_CHECKING:
+    from ...gpu.context import Context
+    from ...model.scene import Scene
+    from ...model.settings import RenderSettings
+
+FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
+    "spectral columns": ("variable_step", "index_ratio_derivative", "medium_slope", "dposition_dvar0", "spectral_variable", "VARIABLE_ROW"),
+    "shared spectral variable": ("SLOPE_ROW",),
+    "weights over the band": (r"crossing_indices\(crossing, x3",),
+    "band cuts": ("anchor_at", "passes_x", "MIN_CUT_BAND", "FELL_BAND", "is_cut", "energy_below"),
+    "spatial columns": (r"ray\.dposition\[c\]\.xyz = transfer_column", r"photon\.dposition_ds = ray", r"ray\.ddirection\[0\]\.xyz = "),
+    "refraction": ("refract_direction", "fresnel_reflectance", "transmitted_cosine2", "medium_index", "cross_boundary", "cross_glass", "INDEX_ROW"),
+    "mirrors": (r"\(kind == KIND_MIRROR\) ",),
+    "interpolated normals": ("corner_normal", "smooth_facet", "summed", "NORMALS_AT", "normalised_derivative", "dsummed"),
+    "normal derivatives": ("normal_columns",),
+    "absorption": ("medium_weight_row", "alpha"),
+    "medium stack": ("medium_of", "stack_objects", "STACK_OBJECTS", "mask_before"),
+    "triangle tree": ("intersect_tree", "box_entry", "LEAF_BIT", "TREE_AT", "TREE_STACK"),
+    "half-space solids": ("intersect_solid", "planes", "solids", "SOLID_COUNT"),
+    "charts": ("RECEIVER_CHARTS", "PLACED_CHART"),
+    "nested windows": ("only_fine", "outer"),
+    "local gain": ("gain_boxes", "local_gain"),
+    "photons by index": ("traced_bands", "v_path"),
+    "eye refraction": ("meet_surface", "reflect_path", "Facing", "waiting", "waits", "listed"),
+    "eye spectral taps": (r"narrow\(path, pixel_key\)", "taps_of", "cut_of"),
+    "spectral maps": ("BIN_ROW", "BIN_SPECTRUM_ROW", "BIN_TARGET"),
+    "spectral bins": ("define TARGETS [2-9]", "define TARGETS 1[0-9]"),
+}
+"""By `explain`'s names. Names that only this feature uses; one with a space is a pattern for a line, where the eye, whose rays always carry
+a pixel's columns and weights over a band, uses a name that in the light half belongs to a feature."""
+_PHOTONS = 4096
+
+
+@dataclass(frozen=True)
+class ProgramText:
+    """One compiled source."""
+
+    name: str
+    lines: int
+    flattened_lines: int
+    """Before what cannot run was left out."""
+    found: dict[str, tuple[str, ...]]
+    """By feature: which of its symbols occur."""
+
+
+@dataclass(frozen=True)
+class Proof:
+    """One feature over all programs."""
+
+    feature: str
+    included: bool
+    symbols: tuple[str, ...]
+    programs: tuple[str, ...]
+    """Those that hold at least one of the symbols."""
+
+    @property
+    def holds(self) -> bool:
+        """Absent from every program where it is out; somewhere where it is in."""
+        return bool(self.programs) == self.included
+
+
+def compiled_sources(context: Context, scene: Scene, settings: RenderSettings) -> list[Source]:
+    """The source of every program that a rendering of `scene` builds, each once."""
+    from ...render.still import render
+
+    small = replace(settings, width=32, height=18, photons=_PHOTONS, spp=1, seconds=None)
+    with recorded() as sources:
+        render(scene, small, context=context)
+    return list({(source.name, source.text): source for source in sources}.values())
+
+
+def program_texts(sources: Iterable[Source]) -> list[ProgramText]:
+    """What each source holds."""
+    return [
+        ProgramText(
+            source.name, len(source.text.splitlines()), source.flattened_lines,
+            {feature: found for feature, symbols in FEATURE_SYMBOLS.items() if (found := occurring(source.text, symbols))},
+        )
+        for source in sources
+    ]  # fmt: skip
+
+
+def occurring(text: str, symbols: Sequence[str]) -> tuple[str, ...]:
+    """Those of `symbols` that occur in GLSL text."""
+    present = words(text)
+    return tuple(s for s in symbols if (re.search(s, text) if " " in s else s in present))
+
+
+def prove(texts: Sequence[ProgramText], included: dict[str, bool]) -> list[Proof]:
+    """One proof a feature of `FEATURE_SYMBOLS`; `included`: what `explain` says of each."""
+    return [
+        Proof(feature, included[feature], symbols, tuple(dict.fromkeys(text.name for text in texts if feature in text.found)))
+        for feature, symbols in FEATURE_SYMBOLS.items()
+    ]

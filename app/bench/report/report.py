@@ -1,0 +1,81 @@
+"""Writes what a bench run has found: plots as PNG and SVG, and one page that stands alone.
+
+    DIR/plots/SCENE_error_time.png .svg    DIR/plots/SCENE_error_photons.png .svg (the eye half: _samples)
+    DIR/plots/overview.png .svg            DIR/plots/scenes.png .svg (the README's figure)
+    DIR/report.html
+
+A run that was stopped can be reported as well: what is missing is named where it would stand.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from ...base.atomic import atomic_output
+from ...base.errors import UserError
+from ...base.progress import ProgressReporter
+from ..measured_passes import HALVES
+from ..results import BenchResult, SceneResult
+from . import scene as report_scene
+from . import sections as report_sections
+from . import style as report_style
+from .curve_plots import error_against
+from .html import Html, page
+from .overview import overview, small_multiples
+
+
+def write_report(result: BenchResult, directory: Path) -> None:
+    """Write plots and page into `directory`, where the files that `SceneResult.pictures` names lie as well.
+
+    Each file appears whole or not at all. Raises `UserError` where one cannot be written.
+    """
+    plots = directory / "plots"
+    try:
+        plots.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"cannot make the folder {plots}: {error.strerror or error}; choose another place") from error
+    names = file_names([scene.scene for scene in result.scenes])
+    sections = []
+    with report_style.plot_style(), ProgressReporter("report") as progress:
+        for index, (scene, name) in enumerate(zip(result.scenes, names, strict=True)):
+            progress(index / (len(names) + 1), scene.scene)
+            sections.append(report_scene.section(scene, f"scene-{name}", _curve_plots(scene, name, plots), directory))
+        document = report_style.save(overview(result), plots / "overview")
+        glance = report_scene.inlined(document, "overview", "time to equal error of each method in each scene, as a ratio to stochastic")
+        readme_plot(result, plots / "scenes")
+        progress(1.0, "page")
+    body = [
+        report_sections.header(result), report_sections.contents(result, [f"scene-{name}" for name in names]), report_sections.claims(result, glance),
+        report_sections.definitions(result), sections, report_sections.limits(result),
+    ]  # fmt: skip
+    with atomic_output(directory / "report.html") as temporary:
+        temporary.write_text(page(f"Error against run time, SpectraSplat {result.version}", body), encoding="utf-8")
+
+
+def readme_plot(result: BenchResult, stem: Path) -> None:
+    """Write the README's figure, error against time of `stochastic`, `srd-lambda` and `srd` in each scene, to `stem`.png and `stem`.svg."""
+    with report_style.plot_style():
+        report_style.save(small_multiples(result), stem)
+
+
+def _curve_plots(scene: SceneResult, name: str, plots: Path) -> dict[str, Html]:
+    """Error over time and over photons or samples: saved, and as SVG for the page."""
+    drawn, half = {}, HALVES[scene.half]
+    for abscissa, ending, words in (("seconds", "time", half.time), ("photons", half.units, half.unit)):
+        document = report_style.save(error_against(scene, abscissa), plots / f"{name}_error_{ending}")
+        drawn[abscissa] = report_scene.inlined(document, f"{name}-{ending}", f"{scene.scene}: relMSE of each method against {words}, logarithmic axes")
+    return drawn
+
+
+def file_names(scenes: list[str]) -> list[str]:
+    """Names fit for files and anchors, each used once: letters, digits, hyphen, underscore."""
+    taken: list[str] = []
+    for scene in scenes:
+        base = re.sub(r"[^A-Za-z0-9_-]+", "_", scene)[:60].strip("_") or "scene"
+        name, count = base, 1
+        while name in taken or name in ("overview", "scenes"):
+            count += 1
+            name = f"{base}_{count}"
+        taken.append(name)
+    return taken

@@ -1,0 +1,140 @@
+"""The animate command: check everything, then render frame after frame; Ctrl-C keeps what is done."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ..base.errors import UserError
+from ..model.scene import Scene
+from ..model.settings import RenderSettings
+from . import options as options
+from .render import INTERRUPTED, interrupt_flag
+
+DEFAULT_FRAMES = 120
+DEFAULT_FPS = 24.0
+MAX_FPS = 240.0
+
+
+@dataclass(frozen=True)
+class AnimateRequest:
+    """The animate command's options as typed; None where the user said nothing."""
+
+    scene: str
+    output: Path
+    turntable: bool = False
+    keys: Path | None = None
+    ranges: tuple[str, ...] = ()
+    frames: str | None = None
+    fps: str | None = None
+    size: str | None = None
+    photons: str | None = None
+    spp: str | None = None
+    exposure: str | None = None
+    seed: str | None = None
+    method: str | None = None
+    overwrite: bool = False
+
+
+def animate_command(request: AnimateRequest) -> int:
+    """Render an animation; returns the exit code. Raises `UserError`."""
+    from ..base.movie import MANIFEST, open_sink
+    from ..base.progress import ProgressReporter
+    from ..edit.parameters import Stage
+    from ..model.io.scene_file import load_scene
+    from ..render.animate import description, render_animation
+
+    frames = None if request.frames is None else options.parse_integer("--frames", request.frames, 1, 1_000_000)
+    fps = DEFAULT_FPS if request.fps is None else _parse_fps(request.fps)
+    scene = load_scene(options.find_scene(request.scene))
+    settings = _settings(request, scene)
+    exposure = scene.render.exposure_ev if request.exposure is None else options.parse_exposure(request.exposure)
+    animation = _animation(request, Stage(scene, scene.camera, exposure), frames, fps)
+    photons = settings.photons or scene.render.photons
+    for note in scene.notes:
+        print(f"note: {note}", file=sys.stderr)
+    told = description(animation, settings, fps, photons)
+    sink = open_sink(request.output, (settings.width, settings.height), fps, told, request.overwrite)
+
+    from ..gpu.context import create_context
+    from ..gpu.shader import keep_programs
+
+    count, started = len(animation.times_s), time.perf_counter()
+    there = sum(sink.has(i) for i in range(count))
+    try:
+        context = create_context()
+    except BaseException:
+        sink.close()
+        raise
+    with context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
+        keep_programs(context.ctx)  # frames of an edited scene need the same ones
+        work, done = render_animation(context, animation, settings, sink), 0.0
+        for done in work:
+            progress(done, f"frame {min(int(done * count) + 1, count)} of {count}")
+            if interrupted():
+                break
+        work.close()
+        stopped = done < 1.0
+    written = int(done * count + 1e-6)
+    kept = f" ({there} were there)" if there else ""
+    early = ", stopped early" if stopped else ""
+    place = request.output.resolve()
+    if stopped and written == 0:
+        print(f"{place}: no frame was finished")
+        return INTERRUPTED
+    again = f"; the same command goes on ({MANIFEST} knows it)" if stopped and place.is_dir() else ""
+    print(f"{place}: {written} of {count} frames{kept}, {settings.width}×{settings.height} at {fps:g} a second, in {time.perf_counter() - started:.1f} s{early}{again}")
+    return INTERRUPTED if stopped else 0
+
+
+def _parse_fps(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.1 <= value <= MAX_FPS:
+        raise UserError(f"--fps '{text}' is out of range: give between 0.1 and {MAX_FPS:.0f} frames a second")
+    return value
+
+
+def _settings(request: AnimateRequest, scene: Scene) -> RenderSettings:
+    settings = RenderSettings(width=scene.render.width, height=scene.render.height, max_depth=scene.render.max_depth)
+    if request.size is not None:
+        width, height = options.parse_size(request.size)
+        settings = replace(settings, width=width, height=height)
+    if request.photons is not None:
+        settings = replace(settings, photons=options.parse_photons(request.photons))
+    if request.spp is not None:
+        settings = replace(settings, spp=options.parse_integer("--spp", request.spp, 1, options.MAX_SPP))
+    if request.seed is not None:
+        settings = replace(settings, seed=options.parse_integer("--seed", request.seed, 0, options.MAX_SEED))
+    if request.method is not None:
+        settings = replace(settings, method=options.parse_method(request.method))
+    options.check_picture_memory(settings.width, settings.height, None)
+    return settings
+
+
+def _animation(request: AnimateRequest, stage, frames: int | None, fps: float):
+    """What the options describe: keys and ranges together, and the turntable with them or alone."""
+    from ..edit import animation
+
+    tracks = () if request.keys is None else animation.read_keys(request.keys, stage)
+    if request.ranges:
+        last = max((track.times_s[-1] for track in tracks), default=0.0)
+        duration = last or ((frames or DEFAULT_FRAMES) - 1) / fps
+        ranges = tuple(animation.parse_range(text, stage, duration) for text in request.ranges)
+        twice = {track.path for track in tracks} & {track.path for track in ranges}
+        if twice or len({track.path for track in ranges}) < len(ranges):
+            path = next(iter(twice), request.ranges[-1].partition("=")[0])
+            raise UserError(f"{path} is given twice: set each parameter once, by --keys or by --set")
+        tracks += ranges
+    if not tracks:
+        return animation.turntable(stage, frames or DEFAULT_FRAMES, fps)
+    made = animation.keyed(stage, tracks, frames, fps)
+    if not request.turntable:
+        return made
+    if animation.ORBIT in {track.path for track in tracks}:
+        raise UserError(f"--turntable moves {animation.ORBIT}, which has keys of its own: leave one of them out")
+    return animation.with_turntable(made)

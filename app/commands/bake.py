@@ -1,0 +1,59 @@
+"""The bake command: a receiver's caustic map as a texture with its placement."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..model.settings import RenderSettings
+from . import options as options
+from .render import INTERRUPTED, interrupt_flag
+
+
+@dataclass(frozen=True)
+class BakeRequest:
+    """The bake command's options as typed; None where the user said nothing."""
+
+    scene: str
+    receiver: str
+    output: Path
+    size: str | None = None
+    photons: str | None = None
+    seed: str | None = None
+
+
+def bake_command(request: BakeRequest) -> int:
+    """Bake to a file; returns the exit code. Raises `UserError`."""
+    from ..base.atomic import check_writable
+    from ..base.progress import ProgressReporter
+    from ..edit.parameters import Stage
+    from ..model.io.scene_file import load_scene
+    from ..render import bake
+
+    bake.check_output(request.output)
+    width, height = bake.DEFAULT_SIZE if request.size is None else options.parse_size(request.size)
+    photons = None if request.photons is None else options.parse_photons(request.photons)
+    seed = 1 if request.seed is None else options.parse_integer("--seed", request.seed, 0, options.MAX_SEED)
+    options.check_picture_memory(width, height, None)
+    check_writable(request.output)
+    check_writable(bake.placement_path(request.output))
+    scene = load_scene(options.find_scene(request.scene))
+    bake.check_receiver(scene, request.receiver)
+    for note in scene.notes:
+        print(f"note: {note}", file=sys.stderr)
+    settings = RenderSettings(width=width, height=height, photons=photons, seed=seed, max_depth=scene.render.max_depth)
+
+    from ..gpu.context import create_context
+
+    started = time.perf_counter()
+    with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
+        for share in bake.bake(context, Stage(scene, scene.camera), settings, request.receiver, request.output):
+            progress(share, "baking")
+            if interrupted() and share < 1.0:
+                print("spectrasplat: nothing was written: a map is whole or not at all", file=sys.stderr)
+                return INTERRUPTED
+    place = request.output.resolve()
+    print(f"{place}: caustic map of '{request.receiver}' in {time.perf_counter() - started:.1f} s; where it lies is in {bake.placement_path(place).name}")
+    return 0

@@ -1,0 +1,38 @@
+"""The glass command: one hit is shown in full, several as a table; a plot on request."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from ..base.errors import UserError
+from ..model.optics.catalogue import Entry, search, search_key
+from .glass_report import describe, list_glasses, plot
+
+MAX_PLOTTED = 6
+"""Curves that can be told apart in one plot."""
+
+
+def glass_command(query: str | None, plot_file: Path | None, show: Callable[[object], None]) -> None:
+    """Answer `query` through `show`; write `plot_file` when given. Raises `UserError`."""
+    hits = _hits(query or "")
+    if plot_file is not None and len(hits) > MAX_PLOTTED:
+        raise UserError(
+            f"--plot shows at most {MAX_PLOTTED} glasses and {len(hits)} match: give more of the name, for example N-BK7"
+        )
+    if plot_file is not None:
+        plot(hits, plot_file)  # first, so that a refused file name is all that is said
+    if len(hits) == 1:
+        show(describe(hits[0]))
+    else:
+        show(list_glasses(query or ""))
+    if plot_file is not None:
+        show(f"plot: {plot_file.resolve()}")
+
+
+def _hits(query: str) -> list[Entry]:
+    """What matches; an exact name is the only hit, however many names contain it."""
+    hits = search(query)
+    if hits and search_key(query) in (search_key(hits[0].name), search_key(hits[0].qualified_name)):
+        return hits[:1]
+    return hits

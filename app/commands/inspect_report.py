@@ -1,0 +1,251 @@
+"""What `spectrasplat inspect` says of a scene: objects, glasses, lights, camera, and what its programs hold.
+
+For people's eyes only; nothing else of the program reads it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..model.scene import (
+    Black,
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Material,
+    Scene,
+    SceneObject,
+)
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.table import Table
+
+    from ..model.features import Features
+    from ..model.optics.glass import Dispersion
+
+_QUANTITY = {
+    # kind: (photometric unit, radiometric unit) of Light.spectral_power; areas are in scene units
+    "point": ("cd", "W/sr"),
+    "spot": ("cd", "W/sr"),
+    "directional": ("lm/unit²", "W/unit²"),
+    "collimated": ("lm/unit²", "W/unit²"),
+    "area": ("cd/unit²", "W/(sr unit²)"),
+}
+
+
+def inspect_text(scene: Scene) -> RenderableType:
+    """Everything `scene` holds, as one printable group of tables."""
+    from rich.console import Group
+
+    parts: list[RenderableType] = [
+        f"Scene '{scene.name}', bounds {_box(*_bounds(scene.objects))}",
+        _objects_table(scene.objects),
+        _lights_table(scene.lights),
+        camera_line(scene),
+    ]
+    glasses = list(dict.fromkeys(o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)))
+    if glasses:
+        parts.insert(2, _glasses_table(glasses))
+    parts += _compiled(scene)
+    parts += [f"Note: {note}" for note in scene.notes]
+    return Group(*parts)
+
+
+def camera_line(scene: Scene) -> str:
+    """The camera and the picture it makes, one line."""
+    camera: Camera = scene.camera
+    if camera.kind == "orthographic":
+        lens = f"orthographic, {camera.vertical_extent:.4g} units high"
+    else:
+        lens = f"pinhole, {camera.vertical_fov_deg:.4g}° vertical field of view"
+    render = scene.render
+    return (
+        f"Camera: {lens}, at {_point(camera.position)} towards {_point(camera.target)}; "
+        f"{render.width}×{render.height} pixels, {render.photons:,} photons, depth {render.max_depth}"
+    )
+
+
+def light_flux(light: Light) -> tuple[float, float] | None:
+    """(lumen, watt) a light sends out in all; None for a directional one, which has no end."""
+    from ..model.scene_lights import flux_factor
+
+    factor = flux_factor(light)
+    if math.isinf(factor):
+        return None
+    return light.spectral_power.luminous() * factor, light.spectral_power.power_w() * factor
+
+
+# -- tables -------------------------------------------------------------------------------
+
+
+def _table(title: str, *columns: tuple[str, bool]) -> Table:
+    """An empty table; a column is (heading, right-aligned)."""
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left")
+    for heading, right in columns:
+        table.add_column(heading, justify="right" if right else "left", overflow="fold")
+    return table
+
+
+def _objects_table(objects: tuple[SceneObject, ...]) -> Table:
+    from ..model.geometry.mesh_health import examine
+
+    table = _table(
+        "Objects", ("name", False), ("triangles", True), ("bounds", False), ("material", False), ("shading", False), ("mesh", False)
+    )  # fmt: skip
+    health: dict[int, str] = {}
+    for item in objects:
+        mesh = item.mesh
+        if id(mesh) not in health:
+            health[id(mesh)] = examine(mesh).summary()
+        table.add_row(
+            item.name,
+            f"{len(mesh.triangles):,}",
+            _box(*_bounds((item,))),
+            describe_material(item.material),
+            "flat" if mesh.corner_normals is None else "smooth",
+            health[id(mesh)],
+        )
+    return table
+
+
+def _glasses_table(glasses: list) -> Table:
+    table = _table(
+        "Glasses", ("name", False), ("n_d", True), ("V_d", True), ("n at 400 nm", True), ("n at 700 nm", True), ("data", False)
+    )  # fmt: skip
+    for glass in glasses:
+        low, high = glass.range_nm
+        reach = "any wavelength" if math.isinf(high) else f"{low:g}–{high:g} nm"
+        v_d = "∞ (no dispersion)" if math.isinf(glass.V_d) else f"{glass.V_d:.2f}"
+        table.add_row(
+            (glass.name or "(unnamed)") + _gain_words(glass),
+            f"{glass.n_d:.6f}",
+            v_d,
+            f"{float(glass.index(400.0)):.6f}",
+            f"{float(glass.index(700.0)):.6f}",
+            reach,
+        )
+    return table
+
+
+def _lights_table(lights: tuple[Light, ...]) -> Table:
+    table = _table(
+        "Lights", ("name", False), ("kind", False), ("spectrum", False), ("photometric", True), ("radiometric", True), ("in all", False)
+    )  # fmt: skip
+    for light in lights:
+        lumen, watt = _QUANTITY[light.kind]
+        flux = light_flux(light)
+        power = light.spectral_power
+        table.add_row(
+            light.name,
+            _light_kind(light),
+            spectrum_words(light),
+            f"{power.luminous():.5g} {lumen}",
+            f"{power.power_w():.5g} {watt}",
+            "per unit² only" if flux is None else f"{flux[0]:.5g} lm, {flux[1]:.5g} W",
+        )
+    return table
+
+
+def _compiled(scene: Scene) -> list[RenderableType]:
+    from ..bench.features.static_costs import RecordSizes, static_costs
+    from ..model.features import Features, explain
+    from ..model.settings import RenderSettings
+
+    settings = RenderSettings(width=scene.render.width, height=scene.render.height, max_depth=scene.render.max_depth)
+    features = Features.of(scene, settings)
+    costs = static_costs(scene, features)
+    table = _table("Compiled into the programs", ("part", False), ("", False), ("why", False), ("costs", False))
+    for name, included, reason in explain(scene, features):
+        table.add_row(name, "in" if included else "out", reason, costs.get(name, ""))
+    return [table, f"{RecordSizes.of(features).words()} What each part costs in time: bench --features.", _look_ups_table(scene, features)]
+
+
+def _look_ups_table(scene: Scene, features: Features) -> Table:
+    from .inspect_camera import look_ups
+
+    table = _table("Looked up by camera rays", ("what", False), ("content", False), ("how", False), ("memory", False))
+    for row in look_ups(scene, features):
+        table.add_row(*row)
+    return table
+
+
+def _gain_words(glass: Dispersion) -> str:
+    return "" if glass.gain == 1.0 else f", {glass.gain:g} times as dispersive"
+
+
+# -- words --------------------------------------------------------------------------------
+
+
+def describe_material(material: Material) -> str:
+    """A material in a few words."""
+    if isinstance(material, Dielectric):
+        words = material.dispersion.name or f"glass of n_d {material.dispersion.n_d:.4f}"
+        words += _gain_words(material.dispersion)
+        words += ", absorbing" if material.absorption is not None else ""
+        return words + (f", priority {material.priority}" if material.priority else "")
+    if isinstance(material, Diffuse):
+        if material.reflectance is not None:
+            return "diffuse, spectral reflectance"
+        picture = "" if material.texture is None else ", wears a picture"
+        return f"diffuse {_colour(material.reflectance_rgb)}{picture}"
+    if isinstance(material, Black):
+        return "black"
+    return f"mirror {_colour(material.reflectance_rgb)}"
+
+
+def spectrum_words(light: Light) -> str:
+    """A light's spectrum in a few words."""
+    from ..model.scene_describe import describe_spectrum
+
+    said = describe_spectrum(light.spectral_power)
+    if isinstance(said, str):
+        return said
+    if "laser" in said:
+        return f"laser {said['laser']:g} nm"
+    if "blackbody" in said:
+        return f"black body {said['blackbody']:g} K"
+    lines = said.get("lines", [])
+    if "nm" not in said:
+        return "lines at " + ", ".join(f"{wavelength:g}" for wavelength, _ in lines) + " nm"
+    low, high = light.spectral_power.support_nm()
+    return f"table {math.ceil(low)}–{math.floor(high)} nm" + (f" and {len(lines)} line(s)" if lines else "")
+
+
+def _light_kind(light: Light) -> str:
+    if light.kind == "spot":
+        inner, outer = light.inner_half_angle_deg, light.outer_half_angle_deg
+        edge = "hard edge" if inner == outer else f"soft from {inner:.4g}°"
+        return f"spot, half angle {outer:.4g}°, {edge}"
+    if light.kind == "directional":
+        return f"directional, {light.angular_diameter_deg:.4g}° wide"
+    if light.kind == "point":
+        return "point"
+    if light.shape == "disc":
+        return f"{light.kind} disc, radius {light.radius:.4g}"
+    return f"{light.kind} rectangle, {light.width:.4g} × {light.height:.4g}"
+
+
+def _bounds(objects: tuple[SceneObject, ...]) -> tuple[np.ndarray, np.ndarray]:
+    from ..model.scene_defaults import bounds_of
+
+    return bounds_of(objects)
+
+
+def _box(low: np.ndarray, high: np.ndarray) -> str:
+    size = high - low
+    return f"{' × '.join(f'{s:.4g}' for s in size)} about {_point(0.5 * (low + high))}"
+
+
+def _point(point: tuple[float, float, float] | np.ndarray) -> str:
+    return "(" + ", ".join(f"{v + 0.0:.4g}" for v in point) + ")"
+
+
+def _colour(rgb: tuple[float, float, float]) -> str:
+    return f"{rgb[0]:.3g}" if len(set(rgb)) == 1 else "(" + ", ".join(f"{c:.3g}" for c in rgb) + ")"

@@ -1,0 +1,209 @@
+"""Command line values checked by hand, so that each mistake gets one sentence with a way out.
+
+The options arrive as strings: click's own conversions would tell less and differ between
+versions. Every function raises `UserError`.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+from ..base.errors import UserError, nearest_names, suggestion
+from ..base.paths import assets_dir
+from ..model.scene import Diffuse, Scene
+from ..model.settings import EYE_METHODS, METHODS
+
+MAX_SIDE_PX = 16384
+"""Largest texture side OpenGL 4.3 promises."""
+MAX_PHOTONS = 10**12
+MAX_SEED = 2**32 - 1
+MAX_SECONDS = 7 * 24 * 3600.0
+MIN_BINS, MAX_BINS = 4, 32
+MAX_DEPTH = 4096
+MAX_SPP = 4096
+MAX_EXPOSURE_EV = 64.0
+SCENE_SUFFIXES = (".toml", ".glb", ".gltf", ".ply", ".obj", ".stl")
+_MULTIPLES = {"k": 10**3, "m": 10**6, "g": 10**9}
+_BYTES_PER_TARGET_PX = 16  # RGBA32F
+_BYTES_PER_PHOTON = 256
+"""A photon record with several spectral columns, rounded up."""
+_GIB = 1 << 30
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """"960x540" (or with ×, X) as (width, height) in pixels."""
+    parts = text.strip().lower().replace("×", "x").split("x")
+    if len(parts) != 2 or not all(_is_integer(part) for part in parts):
+        raise UserError(f"--size '{text}' is not WIDTHxHEIGHT, for example --size 960x540")
+    width, height = int(parts[0]), int(parts[1])
+    if width < 1 or height < 1:
+        raise UserError(f"--size {text} holds no pixel: both sides must be at least 1")
+    if width > MAX_SIDE_PX or height > MAX_SIDE_PX:
+        raise UserError(f"--size {text} is too large: no side may exceed {MAX_SIDE_PX} pixels")
+    return width, height
+
+
+def parse_photons(text: str) -> int:
+    """A count of photons; "2M", "500k" and "1e6" are understood."""
+    count = _count("--photons", text)
+    if count > MAX_PHOTONS:
+        raise UserError(f"--photons {text} is beyond what can be counted: give at most {MAX_PHOTONS:.0e}")
+    return count
+
+
+def parse_batch(text: str) -> int:
+    """Photons in flight at once; their records must fit into memory."""
+    count = _count("--batch", text)
+    most = memory_bytes() // _BYTES_PER_PHOTON
+    if count > most:
+        raise UserError(f"--batch {text} is beyond this machine's memory: give at most {most}")
+    return count
+
+
+def _count(option: str, text: str) -> int:
+    stripped = text.strip().lower().replace("_", "").replace(",", "")
+    multiple = _MULTIPLES.get(stripped[-1:], 1)
+    try:
+        value = float(stripped[:-1] if multiple != 1 else stripped) * multiple
+    except ValueError:
+        value = math.nan
+    if math.isnan(value) or (math.isfinite(value) and not value.is_integer()):
+        raise UserError(f"{option} '{text}' is not a whole number: give for example 1000000, 1e6 or 1M")
+    if value < 1:
+        raise UserError(f"{option} {text} is too few: give at least 1")
+    if value > 10**18:
+        raise UserError(f"{option} {text} is beyond what memory can hold: give at most {MAX_PHOTONS:.0e}")
+    return int(value)
+
+
+def parse_seconds(text: str) -> float:
+    """A time budget in seconds."""
+    value = _number("--seconds", text, "for example 10")
+    if not 0.0 < value <= MAX_SECONDS:
+        raise UserError(f"--seconds {text} is out of range: give more than 0 and at most {MAX_SECONDS:.0f}")
+    return value
+
+
+def parse_exposure(text: str) -> float:
+    """Stops."""
+    value = _number("--exposure", text, "in stops, for example -1.5")
+    if not abs(value) <= MAX_EXPOSURE_EV:
+        raise UserError(f"--exposure {text} is out of range: give between -{MAX_EXPOSURE_EV:.0f} and {MAX_EXPOSURE_EV:.0f} stops")
+    return value
+
+
+def parse_integer(option: str, text: str, low: int, high: int) -> int:
+    """A whole number in [low, high] for `option`."""
+    if not _is_integer(text.strip()):
+        raise UserError(f"{option} '{text}' is not a whole number, give between {low} and {high}")
+    value = int(text)
+    if not low <= value <= high:
+        raise UserError(f"{option} {text} is out of range: give between {low} and {high}")
+    return value
+
+
+def parse_method(text: str) -> str:
+    """One of the sampling methods."""
+    if text not in METHODS:
+        hint = suggestion(text, METHODS)
+        raise UserError(f"--method '{text}' is unknown{hint or ','} known are {', '.join(METHODS)}")
+    return text
+
+
+def parse_eye_method(text: str) -> str:
+    """One of those that camera rays may follow."""
+    if text not in EYE_METHODS:
+        hint = suggestion(text, EYE_METHODS)
+        raise UserError(f"--eye-method '{text}' is unknown{hint or ','} known are {', '.join(EYE_METHODS)}")
+    return text
+
+
+def check_layer(text: str, scene: Scene) -> str:
+    """"beauty", "caustic" or "map:RECEIVER" with a diffuse object of `scene`."""
+    if text in ("beauty", "caustic"):
+        return text
+    receivers = list(dict.fromkeys(o.name for o in scene.objects if isinstance(o.material, Diffuse)))
+    kind, _, name = text.partition(":")
+    if kind != "map":
+        hint = suggestion(text, ("beauty", "caustic", "map"))
+        raise UserError(f"--layer '{text}' is unknown{hint or ','} known are beauty, caustic and map:RECEIVER")
+    if name not in receivers:
+        listed = ", ".join(f"'map:{receiver}'" for receiver in receivers) or "none, for nothing in it is diffuse"
+        raise UserError(f"--layer '{text}' names no receiver of scene '{scene.name}'; it has {listed}")
+    return text
+
+
+def check_picture_memory(width: int, height: int, bins: int | None) -> None:
+    """Refuse a picture whose targets would not fit into the machine's memory."""
+    targets = 1 + math.ceil((bins or 0) / 4)
+    # Accumulation on the device, its read-back, and the float32 picture made from it.
+    needed = 3 * width * height * targets * _BYTES_PER_TARGET_PX
+    available = memory_bytes()
+    if needed > available:
+        with_bins = f" with --bins {bins}" if bins else ""
+        raise UserError(
+            f"--size {width}x{height}{with_bins} needs about {needed / _GIB:.1f} GiB "
+            f"and this machine has {available / _GIB:.1f} GiB: choose a smaller one"
+        )
+
+
+def memory_bytes() -> int:
+    """Memory this process may use: the machine's, or its control group's where that is less."""
+    total = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    try:
+        limit = Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii").strip()
+    except OSError:
+        return total
+    return min(total, int(limit)) if limit.isdigit() else total
+
+
+def find_scene(text: str) -> Path:
+    """The file of a scene given by path, or by the bare name of a shipped one."""
+    path = Path(text)
+    if path.is_file():
+        return path
+    if path.is_dir():
+        raise UserError(f"scene {text} is a folder: give a scene file in it")
+    shipped = shipped_scenes()
+    if text in shipped:
+        return shipped[text]
+    if os.sep in text or path.suffix:
+        near = nearest_names(path.name, _files_beside(path))
+        hint = f", did you mean '{path.with_name(near[0])}'?" if near else ""
+        if not hint and path.stem in shipped:
+            hint = f", did you mean the shipped scene '{path.stem}'?"
+        raise UserError(f"scene file {text} does not exist{hint or ': check the path'}")
+    hint = suggestion(text, shipped)
+    names = ", ".join(shipped) or "none"
+    raise UserError(f"scene '{text}' is neither a file nor shipped{hint or ','} shipped are {names}")
+
+
+def shipped_scenes() -> dict[str, Path]:
+    """Name → file of the scenes that come with the program, sorted."""
+    files = sorted((assets_dir() / "scenes").glob("*"))
+    return {file.stem: file for file in files if file.suffix in SCENE_SUFFIXES[:3]}
+
+
+def _files_beside(path: Path) -> list[str]:
+    try:
+        return [entry.name for entry in path.parent.iterdir() if entry.suffix.lower() in SCENE_SUFFIXES]
+    except OSError:
+        return []
+
+
+def _is_integer(text: str) -> bool:
+    """ASCII digits with an optional sign, of a length that int() takes gladly."""
+    digits = text.removeprefix("-").removeprefix("+")
+    return digits.isascii() and digits.isdigit() and len(digits) <= 18
+
+
+def _number(option: str, text: str, example: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if math.isnan(value):
+        raise UserError(f"{option} '{text}' is not a number, give one {example}")
+    return value

@@ -1,0 +1,260 @@
+"""The command line: what the commands are called and which options they take.
+
+Options arrive as text and are checked in `cli_options`; the work is in the modules that each
+command imports when it runs, so that `--help` and small commands start at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from typer.core import TyperGroup
+
+from .. import __version__
+from ..base.errors import UserError
+from ..model.settings import EYE_METHODS, METHODS
+from . import options as options
+
+
+class _Interrupted(Exception):
+    """Ctrl-C, carried past typer, some of whose versions turn it silently into an exit code."""
+
+
+class _Program(TyperGroup):
+    def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override]
+        """Run the command."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as interrupt:
+            raise _Interrupted from interrupt
+
+
+app = typer.Typer(
+    name="spectrasplat",
+    cls=_Program,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    no_args_is_help=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+SceneArgument = Annotated[
+    str, typer.Argument(metavar="SCENE", help="A scene file (.toml, .glb, .gltf, a bare mesh), or a shipped scene's name.")
+]
+Text = str | None
+PIPE_WIDTH = 200
+"""Columns where no terminal sets a limit: tables are then not cut."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line; returns the exit code. Raises `UserError` for wrong usage."""
+    try:
+        code = app(args=list(arguments) or ["--help"], prog_name="spectrasplat", standalone_mode=False)
+    except _Interrupted as interrupted:
+        raise KeyboardInterrupt from interrupted
+    except Exception as error:
+        # click's usage errors; typer has moved click inside itself, so there is no one class to name.
+        if not hasattr(error, "format_message"):
+            raise
+        raise UserError(_usage_sentence(error.format_message())) from error
+    return code if isinstance(code, int) else 0
+
+
+def _usage_sentence(message: str) -> str:
+    sentence = message.strip().rstrip(".").replace(". Did you", ", did you")
+    return f"{sentence[:1].lower()}{sentence[1:]}; 'spectrasplat --help' shows the usage"
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        print(f"spectrasplat {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def program(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)] = False,
+) -> None:
+    """Dispersive caustics: light through glass, split into its colours."""
+
+
+@app.command()
+def render(
+    scene: SceneArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="The picture: .png (to look at), .exr or .npy (linear, to work on).")],
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels, for example 1920x1080; default: the scene's.")] = None,
+    photons: Annotated[Text, typer.Option(metavar="N", help="Photons to emit, for example 4M; default: the scene's.")] = None,
+    seconds: Annotated[Text, typer.Option(metavar="S", help="Emit photons for this long instead.")] = None,
+    seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
+    method: Annotated[Text, typer.Option(metavar="NAME", help=f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.")] = None,
+    eye_method: Annotated[Text, typer.Option("--eye-method", metavar="NAME", help=f"The same for the camera's rays: {', '.join(EYE_METHODS)}; default: as --method.")] = None,
+    layer: Annotated[Text, typer.Option(metavar="LAYER", help="beauty (default), caustic, or map:RECEIVER.")] = None,
+    bins: Annotated[Text, typer.Option(metavar="N", help=f"Keep {options.MIN_BINS} to {options.MAX_BINS} spectral bins (written to .exr).")] = None,
+    exposure: Annotated[Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than automatic; .png only.")] = None,
+    max_depth: Annotated[Text, typer.Option("--max-depth", metavar="N", help="Most specular events on a light path; default: 64.")] = None,
+    spp: Annotated[Text, typer.Option(metavar="N", help="Camera samples a pixel.")] = None,
+    batch: Annotated[Text, typer.Option(metavar="N", help="Photons in flight at once (never changes the picture).")] = None,
+    stats: Annotated[bool, typer.Option("--stats", help="Print the energy balance and the times of all stages.")] = False,
+) -> None:
+    """Render a scene to a picture file."""
+    from .render import RenderRequest, render_command
+
+    request = RenderRequest(
+        scene, output, size, photons, seconds, seed, method, eye_method, layer, bins, exposure, max_depth, spp, batch, stats
+    )
+    raise typer.Exit(render_command(request))
+
+
+@app.command()
+def animate(
+    scene: SceneArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="A movie (.mp4), or a folder for numbered PNGs, which can be resumed.")],
+    turntable: Annotated[bool, typer.Option("--turntable", help="Turn the camera once about its target; what happens when nothing else is asked for.")] = False,
+    keys: Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Keys of any parameter: tables named keys with time_s, parameter, value, interpolation.")] = None,
+    ranges: Annotated[list[str] | None, typer.Option("--set", metavar="P=A:B", help="Let a parameter go from A to B, for example objects.prism.dispersion_gain=0:3; may be repeated.")] = None,
+    frames: Annotated[Text, typer.Option(metavar="N", help="Pictures in all; default: 120, or as many as the keys last.")] = None,
+    fps: Annotated[Text, typer.Option(metavar="F", help="Pictures a second; default: 24.")] = None,
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: the scene's.")] = None,
+    photons: Annotated[Text, typer.Option(metavar="N", help="Photons of each traced frame; default: the scene's.")] = None,
+    spp: Annotated[Text, typer.Option(metavar="N", help="Camera samples a pixel; default: 16.")] = None,
+    exposure: Annotated[Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than is automatic in the first frame.")] = None,
+    seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers, the same for all frames; default: 1.")] = None,
+    method: Annotated[Text, typer.Option(metavar="NAME", help=f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the frames of another animation in the folder.")] = False,
+) -> None:
+    """Render an animation: a turntable, or any parameters over time."""
+    from .animate import AnimateRequest, animate_command
+
+    request = AnimateRequest(
+        scene, output, turntable, keys, tuple(ranges or ()), frames, fps, size, photons, spp, exposure, seed, method, overwrite
+    )
+    raise typer.Exit(animate_command(request))
+
+
+@app.command()
+def view(
+    scene: Annotated[Text, typer.Argument(metavar="[SCENE]", help="A scene file, a bare mesh, or a shipped scene's name; default: the default scene.")] = None,
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Of the window; default: as it was last.")] = None,
+    theme: Annotated[Text, typer.Option(metavar="NAME", help="dark or light; default: as it was last.")] = None,
+    screenshot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Write a picture of the window and close.")] = None,
+    after: Annotated[Text, typer.Option(metavar="S", help="Seconds from the first picture until --screenshot; default: 10.")] = None,
+) -> None:
+    """Open the viewer: edit dispersion and caustics on the screen."""
+    from .view import ViewRequest, view_command
+
+    raise typer.Exit(view_command(ViewRequest(scene, size, theme, screenshot, after)))
+
+
+@app.command()
+def bake(
+    scene: SceneArgument,
+    receiver: Annotated[str, typer.Argument(metavar="RECEIVER", help="The diffuse object whose caustic is baked.")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="The texture: .exr or .npy (linear irradiance), .png (to look at); where it lies is written to a .json beside it.")],
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Texels; default: 1024x1024.")] = None,
+    photons: Annotated[Text, typer.Option(metavar="N", help="Photons to emit; default: the scene's.")] = None,
+    seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
+) -> None:
+    """Bake the caustic on an object to a texture, with its placement."""
+    from .bake import BakeRequest, bake_command
+
+    raise typer.Exit(bake_command(BakeRequest(scene, receiver, output, size, photons, seed)))
+
+
+@app.command()
+def inspect(scene: SceneArgument) -> None:
+    """Show what a scene holds, its glasses and mesh health, and which features its programs need."""
+    from ..model.io.scene_file import load_scene
+    from .inspect_report import inspect_text
+
+    _print(inspect_text(load_scene(options.find_scene(scene))))
+
+
+@app.command()
+def glass(
+    query: Annotated[Text, typer.Argument(metavar="[QUERY]", help="Part of a name or maker; nothing lists all.")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Plot n over the wavelength and the place in the Abbe diagram.")] = None,
+) -> None:
+    """Search the glass catalogue; show one glass in full."""
+    from .glass import glass_command
+
+    glass_command(query, plot, _print)
+
+
+@app.command()
+def doctor() -> None:
+    """Check OpenGL, its limits and the packages, and tell the remedy for what is missing."""
+    from .doctor import examine, report
+
+    checks = examine()
+    print(report(checks))
+    raise typer.Exit(0 if all(check.usable for check in checks) else 2)
+
+
+@app.command()
+def bench(
+    scenes: Annotated[list[str] | None, typer.Argument(metavar="[SCENE]...", help="Scenes to measure; default: every shipped one that holds glass.")] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder for results.json, plots and report.html.")] = None,
+    seconds: Annotated[Text, typer.Option(metavar="S", help="Photon time of each method's and seed's largest rendering; default: 3, with --eye 20.")] = None,
+    seeds: Annotated[Text, typer.Option(metavar="N", help="Independent repeats; default: 5.")] = None,
+    methods: Annotated[Text, typer.Option(metavar="A,B", help="Methods to compare; default: all.")] = None,
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: 480 wide, in the scene's aspect.")] = None,
+    reference_seconds: Annotated[Text, typer.Option("--reference-seconds", metavar="S", help="Time added to each scene's cached reference; default: 60.")] = None,
+    features: Annotated[Text, typer.Option(metavar="SCENE", help="Measure instead what each feature of the programs costs in this scene.")] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Begin anew instead of going on from what DIR holds.")] = False,
+    eye: Annotated[bool, typer.Option("--eye", help="Measure the camera's half, by samples a pixel, instead of the light's by photons.")] = False,
+) -> None:
+    """Measure every method's error against its run time, and write a report."""
+    from .bench import BenchRequest, bench_command
+
+    request = BenchRequest(tuple(scenes or ()), output, seconds, seeds, methods, size, reference_seconds, features, fresh, eye)
+    raise typer.Exit(bench_command(request, _print))
+
+
+@app.command()
+def stress(
+    scenes: Annotated[list[str] | None, typer.Argument(metavar="[SCENE]...", help="Sweep these scenes; default: all stiff cases, and a sweep over shipped scenes.")] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder for stress.json and stress.html.")] = None,
+    cases: Annotated[Text, typer.Option(metavar="A,B", help="Only these cases; 'prism/' is all of that scene's.")] = None,
+    list_cases: Annotated[bool, typer.Option("--list", help="List the cases with their number of severities, and measure nothing.")] = False,
+) -> None:
+    """Measure stiff and extreme cases against their promises; exits with 1 where one is broken."""
+    from .stress import StressRequest, stress_command
+
+    raise typer.Exit(stress_command(StressRequest(tuple(scenes or ()), output, cases, list_cases), _print))
+
+
+@app.command("bench-speed")
+def bench_speed() -> None:
+    """Measure tracing, splatting, tree building, memory and the warm start on this machine."""
+    from ..bench import speed
+
+    for line in speed.run():
+        print(line, flush=True)
+
+
+@app.command("bench-view")
+def bench_view(
+    scene: Annotated[Text, typer.Argument(metavar="[SCENE]", help="Default: the default scene.")] = None,
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Of the viewport; default: 960x540, on a GPU 1920x1080.")] = None,
+    seconds: Annotated[Text, typer.Option(metavar="S", help="For each phase; default: 6.")] = None,
+) -> None:
+    """Measure the viewer's frame times: accumulating, orbiting, dragging the dispersion."""
+    from .bench_view import BenchViewRequest, bench_view_command
+
+    raise typer.Exit(bench_view_command(BenchViewRequest(scene, size, seconds)))
+
+
+def _print(content: object) -> None:
+    """Print text as it is, and rich's tables in colour where the terminal has it."""
+    if isinstance(content, str):
+        print(content)
+        return
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = PIPE_WIDTH
+    console.print(content)

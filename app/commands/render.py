@@ -1,0 +1,177 @@
+"""The render command: check everything first, then render, then write, then say what was done."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from ..base.errors import UserError
+from ..model.scene import Scene
+from ..model.settings import RenderSettings
+from . import options as options
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as shells have it (128 + SIGINT)."""
+
+
+@dataclass(frozen=True)
+class RenderRequest:
+    """The render command's options as typed; None where the user said nothing."""
+
+    scene: str
+    output: Path
+    size: str | None = None
+    photons: str | None = None
+    seconds: str | None = None
+    seed: str | None = None
+    method: str | None = None
+    eye_method: str | None = None
+    layer: str | None = None
+    bins: str | None = None
+    exposure: str | None = None
+    max_depth: str | None = None
+    spp: str | None = None
+    batch: str | None = None
+    stats: bool = False
+
+
+def render_command(request: RenderRequest) -> int:
+    """Render to a file; returns the exit code. Raises `UserError`."""
+    from ..base.atomic import check_writable
+    from ..base.image_io import check_suffix, write_image
+    from ..base.progress import ProgressReporter
+
+    # What costs nothing to check comes before the scene is read, and that before the device.
+    asked = _parse(request)
+    check_suffix(request.output)
+    scene_file = options.find_scene(request.scene)
+    # os.path.exists, unlike Path.exists, is silent about a name that is too long.
+    if os.path.exists(request.output) and request.output.samefile(scene_file):
+        raise UserError(f"cannot write {request.output}: it is the scene itself; choose another name")
+    check_writable(request.output)
+
+    from ..model.io.scene_file import load_scene
+
+    scene = load_scene(scene_file)
+    settings = _complete(asked, scene, request.stats)
+    # Before the work: who waits for minutes should know what was assumed, and also if it fails.
+    for note in (*scene.notes, *_unused_options(request)):
+        print(f"note: {note}", file=sys.stderr)
+
+    from ..render.still import render
+
+    with interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
+        result = render(scene, settings, progress=progress, cancelled=interrupted)
+        stopped = interrupted()
+    write_image(
+        request.output,
+        result.rgb,
+        exposure_ev=settings.exposure_ev,
+        spectral=result.spectral,
+        bin_edges_nm=result.bin_edges_nm,
+    )
+    if not np.isfinite(result.rgb).all():
+        print(f"note: {request.output} holds numbers that are not finite: a power or a size is beyond float32", file=sys.stderr)
+    print(_summary(request, settings, result.stats, stopped))
+    if request.stats:
+        print("\n".join(result.stats.lines()))
+    return INTERRUPTED if stopped else 0
+
+
+def _parse(request: RenderRequest) -> dict[str, Any]:
+    """The fields of `RenderSettings` that the user gave, checked as far as no scene is needed."""
+    if request.photons is not None and request.seconds is not None:
+        raise UserError("--photons and --seconds exclude each other: give a count or a time, not both")
+    parsers: dict[str, tuple[str | None, Callable[[str], Any]]] = {
+        "photons": (request.photons, options.parse_photons),
+        "seconds": (request.seconds, options.parse_seconds),
+        "seed": (request.seed, _integer("--seed", 0, options.MAX_SEED)),
+        "method": (request.method, options.parse_method),
+        "eye_method": (request.eye_method, options.parse_eye_method),
+        "layer": (request.layer, str),
+        "bins": (request.bins, _integer("--bins", options.MIN_BINS, options.MAX_BINS)),
+        "exposure_ev": (request.exposure, options.parse_exposure),
+        "max_depth": (request.max_depth, _integer("--max-depth", 1, options.MAX_DEPTH)),
+        "spp": (request.spp, _integer("--spp", 1, options.MAX_SPP)),
+        "batch": (request.batch, options.parse_batch),
+    }
+    asked = {field: parse(text) for field, (text, parse) in parsers.items() if text is not None}
+    if request.size is not None:
+        asked["width"], asked["height"] = options.parse_size(request.size)
+    return asked
+
+
+def _complete(asked: dict[str, Any], scene: Scene, stats: bool) -> RenderSettings:
+    """Settings with the scene's own wishes where the user said nothing."""
+    wishes = scene.render
+    settings = RenderSettings(
+        **{
+            "width": wishes.width,
+            "height": wishes.height,
+            "max_depth": wishes.max_depth,
+            "exposure_ev": wishes.exposure_ev,
+            "photons": None if "seconds" in asked else wishes.photons,
+            "tally": stats,
+            **asked,
+        }
+    )
+    options.check_layer(settings.layer, scene)
+    options.check_picture_memory(settings.width, settings.height, settings.bins)
+    return settings
+
+
+def _unused_options(request: RenderRequest) -> list[str]:
+    """A sentence for each option that the output's format has no use for."""
+    suffix = request.output.suffix.lower()
+    notes = []
+    if request.bins is not None and suffix != ".exr":
+        notes.append(f"--bins: a {suffix} picture holds no spectral channels; write an .exr to keep them")
+    if request.exposure is not None and suffix != ".png":
+        notes.append(f"--exposure does not change a {suffix} picture, which is linear; it is for .png")
+    return notes
+
+
+def _integer(option: str, low: int, high: int) -> Callable[[str], int]:
+    return lambda text: options.parse_integer(option, text, low, high)
+
+
+@contextmanager
+def interrupt_flag() -> Iterator[Callable[[], bool]]:
+    """Within the block the first Ctrl-C only sets a flag, which the yielded function tells.
+
+    The renderer then stops after its batch and what it has is written. A second Ctrl-C
+    interrupts as usual.
+    """
+    interrupted = False
+
+    def remember(_signal: int, _frame: FrameType | None) -> None:
+        nonlocal interrupted
+        if interrupted:
+            raise KeyboardInterrupt
+        interrupted = True
+        print("spectrasplat: stopping; what is done will be written", file=sys.stderr)
+
+    previous = signal.signal(signal.SIGINT, remember)
+    try:
+        yield lambda: interrupted
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+def _summary(request: RenderRequest, settings: RenderSettings, stats: Any, stopped: bool) -> str:
+    """Where the picture is and what was done in what time."""
+    device = "software renderer" if stats.is_software else "GPU"
+    early = ", stopped early" if stopped else ""
+    return (
+        f"{request.output.resolve()}: {settings.width}×{settings.height}, {stats.photons:,} photons, "
+        f"{stats.splats:,} splats in {stats.seconds:.1f} s{early} ({device}: {stats.renderer})"
+    )

@@ -1,0 +1,147 @@
+"""The view command: checks what was typed, opens the window, and sees to it that no work is lost on the way out."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..base.errors import UserError, suggestion
+from . import options as options
+
+if TYPE_CHECKING:
+    from ..edit.preferences import WindowPlace
+    from ..ui.session import Session
+    from ..ui.viewer import Viewer
+    from ..ui.window import Window
+
+THEMES = ("dark", "light")
+DEFAULT_AFTER_S = 10.0
+LONGEST_WAIT_S = 120.0
+"""For the first picture."""
+_ENGINE_WAIT_S = 5.0
+
+
+@dataclass(frozen=True)
+class ViewRequest:
+    """The view command's options as typed; None where the user said nothing."""
+
+    scene: str | None = None
+    size: str | None = None
+    theme: str | None = None
+    screenshot: Path | None = None
+    after: str | None = None
+
+
+def has_display() -> bool:
+    """Whether a window can be expected to open here."""
+    return sys.platform in ("win32", "darwin") or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+
+
+def view_command(request: ViewRequest) -> int:
+    """Open the viewer until it is closed; returns the exit code. Raises `UserError`."""
+    size = None if request.size is None else options.parse_size(request.size)
+    theme = None if request.theme is None else _parse_theme(request.theme)
+    after = DEFAULT_AFTER_S if request.after is None else options.parse_seconds(request.after)
+    if request.after is not None and request.screenshot is None:
+        raise UserError("--after says when the --screenshot is taken: give that too")
+    if request.screenshot is not None:
+        _check_screenshot(request.screenshot)
+    scene = None if request.scene is None else options.find_scene(request.scene)
+
+    # What needs a display comes last, so that a wrong option is told on any machine.
+    from ..edit.preferences import load_settings
+    from ..ui.window import Window
+
+    settings, _ = load_settings()
+    place = settings.window if size is None else replace(settings.window, size=size, maximised=False)
+    with Window(place) as window:
+        _run(window, scene, theme, None if request.screenshot is None else (request.screenshot, after))
+    return 0
+
+
+def _run(window: Window, scene: Path | None, theme: str | None, screenshot: tuple[Path, float] | None) -> None:
+    from ..ui import layout_memory
+    from ..ui.session import Session
+    from ..ui.viewer import Viewer
+
+    session = Session(window.context, scene)
+    if theme is not None:
+        preferences = replace(session.state.preferences, theme=theme)
+        session.state = replace(session.state, preferences=preferences)
+    viewer = Viewer(session, refresh_s=window.refresh_s)
+    layout_memory.load()
+    try:
+        if screenshot is None:
+            window.run(viewer)
+        else:
+            _take_screenshot(window, viewer, session, *screenshot)
+    except Exception as error:
+        raise _rescued(session, error) from error
+    if screenshot is None:
+        layout_memory.save()
+        session.settings = replace(session.settings, window=_place(window, session.settings.window))
+        session.close()
+    else:
+        session.autosave.close()
+        session.release()
+
+
+def _take_screenshot(window: Window, viewer: Viewer, session: Session, path: Path, after_s: float) -> None:
+    """Let the picture gather light for `after_s` seconds, then write the window to `path`.
+
+    They count from the first picture on: a driver may compile for longer than that. What has none is written as it is after `LONGEST_WAIT_S`.
+    """
+    from PIL import Image
+
+    from ..base.atomic import atomic_output
+
+    begun = time.monotonic()
+    first: list[float] = []
+
+    def is_due() -> bool:
+        now, engine = time.monotonic(), session.picture.engine
+        # The start page has no engine.
+        waits_until = begun + (LONGEST_WAIT_S if engine is not None else _ENGINE_WAIT_S)
+        if not first and ((engine is not None and engine.picture is not None) or now > waits_until):
+            first.append(now)
+        return bool(first) and now >= first[0] + after_s
+
+    window.run(viewer, until=is_due)
+    with atomic_output(path) as temporary:
+        Image.fromarray(window.screenshot()).save(temporary)
+    print(path.resolve())
+
+
+def _rescued(session: Session, error: Exception) -> UserError:
+    """The window cannot go on: keep the work, and say where."""
+    session.save_from_crash("drawing the interface", error)
+    kept = " Your work is kept and offered at the next start." if session.document.unsaved else ""
+    what = " ".join(str(error).split()) or type(error).__name__
+    from ..edit.preferences import config_dir
+
+    return UserError(f"the window had to close ({type(error).__name__}: {what[:200]}).{kept} Details are in {config_dir() / 'crash.log'}")
+
+
+def _place(window: Window, before: WindowPlace) -> WindowPlace:
+    """Where the window is; a maximised one remembers the size it had before."""
+    place = window.place
+    return replace(before, maximised=True) if place.maximised else place
+
+
+def _parse_theme(text: str) -> str:
+    if text not in THEMES:
+        hint = suggestion(text, THEMES)
+        raise UserError(f"--theme '{text}' is unknown{hint or ','} known are {' and '.join(THEMES)}")
+    return text
+
+
+def _check_screenshot(path: Path) -> None:
+    from ..base.atomic import check_writable
+
+    if path.suffix.lower() != ".png":
+        raise UserError(f"--screenshot {path} must end in .png; 'spectrasplat render' writes .exr")
+    check_writable(path)

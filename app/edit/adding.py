@@ -1,0 +1,95 @@
+"""New objects: the primitives by name, put where there is room and where they can be seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..base.errors import UserError, suggestion
+from ..model.features import world_bounds
+from ..model.optics import catalogue
+from ..model.scene import Dielectric, Diffuse, Material, Scene, SceneObject
+from ..model.scene_checks import check_scene
+from ..model.scene_defaults import bounds_of, surroundings_of
+from ..model.scene_materials import DEFAULT_GLASS
+from ..model.scene_objects import make_shape
+from .names import free_name
+
+SHAPES = (
+    "sphere", "ellipsoid", "box", "slab", "prism", "polygon_prism", "lens", "brilliant", "torus", "rippled_water", "plane", "disc",
+)  # fmt: skip
+"""What can be added, by its name in the scene file."""
+RECEIVERS = ("plane", "disc")
+"""Those of them that are open and become diffuse."""
+
+
+def add_object(scene: Scene, shape: str) -> Scene:
+    """With one of `SHAPES` at the end: glass beside the other objects, or a diffuse receiver below them.
+
+    It is as large as the rest of the scene asks for and stands upright, whichever axis is up.
+    """
+    if shape not in SHAPES:
+        raise UserError(f"there is no shape '{shape}'{suggestion(shape, SHAPES) or '; known are ' + ', '.join(SHAPES)}")
+    receiver = shape in RECEIVERS
+    material: Material = Diffuse() if receiver else Dielectric(catalogue.find(DEFAULT_GLASS))
+    name = free_name(shape.replace("_", " "), [o.name for o in scene.objects])
+    item = SceneObject(name, make_shape(shape), material)
+    low, high = item.mesh.bounds()
+    around = surroundings_of(scene.objects)
+    scale = (8.0 if receiver else 1.2) * around.radius / float(np.linalg.norm(high - low))
+    matrix = np.eye(4)
+    matrix[:3, :3] = up_frame(scene) * scale
+    matrix[:3, 3] = around.centre - matrix[:3, :3] @ (0.5 * (low + high))
+    item = _standing(scene, replace(item, object_to_world=matrix), below=receiver)
+    changed = replace(scene, objects=(*scene.objects, item if receiver else beside(scene, item)))
+    check_scene(changed, scene.name)
+    return changed
+
+
+def up_frame(scene: Scene) -> np.ndarray:
+    """Rotation from a z-up world to this scene's (glTF has y up), float64 (3, 3), by the camera's up direction."""
+    axis = int(np.argmax(np.abs(scene.camera.up)))
+    # A quarter turn about x, as glTF has it; a third of a turn about the diagonal.
+    if axis == 1:
+        return np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)])
+    return np.eye(3) if axis == 2 else np.array([(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
+
+
+def beside(scene: Scene, item: SceneObject) -> SceneObject:
+    """`item` moved sideways to the first place where it overlaps no other object and holds no light."""
+    low, high = world_bounds(item)
+    sideways, forward, _ = up_frame(scene).T
+    solid = [world_bounds(o) for o in scene.objects if not isinstance(o.material, Diffuse)]
+    lights = [np.array(light.position) for light in scene.lights if light.kind != "directional"]
+    step = 1.1 * np.abs(high - low)
+    for ring in range(64):
+        for direction in (sideways, -sideways, forward, -forward):
+            offset = ring * step * direction
+            box = (low + offset, high + offset)
+            free = not any(_overlap(box, other) for other in solid)
+            if free and not any((box[0] <= p).all() and (p <= box[1]).all() for p in lights):
+                return _moved(item, offset)
+    return _moved(item, 64 * step * sideways)
+
+
+def _standing(scene: Scene, item: SceneObject, below: bool) -> SceneObject:
+    """`item` with its lowest point where the other objects have theirs, or a hair below that."""
+    up = up_frame(scene)[:, 2]
+    around = surroundings_of(scene.objects)
+    floor = min(float(corner @ up) for corner in bounds_of([o for o in scene.objects if not isinstance(o.material, Diffuse)] or scene.objects))
+    lowest = float((item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]).dot(up).min())
+    # As for the default table: two surfaces must not coincide.
+    hair = -1e-3 if below else 1e-3
+    return _moved(item, (floor + hair * around.radius - lowest) * up)
+
+
+def _overlap(a: tuple[np.ndarray, np.ndarray] | np.ndarray, b: np.ndarray) -> bool:
+    return bool(np.all(a[0] <= b[1]) and np.all(b[0] <= a[1]))
+
+
+def _moved(item: SceneObject, offset: np.ndarray) -> SceneObject:
+    matrix = item.object_to_world.copy()
+    matrix[:3, 3] += offset
+    matrix.setflags(write=False)
+    return replace(item, object_to_world=matrix)

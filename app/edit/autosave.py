@@ -1,0 +1,207 @@
+"""Work survives a crash: every changed scene is also written to the config folder, aside from the user's file.
+
+One file for each running process, removed when it ends in good order. A process holds a lock on
+its note for as long as it lives, so what the next start finds unlocked is left over from a crash
+(a process number alone could have been given to somebody else since).
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import IO
+
+import msgspec
+
+from ..base.atomic import atomic_output
+from ..base.errors import UserError
+from ..model.geometry.mesh import Mesh
+from ..model.geometry.mesh_recipes import recipe_of
+from ..model.io.scene_file import load_scene
+from ..model.io.scene_save import save_scene
+from ..model.scene import Scene
+
+INTERVAL_S = 30.0
+_FOLDER = "autosave"
+
+
+@dataclass(frozen=True)
+class Note:
+    """What is known about an autosave."""
+
+    pid: int
+    title: str
+    original: str | None
+    """The user's file, which autosaving never touches."""
+    saved_at: float
+    """Seconds since 1970."""
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """The autosave of a process that is gone."""
+
+    path: Path
+    """The scene (.toml)."""
+    note: Note
+
+    @property
+    def original(self) -> Path | None:
+        """The file it was made from."""
+        return None if self.note.original is None else Path(self.note.original)
+
+    def load(self) -> Scene:
+        """The scene, which needs none of the autosave's files any more. Raises UserError when it cannot be read."""
+        scene = load_scene(self.path)
+        here = self.path.parent.resolve()
+        own: dict[Mesh, Mesh] = {}
+        for mesh in {item.mesh for item in scene.objects}:
+            recipe = recipe_of(mesh) or {}
+            if "mesh" in recipe and Path(recipe["mesh"]).is_relative_to(here):
+                # Another value has no recipe: it is saved as triangles, not as a file that is about to go.
+                own[mesh] = replace(mesh, source=None)
+        return replace(scene, objects=tuple(replace(o, mesh=own.get(o.mesh, o.mesh)) for o in scene.objects))
+
+    def discard(self) -> None:
+        """Delete it."""
+        _remove(self.path)
+
+
+class Autosave:
+    """Writes the scene of this process now and then, on a thread of its own.
+
+    `update` is meant for every frame and returns at once. Nothing here raises: what goes wrong is in
+    `problem`, one sentence, since losing the safety net must not stop the work.
+    """
+
+    def __init__(self, folder: Path, interval_s: float = INTERVAL_S, clock: Callable[[], float] = time.monotonic) -> None:
+        """`folder`: the config folder."""
+        self.problem: str | None = None
+        self._interval_s = interval_s
+        self._clock = clock
+        self._folder = folder / _FOLDER
+        self._path = self._folder / f"{os.getpid()}_{id(self):x}.toml"
+        self._lock: IO[str] | None = None
+        self._thread: threading.Thread | None = None
+        self._written: Scene | None = None
+        self._last_s = clock()
+
+    @property
+    def path(self) -> Path:
+        """The file of this process; there only while something unsaved was written."""
+        return self._path
+
+    def update(self, scene: Scene, title: str, original: Path | None, unsaved: bool) -> None:
+        """Write `scene` if it is unsaved, has changed, and the last writing is `interval_s` ago."""
+        if self._thread is not None and self._thread.is_alive():
+            return
+        if not unsaved:
+            if self._written is not None:
+                self._forget()
+            return
+        now = self._clock()
+        if scene is self._written or now - self._last_s < self._interval_s:
+            return
+        self._start(scene, title, original, now)
+
+    def write_now(self, scene: Scene, title: str, original: Path | None) -> None:
+        """Write at once and wait for it, as when something is about to go wrong."""
+        self.wait()
+        if scene is not self._written:
+            self._start(scene, title, original, self._clock())
+            self.wait()
+
+    def wait(self) -> None:
+        """Until what is being written is on the disk."""
+        if self._thread is not None:
+            self._thread.join()
+
+    def close(self) -> None:
+        """The program ends in good order: nothing is left to recover."""
+        self._forget()
+
+    def _start(self, scene: Scene, title: str, original: Path | None, now: float) -> None:
+        self._written, self._last_s = scene, now
+        note = Note(os.getpid(), title, None if original is None else str(original), time.time())
+        # Scenes are immutable, so a thread may read one while the user goes on editing.
+        self._thread = threading.Thread(target=self._write, args=(scene, note), name="autosave", daemon=True)
+        self._thread.start()
+
+    def _write(self, scene: Scene, note: Note) -> None:
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            save_scene(scene, self._path)
+            if self._lock is None:
+                self._lock = _locked(self._path.with_suffix(".lock"))
+            with atomic_output(self._path.with_suffix(".json")) as temporary:
+                temporary.write_bytes(msgspec.json.encode(note))
+            self.problem = None
+        except (OSError, UserError) as error:
+            self.problem = f"The scene could not be autosaved: {error}."
+
+    def _forget(self) -> None:
+        self.wait()
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+        _remove(self._path)
+        self._written = None
+
+
+def recoveries(folder: Path) -> tuple[Recovery, ...]:
+    """Autosaves in the config folder `folder` whose process is gone, the newest first; what is unreadable is passed over."""
+    found = []
+    for entry in sorted((folder / _FOLDER).glob("*.json")):
+        scene = entry.with_suffix(".toml")
+        try:
+            note = msgspec.json.decode(entry.read_bytes(), type=Note)
+        except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
+            continue
+        if scene.is_file() and not _is_held(entry.with_suffix(".lock")):
+            found.append(Recovery(scene, note))
+    return tuple(sorted(found, key=lambda recovery: -recovery.note.saved_at))
+
+
+def _remove(path: Path) -> None:
+    """The autosave at `path` with its note, lock and meshes."""
+    for each in (path.with_suffix(".json"), path, path.with_suffix(".lock")):
+        with suppress(OSError):
+            each.unlink()
+    shutil.rmtree(path.parent / f"{path.stem}_meshes", ignore_errors=True)
+
+
+def _locked(path: Path) -> IO[str]:
+    """The file `path`, held by this process until it ends."""
+    file = path.open("w", encoding="utf-8")
+    _try_lock(file)
+    return file
+
+
+def _is_held(path: Path) -> bool:
+    """Whether a living process holds the lock."""
+    try:
+        with path.open("r+", encoding="utf-8") as file:
+            return not _try_lock(file)
+    except OSError:
+        return False  # no lock at all: nobody holds it
+
+
+def _try_lock(file: IO[str]) -> bool:
+    try:
+        if os.name == "nt":
+            import msvcrt
+
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True

@@ -1,0 +1,109 @@
+"""The scene being worked on: where it came from, where it goes, and every step since.
+
+Saving writes a whole file or none: what was on the disk stays until the new one is complete.
+A bare mesh and the scenes that come with the program are starting points, not files to write back
+to, so they have no `path` until they are saved somewhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from ..base.errors import UserError
+from ..base.paths import assets_dir
+from ..model.io.gltf_write import save_gltf
+from ..model.io.scene_file import GLTF_SUFFIXES, load_scene
+from ..model.io.scene_save import save_scene
+from ..model.scene import Scene
+from .history import History
+
+SAVE_SUFFIXES = (".toml", ".glb", ".gltf")
+DEFAULT_SCENE = "default"
+
+
+class Document:
+    """A scene with its history and its file."""
+
+    def __init__(self, scene: Scene, source: Path | None = None, path: Path | None = None) -> None:
+        self.history = History(scene)
+        self.path = path
+        """Where saving without a name goes; None asks for one."""
+        self.source = source
+        """The file it was opened from or saved to, for the list of recent files."""
+        self._original = source if source is not None and source.suffix.lower() in GLTF_SUFFIXES else None
+
+    @staticmethod
+    def new() -> Document:
+        """The scene the program starts with, untitled."""
+        scene = load_scene(assets_dir() / "scenes" / f"{DEFAULT_SCENE}.toml")
+        return Document(replace(scene, name="untitled"))
+
+    @staticmethod
+    def open(path: Path) -> Document:
+        """The scene in a file: .toml, .glb, .gltf, or a mesh that gets a glass, a light and a table.
+
+        Raises UserError, in one sentence, for what cannot be opened.
+        """
+        path = Path(path).expanduser().absolute()
+        scene = load_scene(path)
+        return Document(scene, path, path if _is_own_file(path) else None)
+
+    @staticmethod
+    def recovered(scene: Scene, original: Path | None) -> Document:
+        """A scene from an autosave: unsaved, and belonging to the file it was autosaved from."""
+        document = Document(scene, original, original if original is not None and _is_own_file(original) else None)
+        document.history.mark_unsaved()
+        return document
+
+    @property
+    def scene(self) -> Scene:
+        """The scene now."""
+        return self.history.present
+
+    @property
+    def title(self) -> str:
+        """What the title bar says: the file's name, or the scene's where it has no file."""
+        if self.path is not None:
+            return self.path.name
+        return self.scene.name or "untitled"
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether anything would be lost by closing."""
+        return self.history.unsaved
+
+    def save(self, path: Path | None = None) -> Path:
+        """Write the scene to `path`, or back to where it came from; returns where that is.
+
+        Raises UserError where no name is known, the suffix is not one of `SAVE_SUFFIXES`, or the file cannot be
+        written; the old file is then as it was and the document still unsaved.
+        """
+        target = self.path if path is None else Path(path).expanduser().absolute()
+        if target is None:
+            raise UserError("the scene has no file yet; choose a name ending in .toml or .glb")
+        suffix = target.suffix.lower()
+        if suffix not in SAVE_SUFFIXES:
+            raise UserError(f"{target.name}: a scene is saved as .toml or .glb; choose a name with one of these endings")
+        scene = self.scene
+        if suffix in GLTF_SUFFIXES:
+            save_gltf(scene, target, self._readable_original())
+            self._original = target
+        else:
+            save_scene(scene, target)
+        self.path = self.source = target
+        self.history.mark_saved(scene)
+        return target
+
+    def _readable_original(self) -> Path | None:
+        """The glTF file whose textures and extras are kept, while it is there to be read."""
+        if self._original is None or not self._original.is_file():
+            return None
+        return self._original
+
+
+def _is_own_file(path: Path) -> bool:
+    """Whether saving without a name may write to `path`."""
+    if path.suffix.lower() not in SAVE_SUFFIXES:
+        return False
+    return not path.resolve().is_relative_to(assets_dir().resolve())

@@ -1,0 +1,108 @@
+"""Everything a panel can do to a scene: pure functions `edit(scene, …) -> Scene`, checked like a scene file.
+
+A panel writes `return edits.attempt(state, "Move prism", edits.set_position, index, position)`: what is refused
+becomes a sentence on the screen and the scene stays.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..base.errors import UserError
+from ..model.scene import Camera, RenderDefaults, Scene, Vec3
+from ..model.scene_render import MAX_DEPTH, MAX_PICTURE_SIDE
+from .adding import RECEIVERS, SHAPES, add_object
+from .glass import (
+    abbe_numbers,
+    index_points,
+    set_abbe,
+    set_absorption,
+    set_dispersion,
+    set_dispersion_gain,
+    set_index_points,
+    set_priority,
+)
+from .lights import (
+    POWER_UNITS,
+    add_light,
+    delete_light,
+    duplicate_light,
+    light_power,
+    photometric_key,
+    rename_light,
+    set_light,
+    set_light_kind,
+    set_light_power,
+    set_light_spectrum,
+    spectrum_words,
+)
+from .matrices import compose, decompose
+from .objects import (
+    add_dabs,
+    clear_dabs,
+    delete,
+    duplicate,
+    rename,
+    set_diffuse_colour,
+    set_material,
+    set_position,
+    set_rotation,
+    set_scale,
+    set_transform,
+    with_object,
+)
+from .requests import Notice
+from .state import State
+
+__all__ = [
+    "POWER_UNITS", "RECEIVERS", "SHAPES", "abbe_numbers", "add_dabs", "add_light", "add_object", "attempt", "clear_dabs",
+    "compose", "decompose", "delete", "delete_light", "duplicate", "duplicate_light", "index_points", "light_power",
+    "photometric_key", "rename", "rename_light", "set_abbe", "set_absorption", "set_background", "set_camera",
+    "set_diffuse_colour", "set_dispersion", "set_dispersion_gain", "set_index_points", "set_light", "set_light_kind",
+    "set_light_power", "set_light_spectrum", "set_material", "set_position", "set_priority", "set_render_defaults",
+    "set_rotation", "set_scale", "set_transform", "spectrum_words", "with_object",
+]  # fmt: skip
+
+
+def attempt(state: State, label: str, edit: Callable[..., Scene], *args: object, **kwargs: object) -> State:
+    """`state` with `edit(state.scene, …)` done, undone as `label`; a refusal is shown as a notice instead."""
+    try:
+        return state.edited(edit(state.scene, *args, **kwargs), label)
+    except UserError as error:
+        text = str(error)
+        return state.asking(Notice(text[:1].upper() + text[1:] + ".", is_error=True))
+
+
+def set_background(scene: Scene, rgb: Vec3) -> Scene:
+    """Linear Rec.709 radiance behind everything, 0 or more."""
+    if not all(math.isfinite(c) and 0.0 <= c <= 1e30 for c in rgb):
+        raise UserError("the background must be three radiances of 0 or more")
+    return replace(scene, background_rgb=(float(rgb[0]), float(rgb[1]), float(rgb[2])))
+
+
+def set_render_defaults(scene: Scene, **changes: float) -> Scene:
+    """Picture size (`width`, `height`), `photons`, `exposure_ev` and `max_depth` that the scene asks for."""
+    render: RenderDefaults = replace(scene.render, **changes)  # type: ignore[arg-type]
+    limits = {"width": (1, MAX_PICTURE_SIDE), "height": (1, MAX_PICTURE_SIDE), "photons": (1, 10**12)}
+    limits |= {"max_depth": (1, MAX_DEPTH), "exposure_ev": (-64, 64)}
+    for key, (low, high) in limits.items():
+        value = getattr(render, key)
+        if not low <= value <= high:
+            raise UserError(f"{key.replace('_', ' ')} is {value:g} but must lie between {low} and {high}")
+    return replace(scene, render=render)
+
+
+def set_camera(scene: Scene, camera: Camera) -> Scene:
+    """Make `camera` the view the scene is saved with; an up direction along the view, which a file may not hold, is turned aside."""
+    forward = np.subtract(camera.target, camera.position)
+    if not np.isfinite(forward).all() or np.linalg.norm(forward) < 1e-150:
+        raise UserError("the camera looks at its own position; choose another target")
+    forward = forward / np.linalg.norm(forward)
+    if np.linalg.norm(np.cross(forward, camera.up)) < 1e-6 * np.linalg.norm(camera.up):
+        across = np.eye(3)[int(np.argmin(np.abs(forward)))]
+        camera = replace(camera, up=(float(across[0]), float(across[1]), float(across[2])))
+    return replace(scene, camera=camera)

@@ -1,0 +1,116 @@
+"""Edits of a glass: which, how dispersive, how absorbing. Pure; see `edit_objects` for the manner."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..base.errors import UserError
+from ..model.optics import glass
+from ..model.optics.colorimetry import attenuation_from_colour
+from ..model.optics.glass import Dispersion
+from ..model.scene import Absorption, Dielectric, Scene, Vec3
+from ..model.scene_checks import check_lines
+from ..model.scene_materials import MAX_ATTENUATION, MAX_PRIORITY
+
+
+def set_dispersion(scene: Scene, index: int, dispersion: Dispersion) -> Scene:
+    """Make object `index` of another glass; absorption and priority stay.
+
+    Raises UserError where the object is not glass, or a light has a line outside the glass's data.
+    """
+    changed = _with_glass(scene, index, replace(_glass(scene, index), dispersion=dispersion))
+    if dispersion.range_nm != _glass(scene, index).dispersion.range_nm:
+        for light in scene.lights:
+            check_lines(light, [changed.objects[index]], scene.name)
+    return changed
+
+
+def set_dispersion_gain(scene: Scene, index: int, gain: float) -> Scene:
+    """Factor on n(λ) − n_d of object `index`: 0 none, 1 as in nature."""
+    return set_dispersion(scene, index, glass.with_gain(_glass(scene, index).dispersion, gain, _where(scene, index)))
+
+
+def abbe_numbers(dispersion: Dispersion) -> tuple[float, float]:
+    """n_d and V_d (inf without dispersion) to show and to edit: giving them to `set_abbe` again changes nothing.
+
+    For a glass made by `set_abbe` they are the numbers it was made of, not those the formula gives back, which
+    differ in the sixth digit and would creep while a slider is dragged.
+    """
+    if dispersion.kind == "abbe":
+        n_d, v_d = dispersion.coefficients
+        return n_d, math.inf if dispersion.gain == 0.0 else v_d / dispersion.gain
+    if dispersion.kind == "constant":
+        return dispersion.coefficients[0], math.inf
+    return dispersion.n_d, dispersion.V_d
+
+
+def set_abbe(scene: Scene, index: int, n_d: float, v_d: float) -> Scene:
+    """Make object `index` of a glass with this index and Abbe number (inf: no dispersion), without a gain."""
+    if not math.isfinite(n_d):
+        raise UserError(f"{_where(scene, index)}: n_d is {n_d:g}; give a number such as 1.5")
+    return set_dispersion(scene, index, glass.from_abbe(n_d, v_d, where=_where(scene, index)))
+
+
+def set_index_points(scene: Scene, index: int, wavelength_nm: Sequence[float], n: Sequence[float]) -> Scene:
+    """Make object `index` of a glass whose n(λ) runs smoothly through these points, wavelengths ascending."""
+    name = _glass(scene, index).dispersion.name
+    drawn = name if name.endswith(_DRAWN) else f"{name}{_DRAWN}".strip()
+    return set_dispersion(scene, index, glass.table(wavelength_nm, n, drawn, _where(scene, index)))
+
+
+_DRAWN = " (drawn)"
+
+
+def index_points(dispersion: Dispersion, count: int = 9) -> tuple[np.ndarray, np.ndarray]:
+    """Points to drag: wavelengths (nm) and n, float64. Those of a table are its own; of others `count`, evenly in λ⁻².
+
+    A gain is worked in. Points lie within 380–780 nm and the glass's data.
+    """
+    low, high = max(380.0, dispersion.range_nm[0]), min(780.0, dispersion.range_nm[1])
+    if dispersion.kind == "table":
+        own = np.round(np.array(dispersion.coefficients[::2]) * 1e3, 9)
+        if len(own) <= 32:
+            return own, dispersion.index(own)
+    inverse_square = np.linspace(low**-2.0, high**-2.0, count)
+    wavelength = np.round(inverse_square**-0.5, 3)
+    return wavelength, dispersion.index(wavelength)
+
+
+def set_absorption(scene: Scene, index: int, colour: Vec3 | None, distance: float = 1.0) -> Scene:
+    """White light takes this colour (linear Rec.709, 0 to 1) after `distance` scene units of object `index`; None is clear."""
+    if colour is None:
+        return _with_glass(scene, index, replace(_glass(scene, index), absorption=None))
+    if not (math.isfinite(distance) and distance > 0.0):
+        raise UserError(f"{_where(scene, index)}: the distance of the absorption is {distance:g}; give a length above 0")
+    alpha = attenuation_from_colour(colour, distance, _where(scene, index))
+    if alpha.max() > MAX_ATTENUATION:
+        raise UserError(f"{_where(scene, index)}: the glass would be opaque within {1.0 / MAX_ATTENUATION:g} units; choose a longer distance")
+    alpha.setflags(write=False)
+    return _with_glass(scene, index, replace(_glass(scene, index), absorption=Absorption(alpha)))
+
+
+def set_priority(scene: Scene, index: int, priority: int) -> Scene:
+    """Which of overlapping solids decides the medium: the higher priority."""
+    if abs(priority) > MAX_PRIORITY:
+        raise UserError(f"{_where(scene, index)}: the priority is {priority}; give a whole number within ±{MAX_PRIORITY}")
+    return _with_glass(scene, index, replace(_glass(scene, index), priority=int(priority)))
+
+
+def _glass(scene: Scene, index: int) -> Dielectric:
+    material = scene.objects[index].material
+    if not isinstance(material, Dielectric):
+        raise UserError(f"'{scene.objects[index].name}' is not made of glass; give it a glass first")
+    return material
+
+
+def _with_glass(scene: Scene, index: int, material: Dielectric) -> Scene:
+    item = replace(scene.objects[index], material=material)
+    return replace(scene, objects=(*scene.objects[:index], item, *scene.objects[index + 1 :]))
+
+
+def _where(scene: Scene, index: int) -> str:
+    return scene.objects[index].name

@@ -1,0 +1,262 @@
+"""Edits of lights: place, shape, spectrum and power in its own unit. Pure; see `edit_objects` for the manner."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ..base.errors import UserError
+from ..model.optics import spectrum as spectra
+from ..model.optics.spectrum import Spectrum
+from ..model.scene import Dielectric, Light, Scene, Vec3
+from ..model.scene_checks import check_lines, check_outside
+from ..model.scene_defaults import surroundings_of
+from ..model.scene_describe import describe_spectrum
+from ..model.scene_lights import (
+    DEFAULT_ILLUMINANCE,
+    FLUX,
+    KINDS,
+    PHOTOMETRIC,
+    POWER_KEYS,
+    default_direction,
+    flux_factor,
+)
+from .adding import up_frame
+from .names import checked_name, free_name
+from .objects import MAX_LENGTH
+
+LightKind = Literal["point", "spot", "directional", "collimated", "area"]
+SpectrumKind = Literal["illuminant", "blackbody", "laser", "lines", "csv", "table"]
+
+POWER_UNITS = {
+    "intensity_cd": "cd", "intensity_w_sr": "W/sr", "flux_lm": "lm", "flux_w": "W",
+    "illuminance_lx": "lm/unit²", "irradiance_w_m2": "W/unit²", "luminance_nt": "cd/unit²", "radiance_w_sr_m2": "W/(sr unit²)",
+}  # fmt: skip
+"""Unit of each power key of a scene file; areas count in scene units."""
+
+_DARK = 1e-9
+"""Least power, in any unit: at none at all a light would forget its colour."""
+
+
+def set_light(scene: Scene, index: int, light: Light) -> Scene:
+    """`scene` with light `index` replaced; directions are normalised.
+
+    Raises UserError for a size or angle no scene file could hold, a name that is taken, and a place inside glass.
+    """
+    others = [other.name for i, other in enumerate(scene.lights) if i != index]
+    name = checked_name(light.name, others, "light")
+    light = replace(light, name=name, direction=_unit(light, "direction", light.direction))
+    if light.tangent is not None:
+        light = replace(light, tangent=_unit(light, "tangent", light.tangent))
+    _check_values(light)
+    _check_against_glass(scene, light, scene.lights[index] if index < len(scene.lights) else None)
+    return replace(scene, lights=(*scene.lights[:index], light, *scene.lights[index + 1 :]))
+
+
+def add_light(scene: Scene, kind: LightKind = "directional") -> Scene:
+    """With a white light at the end, aimed at the objects and as bright there as a scene file's default."""
+    if kind not in KINDS:
+        raise UserError(f"there is no light of kind '{kind}'; known are {', '.join(KINDS)}")
+    around = surroundings_of(scene.objects)
+    x, y, z = (float(v) for v in up_frame(scene) @ default_direction())
+    position = _vec3(around.centre - 6.0 * around.radius * np.array((x, y, z)))
+    name = free_name(f"{kind} light", [light.name for light in scene.lights])
+    light = Light(name, kind, spectra.illuminant("D65"), position, (x, y, z), radius=0.5 * around.radius)
+    light = replace(light, width=around.radius, height=around.radius)
+    return set_light(scene, len(scene.lights), _lighting(scene, light, DEFAULT_ILLUMINANCE))
+
+
+def duplicate_light(scene: Scene, index: int) -> Scene:
+    """With a copy of light `index` at the end, a little to the side so that the two can be told apart."""
+    light = scene.lights[index]
+    frame = up_frame(scene)
+    copy = replace(light, name=free_name(light.name, [other.name for other in scene.lights]))
+    if light.kind == "directional":
+        turn = math.radians(15.0)
+        about_up = np.array([(math.cos(turn), -math.sin(turn), 0), (math.sin(turn), math.cos(turn), 0), (0, 0, 1)])
+        copy = replace(copy, direction=_vec3(frame @ about_up @ frame.T @ light.direction))
+    else:
+        copy = replace(copy, position=_vec3(light.position + 0.5 * surroundings_of(scene.objects).radius * frame[:, 0]))
+    return set_light(scene, len(scene.lights), copy)
+
+
+def delete_light(scene: Scene, index: int) -> Scene:
+    """Without light `index`. Raises UserError for the last one where there is no environment to see by."""
+    if len(scene.lights) == 1 and scene.environment is None:
+        raise UserError(f"'{scene.lights[index].name}' is the only light; add another or an environment before deleting it")
+    return replace(scene, lights=scene.lights[:index] + scene.lights[index + 1 :])
+
+
+def rename_light(scene: Scene, index: int, name: str) -> Scene:
+    """Give light `index` another name. Raises UserError for one that is empty or taken."""
+    return set_light(scene, index, replace(scene.lights[index], name=name))
+
+
+def set_light_kind(scene: Scene, index: int, kind: LightKind) -> Scene:
+    """Make light `index` of another kind that aims at the same place and lights it as brightly."""
+    light = scene.lights[index]
+    if kind not in KINDS:
+        raise UserError(f"there is no light of kind '{kind}'; known are {', '.join(KINDS)}")
+    around = surroundings_of(scene.objects)
+    illuminance = _illuminance(scene, light)
+    changed = replace(light, kind=kind)
+    if light.kind == "directional":
+        changed = replace(changed, position=_vec3(around.centre - 6.0 * around.radius * np.array(light.direction)))
+    if light.kind == "point":
+        toward = around.centre - light.position
+        if np.linalg.norm(toward) > 1e-9 * around.radius:
+            changed = replace(changed, direction=_vec3(toward))
+    changed = replace(changed, direction=_unit(changed, "direction", changed.direction))
+    return set_light(scene, index, _lighting(scene, changed, illuminance))
+
+
+# -- power ----------------------------------------------------------------------------------
+
+
+def photometric_key(light: Light) -> str:
+    """The power key that a light of this kind is usually given in: cd, lm/unit² or cd/unit²."""
+    return next(iter(POWER_KEYS[light.kind]))
+
+
+def light_power(light: Light, key: str | None = None) -> float:
+    """Power of a light as the scene-file key `key` states it (its own photometric one if None; see `POWER_UNITS`)."""
+    measure, quantity = _power_key(light, key)
+    spectrum = light.spectral_power
+    value = spectrum.luminous() if measure == PHOTOMETRIC else spectrum.power_w()
+    return value * flux_factor(light) if quantity == FLUX else value
+
+
+def set_light_power(scene: Scene, index: int, value: float, key: str | None = None) -> Scene:
+    """Give light `index` a power, in the unit of `key` (None: its photometric one). 0 is kept as a spark of 1e-9."""
+    light = scene.lights[index]
+    measure, quantity = _power_key(light, key)
+    if not (math.isfinite(value) and 0.0 <= value <= MAX_LENGTH):
+        raise UserError(f"light '{light.name}': its power is {value:g}; give a number of 0 or more")
+    own = max(value, _DARK) / (flux_factor(light) if quantity == FLUX else 1.0)
+    power = light.spectral_power
+    return _with_power(scene, index, power.scaled_to_luminous(own) if measure == PHOTOMETRIC else power.scaled_to_power(own))
+
+
+def _power_key(light: Light, key: str | None) -> tuple[str, str]:
+    keys = POWER_KEYS[light.kind]
+    if key is not None and key not in keys:
+        raise UserError(f"light '{light.name}' is {light.kind} and has no {key}; its power is one of {', '.join(keys)}")
+    return keys[key or photometric_key(light)]
+
+
+# -- spectrum -------------------------------------------------------------------------------
+
+
+def set_light_spectrum(
+    scene: Scene, index: int, kind: SpectrumKind, value: str | float | Path | tuple[tuple[float, float], ...]
+) -> Scene:
+    """Give light `index` another spectrum of the same photometric power.
+
+    `value` by kind: "illuminant" a CIE name, "blackbody" kelvin, "laser" nm, "lines" rows of (nm, relative power), "csv" a file of
+    wavelength_nm and power. Raises UserError for what is unknown, invisible or outside a glass's data.
+    """
+    light = scene.lights[index]
+    shape = _spectrum(light, kind, value)
+    changed = _with_power(scene, index, shape.scaled_to_luminous(light.spectral_power.luminous()))
+    _check_against_glass(scene, changed.lights[index], light)
+    return changed
+
+
+@lru_cache(maxsize=64)
+def spectrum_words(spectrum: Spectrum) -> tuple[SpectrumKind, str | float | tuple[tuple[float, float], ...] | None]:
+    """Kind and value of a spectrum, as `set_light_spectrum` takes them; ("table", None) for a measured one."""
+    described = describe_spectrum(spectrum)
+    if isinstance(described, str):
+        return "illuminant", described
+    if "blackbody" in described:
+        return "blackbody", float(described["blackbody"])
+    if "laser" in described:
+        return "laser", float(described["laser"])
+    if set(described) == {"lines"}:
+        return "lines", tuple((w, p) for w, p in described["lines"])
+    return "table", None
+
+
+def _spectrum(light: Light, kind: str, value: object) -> Spectrum:
+    match kind, value:
+        case "illuminant", str(name):
+            return spectra.illuminant(name)
+        case "blackbody", float() | int():
+            return spectra.blackbody(float(value))
+        case "laser", float() | int():
+            return _lines(light, ((float(value), 1.0),))
+        case "lines", tuple(rows) if rows:
+            return _lines(light, rows)
+        case "csv", (str() | Path()) as path:
+            return spectra.from_csv(path)
+    raise UserError(f"light '{light.name}': '{kind}' with {value!r} is no spectrum; use illuminant, blackbody, laser, lines or csv")
+
+
+def _lines(light: Light, rows: tuple[tuple[float, float], ...]) -> Spectrum:
+    for wavelength, _ in rows:
+        if not 380.0 <= wavelength <= 780.0:
+            raise UserError(f"light '{light.name}': a line at {wavelength:g} nm is not visible; choose one from 380 to 780 nm")
+    return Spectrum(lines=rows)
+
+
+def _with_power(scene: Scene, index: int, spectrum: Spectrum) -> Scene:
+    light = replace(scene.lights[index], spectral_power=spectrum)
+    return replace(scene, lights=(*scene.lights[:index], light, *scene.lights[index + 1 :]))
+
+
+# -- brightness on the objects, checks ------------------------------------------------------
+
+
+def _reach(scene: Scene, light: Light) -> float:
+    """Luminous quantity of the light over the illuminance it gives the objects' middle, on a plane across it."""
+    around = surroundings_of(scene.objects)
+    distance = max(float(np.linalg.norm(around.centre - light.position)), 1e-3 * around.radius)
+    if light.kind in ("directional", "collimated"):
+        return 1.0
+    return distance**2 if light.kind != "area" else distance**2 * math.pi / flux_factor(light)
+
+
+def _illuminance(scene: Scene, light: Light) -> float:
+    return light.spectral_power.luminous() / _reach(scene, light)
+
+
+def _lighting(scene: Scene, light: Light, illuminance: float) -> Light:
+    power = light.spectral_power.scaled_to_luminous(max(illuminance * _reach(scene, light), _DARK))
+    return replace(light, spectral_power=power)
+
+
+def _check_against_glass(scene: Scene, light: Light, before: Light | None) -> None:
+    glasses = [o for o in scene.objects if isinstance(o.material, Dielectric)]
+    if light.kind != "directional":
+        check_outside(light, glasses, scene.name)
+    if before is None or before.spectral_power is not light.spectral_power:
+        check_lines(light, glasses, scene.name)
+
+
+def _check_values(light: Light) -> None:
+    numbers = (*light.position, light.radius, light.width, light.height)
+    if not all(math.isfinite(v) and abs(v) <= MAX_LENGTH for v in numbers):
+        raise UserError(f"light '{light.name}': its place or size is not finite or too large; choose another")
+    if min(light.radius, light.width, light.height) <= 0.0:
+        raise UserError(f"light '{light.name}': its size must be above 0")
+    if not 0.0 <= light.inner_half_angle_deg <= light.outer_half_angle_deg <= 90.0 or light.outer_half_angle_deg == 0.0:
+        raise UserError(f"light '{light.name}': its half angles must lie above 0 and up to 90°, the inner one within the outer")
+    if not 0.0 <= light.angular_diameter_deg <= 90.0:
+        raise UserError(f"light '{light.name}': its angular diameter must lie between 0 and 90°")
+
+
+def _unit(light: Light, what: str, vector: Vec3) -> Vec3:
+    length = math.hypot(*vector)
+    if not (math.isfinite(length) and length > 1e-150):
+        raise UserError(f"light '{light.name}': its {what} is zero or not finite; give a direction")
+    return _vec3(np.array(vector) / length)
+
+
+def _vec3(vector: np.ndarray) -> Vec3:
+    x, y, z = (float(v) + 0.0 for v in vector)
+    return x, y, z

@@ -1,0 +1,98 @@
+"""Position, rotation and scale of a placement: the only file that speaks pyrr.
+
+pyrr's quaternions and matrices rotate opposite ways, so quaternions are not used here at all.
+Its 3×3 rotation matrices, applied to column vectors as everywhere in this program
+(p_world = M @ p_object), turn right-handed; tests pin that. Angles are about the fixed axes
+x, then y, then z, as `rotation_deg` of a scene file: R = Rz Ry Rx.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pyrr
+
+from ..model.scene import Vec3
+
+Placement = tuple[Vec3, Vec3, Vec3]
+"""Position (scene units), rotation (degrees about x, y, z), scale along the object's own axes."""
+
+
+def rotation_matrix(rotation_deg: Vec3) -> np.ndarray:
+    """Rz Ry Rx, float64 (3, 3), for column vectors."""
+    x, y, z = (math.radians(angle) for angle in rotation_deg)
+    matrix33 = pyrr.matrix33
+    about = matrix33.create_from_z_rotation(z), matrix33.create_from_y_rotation(y), matrix33.create_from_x_rotation(x)
+    return np.asarray(about[0] @ about[1] @ about[2], dtype=np.float64)
+
+
+def compose(position: Vec3, rotation_deg: Vec3, scale: Vec3) -> np.ndarray:
+    """The object-to-world matrix, float64 (4, 4): scale, then rotation, then position."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation_matrix(rotation_deg) * np.asarray(scale, dtype=np.float64)
+    matrix[:3, 3] = position
+    return matrix
+
+
+def decompose(matrix: np.ndarray) -> Placement:
+    """Position, rotation and scale of an object-to-world matrix: the inverse of `compose`.
+
+    Angles lie in (-180, 180], that about y in [-90, 90]; at ±90 the angle about x is given as 0. A mirrored
+    matrix gets a negative scale on the axis that leaves the least rotation. What shears cannot be told
+    in these terms: the rotation is then that of the nearest rotation matrix.
+    """
+    linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
+    scale = np.linalg.norm(linear, axis=0)
+    axes = _nearest_orthogonal(linear / np.where(scale > 0.0, scale, 1.0))
+    if np.linalg.det(axes) < 0.0:
+        mirrored = int(np.argmin(np.diagonal(axes)))
+        axes[:, mirrored] *= -1.0
+        scale[mirrored] *= -1.0
+    return _vec3(matrix[:3, 3]), _angles_deg(axes), _vec3(scale)
+
+
+def with_position(matrix: np.ndarray, position: Vec3) -> np.ndarray:
+    """`matrix` with another position; rotation, scale and shear stay."""
+    moved = np.array(matrix, dtype=np.float64)
+    moved[:3, 3] = position
+    return moved
+
+
+def with_rotation(matrix: np.ndarray, rotation_deg: Vec3) -> np.ndarray:
+    """`matrix` turned so that `decompose` gives `rotation_deg`; a shear turns with it."""
+    turned = np.array(matrix, dtype=np.float64)
+    before = rotation_matrix(decompose(matrix)[1])
+    turned[:3, :3] = rotation_matrix(rotation_deg) @ before.T @ turned[:3, :3]
+    return turned
+
+
+def with_scale(matrix: np.ndarray, scale: Vec3) -> np.ndarray:
+    """`matrix` with another scale along the object's own axes; a shear stays."""
+    scaled = np.array(matrix, dtype=np.float64)
+    scaled[:3, :3] *= np.divide(scale, decompose(matrix)[2])
+    return scaled
+
+
+def _nearest_orthogonal(axes: np.ndarray) -> np.ndarray:
+    """The polar factor of `axes`: itself, to rounding, where its columns are orthonormal."""
+    if np.abs(axes.T @ axes - np.eye(3)).max() < 1e-12:
+        return axes.copy()
+    u, _, v = np.linalg.svd(axes)
+    return u @ v
+
+
+def _angles_deg(rotation: np.ndarray) -> Vec3:
+    """Angles about fixed x, y, z of a rotation matrix."""
+    level = math.hypot(rotation[0, 0], rotation[1, 0])
+    y = math.atan2(-rotation[2, 0], level)
+    if level < 1e-9:  # x and z turn about one axis: all of it is given to z
+        x, z = 0.0, math.atan2(-rotation[0, 1], rotation[1, 1])
+    else:
+        x, z = math.atan2(rotation[2, 1], rotation[2, 2]), math.atan2(rotation[1, 0], rotation[0, 0])
+    return _vec3(np.degrees([x, y, z]))
+
+
+def _vec3(vector: np.ndarray) -> Vec3:
+    x, y, z = (float(v) + 0.0 for v in vector)
+    return x, y, z

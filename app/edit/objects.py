@@ -1,0 +1,224 @@
+"""Edits of objects: pure functions from a scene to the scene that results.
+
+They check what a scene file's reader checks, so that whatever was edited can be saved and opened
+again; a refusal is a UserError with one sentence. Objects are named by index. Meshes are passed
+on, never copied, so instances keep sharing theirs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..base.errors import UserError
+from ..model.scene import (
+    Dab,
+    Dielectric,
+    Diffuse,
+    Material,
+    Mirror,
+    Scene,
+    SceneObject,
+    Vec3,
+)
+from ..model.scene_checks import check_lines, check_outside, check_scene
+from ..model.scene_dabs import MAX_DAB_LOG2
+from . import matrices
+from .adding import beside
+from .names import checked_name, free_name
+
+MAX_LENGTH = 1e30
+"""As in a scene file: float32 ends at 3e38."""
+
+
+def with_object(scene: Scene, index: int, item: SceneObject) -> Scene:
+    """`scene` with object `index` replaced; what changed is checked, live edits stay cheap."""
+    before = scene.objects[index]
+    if item.name != before.name:
+        item = replace(item, name=_free_name(scene, index, item.name))
+    changed = _replaced(scene, index, item)
+    if type(item.material) is not type(before.material):
+        _check_dabs(item)
+        check_scene(changed, scene.name)
+    elif item.local_dispersion is not before.local_dispersion:
+        _check_dabs(item, item.local_dispersion[_shared(before, item) :])
+    if item.material is not before.material and isinstance(item.material, Dielectric):
+        for light in scene.lights:
+            check_lines(light, [item], scene.name)
+    if item.object_to_world is not before.object_to_world:
+        _check_matrix(item)
+        _check_lights(changed, item)
+    return changed
+
+
+# -- name, number, material -----------------------------------------------------------------
+
+
+def rename(scene: Scene, index: int, name: str) -> Scene:
+    """Give object `index` another name. Raises UserError for one that is empty or taken."""
+    return with_object(scene, index, replace(scene.objects[index], name=name))
+
+
+def duplicate(scene: Scene, index: int) -> Scene:
+    """With a copy of object `index` at the end, beside the original and sharing its mesh."""
+    item = scene.objects[index]
+    copy = replace(item, name=free_name(item.name, [o.name for o in scene.objects]))
+    return _appended(scene, beside(scene, copy))
+
+
+def delete(scene: Scene, index: int) -> Scene:
+    """Without object `index`. Raises UserError for the last one, and for the last that receives light where no environment is seen instead."""
+    rest = scene.objects[:index] + scene.objects[index + 1 :]
+    name = scene.objects[index].name
+    if not rest:
+        raise UserError(f"'{name}' is the only object; add another before deleting it")
+    without = replace(scene, objects=rest)
+    if _shows_nothing(without):
+        raise UserError(f"'{name}' is the only surface that receives light; add another diffuse object or an environment before deleting it")
+    return without
+
+
+def set_material(scene: Scene, index: int, material: Material) -> Scene:
+    """Give object `index` another material; what the dispersion brush painted goes with a diffuse one."""
+    item = scene.objects[index]
+    dabs = item.local_dispersion if isinstance(material, Diffuse) else ()
+    changed = _replaced(scene, index, replace(item, material=material, local_dispersion=dabs))
+    if _shows_nothing(changed):
+        raise UserError(f"'{item.name}' is the only surface that receives light; make another object diffuse or add an environment before changing it")
+    check_scene(changed, scene.name)
+    return changed
+
+
+def set_diffuse_colour(scene: Scene, index: int, rgb: Vec3) -> Scene:
+    """Linear Rec.709 reflectance, 0 to 1, of a diffuse object or a mirror; a spectral reflectance gives way to it, a texture is tinted by it."""
+    item = scene.objects[index]
+    if not all(math.isfinite(c) and 0.0 <= c <= 1.0 for c in rgb):
+        raise UserError(f"'{item.name}': every channel of a reflectance must lie between 0 and 1")
+    colour = (float(rgb[0]), float(rgb[1]), float(rgb[2]))
+    match item.material:
+        case Diffuse():
+            material: Material = Diffuse(colour, texture=item.material.texture)
+        case Mirror():
+            material = Mirror(colour)
+        case _:
+            raise UserError(f"'{item.name}' is neither diffuse nor a mirror and has no colour")
+    return _replaced(scene, index, replace(item, material=material))
+
+
+# -- place ----------------------------------------------------------------------------------
+
+
+def set_transform(scene: Scene, index: int, matrix: np.ndarray) -> Scene:
+    """Place object `index` by its object-to-world matrix (4, 4).
+
+    Raises UserError for one that is not finite or flattens the object, and where a light would end up inside its glass.
+    """
+    placed = np.array(matrix, dtype=np.float64)
+    placed.setflags(write=False)
+    item = replace(scene.objects[index], object_to_world=placed)
+    _check_matrix(item)
+    changed = _replaced(scene, index, item)
+    _check_lights(changed, item)
+    before = scene.objects[index].object_to_world
+    if not np.allclose(np.linalg.norm(before[:3, :3]), np.linalg.norm(placed[:3, :3]), rtol=1e-9):
+        check_scene(changed, scene.name)  # another size may be too different from the others
+    return changed
+
+
+def set_position(scene: Scene, index: int, position: Vec3) -> Scene:
+    """World position of the object's origin, scene units."""
+    return set_transform(scene, index, matrices.with_position(scene.objects[index].object_to_world, position))
+
+
+def set_rotation(scene: Scene, index: int, rotation_deg: Vec3) -> Scene:
+    """Angles about the fixed axes x, then y, then z, degrees."""
+    return set_transform(scene, index, matrices.with_rotation(scene.objects[index].object_to_world, rotation_deg))
+
+
+def set_scale(scene: Scene, index: int, scale: Vec3) -> Scene:
+    """Scale along the object's own axes; negative mirrors, zero is refused."""
+    if not all(math.isfinite(s) and s != 0.0 for s in scale):
+        raise UserError(f"'{scene.objects[index].name}': a scale of 0 would flatten the object; give another number")
+    return set_transform(scene, index, matrices.with_scale(scene.objects[index].object_to_world, scale))
+
+
+# -- the dispersion brush -------------------------------------------------------------------
+
+
+def add_dabs(scene: Scene, index: int, dabs: Sequence[Dab]) -> Scene:
+    """Lay dabs of the dispersion brush on receiver `index`, on top of what is there."""
+    item = scene.objects[index]
+    return with_object(scene, index, replace(item, local_dispersion=item.local_dispersion + tuple(dabs)))
+
+
+def clear_dabs(scene: Scene, index: int | None = None) -> Scene:
+    """Without what was painted on object `index`, or on any (None)."""
+    chosen = range(len(scene.objects)) if index is None else (index,)
+    objects = [replace(o, local_dispersion=()) if i in chosen and o.local_dispersion else o for i, o in enumerate(scene.objects)]
+    return replace(scene, objects=tuple(objects))
+
+
+# -- checks ---------------------------------------------------------------------------------
+
+
+def _free_name(scene: Scene, index: int, name: str) -> str:
+    return checked_name(name, [o.name for i, o in enumerate(scene.objects) if i != index], "object")
+
+
+def _shows_nothing(scene: Scene) -> bool:
+    """Nothing receives light, and there is no environment to be seen (as `check_scene` has it)."""
+    return scene.environment is None and not any(isinstance(o.material, Diffuse) for o in scene.objects)
+
+
+def _replaced(scene: Scene, index: int, item: SceneObject) -> Scene:
+    return replace(scene, objects=(*scene.objects[:index], item, *scene.objects[index + 1 :]))
+
+
+def _appended(scene: Scene, item: SceneObject) -> Scene:
+    changed = replace(scene, objects=(*scene.objects, item))
+    check_scene(changed, scene.name)
+    return changed
+
+
+def _check_matrix(item: SceneObject) -> None:
+    matrix = item.object_to_world
+    if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or np.abs(matrix).max() > MAX_LENGTH:
+        raise UserError(f"'{item.name}': its place holds a number that is not finite or too large; choose another")
+    if not np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0)):
+        raise UserError(f"'{item.name}': its matrix must end in 0, 0, 0, 1")
+    linear = matrix[:3, :3]
+    if abs(np.linalg.det(linear)) <= 1e-12 * np.linalg.norm(linear) ** 3:
+        raise UserError(f"'{item.name}': this place flattens the object; use a scale other than zero on every axis")
+
+
+def _check_lights(scene: Scene, item: SceneObject) -> None:
+    if isinstance(item.material, Dielectric):
+        for light in scene.lights:
+            if light.kind != "directional":
+                check_outside(light, [item], scene.name)
+
+
+def _shared(before: SceneObject, after: SceneObject) -> int:
+    """How many dabs at the beginning are the same ones: a growing stroke is not checked from its start each time."""
+    shared = 0
+    for old, new in zip(before.local_dispersion, after.local_dispersion, strict=False):
+        if old is not new:
+            break
+        shared += 1
+    return shared
+
+
+def _check_dabs(item: SceneObject, dabs: Sequence[Dab] | None = None) -> None:
+    """Raise UserError where dabs (all the object's, if not given) are not what a scene file could hold."""
+    if item.local_dispersion and not isinstance(item.material, Diffuse):
+        raise UserError(f"'{item.name}' is not diffuse: the dispersion brush paints on what receives the caustic")
+    for dab in item.local_dispersion if dabs is None else dabs:
+        if not all(map(math.isfinite, (*dab.position, dab.radius, dab.log2_gain, dab.falloff, dab.erase))):
+            raise UserError(f"'{item.name}': a touch of the brush holds a number that is not finite")
+        if not (0.0 < dab.radius <= MAX_LENGTH and abs(dab.log2_gain) <= MAX_DAB_LOG2):
+            raise UserError(f"'{item.name}': a touch of the brush needs a radius above 0 and a gain within ±{MAX_DAB_LOG2:g} doublings")
+        if not (0.0 <= dab.falloff <= 1.0 and 0.0 <= dab.erase <= 1.0):
+            raise UserError(f"'{item.name}': falloff and eraser of the brush lie between 0 and 1")

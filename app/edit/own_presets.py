@@ -1,0 +1,122 @@
+"""A user's own presets, kept in the config folder as TOML in the words of scene files.
+
+A file that cannot be understood is set aside under another name and told, like the settings.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from ..base.atomic import atomic_output
+from ..base.errors import UserError
+from ..model.io.scene_save import camera_values, light_values, toml_block, toml_key
+from ..model.io.scene_table import SceneTable
+from ..model.scene import Camera, Light, Material
+from ..model.scene_camera import read_camera
+from ..model.scene_describe import describe_material
+from ..model.scene_lights import Surroundings, read_light
+from ..model.scene_materials import read_material
+from .preferences import config_dir
+from .presets import LightPreset, MaterialPreset, ViewPreset
+
+Preset = TypeVar("Preset", MaterialPreset, LightPreset, ViewPreset)
+
+_FILE = "presets.toml"
+_NOWHERE = Surroundings(np.zeros(3), 1.0)
+
+
+@dataclass(frozen=True)
+class OwnPresets:
+    """What the user kept, each list in the order it was kept."""
+
+    materials: tuple[MaterialPreset, ...] = ()
+    lights: tuple[LightPreset, ...] = ()
+    views: tuple[ViewPreset, ...] = ()
+
+    def with_material(self, name: str, material: Material) -> OwnPresets:
+        """With a material kept as `name`, in the place of one of that name."""
+        return replace(self, materials=_put(self.materials, MaterialPreset(_named(name), material)))
+
+    def with_light(self, name: str, light: Light) -> OwnPresets:
+        """With a light kept as `name`."""
+        return replace(self, lights=_put(self.lights, LightPreset(_named(name), None, None, light=light)))
+
+    def with_view(self, name: str, camera: Camera) -> OwnPresets:
+        """With a view kept as `name`."""
+        return replace(self, views=_put(self.views, ViewPreset(_named(name), camera=camera)))
+
+    def without(self, name: str) -> OwnPresets:
+        """Without what is called `name`, of any kind."""
+        materials, lights, views = (
+            tuple(p for p in kept if p.name != name) for kept in (self.materials, self.lights, self.views)
+        )
+        return OwnPresets(materials, lights, views)  # type: ignore[arg-type]
+
+
+def load_own_presets() -> tuple[OwnPresets, str | None]:
+    """What the user kept, and a sentence to show when it could not be read."""
+    try:
+        path = config_dir() / _FILE
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return OwnPresets(), None
+    except (OSError, UserError) as error:
+        return OwnPresets(), f"Your presets cannot be read: {error}."
+    except UnicodeDecodeError as error:
+        return OwnPresets(), _set_aside(path, error)
+    try:
+        return _read(SceneTable(tomllib.loads(text), path)), None
+    except (tomllib.TOMLDecodeError, UserError, RecursionError) as error:
+        return OwnPresets(), _set_aside(path, error)
+
+
+def save_own_presets(presets: OwnPresets) -> None:
+    """Keep `presets`, whole or not at all. Raises UserError when the folder is not writable."""
+    blocks = [toml_block(f"[materials.{toml_key(p.name)}]", describe_material(p.material)) for p in presets.materials]
+    for light in presets.lights:
+        assert light.light is not None
+        blocks.append(toml_block(f"[lights.{toml_key(light.name)}]", light_values(light.light)))
+    for view in presets.views:
+        assert view.camera is not None
+        blocks.append(toml_block(f"[views.{toml_key(view.name)}]", camera_values(view.camera)))
+    with atomic_output(config_dir() / _FILE) as temporary:
+        temporary.write_text("\n".join(blocks), encoding="utf-8")
+
+
+def _read(table: SceneTable) -> OwnPresets:
+    materials = tuple(MaterialPreset(name, read_material(entry)) for name, entry in table.named_tables("materials").items())
+    lights = []
+    for name, entry in table.named_tables("lights").items():
+        lights.append(LightPreset(name, None, None, light=read_light(entry, 0, _NOWHERE)))
+    views = tuple(ViewPreset(name, camera=read_camera(entry, _NOWHERE)) for name, entry in table.named_tables("views").items())
+    table.finish("a file of presets")
+    return OwnPresets(materials, tuple(lights), views)
+
+
+def _put(kept: tuple[Preset, ...], new: Preset) -> tuple[Preset, ...]:
+    if all(p.name != new.name for p in kept):
+        return (*kept, new)
+    return tuple(new if p.name == new.name else p for p in kept)
+
+
+def _named(name: str) -> str:
+    plain = " ".join(name.split())
+    if not plain:
+        raise UserError("the preset needs a name")
+    return plain
+
+
+def _set_aside(path: Path, error: Exception) -> str:
+    aside = path.with_name(f"{path.stem}.broken{path.suffix}")
+    reason = str(error).partition("\n")[0]
+    with suppress(OSError):
+        os.replace(path, aside)
+        return f"Your presets were damaged ({reason}) and are kept as {aside}."
+    return f"Your presets in {path} are damaged ({reason})."

@@ -1,0 +1,145 @@
+"""What a gizmo turns a thing by: its frame in the world, and the thing after that frame was moved, turned or scaled.
+
+Pure functions over objects and lights. A frame is a right-handed orthonormal (4, 4) matrix at the thing's middle. The
+change is worked out in float64 from where the drag began, so nothing drifts and sheared placements stay sheared.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from ..base.errors import UserError
+from ..model.features import world_bounds
+from ..model.scene import (
+    Dielectric,
+    Light,
+    Mirror,
+    Scene,
+    SceneObject,
+    Vec3,
+)
+from . import edits
+from .state import Selection
+
+Operation = Literal["move", "rotate", "scale"]
+LEAST_SCALE = 1e-3
+"""Smallest factor of one drag: a flat thing could not be pulled apart again."""
+
+
+def can_do(scene: Scene, selection: Selection, operation: Operation) -> bool:
+    """Whether an operation means anything for the selection."""
+    if selection.kind == "object":
+        return selection.index < len(scene.objects)
+    if selection.kind != "light" or selection.index >= len(scene.lights):
+        return False
+    light = scene.lights[selection.index]
+    if operation == "move":
+        return light.kind != "directional"
+    if operation == "rotate":
+        return light.kind != "point"
+    return light.kind in ("collimated", "area")
+
+
+def frame_of(scene: Scene, selection: Selection, is_local: bool) -> np.ndarray:
+    """The selection's frame (4, 4): its own axes, or the world's."""
+    frame = np.eye(4)
+    if selection.kind == "light":
+        light = scene.lights[selection.index]
+        frame[:3, 3] = light_place(scene, light)
+        if is_local:
+            frame[:3, :3] = light_axes(light)
+        return frame
+    item = scene.objects[selection.index]
+    frame[:3, 3] = world_bounds(item).mean(axis=0)
+    if is_local:
+        frame[:3, :3] = _nearest_rotation(item.object_to_world[:3, :3])
+    return frame
+
+
+def light_place(scene: Scene, light: Light) -> np.ndarray:
+    """Where a light is drawn: a directional one, which is nowhere, beside what it shines on."""
+    if light.kind != "directional":
+        return np.asarray(light.position, float)
+    chosen = [o for o in scene.objects if isinstance(o.material, Dielectric | Mirror)] or list(scene.objects)
+    bounds = np.stack([world_bounds(item) for item in chosen])
+    low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
+    return 0.5 * (low + high) - 0.9 * float(np.linalg.norm(high - low)) * _unit(np.asarray(light.direction, float))
+
+
+def light_axes(light: Light) -> np.ndarray:
+    """Columns: width, height and propagation direction of a light, right-handed (3, 3)."""
+    axis = _unit(np.asarray(light.direction, float))
+    guide = np.eye(3)[np.argmin(np.abs(axis))] if light.tangent is None else np.asarray(light.tangent, float)
+    first = _unit(guide - axis * (guide @ axis))
+    return np.column_stack([first, np.cross(axis, first), axis])
+
+
+def change(before: np.ndarray, after: np.ndarray, operation: Operation) -> np.ndarray:
+    """World matrix (4, 4) that takes the frame `before` to `after`, of which only the operation's own part counts."""
+    delta = np.eye(4)
+    centre = before[:3, 3]
+    if operation == "move":
+        delta[:3, 3] = after[:3, 3] - centre
+        return delta
+    if operation == "rotate":
+        delta[:3, :3] = _nearest_rotation(after[:3, :3]) @ before[:3, :3].T
+    else:
+        factors = np.maximum(np.linalg.norm(after[:3, :3], axis=0), LEAST_SCALE)
+        delta[:3, :3] = before[:3, :3] @ np.diag(factors) @ before[:3, :3].T
+    delta[:3, 3] = centre - delta[:3, :3] @ centre
+    return delta
+
+
+def changed(scene: Scene, selection: Selection, delta: np.ndarray) -> Scene:
+    """`scene` with the selection moved by a world matrix. Raises `UserError` where the scene may not be so."""
+    if selection.kind == "object":
+        return edits.set_transform(scene, selection.index, delta @ scene.objects[selection.index].object_to_world)
+    if selection.kind != "light":
+        raise UserError("nothing is selected")
+    return edits.set_light(scene, selection.index, moved_light(scene.lights[selection.index], delta))
+
+
+def moved_light(light: Light, delta: np.ndarray) -> Light:
+    """A light after a world matrix: its place, direction, and the size of what it opens with."""
+    linear = delta[:3, :3]
+    axes = light_axes(light)
+    stretched = np.linalg.norm(linear @ axes, axis=0)
+    position = (delta @ np.append(np.asarray(light.position, float), 1.0))[:3]
+    moved = replace(light, position=_vec3(position)) if light.kind != "directional" else light
+    if not np.allclose(linear, np.eye(3), atol=1e-12):
+        moved = replace(moved, direction=_vec3(_unit(linear @ axes[:, 2])))
+        if light.tangent is not None or light.shape == "rectangle":
+            moved = replace(moved, tangent=_vec3(_unit(linear @ axes[:, 0])))
+    if light.kind not in ("collimated", "area"):
+        return moved
+    # A disc stays round: whichever of its two directions was pulled counts.
+    across = stretched[:2][np.argmax(np.abs(np.log(stretched[:2])))]
+    return replace(
+        moved, radius=light.radius * float(across), width=light.width * float(stretched[0]), height=light.height * float(stretched[1])
+    )
+
+
+def name_of(scene: Scene, selection: Selection) -> str:
+    """What the selection is called."""
+    things: tuple[SceneObject, ...] | tuple[Light, ...] = scene.objects if selection.kind == "object" else scene.lights
+    return things[selection.index].name
+
+
+def _nearest_rotation(linear: np.ndarray) -> np.ndarray:
+    left, _, right = np.linalg.svd(linear)
+    rotation = left @ right
+    if np.linalg.det(rotation) < 0.0:
+        rotation[:, 2] *= -1.0
+    return rotation
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)
+
+
+def _vec3(values: np.ndarray) -> Vec3:
+    x, y, z = (float(v) for v in values)
+    return (x, y, z)

@@ -1,0 +1,131 @@
+"""What is remembered between sessions, in one JSON file of the user's config folder.
+
+The folder is the platform's own, or the one that SPECTRASPLAT_CONFIG names (tests do).
+A file that cannot be read is set aside under another name and told, never fatal and never
+silently lost; a folder that cannot be written costs only the remembering.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import msgspec
+import platformdirs
+
+from ..base.atomic import atomic_output
+from ..base.errors import UserError
+from .state import Preferences
+
+ENVIRONMENT = "SPECTRASPLAT_CONFIG"
+MAX_RECENT = 10
+_FILE = "settings.json"
+_SCALES = (0.5, 4.0)
+_PHOTONS = (10_000, 10**12)
+
+
+@dataclass(frozen=True)
+class WindowPlace:
+    """Where the window was, in screen coordinates; None lets the system choose."""
+
+    position: tuple[int, int] | None = None
+    size: tuple[int, int] = (1440, 900)
+    maximised: bool = False
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Everything remembered."""
+
+    preferences: Preferences = field(default_factory=Preferences)
+    recent: tuple[Path, ...] = ()
+    """Files opened or saved, the last one first; some may be gone."""
+    window: WindowPlace = field(default_factory=WindowPlace)
+
+    def opened(self, path: Path) -> Settings:
+        """With `path` the most recent file."""
+        path = Path(os.path.abspath(path))
+        others = tuple(p for p in self.recent if p != path)
+        return replace(self, recent=(path, *others)[:MAX_RECENT])
+
+    def existing_recent(self) -> tuple[Path, ...]:
+        """Recent files that are still there."""
+        return tuple(p for p in self.recent if _is_file(p))
+
+
+def config_dir() -> Path:
+    """The user's settings folder, created on demand. Raises UserError when it cannot be."""
+    given = os.environ.get(ENVIRONMENT)
+    path = Path(given) if given else Path(platformdirs.user_config_dir("spectrasplat", appauthor=False))
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        remedy = f"make it writable or set {ENVIRONMENT} to another folder"
+        raise UserError(f"the settings folder {path} cannot be made: {error.strerror}; {remedy}") from error
+    return path
+
+
+def layout_file() -> Path:
+    """Where Dear ImGui keeps the places of its windows (its `imgui.ini`)."""
+    return config_dir() / "layout.ini"
+
+
+def load_settings() -> tuple[Settings, str | None]:
+    """What was remembered, and a sentence to show when it could not be read."""
+    try:
+        path = config_dir() / _FILE
+    except UserError as error:
+        return Settings(), f"Settings are not remembered: {error}."
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        return Settings(), None
+    except OSError as error:
+        return Settings(), f"The settings in {path} cannot be read ({error.strerror}); those of a new installation are used."
+    try:
+        settings = msgspec.json.decode(data, type=Settings, dec_hook=_decode_path)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        return Settings(), _set_aside(path, error)
+    return _sound(settings), None
+
+
+def save_settings(settings: Settings) -> None:
+    """Remember `settings`, whole or not at all. Raises UserError when the folder is not writable."""
+    content = msgspec.json.format(msgspec.json.encode(settings, enc_hook=os.fspath))
+    with atomic_output(config_dir() / _FILE) as temporary:
+        temporary.write_bytes(content)
+
+
+def _decode_path(kind: type, value: object) -> Path:
+    if kind is Path and isinstance(value, str):
+        return Path(value)
+    raise NotImplementedError(f"{kind} in the settings")
+
+
+def _sound(settings: Settings) -> Settings:
+    """Values that would make the interface unusable are brought back into range."""
+    given = settings.preferences
+    scale = min(max(given.ui_scale, _SCALES[0]), _SCALES[1])
+    photons = min(max(given.target_photons, _PHOTONS[0]), _PHOTONS[1])
+    width, height = settings.window.size
+    window = replace(settings.window, size=(max(width, 320), max(height, 240)))
+    preferences = replace(given, ui_scale=scale, target_photons=photons)
+    return replace(settings, preferences=preferences, window=window, recent=settings.recent[:MAX_RECENT])
+
+
+def _set_aside(path: Path, error: Exception) -> str:
+    aside = path.with_name(f"{path.stem}.broken{path.suffix}")
+    reason = str(error).partition("\n")[0]
+    with suppress(OSError):
+        os.replace(path, aside)
+        return f"The settings were damaged ({reason}) and are kept as {aside}; those of a new installation are used."
+    return f"The settings in {path} are damaged ({reason}); those of a new installation are used."
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:
+        return False

@@ -1,0 +1,180 @@
+"""Ready-made glasses, lights and views: what a user reaches for first, as data.
+
+A preset of a light changes its spectrum and keeps place, kind and brightness; one of a view looks at
+the objects from a side and keeps the lens. Users' own presets live in `own_presets`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from ..model.optics import catalogue
+from ..model.scene import (
+    Camera,
+    Dielectric,
+    Light,
+    Material,
+    Scene,
+    Vec3,
+)
+from ..model.scene_defaults import SUN_DIAMETER_DEG, surroundings_of
+from .adding import up_frame
+from .lights import SpectrumKind, light_power, set_light, set_light_power, set_light_spectrum
+from .objects import set_material
+
+
+@dataclass(frozen=True)
+class MaterialPreset:
+    """A material by name."""
+
+    name: str
+    material: Material
+    remark: str = ""
+    """One line for the tooltip."""
+
+
+@dataclass(frozen=True)
+class LightPreset:
+    """A spectrum by name, as `edits.set_light_spectrum` takes it; or all of a user's light."""
+
+    name: str
+    kind: SpectrumKind | None
+    """None: `light` says it."""
+    value: str | float | Path | tuple[tuple[float, float], ...] | None
+    remark: str = ""
+    angular_diameter_deg: float | None = None
+    """Of directional lights; None keeps it."""
+    light: Light | None = None
+    """A user's light: all but name and place is taken over."""
+
+
+@dataclass(frozen=True)
+class ViewPreset:
+    """A side to look from, in a z-up world whose front is −y; or a user's camera."""
+
+    name: str
+    toward_camera: Vec3 = (0.0, -1.0, 0.0)
+    up: Vec3 = (0.0, 0.0, 1.0)
+    camera: Camera | None = None
+    """A user's view, taken over as it is."""
+
+
+_GLASSES = (
+    ("Crown", "Schott N-BK7", "Borosilicate crown, the glass of most lenses: n_d 1.517, V_d 64"),
+    ("Window glass", "soda-lime glass", "Soda-lime glass: n_d 1.523, V_d 64"),
+    ("Low dispersion", "Schott N-FK51A", "Fluor crown, almost no colour: n_d 1.487, V_d 84"),
+    ("Light flint", "Schott LLF1", "n_d 1.548, V_d 46"),
+    ("Flint", "Schott F2", "The classic prism: n_d 1.620, V_d 36"),
+    ("Dense flint", "Schott N-SF11", "Wide spectra: n_d 1.785, V_d 26"),
+    ("Very dense flint", "Schott N-SF66", "Among the most dispersive glasses: n_d 1.923, V_d 21"),
+    ("Fused silica", "fused silica", "n_d 1.458, V_d 68"),
+    ("Acrylic", "PMMA", "Plexiglas: n_d 1.491, V_d 53"),
+    ("Polycarbonate", "polycarbonate", "A plastic with much colour: n_d 1.585, V_d 28"),
+    ("Water", "water", "At 20 °C: n_d 1.333, V_d 56"),
+    ("Ice", "ice", "n_d 1.310"),
+    ("Quartz", "quartz (ordinary)", "Rock crystal, ordinary ray: n_d 1.544, V_d 70"),
+    ("Sapphire", "sapphire (ordinary)", "Ruby and sapphire, ordinary ray: n_d 1.768, V_d 72"),
+    ("Cubic zirconia", "cubic zirconia", "Diamond's imitation, with more fire: n_d 2.159, V_d 34"),
+    ("Diamond", "diamond", "n_d 2.417, V_d 55"),
+    ("Moissanite", "moissanite (ordinary)", "More than twice the fire of diamond: n_d 2.648, V_d 26"),
+)
+
+_MERCURY = ((404.656, 11.0), (435.833, 20.2), (546.074, 24.5), (576.960, 10.0), (579.066, 10.0))
+"""Watts by line of a medium-pressure lamp, after Calvert and Pitts, Photochemistry, Wiley 1966; the yellow pair shared evenly."""
+
+_LIGHTS = (
+    LightPreset("Daylight", "illuminant", "D65", "CIE D65, average daylight of 6500 K"),
+    LightPreset("Sun", "blackbody", 5772.0, "A black body of 5772 K; a directional light becomes as wide as the sun, 0.53°", SUN_DIAMETER_DEG),
+    LightPreset("Equal energy", "illuminant", "E", "As much power at every wavelength"),
+    LightPreset("Candle", "blackbody", 1900.0, "A black body of 1900 K"),
+    LightPreset("Tungsten", "illuminant", "A", "CIE A, a bulb of 2856 K"),
+    LightPreset("Halogen", "blackbody", 3200.0, "A black body of 3200 K, studio tungsten"),
+    LightPreset("White LED", "illuminant", "LED-B3", "CIE LED-B3, a phosphor LED of 4100 K"),
+    LightPreset("RGB LED", "illuminant", "LED-RGB1", "CIE LED-RGB1, three coloured LEDs mixed to white"),
+    LightPreset("Fluorescent tube", "illuminant", "FL11", "CIE F11, narrow bands of 4000 K"),
+    LightPreset("Sodium street lamp", "illuminant", "HP1", "CIE HP1, high-pressure sodium"),
+    LightPreset("Mercury lamp", "lines", _MERCURY, "Lines at 405, 436, 546, 577 and 579 nm"),
+    LightPreset("Sodium lamp", "lines", ((588.995, 2.0), (589.592, 1.0)), "The yellow pair at 589.0 and 589.6 nm, low pressure"),
+    LightPreset("Fraunhofer F, d, C", "lines", ((486.1327, 1.0), (587.5618, 1.0), (656.2725, 1.0)), "The three lines that define V_d, equally strong"),
+    LightPreset("RGB lasers", "lines", ((450.0, 1.0), (532.0, 1.0), (638.0, 1.0)), "Lines at 450, 532 and 638 nm, equally strong"),
+    LightPreset("Blue laser", "laser", 450.0, "One line at 450 nm"),
+    LightPreset("Green laser", "laser", 532.0, "One line at 532 nm"),
+    LightPreset("Red laser", "laser", 632.8, "Helium and neon, one line at 632.8 nm"),
+)  # fmt: skip
+
+_DIAGONAL = (0.45, -0.75, 0.5)
+_VIEWS = (
+    ViewPreset("Front", (0.0, -1.0, 0.0)),
+    ViewPreset("Back", (0.0, 1.0, 0.0)),
+    ViewPreset("Left", (-1.0, 0.0, 0.0)),
+    ViewPreset("Right", (1.0, 0.0, 0.0)),
+    ViewPreset("Top", (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
+    ViewPreset("Bottom", (0.0, 0.0, -1.0), (0.0, -1.0, 0.0)),
+    ViewPreset("Corner", _DIAGONAL),
+)
+
+
+@cache
+def material_presets() -> tuple[MaterialPreset, ...]:
+    """Glasses from the catalogue, by what people call them, least refracting families first."""
+    return tuple(MaterialPreset(name, Dielectric(catalogue.find(glass)), remark) for name, glass, remark in _GLASSES)
+
+
+def light_presets() -> tuple[LightPreset, ...]:
+    """Spectra of lamps and lasers."""
+    return _LIGHTS
+
+
+def view_presets() -> tuple[ViewPreset, ...]:
+    """Sides to look from."""
+    return _VIEWS
+
+
+def apply_material(scene: Scene, index: int, preset: MaterialPreset) -> Scene:
+    """Give object `index` the preset's material; a glass keeps the priority among overlapping solids it had."""
+    before, material = scene.objects[index].material, preset.material
+    if isinstance(before, Dielectric) and isinstance(material, Dielectric):
+        material = replace(material, priority=before.priority)
+    return set_material(scene, index, material)
+
+
+def apply_light(scene: Scene, index: int, preset: LightPreset) -> Scene:
+    """Give light `index` the preset's spectrum at the brightness it had; a user's light brings kind, shape and power too."""
+    light = scene.lights[index]
+    if preset.light is not None:
+        placed = replace(preset.light, name=light.name, position=light.position, direction=light.direction, tangent=light.tangent)
+        return set_light(scene, index, placed)
+    assert preset.kind is not None and preset.value is not None
+    changed = set_light_spectrum(scene, index, preset.kind, preset.value)
+    if preset.angular_diameter_deg is not None and light.kind == "directional":
+        wide = replace(changed.lights[index], angular_diameter_deg=preset.angular_diameter_deg)
+        changed = set_light_power(set_light(changed, index, wide), index, light_power(light))
+    return changed
+
+
+def view_camera(scene: Scene, camera: Camera, preset: ViewPreset) -> Camera:
+    """The camera that shows the objects from the preset's side, with the lens of `camera`."""
+    if preset.camera is not None:
+        return preset.camera
+    frame, around = up_frame(scene), surroundings_of(scene.objects)
+    reach = 1.8 * around.radius  # the caustic beside the objects is in the picture too
+    if camera.kind == "pinhole":
+        distance = reach / math.sin(math.radians(0.5 * camera.vertical_fov_deg))
+    else:
+        distance = 6.0 * around.radius
+    away = frame @ np.array(preset.toward_camera)
+    away = away / np.linalg.norm(away)
+    target = _vec3(around.centre)
+    return replace(
+        camera, position=_vec3(around.centre + distance * away), target=target, up=_vec3(frame @ preset.up), vertical_extent=2.0 * reach
+    )
+
+
+def _vec3(vector: np.ndarray) -> Vec3:
+    x, y, z = (float(v) + 0.0 for v in vector)
+    return x, y, z

@@ -1,0 +1,165 @@
+"""Everything the interface shows and edits, as one frozen value.
+
+Panels are functions `draw(state, facts) -> state`. They return a changed copy and know neither
+OpenGL nor the renderer. The difference of two states decides what is redone: `live_inputs` names the
+part that the picture depends on, `scene` is what undo and saving cover.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from ..model.scene import Camera, Material, Scene
+from ..render.viewer.inputs import LiveInputs
+from .requests import Pull, Request
+
+Tool = Literal["select", "move", "rotate", "scale", "brush", "pull"]
+ToneCurve = Literal["spectrasplat", "aces", "reinhard", "linear"]
+
+
+@dataclass(frozen=True)
+class Selection:
+    """An object or a light by its index; nothing when `kind` is None."""
+
+    kind: Literal["object", "light"] | None = None
+    index: int = 0
+
+
+@dataclass(frozen=True)
+class Display:
+    """How linear light becomes pixels; never touches the light itself."""
+
+    exposure_ev: float = 0.0
+    auto_exposure: bool = True
+    """Follow the picture until the user sets an exposure."""
+    tone: ToneCurve = "spectrasplat"
+    false_colour: bool = False
+    """Luminance on a logarithmic colour scale."""
+    false_colour_stops: tuple[float, float] = (-8.0, 4.0)
+    """Ends of that scale, stops about display white."""
+    magnifier: bool = False
+    ray_overlay: bool = False
+    ray_count: int = 5
+    ray_wavelengths: int = 9
+
+
+@dataclass(frozen=True)
+class Brush:
+    """The dispersion brush."""
+
+    mode: Literal["widen", "narrow", "erase"] = "widen"
+    radius: float = 0.05
+    """Scene units."""
+    strength: float = 0.5
+    """Doublings of the gain a second under a still cursor; share taken away for the eraser."""
+    falloff: float = 0.7
+
+
+@dataclass(frozen=True)
+class Compare:
+    """A/B with a reference or another method."""
+
+    mode: Literal["off", "hold", "wipe", "error"] = "off"
+    method: str = "reference"
+    """"reference", or one of `METHODS`, run on its own in the time left over."""
+    wipe: float = 0.5
+    """Place of the wipe's line, share of the width."""
+    plot: bool = False
+    """Error against time of the running method and the chosen other."""
+    holding: bool = False
+    """The compare key is down."""
+
+
+@dataclass(frozen=True)
+class Panels:
+    """Which windows are open."""
+
+    outliner: bool = True
+    inspector: bool = True
+    dispersion: bool = True
+    view: bool = True
+    timing: bool = True
+    brush: bool = False
+    abbe: bool = False
+    spectrum: bool = True
+    compare: bool = False
+    history: bool = False
+    shortcuts: bool = False
+    start_page: bool = False
+    export: bool = False
+    about: bool = False
+
+
+@dataclass(frozen=True)
+class Preferences:
+    """Remembered between sessions."""
+
+    theme: Literal["dark", "light"] = "dark"
+    ui_scale: float = 1.0
+    target_photons: int = 32_000_000
+    refine_when_still: bool = True
+    """Trace again with the new glass once the interface is still, after an edit that was only splatted again."""
+    panels: Panels = Panels()
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of the animation: parameter `path` (see `animation.py`) has `value` at `time_s`."""
+
+    time_s: float
+    path: str
+    value: float
+
+
+@dataclass(frozen=True)
+class State:
+    """The interface."""
+
+    scene: Scene
+    camera: Camera
+    views: tuple[Camera | None, ...] = (None,) * 9
+    """Numbered views, keys 1 to 9."""
+    selection: Selection = Selection()
+    tool: Tool = "select"
+    display: Display = Display()
+    brush: Brush = Brush()
+    compare: Compare = Compare()
+    preferences: Preferences = Preferences()
+    method: str = "srd"
+    smoothing: float = 0.45
+    solo_nm: float | None = None
+    physical: bool = False
+    """Leave the brush's local gain out, to compare with the physical picture."""
+    playing: bool = True
+    """Photons accumulate."""
+    viewport_size: tuple[int, int] = (960, 540)
+    """Pixels of the picture."""
+    hover: tuple[float, float] | None = None
+    """Where the cursor is over the picture, 0..1 from the top left; the viewport sets it in every frame."""
+    clipboard: Material | None = None
+    pull: Pull | None = None
+    animation: tuple[Key, ...] = ()
+    interacting: bool = False
+    """Something is being dragged: answer quickly, refine later, and keep undo steps together."""
+    edit_label: str = ""
+    """What the last change of `scene` is called in the undo menu ("Move prism"); same label while dragging is one step."""
+    requests: tuple[Request, ...] = ()
+
+    def edited(self, scene: Scene, label: str) -> State:
+        """With another scene, undone as `label`."""
+        return replace(self, scene=scene, edit_label=label)
+
+    def asking(self, *requests: Request) -> State:
+        """With more requests."""
+        return replace(self, requests=self.requests + requests)
+
+    def with_panels(self, **changes: bool) -> State:
+        """With windows opened or closed."""
+        return replace(self, preferences=replace(self.preferences, panels=replace(self.preferences.panels, **changes)))
+
+    @property
+    def live_inputs(self) -> LiveInputs:
+        """What the picture depends on."""
+        width, height = self.viewport_size
+        return LiveInputs(self.scene, self.camera, width, height, self.method, self.smoothing, self.solo_nm, not self.physical)

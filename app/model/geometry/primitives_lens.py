@@ -1,0 +1,173 @@
+"""Lenses by radii, thickness and diameter, with exact normals, a sharp rim and optional conic surfaces.
+
+Sign convention of optics: light travels along +z, a radius is positive when its centre of
+curvature lies towards +z (Born & Wolf, Principles of Optics, §4.4). Each surface is a disc
+of hexagonal rings spaced evenly along its arc, so its tessellation depends on nothing but
+the surface and the ring count: the cemented faces of a doublet coincide vertex by vertex.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...base.errors import UserError
+from .mesh import Mesh, make_mesh, normalised
+from .primitives_check import count, positive
+
+
+def lens(
+    radius1: float = 1.0,
+    radius2: float = -1.0,
+    thickness: float = 0.3,
+    diameter: float = 1.0,
+    triangles: int = 20_000,
+    conic1: float = 0.0,
+    conic2: float = 0.0,
+    name: str = "lens",
+) -> Mesh:
+    """A lens on the z axis, its centre (half way between the vertices) at the origin.
+
+    `radius1` and `radius2` are the signed radii of the first and second surface (infinite
+    = plane), `conic1` and `conic2` their conic constants (0 sphere, -1 paraboloid). Raises
+    UserError when a surface does not reach the rim or the two cross.
+    """
+    half = 0.5 * positive("lens", "thickness", thickness)
+    rings = _ring_count("lens", triangles)
+    return _lens_between(name, (-half, radius1, conic1), (half, radius2, conic2), diameter, rings)
+
+
+def doublet(
+    radius1: float,
+    radius2: float,
+    radius3: float,
+    thickness1: float,
+    thickness2: float,
+    diameter: float,
+    triangles: int = 40_000,
+    names: tuple[str, str] = ("doublet front", "doublet back"),
+) -> tuple[Mesh, Mesh]:
+    """Two cemented lenses on the z axis, the common vertex at the origin.
+
+    The cemented surface of both has the same vertices to the last bit, and the same
+    triangles turned round, so that no gap and no overlap lies between the glasses.
+    """
+    rings = _ring_count("doublet", count("doublet", "triangles", triangles, 96) // 2)
+    front = -positive("doublet", "thickness1", thickness1)
+    back = positive("doublet", "thickness2", thickness2)
+    return (
+        _lens_between(names[0], (front, radius1, 0.0), (0.0, radius2, 0.0), diameter, rings),
+        _lens_between(names[1], (0.0, radius2, 0.0), (back, radius3, 0.0), diameter, rings),
+    )
+
+
+def _ring_count(shape: str, triangles: int) -> int:
+    # Two caps of 6 k² and a rim of 12 k.
+    return max(1, round(math.sqrt(count(shape, "triangles", triangles, 24) / 12.0 + 0.25) - 0.5))
+
+
+def _lens_between(
+    name: str, first: tuple[float, float, float], second: tuple[float, float, float], diameter: float, rings: int
+) -> Mesh:
+    """The solid between two surfaces, each (vertex z, signed radius, conic constant)."""
+    aperture = 0.5 * positive(name, "diameter", diameter)
+    for number, (_, radius, conic) in enumerate((first, second), start=1):
+        _check_surface(name, number, radius, conic, aperture)
+    radial, faces, direction = _hexagonal_disc(rings)
+    caps = []
+    for vertex_z, radius, conic in (first, second):
+        r = _even_arc(radius, conic, aperture, rings)
+        sag, slope = _sag(r, radius, conic)
+        points = np.column_stack([r[radial][:, None] * direction, vertex_z + sag[radial]])
+        normals = normalised(np.column_stack([-slope[radial][:, None] * direction, np.ones(len(radial))]))
+        caps.append((points, normals))
+    (front, front_normals), (back, back_normals) = caps
+    _check_thickness(name, first, second, aperture)
+
+    size = len(radial)
+    rim = np.arange(size - 6 * rings, size)
+    knife_edge = bool((back[rim, 2] - front[rim, 2] <= 1e-12 * aperture).all())
+    upper = np.arange(size) + size
+    if knife_edge:
+        upper[rim] = rim
+    triangles = [faces[:, ::-1], upper[faces]]
+    corner_normals = [-front_normals[faces[:, ::-1]], back_normals[faces]]
+    if not knife_edge:
+        following = np.roll(rim, -1)
+        radial_normal = np.column_stack([direction, np.zeros(size)])
+        for a, b, c in ((rim, following, following + size), (rim, following + size, rim + size)):
+            triangles.append(np.stack([a, b, c], axis=1))
+            corner_normals.append(np.stack([radial_normal[k % size] for k in (a, b, c)], axis=1))
+    vertices = np.concatenate([front, back[: size - 6 * rings] if knife_edge else back])
+    return make_mesh(name, vertices, np.concatenate(triangles), np.concatenate(corner_normals))
+
+
+def _check_surface(name: str, number: int, radius: float, conic: float, aperture: float) -> None:
+    if math.isnan(radius) or radius == 0.0:
+        raise UserError(f"{name}: radius{number} must not be {radius:g}; use inf for a plane")
+    if not math.isfinite(conic):
+        raise UserError(f"{name}: conic{number} must be a finite number, not {conic:g}")
+    if math.isfinite(radius) and (1.0 + conic) * (aperture / radius) ** 2 > 1.0 + 1e-12:
+        reach = 2.0 * abs(radius) / math.sqrt(1.0 + conic)
+        raise UserError(
+            f"{name}: surface {number} (radius{number} = {radius:g}) reaches a diameter of {reach:g} only; "
+            f"make the diameter smaller or the radius larger"
+        )
+
+
+def _check_thickness(
+    name: str, first: tuple[float, float, float], second: tuple[float, float, float], aperture: float
+) -> None:
+    r = aperture * np.linspace(0.0, 1.0, 257)
+    gap = (second[0] + _sag(r, *second[1:])[0]) - (first[0] + _sag(r, *first[1:])[0])
+    thinnest = int(np.argmin(gap))
+    if gap[thinnest] < -1e-12 * aperture or (gap[thinnest] <= 1e-12 * aperture and thinnest != len(r) - 1):
+        raise UserError(
+            f"{name}: the surfaces cross at {2.0 * r[thinnest]:g} of the diameter {2.0 * aperture:g} "
+            f"(thickness there {gap[thinnest]:.4g}); make it thicker, smaller or less curved"
+        )
+
+
+def _sag(r: np.ndarray, radius: float, conic: float) -> tuple[np.ndarray, np.ndarray]:
+    """Height of a conic surface above its vertex and its slope dz/dr at distance `r` from the axis."""
+    curvature = 0.0 if math.isinf(radius) else 1.0 / radius
+    root = np.sqrt(np.maximum(0.0, 1.0 - (1.0 + conic) * (curvature * r) ** 2))
+    # A hemisphere's rim is vertical: its slope is bounded so that normals stay finite.
+    return curvature * r * r / (1.0 + root), curvature * r / np.maximum(root, 1e-12)
+
+
+def _even_arc(radius: float, conic: float, aperture: float, rings: int) -> np.ndarray:
+    """Radii of the rings 0 … `rings`, evenly spaced along the meridian, float64 (rings + 1,)."""
+    # Sampled in sin t, so that the steep end of a hemisphere is resolved.
+    r = aperture * np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, 16 * rings + 257))
+    sag, _ = _sag(r, radius, conic)
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(r), np.diff(sag)))])
+    even = np.interp(np.linspace(0.0, arc[-1], rings + 1), arc, r)
+    even[-1] = aperture
+    return even
+
+
+def _hexagonal_disc(rings: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Ring number (V,), triangles (6 rings², 3) counter-clockwise from +z, and directions (V, 2).
+
+    Ring k has 6 k vertices after the central one.
+    """
+    ring = np.concatenate([[0], np.repeat(np.arange(1, rings + 1), 6 * np.arange(1, rings + 1))])
+    first = np.concatenate([[0], 1 + 3 * np.arange(rings) * np.arange(1, rings + 1)])
+    place = np.arange(len(ring)) - first[ring]
+    angle = 2.0 * np.pi * place / np.maximum(6 * ring, 1)
+    direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    direction[0] = 0.0
+    triangles = []
+    for k in range(1, rings + 1):
+        sector, i = (g.ravel() for g in np.meshgrid(np.arange(6), np.arange(k), indexing="ij"))
+        outer = first[k] + (sector * k + i) % (6 * k)
+        outer_next = first[k] + (sector * k + i + 1) % (6 * k)
+        inner_size = max(6 * (k - 1), 1)
+        inner = first[k - 1] + (sector * (k - 1) + i) % inner_size
+        triangles.append(np.stack([outer, outer_next, inner], axis=1))
+        between = i < k - 1
+        inner_next = first[k - 1] + (sector * (k - 1) + i + 1) % inner_size
+        triangles.append(np.stack([outer_next, inner_next, inner], axis=1)[between])
+    return ring, np.concatenate(triangles), direction

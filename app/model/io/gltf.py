@@ -1,0 +1,386 @@
+"""Opens a .glb or .gltf file directly as a scene: geometry, transforms, camera, lights and glass.
+
+Coordinates stay as they are (y is up, one unit is one metre), but for those of textures, which run down in glTF. What the file lacks is fitted
+to its bounds and said in `Scene.notes`, and so is everything that is passed over.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ...base.errors import UserError
+from ..geometry.mesh import Mesh, make_mesh
+from ..geometry.mesh_health import examine, repair
+from ..scene import (
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Material,
+    Scene,
+    SceneObject,
+)
+from ..scene_defaults import default_camera, default_light, default_table, surroundings_of
+from ..scene_lights import Surroundings, read_light
+from .gltf_document import GltfDocument, open_document
+from .gltf_extras import read_node_dabs, read_scene_extras
+from .gltf_materials import (
+    DISPERSION,
+    EXTRAS,
+    IOR,
+    TRANSMISSION,
+    VOLUME,
+    read_gltf_material,
+)
+from .gltf_textures import GltfTextures, turned_over
+from .scene_table import SceneTable
+
+LIGHTS = "KHR_lights_punctual"
+UNDERSTOOD = frozenset({LIGHTS, TRANSMISSION, VOLUME, IOR, DISPERSION, "KHR_mesh_quantization"})
+_CAN_BE_LEFT_OUT = ("KHR_texture_", "KHR_materials_", "EXT_texture_", "KHR_xmp", "MSFT_", "EXT_lights_image_based")
+Y_UP_TO_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
+_DEFAULT_DISTANCE = 1.0
+
+
+@dataclass
+class Origins:
+    """Where in the document each part of the scene came from; names are unique."""
+
+    world: dict[int, np.ndarray] = field(default_factory=dict)
+    """Node -> world matrix."""
+    objects: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """Object -> (node, primitive of the node's mesh)."""
+    lights: dict[str, int] = field(default_factory=dict)
+    """Light -> node."""
+    camera: int | None = None
+    textures: dict[str, int] = field(default_factory=dict)
+    """Content of a texture (`gltf_textures.texture_key`) -> its number."""
+
+
+def load_gltf(path: str | os.PathLike[str]) -> Scene:
+    """The scene in a glTF file. Raises UserError for files that are truncated, contradictory or need
+    extensions this program lacks."""
+    return read_scene(open_document(path))[0]
+
+
+def read_scene(document: GltfDocument) -> tuple[Scene, Origins]:
+    """The scene and where its parts lie in the document."""
+    try:
+        return _Reader(document).read()
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+        # The document breaks glTF's schema somewhere we had no sentence of its own for.
+        reason = f"{type(error).__name__}: {error}".partition("\n")[0][:80]
+        raise document.fail(f"the file does not follow glTF 2.0 ({reason}); export it again") from error
+
+
+class _Reader:
+    def __init__(self, document: GltfDocument) -> None:
+        self.document = document
+        self.notes: list[str] = []
+        self.origins = Origins()
+        self.objects: list[SceneObject] = []
+        self.lights: list[tuple[int, dict[str, Any], np.ndarray]] = []
+        self.camera: Camera | None = None
+        self._meshes: dict[str, Mesh | None] = {}
+        self._materials: dict[int | None, Material] = {}
+        self._textures = GltfTextures(document, self.notes)
+        self.origins.textures = self._textures.numbers
+        self._names: set[str] = set()
+
+    def read(self) -> tuple[Scene, Origins]:
+        self._check_extensions()
+        for index, world in self._nodes():
+            self._node(index, world)
+        if not self.objects:
+            raise self.document.fail("the file holds no triangles; check that the scene was exported")
+        if self.document.items("animations") or self.document.items("skins"):
+            self.notes.append("Animations and skins are not played (they are kept when saving).")
+        upright = [replace(o, object_to_world=Y_UP_TO_Z_UP @ o.object_to_world) for o in self.objects]
+        around = surroundings_of(upright)
+        background, environment, render = read_scene_extras(self.document, self.notes)
+        receives = any(isinstance(o.material, Diffuse) for o in self.objects)
+        # An environment shows glass and mirrors without a light and without anything it falls on.
+        if environment is None and not receives:
+            table = default_table(upright)
+            matrix = Y_UP_TO_Z_UP.T @ table.object_to_world
+            self.objects.append(replace(table, name=self._unique("table"), object_to_world=matrix))
+            self.notes.append("Nothing diffuse in the file: a light-grey table was put below the objects.")
+        lights = self._read_lights(Surroundings(Y_UP_TO_Z_UP[:3, :3].T @ around.centre, around.radius))
+        if not lights and (environment is None or receives):
+            sun = default_light()
+            lights = (replace(sun, name=self._unique(sun.name), direction=_turned(sun.direction)),)
+            self.notes.append("No light in the file: a white sun from behind on the left was added.")
+        camera = self.camera
+        if camera is None:
+            fitted = default_camera(around)
+            camera = replace(
+                fitted, position=_turned(fitted.position), target=_turned(fitted.target), up=(0.0, 1.0, 0.0)
+            )
+            self.notes.append("No camera in the file: one that sees the objects was added.")
+        name = self.document.path.stem
+        notes = tuple(dict.fromkeys(self.notes))
+        return Scene(name, camera, lights, tuple(self.objects), background, environment, render, notes), self.origins
+
+    # -- structure ------------------------------------------------------------------------
+
+    def _check_extensions(self) -> None:
+        required = self.document.json.get("extensionsRequired", [])
+        for name in required:
+            if name not in UNDERSTOOD and not str(name).startswith(_CAN_BE_LEFT_OUT):
+                raise self.document.fail(f"needs the extension {name}, which is not supported; export it without")
+        unknown = sorted(set(map(str, self.document.json.get("extensionsUsed", []))) - UNDERSTOOD)
+        if unknown:
+            self.notes.append(f"Not understood and left aside (kept when saving): {', '.join(unknown)}.")
+
+    def _nodes(self) -> Iterator[tuple[int, np.ndarray]]:
+        """Nodes of the default scene with their world matrices, parents first."""
+        nodes = self.document.items("nodes")
+        if self.document.items("scenes"):
+            roots = self.document.item("scenes", self.document.json.get("scene", 0)).get("nodes", [])
+        else:
+            children = {child for node in nodes for child in node.get("children", [])}
+            roots = [index for index in range(len(nodes)) if index not in children]
+        stack = [(root, np.eye(4)) for root in reversed(roots)]
+        seen: set[int] = set()
+        while stack:
+            index, parent = stack.pop()
+            node = self.document.item("nodes", index)
+            if index in seen:
+                raise self.document.fail(f"nodes[{index}] has two parents or is its own ancestor; export the file again")
+            seen.add(index)
+            world = parent @ self._local(node, index)
+            yield index, world
+            stack += [(child, world) for child in reversed(node.get("children", []))]
+
+    def _local(self, node: dict[str, Any], index: int) -> np.ndarray:
+        if "matrix" in node:
+            matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T  # stored column by column
+        else:
+            matrix = np.eye(4)
+            matrix[:3, :3] = _rotation(node.get("rotation", (0, 0, 0, 1))) * np.array(node.get("scale", (1, 1, 1)), float)
+            matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
+        if not np.isfinite(matrix).all():
+            raise self.document.fail(f"nodes[{index}] has a transform that is not finite; export the file again")
+        return matrix
+
+    def _node(self, index: int, world: np.ndarray) -> None:
+        node = self.document.item("nodes", index)
+        self.origins.world[index] = world
+        if "mesh" in node:
+            self._place(index, node, world)
+        if "camera" in node and self.camera is None:
+            self.camera = self._camera(node, world)
+            self.origins.camera = index
+        light = node.get("extensions", {}).get(LIGHTS, {}).get("light")
+        if light is not None:
+            entries = self.document.json.get("extensions", {}).get(LIGHTS, {}).get("lights", [])
+            if not isinstance(light, int) or not 0 <= light < len(entries):
+                raise self.document.fail(f"nodes[{index}] refers to light {light} of {len(entries)}; export the file again")
+            self.lights.append((index, entries[light], world))
+
+    def _unique(self, name: str) -> str:
+        chosen, number = name, 1
+        while chosen in self._names:
+            number += 1
+            chosen = f"{name} {number}"
+        self._names.add(chosen)
+        return chosen
+
+    # -- geometry -------------------------------------------------------------------------
+
+    def _place(self, index: int, node: dict[str, Any], world: np.ndarray) -> None:
+        entry = self.document.item("meshes", node["mesh"])
+        label = str(node.get("name") or entry.get("name") or f"node {index}")
+        if abs(np.linalg.det(world[:3, :3])) <= 1e-30 * np.linalg.norm(world[:3, :3]) ** 3:
+            self.notes.append(f"node '{label}' is flattened by a scale of 0 and is left out.")
+            return
+        for number, primitive in enumerate(entry["primitives"]):
+            mesh = self._mesh(node["mesh"], number, primitive, entry)
+            if mesh is None:
+                continue
+            material = self._wearable(self._material(primitive.get("material")), mesh, label)
+            name = self._unique(label)
+            matrix = world.copy()
+            matrix.setflags(write=False)
+            dabs = read_node_dabs(self.document, index, number, material)
+            self.objects.append(SceneObject(name, mesh, material, matrix, dabs))
+            self.origins.objects[name] = (index, number)
+
+    def _material(self, index: int | None) -> Material:
+        if index not in self._materials:
+            self._materials[index] = read_gltf_material(self.document, index, self._textures, self.notes)
+        return self._materials[index]
+
+    def _wearable(self, material: Material, mesh: Mesh, label: str) -> Material:
+        """`material`, without its texture where the mesh cannot say where it goes."""
+        if not isinstance(material, Diffuse) or material.texture is None or mesh.uv is not None:
+            return material
+        self.notes.append(f"node '{label}' has no texture coordinates; its texture is not shown (it is kept when saving).")
+        return replace(material, texture=None)
+
+    def _mesh(self, index: int, number: int, primitive: dict[str, Any], entry: dict[str, Any]) -> Mesh | None:
+        """One primitive as a repaired mesh; None when it has no triangles.
+
+        Everything that shows the same accessors shares one mesh, whatever its material.
+        """
+        key = json.dumps([primitive.get(k) for k in ("attributes", "indices", "mode")], sort_keys=True)
+        if key not in self._meshes:
+            self._meshes[key] = self._read_primitive(index, number, primitive, entry)
+        return self._meshes[key]
+
+    def _read_primitive(self, index: int, number: int, primitive: dict[str, Any], entry: dict[str, Any]) -> Mesh | None:
+        where = f"{self.document.path.name}: meshes[{index}].primitives[{number}]"
+        mode = primitive.get("mode", 4)
+        attributes = primitive["attributes"]
+        if mode in (0, 1, 2, 3) or "POSITION" not in attributes:
+            self.notes.append(f"meshes[{index}].primitives[{number}] holds points or lines and is left out.")
+            return None
+        if primitive.get("targets"):
+            self.notes.append(f"meshes[{index}].primitives[{number}]: its morph targets are not applied.")
+        positions = self.document.accessor(attributes["POSITION"]).astype(np.float64)
+        indices = primitive.get("indices")
+        order = np.arange(len(positions)) if indices is None else self.document.accessor(indices).astype(np.int64)
+        if positions.ndim != 2 or positions.shape[1] != 3 or order.ndim != 1:
+            raise UserError(f"{where}: POSITION must be triples and indices single numbers; export the file again")
+        triangles = _triangles(order, mode, where)
+        if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(positions):
+            make_mesh("", positions, triangles, source=where)  # raises, naming the face
+        normals, uv = (self._attribute(attributes, n, len(positions)) for n in ("NORMAL", "TEXCOORD_0"))
+        raw = make_mesh(
+            str(entry.get("name") or f"mesh {index}"),
+            positions,
+            triangles,
+            None if normals is None else normals[triangles],
+            None if uv is None else turned_over(uv)[triangles],
+            source=where,
+        )
+        solid = isinstance(self._material(primitive.get("material")), Dielectric)
+        mesh, notes = repair(raw, examine(raw), solid)
+        self.notes.extend(notes)
+        return replace(mesh, source=str(self.document.path))
+
+    def _attribute(self, attributes: dict[str, Any], name: str, count: int) -> np.ndarray | None:
+        if name not in attributes:
+            return None
+        values = self.document.accessor(attributes[name]).astype(np.float64)
+        if len(values) != count:
+            raise self.document.fail(f"{name} has {len(values)} elements for {count} positions; export the file again")
+        return values
+
+    # -- camera and lights ----------------------------------------------------------------
+
+    def _camera(self, node: dict[str, Any], world: np.ndarray) -> Camera:
+        entry = self.document.item("cameras", node["camera"])
+        extras = node.get("extras") if isinstance(node.get("extras"), dict) else {}
+        distance = float(extras.get(EXTRAS, {}).get("target_distance", _DEFAULT_DISTANCE))
+        position, forward, up = world[:3, 3], -_unit(world[:3, 2]), _unit(world[:3, 1])
+        common = {"position": _vec3(position), "target": _vec3(position + distance * forward), "up": _vec3(up)}
+        if entry.get("type") == "orthographic":
+            extent = 2.0 * float(entry["orthographic"]["ymag"])
+            if not extent > 0.0:
+                raise self.document.fail("an orthographic camera has no height (ymag); export the file again")
+            return Camera(kind="orthographic", vertical_extent=extent, **common)
+        fov = math.degrees(float(entry["perspective"]["yfov"]))
+        if not 0.0 < fov < 180.0:
+            raise self.document.fail(f"a camera's yfov is {fov:g} degrees; it must lie between 0 and 180")
+        return Camera(kind="pinhole", vertical_fov_deg=fov, **common)
+
+    def _read_lights(self, around: Surroundings) -> tuple[Light, ...]:
+        lights = []
+        for index, entry, world in self.lights:
+            label = str(entry.get("name") or self.document.item("nodes", index).get("name") or f"light {index}")
+            light = self._light(entry, label, world, around)
+            if light is None:
+                self.notes.append(f"light '{label}' gives no light and is left out.")
+                continue
+            light = replace(light, name=self._unique(light.name))
+            self.origins.lights[light.name] = index
+            lights.append(light)
+        return tuple(lights)
+
+    def _light(self, entry: dict[str, Any], label: str, world: np.ndarray, around: Surroundings) -> Light | None:
+        from ..optics.colorimetry import illuminant_table, rgb709_to_xyz_matrix, rgb_partition
+        from ..optics.spectrum import Spectrum
+
+        position, direction = _vec3(world[:3, 3]), _vec3(-_unit(world[:3, 2]))
+        extras = entry.get("extras") if isinstance(entry.get("extras"), dict) else {}
+        own = extras.get(EXTRAS, {}).get("light")
+        if own is not None:
+            placed: dict[str, Any] = {} if own.get("kind") == "directional" else {"position": list(position)}
+            placed |= {} if own.get("kind", "point") == "point" else {"direction": list(direction)}
+            placed |= {"tangent": list(_vec3(_unit(world[:3, 0])))} if "size" in own else {}
+            table = SceneTable(own | placed, self.document.path, f"{LIGHTS}.extras.{EXTRAS}.light")
+            return read_light(table, 0, around)
+        kind = entry.get("type")
+        if kind not in ("point", "spot", "directional"):
+            raise self.document.fail(f"light '{label}' has the unknown type '{kind}'; use point, spot or directional")
+        rgb = np.array(entry.get("color", (1.0, 1.0, 1.0)), dtype=np.float64)
+        intensity = float(entry.get("intensity", 1.0))
+        if rgb.shape != (3,) or not np.isfinite(rgb).all() or (rgb < 0.0).any() or not 0.0 <= intensity < math.inf:
+            raise self.document.fail(f"light '{label}' needs three colours and an intensity of 0 or more")
+        luminance = float(rgb709_to_xyz_matrix()[1] @ rgb) * intensity
+        if luminance == 0.0:
+            return None
+        tinted = Spectrum(illuminant_table()["D65"] * (rgb_partition() @ rgb)).scaled_to_luminous(luminance)
+        light = Light(label, kind, tinted, position=position, direction=direction)
+        if kind == "spot":
+            cone = entry.get("spot", {})
+            inner, outer = float(cone.get("innerConeAngle", 0.0)), float(cone.get("outerConeAngle", math.pi / 4.0))
+            if not (0.0 <= inner <= outer and 0.0 < outer <= 0.5 * math.pi + 1e-6):
+                raise self.document.fail(f"light '{label}' needs cone angles with 0 <= inner <= outer <= 90 degrees")
+            light = replace(
+                light, inner_half_angle_deg=math.degrees(inner), outer_half_angle_deg=min(90.0, math.degrees(outer))
+            )
+        return light
+
+
+def _triangles(order: np.ndarray, mode: int, where: str) -> np.ndarray:
+    """Vertex numbers (T, 3) of a triangle list (4), strip (5) or fan (6)."""
+    if mode == 4:
+        if len(order) % 3:
+            raise UserError(f"{where}: {len(order)} indices are no whole number of triangles; export the file again")
+        return order.reshape(-1, 3)
+    if mode == 5:
+        strip = np.stack([order[:-2], order[1:-1], order[2:]], axis=1)
+        strip[1::2] = strip[1::2, [1, 0, 2]]
+        return strip
+    if mode == 6:
+        return np.stack([order[1:-1], order[2:], np.full(max(len(order) - 2, 0), order[0])], axis=1)
+    raise UserError(f"{where}: unknown mode {mode}; export the file again")
+
+
+def _rotation(quaternion: Any) -> np.ndarray:
+    """Rotation matrix (3, 3) of a quaternion x, y, z, w."""
+    q = np.array(quaternion, dtype=np.float64)
+    length = np.linalg.norm(q)
+    if not length > 0.0:
+        raise ValueError("a rotation quaternion is zero")
+    x, y, z, w = q / length
+    return np.array(
+        [
+            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+        ]
+    )
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)
+
+
+def _turned(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    """A z-up vector in glTF's y-up axes."""
+    return _vec3(Y_UP_TO_Z_UP[:3, :3].T @ np.array(vector))
+
+
+def _vec3(vector: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = (float(v) + 0.0 for v in vector)
+    return x, y, z

@@ -1,0 +1,254 @@
+"""A glTF 2.0 file as its JSON and its bytes: containers, buffers and accessors, nothing about scenes.
+
+The JSON stays the dictionary it was, so that saving keeps what this program does not
+understand. Every length a file states is held against the bytes it has before use.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+
+from ...base.errors import UserError
+
+GLB_MAGIC = b"glTF"
+JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
+MAX_ELEMENTS = 100_000_000
+
+_COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+
+
+@dataclass
+class GltfDocument:
+    """An opened file."""
+
+    path: Path
+    json: dict[str, Any]
+    binary: bytes | None = None
+    """The BIN chunk of a GLB."""
+    other_chunks: list[tuple[int, bytes]] = field(default_factory=list)
+    """GLB chunks of unknown type, kept for saving."""
+    _buffers: dict[int, bytes] = field(default_factory=dict)
+
+    def fail(self, message: str) -> UserError:
+        """The one sentence about this file."""
+        return UserError(f"{self.path.name}: {message}")
+
+    def items(self, key: str) -> list[dict[str, Any]]:
+        """A top-level array such as "nodes"; empty when absent."""
+        values = self.json.get(key, [])
+        if not isinstance(values, list) or not all(isinstance(v, dict) for v in values):
+            raise self.fail(f"'{key}' must be an array of objects; export the file again")
+        return values
+
+    def item(self, key: str, index: Any) -> dict[str, Any]:
+        """Entry `index` of a top-level array."""
+        values = self.items(key)
+        if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(values):
+            raise self.fail(f"refers to {key}[{index}], but there are {len(values)}; export the file again")
+        return values[index]
+
+    def accessor(self, index: Any) -> np.ndarray:
+        """Elements of an accessor, (count,) or (count, width): ints as stored, normalised ones as float64."""
+        accessor = self.item("accessors", index)
+        label = f"accessors[{index}]"
+        kind, component, count = accessor.get("type"), accessor.get("componentType"), accessor.get("count")
+        if kind not in _WIDTHS or component not in _COMPONENTS:
+            raise self.fail(f"{label} has an unknown type; export the file again")
+        if not isinstance(count, int) or not 0 < count <= MAX_ELEMENTS:
+            raise self.fail(f"{label}.count must be from 1 to {MAX_ELEMENTS}, not {count}; export the file again")
+        dtype, width = np.dtype(_COMPONENTS[component]), _WIDTHS[kind]
+        if "bufferView" in accessor:
+            values = self._view(label, accessor["bufferView"], accessor.get("byteOffset", 0), dtype, width, count)
+        else:
+            values = np.zeros((count, width), dtype)
+        if "sparse" in accessor:
+            values = self._with_sparse(label, accessor["sparse"], values, dtype, width)
+        if accessor.get("normalized") and dtype.kind in "iu":
+            values = np.maximum(values.astype(np.float64) / np.iinfo(dtype).max, -1.0)
+        return values[:, 0] if width == 1 else values
+
+    def _with_sparse(self, label: str, sparse: dict[str, Any], values: np.ndarray, dtype: np.dtype, width: int) -> np.ndarray:
+        count, indices, data = sparse["count"], sparse["indices"], sparse["values"]
+        index_type = np.dtype(_COMPONENTS[indices["componentType"]])
+        where = self._view(label, indices["bufferView"], indices.get("byteOffset", 0), index_type, 1, count)[:, 0]
+        if count and int(where.max()) >= len(values):
+            raise self.fail(f"{label}.sparse names element {int(where.max())} of {len(values)}; export the file again")
+        values = values.copy()
+        values[where] = self._view(label, data["bufferView"], data.get("byteOffset", 0), dtype, width, count)
+        return values
+
+    def _view(self, label: str, index: Any, offset: int, dtype: np.dtype, width: int, count: int) -> np.ndarray:
+        view = self.item("bufferViews", index)
+        data = self.buffer(view.get("buffer"))
+        start, length = view.get("byteOffset", 0), view.get("byteLength")
+        stride = view.get("byteStride") or width * dtype.itemsize
+        numbers = (start, length, stride, offset, count)
+        if not all(isinstance(n, int) and n >= 0 for n in numbers) or stride < width * dtype.itemsize:
+            raise self.fail(f"bufferViews[{index}] is not valid; export the file again")
+        if start + length > len(data):
+            raise self.fail(
+                f"bufferViews[{index}] ends at byte {start + length}, but its buffer has {len(data)}; "
+                f"the file is truncated, copy or export it again"
+            )
+        if count and offset + (count - 1) * stride + width * dtype.itemsize > length:
+            raise self.fail(f"{label} promises {count} elements, more than bufferViews[{index}] holds; export the file again")
+        return np.ndarray((count, width), dtype, data, start + offset, (stride, dtype.itemsize))
+
+    def view_bytes(self, index: Any) -> bytes:
+        """All bytes of a buffer view, such as an image's file."""
+        length = self.item("bufferViews", index).get("byteLength")
+        if not isinstance(length, int) or length < 1:
+            raise self.fail(f"bufferViews[{index}] is not valid; export the file again")
+        return self._view(f"bufferViews[{index}]", index, 0, np.dtype("u1"), length, 1).tobytes()
+
+    def buffer(self, index: Any) -> bytes:
+        """Bytes of a buffer: the BIN chunk, a data URI, or a file beside this one."""
+        entry = self.item("buffers", index)
+        if index not in self._buffers:
+            uri = entry.get("uri")
+            if uri is None:
+                if index != 0 or self.binary is None:
+                    raise self.fail(f"buffers[{index}] has neither a uri nor a binary chunk; the file is truncated")
+                data = self.binary
+            else:
+                data = self.resource(uri, f"buffers[{index}]")
+            if len(data) < entry.get("byteLength", 0):
+                raise self.fail(
+                    f"buffers[{index}] promises {entry['byteLength']} bytes, but has {len(data)}; "
+                    f"the file is truncated, copy or export it again"
+                )
+            self._buffers[index] = data
+        return self._buffers[index]
+
+    def set_buffer(self, index: int, data: bytes) -> None:
+        """Replace a buffer's bytes, for saving."""
+        self._buffers[index] = data
+
+    def resource(self, uri: str, what: str) -> bytes:
+        """Content of a data URI or of a file relative to this one."""
+        if uri.startswith("data:"):
+            try:
+                return base64.b64decode(uri.partition(",")[2], validate=True)
+            except (binascii.Error, ValueError):
+                raise self.fail(f"the data URI of {what} is not base64; export the file again") from None
+        if "://" in uri:
+            raise self.fail(f"{what} lies at '{uri[:60]}'; download it and refer to a file beside this one")
+        target = self.path.parent / unquote(uri)
+        try:
+            return target.read_bytes()
+        except OSError as error:
+            raise self.fail(f"{what} needs {target}, which cannot be read ({error.strerror}); copy it there") from None
+
+
+def open_document(path: str | os.PathLike[str]) -> GltfDocument:
+    """Open a .glb or .gltf. Raises UserError for anything that is not a sound glTF 2.0 container."""
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise UserError(f"{path} cannot be read: {error.strerror}; check the path and its permissions") from None
+    if data[:4] == GLB_MAGIC:
+        document = _open_glb(path, data)
+    elif path.suffix.lower() == ".glb":
+        raise UserError(f"{path.name}: not a GLB file (it does not begin with 'glTF'); check the suffix or export it again")
+    else:
+        document = GltfDocument(path, _parsed(path, data))
+    version = str(document.json.get("asset", {}).get("version", "")) if isinstance(document.json.get("asset"), dict) else ""
+    if not version.startswith("2."):
+        raise document.fail(f"glTF version '{version}' is not supported; export it as glTF 2.0")
+    return document
+
+
+def _open_glb(path: Path, data: bytes) -> GltfDocument:
+    def refuse(message: str) -> UserError:
+        return UserError(f"{path.name}: {message}; the file is truncated or damaged, copy or export it again")
+
+    if len(data) < 20:
+        raise refuse(f"{len(data)} bytes are too few for a GLB file")
+    version, length = np.frombuffer(data, "<u4", 2, 4).tolist()
+    if version != 2:
+        raise UserError(f"{path.name}: GLB version {version} is not supported; export it as glTF 2.0")
+    if length != len(data):
+        raise refuse(f"the GLB header promises {length} bytes, but the file has {len(data)}")
+    chunks: list[tuple[int, bytes]] = []
+    at = 12
+    while at < length:
+        if at + 8 > length:
+            raise refuse("a chunk header is cut off")
+        size, kind = np.frombuffer(data, "<u4", 2, at).tolist()
+        if at + 8 + size > length:
+            raise refuse(f"a chunk promises {size} bytes, but {length - at - 8} are left")
+        chunks.append((kind, data[at + 8 : at + 8 + size]))
+        at += 8 + size
+    if not chunks or chunks[0][0] != JSON_CHUNK:
+        raise refuse("the first chunk is not JSON")
+    has_binary = len(chunks) > 1 and chunks[1][0] == BIN_CHUNK
+    binary = chunks[1][1] if has_binary else None
+    return GltfDocument(path, _parsed(path, chunks[0][1]), binary, chunks[2 if has_binary else 1 :])
+
+
+def _parsed(path: Path, data: bytes) -> dict[str, Any]:
+    try:
+        values = json.loads(data.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        reason = str(error).partition("\n")[0][:80]
+        raise UserError(f"{path.name}: its JSON is not valid ({reason}); copy or export the file again") from None
+    if not isinstance(values, dict):
+        raise UserError(f"{path.name}: its JSON is not an object; this is not a glTF file")
+    return values
+
+
+def save_document(document: GltfDocument, path: str | os.PathLike[str]) -> None:
+    """Write .glb or .gltf by the suffix of `path`, atomically, with every buffer embedded."""
+    from ...base.atomic import atomic_output
+
+    path = Path(path)
+    as_glb = path.suffix.lower() == ".glb"
+    content = dict(document.json)
+    content["buffers"] = buffers = []
+    binary = b""
+    for index, entry in enumerate(document.items("buffers")):
+        data = document.buffer(index)
+        kept = {k: v for k, v in entry.items() if k not in ("uri", "byteLength")} | {"byteLength": len(data)}
+        if as_glb and index == 0:
+            binary = data
+        else:
+            kept["uri"] = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+        buffers.append(kept)
+    if not buffers:
+        del content["buffers"]
+    if path.parent.resolve() != document.path.parent.resolve():
+        content = _with_embedded_images(document, content)
+    text = json.dumps(content, ensure_ascii=False, separators=(",", ":") if as_glb else None, indent=None if as_glb else 1)
+    with atomic_output(path) as temporary:
+        temporary.write_bytes(_glb(text.encode(), binary, document.other_chunks) if as_glb else text.encode())
+
+
+def _with_embedded_images(document: GltfDocument, content: dict[str, Any]) -> dict[str, Any]:
+    """Images in files beside the old place would not be found from the new one."""
+    images = [dict(image) for image in document.items("images")]
+    for index, image in enumerate(images):
+        uri = image.get("uri", "data:")
+        if not uri.startswith("data:") and "://" not in uri:
+            kind = "image/png" if uri.lower().endswith(".png") else "image/jpeg"
+            data = document.resource(uri, f"images[{index}]")
+            image["uri"] = f"data:{image.get('mimeType', kind)};base64," + base64.b64encode(data).decode()
+    return content | ({"images": images} if images else {})
+
+
+def _glb(text: bytes, binary: bytes, others: list[tuple[int, bytes]]) -> bytes:
+    chunks = [(JSON_CHUNK, text + b" " * (-len(text) % 4))]
+    if binary:
+        chunks.append((BIN_CHUNK, binary + b"\0" * (-len(binary) % 4)))
+    body = b"".join(np.array([len(d), kind], "<u4").tobytes() + d for kind, d in chunks + others)
+    return GLB_MAGIC + np.array([2, 12 + len(body)], "<u4").tobytes() + body

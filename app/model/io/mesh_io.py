@@ -1,0 +1,110 @@
+"""Mesh files in and out: PLY, OBJ and STL, with every lie in a file told as one sentence.
+
+The readers are our own rather than trimesh's: that one takes an OBJ's face 0 for its last
+vertex, splits vertices where a normal differs (which opens solids), and costs half a
+second to import.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ...base.errors import UserError
+from ..geometry.mesh import Mesh, make_mesh
+from ..geometry.mesh_health import weld_map
+from .mesh_raw import RawMesh
+
+MESH_SUFFIXES = (".ply", ".obj", ".stl")
+MAX_COORDINATE = 1e30
+"""As for numbers in a scene file: far enough from where squares and float32 overflow."""
+
+
+def load_mesh(path: str | os.PathLike[str], smooth: bool | float | None = None, name: str | None = None) -> Mesh:
+    """Read a mesh file chosen by its suffix; polygons are cut into fans.
+
+    `smooth`: None takes the file's normals, flat where it has none; False is flat; True
+    averages over every edge; a number is a crease angle in degrees. Raises UserError for a
+    missing, unreadable, truncated or contradictory file. Call `mesh_health.repair` on the
+    result: nothing is mended here, except that an STL's triangles are welded (the format
+    has no shared vertices).
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in MESH_SUFFIXES:
+        raise UserError(f"{path}: unknown mesh format '{suffix}'; use one of {', '.join(MESH_SUFFIXES)}")
+    if smooth is not None and not isinstance(smooth, bool) and not 0.0 <= smooth <= 180.0:
+        raise UserError(f"{path}: smooth must be true, false or a crease angle from 0 to 180 degrees, not {smooth:g}")
+    raw = _read(path, suffix)
+    mesh = make_mesh(name or path.stem, raw.vertices, raw.triangles, raw.corner_normals, raw.uv, str(path))
+    if len(far := np.flatnonzero((np.abs(mesh.vertices) > MAX_COORDINATE).any(axis=1))):
+        raise UserError(f"{path}: vertex {far[0]} lies beyond {MAX_COORDINATE:g} units; export the mesh in larger units")
+    if smooth is None:
+        return mesh
+    if smooth is False:
+        return replace(mesh, corner_normals=None)
+    from ..geometry.mesh_normals import angle_weighted_normals
+
+    normals = angle_weighted_normals(mesh, 180.0 if smooth is True else float(smooth))
+    return replace(mesh, corner_normals=normals)
+
+
+def _read(path: Path, suffix: str) -> RawMesh:
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise UserError(f"{path}: no such mesh file; check the path, which is relative to the scene file") from None
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
+    if not data:
+        raise UserError(f"{path}: the file is empty; export the mesh again")
+    if suffix == ".ply":
+        from .mesh_ply import read_ply
+
+        return read_ply(data, str(path))
+    if suffix == ".obj":
+        from .mesh_obj import read_obj
+
+        return read_obj(data, str(path))
+    from .mesh_stl import read_stl
+
+    return read_stl(data, str(path))
+
+
+def save_ply(mesh: Mesh, path: str | os.PathLike[str]) -> None:
+    """Write a binary PLY with float64 positions, atomically.
+
+    PLY knows normals and texture coordinates by vertex only, so vertices are written once
+    for each different set; without either they stay welded.
+    """
+    from ...base.atomic import atomic_output
+
+    columns, names = [mesh.vertices[mesh.triangles].reshape(-1, 3)], ["x", "y", "z"]
+    if mesh.corner_normals is not None:
+        columns.append(mesh.corner_normals.reshape(-1, 3))
+        names += ["nx", "ny", "nz"]
+    if mesh.uv is not None:
+        columns.append(mesh.uv.reshape(-1, 2))
+        names += ["s", "t"]
+    if len(columns) == 1:
+        rows, triangles = mesh.vertices, mesh.triangles
+    else:
+        rows = np.hstack(columns)
+        kept, number = weld_map(rows)
+        rows, triangles = rows[kept], number.reshape(-1, 3)
+    faces = np.empty(len(triangles), dtype=[("count", "u1"), ("corners", "<i4", 3)])
+    faces["count"], faces["corners"] = 3, triangles
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"element vertex {len(rows)}",
+        *(f"property double {n}" for n in names),
+        f"element face {len(faces)}",
+        "property list uchar int vertex_indices",
+        "end_header\n",
+    ]
+    with atomic_output(path) as temporary:
+        temporary.write_bytes("\n".join(header).encode() + rows.astype("<f8").tobytes() + faces.tobytes())

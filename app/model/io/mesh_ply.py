@@ -1,0 +1,263 @@
+"""PLY, ASCII and binary, of either byte order (G. Turk, The PLY Polygon File Format, 1994).
+
+The header is a promise about what follows; it is held against the file's size before
+anything is allocated, and against its content while reading.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...base.errors import UserError
+from .mesh_raw import RawMesh, fan_corners
+
+_TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
+    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
+    "double": "f8", "float64": "f8",
+}  # fmt: skip
+_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
+_FACE_LISTS = ("vertex_indices", "vertex_index")
+_UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+
+
+@dataclass
+class _Property:
+    name: str
+    kind: str
+    count_kind: str | None = None
+    """Type of the count before a list; None for a scalar."""
+
+
+@dataclass
+class _Element:
+    name: str
+    count: int
+    properties: list[_Property] = field(default_factory=list)
+
+
+def read_ply(data: bytes, path: str) -> RawMesh:
+    """Vertices, triangles and, where the file has them, normals and texture coordinates."""
+    order, elements, body = _header(data, path)
+    reader = _AsciiBody(data[body:], path) if not order else _BinaryBody(data, body, order, path)
+    vertex = face = None
+    for element in elements:
+        columns = reader.element(element)
+        if element.name == "vertex":
+            vertex = columns
+        elif element.name == "face":
+            face = columns
+    reader.finish()
+    if vertex is None or any(axis not in vertex for axis in "xyz"):
+        raise UserError(f"{path}: the PLY header has no vertices with x, y, z; export the mesh again")
+    corners = next((face[name] for name in _FACE_LISTS if face and name in face), None)
+    if corners is None:
+        raise UserError(f"{path}: the PLY header has no faces with vertex_indices; a point cloud cannot be rendered")
+    sizes, indices = corners
+    if not len(sizes):
+        raise UserError(f"{path}: the PLY file has no faces; a point cloud cannot be rendered")
+    triangles = indices.astype(np.int64)[fan_corners(sizes)]
+    vertices = _stack(vertex, ("x", "y", "z"))
+    in_range = bool(((triangles >= 0) & (triangles < len(vertices))).all())
+
+    def at_corners(names: tuple[str, ...]) -> np.ndarray | None:
+        # With a face out of range nothing can be looked up; make_mesh tells of it.
+        return _stack(vertex, names)[triangles] if in_range and all(n in vertex for n in names) else None
+
+    uv = next((found for names in _UV_NAMES if (found := at_corners(names)) is not None), None)
+    return RawMesh(vertices, triangles, at_corners(("nx", "ny", "nz")), uv)
+
+
+def _stack(columns: dict[str, np.ndarray], names: tuple[str, ...]) -> np.ndarray:
+    return np.stack([columns[name].astype(np.float64) for name in names], axis=1)
+
+
+def _header(data: bytes, path: str) -> tuple[str, list[_Element], int]:
+    """Byte order ("" = ASCII), the promised elements, and where the body begins."""
+    if not data.startswith(b"ply"):
+        raise UserError(f"{path}: not a PLY file (it does not begin with 'ply'); check the suffix")
+    end = data.find(b"end_header")
+    line_end = data.find(b"\n", end)
+    if end < 0 or line_end < 0:
+        raise UserError(f"{path}: the PLY header has no end_header; the file is truncated, copy or export it again")
+    order: str | None = None
+    elements: list[_Element] = []
+    for number, line in enumerate(data[:end].decode("ascii", "replace").splitlines(), start=1):
+        try:
+            match line.split():
+                case ["format", kind, _]:
+                    order = _ORDERS[kind]
+                case ["element", name, count]:
+                    elements.append(_Element(name, int(count)))
+                    if elements[-1].count < 0:
+                        raise ValueError
+                case ["property", "list", count_kind, kind, name]:
+                    elements[-1].properties.append(_Property(name, _TYPES[kind], _TYPES[count_kind]))
+                case ["property", kind, name]:
+                    elements[-1].properties.append(_Property(name, _TYPES[kind]))
+                case ["ply"] | ["comment", *_] | ["obj_info", *_] | []:
+                    pass
+                case _:
+                    raise ValueError
+        except (KeyError, ValueError, IndexError):
+            raise UserError(f"{path}: line {number} of the PLY header is not valid: '{line[:60]}'") from None
+    if order is None:
+        raise UserError(f"{path}: the PLY header names no format; export the mesh again")
+    return order, elements, line_end + 1
+
+
+def _truncated(path: str, element: _Element, held: int) -> UserError:
+    return UserError(
+        f"{path}: the header promises {element.count} of '{element.name}', but the file ends after {held}; "
+        f"copy or export it again"
+    )
+
+
+class _BinaryBody:
+    """Elements of a binary file, in order."""
+
+    def __init__(self, data: bytes, start: int, order: str, path: str) -> None:
+        self._data, self._at, self._order, self._path = data, start, order, path
+
+    def element(self, element: _Element) -> dict:
+        """Columns by name: an array for a scalar, (sizes, values) for a list."""
+        sizes = self._first_sizes(element)
+        layout = np.dtype([part for p in element.properties for part in self._fields(p, sizes.get(p.name, 0))])
+        room = (len(self._data) - self._at) // layout.itemsize if layout.itemsize else element.count
+        if element.count <= room:
+            rows = np.frombuffer(self._data, layout, element.count, self._at)
+            if all((rows[f"{name} count"] == size).all() for name, size in sizes.items()):
+                self._at += element.count * layout.itemsize
+                return {
+                    p.name: rows[p.name]
+                    if p.count_kind is None
+                    else (np.full(element.count, sizes[p.name]), rows[p.name].reshape(-1))
+                    for p in element.properties
+                }
+        elif not sizes:
+            raise _truncated(self._path, element, room)
+        return self._walk(element)
+
+    def _fields(self, p: _Property, size: int) -> list[tuple]:
+        if p.count_kind is None:
+            return [(p.name, self._order + p.kind)]
+        return [(f"{p.name} count", self._order + p.count_kind), (p.name, self._order + p.kind, (size,))]
+
+    def _first_sizes(self, element: _Element) -> dict[str, int]:
+        """List lengths in the first row: in most files every row has the same."""
+        sizes: dict[str, int] = {}
+        at = self._at
+        for p in element.properties if element.count else []:
+            size = 1
+            if p.count_kind is not None:
+                size = self._one(p.count_kind, at, element, 0)
+                sizes[p.name] = size
+                at += np.dtype(p.count_kind).itemsize
+            at += size * np.dtype(p.kind).itemsize
+            if at > len(self._data):
+                raise _truncated(self._path, element, 0)
+        return sizes
+
+    def _one(self, kind: str, at: int, element: _Element, row: int) -> int:
+        if at + np.dtype(kind).itemsize > len(self._data):
+            raise _truncated(self._path, element, row)
+        return max(0, int(np.frombuffer(self._data, self._order + kind, 1, at)[0]))
+
+    def _walk(self, element: _Element) -> dict:
+        """Row by row, for lists of differing lengths."""
+        lists = {p.name: ([], []) for p in element.properties if p.count_kind is not None}
+        scalars = {p.name: [] for p in element.properties if p.count_kind is None}
+        for row in range(element.count):
+            for p in element.properties:
+                width = np.dtype(p.kind).itemsize
+                size = 1
+                if p.count_kind is not None:
+                    size = self._one(p.count_kind, self._at, element, row)
+                    self._at += np.dtype(p.count_kind).itemsize
+                if self._at + size * width > len(self._data):
+                    raise _truncated(self._path, element, row)
+                values = np.frombuffer(self._data, self._order + p.kind, size, self._at)
+                self._at += size * width
+                if p.count_kind is None:
+                    scalars[p.name].append(values[0])
+                else:
+                    lists[p.name][0].append(size)
+                    lists[p.name][1].append(values)
+        return {name: np.array(values) for name, values in scalars.items()} | {
+            name: _joined(sizes, values) for name, (sizes, values) in lists.items()
+        }
+
+    def finish(self) -> None:
+        """Refuse data nobody promised: the header lied."""
+        rest = len(self._data) - self._at
+        if self._data[self._at :].strip():
+            raise UserError(f"{self._path}: {rest} bytes follow what the PLY header promises; export the mesh again")
+
+
+def _joined(sizes: list[int], parts: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Lists of all rows one after another; an element may well have no rows."""
+    return np.array(sizes, np.int64), np.concatenate(parts) if parts else np.zeros(0)
+
+
+class _AsciiBody:
+    """Elements of an ASCII file, in order."""
+
+    def __init__(self, body: bytes, path: str) -> None:
+        self._path, self._at = path, 0
+        try:
+            self._values = np.array(body.split(), dtype=np.float64)
+        except ValueError as error:
+            raise UserError(f"{path}: the PLY body holds something that is no number ({error})") from None
+
+    def element(self, element: _Element) -> dict:
+        """As `_BinaryBody.element`."""
+        rest = self._values[self._at :]
+        if all(p.count_kind is None for p in element.properties):
+            width = len(element.properties)
+            if element.count * width > len(rest):
+                raise _truncated(self._path, element, len(rest) // max(width, 1))
+            self._at += element.count * width
+            rows = rest[: element.count * width].reshape(element.count, width)
+            return {p.name: rows[:, i] for i, p in enumerate(element.properties)}
+        if len(element.properties) == 1 and element.count and len(rest):
+            size = int(rest[0])
+            rows = rest[: element.count * (size + 1)]
+            if 0 <= size and len(rows) == element.count * (size + 1):
+                rows = rows.reshape(element.count, size + 1)
+                if (rows[:, 0] == size).all():
+                    self._at += rows.size
+                    return {element.properties[0].name: (np.full(element.count, size), rows[:, 1:].reshape(-1))}
+        return self._walk(element)
+
+    def _walk(self, element: _Element) -> dict:
+        lists = {p.name: ([], []) for p in element.properties if p.count_kind is not None}
+        scalars = {p.name: [] for p in element.properties if p.count_kind is None}
+        values, at, end = self._values, self._at, len(self._values)
+        for row in range(element.count):
+            for p in element.properties:
+                size = 1
+                if p.count_kind is not None:
+                    if at >= end:
+                        raise _truncated(self._path, element, row)
+                    size = max(0, int(values[at]))
+                    at += 1
+                if at + size > end:
+                    raise _truncated(self._path, element, row)
+                if p.count_kind is None:
+                    scalars[p.name].append(values[at])
+                else:
+                    lists[p.name][0].append(size)
+                    lists[p.name][1].append(values[at : at + size])
+                at += size
+        self._at = at
+        return {name: np.array(column) for name, column in scalars.items()} | {
+            name: _joined(sizes, parts) for name, (sizes, parts) in lists.items()
+        }
+
+    def finish(self) -> None:
+        """Refuse numbers nobody promised: the header lied."""
+        rest = len(self._values) - self._at
+        if rest:
+            raise UserError(f"{self._path}: {rest} numbers follow what the PLY header promises; export the mesh again")

@@ -1,0 +1,145 @@
+"""Opens a scene: our own TOML, a glTF file, or a bare mesh, always ending in one checked `Scene`.
+
+The TOML format is described in `assets/scenes/README.md`. It is read strictly: a key that
+is not understood is an error, and what the file leaves out is filled in and said in
+`Scene.notes`.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ...base.errors import UserError
+from ..scene import (
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Scene,
+    SceneObject,
+)
+from ..scene_camera import read_camera
+from ..scene_checks import check_scene
+from ..scene_defaults import default_camera, default_light, default_table, surroundings_of
+from ..scene_environment import read_surroundings
+from ..scene_lights import Surroundings, read_light
+from ..scene_materials import DEFAULT_GLASS, read_materials
+from ..scene_objects import MESH_SUFFIXES, ObjectReader, load_checked_mesh
+from ..scene_render import read_render
+from ..scene_textures import TextureReader
+from .scene_table import SceneTable
+
+GLTF_SUFFIXES = (".glb", ".gltf")
+
+
+def load_scene(path: str | os.PathLike[str]) -> Scene:
+    """The scene in `path` (.toml, .glb, .gltf, or a mesh: .ply, .obj, .stl).
+
+    Raises UserError, in one sentence with file, key and remedy, for anything that cannot be
+    rendered as it stands.
+    """
+    path = Path(path)
+    if not path.is_file():
+        problem = "is a folder, not a scene file" if path.is_dir() else "does not exist"
+        raise UserError(f"{path} {problem}; give a .toml, .glb or .gltf scene or a .ply, .obj or .stl mesh")
+    suffix = path.suffix.lower()
+    if suffix == ".toml":
+        scene = _scene_from_table(SceneTable(_read_toml(path), path))
+    elif suffix in GLTF_SUFFIXES:
+        from .gltf import load_gltf
+
+        scene = load_gltf(path)
+    elif suffix in MESH_SUFFIXES:
+        scene = _scene_around_mesh(path)
+    else:
+        raise UserError(
+            f"{path}: '{path.suffix}' is not a kind of scene; use .toml, {', '.join(GLTF_SUFFIXES + MESH_SUFFIXES)}"
+        )
+    notes = [note for note in check_scene(scene, path.name) if note not in scene.notes]
+    return replace(scene, notes=scene.notes + tuple(notes))
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except tomllib.TOMLDecodeError as error:
+        raise UserError(f"{path.name} is not valid TOML: {error}; texts need quotes and keys one line each") from error
+    except RecursionError as error:
+        raise UserError(f"{path.name} is not a scene: its lists are nested too deeply; see assets/scenes for examples") from error
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8") from error
+    except OSError as error:
+        raise UserError(f"{path} cannot be read: {error.strerror}") from error
+
+
+def _scene_from_table(table: SceneTable) -> Scene:
+    name = table.string("name", table.file.stem)
+    table.string("units", "units")  # a label for people; every length is in it
+    notes: list[str] = []
+    background, environment = read_surroundings(table, notes)
+    render = read_render(table.table("render"))
+    textures = TextureReader()
+    reader = ObjectReader(read_materials(table, textures), textures)
+    objects = [item for entry in table.tables("objects") for item in reader.read(entry)]
+    if not objects:
+        table.given(("camera", "lights"))
+        table.finish("a scene")  # a misspelt [[object]] is the likelier mistake
+        table.fail("objects", "is missing or empty; add at least one [[objects]]")
+    notes += textures.notes + reader.notes
+    around = surroundings_of(objects)
+    lights = _read_lights(table, around, notes, dark_without=environment is None or _has_diffuse(objects))
+    camera = _read_camera(table, around, notes)
+    table.finish("a scene")
+    if environment is None and not (table.has("camera") or table.has("lights")):
+        _add_table(objects, notes)
+    return Scene(name, camera, lights, tuple(objects), background, environment, render, tuple(notes))
+
+
+def _read_lights(table: SceneTable, around: Surroundings, notes: list[str], dark_without: bool) -> tuple[Light, ...]:
+    """The lights; a sun where none are given and nothing would be seen without (an environment shows glass and mirrors)."""
+    if not table.has("lights"):
+        if not dark_without:
+            return ()
+        notes.append("No lights given: a white sun from behind on the left was added.")
+        return (default_light(),)
+    lights = tuple(read_light(entry, i, around) for i, entry in enumerate(table.tables("lights")))
+    for i, light in enumerate(lights):
+        if light.name in [other.name for other in lights[:i]]:
+            table.fail(f"lights[{i}].name", f"is '{light.name}', which another light has already; give each its own")
+    return lights
+
+
+def _read_camera(table: SceneTable, around: Surroundings, notes: list[str]) -> Camera:
+    inner = table.table("camera")
+    if inner is None:
+        notes.append("No camera given: one that sees the objects and what falls beside them was added.")
+        return default_camera(around)
+    return read_camera(inner, around)
+
+
+def _add_table(objects: list[SceneObject], notes: list[str]) -> None:
+    """A receiver for a file that gives neither camera nor lights nor anything diffuse."""
+    if not _has_diffuse(objects):
+        objects.append(default_table(objects))
+        notes.append("Nothing diffuse given: a light-grey table was put below the objects.")
+
+
+def _has_diffuse(objects: list[SceneObject]) -> bool:
+    return any(isinstance(o.material, Diffuse) for o in objects)
+
+
+def _scene_around_mesh(path: Path) -> Scene:
+    """A bare mesh as a piece of glass on a table in the sun."""
+    from ..optics import catalogue
+
+    notes = [f"{path.name} is a bare mesh: it was made of {DEFAULT_GLASS}."]
+    mesh = load_checked_mesh(path, None, notes)
+    objects = [SceneObject(path.stem, mesh, Dielectric(catalogue.find(DEFAULT_GLASS)))]
+    camera = default_camera(surroundings_of(objects))
+    _add_table(objects, notes)
+    notes.append("A white sun and a camera were added.")
+    return Scene(path.stem, camera, (default_light(),), tuple(objects), notes=tuple(notes))

@@ -1,0 +1,458 @@
+"""The camera's pass: pictures of the scene from the caustic maps and the lights.
+
+A dispatch adds one camera sample to the pixels of a band of rows, or to some of those that see glass or mirrors there, so that none takes
+long on a software renderer: between two of them there is time for progress and for a stop.
+Samples form a lattice inside the pixel that later launches refine (box filter).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from ..gpu import bindings, shader
+from ..gpu.context import Context
+from ..gpu.dispatch_budget import Portion
+from ..gpu.map_channels import MapChannels
+from ..gpu.records import NONE, PLACEMENT, RECEIVER
+from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
+from ..gpu.texture_store import PICTURE, TextureStore
+from ..model.camera_rays import camera_frame
+from ..model.optics.colorimetry import xyz_to_rgb709_matrix
+from ..model.scene import Camera, Dielectric
+from ..model.scene_checks import contains
+from .camera_programs import (
+    BIND_CELL_CDF,
+    BIND_COUNTERS,
+    BIND_LIGHTS,
+    BIND_LISTED,
+    BIND_OBJECT_COLOURS,
+    BIND_PICTURES,
+    BIND_PLACEMENTS,
+    BIND_RECEIVERS,
+    UNIT_EMISSION,
+    UNIT_PICTURES,
+    direct_defines,
+    eye_defines,
+    single_defines,
+)
+from .camera_records import EYE_LIGHT, EYE_PARAMETERS, light_record
+from .camera_tables import EyeTables
+from .present import Channels
+from .spectrum_choice import Look, Spectrum, choosing_spectrum, grid_of
+
+SPLIT_THRESHOLD = 0.004
+"""Share of a sample's power above which both parts of a split path are followed."""
+MOST_TAPS = 24
+"""Looks along one sweep."""
+TAPS_PER_PIXEL = 1.2
+"""Of one sample; between two looks colours are not told apart, so the more samples there are, the closer they lie."""
+DIRECT_LOOKS = 4
+"""Of one sample at what is seen directly: outlines and textures there cost a tenth of what glass costs …"""
+DIRECT_LOOKS_UNTIL = 16
+"""… and with more samples than these they are smooth as they are."""
+
+_TARGET_SECONDS = 0.15
+"""What one dispatch may take; rows are divided to fit."""
+_GROUP = 8
+_LISTED_GROUP = 64
+_FIRST_ROWS, _FIRST_LISTED = 16, 1024
+_NOTHING_LISTED = bytes(4)
+FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut")
+"""What the shader counts, in its order."""
+
+
+@dataclass(frozen=True)
+class CausticMaps:
+    """The light half's result, as the eye reads it."""
+
+    textures: Sequence[moderngl.Texture]
+    """RGBA32F, energy per texel: XYZ and W with spectral hats after them, or four bins each."""
+    receivers: moderngl.Buffer
+    """RECEIVER records."""
+    placements: moderngl.Buffer
+    """PLACEMENT records."""
+    scale: float = 1.0
+    """Factor on every texel: one over the number of passes summed in it."""
+
+
+class EyePass:
+    """Owns the program, the sums and the light tables; `run` adds samples, `read_*` divide by their number."""
+
+    def __init__(
+        self,
+        context: Context,
+        scene: SceneBuffers,
+        layer: str = "beauty",
+        reflectances: Sequence[np.ndarray | None] = (None,),
+        maps: MapChannels = MapChannels(),
+        pictures: TextureStore | None = None,
+    ) -> None:
+        """`layer`: "beauty", or "caustic" (the maps on what is seen directly, no other light).
+
+        `reflectances`: reflectance classes as the splat tables were built with; the first is
+        None, the others (401,) are folded into the maps. `maps`: what their channels are; those of a picture in bins are its own.
+        `pictures`: textures and environment of `scene.scene`, the caller's; None makes them. The camera's method is that of `scene.features`.
+        """
+        if reflectances[0] is not None:
+            raise ValueError("reflectance class 0 must be None: it stands for receivers whose maps hold plain irradiance")
+        self.context = context
+        self.scene = scene
+        self.channels = Channels(maps.edges_nm)
+        self._ctx = context.ctx
+        self._tables = EyeTables.build(self._ctx, scene, self.channels, reflectances, maps)
+        self._owns_pictures = pictures is None
+        self.pictures = pictures or TextureStore(self._ctx, scene.scene, scene.first_triangle, scene.corner_turn)
+        lights = EYE_LIGHT.zeros(len(scene.scene.lights) + 1)
+        for i, light in enumerate(scene.scene.lights):
+            lights[i] = light_record(light, scene)
+        self._lights = self._ctx.buffer(lights.tobytes())
+        self._lights_in_storage = lights.nbytes > self._ctx.info["GL_MAX_UNIFORM_BLOCK_SIZE"]
+        self._counters = self._ctx.buffer(bytes(4 * len(FALLBACKS)))
+        self._parameters_buffer = self._ctx.buffer(reserve=EYE_PARAMETERS.stride)
+        self._empty: CausticMaps | None = None
+        self._pictures: list[moderngl.Texture] = []
+        self._samples_of_row = np.zeros(0, int)
+        self._rows = self._pixels = Portion(1, 1, 1)
+        self._within_rows = False
+        """Some listed pixels of a band of rows have this sample, others are still to get it."""
+        self._map_targets = maps.targets
+        self.dispatch_seconds = _TARGET_SECONDS
+        """What one dispatch should take; rows are divided to fit."""
+        features = scene.features
+        self.disperses = layer != "caustic" and features.eye_disperses
+        """Samples differ in the stretch of the spectrum they see."""
+        self.fixed_bands = {"regular-7": 7, "regular-16": 16, "srd-lambda": 1}.get(features.method)
+        """What the method prescribes."""
+        self.spectrum = Spectrum(self.fixed_bands or 1)
+        """How samples see the spectrum; one of `single` wavelengths needs `may_be_single`."""
+        self.may_be_single = False
+        """Where bands serve a scene badly, wavelengths may be taken one by one. That takes a program of its own, which is compiled when it is needed."""
+        self.most_taps = MOST_TAPS
+        self.direct_looks = DIRECT_LOOKS if self.chooses else 1
+        """Of a sample, at what is seen directly, while a pixel has few samples."""
+        self.split_threshold = SPLIT_THRESHOLD
+        structs = (*SCENE_STRUCTS, EYE_LIGHT, EYE_PARAMETERS, RECEIVER, PLACEMENT, *([PICTURE] if self.pictures.structs else []))
+        shown = eye_defines(scene, self.channels, layer, maps) | self._tables.defines | self.pictures.defines
+        shown |= {name: 1 for name, on in (("LIGHTS_IN_STORAGE", self._lights_in_storage), ("HAS_IMAGES", bool(self.pictures.structs))) if on}
+        self._listed: moderngl.Buffer | None = None
+        self._beyond: moderngl.ComputeShader | None = None
+        self._single: moderngl.ComputeShader | None = None
+        self._source = (shown, structs)
+        if "EYE_SPECULAR" in shown:
+            self._beyond = shader.compute(self._ctx, "camera/camera.comp", shown, structs)
+            shown = direct_defines(shown)
+        self._program = shader.compute(self._ctx, "camera/camera.comp", shown, structs)
+
+    def run(
+        self,
+        camera: Camera,
+        width: int,
+        height: int,
+        samples: int,
+        sample_offset: int = 0,
+        maps: CausticMaps | None = None,
+        seed: int = 1,
+        progress: Callable[[float], None] | None = None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> bool:
+        """Add `samples` camera samples to every pixel; False when `cancelled` stopped it.
+
+        `sample_offset` is the number of samples already there; 0 starts anew. `maps` None shows
+        direct light only. `progress` gets the share done, 0 to 1.
+        """
+        stops = False
+        for share in self.samples(camera, width, height, samples, sample_offset, maps, seed):
+            if progress is not None:
+                progress(share)
+            stops = stops or (cancelled is not None and cancelled())
+            if stops and not self._within_rows:
+                return False
+        return True
+
+    def samples(
+        self, camera: Camera, width: int, height: int, samples: int, sample_offset: int = 0, maps: CausticMaps | None = None, seed: int = 1
+    ) -> Iterator[float]:
+        """`run`, pausing after every dispatch with the share done: whoever draws meanwhile may bind what it likes."""
+        if sample_offset == 0 or self._size != (width, height):
+            self._clear(width, height)
+        maps = maps or self._no_maps()
+        parameters = self._parameters(camera, width, height, maps.scale, seed)
+        parameters["sample_side"] = 1.0 / np.sqrt(samples + sample_offset)
+        if _is_in_strips(samples, sample_offset):
+            parameters["pixel_width"], parameters["pixel_height"] = samples**-0.5, samples**0.5
+        # Where samples are of one band each, fewer of them share a pixel in that band.
+        parameters["band_side"] = min(1.0, np.sqrt(self.spectrum.bands / (samples + sample_offset)))
+        parameters["taps_per_pixel"] = TAPS_PER_PIXEL * (samples + sample_offset) ** 0.25
+        parameters["direct_looks"] = 1 if self.spectrum.single or samples + sample_offset > DIRECT_LOOKS_UNTIL else self.direct_looks
+        for index, place in enumerate(_pixel_lattice(samples, sample_offset)):
+            parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
+            parameters["within_pixel"] = place
+            for share in self._add_sample(parameters, width, height, maps):
+                yield (index + share) / samples
+        self.context.check("the eye pass")
+
+    @property
+    def chooses(self) -> bool:
+        """`choose_spectrum` has something to choose: the method leaves it open."""
+        return self.disperses and self.fixed_bands is None and not self.scene.features.random_wavelength
+
+    def choose_spectrum(self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None) -> Spectrum:
+        """Sample the spectrum in the way that leaves the least error after so many samples, as far as a coarse grid of the picture's own
+        pixels tells.
+
+        Sets and returns `spectrum`; what was summed up is forgotten. A method that prescribes its way keeps it."""
+        for _ in self.choosing_spectrum(camera, width, height, samples, maps):
+            pass
+        return self.spectrum
+
+    def choosing_spectrum(self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None) -> Iterator[float]:
+        """`choose_spectrum`, pausing after every dispatch."""
+        if not self.chooses:
+            return
+        looks = choosing_spectrum(samples, self.may_be_single)
+        picture: np.ndarray | None = None
+        while True:
+            try:
+                look = looks.send(picture)
+            except StopIteration as stop:
+                self.spectrum = stop.value
+                break
+            picture = yield from self._coarse_picture(look, camera, width, height, samples, maps or self._no_maps())
+        self._clear(*self._size)
+
+    def _coarse_picture(self, look: Look, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps) -> Generator[float, None, np.ndarray]:
+        """Few pixels of the picture, each as large as the picture's own."""
+        columns, rows = grid_of(width, height)
+        self._clear(columns, rows)
+        self.spectrum = look.spectrum
+        parameters = self._parameters(camera, columns, rows, maps.scale, look.seed)
+        parameters["dithered"], parameters["counts_turns"], parameters["sample_side"], parameters["band_side"] = 0, 0, 1.0, 1.0
+        parameters["pixel_width"] = parameters["pixel_height"] = columns / width
+        parameters["taps_per_pixel"] = TAPS_PER_PIXEL * samples**0.25
+        # Within the picture's pixel, which is a small part of the grid's.
+        parameters["within_pixel"] = 0.5 + (look.place - 0.5) * columns / width
+        for number in range(look.spectrum.bands):
+            parameters["sample_index"] = parameters["draw_index"] = number
+            yield from self._add_sample(parameters, columns, rows, maps)
+        picture = self._read().astype(np.float64)
+        # Beside a picture in colour, turns are counted.
+        return picture[..., :3] if self.channels.edges_nm is None else picture
+
+    def _bind(self, maps: CausticMaps) -> None:
+        self.scene.bind()
+        tables = self._tables
+        self.scene.texels.bind_spectra(tables.spectra)
+        if self.scene.texels.as_image:
+            tables.emission.bind_to_image(UNIT_EMISSION, read=True, write=False)
+        else:
+            tables.emission.use(UNIT_EMISSION)
+        self.pictures.bind(BIND_PICTURES, UNIT_PICTURES)
+        if self._lights_in_storage:
+            self._lights.bind_to_storage_buffer(BIND_LIGHTS)
+        else:
+            self._lights.bind_to_uniform_block(BIND_LIGHTS)
+        buffers = (tables.object_colours, tables.cell_cdf, maps.receivers, maps.placements)
+        for binding, buffer in zip((BIND_OBJECT_COLOURS, BIND_CELL_CDF, BIND_RECEIVERS, BIND_PLACEMENTS), buffers, strict=True):
+            buffer.bind_to_storage_buffer(binding)
+        self._counters.bind_to_storage_buffer(BIND_COUNTERS)
+        if self._listed is not None:
+            self._listed.bind_to_storage_buffer(BIND_LISTED)
+        self._parameters_buffer.bind_to_uniform_block(bindings.PARAMETERS)
+        for unit, texture in enumerate(maps.textures):
+            texture.use(location=unit)
+        for unit, picture in enumerate(self._pictures):
+            picture.bind_to_image(unit, read=True, write=True)
+
+    @property
+    def fallbacks(self) -> dict[str, int]:
+        """How often, since the pass was made, a path lost its columns, was left at its greatest depth, could not wait, or kept a band that should have been cut."""
+        return dict(zip(FALLBACKS, np.frombuffer(self._counters.read(), "u4").tolist(), strict=True))
+
+    @property
+    def sums(self) -> Sequence[moderngl.Texture]:
+        """RGBA32F sums over the samples taken, four channels each."""
+        return self._pictures
+
+    @property
+    def samples_taken(self) -> int:
+        """Samples that every pixel has."""
+        return int(self._samples_of_row.min()) if len(self._samples_of_row) else 0
+
+    def read_rgb(self) -> np.ndarray:
+        """Linear Rec.709 radiance, float32 (H, W, 3), lm/(sr unit²) per channel of white; row 0 on top."""
+        return self.channels.to_rgb709(self._read())
+
+    def read_spectral(self) -> np.ndarray:
+        """Radiance of each bin, float32 (H, W, bins), W/(sr unit²)."""
+        return self.channels.to_spectral(self._read())
+
+    def release(self) -> None:
+        """Free every buffer, texture and program."""
+        for owned in (self._tables, self._lights, self._counters, *self._pictures, self._parameters_buffer):
+            owned.release()
+        for program in (self._program, self._beyond, self._single):
+            if program is not None:
+                shader.release(program)
+        if self._listed is not None:
+            self._listed.release()
+        if self._owns_pictures:
+            self.pictures.release()
+        if self._empty is not None:
+            for owned in (*self._empty.textures, self._empty.receivers, self._empty.placements):
+                owned.release()
+        self._pictures, self._empty = [], None
+
+    # ---- private ---------------------------------------------------------------------------
+
+    @property
+    def _size(self) -> tuple[int, int]:
+        return self._pictures[0].size if self._pictures else (0, 0)
+
+    def _parameters(self, camera: Camera, width: int, height: int, map_scale: float, seed: int) -> np.ndarray:
+        space = self.scene.space
+        right, up, forward = camera_frame(camera)
+        orthographic = camera.kind == "orthographic"
+        half_height = 0.5 * camera.vertical_extent * space.scale if orthographic else np.tan(np.radians(0.5 * camera.vertical_fov_deg))
+        parameters = EYE_PARAMETERS.zeros(1)
+        parameters["position"] = space.to_gpu(np.array(camera.position))
+        parameters["orthographic"] = orthographic
+        parameters["forward"] = forward
+        parameters["half_right"] = right * half_height * width / height
+        parameters["half_up"] = up * half_height
+        parameters["seed"] = seed & 0xFFFFFFFF
+        for name, row in zip(("red_of_xyz", "green_of_xyz", "blue_of_xyz"), xyz_to_rgb709_matrix(), strict=True):
+            parameters[name][0, :3] = row
+        parameters["size"] = width, height
+        parameters["pixel_width"] = parameters["pixel_height"] = 1.0
+        parameters["background"][0, :3] = self.scene.scene.background_rgb
+        environment = self.scene.scene.environment
+        if environment is not None:
+            for name, column in zip(("sky_x", "sky_y", "sky_z"), np.asarray(environment.world_to_local, float).T, strict=True):
+                parameters[name] = column
+        bands = self.spectrum.bands
+        parameters["bands"], parameters["dithered"], parameters["counts_turns"] = bands, bands > 1, 1
+        parameters["most_taps"], parameters["split_threshold"] = self.most_taps, self.split_threshold
+        parameters["map_scale"] = map_scale
+        parameters["direct_looks"] = 1
+        parameters["inside_object"] = NONE
+        for index, item in enumerate(self.scene.scene.objects):
+            if isinstance(item.material, Dielectric) and contains(item, np.array(camera.position)):
+                if index in self.scene.stack_objects:
+                    parameters["inside_mask"] |= np.uint32(1 << self.scene.stack_objects.index(index))
+                else:
+                    parameters["inside_object"] = index
+        return parameters
+
+    def _clear(self, width: int, height: int) -> None:
+        if self._size != (width, height):
+            for picture in self._pictures:
+                picture.release()
+            self._pictures = [self._ctx.texture((width, height), 4, dtype="f4") for _ in range(self.channels.targets)]
+            self._rows = Portion(_FIRST_ROWS, _GROUP, -(-height // _GROUP) * _GROUP)
+            self._pixels = Portion(_FIRST_LISTED, _LISTED_GROUP, max(width * height, _LISTED_GROUP))
+            if self._listed is not None:
+                self._listed.release()
+            self._listed = self._ctx.buffer(reserve=4 + 4 * width * (-(-height // _GROUP) * _GROUP)) if self._beyond is not None else None
+        zeros = bytes(width * height * 16)
+        for picture in self._pictures:
+            picture.write(zeros)
+        self._samples_of_row = np.zeros(height, int)
+        self._within_rows = False
+
+    def _add_sample(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
+        """Dispatch one sample, yielding the share done after each dispatch: a band of rows, or some of its listed pixels."""
+        row = 0
+        while row < height:
+            # Groups that overlap the next band would add its rows twice, so bands are whole groups.
+            rows = min(self._rows.units, height - row)
+            parameters["first_row"] = row
+            if self._listed is not None:
+                self._listed.write(_NOTHING_LISTED)
+            self._rows.learn(rows, self._dispatch(self._program, parameters, maps, -(-width // _GROUP), -(-rows // _GROUP)), self.dispatch_seconds)
+            for share in self._follow_listed(parameters, maps):
+                self._within_rows = True
+                yield (row + share * rows) / height
+            self._within_rows = False
+            self._samples_of_row[row : row + rows] += 1
+            row += rows
+            yield row / height
+
+    def _follow_listed(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
+        """Follow what the listed pixels of a band of rows see, yielding the share done after each dispatch but the last."""
+        if self._listed is None:
+            return
+        count, done = int(np.frombuffer(self._listed.read(4), "u4")[0]), 0
+        while done < count:
+            pixels = min(self._pixels.units, count - done)
+            parameters["first_listed"] = done
+            took = self._dispatch(self._program_beyond(), parameters, maps, -(-pixels // _LISTED_GROUP), 1)
+            self._pixels.learn(pixels, took, self.dispatch_seconds)
+            done += pixels
+            if done < count:
+                yield done / count
+
+    def _dispatch(self, program: moderngl.ComputeShader, parameters: np.ndarray, maps: CausticMaps, groups_x: int, groups_y: int) -> float:
+        """Run a program to its end; seconds it took."""
+        self._bind(maps)
+        self._parameters_buffer.write(parameters.tobytes())
+        start = time.perf_counter()
+        program.run(groups_x, groups_y)
+        self._ctx.memory_barrier()
+        self._ctx.finish()
+        return time.perf_counter() - start
+
+    def _program_beyond(self) -> moderngl.ComputeShader:
+        """What follows rays beyond glass and mirrors."""
+        assert self._beyond is not None
+        if not self.spectrum.single:
+            return self._beyond
+        if self._single is None:
+            shown, structs = self._source
+            self._single = shader.compute(self._ctx, "camera/camera.comp", single_defines(shown), structs)
+        return self._single
+
+    def _read(self) -> np.ndarray:
+        if not self._pictures:
+            raise RuntimeError("the eye pass has not run yet")
+        width, height = self._size
+        sums = np.empty((height, width, 4 * len(self._pictures)), np.float32)
+        layer = np.empty((height, width, 4), np.float32)
+        for t, picture in enumerate(self._pictures):
+            picture.read_into(layer)
+            sums[:, :, 4 * t : 4 * t + 4] = layer
+        sums /= np.maximum(self._samples_of_row, 1).astype(np.float32)[:, None, None]
+        return sums
+
+    def _no_maps(self) -> CausticMaps:
+        if self._empty is None:
+            receivers = RECEIVER.zeros(max(1, len(self.scene.receivers)))
+            receivers["placement"] = NONE
+            textures = [self._ctx.texture((1, 1), 4, bytes(16), dtype="f4") for _ in range(self._map_targets)]
+            self._empty = CausticMaps(textures, self._ctx.buffer(receivers.tobytes()), self._ctx.buffer(reserve=PLACEMENT.stride))
+        return self._empty
+
+
+def _is_in_strips(samples: int, offset: int) -> bool:
+    """Whether samples share the pixel in upright strips. Two or three squares of the same area do not fill it: what is small and bright, and
+    letters, would count twice or not at all. With more, outlines want different heights."""
+    return offset == 0 and samples in (2, 3)
+
+
+def _pixel_lattice(samples: int, offset: int) -> np.ndarray:
+    """(samples, 2) places in a pixel: ordered as in a golden-ratio lattice, shifted as a whole from launch to launch.
+
+    Every row and every column of the pixel cut into `samples` holds one sample, so that edges of any slant are filtered well,
+    and the first launch's lie about the pixel's middle, so that the picture does not move.
+    """
+    if _is_in_strips(samples, offset):
+        return np.column_stack([(np.arange(samples) + 0.5) / samples, np.full(samples, 0.5)])
+    golden = 0.6180339887498949
+    shift = offset * np.array([0.7548776662466927, 0.5698402909980532])
+    index = np.arange(samples)
+    rank = np.argsort(np.argsort((0.5 + index * golden) % 1.0))
+    return ((np.column_stack([index, rank]) + 0.5) / samples + shift) % 1.0

@@ -1,0 +1,108 @@
+"""The programs of the camera's pass: what each is compiled with, and how far a sample is followed.
+
+A scene that shows glass or mirrors has two: one for what is seen directly, which lists the pixels that meet something specular first, and
+one for those, which holds all that is dear. A third is for samples of single wavelengths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ..gpu import bindings
+from ..gpu.map_channels import MapChannels
+from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.texture_store import place_defines
+from ..model.scene import Black, Dielectric, Diffuse, Mirror
+from .camera_records import has_extent
+from .camera_tables import EMISSION_CELLS
+from .present import Channels
+
+Defines = dict[str, int | float | str]
+
+MAX_DEPTH = 48
+"""Surfaces that one camera path may meet."""
+MAX_EVENTS = 160
+"""Surfaces that all paths of a sample may meet together."""
+STACK = 6
+"""Paths of a sample that may wait while another is followed."""
+ENDS_HELD = 8
+"""Paths' ends of a sample that are looked at together."""
+CUT_THRESHOLD = 0.004
+"""Share of a sample's power above which both parts of a cut band are followed."""
+TINT_STEPS = 48
+"""Stretches that the whole spectrum is cut into behind coloured glass."""
+
+BIND_LIGHTS, BIND_OBJECT_COLOURS, BIND_CELL_CDF, BIND_RECEIVERS, BIND_PLACEMENTS, BIND_PICTURES, BIND_COUNTERS, BIND_LISTED = range(8, 16)
+UNIT_EMISSION, UNIT_PICTURES = 10, 11
+_BEYOND_ONLY = ("HAS_DISPERSION", "SPECTRAL_SWEEP", "RANDOM_WAVELENGTH", "EVEN_WAVELENGTHS", "MAP_BINS", "ABSORPTION", "NORMAL_DERIVATIVES")
+"""What only rays beyond glass and mirrors need."""
+
+
+def eye_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: MapChannels) -> Defines:
+    """What the scene needs of the shader, for a picture in `channels` and `maps` of these channels; tables and pictures add theirs.
+
+    `EYE_SPECULAR` is among them where rays go on beyond glass or mirrors: these are then for the listed pixels, and `direct_defines` has the others'.
+    """
+    lights, features = scene.scene.lights, scene.features
+    beauty = layer != "caustic"
+    specular = beauty and features.eye_specular
+    disperses = specular and features.eye_disperses
+    defines: Defines = dict(features.defines() | bindings.SCENE_DEFINES | scene.defines | place_defines(BIND_PICTURES, UNIT_PICTURES))
+    # A method that follows single wavelengths has no columns for them; nor has a scene where nothing disperses.
+    groups = features.spectral_groups if disperses else 0
+    defines |= {
+        "TARGETS": channels.targets,
+        "MAP_TARGETS": maps.targets,
+        "SPECTRAL_GROUPS": groups,
+        "BIND_LIGHTS": BIND_LIGHTS,
+        "BIND_OBJECT_COLOURS": BIND_OBJECT_COLOURS,
+        "BIND_CELL_CDF": BIND_CELL_CDF,
+        "BIND_COUNTERS": BIND_COUNTERS,
+        "BIND_LISTED": BIND_LISTED,
+        "BIND_RECEIVERS": BIND_RECEIVERS,
+        "BIND_PLACEMENTS": BIND_PLACEMENTS,
+        "UNIT_EMISSION": UNIT_EMISSION,
+        "EMISSION_CELLS": EMISSION_CELLS,
+        "TINT_STEPS": TINT_STEPS,
+        "BIN_TARGET": maps.first_target,
+        "BIN_COUNT": maps.count,
+        "BIN_OVERLAP": 1 if maps.edges_nm is not None else 0,
+        "LIGHT_COUNT": len(lights),
+        "LIGHT_ROOM": len(lights) + 1,
+        "MAX_DEPTH": MAX_DEPTH,
+        "MAX_EVENTS": MAX_EVENTS if specular else 1,
+        "STACK": STACK,
+        "CUT_THRESHOLD": CUT_THRESHOLD,
+        "ENDS_HELD": ENDS_HELD,
+    }
+    materials = [item.material for item in scene.scene.objects]
+    coloured = any(isinstance(m, Mirror) and len(set(m.reflectance_rgb)) > 1 for m in materials)
+    absorbs = any(isinstance(m, Dielectric) and m.absorption is not None for m in materials)
+    switches = {
+        "LAYER_BEAUTY": beauty,
+        "EYE_SPECULAR": specular,
+        "HAS_DISPERSION": disperses,
+        "SPECTRAL_SWEEP": groups > 0,
+        "RANDOM_WAVELENGTH": features.random_wavelength,
+        "EVEN_WAVELENGTHS": features.even_wavelengths,
+        "RGB_CHANNELS": channels.edges_nm is None,
+        "MAP_BINS": disperses and maps.count > 0,
+        "HAS_RECEIVERS": any(isinstance(m, Diffuse | Black) for m in materials),
+        "VISIBLE_LIGHTS": beauty and any(has_extent(light) for light in lights),
+        "ABSORPTION": specular and (coloured or absorbs),
+        "NORMAL_DERIVATIVES": features.smooth_normals,
+    }
+    for name in switches:
+        defines.pop(name, None)
+    return defines | {name: 1 for name, on in switches.items() if on}
+
+
+def direct_defines(beyond: Mapping[str, int | float | str]) -> Defines:
+    """For what is seen directly, from what the listed pixels are compiled with."""
+    left_out = {"EYE_SPECULAR", *_BEYOND_ONLY}
+    return {name: value for name, value in beyond.items() if name not in left_out} | {"SPECTRAL_GROUPS": 0, "LISTS_SPECULAR": 1, "MAX_EVENTS": 1}
+
+
+def single_defines(beyond: Mapping[str, int | float | str]) -> Defines:
+    """For listed pixels whose samples are of one wavelength each."""
+    return {name: value for name, value in beyond.items() if name != "SPECTRAL_SWEEP"} | {"SPECTRAL_GROUPS": 0, "RANDOM_WAVELENGTH": 1, "EVEN_WAVELENGTHS": 1}

@@ -1,0 +1,94 @@
+"""Records that the eye's shader reads: a light as it is looked at, and what one dispatch is told."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.schema import Field, Struct
+from ..model.scene import Light
+from .emission_domain import orthonormal_frame
+
+EYE_LIGHT = Struct(
+    "EyeLight",
+    (
+        Field("position", "vec3", "GPU space"),
+        Field("kind", "uint", "0 point or spot, 1 directional, 2 collimated, 3 area"),
+        Field("axis", "vec3", "unit, propagation"),
+        Field("is_disc", "uint"),
+        Field("half_u", "vec3", "centre to rim, GPU units; directional: tangent of the angular radius"),
+        Field("measure", "float", "area: GPU units²; directional: radiance per irradiance (0: no extent); else 0"),
+        Field("half_v", "vec3", "as half_u, across it"),
+        Field("reserved", "float", ""),
+        Field("cone", "vec2", "inner and outer half angle, rad"),
+        Field("reserved2", "vec2", ""),
+    ),
+)
+EYE_PARAMETERS = Struct(
+    "EyeParameters",
+    (
+        Field("position", "vec3", "camera, GPU space"),
+        Field("orthographic", "uint"),
+        Field("forward", "vec3", "unit"),
+        Field("first_row", "uint", "row of this dispatch's first pixels"),
+        Field("half_right", "vec3", "picture's middle to its right border"),
+        Field("sample_index", "uint", "counts the samples of a pixel: which stretch of the spectrum this one sees"),
+        Field("half_up", "vec3", "picture's middle to its upper border"),
+        Field("seed", "uint"),
+        Field("red_of_xyz", "vec4", "row of the XYZ to linear Rec.709 matrix"),
+        Field("green_of_xyz", "vec4"),
+        Field("blue_of_xyz", "vec4"),
+        Field("background", "vec4", "linear Rec.709 radiance where nothing is met"),
+        Field("sky_x", "vec3", "column of the rotation from the world to the environment's frame"),
+        Field("map_scale", "float", "factor on the caustic maps: one over the passes in them"),
+        Field("sky_y", "vec3"),
+        Field("sample_side", "float", "side of a sample's share of its pixel, pixels"),
+        Field("sky_z", "vec3"),
+        Field("pixel_width", "float", "of a pixel whose columns rays carry, in pixels of this picture"),
+        Field("size", "uvec2", "picture, pixels"),
+        Field("within_pixel", "vec2", "this sample's place in its pixel, 0 to 1"),
+        Field("inside_mask", "uint", "solids the camera stands in, bits of the medium stack"),
+        Field("inside_object", "uint", "solid outside the stack it stands in, or NONE"),
+        Field("bands", "uint", "stretches the spectrum is cut into; a sample is of one of them"),
+        Field("dithered", "uint", "whether pixels begin with different bands"),
+        Field("most_taps", "uint", "looks along one sweep at most"),
+        Field("split_threshold", "float", "share of a path's power above which both of its parts are followed"),
+        Field("draw_index", "uint", "counts them too: which numbers it draws"),
+        Field("counts_turns", "uint", "whether pixels count their own dispersed samples instead"),
+        Field("taps_per_pixel", "float", "looks along a sweep, for every pixel it is long"),
+        Field("band_side", "float", "side of the share of its pixel that a sample of one band has, pixels"),
+        Field("direct_looks", "uint", "of one sample, at what is seen directly"),
+        Field("first_listed", "uint", "of the listed pixels, this dispatch's first"),
+        Field("pixel_height", "float", "as pixel_width"),
+        Field("unused2", "float", ""),
+        Field("unused3", "vec2", ""),
+    ),
+)
+_LIGHT_KINDS = {"point": 0, "spot": 0, "directional": 1, "collimated": 2, "area": 3}
+
+
+def has_extent(light: Light) -> bool:
+    """Whether a camera ray can run into it."""
+    return light.kind == "area" or (light.kind == "directional" and light.angular_diameter_deg > 0)
+
+
+def light_record(light: Light, scene: SceneBuffers) -> np.void:
+    """The light in GPU space."""
+    record = EYE_LIGHT.zeros(1)[0]
+    axis = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
+    tangent, bitangent = orthonormal_frame(axis, None if light.tangent is None else np.asarray(light.tangent))
+    record["position"] = scene.space.to_gpu(np.array(light.position))
+    record["kind"] = _LIGHT_KINDS[light.kind]
+    record["axis"] = axis
+    record["is_disc"] = light.shape == "disc" or light.kind == "directional"
+    half = np.array([light.radius, light.radius] if light.shape == "disc" else [0.5 * light.width, 0.5 * light.height]) * scene.space.scale
+    if light.kind == "directional":
+        radius = np.radians(0.5 * light.angular_diameter_deg)
+        half = np.full(2, np.tan(radius))
+        record["measure"] = 1.0 / (np.pi * np.sin(radius) ** 2) if radius > 0 else 0.0
+    elif light.kind == "area":
+        record["measure"] = half[0] * half[1] * (np.pi if light.shape == "disc" else 4.0)
+    record["half_u"], record["half_v"] = tangent * half[0], bitangent * half[1]
+    angles = (light.inner_half_angle_deg, light.outer_half_angle_deg)
+    record["cone"] = np.radians(angles) if light.kind == "spot" else (4.0, 4.0)
+    return record

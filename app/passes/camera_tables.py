@@ -1,0 +1,196 @@
+"""Spectra as the eye's rays meet them: indices of the glass that is shown, absorption, and emission times the observer.
+
+The emission table holds running sums over the spectral coordinate x. A look at a stretch of the spectrum is then the
+difference of two of its samples in every channel of the picture, however many wavelengths lie between them.
+Where the shown glass is an edit of the one that photons were traced through, the eye follows the shown one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import moderngl
+import numpy as np
+
+from ..gpu.map_channels import MapChannels
+from ..gpu.scene_buffers import SAMPLES, SceneBuffers, index_slope
+from ..gpu.scene_texels import spectra_texture
+from ..model.optics.colorimetry import VISIBLE_NM, daylight_per_lumen, rgb_basis
+from ..model.optics.glass import Dispersion
+from ..model.optics.spectral_tables import SpectralAxis, cumulative, index_table
+from ..model.optics.spectrum import Spectrum
+from ..model.scene import (
+    Absorption,
+    Dielectric,
+    Diffuse,
+    Material,
+    Mirror,
+    Scene,
+)
+from .present import Channels
+
+EMISSION_CELLS = SAMPLES - 1
+"""Cells of x that a stretch of the spectrum begins and ends with; a wavelength is told to 1/1024 of the indices' variation."""
+
+
+@dataclass(frozen=True)
+class EyeTables:
+    """GPU tables of one shown scene, and the symbols that tell the shader where in them is what."""
+
+    spectra: moderngl.Texture
+    emission: moderngl.Texture
+    object_colours: moderngl.Buffer
+    cell_cdf: moderngl.Buffer
+    defines: dict[str, int]
+    axis: SpectralAxis
+
+    @classmethod
+    def build(
+        cls, ctx: moderngl.Context, scene: SceneBuffers, channels: Channels, reflectances: Sequence[np.ndarray | None], maps: MapChannels
+    ) -> EyeTables:
+        """`scene.scene` is what is shown; its geometry and its partition into glasses are those of `scene`.
+
+        `reflectances`: classes as the splat tables were built with. `maps`: what the caustic maps' channels are."""
+        shown = scene.scene
+        glasses = _shown_media(scene)
+        axis = _axis(scene, list(glasses.values()))
+        absorptions = _absorptions(shown, scene.space.scale)
+        cell_cdf = _cell_cdf(axis, channels)
+        spectra, defines = _spectra(scene, glasses, axis, absorptions, cell_cdf, maps)
+        emission, rows = _emission(shown, axis, channels, reflectances, maps, scene.space.scale)
+        colours = np.zeros((len(shown.objects), 4), "f4")
+        colours[:, 3] = -1.0
+        for row, item in zip(colours, shown.objects, strict=True):
+            if isinstance(item.material, Diffuse | Mirror):
+                row[:3] = item.material.reflectance_rgb
+            coefficient = _absorption(item.material, scene.space.scale)
+            if coefficient is not None:
+                row[3] = next(i for i, known in enumerate(absorptions) if np.array_equal(known, coefficient))
+        return cls(
+            spectra_texture(ctx, spectra),
+            _texture(ctx, emission),
+            ctx.buffer(colours.tobytes()),
+            ctx.buffer(cell_cdf.astype("f4").tobytes()),
+            defines | rows,
+            axis,
+        )
+
+    def release(self) -> None:
+        """Free everything."""
+        for owned in (self.spectra, self.emission, self.object_colours, self.cell_cdf):
+            owned.release()
+
+
+def _shown_media(scene: SceneBuffers) -> dict[Dispersion, Dispersion]:
+    """Each glass that the records number, in their order, and the one that is shown in its stead."""
+    shown = {}
+    for traced in scene.media:
+        owner = next(i for i, material in enumerate(scene.traced_glasses) if material == traced)
+        material = scene.scene.objects[owner].material
+        assert isinstance(material, Dielectric)
+        shown[traced] = material.dispersion
+    return shown
+
+
+def _axis(scene: SceneBuffers, shown: list[Dispersion]) -> SpectralAxis:
+    by_glass = scene.groups.count and not scene.groups.by_wavelength
+    return SpectralAxis.build(shown if by_glass else [])
+
+
+def _absorptions(scene: Scene, scale: float) -> list[np.ndarray]:
+    """Distinct absorption coefficients (401,) of glasses, 1/GPU unit, and of coloured mirrors, a reflection, in the order of the objects."""
+    distinct: list[np.ndarray] = []
+    for item in scene.objects:
+        coefficient = _absorption(item.material, scale)
+        if coefficient is not None and not any(np.array_equal(coefficient, known) for known in distinct):
+            distinct.append(coefficient)
+    return distinct
+
+
+def _absorption(material: Material, scale: float) -> np.ndarray | None:
+    match material:
+        case Dielectric(absorption=Absorption(coefficient=coefficient)):
+            return coefficient / scale
+        case Mirror(reflectance_rgb=rgb) if len(set(rgb)) > 1:
+            return -np.log(np.maximum(rgb_basis() @ np.asarray(rgb, float), 1e-30))
+    return None
+
+
+def _spectra(
+    scene: SceneBuffers, glasses: dict[Dispersion, Dispersion], axis: SpectralAxis, absorptions: list[np.ndarray], cell_cdf: np.ndarray, maps: MapChannels
+) -> tuple[np.ndarray, dict[str, int]]:
+    """Rows over x as `lib/scene.glsl` reads them, and where they begin."""
+    x = np.linspace(0.0, 1.0, SAMPLES)
+    nm = axis.nm_of_samples(SAMPLES)
+    groups = replace(scene.groups, glasses=tuple(glasses[g] for g in scene.groups.glasses))
+    variables = groups.variables(axis)
+    slopes = [index_slope(groups, scene.groups.glasses.index(g) if g in scene.groups.glasses else None, axis, variables) for g in glasses]
+    sections = {
+        "INDEX_ROW": np.asarray(index_table(axis, list(glasses.values()), SAMPLES), float),
+        "SLOPE_ROW": np.array(slopes).reshape(-1, SAMPLES),
+        "VARIABLE_ROW": variables,
+        "ABSORPTION_ROW": np.array([np.interp(nm, VISIBLE_NM, a) for a in absorptions]).reshape(-1, SAMPLES),
+        "BASIS_ROW": np.array([np.interp(nm, VISIBLE_NM, column) for column in rgb_basis().T]),
+        "BIN_ROW": maps.coordinate(axis, x)[None],
+        "QUANTILE_ROW": np.interp(x, cell_cdf, np.linspace(0.0, 1.0, EMISSION_CELLS + 1))[None],
+    }
+    starts = np.cumsum([0] + [len(rows) for rows in sections.values()])
+    defines = dict(zip(sections, starts.tolist(), strict=False))
+    return np.concatenate(list(sections.values())), defines | {"ABSORBERS": len(absorptions)}
+
+
+def _emission(
+    scene: Scene, axis: SpectralAxis, channels: Channels, reflectances: Sequence[np.ndarray | None], maps: MapChannels, scale: float
+) -> tuple[np.ndarray, dict[str, int]]:
+    """Running sums (rows, EMISSION_CELLS + 1, 4·targets) and where each kind of row begins."""
+    x = np.linspace(0.0, 1.0, EMISSION_CELLS + 1)
+    observer, basis = channels.observer(), rgb_basis()
+
+    def running(spectrum: Spectrum, reflectance: np.ndarray | None = None) -> np.ndarray:
+        weights = observer if reflectance is None else observer * np.asarray(reflectance)[:, None]
+        sums = cumulative(axis, spectrum, weights).at(x)
+        # All of the spectrum is between the first sample and the last, a line at 380 nm too.
+        sums[0] = 0.0
+        return sums
+
+    white = Spectrum(daylight_per_lumen())
+    rows = [running(white), *(running(white, column) for column in basis.T)]
+    defines = {"WHITE_ROW": 0, "LIGHT_ROW": len(rows), "ROWS_PER_LIGHT": 4 + len(reflectances) - 1}
+    for light in scene.lights:
+        # Intensity over distance² in GPU units needs the square of the scale; the other kinds are free of lengths.
+        unit = scale**2 if light.kind in ("point", "spot") else 1.0
+        rows += [unit * running(light.spectral_power), *(unit * running(light.spectral_power, column) for column in basis.T)]
+        rows += [unit * running(light.spectral_power, reflectance) for reflectance in reflectances[1:]]
+    defines["BIN_SPECTRUM_ROW"] = len(rows)
+    rows += [running(spectrum) for spectrum in maps.spectra(scene.lights)]
+    defines["REFLECTANCE_ROW"] = len(rows)
+    if channels.edges_nm is not None:
+        # Mean over each bin of the reflectance basis: the last sample alone is read.
+        rows += [np.broadcast_to(channels.of_reflectance(tuple(np.eye(3)[c])), rows[0].shape) for c in range(3)]
+    return np.stack(rows), defines
+
+
+def _texture(ctx: moderngl.Context, rows: np.ndarray) -> moderngl.Texture:
+    """RGBA32F: row r of target t at y = r · targets + t."""
+    count, samples, columns = rows.shape
+    texels = rows.reshape(count, samples, columns // 4, 4).transpose(0, 2, 1, 3).reshape(-1, samples, 4)
+    texture = ctx.texture((samples, len(texels)), 4, np.ascontiguousarray(texels, "f4"), dtype="f4")
+    texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+    return texture
+
+
+def _cell_cdf(axis: SpectralAxis, channels: Channels) -> np.ndarray:
+    """How much of what looks bright lies below each border of the cells of x: what daylight adds to X + Y + Z there, or evenly to all bins.
+
+    Random wavelengths are drawn by it, and looks along a sweep shared out."""
+    x = np.linspace(0.0, 1.0, EMISSION_CELLS + 1)
+    if channels.edges_nm is None:
+        seen = cumulative(axis, Spectrum(daylight_per_lumen())).at(x)[:, :3].sum(axis=1)
+    else:
+        white = daylight_per_lumen()
+        seen = cumulative(axis, Spectrum(white), (channels.observer().sum(axis=1) / white)[:, None] * np.ones(4)).at(x)[:, 0]
+    # No cell is impossible: another light may be brighter there.
+    mixed = 0.98 * seen / seen[-1] + 0.02 * x
+    mixed[0], mixed[-1] = 0.0, 1.0
+    return mixed

@@ -1,0 +1,182 @@
+"""All receivers' caustic maps as tiles of one texture, and the sums kept in it.
+
+Splats are added to a scratch texture first and from there to the total after fixed numbers of photons: a float32
+sum of a million small numbers loses digits that a sum of sums keeps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.errors import UserError
+from ..gpu.records import NONE, PLACEMENT
+
+if TYPE_CHECKING:
+    import moderngl
+
+MAX_SIDE = 4096
+GUARD = 1
+"""Empty texels between tiles, so that a bilinear look-up never meets a neighbour."""
+KIND_FLAT, KIND_CHART = 0, 1
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A rectangle of the atlas, in texels."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    @property
+    def rect(self) -> tuple[int, int, int, int]:
+        """x0, y0, x1, y1."""
+        return self.x, self.y, self.x + self.width, self.y + self.height
+
+
+def pack(sizes: Sequence[tuple[int, int]], max_side: int = MAX_SIDE) -> tuple[list[Tile], tuple[int, int]]:
+    """Shelves, tallest tiles first: a tile per (width, height), in their order, and the atlas size.
+
+    The narrowest of a few atlas widths that wastes least. Raises `UserError` when nothing up to
+    max_side² holds them.
+    """
+    if not sizes:
+        return [], (GUARD, GUARD)
+    widest = max(width for width, _ in sizes) + 2 * GUARD
+    area = sum((width + GUARD) * (height + GUARD) for width, height in sizes)
+    best: tuple[int, list[Tile], tuple[int, int]] | None = None
+    for factor in (0.0, 1.0, 1.2, 1.5, 2.0, 1e9):
+        limit = min(max(widest, int(factor * area**0.5)), max_side)
+        tiles, size = _shelves(sizes, limit)
+        if size[0] <= max_side and size[1] <= max_side and (best is None or size[0] * size[1] < best[0]):
+            best = (size[0] * size[1], tiles, size)
+    if best is None:
+        raise UserError(f"the caustic maps need {area / 1e6:.1f} M texels and do not fit a texture of {max_side}²; ask for a smaller picture or map")
+    return best[1], best[2]
+
+
+def _shelves(sizes: Sequence[tuple[int, int]], limit: int) -> tuple[list[Tile], tuple[int, int]]:
+    tiles: list[Tile] = [Tile(0, 0, 0, 0)] * len(sizes)
+    x = y = GUARD
+    shelf = widest = 0
+    for index in sorted(range(len(sizes)), key=lambda i: (-sizes[i][1], -sizes[i][0], i)):
+        width, height = sizes[index]
+        if x > GUARD and x + width + GUARD > limit:
+            x, y, shelf = GUARD, y + shelf + GUARD, 0
+        tiles[index] = Tile(x, y, width, height)
+        x += width + GUARD
+        shelf = max(shelf, height)
+        widest = max(widest, x)
+    return tiles, (widest, y + shelf + GUARD)
+
+
+def placement_rows(tile: Tile, world_to_texel: np.ndarray, texel_area: np.ndarray | float, rects: np.ndarray | None = None) -> np.ndarray:
+    """Chart placements, one a triangle: `world_to_texel` (n, 2, 4) or (2, 4) maps GPU space to the tile's own texels.
+
+    `rects` (n, 4): the part of the tile each may draw to, in its own texels; None is all of it.
+    Returns PLACEMENT records whose `next` is NONE and whose kind is flat for a single (2, 4), chart otherwise.
+    """
+    rows = np.asarray(world_to_texel, np.float64)
+    flat = rows.ndim == 2
+    rows = np.array(rows.reshape(-1, 2, 4))
+    rows[:, :, 3] += (tile.x, tile.y)
+    records = PLACEMENT.zeros(len(rows))
+    records["row_u"], records["row_v"] = rows[:, 0], rows[:, 1]
+    whole = np.array([[0.0, 0.0, tile.width, tile.height]])
+    records["rect"] = (whole if rects is None else np.asarray(rects, np.float64)) + (tile.x, tile.y, tile.x, tile.y)
+    records["texel_area"] = texel_area
+    records["next"] = NONE
+    records["blurred"] = NONE
+    records["kind"] = KIND_FLAT if flat else KIND_CHART
+    return records
+
+
+class MapAtlas:
+    """The textures of the caustic maps: `targets` RGBA32F scratch and total textures of one size."""
+
+    def __init__(self, ctx: moderngl.Context, size: tuple[int, int], placements: np.ndarray, targets: int = 1) -> None:
+        """`size` from `pack`; `placements`: PLACEMENT records, indexed by the receivers."""
+        from .accumulate import Accumulate
+
+        self.ctx = ctx
+        self.size = size
+        self.targets = targets
+        self.placements = ctx.buffer(np.ascontiguousarray(placements)) if len(placements) else ctx.buffer(reserve=PLACEMENT.stride)
+        self.scratch_textures = [self._texture() for _ in range(targets)]
+        self.total_textures = [self._texture() for _ in range(targets)]
+        self.framebuffer = ctx.framebuffer(self.scratch_textures)
+        self._accumulate = Accumulate(ctx)
+        self.pending = 0
+        """Photons in the scratch textures."""
+        self.clear()
+
+    def _texture(self) -> moderngl.Texture:
+        import moderngl
+
+        texture = self.ctx.texture(self.size, 4, dtype="f4")
+        texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        texture.repeat_x = texture.repeat_y = False
+        return texture
+
+    def set_placements(self, placements: np.ndarray) -> None:
+        """Replace all placements (the window was fitted again)."""
+        data = np.ascontiguousarray(placements)
+        self.placements.orphan(data.nbytes)
+        self.placements.write(data)
+
+    def flush(self) -> None:
+        """Add the scratch textures to the total and clear them."""
+        if self.pending:
+            for scratch, total in zip(self.scratch_textures, self.total_textures, strict=True):
+                self._accumulate.run(scratch, total)
+            self.pending = 0
+
+    def clear(self) -> None:
+        """Forget everything deposited."""
+        for texture in self.total_textures:
+            frame = self.ctx.framebuffer([texture])
+            frame.clear()
+            _park(self.ctx)
+            frame.release()
+        self.framebuffer.clear()
+        self.pending = 0
+
+    def read_total(self) -> np.ndarray:
+        """Everything deposited so far: float32 (height, width, 4 · targets), row 0 at texel y = 0."""
+        self.flush()
+        self.ctx.memory_barrier()
+        width, height = self.size
+        layers = []
+        for texture in self.total_textures:
+            layer = np.empty((height, width, 4), np.float32)
+            texture.read_into(layer)
+            layers.append(layer)
+        return np.concatenate(layers, axis=-1) if len(layers) > 1 else layers[0]
+
+    def read_tile(self, tile: Tile) -> np.ndarray:
+        """One tile of `read_total`: float32 (tile.height, tile.width, 4 · targets)."""
+        x0, y0, x1, y1 = tile.rect
+        return self.read_total()[y0:y1, x0:x1]
+
+    def release(self) -> None:
+        _park(self.ctx)
+        self.framebuffer.release()
+        self._accumulate.release()
+        for resource in (*self.scratch_textures, *self.total_textures, self.placements):
+            resource.release()
+
+
+def _park(ctx: moderngl.Context) -> None:
+    """Bind a framebuffer that lives as long as the context.
+
+    moderngl binds the last used framebuffer again after every clear; were it released meanwhile,
+    that is GL_INVALID_OPERATION, and a context without a window has no screen to fall back on.
+    """
+    if ctx.extra is None:
+        ctx.extra = ctx.simple_framebuffer((1, 1))
+    ctx.extra.use()

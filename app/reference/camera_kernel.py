@@ -1,0 +1,294 @@
+"""The eye's reference, compiled: one camera path of one wavelength, to the first diffuse surface.
+
+Reflection or refraction is drawn with Fresnel's probability, so that a path's weight changes by
+absorption and mirrors only; lights are seen along the way, the environment at its end. At a diffuse surface one
+random point of every light is asked for (anything between hides it, glass too: what comes through glass is the
+caustic's), and the spectral caustic is looked up. Numbers: a scrambled Sobol sequence a part, shifted from pixel to pixel.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .camera_lights import light_seen, sample_light
+from .camera_optics import (
+    AIR,
+    camera_ray,
+    choice,
+    inlined,
+    lean,
+    scatter,
+    sobol_next,
+    sobol_start,
+    transmitted,
+)
+from .camera_scene import beyond, picture_at
+from .photon_emit import search
+from .photon_intersect import blocked, nearest
+from .photon_kernel import DIMENSIONS, _mixed, _unit
+from .photon_scene import BLACK, DIFFUSE
+
+LOST_DEPTH, LOST_NUMERIC = range(2)
+"""Places in a tally of paths that were given up: too many events, or nothing met inside a solid."""
+
+
+class CausticTables(NamedTuple):
+    """The spectral caustic as paths look it up: S sides of flat receivers, each a coarse window (0) and a fine one (1)."""
+
+    side: np.ndarray
+    """int32 (O, 2): S of an object's front and back, or −1."""
+    frame: np.ndarray
+    """float64 (S, 3, 3): origin, then the plane's two unit axes."""
+    low: np.ndarray
+    """float64 (S, 2, 2): a window's lower corner on the plane."""
+    texels_per_unit: np.ndarray
+    """float64 (S, 2, 2)."""
+    size: np.ndarray
+    """int64 (S, 2, 2): columns and rows."""
+    first: np.ndarray
+    """int64 (S, 2): where a window begins in `irradiance`."""
+    irradiance: np.ndarray
+    """float32 (texels × bins,): W/unit² of each bin, row by row, texel by texel."""
+    bins: int
+
+
+class Start(NamedTuple):
+    """What the camera stands in."""
+
+    mask: np.uint64
+    alone: int
+
+
+@inlined
+def texel_of(tables, side, window, x, y):
+    """Number of the texel that holds a point of the plane, counted within its window; −1: outside."""
+    column = math.floor((x - tables.low[side, window, 0]) * tables.texels_per_unit[side, window, 0])
+    row = math.floor((y - tables.low[side, window, 1]) * tables.texels_per_unit[side, window, 1])
+    width, height = tables.size[side, window, 0], tables.size[side, window, 1]
+    if column < 0 or column >= width or row < 0 or row >= height:
+        return -1
+    return int(row) * width + int(column)
+
+
+@inlined
+def on_plane(tables, side, px, py, pz):
+    """Coordinates of a point on a side's plane."""
+    f = tables.frame[side]
+    rx, ry, rz = px - f[0, 0], py - f[0, 1], pz - f[0, 2]
+    return rx * f[1, 0] + ry * f[1, 1] + rz * f[1, 2], rx * f[2, 0] + ry * f[2, 1] + rz * f[2, 2]
+
+
+@inlined
+def _caustic_texel(tables, side, px, py, pz):
+    """Where the bins of the finest texel that holds the point begin; −1: none does."""
+    if side < 0:
+        return -1
+    x, y = on_plane(tables, side, px, py, pz)
+    for window in (1, 0):
+        texel = texel_of(tables, side, window, x, y)
+        if texel >= 0:
+            return tables.first[side, window] + texel * tables.bins
+    return -1
+
+
+@inlined
+def _surface(scene, pictures, triangle, u, v):
+    """A diffuse surface's reflectance at a point: (class, r, g, b); the colour counts in class 0 only."""
+    thing = scene.owner[triangle]
+    r, g, b = pictures.colour[thing, 0], pictures.colour[thing, 1], pictures.colour[thing, 2]
+    if pictures.texture[thing] >= 0 and pictures.uv_row[triangle] >= 0:
+        uv, w = pictures.uv[pictures.uv_row[triangle]], 1.0 - u - v
+        tr, tg, tb = picture_at(pictures, pictures.texture[thing], w * uv[0] + u * uv[2] + v * uv[4], w * uv[1] + u * uv[3] + v * uv[5])
+        r, g, b = r * tr, g * tg, b * tb
+    return scene.reflectance_class[thing], r, g, b
+
+
+@inlined
+def _gain(scene, lights, i, triangle, side, px, py, pz, a, b, stack):
+    """Irradiance by light i, per unit of its quantity, on a facet's front (side 0) or back (1)."""
+    sign = 1.0 if side == 0 else -1.0
+    # The plastic number's fractions turn the sample's place on from light to light.
+    at, bt = a + i * 0.7548776662466927, b + i * 0.5698402909980532
+    tx, ty, tz, distance, gain = sample_light(lights, i, px, py, pz, at - math.floor(at), bt - math.floor(bt))
+    gain *= sign * (tx * scene.normals[triangle, 0] + ty * scene.normals[triangle, 1] + tz * scene.normals[triangle, 2])
+    # A hair less than the way, so that a surface the light lies on does not hide it.
+    if gain <= 0.0 or blocked(scene, px, py, pz, tx, ty, tz, distance * (1.0 - 1e-9), triangle, stack):
+        return 0.0
+    return gain
+
+
+@inlined
+def _added(table, i, row, red, green, blue, factor, xyz):
+    """Add row i of a table of XYZ by reflectance (`Spectra.light_xyz`) to `xyz` (3,)."""
+    for c in range(3):
+        xyz[c] += factor * (table[i, 2 + row, c] if row > 0 else red * table[i, 0, c] + green * table[i, 1, c] + blue * table[i, 2, c])
+
+
+@inlined
+def _diffuse(scene, lights, spectra, pictures, tables, atom, triangle, u, v, px, py, pz, side, a, b, stack, xyz):
+    """Radiance in an atom that a diffuse surface sends back from a side; without atom (−1) all wavelengths go to `xyz`."""
+    row, red, green, blue = _surface(scene, pictures, triangle, u, v)
+    white = atom < 0
+    total = 0.0
+    for i in range(lights.kind.shape[0]):
+        if white or spectra.lights[i, atom] > 0.0:
+            gain = _gain(scene, lights, i, triangle, side, px, py, pz, a, b, stack)
+            if white and gain > 0.0:
+                _added(spectra.light_xyz, i, row, red, green, blue, gain / math.pi, xyz)
+            elif gain > 0.0:
+                total += spectra.lights[i, atom] * gain
+    texel = _caustic_texel(tables, tables.side[scene.owner[triangle], side], px, py, pz)
+    if white:
+        if texel >= 0:
+            for i in range(tables.bins):
+                irradiance = tables.irradiance[texel + i]
+                if irradiance > 0.0:
+                    _added(spectra.bin_xyz, i, row, red, green, blue, irradiance / math.pi, xyz)
+        return 0.0
+    if texel >= 0:
+        total += spectra.share[atom] * tables.irradiance[texel + spectra.bin[atom]]
+    basis = spectra.basis[atom]
+    reflectance = spectra.classes[row, atom] if row > 0 else red * basis[0] + green * basis[1] + blue * basis[2]
+    return total * reflectance / math.pi
+
+
+@inlined
+def _wavelength(spectra, chance):
+    """(atom, nm) drawn by a number in [0, 1)."""
+    atom = search(spectra.cdf, chance)
+    part = (chance - spectra.cdf[atom]) / (spectra.cdf[atom + 1] - spectra.cdf[atom])
+    return atom, spectra.start_nm[atom] + spectra.width_nm[atom] * part
+
+
+@inlined
+def sample(scene, lights, spectra, pictures, tables, start, px, py, pz, dx, dy, dz, state, shift, noise, max_depth, tally, stack, stack_distance, xyz):
+    """Add what a camera ray sees to `xyz` (3,).
+
+    Up to the first event at glass or a mirror nothing depends on a wavelength, and all are added at once;
+    then one is drawn and stands for all by its probability.
+    """
+    last, last_object, within, mask, alone, events = -1, -1, False, start.mask, start.alone, 0
+    atom, nm, found, weight = -1, 0.0, 0.0, 1.0
+    if mask != np.uint64(0) or alone != AIR:  # in glass wavelengths part at once
+        atom, nm = _wavelength(spectra, _unit(state[2] ^ shift[2]))
+    while True:
+        t, triangle, u, v = nearest(scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance)
+        far = t if triangle >= 0 else np.inf
+        for i in range(lights.kind.shape[0]):
+            seen = light_seen(lights, i, px, py, pz, dx, dy, dz, far)
+            if seen > 0.0 and atom < 0:
+                _added(spectra.light_xyz, i, 0, 1.0, 1.0, 1.0, seen, xyz)
+            elif seen > 0.0:
+                found += weight * seen * spectra.lights[i, atom]
+        if triangle < 0:
+            if mask != np.uint64(0) or alone != AIR:
+                tally[LOST_NUMERIC] += 1.0
+                break
+            red, green, blue = beyond(pictures, dx, dy, dz)
+            if atom < 0:
+                _added(spectra.beyond_xyz, 0, 0, red, green, blue, 1.0, xyz)
+            else:
+                basis = spectra.basis[atom]
+                found += weight * spectra.daylight[atom] * (red * basis[0] + green * basis[1] + blue * basis[2])
+            break
+        if atom >= 0:
+            weight *= transmitted(scene, mask, alone, nm, t)
+        px, py, pz = px + t * dx, py + t * dy, pz + t * dz
+        thing = scene.owner[triangle]
+        kind = scene.kind[thing]
+        if kind == BLACK or weight <= 0.0:
+            break
+        if kind == DIFFUSE:
+            facing = dx * scene.normals[triangle, 0] + dy * scene.normals[triangle, 1] + dz * scene.normals[triangle, 2]
+            a, b = _unit(state[3] ^ shift[3]), _unit(state[4] ^ shift[4])
+            found += weight * _diffuse(
+                scene, lights, spectra, pictures, tables, atom, triangle, u, v, px, py, pz, 1 if facing > 0.0 else 0, a, b, stack, xyz
+            )
+            break
+        if events >= max_depth:
+            tally[LOST_DEPTH] += 1.0
+            break
+        if atom < 0:
+            atom, nm = _wavelength(spectra, _unit(state[2] ^ shift[2]))
+        last, last_object = triangle, thing
+        dx, dy, dz, mask, alone, within, is_event, kept = scatter(
+            scene, triangle, u, v, dx, dy, dz, mask, alone, nm, choice(state, shift, events, noise)
+        )
+        weight *= kept
+        if is_event:
+            events += 1
+    if found > 0.0:
+        for c in range(3):
+            xyz[c] += found * spectra.response[atom, c]
+
+
+@lean
+def trace_eye(scene, camera, lights, spectra, pictures, tables, start, sequence, first, count, max_depth, sums, tally, scratch):
+    """Add samples [first, first + count) of every pixel to `sums` (H, W, 3), XYZ of each: divide by their number."""
+    stack, stack_distance, xyz = scratch.stack, scratch.stack_distance, scratch.xyz
+    beginning, state, shift = scratch.beginning, scratch.state, scratch.shift
+    sobol_start(sequence, first, beginning)
+    for row in range(camera.height):
+        for column in range(camera.width):
+            key = _mixed(sequence.key ^ _mixed(np.uint64(row * camera.width + column)))
+            for d in range(DIMENSIONS):
+                key += np.uint64(0x9E3779B97F4A7C15)
+                shift[d] = np.uint32(_mixed(key) >> np.uint64(32))
+                state[d] = beginning[d]
+            for i in range(first, first + count):
+                if i > first:
+                    sobol_next(sequence, i, state)
+                ox, oy, oz, dx, dy, dz = camera_ray(camera, column + _unit(state[0] ^ shift[0]), row + _unit(state[1] ^ shift[1]))
+                noise = _mixed(key ^ _mixed(np.uint64(i)))
+                sample(
+                    scene, lights, spectra, pictures, tables, start, ox, oy, oz, dx, dy, dz,
+                    state, shift, noise, max_depth, tally, stack, stack_distance, xyz,
+                )  # fmt: skip
+            for c in range(3):
+                sums[row, column, c] += xyz[c]
+                xyz[c] = 0.0
+
+
+@lean
+def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, points, which, scratch):
+    """Where `count` camera paths spread over the picture end on sides of receivers, for fitting windows: the number found.
+
+    `side` (O, 2) as in `CausticTables`; fills `points` (count, 4): place, and length of the way there; `which` (count, 2):
+    side, events on the way.
+    """
+    stack, stack_distance, state, shift = scratch.stack, scratch.stack_distance, scratch.state, scratch.shift
+    sobol_start(sequence, 0, state)
+    found = 0
+    for i in range(count):
+        if i > 0:
+            sobol_next(sequence, i, state)
+        px, py, pz, dx, dy, dz = camera_ray(camera, _unit(state[0]) * camera.width, _unit(state[1]) * camera.height)
+        noise = _mixed(sequence.key ^ _mixed(np.uint64(i)))
+        last, last_object, within, mask, alone, events, way = -1, -1, False, start.mask, start.alone, 0, 0.0
+        while events <= max_depth:
+            t, triangle, u, v = nearest(scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance)
+            if triangle < 0:
+                break
+            px, py, pz, way = px + t * dx, py + t * dy, pz + t * dz, way + t
+            thing = scene.owner[triangle]
+            kind = scene.kind[thing]
+            if kind == DIFFUSE:
+                facing = dx * scene.normals[triangle, 0] + dy * scene.normals[triangle, 1] + dz * scene.normals[triangle, 2]
+                at = side[thing, 1 if facing > 0.0 else 0]
+                if at >= 0:
+                    points[found, 0], points[found, 1], points[found, 2], points[found, 3] = px, py, pz, way
+                    which[found, 0], which[found, 1] = at, events
+                    found += 1
+                break
+            if kind == BLACK:
+                break
+            last, last_object = triangle, thing
+            dx, dy, dz, mask, alone, within, is_event, _ = scatter(
+                scene, triangle, u, v, dx, dy, dz, mask, alone, nm, choice(state, shift, events, noise)
+            )
+            if is_event:
+                events += 1
+    return found

@@ -1,0 +1,93 @@
+"""Where rays leave a light, in float64 and world units: the twin of emit.comp.
+
+Without derivatives: difference quotients over `Emitter.start` judge the shader's columns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..gpu.scene_buffers import GpuSpace
+from ..model.scene import Light
+from ..passes.emission_domain import EmissionDomain
+from .emission_maps import (
+    PLASTIC,
+    angle_between,
+    azimuthal_direction,
+    concentric_disc,
+    lattice_point,
+    spot_falloff,
+)
+from .optics import unit
+
+
+@dataclass(frozen=True)
+class Emitter:
+    """One light's emission domain and the place on the light that all rays come from."""
+
+    light: Light
+    domain: EmissionDomain
+    space: GpuSpace
+    place: tuple[float, float]
+    """In the unit square; matters to lights of some extent."""
+
+    @property
+    def unit_length(self) -> float:
+        """Domain coordinates are this many world units (beams), or of the azimuthal plane (1)."""
+        return 1.0 / self.space.scale if self.domain.kind == "plane" else 1.0
+
+    def start(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(position, direction), each (..., 3), of the ray at the domain's point `q` (..., 2).
+
+        `q` is in world units for directional and collimated light, on the azimuthal plane otherwise.
+        """
+        domain = self.domain
+        frame = np.stack([domain.tangent, domain.bitangent])
+        origin = self.space.to_world(domain.origin)
+        q = np.asarray(q, np.float64)
+        if domain.kind == "plane":
+            direction = unit(domain.axis + domain.cone[0] * concentric_disc(np.array(self.place)) @ frame)
+            position = origin + q @ frame - domain.back / self.space.scale * direction
+            return position, np.broadcast_to(direction, position.shape)
+        local = azimuthal_direction(q)
+        if domain.kind == "area":
+            square = 2.0 * np.array(self.place) - 1.0
+            on_light = concentric_disc(np.array(self.place)) if domain.is_disc else square
+            origin = origin + on_light @ np.stack([domain.light_u, domain.light_v]) / self.space.scale
+        return np.broadcast_to(origin, local.shape), local @ np.vstack([frame, domain.axis])
+
+    def weight(self, q: np.ndarray, count: int) -> np.ndarray:
+        """What one of `count` lattice points at `q` (..., 2) carries per unit of the light's own quantity.
+
+        At a hard edge that is the covered share of a lattice cell.
+        """
+        light, share = self.light, self.domain.measure / count
+        start, direction = self.start(q)
+        axis = unit(np.asarray(light.direction, float))
+        spacing = self.domain.spacing(count) * self.unit_length
+
+        def covered(inside: np.ndarray, spacing: float) -> np.ndarray:
+            return np.clip(inside / spacing + 0.5, 0.0, 1.0)
+
+        radial = float(np.sqrt(np.prod(spacing)))
+
+        if light.kind == "spot":
+            inner, outer = np.radians([light.inner_half_angle_deg, light.outer_half_angle_deg])
+            return share * (covered(outer - angle_between(direction, axis), radial) if inner == outer else spot_falloff(direction, axis, inner, outer))
+        if light.kind == "area":
+            return share * np.maximum(direction @ axis, 0.0)
+        if light.kind == "collimated":
+            offset = (start - np.array(light.position)) @ np.stack([self.domain.tangent, self.domain.bitangent]).T
+            if light.shape == "disc":
+                return share * covered(light.radius - np.linalg.norm(offset, axis=-1), radial)
+            inside = 0.5 * np.array([light.width, light.height]) - np.abs(offset)
+            return share * covered(inside[..., 0], spacing[0]) * covered(inside[..., 1], spacing[1])
+        return np.full(direction.shape[:-1], share)
+
+    def lattice(self, count: int, shift: tuple[int, int], sub_lattice: int = 0) -> np.ndarray:
+        """All points (count, 2) of a sub-lattice of the domain, in the coordinates of `start`."""
+        own = tuple((s + sub_lattice * g) % 2**32 for s, g in zip(shift, PLASTIC, strict=True))
+        square = lattice_point(np.arange(count), count, own)
+        return self.unit_length * (self.domain.rect[:2] + square * self.domain.rect[2:])

@@ -1,0 +1,290 @@
+"""The scene as the reference renderer sees it: flat float64 arrays that compiled code can walk through.
+
+Made straight from `spectrasplat.model`, in world lengths about the middle of the specular objects, so that
+nothing of the GPU's packing, float32 rounding or half-space solids enters the truth. Media follow
+the rule of nested dielectrics (Schmidt and Budge, "Simple Nested Dielectrics in Ray Traced
+Images", 2002): of all solids a point lies in, the one of highest rank is its medium.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.errors import UserError
+from ..model.geometry.bvh import Bvh, build_bvh
+from ..model.geometry.mesh import Mesh
+from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, rgb_partition, xyz_to_rgb709_matrix
+from ..model.optics.spectrum import Spectrum, cmf_at
+from ..model.scene import (
+    Black,
+    Camera,
+    Dielectric,
+    Diffuse,
+    Mirror,
+    Scene,
+)
+
+BLACK, DIFFUSE, MIRROR, DIELECTRIC = range(4)
+OUTSIDE = -1
+"""In place of an object: air."""
+
+_STEP_NM = 0.05
+TABLE_NM = np.linspace(380.0, 780.0, 8001)
+"""Grid of index and weight tables; linear between them n errs below 1e-8 for every catalogue glass."""
+_NEAR = 1e-9
+"""Share of the scene's size below which two surfaces count as one place."""
+_MAX_STACK = 60
+
+
+class PhotonScene(NamedTuple):
+    """Everything a photon meets. T triangles in tree order, O objects, N tree nodes."""
+
+    node_bounds: np.ndarray
+    """float64 (N, 6): low and high corner; children of a node are neighbours."""
+    node_first: np.ndarray
+    """int32 (N,): left child, or first triangle of a leaf."""
+    node_count: np.ndarray
+    """int32 (N,): triangles of a leaf, 0 for an inner node."""
+    corners: np.ndarray
+    """float64 (T, 9): first corner, then both edges from it."""
+    normals: np.ndarray
+    """float64 (T, 3): unit geometric normal, outward."""
+    owner: np.ndarray
+    """int32 (T,): object."""
+    smooth: np.ndarray
+    """int32 (T,): row of `corner_normals`, or −1 for a flat facet."""
+    corner_normals: np.ndarray
+    """float64 (S, 9)."""
+    kind: np.ndarray
+    """int32 (O,)."""
+    medium: np.ndarray
+    """int32 (O,): row of `index`, or −1."""
+    weight: np.ndarray
+    """int32 (O,): row of `weights` (absorption per unit, or a mirror's reflectance), or −1."""
+    bit: np.ndarray
+    """int32 (O,): rank of a solid among those that nest or touch, or −1."""
+    stack: np.ndarray
+    """int32 (B,): object of each rank."""
+    reflectance: np.ndarray
+    """float64 (O, 3): linear Rec.709 factor of a receiver (1 where its reflectance is a spectrum)."""
+    reflectance_class: np.ndarray
+    """int32 (O,): row of the colour tables."""
+    index: np.ndarray
+    """float64 (M, 8001): n on `TABLE_NM`."""
+    weights: np.ndarray
+    """float64 (W, 8001)."""
+    near: float
+    """Distances below this are the same place."""
+
+
+class Eye(NamedTuple):
+    """The camera: a pixel is found by projection, row 0 on top."""
+
+    position: np.ndarray
+    right: np.ndarray
+    up: np.ndarray
+    forward: np.ndarray
+    half_width: float
+    """Picture's middle to its right border: at distance one (pinhole) or on the film (orthographic)."""
+    half_height: float
+    orthographic: bool
+    width: int
+    height: int
+
+
+class Colours(NamedTuple):
+    """One light's spectrum as A atoms: nanometre cells and lines, drawn by `cdf`."""
+
+    cdf: np.ndarray
+    """float64 (A + 1,): 0 to 1."""
+    start_nm: np.ndarray
+    width_nm: np.ndarray
+    """float64 (A,) each; a line has no width."""
+    watt: np.ndarray
+    """float64 (A,): power over probability."""
+    rgb: np.ndarray
+    """float64 (classes, A, 3): linear Rec.709 per watt, lm/W, the class's reflectance included."""
+
+
+def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
+    """The arrays, and the world position float64 (3,) of their origin.
+
+    Raises UserError where more solids nest or touch than a photon can remember.
+    """
+    meshes = [item.mesh.transformed(item.object_to_world) for item in scene.objects]
+    centre, size = _middle(scene, meshes)
+    corners = np.concatenate([mesh.corners() for mesh in meshes]) - centre
+    owner = np.repeat(np.arange(len(meshes)), [len(mesh.triangles) for mesh in meshes])
+    tree = build_bvh(corners.astype(np.float32))
+    order = tree.order
+    corners, owner = corners[order], owner[order].astype(np.int32)
+    normals = np.concatenate([mesh.face_normals() for mesh in meshes])[order]
+    smooth, corner_normals = _corner_normals(scene, meshes, order)
+    rank = _ranks(scene, meshes)
+    media, weights = _Rows(), _Rows()
+    kinds, medium, weight = [], [], []
+    for item in scene.objects:
+        material = item.material
+        kinds.append({Black: BLACK, Diffuse: DIFFUSE, Mirror: MIRROR, Dielectric: DIELECTRIC}[type(material)])
+        medium.append(media.add(material.dispersion.index(TABLE_NM)) if isinstance(material, Dielectric) else -1)
+        weight.append(-1)
+        if isinstance(material, Dielectric) and material.absorption is not None:
+            weight[-1] = weights.add(np.interp(TABLE_NM, VISIBLE_NM, material.absorption.coefficient))
+        elif isinstance(material, Mirror):
+            reflectance = rgb_partition() @ np.asarray(material.reflectance_rgb, float)
+            weight[-1] = weights.add(np.interp(TABLE_NM, VISIBLE_NM, reflectance))
+    _, reflectance_class = reflectance_classes(scene)
+    factor = [
+        np.asarray(o.material.reflectance_rgb, float) if isinstance(o.material, Diffuse) and o.material.reflectance is None else np.ones(3)
+        for o in scene.objects
+    ]
+    bounds, first, count = _exact_nodes(tree, corners)
+    return PhotonScene(
+        bounds, first, count,
+        np.concatenate([corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1),
+        np.ascontiguousarray(normals), owner, smooth, corner_normals,
+        np.array(kinds, np.int32), np.array(medium, np.int32), np.array(weight, np.int32),
+        np.array([rank.get(i, -1) for i in range(len(meshes))], np.int32),
+        np.array(sorted(rank, key=lambda i: rank[i]) or [OUTSIDE], np.int32),
+        np.array(factor), reflectance_class, media.array(), weights.array(), _NEAR * size,
+    ), centre  # fmt: skip
+
+
+def eye(camera: Camera, width: int, height: int, centre: np.ndarray) -> Eye:
+    """The camera about the arrays' origin; its upright is any where it looks along `up`."""
+    position = np.asarray(camera.position, float)
+    forward = np.asarray(camera.target, float) - position
+    forward /= np.linalg.norm(forward)
+    up = np.asarray(camera.up, float)
+    right = np.cross(forward, up)
+    if np.linalg.norm(right) < 1e-9 * np.linalg.norm(up):
+        right = np.cross(forward, np.eye(3)[np.argmin(np.abs(forward))])
+    right /= np.linalg.norm(right)
+    orthographic = camera.kind == "orthographic"
+    half = 0.5 * camera.vertical_extent if orthographic else np.tan(np.radians(0.5 * camera.vertical_fov_deg))
+    return Eye(position - centre, right, np.cross(right, forward), forward, float(half * width / height), float(half), orthographic, width, height)
+
+
+def colours(spectrum: Spectrum, classes: list[np.ndarray | None]) -> Colours:
+    """Atoms of a spectrum: most of the probability goes where the eye sees most, some where power is.
+
+    A cell has the colour of its nanometre, as everywhere in the program; a line that of its own wavelength.
+    """
+    lit = np.flatnonzero(spectrum.density > 0.0)
+    line_nm = np.array([nm for nm, power in spectrum.lines if power > 0.0])
+    line_power = np.array([power for _, power in spectrum.lines if power > 0.0])
+    low, high = np.maximum(VISIBLE_NM[lit] - 0.5, VISIBLE_NM[0]), np.minimum(VISIBLE_NM[lit] + 0.5, VISIBLE_NM[-1])
+    start = np.concatenate([low, line_nm])
+    width = np.concatenate([high - low, np.zeros(len(line_nm))])
+    power = np.concatenate([spectrum.density[lit], line_power])
+    if not len(power):
+        return Colours(np.array([0.0, 1.0]), np.array([560.0]), np.zeros(1), np.zeros(1), np.zeros((len(classes), 1, 3)))
+    seen = np.concatenate([cmf_xyz()[lit], cmf_at(line_nm).reshape(-1, 3)])
+    share = 0.2 * power / power.sum()
+    bright = power * seen.sum(axis=1)
+    share = share + 0.8 * (bright / bright.sum() if bright.sum() > 0.0 else power / power.sum())
+    share /= share.sum()
+    order = np.argsort(start, kind="stable")
+    start, width, power, seen, share = start[order], width[order], power[order], seen[order], share[order]
+    rgb = []
+    for reflectance in classes:
+        factor = np.ones(401) if reflectance is None else reflectance
+        at = np.where(width > 0.0, start + 0.5 * width, start)
+        cell = np.clip(np.rint(at).astype(int) - 380, 0, 400)
+        here = np.where(width > 0.0, factor[cell], np.interp(at, VISIBLE_NM, factor))
+        rgb.append(K_M * (here[:, None] * seen) @ xyz_to_rgb709_matrix().T)
+    cdf = np.concatenate([[0.0], np.cumsum(share)])
+    cdf[-1] = 1.0
+    return Colours(cdf, start, width, power / share, np.array(rgb))
+
+
+def reflectance_classes(scene: Scene) -> tuple[list[np.ndarray | None], np.ndarray]:
+    """Distinct spectral reflectances (the first is None: a plain colour), and each object's row, int32 (O,)."""
+    classes: list[np.ndarray | None] = [None]
+    row = np.zeros(len(scene.objects), np.int32)
+    for index, item in enumerate(scene.objects):
+        if isinstance(item.material, Diffuse) and item.material.reflectance is not None:
+            row[index] = len(classes)
+            classes.append(np.asarray(item.material.reflectance, float))
+    return classes, row
+
+
+def specular_corners(photons: PhotonScene) -> np.ndarray:
+    """Triangles of glass and mirrors, float64 (S, 3, 3)."""
+    chosen = photons.corners[photons.kind[photons.owner] >= MIRROR].reshape(-1, 3, 3).copy()
+    chosen[:, 1:] += chosen[:, :1]
+    return chosen
+
+
+class _Rows:
+    """Distinct table rows."""
+
+    def __init__(self) -> None:
+        self._rows: list[np.ndarray] = []
+
+    def add(self, row: np.ndarray) -> int:
+        for i, known in enumerate(self._rows):
+            if np.array_equal(known, row):
+                return i
+        self._rows.append(row)
+        return len(self._rows) - 1
+
+    def array(self) -> np.ndarray:
+        return np.array(self._rows).reshape(-1, len(TABLE_NM)) if self._rows else np.ones((1, len(TABLE_NM)))
+
+
+def _middle(scene: Scene, meshes: list[Mesh]) -> tuple[np.ndarray, float]:
+    """Middle and half diagonal of the specular objects, or of everything."""
+    chosen = [m for m, o in zip(meshes, scene.objects, strict=True) if isinstance(o.material, Dielectric | Mirror)] or meshes
+    low = np.min([m.bounds()[0] for m in chosen], axis=0)
+    high = np.max([m.bounds()[1] for m in chosen], axis=0)
+    return 0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), 1e-300)
+
+
+def _corner_normals(scene: Scene, meshes: list[Mesh], order: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Row of each triangle's corner normals (−1: flat, or not specular), and the rows (S, 9)."""
+    rows = []
+    for mesh, item in zip(meshes, scene.objects, strict=True):
+        smooth = mesh.corner_normals is not None and isinstance(item.material, Dielectric | Mirror)
+        rows.append(mesh.corner_normals if smooth else np.zeros((len(mesh.triangles), 3, 3)))
+    normals = np.concatenate(rows)[order]
+    known = (np.abs(normals).sum(axis=2) > 0.0).all(axis=1)
+    index = np.full(len(order), -1, np.int32)
+    index[known] = np.arange(np.count_nonzero(known))
+    packed = normals[known].reshape(-1, 9)
+    return index, np.ascontiguousarray(packed) if len(packed) else np.zeros((1, 9))
+
+
+def _ranks(scene: Scene, meshes: list[Mesh]) -> dict[int, int]:
+    """Rank of every transparent solid whose bounds meet another's: by priority, then by order."""
+    solids = [i for i, o in enumerate(scene.objects) if isinstance(o.material, Dielectric)]
+    if len(solids) < 2:
+        return {}
+    bounds = {i: np.array(meshes[i].bounds()) for i in solids}
+    slack = 1e-5 * np.ptp(np.concatenate(list(bounds.values())), axis=0).max()
+    meeting = [
+        i for i in solids
+        if any(j != i and (bounds[i][0] <= bounds[j][1] + slack).all() and (bounds[j][0] <= bounds[i][1] + slack).all() for j in solids)
+    ]  # fmt: skip
+    if len(meeting) > _MAX_STACK:
+        raise UserError(f"scene '{scene.name}': {len(meeting)} transparent solids nest or touch and at most {_MAX_STACK} may; move some apart")
+    ranked = sorted(meeting, key=lambda i: (scene.objects[i].material.priority, i))  # type: ignore[union-attr]
+    return {index: rank for rank, index in enumerate(ranked)}
+
+
+def _exact_nodes(tree: Bvh, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The tree's nodes with bounds of the float64 corners (its own hold float32 ones)."""
+    first = tree.nodes["left_or_first"].astype(np.int32)
+    count = tree.nodes["count"].astype(np.int32)
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    bounds = np.empty((len(first), 6))
+    for node in range(len(first) - 1, -1, -1):  # children come after their parent
+        if count[node]:
+            span = slice(first[node], first[node] + count[node])
+            bounds[node, :3], bounds[node, 3:] = low[span].min(axis=0), high[span].max(axis=0)
+        else:
+            left, right = bounds[first[node]], bounds[first[node] + 1]
+            bounds[node, :3], bounds[node, 3:] = np.minimum(left[:3], right[:3]), np.maximum(left[3:], right[3:])
+    return bounds, first, count

@@ -1,0 +1,90 @@
+"""An animation, frame after frame, into a sink; can be driven in small steps beside a window."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import astuple
+
+import numpy as np
+
+from ..base.movie import Frames, Sink
+from ..base.tone_map import auto_exposure, tone_map_8bit
+from ..edit.animation import Animation
+from ..gpu.context import Context
+from ..model.scene import Diffuse, Scene
+from ..model.settings import RenderSettings
+from .frames import FrameRenderer
+
+Develop = Callable[[np.ndarray, float], np.ndarray]
+"""(linear Rec.709 (H, W, 3), absolute exposure in EV) → sRGB codes uint8 (H, W, 3)."""
+
+
+def render_animation(
+    context: Context,
+    animation: Animation,
+    settings: RenderSettings,
+    sink: Sink,
+    base_ev: float | None = None,
+    develop: Develop = tone_map_8bit,
+) -> Iterator[float]:
+    """Render all frames that `sink` lacks, pausing with the share done; the sink is closed however it ends.
+
+    All frames share one exposure: `base_ev` plus the stage's own; `base_ev` None takes the automatic one of the first
+    frame. Leaving the iteration early (`close()`) keeps the frames that are done.
+    """
+    stages = [animation.frame(i) for i in range(len(animation.times_s))]
+    base_ev = sink.base_ev if isinstance(sink, Frames) and sink.base_ev is not None else base_ev
+    renderer = FrameRenderer(context, settings, stages)
+    try:
+        if base_ev is not None and isinstance(sink, Frames):
+            sink.fix_exposure(base_ev)
+        for index, stage in enumerate(stages):
+            if not sink.has(index):
+                for share in renderer.steps(stage):
+                    yield (index + 0.99 * share) / len(stages)  # the rest is developing and writing
+                rgb = renderer.rgb()
+                if base_ev is None:
+                    base_ev = auto_exposure(rgb)
+                    if isinstance(sink, Frames):
+                        sink.fix_exposure(base_ev)
+                sink.write(index, develop(rgb, base_ev + stage.exposure_ev))
+            yield (index + 1) / len(stages)
+    finally:
+        renderer.release()
+        sink.close()
+
+
+def description(animation: Animation, settings: RenderSettings, fps: float, photons: int) -> Mapping[str, object]:
+    """All that decides how the frames look, as plain values: what a resumed folder must agree on."""
+    from ..reference.photon_reference import scene_key
+
+    start = animation.start
+    return {
+        "scene": start.scene.name,
+        "content": scene_key(start.scene, settings.width, settings.height, settings.max_depth),
+        "dabs": repr([item.local_dispersion for item in start.scene.objects]),
+        "background": list(start.scene.background_rgb),
+        "pictures": _pictures(start.scene),
+        "camera": list(astuple(start.camera)),
+        "exposure_ev": start.exposure_ev,
+        "solo_nm": start.solo_nm,
+        "size": [settings.width, settings.height],
+        "photons": photons,
+        "samples": settings.spp,
+        "method": settings.method,
+        "seed": settings.seed,
+        "fps": fps,
+        "frames": len(animation.times_s),
+        "tracks": [list(astuple(track)) for track in animation.tracks],
+    }
+
+
+def _pictures(scene: Scene) -> list[str]:
+    """Hashes of the environment and of every texture, which `scene_key` does not know."""
+    found = [item.material.texture for item in scene.objects if isinstance(item.material, Diffuse)]
+    hashes = ["" if t is None else hashlib.sha256(np.ascontiguousarray(t.rgb).tobytes() + t.wrap.encode()).hexdigest() for t in found]
+    if scene.environment is not None:
+        turned = np.asarray(scene.environment.world_to_local, float).tobytes()
+        hashes.append(hashlib.sha256(np.ascontiguousarray(scene.environment.rgb).tobytes() + turned).hexdigest())
+    return hashes

@@ -1,0 +1,149 @@
+"""A receiver's caustic map as a texture, with the place where it belongs in a `.json` beside it.
+
+What is written is irradiance: the light that glass and mirrors throw on the receiver, before its own reflectance, linear
+Rec.709 in lm/unit² for white. A flat receiver gets the rectangle on which its light lands; a curved one its charts, with the texture
+coordinates of every triangle.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ..base.atomic import atomic_output
+from ..base.errors import UserError, suggestion
+from ..base.image_io import check_suffix, write_image
+from ..base.tone_map import auto_exposure
+from ..edit.parameters import Stage
+from ..gpu.context import Context
+from ..model.geometry.charts import ChartAtlas
+from ..model.optics.colorimetry import xyz_to_rgb709
+from ..model.scene import Diffuse, Scene
+from ..model.settings import RenderSettings
+from .frames import FrameRenderer
+from .light_pass import LightHalf
+
+DEFAULT_SIZE = (1024, 1024)
+UNITS = "irradiance, lm/unit² (linear Rec.709, white counts in full), without the receiver's reflectance"
+
+
+def placement_path(path: Path) -> Path:
+    """The `.json` that belongs to a baked map."""
+    return path.with_suffix(".json")
+
+
+def receivers(scene: Scene) -> list[str]:
+    """Names of what can be baked."""
+    return list(dict.fromkeys(item.name for item in scene.objects if isinstance(item.material, Diffuse)))
+
+
+def check_receiver(scene: Scene, name: str) -> str:
+    """`name`, where it is a receiver of `scene`; raises `UserError` naming those there are."""
+    known = receivers(scene)
+    if name not in known:
+        listed = ", ".join(f"'{receiver}'" for receiver in known) or "none, for nothing in it is diffuse"
+        raise UserError(f"'{name}' is no receiver of scene '{scene.name}'{suggestion(name, known)}; it has {listed}")
+    return name
+
+
+def check_output(path: Path) -> Path:
+    """`path`, where it can hold a map: .exr, .png or .npy; raises `UserError`."""
+    check_suffix(path)
+    return path
+
+
+def bake(context: Context, stage: Stage, settings: RenderSettings, receiver: str, path: Path) -> Iterator[float]:
+    """Bake in steps, pausing with the share done; writes `path` and its placement at the end, or nothing if it is left before.
+
+    `settings.width`, `height`: texels. Raises `UserError`.
+    """
+    check_receiver(stage.scene, receiver)
+    check_output(path)
+    own = RenderSettings(**{**vars(settings), "layer": f"map:{receiver}"})
+    renderer = FrameRenderer(context, own, [stage])
+    try:
+        for share in renderer.steps(stage):
+            yield 0.98 * share
+        assert renderer.light is not None
+        rgb, placement = baked(renderer.light)
+    finally:
+        renderer.release()
+    placement |= {"receiver": receiver, "scene": stage.scene.name, "file": path.name, "units": UNITS}
+    if path.suffix.lower() == ".png":
+        placement["exposure_ev"] = auto_exposure(rgb)
+    write_image(path, rgb)
+    with atomic_output(placement_path(path)) as temporary:
+        temporary.write_text(json.dumps(placement, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    yield 1.0
+
+
+def baked(light: LightHalf) -> tuple[np.ndarray, dict[str, object]]:
+    """Irradiance float32 (H, W, 3), row 0 on top, and where it lies; of a light half whose settings ask for a map layer."""
+    receiver = light.map_receiver
+    assert receiver is not None
+    charts = light.layout.charts.get(receiver)
+    energy = light.resolved_map(receiver)[..., :3].astype(float) * light.map_scale
+    if charts is None:
+        area = float(light.layout.placements["texel_area"][light.layout.receivers[receiver]["placement"]])
+        irradiance = energy / area
+    else:
+        # Gutters hold what lies across their seam, measured in texels of their own chart's edge.
+        areas = charts.texel_area[np.maximum(_nearest_owner(charts), 0)]
+        irradiance = energy / areas[..., None]
+    rgb = xyz_to_rgb709(irradiance)[::-1].astype(np.float32)
+    height, width = rgb.shape[:2]
+    placement = _rectangle(light, receiver, width, height) if charts is None else _charts(light, receiver, charts)
+    return np.ascontiguousarray(rgb), {"width": width, "height": height, **placement}
+
+
+def _nearest_owner(charts: ChartAtlas) -> np.ndarray:
+    """Triangle of each texel; in gutters that of the place across the seam, else -1 (nothing landed there)."""
+    owner = charts.owner.copy()
+    x, y = charts.gutter_texel_xy.T
+    to_x, to_y = charts.destination_xy.T
+    kept = to_x >= 0
+    owner[y[kept], x[kept]] = charts.owner[to_y[kept], to_x[kept]]
+    return owner
+
+
+def _rectangle(light: LightHalf, receiver: int, width: int, height: int) -> Mapping[str, object]:
+    from ..passes.map_layout import plane_frame
+
+    space = light.buffers.space
+    points = space.to_gpu(light.buffers.world_meshes[light.buffers.receivers[receiver]].vertices)
+    frame = plane_frame(points)
+    low, high = light.layout.windows[receiver][0].low, light.layout.windows[receiver][0].high
+    corners = {
+        "bottom_left": (low[0], low[1]),
+        "bottom_right": (high[0], low[1]),
+        "top_right": (high[0], high[1]),
+        "top_left": (low[0], high[1]),
+    }
+    world = {name: space.to_world(frame.origin + np.array(place) @ frame.axes).tolist() for name, place in corners.items()}
+    size = (high - low) / space.scale
+    return {
+        "kind": "rectangle",
+        "corners_world": world,
+        "normal_world": np.cross(frame.axes[0], frame.axes[1]).tolist(),
+        "size_units": size.tolist(),
+        "texel_size_units": (size / (width, height)).tolist(),
+    }
+
+
+def _charts(light: LightHalf, receiver: int, charts: ChartAtlas) -> Mapping[str, object]:
+    mesh = light.buffers.world_meshes[light.buffers.receivers[receiver]]
+    corners = mesh.corners()
+    texel = np.einsum("tij,tcj->tci", charts.rows[..., :3], corners) + charts.rows[:, None, :, 3]
+    # As glTF has them: (0, 0) is the picture's upper left corner; row 0 of the map is its bottom.
+    uv = np.stack([texel[..., 0] / charts.width, 1.0 - texel[..., 1] / charts.height], axis=-1)
+    return {
+        "kind": "charts",
+        "uv_origin": "upper left",
+        "mesh": mesh.name,
+        "own_uv": charts.from_own_uv,
+        "triangle_uv": np.round(uv, 7).tolist(),
+        "texel_area_units2": [float(charts.texel_area.min()), float(charts.texel_area.max())],
+    }

@@ -1,0 +1,122 @@
+"""The caustic maps of a scene laid out in one way: what splats are added to, and what is read of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import moderngl
+import numpy as np
+
+from ..gpu.records import RECEIVER
+from ..gpu.shader import Releasable
+from ..model.features import Features
+from ..passes.accumulate import LevelsFold, SeamFold, copy_texture
+from ..passes.map_atlas import MapAtlas
+from ..passes.map_layout import MapLayout
+from ..passes.splat import Splatter
+
+
+class LightMaps:
+    """Owns atlas, splat pass and resolved textures of one layout; empty at first."""
+
+    def __init__(self, ctx: moderngl.Context, layout: MapLayout, features: Features) -> None:
+        self._ctx = ctx
+        self.layout = layout
+        # Only the layout tells whether a fine window pays: without one no splat is drawn twice.
+        self.features = replace(features, nested_windows=any(len(windows) > 1 for windows in layout.windows.values()))
+        self.splatter = Splatter(ctx, self.features)
+        self.atlas = MapAtlas(ctx, layout.size, layout.placements, features.targets)
+        self.receivers = ctx.buffer(np.ascontiguousarray(layout.receivers if len(layout.receivers) else RECEIVER.zeros(1)).tobytes())
+        self.photon_weight = 0.0
+        """What was deposited is energy times this."""
+        self._resolved = [ctx.texture(self.atlas.size, 4, dtype="f4") for _ in range(features.targets)]
+        self._levels_fold = LevelsFold(ctx, layout.folds)
+        self._seam_fold = SeamFold(ctx, [(layout.tiles[r][0], charts) for r, charts in layout.charts.items()])
+
+    def take(self, features: Features) -> None:
+        """Splat from now on with other features of the same layout (the brush came or went)."""
+        self.splatter.release()
+        self.features = replace(features, nested_windows=self.features.nested_windows)
+        self.splatter = Splatter(self._ctx, self.features)
+
+    def clear(self) -> None:
+        """Forget what was deposited and counted."""
+        self.photon_weight = 0.0
+        self.atlas.clear()
+        self.splatter.reset_counts()
+
+    @property
+    def scale(self) -> float:
+        """Factor from what the atlas has summed to energy per texel."""
+        return 1.0 / self.photon_weight if self.photon_weight else 0.0
+
+    @property
+    def bytes(self) -> int:
+        """Device memory of the textures."""
+        width, height = self.atlas.size
+        return 16 * width * height * 4 * self.features.targets
+
+    def resolved_textures(self) -> list[moderngl.Texture]:
+        """The summed maps for look-ups: wide texels added to fine ones, charts' seams folded home."""
+        self.atlas.flush()
+        ctx = self._ctx
+        total = self.atlas.total_textures
+        if self.layout.charts:
+            self._seam_fold.run(total, self._resolved)
+        else:
+            for source, target in zip(total, self._resolved, strict=True):
+                copy_texture(ctx, source, target)
+        self._levels_fold.run(self._resolved)
+        return self._resolved
+
+    def _read_resolved(self) -> np.ndarray:
+        """All maps put together, float32 (height, width, channels)."""
+        width, height = self.atlas.size
+        layers = []
+        for texture in self.resolved_textures():
+            layer = np.empty((height, width, 4), np.float32)
+            texture.read_into(layer)
+            layers.append(layer)
+        return np.concatenate(layers, axis=-1)
+
+    def receiver(self, receiver: int) -> np.ndarray:
+        """A receiver's finest map: float32 (height, width, channels), row 0 at texel y = 0."""
+        x0, y0, x1, y1 = self.layout.tiles[receiver][0].rect
+        return self._read_resolved()[y0:y1, x0:x1]
+
+    def flux(self, is_xyz: bool) -> float:
+        """What the maps hold where they are read: the sum of XYZ maps' last channel (W), or of all bins."""
+        total = self._read_resolved()
+        total = total[..., 3] if is_xyz else total.sum(axis=-1)
+        flux = 0.0
+        for receiver, tiles in self.layout.tiles.items():
+            charts = self.layout.charts.get(receiver)
+            for level, tile in enumerate(tiles):
+                x0, y0, x1, y1 = tile.rect
+                energy = total[y0:y1, x0:x1].astype(float)
+                if charts is not None:
+                    energy = energy[charts.owner >= 0]
+                elif level:
+                    energy = self._outside_finer(receiver, level, energy)
+                flux += energy.sum()
+        return flux
+
+    def _outside_finer(self, receiver: int, level: int, energy: np.ndarray) -> np.ndarray:
+        """Energy of a coarse window without the part that the finer window is read for."""
+        fine, coarse = self.layout.windows[receiver][level - 1 : level + 1]
+        height, width = energy.shape
+        share = [
+            np.clip(np.minimum(high_f, edges[1:]) - np.maximum(low_f, edges[:-1]), 0.0, None) / np.diff(edges)
+            for low_f, high_f, edges in (
+                (fine.low[0], fine.high[0], np.linspace(coarse.low[0], coarse.high[0], width + 1)),
+                (fine.low[1], fine.high[1], np.linspace(coarse.low[1], coarse.high[1], height + 1)),
+            )
+        ]
+        return energy * (1.0 - share[1][:, None] * share[0])
+
+    def release(self) -> None:
+        """Free everything."""
+        owned: Iterable[Releasable] = (self.splatter, self.atlas, self.receivers, *self._resolved, self._levels_fold, self._seam_fold)
+        for resource in owned:
+            resource.release()

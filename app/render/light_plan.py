@@ -1,0 +1,119 @@
+"""How a pass divides its photons: over the lights, over spectral bands, over points on an extended light."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..gpu.records import MAX_BANDS
+from ..gpu.scene_buffers import SceneBuffers
+from ..model.features import Features
+from ..model.scene import Scene
+from ..model.settings import RenderSettings
+from ..passes.emission_domain import EmissionDomain
+from ..passes.pilot import MAX_LIGHT_POINTS, Pilot, PilotFit, has_extent
+from ..passes.trace import Band, LatticeSlice
+
+SMALLEST_BATCH = MAX_BANDS * MAX_LIGHT_POINTS
+"""One point of every sub-lattice a light may have."""
+TINTED_BANDS = 16
+"""Least number of bands where glass absorbs or mirrors are coloured."""
+_SHIFT_GENERATORS = (1116352409, 1899447441, 3141592653, 1640531527, 1359893119)
+
+
+@dataclass(frozen=True)
+class LightPlan:
+    """One light's share of every pass."""
+
+    index: int
+    domain: EmissionDomain
+    bands: tuple[Band, ...]
+    light_points: int
+    share: float
+    """Share of the photons."""
+
+    @property
+    def lattices(self) -> int:
+        """Sub-lattices: one a band and point on the light."""
+        return len(self.bands) * self.light_points
+
+    def lattice_count(self, photons: int) -> int:
+        """Points of each sub-lattice over the whole rectangle, so that about the light's share of `photons` starts."""
+        return max(1, round(photons * self.share / self.lattices / self.domain.active_share))
+
+    def piece(self, seed: int, number: int, lattice: int, first: int, stride: int, points: int, weight: float) -> LatticeSlice:
+        """Points first, first + stride, … of pass `number`'s lattices of `lattice` points each."""
+        # Successive passes follow a Kronecker sequence, so their union is again even.
+        start = (seed * 0x9E3779B1 + self.index * 0x85EBCA6B) & 0xFFFFFFFF
+        shifts = [(start + (number + 1) * g) & 0xFFFFFFFF for g in _SHIFT_GENERATORS]
+        return LatticeSlice(
+            self.index, self.bands, lattice, first, stride, points, (shifts[0], shifts[1]), (shifts[2], shifts[3]), shifts[4],
+            (seed + 7919 * number) & 0xFFFFFFFF, self.light_points, weight=weight,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Planner:
+    """What a plan is made from."""
+
+    scene: Scene
+    settings: RenderSettings
+    features: Features
+    buffers: SceneBuffers
+    domains: dict[int, EmissionDomain]
+    pilots: dict[int, Pilot]
+    batch: int = SMALLEST_BATCH
+    """Rays in flight at once: a sub-lattice of each kind must have a point in them."""
+
+    def plans(self, photons: int, texel: np.ndarray) -> list[LightPlan]:
+        """Photons, bands and points of each light that reaches a receiver; `texel`: side of each receiver's finest window, GPU units."""
+        power = {i: max(float(self.buffers.light_power[i].band(0.0, 1.0)[1]) * d.measure * d.active_share, 0.0) for i, d in self.domains.items()}
+        lit = [i for i in self.domains if power[i] > 0.0 and len(self.pilots[i].whole)]
+        total = sum(power[i] for i in lit)
+        plans = []
+        for i in lit:
+            # Half by power, half evenly: a dim light must not be left coarse.
+            share = 0.5 * power[i] / total + 0.5 / len(lit)
+            budget = int(photons * share)
+            fit = PilotFit(self.pilots[i], texel, self.buffers.variable_table, self.settings.smoothing, budget)
+            bands = self._bands(i, fit)
+            points = fit.light_points(len(bands)) if self.features.footprints else self._scattered_points(i, len(bands), budget)
+            points = max(1, min(points, self.batch // len(bands)))
+            plans.append(LightPlan(i, self.domains[i], bands, points, share))
+        return plans
+
+    def _scattered_points(self, light: int, bands: int, budget: int) -> int:
+        """Points on an extended light for photons without footprints, which need no lattice of their own."""
+        return min(SMALLEST_BATCH // bands, max(1, budget // (16 * bands))) if has_extent(self.scene.lights[light]) else 1
+
+    def _bands(self, light: int, fit: PilotFit) -> tuple[Band, ...]:
+        power = self.buffers.light_power[light]
+        axis = self.buffers.axis
+        lo_nm, hi_nm = self.scene.lights[light].spectral_power.support_nm()
+        if hi_nm - lo_nm < 1e-6:
+            x = float(axis.x_of_nm(lo_nm))
+            return (Band(x, x, x, float(power.values[-1, 3])),)
+        method = self.settings.method
+        if method.startswith("regular"):
+            edges_nm = np.linspace(max(lo_nm, 380.0), min(hi_nm, 780.0), int(method.split("-")[1]) + 1)
+            edges = axis.x_of_nm(edges_nm)
+            middles = axis.x_of_nm(0.5 * (edges_nm[:-1] + edges_nm[1:]))
+        else:
+            count = fit.band_count() if method == "srd" and self.features.spectral_groups else 1
+            lo_nm, hi_nm = max(lo_nm - 0.5, 380.0), min(hi_nm + 0.5, 780.0)
+            edges = np.linspace(float(axis.x_of_nm(lo_nm)), float(axis.x_of_nm(hi_nm)), count + 1)
+            if self._tinted and count < TINTED_BANDS:
+                # Three weights a band cannot follow a colour over the whole spectrum; steps even in both measures.
+                nm = np.linspace(lo_nm, hi_nm, 401)
+                even = 0.5 * (nm - lo_nm) / (hi_nm - lo_nm) + 0.5 * (axis.x_of_nm(nm) - edges[0]) / (edges[-1] - edges[0])
+                edges = axis.x_of_nm(np.interp(np.linspace(0.0, 1.0, TINTED_BANDS + 1), even, nm))
+            middles = 0.5 * (edges[:-1] + edges[1:])
+        return tuple(
+            Band(float(lo), float(hi), float(mid), float(power.band(lo, hi)[3])) for lo, hi, mid in zip(edges[:-1], edges[1:], middles, strict=True)
+        )
+
+    @property
+    def _tinted(self) -> bool:
+        """Something on the way changes a spectrum's shape."""
+        return self.features.absorption or (self.features.mirrors and self.features.spectral_weights)

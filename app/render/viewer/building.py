@@ -1,0 +1,82 @@
+"""From a scene to the first picture of its light: programs, buffers, pilots, maps and a first coarse pass, in pauses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from ...gpu.scene_buffers import SceneBuffers
+from ...model.features import Features
+from ...model.settings import RenderSettings
+from ..light_pass import spectral_axis
+from .accumulation import Accumulation
+from .live_light import LiveLight, quick_size
+
+if TYPE_CHECKING:
+    from ...gpu.context import Context
+    from .inputs import LiveInputs
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Sizes that depend on the device."""
+
+    batch: int
+    first_photons: int
+    largest_photons: int
+    store_bytes: int
+
+    @staticmethod
+    def of(context: Context) -> Budget:
+        """A software renderer answers in small steps; a GPU takes millions at a time."""
+        if context.is_software:
+            return Budget(1 << 14, 1 << 14, 1 << 22, 256 << 20)
+        return Budget(1 << 18, 1 << 20, 1 << 25, 1 << 30)
+
+
+@dataclass
+class Shown:
+    """A light half and how far it has come."""
+
+    traced: LiveInputs
+    light: LiveLight
+    accumulation: Accumulation
+    steps: Iterator[None] = field(default_factory=lambda: iter(()))
+    """What is left of the accumulation."""
+
+
+def build(
+    context: Context, budget: Budget, wanted: LiveInputs, largest: int, target: int, publish: Callable[[], None]
+) -> Iterator[Shown | None]:
+    """Everything for a scene that photons must be traced for, up to its first picture; None while it is not done.
+
+    `largest`: photons of the finest pass, `target`: after which nothing more is traced. `publish` is called for every
+    later picture. What was made is freed when the generator is closed before its end.
+    """
+    width, height = quick_size(wanted.width, wanted.height)
+    settings = RenderSettings(
+        width=width, height=height, method=wanted.method, seed=wanted.seed, smoothing=wanted.smoothing,
+        max_depth=wanted.scene.render.max_depth, batch=budget.batch, local_gain=wanted.local_gain, anchor_weights=True, any_view=True,
+    )  # fmt: skip
+    scene = replace(wanted.scene, camera=wanted.camera)
+    features = Features.of(scene, settings)
+    buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+    light = LiveLight(context, scene, settings, features, buffers, budget.store_bytes)
+    try:
+        yield None
+        for _ in light.preparing():
+            yield None
+        light.show(wanted)
+        published: list[bool] = []
+        first = min(budget.first_photons, largest)
+        accumulation = Accumulation(light, first, largest, target, wanted.seed, lambda: published.append(True))
+        steps = accumulation.steps()
+        while not published:
+            next(steps, None)
+            yield None
+        accumulation.publish = publish
+    except BaseException:  # also when the generator is closed because nobody wants this scene any more
+        light.release()
+        raise
+    yield Shown(wanted, light, accumulation, steps)

@@ -1,0 +1,191 @@
+"""What changed between two `LiveInputs`, and how little has to be done again for it.
+
+Photons belong to the glass they were traced through. A glass with another dispersion but the same n_d keeps
+their paths, to first order in the change of n at each photon's own anchor wavelength: its spectral columns
+say where the light lands instead, and nothing is traced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+
+import numpy as np
+
+from ...model.optics.glass import Dispersion
+from ...model.scene import (
+    Dielectric,
+    Diffuse,
+    Light,
+    Material,
+    Scene,
+    SceneObject,
+)
+from .inputs import LiveInputs, Redo
+
+SAME_INDEX = 1e-6
+"""Difference in n_d up to which a glass keeps the paths."""
+
+
+def redo(traced: LiveInputs, shown: LiveInputs, new: LiveInputs) -> Redo:
+    """What `new` asks for where the photons stand for `traced` and the picture for `shown`."""
+    paths = max(_inputs(traced, new), _scene(traced.scene, new.scene))
+    if paths >= Redo.TRACE:
+        return paths
+    return max(_inputs(shown, new), _scene(shown.scene, new.scene))
+
+
+def _inputs(old: LiveInputs, new: LiveInputs) -> Redo:
+    cost = Redo.NOTHING
+    for item in fields(LiveInputs):
+        a, b = getattr(old, item.name), getattr(new, item.name)
+        if item.name == "scene" or a is b or a == b:
+            continue
+        cost = max(cost, _INPUTS.get(item.name, Redo.BUILD))
+    return cost
+
+
+_INPUTS = {
+    "camera": Redo.LOOK,
+    "width": Redo.LOOK,
+    "height": Redo.LOOK,
+    "smoothing": Redo.SPLAT,
+    "solo_nm": Redo.SPLAT,
+    "local_gain": Redo.SPLAT,
+    "seed": Redo.TRACE,
+}
+"""Fields that are not here (the method) ask for everything."""
+
+
+def _scene(old: Scene, new: Scene) -> Redo:
+    if old is new:
+        return Redo.NOTHING
+    cost = Redo.NOTHING
+    for item in fields(Scene):
+        a, b = getattr(old, item.name), getattr(new, item.name)
+        if a is b or item.name in ("name", "camera", "notes"):
+            continue
+        if item.name == "objects":
+            cost = max(cost, _objects(a, b))
+        elif item.name == "lights":
+            cost = max(cost, _lights(a, b))
+        elif item.name in ("background_rgb", "environment"):
+            # They light nothing. Environments are compared by identity: a new one is another one.
+            cost = max(cost, Redo.LOOK if a != b else Redo.NOTHING)
+        elif item.name == "render":
+            cost = max(cost, Redo.BUILD if a.max_depth != b.max_depth else Redo.NOTHING)
+        else:
+            cost = Redo.BUILD
+    return max(cost, Redo.NOTHING if cost >= Redo.TRACE else _glasses(old, new))
+
+
+def _objects(old: tuple[SceneObject, ...], new: tuple[SceneObject, ...]) -> Redo:
+    if len(old) != len(new):
+        return Redo.BUILD
+    return max((_object(a, b) for a, b in zip(old, new, strict=True)), default=Redo.NOTHING)
+
+
+def _object(old: SceneObject, new: SceneObject) -> Redo:
+    """All but the change of a glass's dispersion, which `_glasses` judges over all objects."""
+    if old is new:
+        return Redo.NOTHING
+    if old.mesh is not new.mesh:
+        return Redo.BUILD
+    cost = Redo.NOTHING
+    if not np.array_equal(old.object_to_world, new.object_to_world):
+        cost = Redo.TRACE
+    if old.local_dispersion != new.local_dispersion:
+        cost = max(cost, Redo.SPLAT)
+    a, b = old.material, new.material
+    if a is b:
+        return cost
+    if type(a) is not type(b):
+        return Redo.BUILD
+    if isinstance(a, Diffuse) and isinstance(b, Diffuse):
+        if a.reflectance is None and b.reflectance is None and (a.texture is None) == (b.texture is None):
+            # Another picture is only looked at; whether there is one, the objects' records on the device know.
+            same = a.reflectance_rgb == b.reflectance_rgb and a.texture is b.texture
+            return max(cost, Redo.NOTHING if same else Redo.LOOK)
+        return Redo.BUILD
+    if isinstance(a, Dielectric) and isinstance(b, Dielectric):
+        same_absorption = a.absorption is b.absorption or (
+            a.absorption is not None and b.absorption is not None and np.array_equal(a.absorption.coefficient, b.absorption.coefficient)
+        )
+        if not same_absorption:
+            return Redo.BUILD if (a.absorption is None) != (b.absorption is None) else max(cost, Redo.TRACE)
+        return max(cost, Redo.TRACE) if a.priority != b.priority else cost
+    return max(cost, Redo.NOTHING if a == b else Redo.BUILD)
+
+
+def _glasses(old: Scene, new: Scene) -> Redo:
+    pairs = [
+        (a.material.dispersion, b.material.dispersion)
+        for a, b in zip(old.objects, new.objects, strict=True)
+        if isinstance(a.material, Dielectric) and isinstance(b.material, Dielectric)
+    ]
+    if all(a == b for a, b in pairs):
+        return Redo.NOTHING
+    if shown_glasses(old, new) is None:
+        # Whether a glass disperses at all decides what photons carry.
+        return Redo.BUILD if any(a.is_dispersive != b.is_dispersive for a, b in pairs) or _partition(pairs, 0) != _partition(pairs, 1) else Redo.TRACE
+    return Redo.SPLAT
+
+
+def _partition(pairs: list[tuple[Dispersion, Dispersion]], side: int) -> list[int]:
+    """Which objects share a glass, as the number of the first one of each."""
+    glasses = [pair[side] for pair in pairs]
+    return [glasses.index(glass) for glass in glasses]
+
+
+def shown_glasses(traced: Scene, shown: Scene) -> Mapping[Dispersion, Dispersion] | None:
+    """The glass that stands in for each one photons were traced through; None where paths do not follow.
+
+    They follow where n_d stays, the glass was dispersive (photons carry its column), and objects of one glass are still of one.
+    """
+    found: dict[Dispersion, Dispersion] = {}
+    for a, b in zip(traced.objects, shown.objects, strict=True):
+        if not (isinstance(a.material, Dielectric) and isinstance(b.material, Dielectric)):
+            continue
+        before, after = a.material.dispersion, b.material.dispersion
+        if found.setdefault(before, after) != after:
+            return None
+        if before != after and (abs(before.n_d - after.n_d) > SAME_INDEX or not before.is_dispersive):
+            return None
+    return found
+
+
+def _lights(old: tuple[Light, ...], new: tuple[Light, ...]) -> Redo:
+    if len(old) != len(new):
+        return Redo.BUILD
+    return max((_light(a, b) for a, b in zip(old, new, strict=True)), default=Redo.NOTHING)
+
+
+def _light(old: Light, new: Light) -> Redo:
+    if old is new or old == new:
+        return Redo.NOTHING
+    if replace(old, name="", spectral_power=new.spectral_power) != replace(new, name=""):
+        return Redo.TRACE if old.kind == new.kind and old.shape == new.shape else Redo.BUILD
+    if old.spectral_power == new.spectral_power:
+        return Redo.NOTHING
+    # Photons carry weights, not watts; bands reach as far as the light they were planned for.
+    (a0, a1), (b0, b1) = old.spectral_power.support_nm(), new.spectral_power.support_nm()
+    return Redo.SPLAT if a0 <= b0 and b1 <= a1 and (a0 < a1) else Redo.TRACE
+
+
+def looks_other(old: LiveInputs, new: LiveInputs) -> bool:
+    """Whether what the eye sees without the maps differs: colours, lights, what lies behind everything, glass that bends its own rays otherwise."""
+    a, b = old.scene, new.scene
+    if old.solo_nm != new.solo_nm or a.background_rgb != b.background_rgb or a.environment is not b.environment:
+        return True
+    if a.lights is not b.lights and any(x is not y for x, y in zip(a.lights, b.lights, strict=True)):
+        return True
+    return any(_material_looks_other(x.material, y.material) for x, y in zip(a.objects, b.objects, strict=True))
+
+
+def _material_looks_other(old: Material, new: Material) -> bool:
+    if old is new:
+        return False
+    if isinstance(old, Dielectric) and isinstance(new, Dielectric):
+        # The rest of a glass is traced anew before it is looked at.
+        return old.dispersion != new.dispersion
+    return True

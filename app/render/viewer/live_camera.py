@@ -1,0 +1,308 @@
+"""The eye half of a live rendering: camera samples within a time budget, and the last picture worth showing.
+
+A picture is published when every pixel has a whole sample. While something moves the picture is as small as one
+sample in the time that is left asks for; once still it starts over in full size and is refined.
+
+Where glass disperses, a sample of a fine picture sees one band of the spectrum only, and such a picture is whole after as many
+samples as there are bands; before that it has grain in all colours. So samples of the whole spectrum, coarser
+along it but smooth, come first, in motion alone; pictures of bands are shown after whole cycles only.
+"""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...gpu import shader
+from ...gpu.map_channels import MapChannels
+from ...gpu.texture_store import TextureStore
+from ...passes.camera import MOST_TAPS, CausticMaps, EyePass
+from ...passes.spectrum_choice import Spectrum
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from ...gpu.context import Context
+    from ...gpu.scene_buffers import SceneBuffers
+    from ...model.scene import Camera, Scene
+
+SCALES = (1.0, 0.5, 1 / 3, 0.25, 1 / 6, 0.125, 1 / 12)
+"""Sides of a picture in motion over the side asked for."""
+DISPATCH_SECONDS = 0.008
+SETTLED = 8
+"""Samples at most that a better map waits for before its picture replaces the one shown."""
+MOVING_TAPS = 8
+"""Looks along one spectral sweep at most, in a picture that must be there at once."""
+BANDED_SAMPLES = 16
+"""Samples whose error the number of bands is fitted to: a still picture shall be whole within seconds, so not to all that it gets in the end."""
+SMOOTH_SHARE = 1 / 4
+"""Samples of the whole spectrum that come before bands, over the number of these: edges are smooth while the bands are awaited."""
+_FIRST_RATE = 0.5e6
+"""Pixels per second before anything was measured: slow, so that the first picture comes at once."""
+_RATE_BLEND = 0.5
+
+
+class LiveEye:
+    """Owns the eye pass of the shown scene and the published picture."""
+
+    def __init__(self, context: Context, target_samples: int = 32) -> None:
+        self._context = context
+        self.target_samples = target_samples
+        self._pass: EyePass | None = None
+        self._pictures: TextureStore | None = None
+        self._average = shader.compute(context.ctx, "light/average.comp")
+        self._steps: Iterator[float] | None = None
+        self._choosing: Iterator[float] | None = None
+        self._maps: CausticMaps | None = None
+        self._camera: Camera | None = None
+        self._size = (0, 0)
+        self._is_quick = False
+        """The picture that runs is an answer to a movement."""
+        self._is_smooth = False
+        """Its samples are of the whole spectrum: the picture until there are bands."""
+        self._bands: int | None = None
+        """Stretches of the spectrum that this view of this scene needs; None until that is found out."""
+        self._bands_view: object = None
+        self._taken = 0
+        self._publish_from = self._settled = 1
+        """Samples from which on this picture replaces the one shown, and those that it has."""
+        self._owes = False
+        self._shows_other = False
+        """What is shown is of another scene than the one that is looked at."""
+        self._shows_whole = False
+        """What is shown is no answer to a movement and no mere first sample."""
+        self._rates: dict[bool, float] = {}
+        """Pixels per second, of quick pictures and of others."""
+        self.picture: moderngl.Texture | None = None
+        """RGBA32F, linear Rec.709, top row first; None before the first sample."""
+        self.shown_samples = 0
+        self.shown_bands = 1
+        """Stretches of the spectrum that the shown picture is made of."""
+        self.fallbacks: dict[str, int] = {}
+        """What `EyePass.fallbacks` counted up to the shown picture."""
+        self.version = 0
+        """Counts what was published."""
+        self.scale = 1.0
+        self._wanted_scale = 1.0
+
+    def look_at(self, buffers: SceneBuffers, scene: Scene, reflectances: list[np.ndarray | None], maps: MapChannels) -> None:
+        """Take the scene as it is shown: `buffers` hold its geometry, `scene` its colours, glass, lights and pictures; `maps` is what caustic maps hold.
+
+        Raises `ShaderError`, and `UserError` where pictures do not fit the device; then everything stays as it was."""
+        shown = copy.copy(buffers)
+        shown.scene = scene
+        kept, before = self._pictures, self._pass
+        pictures = self._store_of(shown)
+        try:
+            self._pass = EyePass(self._context, shown, "beauty", reflectances, maps, pictures)
+        except BaseException:
+            if pictures is not kept:
+                pictures.release()
+            elif before is not None:
+                kept.follow(before.scene.scene, before.scene.first_triangle, before.scene.corner_turn)
+            raise
+        self._pictures = pictures
+        self._pass.dispatch_seconds = DISPATCH_SECONDS
+        self._steps = self._choosing = self._bands = None
+        self._shows_other = True
+        if before is not None:
+            before.release()
+        if kept is not None and kept is not pictures:
+            kept.release()
+
+    def _store_of(self, shown: SceneBuffers) -> TextureStore:
+        """The textures and the environment on the device: those that are there, unless others are shown."""
+        place = shown.scene, shown.first_triangle, shown.corner_turn
+        if self._pictures is not None and self._pictures.follow(*place):
+            return self._pictures
+        return TextureStore(self._context.ctx, *place)
+
+    def restart(
+        self, camera: Camera, width: int, height: int, maps: CausticMaps, *,
+        seconds: float | None = None, same_view: bool = False, finer_maps: bool = False,
+    ) -> None:  # fmt: skip
+        """Start over. `seconds`: be done with one sample in about that time, however small the picture.
+
+        `same_view`: only the maps are better: what is shown stays until the new picture is as smooth. `finer_maps`: so much
+        better that more bands of the spectrum may be told apart in them."""
+        assert self._pass is not None
+        scale = 1.0
+        if seconds is not None:
+            rate = self._rates.get(True, 0.5 * self._rates.get(False, _FIRST_RATE))
+            scale = next((s for s in SCALES if s * s * width * height <= rate * seconds), SCALES[-1])
+        self._camera, self._maps = camera, maps
+        self._size = (width, height) if scale == 1.0 else (_side(width * scale), _side(height * scale))
+        keeps = same_view and self.scale == scale == 1.0 and not self._shows_other
+        self._wanted_scale, self._is_quick = scale, seconds is not None
+        view = camera, width, height
+        if finer_maps or view != self._bands_view:
+            self._bands = None
+        self._bands_view = view
+        self._owes = True
+        smooth = not self._is_quick and self._needed_bands != 1 and not (keeps and self._shows_whole)
+        self._settled = 1
+        if keeps and not (smooth and self._needed_bands is None):
+            self._settled = max(1, min(self.shown_samples, self._smooth_samples if smooth else SETTLED))
+        self._begin(smooth=smooth)
+
+    def pause(self) -> None:
+        """Leave the maps alone, which are about to go; what is shown stays until `restart`."""
+        self._maps = self._steps = self._choosing = None
+
+    @property
+    def is_coarse(self) -> bool:
+        """The picture asked for last is less than what is wanted."""
+        return self._wanted_scale < 1.0 or (self._is_quick and self._needed_bands != 1)
+
+    @property
+    def owes_picture(self) -> bool:
+        """Nothing of what was asked for last is shown yet."""
+        return self._maps is not None and self._owes
+
+    @property
+    def is_within_cycle(self) -> bool:
+        """Part of the bands of the first whole picture since `restart` are there: with other maps they would be lost."""
+        begun = self._maps is not None and not (self._is_quick or self._is_smooth) and self._cycle > 1
+        return begun and self._taken < self._publish_from
+
+    @property
+    def is_done(self) -> bool:
+        """Every sample is taken, in full size."""
+        return self._maps is None or not (self.is_coarse or self._is_smooth or self._choosing or self._taken < self._target)
+
+    def advance(self, deadline: float, *, one_sample: bool = False) -> float:
+        """Take samples until `deadline` (`time.perf_counter`), `one_sample` not beyond the next published one; returns the seconds it took."""
+        started = now = time.perf_counter()
+        published = False
+        while now < deadline and (self._choosing is not None or self._taken < self._target) and not (published and one_sample):
+            published = self._step()
+            now = time.perf_counter()
+        return now - started
+
+    # ---- bands of the spectrum ---------------------------------------------------------------
+
+    @property
+    def _needed_bands(self) -> int | None:
+        """Of a fine picture; None while nobody knows."""
+        assert self._pass is not None
+        if not self._pass.disperses or self._pass.scene.features.random_wavelength:
+            return 1
+        return self._pass.fixed_bands or self._bands
+
+    @property
+    def _cycle(self) -> int:
+        """Samples after which the picture that runs is whole."""
+        return 1 if self._is_quick or self._is_smooth else self._needed_bands or 1
+
+    @property
+    def _target(self) -> int:
+        """Samples after which the picture that runs is finished."""
+        if self._is_smooth:
+            return 1 if self._needed_bands is None else self._smooth_samples
+        return self.target_samples + -self.target_samples % self._cycle
+
+    @property
+    def _smooth_samples(self) -> int:
+        return max(1, int(SMOOTH_SHARE * (self._needed_bands or 1)))
+
+    def _begin(self, *, smooth: bool) -> None:
+        """Forget the samples; ask for the number of bands where it is needed first."""
+        assert self._pass is not None and self._camera is not None and self._maps is not None
+        self._is_smooth = smooth
+        self._taken = 0
+        self._steps = self._choosing = None
+        self._publish_from = self._settled + -self._settled % self._cycle
+        if not (smooth or self._is_quick) and self._needed_bands is None:
+            self._pass.most_taps = MOST_TAPS
+            self._choosing = self._pass.choosing_spectrum(self._camera, *self._size, BANDED_SAMPLES, self._maps)
+
+    # ---- samples -----------------------------------------------------------------------------
+
+    def _step(self) -> bool:
+        """One dispatch; whether it completed a picture that was published."""
+        if self._choosing is not None:
+            if next(self._choosing, None) is None:
+                assert self._pass is not None
+                self._bands = self._pass.spectrum.bands
+                again = not self._shows_whole and self._smooth_samples > self.shown_samples
+                self._settled = self.shown_samples + 1 if again else self._settled
+                self._begin(smooth=again)
+            return False
+        if self._dispatch():
+            return False
+        self._steps = None
+        self._taken += 1
+        if self._taken < self._publish_from or self._taken % self._cycle:
+            return False
+        self._publish()
+        if self._is_smooth and self._taken >= self._target:
+            # The picture of bands replaces it in its own time.
+            self._settled = 1
+            self._begin(smooth=False)
+        return True
+
+    def _dispatch(self) -> bool:
+        """A band of rows of one sample; False when the sample has them all."""
+        assert self._pass is not None and self._camera is not None and self._maps is not None
+        width, height = self._size
+        if self._steps is None:
+            self._pass.spectrum = Spectrum(self._cycle)
+            self._pass.most_taps = MOVING_TAPS if self._is_quick or self._is_smooth else MOST_TAPS
+            self._steps = self._pass.samples(self._camera, width, height, 1, self._taken, self._maps)
+            self._spent_s = 0.0
+        started = time.perf_counter()
+        goes_on = next(self._steps, None) is not None
+        self._spent_s += time.perf_counter() - started
+        if not goes_on and self._spent_s > 1e-4:
+            # Of whole pictures: rows without glass go ten times as fast.
+            measured = width * height / self._spent_s
+            rate = self._rates.setdefault(self._is_quick, measured)
+            self._rates[self._is_quick] = rate + _RATE_BLEND * (measured - rate)
+        return goes_on
+
+    def _publish(self) -> None:
+        assert self._pass is not None
+        (sums,) = self._pass.sums
+        if self.picture is None or self.picture.size != sums.size:
+            if self.picture is not None:
+                self.picture.release()
+            self.picture = self._context.ctx.texture(sums.size, 4, dtype="f4")
+        sums.bind_to_image(0, read=True, write=False)
+        self.picture.bind_to_image(1, read=False, write=True)
+        self._average["scale"].value = 1.0 / self._taken
+        self._average.run(-(-sums.width // 8), -(-sums.height // 8))
+        self._context.ctx.memory_barrier()
+        self.shown_samples, self.shown_bands, self.scale = self._taken, self._cycle, self._wanted_scale
+        self._shows_whole, self._shows_other = not (self._is_quick or self._is_smooth), False
+        self._owes = False
+        self.fallbacks = self._pass.fallbacks
+        self.version += 1
+
+    def release(self) -> None:
+        """Free everything."""
+        shader.release(self._average)
+        for owned in (self._pass, self._pictures, self.picture):
+            if owned is not None:
+                owned.release()
+        self._pass = self._pictures = self.picture = None
+
+
+def _side(pixels: float) -> int:
+    """Whole pixels of a picture in motion. Mesa's software renderer compiles its programs once more for textures whose side is a power of two."""
+    side = max(9, round(pixels))
+    return side + 1 if side & (side - 1) == 0 else side
+
+
+def solo_scene(scene: Scene, wavelength_nm: float | None) -> Scene:
+    """`scene` as seen in the light of one wavelength: lights narrowed, what lies behind everything dark; itself for None."""
+    if wavelength_nm is None:
+        return scene
+    from .live_light import solo
+
+    lights = tuple(replace(light, spectral_power=solo(light.spectral_power, wavelength_nm)) for light in scene.lights)
+    return replace(scene, lights=lights, background_rgb=(0.0, 0.0, 0.0), environment=None)

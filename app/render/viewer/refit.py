@@ -1,0 +1,59 @@
+"""Whether the maps still fit what the camera sees.
+
+Walking round traces nothing and keeps what is accumulated, so maps are only fitted again where that shows: the
+window has another size, the camera has come so near that texels are larger than pixels, or it looks beside the fine window at light that only
+the coarse one holds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...passes.map_layout import MapLayout, layout_maps
+from ...passes.pilot import landings_of
+
+if TYPE_CHECKING:
+    from .inputs import LiveInputs
+    from .live_light import LiveLight
+
+PAYS = 1.5
+"""Texels must get so many times smaller."""
+BESIDE = 0.25
+"""Share of the window that would be fitted now that may lie outside the present one."""
+
+
+def layout_for(light: LiveLight, inputs: LiveInputs) -> MapLayout:
+    """Maps as they would be laid out for the camera and picture of `inputs`."""
+    seen = replace(light.scene, camera=inputs.camera)
+    return layout_maps(seen, light.buffers, landings_of(light.pilots.values()), (inputs.width, inputs.height), light.reflectance_class)
+
+
+def is_judged(light: LiveLight, inputs: LiveInputs) -> bool:
+    """Whether `wants_new_maps` has looked at this view."""
+    return light.judged_view == (inputs.camera, inputs.width, inputs.height)
+
+
+def wants_new_maps(light: LiveLight, inputs: LiveInputs) -> bool:
+    """Whether new maps would show more of what the camera of `inputs` sees."""
+    if is_judged(light, inputs):
+        return False
+    light.judged_view = (inputs.camera, inputs.width, inputs.height)
+    if (inputs.width, inputs.height) != (light.settings.width, light.settings.height):
+        return True
+    now, then = light.layout, layout_for(light, inputs)
+    return any(_pays(now, then, receiver) for receiver in range(len(now.receivers)))
+
+
+def _pays(now: MapLayout, then: MapLayout, receiver: int) -> bool:
+    side = [float(np.sqrt(layout.placements["texel_area"][layout.receivers[receiver]["placement"]])) for layout in (now, then)]
+    if side[0] > PAYS * side[1]:
+        return True
+    old, new = now.windows.get(receiver), then.windows.get(receiver)
+    if not old or not new or len(old) < 2:
+        return False
+    overlap = np.minimum(old[0].high, new[0].high) - np.maximum(old[0].low, new[0].low)
+    covered = float(np.prod(np.clip(overlap, 0.0, None)) / max(float(np.prod(new[0].size)), 1e-30))
+    return covered < 1.0 - BESIDE

@@ -1,0 +1,11 @@
+"""All cases of whole paths through the real emit and trace passes, in the order of the report."""
+
+from __future__ import annotations
+
+from ..case import Case
+from .caustic_cases import CASES as CAUSTICS
+from .chain_cases import CASES as CHAINS
+from .material_cases import CASES as MATERIALS
+from .mesh_cases import CASES as MESHES
+
+CASES: tuple[Case, ...] = (*MATERIALS, *CAUSTICS, *CHAINS, *MESHES)

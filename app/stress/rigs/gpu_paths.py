@@ -1,0 +1,240 @@
+"""Photons of the real emit and trace passes in scenes made for one question, in world coordinates.
+
+A light falls on glass or mirrors before a diffuse screen; the photon records come back with the
+float64 start of the lattice point each grew from and the choices of its path, so that every photon
+can be held against a closed form or the reference tracer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+
+from ...gpu.context import Context
+from ...gpu.scene_buffers import Groups, SceneBuffers
+from ...model.features import Features
+from ...model.geometry.mesh import Mesh, make_mesh
+from ...model.optics.glass import sellmeier
+from ...model.optics.spectral_tables import SpectralAxis
+from ...model.optics.spectrum import constant
+from ...model.scene import (
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Mirror,
+    Scene,
+    SceneObject,
+)
+from ...model.settings import RenderSettings
+from ...passes.emission_domain import emission_domain, orthonormal_frame
+from ...passes.trace import Band, FluxTally, LatticeSlice, TracePass
+from ...reference.emission import Emitter
+from ...reference.glasses import sellmeier_terms
+from ...reference.optics import unit
+from ...reference.random_numbers import hash_combine
+from ...render.light_pass import spectral_axis
+
+SHIFT = (123456789, 987654321)
+SEED = 1
+REFLECTED, REFRACTED, MIRRORED, CUT_LOW, CUT_HIGH = 1, 2, 3, 5, 6
+"""Choices of a path as trace.comp names them in the branch key."""
+_CHOICES = (REFLECTED, REFRACTED, MIRRORED, CUT_LOW, CUT_HIGH)
+
+
+@dataclass(frozen=True)
+class Photons:
+    """Landings, world units; N rows, G spectral groups."""
+
+    records: np.ndarray
+    """The photon buffer as it is."""
+    emitter: Emitter
+    q: np.ndarray
+    """float64 (N, 2): the point of the emission domain."""
+    start: np.ndarray
+    """float64 (N, 3): where each ray left the light."""
+    direction: np.ndarray
+    """float64 (N, 3): in which direction."""
+    position: np.ndarray
+    dposition_ds: np.ndarray
+    """(N, 3) per unit of q: world units across a beam, of the azimuthal plane for light that diverges."""
+    dposition_dt: np.ndarray
+    dposition_dvar: np.ndarray
+    """(N, G, 3) per unit of each group's variable."""
+    weight: np.ndarray
+    """(N,): flux each photon's band starts with, float64."""
+    nm: np.ndarray
+    """(N, 3): wavelengths of the band's start, the anchor and the band's end."""
+    axis: SpectralAxis
+    groups: Groups
+    lattice_in_disc: int
+    """Lattice points inside the disc that was asked for (all of them, without one)."""
+    flux_w: float
+    """Flux of a lattice point of full weight."""
+    tally: FluxTally
+
+    @property
+    def dposition_dn(self) -> np.ndarray:
+        """(N, 3) per unit of the first group's variable; zero without dispersion."""
+        return self.dposition_dvar[:, 0] if self.dposition_dvar.shape[1] else np.zeros_like(self.position)
+
+    def of_depth(self, depth: int) -> Photons:
+        """Those after `depth` specular events."""
+        return self.where(self.records["depth"] == depth)
+
+    def of_choices(self, *choices: int) -> Photons:
+        """Those whose path took these choices, one an event (`REFLECTED`, …)."""
+        keys = {int(band): branch_key(choices, int(band)) for band in np.unique(self.band)}
+        return self.where(self.records["branch_key"] == np.array([keys[int(band)] for band in self.band], np.uint32))
+
+    def choices(self, longest: int) -> list[tuple[int, ...]]:
+        """Each photon's choices, at most `longest` of them; KeyError where a path made more."""
+        wanted = set(zip(self.band.tolist(), self.records["branch_key"].tolist(), strict=True))
+        table = {}
+        for band in np.unique(self.band).tolist():
+            keys = np.array([branch_key((), band)])
+            for length in range(1, longest + 1):
+                keys = hash_combine(keys[:, None], np.array(_CHOICES)).ravel()
+                for place in np.flatnonzero(np.isin(keys, self.records["branch_key"])).tolist():
+                    if (band, int(keys[place])) in wanted:
+                        digits = np.unravel_index(place, (len(_CHOICES),) * length)
+                        table[band, int(keys[place])] = tuple(_CHOICES[digit] for digit in digits)
+        return [table[key] for key in zip(self.band.tolist(), self.records["branch_key"].tolist(), strict=True)]
+
+    def of_band(self, band: int) -> Photons:
+        """Those of one of the bands that were asked for."""
+        return self.where(self.band == band)
+
+    def where(self, chosen: np.ndarray) -> Photons:
+        names = ("records", "q", "start", "direction", "position", "dposition_ds", "dposition_dt", "dposition_dvar", "weight", "nm")
+        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
+
+    @property
+    def band(self) -> np.ndarray:
+        """Number of each photon's band among those asked for (N,)."""
+        return self.records["light_and_source"] >> 8 & 0xFF
+
+
+def branch_key(choices: Sequence[int], band: int = 0) -> int:
+    """The key that trace.comp gives a path of these choices, first light."""
+    return int(reduce(hash_combine, choices, hash_combine(SEED, band)))
+
+
+def glass(name: str) -> Dielectric:
+    """A glass of the reference's own table."""
+    return Dielectric(sellmeier(*sellmeier_terms(name), name=name))
+
+
+def screen(centre: np.ndarray, normal: np.ndarray, half: float = 50.0) -> Mesh:
+    """A square of side 2·half across `normal`."""
+    side, up = orthonormal_frame(unit(np.asarray(normal, float)))
+    corners = [np.asarray(centre) + half * (s * side + t * up) for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return make_mesh("screen", np.array(corners), np.array([[0, 1, 2], [0, 2, 3]]))
+
+
+def extruded(name: str, section: np.ndarray, half: float = 0.5) -> Mesh:
+    """A closed convex solid: a polygon (P, 2), counter-clockwise in x-y, drawn out along z by ±half."""
+    count = len(section)
+    low, high = (np.column_stack([section, np.full(count, z)]) for z in (-half, half))
+    caps = [[0, k + 1, k] for k in range(1, count - 1)] + [[count, count + k, count + k + 1] for k in range(1, count - 1)]
+    sides = [t for k in range(count) for t in ([k, (k + 1) % count, count + k], [(k + 1) % count, count + (k + 1) % count, count + k])]
+    return make_mesh(name, np.concatenate([low, high]), np.array(caps + sides))
+
+
+def placed(name: str, mesh: Mesh, material: Dielectric | Diffuse | Mirror) -> SceneObject:
+    """An object where its mesh is."""
+    return SceneObject(name, mesh, material)
+
+
+def trace_light(
+    gl: Context,
+    objects: Sequence[SceneObject],
+    light: Light,
+    bands_nm: Sequence[tuple[float, float]],
+    count: int = 256,
+    max_depth: int = 3,
+    method: str = "srd",
+    place: tuple[float, float] = (0.5, 0.5),
+) -> Photons:
+    """All landings of `count` lattice points for each spectral band.
+
+    Every interface splits and nothing plays roulette, so each path is there once and with its true flux (1 W
+    per unit of the light's quantity and band). `place` is where on an extended light the rays start.
+    """
+    scene = Scene("question", Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), (light,), tuple(objects))
+    features = Features.of(scene, RenderSettings(method=method))
+    buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
+    trace = TracePass(gl, features, buffers, batch=max(2 * count * len(bands_nm), 1024), max_depth=max_depth, split_threshold=0.0)
+    try:
+        space = buffers.space
+        specular = [o.mesh.corners() for o in objects if not isinstance(o.material, Diffuse)]
+        domain = emission_domain(light, scene, space, space.to_gpu(np.concatenate(specular)))
+        assert domain is not None
+        ends = [buffers.axis.x_of_nm(np.array(band)) for band in bands_nm]
+        bands = tuple(Band(float(lo), float(hi), float(0.5 * (lo + hi)), 1.0) for lo, hi in ends)
+        batch = trace.run(LatticeSlice(0, bands, count, 0, 1, count, SHIFT, (0, 0), 0, SEED, light_place=place), domain)
+        assert batch.tally.fallbacks["queue_overflow"] == 0
+        assert batch.tally.imbalance < 1e-4, "flux does not close"
+        records = np.frombuffer(trace.photons.read(), trace.photon.dtype, batch.photons)
+        emitter = Emitter(light, domain, space, place)
+        # Only wavelengths that part have lattices of their own.
+        lattices = [emitter.lattice(count, SHIFT, k if features.spectral_groups else 0) for k in range(len(bands))]
+        q = np.stack(lattices, axis=1).reshape(-1, 2)[records["photon_id"]]
+        start, direction = emitter.start(q)
+        per_s, per_t = 1.0 / (domain.spacing(count) * space.scale * emitter.unit_length)
+        groups = [records[f"dposition_dvar{g}"][:, :3] for g in range(features.spectral_groups)]
+        return Photons(
+            records, emitter, q, start, direction, space.to_world(records["position"]),
+            records["dposition_ds"] * per_s, records["dposition_dt"] * per_t,
+            np.stack(groups, axis=1) / space.scale if groups else np.zeros((len(records), 0, 3)),
+            emitter.weight(q, count), buffers.axis.nm_of_x(np.column_stack([records[f"x_{end}"] for end in ("lo", "anchor", "hi")])),
+            buffers.axis, buffers.groups, count * len(bands), domain.measure / count, batch.tally,
+        )  # fmt: skip
+    finally:
+        trace.release()
+        buffers.release()
+
+
+def beam_light(start: np.ndarray, direction: np.ndarray, radius: float) -> Light:
+    """Collimated white light from a disc."""
+    return Light("beam", "collimated", constant(1.0), position=tuple(start), direction=tuple(unit(np.asarray(direction, float))), radius=radius)
+
+
+def trace_beam(
+    gl: Context,
+    solid: Mesh | Sequence[SceneObject],
+    material: Dielectric | Mirror | None,
+    screen_mesh: Mesh,
+    start: np.ndarray,
+    direction: np.ndarray,
+    radius: float,
+    nm: float | tuple[float, float] | Sequence[tuple[float, float]],
+    count: int = 256,
+    max_depth: int = 3,
+    method: str = "srd",
+) -> Photons:
+    """Send about `count` lattice points of a disc beam through `solid` (a mesh of `material`, or several objects).
+
+    `nm` is one wavelength, a band (lo, hi), or several bands. The real beam is wider, and what starts outside the
+    disc is dropped: at the beam's own edge a lattice cell is covered in part only and its photon weaker.
+    """
+    wider = 1.0 + 3.0 / np.sqrt(count)
+    if isinstance(solid, Mesh):
+        assert material is not None
+        solid = (placed("solid", solid, material),)
+    bands = [(nm, nm)] if isinstance(nm, float) else [nm] if isinstance(nm, tuple) else list(nm)
+    objects = (*solid, placed("screen", screen_mesh, Diffuse()))
+    count = int(np.ceil(count * wider**2))
+    everything = trace_light(gl, objects, beam_light(start, direction, radius * wider), bands, count, max_depth, method)
+
+    def inside(points: np.ndarray) -> np.ndarray:
+        from_axis = np.cross(points - np.asarray(start, float), everything.emitter.domain.axis)
+        return np.linalg.norm(from_axis, axis=-1) <= radius
+
+    own = range(len(bands) if everything.groups.count else 1)
+    lattice = np.concatenate([everything.emitter.start(everything.emitter.lattice(count, SHIFT, k))[0] for k in own])
+    chosen = everything.where(inside(everything.start))
+    return replace(chosen, lattice_in_disc=int(np.count_nonzero(inside(lattice))))

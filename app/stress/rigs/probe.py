@@ -1,0 +1,201 @@
+"""One small rendering for the stress sweep, with everything it made looked at: photons, maps, picture, flux.
+
+The product's own light half and eye pass do the work. What is added only reads: every photon
+record of every batch, every texel of every map, every pixel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...gpu import records
+from ...model.features import Features
+from ...model.settings import RenderSettings
+from ...passes.camera import CausticMaps, EyePass
+from ...render.light_pass import LightHalf, LightStats, spectral_axis
+from ..case import Measurement
+
+if TYPE_CHECKING:
+    from ...gpu.context import Context
+    from ...model.scene import Scene
+    from ...passes.trace import Batch
+
+SMALL = RenderSettings(width=160, height=90, photons=32_768, spp=16)
+"""What a sweep renders unless the case is about just that. Fewer than 16 samples a pixel would miss texels of a sharp focus."""
+LOST_TO_NUMERICS = 1e-3
+"""Largest share of the flux that may end for numerical reasons (cracks, overflows): a tenth of what a picture shows."""
+
+
+class WatchedLight(LightHalf):
+    """A light half whose photon records are read after every batch."""
+
+    def __init__(self, *arguments) -> None:
+        super().__init__(*arguments)
+        self.nonfinite_photons = 0
+        self.dropped = 0
+        self.watched = 0
+
+    def _account(self, batch: Batch) -> None:
+        super()._account(batch)
+        if not batch.photons:
+            return
+        photons = np.frombuffer(self.trace.photons.read(batch.photons * self.trace.photon.stride), self.trace.photon.dtype)
+        self.watched += len(photons)
+        dropped = (photons["flags"] & records.FLAG_FOOTPRINT_DROPPED) != 0
+        self.dropped += int(dropped.sum())
+        # A dropped footprint's columns are never read again, everything else always is.
+        columns = [name for name in photons.dtype.names if name.startswith("dposition")]
+        floats = [name for name in photons.dtype.names if photons.dtype[name].base == np.float32 and name not in columns]
+        bad = np.zeros(len(photons), bool)
+        for name in floats:
+            bad |= ~_finite_rows(photons[name])
+        for name in columns:
+            bad |= ~_finite_rows(photons[name]) & ~dropped
+        self.nonfinite_photons += int(bad.sum())
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What one rendering made."""
+
+    picture: np.ndarray
+    """float64 (H, W, 3), linear Rec.709."""
+    stats: LightStats
+    nonfinite: int
+    """Photon records, texel values and pixel values that are NaN or infinite."""
+    dropped: int
+    """Photon records whose flag says that the footprint was dropped."""
+    map_flux_w: float
+    """What the maps hold where they are read, per pass weight."""
+    spectral: np.ndarray | None = None
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Where flux ended, as shares of what was emitted; empty where no light reaches glass."""
+        tally = self.stats.tally
+        return {name: flux / tally.emitted for name, flux in tally.ended.items()} if tally.emitted else {}
+
+    @property
+    def map_error(self) -> float:
+        """|what maps hold + what lies outside all of them − deposited| / deposited."""
+        deposited = self.stats.tally.ended["deposited"]
+        return abs(self.map_flux_w + self.stats.outside_map_w - deposited) / deposited if deposited else 0.0
+
+
+@contextmanager
+def light_half(context: Context, scene: Scene, settings: RenderSettings) -> Iterator[WatchedLight]:
+    """The prepared light half of `scene`; everything is freed afterwards."""
+    from ...gpu.scene_buffers import SceneBuffers
+
+    features = Features.of(scene, settings)
+    buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+    light = WatchedLight(context, scene, settings, features, buffers)
+    try:
+        light.prepare()
+        yield light
+    finally:
+        light.release()
+        buffers.release()
+
+
+def probe(context: Context, scene: Scene, settings: RenderSettings = SMALL) -> Probe:
+    """Render `scene` in one pass and look at everything."""
+    photons = settings.photons or scene.render.photons
+    with light_half(context, scene, settings) as light:
+        light.begin(photons, settings.seed)
+        light.run_pass(0, photons, lambda _: True)
+        light.finish()
+        if light.watched != light.stats.splats:
+            raise RuntimeError(f"{light.watched} of {light.stats.splats} photon records were seen")
+        eye = EyePass(context, light.buffers, settings.layer, light.reflectances, light.map_channels)
+        try:
+            maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
+            eye.run(scene.camera, settings.width, settings.height, settings.spp or 1, 0, maps, settings.seed)
+            picture = eye.read_rgb()
+            spectral = eye.read_spectral() if settings.bins else None
+        finally:
+            eye.release()
+        bad = light.nonfinite_photons + nonfinite(picture) + nonfinite(read_maps(light))
+        bad += 0 if spectral is None else nonfinite(spectral)
+        return Probe(picture.astype(float), light.stats, bad, light.dropped, light.map_flux(), spectral)
+
+
+def read_maps(light: LightHalf) -> np.ndarray:
+    """All maps as they are looked up, float32 (targets, height, width, 4)."""
+    width, height = light.atlas.size
+    textures = light.resolved_textures()
+    values = np.empty((len(textures), height, width, 4), np.float32)
+    for texture, layer in zip(textures, values, strict=True):
+        texture.read_into(layer)
+    return values
+
+
+def nonfinite(values: np.ndarray) -> int:
+    """How many of `values` are NaN or infinite."""
+    return int(values.size - np.count_nonzero(np.isfinite(values)))
+
+
+def picture_error(picture: np.ndarray, expected: np.ndarray) -> float:
+    """nRMSE: root of Σ(a − b)² over root of Σb²; infinite where only one of them is dark."""
+    with np.errstate(all="ignore"):
+        return _ratio(float(np.sqrt(np.sum((picture - expected) ** 2))), float(np.sqrt(np.sum(expected**2))))
+
+
+def energy_error(picture: np.ndarray, expected: np.ndarray) -> float:
+    """|Σa − Σb| / Σb."""
+    with np.errstate(all="ignore"):
+        return _ratio(abs(float(picture.sum() - expected.sum())), abs(float(expected.sum())))
+
+
+def blocks(picture: np.ndarray, side: int = 10) -> np.ndarray:
+    """Means of `side` × `side` pixels; what does not fill a block is left out."""
+    height, width = (n // side * side for n in picture.shape[:2])
+    cut = picture[:height, :width]
+    return cut.reshape(height // side, side, width // side, side, -1).mean(axis=(1, 3))
+
+
+@dataclass(frozen=True)
+class Held:
+    """Errors and bounds beyond those that every rendering is held to."""
+
+    errors: dict[str, float] = field(default_factory=dict)
+    bounds: dict[str, float] = field(default_factory=dict)
+    note: str = ""
+
+
+def measurement(severity: float, label: str, found: Probe, held: Held = Held(), lost: float = LOST_TO_NUMERICS) -> Measurement:
+    """A rendering's measurement: finite, flux closed, every dropped footprint counted, little lost to numerics."""
+    counted = found.stats.tally.fallbacks["footprint_dropped"]
+    errors = {"uncounted": float(max(0, found.dropped - counted)), "lost": found.shares.get("lost_numeric", 0.0), **held.errors}
+    return Measurement(
+        severity=severity,
+        label=label,
+        nonfinite=found.nonfinite,
+        errors=errors,
+        bounds={"uncounted": 0.0, "lost": lost, **held.bounds},
+        flux_imbalance=found.stats.tally.imbalance,
+        fallbacks={**found.stats.tally.fallbacks, "splat_footprint_dropped": found.stats.footprints_dropped},
+        dropped=found.dropped,
+        note=held.note,
+    )
+
+
+def with_photons(photons: int) -> RenderSettings:
+    """`SMALL` with another number of photons."""
+    return replace(SMALL, photons=photons)
+
+
+def _ratio(difference: float, size: float) -> float:
+    if size == 0.0:
+        return 0.0 if difference == 0.0 else float("inf")
+    return difference / size
+
+
+def _finite_rows(values: np.ndarray) -> np.ndarray:
+    """Which records' values are all finite, bool (n,)."""
+    return np.isfinite(values).reshape(len(values), -1).all(axis=1)

@@ -1,0 +1,131 @@
+"""Parts of small scenes for the stress sweep, and ways to bend a whole scene: move, scale, other glass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...model.geometry.mesh import Mesh
+from ...model.geometry.primitives import plane
+from ...model.optics.glass import Dispersion, from_abbe
+from ...model.optics.spectrum import Spectrum, illuminant
+from ...model.placement import rotation_about
+from ...model.scene import (
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Scene,
+    SceneObject,
+)
+
+TABLE = SceneObject("table", plane(8.0, 8.0), Diffuse())
+"""Receiver in z = 0."""
+FROM_BELOW = Camera((0.0, 0.0, -5.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=4.5)
+"""Sees the table's caustic without any glass before it, on the same pixels whatever stands on the table."""
+BEAM = Light("beam", "collimated", illuminant("D65").scaled_to_luminous(10.0), (0.3, 0.0, 6.0), (0.0, 0.0, -1.0), radius=0.45)
+"""A beam straight down."""
+SUN = Light("sun", "directional", illuminant("D65").scaled_to_luminous(10.0), direction=(0.36, 0.0, -0.9329523))
+"""Slanting light over everything."""
+FLINT = from_abbe(1.7, 30.0, "flint")
+CROWN = from_abbe(1.5, 60.0, "crown")
+WATER = from_abbe(1.333, 55.0, "water")
+
+
+def solid(
+    name: str, mesh: Mesh, glass: Dispersion, at: tuple[float, float, float] = (0.0, 0.0, 0.0), priority: int = 0, turned: np.ndarray | None = None
+) -> SceneObject:
+    """A piece of glass with its own origin at `at`, first turned by the matrix `turned` (3, 3)."""
+    place = np.eye(4)
+    if turned is not None:
+        place[:3, :3] = turned
+    place[:3, 3] = at
+    return SceneObject(name, mesh, Dielectric(glass, priority=priority), place)
+
+
+def stage(*objects: SceneObject, lights: Sequence[Light] = (BEAM,), camera: Camera = FROM_BELOW, table: SceneObject = TABLE) -> Scene:
+    """Objects over the table."""
+    return Scene("stage", camera, tuple(lights), (*objects, table))
+
+
+def moved(scene: Scene, scale: float = 1.0, offset: tuple[float, float, float] = (0.0, 0.0, 0.0), rotation: np.ndarray | None = None) -> Scene:
+    """The whole scene under a similarity; radiance stays, so the picture does.
+
+    Lengths grow by `scale`, hence intensities by its square and absorption by its inverse.
+    """
+    turn = np.eye(3) if rotation is None else rotation
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = scale * turn, offset
+
+    def point(p: Sequence[float]) -> tuple[float, float, float]:
+        x, y, z = (float(v) for v in matrix[:3, :3] @ p + matrix[:3, 3])
+        return x, y, z
+
+    def direction(d: Sequence[float]) -> tuple[float, float, float]:
+        x, y, z = (float(v) for v in turn @ d)
+        return x, y, z
+
+    camera = replace(
+        scene.camera,
+        position=point(scene.camera.position),
+        target=point(scene.camera.target),
+        up=direction(scene.camera.up),
+        vertical_extent=scale * scene.camera.vertical_extent,
+    )
+    lights = tuple(
+        replace(
+            light,
+            position=point(light.position),
+            direction=direction(light.direction),
+            tangent=None if light.tangent is None else direction(light.tangent),
+            radius=scale * light.radius,
+            width=scale * light.width,
+            height=scale * light.height,
+            spectral_power=brighter(light.spectral_power, scale**2) if light.kind in ("point", "spot") else light.spectral_power,
+        )
+        for light in scene.lights
+    )
+    objects = tuple(replace(_thinner(item, scale), object_to_world=matrix @ item.object_to_world) for item in scene.objects)
+    return replace(scene, camera=camera, lights=lights, objects=objects)
+
+
+def turn(axis: Sequence[float], degrees: float) -> np.ndarray:
+    """Rotation about `axis` (of any length), float64 (3, 3)."""
+    x, y, z = (float(v) for v in np.asarray(axis, float) / np.linalg.norm(axis))
+    return rotation_about((x, y, z), np.radians(degrees))
+
+
+def brighter(spectrum: Spectrum, factor: float) -> Spectrum:
+    """Every power times `factor`."""
+    return Spectrum(spectrum.density * factor, tuple((nm, power * factor) for nm, power in spectrum.lines))
+
+
+def with_glass(scene: Scene, change: Callable[[Dispersion], Dispersion]) -> Scene:
+    """The scene with every glass replaced by `change(glass)`."""
+
+    def changed(item: SceneObject) -> SceneObject:
+        if not isinstance(item.material, Dielectric):
+            return item
+        return replace(item, material=replace(item.material, dispersion=change(item.material.dispersion)))
+
+    return replace(scene, objects=tuple(changed(item) for item in scene.objects))
+
+
+def extent(scene: Scene) -> float:
+    """Diagonal of what is not a receiver (else of everything), scene units."""
+    from ...model.scene_defaults import bounds_of
+
+    items = [o for o in scene.objects if not isinstance(o.material, Diffuse)] or list(scene.objects)
+    low, high = bounds_of(items)
+    return float(np.linalg.norm(np.asarray(high) - np.asarray(low)))
+
+
+def _thinner(item: SceneObject, scale: float) -> SceneObject:
+    """Absorption is per length."""
+    material = item.material
+    if not isinstance(material, Dielectric) or material.absorption is None:
+        return item
+    absorption = replace(material.absorption, coefficient=material.absorption.coefficient / scale)
+    return replace(item, material=replace(material, absorption=absorption))

@@ -1,0 +1,106 @@
+"""Photon records made by hand, in texel units, and the splat pass around them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import moderngl
+import numpy as np
+
+from ...gpu.map_channels import MapChannels
+from ...gpu.records import NONE, RECEIVER, photon_record
+from ...gpu.splat_tables import SplatTables
+from ...model.optics import spectrum
+from ...model.optics.spectral_tables import SpectralAxis
+from ...passes.footprint import SpectralVariables
+from ...passes.map_atlas import MapAtlas, Tile, pack, placement_rows
+from ...passes.splat import Splatter
+
+IDENTITY_ROWS = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
+"""GPU space is the tile's texels."""
+WHOLE_BAND = ((0.0, 1.0),)
+
+
+@dataclass(frozen=True)
+class SplatFeatures:
+    spectral_groups: int = 1
+    band_cuts: bool = False
+    nested_windows: bool = False
+    charts: bool = False
+    targets: int = 1
+    point_spectrum: bool = False
+    local_gain: bool = False
+    reindexed: bool = False
+
+
+@dataclass
+class Rig:
+    """One flat receiver of `size` texels, and what is drawn into it."""
+
+    ctx: moderngl.Context
+    features: SplatFeatures = field(default_factory=SplatFeatures)
+    size: tuple[int, int] = (64, 64)
+    light: spectrum.Spectrum = field(default_factory=lambda: spectrum.illuminant("D65"))
+    bands: Sequence[tuple[float, float]] = WHOLE_BAND
+    channels: MapChannels = MapChannels()
+    axis: SpectralAxis = field(default_factory=lambda: SpectralAxis.build([]))
+    coarse: tuple[tuple[int, int], np.ndarray, float] | None = None
+    """Size, rows (2, 4) and texel area of a coarser window."""
+
+    def __post_init__(self) -> None:
+        self.tables = SplatTables.build(self.ctx, self.axis, [self.light], [None], [self.bands], self.channels)
+        sizes = [self.size] if self.coarse is None else [self.size, self.coarse[0]]
+        self.tiles, atlas_size = pack(sizes)
+        placements = placement_rows(self.tiles[0], IDENTITY_ROWS, 1.0)
+        if self.coarse is not None:
+            placements["next"] = 1
+            placements = np.concatenate([placements, placement_rows(self.tiles[1], self.coarse[1], self.coarse[2])])
+            assert placements["next"][1] == NONE
+        self.atlas = MapAtlas(self.ctx, atlas_size, placements, self.features.targets)
+        self.receivers = self.ctx.buffer(RECEIVER.zeros(1))
+        self.variable = SpectralVariables.build(self.ctx, np.linspace(0.0, 1.0, 1025)[None])
+        self.splatter = Splatter(self.ctx, self.features)
+
+    def draw(self, photons: np.ndarray, smoothing: float = 1.0, batch: int | None = None, tile: int = 0) -> np.ndarray:
+        """The tile after these photons alone, float64 (height, width, channels)."""
+        self.atlas.clear()
+        self.splatter.reset_counts()
+        for part in np.array_split(photons, np.arange(batch, len(photons), batch)) if batch else [photons]:
+            buffer = self.ctx.buffer(part)
+            self.splatter.run(buffer, len(part), self.variable, self.tables, self.atlas, self.receivers, smoothing)
+            buffer.release()
+        return self.atlas.read_tile(self.tiles[tile]).astype(np.float64)
+
+    @property
+    def tile(self) -> Tile:
+        return self.tiles[0]
+
+
+def photons(
+    features: SplatFeatures,
+    centre: np.ndarray,
+    axis_s: np.ndarray = (0.0, 0.0),
+    axis_t: np.ndarray = (0.0, 0.0),
+    chord: np.ndarray = (0.0, 0.0),
+    x_lo: float = 0.0,
+    x_hi: float = 1.0,
+    x_anchor: float | None = None,
+    throughput: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    band: int = 0,
+) -> np.ndarray:
+    """Photon records about `centre` (n, 2); `chord` is what the whole of x in [0, 1] sweeps, anchored at `x_anchor`
+    (the middle of the band by default), where `centre` is."""
+    places = np.atleast_2d(np.asarray(centre, np.float64))
+    records = photon_record(features.spectral_groups).zeros(len(places))
+    records["position"][:, :2] = places
+    records["dposition_ds"][:, :2] = axis_s
+    records["dposition_dt"][:, :2] = axis_t
+    records["x_lo"], records["x_hi"] = x_lo, x_hi
+    records["x_anchor"] = 0.5 * (x_lo + x_hi) if x_anchor is None else x_anchor
+    records["throughput"] = throughput
+    records["flux_w"] = 1.0
+    records["light_and_source"] = 0xFFFF0000 | (band << 8)
+    if features.spectral_groups:
+        records["dposition_dvar0"][:, :2] = chord
+    return records

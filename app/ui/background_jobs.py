@@ -1,0 +1,88 @@
+"""What works beside the engine in a frame: comparison, exports, ray overlay, cursor, thumbnails. Each has its share of the time."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from ..base.errors import UserError
+from ..commands.options import shipped_scenes
+from .compare import Comparison
+from .cursor_info import Cursor
+from .export import Exports, Shown
+from .gallery import Gallery
+from .ray_overlay import RayOverlay
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from ..edit import requests
+    from ..edit.state import State
+    from ..gpu.context import Context
+    from .live_picture import LivePicture
+
+JOB_SHARE = 0.6
+"""Of a frame's budget that a running export gets."""
+COMPARE_SHARE = 0.4
+"""Likewise what is compared with."""
+
+
+class Companions:
+    """Owns them. `told` collects sentences about what was finished, for the host to show."""
+
+    def __init__(self, context: Context, config: Path) -> None:
+        self.comparison = Comparison(context)
+        self.exports = Exports(context)
+        self.overlay = RayOverlay(context)
+        self.cursor = Cursor()
+        self.gallery = Gallery(context, config, shipped_scenes())
+        self.told: list[tuple[str, bool]] = []
+        """Sentence, whether it is an error."""
+
+    @property
+    def is_busy(self) -> bool:
+        """The window must not sleep."""
+        return self.exports.job is not None or self.comparison.is_busy
+
+    def work(self, state: State, picture: LivePicture, budget_s: float) -> float:
+        """Let exports and comparison work; returns what is left of `budget_s` for the engine."""
+        started = time.perf_counter()
+        left = budget_s
+        if self.exports.job is not None:
+            try:
+                told = self.exports.step(JOB_SHARE * budget_s)
+            except UserError as error:
+                self.told.append((str(error), True))
+            else:
+                if told is not None:
+                    self.told.append((told, False))
+            left = budget_s - (time.perf_counter() - started)
+        share = COMPARE_SHARE if picture.engine is not None and not picture.stats.converged else 1.0
+        self.comparison.advance(state, picture.engine, share * max(left, 0.0))
+        return max(budget_s - (time.perf_counter() - started), 0.2 * budget_s)
+
+    def look(self, state: State, picture: LivePicture, now_s: float) -> None:
+        """After the picture is made: what lies under the cursor, where rays go. Raises `UserError`."""
+        self.cursor.update(state, picture, now_s)
+        self.overlay.update(state)
+
+    def export(self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, picture: LivePicture) -> None:
+        """Begin what `request` asks for. Raises `UserError`."""
+        if picture.shown is None or picture.radiance is None:
+            raise UserError("there is no picture yet; wait a moment")
+        told = self.exports.begin(request, state, Shown(picture.shown, picture.radiance, picture.exposure_ev, picture.stats.photons))
+        if told is not None:
+            self.told.append((told, False))
+
+    def cancel_export(self) -> None:
+        """Stop the running export; what is finished stays."""
+        told = self.exports.cancel()
+        if told is not None:
+            self.told.append((told, False))
+
+    def release(self) -> None:
+        """End and free everything; before the engine is released."""
+        self.exports.release()
+        self.comparison.release()
+        self.overlay.release()
+        self.gallery.release()

@@ -1,0 +1,139 @@
+"""What the panels may know and cannot change: filled by the host before every frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..model.scene import Vec3
+from ..render.viewer.stats import LiveStats
+
+
+@dataclass(frozen=True)
+class CursorFacts:
+    """What lies under the cursor in the viewport, as of the last frame."""
+
+    pixel: tuple[int, int]
+    rgb: Vec3
+    """Linear Rec.709 radiance, lm/(sr unit²)."""
+    object_index: int | None = None
+    """First surface hit."""
+    position: Vec3 | None = None
+    """World position of that hit."""
+    normal: Vec3 | None = None
+    """Unit, facing the camera."""
+    is_receiver: bool = False
+    spectrum_nm: np.ndarray | None = None
+    """Bin centres, when a spectrum was asked for (`Panels.spectrum`)."""
+    spectrum: np.ndarray | None = None
+    """Shape of the caustic's spectrum there: irradiance of each bin over that of the brightest."""
+    magnified: int | None = None
+    """Texture id of the magnifier's picture."""
+
+
+@dataclass(frozen=True)
+class SceneEntry:
+    """A scene of the start page."""
+
+    path: Path
+    title: str
+    description: str
+    thumbnail: int | None
+    """Texture id."""
+    thumbnail_size: tuple[int, int] = (0, 0)
+
+
+@dataclass(frozen=True)
+class HistoryEntry:
+    """One step of undo."""
+
+    label: str
+    is_present: bool
+
+
+@dataclass(frozen=True)
+class ErrorCurve:
+    """Error of a running method against the reference."""
+
+    method: str
+    seconds: np.ndarray
+    error: np.ndarray
+    """relMSE."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """A sentence to the user that fades after a while; `is_error` stays until it is closed."""
+
+    text: str
+    is_error: bool
+    age_s: float
+
+
+@dataclass(frozen=True)
+class JobFacts:
+    """A running export."""
+
+    title: str
+    fraction: float
+    text: str
+
+
+@dataclass(frozen=True)
+class RayLine:
+    """One path of the ray overlay."""
+
+    wavelength_nm: float
+    points: np.ndarray
+    """float64 (n, 3), world."""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """One frame's."""
+
+    stats: LiveStats = LiveStats()
+    picture: int | None = None
+    """Texture id of the displayed picture, top row first."""
+    picture_size: tuple[int, int] = (0, 0)
+    frame_ms: tuple[float, ...] = ()
+    """Durations of the last frames, newest last."""
+    pass_ms: dict[str, float] = field(default_factory=dict)
+    """Of the last frame, by pass: trace, splat, resolve, eye, display, interface."""
+    cursor: CursorFacts | None = None
+    title: str = "untitled"
+    path: Path | None = None
+    unsaved: bool = False
+    undo: str | None = None
+    """Label of what undo would take back."""
+    redo: str | None = None
+    history: tuple[HistoryEntry, ...] = ()
+    recent: tuple[Path, ...] = ()
+    scenes: tuple[SceneEntry, ...] = ()
+    messages: tuple[Message, ...] = ()
+    shader_error: str | None = None
+    recovery: Path | None = None
+    """An autosave found at the start."""
+    asks_to_quit: bool = False
+    """Unsaved changes: the dialogue with Save, Discard and Cancel is open."""
+    curves: tuple[ErrorCurve, ...] = ()
+    reference_progress: float | None = None
+    """How far the picture that compare modes show is, 0 to 1; None where none was begun."""
+    compare_text: str = ""
+    """What that picture is and how good, or why there is none: one or two sentences."""
+    compare_ready: bool = False
+    """There is a picture to compare with."""
+    compare_stale: bool = False
+    """The scene or the view has changed since it was begun."""
+    rays: tuple[RayLine, ...] = ()
+    job: JobFacts | None = None
+    exposure_ev: float = 0.0
+    """The exposure in use, automatic or not."""
+    delta_s: float = 1 / 60
+    """Since the last frame."""
+    framebuffer_scale: float = 1.0
+    """Device pixels per interface pixel."""
+    interface_scale: float = 1.0
+    """Interface pixels per logical pixel: what `theme.apply` takes."""

@@ -1,0 +1,60 @@
+"""What the panels may know in a frame, gathered from the session."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .view_model import Facts
+
+if TYPE_CHECKING:
+    from .session import Session
+
+
+def facts_of(session: Session) -> Facts:
+    """The facts of the frame that begins."""
+    picture, document = session.picture, session.document
+    shown = picture.shown
+    stats, comparison = picture.stats, session.companions.comparison
+    return Facts(
+        stats=stats,
+        picture=None if shown is None else shown.glo,
+        picture_size=(0, 0) if shown is None else shown.size,
+        frame_ms=tuple(session.frame_ms),
+        pass_ms=_pass_ms(session),
+        cursor=session.companions.cursor.facts,
+        title=document.title,
+        path=document.path,
+        unsaved=document.unsaved,
+        undo=document.history.undo_label,
+        redo=document.history.redo_label,
+        history=document.history.entries,
+        recent=session.settings.existing_recent(),
+        scenes=session.companions.gallery.entries,
+        messages=session.messages.messages(),
+        shader_error=picture.shader_error,
+        recovery=None if session.recovery is None else session.recovery.path,
+        asks_to_quit=session.asks_to_quit,
+        curves=comparison.curves,
+        reference_progress=comparison.progress,
+        compare_text=comparison.text,
+        compare_ready=comparison.picture is not None,
+        compare_stale=comparison.is_stale,
+        rays=session.companions.overlay.rays,
+        job=session.companions.exports.job,
+        exposure_ev=picture.exposure_ev,
+        delta_s=session.delta_s,
+        framebuffer_scale=session.framebuffer_scale,
+        interface_scale=session.interface_scale,
+    )
+
+
+def _pass_ms(session: Session) -> dict[str, float]:
+    stats = session.picture.stats
+    seconds = {
+        "trace": stats.trace_s,
+        "splat": stats.splat_s,
+        "eye": stats.eye_s,
+        "display": session.picture.display_s,
+        "interface": session.interface_s,
+    }
+    return {name: 1000.0 * value for name, value in seconds.items()}

@@ -1,0 +1,213 @@
+"""What the mouse and the keys do in the viewport: walk the camera, select, paint, pull, shift the wipe.
+
+`Hand` remembers what a drag that is under way holds; that is memory of the interface, like a scroll position, and no part of
+the state. The gizmo has its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from imgui_bundle import imgui
+
+from ..base.errors import UserError
+from ..edit import brush as brushes
+from ..edit import camera_controls as controls
+from ..edit import pull as pulling
+from ..edit.projection import View
+from ..edit.requests import BeginPull, Notice, SelectAt
+from ..edit.state import State
+from ..model.scene import Scene
+from .overlay import Canvas
+from .view_model import CursorFacts, Facts
+
+Grip = Literal["orbit", "pan", "dolly", "fly", "click", "brush", "pull", "wipe"]
+CLICK_PX = 4.0
+"""A press that moved no farther is a click, logical pixels."""
+WIPE_REACH_PX = 6.0
+FLY_SPEED = 0.6
+"""Of the target's distance, a second."""
+FLY_STEP = 1.25
+"""Of the flying speed, by a notch of the wheel."""
+_Key = imgui.Key
+
+
+@dataclass(frozen=True)
+class Mouse:
+    """The mouse over the picture in this frame."""
+
+    x: float
+    y: float
+    """Of the picture, 0..1 from its top left; outside of that while a drag leaves it."""
+    is_over: bool
+    """Over the picture itself: not over another window, a button or a handle."""
+    dx: float
+    dy: float
+    """Since the last frame, picture heights."""
+
+
+class Hand:
+    """What is held."""
+
+    def __init__(self) -> None:
+        self.grip: Grip | None = None
+        self.fly_speed = 1.0
+        """Factor, by the wheel while flying."""
+        self._button = 0
+        self._travelled_px = 0.0
+        self._pivot: np.ndarray | None = None
+        self._stroke: brushes.Stroke | None = None
+
+    @property
+    def is_free(self) -> bool:
+        """Nothing is being dragged."""
+        return self.grip is None
+
+    def act(self, state: State, facts: Facts, canvas: Canvas, mouse: Mouse) -> State:
+        """Answer this frame's mouse and keys."""
+        if self.grip is not None and not imgui.is_mouse_down(self._button):
+            state = self._let_go(state, mouse)
+        if state.pull is not None and self.grip != "pull":
+            state = replace(state, pull=None)  # the button was let go before the host had found anything to hold
+        if self.grip is None and mouse.is_over:
+            state = self._take(state, facts, canvas, mouse)
+        state = self._wheel(state, facts, canvas, mouse) if mouse.is_over or self.grip == "fly" else state
+        state = self._keys(state, canvas, mouse)
+        return state if self.grip is None else self._hold(state, facts, canvas, mouse)
+
+    # ---- beginning and end of a drag --------------------------------------------------------
+
+    def _take(self, state: State, facts: Facts, canvas: Canvas, mouse: Mouse) -> State:
+        io = imgui.get_io()
+        position = _position(facts.cursor)
+        if imgui.is_mouse_clicked(2) or (io.key_alt and imgui.is_mouse_clicked(0)):
+            grip: Grip = "pan" if io.key_shift else "dolly" if io.key_ctrl else "orbit"
+            return self._grip(state, grip, 2 if imgui.is_mouse_clicked(2) else 0, position)
+        if imgui.is_mouse_clicked(1):
+            self.fly_speed = 1.0
+            return self._grip(state, "fly", 1, position)
+        if not imgui.is_mouse_clicked(0):
+            return state
+        if state.compare.mode == "wipe" and abs(mouse.x - state.compare.wipe) * canvas.width < WIPE_REACH_PX * canvas.scale:
+            return self._grip(state, "wipe", 0, position)
+        if state.tool == "brush":
+            return self._begin_stroke(self._grip(state, "brush", 0, position), facts)
+        if state.tool == "pull":
+            return self._grip(state, "pull", 0, position).asking(BeginPull(mouse.x, mouse.y, io.key_shift))
+        return self._grip(state, "click", 0, position)
+
+    def _grip(self, state: State, grip: Grip, button: int, position: np.ndarray | None) -> State:
+        self.grip, self._button, self._travelled_px, self._pivot, self._stroke = grip, button, 0.0, position, None
+        return state
+
+    def _let_go(self, state: State, mouse: Mouse) -> State:
+        grip, self.grip, self._stroke = self.grip, None, None
+        if grip == "click" and self._travelled_px <= CLICK_PX and mouse.is_over:
+            return state.asking(SelectAt(mouse.x, mouse.y, imgui.get_io().key_ctrl))
+        return state
+
+    # ---- while it lasts ---------------------------------------------------------------------
+
+    def _hold(self, state: State, facts: Facts, canvas: Canvas, mouse: Mouse) -> State:
+        delta = imgui.get_io().mouse_delta
+        self._travelled_px += (abs(delta.x) + abs(delta.y)) / canvas.scale
+        if self.grip == "click":
+            return state
+        state = replace(state, interacting=True)
+        camera = state.camera
+        match self.grip:
+            case "orbit":
+                return replace(state, camera=controls.orbit(camera, mouse.dx, mouse.dy, self._pivot))
+            case "pan":
+                depth = None if self._pivot is None else float(canvas.view.depth(self._pivot))
+                return replace(state, camera=controls.pan(camera, mouse.dx, mouse.dy, depth))
+            case "dolly":
+                return replace(state, camera=controls.dolly(camera, mouse.dy))
+            case "fly":
+                return replace(state, camera=self._flown(controls.look(camera, mouse.dx, mouse.dy), facts.delta_s))
+            case "wipe":
+                return replace(state, compare=replace(state.compare, wipe=float(np.clip(mouse.x, 0.0, 1.0))))
+            case "brush":
+                return self._paint(state, facts)
+        return self._pull(state, canvas, mouse)
+
+    def _flown(self, camera: controls.Camera, dt: float) -> controls.Camera:
+        io, down = imgui.get_io(), imgui.is_key_down
+        keys = (
+            float(down(_Key.d)) - float(down(_Key.a)), float(down(_Key.e)) - float(down(_Key.q)), float(down(_Key.w)) - float(down(_Key.s))
+        )  # fmt: skip
+        haste = controls.FAST if io.key_shift else controls.SLOW if io.key_ctrl else 1.0
+        return controls.fly(camera, keys, self.fly_speed * haste * FLY_SPEED * View.of(camera, 1.0).target_distance, dt)
+
+    def _begin_stroke(self, state: State, facts: Facts) -> State:
+        cursor = facts.cursor
+        if cursor is None or cursor.position is None or not brushes.can_paint(state.scene, cursor.object_index):
+            return state.asking(Notice("The brush paints on diffuse surfaces, where colours land."))
+        # What is painted must be seen.
+        return self._paint(replace(state, physical=False, interacting=True), facts)
+
+    def _paint(self, state: State, facts: Facts) -> State:
+        cursor, io = facts.cursor, imgui.get_io()
+        if cursor is None or cursor.position is None or cursor.object_index is None or not brushes.can_paint(state.scene, cursor.object_index):
+            return state
+        brush = brushes.mode_held(state.brush, io.key_shift, io.key_ctrl)
+        stroke = self._stroke
+        if stroke is None or (stroke.object_index, stroke.brush) != (cursor.object_index, brush):
+            stroke = brushes.begin(state.scene, cursor.object_index, brush, cursor.position)
+        else:
+            stroke = brushes.extend(stroke, state.scene, cursor.position, facts.delta_s)
+        self._stroke = stroke
+        return _edited(state, lambda: (brushes.applied(state.scene, stroke), brushes.LABEL))
+
+    def _pull(self, state: State, canvas: Canvas, mouse: Mouse) -> State:
+        pull = state.pull
+        if pull is None or self._travelled_px <= CLICK_PX:
+            return state
+        point = pulling.nearest_on_line(pull, *canvas.view.ray(mouse.x, mouse.y))
+        return _edited(state, lambda: pulling.apply(state.scene, pull, point, state.brush.radius, state.brush.falloff))
+
+    # ---- wheel and keys ---------------------------------------------------------------------
+
+    def _wheel(self, state: State, facts: Facts, canvas: Canvas, mouse: Mouse) -> State:
+        io = imgui.get_io()
+        notches = io.mouse_wheel + io.mouse_wheel_h
+        if notches == 0.0:
+            return state
+        if self.grip == "fly":
+            self.fly_speed = float(np.clip(self.fly_speed * FLY_STEP**notches, 0.02, 50.0))
+            return state
+        if io.key_shift:
+            return replace(state, brush=brushes.resized(state.brush, notches, visible_height(canvas.view, facts.cursor)))
+        hit = _position(facts.cursor)
+        camera = controls.zoom_to(state.camera, notches, (mouse.x, mouse.y), canvas.view.aspect, hit)
+        return replace(state, camera=camera, interacting=True)
+
+    def _keys(self, state: State, canvas: Canvas, mouse: Mouse) -> State:
+        if imgui.get_io().want_text_input or not (mouse.is_over or self.grip == "brush"):
+            return state
+        steps = float(imgui.is_key_pressed(_Key.right_bracket)) - float(imgui.is_key_pressed(_Key.left_bracket))
+        return replace(state, brush=brushes.resized(state.brush, steps, visible_height(canvas.view, None))) if steps else state
+
+
+def visible_height(view: View, cursor: CursorFacts | None) -> float:
+    """Scene units that the picture's height shows where the cursor is, else at the target."""
+    position = _position(cursor)
+    depth = view.target_distance if position is None else max(float(view.depth(position)), 1e-9)
+    return view.height_at(depth)
+
+
+def _position(cursor: CursorFacts | None) -> np.ndarray | None:
+    return None if cursor is None or cursor.position is None else np.asarray(cursor.position, float)
+
+
+def _edited(state: State, edit: Callable[[], tuple[Scene, str]]) -> State:
+    """With an edit done; one that is refused becomes a sentence."""
+    try:
+        scene, label = edit()
+    except UserError as error:
+        text = str(error)
+        return state.asking(Notice(text[:1].upper() + text[1:] + ".", is_error=True))
+    return state if scene is state.scene else state.edited(scene, label)

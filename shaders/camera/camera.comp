@@ -1,0 +1,410 @@
+// The eye half: one camera sample a pixel and dispatch, added to the sums. A ray runs through glass and over mirrors with the
+// columns of its pixel (Igehy 1999) and of its spectrum (Elek et al. 2014) to the first diffuse surface, light or environment,
+// and looks up along its spectral sweep what is there. Where glass splits it, both parts are followed while they are strong; of the weak rest
+// one is chosen by chance.
+//
+// Where the scene shows glass or mirrors this is two programs: one for what is seen directly, which lists the pixels that meet something
+// specular first (LISTS_SPECULAR), and one for the listed ones (EYE_SPECULAR), which holds all that is dear.
+#ifdef EYE_SPECULAR
+layout(local_size_x = 64) in;
+#else
+layout(local_size_x = 8, local_size_y = 8) in;
+#endif
+
+#include "lib/intersect.glsl"
+#include "lib/camera.glsl"
+#include "lib/lights.glsl"
+#include "lib/lookup.glsl"
+#include "lib/random.glsl"
+#include "lib/optics.glsl"
+#include "lib/surface.glsl"
+
+// All that medium.glsl needs to know of a ray.
+struct RayRecord {
+    uint inside_mask;
+    uint inside_object;
+};
+#include "lib/medium.glsl"
+
+layout(std140, binding = BIND_PARAMETERS) uniform Parameters { EyeParameters p; };
+// Every ray asks all lights: constants to all, where they fit a uniform block.
+#ifdef LIGHTS_IN_STORAGE
+layout(std430, binding = BIND_LIGHTS) readonly restrict buffer Lights { EyeLight lights[]; };
+#else
+layout(std140, binding = BIND_LIGHTS) uniform Lights { EyeLight lights[LIGHT_ROOM]; };
+#endif
+// Per object: reflectance in linear Rec.709; number of its absorption row, or -1.
+layout(std430, binding = BIND_OBJECT_COLOURS) readonly restrict buffer ObjectColours { vec4 object_colours[]; };
+#ifdef HAS_DISPERSION
+layout(std430, binding = BIND_CELL_CDF) readonly restrict buffer CellCdf { float cell_cdf[]; };
+#endif
+layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallbacks[4]; };
+#if defined(LISTS_SPECULAR) || defined(EYE_SPECULAR)
+// How many pixels are listed, and what is to be known of them.
+layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_count; uint listed[]; };
+#endif
+layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
+
+#ifdef HAS_IMAGES
+#include "lib/textures.glsl"
+#endif
+
+// An `if` whose body is left out where no ray takes it: a software renderer runs both sides of an `if` for all rays, but ends a loop
+// that none is in.
+#define WHEN(condition) for (bool wanted = (condition); wanted; wanted = false)
+
+#define FELL_COLUMNS 0
+#define FELL_DEPTH 1
+#define FELL_STACK 2
+#define FELL_CUT 3
+
+// Which of its turns a pixel's dispersed sample takes, and whether this sample took one. A picture in colour counts them beside its sums, since
+// where glass fills a pixel in part only some samples are dispersed, and all bands must have had as many.
+uint turn = 0u;
+bool took_turn = false;
+
+#include "camera/path.glsl"
+
+// What a sample has found so far, and the paths that wait while another is followed. Global: an array handed from function to function is
+// copied there and back by some drivers.
+vec4 radiance[TARGETS];
+#ifdef EYE_SPECULAR
+EyePath waiting[STACK];
+int waits;
+// What this event adds to them, put there in one place: storing a path at an index takes a compiler long.
+EyePath aside;
+bool sets_aside;
+#ifdef SPECTRAL_SWEEP
+// Where this event cuts the path's band; negative: nowhere.
+float cut_at;
+#endif
+#endif
+
+#ifdef EYE_SPECULAR
+// Ends of paths are looked at together, when there are that many or no path is left: a software renderer, and a GPU, looks at those of
+// neighbouring pixels side by side then.
+struct PathEnd {
+    EyePath path;
+    Hit hit;
+    bool met;
+    bool alike;
+};
+PathEnd ended[ENDS_HELD];
+#endif
+
+#include "camera/emission.glsl"
+#include "camera/footprint.glsl"
+#include "camera/receiver.glsl"
+#include "camera/taps.glsl"
+#include "camera/crossing.glsl"
+#if defined(EYE_SPECULAR) && defined(SPECTRAL_SWEEP)
+#include "camera/cuts.glsl"
+#endif
+
+// Looks of one sample at what is seen directly, which costs little, lie round the sample's own place within its share of the pixel. Those that
+// meet something specular go on as one of them, chosen by chance; as the sample itself where all of them do.
+#define THE_SAMPLE 4u
+const vec2 direct_look[5] = vec2[](vec2(-0.125, -0.375), vec2(0.375, -0.125), vec2(0.125, 0.375), vec2(-0.375, 0.125), vec2(0.0));
+
+vec2 place_of_look(uint look)
+{
+    return p.within_pixel + p.sample_side * vec2(p.pixel_width, p.pixel_height) * direct_look[look];
+}
+
+// A listed pixel: its number, the look that goes on, and of how many it is one.
+const uint LISTED_BITS = 27u;
+uint listed_entry(uint number, uint look, uint count)
+{
+    return number | (look << LISTED_BITS) | ((count - 1u) << (LISTED_BITS + 3u));
+}
+
+EyePath camera_path(uvec2 pixel, uint look, float gain)
+{
+    vec2 place = picture_point(pixel, place_of_look(look), p.size);
+    CameraRay ray = camera_ray(p.position, p.forward, p.half_right, p.half_up, p.orthographic != 0u, place);
+    EyePath path;
+    path.position = ray.position;
+    path.direction = ray.direction;
+    path.origin = RayOrigin(NONE, NONE, false, p.inside_mask);
+    path.medium = RayRecord(p.inside_mask, p.inside_object);
+    for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
+    vec3 right = p.half_right * (2.0 * p.pixel_width / float(p.size.x)), up = p.half_up * (2.0 * p.pixel_height / float(p.size.y));
+    if (p.orthographic != 0u) {
+        path.dposition[0] = right;
+        path.dposition[1] = up;
+    } else {
+        // Derivative of the normalised direction.
+        float scale = inversesqrt(dot(p.forward + place.x * p.half_right + place.y * p.half_up, p.forward + place.x * p.half_right + place.y * p.half_up));
+        path.ddirection[0] = scale * (right - dot(right, ray.direction) * ray.direction);
+        path.ddirection[1] = scale * (up - dot(up, ray.direction) * ray.direction);
+    }
+    path.band = vec3(0.0, 0.5, 1.0);
+    path.weight = vec3(1.0);
+    path.gain = gain;
+    path.share = 1.0;
+    path.key = 0u;
+    path.depth = 0;
+    path.narrowed = false;
+    path.recut = false;
+    path.sound = true;
+    path.cuts = 0;
+#ifdef SPECTRAL_SWEEP
+    for (int end = 0; end < 2; ++end) {
+        path.end_position[end] = path.position;
+        path.end_direction[end] = path.direction;
+    }
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) path.end_step[g] = vec2(0.0);
+#endif
+#ifdef ABSORPTION
+    for (int i = 0; i < ABSORBERS; ++i) path.lengths[i] = 0.0;
+#endif
+    return path;
+}
+
+#ifdef EYE_SPECULAR
+#ifdef HAS_DIELECTRIC
+// A number for a choice at this depth: a Kronecker sequence over a pixel's samples, one irrational a depth (the first is the wavelength's).
+float choice(EyePath path, uint pixel_key)
+{
+    const uint generators[8] = uint[](1779033703u, 3144134277u, 2773480763u, 1359893119u, 2600822925u, 528734635u, 1541459225u, 3418070365u);
+    uint generator = path.depth < 8 ? generators[path.depth] : hash_pcg(uint(path.depth)) | 1u;
+    return kronecker(p.draw_index, generator, hash_combine(pixel_key, path.key + uint(path.depth) * 2654435769u));
+}
+
+// One glass surface: `path` goes on, the other part is put on the stack or, if weak, one of them is chosen.
+void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key)
+{
+    bool entering = dot(whole.direction, hit.normal_g) < 0.0;
+    Crossing crossing = cross_boundary(path.medium, hit.object, entering);
+    RayRecord beyond = RayRecord(crossing.mask_after, crossing.object_after);
+    RayOrigin origin_beyond = RayOrigin(hit.primitive, hit.object, entering, crossing.mask_after);
+    RayOrigin origin_back = RayOrigin(hit.primitive, hit.object, !entering, path.medium.inside_mask);
+    if (!crossing.changes) {
+        path.medium = beyond;
+        path.origin = origin_beyond;
+        return;
+    }
+    Facing facing = facing_of(hit, path);
+    EyePath mirrored = path;
+    vec3 n_i, n_t, theta3, cosine2, reflectance, mirror_weight;
+    bool begins = false;
+    for (int round = 0; round < 2; ++round) {
+        crossing_indices(crossing, path.band, n_i, n_t);
+        theta3 = thetas(path, facing);
+        cosine2 = transmitted_cosine2(theta3, n_i / n_t);
+        reflectance = fresnel_reflectance(theta3, n_i / n_t, cosine2);
+        mirror_weight = begins ? mirror_weight : reflectance;
+#ifdef HAS_DISPERSION
+        // What is reflected off the outside of glass knows no wavelength but in its strength: it stays whole. What goes on is one band.
+        if (round == 1 || path.narrowed || (n_i.x == n_i.z && n_t.x == n_t.z)) break;
+        begins = all(greaterThan(cosine2, vec3(0.0)));
+        narrow(path, pixel_key);
+        if (!begins) mirrored = path;
+#else
+        break;
+#endif
+    }
+#ifdef SPECTRAL_SWEEP
+    bvec3 passes = greaterThan(cosine2, vec3(0.0));
+    bool may_cut = path.narrowed && any(passes) && !all(passes) && !path.recut;
+    bool cut = false;
+    WHEN(may_cut) {
+        float at = cell_border(cut_of(path, theta3, crossing, passes));
+        cut = may_cut_at(path, at);
+        bool near = cut && (whole.sound || cut_is_near(whole, at, hit.distance));
+        if (cut && !near) atomicAdd(fallbacks[FELL_CUT], 1u);
+        cut = near;
+        WHEN(cut) {
+            // Both parts meet this surface again, each from its own start.
+            path = whole;
+            path.recut = true;
+            cut_at = at;
+        }
+    }
+    if (cut) return;
+#endif
+    path.recut = mirrored.recut = false;
+    bool total = cosine2.y <= 0.0, reflects = total;
+    float likely = total ? 1.0 : dot(reflectance, vec3(0.25, 0.5, 0.25));
+    bool strong = !total && (begins || path.depth <= 1 || min(path.share * likely, path.share * (1.0 - likely)) > p.split_threshold);
+    bool splits = strong && waits < STACK;
+    if (strong && !splits) atomicAdd(fallbacks[FELL_STACK], 1u);
+    WHEN(splits && mirror_weight.y > 0.0) {
+        mirrored.weight *= mirror_weight;
+        mirrored.share *= likely;
+        mirrored.origin = origin_back;
+        mirrored.key = hash_combine(mirrored.key, 1u);
+        reflect_path(mirrored, facing);
+        aside = mirrored;
+        sets_aside = true;
+    }
+    if (!total && !splits) {
+        reflects = choice(path, pixel_key) < likely;
+        path.weight *= (reflects ? reflectance : 1.0 - reflectance) / (reflects ? likely : 1.0 - likely);
+        path.key = hash_combine(path.key, reflects ? 3u : 4u);
+    } else {
+        path.weight *= total ? vec3(1.0) : 1.0 - reflectance;
+        path.share *= total ? 1.0 : 1.0 - likely;
+    }
+    bool through = false;
+    WHEN(!reflects) through = refract_path(path, facing, crossing, n_i, n_t);
+    if (through) path.medium = beyond;
+    path.origin = through ? origin_beyond : origin_back;
+    WHEN(!through) reflect_path(path, facing);
+}
+#endif
+
+// A surface that throws the path on.
+void meet_surface(inout EyePath path, Hit hit, uint kind, uint pixel_key)
+{
+    EyePath whole = path;
+#ifdef ABSORPTION
+    uint filling = ray_medium(path.medium);
+    int absorber = filling == NONE ? -1 : int(object_colours[filling].w);
+    for (int i = 0; i < ABSORBERS; ++i)
+        if (i == absorber) path.lengths[i] += hit.distance;
+#endif
+    transfer_columns(path, hit.normal_g, hit.distance);
+    if (!columns_hold(path)) atomicAdd(fallbacks[FELL_COLUMNS], 1u);
+    path.position = surface_point(hit, whole.position, whole.direction);
+#ifdef SPECTRAL_SWEEP
+    path.sound = path.sound && !is_curved(hit);
+    WHEN(path.narrowed) transfer_ends(path, hit.normal_g);
+#endif
+    path.depth += 1;
+#ifdef HAS_MIRROR
+    WHEN(kind == KIND_MIRROR) {
+        reflect_path(path, facing_of(hit, path));
+        path.origin = RayOrigin(hit.primitive, hit.object, dot(path.direction, hit.normal_g) < 0.0, path.origin.inside_mask);
+        path.recut = false;
+        vec3 colour = object_colours[hit.object].rgb;
+#ifdef ABSORPTION
+        // A coloured mirror lets through like a glass of its own, once a reflection.
+        int mirror = int(object_colours[hit.object].w);
+        for (int i = 0; i < ABSORBERS; ++i)
+            if (i == mirror) path.lengths[i] += 1.0;
+        if (mirror < 0) path.weight *= colour.g;
+#else
+        path.weight *= colour.g;
+#endif
+        path.share *= max(colour.r, max(colour.g, colour.b));
+    }
+#endif
+#ifdef HAS_DIELECTRIC
+    WHEN(kind == KIND_DIELECTRIC) cross_glass(path, whole, hit, pixel_key);
+#endif
+}
+#endif
+
+#ifndef EYE_SPECULAR
+// What a camera ray meets that nothing specular is in the way of.
+void see_directly(EyePath path, bool met, Hit hit, uint kind, uint pixel_key)
+{
+#if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
+    add_lights(path, met ? hit.distance : FAR_DISTANCE);
+#endif
+    WHEN(!met || kind == KIND_DIFFUSE) add_end(path, met, hit, true, pixel_key);
+}
+#endif
+
+void main()
+{
+#ifdef EYE_SPECULAR
+    uint at_listed = p.first_listed + gl_GlobalInvocationID.x;
+    if (at_listed >= listed_count) return;
+    uint entry = listed[at_listed], number = bitfieldExtract(entry, 0, int(LISTED_BITS)), look = bitfieldExtract(entry, int(LISTED_BITS), 3);
+    float gain = float((entry >> (LISTED_BITS + 3u)) + 1u) / float(p.direct_looks);
+    uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
+#else
+    uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, p.first_row);
+    if (pixel.x >= p.size.x || pixel.y >= p.size.y) return;
+#endif
+    uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
+#ifndef LISTS_SPECULAR
+#ifndef EYE_SPECULAR
+    uint look = THE_SAMPLE;
+    float gain = 1.0;
+#endif
+    EyePath path = camera_path(pixel, look, gain);
+#endif
+#ifdef RGB_CHANNELS
+    turn = p.counts_turns != 0u ? uint(imageLoad(picture[0], ivec2(pixel)).w) : p.sample_index;
+#else
+    turn = p.sample_index;
+#endif
+    for (int t = 0; t < TARGETS; ++t) radiance[t] = vec4(0.0);
+#ifdef EYE_SPECULAR
+    waits = 0;
+#endif
+#ifdef LISTS_SPECULAR
+    uint specular_looks = 0u, chosen = THE_SAMPLE, draw = hash_combine(pixel_key, p.draw_index);
+    for (uint k = 0u; k < p.direct_looks; ++k) {
+        EyePath path = camera_path(pixel, p.direct_looks == 1u ? THE_SAMPLE : k, 1.0 / float(p.direct_looks));
+        Hit hit;
+        bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
+        uint kind = met ? object_at(hit.object).kind : NONE;
+        if (kind == KIND_MIRROR || kind == KIND_DIELECTRIC) {
+            specular_looks += 1u;
+            // Each of them as likely: the newest of c with 1 / c.
+            draw = hash_pcg(draw);
+            if (unit_float(draw) * float(specular_looks) < 1.0) chosen = k;
+        } else {
+            see_directly(path, met, hit, kind, pixel_key);
+        }
+    }
+    WHEN(specular_looks > 0u) {
+        listed[atomicAdd(listed_count, 1u)] = listed_entry(pixel.y * p.size.x + pixel.x, specular_looks == p.direct_looks ? THE_SAMPLE : chosen, specular_looks);
+    }
+#elif defined(EYE_SPECULAR)
+    int events = 0;
+    bool goes_on = true;
+    while (goes_on) {
+        int found = 0;
+        for (; goes_on && found < ENDS_HELD; ++events) {
+            Hit hit;
+            bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
+            uint kind = met ? object_at(hit.object).kind : NONE;
+            bool ends = !met || kind == KIND_DIFFUSE, alike = true, parts = false, tired = events >= MAX_EVENTS;
+            sets_aside = false;
+#ifdef SPECTRAL_SWEEP
+            cut_at = -1.0;
+            bool asks = path.narrowed && !tired && (ends || (path.sound && kind != KIND_BLACK && asked < MOST_ASKED));
+            if (asks) asks = sweep_pixels(path, met ? hit.distance : FAR_DISTANCE) > (ends ? LEAST_SWEEP : LEAST_CUT_SWEEP * sample_side(path));
+            WHEN(asks) cut_at = where_ways_part(path, met, ends, hit, alike);
+            parts = cut_at >= 0.0;
+#endif
+            WHEN(!parts) {
+#if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
+                WHEN(!path.recut) add_lights(path, met ? hit.distance : FAR_DISTANCE);
+#endif
+                // Light that would still be caught inside is as if it left here.
+                bool specular = !ends && kind != KIND_BLACK, leaves = specular && (tired || path.depth >= MAX_DEPTH);
+                if (leaves) atomicAdd(fallbacks[FELL_DEPTH], 1u);
+                WHEN(ends || leaves) ended[found++] = PathEnd(path, hit, met && ends, alike || leaves);
+                goes_on = specular && !leaves;
+                WHEN(goes_on) meet_surface(path, hit, kind, pixel_key);
+            }
+#ifdef SPECTRAL_SWEEP
+            WHEN(cut_at >= 0.0) cut_band(path, cut_at, pixel_key);
+#endif
+            WHEN(sets_aside) waiting[waits++] = aside;
+            WHEN(!goes_on && waits > 0) {
+                path = waiting[--waits];
+                goes_on = true;
+            }
+        }
+        for (int e = 0; e < found; ++e) add_end(ended[e].path, ended[e].met, ended[e].hit, ended[e].alike, pixel_key);
+    }
+#else
+    Hit hit;
+    bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
+    see_directly(path, met, hit, met ? object_at(hit.object).kind : NONE, pixel_key);
+#endif
+#ifdef RGB_CHANNELS
+    radiance[0].w = took_turn ? 1.0 : 0.0;
+#endif
+    for (int t = 0; t < TARGETS; ++t) {
+        vec4 sum = imageLoad(picture[t], ivec2(pixel));
+        imageStore(picture[t], ivec2(pixel), sum + radiance[t]);
+    }
+}

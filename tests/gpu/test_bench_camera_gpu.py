@@ -1,0 +1,89 @@
+"""The bench of the eye half on the real renderer, small: rigs look again and again, and a tiny run ends in a report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from spectrasplat.__main__ import main
+from spectrasplat.bench import camera_rendering, reference_picture, runner
+from spectrasplat.bench.camera_rendering import EyeRig, SharedLight
+from spectrasplat.bench.rendering import NothingToMeasure
+from spectrasplat.bench.results import BenchResult
+from spectrasplat.commands.options import find_scene
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics.colorimetry import rgb709_to_xyz
+from spectrasplat.model.scene import Scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.reference.spectral_caustic import CausticPlan
+from spectrasplat.render.still import render
+
+WIDTH, HEIGHT = 48, 27
+PHOTONS = 1 << 14
+
+
+@pytest.fixture(scope="module")
+def ball() -> Scene:
+    """A flint ball before its caustic, with few triangles."""
+    return load_scene(find_scene("ball_caustic"))
+
+
+def test_a_rig_looks_as_render_does_again_and_again(gl: Any, ball: Scene) -> None:
+    told: list[str] = []
+    light = SharedLight(gl, ball, WIDTH, HEIGHT, told.append, PHOTONS)
+    rigs = {method: EyeRig(gl, ball, method, WIDTH, HEIGHT, light) for method in ("stochastic", "srd", "regular-7")}
+    try:
+        first = {method: rig.render(16, 1) for method, rig in rigs.items()}
+        other, again = rigs["stochastic"].render(3, 2), rigs["stochastic"].render(16, 1)
+        budgets = rigs["regular-7"].budgets(0.05, 4)
+        fitting = rigs["regular-7"].fitting(20)
+    finally:
+        for owned in (*rigs.values(), light):
+            owned.release()
+    for method in ("stochastic", "srd"):
+        settings = RenderSettings(width=WIDTH, height=HEIGHT, photons=PHOTONS, seed=1, eye_method=method, spp=16, max_depth=ball.render.max_depth)
+        picture = rgb709_to_xyz(render(ball, settings, context=gl).rgb.astype(float))
+        assert np.allclose(first[method].xyz, picture, rtol=1e-3, atol=1e-4 * picture.max()), method
+    assert np.allclose(again.xyz, first["stochastic"].xyz, rtol=1e-5, atol=1e-6 * again.xyz.max())  # nothing is left of the picture between
+    assert not np.allclose(other.xyz, again.xyz, rtol=0.05, atol=1e-3 * again.xyz.max())
+    assert {method: r.emitted for method, r in first.items()} == {"stochastic": 16, "srd": 16, "regular-7": 21}
+    assert fitting == 14 and budgets and all(n % 7 == 0 for n in budgets)
+    assert all(set(r.seconds) == {"bands", "looks"} and r.seconds["looks"] > 0.0 for r in first.values()) and light.seconds > 0.0 and told
+
+
+def test_where_nothing_disperses_there_is_nothing_to_measure(gl: Any) -> None:
+    plain = load_scene(find_scene("ball_plain"))
+    light = SharedLight(gl, replace(plain, lights=()), WIDTH, HEIGHT, lambda _: None, PHOTONS)
+    assert light.maps is None and light.seconds == 0.0
+    with pytest.raises(NothingToMeasure, match="nothing to measure"):
+        EyeRig(gl, plain, "srd", WIDTH, HEIGHT, light)
+
+
+def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two methods against the real reference of one second, through the command line: a prism before an edge."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(runner, "POINTS", 3)
+    monkeypatch.setattr(eye_rendering, "LIGHT_PHOTONS", PHOTONS)
+    monkeypatch.setattr(truth_picture, "caustic_plan", lambda _: CausticPlan(1 << 16))
+    monkeypatch.setattr("spectrasplat.bench.machine.program_hash", lambda: "as it is")  # an editor may be at work
+    out = tmp_path / "out"
+    arguments = ["bench", "--eye", "prism_edge", "-o", str(out), "--seconds", "0.4", "--seeds", "2", "--methods", "stochastic,srd", "--size", f"{WIDTH}x{HEIGHT}"]
+    assert main([*arguments, "--reference-seconds", "1"]) == 0
+    shown = capsys.readouterr().out
+    result = msgspec.json.decode((out / "results.json").read_bytes(), type=BenchResult)
+    (scene,) = result.scenes
+    assert scene.complete and scene.half == result.settings.half == "eye" and [curve.method for curve in scene.curves] == ["stochastic", "srd"]
+    assert scene.reference is not None and scene.reference.photons >= 8 and 0.0 < scene.reference.relmse < 0.1
+    for curve in scene.curves:
+        assert len(curve.samples) == 2 * len(curve.budgets) == 2 * len(curve.points)
+        assert all(sample.emitted == sample.photons and 0.97 < sample.metrics["energy_ratio"] < 1.03 for sample in curve.samples if sample.photons == max(curve.budgets))
+    assert scene.curves[0].points[-1].relmse < scene.curves[0].points[0].relmse
+    assert [claim.name for claim in scene.claims][:1] == ["time to equal error"] and "samples" in shown
+    assert set(scene.pictures) == {"reference", *(f"{method}{ending}" for method in ("stochastic", "srd") for ending in ("", " early", " first"))}
+    assert (out / "report.html").stat().st_size > 10_000 and (out / "plots" / "prism_edge_error_samples.svg").exists()
+    assert main(["bench", *arguments[2:]]) == 2  # the folder holds the other half
+    assert "the eye half measured instead of the light half" in capsys.readouterr().err

@@ -1,0 +1,236 @@
+"""Every function of shaders/lib/optics.glsl against its float64 twin, on ordinary and on stiff input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from spectrasplat.reference import optics
+from spectrasplat.reference.glasses import C_NM, D_NM, F_NM, index
+from spectrasplat.reference.optics import dot, times
+from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
+
+COVERS = {
+    "optics.glsl": (
+        "transmitted_cosine2", "refraction_mu", "refract_direction", "reflect_direction", "reflect_column", "refract_column",
+        "transfer_column", "normalised_derivative", "barycentric_gradients", "fresnel_reflectance",
+    ),
+}
+OPTICS = ["lib/optics.glsl"]
+COUNT = 4096
+EPSILON = float(np.finfo(np.float32).eps)
+
+REFRACT = """
+    float theta = dot(d, n);
+    float cosine2 = transmitted_cosine2(theta, eta);
+    float omega = sqrt(cosine2);
+    out_d = refract_direction(d, n, theta, eta, omega);
+    out_dd = refract_column(d, dd, n, dn, theta, eta, omega, deta);
+"""
+
+
+def events(count: int = COUNT, seed: int = 1, cosine: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    """Rays meeting surfaces, rounded to float32: unit d and n with d·n < 0, tangent columns."""
+    rng = np.random.default_rng(seed)
+    n = optics.unit(rng.normal(size=(count, 3)))
+    along = optics.unit(np.cross(n, rng.normal(size=(count, 3))))
+    cosine = rng.uniform(0.05, 1.0, count) if cosine is None else cosine
+    d = times(np.sqrt(1 - cosine**2), along) - times(cosine, n)
+    dd = optics.normalised_derivative(d, rng.normal(size=(count, 3)))
+    dn = optics.normalised_derivative(n, rng.normal(size=(count, 3)))
+    return {name: as_f32(value) for name, value in {"d": d, "n": n, "dd": dd, "dn": dn}.items()}
+
+
+def relative_error(got: np.ndarray, want: np.ndarray, scale: np.ndarray | float = 0.0) -> np.ndarray:
+    """|got - want| over the larger of |want| and `scale`, per row."""
+    if want.ndim == 1:
+        return np.abs(got - want) / np.maximum(np.abs(want), scale)
+    return np.linalg.norm(got - want, axis=-1) / np.maximum(np.linalg.norm(want, axis=-1), scale)
+
+
+def twin_refraction(e: dict[str, np.ndarray], eta: np.ndarray, deta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What float64 makes of the same float32 numbers. The rounded d and n are not quite unit vectors,
+    which every formula treats in its own way: compare with the one that states the same algebra."""
+    theta = dot(e["d"], e["n"])
+    omega = np.sqrt((1 - eta) * (1 + eta) + (eta * theta) ** 2)
+    mu = (1 - eta) * (1 + eta) / (omega - eta * theta)
+    column = optics.refract_column_stable(e["d"], e["dd"], e["n"], e["dn"], eta, deta)
+    return times(eta, e["d"]) - times(mu, e["n"]), column
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.4, 1.0), (1.0, 2.4)], ids=["entering", "leaving"])
+def test_refraction_away_from_hazards(gl, low: float, high: float) -> None:
+    rng = np.random.default_rng(4)
+    eta = as_f32(rng.uniform(low, high, COUNT))
+    deta = as_f32(rng.normal(size=COUNT))
+    cosine = np.sqrt(1 - (rng.uniform(0, 0.95, COUNT) * np.minimum(1, 1 / eta)) ** 2)
+    e = events(cosine=cosine)
+    got = evaluate(gl.ctx, OPTICS, REFRACT, {**e, "eta": eta, "deta": deta}, {"out_d": "vec3", "out_dd": "vec3"})
+    want_d, want_dd = twin_refraction(e, eta, deta)
+    assert relative_error(got["out_d"], want_d).max() < 1e-6
+    assert relative_error(got["out_dd"], want_dd, scale=1.0).max() < 5e-6
+    # Against the twin that knows neither theta nor mu, unit vectors made exact first.
+    exact_d, exact_n = optics.unit(e["d"]), optics.unit(e["n"])
+    assert relative_error(got["out_d"], optics.refract(exact_d, exact_n, eta)).max() < 2e-6
+    textbook = optics.refract_column_textbook(exact_d, e["dd"], exact_n, e["dn"], eta, deta)
+    assert relative_error(got["out_dd"], textbook, scale=1.0).max() < 2e-5
+
+
+def test_refraction_invariants(gl) -> None:
+    rng = np.random.default_rng(5)
+    eta = as_f32(rng.uniform(0.4, 1.0, COUNT))
+    e = events()
+    zero = np.zeros((COUNT, 3))
+    deta = np.ones(COUNT)
+    full = evaluate(gl.ctx, OPTICS, REFRACT, {**e, "eta": eta, "deta": deta}, {"out_d": "vec3", "out_dd": "vec3"})
+    lengths = 1 + np.linalg.norm(full["out_dd"], axis=-1)
+    assert np.abs(dot(full["out_d"], full["out_dd"]) / lengths).max() < 3e-6
+    assert np.abs(np.linalg.norm(full["out_d"], axis=-1) - 1).max() < 1e-6
+    bend = evaluate(gl.ctx, OPTICS, REFRACT, {**e, "dd": zero, "dn": zero, "eta": eta, "deta": deta}, {"out_d": "vec3", "out_dd": "vec3"})
+    expected = np.linalg.norm(np.cross(e["d"], e["n"]), axis=-1) / -dot(bend["out_d"], e["n"])
+    assert relative_error(np.linalg.norm(bend["out_dd"], axis=-1), expected, scale=0.05).max() < 5e-6
+
+
+def test_equal_indices_change_nothing_at_all(gl) -> None:
+    e = events()
+    got = evaluate(gl.ctx, OPTICS, REFRACT, {**e, "eta": np.ones(COUNT), "deta": np.zeros(COUNT)}, {"out_d": "vec3", "out_dd": "vec3"})
+    np.testing.assert_array_equal(got["out_d"], e["d"])
+    np.testing.assert_array_equal(got["out_dd"], e["dd"])
+
+
+@pytest.mark.parametrize("eta_minus_one", [-1e-6, 1e-6, -1e-4, 1e-4])
+def test_nearly_equal_indices_keep_their_digits(gl, eta_minus_one: float) -> None:
+    # What the two media do to the ray is of the size of eta - 1: judge the change, not the ray.
+    eta = as_f32(np.full(COUNT, 1 + eta_minus_one))
+    e = events(cosine=np.random.default_rng(6).uniform(0.2, 1, COUNT))
+    got = evaluate(gl.ctx, OPTICS, "mu = refraction_mu(t, eta, sqrt(transmitted_cosine2(t, eta)));", {"t": dot(e["d"], e["n"]), "eta": eta}, {"mu": "float"})
+    theta = as_f32(dot(e["d"], e["n"]))
+    omega = np.sqrt((1 - eta) * (1 + eta) + (eta * theta) ** 2)
+    assert relative_error(got["mu"], eta * theta + omega).max() < 1e-6
+    full = evaluate(gl.ctx, OPTICS, REFRACT, {**e, "eta": eta, "deta": np.ones(COUNT)}, {"out_d": "vec3", "out_dd": "vec3"})
+    want_d, want_dd = twin_refraction(e, eta, np.ones(COUNT))
+    assert relative_error(full["out_d"], want_d).max() < 3e-7
+    assert relative_error(full["out_dd"], want_dd, scale=1.0).max() < 3e-6
+
+
+@pytest.mark.parametrize("margin_rad", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
+def test_near_total_reflection_the_column_loses_no_more_than_the_angle_does(gl, margin_rad: float) -> None:
+    # |∂d'/∂eta| = sin θi / cos θt, and cos² θt is known in float32 to a few eps: the relative error grows as eps / cos².
+    eta = as_f32(np.full(COUNT, float(index("N-BK7", D_NM))))
+    critical = np.arcsin(1 / eta)
+    e = events(cosine=np.cos(critical - margin_rad))
+    zero = np.zeros((COUNT, 3))
+    inputs = {**e, "dd": zero, "dn": zero, "eta": eta, "deta": np.ones(COUNT)}
+    got = evaluate(gl.ctx, OPTICS, REFRACT + "c2 = cosine2;", inputs, {"out_d": "vec3", "out_dd": "vec3", "c2": "float"})
+    theta = dot(e["d"], e["n"])
+    cosine2 = (1 - eta) * (1 + eta) + (eta * theta) ** 2
+    assert np.abs(got["c2"] - cosine2).max() < 6 * EPSILON
+    safe = cosine2 > 12 * EPSILON
+    assert safe.any() or margin_rad < 1e-5
+    if safe.any():
+        want = np.sqrt((1 - theta**2) / np.where(safe, cosine2, 1))
+        error = relative_error(np.linalg.norm(got["out_dd"][safe], axis=-1), want[safe])
+        assert (error * cosine2[safe]).max() < 8 * EPSILON
+        assert np.isfinite(got["out_dd"][safe]).all()
+
+
+@pytest.mark.parametrize("angle_deg", [89.0, 89.9, 89.99, 89.999])
+def test_grazing_incidence(gl, angle_deg: float) -> None:
+    eta = as_f32(np.full(COUNT, 1 / float(index("N-BK7", D_NM))))
+    e = events(cosine=np.full(COUNT, np.cos(np.radians(angle_deg))))
+    deta = np.ones(COUNT)
+    body = REFRACT + "reflectance = fresnel_reflectance(theta, eta, cosine2);"
+    got = evaluate(gl.ctx, OPTICS, body, {**e, "eta": eta, "deta": deta}, {"out_d": "vec3", "out_dd": "vec3", "reflectance": "float"})
+    want_d, want_dd = twin_refraction(e, eta, deta)
+    assert relative_error(got["out_d"], want_d).max() < 1e-6
+    assert relative_error(got["out_dd"], want_dd, scale=1.0).max() < 3e-6
+    expected = optics.fresnel_reflectance(e["d"], e["n"], eta)
+    assert np.abs(got["reflectance"] - expected).max() < 2e-6
+
+
+def test_reflection(gl) -> None:
+    e = events()
+    body = "float t = dot(d, n); out_d = reflect_direction(d, n, t); out_dd = reflect_column(d, dd, n, dn, t);"
+    got = evaluate(gl.ctx, OPTICS, body, e, {"out_d": "vec3", "out_dd": "vec3"})
+    assert relative_error(got["out_d"], optics.reflect(e["d"], e["n"])).max() < 5e-7
+    assert relative_error(got["out_dd"], optics.reflect_column(*(e[k] for k in ("d", "dd", "n", "dn"))), scale=1.0).max() < 1e-6
+
+
+def test_transfer(gl) -> None:
+    rng = np.random.default_rng(7)
+    e = events(cosine=rng.uniform(0.02, 1, COUNT))
+    dp, distance = as_f32(rng.normal(size=(COUNT, 3))), as_f32(rng.uniform(0, 3, COUNT))
+    got = evaluate(gl.ctx, OPTICS, "q = transfer_column(dp, dd, d, n, t);", {**e, "dp": dp, "t": distance}, {"q": "vec3"})["q"]
+    want = optics.transfer_column(dp, e["dd"], e["d"], e["n"], distance)
+    size = np.linalg.norm(dp + times(distance, e["dd"]), axis=-1) / np.abs(dot(e["d"], e["n"]))
+    assert relative_error(got, want, scale=size).max() < 3e-6
+    # The result lies in the surface.
+    assert np.abs(dot(got, e["n"]) / size).max() < 1e-6
+
+
+@pytest.mark.parametrize("scale", [1e-4, 1.0, 1e4])
+def test_interpolated_normals(gl, scale: float) -> None:
+    rng = np.random.default_rng(8)
+    triangles = as_f32(scale * rng.normal(size=(512, 3, 3)))
+    quality = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=-1)
+    triangles = triangles[quality > 0.3 * scale**2]
+    normals = as_f32(optics.unit(rng.normal(0, 0.3, (len(triangles), 3, 3)) + [0, 0, 1]))
+    weights = rng.dirichlet([1, 1, 1], len(triangles))
+    point = np.einsum("tc,tcx->tx", weights, triangles)
+    dp = as_f32(np.einsum("tc,tcx->tx", rng.normal(size=(len(triangles), 2)), triangles[:, 1:] - triangles[:, :1]))
+    body = """
+    vec3 gu, gv;
+    barycentric_gradients(e1, e2, gu, gv);
+    vec3 summed = weight.x * n0 + weight.y * n1 + weight.z * n2;
+    vec3 dsummed = dot(gu, dp) * (n1 - n0) + dot(gv, dp) * (n2 - n0);
+    dn = normalised_derivative(summed, dsummed);
+    """
+    inputs = {
+        "e1": as_f32(triangles[:, 1] - triangles[:, 0]),
+        "e2": as_f32(triangles[:, 2] - triangles[:, 0]),
+        "weight": weights,
+        "dp": dp,
+        **{f"n{c}": normals[:, c] for c in range(3)},
+    }
+    got = evaluate(gl.ctx, OPTICS, body, inputs, {"dn": "vec3"})["dn"]
+    want = np.array([optics.shading_normal_column(t, n, p, q)[1] for t, n, p, q in zip(triangles, normals, point, dp, strict=True)])
+    assert np.median(np.linalg.norm(want, axis=-1)) > 0.1
+    assert relative_error(got, want, scale=1.0).max() < 1e-5
+
+
+def test_fresnel_scalar_and_per_wavelength(gl) -> None:
+    rng = np.random.default_rng(9)
+    cosine = rng.uniform(0.0, 1.0, COUNT)
+    eta = np.stack([index("N-BK7", nm) / np.ones(COUNT) for nm in (F_NM, D_NM, C_NM)], -1)
+    eta[::2] = 1 / eta[::2]
+    eta, e = as_f32(eta), events(cosine=cosine)
+    # Grid points on the edge of total reflection are the other test's.
+    clear = np.abs(1 - eta**2 * (1 - dot(e["d"], e["n"])[:, None] ** 2)).min(-1) > 1e-4
+    e = {name: value[clear] for name, value in e.items()}
+    eta = eta[clear]
+    body = """
+    float theta = dot(d, n);
+    scalar = fresnel_reflectance(theta, eta.y, transmitted_cosine2(theta, eta.y));
+    three = fresnel_reflectance(vec3(theta), eta, transmitted_cosine2(vec3(theta), eta));
+    """
+    got = evaluate(gl.ctx, OPTICS, body, {**e, "eta": eta}, {"scalar": "float", "three": "vec3"})
+    want = np.stack([optics.fresnel_reflectance(e["d"], e["n"], eta[:, c]) for c in range(3)], -1)
+    assert (want == 1).any() and (want < 0.05).any()
+    assert np.abs(got["three"] - want).max() < 3e-5
+    assert np.median(np.abs(got["three"] - want)) < 1e-7
+    np.testing.assert_allclose(got["scalar"], got["three"][:, 1], atol=1e-6)
+    # Known answers (T16).
+    angles = np.radians([0, 45, 60, 75])
+    d = np.stack([np.sin(angles), -np.cos(angles), 0 * angles], -1)
+    n = np.tile([0.0, 1.0, 0.0], (4, 1))
+    bk7 = np.full((4, 3), 1 / float(index("N-BK7", D_NM)))
+    known = evaluate(gl.ctx, OPTICS, body, {"d": d, "n": n, "eta": bk7}, {"scalar": "float", "three": "vec3"})["scalar"]
+    np.testing.assert_allclose(known, [0.042165, 0.052595, 0.091958, 0.256144], atol=1e-6)
+
+
+def test_total_reflection_is_total(gl) -> None:
+    e = events(cosine=np.random.default_rng(10).uniform(0.01, 0.74, COUNT))
+    eta = np.full(COUNT, 1.5168)  # critical angle 41.2°, cosine 0.752
+    body = "float t = dot(d, n); c2 = transmitted_cosine2(t, eta); r = fresnel_reflectance(t, eta, c2);"
+    got = evaluate(gl.ctx, OPTICS, body, {**e, "eta": eta}, {"c2": "float", "r": "float"})
+    assert (got["c2"] < 0).all()
+    np.testing.assert_array_equal(got["r"], 1.0)

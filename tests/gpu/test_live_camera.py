@@ -1,0 +1,243 @@
+"""The live eye before dispersive glass: smooth while the camera moves, whole cycles of bands once it rests, and edits that are only looked at."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.environment import gradient, world_to_local
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics.glass import with_gain
+from spectrasplat.model.scene import Camera, Dielectric, Scene
+from spectrasplat.model.texture import Environment
+from spectrasplat.passes.spectrum_choice import Spectrum
+from spectrasplat.render.viewer.engine import LOOK_S, Budget, LiveEngine
+from spectrasplat.render.viewer.inputs import LiveInputs, Redo
+from spectrasplat.render.viewer.invalidation import looks_other, redo
+from spectrasplat.render.viewer.live_camera import SCALES, _side, solo_scene
+from spectrasplat.render.viewer.spectrum_guess import guess_weights
+
+SIZE = (120, 68)
+WHITE = 5.0
+GREY = 0.03
+"""Spread of the colours over their mean, up to which a picture is called free of colour grain."""
+
+
+@pytest.fixture(scope="module")
+def stage() -> Scene:
+    """The prism from close by, near minimum deviation, before white: the table lies far below."""
+    scene = load_scene(assets_dir() / "scenes" / "prism.toml")
+    below = np.eye(4)
+    below[2, 3] = -30.0
+    objects = tuple(o if isinstance(o.material, Dielectric) else replace(o, object_to_world=below @ o.object_to_world) for o in scene.objects)
+    glass = next(o for o in objects if isinstance(o.material, Dielectric))
+    middle = glass.object_to_world[:3, :3] @ np.mean(glass.mesh.bounds(), axis=0) + glass.object_to_world[:3, 3]
+    x, y, z = (float(v) for v in middle)
+    camera = Camera((x - 4.0 * 0.83, y - 4.0 * 0.55, z), (x, y, z), vertical_fov_deg=20.0)
+    return replace(scene, objects=objects, camera=camera, background_rgb=(WHITE, WHITE, WHITE))
+
+
+def inputs(scene: Scene, **changes) -> LiveInputs:
+    return LiveInputs(scene, scene.camera, *SIZE, **changes)
+
+
+def edged(scene: Scene, turn_deg: float = 0.0) -> Scene:
+    """White and black stripes all round behind it, 4 degrees wide."""
+    rgb = np.zeros((90, 360, 3), np.float32)
+    rgb[:, np.arange(360) % 8 < 4] = WHITE
+    return replace(scene, environment=Environment(rgb, world_to_local((0.0, 0.0, 1.0), turn_deg)))
+
+
+def with_dispersion(scene: Scene, gain: float) -> Scene:
+    objects = [
+        replace(o, material=replace(o.material, dispersion=with_gain(o.material.dispersion, gain))) if isinstance(o.material, Dielectric) else o
+        for o in scene.objects
+    ]
+    return replace(scene, objects=tuple(objects))
+
+
+@pytest.fixture
+def engine(gl: Context) -> Iterator[LiveEngine]:
+    made = LiveEngine(gl, Budget(8192, 1 << 12, 1 << 14, 1 << 24))
+    made.target_photons = 1 << 13
+    made.refine_when_still = False
+    yield made
+    made.release()
+
+
+def until(done: Callable[[], bool], engine: LiveEngine, each: Callable[[], None] = lambda: None, patience_s: float = 120.0) -> None:
+    end = time.monotonic() + patience_s
+    while not done():
+        assert engine.problem is None, engine.problem
+        assert time.monotonic() < end, "it took too long"
+        engine.advance(0.05)
+        each()
+
+
+def settle(engine: LiveEngine, wanted: LiveInputs) -> np.ndarray:
+    engine.set(wanted)
+    until(lambda: engine.is_idle, engine)
+    return picture(engine)
+
+
+def picture(engine: LiveEngine) -> np.ndarray:
+    texture = engine.picture
+    return np.frombuffer(texture.read(), np.float32).reshape(texture.height, texture.width, 4)[..., :3].astype(float)
+
+
+def in_glass(engine: LiveEngine, shape: tuple[int, ...]) -> np.ndarray:
+    """bool (h, w): pixels whose middle shows glass, and their neighbours too."""
+    height, width = shape[:2]
+    glass = {i for i, o in enumerate(engine.inputs.scene.objects) if isinstance(o.material, Dielectric)}
+    hits = [[engine.pick((x + 0.5) / width, (y + 0.5) / height) for x in range(width)] for y in range(height)]
+    mask = np.array([[hit is not None and hit.object_index in glass for hit in row] for row in hits])
+    return mask & np.roll(mask, 1, 0) & np.roll(mask, -1, 0) & np.roll(mask, 1, 1) & np.roll(mask, -1, 1)
+
+
+def colour_grain(rgb: np.ndarray, mask: np.ndarray) -> float:
+    """Root mean square of how much R − G and B − G differ from pixel to pixel, over the mean."""
+    colour = (rgb[..., ::2] - rgb[..., 1:2]) / rgb[mask].mean()
+    step = (colour - np.roll(colour, 1, axis=1))[mask]
+    return float(np.sqrt((step**2).mean()))
+
+
+def test_a_moving_camera_sees_no_colour_grain_in_glass(engine: LiveEngine, stage: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("spectrasplat.render.viewer.live_camera.SCALES", (1.0,))  # a slow machine must not leave too few pixels to see grain in
+    settle(engine, inputs(stage))
+    moved = replace(stage.camera, position=tuple(np.add(stage.camera.position, (0.02, 0.0, 0.0))))
+    engine.set(replace(inputs(stage), camera=moved))
+    engine.advance(5.0, interacting=True)
+    assert engine.stats.camera_samples == 1 and engine.stats.eye_bands == 1
+    first = picture(engine)
+    mask = in_glass(engine, first.shape)
+    assert mask.sum() > 100
+    assert colour_grain(first, mask) < GREY
+    # What a sample of one band of sixteen looks like: this measure sees it.
+    eye = engine._eye._pass
+    eye.spectrum = Spectrum(16)
+    eye.run(moved, first.shape[1], first.shape[0], 1, 0, engine._maps)
+    assert colour_grain(eye.read_rgb().astype(float), mask) > 5 * GREY
+
+
+def test_only_whole_cycles_of_bands_are_shown_and_smooth_samples_before(engine: LiveEngine, stage: Scene) -> None:
+    shown: list[tuple[int, int, int]] = []
+
+    def look() -> None:
+        stats = engine.stats
+        if not shown or shown[-1][0] != engine.picture_version:
+            shown.append((engine.picture_version, int(stats.camera_samples), stats.eye_bands))
+
+    engine.set(inputs(with_dispersion(edged(stage), 3.0)))
+    until(lambda: engine.is_idle, engine, look)
+    told = [(samples, bands) for version, samples, bands in shown if version]
+    assert told[0][1] == 1 and told[-1][1] > 1, told
+    assert all(samples % bands == 0 for samples, bands in told)
+    samples, bands = told[-1]
+    assert samples >= engine.camera_samples > samples - bands
+    # After bands came into view nothing of the whole spectrum replaces them unless the maps became finer.
+    rgb, mask = picture(engine), in_glass(engine, (SIZE[1], SIZE[0]))
+    assert np.abs(rgb[mask][:, 0] - rgb[mask][:, 2]).max() > 0.1 * WHITE  # fringes
+
+
+def test_better_maps_wait_for_a_cycle_and_the_last_are_shown(engine: LiveEngine, stage: Scene) -> None:
+    engine.target_photons = 1 << 16
+    wanted = inputs(with_dispersion(edged(stage), 3.0))
+    engine.set(wanted)
+    until(lambda: engine._eye.is_within_cycle and engine._shown is not None and engine._shown.accumulation.number >= 1, engine)
+    maps = engine._maps
+    engine._shown.accumulation.number += 1
+    engine._publish_maps()
+    assert engine._maps is maps and engine._maps_wait and not engine.is_idle
+    engine._shown.accumulation.number -= 1
+    until(lambda: engine.is_idle, engine)
+    assert engine._maps is not maps and not engine._maps_wait
+    assert engine.stats.photons == pytest.approx(engine._shown.light.maps.photon_weight, abs=1)
+
+
+def test_an_edited_dispersion_changes_what_is_seen_in_glass_and_traces_nothing(engine: LiveEngine, gl: Context, stage: Scene) -> None:
+    scene = edged(stage)
+    before = settle(engine, inputs(scene))
+    rays, mask = engine.stats.rays_traced, in_glass(engine, before.shape)
+    edited = with_dispersion(scene, 4.0)
+    assert looks_other(inputs(scene), inputs(edited)) and redo(inputs(scene), inputs(scene), inputs(edited)) == Redo.SPLAT
+    after = settle(engine, inputs(edited))
+    assert engine.stats.rays_traced == rays and engine.stats.first_order
+    change = np.abs(after - before).max(axis=-1)
+    assert (change[mask] > 0.1 * WHITE).mean() > 0.05
+    fresh = LiveEngine(gl, engine.budget)
+    fresh.target_photons = engine.target_photons
+    expected = settle(fresh, inputs(edited))
+    fresh.release()
+    assert np.sqrt(((after - expected)[mask] ** 2).mean()) < 0.15 * np.sqrt(((before - expected)[mask] ** 2).mean())
+
+
+def test_environments_are_only_looked_at_and_a_turned_one_is_not_sent_again(engine: LiveEngine, stage: Scene) -> None:
+    plain = settle(engine, inputs(stage))
+    rays, shown = engine.stats.rays_traced, engine._shown
+    striped = edged(stage)
+    turned = replace(striped, environment=replace(striped.environment, world_to_local=world_to_local((0.0, 0.0, 1.0), 4.0)))
+    graded = replace(stage, environment=gradient((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+    for scene in (striped, turned, graded):
+        assert redo(engine._inputs, engine._inputs, inputs(scene)) == Redo.LOOK
+    corner = settle(engine, inputs(striped))[:4, :, 0]
+    assert np.ptp(corner) > 0.9 * WHITE
+    store = engine._eye._pictures
+    opposite = settle(engine, inputs(turned))[:4, :, 0]
+    assert engine._eye._pictures is store
+    assert np.corrcoef(corner.ravel(), opposite.ravel())[0, 1] < -0.8
+    blue = settle(engine, inputs(graded))[:4].mean(axis=(0, 1))
+    assert blue[0] > 10 * blue[1] and engine._eye._pictures is not store
+    assert np.allclose(settle(engine, inputs(stage)), plain, atol=1e-4 * WHITE)
+    assert engine.stats.rays_traced == rays and engine._shown is shown
+
+
+def test_one_wavelength_leaves_the_environment_dark(stage: Scene) -> None:
+    alone = solo_scene(edged(stage), 550.0)
+    assert alone.environment is None and alone.background_rgb == (0.0, 0.0, 0.0)
+    assert solo_scene(stage, None) is stage
+
+
+def test_a_picture_in_motion_is_as_small_as_its_time_asks_for(engine: LiveEngine, stage: Scene) -> None:
+    large = replace(inputs(stage), width=960, height=540)
+    engine.set(large)
+    until(lambda: engine.picture is not None, engine)
+    engine.playing = False
+    seconds, pictures = [], []
+    for step in range(12):
+        moved = replace(stage.camera, position=tuple(np.add(stage.camera.position, (0.01 + 0.01 * step, 0.0, 0.0))))
+        engine.set(replace(large, camera=moved))
+        started = time.perf_counter()
+        engine.advance(0.045, interacting=True)
+        seconds.append(time.perf_counter() - started)
+        pictures.append(engine.picture_version)
+    # However slow the machine is, what is moved is seen to move: every few frames at least.
+    assert all(later > before for before, later in zip(pictures[:-4], pictures[4:], strict=True)), pictures
+    eye = engine._eye
+    pixels = eye.picture.width * eye.picture.height
+    assert eye.shown_samples == 1 and (pixels <= 2.0 * eye._rates[True] * LOOK_S or eye.scale == SCALES[-1])
+    # Ten times the aim leaves room for a machine that does other things besides.
+    assert np.median(seconds[4:]) < 10 * 0.05
+
+
+def test_sides_in_motion_are_no_powers_of_two() -> None:
+    sides = [_side(pixels) for pixels in range(1, 1100)]
+    assert all(side & (side - 1) for side in sides) and max(abs(side - pixels) for pixels, side in enumerate(sides[8:], start=9)) <= 1
+
+
+def test_the_spectrum_guessed_for_a_colour_has_that_colour(gl: Context, engine: LiveEngine, stage: Scene) -> None:
+    engine.set(inputs(stage))
+    until(lambda: engine._shown is not None, engine)
+    channels = engine._shown.light.map_channels
+    weights, luminance = guess_weights(channels, stage.lights)
+    xyz = np.array([spectrum.xyz() for spectrum in channels.spectra(stage.lights)])
+    np.testing.assert_allclose(weights.T @ xyz, np.eye(3), atol=1e-9)
+    np.testing.assert_allclose(luminance, xyz[:, 1])
+    # The light's own colour is the light itself: every channel holds its own share.
+    cells = channels.cell_weights()[:, 4 : 4 + channels.count]
+    own = np.sum([light.spectral_power.density for light in stage.lights], axis=0) @ cells
+    np.testing.assert_allclose(weights @ (own @ xyz), own, rtol=0.02)

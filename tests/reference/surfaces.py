@@ -1,0 +1,91 @@
+"""Smooth and faceted surfaces for the reference tracer: where a ray meets them and how they bend there.
+
+Each surface answers `distances(origin, direction)` — signed, ascending — and
+`normals(point, dposition)` — the geometric normal, the shading normal and the shading normal's
+derivative for columns (C, 3). Normals point outward, or to the side a plane's normal names.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from spectrasplat.reference.optics import cross, normalised_derivative, shading_normal_column, unit
+
+
+class Surface(Protocol):
+    """What the tracer asks of a surface."""
+
+    def distances(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray: ...
+
+    def normals(self, point: np.ndarray, dposition: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The unbounded plane through `point`."""
+
+    point: tuple[float, float, float]
+    normal: tuple[float, float, float]
+
+    def distances(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        normal = unit(np.array(self.normal, float))
+        return np.array([(np.array(self.point) - origin) @ normal / (direction @ normal)])
+
+    def normals(self, point: np.ndarray, dposition: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        normal = unit(np.array(self.normal, float))
+        return normal, normal, np.zeros_like(dposition)
+
+
+@dataclass(frozen=True)
+class Quadric:
+    """The ellipsoid Σ ((p - centre)/semi_axes)² = 1; three equal semi-axes make a sphere."""
+
+    centre: tuple[float, float, float]
+    semi_axes: tuple[float, float, float]
+
+    def distances(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        # In the space where it is the unit sphere; |o + t d|² = 1 by its two roots.
+        o = (origin - np.array(self.centre)) / self.semi_axes
+        d = direction / np.array(self.semi_axes)
+        a, b = d @ d, o @ d
+        closest = o - b / a * d
+        discriminant = 1.0 - closest @ closest
+        if discriminant < 0.0:
+            return np.empty(0)
+        half = np.sqrt(discriminant / a)
+        return np.array([-b / a - half, -b / a + half])
+
+    def normals(self, point: np.ndarray, dposition: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        weights = 1.0 / np.array(self.semi_axes) ** 2
+        gradient = (point - np.array(self.centre)) * weights
+        normal = unit(gradient)
+        return normal, normal, normalised_derivative(gradient, dposition * weights)
+
+
+def sphere(centre: tuple[float, float, float], radius: float) -> Quadric:
+    """A sphere."""
+    return Quadric(centre, (radius, radius, radius))
+
+
+@dataclass(frozen=True, eq=False)
+class Facet:
+    """The plane of one triangle, with normals interpolated from its corners (flat without them)."""
+
+    corners: np.ndarray
+    corner_normals: np.ndarray | None = None
+
+    def distances(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        normal = self.area_vector()
+        return np.array([(self.corners[0] - origin) @ normal / (direction @ normal)])
+
+    def normals(self, point: np.ndarray, dposition: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        geometric = unit(self.area_vector())
+        if self.corner_normals is None:
+            return geometric, geometric, np.zeros_like(dposition)
+        return geometric, *shading_normal_column(self.corners, self.corner_normals, point, dposition)
+
+    def area_vector(self) -> np.ndarray:
+        a, b, c = self.corners
+        return cross(b - a, c - a)

@@ -1,0 +1,302 @@
+"""A slow, readable float64 ray with its derivative columns, and the central differences that judge them.
+
+A `Ray` carries C columns: column c is the derivative of (position, direction) with respect to
+a variable of its own — a coordinate of the emission domain, a refractive index, a wavelength.
+What a column means is said by its seed and by the derivatives of the indices along it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from reference.surfaces import Facet, Surface
+from spectrasplat.reference import optics
+
+
+def _no_columns() -> np.ndarray:
+    return np.zeros((0, 3))
+
+
+@dataclass(frozen=True)
+class Ray:
+    """A ray and its columns."""
+
+    position: np.ndarray
+    direction: np.ndarray
+    """Unit, propagation."""
+    dposition: np.ndarray = field(default_factory=_no_columns)
+    """(C, 3)."""
+    ddirection: np.ndarray = field(default_factory=_no_columns)
+    """(C, 3)."""
+
+    def at(self, distance: float) -> np.ndarray:
+        return self.position + distance * self.direction
+
+
+def make_ray(
+    position: Sequence[float], direction: Sequence[float], dposition: Sequence = (), ddirection: Sequence | None = None
+) -> Ray:
+    """A ray from plain sequences; the direction is normalised, missing direction columns are zero."""
+    dposition = np.array(dposition, np.float64).reshape(-1, 3)
+    ddirection = np.zeros_like(dposition) if ddirection is None else np.array(ddirection, np.float64).reshape(-1, 3)
+    return Ray(np.array(position, np.float64), optics.unit(np.array(direction, np.float64)), dposition, ddirection)
+
+
+@dataclass(frozen=True)
+class Index:
+    """A refractive index and its derivative (C,) along each column (a scalar 0 where none depends on it)."""
+
+    n: float
+    dn: np.ndarray | float = 0.0
+
+
+AIR = Index(1.0)
+
+
+def advance(ray: Ray, surface: Surface, distance: float) -> tuple[Ray, np.ndarray, np.ndarray, np.ndarray]:
+    """Move a ray to a surface: (ray there, outward geometric normal, n̂ and ∂n̂ turned against the ray)."""
+    point = ray.at(distance)
+    geometric, _, _ = surface.normals(point, ray.dposition)
+    dposition = optics.transfer_column(ray.dposition, ray.ddirection, ray.direction, geometric, np.float64(distance))
+    _, normal, dnormal = surface.normals(point, dposition)
+    if ray.direction @ normal > 0.0:
+        normal, dnormal = -normal, -dnormal
+    return replace(ray, position=point, dposition=dposition), geometric, normal, dnormal
+
+
+def reflected(ray: Ray, normal: np.ndarray, dnormal: np.ndarray) -> Ray:
+    """The ray after a mirror at its position."""
+    return replace(
+        ray,
+        direction=optics.reflect(ray.direction, normal),
+        ddirection=optics.reflect_column(ray.direction, ray.ddirection, normal, dnormal),
+    )
+
+
+def refracted(ray: Ray, normal: np.ndarray, dnormal: np.ndarray, n_i: Index, n_t: Index) -> Ray | None:
+    """The ray beyond a boundary, or None at total reflection; textbook columns."""
+    eta = n_i.n / n_t.n
+    if optics.transmitted_cosine2(ray.direction, normal, eta) <= 0.0:
+        return None
+    # d(n_i/n_t) by the quotient rule.
+    deta = np.broadcast_to((np.asarray(n_i.dn) * n_t.n - n_i.n * np.asarray(n_t.dn)) / n_t.n**2, len(ray.dposition))
+    return replace(
+        ray,
+        direction=optics.refract(ray.direction, normal, eta),
+        ddirection=optics.refract_column_textbook(ray.direction, ray.ddirection, normal, dnormal, eta, deta),
+    )
+
+
+def through(ray: Ray, surface: Surface, n_i: Index, n_t: Index, root: int = 0, mirror: bool = False) -> Ray:
+    """Follow a ray to the given root of a surface and refract it there (reflect it, where `mirror`).
+
+    Raises ValueError at total internal reflection.
+    """
+    arrived, _, normal, dnormal = advance(ray, surface, surface.distances(ray.position, ray.direction)[root])
+    left = reflected(arrived, normal, dnormal) if mirror else refracted(arrived, normal, dnormal, n_i, n_t)
+    if left is None:
+        raise ValueError("total internal reflection")
+    return left
+
+
+def onto(ray: Ray, surface: Surface, root: int = 0) -> Ray:
+    """Move a ray and its columns to a surface without changing its direction."""
+    return advance(ray, surface, surface.distances(ray.position, ray.direction)[root])[0]
+
+
+# ---- triangle lists --------------------------------------------------------------------------
+
+RECEIVER, MIRROR = -1, -2
+"""Materials of a triangle that are not glass; a glass is its position in the list of indices."""
+
+TOUCHING = 1e-9
+"""Two surfaces closer than this are at one place: a ray enters what lies there before it leaves."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """What a ray meets, at one wavelength."""
+
+    index: Index = AIR
+    absorption: float = 0.0
+    """Per unit of length, inside."""
+    reflectance: float = 1.0
+    """Of a mirror."""
+    priority: int = 0
+    """Where glasses overlap, the highest decides; of equal ones the later."""
+    kind: Literal["glass", "mirror", "receiver"] = "glass"
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleList:
+    """Triangles (T, 3, 3) with a material each (T,) and, for smooth ones, corner normals (T, 3, 3)."""
+
+    corners: np.ndarray
+    material: np.ndarray
+    corner_normals: np.ndarray | None = None
+    """A row of zeros is a flat triangle."""
+
+    def facet(self, triangle: int) -> Facet:
+        normals = None if self.corner_normals is None else self.corner_normals[triangle]
+        return Facet(self.corners[triangle], normals if normals is not None and normals.any() else None)
+
+    def nearest(self, ray: Ray, leaving: int | None, inside: frozenset[int] = frozenset()) -> tuple[int, float] | None:
+        """(triangle, distance) of the closest hit that is not the triangle just left.
+
+        Glass is entered from outside and left from `inside` only: so surfaces that touch cannot be met twice.
+        """
+        crossed, distance, leaves = self._crossings(ray)
+        glass, within = self.material >= 0, np.isin(self.material, list(inside))
+        crossed &= np.where(glass, (distance > -TOUCHING) & (within == leaves), distance > 0.0)
+        if leaving is not None:
+            crossed[leaving] = False
+        if not crossed.any():
+            return None
+        best = int(np.where(crossed, distance + TOUCHING * (glass & within), np.inf).argmin())
+        return best, float(distance[best])
+
+    def holding(self, ray: Ray) -> frozenset[int]:
+        """The glasses round a ray's start: those that it leaves once more than it enters them."""
+        crossed, distance, leaves = self._crossings(ray)
+        ahead = crossed & (distance > 0.0) & (self.material >= 0)
+        balance = {int(solid): np.sum(np.where(leaves, 1, -1)[ahead & (self.material == solid)]) for solid in np.unique(self.material[ahead])}
+        return frozenset(solid for solid, exits in balance.items() if exits > 0)
+
+    @cached_property
+    def _planes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Normals (T, 3) and, in each plane, the vectors (T, 3, 3) across the edges that point inwards."""
+        edges = np.roll(self.corners, -1, axis=1) - self.corners
+        normal = optics.cross(edges[:, 0], -edges[:, 2])
+        return normal, optics.cross(normal[:, None], edges)
+
+    def _crossings(self, ray: Ray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Over all triangles (T,): whether the ray's line meets it, at which distance, and from behind."""
+        normal, inward = self._planes
+        facing = normal @ ray.direction
+        crossed = facing != 0.0
+        distance = np.full(len(facing), np.inf)
+        distance[crossed] = optics.dot(self.corners[:, 0] - ray.position, normal)[crossed] / facing[crossed]
+        point = ray.position + np.where(crossed, distance, 0.0)[:, None] * ray.direction
+        crossed &= (optics.dot(point[:, None] - self.corners, inward) >= 0.0).all(axis=1)
+        return crossed, distance, facing > 0.0
+
+
+@dataclass(frozen=True)
+class Path:
+    """Where a ray went. `triangles[-1]` is the receiver's, unless the ray escaped or ran too deep."""
+
+    ray: Ray
+    """At the last hit, with its columns (at the last departure, where it escaped)."""
+    triangles: tuple[int, ...]
+    reflections: tuple[bool, ...]
+    """For each specular event: whether it was reflected."""
+    landed: bool
+    transmittance: float = 1.0
+    """Product of Fresnel factors of the branches taken, absorption and mirrors."""
+    margin: float = 1.0
+    """Smallest cosine on the way, incident on a facet or (imaginary ones too) transmitted: how far from the hazards."""
+
+
+def follow(
+    ray: Ray,
+    scene: TriangleList,
+    bodies: Sequence[Body],
+    reflects: Callable[[int], bool] = lambda event: False,
+    max_depth: int = 64,
+    along: Sequence[int] | None = None,
+    inside: frozenset[int] | None = None,
+) -> Path:
+    """Follow one path among glasses that may nest or touch, mirrors and receivers.
+
+    A triangle's material is an index into `bodies`, and glass has one that is not negative: mirrors and
+    receivers stand at the end and are counted from there. `reflects(event)` chooses reflection at a specular event (total
+    reflection happens anyway). `along` forces a sequence of triangles: each is met on its whole
+    plane, inside its edges or not, as a difference quotient over one and the same path needs.
+    `inside`: glasses that the ray starts in, found by counting boundaries where it is not given.
+    """
+    inside = scene.holding(ray) if inside is None else inside
+    triangles: list[int] = []
+    reflections: list[bool] = []
+    factor, margin = 1.0, 1.0
+    while len(reflections) <= max_depth:
+        if along is not None:
+            hit = None if len(triangles) >= len(along) else (along[len(triangles)], _distance(ray, scene.facet(along[len(triangles)])))
+        else:
+            hit = scene.nearest(ray, triangles[-1] if triangles else None, inside)
+        if hit is None:
+            return Path(ray, tuple(triangles), tuple(reflections), False, factor, margin)
+        triangle, distance = hit
+        factor *= float(np.exp(-_medium(inside, bodies).absorption * distance))
+        triangles.append(triangle)
+        arrived, geometric, normal, dnormal = advance(ray, scene.facet(triangle), distance)
+        margin = min(margin, abs(float(ray.direction @ geometric)))
+        material = int(scene.material[triangle])
+        body = bodies[material]
+        if body.kind == "receiver":
+            return Path(arrived, tuple(triangles), tuple(reflections), True, factor, margin)
+        if body.kind == "mirror":
+            ray = reflected(arrived, normal, dnormal)
+            factor *= body.reflectance
+            reflections.append(True)
+            continue
+        before = inside - {material} if ray.direction @ geometric < 0.0 else inside | {material}
+        after = before ^ {material}
+        n_i, n_t = _medium(before, bodies), _medium(after, bodies)
+        if n_i is n_t:
+            # Another glass decides here: the boundary is not seen.
+            ray, inside = arrived, after
+            continue
+        eta_it = n_i.index.n / n_t.index.n
+        reflectance = float(optics.fresnel_reflectance(arrived.direction, normal, eta_it))
+        margin = min(margin, float(np.sqrt(abs(optics.transmitted_cosine2(arrived.direction, normal, eta_it)))))
+        beyond = None if reflects(len(reflections)) else refracted(arrived, normal, dnormal, n_i.index, n_t.index)
+        factor *= reflectance if beyond is None else 1.0 - reflectance
+        reflections.append(beyond is None)
+        ray, inside = (reflected(arrived, normal, dnormal), before) if beyond is None else (beyond, after)
+    return Path(ray, tuple(triangles), tuple(reflections), False, factor, margin)
+
+
+_OUTSIDE = Body()
+
+
+def _medium(inside: frozenset[int], bodies: Sequence[Body]) -> Body:
+    """The glass that decides among those a ray is inside of."""
+    return bodies[max(inside, key=lambda i: (bodies[i].priority, i))] if inside else _OUTSIDE
+
+
+def trace(
+    ray: Ray,
+    scene: TriangleList,
+    indices: Sequence[Index],
+    reflect_at: Sequence[int] = (),
+    max_depth: int = 64,
+    along: Sequence[int] | None = None,
+) -> Path:
+    """`follow` through clear glasses of `indices`, perfect mirrors (`MIRROR`) and receivers (`RECEIVER`)."""
+    bodies = [*map(Body, indices), Body(kind="mirror"), Body(kind="receiver")]
+    return follow(ray, scene, bodies, lambda event: event in reflect_at, max_depth, along)
+
+
+def _distance(ray: Ray, facet: Facet) -> float:
+    return float(facet.distances(ray.position, ray.direction)[0])
+
+
+def central_difference(path_of: Callable[[float], Path], step: float) -> tuple[np.ndarray, np.ndarray]:
+    """(∂position, ∂direction) at the end of `path_of(x)` at x = 0, to fourth order in the step.
+
+    Raises ValueError when the four neighbours do not run over the same triangles and choices.
+    """
+    paths = {k: path_of(k * step) for k in (-2, -1, 1, 2)}
+    if len({(p.triangles, p.reflections) for p in paths.values()}) != 1:
+        raise ValueError("the neighbouring paths differ; use a smaller step or force one sequence")
+
+    def slope(of: Callable[[Path], np.ndarray]) -> np.ndarray:
+        near = of(paths[1]) - of(paths[-1])
+        far = of(paths[2]) - of(paths[-2])
+        return (8.0 * near - far) / (12.0 * step)
+
+    return slope(lambda p: p.ray.position), slope(lambda p: p.ray.direction)

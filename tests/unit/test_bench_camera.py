@@ -1,0 +1,183 @@
+"""The bench of the eye half without a GPU: made-up rigs and curves, budgets that keep to whole bands, a report that speaks of samples."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from spectrasplat.base.errors import UserError
+from spectrasplat.bench import reference_picture, runner
+from spectrasplat.bench.camera_rendering import EyeRig
+from spectrasplat.bench.claims import claims_of
+from spectrasplat.bench.measured_passes import EYE, HALVES
+from spectrasplat.bench.rendering import Rendering
+from spectrasplat.bench.report import report
+from spectrasplat.bench.report.prose import PROSE
+from spectrasplat.bench.results import BenchResult, BenchSettings, Curve, SceneResult
+from spectrasplat.bench.store import Store
+from spectrasplat.bench.subjects import SUBJECTS, Subject
+from spectrasplat.model.scene import Diffuse, Scene
+from spectrasplat.passes.spectrum_choice import Spectrum
+
+from tests.unit.bench_synthetic import synthetic_result, synthetic_scene
+from tests.unit.test_bench_curves import curve, law, scene
+from tests.unit.test_bench_report import assert_stands_alone
+from tests.unit.test_bench_resume import (
+    HEIGHT,
+    MACHINE,
+    WIDTH,
+    Rig,
+    Rigs,
+    glass_scene,
+)
+from tests.unit.test_bench_resume import (
+    truth_picture as truth_pixels,
+)
+
+SETTINGS = BenchSettings(20.0, 2, ("stochastic", "srd"), (WIDTH, HEIGHT), half="eye")
+
+
+class WholeRig(Rig):
+    """Renders multiples of four samples only, at 0.1 s each."""
+
+    def budgets(self, _seconds: float, count: int) -> list[int]:
+        return [4 * n for n in (1, 2, 4, 12, 50)]
+
+    def fitting(self, budget: int) -> int:
+        return max(budget // 4, 1) * 4
+
+    def render(self, photons: int, seed: int) -> Rendering:
+        assert photons % 4 == 0
+        return replace(super().render(photons, seed), seconds={"bands": 0.02, "looks": 0.1 * photons}, splats=0)
+
+
+class WholeRigs(Rigs):
+    rig = WholeRig
+
+
+def run(directory: Path, settings: BenchSettings = SETTINGS) -> SceneResult:
+    def truth(*_: object) -> tuple[object, object]:
+        from spectrasplat.bench.results import ReferenceInfo
+        from spectrasplat.reference.metrics import Truth
+
+        return Truth(truth_pixels(), np.full((HEIGHT, WIDTH, 3), 1e-9)), ReferenceInfo("made up", 2000, 1.0, 1e-9, "key", 1 << 20, 1e-5)
+
+    store = Store(directory, BenchResult("0", "today", "command", dict(MACHINE), [], settings))
+    runner.run_bench(None, {"one": glass_scene()}, store, lambda *_: None, None, Subject(WholeRigs().make, truth, lambda *_: "key"))  # type: ignore[arg-type]
+    return store.result.scenes[0]
+
+
+def test_a_run_of_the_eye(tmp_path: Path) -> None:
+    done = run(tmp_path)
+    assert done.half == "eye" and done.complete and [c.budgets for c in done.curves] == [[4, 8, 16, 48, 200]] * 2
+    assert done.curves[0].points[-1].seconds == pytest.approx(20.02)  # choosing the bands counts
+    wanted = {"": 20.0, " early": 1.0, " first": 0.5}  # the talk's crops
+    assert {ending: share * 20.0 for ending, share in EYE.pictures} == pytest.approx(wanted)
+    for ending, seconds in wanted.items():
+        sample = done.picture_samples[f"srd{ending}"]
+        assert sample.photons % 4 == 0 and sample.photons == max(int(10 * (seconds - 0.02)) // 4 * 4, 4)
+    stored = msgspec.json.decode((tmp_path / "results.json").read_bytes(), type=BenchResult)
+    assert stored.scenes[0].reference is not None and stored.scenes[0].reference.caustic_photons == 1 << 20
+    with pytest.raises(UserError, match="the eye half measured instead of the light half.*--fresh"):
+        run(tmp_path, msgspec.structs.replace(SETTINGS, half="light"))
+
+
+class CountedRig(EyeRig):
+    """The budgets of a real rig on a made-up device: 50 ms a sample, bands that double while there are samples for them, up to 8."""
+
+    def __init__(self, most_bands: int, a_sample_s: float = 0.05) -> None:
+        self._most, self._sample_s = most_bands, a_sample_s
+
+    def _choose(self, samples: int) -> Spectrum:
+        return Spectrum(min(self._most, 1 << (max(samples, 1).bit_length() - 1)))
+
+    def render(self, budget: int, seed: int) -> Rendering:
+        bands, samples = self._choose(budget).bands, self._choose(budget).samples(budget)
+        return Rendering(np.zeros((1, 1, 3)), {"bands": 0.01 * (2 * bands - 1), "looks": self._sample_s * samples}, samples, 0)
+
+
+@pytest.mark.parametrize(("most_bands", "seconds"), [(1, 20.0), (8, 20.0), (8, 2.0), (32, 1.0), (1, 0.01)])
+def test_budgets_are_whole_multiples_of_their_bands(most_bands: int, seconds: float) -> None:
+    rig = CountedRig(most_bands)
+    budgets = rig.budgets(seconds, 10)
+    assert budgets == sorted(set(budgets)) and budgets[0] == 1 and len(budgets) <= 10
+    assert all(n % rig._choose(n).bands == 0 and rig.fitting(n) == n and rig.render(n, 1).emitted == n for n in budgets)
+    if seconds > 1.0:
+        assert len(budgets) >= 7
+        assert sum(rig.render(budgets[-1], 1).seconds.values()) == pytest.approx(seconds, rel=0.2)
+
+
+def eye_scene(*curves: Curve, seconds: float = 20.0) -> SceneResult:
+    made = scene(*curves, seconds=seconds)
+    made.half = "eye"
+    for one in made.curves:
+        one.samples = [msgspec.structs.replace(s, seconds={"bands": 0.2 * s.photon_seconds, "looks": 0.8 * s.photon_seconds}) for s in one.samples]
+    return made
+
+
+def test_claims_of_the_eye_ask_for_a_twentieth() -> None:
+    """25 times sooner is enough for the eye and not for the light."""
+    fast, slow = law(0.04), law(1.0)
+    claims = claims_of(eye_scene(curve("stochastic", slow), curve("srd", fast)))
+    assert [(c.name, c.holds) for c in claims] == [("time to equal error", True)] and "1/20" in claims[0].asked
+    assert not claims_of(scene(curve("stochastic", slow), curve("srd", fast)))[0].holds
+
+
+def test_reasons_of_the_eye() -> None:
+    (claim,) = claims_of(eye_scene(curve("stochastic", law(0.1, floor=0.05)), curve("srd", law(1e-4, floor=0.2))))
+    assert not claim.holds and "straight columns" in claim.why and "25 % of that bias² is found in stochastic too" in claim.why
+    assert "20 % bands, 80 % looks" in claim.why
+    (claim,) = claims_of(eye_scene(curve("stochastic", law(1.0)), curve("srd", law(0.2))))
+    assert not claim.holds and "more samples reduce" in claim.why
+
+
+def test_the_report_speaks_of_samples(tmp_path: Path) -> None:
+    names = ("stochastic", "regular-7", "srd-lambda", "srd")
+    made = [synthetic_scene(tmp_path, name, methods=names, longest_s=20.0) for name in ("edge", "text", "studio", "ball")]
+    for one in made:
+        one.half, one.title = "eye", "made up"
+        assert one.reference is not None
+        one.reference.method, one.reference.photons, one.reference.caustic_photons = "camera paths", 900, 67_000_000
+        for each in one.curves:
+            each.setup_seconds = {"light half": 2.0, "buffers": 0.1, "compile": 1.0}
+            each.samples = [msgspec.structs.replace(s, seconds={"bands": 0.1, "looks": s.photon_seconds}) for s in each.samples]
+            one.picture_samples |= {f"{each.method}{ending}": each.samples[0] for ending, _ in EYE.pictures}
+            one.pictures[f"{each.method} first"] = one.pictures[f"{each.method} early"]
+        one.claims = claims_of(one)
+    result = synthetic_result(made)
+    result.settings = BenchSettings(20.0, methods=names, half="eye")
+    report.write_report(result, tmp_path)
+    page = assert_stands_alone((tmp_path / "report.html").read_text(encoding="utf-8"))
+    text = page.text
+    for told in ("the eye half", "camera samples a pixel", "20 s of eye time", "0.5 s, part", "1 s, part", "asked of srd: at most 1/20 of the time", "its caustic: 67 M photons",
+                 "Stages of eye time", "choosing the bands", "bands s", "light half s", *(PROSE["eye"].methods[name] for name in names)):  # fmt: skip
+        assert told in text, told
+    without_caustic = text.replace("67 M photons", "")
+    assert not re.search(r"photon", without_caustic, re.IGNORECASE), re.findall(r".{40}photon.{40}", without_caustic)
+    stems = {path.stem for path in (tmp_path / "plots").iterdir()}
+    assert {"edge_error_time", "edge_error_samples", "overview", "scenes"} <= stems and "edge_error_photons" not in stems
+    # Four columns and the reference: three rows of parts and one of whole pictures, four error maps and their scale.
+    assert page.tags["img"] == 4 * (4 * 5 + 4 + 1)
+
+
+def test_halves_and_subjects_fit() -> None:
+    assert set(HALVES) == set(SUBJECTS) == set(PROSE)
+    for half in HALVES.values():
+        assert set(half.counted) <= set(half.stages) == set(PROSE[half.key].stages) and half.pictures[0] == ("", 1.0)
+
+
+def test_a_caustic_is_planned_where_light_may_fall() -> None:
+    """Light and something diffuse are both needed; depth is the scene's, as in the maps."""
+    from spectrasplat.commands.options import find_scene
+    from spectrasplat.model.io.scene_file import load_scene
+
+    ball = load_scene(find_scene("ball_plain"))
+    plan = truth_picture.caustic_plan(ball)
+    assert plan is not None and plan.max_depth == ball.render.max_depth and 0.0 < plan.target_relmse <= 1e-4
+    assert truth_picture.caustic_plan(replace(ball, lights=())) is None
+    bare = replace(ball, objects=tuple(o for o in ball.objects if not isinstance(o.material, Diffuse)))
+    assert isinstance(bare, Scene) and truth_picture.caustic_plan(bare) is None

@@ -1,0 +1,281 @@
+"""What the eye's reference sees through glass: fringes by slabs and prisms against closed forms, caustics against the light's reference.
+
+Mutants of the closed forms (another Fresnel, dispersion the other way round) must be told apart.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from reference import camera_answers
+from spectrasplat.base.errors import UserError
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.geometry.primitives_round import sphere
+from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz
+from spectrasplat.model.optics.glass import Dispersion
+from spectrasplat.model.optics.glass import constant as constant_index
+from spectrasplat.model.optics.spectrum import Spectrum, laser
+from spectrasplat.model.scene import (
+    Absorption,
+    Black,
+    Camera,
+    Dielectric,
+    Diffuse,
+    Light,
+    Mirror,
+    Scene,
+    SceneObject,
+)
+from spectrasplat.model.texture import Texture
+from spectrasplat.reference import photon_run
+from spectrasplat.reference.camera_reference import render_eye_reference
+from spectrasplat.reference.camera_run import EyePicture, EyeRun
+from spectrasplat.reference.direct_view import seen_directly
+from spectrasplat.reference.photon_reference import render_reference
+from spectrasplat.reference.spectral_caustic import CausticPlan, build_caustic
+from tests.unit.eye_scenes import (
+    D65,
+    FLINT,
+    THICKNESS,
+    TILT,
+    place,
+    plate,
+    scene_of,
+    slab_scene,
+)
+
+# ---- a slab before an edge -------------------------------------------------------------------
+
+
+def slab_column(glass: Dispersion, rows: int, fresnel: str = "exact", sign: float = 1.0) -> np.ndarray:
+    """XYZ of a column of pixels, (rows, 3): the edge, once for each wavelength and number of reflections inside."""
+    n = glass.index(VISIBLE_NM)
+    centre = float(np.mean(eye_answers.slab_displacement(n, THICKNESS, TILT)))
+    n = glass.n_d + sign * (n - glass.n_d)
+    cosine, inner = math.cos(TILT), np.sqrt(1.0 - (math.sin(TILT) / n) ** 2)
+    if fresnel == "exact":
+        reflectance = 0.5 * (((cosine - n * inner) / (cosine + n * inner)) ** 2 + ((n * cosine - inner) / (n * cosine + inner)) ** 2)
+    else:  # Schlick 1994
+        reflectance = ((n - 1) / (n + 1)) ** 2
+        reflectance = reflectance + (1 - reflectance) * (1 - cosine) ** 5
+    # Along x, row 0 on top is the largest x; a film's length is cos 45° of the plate's.
+    border = centre + 0.06 / cosine * (0.5 - np.arange(rows + 1) / rows)
+    total = np.zeros((rows, 3))
+    offset = eye_answers.slab_offset(n, THICKNESS, TILT)
+    for k in range(6):  # 2k reflections inside lead the ray on by 2k offsets: it meets the plate farther along
+        # Without glass the pixel at `border` sees x = border; with it x − displacement + 2k offset.
+        seen = border[:, None] - eye_answers.slab_displacement(n, THICKNESS, TILT) + 2 * k * offset
+        white = np.clip(seen[:-1], 0.0, None) - np.clip(seen[1:], 0.0, None)
+        share = white / (border[:-1] - border[1:])[:, None] * (1 - reflectance) ** 2 * reflectance ** (2 * k)
+        total += K_M * (share * D65.density) @ cmf_xyz() / math.pi
+    return total
+
+
+@pytest.fixture(scope="module")
+def slab_picture() -> EyePicture:
+    return render_eye_reference(slab_scene(FLINT), 12, 48, samples=1024)
+
+
+def slab_z_squared(picture: EyePicture, expected: np.ndarray) -> float:
+    """Mean of z² over rows and channels; a row's twelve variances together have 84 degrees of freedom, so that 1.02 is right."""
+    variance = picture.variance.sum(axis=1) / 144
+    return float(np.mean((picture.xyz.mean(axis=1) - expected) ** 2 / variance))
+
+
+def test_an_edge_behind_a_slab_has_the_fringe_of_snells_law(slab_picture: EyePicture) -> None:
+    """48 rows of three channels that go together: the mean of z² scatters by √(2/48) = 0.2."""
+    expected = slab_column(FLINT, 48)
+    assert slab_z_squared(slab_picture, expected) < 1.02 + 4 * 0.2
+    np.testing.assert_allclose(slab_picture.xyz.mean(axis=1), expected, atol=6e-3 * expected.max())
+
+
+@pytest.mark.parametrize("mutant", [{"fresnel": "schlick"}, {"sign": -1.0}], ids=str)
+def test_wrong_optics_would_show_in_the_fringe(slab_picture: EyePicture, mutant: dict) -> None:
+    assert slab_z_squared(slab_picture, slab_column(FLINT, 48, **mutant)) > 4.0
+
+
+def test_a_pane_of_air_changes_nothing() -> None:
+    """Behind a pane of n = 1 every path carries one wavelength, without it all of them: both ways of adding must agree."""
+    rgb = np.random.default_rng(5).random((5, 5, 3)).astype(np.float32)
+    curve = np.linspace(0.1, 0.9, 401)
+    lights = (
+        Light("lamp", "area", D65, (0.5, 0.2, 1.0), radius=0.3),
+        Light("line", "point", laser(560.0, 0.004), (-0.4, 0.3, 0.8)),
+        Light("lines", "point", Spectrum(np.zeros(401), ((450.0, 0.003), (640.0, 0.002))), (0.0, -0.4, 0.8)),
+    )
+    things = (
+        place(primitives.plane(1.0, 1.0), Diffuse((0.9, 0.8, 1.0), texture=Texture(rgb)), (-0.5, 0.0, 0.0)),
+        place(primitives.plane(1.0, 1.0), Diffuse(reflectance=curve), (0.5, 0.0, 0.0)),
+    )
+    pane = place(primitives.box((4.0, 4.0, 0.1)), Dielectric(constant_index(1.0)), (0.0, 0.0, 5.0))
+    straight = render_eye_reference(scene_of(*lights, *things), 16, 16, samples=2048)
+    behind = render_eye_reference(scene_of(*lights, *things, pane), 16, 16, samples=2048)
+    assert behind.relmse > 3.0 * straight.relmse  # which is why
+    np.testing.assert_allclose(behind.xyz, straight.xyz, rtol=0.03)
+    for half in (np.s_[:, :8], np.s_[:, 8:]):  # texture; spectral reflectance: means to 6e-4, so 3e-3 too much would show
+        error = np.sqrt((behind.variance + straight.variance)[half].sum(axis=(0, 1))) / 128
+        mean = straight.xyz[half].mean(axis=(0, 1))
+        assert (error < 6e-4 * mean).all()
+        assert (np.abs(behind.xyz[half].mean(axis=(0, 1)) - mean) < 4.5 * error).all()
+
+
+# ---- a prism before an edge, against the exact trace -----------------------------------------
+
+
+def test_an_edge_behind_a_prism_stands_where_the_exact_trace_puts_it() -> None:
+    """Two laser lines through 20° of flint: each line's edge, from the share of white it leaves, to a fiftieth of a pixel."""
+    apex, rows, lines = math.radians(20.0), 64, (486.1327, 656.2725)
+    faces = eye_answers.prism_faces(apex, 5.0, 1.2)
+    angle = {nm: eye_answers.viewing_angle(faces, (float(FLINT.index(nm)), 1.0), 9.0, 0.0, 0.0, 0.3) for nm in lines}
+    middle = 0.5 * sum(angle.values())
+    c, s = math.cos(apex / 2), math.sin(apex / 2)
+    outline = np.array([(0.0, 0.6 / math.tan(apex / 2)), (-0.6 - 2 * s / c, -2.0), (0.6 + 2 * s / c, -2.0)])
+    vertices = np.concatenate([np.column_stack([outline[:, 0] + 5.6, np.full(3, w), outline[:, 1]]) for w in (-2.0, 2.0)])
+    triangles = [(0, 1, 2), (3, 5, 4), (0, 3, 1), (1, 3, 4), (1, 4, 2), (2, 4, 5), (2, 5, 0), (0, 5, 3)]
+    mesh = primitives.make_mesh("wedge", vertices, triangles)
+    mesh = mesh if mesh.volume() > 0.0 else mesh.flipped()
+    turn = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])  # the plane's front to −x, its x to z
+    white = place(primitives.plane(2.0, 4.0), Diffuse((1.0, 1.0, 1.0)), (9.0, 0.0, 1.0), turn)
+    black = place(primitives.plane(2.0, 4.0), Black(), (9.0, 0.0, -1.0), turn)
+    camera = Camera((0.0, 0.0, 0.0), (math.cos(middle), 0.0, math.sin(middle)), vertical_fov_deg=3.0)
+    # Even light from between prism and screen.
+    lit = [Light("l", "directional", laser(nm, 1.0), direction=(math.sin(0.35), 0.0, -math.cos(0.35))) for nm in lines]
+    edges = []
+    for light in lit:
+        glass = place(mesh, Dielectric(FLINT))
+        y = render_eye_reference(scene_of(light, glass, white, black, camera=camera), 3, rows, samples=2048).xyz[..., 1].mean(axis=1)
+        whole = np.polyval(np.polyfit(np.arange(20), y[:20], 1), np.arange(rows))  # Fresnel's share changes a little
+        at = 1.0 - 2.0 / rows * float(np.sum(y / whole))
+        edges.append(middle + math.atan(at * math.tan(math.radians(1.5))))
+    pixel = math.radians(3.0) / rows
+    errors = np.array([edge - angle[nm] for edge, nm in zip(edges, lines, strict=True)])
+    assert (np.abs(errors) < 0.1 * pixel).all()
+    fringe = edges[0] - edges[1]
+    assert fringe == pytest.approx(angle[lines[0]] - angle[lines[1]], abs=0.03 * pixel) and fringe > 4.0 * pixel
+
+
+def test_closed_forms_agree_with_each_other() -> None:
+    n = np.array([1.5168, 1.62])
+    # T2 of the known answers: N-BK7 at minimum deviation; a thin prism's limit is the thin formula.
+    assert math.degrees(eye_answers.prism_deviation(1.5168, math.pi / 3, math.radians(49.32335))) == pytest.approx(38.6467, abs=1e-5)
+    np.testing.assert_allclose(eye_answers.prism_deviation(n, 1e-4, 0.0), eye_answers.thin_prism_deviation(n, 1e-4), rtol=1e-6)
+    assert np.isnan(eye_answers.prism_deviation(1.7847, math.pi / 2, 0.0))
+    apex = math.radians(0.2)
+    low, high = (eye_answers.height_on_screen(eye_answers.prism_faces(apex, 5.0, 0.001), (k, 1.0), 0.0, 15.0) for k in n)
+    assert low - high == pytest.approx(eye_answers.thin_prism_fringe(n[1], n[0], apex, 10.0), rel=1e-3)
+    # T3: a slab at 45°.
+    assert eye_answers.slab_offset(1.5168, 1.0, TILT) == pytest.approx(0.526946, abs=1e-6)
+    assert eye_answers.slab_lateral_shift(1.5168, 1.0, TILT) == pytest.approx(0.334499, abs=1e-6)
+    assert eye_answers.slab_displacement_derivative(1.5168, -0.041799e-3, 1.0, TILT) == pytest.approx(-0.018554e-3, abs=1e-8)
+    # A lens: matrices against the trace near the axis, thin against thick.
+    faces = eye_answers.plano_convex_faces(10.0, 8.0, 0.5)
+    for k in n:
+        seen = math.tan(eye_answers.viewing_angle(faces, (k, 1.0), 11.0, 1e-4, 0.0, 0.2)) / 1e-4
+        assert seen == pytest.approx(eye_answers.thick_seen_tangent(k, 10.0, 0.5, 8.0, 2.5, 1.0), rel=1e-6)
+        thin = eye_answers.seen_tangent(eye_answers.plano_convex_focal_length(k, 10.0), 8.0, 3.0, 1.0)
+        assert thin == pytest.approx(eye_answers.thick_seen_tangent(k, 10.0, 1e-9, 8.0, 3.0, 1.0), rel=1e-8)
+    with pytest.raises(ValueError, match="total reflection"):
+        eye_answers.trace(eye_answers.prism_faces(math.pi / 2, 5.0, 1.0), (1.7847, 1.0), (0.0, 0.0), 0.0)
+
+
+# ---- caustics --------------------------------------------------------------------------------
+
+
+def caustic_scene(*more: SceneObject) -> Scene:
+    """A beam through a prism on to a plate that the camera sees from above."""
+    light = Light("beam", "collimated", D65.scaled(3.0), (-0.2, 0.0, 3.0), (0.0, 0.0, -1.0), shape="rectangle", width=0.3, height=0.6)
+    prism = place(primitives.prism(50.0, 1.0, 1.0), Dielectric(FLINT), (0.0, 0.0, 1.6))
+    camera = Camera((0.9, -3.0, 4.0), (1.2, 0.0, 0.0), vertical_fov_deg=38.0)
+    return scene_of(light, prism, plate(size=8.0), *more, camera=camera)
+
+
+@pytest.fixture(autouse=True)
+def short_pilot(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(photon_run, "_PILOT_PHOTONS", 1 << 14)
+
+
+PLAN = CausticPlan(photons=1 << 18, bins=40)
+
+
+def test_the_caustic_is_that_of_the_light_reference() -> None:
+    """Where it is seen directly: the sums of blocks of both pictures, of 2.6e5 and 1e6 photons, agree to 3 % of the
+    brightest (half a texel at a border is 2.5 % of a block) and to 0.4 % in all."""
+    scene = caustic_scene()
+    caustic = build_caustic(scene, 36, 24, replace(PLAN, texel_size=0.02))
+    assert caustic.relmse < 0.01 and caustic.outside_w < 0.5 * caustic.landed_w
+    lit = render_eye_reference(scene, 36, 24, samples=256, caustic=caustic)
+    dark = render_eye_reference(scene, 36, 24, samples=256)
+    light = render_reference(scene, 36, 24, photons=1 << 20)
+    seen = seen_directly(scene, 36, 24)
+    blocks = [(np.where(seen[..., None], p, 0.0)).reshape(12, 2, 18, 2, 3).mean(axis=(1, 3)) for p in (lit.xyz - dark.xyz, light.xyz())]
+    assert blocks[1].max() > 0.1
+    np.testing.assert_allclose(blocks[0], blocks[1], atol=0.03 * blocks[1].max())
+    np.testing.assert_allclose(blocks[0].sum(axis=(0, 1)), blocks[1].sum(axis=(0, 1)), rtol=4e-3)
+
+
+def busy_scene() -> Scene:
+    """A smooth tinted ball with a bubble of other glass in it, a block that touches it, a mirror, over a plate of spectral reflectance."""
+    tint = Absorption(np.linspace(0.3, 0.0, 401))
+    lights = (Light("sun", "directional", D65, direction=(0.3, 0.2, -1.0), angular_diameter_deg=3.0), Light("spot", "spot", laser(600.0, 0.02), (0.5, -1.0, 4.0), outer_half_angle_deg=30.0))
+    return scene_of(
+        *lights,
+        place(sphere(0.5, 1280), Dielectric(FLINT, tint, 1), (0.0, 0.0, 0.6)),
+        place(sphere(0.2, 320), Dielectric(constant_index(1.33), None, 2), (0.1, 0.0, 0.7)),
+        place(primitives.box((0.6, 0.6, 0.6)), Dielectric(constant_index(1.6), None, 0), (0.5, 0.0, 0.5)),
+        place(sphere(0.2, 320), Mirror((1.0, 1.0, 1.0)), (-0.7, 0.3, 0.4)),
+        plate(Diffuse(reflectance=np.linspace(0.9, 0.3, 401)), 8.0),
+        camera=Camera((0.0, -5.0, 4.0), (0.0, 0.3, 0.0), vertical_fov_deg=40.0),
+    )
+
+
+def test_nested_and_smooth_glass_throws_the_light_references_light() -> None:
+    """Both tracers' loops are written apart. Sums over what is seen directly agree to 2 %, blocks to 8 % of the brightest (a focus of few texels)."""
+    scene = busy_scene()
+    caustic = build_caustic(scene, 36, 24, replace(PLAN, photons=1 << 18, texel_size=0.02))
+    lit, dark = (render_eye_reference(scene, 36, 24, samples=256, caustic=c).xyz for c in (caustic, None))
+    seen = seen_directly(scene, 36, 24)[..., None]
+    light = render_reference(scene, 36, 24, photons=1 << 19).xyz() * seen
+    mine = (lit - dark) * seen
+    np.testing.assert_allclose(mine.sum(axis=(0, 1)), light.sum(axis=(0, 1)), rtol=0.02)
+    blocks = [p.reshape(6, 4, 9, 4, 3).mean(axis=(1, 3)) for p in (mine, light)]
+    np.testing.assert_allclose(blocks[0], blocks[1], atol=0.08 * blocks[1].max())
+
+
+def test_a_caustic_behind_a_pane_of_air_is_the_same() -> None:
+    """One wavelength at a time from its bin, or all bins at once."""
+    pane = place(primitives.box((8.0, 8.0, 0.02)), Dielectric(constant_index(1.0)), (0.0, 0.0, 3.4))
+    scene, behind = caustic_scene(), caustic_scene(pane)
+    caustic = build_caustic(scene, 24, 16, PLAN)
+    straight = render_eye_reference(scene, 24, 16, samples=1024, caustic=caustic)
+    through = EyeRun(behind, 24, 16, caustic=replace(caustic, tables=caustic.tables._replace(side=np.vstack([caustic.tables.side, [[-1, -1]]]).astype(np.int32))))
+    while through.samples < 1024:
+        through.advance()
+    picture = through.picture()
+    # The pane is below the camera and above the beam, so it hides nothing that is lit.
+    # A caustic has dark places where few samples find light, so blocks are compared: to 3 % of the brightest.
+    blocks = [p.xyz.reshape(8, 2, 12, 2, 3).mean(axis=(1, 3)) for p in (picture, straight)]
+    np.testing.assert_allclose(blocks[0], blocks[1], atol=0.03 * blocks[1].max())
+    error = np.sqrt((picture.variance + straight.variance).sum(axis=(0, 1)))
+    total = straight.xyz.sum(axis=(0, 1))
+    assert (error < 0.015 * total).all()
+    assert (np.abs(picture.xyz.sum(axis=(0, 1)) - total) < 4.5 * error).all()
+
+
+def test_every_line_of_a_laser_has_a_bin_of_its_own() -> None:
+    scene = caustic_scene()
+    red_and_blue = Spectrum(np.zeros(401), ((450.0, 1.0), (640.0, 1.0)))
+    scene = replace(scene, lights=(replace(scene.lights[0], spectral_power=red_and_blue),))
+    caustic = build_caustic(scene, 24, 16, replace(PLAN, photons=1 << 14, bins=8))
+    assert caustic.tables.bins == 10
+    side = int(np.flatnonzero(np.prod(caustic.tables.size[:, 1], axis=1))[0])
+    bins = caustic.irradiance(side, 1).sum(axis=(0, 1))
+    assert (bins[:8] == 0.0).all() and (bins[8:] > 0.0).all()
+
+
+def test_a_curved_receiver_is_refused_by_name() -> None:
+    scene = caustic_scene(place(sphere(0.4, 320), Diffuse(), (1.1, 0.0, 0.4)))
+    with pytest.raises(UserError, match="sphere.*not flat"):
+        build_caustic(scene, 12, 8, PLAN)

@@ -1,0 +1,225 @@
+"""The reference judged by itself: two derivations agree, columns match differences, meshes converge."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from reference.splat import gaussian, swept_gaussian, texel_average
+from reference.surfaces import Plane, sphere
+from reference.tracer import (
+    AIR,
+    RECEIVER,
+    Index,
+    Path,
+    TriangleList,
+    central_difference,
+    make_ray,
+    onto,
+    through,
+    trace,
+)
+from spectrasplat.reference import glasses, optics
+
+RNG = np.random.default_rng
+
+
+def random_events(count: int, seed: int = 1) -> dict[str, np.ndarray]:
+    """Directions, facing normals and columns that keep to their spheres (d·∂d = 0, n̂·∂n̂ = 0)."""
+    rng = RNG(seed)
+    normal = optics.unit(rng.normal(size=(count, 3)))
+    direction = optics.unit(rng.normal(size=(count, 3)))
+    direction = direction - optics.times(np.maximum(2 * optics.dot(direction, normal), 0), normal)
+    tangent = lambda v: optics.normalised_derivative(v, rng.normal(size=(count, 3)))  # noqa: E731
+    return {"direction": direction, "normal": normal, "ddirection": tangent(direction), "dnormal": tangent(normal)}
+
+
+def test_textbook_and_stable_columns_agree() -> None:
+    events = random_events(2000)
+    eta = RNG(2).uniform(0.4, 1.0, 2000)
+    deta = RNG(3).normal(size=2000)
+    args = (events["direction"], events["ddirection"], events["normal"], events["dnormal"], eta, deta)
+    textbook, stable = optics.refract_column_textbook(*args), optics.refract_column_stable(*args)
+    scale = 1 + np.abs(textbook).max(-1, keepdims=True)
+    assert (np.abs(textbook - stable) / scale).max() < 1e-14
+
+
+def test_invariants_of_refraction_and_reflection() -> None:
+    events = random_events(2000)
+    d, n, dd, dn = (events[k] for k in ("direction", "normal", "ddirection", "dnormal"))
+    eta = RNG(2).uniform(0.4, 1.0, 2000)
+    out = optics.refract(d, n, eta)
+    np.testing.assert_allclose(optics.dot(out, out), 1, atol=1e-14)
+    dout = optics.refract_column_textbook(d, dd, n, dn, eta, np.ones(2000))
+    np.testing.assert_allclose(optics.dot(out, dout) / (1 + np.linalg.norm(dout, axis=-1)), 0, atol=1e-14)
+    mirrored = optics.reflect(d, n)
+    np.testing.assert_allclose(optics.dot(mirrored, optics.reflect_column(d, dd, n, dn)), 0, atol=1e-14)
+    zero = np.zeros((2000, 3))
+    bend = optics.refract_column_stable(d, zero, n, zero, eta, np.ones(2000))
+    sine_i = np.linalg.norm(np.cross(d, n), axis=-1)
+    np.testing.assert_allclose(np.linalg.norm(bend, axis=-1), sine_i / -optics.dot(out, n), rtol=1e-12)
+    same = optics.refract_column_stable(d, dd, n, dn, np.ones(2000), np.zeros(2000))
+    np.testing.assert_array_equal(same, dd)
+
+
+def test_columns_are_derivatives() -> None:
+    events = random_events(50)
+    eta, deta, step = 0.7, 0.3, 1e-6
+
+    def moved(x: float) -> tuple[np.ndarray, np.ndarray]:
+        d = optics.unit(events["direction"] + x * events["ddirection"])
+        n = optics.unit(events["normal"] + x * events["dnormal"])
+        return optics.refract(d, n, np.float64(eta + x * deta)), optics.reflect(d, n)
+
+    (hi_t, hi_r), (lo_t, lo_r) = moved(step), moved(-step)
+    args = (events["direction"], events["ddirection"], events["normal"], events["dnormal"])
+    np.testing.assert_allclose((hi_t - lo_t) / (2 * step), optics.refract_column_textbook(*args, eta, deta), atol=1e-8)
+    np.testing.assert_allclose((hi_r - lo_r) / (2 * step), optics.reflect_column(*args), atol=1e-8)
+
+
+def prism(material: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """A 60° prism, apex up, over a floor of two triangles: corners (T, 3, 3) and materials (T,)."""
+    section = np.array([[-1, 0], [1, 0], [0, np.sqrt(3)]])
+    near, far = (np.column_stack([section[:, 0], np.full(3, y), section[:, 1] + 1]) for y in (-1.0, 1.0))
+    glass = [near[[0, 1, 2]], far[[0, 2, 1]]]
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        glass += [np.array([near[i], far[j], near[j]]), np.array([near[i], far[i], far[j]])]
+    a, b, c, d = np.array([[-9, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]], float)
+    return np.array([*glass, [a, b, c], [a, c, d]]), np.array([material] * 8 + [RECEIVER] * 2)
+
+
+def icosphere(level: int) -> np.ndarray:
+    """Corners (20·4^level, 3, 3) of a subdivided icosahedron on the unit sphere."""
+    g = (1 + 5**0.5) / 2
+    v = [(s * a, t * b) for a, b in ((1, g),) for s in (-1, 1) for t in (-1, 1)]
+    points = np.array([p for x, y in v for p in ((0, x, y), (x, y, 0), (y, 0, x))])
+    faces = []
+    for i in range(12):
+        for j in range(i + 1, 12):
+            for k in range(j + 1, 12):
+                sides = [np.sum((points[p] - points[q]) ** 2) for p, q in ((i, j), (j, k), (k, i))]
+                if max(sides) < 4.1:
+                    faces.append(points[[i, j, k]])
+    t = np.array(faces)
+    turned = np.einsum("ti,ti->t", np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), t[:, 0]) < 0
+    t[turned] = t[turned][:, ::-1]
+    for _ in range(level):
+        a, b, c = t[:, 0], t[:, 1], t[:, 2]
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        t = np.concatenate([np.stack(x, 1) for x in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    return optics.unit(t)
+
+
+def ball_over_floor(level: int) -> TriangleList:
+    """A smooth unit ball about (0, 0, 2) over the floor z = 0."""
+    ball = icosphere(level)
+    floor = np.array([[[-50, -50, 0], [50, -50, 0], [0, 80, 0]]], float)
+    return TriangleList(
+        np.concatenate([ball + [0, 0, 2], floor]),
+        np.append(np.zeros(len(ball), int), RECEIVER),
+        np.concatenate([ball, np.zeros((1, 3, 3))]),
+    )
+
+
+def columns_against_differences(scene: TriangleList, position: list[float], direction: list[float], n: float) -> Path:
+    """Trace with columns by two shifts of the start, a turn, and the index; check each by differences."""
+    d = optics.unit(np.array(direction, float))
+    side = optics.unit(np.cross(d, [0.3, 0.8, -0.5]))
+    up = np.cross(side, d)
+    dposition = np.array([side, up, np.zeros(3), np.zeros(3)])
+    ddirection = np.array([np.zeros(3), np.zeros(3), side, np.zeros(3)])
+    glass = Index(n, np.array([0.0, 0.0, 0.0, 1.0]))
+    path = trace(make_ray(position, d, dposition, ddirection), scene, [glass])
+    assert path.landed and len(path.triangles) >= 3
+
+    def moved(column: int, x: float) -> Path:
+        start = make_ray(np.array(position) + x * dposition[column], d + x * ddirection[column])
+        return trace(start, scene, [Index(n + x * float(column == 3))], along=path.triangles)
+
+    for column in range(4):
+        dp, dd = central_difference(lambda x, c=column: moved(c, x), 1e-4)
+        scale = np.linalg.norm(dp) + np.linalg.norm(dd)
+        assert scale > 1e-3
+        np.testing.assert_allclose(path.ray.dposition[column], dp, atol=1e-9 * scale)
+        np.testing.assert_allclose(path.ray.ddirection[column], dd, atol=1e-9 * scale)
+    return path
+
+
+def test_columns_through_a_prism_match_differences() -> None:
+    scene = TriangleList(*prism())
+    path = columns_against_differences(scene, [-3, 0.1, 1], [1, 0.02, 0.35], 1.5168)
+    assert [bool(r) for r in path.reflections] == [False, False]
+
+
+def test_columns_through_total_reflection_match_differences() -> None:
+    scene = TriangleList(*prism())
+    path = columns_against_differences(scene, [-2.2, 0.1, 2.87], [0.87, 0.03, -0.45], 1.5168)
+    assert [bool(r) for r in path.reflections] == [False, True, False]
+
+
+@pytest.mark.parametrize("height", [0.0, 0.3, 0.6])
+def test_columns_through_a_smooth_ball_match_differences(height: float) -> None:
+    columns_against_differences(ball_over_floor(3), [0.11, height, 5], [0.02, 0.05, -1], 1.5168)
+
+
+def test_a_tessellated_ball_converges_to_the_ball() -> None:
+    exact = sphere((0, 0, 2), 1)
+    glass = Index(1.5168, np.array([0.0, 1.0]))
+    errors = np.zeros((4, 2))
+    for x in (0.1, 0.23, 0.37, 0.52):
+        start = make_ray([x, 0.2, 5], [0, 0, -1], [[1, 0, 0], [0, 0, 0]])
+        ball = through(through(start, exact, AIR, glass), exact, glass, AIR, root=1)
+        floor = onto(ball, Plane((0, 0, 0), (0, 0, 1)))
+        for level in range(4):
+            landed = trace(start, ball_over_floor(level + 2), [glass]).ray
+            errors[level, 0] += np.linalg.norm(landed.position - floor.position)
+            errors[level, 1] += np.linalg.norm(landed.dposition - floor.dposition)
+    # Three halvings: positions gain 64 (second order), columns 8 (the normal's slope is per facet).
+    assert errors[0, 0] > 30 * errors[-1, 0]
+    assert errors[0, 1] > 4 * errors[-1, 1]
+    assert errors[-1, 0] < 2e-3
+
+
+def test_reflection_on_request_and_its_fresnel_share() -> None:
+    scene = TriangleList(*prism())
+    n = float(glasses.index("N-BK7", glasses.D_NM))
+    ray = make_ray([-0.3, 0.1, 1.5], [0, 0, -1])  # starts inside, meets the base head-on
+    straight, mirrored = trace(ray, scene, [Index(n)]), trace(ray, scene, [Index(n)], reflect_at=[0], max_depth=0)
+    head_on = ((n - 1) / (n + 1)) ** 2
+    assert straight.landed and straight.transmittance == pytest.approx(1 - head_on, rel=1e-12)
+    assert mirrored.ray.direction == pytest.approx([0, 0, 1])
+    assert mirrored.transmittance == pytest.approx(head_on, rel=1e-12)
+    assert not mirrored.landed and mirrored.reflections == (True,)
+
+
+def closed_form(points: np.ndarray, p0: np.ndarray, v: np.ndarray, covariance: np.ndarray, band: tuple[float, float]) -> np.ndarray:
+    """The integral done by hand: along the sweep a difference of error functions, across it the Gaussian."""
+    from math import erf
+
+    lower = np.linalg.cholesky(covariance)
+    u, q = np.linalg.solve(lower, (points - p0).T).T, np.linalg.solve(lower, v)
+    speed = np.linalg.norm(q)
+    tau = u @ q / speed
+    across = np.exp(-0.5 * np.sum((u - np.outer(tau, q / speed)) ** 2, axis=1)) / (np.sqrt(2 * np.pi) * speed)
+    sweep = [0.5 * (erf((t - band[0] * speed) / 2**0.5) - erf((t - band[1] * speed) / 2**0.5)) for t in tau]
+    return across * sweep / np.abs(np.linalg.det(lower))
+
+
+def test_swept_gaussian_equals_the_closed_form_and_keeps_the_flux() -> None:
+    rng = RNG(5)
+    axes = rng.normal(size=(2, 2))
+    covariance = axes @ axes.T + 0.1 * np.eye(2)
+    p0, v, band = np.array([0.2, -0.1]), np.array([1.5, 0.7]), (-1.0, 1.5)
+    points = rng.uniform(-3, 3, (200, 2))
+    swept = swept_gaussian(points, p0, v, covariance, band)
+    np.testing.assert_allclose(swept, closed_form(points, p0, v, covariance, band), atol=1e-12)
+    x = np.linspace(-14, 14, 281)
+    grid = np.stack(np.meshgrid(x, x), -1)
+    assert swept_gaussian(grid, p0, v, covariance, band, nodes=40, pieces=2).sum() * 0.01 == pytest.approx(2.5, rel=1e-6)
+
+
+def test_texel_average_of_a_gaussian_is_a_difference_of_erfs() -> None:
+    from math import erf
+
+    average = texel_average(lambda p: gaussian(p, np.zeros(2), 0.04 * np.eye(2)), np.array([[0.3, 0.1]]), 1.0)
+    part = [0.5 * (erf((c + 0.5) / 0.2 / 2**0.5) - erf((c - 0.5) / 0.2 / 2**0.5)) for c in (0.3, 0.1)]
+    assert average[0] == pytest.approx(part[0] * part[1], rel=1e-8)
