@@ -11,7 +11,7 @@ import pytest
 
 PROCESS_BYTES = 3 << 30
 """Memory that one process of the tests may come to need, mostly for compiled programs that are kept (1.7 GB were seen)."""
-MOST_PROCESSES = 4
+MAX_PROCESSES = 4
 """More would wait for the longest files, and crowd a graphics card that all share."""
 
 
@@ -32,7 +32,7 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     if len(files) == 1 and Path(*files).is_file():
         return 0
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    workers = min(usable_cores(), memory // PROCESS_BYTES, MOST_PROCESSES)
+    workers = min(usable_cores(), memory // PROCESS_BYTES, MAX_PROCESSES)
     return workers if workers > 1 else 0
 
 

@@ -1,4 +1,4 @@
-"""One method of the eye half in one scene, ready to look again and again: what `bench --eye` times, and nothing else.
+"""One method of the camera pass in one scene, ready to look again and again: what `bench --eye` times, and nothing else.
 
 All methods look up the same caustic maps, which are made once and cost nothing here: they differ in how camera rays
 sample the spectrum. A rendering starts from nothing; what `srd` needs to choose the bands of its spectrum counts.
@@ -19,14 +19,14 @@ from ..model.features import Features
 from ..model.optics.colorimetry import rgb709_to_xyz
 from ..model.scene import Diffuse, Scene
 from ..model.settings import RenderSettings
-from ..passes.camera import CausticMaps, EyePass
+from ..passes.camera import CausticMaps, CameraPass
 from ..passes.spectrum_choice import Spectrum
-from ..render.light_pass import LightHalf, spectral_axis
+from ..render.light_pass import LightPass, spectral_axis
 from .rendering import NothingToMeasure, Rendering, Rig
 
 LIGHT_PHOTONS = 1 << 22
 """Photons of the caustic maps, traced by `srd`. In `ball_caustic` twice 2^20 photons change the picture by a relMSE of 2.6e-4, twice 2^18 by ten
-times that: with so many more, the maps' own error is far below what the eye's methods reach in the time."""
+times that: with so many more, the maps' own error is far below what the camera's methods reach in the time."""
 LIGHT_SEED = 1
 _TRIAL_SHARE = 0.25
 """A trial this long, as a share of the time given, tells the rate of the longest rendering."""
@@ -41,19 +41,19 @@ class SharedLight:
         self.channels = MapChannels()
         self.reflectances: Sequence[np.ndarray | None] = (None,)
         self.seconds = 0.0
-        self._light: LightHalf | None = None
+        self._light: LightPass | None = None
         if not scene.lights or not any(isinstance(o.material, Diffuse) for o in scene.objects):
             return
         started = time.perf_counter()
         settings = _settings(scene, "srd", width, height)
         features = Features.of(scene, settings)
         self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
-        self._light = light = LightHalf(context, scene, settings, features, self._buffers)
+        self._light = light = LightPass(context, scene, settings, features, self._buffers)
         light.prepare()
         light.begin(photons, LIGHT_SEED)
 
         def told(done: float) -> bool:
-            progress(f"light half, {100.0 * done:.0f} %")
+            progress(f"light pass, {100.0 * done:.0f} %")
             return True
 
         light.run_pass(0, photons, told)
@@ -61,7 +61,7 @@ class SharedLight:
         self.channels, self.reflectances = light.map_channels, light.reflectances
         self.maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
         context.finish()
-        context.check("the light half of the bench")
+        context.check("the light pass of the bench")
         self.seconds = time.perf_counter() - started
 
     def release(self) -> None:
@@ -71,26 +71,26 @@ class SharedLight:
             self._buffers.release()
 
 
-class EyeRig:
-    """Owns the eye's buffers and programs for one scene, method and picture size; the maps are `light`'s."""
+class CameraRig:
+    """Owns the camera's buffers and programs for one scene, method and picture size; the maps are `light`'s."""
 
     def __init__(self, context: Context, scene: Scene, method: str, width: int, height: int, light: SharedLight) -> None:
         """Raises `NothingToMeasure` where the camera cannot see through dispersive glass: all methods are the same then."""
         self._context, self._scene, self._size, self._light = context, scene, (width, height), light
         features = Features.of(scene, _settings(scene, method, width, height))
-        if not features.eye_disperses:
-            raise NothingToMeasure(f"scene '{scene.name}': the camera sees nothing through glass that disperses, so the eye's methods do not differ and there is nothing to measure")
+        if not features.camera_disperses:
+            raise NothingToMeasure(f"scene '{scene.name}': the camera sees nothing through glass that disperses, so the camera's methods do not differ and there is nothing to measure")
         started = time.perf_counter()
         self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
         buffered = self._finished()
-        self._eye = EyePass(context, self._buffers, "beauty", light.reflectances, light.channels)
+        self._camera_pass = CameraPass(context, self._buffers, "beauty", light.reflectances, light.channels)
         # Drivers put off part of the compiling until a program runs.
-        self._eye.run(scene.camera, width, height, 1, 0, light.maps)
-        if self._eye.chooses:
-            self._eye.may_be_single, self._eye.spectrum = True, Spectrum(single=True)
-            self._eye.run(scene.camera, width, height, 1, 0, light.maps)
+        self._camera_pass.run(scene.camera, width, height, 1, 0, light.maps)
+        if self._camera_pass.chooses:
+            self._camera_pass.may_be_single, self._camera_pass.spectrum = True, Spectrum(single=True)
+            self._camera_pass.run(scene.camera, width, height, 1, 0, light.maps)
         compiled = self._finished()
-        self.setup_seconds = {"light half": light.seconds, "buffers": buffered - started, "compile": compiled - buffered}
+        self.setup_seconds = {"light pass": light.seconds, "buffers": buffered - started, "compile": compiled - buffered}
         self.buffers_mib = self._buffers.bytes / 2**20
 
     def render(self, budget: int, seed: int) -> Rendering:
@@ -98,9 +98,9 @@ class EyeRig:
         started = self._finished()
         samples = self._choose(budget).samples(budget)
         chosen = self._finished()
-        self._eye.run(self._scene.camera, *self._size, samples, 0, self._light.maps, seed)
+        self._camera_pass.run(self._scene.camera, *self._size, samples, 0, self._light.maps, seed)
         looked = self._finished()
-        xyz = rgb709_to_xyz(self._eye.read_rgb().astype(np.float64))
+        xyz = rgb709_to_xyz(self._camera_pass.read_rgb().astype(np.float64))
         return Rendering(xyz, {"bands": chosen - started, "looks": looked - chosen}, samples, 0)
 
     def fitting(self, budget: int) -> int:
@@ -124,7 +124,7 @@ class EyeRig:
 
     def release(self) -> None:
         """Free everything on the device."""
-        self._eye.release()
+        self._camera_pass.release()
         self._buffers.release()
 
     def _seconds(self, budget: int) -> tuple[float, float, int]:
@@ -134,7 +134,7 @@ class EyeRig:
         return rendering.seconds["bands"], sum(rendering.seconds.values()), taken
 
     def _choose(self, samples: int) -> Spectrum:
-        return self._eye.choose_spectrum(self._scene.camera, *self._size, samples, self._light.maps)
+        return self._camera_pass.choose_spectrum(self._scene.camera, *self._size, samples, self._light.maps)
 
     def _finished(self) -> float:
         self._context.finish()
@@ -142,16 +142,16 @@ class EyeRig:
 
 
 @contextmanager
-def eye_rigs(context: Context, scene: Scene, methods: Sequence[str], width: int, height: int, progress: Callable[[str], None]) -> Iterator[dict[str, Rig]]:
-    """The eye half's rigs by method, freed at the end. Raises `NothingToMeasure`."""
+def camera_rigs(context: Context, scene: Scene, methods: Sequence[str], width: int, height: int, progress: Callable[[str], None]) -> Iterator[dict[str, Rig]]:
+    """The camera pass's rigs by method, freed at the end. Raises `NothingToMeasure`."""
     rigs: dict[str, Rig] = {}
     with ExitStack() as stack:
-        progress("preparing the light half")
+        progress("preparing the light pass")
         light = SharedLight(context, scene, width, height, progress)
         stack.callback(light.release)
         for method in methods:
             progress(f"preparing {method}")
-            rigs[method] = rig = EyeRig(context, scene, method, width, height, light)
+            rigs[method] = rig = CameraRig(context, scene, method, width, height, light)
             stack.callback(rig.release)
         yield rigs
 

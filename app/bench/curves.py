@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from ..reference.metrics import Truth, bias_variance
+from ..reference.metrics import ReferencePicture, bias_variance
 from .results import Curve, Point, Sample
 
 SMALLEST_ERROR = 1e-12
@@ -20,9 +20,9 @@ SMALLEST_ERROR = 1e-12
 CONFIDENCE = 0.95
 
 
-def make_point(samples: Sequence[Sample], mean_difference: np.ndarray, truth: Truth) -> Point:
+def make_point(samples: Sequence[Sample], mean_difference: np.ndarray, reference_image: ReferencePicture) -> Point:
     """All seeds of one photon budget; `mean_difference`: mean over them of I − R̂, XYZ (H, W, 3)."""
-    told_apart = bias_variance(mean_difference, [s.metrics["relmse_raw"] for s in samples], truth)
+    told_apart = bias_variance(mean_difference, [s.metrics["relmse_raw"] for s in samples], reference_image)
     single = [s.metrics["relmse"] for s in samples]
     return Point(
         samples[0].photons,
@@ -58,12 +58,12 @@ def tail_slope(samples: Sequence[Sample], budgets: Sequence[int]) -> tuple[float
     return slope, float(t.ppf(0.5 + CONFIDENCE / 2, freedom) * error)
 
 
-def complete_curve(curve: Curve, mean_differences: Mapping[int, np.ndarray], truth: Truth) -> None:
+def complete_curve(curve: Curve, mean_differences: Mapping[int, np.ndarray], reference_image: ReferencePicture) -> None:
     """Fill `curve.points` and its slope from its samples; budgets without a mean picture are left out."""
     by_budget: dict[int, list[Sample]] = {}
     for sample in curve.samples:
         by_budget.setdefault(sample.photons, []).append(sample)
-    curve.points = [make_point(by_budget[n], mean_differences[n], truth) for n in sorted(by_budget) if n in mean_differences]
+    curve.points = [make_point(by_budget[n], mean_differences[n], reference_image) for n in sorted(by_budget) if n in mean_differences]
     slope, half_width = tail_slope(curve.samples, curve.budgets)
     curve.slope, curve.slope_half_width = (slope, half_width) if np.isfinite(slope) else (0.0, 0.0)
 

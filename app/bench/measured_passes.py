@@ -1,6 +1,6 @@
-"""The two halves of the renderer that a bench measures, and the words, stages and demands that differ between them.
+"""The two passes of the renderer that a bench measures, and the words, stages and demands that differ between them.
 
-What one rendering costs is counted in photons for the light half and in camera samples a pixel for the eye half; all
+What one rendering costs is counted in photons for the light pass and in camera samples a pixel for the camera pass; all
 else that runner, claims and report do is the same for both.
 """
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Half:
+class MeasuredPass:
     """How one half is measured and spoken of."""
 
     key: str
@@ -55,7 +55,7 @@ class Half:
         return f"{budget:,} {self.each if budget == 1 else self.units}"
 
 
-LIGHT = Half(
+LIGHT = MeasuredPass(
     "light", "photons", "photons", "photon", "photon time",
     stages=("trace", "splat", "resolve"),
     counted=("trace", "splat"),  # putting the maps together is part of display, the same for every method
@@ -72,12 +72,12 @@ LIGHT = Half(
     bare_text="which has neither footprints nor bands: the texels of the maps, common to all methods",
 )  # fmt: skip
 
-EYE = Half(
-    "eye", "camera samples a pixel", "samples", "sample", "eye time",
+CAMERA = MeasuredPass(
+    "camera", "camera samples a pixel", "samples", "sample", "camera time",
     stages=("bands", "looks"),
     counted=("bands", "looks"),
     stage_names={"bands": "choosing the bands", "looks": "looking"},
-    setup=("light half", "buffers", "compile"),
+    setup=("light pass", "buffers", "compile"),
     uncounted=(),
     tick=(1e3, "ms"),
     asked_ratio=20.0,  # 1 second against 20 in the talk
@@ -89,6 +89,6 @@ EYE = Half(
     bare_text="which has neither columns nor bands: places within a pixel, caustic maps and the noise of the reference's caustic, common to all methods",
 )  # fmt: skip
 
-HALVES = {half.key: half for half in (LIGHT, EYE)}
+HALVES = {half.key: half for half in (LIGHT, CAMERA)}
 COUNTED_STAGES = frozenset(stage for half in HALVES.values() for stage in half.counted)
 """No name of a counted stage of one half is that of an uncounted one of the other."""

@@ -1,5 +1,5 @@
-"""One method in one scene, ready to render again and again: what the bench times, and nothing else. This is the light half's; the
-eye half's is `eye_rendering`.
+"""One method in one scene, ready to render again and again: what the bench times, and nothing else. This is the light pass's; the
+camera pass's is `camera_rendering`.
 
 Programs, buffers, pilot and maps are made once. Then each rendering starts from nothing with one lattice of the
 photons asked for. Times are wall clock between points where the device has finished, on software and GPU alike; on
@@ -23,8 +23,8 @@ from ..model.features import Features
 from ..model.optics.colorimetry import rgb709_to_xyz
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
-from ..passes.camera import CausticMaps, EyePass
-from ..render.light_pass import LightHalf, spectral_axis
+from ..passes.camera import CausticMaps, CameraPass
+from ..render.light_pass import LightPass, spectral_axis
 from ..render.still import DEFAULT_SAMPLES
 
 WARM_UP_PHOTONS = 2048
@@ -37,7 +37,7 @@ _TRIAL_GROWTH = 4
 
 
 class NothingToMeasure(UserError):
-    """The scene's caustic layer is black, or the eye sees nothing that methods differ in."""
+    """The scene's caustic layer is black, or the camera sees nothing that methods differ in."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,11 @@ class Rendering:
     xyz: np.ndarray
     """float64 (H, W, 3), linear XYZ of the layer that is measured, row 0 on top."""
     seconds: dict[str, float]
-    """The light half's: "plan", "trace", "splat", "resolve", "eye"; the eye half's: "bands", "looks"."""
+    """The light pass's: "plan", "trace", "splat", "resolve", "camera"; the camera pass's: "bands", "looks"."""
     emitted: int
     """Photons, or samples a pixel, that there really were."""
     splats: int
-    """0 for the eye half."""
+    """0 for the camera pass."""
 
 
 class Rig(Protocol):
@@ -75,7 +75,7 @@ class Rig(Protocol):
 
 @contextmanager
 def light_rigs(context: Context, scene: Scene, methods: Sequence[str], width: int, height: int, progress: Callable[[str], None]) -> Iterator[dict[str, Rig]]:
-    """The light half's rigs by method, freed at the end. Raises `NothingToMeasure`."""
+    """The light pass's rigs by method, freed at the end. Raises `NothingToMeasure`."""
     rigs: dict[str, Rig] = {}
     with ExitStack() as stack:
         for method in methods:
@@ -96,8 +96,8 @@ class MethodRig:
         started = time.perf_counter()
         self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
         buffered = self._finished()
-        self._light = LightHalf(context, scene, self._settings, features, self._buffers)
-        self._eye = EyePass(context, self._buffers, "caustic", self._light.reflectances)
+        self._light = LightPass(context, scene, self._settings, features, self._buffers)
+        self._camera_pass = CameraPass(context, self._buffers, "caustic", self._light.reflectances)
         compiled = self._finished()
         self._light.prepare()
         piloted = self._finished()
@@ -115,9 +115,9 @@ class MethodRig:
         started = time.perf_counter()
         light, settings = self._light, self._settings
         maps = CausticMaps(self._textures, light.receivers, light.atlas.placements, light.map_scale)
-        self._eye.run(self._scene.camera, settings.width, settings.height, DEFAULT_SAMPLES, 0, maps, seed)
-        xyz = rgb709_to_xyz(self._eye.read_rgb().astype(np.float64))
-        seconds["eye"] = time.perf_counter() - started
+        self._camera_pass.run(self._scene.camera, settings.width, settings.height, DEFAULT_SAMPLES, 0, maps, seed)
+        xyz = rgb709_to_xyz(self._camera_pass.read_rgb().astype(np.float64))
+        seconds["camera"] = time.perf_counter() - started
         return Rendering(xyz, seconds, light.stats.photons, light.stats.splats)
 
     def budgets(self, seconds: float, count: int) -> list[int]:
@@ -146,7 +146,7 @@ class MethodRig:
 
     def release(self) -> None:
         """Free everything on the device."""
-        self._eye.release()
+        self._camera_pass.release()
         self._light.release()
         self._buffers.release()
 

@@ -25,7 +25,7 @@ class BenchSettings(msgspec.Struct, frozen=True):
     """Most time that one run spends on a scene's reference; what earlier runs made is used as well."""
     half: str = "light"
     """Which half of the renderer is measured, a key of `halves.HALVES`. Below, what is said of photons and photon time holds for
-    camera samples a pixel and eye time where it is the eye's."""
+    camera samples a pixel and camera time where it is the camera's."""
 
 
 class Sample(msgspec.Struct, frozen=True):
@@ -37,8 +37,8 @@ class Sample(msgspec.Struct, frozen=True):
     emitted: int
     splats: int
     seconds: dict[str, float]
-    """By stage: `Half.stages`; and, not counted, the light half's "plan" (bands and spectral tables, once before a rendering) and
-    "eye" (display, the same for every method)."""
+    """By stage: `Half.stages`; and, not counted, the light pass's "plan" (bands and spectral tables, once before a rendering) and
+    "camera" (display, the same for every method)."""
     metrics: dict[str, float]
     """relmse, relmse_raw (the reference's own variance left in), relmse_trimmed, relmse_whole (ε from the whole picture's mean),
     smape, chroma, nrmse, energy_ratio (Σ picture / Σ reference); "flip" for the equal-time pictures alone. See `metrics`."""
@@ -70,7 +70,7 @@ class Curve(msgspec.Struct):
     method: str
     setup_seconds: dict[str, float]
     """Once per scene and not in photon time: "buffers" (tree and uploads), "compile", "pilot", "warm-up" (a small
-    rendering, in which drivers finish compiling); "light half" (the caustic maps that all eyes look up)."""
+    rendering, in which drivers finish compiling); "light pass" (the caustic maps that all eyes look up)."""
     samples: list[Sample]
     budgets: list[int] = []
     """Photons of each point, from the rate that a first trial had; the same for every seed."""
@@ -93,7 +93,7 @@ class ReferenceInfo(msgspec.Struct):
     key: str
     """Hash of scene content, camera and size: the cache's key."""
     caustic_photons: int = 0
-    """Photons of the caustic that the eye's reference looks up; 0: there is none in it."""
+    """Photons of the caustic that the camera's reference looks up; 0: there is none in it."""
     caustic_relmse: float = 0.0
     """What the caustic's noise adds to the picture's relMSE, about: a part of `relmse`."""
 

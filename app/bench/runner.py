@@ -14,7 +14,7 @@ from ..base.errors import UserError
 from ..gpu.context import Context
 from ..model.scene import Dielectric, Scene
 from ..reference import metrics
-from ..reference.metrics import Truth
+from ..reference.metrics import ReferencePicture
 from .claims import claims_of, ratios_of
 from .curves import budget_at_time, complete_curve
 from .measured_passes import HALVES
@@ -84,7 +84,7 @@ class _SceneBench:
             return
         make = self._subject.rigs
         with make(self._context, self._scene, settings.methods, *self._size, lambda text: self._progress(0.0, text)) as rigs:
-            self._truth = self._reference()
+            self._reference_image = self._reference()
             self._set_budgets(rigs)
             for number in range(settings.seeds):
                 turn = number % len(rigs)
@@ -99,22 +99,22 @@ class _SceneBench:
         self._store.save()
         self._store.drop_partial(result)
 
-    def _reference(self) -> Truth:
-        """The truth that this scene's samples are measured against: one and the same, also over interruptions."""
+    def _reference(self) -> ReferencePicture:
+        """The reference that this scene's samples are measured against: one and the same, also over interruptions."""
         result, store = self._result, self._store
-        kept = store.load_truth(result.scene)
+        kept = store.load_reference(result.scene)
         if kept is not None and result.reference is not None and kept.xyz.shape[:2] == (self._size[1], self._size[0]):
             return kept
-        truth, result.reference = self._subject.truth(
+        reference_image, result.reference = self._subject.reference_image(
             self._scene, *self._size, self._settings.reference_seconds, lambda fraction, text: self._progress(_REFERENCE_SHARE * fraction, f"reference {text}")
         )
         # What was measured against another reference cannot be gone on from.
         result.curves = []
-        store.save_truth(result.scene, truth)
-        result.pictures["reference"] = store.save_picture(result.scene, "reference", truth.xyz)
+        store.save_reference(result.scene, reference_image)
+        result.pictures["reference"] = store.save_picture(result.scene, "reference", reference_image.xyz)
         store.put_scene(result)
         store.save()
-        return truth
+        return reference_image
 
     def _set_budgets(self, rigs: Mapping[str, Rig]) -> None:
         """Budgets of the methods that have none yet."""
@@ -129,10 +129,10 @@ class _SceneBench:
 
     def _measure_seed(self, rig: Rig, curve: Curve, seed: int, done: float) -> None:
         """All budgets of one method and seed, unless results.json has them already."""
-        store, result, truth = self._store, self._result, self._truth
+        store, result, reference_image = self._store, self._result, self._reference_image
         if any(sample.seed == seed for sample in curve.samples):
             return
-        earlier = store.load_sums(result.scene, curve.method, seed - 1) if seed > 1 else np.zeros((len(curve.budgets), *truth.xyz.shape), np.float32)
+        earlier = store.load_sums(result.scene, curve.method, seed - 1) if seed > 1 else np.zeros((len(curve.budgets), *reference_image.xyz.shape), np.float32)
         if earlier is None:
             raise UserError(f"{store.directory}/partial has lost what going on with '{result.scene}' needs: give --fresh to begin anew")
         sums, samples = earlier, []
@@ -141,10 +141,10 @@ class _SceneBench:
             self._progress(_REFERENCE_SHARE + (1.0 - _REFERENCE_SHARE) * done + step * i / len(curve.budgets), f"{curve.method}, seed {seed} of {self._settings.seeds}")
             rendering = rig.render(budget, seed)
             samples.append(self._sample(rendering, curve.method, budget, seed))
-            sums[i] += rendering.xyz - truth.xyz
+            sums[i] += rendering.xyz - reference_image.xyz
         store.save_sums(result.scene, curve.method, seed, sums)
         curve.samples.extend(samples)
-        complete_curve(curve, {n: sums[i].astype(np.float64) / seed for i, n in enumerate(curve.budgets)}, truth)
+        complete_curve(curve, {n: sums[i].astype(np.float64) / seed for i, n in enumerate(curve.budgets)}, reference_image)
         self._judge()
         store.save()
         store.drop_sums(result.scene, curve.method, seed - 1)
@@ -152,7 +152,7 @@ class _SceneBench:
     def _sample(self, rendering: Rendering, method: str, budget: int, seed: int) -> Sample:
         if not np.isfinite(rendering.xyz).all():
             raise RuntimeError(f"{method} gave a picture with numbers that are not finite ({self._result.scene}, {budget} {HALVES[self._result.half].units}, seed {seed})")
-        return Sample(budget, seed, rendering.emitted, rendering.splats, rendering.seconds, metrics.measure(rendering.xyz, self._truth))
+        return Sample(budget, seed, rendering.emitted, rendering.splats, rendering.seconds, metrics.measure(rendering.xyz, self._reference_image))
 
     def _judge(self) -> None:
         """What all curves so far say about each other."""
@@ -175,7 +175,7 @@ class _SceneBench:
             if budget not in made:
                 rendering = rig.render(budget, 1)
                 made[budget] = rendering, self._sample(rendering, method, budget, 1)
-                look = metrics.flip(rendering.xyz, self._truth)
+                look = metrics.flip(rendering.xyz, self._reference_image)
                 if look is not None:
                     made[budget][1].metrics["flip"] = look
             rendering, sample = made[budget]

@@ -103,7 +103,7 @@ def _trace_rates(context: Context) -> tuple[float, float]:
 
 
 def _tree_seconds() -> float:
-    """Time of a build, not of a look-up in the cache: the ball is turned a little each time."""
+    """Time of a build, not of a lookup in the cache: the ball is turned a little each time."""
     corners = primitives_round.sphere(1.0, triangles=TRIANGLES).corners()
     times = []
     for repeat in range(3):

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.atomic import atomic_output, check_writable
 from ..base.errors import UserError
-from ..reference.metrics import Truth
+from ..reference.metrics import ReferencePicture
 from .results import BenchResult, BenchSettings, SceneResult
 
 RESULTS = "results.json"
@@ -75,14 +75,14 @@ class Store:
         self._save_array(self.directory / relative, xyz.astype(np.float32))
         return relative
 
-    def save_truth(self, scene: str, truth: Truth) -> None:
+    def save_reference(self, scene: str, reference_image: ReferencePicture) -> None:
         """Keep the very reference that the samples are measured against."""
-        self._save_array(self._truth_path(scene), np.stack([truth.xyz, truth.variance]))
+        self._save_array(self._reference_path(scene), np.stack([reference_image.xyz, reference_image.variance]))
 
-    def load_truth(self, scene: str) -> Truth | None:
+    def load_reference(self, scene: str) -> ReferencePicture | None:
         """The reference of a scene under way."""
-        stored = _load_array(self._truth_path(scene))
-        return None if stored is None else Truth(stored[0], stored[1])
+        stored = _load_array(self._reference_path(scene))
+        return None if stored is None else ReferencePicture(stored[0], stored[1])
 
     def save_sums(self, scene: str, method: str, seeds: int, sums: np.ndarray) -> None:
         """Keep Σ (I − R̂) over the first `seeds` seeds, float32 (budgets, H, W, 3). Earlier sums stay until `drop_sums`."""
@@ -98,7 +98,7 @@ class Store:
 
     def drop_partial(self, scene: SceneResult) -> None:
         """Forget all that only going on with `scene` needs."""
-        self._truth_path(scene.scene).unlink(missing_ok=True)
+        self._reference_path(scene.scene).unlink(missing_ok=True)
         for curve in scene.curves:
             for seeds in range(scene.seeds + 1):
                 self.drop_sums(scene.scene, curve.method, seeds)
@@ -109,7 +109,7 @@ class Store:
     def _partial(self) -> Path:
         return self.directory / PARTIAL
 
-    def _truth_path(self, scene: str) -> Path:
+    def _reference_path(self, scene: str) -> Path:
         return self._partial / f"{scene}.reference.npy"
 
     def _sums_path(self, scene: str, method: str, seeds: int) -> Path:

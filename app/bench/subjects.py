@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 from ..gpu.context import Context
 from ..model.scene import Scene
-from ..reference.metrics import Truth
-from .camera_rendering import eye_rigs
-from .reference_picture import eye_truth_key, make_eye_truth, make_truth, truth_key
+from ..reference.metrics import ReferencePicture
+from .camera_rendering import camera_rigs
+from .reference_picture import camera_reference_key, make_camera_reference, make_reference, reference_key
 from .rendering import Rig, light_rigs
 from .results import ReferenceInfo
 
 Progress = Callable[[float, str], None]
 RigMaker = Callable[[Context, Scene, Sequence[str], int, int, Callable[[str], None]], AbstractContextManager[Mapping[str, Rig]]]
-TruthMaker = Callable[[Scene, int, int, float, Progress], tuple[Truth, ReferenceInfo]]
+ReferenceMaker = Callable[[Scene, int, int, float, Progress], tuple[ReferencePicture, ReferenceInfo]]
 KeyMaker = Callable[[Scene, int, int], str]
 
 
@@ -26,13 +26,13 @@ class Subject:
 
     rigs: RigMaker
     """(context, scene, methods, width, height, progress) → every method's rig, as long as the context lasts."""
-    truth: TruthMaker
+    reference_image: ReferenceMaker
     """(scene, width, height, seconds, progress) → the reference, with so many seconds added to what is kept of it."""
     key: KeyMaker
     """(scene, width, height) → hash of everything that the reference depends on."""
 
 
 SUBJECTS = {
-    "light": Subject(light_rigs, make_truth, truth_key),
-    "eye": Subject(eye_rigs, make_eye_truth, eye_truth_key),
+    "light": Subject(light_rigs, make_reference, reference_key),
+    "camera": Subject(camera_rigs, make_camera_reference, camera_reference_key),
 }

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from ..base.errors import UserError, suggestion
 from ..bench.results import DEFAULT_METHODS, BenchResult, BenchSettings
-from ..model.settings import EYE_METHODS, METHODS
+from ..model.settings import CAMERA_METHODS, METHODS
 from . import options as options
 
 if TYPE_CHECKING:
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 MAX_SEEDS = 1000
 MAX_SECONDS = 3600.0
-EYE_SECONDS = 20.0
-"""Time of the largest rendering where the eye is measured and nothing else was asked for: the talk's stochastic picture had as much."""
-EYE_SCENES = ("prism_edge", "lens_text", "brilliant_studio", "ball_caustic")
+CAMERA_SECONDS = 20.0
+"""Time of the largest rendering where the camera is measured and nothing else was asked for: the talk's stochastic picture had as much."""
+CAMERA_SCENES = ("prism_edge", "lens_text", "brilliant_studio", "ball_caustic")
 """Shipped scenes that are about what is seen through glass; `bench --eye` without names measures these."""
 
 
@@ -41,19 +41,19 @@ class BenchRequest:
     reference_seconds: str | None = None
     features: str | None = None
     fresh: bool = False
-    eye: bool = False
+    camera_pass: bool = False
 
 
 def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
     """Run the bench; returns the exit code. Raises `UserError`."""
     if request.features is not None:
-        if request.eye:
+        if request.camera_pass:
             raise UserError("--features and --eye exclude each other: give one of them")
         return _features(request)
     if request.output is None:
         raise UserError("bench needs a folder for what it finds: give one with -o DIR")
     settings = parse_settings(request)
-    scenes = load_scenes(request.scenes or (EYE_SCENES if request.eye else ()))
+    scenes = load_scenes(request.scenes or (CAMERA_SCENES if request.camera_pass else ()))
 
     from ..base.progress import ProgressReporter
     from ..bench.machine import machine
@@ -79,8 +79,8 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
 def parse_settings(request: BenchRequest) -> BenchSettings:
     """The options checked, with defaults where nothing was said."""
     asked: dict[str, Any] = {}
-    if request.eye:
-        asked |= {"half": "eye", "seconds": EYE_SECONDS, "methods": tuple(name for name in DEFAULT_METHODS if name in EYE_METHODS)}
+    if request.camera_pass:
+        asked |= {"half": "camera", "seconds": CAMERA_SECONDS, "methods": tuple(name for name in DEFAULT_METHODS if name in CAMERA_METHODS)}
     if request.seconds is not None:
         asked["seconds"] = _seconds("--seconds", request.seconds)
     if request.reference_seconds is not None:
@@ -88,7 +88,7 @@ def parse_settings(request: BenchRequest) -> BenchSettings:
     if request.seeds is not None:
         asked["seeds"] = options.parse_integer("--seeds", request.seeds, 1, MAX_SEEDS)
     if request.methods is not None:
-        asked["methods"] = parse_methods(request.methods, EYE_METHODS if request.eye else METHODS)
+        asked["methods"] = parse_methods(request.methods, CAMERA_METHODS if request.camera_pass else METHODS)
     if request.size is not None:
         asked["size"] = options.parse_size(request.size)
         options.check_picture_memory(*asked["size"], None)
@@ -112,7 +112,7 @@ def parse_methods(text: str, known: Sequence[str] = METHODS) -> tuple[str, ...]:
         for name in ("regular-7", "regular-16") if part == "regular" else (part,):
             if name not in known:
                 hint = suggestion(name, known)
-                what = "is a method of the light half alone" if name in METHODS else "is unknown"
+                what = "is a method of the light pass alone" if name in METHODS else "is unknown"
                 raise UserError(f"--methods '{name}' {what}{hint or ','} known are {', '.join(known)}")
             if name not in names:
                 names.append(name)
@@ -145,7 +145,7 @@ def repeat_command(scenes: Sequence[str], request: BenchRequest) -> str:
         "--size": request.size,
         "--reference-seconds": request.reference_seconds,
     }
-    words = ["spectrasplat", "bench", *(["--eye"] if request.eye else []), *(request.scenes or scenes), "-o", request.output.name if request.output else ""]
+    words = ["spectrasplat", "bench", *(["--eye"] if request.camera_pass else []), *(request.scenes or scenes), "-o", request.output.name if request.output else ""]
     for option, value in given.items():
         words += [] if value is None else [option, value]
     return shlex.join(words)

@@ -50,7 +50,7 @@ def describe(entry: Entry) -> str:
     glass = entry.dispersion
     n_f, n_c = float(glass.index(LINE_F_NM)), float(glass.index(LINE_C_NM))
     lines = [entry.qualified_name]
-    facts = {
+    view_model = {
         "maker": entry.maker if entry.maker != "Materials" else "",
         "also called": ", ".join(entry.aliases),
         "status": entry.status,
@@ -65,7 +65,7 @@ def describe(entry: Entry) -> str:
         "source": entry.source,
         "licence": LICENCE,
     }
-    lines += [f"  {label:<17}{value}" for label, value in facts.items() if value]
+    lines += [f"  {label:<17}{value}" for label, value in view_model.items() if value]
     lines.append("  formula (λ in µm)")
     lines += [f"    {row}" for row in glass.formula_text().splitlines()]
     lines += [f"  note: {note}" for note in glass.notes()]

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..bench.features.static_costs import picture_bytes, size_words
-from ..gpu.map_channels import hats
+from ..gpu.map_channels import tents
 from ..gpu.mip_chain import level_count
 from ..model.features import Features
 from ..model.scene import Diffuse, Scene
@@ -16,7 +16,7 @@ from ..render.light_pass import spectral_axis
 _FILTER = "interpolated, the level by the footprint, more looks along a long one"
 
 
-class LookUp(NamedTuple):
+class Lookup(NamedTuple):
     """One thing that camera rays look up, in words."""
 
     what: str
@@ -26,31 +26,31 @@ class LookUp(NamedTuple):
     """On the device; "" for nothing worth telling."""
 
 
-def look_ups(scene: Scene, features: Features) -> list[LookUp]:
+def lookups(scene: Scene, features: Features) -> list[Lookup]:
     """Everything that camera rays look up, and what they do without."""
     return [_beyond(scene), *_pictures(scene), _maps(scene, features), _spectrum(features)]
 
 
-def _beyond(scene: Scene) -> LookUp:
+def _beyond(scene: Scene) -> Lookup:
     if scene.environment is None:
         colour = ", ".join(f"{c:.3g}" for c in scene.background_rgb)
         content = f"one colour ({colour}) lm/(sr unit²)" if any(scene.background_rgb) else "black"
-        return LookUp("background", content, "no picture: the look-up is left out", "")
+        return Lookup("background", content, "no picture: the lookup is left out", "")
     kind, source = scene.environment.kind, scene.environment.source
     content = f"{kind}{f' {Path(source).name}' if source else ''}, {_size(scene.environment)}"
-    return LookUp("environment", content, f"on the sphere, {_FILTER}", picture_words(scene.environment))
+    return Lookup("environment", content, f"on the sphere, {_FILTER}", picture_words(scene.environment))
 
 
-def _pictures(scene: Scene) -> list[LookUp]:
+def _pictures(scene: Scene) -> list[Lookup]:
     worn: dict[int, tuple[Texture, list[str]]] = {}
     for item in scene.objects:
         texture = item.material.texture if isinstance(item.material, Diffuse) else None
         if texture is not None:
             worn.setdefault(id(texture.rgb), (texture, []))[1].append(item.name)
     if not worn:
-        return [LookUp("textures", "none", "no surface wears a picture: the look-up is left out", "")]
+        return [Lookup("textures", "none", "no surface wears a picture: the lookup is left out", "")]
     return [
-        LookUp(
+        Lookup(
             "texture",
             f"{Path(texture.source).name if texture.source else '(no file)'}, {_size(texture)}, on {', '.join(names)}",
             f"{'repeats' if texture.wrap == 'repeat' else 'its border goes on'}; {_FILTER}",
@@ -60,28 +60,28 @@ def _pictures(scene: Scene) -> list[LookUp]:
     ]
 
 
-def _maps(scene: Scene, features: Features) -> LookUp:
+def _maps(scene: Scene, features: Features) -> Lookup:
     if not scene.lights or not any(isinstance(o.material, Diffuse) for o in scene.objects):
         why = "there is no light" if not scene.lights else "nothing diffuse receives light"
-        return LookUp("caustic maps", "none", why, "")
-    if not features.map_hats:
-        why = "all wavelengths of a ray meet at one place" if features.eye_specular else "caustics are seen directly"
-        return LookUp("caustic maps", "XYZ and W", f"no spectra: {why}", "16 B a texel")
-    peaks = hats(spectral_axis(scene, features), features.map_hats).hats_nm
-    content = f"XYZ and W, hats at {', '.join(f'{nm:.0f}' for nm in peaks)} nm"
-    return LookUp("caustic maps", content, "each wavelength looks elsewhere behind dispersive glass; straight views take XYZ", f"{16 * features.targets} B a texel")
+        return Lookup("caustic maps", "none", why, "")
+    if not features.map_tents:
+        why = "all wavelengths of a ray meet at one place" if features.camera_specular else "caustics are seen directly"
+        return Lookup("caustic maps", "XYZ and W", f"no spectra: {why}", "16 B a texel")
+    peaks = tents(spectral_axis(scene, features), features.map_tents).tents_nm
+    content = f"XYZ and W, tents at {', '.join(f'{nm:.0f}' for nm in peaks)} nm"
+    return Lookup("caustic maps", content, "each wavelength looks elsewhere behind dispersive glass; straight views take XYZ", f"{16 * features.targets} B a texel")
 
 
-def _spectrum(features: Features) -> LookUp:
-    if not features.eye_disperses:
-        return LookUp("spectrum", "one stretch", "no dispersive glass is in view: one look a place", "")
+def _spectrum(features: Features) -> Lookup:
+    if not features.camera_disperses:
+        return Lookup("spectrum", "one stretch", "no dispersive glass is in view: one look a place", "")
     if features.random_wavelength:
-        return LookUp("spectrum", "one wavelength a sample behind glass", f"drawn anew for each ({features.method})", "")
+        return Lookup("spectrum", "one wavelength a sample behind glass", f"drawn anew for each ({features.method})", "")
     if features.point_spectrum:
-        return LookUp("spectrum", f"{features.method.removeprefix('regular-')} wavelengths in turn", f"evenly spaced ({features.method})", "")
+        return Lookup("spectrum", f"{features.method.removeprefix('regular-')} wavelengths in turn", f"evenly spaced ({features.method})", "")
     if features.merged_groups:
-        return LookUp("spectrum", "one band", f"swept along its columns ({features.method})", "")
-    return LookUp("spectrum", "bands", f"as many as a small picture of the view asks for, each swept along its columns ({features.method})", "")
+        return Lookup("spectrum", "one band", f"swept along its columns ({features.method})", "")
+    return Lookup("spectrum", "bands", f"as many as a small picture of the view asks for, each swept along its columns ({features.method})", "")
 
 
 def picture_words(picture: Texture | Environment) -> str:

@@ -164,14 +164,14 @@ def _compiled(scene: Scene) -> list[RenderableType]:
     table = _table("Compiled into the programs", ("part", False), ("", False), ("why", False), ("costs", False))
     for name, included, reason in explain(scene, features):
         table.add_row(name, "in" if included else "out", reason, costs.get(name, ""))
-    return [table, f"{RecordSizes.of(features).words()} What each part costs in time: bench --features.", _look_ups_table(scene, features)]
+    return [table, f"{RecordSizes.of(features).words()} What each part costs in time: bench --features.", _lookups_table(scene, features)]
 
 
-def _look_ups_table(scene: Scene, features: Features) -> Table:
-    from .inspect_camera import look_ups
+def _lookups_table(scene: Scene, features: Features) -> Table:
+    from .inspect_camera import lookups
 
     table = _table("Looked up by camera rays", ("what", False), ("content", False), ("how", False), ("memory", False))
-    for row in look_ups(scene, features):
+    for row in lookups(scene, features):
         table.add_row(*row)
     return table
 

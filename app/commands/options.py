@@ -13,7 +13,7 @@ from pathlib import Path
 from ..base.errors import UserError, nearest_names, suggestion
 from ..base.paths import assets_dir
 from ..model.scene import Diffuse, Scene
-from ..model.settings import EYE_METHODS, METHODS
+from ..model.settings import CAMERA_METHODS, METHODS
 
 MAX_SIDE_PX = 16384
 """Largest texture side OpenGL 4.3 promises."""
@@ -112,11 +112,11 @@ def parse_method(text: str) -> str:
     return text
 
 
-def parse_eye_method(text: str) -> str:
+def parse_camera_method(text: str) -> str:
     """One of those that camera rays may follow."""
-    if text not in EYE_METHODS:
-        hint = suggestion(text, EYE_METHODS)
-        raise UserError(f"--eye-method '{text}' is unknown{hint or ','} known are {', '.join(EYE_METHODS)}")
+    if text not in CAMERA_METHODS:
+        hint = suggestion(text, CAMERA_METHODS)
+        raise UserError(f"--eye-method '{text}' is unknown{hint or ','} known are {', '.join(CAMERA_METHODS)}")
     return text
 
 

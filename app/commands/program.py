@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 
 from .. import __version__
 from ..base.errors import UserError
-from ..model.settings import EYE_METHODS, METHODS
+from ..model.settings import CAMERA_METHODS, METHODS
 from . import options as options
 
 
@@ -90,7 +90,7 @@ def render(
     seconds: Annotated[Text, typer.Option(metavar="S", help="Emit photons for this long instead.")] = None,
     seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
     method: Annotated[Text, typer.Option(metavar="NAME", help=f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.")] = None,
-    eye_method: Annotated[Text, typer.Option("--eye-method", metavar="NAME", help=f"The same for the camera's rays: {', '.join(EYE_METHODS)}; default: as --method.")] = None,
+    camera_method: Annotated[Text, typer.Option("--eye-method", metavar="NAME", help=f"The same for the camera's rays: {', '.join(CAMERA_METHODS)}; default: as --method.")] = None,
     layer: Annotated[Text, typer.Option(metavar="LAYER", help="beauty (default), caustic, or map:RECEIVER.")] = None,
     bins: Annotated[Text, typer.Option(metavar="N", help=f"Keep {options.MIN_BINS} to {options.MAX_BINS} spectral bins (written to .exr).")] = None,
     exposure: Annotated[Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than automatic; .png only.")] = None,
@@ -103,7 +103,7 @@ def render(
     from .render import RenderRequest, render_command
 
     request = RenderRequest(
-        scene, output, size, photons, seconds, seed, method, eye_method, layer, bins, exposure, max_depth, spp, batch, stats
+        scene, output, size, photons, seconds, seed, method, camera_method, layer, bins, exposure, max_depth, spp, batch, stats
     )
     raise typer.Exit(render_command(request))
 
@@ -204,12 +204,12 @@ def bench(
     reference_seconds: Annotated[Text, typer.Option("--reference-seconds", metavar="S", help="Time added to each scene's cached reference; default: 60.")] = None,
     features: Annotated[Text, typer.Option(metavar="SCENE", help="Measure instead what each feature of the programs costs in this scene.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Begin anew instead of going on from what DIR holds.")] = False,
-    eye: Annotated[bool, typer.Option("--eye", help="Measure the camera's half, by samples a pixel, instead of the light's by photons.")] = False,
+    camera_pass: Annotated[bool, typer.Option("--eye", help="Measure the camera's half, by samples a pixel, instead of the light's by photons.")] = False,
 ) -> None:
     """Measure every method's error against its run time, and write a report."""
     from .bench import BenchRequest, bench_command
 
-    request = BenchRequest(tuple(scenes or ()), output, seconds, seeds, methods, size, reference_seconds, features, fresh, eye)
+    request = BenchRequest(tuple(scenes or ()), output, seconds, seeds, methods, size, reference_seconds, features, fresh, camera_pass)
     raise typer.Exit(bench_command(request, _print))
 
 

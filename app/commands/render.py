@@ -34,7 +34,7 @@ class RenderRequest:
     seconds: str | None = None
     seed: str | None = None
     method: str | None = None
-    eye_method: str | None = None
+    camera_method: str | None = None
     layer: str | None = None
     bins: str | None = None
     exposure: str | None = None
@@ -96,7 +96,7 @@ def _parse(request: RenderRequest) -> dict[str, Any]:
         "seconds": (request.seconds, options.parse_seconds),
         "seed": (request.seed, _integer("--seed", 0, options.MAX_SEED)),
         "method": (request.method, options.parse_method),
-        "eye_method": (request.eye_method, options.parse_eye_method),
+        "camera_method": (request.camera_method, options.parse_camera_method),
         "layer": (request.layer, str),
         "bins": (request.bins, _integer("--bins", options.MIN_BINS, options.MAX_BINS)),
         "exposure_ev": (request.exposure, options.parse_exposure),

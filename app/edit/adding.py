@@ -11,7 +11,7 @@ from ..model.features import world_bounds
 from ..model.optics import catalogue
 from ..model.scene import Dielectric, Diffuse, Material, Scene, SceneObject
 from ..model.scene_checks import check_scene
-from ..model.scene_defaults import bounds_of, surroundings_of
+from ..model.scene_defaults import bounds_of, environment_of
 from ..model.scene_materials import DEFAULT_GLASS
 from ..model.scene_objects import make_shape
 from .names import free_name
@@ -36,7 +36,7 @@ def add_object(scene: Scene, shape: str) -> Scene:
     name = free_name(shape.replace("_", " "), [o.name for o in scene.objects])
     item = SceneObject(name, make_shape(shape), material)
     low, high = item.mesh.bounds()
-    around = surroundings_of(scene.objects)
+    around = environment_of(scene.objects)
     scale = (8.0 if receiver else 1.2) * around.radius / float(np.linalg.norm(high - low))
     matrix = np.eye(4)
     matrix[:3, :3] = up_frame(scene) * scale
@@ -76,7 +76,7 @@ def beside(scene: Scene, item: SceneObject) -> SceneObject:
 def _standing(scene: Scene, item: SceneObject, below: bool) -> SceneObject:
     """`item` with its lowest point where the other objects have theirs, or a hair below that."""
     up = up_frame(scene)[:, 2]
-    around = surroundings_of(scene.objects)
+    around = environment_of(scene.objects)
     floor = min(float(corner @ up) for corner in bounds_of([o for o in scene.objects if not isinstance(o.material, Diffuse)] or scene.objects))
     lowest = float((item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]).dot(up).min())
     # As for the default table: two surfaces must not coincide.

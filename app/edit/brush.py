@@ -20,7 +20,7 @@ SPACING = 0.25
 """Between dabs, radii."""
 FIRST_TOUCH_S = 0.1
 """What a mere click is worth, seconds of painting."""
-LEAST_RADIUS, MOST_RADIUS = 1e-3, 0.5
+MIN_RADIUS, MAX_RADIUS = 1e-3, 0.5
 """Of the brush, as shares of the picture's height at the cursor's distance."""
 RADIUS_STEP = 1.15
 LABEL = "Brush dispersion"
@@ -54,7 +54,7 @@ def mode_held(brush: Brush, shift: bool, ctrl: bool) -> Brush:
 
 def resized(brush: Brush, steps: float, visible_height: float) -> Brush:
     """With a radius larger by `steps` notches, kept usable for a picture that shows `visible_height` scene units."""
-    radius = float(np.clip(brush.radius * RADIUS_STEP**steps, LEAST_RADIUS * visible_height, MOST_RADIUS * visible_height))
+    radius = float(np.clip(brush.radius * RADIUS_STEP**steps, MIN_RADIUS * visible_height, MAX_RADIUS * visible_height))
     return replace(brush, radius=radius)
 
 

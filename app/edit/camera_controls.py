@@ -25,7 +25,7 @@ ZOOM_STEP = 0.88
 FAST, SLOW = 4.0, 0.25
 """Flying with Shift, with Ctrl."""
 FRAME_MARGIN = 1.12
-_LEAST_DISTANCE = 1e-4
+_MIN_DISTANCE = 1e-4
 """Share of the pivot's distance that a zoom may come near in one step."""
 
 
@@ -94,7 +94,7 @@ def zoom_to(camera: Camera, amount: float, cursor: tuple[float, float] = (0.5, 0
         hit = view.on_plane(*cursor, np.asarray(camera.target, float), view.forward)
     focus = np.asarray(camera.target if hit is None else hit, float)
     position = focus + factor * (view.position - focus)
-    distance = max(view.target_distance * factor, _LEAST_DISTANCE * view.target_distance)
+    distance = max(view.target_distance * factor, _MIN_DISTANCE * view.target_distance)
     return replace(camera, position=_vec3(position), target=_vec3(position + distance * view.forward))
 
 

@@ -11,7 +11,7 @@ from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, illuminant_tabl
 
 
 @dataclass(frozen=True)
-class ColourFacts:
+class ColourInfo:
     """Of one spectrum."""
 
     illuminance: float
@@ -26,7 +26,7 @@ class ColourFacts:
     """Excitation purity: distance from white over that of the border."""
 
 
-def colour_facts(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> ColourFacts | None:
+def colour_info(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> ColourInfo | None:
     """Colour of `spectrum` (n,) at bin centres `wavelengths_nm` (n,), evenly spaced; None when it is dark."""
     at = np.asarray(wavelengths_nm, float)
     density = np.asarray(spectrum, float)
@@ -38,7 +38,7 @@ def colour_facts(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> ColourFact
         return None
     x, y = float(xyz[0] / total), float(xyz[1] / total)
     dominant, is_complementary, purity = _dominant(x, y)
-    return ColourFacts(K_M * float(xyz[1]), x, y, dominant, is_complementary, purity)
+    return ColourInfo(K_M * float(xyz[1]), x, y, dominant, is_complementary, purity)
 
 
 @cache

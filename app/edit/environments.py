@@ -16,7 +16,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..model.environment import from_map, gradient, sky, up_and_rotation, world_to_local
 from ..model.scene import Diffuse, Light, Scene, Vec3
-from ..model.scene_defaults import surroundings_of
+from ..model.scene_defaults import environment_of
 from ..model.scene_textures import TextureReader
 from ..model.texture import Environment, Texture
 
@@ -31,17 +31,17 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _ZENITH, _HORIZON, _NADIR = (0.25, 0.45, 0.9), (0.9, 0.95, 1.0), (0.2, 0.18, 0.16)
 
 
-def surroundings_kind(scene: Scene) -> str:
+def environment_kind(scene: Scene) -> str:
     """ "constant", "gradient", "sky" or "map"."""
     return "constant" if scene.environment is None else scene.environment.kind
 
 
-def set_surroundings_kind(scene: Scene, kind: str) -> Scene:
+def set_environment_kind(scene: Scene, kind: str) -> Scene:
     """A plain background, a first gradient or a first sky as bright as suits the scene's lights. A map wants a file: `set_environment_map`.
 
     Raises UserError where the environment is all that there is to be seen.
     """
-    if kind == surroundings_kind(scene):
+    if kind == environment_kind(scene):
         return scene
     if kind == "constant":
         return _without_environment(scene)
@@ -209,7 +209,7 @@ def _illuminance(light: Light, scene: Scene) -> float:
     power = light.spectral_power.luminous()
     if light.kind in ("directional", "collimated"):
         return power
-    around = surroundings_of(scene.objects)
+    around = environment_of(scene.objects)
     distance2 = float(np.sum((around.centre - np.array(light.position)) ** 2)) + around.radius**2
     area = 1.0 if light.kind != "area" else math.pi * light.radius**2 if light.shape == "disc" else light.width * light.height
     return power * area / distance2

@@ -60,7 +60,7 @@ class History:
         """One step back, if there is one; returns the present."""
         return self.go_to(max(self._at - 1, 0))
 
-    def redo(self) -> Scene:
+    def dirty_level(self) -> Scene:
         """One step forward again, if there is one; returns the present."""
         return self.go_to(min(self._at + 1, len(self._steps) - 1))
 

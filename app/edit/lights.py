@@ -15,7 +15,7 @@ from ..model.optics import spectrum as spectra
 from ..model.optics.spectrum import Spectrum
 from ..model.scene import Dielectric, Light, Scene, Vec3
 from ..model.scene_checks import check_lines, check_outside
-from ..model.scene_defaults import surroundings_of
+from ..model.scene_defaults import environment_of
 from ..model.scene_describe import describe_spectrum
 from ..model.scene_lights import (
     DEFAULT_ILLUMINANCE,
@@ -62,7 +62,7 @@ def add_light(scene: Scene, kind: LightKind = "directional") -> Scene:
     """With a white light at the end, aimed at the objects and as bright there as a scene file's default."""
     if kind not in KINDS:
         raise UserError(f"there is no light of kind '{kind}'; known are {', '.join(KINDS)}")
-    around = surroundings_of(scene.objects)
+    around = environment_of(scene.objects)
     x, y, z = (float(v) for v in up_frame(scene) @ default_direction())
     position = _vec3(around.centre - 6.0 * around.radius * np.array((x, y, z)))
     name = free_name(f"{kind} light", [light.name for light in scene.lights])
@@ -81,7 +81,7 @@ def duplicate_light(scene: Scene, index: int) -> Scene:
         about_up = np.array([(math.cos(turn), -math.sin(turn), 0), (math.sin(turn), math.cos(turn), 0), (0, 0, 1)])
         copy = replace(copy, direction=_vec3(frame @ about_up @ frame.T @ light.direction))
     else:
-        copy = replace(copy, position=_vec3(light.position + 0.5 * surroundings_of(scene.objects).radius * frame[:, 0]))
+        copy = replace(copy, position=_vec3(light.position + 0.5 * environment_of(scene.objects).radius * frame[:, 0]))
     return set_light(scene, len(scene.lights), copy)
 
 
@@ -102,7 +102,7 @@ def set_light_kind(scene: Scene, index: int, kind: LightKind) -> Scene:
     light = scene.lights[index]
     if kind not in KINDS:
         raise UserError(f"there is no light of kind '{kind}'; known are {', '.join(KINDS)}")
-    around = surroundings_of(scene.objects)
+    around = environment_of(scene.objects)
     illuminance = _illuminance(scene, light)
     changed = replace(light, kind=kind)
     if light.kind == "directional":
@@ -214,7 +214,7 @@ def _with_power(scene: Scene, index: int, spectrum: Spectrum) -> Scene:
 
 def _reach(scene: Scene, light: Light) -> float:
     """Luminous quantity of the light over the illuminance it gives the objects' middle, on a plane across it."""
-    around = surroundings_of(scene.objects)
+    around = environment_of(scene.objects)
     distance = max(float(np.linalg.norm(around.centre - light.position)), 1e-3 * around.radius)
     if light.kind in ("directional", "collimated"):
         return 1.0

@@ -25,7 +25,7 @@ from . import edits
 from .state import Selection
 
 Operation = Literal["move", "rotate", "scale"]
-LEAST_SCALE = 1e-3
+MIN_SCALE = 1e-3
 """Smallest factor of one drag: a flat thing could not be pulled apart again."""
 
 
@@ -87,7 +87,7 @@ def change(before: np.ndarray, after: np.ndarray, operation: Operation) -> np.nd
     if operation == "rotate":
         delta[:3, :3] = _nearest_rotation(after[:3, :3]) @ before[:3, :3].T
     else:
-        factors = np.maximum(np.linalg.norm(after[:3, :3], axis=0), LEAST_SCALE)
+        factors = np.maximum(np.linalg.norm(after[:3, :3], axis=0), MIN_SCALE)
         delta[:3, :3] = before[:3, :3] @ np.diag(factors) @ before[:3, :3].T
     delta[:3, 3] = centre - delta[:3, :3] @ centre
     return delta

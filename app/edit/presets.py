@@ -22,7 +22,7 @@ from ..model.scene import (
     Scene,
     Vec3,
 )
-from ..model.scene_defaults import SUN_DIAMETER_DEG, surroundings_of
+from ..model.scene_defaults import SUN_DIAMETER_DEG, environment_of
 from .adding import up_frame
 from .lights import SpectrumKind, light_power, set_light, set_light_power, set_light_spectrum
 from .objects import set_material
@@ -161,7 +161,7 @@ def view_camera(scene: Scene, camera: Camera, preset: ViewPreset) -> Camera:
     """The camera that shows the objects from the preset's side, with the lens of `camera`."""
     if preset.camera is not None:
         return preset.camera
-    frame, around = up_frame(scene), surroundings_of(scene.objects)
+    frame, around = up_frame(scene), environment_of(scene.objects)
     reach = 1.8 * around.radius  # the caustic beside the objects is in the picture too
     if camera.kind == "pinhole":
         distance = reach / math.sin(math.radians(0.5 * camera.vertical_fov_deg))

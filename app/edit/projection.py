@@ -87,14 +87,14 @@ class View:
         return 2.0 * self.half_height * (1.0 if self.is_orthographic else depth)
 
     def view_matrix(self, origin: np.ndarray | None = None) -> np.ndarray:
-        """World to eye space (x right, y up, z backwards), (4, 4). `origin`: where the world's zero is put, so that float32 loses nothing."""
+        """World to camera space (x right, y up, z backwards), (4, 4). `origin`: where the world's zero is put, so that float32 loses nothing."""
         matrix = np.eye(4)
         matrix[:3, :3] = np.stack([self.right, self.up, -self.forward])
         matrix[:3, 3] = -matrix[:3, :3] @ (self.position - (0.0 if origin is None else np.asarray(origin, float)))
         return matrix
 
     def projection_matrix(self, near: float, far: float) -> np.ndarray:
-        """Eye space to OpenGL's clip space, (4, 4)."""
+        """Camera space to OpenGL's clip space, (4, 4)."""
         matrix = np.zeros((4, 4))
         matrix[0, 0], matrix[1, 1] = 1.0 / (self.half_height * self.aspect), 1.0 / self.half_height
         if self.is_orthographic:

@@ -19,14 +19,14 @@ from ..model.optics.glass import LINE_D_NM
 from ..model.scene import Dab, Dielectric, Scene, SceneObject, Vec3
 from .requests import Pull
 
-MOST_GAIN = 10.0
+MAX_GAIN = 10.0
 _GRID_NM = np.arange(380.0, 781.0, 4.0)
 _AROUND_NM = 12.0
 """How far from the wavelength asked for light still counts as it."""
-_MOST_CANDIDATES = 2000
+_MAX_CANDIDATES = 2000
 _PREFERRED_SHARE = 0.05
 """Share of the light at the point above which the preferred glass is taken."""
-_LEAST_PURITY = 0.12
+_MIN_PURITY = 0.12
 _SHORTEST = 0.25
 """Least displacement that can be pulled by, in radii of the point taken."""
 
@@ -84,7 +84,7 @@ def dominant_nm(xyz: np.ndarray) -> float | None:
     along = rays @ way / (np.linalg.norm(rays, axis=1) * max(float(np.linalg.norm(way)), 1e-12))
     best = int(along.argmax())
     purity = float(np.linalg.norm(way) / np.linalg.norm(rays[best]))
-    return float(VISIBLE_NM[best]) if along[best] > 0.999 and purity > _LEAST_PURITY else None
+    return float(VISIBLE_NM[best]) if along[best] > 0.999 and purity > _MIN_PURITY else None
 
 
 def begin_pull(
@@ -148,7 +148,7 @@ def _candidates(photons: PullPhotons, point: np.ndarray, radius: float, receiver
     # With several glasses the sweep is bent, so the chord is judged generously.
     reach = 3.0 * radius + (0.1 * np.linalg.norm(sweep, axis=1) if len(some.variables) > 1 else 0.0)
     index = np.flatnonzero(np.linalg.norm(nearest - point, axis=1) < reach)
-    return some.chosen(index[:: max(1, len(index) // _MOST_CANDIDATES)])
+    return some.chosen(index[:: max(1, len(index) // _MAX_CANDIDATES)])
 
 
 def _weights(photons: PullPhotons, point: np.ndarray, radius: float, wavelength_nm: float | None) -> np.ndarray:
@@ -193,7 +193,7 @@ def _source(photons: PullPhotons, weight: np.ndarray, prefer: int | None) -> int
 def nearest_on_line(pull: Pull, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """The point of the line that the held colour moves along, nearest to a camera ray (unit `direction`)."""
     start, along = np.asarray(pull.start), np.asarray(pull.direction)
-    # Across the ray only: where the line runs towards the eye the cursor says nothing, and the colour stays.
+    # Across the ray only: where the line runs towards the camera the cursor says nothing, and the colour stays.
     across = along - (along @ direction) * direction
     square = float(across @ across)
     return start if square < 1e-6 else start + float((origin - start) @ across) / square * along
@@ -203,7 +203,7 @@ def solve(pull: Pull, point: Vec3 | np.ndarray) -> float:
     """The gain, 0 to 10, with which the held colour lands where `point` (world) stands along the pull's direction."""
     direction, reference = np.asarray(pull.direction), np.asarray(pull.reference)
     held = float((np.asarray(pull.start) - reference) @ direction)
-    return float(np.clip(pull.gain_at_start * ((np.asarray(point, float) - reference) @ direction) / held, 0.0, MOST_GAIN))
+    return float(np.clip(pull.gain_at_start * ((np.asarray(point, float) - reference) @ direction) / held, 0.0, MAX_GAIN))
 
 
 def abbe_number(pull: Pull, gain: float) -> float:

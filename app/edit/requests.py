@@ -38,7 +38,7 @@ class Undo:
 
 
 @dataclass(frozen=True)
-class Redo:
+class DirtyLevel:
     """One step forward again."""
 
 
@@ -175,7 +175,7 @@ class DismissMessage:
 
 
 Request = (
-    NewScene | Open | Save | Undo | Redo | GoTo | Quit | CancelQuit | Recover | SelectAt | BeginPull | FrameSelection | Retrace | ReloadShaders
+    NewScene | Open | Save | Undo | DirtyLevel | GoTo | Quit | CancelQuit | Recover | SelectAt | BeginPull | FrameSelection | Retrace | ReloadShaders
     | Screenshot | Bake | Animate | CancelJob | ComputeReference | CopyMaterial | Notice | DismissMessage
 )  # fmt: skip
 

@@ -25,7 +25,7 @@ _STRUCT = re.compile(r"\s*struct\s+(\w+)")
 _CONSTANT = re.compile(r"\s*const\s+\w+\s+(\w+)[^;]*;\s*$")
 
 
-def lean(lines: Sequence[Line]) -> list[Line]:
+def stripped(lines: Sequence[Line]) -> list[Line]:
     """The lines of `lines` that can run, without comments, in their order."""
     kept, resolved = resolve_conditionals(list(_units(_without_comments(lines))))
     if resolved:

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 _GROWTH = 4
 """Most by which a portion grows at a time."""
-_LEAST_S = 1e-4
+_MIN_S = 1e-4
 """Times shorter than this are mostly the dispatch itself."""
 
 
 @dataclass
-class Portion:
+class DispatchBudget:
     """Units of work of one dispatch; `learn` from what they took."""
 
     units: int
@@ -26,5 +26,5 @@ class Portion:
         A rest that was less than a whole portion tells little, unless it took too long."""
         if units < self.units and took_s < wanted_s:
             return
-        fitting = int(units * wanted_s / max(took_s, _LEAST_S)) // self.whole * self.whole
+        fitting = int(units * wanted_s / max(took_s, _MIN_S)) // self.whole * self.whole
         self.units = max(self.whole, min(fitting, _GROWTH * self.units, self.most))

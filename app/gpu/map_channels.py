@@ -1,7 +1,7 @@
 """What the channels of a caustic map stand for.
 
 A picture in colour needs the map's XYZ only, unless the camera sees it through glass that disperses: then every
-wavelength is looked up at another place, and the map holds coarse spectra beside XYZ. Their bins overlap by half (hats), so that a
+wavelength is looked up at another place, and the map holds coarse spectra beside XYZ. Their bins overlap by half (tents), so that a
 pure colour between two of them is a mixture of both and no step shows. A spectral picture asks for the bins it wants.
 """
 
@@ -20,17 +20,17 @@ from ..model.scene import Light
 
 @dataclass(frozen=True)
 class MapChannels:
-    """XYZ and W; the same with spectral hats after them; or bins with edges."""
+    """XYZ and W; the same with spectral tents after them; or bins with edges."""
 
     edges_nm: tuple[float, ...] | None = None
     """Ascending edges of the bins that a spectral picture asks for."""
-    hats_nm: tuple[float, ...] = ()
-    """Ascending peaks of the hats that follow XYZ and W; the first and the last one's flat sides reach on."""
+    tents_nm: tuple[float, ...] = ()
+    """Ascending peaks of the tents that follow XYZ and W; the first and the last one's flat sides reach on."""
 
     @property
     def count(self) -> int:
-        """Spectral channels: bins or hats."""
-        return len(self.edges_nm) - 1 if self.edges_nm is not None else len(self.hats_nm)
+        """Spectral channels: bins or tents."""
+        return len(self.edges_nm) - 1 if self.edges_nm is not None else len(self.tents_nm)
 
     @property
     def first_target(self) -> int:
@@ -71,8 +71,8 @@ class MapChannels:
         return weights
 
     def coordinate(self, axis: SpectralAxis, x: np.ndarray) -> np.ndarray:
-        """Where on the row of spectral channels x lies: channel k is touched from k − 1 (hats; bins: k) to k + 1."""
-        marks = self.edges_nm if self.edges_nm is not None else self.hats_nm
+        """Where on the row of spectral channels x lies: channel k is touched from k − 1 (tents; bins: k) to k + 1."""
+        marks = self.edges_nm if self.edges_nm is not None else self.tents_nm
         if len(marks) < 2:
             return np.zeros_like(x)
         return np.interp(axis.nm_of_x(x), marks, np.arange(len(marks)))
@@ -98,10 +98,10 @@ class MapChannels:
         weights = np.zeros((len(nm), self.columns))
         weights[:, :4] = xyzw
         for k in range(self.count):
-            weights[:, 4 + k] = np.interp(nm, self.hats_nm, np.eye(self.count)[k])
+            weights[:, 4 + k] = np.interp(nm, self.tents_nm, np.eye(self.count)[k])
         return weights
 
 
-def hats(axis: SpectralAxis, count: int) -> MapChannels:
-    """XYZ, W and `count` hats, evenly spaced where the indices change."""
-    return MapChannels(hats_nm=tuple(float(nm) for nm in axis.nm_of_samples(count)))
+def tents(axis: SpectralAxis, count: int) -> MapChannels:
+    """XYZ, W and `count` tents, evenly spaced where the indices change."""
+    return MapChannels(tents_nm=tuple(float(nm) for nm in axis.nm_of_samples(count)))

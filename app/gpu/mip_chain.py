@@ -3,7 +3,7 @@
 A texel of a level is the exact mean of the part of level 0 below it, also where a side is odd and its border cuts
 texels. On an environment "mean" is over solid angle, so that what little there is at the poles does not count as if
 it were much; and below level 0 every row is smoothed to texels that are about as wide as high on the sphere, so
-that near a pole, where a round footprint covers many columns, one look-up still sees all of them.
+that near a pole, where a round footprint covers many columns, one lookup still sees all of them.
 """
 
 from __future__ import annotations

@@ -133,7 +133,7 @@ OUTCOME = Struct(
 )
 
 CATEGORIES = ("deposited", "absorbed", "escaped", "direct", "lost_depth", "lost_numeric")
-"""Where flux may end. `direct`: met a receiver without any specular event (the eye half draws it)."""
+"""Where flux may end. `direct`: met a receiver without any specular event (the camera pass draws it)."""
 
 FALLBACKS = ("footprint_dropped", "shading_normal", "band_cut", "queue_overflow")
 """Counted fall-backs, in the order of `Outcome.what`'s bits from 8."""

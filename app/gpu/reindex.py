@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Spans = list[list[tuple[float, float]]]
 """Ends of each light's bands in some spectral coordinate, ascending."""
 
-LEAST_GAIN = 1e-4
+MIN_GAIN = 1e-4
 """A glass without dispersion is shown with so much of the traced one's: one index would be no interval."""
 _BIND_BANDS = 11
 
@@ -48,7 +48,7 @@ class Reindexing:
     def of(cls, traced: Dispersion, shown: Dispersion) -> Reindexing | None:
         """For paths that were traced through `traced`; None where n of either is no monotone function of λ, or they run opposite ways."""
         if not shown.is_dispersive:
-            shown = with_gain(traced, LEAST_GAIN * traced.gain)
+            shown = with_gain(traced, MIN_GAIN * traced.gain)
         axes = [SpectralAxis.build([glass]) for glass in (traced, shown)]
         if any(len(turning) > 2 for axis in axes for turning in axis.turning_nm):
             return None

@@ -3,7 +3,7 @@
 moderngl's own includes go one level deep and lose line numbers, so sources are flattened
 here: `#include "lib/x.glsl"` (relative to the shaders folder, each file once), then
 `#version`, the defines of the scene's `Features`, and the structs of `records` on top. What then cannot
-run is left out (`lean_source`), so the text that is compiled holds only what the scene needs. A table
+run is left out (`dead_code`), so the text that is compiled holds only what the scene needs. A table
 from flattened line to (file, line) turns a compiler message back into something to click on.
 """
 
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from ..base import paths
-from .dead_code import lean
+from .dead_code import stripped
 from .glsl_conditionals import Line
 from .schema import Struct
 
@@ -108,7 +108,7 @@ def load_source(
                 emit(line, file, number)
 
     flatten(name, "the program")
-    kept = lean(lines)
+    kept = stripped(lines)
     source = Source(name, "\n".join(line.text for line in kept) + "\n", tuple((line.file, line.number) for line in kept), len(lines))
     if _kept:
         _sources[asked] = source

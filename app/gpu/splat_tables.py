@@ -1,7 +1,7 @@
 """Spectra as splats see them: a band of light, weighted per channel, blurred by the splat's width.
 
 Along its sweep a splat is its band's spectrum convolved with a Gaussian, so a fragment's
-colour is one look-up by (place xi, Gaussian's standard deviation / sweep length). Energies are exact in
+colour is one lookup by (place xi, Gaussian's standard deviation / sweep length). Energies are exact in
 float64: the integral of every small cell of the spectrum comes from its running integral, lines keep their
 wavelength, and what the cut at three standard deviations leaves out is given back to each cell.
 """

@@ -1,4 +1,4 @@
-"""A camera's frame and rays in float64, for fitting maps and for tests; the eye pass makes its rays in GLSL."""
+"""A camera's frame and rays in float64, for fitting maps and for tests; the camera pass makes its rays in GLSL."""
 
 from __future__ import annotations
 

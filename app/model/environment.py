@@ -1,6 +1,6 @@
 """Makes what lies beyond everything: a panorama from a file, a gradient, or a sky, always as one picture.
 
-One representation keeps everything after this simple: whatever was asked for, the eye filters one
+One representation keeps everything after this simple: whatever was asked for, the camera filters one
 latitude-longitude picture (`texture.Environment` says how it hangs).
 """
 

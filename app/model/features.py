@@ -28,7 +28,7 @@ MAX_GROUPS = 4
 MAX_LOOSE_TRIANGLES = 24
 """Up to so many triangles a plain loop beats a tree."""
 
-MAP_HATS = 8
+MAP_TENTS = 8
 """Spectral channels of a caustic map that is seen through dispersive glass."""
 
 MAX_SOLID_PLANES = 96
@@ -82,12 +82,12 @@ class Features:
     """The dispersion brush scales spectral displacements on some receiver."""
     reindexed: bool = False
     """Photons stand for intervals of the one index that disperses, and carry whatever wavelengths an edit puts there."""
-    eye_specular: bool = False
+    camera_specular: bool = False
     """The camera may see glass or a mirror: its rays go on behind them."""
-    eye_disperses: bool = False
+    camera_disperses: bool = False
     """The camera may see through glass that disperses: its rays carry a band of the spectrum, and look up along their sweep."""
-    map_hats: int = 0
-    """Spectral channels of the caustic maps beside XYZ, for light whose dispersion the eye's adds to."""
+    map_tents: int = 0
+    """Spectral channels of the caustic maps beside XYZ, for light whose dispersion the camera's adds to."""
     anchor_weights: bool = False
     """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
 
@@ -127,8 +127,8 @@ class Features:
         absorbing = any(o.material.absorption is not None for o in dielectrics)
         smooth = any(o.mesh.corner_normals is not None for o in scene.objects if isinstance(o.material, Dielectric | Mirror))
         footprints = settings.method != "stochastic-point"
-        eye_specular, eye_disperses = eye_needs(scene, settings)
-        hats = MAP_HATS if eye_disperses and settings.layer == "beauty" and not settings.bins and scene.lights and _has_receivers(scene) else 0
+        camera_specular, camera_disperses = camera_needs(scene, settings)
+        tents = MAP_TENTS if camera_disperses and settings.layer == "beauty" and not settings.bins and scene.lights and _has_receivers(scene) else 0
         coloured_mirror = any(isinstance(o.material, Mirror) and len(set(o.material.reflectance_rgb)) > 1 for o in scene.objects)
         return Features(
             method=settings.method,
@@ -151,10 +151,10 @@ class Features:
             convex_solids=len(loose) < len(scene.objects),
             charts=any(isinstance(o.material, Diffuse) and not is_flat(o) for o in scene.objects),
             nested_windows=any(isinstance(o.material, Diffuse) and is_flat(o) for o in scene.objects),
-            targets=-(-settings.bins // 4) if settings.bins else 1 + -(-hats // 4),
-            eye_specular=eye_specular,
-            eye_disperses=eye_disperses,
-            map_hats=hats,
+            targets=-(-settings.bins // 4) if settings.bins else 1 + -(-tents // 4),
+            camera_specular=camera_specular,
+            camera_disperses=camera_disperses,
+            map_tents=tents,
             reindexed=_reindexed(scene, settings, groups, coloured=absorbing or coloured_mirror),
             local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
             anchor_weights=settings.anchor_weights,
@@ -172,7 +172,7 @@ def _reindexed(scene: Scene, settings: RenderSettings, groups: int, *, coloured:
     return len(turning) == 2
 
 
-def eye_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:
+def camera_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:
     """Whether the camera may see glass or mirrors, and whether it may see through glass that disperses."""
     if settings.layer != "beauty":
         return False, False
@@ -284,10 +284,10 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
         ("nested windows", features.nested_windows, "flat receivers may get a fine window inside a coarse one" if features.nested_windows else "no receiver has two windows"),
         ("local gain", features.local_gain, "the dispersion brush was used on a receiver" if features.local_gain else "no receiver was painted on"),
         ("photons by index", features.reindexed, "an edit or the brush may move wavelengths between paths" if features.reindexed else "every path keeps its wavelengths"),
-        ("eye refraction", features.eye_specular, "the camera may see glass or mirrors" if features.eye_specular else "no glass and no mirror is in view"),
-        ("eye spectral taps", features.eye_disperses, "the camera may see through dispersive glass" if features.eye_disperses else
+        ("camera refraction", features.camera_specular, "the camera may see glass or mirrors" if features.camera_specular else "no glass and no mirror is in view"),
+        ("camera spectral taps", features.camera_disperses, "the camera may see through dispersive glass" if features.camera_disperses else
          ("no dispersive glass is in view" if glasses else "nothing disperses")),
-        ("spectral maps", features.map_hats > 0, f"{features.map_hats} channels beside XYZ: light and eye disperse" if features.map_hats else "no caustic is seen through dispersive glass"),
+        ("spectral maps", features.map_tents > 0, f"{features.map_tents} channels beside XYZ: light and camera disperse" if features.map_tents else "no caustic is seen through dispersive glass"),
         ("spectral bins", features.targets > 1, _target_words(features)),
         ("textures", bool(worn), f"on {names(worn)}" if worn else "no surface wears a picture"),
         ("environment map", scene.environment is not None, f"a {scene.environment.kind} lies beyond" if scene.environment is not None else "one colour lies beyond"),
@@ -298,4 +298,4 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
 def _target_words(features: Features) -> str:
     if features.targets == 1:
         return "XYZ in one target"
-    return f"{features.targets} targets" + (": XYZ and the spectral maps' channels" if features.map_hats else "")
+    return f"{features.targets} targets" + (": XYZ and the spectral maps' channels" if features.map_tents else "")

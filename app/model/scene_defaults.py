@@ -25,7 +25,7 @@ def bounds_of(objects: Sequence[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
     return np.min([p.min(axis=0) for p in points], axis=0), np.max([p.max(axis=0) for p in points], axis=0)
 
 
-def surroundings_of(objects: Sequence[SceneObject]) -> Surroundings:
+def environment_of(objects: Sequence[SceneObject]) -> Surroundings:
     """Middle and half diagonal of what is worth looking at: everything but the receivers, if there is more."""
     interesting = [o for o in objects if not isinstance(o.material, Diffuse)] or list(objects)
     low, high = bounds_of(interesting)
@@ -51,7 +51,7 @@ def default_light() -> Light:
 
 def default_table(objects: Sequence[SceneObject]) -> SceneObject:
     """A wide light-grey plane just below everything."""
-    around = surroundings_of(objects)
+    around = environment_of(objects)
     matrix = np.eye(4)
     matrix[:3, 3] = around.centre
     # A hair below, so that a flat underside and the table are not one surface.

@@ -26,7 +26,7 @@ KINDS = ("map", "gradient", "sky", "constant")
 _BLACK = (0.0, 0.0, 0.0)
 
 
-def read_surroundings(table: SceneTable, notes: list[str]) -> tuple[Vec3, Environment | None]:
+def read_environment(table: SceneTable, notes: list[str]) -> tuple[Vec3, Environment | None]:
     """Background (linear Rec.709 radiance) and environment of a scene's table; black and None where neither is given.
 
     What was assumed goes to `notes`. Raises UserError for both at once and for anything that is not understood.

@@ -67,12 +67,12 @@ class Surroundings:
     """Half the diagonal of their bounds, scene units."""
 
 
-def read_light(table: SceneTable, index: int, surroundings: Surroundings) -> Light:
+def read_light(table: SceneTable, index: int, environment: Surroundings) -> Light:
     """One entry of [[lights]], its power already in the quantity of `Light.spectral_power`."""
     kind = table.choice("kind", KINDS, "point")
     name = table.string("name", f"{kind} {index + 1}")
     shape_fields = _read_shape(table, kind)
-    placement = _read_placement(table, kind, surroundings)
+    placement = _read_placement(table, kind, environment)
     distance = placement.pop("distance")
     spectrum = _read_spectrum(table)
     light = Light(name=name, kind=kind, spectral_power=spectrum, **placement, **shape_fields)  # type: ignore[arg-type]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 METHODS = ("srd", "srd-lambda", "stochastic", "stochastic-even", "stochastic-point", "regular-7", "regular-16")
 """Sampling methods that every comparison holds (README, "Methods")."""
-EYE_METHODS = tuple(name for name in METHODS if name != "stochastic-point")
+CAMERA_METHODS = tuple(name for name in METHODS if name != "stochastic-point")
 """Of those, the ones that camera rays may follow too."""
 
 
@@ -20,7 +20,7 @@ class RenderSettings:
     seconds: float | None = None
     seed: int = 1
     method: str = "srd"
-    eye_method: str | None = None
+    camera_method: str | None = None
     """The camera's method where it differs from the light's `method`."""
     layer: str = "beauty"
     """"beauty", "caustic" or "map:RECEIVER"."""

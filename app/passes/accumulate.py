@@ -48,7 +48,7 @@ class SeamFold:
     """Brings home what fell into chart gutters, from the total into a resolved copy.
 
     The gathering order is fixed, so the result is the same every time. Gutters then hold what lies across their seam,
-    for interpolated look-ups; those beyond an open border keep what fell there, which is lost to the receiver.
+    for interpolated lookups; those beyond an open border keep what fell there, which is lost to the receiver.
     """
 
     def __init__(self, ctx: moderngl.Context, charts: Sequence[tuple[Tile, ChartAtlas]]) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..gpu import bindings, shader
 from ..gpu.context import Context
-from ..gpu.dispatch_budget import Portion
+from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.map_channels import MapChannels
 from ..gpu.records import NONE, PLACEMENT, RECEIVER
 from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
@@ -37,23 +37,23 @@ from .camera_programs import (
     UNIT_EMISSION,
     UNIT_PICTURES,
     direct_defines,
-    eye_defines,
+    camera_defines,
     single_defines,
 )
-from .camera_records import EYE_LIGHT, EYE_PARAMETERS, light_record
-from .camera_tables import EyeTables
+from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
+from .camera_tables import CameraTables
 from .present import Channels
-from .spectrum_choice import Look, Spectrum, choosing_spectrum, grid_of
+from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
 
 SPLIT_THRESHOLD = 0.004
 """Share of a sample's power above which both parts of a split path are followed."""
-MOST_TAPS = 24
+MAX_TAPS = 24
 """Looks along one sweep."""
 TAPS_PER_PIXEL = 1.2
 """Of one sample; between two looks colours are not told apart, so the more samples there are, the closer they lie."""
-DIRECT_LOOKS = 4
+PRIMARY_SAMPLES = 4
 """Of one sample at what is seen directly: outlines and textures there cost a tenth of what glass costs …"""
-DIRECT_LOOKS_UNTIL = 16
+PRIMARY_SAMPLES_UNTIL = 16
 """… and with more samples than these they are smooth as they are."""
 
 _TARGET_SECONDS = 0.15
@@ -68,10 +68,10 @@ FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut")
 
 @dataclass(frozen=True)
 class CausticMaps:
-    """The light half's result, as the eye reads it."""
+    """The light pass's result, as the camera reads it."""
 
     textures: Sequence[moderngl.Texture]
-    """RGBA32F, energy per texel: XYZ and W with spectral hats after them, or four bins each."""
+    """RGBA32F, energy per texel: XYZ and W with spectral tents after them, or four bins each."""
     receivers: moderngl.Buffer
     """RECEIVER records."""
     placements: moderngl.Buffer
@@ -80,7 +80,7 @@ class CausticMaps:
     """Factor on every texel: one over the number of passes summed in it."""
 
 
-class EyePass:
+class CameraPass:
     """Owns the program, the sums and the light tables; `run` adds samples, `read_*` divide by their number."""
 
     def __init__(
@@ -104,27 +104,27 @@ class EyePass:
         self.scene = scene
         self.channels = Channels(maps.edges_nm)
         self._ctx = context.ctx
-        self._tables = EyeTables.build(self._ctx, scene, self.channels, reflectances, maps)
+        self._tables = CameraTables.build(self._ctx, scene, self.channels, reflectances, maps)
         self._owns_pictures = pictures is None
         self.pictures = pictures or TextureStore(self._ctx, scene.scene, scene.first_triangle, scene.corner_turn)
-        lights = EYE_LIGHT.zeros(len(scene.scene.lights) + 1)
+        lights = CAMERA_LIGHT.zeros(len(scene.scene.lights) + 1)
         for i, light in enumerate(scene.scene.lights):
             lights[i] = light_record(light, scene)
         self._lights = self._ctx.buffer(lights.tobytes())
         self._lights_in_storage = lights.nbytes > self._ctx.info["GL_MAX_UNIFORM_BLOCK_SIZE"]
         self._counters = self._ctx.buffer(bytes(4 * len(FALLBACKS)))
-        self._parameters_buffer = self._ctx.buffer(reserve=EYE_PARAMETERS.stride)
+        self._parameters_buffer = self._ctx.buffer(reserve=CAMERA_PARAMETERS.stride)
         self._empty: CausticMaps | None = None
         self._pictures: list[moderngl.Texture] = []
         self._samples_of_row = np.zeros(0, int)
-        self._rows = self._pixels = Portion(1, 1, 1)
+        self._rows = self._pixels = DispatchBudget(1, 1, 1)
         self._within_rows = False
         """Some listed pixels of a band of rows have this sample, others are still to get it."""
         self._map_targets = maps.targets
         self.dispatch_seconds = _TARGET_SECONDS
         """What one dispatch should take; rows are divided to fit."""
         features = scene.features
-        self.disperses = layer != "caustic" and features.eye_disperses
+        self.disperses = layer != "caustic" and features.camera_disperses
         """Samples differ in the stretch of the spectrum they see."""
         self.fixed_bands = {"regular-7": 7, "regular-16": 16, "srd-lambda": 1}.get(features.method)
         """What the method prescribes."""
@@ -132,18 +132,18 @@ class EyePass:
         """How samples see the spectrum; one of `single` wavelengths needs `may_be_single`."""
         self.may_be_single = False
         """Where bands serve a scene badly, wavelengths may be taken one by one. That takes a program of its own, which is compiled when it is needed."""
-        self.most_taps = MOST_TAPS
-        self.direct_looks = DIRECT_LOOKS if self.chooses else 1
+        self.max_taps = MAX_TAPS
+        self.primary_samples = PRIMARY_SAMPLES if self.chooses else 1
         """Of a sample, at what is seen directly, while a pixel has few samples."""
         self.split_threshold = SPLIT_THRESHOLD
-        structs = (*SCENE_STRUCTS, EYE_LIGHT, EYE_PARAMETERS, RECEIVER, PLACEMENT, *([PICTURE] if self.pictures.structs else []))
-        shown = eye_defines(scene, self.channels, layer, maps) | self._tables.defines | self.pictures.defines
+        structs = (*SCENE_STRUCTS, CAMERA_LIGHT, CAMERA_PARAMETERS, RECEIVER, PLACEMENT, *([PICTURE] if self.pictures.structs else []))
+        shown = camera_defines(scene, self.channels, layer, maps) | self._tables.defines | self.pictures.defines
         shown |= {name: 1 for name, on in (("LIGHTS_IN_STORAGE", self._lights_in_storage), ("HAS_IMAGES", bool(self.pictures.structs))) if on}
         self._listed: moderngl.Buffer | None = None
         self._beyond: moderngl.ComputeShader | None = None
         self._single: moderngl.ComputeShader | None = None
         self._source = (shown, structs)
-        if "EYE_SPECULAR" in shown:
+        if "CAMERA_SPECULAR" in shown:
             self._beyond = shader.compute(self._ctx, "camera/camera.comp", shown, structs)
             shown = direct_defines(shown)
         self._program = shader.compute(self._ctx, "camera/camera.comp", shown, structs)
@@ -188,13 +188,13 @@ class EyePass:
         # Where samples are of one band each, fewer of them share a pixel in that band.
         parameters["band_side"] = min(1.0, np.sqrt(self.spectrum.bands / (samples + sample_offset)))
         parameters["taps_per_pixel"] = TAPS_PER_PIXEL * (samples + sample_offset) ** 0.25
-        parameters["direct_looks"] = 1 if self.spectrum.single or samples + sample_offset > DIRECT_LOOKS_UNTIL else self.direct_looks
+        parameters["primary_samples"] = 1 if self.spectrum.single or samples + sample_offset > PRIMARY_SAMPLES_UNTIL else self.primary_samples
         for index, place in enumerate(_pixel_lattice(samples, sample_offset)):
             parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
             parameters["within_pixel"] = place
             for share in self._add_sample(parameters, width, height, maps):
                 yield (index + share) / samples
-        self.context.check("the eye pass")
+        self.context.check("the camera pass")
 
     @property
     def chooses(self) -> bool:
@@ -225,7 +225,7 @@ class EyePass:
             picture = yield from self._coarse_picture(look, camera, width, height, samples, maps or self._no_maps())
         self._clear(*self._size)
 
-    def _coarse_picture(self, look: Look, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps) -> Generator[float, None, np.ndarray]:
+    def _coarse_picture(self, look: PilotRender, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps) -> Generator[float, None, np.ndarray]:
         """Few pixels of the picture, each as large as the picture's own."""
         columns, rows = grid_of(width, height)
         self._clear(columns, rows)
@@ -318,7 +318,7 @@ class EyePass:
         right, up, forward = camera_frame(camera)
         orthographic = camera.kind == "orthographic"
         half_height = 0.5 * camera.vertical_extent * space.scale if orthographic else np.tan(np.radians(0.5 * camera.vertical_fov_deg))
-        parameters = EYE_PARAMETERS.zeros(1)
+        parameters = CAMERA_PARAMETERS.zeros(1)
         parameters["position"] = space.to_gpu(np.array(camera.position))
         parameters["orthographic"] = orthographic
         parameters["forward"] = forward
@@ -336,9 +336,9 @@ class EyePass:
                 parameters[name] = column
         bands = self.spectrum.bands
         parameters["bands"], parameters["dithered"], parameters["counts_turns"] = bands, bands > 1, 1
-        parameters["most_taps"], parameters["split_threshold"] = self.most_taps, self.split_threshold
+        parameters["max_taps"], parameters["split_threshold"] = self.max_taps, self.split_threshold
         parameters["map_scale"] = map_scale
-        parameters["direct_looks"] = 1
+        parameters["primary_samples"] = 1
         parameters["inside_object"] = NONE
         for index, item in enumerate(self.scene.scene.objects):
             if isinstance(item.material, Dielectric) and contains(item, np.array(camera.position)):
@@ -353,8 +353,8 @@ class EyePass:
             for picture in self._pictures:
                 picture.release()
             self._pictures = [self._ctx.texture((width, height), 4, dtype="f4") for _ in range(self.channels.targets)]
-            self._rows = Portion(_FIRST_ROWS, _GROUP, -(-height // _GROUP) * _GROUP)
-            self._pixels = Portion(_FIRST_LISTED, _LISTED_GROUP, max(width * height, _LISTED_GROUP))
+            self._rows = DispatchBudget(_FIRST_ROWS, _GROUP, -(-height // _GROUP) * _GROUP)
+            self._pixels = DispatchBudget(_FIRST_LISTED, _LISTED_GROUP, max(width * height, _LISTED_GROUP))
             if self._listed is not None:
                 self._listed.release()
             self._listed = self._ctx.buffer(reserve=4 + 4 * width * (-(-height // _GROUP) * _GROUP)) if self._beyond is not None else None
@@ -418,7 +418,7 @@ class EyePass:
 
     def _read(self) -> np.ndarray:
         if not self._pictures:
-            raise RuntimeError("the eye pass has not run yet")
+            raise RuntimeError("the camera pass has not run yet")
         width, height = self._size
         sums = np.empty((height, width, 4 * len(self._pictures)), np.float32)
         layer = np.empty((height, width, 4), np.float32)

@@ -38,15 +38,15 @@ _BEYOND_ONLY = ("HAS_DISPERSION", "SPECTRAL_SWEEP", "RANDOM_WAVELENGTH", "EVEN_W
 """What only rays beyond glass and mirrors need."""
 
 
-def eye_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: MapChannels) -> Defines:
+def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: MapChannels) -> Defines:
     """What the scene needs of the shader, for a picture in `channels` and `maps` of these channels; tables and pictures add theirs.
 
-    `EYE_SPECULAR` is among them where rays go on beyond glass or mirrors: these are then for the listed pixels, and `direct_defines` has the others'.
+    `CAMERA_SPECULAR` is among them where rays go on beyond glass or mirrors: these are then for the listed pixels, and `direct_defines` has the others'.
     """
     lights, features = scene.scene.lights, scene.features
     beauty = layer != "caustic"
-    specular = beauty and features.eye_specular
-    disperses = specular and features.eye_disperses
+    specular = beauty and features.camera_specular
+    disperses = specular and features.camera_disperses
     defines: Defines = dict(features.defines() | bindings.SCENE_DEFINES | scene.defines | place_defines(BIND_PICTURES, UNIT_PICTURES))
     # A method that follows single wavelengths has no columns for them; nor has a scene where nothing disperses.
     groups = features.spectral_groups if disperses else 0
@@ -80,7 +80,7 @@ def eye_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: MapCh
     absorbs = any(isinstance(m, Dielectric) and m.absorption is not None for m in materials)
     switches = {
         "LAYER_BEAUTY": beauty,
-        "EYE_SPECULAR": specular,
+        "CAMERA_SPECULAR": specular,
         "HAS_DISPERSION": disperses,
         "SPECTRAL_SWEEP": groups > 0,
         "RANDOM_WAVELENGTH": features.random_wavelength,
@@ -99,7 +99,7 @@ def eye_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: MapCh
 
 def direct_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     """For what is seen directly, from what the listed pixels are compiled with."""
-    left_out = {"EYE_SPECULAR", *_BEYOND_ONLY}
+    left_out = {"CAMERA_SPECULAR", *_BEYOND_ONLY}
     return {name: value for name, value in beyond.items() if name not in left_out} | {"SPECTRAL_GROUPS": 0, "LISTS_SPECULAR": 1, "MAX_EVENTS": 1}
 
 

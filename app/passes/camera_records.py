@@ -1,4 +1,4 @@
-"""Records that the eye's shader reads: a light as it is looked at, and what one dispatch is told."""
+"""Records that the camera's shader reads: a light as it is looked at, and what one dispatch is told."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from ..gpu.schema import Field, Struct
 from ..model.scene import Light
 from .emission_domain import orthonormal_frame
 
-EYE_LIGHT = Struct(
-    "EyeLight",
+CAMERA_LIGHT = Struct(
+    "CameraLight",
     (
         Field("position", "vec3", "GPU space"),
         Field("kind", "uint", "0 point or spot, 1 directional, 2 collimated, 3 area"),
@@ -24,8 +24,8 @@ EYE_LIGHT = Struct(
         Field("reserved2", "vec2", ""),
     ),
 )
-EYE_PARAMETERS = Struct(
-    "EyeParameters",
+CAMERA_PARAMETERS = Struct(
+    "CameraParameters",
     (
         Field("position", "vec3", "camera, GPU space"),
         Field("orthographic", "uint"),
@@ -51,13 +51,13 @@ EYE_PARAMETERS = Struct(
         Field("inside_object", "uint", "solid outside the stack it stands in, or NONE"),
         Field("bands", "uint", "stretches the spectrum is cut into; a sample is of one of them"),
         Field("dithered", "uint", "whether pixels begin with different bands"),
-        Field("most_taps", "uint", "looks along one sweep at most"),
+        Field("max_taps", "uint", "looks along one sweep at most"),
         Field("split_threshold", "float", "share of a path's power above which both of its parts are followed"),
         Field("draw_index", "uint", "counts them too: which numbers it draws"),
         Field("counts_turns", "uint", "whether pixels count their own dispersed samples instead"),
         Field("taps_per_pixel", "float", "looks along a sweep, for every pixel it is long"),
         Field("band_side", "float", "side of the share of its pixel that a sample of one band has, pixels"),
-        Field("direct_looks", "uint", "of one sample, at what is seen directly"),
+        Field("primary_samples", "uint", "of one sample, at what is seen directly"),
         Field("first_listed", "uint", "of the listed pixels, this dispatch's first"),
         Field("pixel_height", "float", "as pixel_width"),
         Field("unused2", "float", ""),
@@ -74,7 +74,7 @@ def has_extent(light: Light) -> bool:
 
 def light_record(light: Light, scene: SceneBuffers) -> np.void:
     """The light in GPU space."""
-    record = EYE_LIGHT.zeros(1)[0]
+    record = CAMERA_LIGHT.zeros(1)[0]
     axis = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
     tangent, bitangent = orthonormal_frame(axis, None if light.tangent is None else np.asarray(light.tangent))
     record["position"] = scene.space.to_gpu(np.array(light.position))

@@ -1,8 +1,8 @@
-"""Spectra as the eye's rays meet them: indices of the glass that is shown, absorption, and emission times the observer.
+"""Spectra as the camera's rays meet them: indices of the glass that is shown, absorption, and emission times the observer.
 
 The emission table holds running sums over the spectral coordinate x. A look at a stretch of the spectrum is then the
 difference of two of its samples in every channel of the picture, however many wavelengths lie between them.
-Where the shown glass is an edit of the one that photons were traced through, the eye follows the shown one.
+Where the shown glass is an edit of the one that photons were traced through, the camera follows the shown one.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ EMISSION_CELLS = SAMPLES - 1
 
 
 @dataclass(frozen=True)
-class EyeTables:
+class CameraTables:
     """GPU tables of one shown scene, and the symbols that tell the shader where in them is what."""
 
     spectra: moderngl.Texture
@@ -48,7 +48,7 @@ class EyeTables:
     @classmethod
     def build(
         cls, ctx: moderngl.Context, scene: SceneBuffers, channels: Channels, reflectances: Sequence[np.ndarray | None], maps: MapChannels
-    ) -> EyeTables:
+    ) -> CameraTables:
         """`scene.scene` is what is shown; its geometry and its partition into glasses are those of `scene`.
 
         `reflectances`: classes as the splat tables were built with. `maps`: what the caustic maps' channels are."""

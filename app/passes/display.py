@@ -51,7 +51,7 @@ class _Variant:
     """A tone curve, or "false_colour"; unused in the error map."""
     shows: Shows
     taps: int
-    """Look-ups along a side of an output pixel."""
+    """Lookups along a side of an output pixel."""
 
     def defines(self) -> dict[str, int | str]:
         table = ERROR if self.shows == "error" else FALSE_COLOUR

@@ -208,12 +208,12 @@ def _rect_and_mask(low: np.ndarray, high: np.ndarray, box_low: np.ndarray, box_h
     return np.concatenate([corner, size]), mask
 
 
-def _subdivided(triangles: np.ndarray, eye: np.ndarray) -> np.ndarray:
-    """Triangles split until each looks small from `eye`: straight edges bend on the azimuthal plane."""
+def _subdivided(triangles: np.ndarray, viewpoint: np.ndarray) -> np.ndarray:
+    """Triangles split until each looks small from `camera`: straight edges bend on the azimuthal plane."""
     done = []
     while len(triangles):
         edges = triangles - np.roll(triangles, 1, axis=1)
-        distance = np.linalg.norm(triangles.mean(axis=1) - eye, axis=1)
+        distance = np.linalg.norm(triangles.mean(axis=1) - viewpoint, axis=1)
         large = np.linalg.norm(edges, axis=-1).max(axis=1) > _COARSE_ANGLE * np.maximum(distance, 1e-3)
         done.append(triangles[~large])
         big = triangles[large]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 MAX_SIDE = 4096
 GUARD = 1
-"""Empty texels between tiles, so that a bilinear look-up never meets a neighbour."""
+"""Empty texels between tiles, so that a bilinear lookup never meets a neighbour."""
 KIND_FLAT, KIND_CHART = 0, 1
 
 

@@ -70,7 +70,7 @@ class PlaneFrame:
 
 @dataclass(frozen=True)
 class MapLayout:
-    """Everything the atlas and the look-ups need; `tiles[receiver]` lists each window's finest texels, fine window first."""
+    """Everything the atlas and the lookups need; `tiles[receiver]` lists each window's finest texels, fine window first."""
 
     size: tuple[int, int]
     placements: np.ndarray

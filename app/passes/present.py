@@ -1,6 +1,6 @@
 """What the channels of a picture mean: linear Rec.709, or watts in spectral bins.
 
-The eye's shader adds up channels and knows nothing else about them. Here is what a watt of each wavelength adds to
+The camera's shader adds up channels and knows nothing else about them. Here is what a watt of each wavelength adds to
 them, and how the sums that come back become linear Rec.709.
 """
 

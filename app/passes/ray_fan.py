@@ -20,7 +20,7 @@ from ..ui.view_model import RayLine
 from .emission_domain import orthonormal_frame
 from .ray_paths import Path, RayPaths
 
-_LEAST_BEND = 1e-3
+_MIN_BEND = 1e-3
 """Sine of the least deviation that names a plane."""
 _MAX_TANGENT = 20.0
 """Widest fan: objects that surround their light are cut there."""
@@ -168,7 +168,7 @@ class RayFan:
         if len(path.points) > 2:
             leaving = _unit(path.points[-1] - path.points[-2])
             bend = leaving - (leaving @ beam.axis) * beam.axis
-        if np.linalg.norm(bend) > _LEAST_BEND:
+        if np.linalg.norm(bend) > _MIN_BEND:
             return _unit(bend)
         level = np.cross(beam.axis, np.asarray(self._scene.camera.up, float))
         return _unit(level) if np.linalg.norm(level) > 1e-6 else orthonormal_frame(beam.axis)[0]

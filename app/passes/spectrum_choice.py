@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LEAST_SAMPLES = 8
+MIN_SAMPLES = 8
 """With fewer, a pilot would cost more than it brings: one band."""
-MOST_BANDS = 32
+MAX_BANDS = 32
 SAMPLES_A_BAND = 8
 """That every band must keep, to smooth an outline."""
 _COLUMNS = 50
@@ -48,7 +48,7 @@ class Spectrum:
 
 
 @dataclass(frozen=True)
-class Look:
+class PilotRender:
     """One picture that the pilot asks for."""
 
     spectrum: Spectrum
@@ -57,27 +57,27 @@ class Look:
     """In each pixel, across and down."""
 
 
-Looks = Generator[Look, np.ndarray, Spectrum]
+Lookups = Generator[PilotRender, np.ndarray, Spectrum]
 
 
-def choosing_spectrum(samples: int, may_be_single: bool) -> Looks:
+def choosing_spectrum(samples: int, may_be_single: bool) -> Lookups:
     """Yields pictures it wants, is sent them (H, W, C), and returns what is best for `samples` samples a pixel."""
     chosen = Spectrum()
-    if samples < LEAST_SAMPLES:
+    if samples < MIN_SAMPLES:
         return chosen
-    coarse = (yield Look(chosen, 1)), (yield Look(chosen, 2))
-    moved = yield Look(chosen, 3, place=0.85)
+    coarse = (yield PilotRender(chosen, 1)), (yield PilotRender(chosen, 2))
+    moved = yield PilotRender(chosen, 3, place=0.85)
     variance = 0.5 * difference(coarse[0], moved)
     # Twice as many bands, as long as that changes more than the noise that remains anyway.
     while True:
         finer = Spectrum(2 * chosen.bands)
-        pictures = (yield Look(finer, 4)), (yield Look(finer, 5))
+        pictures = (yield PilotRender(finer, 4)), (yield PilotRender(finer, 5))
         bias = sure_bias(coarse, pictures)
-        if bias <= variance / samples or finer.bands > MOST_BANDS or finer.bands * SAMPLES_A_BAND > samples:
+        if bias <= variance / samples or finer.bands > MAX_BANDS or finer.bands * SAMPLES_A_BAND > samples:
             break
         chosen, coarse = finer, pictures
     if may_be_single and bias > variance / samples:
-        alone = variance + difference(coarse[0], (yield Look(Spectrum(single=True))))
+        alone = variance + difference(coarse[0], (yield PilotRender(Spectrum(single=True))))
         if alone / (SINGLE_SPEED * samples) < variance / samples + bias:
             return Spectrum(single=True)
     return chosen

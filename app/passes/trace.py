@@ -1,4 +1,4 @@
-"""The light half's first two stages: a batch of lattice points becomes photon records.
+"""The light pass's first two stages: a batch of lattice points becomes photon records.
 
 `emit` fills the queue, then every step sends all rays in flight to their next surface. The
 queue between steps is listed by count, scan and scatter without atomics, so the order of the

@@ -1,4 +1,4 @@
-"""The eye's reference, compiled: one camera path of one wavelength, to the first diffuse surface.
+"""The camera's reference, compiled: one camera path of one wavelength, to the first diffuse surface.
 
 Reflection or refraction is drawn with Fresnel's probability, so that a path's weight changes by
 absorption and mirrors only; lights are seen along the way, the environment at its end. At a diffuse surface one
@@ -19,7 +19,7 @@ from .camera_optics import (
     camera_ray,
     choice,
     inlined,
-    lean,
+    stripped,
     scatter,
     sobol_next,
     sobol_start,
@@ -225,8 +225,8 @@ def sample(scene, lights, spectra, pictures, tables, start, px, py, pz, dx, dy, 
             xyz[c] += found * spectra.response[atom, c]
 
 
-@lean
-def trace_eye(scene, camera, lights, spectra, pictures, tables, start, sequence, first, count, max_depth, sums, tally, scratch):
+@stripped
+def trace_camera(scene, camera, lights, spectra, pictures, tables, start, sequence, first, count, max_depth, sums, tally, scratch):
     """Add samples [first, first + count) of every pixel to `sums` (H, W, 3), XYZ of each: divide by their number."""
     stack, stack_distance, xyz = scratch.stack, scratch.stack_distance, scratch.xyz
     beginning, state, shift = scratch.beginning, scratch.state, scratch.shift
@@ -252,7 +252,7 @@ def trace_eye(scene, camera, lights, spectra, pictures, tables, start, sequence,
                 xyz[c] = 0.0
 
 
-@lean
+@stripped
 def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, points, which, scratch):
     """Where `count` camera paths spread over the picture end on sides of receivers, for fitting windows: the number found.
 

@@ -1,4 +1,4 @@
-"""Lights as the eye's reference meets them, compiled in float64: from a surface point, and where a ray runs into one.
+"""Lights as the camera's reference meets them, compiled in float64: from a surface point, and where a ray runs into one.
 
 Written from the scene's own quantities (`model.scene.Light`); a light's disc or rectangle is no
 geometry: rays pass through it and gain its radiance.
@@ -21,7 +21,7 @@ POINT, DIRECTIONAL, COLLIMATED, AREA = range(4)
 _KINDS = {"point": POINT, "spot": POINT, "directional": DIRECTIONAL, "collimated": COLLIMATED, "area": AREA}
 
 
-class EyeLights(NamedTuple):
+class CameraLights(NamedTuple):
     """L lights, positions about the arrays' origin (`photon_scene`)."""
 
     kind: np.ndarray
@@ -40,10 +40,10 @@ class EyeLights(NamedTuple):
     """float64 (L, 2): a spot's half angles, rad; beyond π for none."""
 
 
-def eye_lights(lights: Sequence[Light], centre: np.ndarray) -> EyeLights:
+def camera_lights(lights: Sequence[Light], centre: np.ndarray) -> CameraLights:
     """The arrays for `lights`, about the world position `centre` (3,)."""
     count = len(lights)
-    packed = EyeLights(
+    packed = CameraLights(
         np.zeros(count, np.int32), np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3)),
         np.zeros(count, np.bool_), np.zeros(count), np.full((count, 2), 4.0),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What a camera path and a photon of the eye's reference have in common, compiled: numbers, surfaces, absorption.
+"""What a camera path and a photon of the camera's reference have in common, compiled: numbers, surfaces, absorption.
 
 One event at glass or a mirror is one call of `scatter`, by the same rules as the light's reference
 (`photon_kernel`): Fresnel's exact reflectance decides by chance, nested solids follow their rank, an interpolated
@@ -34,7 +34,7 @@ AIR = _AIR
 _LEAN = {"nogil": True, "error_model": "numpy", "_nrt": False}
 
 
-def lean(function: Callable) -> Callable:
+def stripped(function: Callable) -> Callable:
     """`compiled` without counting references: a scene is some sixty arrays, and counting them took 60 % of a path's time.
 
     Nothing may be allocated inside: scratch comes from the caller.

@@ -1,7 +1,7 @@
-"""The eye reference's samples, round by round, and the picture they have made so far.
+"""The camera reference's samples, round by round, and the picture they have made so far.
 
 PARTS independent scramblings of one quasi-random sequence run side by side, a thread each, every pixel with a shift
-of its own: the picture converges faster than random and still knows its own error. `eye_reference` is the way in.
+of its own: the picture converges faster than random and still knows its own error. `camera_reference` is the way in.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _BLACK_SAMPLES = 256
 
 
 @dataclass(frozen=True)
-class EyePicture:
+class CameraPicture:
     """What the camera sees and what is known of its error; row 0 on top."""
 
     xyz: np.ndarray
@@ -41,7 +41,7 @@ class EyePicture:
     lost: dict[str, float]
     """Share of paths given up: "depth" (too many events) and "numeric" (nothing met inside a solid)."""
     caustic_photons: int = 0
-    """Of the caustic that was looked up, where `cached_eye_reference` made it."""
+    """Of the caustic that was looked up, where `cached_camera_reference` made it."""
     caustic_relmse: float = 0.0
     """What its noise adds to the picture's own error, about: a part of `variance`."""
 
@@ -60,7 +60,7 @@ class EyePicture:
         return self.relmse <= target_relmse and (bool(self.xyz.any()) or self.samples >= _BLACK_SAMPLES)
 
 
-class EyeRun:
+class CameraRun:
     """Samples of one picture, added round by round; `picture()` at any time."""
 
     def __init__(
@@ -81,16 +81,16 @@ class EyeRun:
                 spectral_caustic,
             )
         except ImportError as error:
-            raise UserError(f"the eye's reference renderer needs numba ({error}); install it with: pip install numba") from error
-        self._kernel, self._scratch = eye_kernel, eye_optics.scratch
+            raise UserError(f"the camera's reference renderer needs numba ({error}); install it with: pip install numba") from error
+        self._kernel, self._scratch = camera_kernel, camera_optics.scratch
         photons, centre = photon_scene.photon_scene(scene)
-        self._scene = eye_scene.with_upsampled_mirrors(photons, scene)
-        self._camera = photon_scene.eye(scene.camera, width, height, centre)
-        self._start = eye_start.camera_start(scene, photons)
-        self._lights = eye_lights.eye_lights(scene.lights, centre)
-        self._pictures = eye_scene.pictures(scene, photons, centre)
+        self._scene = camera_scene.with_upsampled_mirrors(photons, scene)
+        self._camera = photon_scene.viewpoint(scene.camera, width, height, centre)
+        self._start = camera_start.camera_start(scene, photons)
+        self._lights = camera_lights.camera_lights(scene.lights, centre)
+        self._pictures = camera_scene.pictures(scene, photons, centre)
         self._tables = [caustic.half(number).tables for number in range(2)] if caustic else [spectral_caustic.no_caustic(scene)]
-        self._spectra = eye_scene.spectra(scene, caustic.plan.bins if caustic else 1)
+        self._spectra = camera_scene.spectra(scene, caustic.plan.bins if caustic else 1)
         self._sequences = [photon_kernel.scrambled(seed, part) for part in range(PARTS)]
         self._max_depth = max_depth
         self.sums = np.zeros((PARTS, height, width, 3))
@@ -126,26 +126,26 @@ class EyeRun:
         self.seconds += took
         self._pace.learn(count, took, seconds_left)
 
-    def picture(self) -> EyePicture:
+    def picture(self) -> CameraPicture:
         """What has been gathered; black without variance before the first round."""
-        return summed_eye(self.sums, self.units, self.tallies, self.seconds, len(self._tables) > 1)
+        return summed_camera(self.sums, self.units, self.tallies, self.seconds, len(self._tables) > 1)
 
     def _trace_part(self, part: int, count: int) -> None:
-        self._kernel.trace_eye(
+        self._kernel.trace_camera(
             self._scene, self._camera, self._lights, self._spectra, self._pictures, self._tables[part % len(self._tables)], self._start,
             self._sequences[part], int(self.units[part]), count, self._max_depth, self.sums[part], self.tallies[part], self._scratch(),
         )  # fmt: skip
         self.units[part] += count
 
 
-def summed_eye(sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, seconds: float, halves: bool = False) -> EyePicture:
+def summed_camera(sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, seconds: float, measured_passes: bool = False) -> CameraPicture:
     """The picture from the sums (PARTS, H, W, 3) and tallies (PARTS, TALLY_SIZE) of parts with `units` (PARTS,) samples a pixel.
 
     `halves`: even parts have one thing in common, the caustic they looked up, and so have odd ones: two independent pictures."""
     total = max(int(units.sum()), 1)
     mean = sums.sum(axis=0) / total
     variance = np.zeros_like(mean)
-    if halves:
+    if measured_passes:
         sums, units = (np.stack([values[half::2].sum(axis=0) for half in range(2)]) for values in (sums, units))
     used = np.flatnonzero(units)
     if len(used) > 1:
@@ -153,4 +153,4 @@ def summed_eye(sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, seconds
             variance += units[part] / total * (sums[part] / units[part] - mean) ** 2
         variance /= len(used) - 1
     lost = tallies.sum(axis=0)[:2] / (total * mean.shape[0] * mean.shape[1])
-    return EyePicture(mean, variance, total if used.size else 0, seconds, {"depth": float(lost[0]), "numeric": float(lost[1])})
+    return CameraPicture(mean, variance, total if used.size else 0, seconds, {"depth": float(lost[0]), "numeric": float(lost[1])})

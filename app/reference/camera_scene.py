@@ -1,4 +1,4 @@
-"""What the eye's reference sees beyond shapes, as flat float64 arrays: spectra by wavelength cell, textures, the environment.
+"""What the camera's reference sees beyond shapes, as flat float64 arrays: spectra by wavelength cell, textures, the environment.
 
 A path has one wavelength, drawn from *atoms*: the nanometre cells of the visible grid and the
 lines of the scene's lights. Colours given as RGB become spectra by `colorimetry.rgb_basis`, which is linear: a
@@ -21,7 +21,7 @@ from .camera_optics import inlined
 from .photon_scene import TABLE_NM, PhotonScene, reflectance_classes
 
 _EVEN_SHARE = 0.2
-"""Of the wavelengths: drawn by power, the rest by what the eye sees."""
+"""Of the wavelengths: drawn by power, the rest by what the camera sees."""
 
 
 class Spectra(NamedTuple):
@@ -120,7 +120,7 @@ def spectra(scene: Scene, bins: int) -> Spectra:
 
 
 def _probability(sources: list[np.ndarray], seen: np.ndarray) -> np.ndarray:
-    """Of each atom (A,): every source counts alike, mostly by what the eye (A, 3) sees of it."""
+    """Of each atom (A,): every source counts alike, mostly by what the camera (A, 3) sees of it."""
     share = np.zeros(len(seen))
     for power in sources:
         bright = power * seen.sum(axis=1)
@@ -130,7 +130,7 @@ def _probability(sources: list[np.ndarray], seen: np.ndarray) -> np.ndarray:
 
 
 def with_upsampled_mirrors(photons: PhotonScene, scene: Scene) -> PhotonScene:
-    """The same arrays with every mirror's reflectance as basis @ rgb, as the eye's RGB colours are meant."""
+    """The same arrays with every mirror's reflectance as basis @ rgb, as the camera's RGB colours are meant."""
     rows, weight = [photons.weights], photons.weight.copy()
     for index, item in enumerate(scene.objects):
         if isinstance(item.material, Mirror):

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..model.content_key import ContentKey
 from ..model.scene import Scene
-from .camera_run import EyeRun
+from .camera_run import CameraRun
 from .kept import kept_path, load_kept, save_kept
 from .photon_run import RELMSE_EPSILON
 from .rounds import PARTS, Progress
@@ -23,7 +23,7 @@ _FIRST_LOOK = 1 << 22
 """Photons after which the noise is measured first."""
 _NOISE_SAMPLES = 128
 """Of each pixel, by which it is measured."""
-_SPARE, _LEAST_STEP = 1.1, 1.25
+_SPARE, _MIN_STEP = 1.1, 1.25
 """Factors on the photons that should be enough, as noise falls as one over their number, about; and on those that were not."""
 _SAVE_SECONDS = 120.0
 """A run that is killed loses no more."""
@@ -90,9 +90,9 @@ class CachedCaustic:
 def picture_noise(scene: Scene, width: int, height: int, max_depth: int, caustic: SpectralCaustic) -> float:
     """relMSE that the caustic's noise adds to a picture, mean[var/(R² + ε)].
 
-    Both halves are looked up by the same paths, and what the parts' differences have in common is no noise of the paths.
+    Both passes are looked up by the same paths, and what the parts' differences have in common is no noise of the paths.
     """
-    runs = [EyeRun(scene, width, height, max_depth, caustic=caustic.half(number)) for number in range(2)]
+    runs = [CameraRun(scene, width, height, max_depth, caustic=caustic.half(number)) for number in range(2)]
     for run in runs:
         while run.samples < _NOISE_SAMPLES:
             run.advance(_NOISE_SAMPLES - run.samples)
@@ -112,4 +112,4 @@ def _goal(plan: CausticPlan, measured: int, noise: float) -> int:
         return min(_FIRST_LOOK, plan.photons)
     if noise <= plan.target_relmse or measured >= plan.photons:
         return measured
-    return int(min(max(_SPARE * noise / plan.target_relmse, _LEAST_STEP) * measured, plan.photons))
+    return int(min(max(_SPARE * noise / plan.target_relmse, _MIN_STEP) * measured, plan.photons))

@@ -1,7 +1,7 @@
 """Photons that land on flat receivers, compiled: where, in which spectral bin, with how much power.
 
 The photons are those of the light's reference (`photon_emission`: densities; `photon_emit`: rays); only
-their end differs: they are counted on the receiver, not in a pixel, so that the eye's reference may look at them
+their end differs: they are counted on the receiver, not in a pixel, so that the camera's reference may look at them
 through glass.
 """
 
@@ -13,7 +13,7 @@ from .camera_kernel import on_plane, texel_of
 from .camera_optics import (
     AIR,
     choice,
-    lean,
+    stripped,
     scatter,
     sobol_next,
     sobol_start,
@@ -25,7 +25,7 @@ from .photon_kernel import _mixed, _unit
 from .photon_scene import BLACK, DIFFUSE
 
 
-@lean
+@stripped
 def land(scene, domain, colour, band_of, side, sequence, first, count, share, max_depth, points, watts, ends, scratch):
     """Trace photons [first, first + count) of a domain and note those that land after glass or a mirror: their number.
 
@@ -78,7 +78,7 @@ def land(scene, domain, colour, band_of, side, sequence, first, count, share, ma
     return landed
 
 
-@lean
+@stripped
 def gather(tables, points, watts, ends, count, sums):
     """Add landed photons to `sums` (as `CausticTables.irradiance`, but W a texel).
 

@@ -27,7 +27,7 @@ _MARGIN_SEEN, _MARGIN_LIT = 0.1, 0.05
 """Shares of their sizes by which windows are larger than what the pilots found."""
 _COARSE = 0.05
 """Texels of the coarse window, against the fine one's …"""
-_LEAST_COARSE = 1 << 14
+_MIN_COARSE = 1 << 14
 """… and at least."""
 
 
@@ -50,7 +50,7 @@ class Planes(NamedTuple):
         return (points - self.frame[side, 0]) @ self.frame[side, 1:].T
 
 
-class Seen(NamedTuple):
+class SurfaceInteraction(NamedTuple):
     """Where N camera paths ended on receivers."""
 
     points: np.ndarray
@@ -106,7 +106,7 @@ def no_caustic(scene: Scene) -> CausticTables:
     return _tables(np.full((len(scene.objects), 2), -1, np.int32), np.zeros((1, 3, 3)), np.zeros((1, 2, 2)), np.ones((1, 2, 2)), np.zeros((1, 2, 2), np.int64), 1)
 
 
-def fit_windows(planes: Planes, seen: Seen, lit: Landed, bins: int, texel_at: Callable[[float], float], max_texels: int) -> tuple[CausticTables, np.ndarray]:
+def fit_windows(planes: Planes, seen: SurfaceInteraction, lit: Landed, bins: int, texel_at: Callable[[float], float], max_texels: int) -> tuple[CausticTables, np.ndarray]:
     """Tables of zeros over what both pilots found, and which sides have any, bool (S,) (at least one).
 
     `texel_at`: size of a fine texel at a distance along the camera's way; where all fine windows together had more than `max_texels`,
@@ -143,7 +143,7 @@ def fit_windows(planes: Planes, seen: Seen, lit: Landed, bins: int, texel_at: Ca
     size = np.zeros((count, 2, 2), np.int64)
     for side in np.flatnonzero(wanted):
         size[side, 1] = np.maximum(np.ceil(span[side, 1] / texel[side] - 1e-9), 1)
-        texels = max(_COARSE * float(np.prod(size[side, 1])), _LEAST_COARSE)
+        texels = max(_COARSE * float(np.prod(size[side, 1])), _MIN_COARSE)
         size[side, 0] = np.maximum(np.ceil(span[side, 0] * math.sqrt(texels / np.prod(span[side, 0]))), 1)
     number = np.where((planes.side >= 0) & wanted[np.maximum(planes.side, 0)], planes.side, -1).astype(np.int32)
     return _tables(number, planes.frame, low, np.maximum(size, 1) / span, size, bins), wanted

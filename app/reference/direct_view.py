@@ -6,7 +6,7 @@ import numpy as np
 
 from ..model.scene import Scene
 from .photon_intersect import STACK_SIZE, compiled, nearest
-from .photon_scene import MIRROR, eye, photon_scene
+from .photon_scene import MIRROR, viewpoint, photon_scene
 
 
 def seen_directly(scene: Scene, width: int, height: int) -> np.ndarray:
@@ -15,7 +15,7 @@ def seen_directly(scene: Scene, width: int, height: int) -> np.ndarray:
     Raises `UserError` where more solids nest than the reference can follow.
     """
     photons, centre = photon_scene(scene)
-    camera = eye(scene.camera, width, height, centre)
+    camera = viewpoint(scene.camera, width, height, centre)
     corners = np.zeros((height + 1, width + 1), np.bool_)
     middles = np.zeros((height, width), np.bool_)
     _specular(photons, camera, 0.0, corners)

@@ -1,4 +1,4 @@
-"""Where rays leave a light, in float64 and world units: the twin of emit.comp.
+"""Where rays leave a light, in float64 and world units: the CPU reference of emit.comp.
 
 Without derivatives: difference quotients over `Emitter.start` judge the shader's columns.
 """

@@ -1,4 +1,4 @@
-"""How far a picture is from the truth: one number each for energy, noise, colour and look.
+"""How far a picture is from the reference: one number each for energy, noise, colour and look.
 
 All but FLIP are taken on linear XYZ before tone mapping, pooled over pixels and channels. The reference is a
 Monte Carlo picture itself, so what its own variance adds to a squared error is subtracted:
@@ -36,7 +36,7 @@ def lit_mean(xyz: np.ndarray) -> float:
 
 
 @dataclass(frozen=True)
-class Truth:
+class ReferencePicture:
     """A reference picture, with what relMSE needs of it."""
 
     xyz: np.ndarray
@@ -63,34 +63,34 @@ class Truth:
         return float(np.mean(self.weight * self.variance))
 
 
-def relmse_raw(xyz: np.ndarray, truth: Truth) -> float:
+def relmse_raw(xyz: np.ndarray, reference_image: ReferencePicture) -> float:
     """mean[(I−R̂)²/(R̂²+ε)], the reference's variance left in."""
-    return float(np.mean(truth.weight * (xyz - truth.xyz) ** 2))
+    return float(np.mean(reference_image.weight * (xyz - reference_image.xyz) ** 2))
 
 
-def measure(xyz: np.ndarray, truth: Truth) -> dict[str, float]:
+def measure(xyz: np.ndarray, reference_image: ReferencePicture) -> dict[str, float]:
     """All measures of `xyz` (H, W, 3) that `results.Sample.metrics` lists, but FLIP.
 
     relmse, relmse_whole and nrmse are freed of the reference's variance and never below 0; smape = mean |I−R|/(|I|+|R|+√ε), from
     0 to 1; chroma = mean distance in CIE 1976 u′v′ over lit pixels.
     """
-    difference = xyz - truth.xyz
-    terms = truth.weight * difference**2
-    noise = truth.weight * truth.variance
+    difference = xyz - reference_image.xyz
+    terms = reference_image.weight * difference**2
+    noise = reference_image.weight * reference_image.variance
     raw = float(terms.mean())
-    mean = float(truth.xyz.mean())
-    square = float(np.sum(truth.xyz**2))
-    total = float(truth.xyz.sum())
+    mean = float(reference_image.xyz.mean())
+    square = float(np.sum(reference_image.xyz**2))
+    total = float(reference_image.xyz.sum())
     floor = np.sqrt(EPSILON_SHARE) * mean
-    sums = np.abs(xyz) + np.abs(truth.xyz) + floor
+    sums = np.abs(xyz) + np.abs(reference_image.xyz) + floor
     return {
-        "relmse": max(raw - truth.own_relmse, 0.0),
+        "relmse": max(raw - reference_image.own_relmse, 0.0),
         "relmse_raw": raw,
         "relmse_trimmed": _trimmed(terms, noise),
-        "relmse_whole": max(float(np.mean(truth.whole_weight * (difference**2 - truth.variance))), 0.0),
+        "relmse_whole": max(float(np.mean(reference_image.whole_weight * (difference**2 - reference_image.variance))), 0.0),
         "smape": float(np.mean(np.abs(difference) / np.where(sums > 0.0, sums, 1.0))),
-        "chroma": _chroma(xyz, truth.xyz),
-        "nrmse": float(np.sqrt(max(np.sum(difference**2 - truth.variance), 0.0) / square)) if square else 0.0,
+        "chroma": _chroma(xyz, reference_image.xyz),
+        "nrmse": float(np.sqrt(max(np.sum(difference**2 - reference_image.variance), 0.0) / square)) if square else 0.0,
         "energy_ratio": float(xyz.sum() / total) if total else 0.0,
     }
 
@@ -120,7 +120,7 @@ def _uv(xyz: np.ndarray) -> np.ndarray:
     return np.where(bright[:, None], xyz[:, :2] * np.array([4.0, 9.0]) / safe[:, None], _GREY_UV)
 
 
-def flip(xyz: np.ndarray, truth: Truth) -> float | None:
+def flip(xyz: np.ndarray, reference_image: ReferencePicture) -> float | None:
     """Mean HDR-FLIP on linear Rec.709 (Andersson et al. 2021), 0 to 1; None where the package is missing or nothing is lit.
 
     FLIP takes its exposures from the reference's median, which is black in most caustics: here it is the median of the lit
@@ -132,13 +132,13 @@ def flip(xyz: np.ndarray, truth: Truth) -> float | None:
         return None
     from ..model.optics.colorimetry import xyz_to_rgb709
 
-    luminance = truth.xyz[..., 1]
+    luminance = reference_image.xyz[..., 1]
     lit = luminance[luminance > LIT_SHARE * luminance.mean()]
     if not lit.size:
         return None
     brightest, median = float(np.quantile(lit, _HIGHLIGHT_QUANTILE)), float(np.median(lit))
     exposures = {"startExposure": float(np.log2(_FLIP_WHITE / brightest)), "stopExposure": float(np.log2(_FLIP_WHITE / median))}
-    reference, test = (np.ascontiguousarray(np.clip(xyz_to_rgb709(picture), 0.0, None), dtype=np.float32) for picture in (truth.xyz, xyz))
+    reference, test = (np.ascontiguousarray(np.clip(xyz_to_rgb709(picture), 0.0, None), dtype=np.float32) for picture in (reference_image.xyz, xyz))
     _, mean, _ = flip_evaluator.evaluate(reference, test, "HDR", applyMagma=False, parameters=exposures)
     return float(mean)
 
@@ -152,7 +152,7 @@ class BiasVariance:
     variance: float
 
 
-def bias_variance(mean_difference: np.ndarray, raw: list[float], truth: Truth) -> BiasVariance:
+def bias_variance(mean_difference: np.ndarray, raw: list[float], reference_image: ReferencePicture) -> BiasVariance:
     """bias² and variance from the mean over n seeds of I − R̂ (H, W, 3) and each seed's relmse_raw.
 
     With w = 1/(R̂²+ε): V = (Σ raw − n·mean[w D̄²])/(n−1) is the variance of one picture, and
@@ -160,14 +160,14 @@ def bias_variance(mean_difference: np.ndarray, raw: list[float], truth: Truth) -
     """
     n = len(raw)
     mean_raw = float(np.mean(raw))
-    relmse = max(mean_raw - truth.own_relmse, 0.0)
+    relmse = max(mean_raw - reference_image.own_relmse, 0.0)
     if n < 2:
         return BiasVariance(relmse, 0.0, 0.0)
-    of_mean = relmse_of_difference(mean_difference, truth)
+    of_mean = relmse_of_difference(mean_difference, reference_image)
     variance = max(n * (mean_raw - of_mean) / (n - 1), 0.0)
-    return BiasVariance(relmse, max(of_mean - variance / n - truth.own_relmse, 0.0), variance)
+    return BiasVariance(relmse, max(of_mean - variance / n - reference_image.own_relmse, 0.0), variance)
 
 
-def relmse_of_difference(difference: np.ndarray, truth: Truth) -> float:
+def relmse_of_difference(difference: np.ndarray, reference_image: ReferencePicture) -> float:
     """mean[w D²] of a difference (H, W, 3)."""
-    return float(np.mean(truth.weight * difference.astype(np.float64) ** 2))
+    return float(np.mean(reference_image.weight * difference.astype(np.float64) ** 2))

@@ -1,4 +1,4 @@
-"""Float64 twins of the light-at-a-surface functions, written from the papers and not from the shaders.
+"""Float64 references of the light-at-a-surface functions, written from the papers and not from the shaders.
 
 Arrays of 3-vectors have shape (..., 3), scalars (...); everything broadcasts. As in the
 shaders `normal` faces the incoming ray (direction · normal < 0) and eta_it = n_incident /

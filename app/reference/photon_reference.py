@@ -1,6 +1,6 @@
 """The converged picture that `bench` and the tests measure errors against.
 
-It shares no code with the shaders, the emission lattice, the splats, the maps or the eye pass:
+It shares no code with the shaders, the emission lattice, the splats, the maps or the camera pass:
 exact float64 intersections, a random wavelength, one photon one pixel, no footprint. The caustic
 layer alone: light that reached a diffuse surface by glass or mirrors, on what the camera sees
 directly.

@@ -31,7 +31,7 @@ RELMSE_EPSILON = 1e-2
 _PILOT_PHOTONS = 1 << 16
 _PILOT_BLOCK = 8
 """Pixels a side over which the pilot's brightness is averaged."""
-_MOST_A_UNIT = 16
+_MAX_A_UNIT = 16
 """Points of the most important domain in a unit; every domain has at least one."""
 _LAST_POINT = 2**31
 _BLACK_PHOTONS = 1 << 20
@@ -91,7 +91,7 @@ class ReferenceRun:
             raise UserError(f"the reference renderer needs numba ({error}); install it with: pip install numba") from error
         self._kernel = photon_kernel
         self._scene, centre = photon_scene.photon_scene(scene)
-        self._eye = photon_scene.eye(scene.camera, width, height, centre)
+        self._camera_pass = photon_scene.viewpoint(scene.camera, width, height, centre)
         self._max_depth, self._seed = max_depth, seed
         classes, _ = photon_scene.reflectance_classes(scene)
         corners = photon_scene.specular_corners(self._scene)
@@ -154,7 +154,7 @@ class ReferenceRun:
         none = np.zeros((0, 0))
         for domain, colour, points, sequence in zip(self._domains, self._colours, self._points, self._sequences[part], strict=True):
             self._kernel.trace(
-                self._scene, self._eye, domain, colour, sequence, int(self.units[part]) * points, units * points, 1.0 / points,
+                self._scene, self._camera_pass, domain, colour, sequence, int(self.units[part]) * points, units * points, 1.0 / points,
                 self._max_depth, self.sums[part], self.tallies[part], none, none,
             )  # fmt: skip
         self.units[part] += units
@@ -178,7 +178,7 @@ class ReferenceRun:
             moments.append(float(np.sum(importance[d] * np.divide(old, new, out=np.zeros_like(old), where=new > 0.0))))
         deviation = np.sqrt(np.array(moments))
         largest = deviation.max(initial=0.0)
-        steps = np.log2(np.maximum(_MOST_A_UNIT * deviation / largest, 1.0)) if largest > 0.0 else np.zeros(len(domains))
+        steps = np.log2(np.maximum(_MAX_A_UNIT * deviation / largest, 1.0)) if largest > 0.0 else np.zeros(len(domains))
         return aimed, [int(2**step) for step in np.rint(steps).astype(int)]
 
     def _pilot(self, domains: list[Domain], weight: np.ndarray, number: int) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -188,7 +188,7 @@ class ReferenceRun:
         for d, (domain, colour) in enumerate(zip(domains, self._colours, strict=True)):
             sequence = self._kernel.scrambled(self._seed, PARTS + number, d)
             self._kernel.trace(
-                self._scene, self._eye, domain, colour, sequence, 0, _PILOT_PHOTONS, 1.0 / _PILOT_PHOTONS,
+                self._scene, self._camera_pass, domain, colour, sequence, 0, _PILOT_PHOTONS, 1.0 / _PILOT_PHOTONS,
                 self._max_depth, picture, np.zeros(TALLY_SIZE), weight, importance[d],
             )  # fmt: skip
         return picture, importance

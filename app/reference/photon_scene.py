@@ -1,7 +1,7 @@
 """The scene as the reference renderer sees it: flat float64 arrays that compiled code can walk through.
 
 Made straight from `spectrasplat.model`, in world lengths about the middle of the specular objects, so that
-nothing of the GPU's packing, float32 rounding or half-space solids enters the truth. Media follow
+nothing of the GPU's packing, float32 rounding or half-space solids enters the reference. Media follow
 the rule of nested dielectrics (Schmidt and Budge, "Simple Nested Dielectrics in Ray Traced
 Images", 2002): of all solids a point lies in, the one of highest rank is its medium.
 """
@@ -79,7 +79,7 @@ class PhotonScene(NamedTuple):
     """Distances below this are the same place."""
 
 
-class Eye(NamedTuple):
+class Viewpoint(NamedTuple):
     """The camera: a pixel is found by projection, row 0 on top."""
 
     position: np.ndarray
@@ -152,7 +152,7 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
     ), centre  # fmt: skip
 
 
-def eye(camera: Camera, width: int, height: int, centre: np.ndarray) -> Eye:
+def viewpoint(camera: Camera, width: int, height: int, centre: np.ndarray) -> Viewpoint:
     """The camera about the arrays' origin; its upright is any where it looks along `up`."""
     position = np.asarray(camera.position, float)
     forward = np.asarray(camera.target, float) - position
@@ -164,11 +164,11 @@ def eye(camera: Camera, width: int, height: int, centre: np.ndarray) -> Eye:
     right /= np.linalg.norm(right)
     orthographic = camera.kind == "orthographic"
     half = 0.5 * camera.vertical_extent if orthographic else np.tan(np.radians(0.5 * camera.vertical_fov_deg))
-    return Eye(position - centre, right, np.cross(right, forward), forward, float(half * width / height), float(half), orthographic, width, height)
+    return Viewpoint(position - centre, right, np.cross(right, forward), forward, float(half * width / height), float(half), orthographic, width, height)
 
 
 def colours(spectrum: Spectrum, classes: list[np.ndarray | None]) -> Colours:
-    """Atoms of a spectrum: most of the probability goes where the eye sees most, some where power is.
+    """Atoms of a spectrum: most of the probability goes where the camera sees most, some where power is.
 
     A cell has the colour of its nanometre, as everywhere in the program; a line that of its own wavelength.
     """

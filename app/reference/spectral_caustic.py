@@ -1,4 +1,4 @@
-"""The caustic as the eye's reference looks it up: histograms of photons on flat receivers, by place and wavelength.
+"""The caustic as the camera's reference looks it up: histograms of photons on flat receivers, by place and wavelength.
 
 The photons start as those of the light's reference do. A pilot of camera paths, through glass too, finds which sides of which
 receivers are seen and how finely; a pilot of photons finds where light lands there (`caustic_windows`). Receivers must be
@@ -24,7 +24,7 @@ from .camera_start import camera_start
 from .caustic_windows import (
     TEXELS_A_PIXEL,
     Landed,
-    Seen,
+    SurfaceInteraction,
     fit_windows,
     free_areas,
     no_caustic,
@@ -46,7 +46,7 @@ _FLOOR = 0.05
 """Of the photons: shared evenly by all domains, whatever the pilot found."""
 _UNIT = 1 << 11
 """Photons of a part's smallest step, over all domains, about."""
-_MOST_UNITS = 64
+_MAX_UNITS = 64
 """A part does at a time: landed photons take memory."""
 _HALVES = 2
 """Sums are kept of even and odd parts, whose difference is the noise."""
@@ -76,7 +76,7 @@ class SpectralCaustic:
 
     plan: CausticPlan
     tables: CausticTables
-    halves: np.ndarray
+    measured_passes: np.ndarray
     """float32 (2, texels × bins): `tables.irradiance` as either half of the photons has it."""
     photons: int
     landed_w: float
@@ -90,15 +90,15 @@ class SpectralCaustic:
 
     def half(self, number: int) -> SpectralCaustic:
         """The caustic by the photons of one half alone."""
-        alone = self.halves[number]
-        return SpectralCaustic(self.plan, self.tables._replace(irradiance=alone), np.broadcast_to(alone, self.halves.shape), self.photons // _HALVES, self.landed_w, self.outside_w)
+        alone = self.measured_passes[number]
+        return SpectralCaustic(self.plan, self.tables._replace(irradiance=alone), np.broadcast_to(alone, self.measured_passes.shape), self.photons // _HALVES, self.landed_w, self.outside_w)
 
     @cached_property
     def relmse(self) -> float:
         """Own error of the fine windows, averaged over blocks of the side of a pixel: mean[var/(E² + ε)] on power."""
         error, count = 0.0, 0
         for side in range(len(self.tables.first)):
-            mean, apart = (_blocks(_window(self.tables, values, side, 1)) for values in (self.tables.irradiance, self.halves[0] - self.halves[1]))
+            mean, apart = (_blocks(_window(self.tables, values, side, 1)) for values in (self.tables.irradiance, self.measured_passes[0] - self.measured_passes[1]))
             epsilon = RELMSE_EPSILON * float(mean.mean()) ** 2 if mean.size else 0.0
             if epsilon > 0.0:
                 error += float((0.25 * apart**2 / (mean**2 + epsilon)).sum())
@@ -126,7 +126,7 @@ class CausticRun:
         """Sends the pilots, which set the windows and where photons start. Raises UserError as `build_caustic` does."""
         self.scene, self.plan = scene, plan
         self.photon_scene, centre = photon_scene.photon_scene(scene)
-        self.camera = photon_scene.eye(scene.camera, width, height, centre)
+        self.camera = photon_scene.viewpoint(scene.camera, width, height, centre)
         self.planes = receiver_planes(scene, self.photon_scene)
         self.domains, self.colours = self._domains(centre)
         lines = line_wavelengths(scene)
@@ -158,22 +158,22 @@ class CausticRun:
 
     def advance(self, photons_left: int) -> None:
         """One round of all parts, or what is left. An interrupt keeps the parts that were finished."""
-        trace_parts(self._trace_part, min(_MOST_UNITS, max(1, -(-photons_left // (self.unit * PARTS)))))
+        trace_parts(self._trace_part, min(_MAX_UNITS, max(1, -(-photons_left // (self.unit * PARTS)))))
 
     def caustic(self) -> SpectralCaustic:
         """What has been gathered."""
         by_half = np.array([self.units[half::_HALVES].sum() for half in range(_HALVES)])
-        halves = self.sums / np.maximum(by_half, 1).astype(np.float32)[:, None]
+        measured_passes = self.sums / np.maximum(by_half, 1).astype(np.float32)[:, None]
         for side in np.flatnonzero(self.wanted):
             for window in range(2):
                 area = free_areas(self.tables, side, window).reshape(self.tables.size[side, window, ::-1])[..., None]
-                for values in halves:
+                for values in measured_passes:
                     irradiance = _window(self.tables, values, side, window)
                     np.divide(irradiance, area, out=irradiance, where=area > 0.0, casting="same_kind")
         total = max(int(self.units.sum()), 1)
-        tables = self.tables._replace(irradiance=np.tensordot((by_half / total).astype(np.float32), halves, 1))
+        tables = self.tables._replace(irradiance=np.tensordot((by_half / total).astype(np.float32), measured_passes, 1))
         landed, outside = self.flux.sum(axis=0) / total
-        return SpectralCaustic(self.plan, tables, halves, self.photons, float(landed), float(outside))
+        return SpectralCaustic(self.plan, tables, measured_passes, self.photons, float(landed), float(outside))
 
     def _trace_part(self, part: int, units: int) -> None:
         found = [self._land(d, self._sequences[part][d], int(self.units[part]) * n, units * n, 1.0 / n) for d, n in enumerate(self.counts.tolist())]
@@ -209,13 +209,13 @@ class CausticRun:
                 colours += [photon_scene.colours(light.spectral_power, classes)] * len(found)
         return domains, colours
 
-    def _seen(self) -> Seen:
+    def _seen(self) -> SurfaceInteraction:
         points, which = np.empty((_PILOT, 4)), np.empty((_PILOT, 2), np.int32)
-        found = eye_kernel.seen_points(
+        found = camera_kernel.seen_points(
             self.photon_scene, self.camera, camera_start(self.scene, self.photon_scene), scrambled(self.plan.seed, PARTS + 1, 0),
             _PILOT, _PILOT_NM, self.plan.max_depth, self.planes.side, points, which, scratch(),
         )  # fmt: skip
-        return Seen(points[:found, :3], points[:found, 3], which[:found, 0])
+        return SurfaceInteraction(points[:found, :3], points[:found, 3], which[:found, 0])
 
     def _land(self, d: int, sequence: Sequence, first: int, count: int, share: float) -> Landed:
         found = Landed(np.empty((count, 3)), np.empty(count), np.empty((count, 4), np.int32))
@@ -225,12 +225,12 @@ class CausticRun:
         )  # fmt: skip
         return Landed(*(values[:landed] for values in found))
 
-    def _refuse_curved(self, seen: Seen, lit: Landed) -> None:
+    def _refuse_curved(self, seen: SurfaceInteraction, lit: Landed) -> None:
         for side in np.intersect1d(seen.side, lit.ends[:, 0]):
             if not self.planes.is_flat[side]:
                 name = self.scene.objects[self.planes.owner[side]].name
                 raise UserError(
-                    f"scene '{self.scene.name}': glass throws light on '{name}', which is not flat, and the eye's reference "
+                    f"scene '{self.scene.name}': glass throws light on '{name}', which is not flat, and the camera's reference "
                     "looks caustics up on flat receivers only; make it flat, or black"
                 )
 
@@ -260,7 +260,7 @@ class CausticRun:
 
 
 def _band_of(bins: int, colour: Colours, lines: list[float]) -> np.ndarray:
-    """Bin of each atom of a light's spectrum, as `eye_scene.spectra` numbers them: int32 (A,)."""
+    """Bin of each atom of a light's spectrum, as `camera_scene.spectra` numbers them: int32 (A,)."""
     cell = np.clip(np.rint(colour.start_nm + 0.5 * colour.width_nm).astype(int) - 380, 0, 400)
     line = bins + np.searchsorted(np.array(lines, float), colour.start_nm)
     return np.where(colour.width_nm > 0.0, cell * bins // 401, line).astype(np.int32)

@@ -24,7 +24,7 @@ from ..model.optics.colorimetry import xyz_to_rgb709
 from ..model.scene import Diffuse, Scene
 from ..model.settings import RenderSettings
 from .frames import FrameRenderer
-from .light_pass import LightHalf
+from .light_pass import LightPass
 
 DEFAULT_SIZE = (1024, 1024)
 UNITS = "irradiance, lm/unit² (linear Rec.709, white counts in full), without the receiver's reflectance"
@@ -80,8 +80,8 @@ def bake(context: Context, stage: Stage, settings: RenderSettings, receiver: str
     yield 1.0
 
 
-def baked(light: LightHalf) -> tuple[np.ndarray, dict[str, object]]:
-    """Irradiance float32 (H, W, 3), row 0 on top, and where it lies; of a light half whose settings ask for a map layer."""
+def baked(light: LightPass) -> tuple[np.ndarray, dict[str, object]]:
+    """Irradiance float32 (H, W, 3), row 0 on top, and where it lies; of a light pass whose settings ask for a map layer."""
     receiver = light.map_receiver
     assert receiver is not None
     charts = light.layout.charts.get(receiver)
@@ -109,7 +109,7 @@ def _nearest_owner(charts: ChartAtlas) -> np.ndarray:
     return owner
 
 
-def _rectangle(light: LightHalf, receiver: int, width: int, height: int) -> Mapping[str, object]:
+def _rectangle(light: LightPass, receiver: int, width: int, height: int) -> Mapping[str, object]:
     from ..passes.map_layout import plane_frame
 
     space = light.buffers.space
@@ -133,7 +133,7 @@ def _rectangle(light: LightHalf, receiver: int, width: int, height: int) -> Mapp
     }
 
 
-def _charts(light: LightHalf, receiver: int, charts: ChartAtlas) -> Mapping[str, object]:
+def _charts(light: LightPass, receiver: int, charts: ChartAtlas) -> Mapping[str, object]:
     mesh = light.buffers.world_meshes[light.buffers.receivers[receiver]]
     corners = mesh.corners()
     texel = np.einsum("tij,tcj->tci", charts.rows[..., :3], corners) + charts.rows[:, None, :, 3]

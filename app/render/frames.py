@@ -22,13 +22,13 @@ from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Camera, Scene
 from ..model.settings import RenderSettings
-from ..passes.camera import CausticMaps, EyePass
+from ..passes.camera import CausticMaps, CameraPass
 from ..passes.pilot import Pilot
 from ..passes.trace import Band
-from .light_pass import LightHalf, spectral_axis
+from .light_pass import LightPass, spectral_axis
 from .light_plan import LightPlan
-from .viewer.inputs import LiveInputs, Redo
-from .viewer.invalidation import redo
+from .viewer.inputs import LiveInputs, DirtyLevel
+from .viewer.invalidation import dirty_level
 from .viewer.live_camera import solo_scene
 
 DEFAULT_SAMPLES = 16
@@ -51,7 +51,7 @@ class _Survey:
     """Spectral bands and points of each light."""
 
 
-class _FramedLight(LightHalf):
+class _FramedLight(LightPass):
     """Maps and lattices fitted to several frames, so that neither changes from one to the next."""
 
     surveys: Sequence[_Survey] = ()
@@ -67,7 +67,7 @@ class _FramedLight(LightHalf):
         self.pilots = own
 
     def begin(self, photons: int, seed: int) -> None:
-        """As in `LightHalf`, with the finest division that any frame asks for."""
+        """As in `LightPass`, with the finest division that any frame asks for."""
         super().begin(photons, seed)
         self.plans = [self._divided(plan) for plan in self.plans]
         for plan in self.plans:
@@ -101,8 +101,8 @@ class FrameRenderer:
         self._context = context
         self._shown: LiveInputs | None = None
         self._buffers: SceneBuffers | None = None
-        self.light: LightHalf | None = None
-        self._eye: EyePass | None = None
+        self.light: LightPass | None = None
+        self._camera_pass: CameraPass | None = None
         moves = any(s.camera != stages[0].camera for s in stages)
         # Light is traced once for all views, so no single one may decide what the programs leave out.
         self._settings = settings = replace(settings, any_view=settings.any_view or moves)
@@ -117,20 +117,20 @@ class FrameRenderer:
         yield from self._survey()
         inputs = self._inputs(stage)
         # A change of what is merely looked at may still concern the maps' records, so only a moved camera keeps the light.
-        if self._shown is None or redo(self._shown, self._shown, replace(inputs, camera=self._shown.camera)) != Redo.NOTHING:
+        if self._shown is None or dirty_level(self._shown, self._shown, replace(inputs, camera=self._shown.camera)) != DirtyLevel.NOTHING:
             yield from self._trace(stage)
         self._shown = inputs
         if self._settings.layer.startswith("map:"):
             return
-        assert self.light is not None and self._eye is not None
-        light, settings, eye = self.light, self._settings, self._eye
+        assert self.light is not None and self._camera_pass is not None
+        light, settings, camera_pass = self.light, self._settings, self._camera_pass
         maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
-        samples = _whole_cycles(eye, settings.spp or DEFAULT_SAMPLES)
+        samples = _whole_cycles(camera_pass, settings.spp or DEFAULT_SAMPLES)
         # For every frame anew: a frame is a function of its own stage, whatever was drawn before it.
-        if eye.chooses:
-            for _ in eye.choosing_spectrum(stage.camera, settings.width, settings.height, samples, maps):
+        if camera_pass.chooses:
+            for _ in camera_pass.choosing_spectrum(stage.camera, settings.width, settings.height, samples, maps):
                 yield _LIGHT_SHARE
-        for share in eye.samples(stage.camera, settings.width, settings.height, samples, 0, maps, settings.seed):
+        for share in camera_pass.samples(stage.camera, settings.width, settings.height, samples, 0, maps, settings.seed):
             yield _LIGHT_SHARE + (1.0 - _LIGHT_SHARE) * share
 
     def run(self, stage: Stage) -> np.ndarray:
@@ -141,20 +141,20 @@ class FrameRenderer:
 
     def rgb(self) -> np.ndarray:
         """Linear Rec.709, float32 (H, W, 3), row 0 on top, of the last frame."""
-        assert self._eye is not None
-        return self._eye.read_rgb()
+        assert self._camera_pass is not None
+        return self._camera_pass.read_rgb()
 
     def spectral(self) -> tuple[np.ndarray, np.ndarray]:
         """Radiance per bin (H, W, bins) and the bins' edges (nm), with `RenderSettings.bins`."""
-        assert self._eye is not None and self.light is not None and self.light.bin_edges_nm is not None
-        return self._eye.read_spectral(), self.light.bin_edges_nm
+        assert self._camera_pass is not None and self.light is not None and self.light.bin_edges_nm is not None
+        return self._camera_pass.read_spectral(), self.light.bin_edges_nm
 
     def release(self) -> None:
         """Free everything but the context's programs."""
-        for owned in (self._eye, self.light, self._buffers):
+        for owned in (self._camera_pass, self.light, self._buffers):
             if owned is not None:
                 owned.release()
-        self._eye = self.light = self._buffers = self._shown = None
+        self._camera_pass = self.light = self._buffers = self._shown = None
 
     def _inputs(self, stage: Stage) -> LiveInputs:
         s = self._settings
@@ -166,7 +166,7 @@ class FrameRenderer:
         for index in np.unique(np.linspace(0, len(stages) - 1, _SURVEYED).astype(int)):
             new = self._inputs(stages[index])
             old = [replace(self._inputs(s), camera=new.camera) for s in found]
-            if all(redo(o, o, new) != Redo.NOTHING for o in old):
+            if all(dirty_level(o, o, new) != DirtyLevel.NOTHING for o in old):
                 found.append(stages[index])
         return found if len(found) > 1 else []
 
@@ -196,7 +196,7 @@ class FrameRenderer:
             yield _LIGHT_SHARE * step.fraction
         light.finish()
         self.traces += 1
-        self._eye = EyePass(self._context, buffers, self._settings.layer, light.reflectances, light.map_channels)
+        self._camera_pass = CameraPass(self._context, buffers, self._settings.layer, light.reflectances, light.map_channels)
 
     def _photons(self, scene: Scene) -> int:
         return self._settings.photons or scene.render.photons
@@ -216,10 +216,10 @@ class FrameRenderer:
         return light, buffers
 
 
-def _whole_cycles(eye: EyePass, samples: int) -> int:
+def _whole_cycles(camera_pass: CameraPass, samples: int) -> int:
     """`samples` or a few more, in which every band of the spectrum has its turn equally often, however many bands a frame chooses:
     all frames then have as many samples, and what stands still in them stays."""
-    cycle = eye.fixed_bands or (1 << (samples.bit_length() - 1) if eye.chooses else 1)
+    cycle = camera_pass.fixed_bands or (1 << (samples.bit_length() - 1) if camera_pass.chooses else 1)
     return -(-samples // cycle) * cycle
 
 

@@ -58,7 +58,7 @@ class LightMaps:
         return 16 * width * height * 4 * self.features.targets
 
     def resolved_textures(self) -> list[moderngl.Texture]:
-        """The summed maps for look-ups: wide texels added to fine ones, charts' seams folded home."""
+        """The summed maps for lookups: wide texels added to fine ones, charts' seams folded home."""
         self.atlas.flush()
         ctx = self._ctx
         total = self.atlas.total_textures

@@ -1,8 +1,8 @@
-"""The light half of a rendering: pilot, bands, maps, then rounds of emit → trace → splat.
+"""The light pass of a rendering: pilot, bands, maps, then rounds of emit → trace → splat.
 
 The pilot is a few thousand photons per light, traced at several wavelengths. It says where light
 lands (so the maps are fitted before anything is deposited) and how far the spectral columns are
-from the truth (so the spectrum is cut into as few bands as that error allows).
+from the reference (so the spectrum is cut into as few bands as that error allows).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from ..gpu import records
 from ..gpu.context import Context
 from ..gpu.gain_buffers import GainBuffers
-from ..gpu.map_channels import MapChannels, hats
+from ..gpu.map_channels import MapChannels, tents
 from ..gpu.reindex import ReindexBuffer, Reindexing, Spans
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.splat_tables import SplatTables
@@ -39,7 +39,7 @@ from .light_plan import SMALLEST_BATCH, Planner
 DEFAULT_BATCH = 1 << 16
 @dataclass
 class LightStats:
-    """What the light half did."""
+    """What the light pass did."""
 
     tally: FluxTally = field(default_factory=FluxTally)
     photons: int = 0
@@ -90,12 +90,12 @@ class RoundOf:
     is_last_light: bool
 
 
-class LightHalf:
-    """Owns the light half's passes and the caustic maps of one scene."""
+class LightPass:
+    """Owns the light pass's passes and the caustic maps of one scene."""
 
     tile_max = (FINE_TILE_MAX, COARSE_TILE_MAX)
     """Longest sides of the maps' fine and coarse windows, texels."""
-    least_batch = SMALLEST_BATCH
+    min_batch = SMALLEST_BATCH
     """With fewer rays in flight the plan would depend on the batch."""
 
     def __init__(self, context: Context, scene: Scene, settings: RenderSettings, features: Features, buffers: SceneBuffers) -> None:
@@ -106,13 +106,13 @@ class LightHalf:
         self.buffers = buffers
         self.stats = LightStats()
         batch = settings.batch or DEFAULT_BATCH * (1 if context.is_software else 4)
-        batch = max(min(batch, _largest_batch(context, features)), self.least_batch)
+        batch = max(min(batch, _largest_batch(context, features)), self.min_batch)
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
         self.variables = SpectralVariables.build(context.ctx, buffers.variables)
         self.gains = GainBuffers(context.ctx, scene, buffers.receivers, buffers.space, buffers.axis) if features.local_gain else None
         self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
         edges = None if settings.bins is None else tuple(np.linspace(380.0, 780.0, settings.bins + 1).tolist())
-        self.map_channels = hats(buffers.axis, features.map_hats) if features.map_hats else MapChannels(edges)
+        self.map_channels = tents(buffers.axis, features.map_tents) if features.map_tents else MapChannels(edges)
         """What the maps' channels stand for."""
         self.maps: LightMaps | None = None
         self.waits = context.is_software
@@ -194,7 +194,7 @@ class LightHalf:
         return self._maps.scale
 
     def resolved_textures(self) -> list[moderngl.Texture]:
-        """The summed maps for look-ups: wide texels added to fine ones, charts' seams folded home."""
+        """The summed maps for lookups: wide texels added to fine ones, charts' seams folded home."""
         return self._maps.resolved_textures()
 
     def resolved_map(self, receiver: int) -> np.ndarray:
@@ -319,7 +319,7 @@ class LightHalf:
     ) -> Iterator[None]:
         """Add every `stride`-th photon record to the maps, with footprints `coarsening` times as wide, pausing after every `splat_part` of them.
 
-        `count`: of those that are added. `tables` of another plan than the one begun, `maps` of another layout than the light half's own."""
+        `count`: of those that are added. `tables` of another plan than the one begun, `maps` of another layout than the light pass's own."""
         maps, tables = maps or self._maps, tables or self.tables
         smoothing = self.settings.smoothing * coarsening
         for start in range(0, count, self.splat_part):

@@ -1,4 +1,4 @@
-"""One rendering, top to bottom: file's Scene → Features → buffers → light half → eye half → picture."""
+"""One rendering, top to bottom: file's Scene → Features → buffers → light pass → camera pass → picture."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ..model.features import Features
 from ..model.optics.colorimetry import xyz_to_rgb709
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
-from ..passes.camera import CausticMaps, EyePass
+from ..passes.camera import CausticMaps, CameraPass
 from ..passes.present import Channels
 from ..passes.spectrum_choice import Spectrum
-from .light_pass import LightHalf, LightStats, spectral_axis
+from .light_pass import LightPass, LightStats, spectral_axis
 
 FIRST_PASS_PHOTONS = 1 << 17
 """Photons of a timed rendering's first pass, which finds out how fast the scene goes."""
@@ -29,8 +29,8 @@ Cancelled = Callable[[], bool]
 
 
 @dataclass(frozen=True)
-class EyeStats:
-    """What the eye half did."""
+class CameraStats:
+    """What the camera pass did."""
 
     samples: int = 0
     """A pixel."""
@@ -48,11 +48,11 @@ class RenderStats:
     light: LightStats
     seconds: float = 0.0
     prepare_seconds: float = 0.0
-    eye_seconds: float = 0.0
+    camera_seconds: float = 0.0
     atlas_size: tuple[int, int] = (0, 0)
     bytes: int = 0
     map_flux_w: float = 0.0
-    eye: EyeStats = EyeStats()
+    camera_pass: CameraStats = CameraStats()
 
     @property
     def photons(self) -> int:
@@ -78,10 +78,10 @@ class RenderStats:
             "fall-backs          " + ", ".join(f"{name} {count}" for name, count in tally.fallbacks.items())
             + f", splat_footprint_dropped {self.light.footprints_dropped} ({self.light.dropped_w / max(tally.ended['deposited'], 1e-300):.1e} of what was deposited)",
             "bands × points      " + ", ".join(f"{name} {count} × {self.light.light_points[name]}" for name, count in self.light.bands.items()),
-            f"eye                 {self.eye.samples} samples a pixel, {self.eye.spectrum.words}; " + ", ".join(f"{name} {count}" for name, count in self.eye.fallbacks.items()),
+            f"camera                 {self.camera_pass.samples} samples a pixel, {self.camera_pass.spectrum.words}; " + ", ".join(f"{name} {count}" for name, count in self.camera_pass.fallbacks.items()),
             f"maps                {self.atlas_size[0]}×{self.atlas_size[1]} texels, buffers {self.bytes / 2**20:.0f} MiB",
             f"seconds             prepare {self.prepare_seconds:.2f}, emit and trace {self.light.trace_seconds:.2f}, "
-            f"splat {self.light.splat_seconds:.2f}, eye {self.eye_seconds:.2f}, all {self.seconds:.2f}",
+            f"splat {self.light.splat_seconds:.2f}, camera {self.camera_seconds:.2f}, all {self.seconds:.2f}",
         ]
         return text
 
@@ -120,7 +120,7 @@ def _render(context: Context, scene: Scene, settings: RenderSettings, progress: 
     progress(0.0, "preparing")
     features = Features.of(scene, settings)
     buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
-    light = LightHalf(context, scene, settings, features, buffers)
+    light = LightPass(context, scene, settings, features, buffers)
     stats = RenderStats(context.renderer, context.is_software, light.stats)
     try:
         light.prepare()
@@ -133,12 +133,12 @@ def _render(context: Context, scene: Scene, settings: RenderSettings, progress: 
         stats.light = light.stats
         stats.atlas_size = light.layout.size
         stats.bytes = buffers.bytes + light.trace.bytes
-        eye_started = time.perf_counter()
+        camera_started = time.perf_counter()
         if settings.layer.startswith("map:"):
             rgb, spectral = _map_layer(light)
         else:
-            rgb, spectral = _eye_layer(context, scene, settings, buffers, light, stats, progress, cancelled)
-        stats.eye_seconds = time.perf_counter() - eye_started
+            rgb, spectral = _camera_layer(context, scene, settings, buffers, light, stats, progress, cancelled)
+        stats.camera_seconds = time.perf_counter() - camera_started
         stats.seconds = time.perf_counter() - started
         if settings.tally:
             stats.map_flux_w = light.map_flux()
@@ -148,7 +148,7 @@ def _render(context: Context, scene: Scene, settings: RenderSettings, progress: 
         buffers.release()
 
 
-def _trace_and_splat(light: LightHalf, photons: int, seed: int, progress: Progress, cancelled: Cancelled) -> None:
+def _trace_and_splat(light: LightPass, photons: int, seed: int, progress: Progress, cancelled: Cancelled) -> None:
     """One pass of so many photons."""
 
     def proceed(fraction: float) -> bool:
@@ -159,7 +159,7 @@ def _trace_and_splat(light: LightHalf, photons: int, seed: int, progress: Progre
     light.run_pass(0, photons, proceed)
 
 
-def _trace_for(light: LightHalf, seconds: float, seed: int, progress: Progress, cancelled: Cancelled) -> None:
+def _trace_for(light: LightPass, seconds: float, seed: int, progress: Progress, cancelled: Cancelled) -> None:
     """Passes as fine as `seconds` allow.
 
     Coarse footprints blur, and what they blurred stays in the sum: so a first small pass only tells how
@@ -187,7 +187,7 @@ def _trace_for(light: LightHalf, seconds: float, seed: int, progress: Progress, 
         number += 1
 
 
-def _map_layer(light: LightHalf) -> tuple[np.ndarray, np.ndarray | None]:
+def _map_layer(light: LightPass) -> tuple[np.ndarray, np.ndarray | None]:
     """The caustic map itself as a picture: irradiance (or reflected light) on the receiver, lm/unit²."""
     receiver = light.map_receiver
     assert receiver is not None
@@ -200,21 +200,21 @@ def _map_layer(light: LightHalf) -> tuple[np.ndarray, np.ndarray | None]:
     return channels.to_rgb709(texels), channels.to_spectral(texels)
 
 
-def eye_features(scene: Scene, settings: RenderSettings) -> Features:
+def camera_features(scene: Scene, settings: RenderSettings) -> Features:
     """What the camera's rays need: those of its own method, where it has one."""
-    method = settings.eye_method or settings.method
+    method = settings.camera_method or settings.method
     return Features.of(scene, replace(settings, method="stochastic" if method == "stochastic-point" else method))
 
 
-def _eye_layer(
-    context: Context, scene: Scene, settings: RenderSettings, buffers: SceneBuffers, light: LightHalf, stats: RenderStats, progress: Progress, cancelled: Cancelled
+def _camera_layer(
+    context: Context, scene: Scene, settings: RenderSettings, buffers: SceneBuffers, light: LightPass, stats: RenderStats, progress: Progress, cancelled: Cancelled
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """The camera's picture and, where asked for, its spectral bins."""
     own = None
-    if (settings.eye_method or settings.method) != settings.method:
-        features = eye_features(scene, settings)
+    if (settings.camera_method or settings.method) != settings.method:
+        features = camera_features(scene, settings)
         own = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
-    eye = EyePass(context, own or buffers, settings.layer, light.reflectances, light.map_channels)
+    camera_pass = CameraPass(context, own or buffers, settings.layer, light.reflectances, light.map_channels)
     maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
     try:
         # A stop asked for while tracing still wants a picture: only the first sample is owed then.
@@ -222,15 +222,15 @@ def _eye_layer(
         stop_at_once = cancelled()
         if not stop_at_once:
             # Every stretch of the spectrum has its turn equally often.
-            eye.may_be_single = True
-            samples = eye.choose_spectrum(scene.camera, settings.width, settings.height, samples, maps).samples(samples)
-        eye.run(
+            camera_pass.may_be_single = True
+            samples = camera_pass.choose_spectrum(scene.camera, settings.width, settings.height, samples, maps).samples(samples)
+        camera_pass.run(
             scene.camera, settings.width, settings.height, 1 if stop_at_once else samples, 0, maps, settings.seed,
             lambda fraction: progress(0.9 + 0.1 * fraction, "looking"), None if stop_at_once else cancelled,
         )
-        stats.eye = EyeStats(eye.samples_taken, eye.spectrum, eye.fallbacks if settings.tally else {})
-        return eye.read_rgb(), eye.read_spectral() if light.bin_edges_nm is not None else None
+        stats.camera_pass = CameraStats(camera_pass.samples_taken, camera_pass.spectrum, camera_pass.fallbacks if settings.tally else {})
+        return camera_pass.read_rgb(), camera_pass.read_spectral() if light.bin_edges_nm is not None else None
     finally:
-        eye.release()
+        camera_pass.release()
         if own is not None:
             own.release()

@@ -30,7 +30,7 @@ def html_text(result: StressResult) -> str:
 
 def _head(result: StressResult) -> list[Html]:
     broken = result.broken()
-    facts = {"version": result.version, "date": result.date, **result.machine}
+    view_model = {"version": result.version, "date": result.date, **result.machine}
     parts = [
         element("p", "SpectraSplat stress report", cls="muted"),
         element("h1", "Every promise holds" if not broken else f"{len(broken)} broken promise{'s' if len(broken) > 1 else ''}"),
@@ -48,7 +48,7 @@ def _head(result: StressResult) -> list[Html]:
             "stated beside it. Errors are relative unless their name says a unit.",
         ),
         element("pre", result.command),
-        element("dl", [element("div", element("dt", name), element("dd", value)) for name, value in facts.items()], cls="facts"),
+        element("dl", [element("div", element("dt", name), element("dd", value)) for name, value in view_model.items()], cls="facts"),
     ]
     return parts
 

@@ -73,10 +73,10 @@ class StressResult:
 
 
 def all_cases() -> tuple[Case, ...]:
-    """The synthetic cases of the light, those of the eye, then those of whole scenes, then the sweep over shipped scenes."""
+    """The synthetic cases of the light, those of the camera, then those of whole scenes, then the sweep over shipped scenes."""
     from .cases import camera_cases, optics_cases, path_cases, scene_cases, splat_cases
 
-    modules = (optics_cases, path_cases, splat_cases, eye_cases, scene_cases)
+    modules = (optics_cases, path_cases, splat_cases, camera_cases, scene_cases)
     return tuple(case for module in modules for case in module.CASES) + scene_cases.default_sweeps()
 
 

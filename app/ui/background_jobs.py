@@ -27,7 +27,7 @@ COMPARE_SHARE = 0.4
 """Likewise what is compared with."""
 
 
-class Companions:
+class BackgroundJobs:
     """Owns them. `told` collects sentences about what was finished, for the host to show."""
 
     def __init__(self, context: Context, config: Path) -> None:

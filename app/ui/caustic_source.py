@@ -8,9 +8,9 @@ import numpy as np
 
 REACH = 0.03
 """Radius about the point from which photons are asked, share of the extent of the glass's light on that receiver."""
-LEAST_BRIGHTNESS = 0.25
+MIN_BRIGHTNESS = 0.25
 """Irradiance within that radius over the mean within the extent: fainter is stray light, not a caustic."""
-LEAST_SHARE = 0.2
+MIN_SHARE = 0.2
 """Of the flux near the point, that must have come through one object."""
 
 
@@ -30,8 +30,8 @@ def source_at(
     radius = REACH * max(extent, 1e-12)
     near = np.linalg.norm(places - np.asarray(point, float), axis=1) <= radius
     mean = flux.sum() / max(extent, 1e-12) ** 2
-    if not near.any() or flux[near].sum() < LEAST_BRIGHTNESS * mean * math.pi * radius**2:
+    if not near.any() or flux[near].sum() < MIN_BRIGHTNESS * mean * math.pi * radius**2:
         return None
     totals = np.bincount(origins[near], weights=flux[near])
     best = int(totals.argmax())
-    return best if totals[best] >= LEAST_SHARE * totals.sum() else None
+    return best if totals[best] >= MIN_SHARE * totals.sum() else None

@@ -15,9 +15,9 @@ from ..edit.state import State, Tool
 from ..model.scene import Dielectric
 from . import view_commands
 from .panels import dialogs
-from .view_model import Facts
+from .view_model import ViewModel
 
-Act = Callable[[State, Facts], State]
+Act = Callable[[State, ViewModel], State]
 
 
 @dataclass(frozen=True)
@@ -30,102 +30,102 @@ class Command:
     group: str
     tip: str
     act: Act
-    enabled: Callable[[State, Facts], bool] = lambda _state, _facts: True
-    checked: Callable[[State, Facts], bool] | None = None
+    enabled: Callable[[State, ViewModel], bool] = lambda _state, _view_model: True
+    checked: Callable[[State, ViewModel], bool] | None = None
     """Set for what is on or off."""
 
 
 def _ask(*what: requests.Request) -> Act:
-    return lambda state, _facts: state.asking(*what)
+    return lambda state, _view_model: state.asking(*what)
 
 
-def _duplicate(state: State, _facts: Facts) -> State:
+def _duplicate(state: State, _view_model: ViewModel) -> State:
     from .panels import outliner
 
     return outliner.duplicate(state, state.selection)
 
 
-def _delete(state: State, _facts: Facts) -> State:
+def _delete(state: State, _view_model: ViewModel) -> State:
     from .panels import outliner
 
     return outliner.delete(state, state.selection)
 
 
-def _save(state: State, facts: Facts) -> State:
-    return state.asking(requests.Save()) if facts.path is not None else dialogs.save_as(state, facts)
+def _save(state: State, view_model: ViewModel) -> State:
+    return state.asking(requests.Save()) if view_model.path is not None else dialogs.save_as(state, view_model)
 
 
-def _copy_material(state: State, _facts: Facts) -> State:
+def _copy_material(state: State, _view_model: ViewModel) -> State:
     return state.asking(requests.CopyMaterial(state.selection.index))
 
 
-def _paste_material(state: State, _facts: Facts) -> State:
+def _paste_material(state: State, _view_model: ViewModel) -> State:
     from .panels import outliner
 
     return outliner.paste_material(state, state.selection)
 
 
-def _set_tool(tool: Tool, state: State, _facts: Facts) -> State:
+def _set_tool(tool: Tool, state: State, _view_model: ViewModel) -> State:
     return replace(state, tool=tool)
 
 
-def _take_brush(state: State, _facts: Facts) -> State:
+def _take_brush(state: State, _view_model: ViewModel) -> State:
     """With its panel, which tells radius and strength and how to compare with the physical picture."""
     return replace(state, tool="brush").with_panels(brush=True)
 
 
-def _toggle_playing(state: State, _facts: Facts) -> State:
+def _toggle_playing(state: State, _view_model: ViewModel) -> State:
     return replace(state, playing=not state.playing)
 
 
-def _toggle_physical(state: State, _facts: Facts) -> State:
+def _toggle_physical(state: State, _view_model: ViewModel) -> State:
     return replace(state, physical=not state.physical)
 
 
-def _toggle_panel(name: str, state: State, _facts: Facts) -> State:
+def _toggle_panel(name: str, state: State, _view_model: ViewModel) -> State:
     return state.with_panels(**{name: not getattr(state.preferences.panels, name)})
 
 
-def _is_object(state: State, _facts: Facts) -> bool:
+def _is_object(state: State, _view_model: ViewModel) -> bool:
     return state.selection.kind == "object" and state.selection.index < len(state.scene.objects)
 
 
-def _is_selected(state: State, facts: Facts) -> bool:
+def _is_selected(state: State, view_model: ViewModel) -> bool:
     lights = state.selection.kind == "light" and state.selection.index < len(state.scene.lights)
-    return lights or _is_object(state, facts)
+    return lights or _is_object(state, view_model)
 
 
-def _can_paste(state: State, facts: Facts) -> bool:
-    return state.clipboard is not None and _is_object(state, facts)
+def _can_paste(state: State, view_model: ViewModel) -> bool:
+    return state.clipboard is not None and _is_object(state, view_model)
 
 
 def _tool(name: str, tool: Tool, key: str, tip: str) -> Command:
-    return Command(name, (key,), "Tools", tip, partial(_set_tool, tool), checked=lambda state, _facts: state.tool == tool)
+    return Command(name, (key,), "Tools", tip, partial(_set_tool, tool), checked=lambda state, _view_model: state.tool == tool)
 
 
 def panel(name: str, field: str, tip: str, keys: tuple[str, ...] = ()) -> Command:
     """The command that opens and closes the panel `Panels.<field>`."""
     return Command(
         name, keys, "Panels", tip, partial(_toggle_panel, field),
-        checked=lambda state, _facts: getattr(state.preferences.panels, field),
+        checked=lambda state, _view_model: getattr(state.preferences.panels, field),
     )  # fmt: skip
 
 
 COMMANDS: tuple[Command, ...] = (
     Command("New scene", ("Ctrl+N",), "File", "Start from the default scene.", dialogs.new_scene),
     Command("Start page", (), "File", "Scenes to begin with, recent files.", partial(_toggle_panel, "start_page"),
-            checked=lambda state, _facts: state.preferences.panels.start_page),
+            checked=lambda state, _view_model: state.preferences.panels.start_page),
     Command("Open…", ("Ctrl+O",), "File", "Open a scene (.toml), glTF (.glb, .gltf) or a bare mesh (.obj, .ply, .stl).",
             dialogs.open_file),
     Command("Save", ("Ctrl+S",), "File", "Save the scene where it came from.", _save),
     Command("Save as…", ("Ctrl+Shift+S",), "File", "Save as scene TOML, or as GLB for other programs.", dialogs.save_as),
     Command("Export…", ("Ctrl+E",), "File", "Screenshots, baked caustic maps and animations.",
-            partial(_toggle_panel, "export"), checked=lambda state, _facts: state.preferences.panels.export),
+            partial(_toggle_panel, "export"), checked=lambda state, _view_model: state.preferences.panels.export),
     Command("Quit", ("Ctrl+Q",), "File", "Close SpectraSplat; asks first where changes are unsaved.", _ask(requests.Quit())),
     Command("Undo", ("Ctrl+Z",), "Edit", "Take back the last edit.", _ask(requests.Undo()),
-            enabled=lambda _state, facts: facts.undo is not None),
-    Command("Redo", ("Ctrl+Shift+Z", "Ctrl+Y"), "Edit", "Do again what was taken back.", _ask(requests.Redo()),
-            enabled=lambda _state, facts: facts.redo is not None),
+            enabled=lambda _state, view_model: view_model.undo is not None),
+    Command("DirtyLevel", ("Ctrl+Shift+Z", "Ctrl+Y"), "Edit", "Do again what was taken back.", _ask(requests.DirtyLevel()),
+            enabled=lambda _state, view_model: view_model.dirty_level is not None),
     Command("Duplicate", ("Ctrl+D",), "Edit", "Copy the selected object or light in place.", _duplicate, enabled=_is_selected),
     Command("Delete", ("Delete",), "Edit", "Remove the selected object or light.", _delete, enabled=_is_selected),
     Command("Copy material", ("Ctrl+C",), "Edit", "Copy the selected object's material.", _copy_material, enabled=_is_object),
@@ -139,34 +139,34 @@ COMMANDS: tuple[Command, ...] = (
             view_commands.keep_as_scene_view),
     Command("Hide panels", ("H",), "View", "Leave only the picture; again brings the panels back.", view_commands.hide_panels),
     Command("Select", ("Esc",), "Tools", "Click an object, or its caustic, to select what made it.",
-            partial(_set_tool, "select"), checked=lambda state, _facts: state.tool == "select"),
+            partial(_set_tool, "select"), checked=lambda state, _view_model: state.tool == "select"),
     _tool("Move", "move", "G", "Move the selection with the gizmo."),
     _tool("Rotate", "rotate", "T", "Turn the selection with the gizmo."),
     _tool("Scale", "scale", "Y", "Scale the selection with the gizmo."),
     Command("Dispersion brush", ("B",), "Tools", "Paint a local gain of dispersion on a receiver. Not physical.", _take_brush,
-            checked=lambda state, _facts: state.tool == "brush"),
+            checked=lambda state, _view_model: state.tool == "brush"),
     _tool("Pull a colour", "pull", "P", "Drag a colour of the caustic: the dispersion follows."),
     Command("Accumulate photons", ("Space",), "Render", "Go on or pause.", _toggle_playing,
-            checked=lambda state, _facts: state.playing),
+            checked=lambda state, _view_model: state.playing),
     Command("Trace again", ("Ctrl+R",), "Render", "Trace photons anew with the present glass.", _ask(requests.Retrace())),
     Command("Physical picture", ("V",), "Render", "Leave the dispersion brush out, to compare.", _toggle_physical,
-            checked=lambda state, _facts: state.physical),
+            checked=lambda state, _view_model: state.physical),
     Command("Reload shaders", ("F5",), "Render", "Compile the shaders from disk again; the last good ones stay on errors.",
             _ask(requests.ReloadShaders())),
     Command("Brighter", ("=",), "Display", "Exposure up by a quarter stop.", partial(view_commands.expose, 0.25)),
     Command("Darker", ("-",), "Display", "Exposure down by a quarter stop.", partial(view_commands.expose, -0.25)),
     Command("Automatic exposure", ("Shift+E",), "Display", "Let the exposure follow the picture.", view_commands.toggle_auto,
-            checked=lambda state, _facts: state.display.auto_exposure),
+            checked=lambda state, _view_model: state.display.auto_exposure),
     Command("False colour", ("X",), "Display", "Luminance on a logarithmic colour scale.",
-            partial(view_commands.toggle_display, "false_colour"), checked=lambda state, _facts: state.display.false_colour),
+            partial(view_commands.toggle_display, "false_colour"), checked=lambda state, _view_model: state.display.false_colour),
     Command("Ray overlay", ("R",), "Display", "Draw a fan of rays through the selected object.",
-            partial(view_commands.toggle_display, "ray_overlay"), checked=lambda state, _facts: state.display.ray_overlay),
+            partial(view_commands.toggle_display, "ray_overlay"), checked=lambda state, _view_model: state.display.ray_overlay),
     Command("Magnifier", ("M",), "Display", "Magnify the pixels under the cursor.",
-            partial(view_commands.toggle_display, "magnifier"), checked=lambda state, _facts: state.display.magnifier),
+            partial(view_commands.toggle_display, "magnifier"), checked=lambda state, _view_model: state.display.magnifier),
     Command("Single wavelength", ("L",), "Display", "Show the light of one wavelength only.", view_commands.toggle_solo,
-            checked=lambda state, _facts: state.solo_nm is not None),
+            checked=lambda state, _view_model: state.solo_nm is not None),
     Command("Shortcuts", ("F1",), "Help", "List the shortcuts.", partial(_toggle_panel, "shortcuts"),
-            checked=lambda state, _facts: state.preferences.panels.shortcuts),
+            checked=lambda state, _view_model: state.preferences.panels.shortcuts),
     Command("About SpectraSplat", (), "Help", "Version, graphics driver, licences.", partial(_toggle_panel, "about")),
 )  # fmt: skip
 """All but the numbered views and the panels, in the order of the menus."""
@@ -191,7 +191,7 @@ VIEWS: tuple[Command, ...] = tuple(
     for command in (
         Command(f"View {number + 1}", (str(number + 1),), "Views", "Go to this stored view.",
                 partial(view_commands.go_to_view, number),
-                enabled=lambda state, _facts, number=number: state.views[number] is not None),
+                enabled=lambda state, _view_model, number=number: state.views[number] is not None),
         Command(f"Store view {number + 1}", (f"Ctrl+{number + 1}",), "Views", "Keep the present camera under this number.",
                 partial(view_commands.store_view, number)),
     )
@@ -207,6 +207,6 @@ def command(name: str) -> Command:
     return _BY_NAME[name]
 
 
-def has_glass_selected(state: State, facts: Facts) -> bool:
+def has_glass_selected(state: State, view_model: ViewModel) -> bool:
     """Whether the selection is an object of glass."""
-    return _is_object(state, facts) and isinstance(state.scene.objects[state.selection.index].material, Dielectric)
+    return _is_object(state, view_model) and isinstance(state.scene.objects[state.selection.index].material, Dielectric)

@@ -16,11 +16,11 @@ import numpy as np
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import Features
 from ..model.settings import RenderSettings
-from ..passes.camera import EyePass
+from ..passes.camera import CameraPass
 from ..passes.spectrum_choice import Spectrum
 from ..render.light_pass import reflectance_classes, spectral_axis
-from ..render.viewer.inputs import LiveInputs, Redo
-from ..render.viewer.invalidation import redo
+from ..render.viewer.inputs import LiveInputs, DirtyLevel
+from ..render.viewer.invalidation import dirty_level
 from .error_curves import ErrorCurves
 from .panels.methods import METHOD_NAMES
 from .reference_thread import ReferenceThread, Snapshot
@@ -141,7 +141,7 @@ class Comparison:
             self._stop()
             self._begun = wanted
         assert self._begun is not None
-        self.is_stale = redo(self._begun, self._begun, replace(wanted, method=self._begun.method)) != Redo.NOTHING
+        self.is_stale = dirty_level(self._begun, self._begun, replace(wanted, method=self._begun.method)) != DirtyLevel.NOTHING
         if self.is_stale:
             self._pause()
             return
@@ -276,17 +276,17 @@ class _DirectPicture:
         self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
         reflectances, _ = reflectance_classes(scene, self._buffers)
         # Without maps, and for what is seen directly alone: there one band of the spectrum is exact.
-        self._eye = EyePass(context, self._buffers, "beauty", reflectances)
-        self._eye.spectrum = Spectrum()
-        self._eye.dispatch_seconds = DISPATCH_SECONDS
-        self._steps: Iterator[float] | None = self._eye.samples(scene.camera, inputs.width, inputs.height, DIRECT_SAMPLES, 0, None, inputs.seed)
+        self._camera_pass = CameraPass(context, self._buffers, "beauty", reflectances)
+        self._camera_pass.spectrum = Spectrum()
+        self._camera_pass.dispatch_seconds = DISPATCH_SECONDS
+        self._steps: Iterator[float] | None = self._camera_pass.samples(scene.camera, inputs.width, inputs.height, DIRECT_SAMPLES, 0, None, inputs.seed)
         self._rgb: np.ndarray | None = None
 
     def advance(self) -> bool:
         """One dispatch of work; True once it is done."""
         if self._steps is not None and next(self._steps, None) is None:
             self._steps = None
-            self._rgb = self._eye.read_rgb()
+            self._rgb = self._camera_pass.read_rgb()
         return self._steps is None
 
     @property
@@ -297,7 +297,7 @@ class _DirectPicture:
 
     def release(self) -> None:
         """Free everything."""
-        self._eye.release()
+        self._camera_pass.release()
         self._buffers.release()
 
 

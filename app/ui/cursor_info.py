@@ -9,7 +9,7 @@ import numpy as np
 
 from ..edit.state import State
 from .live_picture import LivePicture, pixel_of
-from .view_model import CursorFacts
+from .view_model import CursorInfo
 
 if TYPE_CHECKING:
     from ..passes.pick import PickHit
@@ -22,7 +22,7 @@ class Cursor:
     """The facts of the last cursor position."""
 
     def __init__(self) -> None:
-        self.facts: CursorFacts | None = None
+        self.view_model: CursorInfo | None = None
         self._key: tuple[object, ...] = ()
         self._hit: PickHit | None = None
         self._spectrum_s = -1e9
@@ -31,7 +31,7 @@ class Cursor:
     def update(self, state: State, picture: LivePicture, now_s: float) -> None:
         """Look again under `state.hover`."""
         if state.hover is None or picture.engine is None or picture.radiance is None:
-            self.facts = None
+            self.view_model = None
             self._key = ()
             return
         inputs = picture.engine.inputs
@@ -39,35 +39,35 @@ class Cursor:
         if key != self._key:
             self._hit = picture.pick(state.hover)
             self._key = key
-        before = self.facts
-        self.facts = self._look(state, picture)
+        before = self.view_model
+        self.view_model = self._look(state, picture)
         if state.preferences.panels.spectrum and self._hit is not None and self._hit.is_receiver:
             self._take_spectrum(state, picture, before, now_s)
 
-    def _look(self, state: State, picture: LivePicture) -> CursorFacts:
+    def _look(self, state: State, picture: LivePicture) -> CursorInfo:
         assert state.hover is not None
         radiance, hit = picture.radiance, self._hit
         assert radiance is not None
-        facts = CursorFacts(
+        view_model = CursorInfo(
             pixel_of(state.hover, state.viewport_size),
             picture.pixel(state.hover) or (0.0, 0.0, 0.0),
             magnified=None if picture.magnified is None else picture.magnified.glo,
         )
         index = None if hit is None else picture.object_in(state.scene, hit.object_index)
         if hit is None or index is None:
-            return facts
+            return view_model
         return replace(
-            facts, object_index=index, position=hit.position, normal=hit.normal, is_receiver=hit.is_receiver
+            view_model, object_index=index, position=hit.position, normal=hit.normal, is_receiver=hit.is_receiver
         )  # fmt: skip
 
-    def _take_spectrum(self, state: State, picture: LivePicture, before: CursorFacts | None, now_s: float) -> None:
-        assert self.facts is not None and self._hit is not None and picture.engine is not None
+    def _take_spectrum(self, state: State, picture: LivePicture, before: CursorInfo | None, now_s: float) -> None:
+        assert self.view_model is not None and self._hit is not None and picture.engine is not None
         key = (*self._key, picture.stats.photons, state.physical, state.smoothing)
         if key == self._spectrum_key or now_s - self._spectrum_s < SPECTRUM_S:
-            if before is not None and before.object_index == self.facts.object_index:
-                self.facts = replace(self.facts, spectrum_nm=before.spectrum_nm, spectrum=before.spectrum)
+            if before is not None and before.object_index == self.view_model.object_index:
+                self.view_model = replace(self.view_model, spectrum_nm=before.spectrum_nm, spectrum=before.spectrum)
             return
         found = picture.engine.caustic_spectrum(self._hit.object_index, np.asarray(self._hit.position, float))
         self._spectrum_key, self._spectrum_s = key, now_s
         if found is not None:
-            self.facts = replace(self.facts, spectrum_nm=found[0], spectrum=found[1])
+            self.view_model = replace(self.view_model, spectrum_nm=found[0], spectrum=found[1])

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model.optics.colorimetry import rgb709_to_xyz
-from ..reference.metrics import Truth, relmse_raw
+from ..reference.metrics import ReferencePicture, relmse_raw
 from .view_model import ErrorCurve
 
 MAX_PIXELS = 1 << 16
@@ -34,7 +34,7 @@ class ErrorCurves:
         self._points: dict[str, list[_Point]] = {}
         self._photons: dict[str, float] = {}
         self._pixels: np.ndarray | None = None
-        self._truth: Truth | None = None
+        self._reference_image: ReferencePicture | None = None
         self._chosen = np.zeros(0, bool)
         """Which of the sampled pixels count."""
         self.curves: tuple[ErrorCurve, ...] = ()
@@ -64,15 +64,15 @@ class ErrorCurves:
             self._pixels = np.sort(np.random.default_rng(_SEED).choice(directly.size, count, replace=False))
         self._chosen = directly.reshape(-1)[self._pixels]
         at = self._pixels[self._chosen]
-        self._truth = Truth(rgb709_to_xyz(rgb.reshape(-1, 3)[at][:, None].astype(float)), variance_xyz.reshape(-1, 3)[at][:, None].astype(float))
+        self._reference_image = ReferencePicture(rgb709_to_xyz(rgb.reshape(-1, 3)[at][:, None].astype(float)), variance_xyz.reshape(-1, 3)[at][:, None].astype(float))
         self._measure()
 
     def _measure(self) -> None:
-        truth = self._truth
-        if truth is None or not truth.xyz.size:
+        reference_image = self._reference_image
+        if reference_image is None or not reference_image.xyz.size:
             return
         curves = []
         for method, points in self._points.items():
-            errors = [relmse_raw(rgb709_to_xyz(p.rgb[self._chosen][:, None].astype(float)), truth) - truth.own_relmse for p in points]
+            errors = [relmse_raw(rgb709_to_xyz(p.rgb[self._chosen][:, None].astype(float)), reference_image) - reference_image.own_relmse for p in points]
             curves.append(ErrorCurve(method, np.array([p.seconds for p in points]), np.maximum(errors, 0.0)))
         self.curves = tuple(curves)

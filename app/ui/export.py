@@ -16,11 +16,11 @@ from ..base.image_io import check_suffix, write_image
 from ..commands.options import MAX_SIDE_PX, check_picture_memory
 from ..edit import requests
 from ..edit.parameters import Stage
-from ..edit.state import Display as Look
+from ..edit.state import Display as PilotRender
 from ..edit.state import State
 from ..model.settings import RenderSettings
 from ..passes.display import Display
-from .view_model import JobFacts
+from .view_model import JobInfo
 
 if TYPE_CHECKING:
     import moderngl
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from ..gpu.context import Context
 
 SPECTRAL_BINS = 20
-LEAST_PHOTONS = 1_000_000
-MOST_PHOTONS = 64_000_000
+MIN_PHOTONS = 1_000_000
+MAX_PHOTONS = 64_000_000
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,9 @@ class Exports:
         self._job: _Job | None = None
 
     @property
-    def job(self) -> JobFacts | None:
+    def job(self) -> JobInfo | None:
         """The running job, for panels."""
-        return None if self._job is None else self._job.facts
+        return None if self._job is None else self._job.view_model
 
     def begin(self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, shown: Shown) -> str | None:
         """Carry out `request`, or start it. Raises `UserError`; a running job is not disturbed."""
@@ -115,8 +115,8 @@ class _Job:
         self._fraction, self._worked_s = 0.0, 0.0
 
     @property
-    def facts(self) -> JobFacts:
-        return JobFacts(self._title, self._fraction, self._text())
+    def view_model(self) -> JobInfo:
+        return JobInfo(self._title, self._fraction, self._text())
 
     def step(self, budget_s: float) -> str | None:
         started = time.perf_counter()
@@ -193,7 +193,7 @@ def _spectral(context: Context, path: Path, stage: Stage, state: State, photons:
         raise UserError(f"cannot write {path}: spectral channels need an .exr")
     check_writable(path)
     check_picture_memory(*state.viewport_size, SPECTRAL_BINS)
-    settings = _settings(state, state.viewport_size, int(np.clip(photons, LEAST_PHOTONS, MOST_PHOTONS)), bins=SPECTRAL_BINS)
+    settings = _settings(state, state.viewport_size, int(np.clip(photons, MIN_PHOTONS, MAX_PHOTONS)), bins=SPECTRAL_BINS)
 
     def work() -> Iterator[float]:
         renderer = FrameRenderer(context, settings, [stage])
@@ -250,7 +250,7 @@ def _animate(context: Context, request: requests.Animate, stage: Stage, state: S
 class _Developer:
     """Linear pictures to codes as the window shows them: tone curve or false colour."""
 
-    def __init__(self, context: Context, look: Look) -> None:
+    def __init__(self, context: Context, look: PilotRender) -> None:
         self._context, self._look = context, look
         self._display: Display | None = None
 

@@ -6,7 +6,7 @@ SOFTWARE_FRAME_S = 0.04
 """A frame on the software renderer: with the piece of work that runs over its end, within the 50 ms in which input must be answered."""
 GPU_SHARE = 0.75
 """Of the time between two pictures of the screen; the rest is the driver's and the window system's."""
-LEAST_SHARE = 0.25
+MIN_SHARE = 0.25
 """Of a frame that the engine always gets: a slow interface must not stop the light."""
 _SMOOTHING = 0.2
 
@@ -21,7 +21,7 @@ class Pace:
     @property
     def budget_s(self) -> float:
         """Seconds for the engine."""
-        return max(self.frame_s - self._besides_s, LEAST_SHARE * self.frame_s)
+        return max(self.frame_s - self._besides_s, MIN_SHARE * self.frame_s)
 
     def note(self, besides_s: float) -> None:
         """A frame took `besides_s` seconds beside the engine's work (without waiting for the screen)."""

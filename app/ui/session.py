@@ -23,13 +23,13 @@ from ..edit.preferences import Settings, config_dir, load_settings, save_setting
 from ..edit.state import Selection, State
 from ..gpu.shader_watch import ShaderWatch
 from . import session_requests
-from .background_jobs import Companions
+from .background_jobs import BackgroundJobs
 from .crash_log import write_crash
 from .export import write_codes
 from .live_picture import EngineError, LivePicture
 from .message_box import MessageBox
 from .sentences import brief, sentence, words
-from .view_model import Facts
+from .view_model import ViewModel
 
 if TYPE_CHECKING:
     import numpy as np
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from ..model.scene import Scene
     from ..render.viewer.engine import LiveEngine
 
-Draw = Callable[[State, Facts], State]
+Draw = Callable[[State, ViewModel], State]
 DEFAULT_BUDGET_S = 0.03
 FRAMES_REMEMBERED = 120
 IDLE_S = 0.5
@@ -66,7 +66,7 @@ class Session:
         self.autosave = Autosave(config_dir())
         self.recovery: Recovery | None = next(iter(recoveries(config_dir())), None)
         self.picture = LivePicture(context, make_engine)
-        self.companions = Companions(context, config_dir())
+        self.companions = BackgroundJobs(context, config_dir())
         self.window_picture: Path | None = None
         """Where a picture of the whole window is to be written once this frame is drawn."""
         self.interface_scale = self.framebuffer_scale = 1.0
@@ -106,12 +106,12 @@ class Session:
 
     def frame(self, draw: Draw, budget_s: float = DEFAULT_BUDGET_S) -> None:
         """Draw the interface with `draw`, within imgui's frame, and answer it; the engine works for about `budget_s`."""
-        from .view_model_builder import facts_of
+        from .view_model_builder import view_model_of
 
-        facts = facts_of(self)
+        view_model = view_model_of(self)
         before = replace(self.state, interacting=False, hover=None, requests=())
         started = self._clock()
-        after = self._with_dropped(draw(before, facts), facts)
+        after = self._with_dropped(draw(before, view_model), view_model)
         self.interface_s = self._clock() - started
         self._accept(before, after)
         for request in after.requests:
@@ -262,13 +262,13 @@ class Session:
         """The window's close button was pressed."""
         self._carry_out(requests.Quit())
 
-    def _with_dropped(self, state: State, facts: Facts) -> State:
+    def _with_dropped(self, state: State, view_model: ViewModel) -> State:
         if not self._dropped:
             return state
         from .panels import dialogs
 
         path, self._dropped = self._dropped[0], []
-        return dialogs.open_path(state, facts, path)
+        return dialogs.open_path(state, view_model, path)
 
     def _remember_file(self, path: Path | None) -> None:
         if path is not None:

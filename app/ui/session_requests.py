@@ -50,8 +50,8 @@ def _undo(session: Session, _request: requests.Undo) -> None:
     session.show_scene(session.document.history.undo())
 
 
-def _redo(session: Session, _request: requests.Redo) -> None:
-    session.show_scene(session.document.history.redo())
+def _redo(session: Session, _request: requests.DirtyLevel) -> None:
+    session.show_scene(session.document.history.dirty_level())
 
 
 def _go_to(session: Session, request: requests.GoTo) -> None:
@@ -192,7 +192,7 @@ _HANDLERS: dict[type, Callable] = {
     requests.Open: _open,
     requests.Save: _save,
     requests.Undo: _undo,
-    requests.Redo: _redo,
+    requests.DirtyLevel: _redo,
     requests.GoTo: _go_to,
     requests.Quit: _quit,
     requests.CancelQuit: _cancel_quit,

@@ -31,23 +31,23 @@ from .panels import (
 from .panels.abbe import draw_abbe
 from .panels.brush_panel import draw_brush
 from .panels.dispersion import draw_dispersion
-from .view_model import Facts
+from .view_model import ViewModel
 from .viewport import draw_viewport
 
-Draw = Callable[[State, Facts], State]
+Draw = Callable[[State, ViewModel], State]
 
 
-def _draw_compare(state: State, facts: Facts) -> State:
+def _draw_compare(state: State, view_model: ViewModel) -> State:
     # Panels that are seldom open are loaded when they are: the window comes up sooner.
     from .panels.compare_panel import draw_compare
 
-    return draw_compare(state, facts)
+    return draw_compare(state, view_model)
 
 
-def _draw_export(state: State, facts: Facts) -> State:
+def _draw_export(state: State, view_model: ViewModel) -> State:
     from .panels.export_panel import draw_export
 
-    return draw_export(state, facts)
+    return draw_export(state, view_model)
 
 
 @dataclass(frozen=True)
@@ -81,43 +81,43 @@ WINDOWS = (
 _DOCKED = tuple(Docked(window.title, window.place) for window in WINDOWS)
 
 
-def draw_interface(state: State, facts: Facts) -> State:
+def draw_interface(state: State, view_model: ViewModel) -> State:
     """Draw everything and return the state as the user left it, with requests for the host appended.
 
     The host applies the theme (`theme.apply`) between frames: sizes must not change within one.
     """
-    state = shortcuts.handle(state, facts)
-    state = menu.draw_menu(state, facts)
+    state = shortcuts.handle(state, view_model)
+    state = menu.draw_menu(state, view_model)
     if state.preferences.panels.start_page:
-        state = start_page.draw_start_page(state, facts)
+        state = start_page.draw_start_page(state, view_model)
     else:
-        state = _draw_windows(state, facts)
-    state = dialogs.draw_dialogs(state, facts)
-    return messages.draw_messages(state, facts)
+        state = _draw_windows(state, view_model)
+    state = dialogs.draw_dialogs(state, view_model)
+    return messages.draw_messages(state, view_model)
 
 
-def _draw_windows(state: State, facts: Facts) -> State:
+def _draw_windows(state: State, view_model: ViewModel) -> State:
     layout.dockspace(_DOCKED, status_bar.height())
-    state = status_bar.draw_status_bar(state, facts)
-    state = _draw_picture(state, facts)
+    state = status_bar.draw_status_bar(state, view_model)
+    state = _draw_picture(state, view_model)
     for window in WINDOWS:
         if getattr(state.preferences.panels, window.field):
-            state = _draw_panel(window, state, facts)
+            state = _draw_panel(window, state, view_model)
     return state
 
 
-def _draw_picture(state: State, facts: Facts) -> State:
+def _draw_picture(state: State, view_model: ViewModel) -> State:
     flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse | imgui.WindowFlags_.no_collapse
     imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(0, 0))
     shown, _ = imgui.begin(layout.VIEWPORT, None, flags)
     imgui.pop_style_var()
     if shown:
-        state = draw_viewport(state, facts)
+        state = draw_viewport(state, view_model)
     imgui.end()
     return state
 
 
-def _draw_panel(window: PanelWindow, state: State, facts: Facts) -> State:
+def _draw_panel(window: PanelWindow, state: State, view_model: ViewModel) -> State:
     viewport = imgui.get_main_viewport()
     width = min(theme.em(window.size_em[0]), viewport.work_size.x * 0.9)
     height = min(theme.em(window.size_em[1]), viewport.work_size.y * 0.85)
@@ -126,6 +126,6 @@ def _draw_panel(window: PanelWindow, state: State, facts: Facts) -> State:
     shown, stays = imgui.begin(window.title, True)
     item_rects.note(f"Window: {window.title}")
     if shown:
-        state = window.draw(state, facts)
+        state = window.draw(state, view_model)
     imgui.end()
     return state if stays else state.with_panels(**{window.field: False})

@@ -9,12 +9,12 @@ from imgui_bundle import imgui
 
 from ..edit.state import State
 from .commands import COMMANDS, PANELS, VIEWS, Command
-from .view_model import Facts
+from .view_model import ViewModel
 
 COMPARE_KEY = imgui.Key.c
 """Held down, the viewport shows the reference."""
 
-_REPEATING = ("Undo", "Redo", "Brighter", "Darker")
+_REPEATING = ("Undo", "DirtyLevel", "Brighter", "Darker")
 """A held key goes on."""
 
 _ON_START_PAGE = ("File", "Help")
@@ -65,7 +65,7 @@ def chord(keys: str) -> int:
     return sum(int(_MODIFIERS[modifier]) for modifier in modifiers) + int(key)
 
 
-def handle(state: State, facts: Facts) -> State:
+def handle(state: State, view_model: ViewModel) -> State:
     """Carry out the commands whose keys were pressed in this frame; nothing while a text field or a dialogue has them."""
     io = imgui.get_io()
     _close_menus()
@@ -79,8 +79,8 @@ def handle(state: State, facts: Facts) -> State:
     for command in _all():
         # What the page hides must not be edited blindly.
         is_reachable = not on_start_page or command.group in _ON_START_PAGE
-        if is_reachable and _is_pressed(command) and command.enabled(state, facts):
-            state = command.act(state, facts)
+        if is_reachable and _is_pressed(command) and command.enabled(state, view_model):
+            state = command.act(state, view_model)
     return _hold_compare(state, imgui.is_key_down(COMPARE_KEY) and not (io.key_ctrl or io.key_shift or io.key_alt))
 
 

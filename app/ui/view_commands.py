@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 from ..edit.requests import FrameSelection, Notice
 from ..edit.state import Panels, Selection, State
-from .view_model import Facts
+from .view_model import ViewModel
 
 _NOT_HIDDEN = ("start_page", "shortcuts", "about")
 """Windows that "Hide panels" leaves alone."""
@@ -15,22 +15,22 @@ _hidden: list[Panels] = []
 """What the last "Hide panels" closed: memory of the interface, like a scroll position, so no part of the state."""
 
 
-def frame_all(state: State, _facts: Facts) -> State:
+def frame_all(state: State, _view_model: ViewModel) -> State:
     """Fit the whole scene: framing with nothing selected."""
     return replace(state, selection=Selection()).asking(FrameSelection())
 
 
-def scene_view(state: State, _facts: Facts) -> State:
+def scene_view(state: State, _view_model: ViewModel) -> State:
     """Back to the saved camera."""
     return replace(state, camera=state.scene.camera)
 
 
-def keep_as_scene_view(state: State, _facts: Facts) -> State:
+def keep_as_scene_view(state: State, _view_model: ViewModel) -> State:
     """Save the present camera with the scene (an edit like others)."""
     return state.edited(replace(state.scene, camera=state.camera), "Keep view")
 
 
-def go_to_view(number: int, state: State, _facts: Facts) -> State:
+def go_to_view(number: int, state: State, _view_model: ViewModel) -> State:
     """Go to numbered view `number` (0 to 8); a notice where none is stored."""
     camera = state.views[number]
     if camera is None:
@@ -38,13 +38,13 @@ def go_to_view(number: int, state: State, _facts: Facts) -> State:
     return replace(state, camera=camera)
 
 
-def store_view(number: int, state: State, _facts: Facts) -> State:
+def store_view(number: int, state: State, _view_model: ViewModel) -> State:
     """Store the camera as numbered view `number` (0 to 8)."""
     views = (*state.views[:number], state.camera, *state.views[number + 1 :])
     return replace(state, views=views).asking(Notice(f"Stored as view {number + 1}. Key {number + 1} comes back to it."))
 
 
-def hide_panels(state: State, _facts: Facts) -> State:
+def hide_panels(state: State, _view_model: ViewModel) -> State:
     """Close all panels, or open those again that the last call closed."""
     panels = state.preferences.panels
     names = [f.name for f in fields(Panels) if f.name not in _NOT_HIDDEN]
@@ -56,25 +56,25 @@ def hide_panels(state: State, _facts: Facts) -> State:
     return state.with_panels(**{name: getattr(before, name) for name in names})
 
 
-def expose(stops: float, state: State, facts: Facts) -> State:
+def expose(stops: float, state: State, view_model: ViewModel) -> State:
     """Change the exposure by `stops` from the one in use; it is the user's from then on."""
-    in_use = facts.exposure_ev if state.display.auto_exposure else state.display.exposure_ev
+    in_use = view_model.exposure_ev if state.display.auto_exposure else state.display.exposure_ev
     return replace(state, display=replace(state.display, exposure_ev=in_use + stops, auto_exposure=False))
 
 
-def toggle_auto(state: State, facts: Facts) -> State:
+def toggle_auto(state: State, view_model: ViewModel) -> State:
     """Automatic exposure on, or off at the present value."""
     if state.display.auto_exposure:
-        return expose(0.0, state, facts)
+        return expose(0.0, state, view_model)
     return replace(state, display=replace(state.display, auto_exposure=True))
 
 
-def toggle_display(name: str, state: State, _facts: Facts) -> State:
+def toggle_display(name: str, state: State, _view_model: ViewModel) -> State:
     """Turn the switch `Display.<name>`."""
     return replace(state, display=replace(state.display, **{name: not getattr(state.display, name)}))
 
 
-def toggle_solo(state: State, _facts: Facts) -> State:
+def toggle_solo(state: State, _view_model: ViewModel) -> State:
     """One wavelength only, or all light again."""
     return replace(state, solo_nm=None if state.solo_nm is not None else SOLO_START_NM)
 

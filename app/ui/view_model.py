@@ -12,7 +12,7 @@ from ..render.viewer.stats import LiveStats
 
 
 @dataclass(frozen=True)
-class CursorFacts:
+class CursorInfo:
     """What lies under the cursor in the viewport, as of the last frame."""
 
     pixel: tuple[int, int]
@@ -73,7 +73,7 @@ class Message:
 
 
 @dataclass(frozen=True)
-class JobFacts:
+class JobInfo:
     """A running export."""
 
     title: str
@@ -91,7 +91,7 @@ class RayLine:
 
 
 @dataclass(frozen=True)
-class Facts:
+class ViewModel:
     """One frame's."""
 
     stats: LiveStats = LiveStats()
@@ -101,14 +101,14 @@ class Facts:
     frame_ms: tuple[float, ...] = ()
     """Durations of the last frames, newest last."""
     pass_ms: dict[str, float] = field(default_factory=dict)
-    """Of the last frame, by pass: trace, splat, resolve, eye, display, interface."""
-    cursor: CursorFacts | None = None
+    """Of the last frame, by pass: trace, splat, resolve, camera, display, interface."""
+    cursor: CursorInfo | None = None
     title: str = "untitled"
     path: Path | None = None
     unsaved: bool = False
     undo: str | None = None
     """Label of what undo would take back."""
-    redo: str | None = None
+    dirty_level: str | None = None
     history: tuple[HistoryEntry, ...] = ()
     recent: tuple[Path, ...] = ()
     scenes: tuple[SceneEntry, ...] = ()
@@ -128,7 +128,7 @@ class Facts:
     compare_stale: bool = False
     """The scene or the view has changed since it was begun."""
     rays: tuple[RayLine, ...] = ()
-    job: JobFacts | None = None
+    job: JobInfo | None = None
     exposure_ev: float = 0.0
     """The exposure in use, automatic or not."""
     delta_s: float = 1 / 60

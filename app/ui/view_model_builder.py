@@ -4,29 +4,29 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .view_model import Facts
+from .view_model import ViewModel
 
 if TYPE_CHECKING:
     from .session import Session
 
 
-def facts_of(session: Session) -> Facts:
+def view_model_of(session: Session) -> ViewModel:
     """The facts of the frame that begins."""
     picture, document = session.picture, session.document
     shown = picture.shown
     stats, comparison = picture.stats, session.companions.comparison
-    return Facts(
+    return ViewModel(
         stats=stats,
         picture=None if shown is None else shown.glo,
         picture_size=(0, 0) if shown is None else shown.size,
         frame_ms=tuple(session.frame_ms),
         pass_ms=_pass_ms(session),
-        cursor=session.companions.cursor.facts,
+        cursor=session.companions.cursor.view_model,
         title=document.title,
         path=document.path,
         unsaved=document.unsaved,
         undo=document.history.undo_label,
-        redo=document.history.redo_label,
+        dirty_level=document.history.redo_label,
         history=document.history.entries,
         recent=session.settings.existing_recent(),
         scenes=session.companions.gallery.entries,
@@ -53,7 +53,7 @@ def _pass_ms(session: Session) -> dict[str, float]:
     seconds = {
         "trace": stats.trace_s,
         "splat": stats.splat_s,
-        "eye": stats.eye_s,
+        "camera": stats.camera_s,
         "display": session.picture.display_s,
         "interface": session.interface_s,
     }

@@ -17,16 +17,16 @@ from . import item_rects, overlay, theme
 from .gizmo import Gizmo
 from .overlay import Canvas
 from .view_axes import draw_axes
-from .view_model import Facts
-from .viewport_input import Hand, Mouse
+from .view_model import ViewModel
+from .viewport_input import ViewportInput, Mouse
 from .viewport_marks import draw_lights, draw_magnifier, draw_marks, draw_wipe
 from .viewport_tools import MARGIN_EM, badges, draw_badges, draw_toolbar
 
-LEAST_SIDE = 64
+MIN_SIDE = 64
 """Pixels of the picture, however small the window."""
 _FLAGS = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_nav
 
-hand = Hand()
+hand = ViewportInput()
 """What the mouse holds."""
 gizmo = Gizmo()
 
@@ -34,57 +34,57 @@ gizmo = Gizmo()
 def reset() -> None:
     """Let go of everything: another interface begins."""
     global hand, gizmo
-    hand, gizmo = Hand(), Gizmo()
+    hand, gizmo = ViewportInput(), Gizmo()
 
 
-def draw_viewport(state: State, facts: Facts) -> State:
+def draw_viewport(state: State, view_model: ViewModel) -> State:
     """Draw the picture into the present window and answer what is done in it."""
     room = imgui.get_content_region_avail()
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
     imgui.begin_child("picture", ImVec2(max(room.x, 1.0), max(room.y, 1.0)), 0, _FLAGS)
     imgui.pop_style_var()
-    state = _draw_inside(state, facts)
+    state = _draw_inside(state, view_model)
     imgui.end_child()
     return state
 
 
 def picture_size(width: float, height: float, scale: float) -> tuple[int, int]:
     """Pixels of a picture that fills `width` × `height` interface pixels: even, and not too small to trace."""
-    wide, high = (max(LEAST_SIDE, 2 * round(0.5 * side * scale)) for side in (width, height))
+    wide, high = (max(MIN_SIDE, 2 * round(0.5 * side * scale)) for side in (width, height))
     return wide, high
 
 
-def _draw_inside(state: State, facts: Facts) -> State:
+def _draw_inside(state: State, view_model: ViewModel) -> State:
     corner, size = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
     width, height = max(size.x, 1.0), max(size.y, 1.0)
-    state = replace(state, viewport_size=picture_size(width, height, facts.framebuffer_scale))
-    _draw_picture(state, facts, corner, ImVec2(width, height))
+    state = replace(state, viewport_size=picture_size(width, height, view_model.framebuffer_scale))
+    _draw_picture(state, view_model, corner, ImVec2(width, height))
     canvas = _canvas(state, corner, width, height)
     drawing = imgui.get_window_draw_list()
     drawing.push_clip_rect(corner, ImVec2(corner.x + width, corner.y + height), True)
     if state.display.ray_overlay:
-        overlay.draw_rays(canvas, facts.rays)
-    draw_marks(canvas, state, facts, hand.grip == "brush")
+        overlay.draw_rays(canvas, view_model.rays)
+    draw_marks(canvas, state, view_model, hand.grip == "brush")
     state = draw_lights(canvas, state)
     state = gizmo.draw(state, canvas.view, (corner.x, corner.y, width, height))
-    draw_wipe(canvas, state, facts)
+    draw_wipe(canvas, state, view_model)
     state = draw_toolbar(state, gizmo, corner.x, corner.y)
     inset = theme.em(MARGIN_EM)
     if height > theme.em(9.0) and width > theme.em(12.0):
         state = draw_axes(state, canvas.view, corner.x + width - inset, corner.y + inset)
-    draw_badges(badges(state, facts), corner.x, corner.y + height)
+    draw_badges(badges(state, view_model), corner.x, corner.y + height)
     mouse = _mouse(canvas)
-    state = hand.act(state, facts, canvas, mouse)
+    state = hand.act(state, view_model, canvas, mouse)
     state = _with_hover(state, mouse)
     if state.display.magnifier and mouse.is_over:
-        draw_magnifier(canvas, facts)
+        draw_magnifier(canvas, view_model)
     drawing.pop_clip_rect()
     return state
 
 
-def _draw_picture(state: State, facts: Facts, corner: ImVec2, size: ImVec2) -> None:
-    if facts.picture is not None:
-        imgui.image(imgui.ImTextureRef(facts.picture), size)
+def _draw_picture(state: State, view_model: ViewModel, corner: ImVec2, size: ImVec2) -> None:
+    if view_model.picture is not None:
+        imgui.image(imgui.ImTextureRef(view_model.picture), size)
         item_rects.note("Picture")
         return
     imgui.dummy(size)

@@ -22,7 +22,7 @@ from ..edit.requests import BeginPull, Notice, SelectAt
 from ..edit.state import State
 from ..model.scene import Scene
 from .overlay import Canvas
-from .view_model import CursorFacts, Facts
+from .view_model import CursorInfo, ViewModel
 
 Grip = Literal["orbit", "pan", "dolly", "fly", "click", "brush", "pull", "wipe"]
 CLICK_PX = 4.0
@@ -49,7 +49,7 @@ class Mouse:
     """Since the last frame, picture heights."""
 
 
-class Hand:
+class ViewportInput:
     """What is held."""
 
     def __init__(self) -> None:
@@ -66,23 +66,23 @@ class Hand:
         """Nothing is being dragged."""
         return self.grip is None
 
-    def act(self, state: State, facts: Facts, canvas: Canvas, mouse: Mouse) -> State:
+    def act(self, state: State, view_model: ViewModel, canvas: Canvas, mouse: Mouse) -> State:
         """Answer this frame's mouse and keys."""
         if self.grip is not None and not imgui.is_mouse_down(self._button):
             state = self._let_go(state, mouse)
         if state.pull is not None and self.grip != "pull":
             state = replace(state, pull=None)  # the button was let go before the host had found anything to hold
         if self.grip is None and mouse.is_over:
-            state = self._take(state, facts, canvas, mouse)
-        state = self._wheel(state, facts, canvas, mouse) if mouse.is_over or self.grip == "fly" else state
+            state = self._take(state, view_model, canvas, mouse)
+        state = self._wheel(state, view_model, canvas, mouse) if mouse.is_over or self.grip == "fly" else state
         state = self._keys(state, canvas, mouse)
-        return state if self.grip is None else self._hold(state, facts, canvas, mouse)
+        return state if self.grip is None else self._hold(state, view_model, canvas, mouse)
 
     # ---- beginning and end of a drag --------------------------------------------------------
 
-    def _take(self, state: State, facts: Facts, canvas: Canvas, mouse: Mouse) -> State:
+    def _take(self, state: State, view_model: ViewModel, canvas: Canvas, mouse: Mouse) -> State:
         io = imgui.get_io()
-        position = _position(facts.cursor)
+        position = _position(view_model.cursor)
         if imgui.is_mouse_clicked(2) or (io.key_alt and imgui.is_mouse_clicked(0)):
             grip: Grip = "pan" if io.key_shift else "dolly" if io.key_ctrl else "orbit"
             return self._grip(state, grip, 2 if imgui.is_mouse_clicked(2) else 0, position)
@@ -94,7 +94,7 @@ class Hand:
         if state.compare.mode == "wipe" and abs(mouse.x - state.compare.wipe) * canvas.width < WIPE_REACH_PX * canvas.scale:
             return self._grip(state, "wipe", 0, position)
         if state.tool == "brush":
-            return self._begin_stroke(self._grip(state, "brush", 0, position), facts)
+            return self._begin_stroke(self._grip(state, "brush", 0, position), view_model)
         if state.tool == "pull":
             return self._grip(state, "pull", 0, position).asking(BeginPull(mouse.x, mouse.y, io.key_shift))
         return self._grip(state, "click", 0, position)
@@ -111,7 +111,7 @@ class Hand:
 
     # ---- while it lasts ---------------------------------------------------------------------
 
-    def _hold(self, state: State, facts: Facts, canvas: Canvas, mouse: Mouse) -> State:
+    def _hold(self, state: State, view_model: ViewModel, canvas: Canvas, mouse: Mouse) -> State:
         delta = imgui.get_io().mouse_delta
         self._travelled_px += (abs(delta.x) + abs(delta.y)) / canvas.scale
         if self.grip == "click":
@@ -127,11 +127,11 @@ class Hand:
             case "dolly":
                 return replace(state, camera=controls.dolly(camera, mouse.dy))
             case "fly":
-                return replace(state, camera=self._flown(controls.look(camera, mouse.dx, mouse.dy), facts.delta_s))
+                return replace(state, camera=self._flown(controls.look(camera, mouse.dx, mouse.dy), view_model.delta_s))
             case "wipe":
                 return replace(state, compare=replace(state.compare, wipe=float(np.clip(mouse.x, 0.0, 1.0))))
             case "brush":
-                return self._paint(state, facts)
+                return self._paint(state, view_model)
         return self._pull(state, canvas, mouse)
 
     def _flown(self, camera: controls.Camera, dt: float) -> controls.Camera:
@@ -142,15 +142,15 @@ class Hand:
         haste = controls.FAST if io.key_shift else controls.SLOW if io.key_ctrl else 1.0
         return controls.fly(camera, keys, self.fly_speed * haste * FLY_SPEED * View.of(camera, 1.0).target_distance, dt)
 
-    def _begin_stroke(self, state: State, facts: Facts) -> State:
-        cursor = facts.cursor
+    def _begin_stroke(self, state: State, view_model: ViewModel) -> State:
+        cursor = view_model.cursor
         if cursor is None or cursor.position is None or not brushes.can_paint(state.scene, cursor.object_index):
             return state.asking(Notice("The brush paints on diffuse surfaces, where colours land."))
         # What is painted must be seen.
-        return self._paint(replace(state, physical=False, interacting=True), facts)
+        return self._paint(replace(state, physical=False, interacting=True), view_model)
 
-    def _paint(self, state: State, facts: Facts) -> State:
-        cursor, io = facts.cursor, imgui.get_io()
+    def _paint(self, state: State, view_model: ViewModel) -> State:
+        cursor, io = view_model.cursor, imgui.get_io()
         if cursor is None or cursor.position is None or cursor.object_index is None or not brushes.can_paint(state.scene, cursor.object_index):
             return state
         brush = brushes.mode_held(state.brush, io.key_shift, io.key_ctrl)
@@ -158,7 +158,7 @@ class Hand:
         if stroke is None or (stroke.object_index, stroke.brush) != (cursor.object_index, brush):
             stroke = brushes.begin(state.scene, cursor.object_index, brush, cursor.position)
         else:
-            stroke = brushes.extend(stroke, state.scene, cursor.position, facts.delta_s)
+            stroke = brushes.extend(stroke, state.scene, cursor.position, view_model.delta_s)
         self._stroke = stroke
         return _edited(state, lambda: (brushes.applied(state.scene, stroke), brushes.LABEL))
 
@@ -171,7 +171,7 @@ class Hand:
 
     # ---- wheel and keys ---------------------------------------------------------------------
 
-    def _wheel(self, state: State, facts: Facts, canvas: Canvas, mouse: Mouse) -> State:
+    def _wheel(self, state: State, view_model: ViewModel, canvas: Canvas, mouse: Mouse) -> State:
         io = imgui.get_io()
         notches = io.mouse_wheel + io.mouse_wheel_h
         if notches == 0.0:
@@ -180,8 +180,8 @@ class Hand:
             self.fly_speed = float(np.clip(self.fly_speed * FLY_STEP**notches, 0.02, 50.0))
             return state
         if io.key_shift:
-            return replace(state, brush=brushes.resized(state.brush, notches, visible_height(canvas.view, facts.cursor)))
-        hit = _position(facts.cursor)
+            return replace(state, brush=brushes.resized(state.brush, notches, visible_height(canvas.view, view_model.cursor)))
+        hit = _position(view_model.cursor)
         camera = controls.zoom_to(state.camera, notches, (mouse.x, mouse.y), canvas.view.aspect, hit)
         return replace(state, camera=camera, interacting=True)
 
@@ -192,14 +192,14 @@ class Hand:
         return replace(state, brush=brushes.resized(state.brush, steps, visible_height(canvas.view, None))) if steps else state
 
 
-def visible_height(view: View, cursor: CursorFacts | None) -> float:
+def visible_height(view: View, cursor: CursorInfo | None) -> float:
     """Scene units that the picture's height shows where the cursor is, else at the target."""
     position = _position(cursor)
     depth = view.target_distance if position is None else max(float(view.depth(position)), 1e-9)
     return view.height_at(depth)
 
 
-def _position(cursor: CursorFacts | None) -> np.ndarray | None:
+def _position(cursor: CursorInfo | None) -> np.ndarray | None:
     return None if cursor is None or cursor.position is None else np.asarray(cursor.position, float)
 
 

@@ -16,7 +16,7 @@ from .overlay import Canvas, box_corners, draw_box, draw_outlined
 from .panels.methods import METHOD_NAMES
 from .panels.rows import tooltip
 from .panels.spectral_colour import colour_of_nm
-from .view_model import CursorFacts, Facts
+from .view_model import CursorInfo, ViewModel
 
 _RING_COLOURS = {"widen": (1.0, 0.84, 0.45, 0.95), "narrow": (0.55, 0.80, 1.0, 0.95), "erase": (1.0, 0.55, 0.50, 0.95)}
 _MAGNIFIER_EM = 11.0
@@ -24,11 +24,11 @@ _LIGHT_EM = 0.85
 _ARROW_EM = 3.2
 
 
-def draw_marks(canvas: Canvas, state: State, facts: Facts, is_painting: bool) -> None:
+def draw_marks(canvas: Canvas, state: State, view_model: ViewModel, is_painting: bool) -> None:
     """What lies in the scene: selection, the ring of the brush, a colour being pulled."""
     _draw_selection(canvas, state)
-    if state.tool == "brush" and facts.cursor is not None:
-        _draw_ring(canvas, state, facts.cursor, is_painting)
+    if state.tool == "brush" and view_model.cursor is not None:
+        _draw_ring(canvas, state, view_model.cursor, is_painting)
     if state.pull is not None:
         _draw_pull(canvas, state)
 
@@ -42,7 +42,7 @@ def _draw_selection(canvas: Canvas, state: State) -> None:
     draw_box(canvas, box_corners(item.mesh.vertices, item.object_to_world), (*accent[:3], 0.8))
 
 
-def _draw_ring(canvas: Canvas, state: State, cursor: CursorFacts, is_painting: bool) -> None:
+def _draw_ring(canvas: Canvas, state: State, cursor: CursorInfo, is_painting: bool) -> None:
     if cursor.position is None or cursor.normal is None:
         return
     if not brushes.can_paint(state.scene, cursor.object_index):
@@ -132,9 +132,9 @@ def _draw_light(canvas: Canvas, state: State, index: int, place: np.ndarray, x: 
     canvas.drawing.add_text(ImVec2(x - 0.5 * size.x, y - 0.5 * size.y), theme.packed(colour, opacity), icon)
 
 
-def draw_wipe(canvas: Canvas, state: State, facts: Facts) -> None:
+def draw_wipe(canvas: Canvas, state: State, view_model: ViewModel) -> None:
     """The handle on the wipe's line, with what is on either side."""
-    if state.compare.mode != "wipe" or facts.picture is None:
+    if state.compare.mode != "wipe" or view_model.picture is None:
         return
     x = canvas.left + state.compare.wipe * canvas.width
     middle, radius = canvas.top + 0.5 * canvas.height, theme.em(0.8)
@@ -154,9 +154,9 @@ def draw_wipe(canvas: Canvas, state: State, facts: Facts) -> None:
     _label(canvas, x + gap, y, right)
 
 
-def draw_magnifier(canvas: Canvas, facts: Facts) -> None:
+def draw_magnifier(canvas: Canvas, view_model: ViewModel) -> None:
     """The pixels round the cursor, enlarged, beside it; a cross marks the one that is read out."""
-    cursor, mouse = facts.cursor, imgui.get_io().mouse_pos
+    cursor, mouse = view_model.cursor, imgui.get_io().mouse_pos
     if cursor is None or cursor.magnified is None:
         return
     side, gap, palette = theme.em(_MAGNIFIER_EM), theme.em(1.6), theme.palette()

@@ -13,7 +13,7 @@ from .commands import command
 from .gizmo import Gizmo
 from .panels.brush_panel import NOT_PHYSICAL
 from .panels.rows import tooltip
-from .view_model import Facts
+from .view_model import ViewModel
 
 MARGIN_EM = 0.6
 _BUTTON_EM = 1.9
@@ -91,7 +91,7 @@ def _button(name: str, icon: str, x: float, y: float, is_on: bool, tip: str, key
     return pressed
 
 
-def badges(state: State, facts: Facts) -> list[Badge]:
+def badges(state: State, view_model: ViewModel) -> list[Badge]:
     """What must be said of the present picture."""
     told = []
     painted = any(item.local_dispersion for item in state.scene.objects)
@@ -99,11 +99,11 @@ def badges(state: State, facts: Facts) -> list[Badge]:
         told.append(Badge(NOT_PHYSICAL, "The dispersion brush has changed how far colours spread on a receiver. V shows the physical picture."))
     elif painted:
         told.append(Badge("Physical: local gain left out", "What the dispersion brush painted is kept but not shown. V brings it back.", False))
-    if facts.stats.first_order:
+    if view_model.stats.first_order:
         told.append(Badge("First order", "Photons were traced through a glass of another dispersion; the picture follows the edit to first order until they are traced again (Ctrl+R)."))
     if state.solo_nm is not None:
         told.append(Badge(f"Only {state.solo_nm:.0f} nm", "The light of a single wavelength is shown. L goes back to all of it.", False))
-    if (state.compare.mode in ("wipe", "error") or state.compare.holding) and not facts.compare_ready:
+    if (state.compare.mode in ("wipe", "error") or state.compare.holding) and not view_model.compare_ready:
         told.append(Badge("Nothing to compare with yet", "The other picture is being computed; the compare panel shows how far it is."))
     elif state.compare.holding:
         told.append(Badge("Reference", "Shown while C is held down.", False))

@@ -20,7 +20,7 @@ import yaml
 HERE = Path(__file__).resolve().parent
 
 VISIBLE_UM = (0.38, 0.78)
-LEAST_COVER_UM = 0.2
+MIN_COVER_UM = 0.2
 """A fit must reach over half of the visible range (infrared glasses are left out)."""
 
 MAKER_FOLDERS = {
@@ -122,7 +122,7 @@ def read_entry(path: Path) -> dict[str, Any] | None:
             lo, hi, coefficients, number = rows[0, 0], rows[-1, 0], rows.ravel().tolist(), "table"
         else:
             continue
-        if min(hi, VISIBLE_UM[1]) - max(lo, VISIBLE_UM[0]) < LEAST_COVER_UM:
+        if min(hi, VISIBLE_UM[1]) - max(lo, VISIBLE_UM[0]) < MIN_COVER_UM:
             return None
         range_nm = [float(f"{1e3 * x:.10g}") for x in (lo, hi)]
         entry = {"c": coefficients, "f": number, "r": range_nm, "s": plain(record.get("REFERENCES"))}

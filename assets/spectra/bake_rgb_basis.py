@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from scipy.sparse import block_diag, bmat, csc_matrix, diags, eye, hstack
+from scipy.sparse import block_diag, bmat, csc_matrix, diags, viewpoint, hstack
 from scipy.sparse.linalg import splu
 
 HERE = Path(__file__).resolve().parent
@@ -38,7 +38,7 @@ def smoothest_basis() -> np.ndarray:
     to_rgb = (xyz_to_rgb709_matrix() @ (daylight[:, None] * cmf_xyz()).T) / (daylight @ cmf_xyz()[:, 1])
     # With the sum fixed, blue's colour follows from the other two (white is D65): its rows would be dependent.
     colours = hstack([block_diag([to_rgb, to_rgb]), csc_matrix((6, COUNT))])
-    equations = csc_matrix(bmat([[hstack([eye(COUNT)] * 3)], [colours]]))
+    equations = csc_matrix(bmat([[hstack([viewpoint(COUNT)] * 3)], [colours]]))
     wanted = np.concatenate([np.ones(COUNT), np.eye(3)[:2].ravel()])
     zero = np.zeros(3 * COUNT, dtype=bool)
     for _ in range(ROUNDS):

@@ -1,11 +1,11 @@
-// The eye half: one camera sample a pixel and dispatch, added to the sums. A ray runs through glass and over mirrors with the
+// The camera pass: one camera sample a pixel and dispatch, added to the sums. A ray runs through glass and over mirrors with the
 // columns of its pixel (Igehy 1999) and of its spectrum (Elek et al. 2014) to the first diffuse surface, light or environment,
 // and looks up along its spectral sweep what is there. Where glass splits it, both parts are followed while they are strong; of the weak rest
 // one is chosen by chance.
 //
 // Where the scene shows glass or mirrors this is two programs: one for what is seen directly, which lists the pixels that meet something
-// specular first (LISTS_SPECULAR), and one for the listed ones (EYE_SPECULAR), which holds all that is dear.
-#ifdef EYE_SPECULAR
+// specular first (LISTS_SPECULAR), and one for the listed ones (CAMERA_SPECULAR), which holds all that is dear.
+#ifdef CAMERA_SPECULAR
 layout(local_size_x = 64) in;
 #else
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -26,12 +26,12 @@ struct RayRecord {
 };
 #include "lib/medium.glsl"
 
-layout(std140, binding = BIND_PARAMETERS) uniform Parameters { EyeParameters p; };
+layout(std140, binding = BIND_PARAMETERS) uniform Parameters { CameraParameters p; };
 // Every ray asks all lights: constants to all, where they fit a uniform block.
 #ifdef LIGHTS_IN_STORAGE
-layout(std430, binding = BIND_LIGHTS) readonly restrict buffer Lights { EyeLight lights[]; };
+layout(std430, binding = BIND_LIGHTS) readonly restrict buffer Lights { CameraLight lights[]; };
 #else
-layout(std140, binding = BIND_LIGHTS) uniform Lights { EyeLight lights[LIGHT_ROOM]; };
+layout(std140, binding = BIND_LIGHTS) uniform Lights { CameraLight lights[LIGHT_ROOM]; };
 #endif
 // Per object: reflectance in linear Rec.709; number of its absorption row, or -1.
 layout(std430, binding = BIND_OBJECT_COLOURS) readonly restrict buffer ObjectColours { vec4 object_colours[]; };
@@ -39,7 +39,7 @@ layout(std430, binding = BIND_OBJECT_COLOURS) readonly restrict buffer ObjectCol
 layout(std430, binding = BIND_CELL_CDF) readonly restrict buffer CellCdf { float cell_cdf[]; };
 #endif
 layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallbacks[4]; };
-#if defined(LISTS_SPECULAR) || defined(EYE_SPECULAR)
+#if defined(LISTS_SPECULAR) || defined(CAMERA_SPECULAR)
 // How many pixels are listed, and what is to be known of them.
 layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_count; uint listed[]; };
 #endif
@@ -68,11 +68,11 @@ bool took_turn = false;
 // What a sample has found so far, and the paths that wait while another is followed. Global: an array handed from function to function is
 // copied there and back by some drivers.
 vec4 radiance[TARGETS];
-#ifdef EYE_SPECULAR
-EyePath waiting[STACK];
+#ifdef CAMERA_SPECULAR
+CameraPath waiting[STACK];
 int waits;
 // What this event adds to them, put there in one place: storing a path at an index takes a compiler long.
-EyePath aside;
+CameraPath aside;
 bool sets_aside;
 #ifdef SPECTRAL_SWEEP
 // Where this event cuts the path's band; negative: nowhere.
@@ -80,11 +80,11 @@ float cut_at;
 #endif
 #endif
 
-#ifdef EYE_SPECULAR
+#ifdef CAMERA_SPECULAR
 // Ends of paths are looked at together, when there are that many or no path is left: a software renderer, and a GPU, looks at those of
 // neighbouring pixels side by side then.
 struct PathEnd {
-    EyePath path;
+    CameraPath path;
     Hit hit;
     bool met;
     bool alike;
@@ -97,7 +97,7 @@ PathEnd ended[ENDS_HELD];
 #include "camera/receiver.glsl"
 #include "camera/taps.glsl"
 #include "camera/crossing.glsl"
-#if defined(EYE_SPECULAR) && defined(SPECTRAL_SWEEP)
+#if defined(CAMERA_SPECULAR) && defined(SPECTRAL_SWEEP)
 #include "camera/cuts.glsl"
 #endif
 
@@ -118,11 +118,11 @@ uint listed_entry(uint number, uint look, uint count)
     return number | (look << LISTED_BITS) | ((count - 1u) << (LISTED_BITS + 3u));
 }
 
-EyePath camera_path(uvec2 pixel, uint look, float gain)
+CameraPath camera_path(uvec2 pixel, uint look, float gain)
 {
     vec2 place = picture_point(pixel, place_of_look(look), p.size);
     CameraRay ray = camera_ray(p.position, p.forward, p.half_right, p.half_up, p.orthographic != 0u, place);
-    EyePath path;
+    CameraPath path;
     path.position = ray.position;
     path.direction = ray.direction;
     path.origin = RayOrigin(NONE, NONE, false, p.inside_mask);
@@ -161,10 +161,10 @@ EyePath camera_path(uvec2 pixel, uint look, float gain)
     return path;
 }
 
-#ifdef EYE_SPECULAR
+#ifdef CAMERA_SPECULAR
 #ifdef HAS_DIELECTRIC
 // A number for a choice at this depth: a Kronecker sequence over a pixel's samples, one irrational a depth (the first is the wavelength's).
-float choice(EyePath path, uint pixel_key)
+float choice(CameraPath path, uint pixel_key)
 {
     const uint generators[8] = uint[](1779033703u, 3144134277u, 2773480763u, 1359893119u, 2600822925u, 528734635u, 1541459225u, 3418070365u);
     uint generator = path.depth < 8 ? generators[path.depth] : hash_pcg(uint(path.depth)) | 1u;
@@ -172,10 +172,10 @@ float choice(EyePath path, uint pixel_key)
 }
 
 // One glass surface: `path` goes on, the other part is put on the stack or, if weak, one of them is chosen.
-void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key)
+void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, uint pixel_key)
 {
     bool entering = dot(whole.direction, hit.normal_g) < 0.0;
-    Crossing crossing = cross_boundary(path.medium, hit.object, entering);
+    MediumInterface crossing = cross_boundary(path.medium, hit.object, entering);
     RayRecord beyond = RayRecord(crossing.mask_after, crossing.object_after);
     RayOrigin origin_beyond = RayOrigin(hit.primitive, hit.object, entering, crossing.mask_after);
     RayOrigin origin_back = RayOrigin(hit.primitive, hit.object, !entering, path.medium.inside_mask);
@@ -184,8 +184,8 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key)
         path.origin = origin_beyond;
         return;
     }
-    Facing facing = facing_of(hit, path);
-    EyePath mirrored = path;
+    ShadingFrame facing = shading_frame_of(hit, path);
+    CameraPath mirrored = path;
     vec3 n_i, n_t, theta3, cosine2, reflectance, mirror_weight;
     bool begins = false;
     for (int round = 0; round < 2; ++round) {
@@ -255,9 +255,9 @@ void cross_glass(inout EyePath path, EyePath whole, Hit hit, uint pixel_key)
 #endif
 
 // A surface that throws the path on.
-void meet_surface(inout EyePath path, Hit hit, uint kind, uint pixel_key)
+void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
 {
-    EyePath whole = path;
+    CameraPath whole = path;
 #ifdef ABSORPTION
     uint filling = ray_medium(path.medium);
     int absorber = filling == NONE ? -1 : int(object_colours[filling].w);
@@ -274,7 +274,7 @@ void meet_surface(inout EyePath path, Hit hit, uint kind, uint pixel_key)
     path.depth += 1;
 #ifdef HAS_MIRROR
     WHEN(kind == KIND_MIRROR) {
-        reflect_path(path, facing_of(hit, path));
+        reflect_path(path, shading_frame_of(hit, path));
         path.origin = RayOrigin(hit.primitive, hit.object, dot(path.direction, hit.normal_g) < 0.0, path.origin.inside_mask);
         path.recut = false;
         vec3 colour = object_colours[hit.object].rgb;
@@ -296,9 +296,9 @@ void meet_surface(inout EyePath path, Hit hit, uint kind, uint pixel_key)
 }
 #endif
 
-#ifndef EYE_SPECULAR
+#ifndef CAMERA_SPECULAR
 // What a camera ray meets that nothing specular is in the way of.
-void see_directly(EyePath path, bool met, Hit hit, uint kind, uint pixel_key)
+void see_directly(CameraPath path, bool met, Hit hit, uint kind, uint pixel_key)
 {
 #if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
     add_lights(path, met ? hit.distance : FAR_DISTANCE);
@@ -309,11 +309,11 @@ void see_directly(EyePath path, bool met, Hit hit, uint kind, uint pixel_key)
 
 void main()
 {
-#ifdef EYE_SPECULAR
+#ifdef CAMERA_SPECULAR
     uint at_listed = p.first_listed + gl_GlobalInvocationID.x;
     if (at_listed >= listed_count) return;
     uint entry = listed[at_listed], number = bitfieldExtract(entry, 0, int(LISTED_BITS)), look = bitfieldExtract(entry, int(LISTED_BITS), 3);
-    float gain = float((entry >> (LISTED_BITS + 3u)) + 1u) / float(p.direct_looks);
+    float gain = float((entry >> (LISTED_BITS + 3u)) + 1u) / float(p.primary_samples);
     uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
 #else
     uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, p.first_row);
@@ -321,11 +321,11 @@ void main()
 #endif
     uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
 #ifndef LISTS_SPECULAR
-#ifndef EYE_SPECULAR
+#ifndef CAMERA_SPECULAR
     uint look = THE_SAMPLE;
     float gain = 1.0;
 #endif
-    EyePath path = camera_path(pixel, look, gain);
+    CameraPath path = camera_path(pixel, look, gain);
 #endif
 #ifdef RGB_CHANNELS
     turn = p.counts_turns != 0u ? uint(imageLoad(picture[0], ivec2(pixel)).w) : p.sample_index;
@@ -333,29 +333,29 @@ void main()
     turn = p.sample_index;
 #endif
     for (int t = 0; t < TARGETS; ++t) radiance[t] = vec4(0.0);
-#ifdef EYE_SPECULAR
+#ifdef CAMERA_SPECULAR
     waits = 0;
 #endif
 #ifdef LISTS_SPECULAR
-    uint specular_looks = 0u, chosen = THE_SAMPLE, draw = hash_combine(pixel_key, p.draw_index);
-    for (uint k = 0u; k < p.direct_looks; ++k) {
-        EyePath path = camera_path(pixel, p.direct_looks == 1u ? THE_SAMPLE : k, 1.0 / float(p.direct_looks));
+    uint specular_samples = 0u, chosen = THE_SAMPLE, draw = hash_combine(pixel_key, p.draw_index);
+    for (uint k = 0u; k < p.primary_samples; ++k) {
+        CameraPath path = camera_path(pixel, p.primary_samples == 1u ? THE_SAMPLE : k, 1.0 / float(p.primary_samples));
         Hit hit;
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
         uint kind = met ? object_at(hit.object).kind : NONE;
         if (kind == KIND_MIRROR || kind == KIND_DIELECTRIC) {
-            specular_looks += 1u;
+            specular_samples += 1u;
             // Each of them as likely: the newest of c with 1 / c.
             draw = hash_pcg(draw);
-            if (unit_float(draw) * float(specular_looks) < 1.0) chosen = k;
+            if (unit_float(draw) * float(specular_samples) < 1.0) chosen = k;
         } else {
             see_directly(path, met, hit, kind, pixel_key);
         }
     }
-    WHEN(specular_looks > 0u) {
-        listed[atomicAdd(listed_count, 1u)] = listed_entry(pixel.y * p.size.x + pixel.x, specular_looks == p.direct_looks ? THE_SAMPLE : chosen, specular_looks);
+    WHEN(specular_samples > 0u) {
+        listed[atomicAdd(listed_count, 1u)] = listed_entry(pixel.y * p.size.x + pixel.x, specular_samples == p.primary_samples ? THE_SAMPLE : chosen, specular_samples);
     }
-#elif defined(EYE_SPECULAR)
+#elif defined(CAMERA_SPECULAR)
     int events = 0;
     bool goes_on = true;
     while (goes_on) {
@@ -368,8 +368,8 @@ void main()
             sets_aside = false;
 #ifdef SPECTRAL_SWEEP
             cut_at = -1.0;
-            bool asks = path.narrowed && !tired && (ends || (path.sound && kind != KIND_BLACK && asked < MOST_ASKED));
-            if (asks) asks = sweep_pixels(path, met ? hit.distance : FAR_DISTANCE) > (ends ? LEAST_SWEEP : LEAST_CUT_SWEEP * sample_side(path));
+            bool asks = path.narrowed && !tired && (ends || (path.sound && kind != KIND_BLACK && asked < MAX_ASKED));
+            if (asks) asks = sweep_pixels(path, met ? hit.distance : FAR_DISTANCE) > (ends ? MIN_SWEEP : MIN_CUT_SWEEP * sample_side(path));
             WHEN(asks) cut_at = where_ways_part(path, met, ends, hit, alike);
             parts = cut_at >= 0.0;
 #endif

@@ -1,12 +1,12 @@
 // What a surface of glass or a mirror does to a camera path: its ray, its columns, its weight over its band.
-#ifndef EYE_CROSSING_GLSL
-#define EYE_CROSSING_GLSL
+#ifndef CAMERA_CROSSING_GLSL
+#define CAMERA_CROSSING_GLSL
 
 // GPU units that a cut may move a ray's start.
 #define MAX_MOVED_START 0.01
 
 // A surface as a path meets it. The shading normal decides, and the geometric one where that leads to the wrong side.
-struct Facing {
+struct ShadingFrame {
     vec3 normal;
     vec3 normal_g;
 #ifdef SPECTRAL_SWEEP
@@ -27,9 +27,9 @@ bool is_curved(Hit hit)
 #endif
 }
 
-Facing facing_of(Hit hit, EyePath path)
+ShadingFrame shading_frame_of(Hit hit, CameraPath path)
 {
-    Facing facing;
+    ShadingFrame facing;
     facing.normal_g = facing_geometric(hit, path.direction);
     facing.normal = facing_normal(hit, path.direction);
 #ifdef SPECTRAL_SWEEP
@@ -68,7 +68,7 @@ Facing facing_of(Hit hit, EyePath path)
 #endif
 
 // The geometric normal judges a smooth one that leads to the wrong side.
-void use_geometric(inout Facing facing)
+void use_geometric(inout ShadingFrame facing)
 {
     facing.normal = facing.normal_g;
 #ifdef SPECTRAL_SWEEP
@@ -79,7 +79,7 @@ void use_geometric(inout Facing facing)
 #endif
 }
 
-void reflect_path(inout EyePath path, Facing facing)
+void reflect_path(inout CameraPath path, ShadingFrame facing)
 {
     float theta = dot(path.direction, facing.normal);
     if (dot(reflect_direction(path.direction, facing.normal, theta), facing.normal_g) <= 0.0) {
@@ -97,7 +97,7 @@ void reflect_path(inout EyePath path, Facing facing)
 
 #ifdef HAS_DIELECTRIC
 // False where the geometric normal, which had to judge, transmits nothing.
-bool refract_path(inout EyePath path, Facing facing, Crossing crossing, vec3 n_i3, vec3 n_t3)
+bool refract_path(inout CameraPath path, ShadingFrame facing, MediumInterface crossing, vec3 n_i3, vec3 n_t3)
 {
     float n_i = n_i3.y, n_t = n_t3.y, eta_it = n_i / n_t;
     float theta = dot(path.direction, facing.normal);
@@ -131,7 +131,7 @@ bool refract_path(inout EyePath path, Facing facing, Crossing crossing, vec3 n_i
 }
 
 // Cosine to the surface at three places of the band.
-vec3 thetas(EyePath path, Facing facing)
+vec3 thetas(CameraPath path, ShadingFrame facing)
 {
     vec3 theta = vec3(dot(path.direction, facing.normal));
 #ifdef SPECTRAL_SWEEP
@@ -146,7 +146,7 @@ vec3 thetas(EyePath path, Facing facing)
 
 #if SPECTRAL_GROUPS > 0
 // The wavelength within the path's band where total internal reflection sets in; `passes` says where it transmits.
-float cut_of(EyePath path, vec3 theta, Crossing crossing, bvec3 passes)
+float cut_of(CameraPath path, vec3 theta, MediumInterface crossing, bvec3 passes)
 {
     bool low_side = passes.x != passes.y;
     float a = low_side ? path.band.x : path.band.y, b = low_side ? path.band.y : path.band.z;
@@ -163,7 +163,7 @@ float cut_of(EyePath path, vec3 theta, Crossing crossing, bvec3 passes)
 }
 
 // Whether anchoring the parts [x, at] and [at, z] of the band leaves a path's start where it is known to be clear.
-bool cut_is_near(EyePath whole, float at, float distance)
+bool cut_is_near(CameraPath whole, float at, float distance)
 {
     vec3 low, high, unused;
     ray_at(whole, anchor_of(whole, whole.band.x, at), low, unused);

@@ -1,18 +1,18 @@
 // Where the colours of a band part, its band is cut: each part then goes its own way. A band's middle decides which surface a path meets, and
 // sees for all of it; so at every surface the rays at the band's ends are asked whether they meet the same.
-#ifndef EYE_CUTS_GLSL
-#define EYE_CUTS_GLSL
+#ifndef CAMERA_CUTS_GLSL
+#define CAMERA_CUTS_GLSL
 
 // Cuts of one path where its ways part.
-#define MOST_CUTS 4
+#define MAX_CUTS 4
 // Sweep, in sides of a sample's share of its pixel, below which nobody sees which colour went where.
-#define LEAST_CUT_SWEEP 0.5
+#define MIN_CUT_SWEEP 0.5
 // Halvings between the middle of a band and an end: a cut is told to 1/256 of the band.
 #define CUT_HALVINGS 7
 #define EDGE_HALVINGS 10
 // Rays that a sample may trace to find out where its ways part: bounds what a sample costs, and llvmpipe ends all loops of an invocation once
 // they have run 65,535 rounds together.
-#define MOST_ASKED 96
+#define MAX_ASKED 96
 // Cosine of two normals, and distance (GPU units) from a plane, up to which two facets are one face.
 #define SAME_FACE_COSINE 0.999999
 #define SAME_FACE_DISTANCE 1e-5
@@ -23,7 +23,7 @@ float cell_border(float at)
     return float(emission_cell(at)) / float(EMISSION_CELLS);
 }
 
-bool may_cut_at(EyePath path, float at)
+bool may_cut_at(CameraPath path, float at)
 {
     return min(at - path.band.x, path.band.z - at) > 0.5 / float(EMISSION_CELLS);
 }
@@ -32,7 +32,7 @@ bool may_cut_at(EyePath path, float at)
 int asked = 0;
 
 // How much of what looks bright in the band lies below `at`.
-float share_below(EyePath path, float at)
+float share_below(CameraPath path, float at)
 {
     vec2 brightness = brightness_of(path.band);
     return clamp((cell_cdf[emission_cell(at)] - brightness.x) / max(brightness.y - brightness.x, 1e-9), 0.05, 0.95);
@@ -40,14 +40,14 @@ float share_below(EyePath path, float at)
 
 // Both parts of a cut band set out again from the path's last surface (`anchor_at`): `path` is one, the other is set aside. Of weak parts one is
 // chosen by chance.
-void cut_band(inout EyePath path, float at, uint pixel_key)
+void cut_band(inout CameraPath path, float at, uint pixel_key)
 {
     float below = share_below(path, at);
     bool both = path.share * min(below, 1.0 - below) > CUT_THRESHOLD && waits < STACK;
     bool takes_low = true;
     WHEN(!both) takes_low = unit_float(hash_combine(hash_combine(pixel_key, path.key + uint(path.depth + path.cuts) * 2654435769u), p.draw_index)) < below;
     path.cuts += 1;
-    EyePath whole = path;
+    CameraPath whole = path;
     // What waits first, then what goes on.
     for (int part = both ? 0 : 1; part < 2; ++part) {
         bool low = part == 0 ? !takes_low : takes_low;
@@ -64,7 +64,7 @@ void cut_band(inout EyePath path, float at, uint pixel_key)
 
 // Whether the ray at the wavelength x meets what the path's own ray met. `ends`: the path ends there; colours that end elsewhere, or in
 // nothing, then go along, for every look along the sweep finds out for itself; `alike` is made false by them.
-bool goes_along(EyePath path, float x, bool met, bool ends, Hit hit, inout bool alike, out Hit found)
+bool goes_along(CameraPath path, float x, bool met, bool ends, Hit hit, inout bool alike, out Hit found)
 {
     asked += 1;
     vec3 position, direction;
@@ -89,7 +89,7 @@ float sooner(vec3 position, vec3 direction, vec3 normal_a, vec3 on_a, vec3 norma
 
 // Asks both ends; where the way of one of them parts from the middle's, the wavelength where it does, else a negative one.
 // `alike`: whether all of the band ends on the facet, or in the nothing, that its middle ends in.
-float where_ways_part(EyePath path, bool met, bool ends, Hit hit, out bool alike)
+float where_ways_part(CameraPath path, bool met, bool ends, Hit hit, out bool alike)
 {
     alike = true;
     bool parts = false, bisects = true;
@@ -114,7 +114,7 @@ float where_ways_part(EyePath path, bool met, bool ends, Hit hit, out bool alike
             parted = goes ? parted : x;
         }
         if (i == 1) {
-            bisects = parts && path.sound && path.cuts < MOST_CUTS;
+            bisects = parts && path.sound && path.cuts < MAX_CUTS;
             WHEN(bisects && met && other.object == hit.object) {
                 // Two facets of one solid part in the edge where they meet: where both are as far.
                 vec3 position, direction;
@@ -134,7 +134,7 @@ float where_ways_part(EyePath path, bool met, bool ends, Hit hit, out bool alike
         }
     }
     float at = cell_border(0.5 * (along + parted));
-    return parts && path.sound && path.cuts < MOST_CUTS && may_cut_at(path, at) ? at : -1.0;
+    return parts && path.sound && path.cuts < MAX_CUTS && may_cut_at(path, at) ? at : -1.0;
 }
 
 #endif

@@ -1,7 +1,7 @@
 // Spectra as the picture's channels see them. Row r of the table is a spectrum times the observer, summed up from
 // x = 0 on; a difference of two of its samples is the light of a stretch of the spectrum in every channel.
-#ifndef EYE_EMISSION_GLSL
-#define EYE_EMISSION_GLSL
+#ifndef CAMERA_EMISSION_GLSL
+#define CAMERA_EMISSION_GLSL
 
 #ifdef SCENE_IMAGE
 layout(rgba32f, binding = UNIT_EMISSION) uniform readonly restrict image2D emission_table;
@@ -24,7 +24,7 @@ vec4 emission_until(uint row, int target, int cell)
 }
 
 // What a path lets through at the wavelength x.
-float transmitted(EyePath path, float x)
+float transmitted(CameraPath path, float x)
 {
     float kept = weights_at(path, vec3(x)).x;
 #ifdef ABSORPTION
@@ -49,7 +49,7 @@ struct Stretch {
     int steps;      // parts that differ in what the path lets through
 };
 
-Stretch stretch_of(EyePath path, float lo, float hi)
+Stretch stretch_of(CameraPath path, float lo, float hi)
 {
     Stretch stretch;
     stretch.lo = lo;
@@ -66,7 +66,7 @@ Stretch stretch_of(EyePath path, float lo, float hi)
 }
 
 // Adds a light whose spectrum is that of `row`, `factor` times.
-void add_spectrum(EyePath path, Stretch stretch, uint row, float factor)
+void add_spectrum(CameraPath path, Stretch stretch, uint row, float factor)
 {
     WHEN(stretch.steps == 1)
         for (int t = 0; t < TARGETS; ++t)
@@ -82,7 +82,7 @@ void add_spectrum(EyePath path, Stretch stretch, uint row, float factor)
 }
 
 // The same under a colour: `row` holds the light itself, the three after it the light times the functions of the reflectance basis.
-void add_colour(EyePath path, Stretch stretch, uint row, vec3 colour)
+void add_colour(CameraPath path, Stretch stretch, uint row, vec3 colour)
 {
     bool grey = colour.r == colour.g && colour.g == colour.b;
     WHEN(grey) add_spectrum(path, stretch, row, colour.r);
@@ -90,7 +90,7 @@ void add_colour(EyePath path, Stretch stretch, uint row, vec3 colour)
 }
 
 // Factor on every channel of light whose spectrum is no longer known: that of white light along the same path.
-void channel_factors(EyePath path, Stretch stretch, out vec4 factors[TARGETS])
+void channel_factors(CameraPath path, Stretch stretch, out vec4 factors[TARGETS])
 {
     bool whole = stretch.steps == 1 && !path.narrowed;
     for (int t = 0; t < TARGETS; ++t) factors[t] = vec4(stretch.through);

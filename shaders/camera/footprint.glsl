@@ -1,6 +1,6 @@
 // What a look is averaged over: the sides of a sample's share of its pixel, and the way from one look along the sweep to the next.
-#ifndef EYE_FOOTPRINT_GLSL
-#define EYE_FOOTPRINT_GLSL
+#ifndef CAMERA_FOOTPRINT_GLSL
+#define CAMERA_FOOTPRINT_GLSL
 
 // The two axes of a box of about the same covariance as the sum of three.
 void box_of_three(vec2 a, vec2 b, vec2 c, out vec2 major, out vec2 minor)

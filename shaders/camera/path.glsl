@@ -1,8 +1,8 @@
 // A camera path: a ray with its pixel columns and, where the scene disperses, one spectral column a group of glasses,
 // and what it has lost on its way. It stands for the whole spectrum until it is first bent by glass that disperses;
 // from there on for one band of it (`narrow`).
-#ifndef EYE_PATH_GLSL
-#define EYE_PATH_GLSL
+#ifndef CAMERA_PATH_GLSL
+#define CAMERA_PATH_GLSL
 
 #define SPATIAL 2
 #define COLUMNS_HELD (SPATIAL + SPECTRAL_GROUPS)
@@ -13,7 +13,7 @@
 // An end of a band that arrives farther off (GPU units) is beyond the facet for good.
 #define END_LIMIT 1.0
 
-struct EyePath {
+struct CameraPath {
     vec3 position;
     vec3 direction;
     RayOrigin origin;
@@ -51,7 +51,7 @@ float variable_step(uint g, float x, float x_anchor)
 
 #ifdef SPECTRAL_SWEEP
 // Where the columns alone put an end's ray.
-void linear_end(EyePath path, int end, out vec3 position, out vec3 direction)
+void linear_end(CameraPath path, int end, out vec3 position, out vec3 direction)
 {
     position = path.position;
     direction = path.direction;
@@ -63,7 +63,7 @@ void linear_end(EyePath path, int end, out vec3 position, out vec3 direction)
 }
 
 // Steps to the ends of the band.
-void set_steps(inout EyePath path)
+void set_steps(inout CameraPath path)
 {
     for (int g = 0; g < SPECTRAL_GROUPS; ++g)
         path.end_step[g] = vec2(variable_step(uint(g), path.band.x, path.band.y), variable_step(uint(g), path.band.z, path.band.y));
@@ -72,7 +72,7 @@ void set_steps(inout EyePath path)
 
 // The path's ray at the wavelength x: along the spectral columns, and off them by the share of an end's own deviation that a second
 // derivative would have there. So it is exact in the middle, where it also has the columns' slope, and at both ends.
-void ray_at(EyePath path, float x, out vec3 position, out vec3 direction)
+void ray_at(CameraPath path, float x, out vec3 position, out vec3 direction)
 {
     position = path.position;
     direction = path.direction;
@@ -94,17 +94,17 @@ void ray_at(EyePath path, float x, out vec3 position, out vec3 direction)
 }
 
 // Side of the share of its pixel that a sample of this path has, pixels.
-float sample_side(EyePath path)
+float sample_side(CameraPath path)
 {
 #ifdef LISTS_SPECULAR
-    return p.sample_side * inversesqrt(float(p.direct_looks));
+    return p.sample_side * inversesqrt(float(p.primary_samples));
 #else
     return path.narrowed ? p.band_side : p.sample_side;
 #endif
 }
 
 // Weights at other wavelengths of the same band.
-vec3 weights_at(EyePath path, vec3 x)
+vec3 weights_at(CameraPath path, vec3 x)
 {
     vec3 below = clamp((x - path.band.x) / max(path.band.y - path.band.x, 1e-9), 0.0, 1.0);
     vec3 above = clamp((x - path.band.y) / max(path.band.z - path.band.y, 1e-9), 0.0, 1.0);
@@ -126,7 +126,7 @@ float quantile(vec2 brightness, float share)
 #endif
 
 // From here on the path stands for one band only; all others have their turn in other samples.
-void narrow(inout EyePath path, uint pixel_key)
+void narrow(inout CameraPath path, uint pixel_key)
 {
     path.narrowed = true;
 #ifdef RANDOM_WAVELENGTH
@@ -168,16 +168,16 @@ void narrow(inout EyePath path, uint pixel_key)
 
 // The wavelength that a part of a band is traced at: the band's own, where that lies in it, else the part's middle. What the path lets through,
 // which bends at its own wavelength, is then the same function in the parts as in the whole, and all branches together stay one.
-float anchor_of(EyePath path, float lo, float hi)
+float anchor_of(CameraPath path, float lo, float hi)
 {
     return path.band.y > lo && path.band.y < hi ? path.band.y : 0.5 * (lo + hi);
 }
 
 // The same path for a part of its band.
-void anchor_at(inout EyePath path, float lo, float hi)
+void anchor_at(inout CameraPath path, float lo, float hi)
 {
     vec3 band = vec3(lo, anchor_of(path, lo, hi), hi);
-    EyePath before = path;
+    CameraPath before = path;
     path.weight = weights_at(before, band);
     if (band.y != path.band.y) ray_at(before, band.y, path.position, path.direction);
     path.band = band;
@@ -189,7 +189,7 @@ void anchor_at(inout EyePath path, float lo, float hi)
 }
 
 // Column c carried to a surface at `distance` whose geometric normal is `normal_g`.
-void transfer_columns(inout EyePath path, vec3 normal_g, float distance)
+void transfer_columns(inout CameraPath path, vec3 normal_g, float distance)
 {
     for (int c = 0; c < COLUMNS_HELD; ++c)
         path.dposition[c] = transfer_column(path.dposition[c], path.ddirection[c], path.direction, normal_g, distance);
@@ -198,7 +198,7 @@ void transfer_columns(inout EyePath path, vec3 normal_g, float distance)
 #ifdef SPECTRAL_SWEEP
 // The ends carried to the plane of a facet that the path has met at its own wavelength; an end that cannot get there, or only far away,
 // is where the columns say.
-void transfer_ends(inout EyePath path, vec3 normal_g)
+void transfer_ends(inout CameraPath path, vec3 normal_g)
 {
     for (int end = 0; end < 2; ++end) {
         vec3 position = path.end_position[end], direction = path.end_direction[end];
@@ -214,7 +214,7 @@ void transfer_ends(inout EyePath path, vec3 normal_g)
 #endif
 
 // Columns that are not finite, or longer than anything, are dropped: the path goes on as a single ray.
-bool columns_hold(inout EyePath path)
+bool columns_hold(inout CameraPath path)
 {
     float largest = 0.0;
     for (int c = 0; c < COLUMNS_HELD; ++c)

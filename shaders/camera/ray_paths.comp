@@ -62,7 +62,7 @@ void main()
 #ifdef HAS_DIELECTRIC
         if (kind == KIND_DIELECTRIC) {
             bool entering = dot(direction, hit.normal_g) < 0.0;
-            Crossing crossing = cross_boundary(medium, hit.object, entering);
+            MediumInterface crossing = cross_boundary(medium, hit.object, entering);
             bool total = false;
             if (crossing.changes) {
                 float eta_it = medium_index(crossing.before, starts[id].x) / medium_index(crossing.after, starts[id].x);

@@ -1,12 +1,12 @@
 // What a diffuse surface sends back: direct light, whose shadow rays stop at anything, glass too, and the caustic map,
 // which holds all light that came by way of glass or mirrors. Nothing counts twice.
-#ifndef EYE_RECEIVER_GLSL
-#define EYE_RECEIVER_GLSL
+#ifndef CAMERA_RECEIVER_GLSL
+#define CAMERA_RECEIVER_GLSL
 
 const float INVERSE_PI = 0.31830988618;
 
 // One place on a diffuse surface, as a stretch [lo, hi] of the path's spectrum sees it.
-struct Seen {
+struct SurfaceInteraction {
     vec3 position;
     vec3 direction;      // of the ray that found it
     vec3 dposition[3];   // what it is averaged over: a sample's two sides, and the way from this stretch to the next
@@ -17,9 +17,9 @@ struct Seen {
     vec3 reflectance;    // coefficients of the reflectance basis
 };
 
-Seen seen_on(EyePath path, Hit hit, Triangle facet, vec3 position, vec3 direction)
+SurfaceInteraction seen_on(CameraPath path, Hit hit, Triangle facet, vec3 position, vec3 direction)
 {
-    Seen seen;
+    SurfaceInteraction seen;
     seen.position = position;
     seen.direction = direction;
     seen.normal_g = hit.normal_g;
@@ -54,7 +54,7 @@ Paint paint_of(uint picture, uint source, Triangle facet)
 }
 
 // Reflectance of a painted place, averaged over what a look is averaged over.
-vec3 painted(Paint paint, Seen seen)
+vec3 painted(Paint paint, SurfaceInteraction seen)
 {
     vec3 along = seen.position - paint.origin;
     vec2 columns[3];
@@ -73,14 +73,14 @@ vec2 light_point(uint light, uint pixel_key)
 }
 
 // Irradiance from one light, as a factor on its own quantity, before anything is in the way.
-float unshadowed(uint light, Seen seen, uint pixel_key, out LightSample s)
+float unshadowed(uint light, SurfaceInteraction seen, uint pixel_key, out LightSample s)
 {
     s = sample_light(lights[light], seen.position, light_point(light, pixel_key));
     vec3 normal = dot(seen.direction, seen.normal_g) < 0.0 ? seen.normal_g : -seen.normal_g;
     return s.gain * max(dot(s.toward, normal), 0.0);
 }
 
-bool hidden_from(LightSample s, Seen seen)
+bool hidden_from(LightSample s, SurfaceInteraction seen)
 {
     RayOrigin origin = RayOrigin(seen.primitive, seen.object, dot(seen.direction, seen.normal_g) > 0.0, 0u);
     // Up to the light, less a hair so that a surface the light lies on does not hide it.
@@ -101,7 +101,7 @@ struct Steady {
 };
 
 // Adds the direct light of one place; that of `steady` lights as their ends have it.
-void add_direct(EyePath path, Seen seen, Stretch stretch, uint pixel_key, Steady steady)
+void add_direct(CameraPath path, SurfaceInteraction seen, Stretch stretch, uint pixel_key, Steady steady)
 {
     uint reflectance_class = receivers[object_at(seen.object).receiver].reflectance_class;
     float share = clamp(dot(seen.position - steady.from, steady.along), 0.0, 1.0);
@@ -131,7 +131,7 @@ Steady no_steady_lights()
 
 #ifdef SPECTRAL_SWEEP
 // What both ends of a sweep over one facet, and its middle `seen`, tell of the direct light between them.
-Steady steady_lights(Seen seen, vec3 lo, vec3 hi, uint pixel_key)
+Steady steady_lights(SurfaceInteraction seen, vec3 lo, vec3 hi, uint pixel_key)
 {
     Steady steady = no_steady_lights();
     vec3 way = hi - lo, middle = seen.position;
@@ -170,12 +170,12 @@ vec4 map_to_channels(vec4 texel)
 }
 
 // Texels that a look at a map averages across and down at most; what it covers beyond is met by the pixel's other samples.
-#define MOST_TEXELS 4
+#define MAX_TEXELS 4
 
 // Irradiance of the map's targets `first` to `last`: their mean over a box of this many texels.
 void caustic_values(uint placement, vec2 texel, vec2 box, out vec4 values[MAP_TARGETS], const int first, const int last)
 {
-    ivec2 looks = clamp(ivec2(ceil(box)), ivec2(1), ivec2(MOST_TEXELS));
+    ivec2 looks = clamp(ivec2(ceil(box)), ivec2(1), ivec2(MAX_TEXELS));
     vec2 part = box / vec2(looks), corner = texel - 0.5 * (box - part);
     float share = 1.0 / float(looks.x * looks.y);
     for (int t = 0; t < MAP_TARGETS; ++t) values[t] = vec4(0.0);
@@ -221,7 +221,7 @@ vec4 bin_reflectance(vec3 colour, int target)
 #endif
 
 // Irradiance by what glass and mirrors threw at a place of a map.
-void add_caustic_at(EyePath path, Seen seen, Stretch stretch, uint receiver, uint placement, vec2 texel)
+void add_caustic_at(CameraPath path, SurfaceInteraction seen, Stretch stretch, uint receiver, uint placement, vec2 texel)
 {
     // Texels larger than pixels are interpolated, smaller ones weighed by their share of the sample.
     vec3 row_u = placements[placement].row_u.xyz, row_v = placements[placement].row_v.xyz;
@@ -236,7 +236,7 @@ void add_caustic_at(EyePath path, Seen seen, Stretch stretch, uint receiver, uin
     bool plain = receivers[receiver].reflectance_class == 0u;
     float scale = p.map_scale * INVERSE_PI;
 #ifdef MAP_BINS
-    // The caustic's own dispersion meets the eye's: every spectral channel that the stretch touches is read by itself.
+    // The caustic's own dispersion meets the camera's: every spectral channel that the stretch touches is read by itself.
     WHEN(path.narrowed) {
         float x = 0.5 * (stretch.lo + stretch.hi);
         float first = spectral_row(uint(BIN_ROW), stretch.lo), last = spectral_row(uint(BIN_ROW), stretch.hi);
@@ -300,7 +300,7 @@ void add_caustic_at(EyePath path, Seen seen, Stretch stretch, uint receiver, uin
 }
 
 // Irradiance by what glass and mirrors threw here, where a map covers it.
-void add_caustic(EyePath path, Seen seen, Stretch stretch)
+void add_caustic(CameraPath path, SurfaceInteraction seen, Stretch stretch)
 {
     uint placement;
     vec2 texel;

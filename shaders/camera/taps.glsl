@@ -1,20 +1,20 @@
 // Where a path ends in something that shines, it looks up along its spectral sweep what is there. A path that was never
 // bent by dispersive glass looks once; another as often as its sweep is long, and what lies between two looks is averaged.
-#ifndef EYE_TAPS_GLSL
-#define EYE_TAPS_GLSL
+#ifndef CAMERA_TAPS_GLSL
+#define CAMERA_TAPS_GLSL
 
 #ifdef SPECTRAL_SWEEP
 // Where the look number `tap` of so many begins: each stands for as much of what looks bright, and looks in the midst of it.
-float tap_border(EyePath path, vec2 brightness, float tap, int taps)
+float tap_border(CameraPath path, vec2 brightness, float tap, int taps)
 {
     return tap <= 0.0 ? path.band.x : (tap >= float(taps) ? path.band.z : clamp(quantile(brightness, tap / float(taps)), path.band.x, path.band.z));
 }
 
 // A sweep shorter than this, in widths of a pixel, does not show.
-#define LEAST_SWEEP 0.2
+#define MIN_SWEEP 0.2
 
 // Sweep of the path over the distance ahead, in widths of a pixel.
-float sweep_pixels(EyePath path, float distance)
+float sweep_pixels(CameraPath path, float distance)
 {
     vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1], d_hi = path.end_direction[1];
     float reach = min(distance, 1e4);
@@ -26,10 +26,10 @@ float sweep_pixels(EyePath path, float distance)
 }
 
 // Looks that this sweep needs: where it shows at all, one for either half; the fewer, the less of the sample the path is.
-int taps_of(EyePath path, float distance)
+int taps_of(CameraPath path, float distance)
 {
     float pixels = sweep_pixels(path, distance);
-    return clamp(int(min(ceil(pixels * p.taps_per_pixel), float(p.most_taps)) * sqrt(min(path.share, 1.0)) + 0.99), pixels > LEAST_SWEEP ? 2 : 1, int(p.most_taps));
+    return clamp(int(min(ceil(pixels * p.taps_per_pixel), float(p.max_taps)) * sqrt(min(path.share, 1.0)) + 0.99), pixels > MIN_SWEEP ? 2 : 1, int(p.max_taps));
 }
 #endif
 
@@ -54,7 +54,7 @@ vec3 sky_colour(vec3 direction, vec3 ddirection[3])
 }
 
 #ifdef LAYER_BEAUTY
-void add_sky(EyePath path, Stretch stretch, vec3 direction, vec3 sweep)
+void add_sky(CameraPath path, Stretch stretch, vec3 direction, vec3 sweep)
 {
     vec3 columns[3];
     columns[0] = sample_side(path) * path.ddirection[0];
@@ -65,13 +65,13 @@ void add_sky(EyePath path, Stretch stretch, vec3 direction, vec3 sweep)
 
 #ifdef VISIBLE_LIGHTS
 // Diameter of what a sample stands for: where its ray starts (GPU units), and how that grows with distance.
-vec2 sample_width(EyePath path)
+vec2 sample_width(CameraPath path)
 {
     return sample_side(path) * sqrt(vec2(length(cross(path.dposition[0], path.dposition[1])), length(cross(path.ddirection[0], path.ddirection[1]))));
 }
 
 // Lights that can be seen over the distance `far`; edges are as soft as what the ray stands for is wide.
-void add_lights(EyePath path, float far)
+void add_lights(CameraPath path, float far)
 {
     vec2 width = sample_width(path), sweep = vec2(0.0);
     int taps = 1;
@@ -125,7 +125,7 @@ vec3 arrival(vec3 position, vec3 direction, Hit hit, vec3 middle)
     return position + dot(hit.normal_g, middle - position) / dot(hit.normal_g, direction) * direction;
 }
 
-Trace trace_of(EyePath path, Hit hit)
+Trace trace_of(CameraPath path, Hit hit)
 {
     Trace trace;
     trace.middle = path.position + hit.distance * path.direction;
@@ -142,7 +142,7 @@ Trace trace_of(EyePath path, Hit hit)
     return trace;
 }
 
-vec3 arrival_at(EyePath path, Trace trace, float x)
+vec3 arrival_at(CameraPath path, Trace trace, float x)
 {
     bool below = x < path.band.y;
     float reach = (x - path.band.y) / max(abs((below ? path.band.x : path.band.z) - path.band.y), 1e-9);
@@ -154,7 +154,7 @@ vec3 arrival_at(EyePath path, Trace trace, float x)
 
 // A path that has met nothing, or a diffuse surface. Without a sweep that is one look. Where all of a sweep ends on the facet that the path's own
 // wavelength met (`alike`), its looks are of that; else every look finds out for itself.
-void add_end(EyePath path, bool met, Hit hit, bool alike, uint pixel_key)
+void add_end(CameraPath path, bool met, Hit hit, bool alike, uint pixel_key)
 {
     int taps = 1;
 #ifdef SPECTRAL_SWEEP
@@ -170,7 +170,7 @@ void add_end(EyePath path, bool met, Hit hit, bool alike, uint pixel_key)
     float hi = path.band.x;
 #endif
 #ifdef HAS_RECEIVERS
-    Seen seen;
+    SurfaceInteraction seen;
     Triangle facet;
 #ifdef HAS_TEXTURES
     uint texture = NONE;

@@ -14,7 +14,7 @@ const float BRIGHTEST = 1e30;
 const float LINE_HALF_PX = 1.0;
 const vec3 NOT_FINITE = vec3(1.0, 0.0, 1.0);
 
-// Mean of the picture over an output pixel: one look-up where the picture is enlarged, TAPS² where it is shrunk.
+// Mean of the picture over an output pixel: one lookup where the picture is enlarged, TAPS² where it is shrunk.
 vec3 look(sampler2D picture, vec2 pixel)
 {
 #if TAPS == 1

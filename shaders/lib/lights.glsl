@@ -20,7 +20,7 @@ struct LightSample {
 };
 
 // `unit`: uniform in the unit square, used by lights of some extent.
-LightSample sample_light(EyeLight light, vec3 position, vec2 unit)
+LightSample sample_light(CameraLight light, vec3 position, vec2 unit)
 {
     LightSample s = LightSample(-light.axis, 1e30, 1.0);
     if (light.kind == LIGHT_KIND_DIRECTIONAL) {
@@ -73,7 +73,7 @@ float disc_seen(float offset, float blur)
 // Radiance per unit of the light's own quantity that a ray meets within `far`: discs and
 // rectangles from their front, the sun's disc where nothing else is met (far = 1e30).
 // `width`: diameter of what the ray stands for, GPU units at its start and more of them per unit of distance: a light's edge is as soft.
-float light_seen(EyeLight light, vec3 position, vec3 direction, float far, vec2 width)
+float light_seen(CameraLight light, vec3 position, vec3 direction, float far, vec2 width)
 {
     if (light.kind == LIGHT_KIND_DIRECTIONAL) {
         float along = -dot(direction, light.axis);

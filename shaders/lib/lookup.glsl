@@ -1,4 +1,4 @@
-// Caustic maps as the eye reads them: from a place on a receiver to irradiance. The maps hold
+// Caustic maps as the camera reads them: from a place on a receiver to irradiance. The maps hold
 // energy per texel, so that they can be summed and checked; only here it is divided by area.
 #ifndef LOOKUP_GLSL
 #define LOOKUP_GLSL

@@ -6,7 +6,7 @@
 
 #include "lib/scene.glsl"
 
-struct Crossing {
+struct MediumInterface {
     uint before;        // object whose medium the ray comes from, NONE: air
     uint after;         // object whose medium lies behind
     uint mask_after;
@@ -46,9 +46,9 @@ uint medium_weight_row(RayRecord ray)
     return object == NONE ? NONE : object_at(object).weight_row;
 }
 
-Crossing cross_boundary(RayRecord ray, uint object, bool entering)
+MediumInterface cross_boundary(RayRecord ray, uint object, bool entering)
 {
-    Crossing crossing;
+    MediumInterface crossing;
     crossing.mask_after = ray.inside_mask;
     crossing.object_after = entering ? object : NONE;
     crossing.before = entering ? NONE : object;
@@ -77,7 +77,7 @@ float medium_index(uint object, float x)
 }
 
 // Indices before and behind a surface at three places of the spectrum.
-void crossing_indices(Crossing crossing, vec3 x, out vec3 n_i, out vec3 n_t)
+void crossing_indices(MediumInterface crossing, vec3 x, out vec3 n_i, out vec3 n_t)
 {
 #ifdef MEDIUM_STACK
     n_i = vec3(medium_index(crossing.before, x.x), medium_index(crossing.before, x.y), medium_index(crossing.before, x.z));
@@ -105,7 +105,7 @@ float medium_slope(uint object, float x)
 
 // d(n_i / n_t) / d(variable of group g) [physics: -eta/n_t for the transmitting glass, 1/n_t for the
 // incident one].
-float index_ratio_derivative(Crossing crossing, uint g, float x, float n_i, float n_t)
+float index_ratio_derivative(MediumInterface crossing, uint g, float x, float n_i, float n_t)
 {
     float derivative = 0.0;
     if (crossing.after != NONE && object_at(crossing.after).group == g)

@@ -1,5 +1,5 @@
 // What happens to a ray and its derivative columns at a surface. Pure functions; the float64
-// twins live in app/truth. Conventions: `direction` and `normal` are unit vectors, the
+// CPU references live in app/reference. Conventions: `direction` and `normal` are unit vectors, the
 // normal is turned so that theta = dot(direction, normal) < 0, eta_it = n_incident / n_transmitted.
 // A column is one derivative (dposition, ddirection) of the ray [Igehy 1999]; the spectral ones
 // are Elek et al. 2014, here with respect to refractive indices instead of wavelength.

@@ -1,5 +1,5 @@
 // How one ray leaves a specular surface it has hit: the normal that it sees, where exactly it stands, reflected and
-// refracted directions that stay on their side of the facet. For rays without columns (eye, picks, ray fans).
+// refracted directions that stay on their side of the facet. For rays without columns (camera, picks, ray fans).
 #ifndef SURFACE_GLSL
 #define SURFACE_GLSL
 

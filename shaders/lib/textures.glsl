@@ -3,7 +3,7 @@
 // every device shows the same picture: hardware filters differ, and know no environment with poles.
 //
 // The patch is a parallelogram with two derivative columns as sides. Its second moment is that of an ellipse, whose
-// shorter axis chooses the level and whose longer one is covered with look-ups side by side [McCormack et al. 1999].
+// shorter axis chooses the level and whose longer one is covered with lookups side by side [McCormack et al. 1999].
 #ifndef TEXTURES_GLSL
 #define TEXTURES_GLSL
 
@@ -18,9 +18,9 @@ layout(rgba32f, binding = UNIT_PICTURES) uniform readonly restrict image2D pictu
 layout(binding = UNIT_PICTURES) uniform sampler2D picture_texels;
 #endif
 
-// Look-ups along the longer axis at most; a longer patch is read from a coarser level.
+// Lookups along the longer axis at most; a longer patch is read from a coarser level.
 const float MAX_TAPS = 8.0;
-// A patch up to this much longer than wide is one look-up, and so much of a longer one falls to each.
+// A patch up to this much longer than wide is one lookup, and so much of a longer one falls to each.
 const float ROUND_RATIO = 1.25;
 // Interpolation between texels widens what a texel averages, so texels are this much smaller than the patch: the second moment of what is
 // averaged is then the patch's own.
@@ -74,7 +74,7 @@ void patch_axes(float ss, float st, float tt, out float longer, out float shorte
     mixing *= inversesqrt(max(dot(mixing, mixing), 1e-30));
 }
 
-// How a patch with these axes (texels of level 0) is read: from which level, with how many look-ups.
+// How a patch with these axes (texels of level 0) is read: from which level, with how many lookups.
 void filter_plan(float longer, float shorter, out float level, out float taps)
 {
     float width = max(max(shorter, longer / (MAX_TAPS * ROUND_RATIO)), 1.0);
@@ -164,7 +164,7 @@ vec2 environment_place(vec3 direction)
 
 // Mean radiance of the environment about a unit direction, over the patch of directions with these sides, rad.
 //
-// Look-ups lie side by side on the sphere, not on the picture: each finds its own place, so that seam and poles need no
+// Lookups lie side by side on the sphere, not on the picture: each finds its own place, so that seam and poles need no
 // care. Texels below level 0 are about as wide as high on the sphere (mip_chain.py), so the height of the picture
 // alone says which level is as coarse as the patch.
 vec3 environment_radiance(vec3 direction, vec3 ddirection_ds, vec3 ddirection_dt)

@@ -456,7 +456,7 @@ void main() {
 #if SLOTS == 2
     SplatRecord coarse = empty_splat();
     if (place.next != NONE) {
-        // The coarse map is read outside the fine window: up to its border, plus what a bilinear look-up there reaches.
+        // The coarse map is read outside the fine window: up to its border, plus what a bilinear lookup there reaches.
         Placement outer = placements[place.next];
         Footprint g = footprint_in(outer, photon, middle, sweep);
         inside = inside || contains(outer.rect, g.centre, 0.0);

@@ -1,5 +1,5 @@
 // Energy that fell into a chart's gutter goes home across the seam. One thread a destination sums its gutter texels in a
-// fixed order (no float atomics); with FILL, one thread a gutter texel copies back what lies across, for look-ups.
+// fixed order (no float atomics); with FILL, one thread a gutter texel copies back what lies across, for lookups.
 layout(local_size_x = WORKGROUP) in;
 layout(rgba32f, binding = 0) readonly uniform restrict image2D total;
 layout(rgba32f, binding = 1) uniform restrict image2D resolved;

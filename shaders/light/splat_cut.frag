@@ -27,7 +27,7 @@ vec4 energy_below(uint row, float x) {
     return mix(curve[base], curve[base + 1u], place - float(i));
 }
 
-// A Gaussian blur of the spectrum is done by the box of the same variance: two look-ups in the running integral, and all
+// A Gaussian blur of the spectrum is done by the box of the same variance: two lookups in the running integral, and all
 // energy is there whatever the band.
 void main() {
     bvec4 within = bvec4(greaterThan(gl_FragCoord.xy, rect.xy), lessThan(gl_FragCoord.xy, rect.zw));

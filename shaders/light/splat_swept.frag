@@ -1,4 +1,4 @@
-// A Gaussian swept along its spectral chord (or standing still, where it has one colour): across, the average over a texel; along, one look-up of the band's
+// A Gaussian swept along its spectral chord (or standing still, where it has one colour): across, the average over a texel; along, one lookup of the band's
 // spectrum blurred as this fragment sees it. Its cost does not depend on the number of wavelengths.
 #include "lib/gaussian.glsl"
 

@@ -320,7 +320,7 @@ void main()
         }
 #endif
 #ifdef HAS_DIELECTRIC
-        Crossing crossing = cross_boundary(ray, object, entering);
+        MediumInterface crossing = cross_boundary(ray, object, entering);
         bool splits = kind == KIND_DIELECTRIC && crossing.changes, cut = false;
         vec3 theta3 = vec3(theta), n_i, n_t;
 #ifdef SPECTRAL_WEIGHTS

@@ -15,7 +15,7 @@ from spectrasplat.model.optics import spectrum
 from spectrasplat.model.optics.colorimetry import K_M, cmf_xyz, daylight_per_lumen, rgb709_to_xyz, xyz_to_rgb709
 from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes.camera import CausticMaps, EyePass
+from spectrasplat.passes.camera import CausticMaps, CameraPass
 from spectrasplat.render.light_pass import spectral_axis
 
 REFLECTANCE = 0.5
@@ -37,31 +37,31 @@ def floor(half=12.0) -> SceneObject:
     return horizontal(-half, half, -half, half, 0.0, Diffuse((REFLECTANCE,) * 3), "floor")
 
 
-def eye_pass(
+def opened_camera_pass(
     gl, objects, lights=(), background=(0.0, 0.0, 0.0), camera=ABOVE, charts=False, environment=None, method="srd", split_threshold=None, channels=XYZ, **options
-) -> EyePass:
+) -> CameraPass:
     """A pass of its own buffers. `split_threshold` near 0 follows every part of a split path that weighs anything: no chance is left in the picture."""
     scene = Scene("test", camera, tuple(lights), tuple(objects), background, environment)
     features = Features.of(scene, RenderSettings(method=method, bins=channels.count if channels.edges_nm else None, any_view=True))
     features = replace(features, charts=charts or features.charts)
-    eye = EyePass(gl, SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features)), maps=channels, **options)
+    camera_pass = CameraPass(gl, SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features)), maps=channels, **options)
     if split_threshold is not None:
-        eye.split_threshold = split_threshold
-    return eye
+        camera_pass.split_threshold = split_threshold
+    return camera_pass
 
 
-def released(eye: EyePass) -> None:
+def released(camera_pass: CameraPass) -> None:
     """Free the pass and its scene."""
-    eye.scene.release()
-    eye.release()
+    camera_pass.scene.release()
+    camera_pass.release()
 
 
 def render(gl, objects, lights=(), size=(32, 24), samples=1, camera=ABOVE, maps=None, **options) -> np.ndarray:
     """Linear Rec.709 picture (H, W, 3); `maps`: caustic maps."""
-    eye = eye_pass(gl, objects, lights, camera=camera, **options)
-    assert eye.run(camera, *size, samples, maps=maps)
-    rgb = eye.read_rgb()
-    released(eye)
+    camera_pass = opened_camera_pass(gl, objects, lights, camera=camera, **options)
+    assert camera_pass.run(camera, *size, samples, maps=maps)
+    rgb = camera_pass.read_rgb()
+    released(camera_pass)
     return rgb
 
 

@@ -20,7 +20,7 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.colorimetry import rgb709_to_xyz
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.reference.metrics import Truth, measure
+from spectrasplat.reference.metrics import ReferencePicture, measure
 from spectrasplat.render.still import render
 
 WIDTH, HEIGHT = 64, 36
@@ -43,19 +43,19 @@ def test_a_rig_renders_what_render_does_again_and_again(gl: Any, prism: Scene) -
     assert np.allclose(first.xyz, picture, rtol=1e-4, atol=1e-5 * picture.max())
     assert np.allclose(again.xyz, first.xyz, rtol=1e-5, atol=1e-6 * picture.max())  # nothing is left of the rendering between
     assert not np.allclose(other.xyz, first.xyz, rtol=0.05, atol=1e-3 * picture.max())
-    assert set(first.seconds) == {"plan", *LIGHT.stages, "eye"} and all(seconds > 0.0 for seconds in first.seconds.values())
+    assert set(first.seconds) == {"plan", *LIGHT.stages, "camera"} and all(seconds > 0.0 for seconds in first.seconds.values())
     assert 0.5 * 3000 < first.emitted < 2 * 3000 and other.emitted < first.emitted and first.splats > 0
     assert set(rig.setup_seconds) == {"buffers", "compile", "pilot", "warm-up"} and rig.buffers_mib > 1.0
     assert budgets == sorted(set(budgets)) and 1 <= len(budgets) <= 4 and budgets[-1] >= 64
 
 
 def test_more_photons_err_less(gl: Any, prism: Scene) -> None:
-    """The truth is srd's own picture of many photons: only that the chain from photons to relMSE holds together."""
+    """The reference is srd's own picture of many photons: only that the chain from photons to relMSE holds together."""
     rig = MethodRig(gl, prism, "srd", WIDTH, HEIGHT)
     try:
         fine = rig.render(100_000, 1).xyz
-        truth = Truth(fine, np.zeros_like(fine))
-        errors = [measure(rig.render(photons, 2).xyz, truth) for photons in (1000, 16_000)]
+        reference_image = ReferencePicture(fine, np.zeros_like(fine))
+        errors = [measure(rig.render(photons, 2).xyz, reference_image) for photons in (1000, 16_000)]
     finally:
         rig.release()
     assert errors[1]["relmse"] < 0.2 * errors[0]["relmse"] and errors[1]["energy_ratio"] == pytest.approx(1.0, abs=0.02)

@@ -1,4 +1,4 @@
-"""The bench of the eye half on the real renderer, small: rigs look again and again, and a tiny run ends in a report."""
+"""The bench of the camera pass on the real renderer, small: rigs look again and again, and a tiny run ends in a report."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from spectrasplat.__main__ import main
 from spectrasplat.bench import camera_rendering, reference_picture, runner
-from spectrasplat.bench.camera_rendering import EyeRig, SharedLight
+from spectrasplat.bench.camera_rendering import CameraRig, SharedLight
 from spectrasplat.bench.rendering import NothingToMeasure
 from spectrasplat.bench.results import BenchResult
 from spectrasplat.commands.options import find_scene
@@ -35,7 +35,7 @@ def ball() -> Scene:
 def test_a_rig_looks_as_render_does_again_and_again(gl: Any, ball: Scene) -> None:
     told: list[str] = []
     light = SharedLight(gl, ball, WIDTH, HEIGHT, told.append, PHOTONS)
-    rigs = {method: EyeRig(gl, ball, method, WIDTH, HEIGHT, light) for method in ("stochastic", "srd", "regular-7")}
+    rigs = {method: CameraRig(gl, ball, method, WIDTH, HEIGHT, light) for method in ("stochastic", "srd", "regular-7")}
     try:
         first = {method: rig.render(16, 1) for method, rig in rigs.items()}
         other, again = rigs["stochastic"].render(3, 2), rigs["stochastic"].render(16, 1)
@@ -45,7 +45,7 @@ def test_a_rig_looks_as_render_does_again_and_again(gl: Any, ball: Scene) -> Non
         for owned in (*rigs.values(), light):
             owned.release()
     for method in ("stochastic", "srd"):
-        settings = RenderSettings(width=WIDTH, height=HEIGHT, photons=PHOTONS, seed=1, eye_method=method, spp=16, max_depth=ball.render.max_depth)
+        settings = RenderSettings(width=WIDTH, height=HEIGHT, photons=PHOTONS, seed=1, camera_method=method, spp=16, max_depth=ball.render.max_depth)
         picture = rgb709_to_xyz(render(ball, settings, context=gl).rgb.astype(float))
         assert np.allclose(first[method].xyz, picture, rtol=1e-3, atol=1e-4 * picture.max()), method
     assert np.allclose(again.xyz, first["stochastic"].xyz, rtol=1e-5, atol=1e-6 * again.xyz.max())  # nothing is left of the picture between
@@ -60,15 +60,15 @@ def test_where_nothing_disperses_there_is_nothing_to_measure(gl: Any) -> None:
     light = SharedLight(gl, replace(plain, lights=()), WIDTH, HEIGHT, lambda _: None, PHOTONS)
     assert light.maps is None and light.seconds == 0.0
     with pytest.raises(NothingToMeasure, match="nothing to measure"):
-        EyeRig(gl, plain, "srd", WIDTH, HEIGHT, light)
+        CameraRig(gl, plain, "srd", WIDTH, HEIGHT, light)
 
 
 def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Two methods against the real reference of one second, through the command line: a prism before an edge."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(runner, "POINTS", 3)
-    monkeypatch.setattr(eye_rendering, "LIGHT_PHOTONS", PHOTONS)
-    monkeypatch.setattr(truth_picture, "caustic_plan", lambda _: CausticPlan(1 << 16))
+    monkeypatch.setattr(camera_rendering, "LIGHT_PHOTONS", PHOTONS)
+    monkeypatch.setattr(reference_picture, "caustic_plan", lambda _: CausticPlan(1 << 16))
     monkeypatch.setattr("spectrasplat.bench.machine.program_hash", lambda: "as it is")  # an editor may be at work
     out = tmp_path / "out"
     arguments = ["bench", "--eye", "prism_edge", "-o", str(out), "--seconds", "0.4", "--seeds", "2", "--methods", "stochastic,srd", "--size", f"{WIDTH}x{HEIGHT}"]
@@ -76,7 +76,7 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     shown = capsys.readouterr().out
     result = msgspec.json.decode((out / "results.json").read_bytes(), type=BenchResult)
     (scene,) = result.scenes
-    assert scene.complete and scene.half == result.settings.half == "eye" and [curve.method for curve in scene.curves] == ["stochastic", "srd"]
+    assert scene.complete and scene.half == result.settings.half == "camera" and [curve.method for curve in scene.curves] == ["stochastic", "srd"]
     assert scene.reference is not None and scene.reference.photons >= 8 and 0.0 < scene.reference.relmse < 0.1
     for curve in scene.curves:
         assert len(curve.samples) == 2 * len(curve.budgets) == 2 * len(curve.points)
@@ -86,4 +86,4 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     assert set(scene.pictures) == {"reference", *(f"{method}{ending}" for method in ("stochastic", "srd") for ending in ("", " early", " first"))}
     assert (out / "report.html").stat().st_size > 10_000 and (out / "plots" / "prism_edge_error_samples.svg").exists()
     assert main(["bench", *arguments[2:]]) == 2  # the folder holds the other half
-    assert "the eye half measured instead of the light half" in capsys.readouterr().err
+    assert "the camera pass measured instead of the light pass" in capsys.readouterr().err

@@ -174,7 +174,7 @@ def test_seconds_are_kept(render: Render) -> None:
     full = luminance(render(scene, "--layer caustic --photons 100k")).sum()
     started = time.perf_counter()
     timed = luminance(render(scene, "--layer caustic --seconds 1")).sum()
-    assert 1.0 <= time.perf_counter() - started < 6.0  # programs and the eye come on top
+    assert 1.0 <= time.perf_counter() - started < 6.0  # programs and the camera come on top
     assert timed == pytest.approx(full, rel=0.03)
     assert int(re.search(r"([\d,]+) photons", render.said)[1].replace(",", "")) >= 20_000  # type: ignore[attr-defined, index]
 

@@ -10,13 +10,13 @@ from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.optics import glass
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Light, SceneObject
-from tests.gpu.eye_rig import (
+from tests.gpu.camera_rig import (
     ABOVE,
     DOWN,
     REFLECTANCE,
     WHITE,
     at,
-    eye_pass,
+    opened_camera_pass,
     floor,
     floor_points,
     horizontal,
@@ -158,36 +158,36 @@ def test_box_filter_over_a_slanted_edge(gl):
 def test_launches_accumulate_and_repeat_bit_for_bit(gl, monkeypatch):
     lamp = Light("panel", "area", WHITE, position=(0, 0, 2), direction=DOWN, radius=0.5)
     blocker = horizontal(-0.5, 0.5, -0.5, 0.5, 1.0, Diffuse((0, 0, 0)), "blocker")
-    eye = eye_pass(gl, [floor(), blocker], [lamp])
-    eye.run(ABOVE, 40, 30, 8)
-    first = eye.read_rgb()
-    eye.run(ABOVE, 40, 30, 8, sample_offset=8)
-    both = eye.read_rgb()
-    eye.dispatch_seconds = 0.0  # the fewest rows a dispatch
-    eye.run(ABOVE, 40, 30, 8)
-    assert np.array_equal(eye.read_rgb(), first)
-    eye.run(ABOVE, 40, 30, 8, sample_offset=8)
-    assert np.array_equal(eye.read_rgb(), both)
-    eye.run(ABOVE, 40, 30, 128)
-    converged = eye.read_rgb()
+    camera_pass = opened_camera_pass(gl, [floor(), blocker], [lamp])
+    camera_pass.run(ABOVE, 40, 30, 8)
+    first = camera_pass.read_rgb()
+    camera_pass.run(ABOVE, 40, 30, 8, sample_offset=8)
+    both = camera_pass.read_rgb()
+    camera_pass.dispatch_seconds = 0.0  # the fewest rows a dispatch
+    camera_pass.run(ABOVE, 40, 30, 8)
+    assert np.array_equal(camera_pass.read_rgb(), first)
+    camera_pass.run(ABOVE, 40, 30, 8, sample_offset=8)
+    assert np.array_equal(camera_pass.read_rgb(), both)
+    camera_pass.run(ABOVE, 40, 30, 128)
+    converged = camera_pass.read_rgb()
     assert np.abs(both - converged).mean() < 0.85 * np.abs(first - converged).mean()
 
 
 def test_rows_of_a_dispatch_stay_within_the_picture(gl):
     """They once grew fourfold with every quick sample, until after some 500 of them they were no number any more."""
-    eye = eye_pass(gl, [floor()])
-    eye.run(ABOVE, 16, 12, 6)
-    assert 8 <= eye._rows.units <= 16
-    released(eye)
+    camera_pass = opened_camera_pass(gl, [floor()])
+    camera_pass.run(ABOVE, 16, 12, 6)
+    assert 8 <= camera_pass._rows.units <= 16
+    released(camera_pass)
 
 
 def test_a_stop_keeps_what_is_there(gl):
-    eye = eye_pass(gl, [floor()], background=(3, 3, 3), camera=ABOVE)
+    camera_pass = opened_camera_pass(gl, [floor()], background=(3, 3, 3), camera=ABOVE)
     seen = []
-    eye.run(ABOVE, 32, 32, 1)
-    whole = eye.read_rgb()
-    eye.dispatch_seconds = 0.0
-    eye._rows.units = 8
-    assert not eye.run(ABOVE, 32, 32, 4, sample_offset=1, progress=seen.append, cancelled=lambda: len(seen) >= 6)
+    camera_pass.run(ABOVE, 32, 32, 1)
+    whole = camera_pass.read_rgb()
+    camera_pass.dispatch_seconds = 0.0
+    camera_pass._rows.units = 8
+    assert not camera_pass.run(ABOVE, 32, 32, 4, sample_offset=1, progress=seen.append, cancelled=lambda: len(seen) >= 6)
     assert seen == sorted(seen) and len(seen) == 6
-    assert np.array_equal(eye.read_rgb(), whole)
+    assert np.array_equal(camera_pass.read_rgb(), whole)

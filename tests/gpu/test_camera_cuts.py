@@ -15,10 +15,10 @@ from spectrasplat.model.optics.colorimetry import rgb709_to_xyz
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes import camera_programs
-from spectrasplat.passes.camera import EyePass
+from spectrasplat.passes.camera import CameraPass
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.render.light_pass import spectral_axis
-from tests.gpu.eye_rig import released
+from tests.gpu.camera_rig import released
 
 from tests.gpu.mutants import mutate
 
@@ -31,14 +31,14 @@ def edge() -> Scene:
     return load_scene(assets_dir() / "scenes" / "prism_edge.toml")
 
 
-def picture(gl, scene: Scene, samples: int, method: str = "srd", seed: int = 1, direct_looks: int | None = None) -> np.ndarray:
+def picture(gl, scene: Scene, samples: int, method: str = "srd", seed: int = 1, primary_samples: int | None = None) -> np.ndarray:
     """Linear Rec.709 (45, 81, 3), direct light only."""
     features = Features.of(scene, RenderSettings(method=method, any_view=True))
-    eye = EyePass(gl, SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features)))
-    eye.direct_looks = direct_looks or eye.direct_looks
-    eye.run(scene.camera, *SIZE, samples, seed=seed)
-    rgb = eye.read_rgb().astype(float)
-    released(eye)
+    camera_pass = CameraPass(gl, SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features)))
+    camera_pass.primary_samples = primary_samples or camera_pass.primary_samples
+    camera_pass.run(scene.camera, *SIZE, samples, seed=seed)
+    rgb = camera_pass.read_rgb().astype(float)
+    released(camera_pass)
     return rgb
 
 
@@ -64,7 +64,7 @@ def test_parted_colours_go_their_own_ways(gl, edge: Scene, drawn, monkeypatch, t
 
 def test_a_part_chosen_by_chance_stands_for_both(gl, edge: Scene, monkeypatch) -> None:
     both = picture(gl, edge, 64)
-    monkeypatch.setattr(eye_programs, "CUT_THRESHOLD", 2.0)
+    monkeypatch.setattr(camera_programs, "CUT_THRESHOLD", 2.0)
     chosen = np.mean([picture(gl, edge, 64, seed=seed) for seed in (1, 2)], axis=0)
     one = picture(gl, edge, 64, seed=3)
     assert error(one, chosen) > 0.0, "nothing was left to chance"
@@ -81,15 +81,15 @@ def test_a_part_that_is_lost_is_noticed(gl, edge: Scene, monkeypatch, tmp_path) 
 
 
 @pytest.fixture
-def single_wavelengths(gl, edge: Scene) -> Iterator[EyePass]:
+def single_wavelengths(gl, edge: Scene) -> Iterator[CameraPass]:
     features = Features.of(edge, RenderSettings(any_view=True))
-    eye = EyePass(gl, SceneBuffers(gl.ctx, edge, features, spectral_axis(edge, features)))
-    eye.may_be_single, eye.spectrum = True, Spectrum(single=True)
-    yield eye
-    released(eye)
+    camera_pass = CameraPass(gl, SceneBuffers(gl.ctx, edge, features, spectral_axis(edge, features)))
+    camera_pass.may_be_single, camera_pass.spectrum = True, Spectrum(single=True)
+    yield camera_pass
+    released(camera_pass)
 
 
-def test_single_wavelengths_of_a_pass_of_bands_are_those_of_their_own_method(gl, edge: Scene, drawn, single_wavelengths: EyePass) -> None:
+def test_single_wavelengths_of_a_pass_of_bands_are_those_of_their_own_method(gl, edge: Scene, drawn, single_wavelengths: CameraPass) -> None:
     """The same program but for the layout of its tables: agrees to the noise of both."""
     single_wavelengths.run(edge.camera, *SIZE, 1024, seed=2)
     assert error(single_wavelengths.read_rgb().astype(float), drawn) < 2.5e-3
@@ -97,16 +97,16 @@ def test_single_wavelengths_of_a_pass_of_bands_are_those_of_their_own_method(gl,
 
 
 def test_looks_round_a_sample_smooth_outlines_and_change_nothing_else(gl, edge: Scene) -> None:
-    many = picture(gl, edge, 256, direct_looks=1)
-    one, four = (error(picture(gl, edge, 1, direct_looks=looks), many) for looks in (1, 4))
+    many = picture(gl, edge, 256, primary_samples=1)
+    one, four = (error(picture(gl, edge, 1, primary_samples=looks), many) for looks in (1, 4))
     assert four < 0.6 * one, (one, four)
     # Of all samples together the mean is the same: looks that meet glass go on with their share.
-    several = picture(gl, edge, 16, direct_looks=4)
+    several = picture(gl, edge, 16, primary_samples=4)
     assert np.allclose(several.mean(axis=(0, 1)), many.mean(axis=(0, 1)), rtol=2e-3)
     assert error(several, many) < 5e-4
 
 
-def test_every_program_is_let_go(gl, single_wavelengths: EyePass, monkeypatch) -> None:
+def test_every_program_is_let_go(gl, single_wavelengths: CameraPass, monkeypatch) -> None:
     gone: list[object] = []
     monkeypatch.setattr(shader, "release", gone.append)
     single_wavelengths.run(single_wavelengths.scene.scene.camera, 9, 5, 1)

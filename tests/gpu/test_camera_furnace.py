@@ -24,7 +24,7 @@ from spectrasplat.model.scene import (
 from spectrasplat.model.texture import Environment, Texture
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.stress.rigs.gpu_paths import glass
-from tests.gpu.eye_rig import WHITE, at, eye_pass, released, render
+from tests.gpu.camera_rig import WHITE, at, opened_camera_pass, released, render
 
 from tests.gpu.mutants import mutate
 
@@ -74,11 +74,11 @@ def test_clear_glass_vanishes_in_a_closed_white_room(gl, name: str, sky: str, ba
     """
     surrounding = Environment(np.ones((8, 16, 3), np.float32)) if sky == "map" else None
     objects = solids(name)
-    eye = eye_pass(gl, objects, background=(1, 1, 1) if sky == "background" else (0, 0, 0), camera=NEAR, environment=surrounding)
-    eye.spectrum = Spectrum(bands)
-    eye.run(NEAR, *SIZE, 64)
-    rgb, fallbacks = eye.read_rgb().astype(float), eye.fallbacks
-    released(eye)
+    camera_pass = opened_camera_pass(gl, objects, background=(1, 1, 1) if sky == "background" else (0, 0, 0), camera=NEAR, environment=surrounding)
+    camera_pass.spectrum = Spectrum(bands)
+    camera_pass.run(NEAR, *SIZE, 64)
+    rgb, fallbacks = camera_pass.read_rgb().astype(float), camera_pass.fallbacks
+    released(camera_pass)
     off = np.abs(rgb - 1.0).max(axis=-1)
     share = covered(gl, objects)
     outline = (share > 0.0) & (share < 1.0)

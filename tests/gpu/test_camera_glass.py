@@ -1,7 +1,7 @@
 """The camera's pass through glass and over mirrors, against radiances that can be written down.
 
 Where light is thrown to and fro between surfaces a camera sees all of it: expectations sum up every inner reflection. A constant background
-seen through clear glass tells nothing of Fresnel's weights (glass then vanishes, which `test_eye_furnace.py` asks for), so these scenes have
+seen through clear glass tells nothing of Fresnel's weights (glass then vanishes, which `test_camera_furnace.py` asks for), so these scenes have
 a black side.
 """
 
@@ -24,7 +24,7 @@ from spectrasplat.model.scene import (
     Mirror,
     SceneObject,
 )
-from tests.gpu.eye_rig import (
+from tests.gpu.camera_rig import (
     ABOVE,
     DOWN,
     WHITE,

@@ -1,6 +1,6 @@
 """Pictures through dispersive glass that must not change, or only as rounding does: said in other coordinates, other portions, once more.
 
-The scene has all that the eye's rays meet: a flint prism, a smooth ball, a coloured mirror, lit paper and a sky with a pattern.
+The scene has all that the camera's rays meet: a flint prism, a smooth ball, a coloured mirror, lit paper and a sky with a pattern.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from spectrasplat.model.scene import (
 )
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.model.texture import Environment
-from spectrasplat.passes.camera import EyePass
+from spectrasplat.passes.camera import CameraPass
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.render.light_pass import spectral_axis
 from spectrasplat.stress.rigs.gpu_paths import glass
-from tests.gpu.eye_rig import WHITE, at, quad
+from tests.gpu.camera_rig import WHITE, at, quad
 
 from tests.gpu.test_invariance import moved
 
@@ -52,22 +52,22 @@ def scene() -> Scene:
     return Scene("invariance", Camera((0.2, -3.2, 0.9), (0.0, 0.0, -0.05), vertical_fov_deg=38.0), (lamp,), objects, environment=Environment(pattern()))
 
 
-def begun(gl, question: Scene) -> EyePass:
+def begun(gl, question: Scene) -> CameraPass:
     features = Features.of(question, RenderSettings(any_view=True))
-    eye = EyePass(gl, SceneBuffers(gl.ctx, question, features, spectral_axis(question, features)))
-    eye.spectrum = Spectrum(BANDS)
-    return eye
+    camera_pass = CameraPass(gl, SceneBuffers(gl.ctx, question, features, spectral_axis(question, features)))
+    camera_pass.spectrum = Spectrum(BANDS)
+    return camera_pass
 
 
 def picture(gl, question: Scene, samples: int = SAMPLES, seed: int = 1, **how: float) -> np.ndarray:
     """Linear Rec.709 (H, W, 3), float64."""
-    eye = begun(gl, question)
+    camera_pass = begun(gl, question)
     for name, value in how.items():
-        setattr(eye, name, value)
-    eye.run(question.camera, *SIZE, samples, seed=seed)
-    rgb = eye.read_rgb().astype(float)
-    eye.scene.release()
-    eye.release()
+        setattr(camera_pass, name, value)
+    camera_pass.run(question.camera, *SIZE, samples, seed=seed)
+    rgb = camera_pass.read_rgb().astype(float)
+    camera_pass.scene.release()
+    camera_pass.release()
     return rgb
 
 
@@ -112,17 +112,17 @@ def test_the_same_seed_gives_the_same_bits_in_any_portions(gl, shown) -> None:
 
 
 def test_samples_may_be_taken_in_two_runs(gl, shown) -> None:
-    eye, question = begun(gl, scene()), scene()
+    camera_pass, question = begun(gl, scene()), scene()
     pictures = []
     for _ in range(2):
-        eye.run(question.camera, *SIZE, SAMPLES)
-        assert np.array_equal(eye.read_rgb(), shown.astype(np.float32))
-        eye.run(question.camera, *SIZE, SAMPLES, sample_offset=SAMPLES)
-        pictures.append(eye.read_rgb().astype(float))
+        camera_pass.run(question.camera, *SIZE, SAMPLES)
+        assert np.array_equal(camera_pass.read_rgb(), shown.astype(np.float32))
+        camera_pass.run(question.camera, *SIZE, SAMPLES, sample_offset=SAMPLES)
+        pictures.append(camera_pass.read_rgb().astype(float))
     assert np.array_equal(*pictures)
     # What the second run adds is other samples of the same picture.
-    eye.run(question.camera, *SIZE, 64)
-    converged = eye.read_rgb().astype(float)
-    eye.scene.release()
-    eye.release()
+    camera_pass.run(question.camera, *SIZE, 64)
+    converged = camera_pass.read_rgb().astype(float)
+    camera_pass.scene.release()
+    camera_pass.release()
     assert difference(pictures[0], converged) < 0.85 * difference(shown, converged)

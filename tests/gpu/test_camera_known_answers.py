@@ -23,7 +23,7 @@ from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.reference import glasses
 from spectrasplat.reference.glasses import C_NM, D_NM, F_NM
 from spectrasplat.stress.rigs.gpu_paths import extruded, glass
-from tests.gpu.eye_rig import at, eye_pass, quad, released
+from tests.gpu.camera_rig import at, opened_camera_pass, quad, released
 
 from tests.gpu.mutants import mutate
 
@@ -48,13 +48,13 @@ def wavelengths(edges_nm: tuple[float, ...]) -> np.ndarray:
 
 def seen_edges(gl: Context, objects: list[SceneObject], light: Light, camera: Camera, edges_nm: tuple[float, ...], bands: int) -> np.ndarray:
     """Height of the edge between white above and black below in each bin, in half pictures: +1 is the upper border."""
-    eye = eye_pass(gl, objects, [light], camera=camera, channels=MapChannels(edges_nm))
-    eye.spectrum, eye.most_taps = Spectrum(bands), MANY_TAPS
-    assert eye.run(camera, *SIZE, 8)
-    rows = eye.read_spectral().astype(float).mean(axis=1)
+    camera_pass = opened_camera_pass(gl, objects, [light], camera=camera, channels=MapChannels(edges_nm))
+    camera_pass.spectrum, camera_pass.max_taps = Spectrum(bands), MANY_TAPS
+    assert camera_pass.run(camera, *SIZE, 8)
+    rows = camera_pass.read_spectral().astype(float).mean(axis=1)
     # llvmpipe ends an invocation's loops after 65,535 rounds, which so many looks may come near: about a sample in a thousand, counted as depth.
-    assert eye.fallbacks["columns_dropped"] == 0 and eye.fallbacks["depth_reached"] <= 1e-2 * 8 * SIZE[0] * SIZE[1]
-    released(eye)
+    assert camera_pass.fallbacks["columns_dropped"] == 0 and camera_pass.fallbacks["depth_reached"] <= 1e-2 * 8 * SIZE[0] * SIZE[1]
+    released(camera_pass)
     white, black = rows[:6].mean(axis=0), rows[-6:].mean(axis=0)
     assert (white > 20.0 * black).all() and (white > 0.0).all()
     return 1.0 - 2.0 * ((rows - black) / (white - black)).sum(axis=0) / SIZE[1]
@@ -83,14 +83,14 @@ FIELD = 0.6
 
 def prism_scene(name: str) -> tuple[list[SceneObject], Camera, tuple]:
     """A thin prism, its apex up, and paper 10 units behind it whose edge is seen straight ahead in yellow light."""
-    lean = np.tan(APEX / 2)
-    section = [[-2, PRISM_Z + 2 * -lean], [-2, PRISM_Z + THICK + 2 * lean], [2, PRISM_Z + THICK - 2 * lean], [2, PRISM_Z + 2 * lean]]
+    stripped = np.tan(APEX / 2)
+    section = [[-2, PRISM_Z + 2 * -stripped], [-2, PRISM_Z + THICK + 2 * stripped], [2, PRISM_Z + THICK - 2 * stripped], [2, PRISM_Z + 2 * stripped]]
     mesh = extruded("prism", np.array(section)[::-1], 1.0)  # drawn in (y, z), drawn out along what becomes x
     turned = np.eye(4)
     turned[:3, :3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
-    faces = eye_answers.prism_faces(APEX, PRISM_Z, THICK)
+    faces = camera_answers.prism_faces(APEX, PRISM_Z, THICK)
     n_d = float(glasses.index(name, D_NM))
-    edge = eye_answers.height_on_screen(faces, (n_d, 1.0), 0.0, PRISM_Z + THICK + BEHIND)
+    edge = camera_answers.height_on_screen(faces, (n_d, 1.0), 0.0, PRISM_Z + THICK + BEHIND)
     camera = Camera((0, 0, 0), (0, 0, 1), up=(0, 1, 0), vertical_fov_deg=2 * FIELD)
     objects = [SceneObject("prism", mesh, glass(name), turned), *paper(PRISM_Z + THICK + BEHIND, edge, edge + 1.5)]
     return objects, camera, faces
@@ -108,7 +108,7 @@ def test_fringe_of_an_edge_behind_a_thin_prism(gl, name: str, bands: int) -> Non
     edge = float(objects[1].mesh.vertices[:, 1].min())
 
     def place(n: float) -> float:
-        return np.tan(eye_answers.viewing_angle(faces, (n, 1.0), screen, edge, -0.03, 0.03)) / np.tan(np.radians(FIELD))
+        return np.tan(camera_answers.viewing_angle(faces, (n, 1.0), screen, edge, -0.03, 0.03)) / np.tan(np.radians(FIELD))
 
     got = seen_edges(gl, objects, LOW, camera, BINS_NM, bands)
     nm = wavelengths(BINS_NM)
@@ -120,7 +120,7 @@ def test_fringe_of_an_edge_behind_a_thin_prism(gl, name: str, bands: int) -> Non
     assert abs((got - expected).mean()) < 0.1 * pixel
     # The thin prism's formula is good to A² / 2 and to what lies between paper and prism.
     lines = np.vectorize(place)(glasses.index(name, np.array([F_NM, C_NM])))
-    width = eye_answers.thin_prism_fringe(*glasses.index(name, np.array([F_NM, C_NM])), APEX, BEHIND) / screen / np.tan(np.radians(FIELD))
+    width = camera_answers.thin_prism_fringe(*glasses.index(name, np.array([F_NM, C_NM])), APEX, BEHIND) / screen / np.tan(np.radians(FIELD))
     assert lines[0] - lines[1] == pytest.approx(width, rel=0.07)
     of_bins = np.polyfit(glasses.index(name, nm).mean(axis=1), got, 1)[0] * float(np.diff(glasses.index(name, np.array([C_NM, F_NM])))[0])
     assert of_bins == pytest.approx(lines[0] - lines[1], rel=0.02)
@@ -132,7 +132,7 @@ def test_the_fringe_notices_a_wrong_sign(gl, monkeypatch, tmp_path) -> None:
     objects, camera, faces = prism_scene("N-SF11")
     edge = float(objects[1].mesh.vertices[:, 1].min())
     nm = wavelengths(BINS_NM)
-    angles = [eye_answers.viewing_angle(faces, (n, 1.0), PRISM_Z + THICK + BEHIND, edge, -0.03, 0.03) for n in glasses.index("N-SF11", nm).mean(axis=1)]
+    angles = [camera_answers.viewing_angle(faces, (n, 1.0), PRISM_Z + THICK + BEHIND, edge, -0.03, 0.03) for n in glasses.index("N-SF11", nm).mean(axis=1)]
     got = seen_edges(gl, objects, LOW, camera, BINS_NM, 1)
     # Forty pixels, where the tolerance is less than one.
     assert np.abs(got - np.tan(angles) / np.tan(np.radians(FIELD))).max() > 20 * 2.0 / SIZE[1]
@@ -151,15 +151,15 @@ def test_shift_of_an_edge_behind_a_slab_at_45_degrees(gl, name: str, offset_d: f
     grazing = np.radians(5.0)
     low = Light("low", "directional", FLAT, direction=(0.0, np.cos(grazing), -np.sin(grazing)))
     # Aimed at where yellow light sees the edge.
-    shift_d = float(eye_answers.slab_lateral_shift(glasses.index(name, D_NM), 1.0, np.pi / 4))
+    shift_d = float(camera_answers.slab_lateral_shift(glasses.index(name, D_NM), 1.0, np.pi / 4))
     across = shift_d * np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0)
     middle = across + (height + 2.0) * np.array([-1.0, 0.0, 1.0])
     index = glasses.index(name, np.array([F_NM, D_NM, C_NM]))
-    expected = eye_answers.slab_lateral_shift(index, 1.0, np.pi / 4)
+    expected = camera_answers.slab_lateral_shift(index, 1.0, np.pi / 4)
     extent = 4.0 * float(np.ptp(expected))
     camera = Camera(tuple(middle), tuple(middle + (1, 0, -1)), up=(0, 0, 1), kind="orthographic", vertical_extent=extent)
     got = shift_d + seen_edges(gl, [slab, white, black], low, camera, LINES_NM, 1)[::2] * extent / 2
-    room = linear_error(lambda n: float(eye_answers.slab_lateral_shift(n, 1.0, np.pi / 4)), glasses.index(name, np.array([380.0, 780.0])), 1)
+    room = linear_error(lambda n: float(camera_answers.slab_lateral_shift(n, 1.0, np.pi / 4)), glasses.index(name, np.array([380.0, 780.0])), 1)
     pixel = extent / SIZE[1]
     assert np.abs(got - expected).max() < LOOK_PX * pixel + room, (got - expected) / pixel
     assert room < 0.1 * np.ptp(expected)
@@ -178,10 +178,10 @@ def test_image_scale_of_a_plano_convex_lens(gl, bands: int) -> None:
     screen = LENS_Z + LENS_THICK + OBJECT_GAP
     mesh = lens(RADIUS, np.inf, LENS_THICK, 0.8, 20_000)
     objects = [SceneObject("lens", mesh, glass("N-SF11"), at(0, 0, LENS_Z + LENS_THICK / 2)), *paper(screen, HEIGHT, HEIGHT + 0.4)]
-    faces = eye_answers.plano_convex_faces(RADIUS, LENS_Z, LENS_THICK)
+    faces = camera_answers.plano_convex_faces(RADIUS, LENS_Z, LENS_THICK)
 
     def angle(n: float) -> float:
-        return eye_answers.viewing_angle(faces, (n, 1.0), screen, HEIGHT, 0.0, 0.1)
+        return camera_answers.viewing_angle(faces, (n, 1.0), screen, HEIGHT, 0.0, 0.1)
 
     aim = angle(float(glasses.index("N-SF11", D_NM)))
     camera = Camera((0, 0, 0), (0, np.sin(aim), np.cos(aim)), up=(0, 1, 0), vertical_fov_deg=0.6)
@@ -195,6 +195,6 @@ def test_image_scale_of_a_plano_convex_lens(gl, bands: int) -> None:
     assert np.abs(got - expected).max() < BIN_PX * pixel + room + 1e-5, (got - expected) / pixel
     assert np.ptp(expected) > 20 * pixel
     # Thick paraxial optics is near: what it leaves out is the lens's own aberration.
-    paraxial = [eye_answers.thick_seen_tangent(float(n), RADIUS, LENS_THICK, LENS_Z, OBJECT_GAP, HEIGHT) for n in glasses.index("N-SF11", np.array([F_NM, C_NM]))]
+    paraxial = [camera_answers.thick_seen_tangent(float(n), RADIUS, LENS_THICK, LENS_Z, OBJECT_GAP, HEIGHT) for n in glasses.index("N-SF11", np.array([F_NM, C_NM]))]
     exact = [angle(float(n)) for n in glasses.index("N-SF11", np.array([F_NM, C_NM]))]
     assert exact[0] - exact[1] == pytest.approx(paraxial[0] - paraxial[1], rel=0.15)

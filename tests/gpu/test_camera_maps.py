@@ -11,12 +11,12 @@ from spectrasplat.gpu.records import NONE, PLACEMENT, RECEIVER
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.optics import glass, spectrum
 from spectrasplat.model.scene import Dielectric, Diffuse, Light, SceneObject
-from tests.gpu.eye_rig import (
+from tests.gpu.camera_rig import (
     ABOVE,
     REFLECTANCE,
     WHITE,
     at,
-    eye_pass,
+    opened_camera_pass,
     flat_maps,
     floor,
     floor_points,
@@ -32,14 +32,14 @@ DOWNWARD = replace(ABOVE, position=(0, 0, -0.5), target=(0, 0, -1))
 
 @pytest.mark.parametrize("layer", ["beauty", "caustic"])
 def test_nested_windows_show_the_finest_map_that_covers_a_place(gl, layer):
-    eye = eye_pass(gl, [floor(), SceneObject("far glass", primitives.box((1, 1, 1)), Dielectric(glass.constant(1.5)), at(40, 3, 0))], layer=layer)
+    camera_pass = opened_camera_pass(gl, [floor(), SceneObject("far glass", primitives.box((1, 1, 1)), Dielectric(glass.constant(1.5)), at(40, 3, 0))], layer=layer)
     rng = np.random.default_rng(5)
     lumens = rng.uniform(1, 2, (16, 24))
     # A fine window of 8² texels over [-0.5, 0.5]², a coarse one of 6² over [-1.5, 1.5]².
-    maps = flat_maps(gl, eye.scene, [(-0.5, -0.5, 1.0, 1, 2, 8), (-1.5, -1.5, 3.0, 12, 5, 6)], white_texels(lumens), scale=0.5)
+    maps = flat_maps(gl, camera_pass.scene, [(-0.5, -0.5, 1.0, 1, 2, 8), (-1.5, -1.5, 3.0, 12, 5, 6)], white_texels(lumens), scale=0.5)
     size = (64, 64)
-    eye.run(ABOVE, *size, 1, maps=maps)
-    rgb = eye.read_rgb()
+    camera_pass.run(ABOVE, *size, 1, maps=maps)
+    rgb = camera_pass.read_rgb()
     x, y = np.moveaxis(floor_points(size, ABOVE)[..., :2], -1, 0)
 
     def bilinear(u, v, ax, ay, count):
@@ -60,10 +60,10 @@ def test_nested_windows_show_the_finest_map_that_covers_a_place(gl, layer):
 def test_charts_have_a_placement_a_triangle(gl):
     """A receiver of two triangles whose charts lie apart in the atlas, after another object's triangles."""
     blocker = horizontal(50, 51, 50, 51, 1, Diffuse((0, 0, 0)), "elsewhere")
-    eye = eye_pass(gl, [blocker, horizontal(-2, 2, -2, 2, 0, Diffuse((REFLECTANCE,) * 3))], charts=True)
+    camera_pass = opened_camera_pass(gl, [blocker, horizontal(-2, 2, -2, 2, 0, Diffuse((REFLECTANCE,) * 3))], charts=True)
     lumens = np.zeros((16, 40))
     lumens[2:10, 2:10], lumens[5:13, 20:28] = 1.0, 3.0
-    maps = flat_maps(gl, eye.scene, [(-2, -2, 4.0, 2, 2, 8), (-2, -2, 4.0, 20, 5, 8)], white_texels(lumens))
+    maps = flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 2, 2, 8), (-2, -2, 4.0, 20, 5, 8)], white_texels(lumens))
     placements = np.frombuffer(maps.placements.read(), PLACEMENT.dtype).copy()
     placements["kind"], placements["next"] = 1, NONE
     maps.placements.write(placements.tobytes())
@@ -72,20 +72,20 @@ def test_charts_have_a_placement_a_triangle(gl):
     receivers["kind"] = 0, 1
     receivers["first_triangle"] = 0, 2
     maps = replace(maps, receivers=gl.ctx.buffer(receivers.tobytes()))
-    eye.run(ABOVE, 32, 32, 1, maps=maps)
+    camera_pass.run(ABOVE, 32, 32, 1, maps=maps)
     x, y = np.moveaxis(floor_points((32, 32), ABOVE)[..., :2], -1, 0)
     expected = REFLECTANCE / np.pi * np.where(y < x, 1.0, 3.0) * 4
     off_diagonal = np.abs(x - y) > 1e-6
-    assert eye.read_rgb()[..., 1][off_diagonal] == pytest.approx(expected[off_diagonal], rel=1e-5)
+    assert camera_pass.read_rgb()[..., 1][off_diagonal] == pytest.approx(expected[off_diagonal], rel=1e-5)
 
 
 def test_small_texels_are_averaged_by_the_pixel_and_keep_their_energy(gl):
-    eye = eye_pass(gl, [floor()])
+    camera_pass = opened_camera_pass(gl, [floor()])
     lumens = np.zeros((256, 256))
     lumens[100, 37] = 3.0  # one focus
-    maps = flat_maps(gl, eye.scene, [(-2, -2, 4.0, 0, 0, 256)], white_texels(lumens))
-    eye.run(ABOVE, 32, 32, 64, maps=maps)
-    rgb = eye.read_rgb()[..., 1]
+    maps = flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 0, 0, 256)], white_texels(lumens))
+    camera_pass.run(ABOVE, 32, 32, 64, maps=maps)
+    rgb = camera_pass.read_rgb()[..., 1]
     pixel_area = (4 / 32) ** 2
     # The samples' shares of the pixel do not quite tile it: one texel of 64 is weighed to a tenth.
     assert rgb.sum() * pixel_area * np.pi / REFLECTANCE == pytest.approx(3.0, rel=0.1)
@@ -95,27 +95,27 @@ def test_small_texels_are_averaged_by_the_pixel_and_keep_their_energy(gl):
 @pytest.mark.parametrize("samples", [1, 2, 3])
 def test_few_samples_fill_the_pixel(gl, samples: int) -> None:
     """Pixels of 2 by 2 texels: a bright one counts once, wherever in its pixel it lies (strips of a third meet it in parts)."""
-    eye = eye_pass(gl, [floor()])
+    camera_pass = opened_camera_pass(gl, [floor()])
     for x, y in ((37, 40), (36, 40), (37, 41), (36, 41)):
         lumens = np.zeros((64, 64))
         lumens[y, x] = 3.0
-        eye.run(ABOVE, 32, 32, samples, maps=flat_maps(gl, eye.scene, [(-2, -2, 4.0, 0, 0, 64)], white_texels(lumens)))
-        rgb = eye.read_rgb()[..., 1]
+        camera_pass.run(ABOVE, 32, 32, samples, maps=flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 0, 0, 64)], white_texels(lumens)))
+        rgb = camera_pass.read_rgb()[..., 1]
         assert rgb.sum() * (4 / 32) ** 2 * np.pi / REFLECTANCE == pytest.approx(3.0, rel=0.01), (x, y)
-    released(eye)
+    released(camera_pass)
 
 
 def test_samples_weigh_texels_by_their_share_of_the_pixel(gl):
     """Pixels of 2.3 texels, every texel different: 16 samples give the box-filtered map to 6 %, its mean to half a per cent."""
-    eye = eye_pass(gl, [floor()])
+    camera_pass = opened_camera_pass(gl, [floor()])
     rng = np.random.default_rng(3)
     lumens = rng.uniform(0.0, 1.0, (74, 74)) ** 4
-    maps = flat_maps(gl, eye.scene, [(-2, -2, 4.0, 0, 0, 74)], white_texels(lumens))
-    eye.run(ABOVE, 32, 32, 16, maps=maps)
+    maps = flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 0, 0, 74)], white_texels(lumens))
+    camera_pass.run(ABOVE, 32, 32, 16, maps=maps)
     edges = np.linspace(0, 74, 33)
     share = np.clip(np.minimum(edges[1:, None], np.arange(1, 75)) - np.maximum(edges[:-1, None], np.arange(74)), 0, None)
     expected = (share @ lumens @ share.T)[::-1] / (4 / 32) ** 2 * REFLECTANCE / np.pi
-    got = eye.read_rgb()[..., 1]
+    got = camera_pass.read_rgb()[..., 1]
     assert np.sqrt(np.mean((got - expected) ** 2)) < 0.06 * expected.mean()
     assert got.mean() == pytest.approx(expected.mean(), rel=5e-3)
 
@@ -124,10 +124,10 @@ def test_caustic_layer_has_no_direct_light_and_beauty_adds_it(gl):
     lamp = Light("lamp", "point", WHITE, position=(0, 0, 1.5))
     pictures = {}
     for layer in ("beauty", "caustic"):
-        eye = eye_pass(gl, [floor()], [lamp], layer=layer, background=(5, 5, 5))
-        maps = flat_maps(gl, eye.scene, [(-2, -2, 4.0, 0, 0, 4)], white_texels(np.full((4, 4), 7.0)))
-        eye.run(ABOVE, 16, 16, 1, maps=maps)
-        pictures[layer] = eye.read_rgb()[..., 1]
+        camera_pass = opened_camera_pass(gl, [floor()], [lamp], layer=layer, background=(5, 5, 5))
+        maps = flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 0, 0, 4)], white_texels(np.full((4, 4), 7.0)))
+        camera_pass.run(ABOVE, 16, 16, 1, maps=maps)
+        pictures[layer] = camera_pass.read_rgb()[..., 1]
     assert pictures["caustic"] == pytest.approx(REFLECTANCE / np.pi * 7.0, rel=1e-5)
     direct = point_light_radiance(floor_points((16, 16), ABOVE), lamp.position)
     assert pictures["beauty"] - pictures["caustic"] == pytest.approx(direct, rel=1e-3)
@@ -137,18 +137,18 @@ def test_spectral_bins(gl):
     """Six bins over two targets: map and light land in their bins and give the same white as XYZ does."""
     edges = (380.0, 450.0, 500.0, 550.0, 600.0, 650.0, 780.0)
     lamp = Light("lamp", "point", spectrum.laser(532.0, 2.0), position=(0, 0, 2))
-    eye = eye_pass(gl, [floor()], [lamp], channels=MapChannels(edges))
+    camera_pass = opened_camera_pass(gl, [floor()], [lamp], channels=MapChannels(edges))
     energy = np.zeros((4, 4, 8))
     energy[..., :6] = [1, 2, 3, 4, 5, 6]
-    maps = flat_maps(gl, eye.scene, [(-2, -2, 4.0, 0, 0, 4)], energy)
-    eye.run(ABOVE, 16, 16, 1, maps=maps)
-    bins = eye.read_spectral()
+    maps = flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 0, 0, 4)], energy)
+    camera_pass.run(ABOVE, 16, 16, 1, maps=maps)
+    bins = camera_pass.read_spectral()
     assert bins.shape == (16, 16, 6)
     direct = point_light_radiance(floor_points((16, 16), ABOVE), lamp.position, 2.0)
     expected = REFLECTANCE / np.pi * np.array([1, 2, 3, 4, 5, 6]) * np.ones((16, 16, 1))
     expected[..., 2] += direct
     assert bins == pytest.approx(expected, rel=1e-4)
-    assert eye.read_rgb().shape == (16, 16, 3)
+    assert camera_pass.read_rgb().shape == (16, 16, 3)
 
 
 @pytest.mark.parametrize("shown", ["background", "light"])
@@ -164,12 +164,12 @@ def test_a_bin_is_shown_in_its_own_colour(gl, shown):
 def test_spectral_reflectance_class_acts_on_direct_light(gl):
     red_only = np.where(np.arange(380, 781) > 600, 1.0, 0.0)
     item = replace(floor(), material=Diffuse(reflectance=red_only))
-    eye = eye_pass(gl, [item], [Light("lamp", "point", WHITE, position=(0, 0, 1.5))], reflectances=(None, red_only))
-    maps = flat_maps(gl, eye.scene, [(-2, -2, 4.0, 0, 0, 4)], white_texels(np.zeros((4, 4))))
+    camera_pass = opened_camera_pass(gl, [item], [Light("lamp", "point", WHITE, position=(0, 0, 1.5))], reflectances=(None, red_only))
+    maps = flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 0, 0, 4)], white_texels(np.zeros((4, 4))))
     receivers = RECEIVER.zeros(1)
     receivers["reflectance_class"] = 1
     maps.receivers.write(receivers.tobytes())
-    eye.run(ABOVE, 17, 17, 1, maps=maps)
+    camera_pass.run(ABOVE, 17, 17, 1, maps=maps)
     expected = spectrum.xyz_to_rgb709(spectrum.Spectrum(WHITE.density * red_only).xyz()) / np.pi / 1.5**2
     assert expected[0] > 20 * expected[2] > 0 or expected[2] <= 0
-    assert eye.read_rgb()[8, 8] == pytest.approx(expected, rel=1e-3)
+    assert camera_pass.read_rgb()[8, 8] == pytest.approx(expected, rel=1e-3)

@@ -1,4 +1,4 @@
-"""Different ways to the same picture: sampling methods, spectral bins, spectral maps, and the light half looked at in reverse.
+"""Different ways to the same picture: sampling methods, spectral bins, spectral maps, and the light pass looked at in reverse.
 
 Tolerances are those of chance, measured from runs with other seeds, and beside each stands a mutant that exceeds it.
 """
@@ -26,7 +26,7 @@ from spectrasplat.model.texture import Environment
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.render.still import render as render_scene
 from spectrasplat.stress.rigs.gpu_paths import extruded, glass
-from tests.gpu.eye_rig import at, eye_pass, horizontal, released
+from tests.gpu.camera_rig import at, opened_camera_pass, horizontal, released
 
 from tests.gpu.mutants import mutate
 
@@ -49,12 +49,12 @@ BEFORE = Camera((-2.6, -2.2, 0.1), (0.0, 0.0, 0.0), vertical_fov_deg=17.0)
 def seen(gl, method: str, samples: int, bands: int | None = None, seed: int = 1, channels: MapChannels = MapChannels()) -> np.ndarray:
     """Means over 3×3 pixels (8, 8, 3) of the sky through a flint prism."""
     prism = SceneObject("prism", UPRIGHT, glass("N-SF11"))
-    eye = eye_pass(gl, [prism], camera=BEFORE, environment=Environment(stripes()), method=method, channels=channels)
+    camera_pass = opened_camera_pass(gl, [prism], camera=BEFORE, environment=Environment(stripes()), method=method, channels=channels)
     if bands is not None:
-        eye.spectrum = Spectrum(bands)
-    eye.run(BEFORE, *SIZE, samples, seed=seed)
-    rgb = eye.read_rgb().astype(float)
-    released(eye)
+        camera_pass.spectrum = Spectrum(bands)
+    camera_pass.run(BEFORE, *SIZE, samples, seed=seed)
+    rgb = camera_pass.read_rgb().astype(float)
+    released(camera_pass)
     return rgb.reshape(8, 3, 8, 3, 3).mean(axis=(1, 3))
 
 
@@ -101,12 +101,12 @@ def test_bins_add_up_to_the_picture_in_colour(gl) -> None:
     assert difference(seen(gl, "srd", 32, 4, channels=bins), seen(gl, "srd", 32, 4)) < 0.01
 
 
-# ---- with the light half -----------------------------------------------------------------------
+# ---- with the light pass -----------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
 def behind_panes(gl) -> tuple[np.ndarray, np.ndarray]:
-    """A prism's spectrum on the floor, seen through a pane that bends nothing: one that by law disperses, so that the eye looks up single
+    """A prism's spectrum on the floor, seen through a pane that bends nothing: one that by law disperses, so that the camera looks up single
     wavelengths in maps with spectra, and one that does not, so that it looks up XYZ whole. Means over 2×2 pixels, (12, 16, 3)."""
     section = 0.35 * np.column_stack([np.cos(np.radians([90.0, 210.0, 330.0])), np.sin(np.radians([90.0, 210.0, 330.0]))])
     upright = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 1.2], [0, 0, 0, 1]], float)
@@ -143,11 +143,11 @@ def test_a_caustic_behind_matched_glass_has_its_colours(behind_panes) -> None:
 EDGES_NM = tuple(np.linspace(380.0, 780.0, 9).tolist())
 
 
-def test_light_and_eye_half_agree_on_a_lamp_behind_a_slab(gl) -> None:
-    """Reciprocity to 1.2 %: the irradiance that the light half throws through a slab onto paper is what a camera on the paper finds when it adds up
+def test_light_and_camera_half_agree_on_a_lamp_behind_a_slab(gl) -> None:
+    """Reciprocity to 1.2 %: the irradiance that the light pass throws through a slab onto paper is what a camera on the paper finds when it adds up
     the lamp it sees through the slab, L cos θ dΩ, in every bin.
 
-    The light half follows sixteen wavelengths by themselves and is within half a per cent (of photons' lattices and texels), the eye's eight
+    The light pass follows sixteen wavelengths by themselves and is within half a per cent (of photons' lattices and texels), the camera's eight
     bands leave as much grain. Fresnel's loss is 15 %, the slab lets the lamp seem 9 % nearer, and both change by 2 % over the spectrum."""
     lamp = Light("lamp", "area", FLAT, position=(0.0, 0.0, 3.0), direction=(0.0, 0.0, -1.0), radius=0.25)
     turn = np.radians(25.0)
@@ -162,11 +162,11 @@ def test_light_and_eye_half_agree_on_a_lamp_behind_a_slab(gl) -> None:
         column, row = int((x + 0.6) / 1.2 * side), int((0.6 - y) / 1.2 * side)
         patch = maps[row - side // 20 : row + side // 20, column - side // 20 : column + side // 20].astype(float).mean(axis=(0, 1))
         camera = Camera((x, y, 1e-3), (0.12, 0.0, 3.0), up=(0, 1, 0), vertical_fov_deg=24.0)
-        eye = eye_pass(gl, [slab, paper], [lamp], camera=camera, channels=MapChannels(EDGES_NM), split_threshold=1e-4)
-        eye.spectrum = Spectrum(8)
-        eye.run(camera, 48, 48, 32)
-        radiance = eye.read_spectral().astype(float)
-        released(eye)
+        camera_pass = opened_camera_pass(gl, [slab, paper], [lamp], camera=camera, channels=MapChannels(EDGES_NM), split_threshold=1e-4)
+        camera_pass.spectrum = Spectrum(8)
+        camera_pass.run(camera, 48, 48, 32)
+        radiance = camera_pass.read_spectral().astype(float)
+        released(camera_pass)
         forward = np.array([0.12 - x, -y, 3.0 - 1e-3])
         forward /= np.linalg.norm(forward)
         assert radiance[:2].max() == radiance[-2:].max() == 0.0 < radiance.max()  # all of the lamp is in the picture

@@ -12,7 +12,7 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.base.image_io import read_image
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit.requests import Animate, Bake, Screenshot
-from spectrasplat.edit.state import Display as Look
+from spectrasplat.edit.state import Display as PilotRender
 from spectrasplat.edit.state import Key, State
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.passes.display import Display
@@ -40,7 +40,7 @@ def shown(gl):
     rgb = np.linspace(0.0, 2.0, SIZE[0] * SIZE[1] * 4, dtype=np.float32).reshape(SIZE[1], SIZE[0], 4)
     radiance = gl.ctx.texture(SIZE, 4, rgb.tobytes(), dtype="f4")
     display = Display(gl)
-    yield Shown(display.run(radiance, Look(), 0.5, SIZE), radiance, 0.5)
+    yield Shown(display.run(radiance, PilotRender(), 0.5, SIZE), radiance, 0.5)
     display.release()
     radiance.release()
 
@@ -72,7 +72,7 @@ def test_a_png_is_what_is_on_the_screen_and_an_exr_what_is_behind_it(exports: Ex
 def test_a_spectral_screenshot_adds_up_to_its_colours(exports: Exports, state: State, shown: Shown, tmp_path: Path, monkeypatch) -> None:
     from spectrasplat.ui import export
 
-    monkeypatch.setattr(export, "LEAST_PHOTONS", 20_000)
+    monkeypatch.setattr(export, "MIN_PHOTONS", 20_000)
     assert exports.begin(Screenshot(tmp_path / "s.exr", spectral=True), state, shown) is None
     told, shares = finished(exports)
     assert told == "Saved s.exr." and exports.job is None
@@ -94,7 +94,7 @@ def test_an_animation_looks_as_the_window_and_can_be_cancelled(exports: Exports,
 
     from PIL import Image
 
-    false = replace(state, display=Look(false_colour=True), animation=(Key(0.0, "camera.fov_deg", 30.0), Key(1.0, "camera.fov_deg", 40.0)))
+    false = replace(state, display=PilotRender(false_colour=True), animation=(Key(0.0, "camera.fov_deg", 30.0), Key(1.0, "camera.fov_deg", 40.0)))
     request = Animate(tmp_path / "frames", "keys", 2, 2.0, SIZE, 10_000, 1)
     exports.begin(request, false, shown)
     told, _ = finished(exports)

@@ -21,7 +21,7 @@ from spectrasplat.model.features import Features, explain
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.render.light_pass import LightHalf, spectral_axis
+from spectrasplat.render.light_pass import LightPass, spectral_axis
 
 LAMP = '[[lights]]\nname = "lamp"\nkind = "point"\nposition = [0.4, 0.2, 6]\nspectrum = "D65"\nintensity_cd = 100\n'
 FLOOR = '[[objects]]\nname = "floor"\nshape = "plane"\nwidth = 20\nheight = 20\nposition = [0, 0, -2]\nmaterial = { kind = "diffuse", colour = 0.5 }\n'
@@ -48,16 +48,16 @@ def settings_of(scene: Scene) -> RenderSettings:
     return RenderSettings(width=scene.render.width, height=scene.render.height, max_depth=scene.render.max_depth)
 
 
-def begun(gl: Context, scene: Scene) -> LightHalf:
+def begun(gl: Context, scene: Scene) -> LightPass:
     settings = settings_of(scene)
     features = Features.of(scene, settings)
-    light = LightHalf(gl, scene, settings, features, SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features)))
+    light = LightPass(gl, scene, settings, features, SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features)))
     light.prepare()
     light.begin(scene.render.photons, 1)
     return light
 
 
-def released(light: LightHalf) -> None:
+def released(light: LightPass) -> None:
     light.release()
     light.buffers.release()
 
@@ -65,7 +65,7 @@ def released(light: LightHalf) -> None:
 @pytest.mark.parametrize(
     ("name", "absent"),
     [
-        ("plain ball", {"eye spectral taps", "spectral maps", "spectral columns", "weights over the band", "band cuts", "absorption", "medium stack", "spectral bins", "mirrors", "half-space solids"}),
+        ("plain ball", {"camera spectral taps", "spectral maps", "spectral columns", "weights over the band", "band cuts", "absorption", "medium stack", "spectral bins", "mirrors", "half-space solids"}),
         ("box of flint", {"interpolated normals", "normal derivatives", "triangle tree", "absorption", "medium stack", "local gain"}),
         ("nested", {"half-space solids", "mirrors", "charts"}),
     ],
@@ -88,7 +88,7 @@ QUICK = {
 }
 
 
-def compared(gl: Context, light: LightHalf, trial: Trial) -> float:
+def compared(gl: Context, light: LightPass, trial: Trial) -> float:
     """Difference of the maps of a trial's two programs."""
     assert trial.carried is not None and trial.absent is not None and trial.same_map
     work = Work.of(light, light.scene.render.photons, 4096)
@@ -140,7 +140,7 @@ def test_every_forced_feature_compiles_runs_and_keeps_the_map(gl: Context, tmp_p
 
 @pytest.mark.slow
 def test_a_scene_without_dispersion_traces_faster_than_with_columns_forced(gl: Context) -> None:
-    """The shipped twin of `ball`: columns, weights and cuts forced in make its trace dearer than any noise.
+    """The shipped CPU reference of `ball`: columns, weights and cuts forced in make its trace dearer than any noise.
 
     The smallest cost this can tell from none is the half-width of the interval of two equal programs,
     measured beside it (about 5 % on a busy machine).

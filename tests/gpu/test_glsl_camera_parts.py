@@ -1,4 +1,4 @@
-"""Parts of the eye's program that stand alone: the box that a look is averaged over, weights over a band, and when columns are dropped."""
+"""Parts of the camera's program that stand alone: the box that a look is averaged over, weights over a band, and when columns are dropped."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ PATH = {"SPECTRAL_GROUPS": 0, "NONE": "0xffffffffu"}
 STANDALONE = """
 struct RayOrigin { uint primitive; uint object; bool inside; uint inside_mask; };
 struct RayRecord { uint inside_mask; uint inside_object; };
-struct EyeParameters { uint sample_index; uint draw_index; uint dithered; uint bands; };
-EyeParameters p = EyeParameters(3u, 3u, 0u, 4u);
+struct CameraParameters { uint sample_index; uint draw_index; uint dithered; uint bands; };
+CameraParameters p = CameraParameters(3u, 3u, 0u, 4u);
 vec3 transfer_column(vec3 dp, vec3 dd, vec3 d, vec3 n, float t) { vec3 q = dp + t * dd; return q - dot(q, n) / dot(d, n) * d; }
 uint hash_combine(uint a, uint b) { return a ^ b; }
 #include "camera/path.glsl"
@@ -70,7 +70,7 @@ def test_columns_that_are_no_numbers_or_without_bound_are_dropped(gl) -> None:
     dp = dp.astype(np.float32)
     dp[:50, 1], dp[50:100, 2], dp[100:150, 0] = np.nan, np.inf, -np.inf
     body = """
-    EyePath path;
+    CameraPath path;
     for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.5);
     path.dposition[1] = column;
     held = columns_hold(path) ? 1u : 0u;

@@ -1,4 +1,4 @@
-"""Random numbers, emission, spots, spectral tables, Gaussians and media of shaders/lib against their float64 twins."""
+"""Random numbers, emission, spots, spectral tables, Gaussians and media of shaders/lib against their float64 references."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WORD = 2**32
 GOLDEN = 2654435769
 
 
-def twin_hash(value: int) -> int:
+def cpu_reference_hash(value: int) -> int:
     """PCG-RXS-M-XS 32/32 output of one step of its generator (O'Neill 2014), in Python's integers."""
     state = (value * 747796405 + 2891336453) % WORD
     word = ((state >> ((state >> 28) + 4)) ^ state) * 277803737 % WORD
@@ -27,7 +27,7 @@ def test_hashes_are_the_published_generator(gl) -> None:
     values = np.random.default_rng(1).integers(0, WORD, 1000, dtype=np.uint32)
     values[:3] = 0, 1, WORD - 1
     got = evaluate(gl.ctx, ["lib/random.glsl"], "h = hash_pcg(v); u = unit_float(h);", {"v": values}, {"h": "uint", "u": "float"})
-    want = np.array([twin_hash(int(v)) for v in values], np.uint32)
+    want = np.array([cpu_reference_hash(int(v)) for v in values], np.uint32)
     np.testing.assert_array_equal(got["h"], want)
     np.testing.assert_array_equal(got["u"], (want >> 8) / 2**24)
     assert got["u"].max() < 1
@@ -93,7 +93,7 @@ def test_concentric_disc_keeps_area_and_rings(gl) -> None:
     np.testing.assert_array_equal(centre, 0)
 
 
-def twin_falloff(angle: np.ndarray, inner: float, outer: float) -> np.ndarray:
+def cpu_reference_falloff(angle: np.ndarray, inner: float, outer: float) -> np.ndarray:
     if inner == outer:
         return (angle <= outer).astype(float)
     t = np.clip((outer - angle) / (outer - inner), 0, 1)
@@ -112,7 +112,7 @@ def test_spot_edges(gl, inner_deg: float, outer_deg: float) -> None:
     angle = np.arctan2(np.linalg.norm(np.cross(d, a), axis=-1), optics.dot(d, a))
     cone = np.tile([inner, outer], (COUNT, 1))
     got = evaluate(gl.ctx, ["lib/spot.glsl"], "f = spot_falloff(d, a, cone);", {"d": d, "a": a, "cone": cone}, {"f": "float"})["f"]
-    want = twin_falloff(angle, inner, outer)
+    want = cpu_reference_falloff(angle, inner, outer)
     clear = np.abs(angle - outer) > 1e-6
     # Unit vectors in float32 know an angle to 1e-7, a larger share of a narrow edge; llvmpipe's atan
     # errs by 2e-6 of the angle.

@@ -1,4 +1,4 @@
-"""Every function of shaders/lib/optics.glsl against its float64 twin, on ordinary and on stiff input."""
+"""Every function of shaders/lib/optics.glsl against its float64 reference, on ordinary and on stiff input."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def relative_error(got: np.ndarray, want: np.ndarray, scale: np.ndarray | float 
     return np.linalg.norm(got - want, axis=-1) / np.maximum(np.linalg.norm(want, axis=-1), scale)
 
 
-def twin_refraction(e: dict[str, np.ndarray], eta: np.ndarray, deta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def cpu_reference_refraction(e: dict[str, np.ndarray], eta: np.ndarray, deta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """What float64 makes of the same float32 numbers. The rounded d and n are not quite unit vectors,
     which every formula treats in its own way: compare with the one that states the same algebra."""
     theta = dot(e["d"], e["n"])
@@ -65,10 +65,10 @@ def test_refraction_away_from_hazards(gl, low: float, high: float) -> None:
     cosine = np.sqrt(1 - (rng.uniform(0, 0.95, COUNT) * np.minimum(1, 1 / eta)) ** 2)
     e = events(cosine=cosine)
     got = evaluate(gl.ctx, OPTICS, REFRACT, {**e, "eta": eta, "deta": deta}, {"out_d": "vec3", "out_dd": "vec3"})
-    want_d, want_dd = twin_refraction(e, eta, deta)
+    want_d, want_dd = cpu_reference_refraction(e, eta, deta)
     assert relative_error(got["out_d"], want_d).max() < 1e-6
     assert relative_error(got["out_dd"], want_dd, scale=1.0).max() < 5e-6
-    # Against the twin that knows neither theta nor mu, unit vectors made exact first.
+    # Against the CPU reference that knows neither theta nor mu, unit vectors made exact first.
     exact_d, exact_n = optics.unit(e["d"]), optics.unit(e["n"])
     assert relative_error(got["out_d"], optics.refract(exact_d, exact_n, eta)).max() < 2e-6
     textbook = optics.refract_column_textbook(exact_d, e["dd"], exact_n, e["dn"], eta, deta)
@@ -107,7 +107,7 @@ def test_nearly_equal_indices_keep_their_digits(gl, eta_minus_one: float) -> Non
     omega = np.sqrt((1 - eta) * (1 + eta) + (eta * theta) ** 2)
     assert relative_error(got["mu"], eta * theta + omega).max() < 1e-6
     full = evaluate(gl.ctx, OPTICS, REFRACT, {**e, "eta": eta, "deta": np.ones(COUNT)}, {"out_d": "vec3", "out_dd": "vec3"})
-    want_d, want_dd = twin_refraction(e, eta, np.ones(COUNT))
+    want_d, want_dd = cpu_reference_refraction(e, eta, np.ones(COUNT))
     assert relative_error(full["out_d"], want_d).max() < 3e-7
     assert relative_error(full["out_dd"], want_dd, scale=1.0).max() < 3e-6
 
@@ -140,7 +140,7 @@ def test_grazing_incidence(gl, angle_deg: float) -> None:
     deta = np.ones(COUNT)
     body = REFRACT + "reflectance = fresnel_reflectance(theta, eta, cosine2);"
     got = evaluate(gl.ctx, OPTICS, body, {**e, "eta": eta, "deta": deta}, {"out_d": "vec3", "out_dd": "vec3", "reflectance": "float"})
-    want_d, want_dd = twin_refraction(e, eta, deta)
+    want_d, want_dd = cpu_reference_refraction(e, eta, deta)
     assert relative_error(got["out_d"], want_d).max() < 1e-6
     assert relative_error(got["out_dd"], want_dd, scale=1.0).max() < 3e-6
     expected = optics.fresnel_reflectance(e["d"], e["n"], eta)

@@ -1,4 +1,4 @@
-"""Camera, lights and caustic maps as the eye reads them: shaders/lib against the twins in app/truth."""
+"""Camera, lights and caustic maps as the camera reads them: shaders/lib against the CPU references in app/reference."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from reference import camera, lights, maps
 from spectrasplat.gpu.records import NONE, PLACEMENT, RECEIVER
-from spectrasplat.passes.camera_records import EYE_LIGHT
+from spectrasplat.passes.camera_records import CAMERA_LIGHT
 from spectrasplat.reference.optics import unit
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
@@ -23,26 +23,26 @@ def test_camera_rays_go_through_their_pixels(gl) -> None:
     size = rng.integers(1, 4097, (COUNT, 2), dtype=np.uint32)
     pixel = (rng.random((COUNT, 2)) * size).astype(np.uint32)
     within = as_f32(rng.random((COUNT, 2)))
-    vectors = {name: as_f32(rng.normal(size=(COUNT, 3))) for name in ("eye", "half_right", "half_up")}
+    vectors = {name: as_f32(rng.normal(size=(COUNT, 3))) for name in ("camera", "half_right", "half_up")}
     forward = as_f32(unit(rng.normal(size=(COUNT, 3))))
     parallel = rng.integers(0, 2, COUNT, dtype=np.uint32)
     body = """
     p = picture_point(pixel, within, size);
-    CameraRay ray = camera_ray(eye, forward, half_right, half_up, parallel != 0u, p);
+    CameraRay ray = camera_ray(camera, forward, half_right, half_up, parallel != 0u, p);
     start = ray.position; d = ray.direction;
     """
     inputs = {"pixel": pixel, "within": within, "size": size, "forward": forward, "parallel": parallel, **vectors}
     got = evaluate(gl.ctx, ["lib/camera.glsl"], body, inputs, {"p": "vec2", "start": "vec3", "d": "vec3"})
     point = camera.picture_point(pixel, within, size)
     assert np.abs(got["p"] - point).max() < 3e-7
-    start, direction = camera.camera_ray(vectors["eye"], forward, vectors["half_right"], vectors["half_up"], parallel, as_f32(got["p"]))
+    start, direction = camera.camera_ray(vectors["camera"], forward, vectors["half_right"], vectors["half_up"], parallel, as_f32(got["p"]))
     assert np.abs(got["start"] - start).max() < 2e-6
     assert np.abs(got["d"] - direction).max() < 1e-6
 
 
 def random_lights(kind: int, rng: np.random.Generator) -> np.ndarray:
-    """Lights of a kind as `EyePass` packs them: the half extents lie across the axis."""
-    records = EYE_LIGHT.zeros(COUNT)
+    """Lights of a kind as `CameraPass` packs them: the half extents lie across the axis."""
+    records = CAMERA_LIGHT.zeros(COUNT)
     axis = unit(rng.normal(size=(COUNT, 3)))
     first = unit(np.cross(axis, rng.normal(size=(COUNT, 3))))
     half = rng.uniform(0.01 if kind == lights.DIRECTIONAL else 0.1, 0.05 if kind == lights.DIRECTIONAL else 1.0, (COUNT, 2))
@@ -86,7 +86,7 @@ def test_lights_as_a_point_and_as_a_ray_see_them(gl, kind: int) -> None:
     declared = "layout(std430, binding = 8) readonly buffer Lights { EyeLight lights[]; };"
     inputs = {"position": position, "unit": uniform, "direction": direction, "far": far, "width": width}
     outputs = {"toward": "vec3", "distance": "float", "gain": "float", "seen": "float"}
-    got = evaluate(gl.ctx, ["lib/lights.glsl"], body, inputs, outputs, structs=[EYE_LIGHT], buffers={8: records}, declarations=declared)
+    got = evaluate(gl.ctx, ["lib/lights.glsl"], body, inputs, outputs, structs=[CAMERA_LIGHT], buffers={8: records}, declarations=declared)
     toward, distance, gain = lights.sample_light(records, position, uniform)
     seen = lights.light_seen(records, position, direction, far, width)
     near = distance > 0.05
@@ -108,7 +108,7 @@ def soft_amounts(gl, body: str, offset: np.ndarray, blur: float) -> np.ndarray:
     """What a soft look at the offsets sees, by the shader."""
     inputs = {"offset": offset, "blur": np.full(len(offset), blur)}
     declared = "layout(std430, binding = 8) readonly buffer Lights { EyeLight lights[]; };"
-    got = evaluate(gl.ctx, ["lib/lights.glsl"], body, inputs, {"seen": "float"}, structs=[EYE_LIGHT], buffers={8: EYE_LIGHT.zeros(1)}, declarations=declared)
+    got = evaluate(gl.ctx, ["lib/lights.glsl"], body, inputs, {"seen": "float"}, structs=[CAMERA_LIGHT], buffers={8: CAMERA_LIGHT.zeros(1)}, declarations=declared)
     return got["seen"]
 
 

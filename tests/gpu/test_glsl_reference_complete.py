@@ -1,4 +1,4 @@
-"""Every function of shaders/lib has a test: each twin test declares in `COVERS` what it covers, and this reads the declarations.
+"""Every function of shaders/lib has a test: each CPU reference test declares in `COVERS` what it covers, and this reads the declarations.
 
 A declared function must be called by the module's own GLSL, or by a library function that is: a name alone does not count.
 """
@@ -69,4 +69,4 @@ def test_every_library_function_has_a_test() -> None:
             assert set(names) <= runs, f"{module} declares {sorted(set(names) - runs)} of {file} and never runs them"
             covered |= {(file, name) for name in names}
     missing = {(file, name) for file, names in library.items() for name in names} - covered
-    assert not missing, f"functions of shaders/lib without a twin test: {sorted(missing)}"
+    assert not missing, f"functions of shaders/lib without a CPU reference test: {sorted(missing)}"

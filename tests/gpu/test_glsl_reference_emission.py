@@ -1,4 +1,4 @@
-"""Random numbers, emission and the spot's edge of shaders/lib against their twins in app/truth."""
+"""Random numbers, emission and the spot's edge of shaders/lib against their CPU references in app/reference."""
 
 from __future__ import annotations
 

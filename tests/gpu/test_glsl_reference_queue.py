@@ -1,4 +1,4 @@
-"""The queue between two trace steps (lib/queue.glsl and the five kernels over it) against its twin in app/truth."""
+"""The queue between two trace steps (lib/queue.glsl and the five kernels over it) against its CPU reference in app/reference."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Media, spectral rows, scene records, Gaussians and the small tests of an intersection against their twins in app/truth."""
+"""Media, spectral rows, scene records, Gaussians and the small tests of an intersection against their CPU references in app/reference."""
 
 from __future__ import annotations
 

@@ -232,8 +232,8 @@ def test_order_of_lights_does_not_show(gl, original: np.ndarray) -> None:
 @pytest.mark.slow
 def test_two_halves_of_a_light_are_the_light(gl, original: np.ndarray) -> None:
     question = scene()
-    halves = tuple(replace(light, name=f"{light.name} {k}", spectral_power=Spectrum(0.5 * light.spectral_power.density)) for light in question.lights for k in (1, 2))
-    after = picture(gl, replace(question, lights=halves), photons=2 * SMALL.photons)
+    measured_passes = tuple(replace(light, name=f"{light.name} {k}", spectral_power=Spectrum(0.5 * light.spectral_power.density)) for light in question.lights for k in (1, 2))
+    after = picture(gl, replace(question, lights=measured_passes), photons=2 * SMALL.photons)
     assert difference(after, original) < OTHER_LATTICE
     assert after.sum() == pytest.approx(original.sum(), rel=ENERGY)
 

@@ -1,4 +1,4 @@
-"""The live eye before dispersive glass: smooth while the camera moves, whole cycles of bands once it rests, and edits that are only looked at."""
+"""The live camera before dispersive glass: smooth while the camera moves, whole cycles of bands once it rests, and edits that are only looked at."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from spectrasplat.model.scene import Camera, Dielectric, Scene
 from spectrasplat.model.texture import Environment
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.render.viewer.engine import LOOK_S, Budget, LiveEngine
-from spectrasplat.render.viewer.inputs import LiveInputs, Redo
-from spectrasplat.render.viewer.invalidation import looks_other, redo
+from spectrasplat.render.viewer.inputs import LiveInputs, DirtyLevel
+from spectrasplat.render.viewer.invalidation import looks_other, dirty_level
 from spectrasplat.render.viewer.live_camera import SCALES, _side, solo_scene
 from spectrasplat.render.viewer.spectrum_guess import guess_weights
 
@@ -112,16 +112,16 @@ def test_a_moving_camera_sees_no_colour_grain_in_glass(engine: LiveEngine, stage
     moved = replace(stage.camera, position=tuple(np.add(stage.camera.position, (0.02, 0.0, 0.0))))
     engine.set(replace(inputs(stage), camera=moved))
     engine.advance(5.0, interacting=True)
-    assert engine.stats.camera_samples == 1 and engine.stats.eye_bands == 1
+    assert engine.stats.camera_samples == 1 and engine.stats.camera_bands == 1
     first = picture(engine)
     mask = in_glass(engine, first.shape)
     assert mask.sum() > 100
     assert colour_grain(first, mask) < GREY
     # What a sample of one band of sixteen looks like: this measure sees it.
-    eye = engine._eye._pass
-    eye.spectrum = Spectrum(16)
-    eye.run(moved, first.shape[1], first.shape[0], 1, 0, engine._maps)
-    assert colour_grain(eye.read_rgb().astype(float), mask) > 5 * GREY
+    viewpoint = engine._camera_pass._pass
+    viewpoint.spectrum = Spectrum(16)
+    viewpoint.run(moved, first.shape[1], first.shape[0], 1, 0, engine._maps)
+    assert colour_grain(viewpoint.read_rgb().astype(float), mask) > 5 * GREY
 
 
 def test_only_whole_cycles_of_bands_are_shown_and_smooth_samples_before(engine: LiveEngine, stage: Scene) -> None:
@@ -130,7 +130,7 @@ def test_only_whole_cycles_of_bands_are_shown_and_smooth_samples_before(engine: 
     def look() -> None:
         stats = engine.stats
         if not shown or shown[-1][0] != engine.picture_version:
-            shown.append((engine.picture_version, int(stats.camera_samples), stats.eye_bands))
+            shown.append((engine.picture_version, int(stats.camera_samples), stats.camera_bands))
 
     engine.set(inputs(with_dispersion(edged(stage), 3.0)))
     until(lambda: engine.is_idle, engine, look)
@@ -148,7 +148,7 @@ def test_better_maps_wait_for_a_cycle_and_the_last_are_shown(engine: LiveEngine,
     engine.target_photons = 1 << 16
     wanted = inputs(with_dispersion(edged(stage), 3.0))
     engine.set(wanted)
-    until(lambda: engine._eye.is_within_cycle and engine._shown is not None and engine._shown.accumulation.number >= 1, engine)
+    until(lambda: engine._camera_pass.is_within_cycle and engine._shown is not None and engine._shown.accumulation.number >= 1, engine)
     maps = engine._maps
     engine._shown.accumulation.number += 1
     engine._publish_maps()
@@ -164,7 +164,7 @@ def test_an_edited_dispersion_changes_what_is_seen_in_glass_and_traces_nothing(e
     before = settle(engine, inputs(scene))
     rays, mask = engine.stats.rays_traced, in_glass(engine, before.shape)
     edited = with_dispersion(scene, 4.0)
-    assert looks_other(inputs(scene), inputs(edited)) and redo(inputs(scene), inputs(scene), inputs(edited)) == Redo.SPLAT
+    assert looks_other(inputs(scene), inputs(edited)) and dirty_level(inputs(scene), inputs(scene), inputs(edited)) == DirtyLevel.SPLAT
     after = settle(engine, inputs(edited))
     assert engine.stats.rays_traced == rays and engine.stats.first_order
     change = np.abs(after - before).max(axis=-1)
@@ -183,15 +183,15 @@ def test_environments_are_only_looked_at_and_a_turned_one_is_not_sent_again(engi
     turned = replace(striped, environment=replace(striped.environment, world_to_local=world_to_local((0.0, 0.0, 1.0), 4.0)))
     graded = replace(stage, environment=gradient((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
     for scene in (striped, turned, graded):
-        assert redo(engine._inputs, engine._inputs, inputs(scene)) == Redo.LOOK
+        assert dirty_level(engine._inputs, engine._inputs, inputs(scene)) == DirtyLevel.LOOK
     corner = settle(engine, inputs(striped))[:4, :, 0]
     assert np.ptp(corner) > 0.9 * WHITE
-    store = engine._eye._pictures
+    store = engine._camera_pass._pictures
     opposite = settle(engine, inputs(turned))[:4, :, 0]
-    assert engine._eye._pictures is store
+    assert engine._camera_pass._pictures is store
     assert np.corrcoef(corner.ravel(), opposite.ravel())[0, 1] < -0.8
     blue = settle(engine, inputs(graded))[:4].mean(axis=(0, 1))
-    assert blue[0] > 10 * blue[1] and engine._eye._pictures is not store
+    assert blue[0] > 10 * blue[1] and engine._camera_pass._pictures is not store
     assert np.allclose(settle(engine, inputs(stage)), plain, atol=1e-4 * WHITE)
     assert engine.stats.rays_traced == rays and engine._shown is shown
 
@@ -217,9 +217,9 @@ def test_a_picture_in_motion_is_as_small_as_its_time_asks_for(engine: LiveEngine
         pictures.append(engine.picture_version)
     # However slow the machine is, what is moved is seen to move: every few frames at least.
     assert all(later > before for before, later in zip(pictures[:-4], pictures[4:], strict=True)), pictures
-    eye = engine._eye
-    pixels = eye.picture.width * eye.picture.height
-    assert eye.shown_samples == 1 and (pixels <= 2.0 * eye._rates[True] * LOOK_S or eye.scale == SCALES[-1])
+    viewpoint = engine._camera_pass
+    pixels = viewpoint.picture.width * viewpoint.picture.height
+    assert viewpoint.shown_samples == 1 and (pixels <= 2.0 * viewpoint._rates[True] * LOOK_S or viewpoint.scale == SCALES[-1])
     # Ten times the aim leaves room for a machine that does other things besides.
     assert np.median(seconds[4:]) < 10 * 0.05
 

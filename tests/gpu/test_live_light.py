@@ -18,8 +18,8 @@ from spectrasplat.model.scene import Dab, Dielectric, Diffuse, Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.light_pass import spectral_axis
 from spectrasplat.render.light_plan import LightPlan
-from spectrasplat.render.viewer.inputs import LiveInputs, Redo
-from spectrasplat.render.viewer.invalidation import redo
+from spectrasplat.render.viewer.inputs import LiveInputs, DirtyLevel
+from spectrasplat.render.viewer.invalidation import dirty_level
 from spectrasplat.render.viewer.live_light import LiveLight
 
 SIZE = (160, 90)
@@ -104,7 +104,7 @@ def anchored_alike(fresh: LiveLight, light: LiveLight) -> list[LightPlan]:
 
 
 def into(light: LiveLight, fresh: LiveLight) -> np.ndarray:
-    """Another light half's photons in the maps of `light`; `fresh` splats them with its own tables and variables."""
+    """Another light pass's photons in the maps of `light`; `fresh` splats them with its own tables and variables."""
     assert fresh._running is not None and light.maps is not None
     light.maps.clear()
     for slab in fresh._running.store.slabs:
@@ -253,29 +253,29 @@ def test_records_beyond_the_store_leave_whole_rounds(gl: Context) -> None:
 @pytest.mark.parametrize(
     ("change", "cost"),
     [
-        (lambda s: s, Redo.NOTHING),
-        (lambda s: replace(s, name="other"), Redo.NOTHING),
-        (lambda s: replace(s, background_rgb=(0.1, 0.0, 0.0)), Redo.LOOK),
-        (lambda s: edited(s, 2.0), Redo.SPLAT),
-        (lambda s: painted(s, 1.0), Redo.SPLAT),
-        (lambda s: replace(s, lights=tuple(replace(x, spectral_power=x.spectral_power.scaled(2.0)) for x in s.lights)), Redo.SPLAT),
-        (lambda s: replace(s, objects=tuple(replace(o, object_to_world=o.object_to_world + np.eye(4)[3] * 0.0 + np.diag([0.1, 0, 0, 0])) for o in s.objects)), Redo.TRACE),
-        (lambda s: replace(s, objects=s.objects[:-1]), Redo.BUILD),
-        (lambda s: replace(s, render=replace(s.render, max_depth=3)), Redo.BUILD),
+        (lambda s: s, DirtyLevel.NOTHING),
+        (lambda s: replace(s, name="other"), DirtyLevel.NOTHING),
+        (lambda s: replace(s, background_rgb=(0.1, 0.0, 0.0)), DirtyLevel.LOOK),
+        (lambda s: edited(s, 2.0), DirtyLevel.SPLAT),
+        (lambda s: painted(s, 1.0), DirtyLevel.SPLAT),
+        (lambda s: replace(s, lights=tuple(replace(x, spectral_power=x.spectral_power.scaled(2.0)) for x in s.lights)), DirtyLevel.SPLAT),
+        (lambda s: replace(s, objects=tuple(replace(o, object_to_world=o.object_to_world + np.eye(4)[3] * 0.0 + np.diag([0.1, 0, 0, 0])) for o in s.objects)), DirtyLevel.TRACE),
+        (lambda s: replace(s, objects=s.objects[:-1]), DirtyLevel.BUILD),
+        (lambda s: replace(s, render=replace(s.render, max_depth=3)), DirtyLevel.BUILD),
     ],
 )
-def test_a_change_costs_what_it_must(change, cost: Redo) -> None:
+def test_a_change_costs_what_it_must(change, cost: DirtyLevel) -> None:
     scene = shipped("prism")
     before = inputs(scene)
-    assert redo(before, before, inputs(change(scene))) == cost
+    assert dirty_level(before, before, inputs(change(scene))) == cost
 
 
 def test_other_inputs_cost() -> None:
     before = inputs(shipped("prism"))
     moved = replace(before.camera, position=(0.0, 1.0, 2.0))
     costs = {
-        "camera": (moved, Redo.LOOK), "width": (80, Redo.LOOK), "smoothing": (0.6, Redo.SPLAT), "solo_nm": (500.0, Redo.SPLAT),
-        "local_gain": (False, Redo.SPLAT), "seed": (2, Redo.TRACE), "method": ("stochastic", Redo.BUILD),
+        "camera": (moved, DirtyLevel.LOOK), "width": (80, DirtyLevel.LOOK), "smoothing": (0.6, DirtyLevel.SPLAT), "solo_nm": (500.0, DirtyLevel.SPLAT),
+        "local_gain": (False, DirtyLevel.SPLAT), "seed": (2, DirtyLevel.TRACE), "method": ("stochastic", DirtyLevel.BUILD),
     }  # fmt: skip
     for name, (value, cost) in costs.items():
-        assert redo(before, before, replace(before, **{name: value})) == cost, name
+        assert dirty_level(before, before, replace(before, **{name: value})) == cost, name

@@ -54,7 +54,7 @@ def tracing(gl, scene: Scene) -> Iterator[RayPaths]:
         buffers.release()
 
 
-def truth_of(scene: Scene, origin: np.ndarray, direction: np.ndarray, nm: float) -> tuple[tracer.Path, TriangleList]:
+def reference_of(scene: Scene, origin: np.ndarray, direction: np.ndarray, nm: float) -> tuple[tracer.Path, TriangleList]:
     """The same ray in float64."""
     corners, material, normals, bodies = [], [], [], []
     for item in scene.objects:
@@ -82,7 +82,7 @@ def test_rays_of_a_scene_follow_the_float64_path(gl, name: str, rays: int) -> No
     assert [line.wavelength_nm for line in lines[:3]] == list(LINES_NM)
     compared = 0
     for line in lines:
-        path, _ = truth_of(scene, line.points[0], line.points[1] - line.points[0], line.wavelength_nm)
+        path, _ = reference_of(scene, line.points[0], line.points[1] - line.points[0], line.wavelength_nm)
         assert path.landed
         if path.margin < 0.02:
             continue  # so close to an edge or to total reflection float32 may choose otherwise
@@ -185,9 +185,9 @@ def test_total_reflection_and_a_start_inside_glass(gl) -> None:
     start, slanting = np.array([0.95, 0.1, 0.0]), optics.unit(np.array([0.5, 0.0, -0.87]))
     with tracing(gl, scene) as paths:
         path = paths.trace(start[None], slanting[None], np.array([550.0]), 4.0)[0]
-    truth, _ = truth_of(scene, start, slanting, 550.0)
-    assert truth.reflections == (True, False)
-    assert path.points[-1] == pytest.approx(truth.ray.position, abs=1e-4)
+    reference_image, _ = reference_of(scene, start, slanting, 550.0)
+    assert reference_image.reflections == (True, False)
+    assert path.points[-1] == pytest.approx(reference_image.ray.position, abs=1e-4)
 
 
 def _box(half: float) -> tuple[np.ndarray, np.ndarray]:

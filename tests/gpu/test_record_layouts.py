@@ -174,7 +174,7 @@ def test_uniform_blocks_read_what_numpy_wrote(gl, file: str, name: str, text: st
 def test_all_structs_are_found() -> None:
     names = {struct.name for struct in STRUCTS}
     assert {"PhotonRecord", "RayRecord", "Outcome", "ChunkCount", "QueueState", "EmitParameters", "TraceParameters", "Placement", "Receiver"} <= names
-    assert {"Triangle", "Solid", "Object", "EyeLight", "EyeParameters", "SplatRecord", "FootprintParameters", "DrawParameters"} <= names
+    assert {"Triangle", "Solid", "Object", "CameraLight", "CameraParameters", "SplatRecord", "FootprintParameters", "DrawParameters"} <= names
     declared = "".join(file.read_text() for file in (Path(spectrasplat.__path__[0])).rglob("*.py") if file.name != "schema.py")
     assert set(re.findall(r'Struct\(\s*"(\w+)"', declared)) <= names
 

@@ -212,8 +212,8 @@ def subdivided(mesh):
 def test_methods_agree_on_energy(gl, tmp_path: Path, method: str) -> None:
     scene = scene_of(tmp_path)
     settings = replace(SMALL, photons=60_000, layer="caustic")
-    truth = render(scene, settings, context=gl).rgb.sum()
-    assert render(scene, replace(settings, method=method), context=gl).rgb.sum() == pytest.approx(truth, rel=0.03)
+    reference = render(scene, settings, context=gl).rgb.sum()
+    assert render(scene, replace(settings, method=method), context=gl).rgb.sum() == pytest.approx(reference, rel=0.03)
 
 
 def test_map_layer_and_bins(gl, tmp_path: Path) -> None:

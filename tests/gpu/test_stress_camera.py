@@ -1,4 +1,4 @@
-"""The eye's stress cases keep their promises, and break them where a shader is wrong; the sums they are held against are right."""
+"""The camera's stress cases keep their promises, and break them where a shader is wrong; the sums they are held against are right."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from spectrasplat.stress.rigs.camera_probe import daylight_mean, fresnel, sky
 
 from tests.gpu.mutants import mutate
 
-CASES = {case.name: case for case in eye_cases.CASES}
+CASES = {case.name: case for case in camera_cases.CASES}
 QUICK = ("eye-tir-margin", "eye-corner", "eye-guide", "eye-room", "eye-mirrors", "eye-shells", "eye-inside", "eye-poles", "eye-slanting", "eye-absorption")
 """Those that take a second or two; of the others one severity is looked at below, and all of it in the slow run."""
 
@@ -38,24 +38,24 @@ def test_case_keeps_its_promises(gl, name: str) -> None:
 
 
 def test_one_glass_agrees_with_the_reference(gl, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(eye_glass_cases, "glasses", lambda chosen=eye_glass_cases.glasses(): chosen[:1])
-    (found,) = eye_glass_cases.measure_glasses(gl)
+    monkeypatch.setattr(camera_glass_cases, "glasses", lambda chosen=camera_glass_cases.glasses(): chosen[:1])
+    (found,) = camera_glass_cases.measure_glasses(gl)
     assert found.broken() == []
 
 
 def test_a_stone_ten_thousand_extents_off_looks_the_same(gl, monkeypatch: pytest.MonkeyPatch) -> None:
     """And where GPU space is not fitted to the glass, the case says so."""
-    monkeypatch.setattr(eye_solid_cases, "CHANGES", eye_solid_cases.CHANGES[-1:])
-    (found,) = eye_solid_cases.measure_scale(gl)
+    monkeypatch.setattr(camera_solid_cases, "CHANGES", camera_solid_cases.CHANGES[-1:])
+    (found,) = camera_solid_cases.measure_scale(gl)
     assert found.broken() == []
     monkeypatch.setattr(scene_buffers.GpuSpace, "of", staticmethod(lambda scene: scene_buffers.GpuSpace(np.zeros(3), 1.0)))
-    (found,) = eye_solid_cases.measure_scale(gl)
+    (found,) = camera_solid_cases.measure_scale(gl)
     assert "error of picture" in "; ".join(found.broken())
 
 
 def test_a_sun_in_a_panorama_is_linear(gl, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(eye_light_cases, "SUNS", (1e2, 1e8))
-    assert [m.broken() for m in eye_light_cases.measure_sun(gl)] == [[], []]
+    monkeypatch.setattr(camera_light_cases, "SUNS", (1e2, 1e8))
+    assert [m.broken() for m in camera_light_cases.measure_sun(gl)] == [[], []]
 
 
 def broken(case: Case, gl) -> str:
@@ -95,16 +95,16 @@ def test_case_notices_a_mistake_in_a_shader(gl, monkeypatch: pytest.MonkeyPatch,
 
 def test_glass_of_other_dispersion_is_noticed(gl, monkeypatch: pytest.MonkeyPatch) -> None:
     """V_d 20 seen, V_d 8 in the reference."""
-    true_reference = eye_glass_cases.render_eye_reference
+    true_reference = camera_glass_cases.render_camera_reference
     wrong = from_abbe(1.6, 8.0)
 
     def reference(scene: Scene, *arguments, **options):
         objects = tuple(replace(item, material=replace(item.material, dispersion=wrong)) for item in scene.objects)
         return true_reference(replace(scene, objects=objects), *arguments, **options)
 
-    monkeypatch.setattr(eye_glass_cases, "render_eye_reference", reference)
-    monkeypatch.setattr(eye_glass_cases, "glasses", lambda chosen=eye_glass_cases.glasses(): chosen[:1])
-    (found,) = eye_glass_cases.measure_glasses(gl)
+    monkeypatch.setattr(camera_glass_cases, "render_camera_reference", reference)
+    monkeypatch.setattr(camera_glass_cases, "glasses", lambda chosen=camera_glass_cases.glasses(): chosen[:1])
+    (found,) = camera_glass_cases.measure_glasses(gl)
     assert "error of colour" in "; ".join(found.broken())
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from reference import textures as twin
+from reference import textures as cpu_reference
 from spectrasplat.gpu import mip_chain
 from spectrasplat.model.texture import Texture
 from spectrasplat.stress.rigs.glsl_function import as_f32
@@ -42,22 +42,22 @@ def patches(ratio: float, width_texels: float, rng: np.random.Generator) -> tupl
 @pytest.mark.parametrize(("make", "limit"), [(noise, 0.42), (natural, 0.18)], ids=["noise", "natural"])
 @pytest.mark.parametrize("ratio", [1.0, 2.0, 4.0, 8.0])
 def test_a_patch_shows_its_mean(gl, make, limit: float, ratio: float) -> None:
-    """A look-up averages with a kernel about as wide as the patch but of another shape, and one that hangs on where texels lie. At white
+    """A lookup averages with a kernel about as wide as the patch but of another shape, and one that hangs on where texels lie. At white
     noise that leaves up to 0.38 standard deviations of the picture (the means themselves spread by 0.46 to 0.16), at a natural
-    picture up to 0.16 (0.87 to 0.70): as sharp as the patch, at the price of some grain, which a pixel's samples average out; `ratio` look-ups side by side err apart, so that their mean errs by 1/√ratio of it."""
+    picture up to 0.16 (0.87 to 0.70): as sharp as the patch, at the price of some grain, which a pixel's samples average out; `ratio` lookups side by side err apart, so that their mean errs by 1/√ratio of it."""
     rng = np.random.default_rng(int(ratio))
     rgb = make()
     store = store_of(gl, scene_of(Texture(rgb)))
     uv = as_f32(rng.random((COUNT, 2)))
 
     def value(at: np.ndarray) -> np.ndarray:
-        return twin.bilinear(rgb, np.column_stack([at[:, 0], 1.0 - at[:, 1]]), (True, True))
+        return cpu_reference.bilinear(rgb, np.column_stack([at[:, 0], 1.0 - at[:, 1]]), (True, True))
 
     body = "rgb = texture_filtered(pictures[0], uv, s, t); other = texture_filtered(pictures[0], uv, vec2(-s.x, s.y), vec2(-t.x, t.y));"
     for width in (1.5, 2.0, 3.0, 5.0):
         s, t = patches(ratio, width, rng)
         got = run(gl, store, body, {"uv": uv, "s": s, "t": t}, {"rgb": "vec3", "other": "vec3"})
-        want = twin.mean_by_force(value, uv, s, t, steps=24)
+        want = cpu_reference.mean_by_force(value, uv, s, t, steps=24)
         error = np.sqrt(np.mean((got["rgb"] - want) ** 2))
         assert error < limit / np.sqrt(ratio), (width, error)
         assert abs((got["rgb"] - want).mean()) < 4.0 * error / np.sqrt(COUNT) + 1e-4
@@ -67,7 +67,7 @@ def test_a_patch_shows_its_mean(gl, make, limit: float, ratio: float) -> None:
 
 
 def test_long_patches_blur_instead_of_missing_texels(gl) -> None:
-    """Past eight look-ups the level rises: a patch right across a striped picture still shows its mean."""
+    """Past eight lookups the level rises: a patch right across a striped picture still shows its mean."""
     stripes = np.zeros((64, 64, 3), np.float32)
     stripes[:, ::2] = 1.0
     store = store_of(gl, scene_of(Texture(stripes)))
@@ -136,7 +136,7 @@ def test_a_patch_of_the_sky_shows_its_mean(gl) -> None:
     store = store_of(gl, scene_of(environment=sky))
 
     def value(d: np.ndarray) -> np.ndarray:
-        return twin.bilinear(sky, twin.environment_place(d), (True, False))
+        return cpu_reference.bilinear(sky, cpu_reference.environment_place(d), (True, False))
 
     rng = np.random.default_rng(5)
     row = np.pi / SIDE
@@ -145,10 +145,10 @@ def test_a_patch_of_the_sky_shows_its_mean(gl) -> None:
         for width, ratio in ((2.5, 1.0), (4.0, 1.0), (2.5, 4.0)):
             s, t = as_f32(a * width * ratio * row), as_f32(b * width * row)
             got = run(gl, store, RADIANCE, {"d": d, "s": s, "t": t}, {"rgb": "vec3"})
-            want = twin.mean_by_force(value, d, s, t, steps=24)
+            want = cpu_reference.mean_by_force(value, d, s, t, steps=24)
             error = np.sqrt(np.mean((got["rgb"] - want) ** 2))
             if polar[0] < 0.4:  # mutant: levels whose texels are thin near the poles
-                thin = twin.environment_radiance(mip_chain.texture_levels(sky), d, s, t)
+                thin = cpu_reference.environment_radiance(mip_chain.texture_levels(sky), d, s, t)
                 assert np.sqrt(np.mean((thin - want) ** 2)) > 1.8 * error
             assert error < limit / np.sqrt(ratio), (polar, width, ratio, error)
     store.release()

@@ -1,4 +1,4 @@
-"""Pictures on surfaces and round the scene: the store, and every function of lib/textures.glsl against its twin.
+"""Pictures on surfaces and round the scene: the store, and every function of lib/textures.glsl against its CPU reference.
 
 What the filter stands for is tested apart from how it does it: `test_textures_filter.py` compares with means by brute force.
 """
@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reference import textures as twin
+from reference import textures as cpu_reference
 from spectrasplat.base.errors import UserError
 from spectrasplat.gpu import mip_chain, shader
 from spectrasplat.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
@@ -102,7 +102,7 @@ def test_a_patch_without_size_is_bilinear(gl, wrap: str) -> None:
     direct = level_bilinear(level_origin(pictures[0], 0), vec2(pictures[0].size), repeats, vec2(uv.x, 1.0 - uv.y));
     """
     got = run(gl, store, body, {"uv": uv}, {"rgb": "vec3", "direct": "vec3"})
-    want = twin.bilinear(rgb, np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]), (wrap == "repeat",) * 2)
+    want = cpu_reference.bilinear(rgb, np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]), (wrap == "repeat",) * 2)
     room = 3e-5  # a place is known to 2^-22 of the picture, 1e-5 of its 50 texels
     assert np.abs(got["rgb"] - want).max() < room and np.abs(got["direct"] - want).max() < room
     # Texel centres show their texel; row 0 is the top.
@@ -127,7 +127,7 @@ def test_repeated_pictures_go_on_and_clamped_ones_end(gl) -> None:
     got = run(gl, store, body, {"uv": uv, "side": side, "beyond": beyond, "far": far}, {"here": "vec3", "there": "vec3", "border": "vec3"})
     assert np.abs(got["here"] - got["there"]).max() < 1e-4
     edge = rgb[:, np.where(far[:, 0] < 0, 0, 39)].swapaxes(0, 1)  # (COUNT, 24, 3): the column it ends with
-    want = np.stack([twin.bilinear(e[:, None], np.array([[0.5, 1.0 - v]]), (False, False))[0] for e, v in zip(edge, far[:, 1], strict=True)])
+    want = np.stack([cpu_reference.bilinear(e[:, None], np.array([[0.5, 1.0 - v]]), (False, False))[0] for e, v in zip(edge, far[:, 1], strict=True)])
     assert np.abs(got["border"] - want).max() < 3e-5
     store.release()
 
@@ -150,7 +150,7 @@ def test_axes_and_plan_of_a_patch(gl) -> None:
     """
     store = store_of(gl, scene_of(Texture(picture(4, 4))))
     got = run(gl, store, body, {"s": side_s, "t": side_t}, {"longer": "float", "shorter": "float", "axis": "vec2", "level": "float", "taps": "float"})
-    longer, shorter, axis = twin.patch_axes(side_s, side_t)
+    longer, shorter, axis = cpu_reference.patch_axes(side_s, side_t)
     assert np.abs(got["longer"] - longer).max() < 1e-6 * longer.max() and (np.abs(got["longer"] - longer) <= 1e-6 * longer).all()
     # The shorter one is a difference of squares: what is lost is far below an eighth of the longer one.
     assert (np.abs(got["shorter"] - shorter) <= 1e-3 * longer).all()
@@ -158,7 +158,7 @@ def test_axes_and_plan_of_a_patch(gl) -> None:
     same = np.minimum(np.linalg.norm(got["axis"] - axis, axis=1), np.linalg.norm(got["axis"] + axis, axis=1))
     assert (same <= 1e-4 * longer)[clear].all() and clear.mean() > 0.9
     assert np.isfinite(got["axis"]).all() and got["taps"][0] == 1.0 and got["level"][0] == 0.0
-    level, taps = twin.filter_plan(500.0 * got["longer"], 500.0 * got["shorter"])
+    level, taps = cpu_reference.filter_plan(500.0 * got["longer"], 500.0 * got["shorter"])
     assert np.abs(got["level"] - level).max() < 1e-4 and (got["taps"] == taps).mean() > 0.998
     assert set(taps) == set(range(1, 9))
     store.release()
@@ -178,15 +178,15 @@ def test_filters_agree_with_their_twins(gl) -> None:
     body = "rgb = texture_filtered(pictures[0], uv, s, t); sky = environment_radiance(d, ds, dt); place = environment_place(3.0 * d);"
     inputs = {"uv": uv, "s": s, "t": t, "d": direction, "ds": ds, "dt": dt}
     got = run(gl, store, body, inputs, {"rgb": "vec3", "sky": "vec3", "place": "vec2"})
-    place = twin.environment_place(direction)
+    place = cpu_reference.environment_place(direction)
     off = got["place"] - place
     off[:, 0] -= np.round(off[:, 0])  # the seam
     assert np.abs(off).max() < 3e-6  # drivers' arcus tangent
     for name, want in (
-        ("rgb", twin.texture_filtered(mip_chain.texture_levels(rgb), uv, s, t, True)),
-        ("sky", twin.environment_radiance(mip_chain.environment_levels(sky), direction, ds, dt)),
+        ("rgb", cpu_reference.texture_filtered(mip_chain.texture_levels(rgb), uv, s, t, True)),
+        ("sky", cpu_reference.environment_radiance(mip_chain.environment_levels(sky), direction, ds, dt)),
     ):
-        # Where the number of look-ups falls the other way by rounding, another eighth is seen: a few rows.
+        # Where the number of lookups falls the other way by rounding, another eighth is seen: a few rows.
         wrong = np.abs(got[name] - want).max(axis=1) > 2e-4
         assert wrong.mean() < 3e-3, name
         assert want.std() > 0.05
@@ -257,12 +257,12 @@ def test_texture_coordinates_follow_turned_and_mirrored_triangles(gl) -> None:
             for edge in edges:
                 along = np.einsum("ij,ij->i", got[name][mine] * buffers.space.scale, edge)
                 assert np.abs(along - edge @ rows[:, axis]).max() < 2e-4
-        # The twins are given the corners as the GPU holds them, uv from the affine map.
+        # The CPU references are given the corners as the GPU holds them, uv from the affine map.
         corners = np.stack([np.zeros_like(edges[0]), *edges], axis=1)
-        gradient_u, gradient_v = twin.uv_gradients(corners, corners @ rows)
+        gradient_u, gradient_v = cpu_reference.uv_gradients(corners, corners @ rows)
         for name, gradient in (("gradient_u", gradient_u), ("gradient_v", gradient_v)):
             assert (np.linalg.norm(got[name][mine] * buffers.space.scale - gradient, axis=1) < 1e-3 * np.linalg.norm(gradient, axis=1)).all()
-        assert np.abs(twin.hit_uv(corners @ rows + got["first"][mine][:, None], bary[mine]) - got["uv"][mine]).max() < 3e-5
+        assert np.abs(cpu_reference.hit_uv(corners @ rows + got["first"][mine][:, None], bary[mine]) - got["uv"][mine]).max() < 3e-5
     store.release()
     buffers.release()
 

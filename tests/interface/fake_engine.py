@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 from spectrasplat.gpu.context import Context
 from spectrasplat.passes.pick import PickHit
-from spectrasplat.render.viewer.inputs import LiveInputs, Redo
+from spectrasplat.render.viewer.inputs import LiveInputs, DirtyLevel
 from spectrasplat.render.viewer.photon_queries import StoredPhotons
 from spectrasplat.render.viewer.stats import LiveStats
 
@@ -34,9 +34,9 @@ class FakeEngine:
     target_photons: int = 0
     refine_when_still: bool = True
 
-    def set(self, inputs: LiveInputs) -> Redo:
+    def set(self, inputs: LiveInputs) -> DirtyLevel:
         self.inputs = inputs
-        return Redo.LOOK
+        return DirtyLevel.LOOK
 
     def advance(self, budget_s: float, interacting: bool = False) -> None:
         assert self.inputs is not None

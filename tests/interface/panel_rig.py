@@ -12,9 +12,9 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Dielectric, Diffuse
 from spectrasplat.ui.headless import HeadlessInterface
-from spectrasplat.ui.view_model import Facts
+from spectrasplat.ui.view_model import ViewModel
 
-Draw = Callable[[State, Facts], State]
+Draw = Callable[[State, ViewModel], State]
 
 
 def scene_state(name: str = "prism", select: type | str = Dielectric) -> State:
@@ -36,7 +36,7 @@ class PanelRig(HeadlessInterface):
 
     def __init__(self, gl: Context, draw: Draw, state: State, size: tuple[int, int] = (420, 900)) -> None:
         self.state = state
-        self.facts = Facts()
+        self.view_model = ViewModel()
         self.labels: list[str] = []
         self.was_held = False
         self._panel = draw
@@ -58,7 +58,7 @@ class PanelRig(HeadlessInterface):
         imgui.set_next_window_size(self.size)
         imgui.begin("Panel")
         before = replace(self.state, interacting=False)
-        self.state = self._panel(before, self.facts)
+        self.state = self._panel(before, self.view_model)
         if self.state.scene is not before.scene and self.state.edit_label not in self.labels:
             self.labels.append(self.state.edit_label)
         self.was_held |= self.state.interacting

@@ -10,7 +10,7 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.ui.headless import HeadlessInterface
 from spectrasplat.ui.panels import dialogs
 from spectrasplat.ui.shell import draw_interface
-from spectrasplat.ui.view_model import Facts
+from spectrasplat.ui.view_model import ViewModel
 
 from tests.interface.panel_rig import scene_state
 
@@ -21,16 +21,16 @@ SETTLED = 8
 class ShellRig(HeadlessInterface):
     """Draws the interface each frame; `asked` is every request so far."""
 
-    def __init__(self, gl: Context, state: State | None = None, facts: Facts | None = None, size: tuple[int, int] = (1280, 720)) -> None:
+    def __init__(self, gl: Context, state: State | None = None, view_model: ViewModel | None = None, size: tuple[int, int] = (1280, 720)) -> None:
         self.state = state or scene_state()
-        self.facts = facts or Facts(title="prism")
+        self.view_model = view_model or ViewModel(title="prism")
         self.asked: list[Request] = []
         dialogs.reset()
         super().__init__(gl, self._draw_all, size, preferences=lambda: self.state.preferences)
         self.frame(SETTLED)
 
     def _draw_all(self) -> None:
-        self.state = draw_interface(replace(self.state, interacting=False, requests=()), self.facts)
+        self.state = draw_interface(replace(self.state, interacting=False, requests=()), self.view_model)
         self.asked += self.state.requests
 
     def open_panel(self, **panels: bool) -> None:

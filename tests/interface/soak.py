@@ -14,7 +14,7 @@ from imgui_bundle import imgui
 from spectrasplat.edit import requests
 from spectrasplat.edit.state import Panels, Selection, State
 from spectrasplat.ui.shell import draw_interface
-from spectrasplat.ui.view_model import Facts
+from spectrasplat.ui.view_model import ViewModel
 
 from tests.interface.rig import Hands
 
@@ -30,7 +30,7 @@ TEXTS = ("1.5", "0", "-3", "1e9", "nan", "589.3", "N-BK7", "λ", "", "a" * 40)
 LEAVES_THE_SCENE = (requests.NewScene, requests.Open, requests.Recover)
 """What the soak must not do: its history would begin anew."""
 TAKES_LONG = (requests.Animate, requests.Bake)
-MOST_OBJECTS = 6
+MAX_OBJECTS = 6
 TABS = ("dispersion", "dispersion", "inspector", "inspector", "view", "brush")
 EDITORS = ("Dispersion", "Inspector", "View", "Brush", "Abbe diagram")
 """Windows that edit the scene: most of what is done is done there."""
@@ -45,9 +45,9 @@ class Guard:
     labels: set[str] = field(default_factory=set)
     """Of all edits."""
 
-    def draw(self, state: State, facts: Facts) -> State:
+    def draw(self, state: State, view_model: ViewModel) -> State:
         """`draw_interface`, and what it may ask for."""
-        after = draw_interface(state, facts)
+        after = draw_interface(state, view_model)
         kept: list[requests.Request] = []
         for request in after.requests:
             if isinstance(request, LEAVES_THE_SCENE + TAKES_LONG):
@@ -56,14 +56,14 @@ class Guard:
                 request = replace(request, path=self.folder / request.path.name)
             kept.append(request)
         self.answered += len(kept)
-        if len(after.scene.objects) > MOST_OBJECTS:
+        if len(after.scene.objects) > MAX_OBJECTS:
             after = replace(after, scene=state.scene)
         elif after.scene is not state.scene:
             self.labels.add(after.edit_label)
         return replace(after, requests=tuple(kept))
 
 
-class Hand:
+class ViewportInput:
     """Random actions on `hands`; `log` tells what was done, for the report of a failure."""
 
     def __init__(self, hands: Hands, seed: int) -> None:

@@ -13,7 +13,7 @@ from spectrasplat.base import paths
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.gpu import shader_watch
 from spectrasplat.gpu.context import Context
-from spectrasplat.ui.view_model_builder import facts_of
+from spectrasplat.ui.view_model_builder import view_model_of
 
 from tests.interface.rig import Hands, viewer
 
@@ -48,7 +48,7 @@ def frames_until_error_is(hands: Hands, present: bool) -> str | None:
     """Frames until a shader error is shown, or is gone."""
     for _ in range(PATIENCE):
         hands.interface.frame()
-        told = facts_of(hands.session).shader_error
+        told = view_model_of(hands.session).shader_error
         if (told is not None) == present:
             return told
     raise AssertionError(f"shader error still {told!r}")
@@ -59,7 +59,7 @@ def test_a_mistake_is_shown_with_file_and_line_and_the_picture_stays(hands: Hand
     edit(shaders / "camera/camera.comp", "void main()\n{", "void main()\n{\n    this is no GLSL;")
     line = (shaders / "camera/camera.comp").read_text().splitlines().index("    this is no GLSL;") + 1
     told = frames_until_error_is(hands, present=True)
-    assert told is not None and f"eye.comp:{line}" in told
+    assert told is not None and f"camera.comp:{line}" in told
     hands.settle()
     assert np.array_equal(hands.picture(), before)
     edit(shaders / "camera/camera.comp", "    this is no GLSL;\n", "")
@@ -74,7 +74,7 @@ def test_a_change_on_disk_shows_in_the_picture(hands: Hands, shaders: Path) -> N
     before = hands.interface.screenshot()[row, column]
     edit(shaders / "display/display.comp", "vec4(colour, 1.0)", "vec4(1.0 - colour, 1.0)")
     hands.interface.frame(4)
-    assert facts_of(hands.session).shader_error is None
+    assert view_model_of(hands.session).shader_error is None
     assert not np.array_equal(hands.interface.screenshot()[row, column], before)
 
 
@@ -83,8 +83,8 @@ def test_f5_compiles_from_disk(hands: Hands, shaders: Path, monkeypatch: pytest.
     hands.session._watch = shader_watch.ShaderWatch()
     edit(shaders / "display/display.comp", "void main()\n{", "void main()\n{\n    this is no GLSL;")
     hands.interface.frame(5)
-    assert facts_of(hands.session).shader_error is None
+    assert view_model_of(hands.session).shader_error is None
     hands.interface.key(imgui.Key.f5)
     hands.interface.frame()
-    told = facts_of(hands.session).shader_error
+    told = view_model_of(hands.session).shader_error
     assert told is not None and "display.comp:" in told

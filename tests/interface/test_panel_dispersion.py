@@ -165,7 +165,7 @@ def _pixel(rig: PanelRig, n_d: float, v_d: float) -> tuple[float, float]:
     return x, y
 
 
-def most_isolated(maker: str) -> Dispersion:
+def max_isolated(maker: str) -> Dispersion:
     """The glass of a maker with the widest empty space about it in the diagram."""
     shown = [e.dispersion for e in catalogue.entries() if e.maker in (maker, "Materials")]
     places = np.array([(g.V_d / 85.0, g.n_d / 0.7) for g in shown if np.isfinite(g.V_d)])
@@ -183,7 +183,7 @@ def test_click_in_the_abbe_diagram_gives_that_glass(gl: Context) -> None:
     with PanelRig(gl, draw_abbe, scene_state(), (700, 600)) as rig:
         for maker in catalogue.MAKER_ORDER[2:]:
             rig.click(maker)
-        chosen = most_isolated("Schott")
+        chosen = max_isolated("Schott")
         rig.click(_pixel(rig, chosen.n_d, chosen.V_d))
         assert rig.glass == chosen
         assert rig.labels == [f"Glass of prism: {chosen.name.removeprefix('Schott ')}"]

@@ -17,14 +17,14 @@ from spectrasplat.edit.state import Selection, State
 from spectrasplat.gpu.context import Context
 from spectrasplat.ui.panels import dialogs, file_browser, picture_choice
 from spectrasplat.ui.panels.inspector import draw_inspector
-from spectrasplat.ui.view_model import Facts
+from spectrasplat.ui.view_model import ViewModel
 
 STUDIO = assets_dir() / "environments" / "studio.hdr"
 
 
-def draw(state: State, facts: Facts) -> State:
+def draw(state: State, view_model: ViewModel) -> State:
     """The panel, with the dialogues that answer it."""
-    return dialogs.draw_dialogs(draw_inspector(state, facts), facts)
+    return dialogs.draw_dialogs(draw_inspector(state, view_model), view_model)
 
 
 @pytest.fixture
@@ -82,7 +82,7 @@ def test_a_sky_has_a_type_and_a_sun_that_is_dragged(panel: PanelRig) -> None:
 
 
 def test_a_picture_all_round_asks_for_its_file(panel: PanelRig) -> None:
-    panel.facts = Facts(path=STUDIO.parent / "scene.toml")
+    panel.view_model = ViewModel(path=STUDIO.parent / "scene.toml")
     choose(panel, "Kind", "Picture all round")
     assert panel.state.scene.environment is None and file_browser.is_open("environment")
     open_file(panel, STUDIO)
@@ -109,7 +109,7 @@ def test_a_surface_wears_a_picture_and_takes_it_off(gl: Context, picture: Path) 
     state = scene_state()
     table = receiver_of(state)
     with PanelRig(gl, draw, replace(state, selection=Selection("object", table))) as rig:
-        rig.facts = Facts(path=picture.parent / "scene.toml")
+        rig.view_model = ViewModel(path=picture.parent / "scene.toml")
         rig.click("Picture")
         assert file_browser.is_open("texture")
         open_file(rig, picture)
@@ -124,20 +124,20 @@ def test_a_surface_wears_a_picture_and_takes_it_off(gl: Context, picture: Path) 
 
 
 def test_dropped_pictures(nothing_selected: State, picture: Path) -> None:
-    facts = Facts(unsaved=True)
-    round_it = dialogs.open_path(nothing_selected, facts, STUDIO)
+    view_model = ViewModel(unsaved=True)
+    round_it = dialogs.open_path(nothing_selected, view_model, STUDIO)
     assert round_it.scene.environment.kind == "map" and round_it.edit_label == "Environment studio.hdr" and not round_it.requests
-    lost = dialogs.open_path(nothing_selected, facts, picture)
+    lost = dialogs.open_path(nothing_selected, view_model, picture)
     assert lost.scene is nothing_selected.scene and "Select a diffuse object" in lost.requests[-1].text
     table = receiver_of(nothing_selected)
-    worn = dialogs.open_path(replace(nothing_selected, selection=Selection("object", table)), facts, picture)
+    worn = dialogs.open_path(replace(nothing_selected, selection=Selection("object", table)), view_model, picture)
     assert worn.scene.objects[table].material.texture is not None
-    assert dialogs.open_path(nothing_selected, Facts(), Path("other.toml")).requests == (Open(Path("other.toml")),)
+    assert dialogs.open_path(nothing_selected, ViewModel(), Path("other.toml")).requests == (Open(Path("other.toml")),)
     assert picture_choice.is_picture(Path("X.EXR")) and not picture_choice.is_picture(Path("x.glb"))
 
 
 def test_a_name_too_long_for_its_field_is_cut(gl: Context, nothing_selected: State) -> None:
-    scene = edit_surroundings.set_environment_map(nothing_selected.scene, STUDIO)
+    scene = environments.set_environment_map(nothing_selected.scene, STUDIO)
     long = replace(scene, environment=replace(scene.environment, source="/x/" + 30 * "panorama_" + ".hdr"))
     with PanelRig(gl, draw, replace(nothing_selected, scene=long), (300, 600)) as rig:
         field = rig.find("Picture")

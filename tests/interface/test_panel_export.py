@@ -14,12 +14,12 @@ from spectrasplat.edit.state import Compare, Key, State
 from spectrasplat.ui.panels import export_panel, file_browser
 from spectrasplat.ui.panels.compare_panel import draw_compare
 from spectrasplat.ui.panels.export_panel import draw_export
-from spectrasplat.ui.view_model import ErrorCurve, Facts, JobFacts
+from spectrasplat.ui.view_model import ErrorCurve, ViewModel, JobInfo
 
 
-def with_browser(state: State, facts: Facts) -> State:
+def with_browser(state: State, view_model: ViewModel) -> State:
     """The panel with the file dialogue, as the shell draws them."""
-    state = draw_export(state, facts)
+    state = draw_export(state, view_model)
     file_browser.draw()
     return state
 
@@ -29,7 +29,7 @@ def rig(gl, tmp_path: Path):
     export_panel.reset()
     file_browser.close()
     with PanelRig(gl, with_browser, scene_state(), (900, 900)) as made:
-        made.facts = Facts(path=tmp_path / "scene.toml", title="scene")
+        made.view_model = ViewModel(path=tmp_path / "scene.toml", title="scene")
         made.frame(2)
         yield made
     file_browser.close()
@@ -93,7 +93,7 @@ def test_keys_are_added_changed_and_deleted(rig: PanelRig, tmp_path: Path) -> No
 
 
 def test_while_an_export_runs_it_can_only_be_cancelled(rig: PanelRig) -> None:
-    rig.facts = replace(rig.facts, job=JobFacts("Turntable: a.mp4", 0.4, "Frame 3 of 8"))
+    rig.view_model = replace(rig.view_model, job=JobInfo("Turntable: a.mp4", 0.4, "Frame 3 of 8"))
     rig.frame(2)
     for label in ("Save screenshot…", "Bake map…"):
         rig.click(label)
@@ -122,6 +122,6 @@ def test_curves_are_drawn_even_where_an_error_is_zero(gl) -> None:
     state = replace(scene_state(), compare=Compare(plot=True))
     with PanelRig(gl, draw_compare, state, (900, 320)) as rig:
         before = rig.screenshot()
-        rig.facts = Facts(curves=curves)
+        rig.view_model = ViewModel(curves=curves)
         rig.frame(3)
         assert np.any(rig.screenshot() != before)

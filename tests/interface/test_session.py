@@ -19,7 +19,7 @@ from spectrasplat.render.viewer.photon_queries import StoredPhotons
 from spectrasplat.ui.crash_log import FILE_NAME
 from spectrasplat.ui.live_picture import LivePicture
 from spectrasplat.ui.session import LAYOUT_FRAMES, Session
-from spectrasplat.ui.view_model import Facts
+from spectrasplat.ui.view_model import ViewModel
 
 from tests.interface.fake_engine import FakeEngine
 
@@ -31,13 +31,13 @@ class Rig:
     """A session whose panels do what the test says."""
 
     session: Session
-    facts: Facts = Facts()
+    view_model: ViewModel = ViewModel()
 
     def frame(self, edit: Edit = lambda state: state) -> State:
         """One frame in which the panels return `edit(state)`; returns the state after it."""
 
-        def draw(state: State, facts: Facts) -> State:
-            self.facts = facts
+        def draw(state: State, view_model: ViewModel) -> State:
+            self.view_model = view_model
             return edit(replace(state, viewport_size=(64, 36)))
 
         self.session.prepare()
@@ -87,21 +87,21 @@ def test_the_picture_of_a_frame_answers_its_input(rig: Rig) -> None:
     assert rig.engine.inputs is not None and rig.engine.inputs.camera.position == (0, 0, 7.0)
     assert rig.session.picture.pixel((0.5, 0.5)) == pytest.approx((0.7, 0.7, 0.7))
     rig.frame()
-    assert rig.facts.picture_size == (64, 36) and rig.facts.picture is not None
-    assert set(rig.facts.pass_ms) >= {"trace", "splat", "eye", "display", "interface"}
+    assert rig.view_model.picture_size == (64, 36) and rig.view_model.picture is not None
+    assert set(rig.view_model.pass_ms) >= {"trace", "splat", "camera", "display", "interface"}
 
 
 def test_shown_texture_stays_valid_in_the_frame_in_which_the_size_changes(rig: Rig) -> None:
     rig.frame()
     before = rig.session.picture.shown
     rig.session.prepare()
-    rig.session.frame(lambda state, _facts: replace(state, viewport_size=(128, 72)))
+    rig.session.frame(lambda state, _view_model: replace(state, viewport_size=(128, 72)))
     assert rig.session.picture.shown is before  # imgui has yet to draw it
     rig.session.prepare()
     resized = rig.session.picture.shown
     assert resized is not None and resized.size == (128, 72)
     drawn: list[int | None] = []
-    rig.session.frame(lambda state, facts: drawn.append(facts.picture) or replace(state, viewport_size=(128, 72)))
+    rig.session.frame(lambda state, view_model: drawn.append(view_model.picture) or replace(state, viewport_size=(128, 72)))
     assert rig.session.picture.shown is resized and drawn == [resized.glo]
 
 
@@ -114,14 +114,14 @@ def test_edits_are_undone_one_by_one_and_a_drag_is_one_step(rig: Rig) -> None:
     rig.frame()
     rig.rename("f", "Drag")
     rig.frame()
-    assert [entry.label for entry in rig.facts.history] == ["Open", "Rename", "Drag", "Drag"]
+    assert [entry.label for entry in rig.view_model.history] == ["Open", "Rename", "Drag", "Drag"]
     names = [rig.ask(requests.Undo()).scene.name for _ in range(4)]
     assert names[:2] == ["e", "a"]
     assert rig.session.state.scene is first
-    assert rig.facts.undo is None and rig.facts.redo == "Rename" and not rig.facts.unsaved
-    assert rig.ask(requests.Redo()).scene.name == "a"
+    assert rig.view_model.undo is None and rig.view_model.dirty_level == "Rename" and not rig.view_model.unsaved
+    assert rig.ask(requests.DirtyLevel()).scene.name == "a"
     assert rig.ask(requests.GoTo(3)).scene.name == "f"
-    assert rig.facts.unsaved
+    assert rig.view_model.unsaved
 
 
 def test_undo_of_a_deletion_keeps_the_selection_in_range(rig: Rig) -> None:
@@ -137,11 +137,11 @@ def test_save_and_open_again(rig: Rig, tmp_path: Path) -> None:
     rig.rename("mine")
     target = tmp_path / "mine.toml"
     rig.ask(requests.Save(target))
-    assert not rig.facts.unsaved and rig.facts.path == target and rig.facts.recent == (target,)
+    assert not rig.view_model.unsaved and rig.view_model.path == target and rig.view_model.recent == (target,)
     rig.ask(requests.NewScene())
-    assert rig.facts.path is None
+    assert rig.view_model.path is None
     assert rig.ask(requests.Open(target)).scene.name == "mine"
-    assert rig.facts.history[0].is_present and len(rig.facts.history) == 1
+    assert rig.view_model.history[0].is_present and len(rig.view_model.history) == 1
 
 
 def test_what_cannot_be_opened_or_saved_is_told_and_changes_nothing(rig: Rig, tmp_path: Path) -> None:
@@ -149,21 +149,21 @@ def test_what_cannot_be_opened_or_saved_is_told_and_changes_nothing(rig: Rig, tm
     broken = tmp_path / "broken.toml"
     broken.write_text("name = ")
     rig.ask(requests.Open(broken), requests.Save(), requests.Save(tmp_path / "none" / "x.toml"))
-    texts = [message.text for message in rig.facts.messages if message.is_error]
+    texts = [message.text for message in rig.view_model.messages if message.is_error]
     assert len(texts) == 3
     assert "broken.toml" in texts[0] and "no file yet" in texts[1] and "none" in texts[2]
-    assert rig.session.state.scene is before and rig.facts.unsaved
+    assert rig.session.state.scene is before and rig.view_model.unsaved
     rig.ask(requests.DismissMessage(texts[0]))
-    assert texts[0] not in [message.text for message in rig.facts.messages]
+    assert texts[0] not in [message.text for message in rig.view_model.messages]
 
 
 def test_quitting_asks_only_where_work_would_be_lost(rig: Rig) -> None:
     rig.rename("unsaved")
     rig.session.ask_to_close()
     rig.frame()
-    assert rig.facts.asks_to_quit and not rig.session.wants_to_close
+    assert rig.view_model.asks_to_quit and not rig.session.wants_to_close
     rig.ask(requests.CancelQuit())
-    assert not rig.facts.asks_to_quit
+    assert not rig.view_model.asks_to_quit
     rig.ask(requests.Quit())
     rig.ask(requests.Quit(discard=True))
     assert rig.session.wants_to_close
@@ -183,7 +183,7 @@ def test_a_bug_in_a_request_is_logged_and_the_work_autosaved(rig: Rig, config: P
     monkeypatch.setattr("spectrasplat.ui.session_requests.source_at", bug)
     rig.engine.hit = _hit(rig, Diffuse)
     rig.ask(requests.SelectAt(0.5, 0.5))
-    assert any("a fault" in message.text and message.is_error for message in rig.facts.messages)
+    assert any("a fault" in message.text and message.is_error for message in rig.view_model.messages)
     log = (config / FILE_NAME).read_text()
     assert "SelectAt" in log and "ZeroDivisionError" in log
     assert "precious" in rig.session.autosave.path.read_text()
@@ -196,7 +196,7 @@ def test_a_failed_engine_is_replaced_on_demand_and_the_work_kept(rig: Rig, confi
     rig.frame()
     rig.frame()
     assert rig.session.picture.engine is None and failed.released
-    assert any("GL_CONTEXT_LOST" in message.text and "F5" in message.text for message in rig.facts.messages)
+    assert any("GL_CONTEXT_LOST" in message.text and "F5" in message.text for message in rig.view_model.messages)
     assert "GL_CONTEXT_LOST" in (config / FILE_NAME).read_text()
     assert "precious" in rig.session.autosave.path.read_text()
     rig.rename("goes on")
@@ -209,18 +209,18 @@ def test_what_the_engine_cannot_show_is_told_once(rig: Rig) -> None:
     rig.engine.problem = "the maps of this scene are too large"
     for _ in range(3):
         rig.frame()
-    assert [m.text for m in rig.facts.messages].count("The maps of this scene are too large.") == 1
+    assert [m.text for m in rig.view_model.messages].count("The maps of this scene are too large.") == 1
     rig.ask(requests.DismissMessage("The maps of this scene are too large."))
     rig.frame()
-    assert "The maps of this scene are too large." not in [m.text for m in rig.facts.messages]
+    assert "The maps of this scene are too large." not in [m.text for m in rig.view_model.messages]
 
 
 def test_a_shader_error_is_shown_as_one(rig: Rig) -> None:
     rig.engine.problem = "trace.comp does not compile:\ntrace.comp:12 : syntax error"
     rig.frame()
     rig.frame()
-    assert rig.facts.shader_error == rig.engine.problem
-    assert not any("light/trace.comp" in message.text for message in rig.facts.messages)
+    assert rig.view_model.shader_error == rig.engine.problem
+    assert not any("light/trace.comp" in message.text for message in rig.view_model.messages)
 
 
 def test_recovery_after_a_crash(gl: Context, rig: Rig, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -230,10 +230,10 @@ def test_recovery_after_a_crash(gl: Context, rig: Rig, config: Path, monkeypatch
     monkeypatch.setattr("spectrasplat.edit.autosave._is_held", lambda _path: False)  # as if that process were gone
     second = Rig(Session(gl, make_engine=FakeEngine))
     second.frame()
-    assert second.facts.recovery == session.autosave.path and second.session.state.preferences.panels.start_page
+    assert second.view_model.recovery == session.autosave.path and second.session.state.preferences.panels.start_page
     second.ask(requests.Recover())
     assert second.session.state.scene.name == "lost and found"
-    assert second.facts.unsaved and second.facts.recovery is None
+    assert second.view_model.unsaved and second.view_model.recovery is None
     second.session.autosave.close()
     second.session.release()
 
@@ -268,14 +268,14 @@ def test_facts_under_the_cursor(rig: Rig) -> None:
     hover: Edit = lambda state: replace(state, hover=(0.25, 0.75))  # noqa: E731
     rig.frame(hover)
     rig.frame(hover)
-    cursor = rig.facts.cursor
+    cursor = rig.view_model.cursor
     assert cursor is not None and cursor.pixel == (16, 27) and cursor.is_receiver
     grey = 0.1 * rig.session.state.camera.position[2]
     assert cursor.rgb == pytest.approx((grey,) * 3)
     assert cursor.spectrum is not None and cursor.spectrum_nm is not None
     rig.frame()
     rig.frame()
-    assert rig.facts.cursor is None
+    assert rig.view_model.cursor is None
 
 
 def test_copy_material_and_frame_selection(rig: Rig) -> None:
@@ -325,7 +325,7 @@ def test_exposure_is_automatic_until_it_is_set(rig: Rig) -> None:
     assert automatic != 0.0
     rig.frame(lambda s: replace(s, display=replace(s.display, auto_exposure=False, exposure_ev=-2.5)))
     rig.frame()
-    assert rig.facts.exposure_ev == -2.5
+    assert rig.view_model.exposure_ev == -2.5
 
 
 def test_the_live_picture_frees_what_it_owns(gl: Context) -> None:

@@ -13,7 +13,7 @@ from spectrasplat.edit.state import Panels, Selection, State
 from spectrasplat.gpu.context import Context
 from spectrasplat.ui.commands import COMMANDS, PANELS, VIEWS, command
 from spectrasplat.ui.shortcuts import chord, listed
-from spectrasplat.ui.view_model import Facts
+from spectrasplat.ui.view_model import ViewModel
 
 from tests.interface.panel_rig import scene_state
 from tests.interface.shell_rig import ShellRig
@@ -57,8 +57,8 @@ def test_every_panel_has_a_command() -> None:
         (imgui.Key.s, [CTRL], requests.Save()),
         (imgui.Key.q, [CTRL], requests.Quit()),
         (imgui.Key.z, [CTRL], requests.Undo()),
-        (imgui.Key.z, [CTRL, SHIFT], requests.Redo()),
-        (imgui.Key.y, [CTRL], requests.Redo()),
+        (imgui.Key.z, [CTRL, SHIFT], requests.DirtyLevel()),
+        (imgui.Key.y, [CTRL], requests.DirtyLevel()),
         (imgui.Key.f, [], requests.FrameSelection()),
         (imgui.Key.f5, [], requests.ReloadShaders()),
         (imgui.Key.r, [CTRL], requests.Retrace()),
@@ -66,7 +66,7 @@ def test_every_panel_has_a_command() -> None:
     ],
 )
 def test_shortcuts_ask_the_host_once(rig: ShellRig, key: imgui.Key, modifiers: list[imgui.Key], expected: requests.Request) -> None:
-    rig.facts = replace(rig.facts, path=Path("prism.toml"), undo="Move prism", redo="Move prism")
+    rig.view_model = replace(rig.view_model, path=Path("prism.toml"), undo="Move prism", dirty_level="Move prism")
     rig.key(key, modifiers)
     assert rig.asked == [expected]
 
@@ -121,7 +121,7 @@ def test_menu_undo_is_named_and_off_without_history(rig: ShellRig) -> None:
     rig.menu("Edit", "Undo")
     assert rig.asked == []
     rig.key(imgui.Key.escape)
-    rig.facts = replace(rig.facts, undo="Move prism")
+    rig.view_model = replace(rig.view_model, undo="Move prism")
     rig.menu("Edit", "Undo")
     assert rig.asked == [requests.Undo()]
 
@@ -150,7 +150,7 @@ def test_delete_removes_the_selection_and_refuses_the_last_receiver(gl: Context)
 
 
 def test_unsaved_work_is_asked_about_before_another_scene(rig: ShellRig) -> None:
-    rig.facts = replace(rig.facts, unsaved=True, path=Path("prism.toml"))
+    rig.view_model = replace(rig.view_model, unsaved=True, path=Path("prism.toml"))
     rig.key(imgui.Key.n, [CTRL])
     assert rig.asked == []
     rig.click("Cancel")
@@ -164,13 +164,13 @@ def test_unsaved_work_is_asked_about_before_another_scene(rig: ShellRig) -> None
     rig.press()
     rig.let_go()
     assert rig.asked == [requests.Save()]
-    rig.facts = replace(rig.facts, unsaved=False)
+    rig.view_model = replace(rig.view_model, unsaved=False)
     rig.frame(2)
     assert rig.asked == [requests.Save(), requests.NewScene()]
 
 
 def test_a_failed_save_opens_nothing(rig: ShellRig) -> None:
-    rig.facts = replace(rig.facts, unsaved=True, path=Path("prism.toml"))
+    rig.view_model = replace(rig.view_model, unsaved=True, path=Path("prism.toml"))
     rig.key(imgui.Key.n, [CTRL])
     rig.click("Save")
     rig.frame(4)
@@ -178,20 +178,20 @@ def test_a_failed_save_opens_nothing(rig: ShellRig) -> None:
 
 
 def test_quit_question_answers(rig: ShellRig) -> None:
-    rig.facts = replace(rig.facts, unsaved=True, asks_to_quit=True, path=Path("prism.toml"))
+    rig.view_model = replace(rig.view_model, unsaved=True, asks_to_quit=True, path=Path("prism.toml"))
     rig.frame(3)
     rig.click("Discard")
     assert rig.asked[0] == requests.Quit(discard=True)
     rig.asked.clear()
-    rig.facts = replace(rig.facts, asks_to_quit=False)
+    rig.view_model = replace(rig.view_model, asks_to_quit=False)
     rig.frame(3)
-    rig.facts = replace(rig.facts, asks_to_quit=True)
+    rig.view_model = replace(rig.view_model, asks_to_quit=True)
     rig.frame(3)
     rig.move("Save")
     rig.press()
     rig.let_go()
     assert rig.asked[:2] == [requests.CancelQuit(), requests.Save()]
-    rig.facts = replace(rig.facts, asks_to_quit=False, unsaved=False)
+    rig.view_model = replace(rig.view_model, asks_to_quit=False, unsaved=False)
     rig.frame(2)
     assert rig.asked[-1] == requests.Quit()
 
@@ -200,7 +200,7 @@ def test_file_browser_opens_and_saves(rig: ShellRig, tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("x")
     (tmp_path / "ignored.txt").write_text("x")
     (tmp_path / "folder").mkdir()
-    rig.facts = replace(rig.facts, recent=(tmp_path / "mine.toml",))
+    rig.view_model = replace(rig.view_model, recent=(tmp_path / "mine.toml",))
     rig.key(imgui.Key.o, [CTRL])
     rig.frame(2)
     assert "ignored.txt" not in rig.items.items and "folder" in rig.items.items
@@ -221,7 +221,7 @@ def test_file_browser_opens_and_saves(rig: ShellRig, tmp_path: Path) -> None:
 
 
 def test_a_folder_that_cannot_be_read_is_said(rig: ShellRig, tmp_path: Path) -> None:
-    rig.facts = replace(rig.facts, recent=(tmp_path / "gone" / "mine.toml",))
+    rig.view_model = replace(rig.view_model, recent=(tmp_path / "gone" / "mine.toml",))
     rig.key(imgui.Key.o, [CTRL])
     rig.frame(2)
     assert "Cancel" in rig.items.items
@@ -232,6 +232,6 @@ def test_a_folder_that_cannot_be_read_is_said(rig: ShellRig, tmp_path: Path) -> 
 
 def test_command_looks_up_by_name() -> None:
     state: State = scene_state()
-    assert command("Physical picture").act(state, Facts()).physical
+    assert command("Physical picture").act(state, ViewModel()).physical
     with pytest.raises(KeyError):
         command("Fly to the moon")

@@ -16,10 +16,10 @@ from spectrasplat.model.scene import Diffuse
 from spectrasplat.render.viewer.stats import LiveStats
 from spectrasplat.ui.panels.view_panel import SWEEP_NM_PER_S
 from spectrasplat.ui.view_model import (
-    CursorFacts,
-    Facts,
+    CursorInfo,
+    ViewModel,
     HistoryEntry,
-    JobFacts,
+    JobInfo,
     Message,
     SceneEntry,
 )
@@ -31,34 +31,34 @@ SETTLED_TABS = 4
 NM = np.arange(385.0, 780.0, 10.0)
 
 
-def full_facts() -> Facts:
+def full_view_model() -> ViewModel:
     """Something in every fact that the shell's panels show."""
     stats = LiveStats(
         renderer="llvmpipe", rays_traced=18_400_000, photons=12_345_678, photons_stored=1_000_000, photons_per_second=8e5,
         first_order=True, bytes=180 << 20, fallbacks={"no_footprint": 12}, lost={"absorbed": 0.02}, bands={"slit": 4},
     )  # fmt: skip
-    return Facts(
+    return ViewModel(
         stats=stats,
         frame_ms=tuple(float(v) for v in range(10, 30)),
         pass_ms={"trace": 8.0, "splat": 5.0, "interface": 2.0},
-        cursor=CursorFacts((10, 10), (0.8, 0.4, 0.0), 1, (0, 0, 0), (0, 0, 1), True, NM, 1e-3 * np.exp(-(((NM - 560) / 60) ** 2))),
+        cursor=CursorInfo((10, 10), (0.8, 0.4, 0.0), 1, (0, 0, 0), (0, 0, 1), True, NM, 1e-3 * np.exp(-(((NM - 560) / 60) ** 2))),
         title="prism",
         history=tuple(HistoryEntry(label, i == 1) for i, label in enumerate(("Open", "Move prism", "Brush"))),
         scenes=tuple(SceneEntry(Path(f"/scenes/{name}.toml"), name, "Words about it.", None) for name in ("prism", "lens")),
-        job=JobFacts("Turntable", 0.4, "Frame 40 of 100"),
+        job=JobInfo("Turntable", 0.4, "Frame 40 of 100"),
     )
 
 
 @pytest.fixture
 def rig(gl: Context) -> Iterator[ShellRig]:
-    with ShellRig(gl, facts=full_facts()) as made:
+    with ShellRig(gl, view_model=full_view_model()) as made:
         yield made
 
 
 @pytest.mark.parametrize(("size", "theme"), [((1280, 720), "dark"), ((1920, 1080), "light"), ((640, 400), "dark")])
 def test_every_panel_draws(gl: Context, size: tuple[int, int], theme: str) -> None:
     state = replace(scene_state(), preferences=Preferences(theme=theme))  # type: ignore[arg-type]
-    with ShellRig(gl, state, full_facts(), size) as rig:
+    with ShellRig(gl, state, full_view_model(), size) as rig:
         everything = {field.name: field.name != "start_page" for field in fields(Panels)}
         rig.open_panel(**everything)
         rig.frame(SETTLED_TABS)
@@ -132,7 +132,7 @@ def test_solo_strip_picks_and_sweep_runs_until_touched(rig: ShellRig) -> None:
     first = rig.state.solo_nm
     rig.frame(20)
     assert first is not None and rig.state.solo_nm is not None
-    assert rig.state.solo_nm - first == pytest.approx(SWEEP_NM_PER_S * 20 * rig.facts.delta_s, rel=1e-6)
+    assert rig.state.solo_nm - first == pytest.approx(SWEEP_NM_PER_S * 20 * rig.view_model.delta_s, rel=1e-6)
     assert rig.state.interacting
     rig.click(rig.find("Spectrum strip").at(0.25))
     still = rig.state.solo_nm
@@ -174,14 +174,14 @@ def test_status_bar_pauses(rig: ShellRig) -> None:
 
 
 def test_start_page_offers_the_recovery(rig: ShellRig) -> None:
-    rig.facts = replace(rig.facts, recovery=Path("autosave.toml"))
+    rig.view_model = replace(rig.view_model, recovery=Path("autosave.toml"))
     rig.open_panel(start_page=True)
     rig.click("Recover")
     assert rig.asked == [requests.Recover()]
 
 
 def test_errors_stay_until_closed_and_shader_errors_have_a_window(rig: ShellRig) -> None:
-    rig.facts = replace(rig.facts, messages=(Message("The disk is full.", True, 99.0),), shader_error="eye.comp:12: oh")
+    rig.view_model = replace(rig.view_model, messages=(Message("The disk is full.", True, 99.0),), shader_error="camera.comp:12: oh")
     rig.frame(3)
     rig.click("Close message 0")
     assert rig.asked[-1] == requests.DismissMessage("The disk is full.")

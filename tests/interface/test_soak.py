@@ -15,7 +15,7 @@ from spectrasplat.ui import layout
 from spectrasplat.ui.crash_log import FILE_NAME
 
 from tests.interface.rig import Hands, viewer
-from tests.interface.soak import DATA, Guard, Hand, device_objects, resident_bytes
+from tests.interface.soak import DATA, Guard, ViewportInput, device_objects, resident_bytes
 
 WARM = 0.4
 """Share of the actions after which every panel was open and every cache is full."""
@@ -35,7 +35,7 @@ def soak(gl: Context, folder: Path, actions: int, seed: int) -> None:
         first = hands.settle()
         start, objects = hands.session.state, device_objects(DATA)
         hands.pace.frame_s = 0.006  # the picture may lag behind; the hand does not wait for it
-        hand = Hand(hands, seed)
+        hand = ViewportInput(hands, seed)
         resident = 0
         for number in range(actions):
             hand.act()

@@ -17,7 +17,7 @@ from spectrasplat.model.scene import Diffuse
 from spectrasplat.render.viewer.stats import LiveStats
 from spectrasplat.ui import viewport, viewport_tools
 from spectrasplat.ui.headless import HeadlessInterface
-from spectrasplat.ui.view_model import CursorFacts, Facts, RayLine
+from spectrasplat.ui.view_model import CursorInfo, ViewModel, RayLine
 
 from tests.interface.panel_rig import receiver_of, scene_state
 
@@ -30,7 +30,7 @@ class ViewportRig(HeadlessInterface):
 
     def __init__(self, gl: Context, state: State | None = None) -> None:
         self.state = state or scene_state()
-        self.facts = Facts()
+        self.view_model = ViewModel()
         self.asked: list = []
         self.labels: list[str] = []
         self.held_frames = 0
@@ -51,8 +51,8 @@ class ViewportRig(HeadlessInterface):
         imgui.begin("Viewport", None, imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize)
         imgui.pop_style_var()
         before = replace(self.state, interacting=False, hover=None, requests=())
-        facts = replace(self.facts, picture=self._colour.glo, cursor=self.cursor())
-        self.state = viewport.draw_viewport(before, facts)
+        view_model = replace(self.view_model, picture=self._colour.glo, cursor=self.cursor())
+        self.state = viewport.draw_viewport(before, view_model)
         if self.state.scene is not before.scene:
             self.labels.append(self.state.edit_label)
         self.asked += self.state.requests
@@ -63,13 +63,13 @@ class ViewportRig(HeadlessInterface):
         wide, high = self.state.viewport_size
         return View.of(self.state.camera, wide / high)
 
-    def cursor(self) -> CursorFacts | None:
+    def cursor(self) -> CursorInfo | None:
         """What the host found where the cursor was in the last frame."""
         if self.state.hover is None or not self.on_floor:
             return None
         point = self.view().on_plane(*self.state.hover, np.zeros(3), np.array([0.0, 0.0, 1.0]))
         floor = receiver_of(self.state)
-        return None if point is None else CursorFacts((0, 0), (1.0, 1.0, 1.0), floor, tuple(point), (0.0, 0.0, 1.0), True)
+        return None if point is None else CursorInfo((0, 0), (1.0, 1.0, 1.0), floor, tuple(point), (0.0, 0.0, 1.0), True)
 
     def at(self, point) -> tuple[float, float]:
         """Where a world point is on the screen."""
@@ -90,7 +90,7 @@ def test_the_picture_fills_the_window_and_says_its_size(rig) -> None:
     assert rig.find("Picture").size == SIZE
     assert rig.state.viewport_size == SIZE
     assert rig.screenshot()[SIZE[1] // 2, SIZE[0] - 20].tolist() == [40, 80, 120]
-    rig.facts = replace(rig.facts, framebuffer_scale=2.0)
+    rig.view_model = replace(rig.view_model, framebuffer_scale=2.0)
     rig.frame()
     assert rig.state.viewport_size == (2 * SIZE[0], 2 * SIZE[1])
     assert viewport.picture_size(3.0, 101.3, 1.0) == (64, 102)
@@ -365,7 +365,7 @@ def test_badges_say_what_the_picture_is_not(gl) -> None:
         rig.drag(CENTRE, (CENTRE[0] + 30, CENTRE[1]))
         assert rig.find("Not physical: local gain")
         rig.state = replace(rig.state, physical=True)
-        rig.facts = replace(rig.facts, stats=LiveStats(first_order=True))
+        rig.view_model = replace(rig.view_model, stats=LiveStats(first_order=True))
         rig.frame()
         assert "Not physical: local gain" not in rig.items.items
         assert rig.find("Physical: local gain left out") and rig.find("First order")
@@ -375,19 +375,19 @@ def test_rays_are_drawn_in_their_colour_and_behind_the_camera_not_at_all(rig) ->
     a, b = (rig.view().on_plane(x, 0.85, np.zeros(3), np.array([0.0, 0.0, 1.0])) for x in (0.3, 0.7))
     behind = np.asarray(rig.state.camera.position) - 3.0 * rig.view().forward
     rig.state = replace(rig.state, display=replace(rig.state.display, ray_overlay=True))
-    rig.facts = replace(rig.facts, rays=(RayLine(650.0, np.stack([a, b])), RayLine(550.0, np.stack([behind, behind + [0.1, 0, 0]]))))
+    rig.view_model = replace(rig.view_model, rays=(RayLine(650.0, np.stack([a, b])), RayLine(550.0, np.stack([behind, behind + [0.1, 0, 0]]))))
     rig.move((5, 395))
     rig.frame()
     red, green, blue = rig.screenshot()[int(0.85 * SIZE[1]), SIZE[0] // 2].astype(int)
     assert red > 150 and green < 100 and blue < 100
-    rig.facts = replace(rig.facts, rays=(RayLine(550.0, np.stack([b, behind])),))
+    rig.view_model = replace(rig.view_model, rays=(RayLine(550.0, np.stack([b, behind])),))
     rig.frame()  # cut where it passes the camera
     assert (rig.screenshot()[..., 1].astype(int) - rig.screenshot()[..., 0] > 100).any()
 
 
 def test_a_comparison_that_is_not_there_yet_is_told() -> None:
     state = replace(scene_state(), compare=Compare(mode="wipe"))
-    told = [badge.text for badge in viewport_tools.badges(state, Facts())]
+    told = [badge.text for badge in viewport_tools.badges(state, ViewModel())]
     assert "Nothing to compare with yet" in told
-    told = [badge.text for badge in viewport_tools.badges(state, Facts(compare_ready=True))]
+    told = [badge.text for badge in viewport_tools.badges(state, ViewModel(compare_ready=True))]
     assert "Nothing to compare with yet" not in told

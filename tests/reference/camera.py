@@ -1,4 +1,4 @@
-"""Float64 twin of shaders/lib/camera.glsl: from a pixel to the ray through it."""
+"""Float64 reference of shaders/lib/camera.glsl: from a pixel to the ray through it."""
 
 from __future__ import annotations
 

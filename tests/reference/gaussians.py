@@ -1,4 +1,4 @@
-"""Float64 twin of shaders/lib/gaussian.glsl, from the error function's own definition."""
+"""Float64 reference of shaders/lib/gaussian.glsl, from the error function's own definition."""
 
 from __future__ import annotations
 

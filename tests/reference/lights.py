@@ -1,6 +1,6 @@
-"""Float64 twin of shaders/lib/lights.glsl: lights as a surface point sees them, and as a ray meets them.
+"""Float64 reference of shaders/lib/lights.glsl: lights as a surface point sees them, and as a ray meets them.
 
-`lights` are records of `spectrasplat.passes.camera.EYE_LIGHT`, one a row; points and directions are (N, 3).
+`lights` are records of `spectrasplat.passes.camera.CAMERA_LIGHT`, one a row; points and directions are (N, 3).
 """
 
 from __future__ import annotations

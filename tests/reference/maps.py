@@ -1,6 +1,6 @@
-"""Float64 twin of shaders/lib/lookup.glsl: from a place on a receiver to irradiance.
+"""Float64 reference of shaders/lib/lookup.glsl: from a place on a receiver to irradiance.
 
-Written from what the functions promise: a look-up is the exact mean of the piecewise constant map over a
+Written from what the functions promise: a lookup is the exact mean of the piecewise constant map over a
 box of texels, worked out texel by texel from overlaps. Records are of `spectrasplat.gpu.records`.
 """
 

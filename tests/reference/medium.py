@@ -1,4 +1,4 @@
-"""Twin of shaders/lib/medium.glsl: which solid a ray is in, by sets instead of bits (Schmidt and Budge 2002).
+"""CPU reference of shaders/lib/medium.glsl: which solid a ray is in, by sets instead of bits (Schmidt and Budge 2002).
 
 Solids of the stack are known by rank: `order[rank]` is the object, a higher rank wins. NONE stands for air.
 """
@@ -13,7 +13,7 @@ from spectrasplat.gpu.records import NONE
 
 
 @dataclass(frozen=True)
-class Crossing:
+class MediumInterface:
     """What a surface separates, and what a ray is inside of behind it."""
 
     before: int
@@ -29,16 +29,16 @@ def medium(inside: frozenset[int], alone: int, order: Sequence[int]) -> int:
     return order[max(inside)] if inside else alone
 
 
-def cross(inside: frozenset[int], alone: int, hit: int, entering: bool, order: Sequence[int]) -> Crossing:
+def cross(inside: frozenset[int], alone: int, hit: int, entering: bool, order: Sequence[int]) -> MediumInterface:
     """A ray inside the ranks `inside` and the lone solid `alone` (or NONE) crosses a surface of the object `hit`."""
     if hit not in order:
         before, after = (NONE, hit) if entering else (hit, NONE)
-        return Crossing(before, after, inside, after, True)
+        return MediumInterface(before, after, inside, after, True)
     rank = frozenset([order.index(hit)])
     outside, within = inside - rank, inside | rank
     near, far = (outside, within) if entering else (within, outside)
     before, after = medium(near, NONE, order), medium(far, NONE, order)
-    return Crossing(before, after, far, alone, before != after)
+    return MediumInterface(before, after, far, alone, before != after)
 
 
 def index_ratio_slope(n_i: float, n_t: float, dn_i: float, dn_t: float) -> float:

@@ -1,4 +1,4 @@
-"""Twin of the queue between two trace steps (shaders/queue_*.comp): whose children go on, and in which order.
+"""CPU reference of the queue between two trace steps (shaders/queue_*.comp): whose children go on, and in which order.
 
 In each chunk of 64 rays first the refracted children (odd slots), then the reflected ones (even slots), both in the order of
 their parents; photons in the order of their parents.

@@ -1,7 +1,7 @@
-"""Float64 twin of shaders/lib/textures.glsl and of the levels it reads, and what both stand for: means over areas.
+"""Float64 reference of shaders/lib/textures.glsl and of the levels it reads, and what both stand for: means over areas.
 
-The twin finds the axes of a patch by a singular value decomposition and levels by summing overlaps texel by texel; the
-means by brute force know nothing of levels or look-ups.
+The CPU reference finds the axes of a patch by a singular value decomposition and levels by summing overlaps texel by texel; the
+means by brute force know nothing of levels or lookups.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def patch_axes(side_s: Array, side_t: Array) -> tuple[Array, Array, Array]:
 
 
 def filter_plan(longer: Array, shorter: Array) -> tuple[Array, Array]:
-    """Level and number of look-ups for a patch with these axes in texels."""
+    """Level and number of lookups for a patch with these axes in texels."""
     width = np.maximum(np.maximum(shorter, longer / (MAX_TAPS * ROUND_RATIO)), 1.0)
     taps = np.clip(np.ceil(longer / (ROUND_RATIO * width)), 1, MAX_TAPS)
     return np.maximum(np.log2(width) + LEVEL_BIAS, 0.0), taps

@@ -1,4 +1,4 @@
-"""Float64 twin of shaders/lib/tone.glsl: from linear Rec.709 to what a display shows."""
+"""Float64 reference of shaders/lib/tone.glsl: from linear Rec.709 to what a display shows."""
 
 from __future__ import annotations
 

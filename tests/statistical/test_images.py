@@ -26,7 +26,7 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.map_layout import plane_frame
 from spectrasplat.reference import optics
 from spectrasplat.reference.glasses import index
-from spectrasplat.render.light_pass import LightHalf, spectral_axis
+from spectrasplat.render.light_pass import LightPass, spectral_axis
 from spectrasplat.stress.rigs.gpu_paths import extruded, glass, screen
 
 ALPHA = 1e-4
@@ -76,7 +76,7 @@ def rendered(gl: Context, method: str) -> tuple[np.ndarray, Window]:
     question = scene()
     features = Features.of(question, settings)
     buffers = SceneBuffers(gl.ctx, question, features, spectral_axis(question, features))
-    half = LightHalf(gl, question, settings, features, buffers)
+    half = LightPass(gl, question, settings, features, buffers)
     try:
         half.prepare()
         maps = []

@@ -1,6 +1,6 @@
 """Random numbers, lattices and roulette's draws: uniform alone, in pairs and over passes.
 
-The numpy twins stand for the shaders here; tests/gpu holds them equal bit for bit. Independent draws are judged by
+The numpy CPU references stand for the shaders here; tests/gpu holds them equal bit for bit. Independent draws are judged by
 chi² (a tilt of `tilt` is seen with probability 0.99), low-discrepancy ones by their discrepancy too, against
 bounds a few times what golden-ratio lattices reach and a tenth of what random numbers of that count have.
 """
@@ -45,7 +45,7 @@ def test_hashes_are_uniform_and_neighbours_independent() -> None:
     hashed = hash_pcg(i)
     low = (hashed & np.uint32(0xFFFF)) / 65536.0
     assert min(even(unit_float(hashed)), even(low), even(unit_float(hashed[:-1]), unit_float(hashed[1:])), even(unit_float(hashed), low)) > ALPHA
-    # As the eye uses them: keys of pixels, then of lights.
+    # As the camera uses them: keys of pixels, then of lights.
     x, y = i % 512, i // 512
     pixel = hash_combine(hash_combine(np.uint32(1), x), y)
     right = hash_combine(hash_combine(np.uint32(1), x + 1), y)
@@ -136,7 +136,7 @@ def test_places_in_a_pixel_are_even_in_one_launch_and_over_many() -> None:
 
 def test_single_wavelengths_are_even_over_the_places_in_a_pixel() -> None:
     """Of camera samples: with the places' own ratio every height in the pixel had a colour of its own, and more samples did not help."""
-    shader = (paths.shaders_dir() / "eye" / "path.glsl").read_text()
+    shader = (paths.shaders_dir() / "camera" / "path.glsl").read_text()
     (generator,) = re.findall(r"#define WAVELENGTH_GENERATOR (\d+)u", shader)
     for samples in (64, 204, 1024):
         places = _pixel_lattice(samples, 0)
@@ -169,7 +169,7 @@ TABLE = 8
 
 
 def draws(depth: int, key: np.ndarray | int, photon: np.ndarray, irrationals: list[int]) -> np.ndarray:
-    """Twin of roulette's number."""
+    """CPU reference of roulette's number."""
     shift = (np.asarray(key, np.uint64) + (photon % LATTICES).astype(np.uint64) * np.uint64(GOLDEN)) % np.uint64(WORD)
     return kronecker(photon // LATTICES, irrationals[depth], shift)
 

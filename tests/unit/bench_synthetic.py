@@ -44,7 +44,7 @@ def synthetic_curve(method: str, difficulty: float, seeds: int, longest_s: float
         for seed, error in enumerate(errors, 1):
             share = seconds - overhead_s
             samples.append(Sample(
-                photons, seed, photons, int(photons * 1.7), {"trace": 0.6 * share, "splat": 0.4 * share, "resolve": overhead_s, "eye": 0.02},
+                photons, seed, photons, int(photons * 1.7), {"trace": 0.6 * share, "splat": 0.4 * share, "resolve": overhead_s, "camera": 0.02},
                 {"relmse": float(error), "relmse_trimmed": float(error) * 0.7, "smape": 0.2, "chroma": 0.01, "nrmse": 0.1, "flip": 0.05,
                  "energy_ratio": 0.999},
             ))  # fmt: skip

@@ -1,4 +1,4 @@
-"""Scenes and shorthand that the tests of the eye's reference share."""
+"""Scenes and shorthand that the tests of the camera's reference share."""
 
 from __future__ import annotations
 
@@ -54,6 +54,6 @@ def slab_scene(glass: Dispersion) -> Scene:
     white = place(primitives.plane(4.0, 8.0), Diffuse((1.0, 1.0, 1.0)), (2.0, 0.0, 0.0))
     black = place(primitives.plane(4.0, 8.0), Black(), (-2.0, 0.0, 0.0))
     slab = place(primitives.box((9.0, 2.0, THICKNESS)), Dielectric(glass), (0.0, 0.0, 2.0))
-    edge = float(np.mean(eye_answers.slab_displacement(glass.index(VISIBLE_NM), THICKNESS, TILT)))
+    edge = float(np.mean(camera_answers.slab_displacement(glass.index(VISIBLE_NM), THICKNESS, TILT)))
     camera = Camera((-10.0 + edge, 0.0, 10.0), (edge, 0.0, 0.0), kind="orthographic", up=(1.0, 0.0, 0.0), vertical_extent=0.06)
     return scene_of(light, white, black, slab, camera=camera)

@@ -1,4 +1,4 @@
-"""The bench of the eye half without a GPU: made-up rigs and curves, budgets that keep to whole bands, a report that speaks of samples."""
+"""The bench of the camera pass without a GPU: made-up rigs and curves, budgets that keep to whole bands, a report that speaks of samples."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.bench import reference_picture, runner
-from spectrasplat.bench.camera_rendering import EyeRig
+from spectrasplat.bench.camera_rendering import CameraRig
 from spectrasplat.bench.claims import claims_of
-from spectrasplat.bench.measured_passes import EYE, HALVES
+from spectrasplat.bench.measured_passes import CAMERA, HALVES
 from spectrasplat.bench.rendering import Rendering
 from spectrasplat.bench.report import report
 from spectrasplat.bench.report.prose import PROSE
@@ -35,10 +35,10 @@ from tests.unit.test_bench_resume import (
     glass_scene,
 )
 from tests.unit.test_bench_resume import (
-    truth_picture as truth_pixels,
+    reference_picture as reference_pixels,
 )
 
-SETTINGS = BenchSettings(20.0, 2, ("stochastic", "srd"), (WIDTH, HEIGHT), half="eye")
+SETTINGS = BenchSettings(20.0, 2, ("stochastic", "srd"), (WIDTH, HEIGHT), half="camera")
 
 
 class WholeRig(Rig):
@@ -60,37 +60,37 @@ class WholeRigs(Rigs):
 
 
 def run(directory: Path, settings: BenchSettings = SETTINGS) -> SceneResult:
-    def truth(*_: object) -> tuple[object, object]:
+    def reference_image(*_: object) -> tuple[object, object]:
         from spectrasplat.bench.results import ReferenceInfo
-        from spectrasplat.reference.metrics import Truth
+        from spectrasplat.reference.metrics import ReferencePicture
 
-        return Truth(truth_pixels(), np.full((HEIGHT, WIDTH, 3), 1e-9)), ReferenceInfo("made up", 2000, 1.0, 1e-9, "key", 1 << 20, 1e-5)
+        return ReferencePicture(reference_pixels(), np.full((HEIGHT, WIDTH, 3), 1e-9)), ReferenceInfo("made up", 2000, 1.0, 1e-9, "key", 1 << 20, 1e-5)
 
     store = Store(directory, BenchResult("0", "today", "command", dict(MACHINE), [], settings))
-    runner.run_bench(None, {"one": glass_scene()}, store, lambda *_: None, None, Subject(WholeRigs().make, truth, lambda *_: "key"))  # type: ignore[arg-type]
+    runner.run_bench(None, {"one": glass_scene()}, store, lambda *_: None, None, Subject(WholeRigs().make, reference_image, lambda *_: "key"))  # type: ignore[arg-type]
     return store.result.scenes[0]
 
 
-def test_a_run_of_the_eye(tmp_path: Path) -> None:
+def test_a_run_of_the_camera(tmp_path: Path) -> None:
     done = run(tmp_path)
-    assert done.half == "eye" and done.complete and [c.budgets for c in done.curves] == [[4, 8, 16, 48, 200]] * 2
+    assert done.half == "camera" and done.complete and [c.budgets for c in done.curves] == [[4, 8, 16, 48, 200]] * 2
     assert done.curves[0].points[-1].seconds == pytest.approx(20.02)  # choosing the bands counts
     wanted = {"": 20.0, " early": 1.0, " first": 0.5}  # the talk's crops
-    assert {ending: share * 20.0 for ending, share in EYE.pictures} == pytest.approx(wanted)
+    assert {ending: share * 20.0 for ending, share in CAMERA.pictures} == pytest.approx(wanted)
     for ending, seconds in wanted.items():
         sample = done.picture_samples[f"srd{ending}"]
         assert sample.photons % 4 == 0 and sample.photons == max(int(10 * (seconds - 0.02)) // 4 * 4, 4)
     stored = msgspec.json.decode((tmp_path / "results.json").read_bytes(), type=BenchResult)
     assert stored.scenes[0].reference is not None and stored.scenes[0].reference.caustic_photons == 1 << 20
-    with pytest.raises(UserError, match="the eye half measured instead of the light half.*--fresh"):
+    with pytest.raises(UserError, match="the camera pass measured instead of the light pass.*--fresh"):
         run(tmp_path, msgspec.structs.replace(SETTINGS, half="light"))
 
 
-class CountedRig(EyeRig):
+class CountedRig(CameraRig):
     """The budgets of a real rig on a made-up device: 50 ms a sample, bands that double while there are samples for them, up to 8."""
 
-    def __init__(self, most_bands: int, a_sample_s: float = 0.05) -> None:
-        self._most, self._sample_s = most_bands, a_sample_s
+    def __init__(self, max_bands: int, a_sample_s: float = 0.05) -> None:
+        self._most, self._sample_s = max_bands, a_sample_s
 
     def _choose(self, samples: int) -> Spectrum:
         return Spectrum(min(self._most, 1 << (max(samples, 1).bit_length() - 1)))
@@ -100,9 +100,9 @@ class CountedRig(EyeRig):
         return Rendering(np.zeros((1, 1, 3)), {"bands": 0.01 * (2 * bands - 1), "looks": self._sample_s * samples}, samples, 0)
 
 
-@pytest.mark.parametrize(("most_bands", "seconds"), [(1, 20.0), (8, 20.0), (8, 2.0), (32, 1.0), (1, 0.01)])
-def test_budgets_are_whole_multiples_of_their_bands(most_bands: int, seconds: float) -> None:
-    rig = CountedRig(most_bands)
+@pytest.mark.parametrize(("max_bands", "seconds"), [(1, 20.0), (8, 20.0), (8, 2.0), (32, 1.0), (1, 0.01)])
+def test_budgets_are_whole_multiples_of_their_bands(max_bands: int, seconds: float) -> None:
+    rig = CountedRig(max_bands)
     budgets = rig.budgets(seconds, 10)
     assert budgets == sorted(set(budgets)) and budgets[0] == 1 and len(budgets) <= 10
     assert all(n % rig._choose(n).bands == 0 and rig.fitting(n) == n and rig.render(n, 1).emitted == n for n in budgets)
@@ -111,27 +111,27 @@ def test_budgets_are_whole_multiples_of_their_bands(most_bands: int, seconds: fl
         assert sum(rig.render(budgets[-1], 1).seconds.values()) == pytest.approx(seconds, rel=0.2)
 
 
-def eye_scene(*curves: Curve, seconds: float = 20.0) -> SceneResult:
+def camera_scene(*curves: Curve, seconds: float = 20.0) -> SceneResult:
     made = scene(*curves, seconds=seconds)
-    made.half = "eye"
+    made.half = "camera"
     for one in made.curves:
         one.samples = [msgspec.structs.replace(s, seconds={"bands": 0.2 * s.photon_seconds, "looks": 0.8 * s.photon_seconds}) for s in one.samples]
     return made
 
 
-def test_claims_of_the_eye_ask_for_a_twentieth() -> None:
-    """25 times sooner is enough for the eye and not for the light."""
+def test_claims_of_the_camera_ask_for_a_twentieth() -> None:
+    """25 times sooner is enough for the camera and not for the light."""
     fast, slow = law(0.04), law(1.0)
-    claims = claims_of(eye_scene(curve("stochastic", slow), curve("srd", fast)))
+    claims = claims_of(camera_scene(curve("stochastic", slow), curve("srd", fast)))
     assert [(c.name, c.holds) for c in claims] == [("time to equal error", True)] and "1/20" in claims[0].asked
     assert not claims_of(scene(curve("stochastic", slow), curve("srd", fast)))[0].holds
 
 
-def test_reasons_of_the_eye() -> None:
-    (claim,) = claims_of(eye_scene(curve("stochastic", law(0.1, floor=0.05)), curve("srd", law(1e-4, floor=0.2))))
+def test_reasons_of_the_camera() -> None:
+    (claim,) = claims_of(camera_scene(curve("stochastic", law(0.1, floor=0.05)), curve("srd", law(1e-4, floor=0.2))))
     assert not claim.holds and "straight columns" in claim.why and "25 % of that bias² is found in stochastic too" in claim.why
     assert "20 % bands, 80 % looks" in claim.why
-    (claim,) = claims_of(eye_scene(curve("stochastic", law(1.0)), curve("srd", law(0.2))))
+    (claim,) = claims_of(camera_scene(curve("stochastic", law(1.0)), curve("srd", law(0.2))))
     assert not claim.holds and "more samples reduce" in claim.why
 
 
@@ -139,22 +139,22 @@ def test_the_report_speaks_of_samples(tmp_path: Path) -> None:
     names = ("stochastic", "regular-7", "srd-lambda", "srd")
     made = [synthetic_scene(tmp_path, name, methods=names, longest_s=20.0) for name in ("edge", "text", "studio", "ball")]
     for one in made:
-        one.half, one.title = "eye", "made up"
+        one.half, one.title = "camera", "made up"
         assert one.reference is not None
         one.reference.method, one.reference.photons, one.reference.caustic_photons = "camera paths", 900, 67_000_000
         for each in one.curves:
-            each.setup_seconds = {"light half": 2.0, "buffers": 0.1, "compile": 1.0}
+            each.setup_seconds = {"light pass": 2.0, "buffers": 0.1, "compile": 1.0}
             each.samples = [msgspec.structs.replace(s, seconds={"bands": 0.1, "looks": s.photon_seconds}) for s in each.samples]
-            one.picture_samples |= {f"{each.method}{ending}": each.samples[0] for ending, _ in EYE.pictures}
+            one.picture_samples |= {f"{each.method}{ending}": each.samples[0] for ending, _ in CAMERA.pictures}
             one.pictures[f"{each.method} first"] = one.pictures[f"{each.method} early"]
         one.claims = claims_of(one)
     result = synthetic_result(made)
-    result.settings = BenchSettings(20.0, methods=names, half="eye")
+    result.settings = BenchSettings(20.0, methods=names, half="camera")
     report.write_report(result, tmp_path)
     page = assert_stands_alone((tmp_path / "report.html").read_text(encoding="utf-8"))
     text = page.text
-    for told in ("the eye half", "camera samples a pixel", "20 s of eye time", "0.5 s, part", "1 s, part", "asked of srd: at most 1/20 of the time", "its caustic: 67 M photons",
-                 "Stages of eye time", "choosing the bands", "bands s", "light half s", *(PROSE["eye"].methods[name] for name in names)):  # fmt: skip
+    for told in ("the camera pass", "camera samples a pixel", "20 s of camera time", "0.5 s, part", "1 s, part", "asked of srd: at most 1/20 of the time", "its caustic: 67 M photons",
+                 "Stages of camera time", "choosing the bands", "bands s", "light pass s", *(PROSE["camera"].methods[name] for name in names)):  # fmt: skip
         assert told in text, told
     without_caustic = text.replace("67 M photons", "")
     assert not re.search(r"photon", without_caustic, re.IGNORECASE), re.findall(r".{40}photon.{40}", without_caustic)
@@ -176,8 +176,8 @@ def test_a_caustic_is_planned_where_light_may_fall() -> None:
     from spectrasplat.model.io.scene_file import load_scene
 
     ball = load_scene(find_scene("ball_plain"))
-    plan = truth_picture.caustic_plan(ball)
+    plan = reference_picture.caustic_plan(ball)
     assert plan is not None and plan.max_depth == ball.render.max_depth and 0.0 < plan.target_relmse <= 1e-4
-    assert truth_picture.caustic_plan(replace(ball, lights=())) is None
+    assert reference_picture.caustic_plan(replace(ball, lights=())) is None
     bare = replace(ball, objects=tuple(o for o in ball.objects if not isinstance(o.material, Diffuse)))
-    assert isinstance(bare, Scene) and truth_picture.caustic_plan(bare) is None
+    assert isinstance(bare, Scene) and reference_picture.caustic_plan(bare) is None

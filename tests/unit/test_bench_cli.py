@@ -14,7 +14,7 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.bench import runner, screen
 from spectrasplat.bench.results import BenchSettings, Curve, Point, Sample, SceneResult
 from spectrasplat.commands import bench as cli_bench
-from spectrasplat.model.settings import EYE_METHODS
+from spectrasplat.model.settings import CAMERA_METHODS
 
 
 class FakeContext:
@@ -27,7 +27,7 @@ class FakeContext:
         pass
 
 
-class Seen:
+class SurfaceInteraction:
     """What the runner and the report were given."""
 
     def __init__(self) -> None:
@@ -39,9 +39,9 @@ class Seen:
 
 
 @pytest.fixture
-def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
+def seen(monkeypatch: pytest.MonkeyPatch) -> SurfaceInteraction:
     """The command without OpenGL: the runner is made up."""
-    found = Seen()
+    found = SurfaceInteraction()
 
     def run(_context: object, scenes: dict[str, Any], store: Any, _progress: object, _skipped: object) -> None:
         found.scenes, found.settings, found.command = [*scenes], store.result.settings, store.result.command
@@ -79,13 +79,13 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
         (["prism", "-o", "out", "--reference-seconds", "0"], "--reference-seconds 0 is out of range"),
         (["prism", "-o", "out", "--size", "64"], "--size '64' is not WIDTHxHEIGHT"),
         (["prism", "-o", "out", "--size", "16384x16384", "--seeds", "1"], ""),
-        (["prism", "-o", "out", "--eye", "--methods", "stochastic-point"], "--methods 'stochastic-point' is a method of the light half alone"),
+        (["prism", "-o", "out", "--eye", "--methods", "stochastic-point"], "--methods 'stochastic-point' is a method of the light pass alone"),
         (["--eye", "--features", "prism"], "--features and --eye exclude each other"),
         (["--features", "prism", "ball"], "'bench --features prism' without further scenes"),
         (["--features", "nowhere"], "neither a file nor shipped"),
     ],
 )
-def test_mistakes_are_one_sentence(arguments: list[str], told: str, seen: Seen, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_mistakes_are_one_sentence(arguments: list[str], told: str, seen: SurfaceInteraction, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
     if not told:  # depends on the machine
         monkeypatch.setattr("spectrasplat.commands.options.memory_bytes", lambda: 1 << 30)
@@ -96,7 +96,7 @@ def test_mistakes_are_one_sentence(arguments: list[str], told: str, seen: Seen, 
     assert seen.scenes == [] and list(tmp_path.iterdir()) == []
 
 
-def test_folders_that_cannot_be_used(seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_folders_that_cannot_be_used(seen: SurfaceInteraction, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "file"
     file.write_text("")
     assert main(["bench", "prism", "-o", str(file)]) == 2
@@ -110,13 +110,13 @@ def test_folders_that_cannot_be_used(seen: Seen, tmp_path: Path, capsys: pytest.
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_write_protected_folder(seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_write_protected_folder(seen: SurfaceInteraction, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     tmp_path.chmod(0o500)
     assert main(["bench", "prism", "-o", str(tmp_path / "out")]) == 2
     assert "cannot make the folder" in capsys.readouterr().err
 
 
-def test_options_reach_the_runner(seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_options_reach_the_runner(seen: SurfaceInteraction, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     options = ["--seconds", "0.5", "--seeds", "2", "--methods", "srd, regular", "--size", "64x36", "--reference-seconds", "4"]
     assert main(["bench", "prism", "ball", "-o", str(out), *options]) == 0
@@ -128,24 +128,24 @@ def test_options_reach_the_runner(seen: Seen, tmp_path: Path, capsys: pytest.Cap
     assert "prism, 64" not in shown and "1/40" in shown and "-1.00 ± 0.10" in shown and "20 %" in shown and "report.html" in shown
 
 
-def test_defaults_are_all_scenes_with_glass_and_all_methods(seen: Seen, tmp_path: Path) -> None:
+def test_defaults_are_all_scenes_with_glass_and_all_methods(seen: SurfaceInteraction, tmp_path: Path) -> None:
     assert main(["bench", "-o", str(tmp_path)]) == 0
     assert seen.settings == BenchSettings() and len(BenchSettings().methods) == 7
     assert {"prism", "brilliant", "ball_plain", "wine_glass"} <= set(seen.scenes) and len(seen.scenes) >= 6
     assert shlex.split(seen.command)[2 : 2 + len(seen.scenes)] == seen.scenes
 
 
-def test_the_eye_has_its_own_defaults(seen: Seen, tmp_path: Path) -> None:
+def test_the_camera_has_its_own_defaults(seen: SurfaceInteraction, tmp_path: Path) -> None:
     assert main(["bench", "--eye", "-o", str(tmp_path)]) == 0
     methods = ("stochastic", "stochastic-even", "regular-7", "regular-16", "srd-lambda", "srd")
-    assert seen.settings == BenchSettings(20.0, methods=methods, half="eye") and set(methods) == set(EYE_METHODS)
+    assert seen.settings == BenchSettings(20.0, methods=methods, half="camera") and set(methods) == set(CAMERA_METHODS)
     assert seen.scenes == ["prism_edge", "lens_text", "brilliant_studio", "ball_caustic"]
     assert shlex.split(seen.command)[:4] == ["spectrasplat", "bench", "--eye", "prism_edge"]
     assert main(["bench", "--eye", "prism", "-o", str(tmp_path / "other"), "--seconds", "2", "--methods", "srd"]) == 0
-    assert seen.settings == BenchSettings(2.0, methods=("srd",), half="eye") and seen.scenes == ["prism"]
+    assert seen.settings == BenchSettings(2.0, methods=("srd",), half="camera") and seen.scenes == ["prism"]
 
 
-def test_ctrl_c_says_what_is_kept_and_reports_it(seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ctrl_c_says_what_is_kept_and_reports_it(seen: SurfaceInteraction, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     seen.interrupt = True
     assert main(["bench", "prism", "-o", str(tmp_path)]) == 130
     told = capsys.readouterr()

@@ -22,7 +22,7 @@ from spectrasplat.bench.results import (
     Sample,
     SceneResult,
 )
-from spectrasplat.reference.metrics import Truth
+from spectrasplat.reference.metrics import ReferencePicture
 
 BUDGETS = [int(n) for n in np.geomspace(1000, 200_000, 10)]
 RATE = 60_000.0
@@ -119,7 +119,7 @@ def noisy_samples(rng: np.random.Generator, exponent: float) -> list[Sample]:
 
 
 def test_slope_and_its_interval() -> None:
-    """Of 1000 intervals 95 % must hold the truth; fewer than 93 % or more than 97 % is 3 standard errors off. Half as wide ones,
+    """Of 1000 intervals 95 % must hold the reference; fewer than 93 % or more than 97 % is 3 standard errors off. Half as wide ones,
     the mutant, hold it 68 times in 100."""
     rng = np.random.default_rng(5)
     slopes = np.array([tail_slope(noisy_samples(rng, -0.8), BUDGETS) for _ in range(1000)])
@@ -130,11 +130,11 @@ def test_slope_and_its_interval() -> None:
 
 
 def test_points_hold_all_seeds() -> None:
-    truth = Truth(np.ones((2, 2, 3)), np.full((2, 2, 3), 0.0101))
+    reference_image = ReferencePicture(np.ones((2, 2, 3)), np.full((2, 2, 3), 0.0101))
     errors = (0.04, 0.02, 0.03)
-    samples = [Sample(100, s + 1, 100, 90, {"trace": t, "eye": 5.0}, {"relmse": e - 0.01, "relmse_raw": e}) for s, (e, t) in enumerate(zip(errors, (1.0, 9.0, 2.0), strict=True))]
+    samples = [Sample(100, s + 1, 100, 90, {"trace": t, "camera": 5.0}, {"relmse": e - 0.01, "relmse_raw": e}) for s, (e, t) in enumerate(zip(errors, (1.0, 9.0, 2.0), strict=True))]
     made = Curve("srd", {}, samples, [100, 200])
-    complete_curve(made, {100: np.full((2, 2, 3), 0.15)}, truth)
+    complete_curve(made, {100: np.full((2, 2, 3), 0.15)}, reference_image)
     (point,) = made.points
     assert (point.photons, point.seconds, point.relmse_low, point.relmse_high) == (100, 2.0, pytest.approx(0.01), pytest.approx(0.03))
     of_mean = 0.15**2 / 1.01

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from spectrasplat.reference.metrics import (
-    Truth,
+    ReferencePicture,
     bias_variance,
     flip,
     measure,
@@ -16,8 +16,8 @@ from spectrasplat.reference.metrics import (
 SHAPE = (12, 20, 3)
 
 
-def exact(xyz: np.ndarray) -> Truth:
-    return Truth(xyz, np.zeros_like(xyz))
+def exact(xyz: np.ndarray) -> ReferencePicture:
+    return ReferencePicture(xyz, np.zeros_like(xyz))
 
 
 def test_values_by_hand() -> None:
@@ -53,8 +53,8 @@ def test_black_pictures_and_black_references_give_numbers() -> None:
     assert flip(lit, exact(black)) is None
 
 
-def noisy_truth(rng: np.random.Generator, xyz: np.ndarray, sigma: float) -> Truth:
-    return Truth(xyz + rng.normal(0.0, sigma, xyz.shape), np.full(xyz.shape, sigma**2))
+def noisy_reference(rng: np.random.Generator, xyz: np.ndarray, sigma: float) -> ReferencePicture:
+    return ReferencePicture(xyz + rng.normal(0.0, sigma, xyz.shape), np.full(xyz.shape, sigma**2))
 
 
 def test_the_references_variance_is_taken_out() -> None:
@@ -67,9 +67,9 @@ def test_the_references_variance_is_taken_out() -> None:
     # Errors of both signs: the weight's own noise is correlated with the error, a second-order effect that one sign would show.
     picture = xyz * (1.0 + 0.02 * rng.choice((-1.0, 1.0), xyz.shape))
     true = measure(picture, exact(xyz))["relmse"]
-    truths = [noisy_truth(rng, xyz, 0.1) for _ in range(400)]
-    raw = np.mean([relmse_raw(picture, truth) for truth in truths])
-    freed = np.mean([measure(picture, truth)["relmse"] for truth in truths])
+    references = [noisy_reference(rng, xyz, 0.1) for _ in range(400)]
+    raw = np.mean([relmse_raw(picture, reference_image) for reference_image in references])
+    freed = np.mean([measure(picture, reference_image)["relmse"] for reference_image in references])
     assert freed == pytest.approx(true, rel=0.015)
     assert not raw == pytest.approx(true, rel=0.2)
 
@@ -86,13 +86,13 @@ def test_bias_and_variance_are_told_apart_without_bias(bias: float) -> None:
     weight = 1.0 / (100.0 + 1.0)
     found, naive = [], []
     for _ in range(300):
-        truth = noisy_truth(rng, xyz, 0.1)
+        reference_image = noisy_reference(rng, xyz, 0.1)
         pictures = [xyz + bias + rng.normal(0.0, 0.5, SHAPE) for _ in range(4)]
-        difference = np.mean(pictures, axis=0) - truth.xyz
-        parts = bias_variance(difference, [relmse_raw(p, truth) for p in pictures], truth)
-        found.append((relmse_of_difference(difference, truth) - parts.variance / 4 - truth.own_relmse, parts.variance, parts.relmse))
+        difference = np.mean(pictures, axis=0) - reference_image.xyz
+        parts = bias_variance(difference, [relmse_raw(p, reference_image) for p in pictures], reference_image)
+        found.append((relmse_of_difference(difference, reference_image) - parts.variance / 4 - reference_image.own_relmse, parts.variance, parts.relmse))
         assert parts.bias2 == max(found[-1][0], 0.0)
-        naive.append(relmse_of_difference(difference, truth) - truth.own_relmse)
+        naive.append(relmse_of_difference(difference, reference_image) - reference_image.own_relmse)
     bias2, variance, relmse = np.mean(found, axis=0)
     assert bias2 == pytest.approx(bias**2 * weight, abs=3e-5)
     assert variance == pytest.approx(0.25 * weight, abs=3e-5)

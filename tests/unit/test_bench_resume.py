@@ -1,6 +1,6 @@
 """A bench run that is stopped anywhere goes on without doing anything twice, to the same result; folders that do not fit are refused.
 
-The rigs are made up: pictures are the truth with a bias and noise that depend on method, photons and seed alone.
+The rigs are made up: pictures are the reference with a bias and noise that depend on method, photons and seed alone.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from spectrasplat.model.scene import (
     SceneObject,
 )
 from spectrasplat.reference import metrics
-from spectrasplat.reference.metrics import Truth
+from spectrasplat.reference.metrics import ReferencePicture
 
 WIDTH, HEIGHT = 8, 6
 SETTINGS = BenchSettings(3.0, 3, ("stochastic", "srd"), (WIDTH, HEIGHT))
@@ -38,7 +38,7 @@ MACHINE = {"processor": "p", "renderer": "r", "program": "hash"}
 
 
 class Rig:
-    """Stands where `MethodRig` and `EyeRig` stand."""
+    """Stands where `MethodRig` and `CameraRig` stand."""
 
     setup_seconds = {"buffers": 0.1}
     buffers_mib = 1.0
@@ -56,8 +56,8 @@ class Rig:
         self._rigs.rendered.append((self._method, photons, seed))
         rng = np.random.default_rng(zlib.crc32(f"{self._method} {photons} {seed}".encode()))
         size = 0.02 if self._method == "srd" else 0.3
-        xyz = truth_picture() * (1.01 + size * np.sqrt(1000 / photons) * rng.normal(size=(HEIGHT, WIDTH, 3)))
-        seconds = {"plan": 0.01, "trace": photons / 2e5, "splat": photons / 4e5, "resolve": 0.01, "eye": 0.2}
+        xyz = reference_picture() * (1.01 + size * np.sqrt(1000 / photons) * rng.normal(size=(HEIGHT, WIDTH, 3)))
+        seconds = {"plan": 0.01, "trace": photons / 2e5, "splat": photons / 4e5, "resolve": 0.01, "camera": 0.2}
         return Rendering(xyz, seconds, photons, photons // 2)
 
     def fitting(self, budget: int) -> int:
@@ -89,13 +89,13 @@ class Rigs:
         self.released += len(rigs)
 
 
-def truth_picture() -> np.ndarray:
+def reference_picture() -> np.ndarray:
     return np.linspace(1.0, 2.0, HEIGHT * WIDTH * 3).reshape(HEIGHT, WIDTH, 3)
 
 
-def relative_error(xyz: np.ndarray, truth: Truth) -> float:
+def relative_error(xyz: np.ndarray, reference_image: ReferencePicture) -> float:
     """Stands for FLIP."""
-    return float(np.abs(xyz / truth.xyz - 1.0).mean())
+    return float(np.abs(xyz / reference_image.xyz - 1.0).mean())
 
 
 def glass_scene() -> Scene:
@@ -108,18 +108,18 @@ class Bench:
     """Opens the folder and runs, as the command does."""
 
     def __init__(self, directory: Path, rigs: Rigs) -> None:
-        self.directory, self.rigs, self.truths, self.told, self.skipped = directory, rigs, 0, [], None
+        self.directory, self.rigs, self.references, self.told, self.skipped = directory, rigs, 0, [], None
 
     def run(self, settings: BenchSettings = SETTINGS, key: str = "key", fresh: bool = False, names: tuple[str, ...] = ("one", "two")) -> BenchResult:
         store = Store(self.directory, BenchResult("0", "today", "command", dict(MACHINE), [], settings), fresh)
-        runner.run_bench(None, dict.fromkeys(names, glass_scene()), store, lambda f, t: self.told.append((f, t)), self.skipped, Subject(self.rigs.make, self._truth, lambda *_: key))  # type: ignore[arg-type]
+        runner.run_bench(None, dict.fromkeys(names, glass_scene()), store, lambda f, t: self.told.append((f, t)), self.skipped, Subject(self.rigs.make, self._reference_image, lambda *_: key))  # type: ignore[arg-type]
         return store.result
 
-    def _truth(self, _scene: Scene, width: int, height: int, seconds: float, progress: Callable[[float, str], None]) -> tuple[Truth, ReferenceInfo]:
-        self.truths += 1
+    def _reference_image(self, _scene: Scene, width: int, height: int, seconds: float, progress: Callable[[float, str], None]) -> tuple[ReferencePicture, ReferenceInfo]:
+        self.references += 1
         progress(0.5, "half")
         assert seconds == SETTINGS.reference_seconds
-        return Truth(truth_picture(), np.full((height, width, 3), 1e-9)), ReferenceInfo("made up", 1, 1.0, 1e-9, "key")
+        return ReferencePicture(reference_picture(), np.full((height, width, 3), 1e-9)), ReferenceInfo("made up", 1, 1.0, 1e-9, "key")
 
     def stored(self) -> BenchResult:
         return msgspec.json.decode((self.directory / "results.json").read_bytes(), type=BenchResult)
@@ -144,7 +144,7 @@ def comparable(scene: SceneResult) -> dict[str, object]:
 def test_one_whole_run(tmp_path: Path, rigs: Rigs) -> None:
     bench = Bench(tmp_path / "new" / "out", rigs)
     result = bench.run()
-    assert bench.stored() == result and [s.scene for s in result.scenes] == ["one", "two"] and bench.truths == 2
+    assert bench.stored() == result and [s.scene for s in result.scenes] == ["one", "two"] and bench.references == 2
     scene = result.scenes[0]
     assert scene.complete and scene.strongest_glass == "Schott N-SF11" and scene.strongest_abbe == pytest.approx(25.68, abs=0.01)
     assert {len(curve.samples) for curve in scene.curves} == {12} and {len(curve.points) for curve in scene.curves} == {4}
@@ -178,7 +178,7 @@ def test_stopped_anywhere_it_goes_on(tmp_path: Path, rigs: Rigs, stop_at: int) -
     resumed = bench.run()
     measured = [] if stop_at > 24 else kept
     again = [r for r in rigs.rendered[: 24 - len(measured)] if r in measured]
-    assert again == [] and bench.truths == 2  # neither a sample nor the reference is made twice
+    assert again == [] and bench.references == 2  # neither a sample nor the reference is made twice
     assert [comparable(s) for s in resumed.scenes] == [comparable(s) for s in whole.scenes]
     assert len({(c.method, s.photons, s.seed) for c in resumed.scenes[0].curves for s in c.samples}) == 24
     assert not (bench.directory / "partial").exists()
@@ -268,7 +268,7 @@ def test_a_black_scene_is_an_error_by_name_and_skipped_among_all(tmp_path: Path,
         bench.run()
     reasons: list[str] = []
     bench.skipped = reasons.append
-    assert bench.run().scenes == [] and reasons == ["nothing", "nothing"] and bench.truths == 0
+    assert bench.run().scenes == [] and reasons == ["nothing", "nothing"] and bench.references == 0
 
 
 def test_default_size_follows_the_scene() -> None:

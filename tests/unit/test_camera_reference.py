@@ -1,4 +1,4 @@
-"""The eye's reference renderer against closed forms: lights, textures, what lies beyond, furnaces, its own error, the cache.
+"""The camera's reference renderer against closed forms: lights, textures, what lies beyond, furnaces, its own error, the cache.
 
 What is seen without glass is exact but for the pixel's area. Behind glass pictures are estimates: z is the distance
 from the closed form in the picture's own standard deviations (8 parts, so Student's t with 7 degrees of freedom: the mean of
@@ -39,10 +39,10 @@ from spectrasplat.model.scene import (
     SceneObject,
 )
 from spectrasplat.model.texture import Environment, Texture
-from spectrasplat.reference.camera_reference import cached_eye_reference, eye_scene_key, render_eye_reference
-from spectrasplat.reference.camera_run import EyePicture, EyeRun
+from spectrasplat.reference.camera_reference import cached_camera_reference, camera_scene_key, render_camera_reference
+from spectrasplat.reference.camera_run import CameraPicture, CameraRun
 from spectrasplat.reference.spectral_caustic import CausticPlan
-from tests.unit.eye_scenes import (
+from tests.unit.camera_scenes import (
     ABOVE,
     D65,
     FLINT,
@@ -54,7 +54,7 @@ from tests.unit.eye_scenes import (
 )
 
 
-def z_squared(picture: EyePicture, expected: np.ndarray) -> float:
+def z_squared(picture: CameraPicture, expected: np.ndarray) -> float:
     """Mean of z² on Y where the picture has noise."""
     noisy = picture.variance[..., 1] > 0.0
     return float(np.mean((picture.xyz[..., 1] - expected[..., 1])[noisy] ** 2 / picture.variance[..., 1][noisy]))
@@ -65,7 +65,7 @@ def z_squared(picture: EyePicture, expected: np.ndarray) -> float:
 
 def test_a_plate_under_a_point_light_is_lamberts_law() -> None:
     light = Light("l", "point", D65.scaled(5.0), (0.3, -0.2, 1.5))
-    picture = render_eye_reference(scene_of(light, plate(Diffuse((0.8, 0.4, 0.1)))), 33, 33, samples=256)
+    picture = render_camera_reference(scene_of(light, plate(Diffuse((0.8, 0.4, 0.1)))), 33, 33, samples=256)
     middle = (np.arange(33) + 0.5) / 33 - 0.5
     x, y = np.meshgrid(middle, -middle)
     lux = 5.0 * 1.5 / ((x - 0.3) ** 2 + (y + 0.2) ** 2 + 1.5**2) ** 1.5
@@ -76,7 +76,7 @@ def test_a_plate_under_a_point_light_is_lamberts_law() -> None:
 def test_a_spectral_reflectance_meets_the_lights_spectrum() -> None:
     curve = np.where(np.abs(VISIBLE_NM - 600.0) < 30.0, 0.9, 0.1)
     light = Light("l", "directional", D65 + laser(532.0, 0.01), direction=(0.0, 0.0, -1.0))
-    picture = render_eye_reference(scene_of(light, plate(Diffuse(reflectance=curve))), 3, 3, samples=8)
+    picture = render_camera_reference(scene_of(light, plate(Diffuse(reflectance=curve))), 3, 3, samples=8)
     expected = K_M * ((D65.density * curve) @ cmf_xyz() + 0.01 * 0.1 * cmf_at(532.0)) / math.pi
     np.testing.assert_allclose(picture.xyz, np.broadcast_to(expected, (3, 3, 3)), rtol=1e-9)
 
@@ -97,7 +97,7 @@ def test_a_spectral_reflectance_meets_the_lights_spectrum() -> None:
 def test_every_kind_of_light_gives_its_irradiance(light: Light, expected: float) -> None:
     """On a plate below its middle: r²/(r² + h²) of the hemisphere for a disc, half a smoothstep half way down a spot's edge."""
     camera = Camera((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), kind="orthographic", vertical_extent=1e-3)
-    picture = render_eye_reference(scene_of(light, plate(Diffuse((1.0, 1.0, 1.0))), camera=camera), 3, 3, samples=2048)
+    picture = render_camera_reference(scene_of(light, plate(Diffuse((1.0, 1.0, 1.0))), camera=camera), 3, 3, samples=2048)
     assert picture.xyz[1, 1, 1] * math.pi == pytest.approx(expected, rel=1e-3, abs=1e-12)
 
 
@@ -106,7 +106,7 @@ def test_lights_are_seen_from_the_front_through_each_other_and_hide_nothing() ->
     through = Light("b", "area", D65.scaled(2.0), (0.0, 0.0, 2.0), (0.0, 0.0, 1.0), shape="rectangle", width=0.2, height=0.8)
     from_behind = Light("c", "area", D65.scaled(4.0), (0.0, 0.0, 4.0), radius=3.0)
     below = replace(front, position=(0.0, 0.0, -1.0))
-    picture = render_eye_reference(scene_of(front, through, from_behind, below, plate(Black())), 21, 21, samples=8)
+    picture = render_camera_reference(scene_of(front, through, from_behind, below, plate(Black())), 21, 21, samples=8)
     y = picture.xyz[..., 1]
     assert y[10, 10] == pytest.approx(3.0) and y[10, 13] == pytest.approx(1.0) and y[4, 10] == pytest.approx(2.0) and y[4, 4] == 0.0
 
@@ -115,7 +115,7 @@ def test_the_suns_disc_is_seen_where_nothing_hides_it() -> None:
     sun = Light("sun", "directional", D65, direction=(0.0, 0.0, -1.0), angular_diameter_deg=8.0)
     up = Camera((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), up=(0.0, 1.0, 0.0), vertical_fov_deg=8.0)
     half = place(primitives.plane(1.0, 1.0), Black(), (0.5, 0.0, 0.5))
-    picture = render_eye_reference(scene_of(sun, half, camera=up), 40, 40, samples=64)
+    picture = render_camera_reference(scene_of(sun, half, camera=up), 40, 40, samples=64)
     columns = picture.xyz[..., 1].sum(axis=0)
     hidden, seen = sorted([columns[:20].sum(), columns[20:].sum()])
     # Solid angle on the film: π tan² r of 4 tan² r, halved; its radiance 1/(π sin² r).
@@ -126,7 +126,7 @@ def test_shadow_rays_stop_at_glass() -> None:
     light = Light("l", "directional", D65, direction=(0.0, 0.0, -1.0))
     pane = place(primitives.box((0.5, 0.5, 0.1)), Dielectric(constant_index(1.0)), (0.25, 0.0, 4.0))
     camera = replace(ABOVE, position=(0.0, 0.0, 3.0))
-    y = render_eye_reference(scene_of(light, plate(), pane, camera=camera), 20, 20, samples=8).xyz[..., 1]
+    y = render_camera_reference(scene_of(light, plate(), pane, camera=camera), 20, 20, samples=8).xyz[..., 1]
     assert y[10, 12] == 0.0 and y[10, 8] == pytest.approx(0.8 / math.pi)
 
 
@@ -139,7 +139,7 @@ def test_a_texture_lies_upright_and_is_interpolated() -> None:
     camera = replace(ABOVE, vertical_extent=1.0)
     for wrap in ("clamp", "repeat"):
         page = place(primitives.plane(1.5, 1.0), Diffuse((1.0, 0.5, 1.0), texture=Texture(rgb, wrap)))
-        picture = render_eye_reference(scene_of(light, page, camera=camera), 60, 40, samples=32)
+        picture = render_camera_reference(scene_of(light, page, camera=camera), 60, 40, samples=32)
         rows, columns = (np.arange(40) + 0.5) / 10 - 0.5, (np.arange(60) + 0.5) / 10 - 0.5
         expected = np.zeros((40, 60, 3))
         for i, y in enumerate(rows):
@@ -163,7 +163,7 @@ def test_the_environment_is_seen_the_way_its_picture_lies() -> None:
 
     def looks(direction: tuple[float, float, float], up=(0.0, 0.0, 1.0)) -> np.ndarray:
         camera = Camera((0.0, 0.0, 0.0), direction, up=up, vertical_fov_deg=0.01)
-        return render_eye_reference(scene_of(thing, camera=camera, environment=env), 1, 1, samples=8).rgb()[0, 0, :2]
+        return render_camera_reference(scene_of(thing, camera=camera, environment=env), 1, 1, samples=8).rgb()[0, 0, :2]
 
     np.testing.assert_allclose(looks((0.0, 1.0, 0.0)), [63.5, 31.5], atol=0.01)  # the middle
     np.testing.assert_allclose(looks((1.0, 0.0, 0.0)), [95.5, 31.5], atol=0.01)  # to the right of local x is −local y
@@ -180,7 +180,7 @@ def test_a_constant_environment_is_exact() -> None:
     camera = Camera((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     flat = Environment(np.broadcast_to(rgb.astype(np.float32), (8, 16, 3)).copy())
     for more in ({"background_rgb": tuple(rgb)}, {"environment": flat}):
-        picture = render_eye_reference(scene_of(thing, camera=camera, **more), 4, 4, samples=8)
+        picture = render_camera_reference(scene_of(thing, camera=camera, **more), 4, 4, samples=8)
         np.testing.assert_allclose(picture.xyz, np.broadcast_to(rgb709_to_xyz(rgb), (4, 4, 3)), rtol=1e-6)
 
 
@@ -199,9 +199,9 @@ def nested() -> Scene:
     return ball_scene(inner, mirror)
 
 
-def unit_run(scene: Scene) -> EyeRun:
+def unit_run(scene: Scene) -> CameraRun:
     """A run in which every wavelength answers with one over the daylight's own power: white is 1 in each path."""
-    run = EyeRun(scene, 48, 36)
+    run = CameraRun(scene, 48, 36)
     spectra = run._spectra
     return_one = np.repeat(1.0 / spectra.daylight[:, None], 3, axis=1)
     run._spectra = spectra._replace(response=return_one, beyond_xyz=np.full_like(spectra.beyond_xyz, 1.0 / 3.0))
@@ -219,7 +219,7 @@ def test_glass_in_a_white_room_is_white_path_by_path(scene: Scene) -> None:
 
 
 def test_glass_in_a_white_room_is_white_in_colour() -> None:
-    picture = render_eye_reference(nested(), 32, 24, samples=512)
+    picture = render_camera_reference(nested(), 32, 24, samples=512)
     assert z_squared(picture, np.broadcast_to(WHITE, picture.xyz.shape)) == pytest.approx(1.4, abs=0.4)
     # 32 × 24 pixels of 512 samples: a hundredth of one per cent of too much or too little light would show.
     np.testing.assert_allclose(picture.xyz.mean(axis=(0, 1)), WHITE, rtol=2e-4)
@@ -230,7 +230,7 @@ def test_a_camera_inside_an_absorbing_ball_sees_the_room_by_way_of_its_radius() 
     alpha, n = 0.4, 1.5
     ball = place(sphere(1.0, 20480), Dielectric(constant_index(n), Absorption(np.full(401, alpha))))
     camera = Camera((0.0, 0.0, 0.0), (0.3, 1.0, 0.2), vertical_fov_deg=50.0)
-    picture = render_eye_reference(scene_of(ball, camera=camera, background_rgb=(1.0, 1.0, 1.0)), 24, 24, samples=512)
+    picture = render_camera_reference(scene_of(ball, camera=camera, background_rgb=(1.0, 1.0, 1.0)), 24, 24, samples=512)
     reflectance = ((n - 1) / (n + 1)) ** 2
     expected = (1 - reflectance) * math.exp(-alpha) / (1 - reflectance * math.exp(-2 * alpha))
     mean, error = picture.xyz[..., 1].mean(), math.sqrt(picture.variance[..., 1].mean() / 576)
@@ -240,7 +240,7 @@ def test_a_camera_inside_an_absorbing_ball_sees_the_room_by_way_of_its_radius() 
 
 def test_a_mirrors_tint_is_its_colour() -> None:
     mirror = place(primitives.plane(9.0, 9.0), Mirror((0.9, 0.5, 0.2)))
-    picture = render_eye_reference(scene_of(mirror, background_rgb=(2.0, 2.0, 2.0)), 16, 16, samples=512)
+    picture = render_camera_reference(scene_of(mirror, background_rgb=(2.0, 2.0, 2.0)), 16, 16, samples=512)
     np.testing.assert_allclose(picture.rgb().mean(axis=(0, 1)), [1.8, 1.0, 0.4], rtol=2e-3)
 
 
@@ -249,7 +249,7 @@ def test_a_mirrors_tint_is_its_colour() -> None:
 
 def test_its_own_error_is_true() -> None:
     """The scatter of ten whole pictures is the variance they claim: over 200 pixels behind glass the ratio's 4 σ is 0.3."""
-    runs = [render_eye_reference(slab_scene(FLINT), 10, 20, samples=64, seed=seed) for seed in range(10)]
+    runs = [render_camera_reference(slab_scene(FLINT), 10, 20, samples=64, seed=seed) for seed in range(10)]
     observed = np.var([run.xyz[..., 1] for run in runs], axis=0, ddof=1).sum()
     claimed = np.mean([run.variance[..., 1] for run in runs], axis=0).sum()
     assert observed / claimed == pytest.approx(1.0, abs=0.3)
@@ -257,26 +257,26 @@ def test_its_own_error_is_true() -> None:
 
 def test_the_picture_grows_in_the_cache(tmp_path: Path) -> None:
     scene = slab_scene(FLINT)
-    first = cached_eye_reference(scene, 8, 12, samples=16, folder=tmp_path)
-    again = cached_eye_reference(scene, 8, 12, samples=8, folder=tmp_path)
+    first = cached_camera_reference(scene, 8, 12, samples=16, folder=tmp_path)
+    again = cached_camera_reference(scene, 8, 12, samples=8, folder=tmp_path)
     assert first.samples == again.samples == 16 and np.array_equal(first.xyz, again.xyz)
-    more = cached_eye_reference(scene, 8, 12, samples=64, folder=tmp_path)
-    at_once = render_eye_reference(scene, 8, 12, samples=64)
+    more = cached_camera_reference(scene, 8, 12, samples=64, folder=tmp_path)
+    at_once = render_camera_reference(scene, 8, 12, samples=64)
     np.testing.assert_allclose(more.xyz, at_once.xyz, rtol=1e-9, atol=1e-15)
-    good_enough = cached_eye_reference(scene, 8, 12, target_relmse=more.relmse * 1.01, folder=tmp_path)
+    good_enough = cached_camera_reference(scene, 8, 12, target_relmse=more.relmse * 1.01, folder=tmp_path)
     assert good_enough.samples == 64
     (stored,) = tmp_path.glob("*.npz")
     stored.write_bytes(stored.read_bytes()[:500])
-    assert cached_eye_reference(scene, 8, 12, samples=16, folder=tmp_path).samples == 16
+    assert cached_camera_reference(scene, 8, 12, samples=16, folder=tmp_path).samples == 16
 
 
 def test_limits() -> None:
     with pytest.raises(ValueError, match="limit"):
-        render_eye_reference(slab_scene(FLINT), 4, 4)
-    rough = render_eye_reference(slab_scene(FLINT), 8, 12, target_relmse=0.01)
+        render_camera_reference(slab_scene(FLINT), 4, 4)
+    rough = render_camera_reference(slab_scene(FLINT), 8, 12, target_relmse=0.01)
     assert 0.0 < rough.relmse <= 0.01
-    assert render_eye_reference(slab_scene(FLINT), 8, 12, seconds=0.05).samples > 0
-    stopped = render_eye_reference(slab_scene(FLINT), 8, 12, samples=10**9, cancelled=iter([False, True]).__next__)
+    assert render_camera_reference(slab_scene(FLINT), 8, 12, seconds=0.05).samples > 0
+    stopped = render_camera_reference(slab_scene(FLINT), 8, 12, samples=10**9, cancelled=iter([False, True]).__next__)
     assert 0 < stopped.samples < 10**9
 
 
@@ -286,16 +286,16 @@ def test_the_key_knows_textures_and_what_lies_beyond() -> None:
     other_texture = replace(scene, objects=(plate(Diffuse(texture=Texture(0.5 * rgb))),))
     room = Environment(rgb)
     keys = [
-        eye_scene_key(scene, 8, 8, 64, None),
-        eye_scene_key(scene, 8, 8, 64, CausticPlan()),
-        eye_scene_key(scene, 8, 8, 64, CausticPlan(photons=5)),
-        eye_scene_key(other_texture, 8, 8, 64, None),
-        eye_scene_key(replace(scene, objects=(plate(Diffuse(texture=Texture(rgb, "clamp"))),)), 8, 8, 64, None),
-        eye_scene_key(replace(scene, background_rgb=(0.1, 0.1, 0.1)), 8, 8, 64, None),
-        eye_scene_key(replace(scene, environment=room), 8, 8, 64, None),
-        eye_scene_key(replace(scene, environment=replace(room, world_to_local=np.diag([-1.0, -1.0, 1.0]))), 8, 8, 64, None),
-        eye_scene_key(replace(scene, environment=replace(room, rgb=2.0 * rgb)), 8, 8, 64, None),
+        camera_scene_key(scene, 8, 8, 64, None),
+        camera_scene_key(scene, 8, 8, 64, CausticPlan()),
+        camera_scene_key(scene, 8, 8, 64, CausticPlan(photons=5)),
+        camera_scene_key(other_texture, 8, 8, 64, None),
+        camera_scene_key(replace(scene, objects=(plate(Diffuse(texture=Texture(rgb, "clamp"))),)), 8, 8, 64, None),
+        camera_scene_key(replace(scene, background_rgb=(0.1, 0.1, 0.1)), 8, 8, 64, None),
+        camera_scene_key(replace(scene, environment=room), 8, 8, 64, None),
+        camera_scene_key(replace(scene, environment=replace(room, world_to_local=np.diag([-1.0, -1.0, 1.0]))), 8, 8, 64, None),
+        camera_scene_key(replace(scene, environment=replace(room, rgb=2.0 * rgb)), 8, 8, 64, None),
     ]
     assert len(set(keys)) == len(keys)
-    assert eye_scene_key(replace(scene, name="other", environment=replace(room, source="elsewhere")), 8, 8, 64, None) == keys[6]
+    assert camera_scene_key(replace(scene, name="other", environment=replace(room, source="elsewhere")), 8, 8, 64, None) == keys[6]
     np.testing.assert_allclose(K_M * (rgb_basis() @ np.ones(3) * daylight_per_lumen()) @ cmf_xyz(), WHITE, rtol=1e-9)

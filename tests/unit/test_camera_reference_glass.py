@@ -1,4 +1,4 @@
-"""What the eye's reference sees through glass: fringes by slabs and prisms against closed forms, caustics against the light's reference.
+"""What the camera's reference sees through glass: fringes by slabs and prisms against closed forms, caustics against the light's reference.
 
 Mutants of the closed forms (another Fresnel, dispersion the other way round) must be told apart.
 """
@@ -31,12 +31,12 @@ from spectrasplat.model.scene import (
 )
 from spectrasplat.model.texture import Texture
 from spectrasplat.reference import photon_run
-from spectrasplat.reference.camera_reference import render_eye_reference
-from spectrasplat.reference.camera_run import EyePicture, EyeRun
+from spectrasplat.reference.camera_reference import render_camera_reference
+from spectrasplat.reference.camera_run import CameraPicture, CameraRun
 from spectrasplat.reference.direct_view import seen_directly
 from spectrasplat.reference.photon_reference import render_reference
 from spectrasplat.reference.spectral_caustic import CausticPlan, build_caustic
-from tests.unit.eye_scenes import (
+from tests.unit.camera_scenes import (
     D65,
     FLINT,
     THICKNESS,
@@ -53,7 +53,7 @@ from tests.unit.eye_scenes import (
 def slab_column(glass: Dispersion, rows: int, fresnel: str = "exact", sign: float = 1.0) -> np.ndarray:
     """XYZ of a column of pixels, (rows, 3): the edge, once for each wavelength and number of reflections inside."""
     n = glass.index(VISIBLE_NM)
-    centre = float(np.mean(eye_answers.slab_displacement(n, THICKNESS, TILT)))
+    centre = float(np.mean(camera_answers.slab_displacement(n, THICKNESS, TILT)))
     n = glass.n_d + sign * (n - glass.n_d)
     cosine, inner = math.cos(TILT), np.sqrt(1.0 - (math.sin(TILT) / n) ** 2)
     if fresnel == "exact":
@@ -64,10 +64,10 @@ def slab_column(glass: Dispersion, rows: int, fresnel: str = "exact", sign: floa
     # Along x, row 0 on top is the largest x; a film's length is cos 45° of the plate's.
     border = centre + 0.06 / cosine * (0.5 - np.arange(rows + 1) / rows)
     total = np.zeros((rows, 3))
-    offset = eye_answers.slab_offset(n, THICKNESS, TILT)
+    offset = camera_answers.slab_offset(n, THICKNESS, TILT)
     for k in range(6):  # 2k reflections inside lead the ray on by 2k offsets: it meets the plate farther along
         # Without glass the pixel at `border` sees x = border; with it x − displacement + 2k offset.
-        seen = border[:, None] - eye_answers.slab_displacement(n, THICKNESS, TILT) + 2 * k * offset
+        seen = border[:, None] - camera_answers.slab_displacement(n, THICKNESS, TILT) + 2 * k * offset
         white = np.clip(seen[:-1], 0.0, None) - np.clip(seen[1:], 0.0, None)
         share = white / (border[:-1] - border[1:])[:, None] * (1 - reflectance) ** 2 * reflectance ** (2 * k)
         total += K_M * (share * D65.density) @ cmf_xyz() / math.pi
@@ -75,17 +75,17 @@ def slab_column(glass: Dispersion, rows: int, fresnel: str = "exact", sign: floa
 
 
 @pytest.fixture(scope="module")
-def slab_picture() -> EyePicture:
-    return render_eye_reference(slab_scene(FLINT), 12, 48, samples=1024)
+def slab_picture() -> CameraPicture:
+    return render_camera_reference(slab_scene(FLINT), 12, 48, samples=1024)
 
 
-def slab_z_squared(picture: EyePicture, expected: np.ndarray) -> float:
+def slab_z_squared(picture: CameraPicture, expected: np.ndarray) -> float:
     """Mean of z² over rows and channels; a row's twelve variances together have 84 degrees of freedom, so that 1.02 is right."""
     variance = picture.variance.sum(axis=1) / 144
     return float(np.mean((picture.xyz.mean(axis=1) - expected) ** 2 / variance))
 
 
-def test_an_edge_behind_a_slab_has_the_fringe_of_snells_law(slab_picture: EyePicture) -> None:
+def test_an_edge_behind_a_slab_has_the_fringe_of_snells_law(slab_picture: CameraPicture) -> None:
     """48 rows of three channels that go together: the mean of z² scatters by √(2/48) = 0.2."""
     expected = slab_column(FLINT, 48)
     assert slab_z_squared(slab_picture, expected) < 1.02 + 4 * 0.2
@@ -93,7 +93,7 @@ def test_an_edge_behind_a_slab_has_the_fringe_of_snells_law(slab_picture: EyePic
 
 
 @pytest.mark.parametrize("mutant", [{"fresnel": "schlick"}, {"sign": -1.0}], ids=str)
-def test_wrong_optics_would_show_in_the_fringe(slab_picture: EyePicture, mutant: dict) -> None:
+def test_wrong_optics_would_show_in_the_fringe(slab_picture: CameraPicture, mutant: dict) -> None:
     assert slab_z_squared(slab_picture, slab_column(FLINT, 48, **mutant)) > 4.0
 
 
@@ -111,8 +111,8 @@ def test_a_pane_of_air_changes_nothing() -> None:
         place(primitives.plane(1.0, 1.0), Diffuse(reflectance=curve), (0.5, 0.0, 0.0)),
     )
     pane = place(primitives.box((4.0, 4.0, 0.1)), Dielectric(constant_index(1.0)), (0.0, 0.0, 5.0))
-    straight = render_eye_reference(scene_of(*lights, *things), 16, 16, samples=2048)
-    behind = render_eye_reference(scene_of(*lights, *things, pane), 16, 16, samples=2048)
+    straight = render_camera_reference(scene_of(*lights, *things), 16, 16, samples=2048)
+    behind = render_camera_reference(scene_of(*lights, *things, pane), 16, 16, samples=2048)
     assert behind.relmse > 3.0 * straight.relmse  # which is why
     np.testing.assert_allclose(behind.xyz, straight.xyz, rtol=0.03)
     for half in (np.s_[:, :8], np.s_[:, 8:]):  # texture; spectral reflectance: means to 6e-4, so 3e-3 too much would show
@@ -128,8 +128,8 @@ def test_a_pane_of_air_changes_nothing() -> None:
 def test_an_edge_behind_a_prism_stands_where_the_exact_trace_puts_it() -> None:
     """Two laser lines through 20° of flint: each line's edge, from the share of white it leaves, to a fiftieth of a pixel."""
     apex, rows, lines = math.radians(20.0), 64, (486.1327, 656.2725)
-    faces = eye_answers.prism_faces(apex, 5.0, 1.2)
-    angle = {nm: eye_answers.viewing_angle(faces, (float(FLINT.index(nm)), 1.0), 9.0, 0.0, 0.0, 0.3) for nm in lines}
+    faces = camera_answers.prism_faces(apex, 5.0, 1.2)
+    angle = {nm: camera_answers.viewing_angle(faces, (float(FLINT.index(nm)), 1.0), 9.0, 0.0, 0.0, 0.3) for nm in lines}
     middle = 0.5 * sum(angle.values())
     c, s = math.cos(apex / 2), math.sin(apex / 2)
     outline = np.array([(0.0, 0.6 / math.tan(apex / 2)), (-0.6 - 2 * s / c, -2.0), (0.6 + 2 * s / c, -2.0)])
@@ -146,7 +146,7 @@ def test_an_edge_behind_a_prism_stands_where_the_exact_trace_puts_it() -> None:
     edges = []
     for light in lit:
         glass = place(mesh, Dielectric(FLINT))
-        y = render_eye_reference(scene_of(light, glass, white, black, camera=camera), 3, rows, samples=2048).xyz[..., 1].mean(axis=1)
+        y = render_camera_reference(scene_of(light, glass, white, black, camera=camera), 3, rows, samples=2048).xyz[..., 1].mean(axis=1)
         whole = np.polyval(np.polyfit(np.arange(20), y[:20], 1), np.arange(rows))  # Fresnel's share changes a little
         at = 1.0 - 2.0 / rows * float(np.sum(y / whole))
         edges.append(middle + math.atan(at * math.tan(math.radians(1.5))))
@@ -160,25 +160,25 @@ def test_an_edge_behind_a_prism_stands_where_the_exact_trace_puts_it() -> None:
 def test_closed_forms_agree_with_each_other() -> None:
     n = np.array([1.5168, 1.62])
     # T2 of the known answers: N-BK7 at minimum deviation; a thin prism's limit is the thin formula.
-    assert math.degrees(eye_answers.prism_deviation(1.5168, math.pi / 3, math.radians(49.32335))) == pytest.approx(38.6467, abs=1e-5)
-    np.testing.assert_allclose(eye_answers.prism_deviation(n, 1e-4, 0.0), eye_answers.thin_prism_deviation(n, 1e-4), rtol=1e-6)
-    assert np.isnan(eye_answers.prism_deviation(1.7847, math.pi / 2, 0.0))
+    assert math.degrees(camera_answers.prism_deviation(1.5168, math.pi / 3, math.radians(49.32335))) == pytest.approx(38.6467, abs=1e-5)
+    np.testing.assert_allclose(camera_answers.prism_deviation(n, 1e-4, 0.0), camera_answers.thin_prism_deviation(n, 1e-4), rtol=1e-6)
+    assert np.isnan(camera_answers.prism_deviation(1.7847, math.pi / 2, 0.0))
     apex = math.radians(0.2)
-    low, high = (eye_answers.height_on_screen(eye_answers.prism_faces(apex, 5.0, 0.001), (k, 1.0), 0.0, 15.0) for k in n)
-    assert low - high == pytest.approx(eye_answers.thin_prism_fringe(n[1], n[0], apex, 10.0), rel=1e-3)
+    low, high = (camera_answers.height_on_screen(camera_answers.prism_faces(apex, 5.0, 0.001), (k, 1.0), 0.0, 15.0) for k in n)
+    assert low - high == pytest.approx(camera_answers.thin_prism_fringe(n[1], n[0], apex, 10.0), rel=1e-3)
     # T3: a slab at 45°.
-    assert eye_answers.slab_offset(1.5168, 1.0, TILT) == pytest.approx(0.526946, abs=1e-6)
-    assert eye_answers.slab_lateral_shift(1.5168, 1.0, TILT) == pytest.approx(0.334499, abs=1e-6)
-    assert eye_answers.slab_displacement_derivative(1.5168, -0.041799e-3, 1.0, TILT) == pytest.approx(-0.018554e-3, abs=1e-8)
+    assert camera_answers.slab_offset(1.5168, 1.0, TILT) == pytest.approx(0.526946, abs=1e-6)
+    assert camera_answers.slab_lateral_shift(1.5168, 1.0, TILT) == pytest.approx(0.334499, abs=1e-6)
+    assert camera_answers.slab_displacement_derivative(1.5168, -0.041799e-3, 1.0, TILT) == pytest.approx(-0.018554e-3, abs=1e-8)
     # A lens: matrices against the trace near the axis, thin against thick.
-    faces = eye_answers.plano_convex_faces(10.0, 8.0, 0.5)
+    faces = camera_answers.plano_convex_faces(10.0, 8.0, 0.5)
     for k in n:
-        seen = math.tan(eye_answers.viewing_angle(faces, (k, 1.0), 11.0, 1e-4, 0.0, 0.2)) / 1e-4
-        assert seen == pytest.approx(eye_answers.thick_seen_tangent(k, 10.0, 0.5, 8.0, 2.5, 1.0), rel=1e-6)
-        thin = eye_answers.seen_tangent(eye_answers.plano_convex_focal_length(k, 10.0), 8.0, 3.0, 1.0)
-        assert thin == pytest.approx(eye_answers.thick_seen_tangent(k, 10.0, 1e-9, 8.0, 3.0, 1.0), rel=1e-8)
+        seen = math.tan(camera_answers.viewing_angle(faces, (k, 1.0), 11.0, 1e-4, 0.0, 0.2)) / 1e-4
+        assert seen == pytest.approx(camera_answers.thick_seen_tangent(k, 10.0, 0.5, 8.0, 2.5, 1.0), rel=1e-6)
+        thin = camera_answers.seen_tangent(camera_answers.plano_convex_focal_length(k, 10.0), 8.0, 3.0, 1.0)
+        assert thin == pytest.approx(camera_answers.thick_seen_tangent(k, 10.0, 1e-9, 8.0, 3.0, 1.0), rel=1e-8)
     with pytest.raises(ValueError, match="total reflection"):
-        eye_answers.trace(eye_answers.prism_faces(math.pi / 2, 5.0, 1.0), (1.7847, 1.0), (0.0, 0.0), 0.0)
+        camera_answers.trace(camera_answers.prism_faces(math.pi / 2, 5.0, 1.0), (1.7847, 1.0), (0.0, 0.0), 0.0)
 
 
 # ---- caustics --------------------------------------------------------------------------------
@@ -206,8 +206,8 @@ def test_the_caustic_is_that_of_the_light_reference() -> None:
     scene = caustic_scene()
     caustic = build_caustic(scene, 36, 24, replace(PLAN, texel_size=0.02))
     assert caustic.relmse < 0.01 and caustic.outside_w < 0.5 * caustic.landed_w
-    lit = render_eye_reference(scene, 36, 24, samples=256, caustic=caustic)
-    dark = render_eye_reference(scene, 36, 24, samples=256)
+    lit = render_camera_reference(scene, 36, 24, samples=256, caustic=caustic)
+    dark = render_camera_reference(scene, 36, 24, samples=256)
     light = render_reference(scene, 36, 24, photons=1 << 20)
     seen = seen_directly(scene, 36, 24)
     blocks = [(np.where(seen[..., None], p, 0.0)).reshape(12, 2, 18, 2, 3).mean(axis=(1, 3)) for p in (lit.xyz - dark.xyz, light.xyz())]
@@ -235,7 +235,7 @@ def test_nested_and_smooth_glass_throws_the_light_references_light() -> None:
     """Both tracers' loops are written apart. Sums over what is seen directly agree to 2 %, blocks to 8 % of the brightest (a focus of few texels)."""
     scene = busy_scene()
     caustic = build_caustic(scene, 36, 24, replace(PLAN, photons=1 << 18, texel_size=0.02))
-    lit, dark = (render_eye_reference(scene, 36, 24, samples=256, caustic=c).xyz for c in (caustic, None))
+    lit, dark = (render_camera_reference(scene, 36, 24, samples=256, caustic=c).xyz for c in (caustic, None))
     seen = seen_directly(scene, 36, 24)[..., None]
     light = render_reference(scene, 36, 24, photons=1 << 19).xyz() * seen
     mine = (lit - dark) * seen
@@ -249,8 +249,8 @@ def test_a_caustic_behind_a_pane_of_air_is_the_same() -> None:
     pane = place(primitives.box((8.0, 8.0, 0.02)), Dielectric(constant_index(1.0)), (0.0, 0.0, 3.4))
     scene, behind = caustic_scene(), caustic_scene(pane)
     caustic = build_caustic(scene, 24, 16, PLAN)
-    straight = render_eye_reference(scene, 24, 16, samples=1024, caustic=caustic)
-    through = EyeRun(behind, 24, 16, caustic=replace(caustic, tables=caustic.tables._replace(side=np.vstack([caustic.tables.side, [[-1, -1]]]).astype(np.int32))))
+    straight = render_camera_reference(scene, 24, 16, samples=1024, caustic=caustic)
+    through = CameraRun(behind, 24, 16, caustic=replace(caustic, tables=caustic.tables._replace(side=np.vstack([caustic.tables.side, [[-1, -1]]]).astype(np.int32))))
     while through.samples < 1024:
         through.advance()
     picture = through.picture()

@@ -1,4 +1,4 @@
-"""The caustic of the eye's reference on disk: made once, grown as far as a picture needs, kept over interrupts."""
+"""The caustic of the camera's reference on disk: made once, grown as far as a picture needs, kept over interrupts."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import pytest
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.scene import Camera, Dielectric, Light, Scene
 from spectrasplat.reference import caustic_cache, photon_run, spectral_caustic
-from spectrasplat.reference.camera_reference import cached_eye_reference, render_eye_reference
-from spectrasplat.reference.camera_run import summed_eye
+from spectrasplat.reference.camera_reference import cached_camera_reference, render_camera_reference
+from spectrasplat.reference.camera_run import summed_camera
 from spectrasplat.reference.caustic_cache import CachedCaustic, picture_noise
 from spectrasplat.reference.photon_run import TALLY_SIZE
 from spectrasplat.reference.rounds import PARTS
 from spectrasplat.reference.spectral_caustic import CausticPlan, CausticRun, build_caustic
-from tests.unit.eye_scenes import D65, FLINT, place, plate, scene_of
+from tests.unit.camera_scenes import D65, FLINT, place, plate, scene_of
 
 SIZE = 24, 16
 PLAN = CausticPlan(photons=1 << 17, bins=12)
@@ -26,7 +26,7 @@ PLAN = CausticPlan(photons=1 << 17, bins=12)
 def short_pilots(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(photon_run, "_PILOT_PHOTONS", 1 << 12)
     monkeypatch.setattr(spectral_caustic, "_PILOT", 1 << 14)
-    monkeypatch.setattr(spectral_caustic, "_MOST_UNITS", 2)  # several rounds
+    monkeypatch.setattr(spectral_caustic, "_MAX_UNITS", 2)  # several rounds
     monkeypatch.setattr(caustic_cache, "_FIRST_LOOK", 1 << 15)
 
 
@@ -61,21 +61,21 @@ def quiet(fraction: float, text: str) -> None:
 
 
 def test_a_finished_reference_builds_nothing(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    first = cached_eye_reference(scene, *SIZE, samples=16, caustic=PLAN, folder=tmp_path)
+    first = cached_camera_reference(scene, *SIZE, samples=16, caustic=PLAN, folder=tmp_path)
     assert first.caustic_photons >= PLAN.photons and 0.0 < first.caustic_relmse < 0.1
     monkeypatch.setattr(CausticRun, "__init__", lambda *_: pytest.fail("the caustic was prepared again"))
-    again = cached_eye_reference(scene, *SIZE, samples=16, caustic=PLAN, folder=tmp_path)
+    again = cached_camera_reference(scene, *SIZE, samples=16, caustic=PLAN, folder=tmp_path)
     assert np.array_equal(first.xyz, again.xyz)
     assert (again.caustic_photons, again.caustic_relmse) == (first.caustic_photons, first.caustic_relmse)
 
 
 def test_more_samples_look_up_the_stored_caustic(scene: Scene, tmp_path: Path, rounds: list[int]) -> None:
-    cached_eye_reference(scene, *SIZE, samples=16, caustic=PLAN, folder=tmp_path)
+    cached_camera_reference(scene, *SIZE, samples=16, caustic=PLAN, folder=tmp_path)
     assert rounds
     rounds.clear()
-    more = cached_eye_reference(scene, *SIZE, samples=64, caustic=PLAN, folder=tmp_path)
+    more = cached_camera_reference(scene, *SIZE, samples=64, caustic=PLAN, folder=tmp_path)
     assert rounds == [] and more.samples == 64
-    at_once = render_eye_reference(scene, *SIZE, samples=64, caustic=build_caustic(scene, *SIZE, PLAN))
+    at_once = render_camera_reference(scene, *SIZE, samples=64, caustic=build_caustic(scene, *SIZE, PLAN))
     np.testing.assert_allclose(more.xyz, at_once.xyz, rtol=1e-6, atol=1e-9 * at_once.xyz.max())
 
 
@@ -100,7 +100,7 @@ def test_a_larger_plan_goes_on_from_a_smaller_one(scene: Scene, tmp_path: Path, 
     rounds.clear()
     large, large_noise = kept(scene, replace(PLAN, photons=8 * PLAN.photons), tmp_path).grown(quiet)
     assert rounds[0] == small.photons and large.photons >= 8 * PLAN.photons
-    # One over the photons, but two halves on some fifty lit pixels tell their noise to a factor of two only.
+    # One over the photons, but two passes on some fifty lit pixels tell their noise to a factor of two only.
     assert 0.03 < large_noise / small_noise < 0.5
 
 
@@ -117,7 +117,7 @@ def test_photons_are_enough_when_the_picture_says_so(scene: Scene, tmp_path: Pat
 def test_the_noise_is_what_other_photons_would_change(scene: Scene) -> None:
     """Half the mean square difference of pictures by the same paths and independent photons; their windows differ, so to a factor of 2."""
     caustics = [build_caustic(scene, *SIZE, replace(PLAN, seed=seed, texel_size=0.05)) for seed in (1, 2, 3)]
-    pictures = [render_eye_reference(scene, *SIZE, samples=1024, caustic=c).xyz for c in caustics]
+    pictures = [render_camera_reference(scene, *SIZE, samples=1024, caustic=c).xyz for c in caustics]
     mean = np.mean(pictures, axis=0)
     observed = np.mean(np.var(pictures, axis=0, ddof=1) / (mean**2 + 1e-2 * mean.mean() ** 2))
     told = np.mean([picture_noise(scene, *SIZE, 256, c) for c in caustics])
@@ -144,9 +144,9 @@ def test_what_halves_of_the_caustic_have_apart_is_in_the_variance() -> None:
     error = np.array([0.3, -0.3])
     sums = np.stack([np.full((1, 1, 3), 4.0 * (1.0 + error[part % 2])) for part in range(PARTS)])
     units, tallies = np.full(PARTS, 4), np.zeros((PARTS, TALLY_SIZE))
-    picture = summed_eye(sums, units, tallies, 1.0, halves=True)
+    picture = summed_camera(sums, units, tallies, 1.0, measured_passes=True)
     assert picture.samples == 4 * PARTS
     np.testing.assert_allclose(picture.xyz, 1.0)
     np.testing.assert_allclose(picture.variance, 0.3**2)  # of a mean of two that are 0.6 apart
-    apart = summed_eye(sums, units, tallies, 1.0)
+    apart = summed_camera(sums, units, tallies, 1.0)
     np.testing.assert_allclose(apart.variance, 0.3**2 / (PARTS - 1))

@@ -1,10 +1,10 @@
-"""Windows of the eye reference's caustic: fine where the camera looks, not where light or a stray look happens to go."""
+"""Windows of the camera reference's caustic: fine where the camera looks, not where light or a stray look happens to go."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from spectrasplat.reference.caustic_windows import Landed, Planes, Seen, _shared, fit_windows
+from spectrasplat.reference.caustic_windows import Landed, Planes, SurfaceInteraction, _shared, fit_windows
 
 RNG = np.random.default_rng(4)
 PAGE, FLOOR = 0, 1
@@ -24,10 +24,10 @@ def points(count: int, half: float) -> np.ndarray:
     return flat
 
 
-def looks(stray: int) -> Seen:
+def looks(stray: int) -> SurfaceInteraction:
     """3000 at the page, 1000 at the floor's middle, `stray` anywhere on the floor."""
     where = np.concatenate([points(3000, 1.0), points(1000, 1.5), points(stray, 20.0)])
-    return Seen(where, np.ones(len(where)), np.repeat(np.array([PAGE, FLOOR], np.int32), [3000, 1000 + stray]))
+    return SurfaceInteraction(where, np.ones(len(where)), np.repeat(np.array([PAGE, FLOOR], np.int32), [3000, 1000 + stray]))
 
 
 def light() -> Landed:

@@ -5,39 +5,39 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from spectrasplat.gpu.dead_code import lean
+from spectrasplat.gpu.dead_code import stripped
 from spectrasplat.gpu.glsl_conditionals import Line
 from spectrasplat.gpu.schema import Field, Struct
 from spectrasplat.gpu.shader import ShaderError, load_source
 
 
-def leaned(text: str) -> list[str]:
-    return [line.text.strip() for line in lean([Line(line, "t", i + 1) for i, line in enumerate(text.splitlines())])]
+def stripped_source(text: str) -> list[str]:
+    return [line.text.strip() for line in stripped([Line(line, "t", i + 1) for i, line in enumerate(text.splitlines())])]
 
 
 def chosen(condition: str, defines: str = "") -> bool:
     """Whether the branch of `condition` is taken; fails when it is not resolved."""
-    kept = leaned(f"{defines}\n#if {condition}\nuniform int yes;\n#else\nuniform int no;\n#endif")
+    kept = stripped_source(f"{defines}\n#if {condition}\nuniform int yes;\n#else\nuniform int no;\n#endif")
     assert kept in (["uniform int yes;"], ["uniform int no;"])
     return kept == ["uniform int yes;"]
 
 
 @pytest.mark.parametrize(
-    ("condition", "truth"),
+    ("condition", "reference"),
     [
         ("GROUPS > 0", True), ("GROUPS == 2 && !defined(TREE)", True), ("GROUPS - 2", False), ("defined TREE || defined(GROUPS)", True),
         ("1 + 2 * 3 == 7", True), ("(1 + 2) * 3 == 7", False), ("0x10 >> 2 == 4u", True), ("-GROUPS < -1", True), ("7 / 2 == 3 && 7 % 2", True),
         ("TWICE == 4", True), ("!(GROUPS >= 3) // really", True), ("1 << 3 <= 7", False),
     ],
 )  # fmt: skip
-def test_conditions(condition: str, truth: bool) -> None:
-    assert chosen(condition, "#define GROUPS 2\n#define TWICE (2 * GROUPS)") is truth
+def test_conditions(condition: str, reference: bool) -> None:
+    assert chosen(condition, "#define GROUPS 2\n#define TWICE (2 * GROUPS)") is reference
 
 
 @pytest.mark.parametrize("condition", ["UNSEEN > 0", "__VERSION__ >= 430", "defined(GL_ARB_gpu_shader5)", "LOOP == 1", "1 / 0", "1 +", "2 $ 3"])
 def test_what_only_the_driver_can_tell_stays_whole(condition: str) -> None:
     text = f"#define LOOP LOOP\n#if {condition}\n#define MAYBE 1\nvoid unused() {{}}\n#elif 1\n#endif\n#ifdef MAYBE\nint i;\n#endif"
-    assert leaned(text) == text.splitlines()
+    assert stripped_source(text) == text.splitlines()
 
 
 def test_chains_nest_and_the_first_true_branch_wins() -> None:
@@ -62,12 +62,12 @@ def test_chains_nest_and_the_first_true_branch_wins() -> None:
 #ifdef A
   uniform int f;
 #endif"""
-    assert leaned(text) == ["#define A", "uniform int d;", "#undef A"]
+    assert stripped_source(text) == ["#define A", "uniform int d;", "#undef A"]
 
 
 def test_comments_go_and_hide_directives() -> None:
     text = "uniform int a; // b\n/* #ifdef X\n#endif */ uniform int c; /* d */ uniform int e;\n"
-    assert [line.split() for line in leaned(text)] == [["uniform", "int", "a;"], ["uniform", "int", "c;", "uniform", "int", "e;"]]
+    assert [line.split() for line in stripped_source(text)] == [["uniform", "int", "a;"], ["uniform", "int", "c;", "uniform", "int", "e;"]]
 
 
 LIBRARY = """
@@ -102,7 +102,7 @@ layout(std430, binding = 0) buffer Out { Ray rays[]; };
 
 
 def test_only_what_main_and_the_interface_reach_is_left() -> None:
-    kept = "\n".join(leaned(LIBRARY + "void main()\n{\n    float total = 0.0;\n    STEP(1.0)\n    pack(rays[0]);\n}\n"))
+    kept = "\n".join(stripped_source(LIBRARY + "void main()\n{\n    float total = 0.0;\n    STEP(1.0)\n    pack(rays[0]);\n}\n"))
     macros, constants, structs = ("define PI", "STEP(x)", "total += helper"), ("const float table", "1.0,"), ("struct Ray",)
     functions = ("pack(Ray", "pack_texel(vec3", "float helper(float", "float helper(vec3", "buffer Out")
     for present in (*macros, *constants, *structs, *functions):

@@ -364,7 +364,7 @@ def _rich_scene() -> Scene:
         ),
         (
             SceneObject("ball", ball, Dielectric(catalogue.find("N-SF11"), tint, 3)),
-            SceneObject("twin", ball, Dielectric(catalogue.find("N-SF11"), tint, 3), moved),
+            SceneObject("CPU reference", ball, Dielectric(catalogue.find("N-SF11"), tint, 3), moved),
             SceneObject("coefficients", primitives.box(), Dielectric(glass.sellmeier((1.1, 0.2), (0.01, 0.02))), mirrored),
             SceneObject("mirror", primitives.disc(), Mirror((0.9, 0.8, 0.7))),
             SceneObject("stop", primitives.plane(), Black()),

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 from spectrasplat.bench.features.static_costs import picture_bytes, size_words
-from spectrasplat.commands.inspect_camera import LookUp, look_ups
+from spectrasplat.commands.inspect_camera import Lookup, lookups
 from spectrasplat.commands.inspect_report import inspect_text, light_flux
 from spectrasplat.commands.options import find_scene
 from spectrasplat.gpu.texture_store import _sources
@@ -90,7 +90,7 @@ def test_features_that_are_in_tell_what_they_add(tmp_path: Path) -> None:
     assert "73 planes" in row(text, "half-space solids")
     assert " B" not in row(text, "mirrors")
     # Both glasses stand before the camera: the maps hold eight spectral channels beside XYZ.
-    assert "32 B a texel" in row(text, "spectral maps") and "a second program" in row(text, "eye refraction")
+    assert "32 B a texel" in row(text, "spectral maps") and "a second program" in row(text, "camera refraction")
     assert "A ray is 224 bytes with 4 derivative column(s), a photon record 128, its splats 192, a map's texel 48." in " ".join(text.split())
     assert "bench --features" in text
 
@@ -121,8 +121,8 @@ def test_spectra_and_fluxes_in_words(tmp_path: Path, light: str, words: str, lum
         assert flux[0] == pytest.approx(lumen, rel=1e-12)
 
 
-def looked_up(value: Scene, **settings: object) -> dict[str, LookUp]:
-    return {row.what: row for row in look_ups(value, Features.of(value, RenderSettings(**settings)))}  # type: ignore[arg-type]
+def looked_up(value: Scene, **settings: object) -> dict[str, Lookup]:
+    return {row.what: row for row in lookups(value, Features.of(value, RenderSettings(**settings)))}  # type: ignore[arg-type]
 
 
 def test_pictures_are_listed_with_size_filter_and_memory() -> None:
@@ -146,9 +146,9 @@ def test_memory_told_is_what_is_packed(name: str) -> None:
 def test_what_the_maps_hold_comes_with_the_reason(tmp_path: Path) -> None:
     value = scene(tmp_path)
     maps = looked_up(value)["caustic maps"]
-    assert maps.content.startswith("XYZ and W, hats at 380, ") and maps.content.count(",") == 8 and maps.memory == "48 B a texel"
+    assert maps.content.startswith("XYZ and W, tents at 380, ") and maps.content.count(",") == 8 and maps.memory == "48 B a texel"
     away = replace(value, camera=replace(value.camera, target=tuple(2 * p - t for p, t in zip(value.camera.position, value.camera.target, strict=True))))
-    assert looked_up(away)["caustic maps"] == LookUp("caustic maps", "XYZ and W", "no spectra: caustics are seen directly", "16 B a texel")
+    assert looked_up(away)["caustic maps"] == Lookup("caustic maps", "XYZ and W", "no spectra: caustics are seen directly", "16 B a texel")
     assert looked_up(away)["spectrum"].content == "one stretch"
     bare = replace(value, objects=tuple(o for o in value.objects if not isinstance(o.material, Diffuse)))
     assert looked_up(bare)["caustic maps"].how == "nothing diffuse receives light"

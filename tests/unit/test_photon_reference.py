@@ -233,11 +233,11 @@ def test_depth_counts_as_the_program_counts_it(busy: Scene) -> None:
 
 
 def test_touching_blocks_of_one_glass_are_one_block() -> None:
-    """No film of air between coincident faces: a beam along the axis of two halves loses only two surfaces."""
+    """No film of air between coincident faces: a beam along the axis of two passes loses only two surfaces."""
     light = Light("beam", "collimated", ONE, (0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=0.3)
     glass = Dielectric(constant_index(1.5))
-    halves = [place(primitives.box((1.0, 1.0, 0.5)), glass, (0.0, 0.0, z)) for z in (1.0, 1.5)]
-    balance = render_reference(scene_of(light, *halves, place(primitives.plane(4.0, 4.0), Diffuse())), 4, 4, photons=20_000).balance
+    measured_passes = [place(primitives.box((1.0, 1.0, 0.5)), glass, (0.0, 0.0, z)) for z in (1.0, 1.5)]
+    balance = render_reference(scene_of(light, *measured_passes, place(primitives.plane(4.0, 4.0), Diffuse())), 4, 4, photons=20_000).balance
     rest = 0.04
     assert balance["deposited"] / balance["emitted"] == pytest.approx((1 - rest) ** 2 / (1 - rest**2), rel=3e-3)
 

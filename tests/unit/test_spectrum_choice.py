@@ -1,14 +1,14 @@
-"""How the eye's pilot weighs bands against single wavelengths: made-up pictures whose noise and bias are known."""
+"""How the camera's pilot weighs bands against single wavelengths: made-up pictures whose noise and bias are known."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from spectrasplat.passes.spectrum_choice import (
-    LEAST_SAMPLES,
+    MIN_SAMPLES,
     SAMPLES_A_BAND,
     SINGLE_SPEED,
-    Look,
+    PilotRender,
     Spectrum,
     choosing_spectrum,
     difference,
@@ -24,19 +24,19 @@ class World:
 
     def __init__(self, chance: float = 0.02, detail: float = 0.1, single: float = 0.8, bias: float = 0.0) -> None:
         rng = np.random.default_rng(1)
-        self.truth = rng.uniform(0.5, 1.5, SHAPE)
+        self.reference = rng.uniform(0.5, 1.5, SHAPE)
         self.wrong = rng.normal(size=SHAPE)
         self.moved = rng.normal(size=SHAPE)
         self.chance, self.detail, self.single, self.bias = chance, detail, single, bias
-        self.looks: list[Look] = []
+        self.looks: list[PilotRender] = []
 
-    def picture(self, look: Look) -> np.ndarray:
+    def picture(self, look: PilotRender) -> np.ndarray:
         self.looks.append(look)
         rng = np.random.default_rng(100 + len(self.looks))
         noise = self.single if look.spectrum.single else self.chance / np.sqrt(look.spectrum.bands)
         bias = 0.0 if look.spectrum.single else self.bias / look.spectrum.bands
         detail = self.detail if look.place != 0.5 else 0.0
-        return self.truth * (1.0 + bias * self.wrong + detail * self.moved + noise * rng.normal(size=SHAPE))
+        return self.reference * (1.0 + bias * self.wrong + detail * self.moved + noise * rng.normal(size=SHAPE))
 
     def choice(self, samples: int, may_be_single: bool = True) -> Spectrum:
         looks = choosing_spectrum(samples, may_be_single)
@@ -50,10 +50,10 @@ class World:
 
 def test_few_samples_ask_for_nothing() -> None:
     world = World(bias=1.0)
-    assert world.choice(LEAST_SAMPLES - 1) == Spectrum() and not world.looks
+    assert world.choice(MIN_SAMPLES - 1) == Spectrum() and not world.looks
 
 
-@pytest.mark.parametrize("samples", [LEAST_SAMPLES, 64, 1024])
+@pytest.mark.parametrize("samples", [MIN_SAMPLES, 64, 1024])
 @pytest.mark.parametrize("chance", [0.01, 0.3])
 def test_chance_alone_is_no_reason_for_bands(samples: int, chance: float) -> None:
     """Pictures of one and of two bands differ by their chance, however large it is."""
@@ -84,13 +84,13 @@ def test_single_wavelengths_are_not_even_looked_at_without_bias() -> None:
 
 def test_bias_is_found_without_its_noise() -> None:
     rng = np.random.default_rng(3)
-    truth = rng.uniform(0.5, 1.5, SHAPE)
+    reference = rng.uniform(0.5, 1.5, SHAPE)
 
     def noisy(base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return base + 0.3 * rng.normal(size=SHAPE), base + 0.3 * rng.normal(size=SHAPE)
 
-    assert sure_bias(noisy(truth), noisy(truth)) < 1e-3 < 0.1 < difference(*noisy(truth))
-    biased = sure_bias(noisy(truth), noisy(1.4 * truth))
+    assert sure_bias(noisy(reference), noisy(reference)) < 1e-3 < 0.1 < difference(*noisy(reference))
+    biased = sure_bias(noisy(reference), noisy(1.4 * reference))
     assert 0.7 * biased < 0.4**2 / 1.2**2 < 1.6 * biased
 
 

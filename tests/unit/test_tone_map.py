@@ -111,7 +111,7 @@ class TestAutoExposure:
     def test_plain_paper_becomes_middle_grey(self):
         assert 0.5 * 2 ** auto_exposure(np.full((8, 8, 3), 0.5)) == pytest.approx(0.18, rel=1e-4)
 
-    def test_black_surroundings_and_fireflies_change_nothing(self):
+    def test_black_environment_and_fireflies_change_nothing(self):
         rgb = np.zeros((100, 100, 3))
         rgb[40:60, 40:60] = np.random.default_rng(2).uniform(0.5, 1.5, (20, 20, 1))
         alone = auto_exposure(rgb[40:60, 40:60])

@@ -95,8 +95,8 @@ def test_modifiers_and_radius() -> None:
     assert brushes.mode_held(replace(BRUSH, mode="narrow"), False, True).mode == "widen"
     assert brushes.mode_held(BRUSH, False, False) == BRUSH
     assert brushes.resized(BRUSH, 2.0, 10.0).radius == pytest.approx(BRUSH.radius * brushes.RADIUS_STEP**2)
-    assert brushes.resized(BRUSH, 1000.0, 10.0).radius == pytest.approx(10.0 * brushes.MOST_RADIUS)
-    assert brushes.resized(BRUSH, -1000.0, 10.0).radius == pytest.approx(10.0 * brushes.LEAST_RADIUS)
+    assert brushes.resized(BRUSH, 1000.0, 10.0).radius == pytest.approx(10.0 * brushes.MAX_RADIUS)
+    assert brushes.resized(BRUSH, -1000.0, 10.0).radius == pytest.approx(10.0 * brushes.MIN_RADIUS)
 
 
 def test_only_receivers_take_paint() -> None:

@@ -4,37 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from spectrasplat.edit.chromaticity import colour_facts
+from spectrasplat.edit.chromaticity import colour_info
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM, illuminant_table
 
 
 @pytest.mark.parametrize("wavelength", [450.0, 486.0, 520.0, 589.0, 640.0])
 def test_a_line_is_its_own_dominant_wavelength(wavelength: float) -> None:
-    facts = colour_facts(VISIBLE_NM, np.where(VISIBLE_NM == wavelength, 1.0, 0.0))
-    assert facts is not None and facts.dominant_nm == pytest.approx(wavelength, abs=0.6)
-    assert facts.purity == pytest.approx(1.0, abs=0.01)
-    assert not facts.is_complementary
+    view_model = colour_info(VISIBLE_NM, np.where(VISIBLE_NM == wavelength, 1.0, 0.0))
+    assert view_model is not None and view_model.dominant_nm == pytest.approx(wavelength, abs=0.6)
+    assert view_model.purity == pytest.approx(1.0, abs=0.01)
+    assert not view_model.is_complementary
 
 
 def test_daylight_is_white() -> None:
-    facts = colour_facts(VISIBLE_NM, illuminant_table()["D65"])
-    assert facts is not None and facts.dominant_nm is None
+    view_model = colour_info(VISIBLE_NM, illuminant_table()["D65"])
+    assert view_model is not None and view_model.dominant_nm is None
     # CIE 15: chromaticity of D65 for the 2° observer.
-    assert (facts.x, facts.y) == pytest.approx((0.3127, 0.3290), abs=2e-4)
+    assert (view_model.x, view_model.y) == pytest.approx((0.3127, 0.3290), abs=2e-4)
 
 
 def test_red_and_violet_together_are_purple() -> None:
-    facts = colour_facts(VISIBLE_NM, np.where((VISIBLE_NM == 440.0) | (VISIBLE_NM == 640.0), 1.0, 0.0))
-    assert facts is not None and facts.is_complementary and facts.dominant_nm is not None
-    assert 495 < facts.dominant_nm < 575
-    assert 0.5 < facts.purity <= 1.0
+    view_model = colour_info(VISIBLE_NM, np.where((VISIBLE_NM == 440.0) | (VISIBLE_NM == 640.0), 1.0, 0.0))
+    assert view_model is not None and view_model.is_complementary and view_model.dominant_nm is not None
+    assert 495 < view_model.dominant_nm < 575
+    assert 0.5 < view_model.purity <= 1.0
 
 
 def test_illuminance_of_green_laser_light() -> None:
     # 1 W at 555 nm is 683 lm (within the table's rounding).
-    facts = colour_facts(VISIBLE_NM, np.where(VISIBLE_NM == 555.0, 1.0, 0.0))
-    assert facts is not None and facts.illuminance == pytest.approx(683.0, abs=0.5)
+    view_model = colour_info(VISIBLE_NM, np.where(VISIBLE_NM == 555.0, 1.0, 0.0))
+    assert view_model is not None and view_model.illuminance == pytest.approx(683.0, abs=0.5)
 
 
 def test_darkness_has_no_colour() -> None:
-    assert colour_facts(VISIBLE_NM, np.zeros(401)) is None
+    assert colour_info(VISIBLE_NM, np.zeros(401)) is None

@@ -11,7 +11,7 @@ from spectrasplat.edit import requests
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.ui.crash_log import FILE_NAME, MAX_BYTES, write_crash
 from spectrasplat.ui.message_box import MAX_MESSAGES, NOTICE_S, MessageBox
-from spectrasplat.ui.pace import GPU_SHARE, LEAST_SHARE, SOFTWARE_FRAME_S, Pace
+from spectrasplat.ui.pace import GPU_SHARE, MIN_SHARE, SOFTWARE_FRAME_S, Pace
 from spectrasplat.ui.sentences import brief, sentence, words
 from spectrasplat.ui.shown_scene import has_same_objects, index_in
 
@@ -32,7 +32,7 @@ def test_the_engine_gets_what_the_rest_of_a_frame_leaves() -> None:
     assert pace.budget_s == pytest.approx(SOFTWARE_FRAME_S - 0.015)
     for _ in range(100):
         pace.note(3.0)  # however slow the interface is, the light goes on
-    assert pace.budget_s == pytest.approx(LEAST_SHARE * SOFTWARE_FRAME_S)
+    assert pace.budget_s == pytest.approx(MIN_SHARE * SOFTWARE_FRAME_S)
 
 
 def test_a_gpu_keeps_to_the_screen() -> None:

@@ -1,4 +1,4 @@
-"""Presets: every one applies, says the truth about itself, and users' own come back."""
+"""Presets: every one applies, says the reference about itself, and users' own come back."""
 
 from __future__ import annotations
 

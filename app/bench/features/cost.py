@@ -19,7 +19,7 @@ from ... import __version__
 from ...base.errors import UserError
 from ...model.features import Features, explain
 from ...model.settings import RenderSettings
-from ...render.light_pass import LightHalf, spectral_axis
+from ...render.light_pass import LightPass, spectral_axis
 from .rig import Rig, Work, map_difference
 from .static_costs import RecordSizes, static_costs
 from .symbol_proof import compiled_sources, program_texts, prove
@@ -169,17 +169,17 @@ def _prove(report: FeatureReport, context: Context, scene: Scene, settings: Rend
     report.proof = [Absence(p.feature, p.included, p.symbols, p.programs, p.holds) for p in prove(texts, included)]
 
 
-def _begun(context: Context, scene: Scene, settings: RenderSettings, features: Features) -> LightHalf:
+def _begun(context: Context, scene: Scene, settings: RenderSettings, features: Features) -> LightPass:
     from ...gpu.scene_buffers import SceneBuffers
 
     buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
-    light = LightHalf(context, scene, settings, features, buffers)
+    light = LightPass(context, scene, settings, features, buffers)
     light.prepare()
     light.begin(scene.render.photons, settings.seed)
     return light
 
 
-def _calibrated(report: FeatureReport, light: LightHalf, seconds: float, context: Context) -> Work:
+def _calibrated(report: FeatureReport, light: LightPass, seconds: float, context: Context) -> Work:
     """Work of about `seconds` for the scene as it is; its costs go to the report."""
     whole = light.scene.render.photons
     photons, work = _PHOTONS[0], Work.of(light, whole, _PHOTONS[0])

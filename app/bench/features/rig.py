@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...gpu.map_channels import MapChannels, hats
+from ...gpu.map_channels import MapChannels, tents
 from ...gpu.scene_buffers import SceneBuffers
 from ...gpu.splat_tables import SplatTables
 from ...passes.footprint import SpectralVariables
@@ -25,7 +25,7 @@ from .variants import Variant
 if TYPE_CHECKING:
     from ...gpu.context import Context
     from ...passes.emission_domain import EmissionDomain
-    from ...render.light_pass import LightHalf
+    from ...render.light_pass import LightPass
 
 _SEED = 1
 
@@ -34,12 +34,12 @@ _SEED = 1
 class Work:
     """What a rig does in one run."""
 
-    light: LightHalf
+    light: LightPass
     """Begun: its plans, maps and tables are shared."""
     slices: tuple[tuple[LatticeSlice, EmissionDomain], ...]
 
     @staticmethod
-    def of(light: LightHalf, whole: int, photons: int) -> Work:
+    def of(light: LightPass, whole: int, photons: int) -> Work:
         """About `photons` points, evenly taken from lattices of `whole` points, so that footprints have their usual size."""
         slices = []
         for plan in light.plans:
@@ -81,7 +81,7 @@ class Rig:
         self._variables = SpectralVariables.build(ctx, self._buffers.variables)
         spans = {plan.index: [(band.x_lo, band.x_hi) for band in plan.bands] for plan in light.plans}
         edges = None if variant.bins is None else tuple(np.linspace(380.0, 780.0, variant.bins + 1).tolist())
-        channels = hats(light.buffers.axis, variant.features.map_hats) if edges is None and variant.features.map_hats else MapChannels(edges)
+        channels = tents(light.buffers.axis, variant.features.map_tents) if edges is None and variant.features.map_tents else MapChannels(edges)
         spectra = [lamp.spectral_power for lamp in scene.lights]
         self._tables = SplatTables.build(
             ctx, light.buffers.axis, spectra, light.reflectances, [spans.get(i, [(0.0, 1.0)]) for i in range(len(spectra))], channels

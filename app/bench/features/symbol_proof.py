@@ -38,13 +38,13 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "nested windows": ("only_fine", "outer"),
     "local gain": ("gain_boxes", "local_gain"),
     "photons by index": ("traced_bands", "v_path"),
-    "eye refraction": ("meet_surface", "reflect_path", "Facing", "waiting", "waits", "listed"),
-    "eye spectral taps": (r"narrow\(path, pixel_key\)", "taps_of", "cut_of"),
+    "camera refraction": ("meet_surface", "reflect_path", "ShadingFrame", "waiting", "waits", "listed"),
+    "camera spectral taps": (r"narrow\(path, pixel_key\)", "taps_of", "cut_of"),
     "spectral maps": ("BIN_ROW", "BIN_SPECTRUM_ROW", "BIN_TARGET"),
     "spectral bins": ("define TARGETS [2-9]", "define TARGETS 1[0-9]"),
 }
-"""By `explain`'s names. Names that only this feature uses; one with a space is a pattern for a line, where the eye, whose rays always carry
-a pixel's columns and weights over a band, uses a name that in the light half belongs to a feature."""
+"""By `explain`'s names. Names that only this feature uses; one with a space is a pattern for a line, where the camera, whose rays always carry
+a pixel's columns and weights over a band, uses a name that in the light pass belongs to a feature."""
 _PHOTONS = 4096
 
 

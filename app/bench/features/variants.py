@@ -18,7 +18,7 @@ from ...model.scene import Absorption, Dielectric, Mirror, Scene, SceneObject
 
 FORCED_BINS = 16
 """Spectral bins that a scene without any is made to pay for."""
-MOST_LOOPED_TRIANGLES = 512
+MAX_LOOPED_TRIANGLES = 512
 """A loop over more is not tried: it would take minutes to say what everybody knows."""
 
 
@@ -50,7 +50,7 @@ class Trial:
     """Both splat photons of like footprints, so that the splat's times say something about the feature."""
 
 
-_EYE = ("eye refraction", "eye spectral taps", "textures", "environment map")
+_CAMERA = ("camera refraction", "camera spectral taps", "textures", "environment map")
 DISPERSION = "dispersion in all"
 """Columns, weights and cuts together: what a scene without dispersion does not pay."""
 
@@ -107,7 +107,7 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             return asked, Variant(scene, replace(base, medium_stack=False)), "without it nested solids refract wrongly"
         case "triangle tree":
             loose = sum(len(o.mesh.triangles) for o in scene.objects if not is_convex_solid(o))
-            if loose > MOST_LOOPED_TRIANGLES:
+            if loose > MAX_LOOPED_TRIANGLES:
                 return None, None, f"cannot be left out here: a loop would test {loose:,} triangles for every ray"
             return asked, Variant(scene, replace(base, tree=False)), "against a loop"
         case "half-space solids":
@@ -122,12 +122,12 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
         case "interpolated normals" | "charts":
             return None, None, "cannot be left out here: light would land elsewhere"
         case "spectral maps":
-            return asked, Variant(scene, replace(base, targets=1, map_hats=0)), "against XYZ alone"
-        case "spectral bins" if base.map_hats:
+            return asked, Variant(scene, replace(base, targets=1, map_tents=0)), "against XYZ alone"
+        case "spectral bins" if base.map_tents:
             return None, None, "these are the spectral maps' channels"
         case "spectral bins":
             return asked, Variant(scene, replace(base, targets=1)), "against XYZ"
-        case _ if name in _EYE:
+        case _ if name in _CAMERA:
             return None, None, "part of the picture; here only the map is drawn"
         case _:
             return None, None, "has no code of its own"
@@ -171,7 +171,7 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
             return None, None, "cannot be forced in: light would be drawn another way"
         case "spectral maps":
             return None, None, "cannot be forced in: the channels are those of glass that the camera sees"
-        case _ if name in _EYE:
+        case _ if name in _CAMERA:
             return None, None, "part of the picture; here only the map is drawn"
         case "half-space solids" | "absorption" | "medium stack" | "triangle tree":
             return None, None, "nothing in the scene to put it to"
@@ -187,7 +187,7 @@ def _specular(scene: Scene) -> list[SceneObject]:
 
 
 def _with_normals(scene: Scene) -> Scene:
-    """Every specular facet with its own normal at all three corners: smooth in name, flat in truth."""
+    """Every specular facet with its own normal at all three corners: smooth in name, flat in reference."""
 
     def smoothed(item: SceneObject) -> SceneObject:
         if not isinstance(item.material, Dielectric | Mirror) or item.mesh.corner_normals is not None or is_convex_solid(item):

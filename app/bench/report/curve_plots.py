@@ -55,7 +55,7 @@ def scene_series(scene: SceneResult, abscissa: str) -> list[Series]:
 
 
 def error_against(scene: SceneResult, abscissa: str) -> Figure:
-    """relMSE of all methods over "seconds" (photon or eye time) or "photons" (or samples); bands over seeds, dotted the reference's own error."""
+    """relMSE of all methods over "seconds" (photon or camera time) or "photons" (or samples); bands over seeds, dotted the reference's own error."""
     figure = style.new_figure(6.6, 4.5)
     axes = figure.add_axes((0.105, 0.125, 0.70, 0.735))
     drawn = scene_series(scene, abscissa)
@@ -85,12 +85,12 @@ def set_limits(axes: Axes, groups: Sequence[Sequence[Series]], own_errors: Seque
     everything = [one for group in groups for one in group]
     x = np.concatenate([one.x for one in everything])
     means, spans = np.concatenate([one.mean for one in everything]), np.concatenate([np.append(one.low, one.high) for one in everything])
-    least_mean = float(np.min(means, where=means > 0, initial=np.inf))
-    if math.isinf(least_mean):
-        least_mean = 1e-3
+    min_mean = float(np.min(means, where=means > 0, initial=np.inf))
+    if math.isinf(min_mean):
+        min_mean = 1e-3
     # Neither a single lucky seed nor a very good reference may stretch the axis over empty decades.
-    kept = [*spans[spans > least_mean / 10], *(own for own in own_errors if least_mean / 300 < own < math.inf)]
-    least, largest = min([least_mean, *kept]), max([least_mean * 3, *means, *kept])
+    kept = [*spans[spans > min_mean / 10], *(own for own in own_errors if min_mean / 300 < own < math.inf)]
+    least, largest = min([min_mean, *kept]), max([min_mean * 3, *means, *kept])
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlim(float(x.min()) / 1.25, float(x.max()) * 1.12)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..measured_passes import HALVES, Half
+from ..measured_passes import HALVES, MeasuredPass
 from ..results import Curve, Sample, SceneResult
 from . import style as style
 from .curve_plots import Series, axis_name, scene_series, set_limits
@@ -116,7 +116,7 @@ def time_by_stage(scene: SceneResult) -> Figure | None:
     return figure
 
 
-def _draw_bar(axes: Axes, place: int, samples: list[Sample], stages: dict[str, float], longest: float, half: Half) -> None:
+def _draw_bar(axes: Axes, place: int, samples: list[Sample], stages: dict[str, float], longest: float, half: MeasuredPass) -> None:
     photons, total = samples[0].photons, sum(stages.values())
     start = 0.0
     for stage in half.stages:

@@ -71,7 +71,7 @@ _LIGHT_NOT_COVERED = {
     "one scene setting": "Each scene was measured at one picture size and one camera; a finer picture shows the bias of footprints sooner.",
 }
 
-_EYE_METHODS = {
+_CAMERA_METHODS = {
     "srd": "The default. Each camera ray carries spectral ray differentials by refractive index, one column for each dispersive glass, and looks "
     "up what lies along its spectrum with filtered taps. A band is cut where its colours part; as many bands, or single wavelengths, as a pilot of the picture asks for.",
     "srd-lambda": "The method as published (Elek et al. 2014): one column by wavelength, the whole spectrum from one anchor.",
@@ -81,35 +81,35 @@ _EYE_METHODS = {
     "regular-16": "Sixteen fixed wavelengths, taken in turn.",
 }
 
-_EYE_METRICS = _METRICS | {
+_CAMERA_METRICS = _METRICS | {
     "tail slope": "exponent of relMSE against camera samples over the curve's second half, with its 95 % confidence interval. "
     "Pure noise of independent samples gives −1; a bias floor bends it towards 0.",
 }
 
-_EYE_STAGES = {
+_CAMERA_STAGES = {
     "bands": "finding out into how many bands the spectrum must be cut for so many samples (srd alone)",
     "looks": "tracing camera rays and looking up what they see",
 }
 
-_EYE_PROTOCOL = (
+_CAMERA_PROTOCOL = (
     "One process and one OpenGL context; all methods look up the same caustic maps and use the same seeds. They differ in how camera "
     "rays sample the spectrum alone, so a difference between curves is a difference between methods.",
     "Every point is an independent rendering from nothing with one number of camera samples a pixel; numbers rise in equal ratios, as far as "
     "a picture is whole only after a multiple of its bands. Methods take turns within a seed, so that disturbances of the machine reach all alike.",
-    "Eye time is bands + looks. Not in it: set-up of the scene (tree, uploads, compilation) and the caustic maps, which are made once for all methods.",
+    "Camera time is bands + looks. Not in it: set-up of the scene (tree, uploads, compilation) and the caustic maps, which are made once for all methods.",
     "Places within a pixel are a lattice that is the same for every seed and method: what is left of it by few samples counts as bias² of all.",
     "Errors are taken on linear XYZ of all that the camera sees, before tone mapping and gamut clipping, against a reference that shares no code with the "
     "shaders: float64 camera paths of one random wavelength each, no column, no caustic map.",
 )
 
-_EYE_NOT_COVERED = {
+_CAMERA_NOT_COVERED = {
     "other machines": "Times hold for the machine above. Ratios move where looking up and tracing differ in speed, as between a CPU and a GPU.",
-    "the caustic maps": "Their cost and their error are those of the light half, which has a bench of its own; here their error is common to all methods.",
+    "the caustic maps": "Their cost and their error are those of the light pass, which has a bench of its own; here their error is common to all methods.",
     "the reference's caustic": "Its noise is not part of the reference's own error, but told beside it.",
     "one scene setting": "Each scene was measured at one picture size and one camera; a finer picture, or a camera nearer to the glass, asks for more bands.",
 }
 
 PROSE = {
     "light": Prose(_LIGHT_METHODS, _METRICS, _LIGHT_STAGES, _LIGHT_PROTOCOL, _LIGHT_NOT_COVERED),
-    "eye": Prose(_EYE_METHODS, _EYE_METRICS, _EYE_STAGES, _EYE_PROTOCOL, _EYE_NOT_COVERED),
+    "camera": Prose(_CAMERA_METHODS, _CAMERA_METRICS, _CAMERA_STAGES, _CAMERA_PROTOCOL, _CAMERA_NOT_COVERED),
 }

@@ -1,6 +1,6 @@
 """Writes what a bench run has found: plots as PNG and SVG, and one page that stands alone.
 
-    DIR/plots/SCENE_error_time.png .svg    DIR/plots/SCENE_error_photons.png .svg (the eye half: _samples)
+    DIR/plots/SCENE_error_time.png .svg    DIR/plots/SCENE_error_photons.png .svg (the camera pass: _samples)
     DIR/plots/overview.png .svg            DIR/plots/scenes.png .svg (the README's figure)
     DIR/report.html
 

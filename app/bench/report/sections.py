@@ -16,7 +16,7 @@ _KNOWN_AS = {"opengl": "OpenGL"}
 
 def header(result: BenchResult) -> Html:
     """Title, findings in a few sentences, machine, and the command that repeats the run."""
-    facts = {
+    view_model = {
         "version": f"SpectraSplat {result.version}",
         "date": result.date,
         **{_KNOWN_AS.get(key, key): value for key, value in result.machine.items()},
@@ -27,7 +27,7 @@ def header(result: BenchResult) -> Html:
         element("p", f"SpectraSplat bench: the {result.settings.half} half", cls="muted"),
         element("h1", "Error against run time"),
         [element("p", sentence, cls="lead") for sentence in text.headline(result)],
-        element("dl", [element("div", element("dt", key), element("dd", value)) for key, value in facts.items()], cls="facts"),
+        element("dl", [element("div", element("dt", key), element("dd", value)) for key, value in view_model.items()], cls="facts"),
         element("p", "The command that repeats it:"),
         element("pre", element("code", result.command)),
     )

@@ -15,7 +15,7 @@ from .mesh import Mesh
 from .mesh_health import connected_roots, weld_map
 
 _SMOOTHING_ROUNDS = 8
-_LEAST_COSINE = 0.57
+_MIN_COSINE = 0.57
 """A triangle joins its neighbours' chart only while it is tilted against it by less than 55°."""
 
 
@@ -85,7 +85,7 @@ def _by_projection(mesh: Mesh) -> Layout:
             around[:, 0],
             np.where(around[:, 1] == around[:, 2], around[:, 1], -1),
         )
-        change = (agreed >= 0) & (agreed != label) & (cosines[triangle, agreed] > _LEAST_COSINE)
+        change = (agreed >= 0) & (agreed != label) & (cosines[triangle, agreed] > _MIN_COSINE)
         if not change.any():
             break
         label = np.where(change, agreed, label)

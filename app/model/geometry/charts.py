@@ -82,9 +82,9 @@ class ChartAtlas:
         return destinations, offsets, self.gutter_texel_xy[kept][order]
 
     def fill(self, folded: np.ndarray) -> np.ndarray:
-        """Copy energies back into the gutters after `fold`, so that interpolated look-ups see no seam.
+        """Copy energies back into the gutters after `fold`, so that interpolated lookups see no seam.
 
-        For look-ups only: the sum of the picture is no longer the energy.
+        For lookups only: the sum of the picture is no longer the energy.
         """
         filled = np.array(folded, dtype=np.float64)
         kept = self.destination_xy[:, 0] >= 0

@@ -27,7 +27,7 @@ from ..scene import (
     Scene,
     SceneObject,
 )
-from ..scene_defaults import default_camera, default_light, default_table, surroundings_of
+from ..scene_defaults import default_camera, default_light, default_table, environment_of
 from ..scene_lights import Surroundings, read_light
 from .gltf_document import GltfDocument, open_document
 from .gltf_extras import read_node_dabs, read_scene_extras
@@ -103,7 +103,7 @@ class _Reader:
         if self.document.items("animations") or self.document.items("skins"):
             self.notes.append("Animations and skins are not played (they are kept when saving).")
         upright = [replace(o, object_to_world=Y_UP_TO_Z_UP @ o.object_to_world) for o in self.objects]
-        around = surroundings_of(upright)
+        around = environment_of(upright)
         background, environment, render = read_scene_extras(self.document, self.notes)
         receives = any(isinstance(o.material, Diffuse) for o in self.objects)
         # An environment shows glass and mirrors without a light and without anything it falls on.

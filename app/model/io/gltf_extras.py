@@ -12,7 +12,7 @@ from typing import Any
 from ..scene import Dab, Material, RenderDefaults, Scene, Vec3
 from ..scene_dabs import KEY, describe_dabs, read_dabs
 from ..scene_environment import KEY as ENVIRONMENT
-from ..scene_environment import environment_values, read_surroundings
+from ..scene_environment import environment_values, read_environment
 from ..scene_render import read_render
 from ..texture import Environment
 from .gltf_document import GltfDocument
@@ -44,7 +44,7 @@ def read_scene_extras(document: GltfDocument, notes: list[str]) -> tuple[Vec3, E
     """Background, environment and render defaults; those of an empty scene file where there are none."""
     values = _own(document.json).get(_SCENE, {})
     table = SceneTable(values if isinstance(values, dict) else {}, document.path, f"extras.{EXTRAS}.{_SCENE}")
-    background, environment = read_surroundings(table, notes)
+    background, environment = read_environment(table, notes)
     return background, environment, read_render(table.table("render"))
 
 

@@ -81,7 +81,7 @@ def _resolution(data: bytes, start: int, where: str) -> tuple[int, int, int]:
 def _radiance(rgbe: np.ndarray) -> np.ndarray:
     """Mantissa · 2^(exponent − 136), and black for exponent 0; float32 holds every value of the format exactly."""
     exponent = rgbe[..., 3:].astype(np.int32)
-    # In two halves: 2^-135 alone would be below float32's normal numbers.
+    # In two passes: 2^-135 alone would be below float32's normal numbers.
     scale = np.ldexp(np.float32(1.0), exponent - 128)
     scale[exponent == 0] = 0.0
     return rgbe[..., :3].astype(np.float32) / np.float32(256.0) * scale

@@ -24,8 +24,8 @@ from ..scene import (
 )
 from ..scene_camera import read_camera
 from ..scene_checks import check_scene
-from ..scene_defaults import default_camera, default_light, default_table, surroundings_of
-from ..scene_environment import read_surroundings
+from ..scene_defaults import default_camera, default_light, default_table, environment_of
+from ..scene_environment import read_environment
 from ..scene_lights import Surroundings, read_light
 from ..scene_materials import DEFAULT_GLASS, read_materials
 from ..scene_objects import MESH_SUFFIXES, ObjectReader, load_checked_mesh
@@ -80,7 +80,7 @@ def _scene_from_table(table: SceneTable) -> Scene:
     name = table.string("name", table.file.stem)
     table.string("units", "units")  # a label for people; every length is in it
     notes: list[str] = []
-    background, environment = read_surroundings(table, notes)
+    background, environment = read_environment(table, notes)
     render = read_render(table.table("render"))
     textures = TextureReader()
     reader = ObjectReader(read_materials(table, textures), textures)
@@ -90,7 +90,7 @@ def _scene_from_table(table: SceneTable) -> Scene:
         table.finish("a scene")  # a misspelt [[object]] is the likelier mistake
         table.fail("objects", "is missing or empty; add at least one [[objects]]")
     notes += textures.notes + reader.notes
-    around = surroundings_of(objects)
+    around = environment_of(objects)
     lights = _read_lights(table, around, notes, dark_without=environment is None or _has_diffuse(objects))
     camera = _read_camera(table, around, notes)
     table.finish("a scene")
@@ -139,7 +139,7 @@ def _scene_around_mesh(path: Path) -> Scene:
     notes = [f"{path.name} is a bare mesh: it was made of {DEFAULT_GLASS}."]
     mesh = load_checked_mesh(path, None, notes)
     objects = [SceneObject(path.stem, mesh, Dielectric(catalogue.find(DEFAULT_GLASS)))]
-    camera = default_camera(surroundings_of(objects))
+    camera = default_camera(environment_of(objects))
     _add_table(objects, notes)
     notes.append("A white sun and a camera were added.")
     return Scene(path.stem, camera, (default_light(),), tuple(objects), notes=tuple(notes))

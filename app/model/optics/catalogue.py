@@ -3,7 +3,7 @@
 Baked by assets/glass/bake.py from the CC0 refractiveindex.info database. A name is looked
 up without regard to case, blanks and punctuation: "N-BK7", "nbk7" and "Schott N-BK7" are the
 same. Where several makers use a name, the first in `MAKER_ORDER` wins; write the maker before
-it, as in "hikari:F2", to choose. Nothing is read before the first look-up.
+it, as in "hikari:F2", to choose. Nothing is read before the first lookup.
 """
 
 from __future__ import annotations

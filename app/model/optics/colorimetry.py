@@ -1,7 +1,7 @@
 """From spectra to colours: observer, illuminant tables, RGB matrices, tinted absorption.
 
 Everything visible lies on `VISIBLE_NM`, 380 to 780 nm at 1 nm, and every integral over
-wavelength is the sum over its 401 values, as CIE 15 prescribes; light and eye thus agree
+wavelength is the sum over its 401 values, as CIE 15 prescribes; light and camera thus agree
 to the last digit. The tables are baked from CIE's by assets/spectra/bake.py.
 """
 

@@ -16,7 +16,7 @@ FINER = 4
 
 @dataclass
 class Accumulation:
-    """Where one light half stands in that order."""
+    """Where one light pass stands in that order."""
 
     light: LiveLight
     photons: int

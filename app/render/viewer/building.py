@@ -37,7 +37,7 @@ class Budget:
 
 @dataclass
 class Shown:
-    """A light half and how far it has come."""
+    """A light pass and how far it has come."""
 
     traced: LiveInputs
     light: LiveLight

@@ -20,9 +20,9 @@ from ...passes.camera import CausticMaps
 from ...passes.pick import Picker, PickHit
 from ..light_maps import LightMaps
 from .building import Budget, Shown, build
-from .inputs import LiveInputs, Redo
-from .invalidation import looks_other, redo
-from .live_camera import LiveEye, solo_scene
+from .inputs import LiveInputs, DirtyLevel
+from .invalidation import looks_other, dirty_level
+from .live_camera import LiveCamera, solo_scene
 from .live_light import LiveLight
 from .photon_queries import StoredPhotons, caustic_spectrum, reach_of, world_photons
 from .refit import is_judged, wants_new_maps
@@ -42,7 +42,7 @@ ANSWER_S = 0.03
 """What a coarse picture may take beyond a frame's budget."""
 LOOK_S = 0.02
 """What a coarse picture should take on a software renderer."""
-EYE_SHARE = 0.4
+CAMERA_SHARE = 0.4
 """Of a frame, where photons are traced as well."""
 
 
@@ -60,7 +60,7 @@ class LiveEngine:
         self.problem: str | None = None
         """Why the last change could not be shown (bad shader, maps too large); the picture before it stays."""
         shader.keep_programs(context.ctx)
-        self._eye = LiveEye(context)
+        self._camera_pass = LiveCamera(context)
         self._wanted: LiveInputs | None = None
         self._inputs: LiveInputs | None = None
         """What the picture shows."""
@@ -80,8 +80,8 @@ class LiveEngine:
         self._quick_photons = 1 << 13
         self._shows_quick_maps = False
         self._maps_wait = False
-        """Better maps are there, but the eye is within a cycle of bands."""
-        self._times = {"trace": 0.0, "splat": 0.0, "eye": 0.0}
+        """Better maps are there, but the camera is within a cycle of bands."""
+        self._times = {"trace": 0.0, "splat": 0.0, "camera": 0.0}
         self._history: list[tuple[float, int, float]] = []
         self._published_photons = 0.0
 
@@ -105,18 +105,18 @@ class LiveEngine:
 
     # ---- what is wanted ----------------------------------------------------------------------
 
-    def set(self, inputs: LiveInputs) -> Redo:
+    def set(self, inputs: LiveInputs) -> DirtyLevel:
         """Want `inputs` from now on; returns what that asks for. The work is done by `advance`."""
         before = self._wanted
-        if before is not None and redo(before, before, inputs) == Redo.NOTHING:
+        if before is not None and dirty_level(before, before, inputs) == DirtyLevel.NOTHING:
             self._wanted = inputs
-            return Redo.NOTHING
+            return DirtyLevel.NOTHING
         self._wanted = inputs
         self._changed_at = time.perf_counter()
         self._urgent = True
         if self._shown is None or self._inputs is None:
-            return Redo.BUILD
-        return redo(self._shown.traced, self._inputs, inputs)
+            return DirtyLevel.BUILD
+        return dirty_level(self._shown.traced, self._inputs, inputs)
 
     def retrace(self) -> None:
         """Trace with the glass that is shown, where the picture followed an edit to first order only."""
@@ -159,20 +159,20 @@ class LiveEngine:
 
     def _work(self, deadline: float, budget_s: float) -> None:
         if self._building is not None:
-            self._build(deadline - (EYE_SHARE * budget_s if self._maps is not None and self._eye.owes_picture else 0.0))
+            self._build(deadline - (CAMERA_SHARE * budget_s if self._maps is not None and self._camera_pass.owes_picture else 0.0))
         elif self._has_work and not self._answering:
-            eye_waits = not self._eye.is_done
-            self._run_job(deadline - (EYE_SHARE * budget_s if eye_waits else 0.0))
+            camera_waits = not self._camera_pass.is_done
+            self._run_job(deadline - (CAMERA_SHARE * budget_s if camera_waits else 0.0))
         if self._maps is not None and self._inputs is not None:
             # A coarse picture that is owed is finished in this frame: what was moved must be seen to move.
-            owed = ANSWER_S if self._eye.is_coarse else 0.25 * budget_s
-            end = max(deadline, time.perf_counter() + owed) if self._eye.owes_picture else deadline
-            self._times["eye"] += self._eye.advance(end, one_sample=self._interacting)
-            if self._last_maps_wait and not self._eye.is_within_cycle:
+            owed = ANSWER_S if self._camera_pass.is_coarse else 0.25 * budget_s
+            end = max(deadline, time.perf_counter() + owed) if self._camera_pass.owes_picture else deadline
+            self._times["camera"] += self._camera_pass.advance(end, one_sample=self._interacting)
+            if self._last_maps_wait and not self._camera_pass.is_within_cycle:
                 self._publish_maps()
             calm = not self._interacting and time.perf_counter() - self._changed_at > CALM_S
-            if calm and self._eye.is_coarse and not self._eye.owes_picture:
-                self._restart_eye(same_view=True)
+            if calm and self._camera_pass.is_coarse and not self._camera_pass.owes_picture:
+                self._restart_camera(same_view=True)
 
     @property
     def _has_work(self) -> bool:
@@ -181,12 +181,12 @@ class LiveEngine:
     @property
     def _answering(self) -> bool:
         """A drag gets the whole budget: what its next step throws away is not begun."""
-        return self._interacting and (self._eye.owes_picture or self._shows_quick_maps)
+        return self._interacting and (self._camera_pass.owes_picture or self._shows_quick_maps)
 
     @property
     def _finishes_answer(self) -> bool:
         """Where not even the smallest picture fits a frame, one that has begun is finished first: else nothing would be seen to move."""
-        return self._interacting and self._eye.is_coarse and self._eye.owes_picture
+        return self._interacting and self._camera_pass.is_coarse and self._camera_pass.owes_picture
 
     def _follow(self, budget_s: float) -> None:
         """Bring what is shown nearer to what is wanted."""
@@ -210,9 +210,9 @@ class LiveEngine:
             return
         if self._urgent:
             self._urgent = False
-            self._answer(redo(shown.traced, self._inputs, wanted), budget_s)
+            self._answer(dirty_level(shown.traced, self._inputs, wanted), budget_s)
         elif self._building is None and self._fits_badly(shown.light, wanted, still):
-            self._eye.pause()
+            self._camera_pass.pause()
             self._maps = None
             shown.light.fit_to(wanted)
             self._show_again(shown)
@@ -226,18 +226,18 @@ class LiveEngine:
         """Whether maps should be laid out anew: they are only a first answer, or the camera has come near."""
         return (light.is_coarse and not self._interacting) or (still and wants_new_maps(light, wanted))
 
-    def _answer(self, cost: Redo, budget_s: float) -> None:
+    def _answer(self, cost: DirtyLevel, budget_s: float) -> None:
         wanted, shown = self._wanted, self._shown
         assert wanted is not None and shown is not None and self._inputs is not None
-        if cost >= Redo.TRACE:
+        if cost >= DirtyLevel.TRACE:
             # A build that runs is finished first and shown; then the newest wish is looked at again.
             if self._building is None:
                 self.problem = None
                 self._start_building(wanted)
             else:
                 self._urgent = wanted is not self._being_built
-            cost = Redo.LOOK if self._only_camera_besides(wanted) else Redo.NOTHING
-        if cost == Redo.SPLAT:
+            cost = DirtyLevel.LOOK if self._only_camera_besides(wanted) else DirtyLevel.NOTHING
+        if cost == DirtyLevel.SPLAT:
             shown.light.show(wanted)
             shown_before, self._inputs = self._inputs, wanted
             if looks_other(shown_before, wanted):
@@ -245,7 +245,7 @@ class LiveEngine:
             self._answer_quickly(0.4 * budget_s)
             self._show_again(shown)
             return
-        elif cost == Redo.LOOK:
+        elif cost == DirtyLevel.LOOK:
             if self._building is None:
                 if wanted.scene is not self._inputs.scene:
                     self._look_at(wanted, shown.light)
@@ -254,7 +254,7 @@ class LiveEngine:
                 self._inputs = replace(self._inputs, camera=wanted.camera, width=wanted.width, height=wanted.height)
         else:
             return
-        self._restart_eye(same_view=False)
+        self._restart_camera(same_view=False)
 
     def _answer_quickly(self, seconds: float) -> None:
         """As many stored photons as can be splatted in about `seconds`, in coarse maps of their own, as the picture for now."""
@@ -267,20 +267,20 @@ class LiveEngine:
         self._shows_quick_maps = True
         took = time.perf_counter() - started
         self._quick_photons = int(np.clip(self._quick_photons * np.clip(seconds / max(took, 1e-4), 0.5, 2.0), 1 << 12, 1 << 24))
-        self._restart_eye(same_view=False)
+        self._restart_camera(same_view=False)
 
     def _only_camera_besides(self, wanted: LiveInputs) -> bool:
         assert self._inputs is not None
         return wanted.camera != self._inputs.camera or (wanted.width, wanted.height) != (self._inputs.width, self._inputs.height)
 
-    def _restart_eye(self, *, same_view: bool, finer_maps: bool = False) -> None:
+    def _restart_camera(self, *, same_view: bool, finer_maps: bool = False) -> None:
         if self._maps is None or self._inputs is None:
             return
         # One coarse answer now; `advance` asks again in full size when things are still. Where photons are splatted again, they want time too.
         software = LOOK_S if not self._shows_quick_maps else 0.6 * LOOK_S
         seconds = None if same_view else software if self.context.is_software else 0.004
         view = self._inputs.camera, self._inputs.width, self._inputs.height
-        self._eye.restart(*view, self._maps, seconds=seconds, same_view=same_view, finer_maps=finer_maps)
+        self._camera_pass.restart(*view, self._maps, seconds=seconds, same_view=same_view, finer_maps=finer_maps)
 
     # ---- building ----------------------------------------------------------------------------
 
@@ -302,7 +302,7 @@ class LiveEngine:
                 return
 
     def _swap(self, built: Shown) -> None:
-        # What does not compile (or fit) leaves everything as it was: the programs of the eye come first.
+        # What does not compile (or fit) leaves everything as it was: the programs of the camera come first.
         picker = None
         try:
             picker = Picker(self.context, built.light.buffers)
@@ -327,7 +327,7 @@ class LiveEngine:
 
     def _look_at(self, inputs: LiveInputs, light: LiveLight) -> None:
         scene = replace(solo_scene(inputs.scene, inputs.solo_nm), camera=inputs.camera)
-        self._eye.look_at(light.buffers, scene, light.reflectances, light.map_channels)
+        self._camera_pass.look_at(light.buffers, scene, light.reflectances, light.map_channels)
 
     # ---- light -------------------------------------------------------------------------------
 
@@ -352,17 +352,17 @@ class LiveEngine:
         self._history.append((time.perf_counter(), max(stats.photons - before[2], 0), traced + splatted))
 
     def _publish_maps(self) -> None:
-        """The maps as they are become what the eye looks at; more photons of the same kind wait until it has seen every band of the spectrum."""
+        """The maps as they are become what the camera looks at; more photons of the same kind wait until it has seen every band of the spectrum."""
         assert self._shown is not None
         maps, number = self._shown.light.maps, self._shown.accumulation.number
         assert maps is not None
         splatted_anew = self._shows_quick_maps or self._repair is not None
-        self._maps_wait = number > 1 and not splatted_anew and not self._interacting and self._eye.is_within_cycle
+        self._maps_wait = number > 1 and not splatted_anew and not self._interacting and self._camera_pass.is_within_cycle
         if self._maps_wait:
             return
         self._set_maps(maps)
         self._shows_quick_maps = False
-        self._restart_eye(same_view=not self._interacting and self._eye.scale == 1.0, finer_maps=number <= 1 or splatted_anew)
+        self._restart_camera(same_view=not self._interacting and self._camera_pass.scale == 1.0, finer_maps=number <= 1 or splatted_anew)
 
     @property
     def _last_maps_wait(self) -> bool:
@@ -371,7 +371,7 @@ class LiveEngine:
 
     def _set_maps(self, maps: LightMaps) -> None:
         assert self._shown is not None
-        self._maps = CausticMaps(self._shown.light.eye_textures(maps), maps.receivers, maps.atlas.placements, maps.scale)
+        self._maps = CausticMaps(self._shown.light.camera_textures(maps), maps.receivers, maps.atlas.placements, maps.scale)
         self._published_photons = maps.photon_weight
 
     # ---- what there is -----------------------------------------------------------------------
@@ -379,21 +379,21 @@ class LiveEngine:
     @property
     def picture(self) -> moderngl.Texture | None:
         """RGBA32F, linear Rec.709 radiance (lm/(sr unit²) for white), top row first; None before the first."""
-        return self._eye.picture
+        return self._camera_pass.picture
 
     @property
     def picture_version(self) -> int:
         """Changes whenever the picture does."""
-        return self._eye.version
+        return self._camera_pass.version
 
     @property
     def camera_samples(self) -> int:
         """A still picture is finished after so many a pixel."""
-        return self._eye.target_samples
+        return self._camera_pass.target_samples
 
     @camera_samples.setter
     def camera_samples(self, samples: int) -> None:
-        self._eye.target_samples = samples
+        self._camera_pass.target_samples = samples
 
     @property
     def inputs(self) -> LiveInputs | None:
@@ -403,10 +403,10 @@ class LiveEngine:
     @property
     def stats(self) -> LiveStats:
         """This moment's."""
-        context, eye = self.context, self._eye
+        context, camera_pass = self.context, self._camera_pass
         common = LiveStats(
-            renderer=context.renderer, is_software=context.is_software, camera_samples=float(eye.shown_samples), resolution_scale=eye.scale,
-            eye_bands=eye.shown_bands, eye_fallbacks=eye.fallbacks)  # fmt: skip
+            renderer=context.renderer, is_software=context.is_software, camera_samples=float(camera_pass.shown_samples), resolution_scale=camera_pass.scale,
+            camera_bands=camera_pass.shown_bands, camera_fallbacks=camera_pass.fallbacks)  # fmt: skip
         if self._shown is None:
             return common
         light = self._shown.light
@@ -420,7 +420,7 @@ class LiveEngine:
             passes=self._shown.accumulation.number,
             trace_s=self._times["trace"],
             splat_s=self._times["splat"],
-            eye_s=self._times["eye"],
+            camera_s=self._times["camera"],
             photons_per_second=sum(h[1] for h in self._history) / seconds if seconds > 0.0 else 0.0,
             first_order=light.first_order,
             converged=self.is_idle,
@@ -436,7 +436,7 @@ class LiveEngine:
         waits = self._building is not None or self._urgent or self._has_work or self._last_maps_wait
         refines = self._shown is not None and self.refine_when_still and self._shown.light.first_order
         unjudged = self._shown is not None and self._wanted is not None and not is_judged(self._shown.light, self._wanted)
-        return self._wanted is None or not (waits or refines or unjudged or not self._eye.is_done)
+        return self._wanted is None or not (waits or refines or unjudged or not self._camera_pass.is_done)
 
     def pick(self, x: float, y: float) -> PickHit | None:
         """First surface at (x, y) of the picture, 0 to 1 from its top left corner; None beyond everything."""
@@ -470,6 +470,6 @@ class LiveEngine:
             self._shown.light.release()
         if self._picker is not None:
             self._picker.release()
-        self._eye.release()
+        self._camera_pass.release()
         shader.forget_programs(self.context.ctx)
         self._shown = self._job = self._repair = self._maps = self._picker = None

@@ -12,7 +12,7 @@ from enum import IntEnum
 from ...model.scene import Camera, Scene
 
 
-class Redo(IntEnum):
+class DirtyLevel(IntEnum):
     """What must be done again, cheapest first; each includes those before it."""
 
     NOTHING = 0

@@ -21,46 +21,46 @@ from ...model.scene import (
     Scene,
     SceneObject,
 )
-from .inputs import LiveInputs, Redo
+from .inputs import LiveInputs, DirtyLevel
 
 SAME_INDEX = 1e-6
 """Difference in n_d up to which a glass keeps the paths."""
 
 
-def redo(traced: LiveInputs, shown: LiveInputs, new: LiveInputs) -> Redo:
+def dirty_level(traced: LiveInputs, shown: LiveInputs, new: LiveInputs) -> DirtyLevel:
     """What `new` asks for where the photons stand for `traced` and the picture for `shown`."""
     paths = max(_inputs(traced, new), _scene(traced.scene, new.scene))
-    if paths >= Redo.TRACE:
+    if paths >= DirtyLevel.TRACE:
         return paths
     return max(_inputs(shown, new), _scene(shown.scene, new.scene))
 
 
-def _inputs(old: LiveInputs, new: LiveInputs) -> Redo:
-    cost = Redo.NOTHING
+def _inputs(old: LiveInputs, new: LiveInputs) -> DirtyLevel:
+    cost = DirtyLevel.NOTHING
     for item in fields(LiveInputs):
         a, b = getattr(old, item.name), getattr(new, item.name)
         if item.name == "scene" or a is b or a == b:
             continue
-        cost = max(cost, _INPUTS.get(item.name, Redo.BUILD))
+        cost = max(cost, _INPUTS.get(item.name, DirtyLevel.BUILD))
     return cost
 
 
 _INPUTS = {
-    "camera": Redo.LOOK,
-    "width": Redo.LOOK,
-    "height": Redo.LOOK,
-    "smoothing": Redo.SPLAT,
-    "solo_nm": Redo.SPLAT,
-    "local_gain": Redo.SPLAT,
-    "seed": Redo.TRACE,
+    "camera": DirtyLevel.LOOK,
+    "width": DirtyLevel.LOOK,
+    "height": DirtyLevel.LOOK,
+    "smoothing": DirtyLevel.SPLAT,
+    "solo_nm": DirtyLevel.SPLAT,
+    "local_gain": DirtyLevel.SPLAT,
+    "seed": DirtyLevel.TRACE,
 }
 """Fields that are not here (the method) ask for everything."""
 
 
-def _scene(old: Scene, new: Scene) -> Redo:
+def _scene(old: Scene, new: Scene) -> DirtyLevel:
     if old is new:
-        return Redo.NOTHING
-    cost = Redo.NOTHING
+        return DirtyLevel.NOTHING
+    cost = DirtyLevel.NOTHING
     for item in fields(Scene):
         a, b = getattr(old, item.name), getattr(new, item.name)
         if a is b or item.name in ("name", "camera", "notes"):
@@ -71,64 +71,64 @@ def _scene(old: Scene, new: Scene) -> Redo:
             cost = max(cost, _lights(a, b))
         elif item.name in ("background_rgb", "environment"):
             # They light nothing. Environments are compared by identity: a new one is another one.
-            cost = max(cost, Redo.LOOK if a != b else Redo.NOTHING)
+            cost = max(cost, DirtyLevel.LOOK if a != b else DirtyLevel.NOTHING)
         elif item.name == "render":
-            cost = max(cost, Redo.BUILD if a.max_depth != b.max_depth else Redo.NOTHING)
+            cost = max(cost, DirtyLevel.BUILD if a.max_depth != b.max_depth else DirtyLevel.NOTHING)
         else:
-            cost = Redo.BUILD
-    return max(cost, Redo.NOTHING if cost >= Redo.TRACE else _glasses(old, new))
+            cost = DirtyLevel.BUILD
+    return max(cost, DirtyLevel.NOTHING if cost >= DirtyLevel.TRACE else _glasses(old, new))
 
 
-def _objects(old: tuple[SceneObject, ...], new: tuple[SceneObject, ...]) -> Redo:
+def _objects(old: tuple[SceneObject, ...], new: tuple[SceneObject, ...]) -> DirtyLevel:
     if len(old) != len(new):
-        return Redo.BUILD
-    return max((_object(a, b) for a, b in zip(old, new, strict=True)), default=Redo.NOTHING)
+        return DirtyLevel.BUILD
+    return max((_object(a, b) for a, b in zip(old, new, strict=True)), default=DirtyLevel.NOTHING)
 
 
-def _object(old: SceneObject, new: SceneObject) -> Redo:
+def _object(old: SceneObject, new: SceneObject) -> DirtyLevel:
     """All but the change of a glass's dispersion, which `_glasses` judges over all objects."""
     if old is new:
-        return Redo.NOTHING
+        return DirtyLevel.NOTHING
     if old.mesh is not new.mesh:
-        return Redo.BUILD
-    cost = Redo.NOTHING
+        return DirtyLevel.BUILD
+    cost = DirtyLevel.NOTHING
     if not np.array_equal(old.object_to_world, new.object_to_world):
-        cost = Redo.TRACE
+        cost = DirtyLevel.TRACE
     if old.local_dispersion != new.local_dispersion:
-        cost = max(cost, Redo.SPLAT)
+        cost = max(cost, DirtyLevel.SPLAT)
     a, b = old.material, new.material
     if a is b:
         return cost
     if type(a) is not type(b):
-        return Redo.BUILD
+        return DirtyLevel.BUILD
     if isinstance(a, Diffuse) and isinstance(b, Diffuse):
         if a.reflectance is None and b.reflectance is None and (a.texture is None) == (b.texture is None):
             # Another picture is only looked at; whether there is one, the objects' records on the device know.
             same = a.reflectance_rgb == b.reflectance_rgb and a.texture is b.texture
-            return max(cost, Redo.NOTHING if same else Redo.LOOK)
-        return Redo.BUILD
+            return max(cost, DirtyLevel.NOTHING if same else DirtyLevel.LOOK)
+        return DirtyLevel.BUILD
     if isinstance(a, Dielectric) and isinstance(b, Dielectric):
         same_absorption = a.absorption is b.absorption or (
             a.absorption is not None and b.absorption is not None and np.array_equal(a.absorption.coefficient, b.absorption.coefficient)
         )
         if not same_absorption:
-            return Redo.BUILD if (a.absorption is None) != (b.absorption is None) else max(cost, Redo.TRACE)
-        return max(cost, Redo.TRACE) if a.priority != b.priority else cost
-    return max(cost, Redo.NOTHING if a == b else Redo.BUILD)
+            return DirtyLevel.BUILD if (a.absorption is None) != (b.absorption is None) else max(cost, DirtyLevel.TRACE)
+        return max(cost, DirtyLevel.TRACE) if a.priority != b.priority else cost
+    return max(cost, DirtyLevel.NOTHING if a == b else DirtyLevel.BUILD)
 
 
-def _glasses(old: Scene, new: Scene) -> Redo:
+def _glasses(old: Scene, new: Scene) -> DirtyLevel:
     pairs = [
         (a.material.dispersion, b.material.dispersion)
         for a, b in zip(old.objects, new.objects, strict=True)
         if isinstance(a.material, Dielectric) and isinstance(b.material, Dielectric)
     ]
     if all(a == b for a, b in pairs):
-        return Redo.NOTHING
+        return DirtyLevel.NOTHING
     if shown_glasses(old, new) is None:
         # Whether a glass disperses at all decides what photons carry.
-        return Redo.BUILD if any(a.is_dispersive != b.is_dispersive for a, b in pairs) or _partition(pairs, 0) != _partition(pairs, 1) else Redo.TRACE
-    return Redo.SPLAT
+        return DirtyLevel.BUILD if any(a.is_dispersive != b.is_dispersive for a, b in pairs) or _partition(pairs, 0) != _partition(pairs, 1) else DirtyLevel.TRACE
+    return DirtyLevel.SPLAT
 
 
 def _partition(pairs: list[tuple[Dispersion, Dispersion]], side: int) -> list[int]:
@@ -154,26 +154,26 @@ def shown_glasses(traced: Scene, shown: Scene) -> Mapping[Dispersion, Dispersion
     return found
 
 
-def _lights(old: tuple[Light, ...], new: tuple[Light, ...]) -> Redo:
+def _lights(old: tuple[Light, ...], new: tuple[Light, ...]) -> DirtyLevel:
     if len(old) != len(new):
-        return Redo.BUILD
-    return max((_light(a, b) for a, b in zip(old, new, strict=True)), default=Redo.NOTHING)
+        return DirtyLevel.BUILD
+    return max((_light(a, b) for a, b in zip(old, new, strict=True)), default=DirtyLevel.NOTHING)
 
 
-def _light(old: Light, new: Light) -> Redo:
+def _light(old: Light, new: Light) -> DirtyLevel:
     if old is new or old == new:
-        return Redo.NOTHING
+        return DirtyLevel.NOTHING
     if replace(old, name="", spectral_power=new.spectral_power) != replace(new, name=""):
-        return Redo.TRACE if old.kind == new.kind and old.shape == new.shape else Redo.BUILD
+        return DirtyLevel.TRACE if old.kind == new.kind and old.shape == new.shape else DirtyLevel.BUILD
     if old.spectral_power == new.spectral_power:
-        return Redo.NOTHING
+        return DirtyLevel.NOTHING
     # Photons carry weights, not watts; bands reach as far as the light they were planned for.
     (a0, a1), (b0, b1) = old.spectral_power.support_nm(), new.spectral_power.support_nm()
-    return Redo.SPLAT if a0 <= b0 and b1 <= a1 and (a0 < a1) else Redo.TRACE
+    return DirtyLevel.SPLAT if a0 <= b0 and b1 <= a1 and (a0 < a1) else DirtyLevel.TRACE
 
 
 def looks_other(old: LiveInputs, new: LiveInputs) -> bool:
-    """Whether what the eye sees without the maps differs: colours, lights, what lies behind everything, glass that bends its own rays otherwise."""
+    """Whether what the camera sees without the maps differs: colours, lights, what lies behind everything, glass that bends its own rays otherwise."""
     a, b = old.scene, new.scene
     if old.solo_nm != new.solo_nm or a.background_rgb != b.background_rgb or a.environment is not b.environment:
         return True

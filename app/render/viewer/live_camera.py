@@ -1,4 +1,4 @@
-"""The eye half of a live rendering: camera samples within a time budget, and the last picture worth showing.
+"""The camera pass of a live rendering: camera samples within a time budget, and the last picture worth showing.
 
 A picture is published when every pixel has a whole sample. While something moves the picture is as small as one
 sample in the time that is left asks for; once still it starts over in full size and is refined.
@@ -21,7 +21,7 @@ import numpy as np
 from ...gpu import shader
 from ...gpu.map_channels import MapChannels
 from ...gpu.texture_store import TextureStore
-from ...passes.camera import MOST_TAPS, CausticMaps, EyePass
+from ...passes.camera import MAX_TAPS, CausticMaps, CameraPass
 from ...passes.spectrum_choice import Spectrum
 
 if TYPE_CHECKING:
@@ -47,13 +47,13 @@ _FIRST_RATE = 0.5e6
 _RATE_BLEND = 0.5
 
 
-class LiveEye:
-    """Owns the eye pass of the shown scene and the published picture."""
+class LiveCamera:
+    """Owns the camera pass of the shown scene and the published picture."""
 
     def __init__(self, context: Context, target_samples: int = 32) -> None:
         self._context = context
         self.target_samples = target_samples
-        self._pass: EyePass | None = None
+        self._pass: CameraPass | None = None
         self._pictures: TextureStore | None = None
         self._average = shader.compute(context.ctx, "light/average.comp")
         self._steps: Iterator[float] | None = None
@@ -84,7 +84,7 @@ class LiveEye:
         self.shown_bands = 1
         """Stretches of the spectrum that the shown picture is made of."""
         self.fallbacks: dict[str, int] = {}
-        """What `EyePass.fallbacks` counted up to the shown picture."""
+        """What `CameraPass.fallbacks` counted up to the shown picture."""
         self.version = 0
         """Counts what was published."""
         self.scale = 1.0
@@ -99,7 +99,7 @@ class LiveEye:
         kept, before = self._pictures, self._pass
         pictures = self._store_of(shown)
         try:
-            self._pass = EyePass(self._context, shown, "beauty", reflectances, maps, pictures)
+            self._pass = CameraPass(self._context, shown, "beauty", reflectances, maps, pictures)
         except BaseException:
             if pictures is not kept:
                 pictures.release()
@@ -218,7 +218,7 @@ class LiveEye:
         self._steps = self._choosing = None
         self._publish_from = self._settled + -self._settled % self._cycle
         if not (smooth or self._is_quick) and self._needed_bands is None:
-            self._pass.most_taps = MOST_TAPS
+            self._pass.max_taps = MAX_TAPS
             self._choosing = self._pass.choosing_spectrum(self._camera, *self._size, BANDED_SAMPLES, self._maps)
 
     # ---- samples -----------------------------------------------------------------------------
@@ -252,7 +252,7 @@ class LiveEye:
         width, height = self._size
         if self._steps is None:
             self._pass.spectrum = Spectrum(self._cycle)
-            self._pass.most_taps = MOVING_TAPS if self._is_quick or self._is_smooth else MOST_TAPS
+            self._pass.max_taps = MOVING_TAPS if self._is_quick or self._is_smooth else MAX_TAPS
             self._steps = self._pass.samples(self._camera, width, height, 1, self._taken, self._maps)
             self._spent_s = 0.0
         started = time.perf_counter()

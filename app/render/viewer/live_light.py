@@ -1,4 +1,4 @@
-"""The light half of a live rendering: photons are stored, and shown through an edited scene without being traced again."""
+"""The light pass of a live rendering: photons are stored, and shown through an edited scene without being traced again."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...gpu.dispatch_budget import Portion
+from ...gpu.dispatch_budget import DispatchBudget
 from ...gpu.gain_buffers import GainBuffers
 from ...gpu.map_channels import MapChannels
 from ...gpu.reindex import Reindexing, Spans
@@ -22,7 +22,7 @@ from ...passes.pilot import landings_of
 from ...passes.splat import CHUNK, FLUSH_SHARE
 from ...passes.trace import Batch
 from ..light_maps import LightMaps
-from ..light_pass import LightHalf, RoundOf, ShownTables
+from ..light_pass import LightPass, RoundOf, ShownTables
 from .invalidation import shown_glasses
 from .photon_store import PhotonStore
 from .spectrum_guess import SpectrumGuess
@@ -82,13 +82,13 @@ class Stored:
         self.forget_tables()
 
 
-class LiveLight(LightHalf):
+class LiveLight(LightPass):
     """Photons of one traced scene and how they are shown.
 
     Batches are small, so that they take little of a frame; extended lights make do with as many points. A pass that has only begun holds fewer photons than the one before it: until it has as many, the older ones stay.
     """
 
-    least_batch = 1024
+    min_batch = 1024
     tile_max = QUICK_TILE_MAX
 
     def __init__(self, context: Context, scene: Scene, settings: RenderSettings, features: Features, buffers: SceneBuffers, capacity_bytes: int) -> None:
@@ -113,7 +113,7 @@ class LiveLight(LightHalf):
         """The maps are those of a first answer: `fit_to` makes proper ones."""
 
     def begin(self, photons: int, seed: int) -> None:
-        """As in `LightHalf`; the photons of the pass before stay until there are as many new ones."""
+        """As in `LightPass`; the photons of the pass before stay until there are as many new ones."""
         fuller = max(self._bundles, key=lambda s: s.store.photons, default=None)
         for bundle in self._bundles:
             if bundle is not fuller:
@@ -138,7 +138,7 @@ class LiveLight(LightHalf):
         return bundle.tables
 
     def _quick_tables(self, bundle: Stored) -> ShownTables:
-        if bundle.tables is not None and not self.features.map_hats:
+        if bundle.tables is not None and not self.features.map_tents:
             return bundle.tables
         if bundle.quick_tables is None:
             # In colour only, like the maps that they are for.
@@ -152,22 +152,22 @@ class LiveLight(LightHalf):
 
     @property
     def _quick_features(self) -> Features:
-        return replace(self.features, map_hats=0, targets=1) if self.features.map_hats else self.features
+        return replace(self.features, map_tents=0, targets=1) if self.features.map_tents else self.features
 
     def maps_for(
-        self, camera: Camera, width: int, height: int, tile_max: tuple[int, int] = LightHalf.tile_max, features: Features | None = None
+        self, camera: Camera, width: int, height: int, tile_max: tuple[int, int] = LightPass.tile_max, features: Features | None = None
     ) -> LightMaps:
-        """As in `LightHalf`; `features` that the maps' channels follow, where they are not the light half's own."""
+        """As in `LightPass`; `features` that the maps' channels follow, where they are not the light pass's own."""
         seen = replace(self.scene, camera=camera)
         layout = layout_maps(seen, self.buffers, landings_of(self.pilots.values()), (width, height), self.reflectance_class, tile_max=tile_max)
         # Mesa's software renderer compiles what reads a texture once more, for seconds, where a side becomes a power of two.
         size = tuple(side + (side & (side - 1) == 0) for side in layout.size)
         return LightMaps(self.context.ctx, replace(layout, size=size), features or self.features)
 
-    def eye_textures(self, maps: LightMaps) -> list[moderngl.Texture]:
-        """`maps`, this light half's, as `map_channels` says: what was splatted in colour only gets a likely spectrum."""
+    def camera_textures(self, maps: LightMaps) -> list[moderngl.Texture]:
+        """`maps`, this light pass's, as `map_channels` says: what was splatted in colour only gets a likely spectrum."""
         textures = maps.resolved_textures()
-        if maps is not self._quick or not self.features.map_hats:
+        if maps is not self._quick or not self.features.map_tents:
             return textures
         if self._guess is None:
             self._guess = SpectrumGuess(self.context.ctx, self.map_channels, self.scene.lights, maps.atlas.size)
@@ -243,7 +243,7 @@ class LiveLight(LightHalf):
         """Maps laid out for the camera and picture size of `inputs`; empty, to be filled from the stored photons."""
         self.view = inputs.camera
         self.is_coarse = False
-        self.tile_max = LightHalf.tile_max
+        self.tile_max = LightPass.tile_max
         self.settings = replace(self.settings, width=inputs.width, height=inputs.height)
         for owned in (self._quick, self._guess, self.maps):
             if owned is not None:
@@ -273,7 +273,7 @@ class LiveLight(LightHalf):
         self, photons: moderngl.Buffer, count: int, coarsening: float = 1.0, tables: ShownTables | None = None,
         maps: LightMaps | None = None, stride: int = 1,
     ) -> Iterator[None]:  # fmt: skip
-        """As in `LightHalf`; maps of several textures are summed up one by one before it has to be, as all together take longer than a frame."""
+        """As in `LightPass`; maps of several textures are summed up one by one before it has to be, as all together take longer than a frame."""
         atlas = (maps or self._maps).atlas
         if atlas.targets > 1 and atlas.pending + count >= FLUSH_AHEAD * min(CHUNK, atlas.size[0] * atlas.size[1] / FLUSH_SHARE):
             yield from self._summing(atlas)
@@ -287,17 +287,17 @@ class LiveLight(LightHalf):
     def _summing(self, atlas: MapAtlas) -> Iterator[None]:
         """`atlas.flush` with pauses."""
         width, height = atlas.size
-        portion = Portion(FIRST_SUMMED, ROWS, -(-height // ROWS) * ROWS)
+        dispatch_budget = DispatchBudget(FIRST_SUMMED, ROWS, -(-height // ROWS) * ROWS)
         for scratch, total in zip(atlas.scratch_textures, atlas.total_textures, strict=True):
             row = 0
             while row < height:
                 started = time.perf_counter()
-                rows = min(portion.units, height - row)
+                rows = min(dispatch_budget.units, height - row)
                 self._accumulate.run_rows(scratch, total, row, rows)
                 if self.waits:
                     self.context.finish()
                 took = time.perf_counter() - started
-                portion.learn(rows, took, SUMMING_SECONDS)
+                dispatch_budget.learn(rows, took, SUMMING_SECONDS)
                 self.stats.splat_seconds += took
                 row += rows
                 yield

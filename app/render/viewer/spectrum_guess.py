@@ -1,4 +1,4 @@
-"""Spectral channels for maps that were splatted in colour only, so that a drag is answered as fast where the eye looks through dispersive glass.
+"""Spectral channels for maps that were splatted in colour only, so that a drag is answered as fast where the camera looks through dispersive glass.
 
 Such maps live for a moment. Each texel gets the smoothest spectrum that has its colour, in the channels that proper maps hold.
 """
@@ -48,7 +48,7 @@ class SpectrumGuess:
     """Owns the textures that it fills."""
 
     def __init__(self, ctx: moderngl.Context, channels: MapChannels, lights: Sequence[Light], size: tuple[int, int]) -> None:
-        """`channels`: with hats; `size` of the maps, texels."""
+        """`channels`: with tents; `size` of the maps, texels."""
         self._ctx = ctx
         targets = channels.targets - channels.first_target
         weights, luminance = guess_weights(channels, lights)

@@ -20,13 +20,13 @@ class LiveStats:
     passes: int = 0
     camera_samples: float = 0.0
     """Camera samples a pixel of the shown picture."""
-    eye_bands: int = 1
+    camera_bands: int = 1
     """Stretches of the spectrum that the shown picture's samples are divided over."""
-    eye_fallbacks: dict[str, int] = field(default_factory=dict)
+    camera_fallbacks: dict[str, int] = field(default_factory=dict)
     """What camera rays met: columns dropped, paths given up."""
     trace_s: float = 0.0
     splat_s: float = 0.0
-    eye_s: float = 0.0
+    camera_s: float = 0.0
     photons_per_second: float = 0.0
     """Emitted photons per second of trace and splat time, over the last second."""
     first_order: bool = False

@@ -1,4 +1,4 @@
-"""All cases of the eye half, in the order of the report."""
+"""All cases of the camera pass, in the order of the report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The eye's paths at their longest: light guides, retroreflectors, gems, rooms of mirrors, and more branches than can wait.
+"""The camera's paths at their longest: light guides, retroreflectors, gems, rooms of mirrors, and more branches than can wait.
 
 What a path is given up for must be counted, and must cost no more light than it carried.
 """

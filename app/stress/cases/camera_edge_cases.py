@@ -1,4 +1,4 @@
-"""The eye's rays at the stiffest single surfaces: the edge of total reflection, grazing views, and glass that is hardly there.
+"""The camera's rays at the stiffest single surfaces: the edge of total reflection, grazing views, and glass that is hardly there.
 
 All glass here has flat sides and is seen along one plane, so that every way of a ray is known (`flat_glass`).
 """
@@ -28,7 +28,7 @@ from ..rigs.camera_probe import (
     at,
     daylight_mean,
     difference,
-    eye_pass,
+    opened_camera_pass,
     half_sky,
     look,
     look_with,
@@ -99,9 +99,9 @@ def measure_cut(context: Context) -> Iterator[Measurement]:
     white = cells.sum(axis=0)
     want = through @ cells / white
     settings = replace(FEW, bins=CUT_BINS)
-    with eye_pass(context, scene, FEW) as eye, eye_pass(context, scene, settings) as eye_in_bins:
+    with opened_camera_pass(context, scene, FEW) as camera_pass, opened_camera_pass(context, scene, settings) as camera_in_bins:
         for bands in BANDS:
-            sight, spectral = look_with(eye, scene.camera, FEW, bands), look_with(eye_in_bins, scene.camera, settings, bands)
+            sight, spectral = look_with(camera_pass, scene.camera, FEW, bands), look_with(camera_in_bins, scene.camera, settings, bands)
             got = spectral.spectral.mean(axis=(0, 1)) / white
             judged = Judged().hold("colour", np.abs(sight.mean - daylight_mean(through)).max(), 0.12 / bands + 2e-3)
             judged.hold("spectrum", np.abs(got - want).max(), 0.4 / bands + 2e-3)

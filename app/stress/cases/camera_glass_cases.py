@@ -1,6 +1,6 @@
-"""Glass that no maker sells, seen through, and what a lens's focus makes of a pixel: against the float64 reference of the eye.
+"""Glass that no maker sells, seen through, and what a lens's focus makes of a pixel: against the float64 reference of the camera.
 
-The reference (`truth.eye_reference`) follows one random wavelength a path and shares nothing with the shaders.
+The reference (`reference.camera_reference`) follows one random wavelength a path and shares nothing with the shaders.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ...model.optics.spectrum import illuminant
 from ...model.placement import rotation_about
 from ...model.scene import Camera, Diffuse, Light, Scene, SceneObject
 from ...model.texture import Texture
-from ...reference.camera_reference import render_eye_reference
+from ...reference.camera_reference import render_camera_reference
 from ..case import Case, Measurement
 from ..rigs.camera_probe import (
     CHANCE,
@@ -100,10 +100,10 @@ def measure_focus(context: Context) -> Iterator[Measurement]:
 
 
 def against_reference(scene: Scene, sight: Sight, bias: float) -> Judged:
-    """The picture in blocks, its colours (red less blue) and its sum against two halves of a reference; what these differ by is chance."""
+    """The picture in blocks, its colours (red less blue) and its sum against two passes of a reference; what these differ by is chance."""
     height, width = sight.picture.shape[:2]
-    halves = [blocks(render_eye_reference(scene, width, height, samples=REFERENCE_SAMPLES, seed=seed).rgb(), BLOCK) for seed in (1, 2)]
-    want, apart = 0.5 * (halves[0] + halves[1]), 0.5 * (halves[0] - halves[1])
+    measured_passes = [blocks(render_camera_reference(scene, width, height, samples=REFERENCE_SAMPLES, seed=seed).rgb(), BLOCK) for seed in (1, 2)]
+    want, apart = 0.5 * (measured_passes[0] + measured_passes[1]), 0.5 * (measured_passes[0] - measured_passes[1])
     error, size = blocks(sight.picture, BLOCK) - want, want.mean()
     judged = Judged().hold("picture", _root_mean_square(error) / size, bias + 2.0 * _root_mean_square(apart) / size)
     judged.hold("colour", _root_mean_square(_red_less_blue(error)) / size, bias + 2.0 * _root_mean_square(_red_less_blue(apart)) / size)

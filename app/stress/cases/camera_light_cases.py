@@ -26,7 +26,7 @@ from ...model.scene import (
 )
 from ...model.texture import Environment, Texture
 from ...passes.camera_programs import TINT_STEPS
-from ...reference.camera_reference import render_eye_reference
+from ...reference.camera_reference import render_camera_reference
 from ..case import Case, Measurement
 from ..rigs.camera_probe import (
     CHANCE,
@@ -75,9 +75,9 @@ def measure_sun(context: Context) -> Iterator[Measurement]:
 
     without, hundred = (look(context, scene(sun), LOOK, 4) for sun in (0.0, SUNS[0]))
     added = (hundred.picture - without.picture) / SUNS[0]
-    truth = render_eye_reference(scene(SUNS[0]), LOOK.width, LOOK.height, samples=256)
-    want = truth.rgb().sum() - without.picture.sum()
-    chance = CHANCE * np.sqrt(truth.variance.sum()) / want
+    reference_image = render_camera_reference(scene(SUNS[0]), LOOK.width, LOOK.height, samples=256)
+    want = reference_image.rgb().sum() - without.picture.sum()
+    chance = CHANCE * np.sqrt(reference_image.variance.sum()) / want
     for sun in SUNS:
         sight = look(context, scene(sun), LOOK, 4)
         judged = Judged().hold("brighter than the sun", max(0.0, sight.picture.max() / (1.02 * sun + without.picture.max()) - 1.0), 0.0)

@@ -60,7 +60,7 @@ class Chain:
 def follow_chain(planes: np.ndarray, position: np.ndarray, direction: np.ndarray, n: float, events: int, screen_z: float) -> Chain:
     """Rays into a convex solid n·x ≤ d of rows (n, d), `events` − 2 reflections, out, and on to z = `screen_z`.
 
-    Written with the float64 twins; a facet is never met twice in a row.
+    Written with the float64 references; a facet is never met twice in a row.
     """
     side = np.cross(direction[0], [0.0, 1.0, 0.0])
     side /= np.linalg.norm(side)

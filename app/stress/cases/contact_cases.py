@@ -205,7 +205,7 @@ def _lens() -> Scene:
 
 
 PAIRS = (
-    Pair("a block in two halves that share a face", lambda: stage(
+    Pair("a block in two passes that share a face", lambda: stage(
         *tilted(solid("a", box((0.5, 1.0, 1.0)), FLINT, (-0.25, 0.0, 0.0)), solid("b", box((0.5, 1.0, 1.0)), FLINT, (0.25, 0.0, 0.0))), lights=[SUN]), _block, redrawn=True),
     Pair("a block in eight parts", lambda: stage(*tilted(*_eighths()), lights=[SUN]), _block, redrawn=True),
     Pair("the same block twice", lambda: _block(solid("again", box(), FLINT)), _block, redrawn=True),

@@ -201,7 +201,7 @@ CASES = (
     Case(
         "gem-bands",
         "A gem with n from 2.2 (violet) to 1.2 (red), in bands of 200 nm to 1 nm",
-        "The path over a band is linear in n, exactly; nothing better is claimed, and nothing worse may happen: the band's ends land within Taylor's remainder of the truth.",
+        "The path over a band is linear in n, exactly; nothing better is claimed, and nothing worse may happen: the band's ends land within Taylor's remainder of the reference.",
         "width of the band (nm)",
         measure_gem_bands,
         steps=6,

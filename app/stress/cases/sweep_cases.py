@@ -23,7 +23,7 @@ from ..rigs.probe import (
     Probe,
     blocks,
     energy_error,
-    light_half,
+    light_pass,
     measurement,
     nonfinite,
     picture_error,
@@ -192,7 +192,7 @@ def _bins(context: Context, whole: Base) -> Iterator[Measurement]:
 def _passes(context: Context, scene: Scene) -> Iterator[Measurement]:
     """Maps after k equal passes against k times the maps after one: every texel, relative to the brightest."""
     photons = 4096
-    with light_half(context, scene, with_photons(photons)) as light:
+    with light_pass(context, scene, with_photons(photons)) as light:
         light.begin(photons, SMALL.seed)
         light.run_pass(0, photons, lambda _: True)
         one, done = read_maps(light).astype(float), 1
@@ -225,10 +225,10 @@ def against_single_wavelengths(context: Context, scene: Scene, severity: float, 
     """
     settings = replace(SMALL, layer="caustic")
     found = probe(context, scene, settings)
-    truth, other = (probe(context, scene, replace(settings, method="stochastic", seed=seed)).picture for seed in (1, 2))
-    chance = picture_error(blocks(other), blocks(truth))
+    reference, other = (probe(context, scene, replace(settings, method="stochastic", seed=seed)).picture for seed in (1, 2))
+    chance = picture_error(blocks(other), blocks(reference))
     held = Held(
-        {"blocks": picture_error(blocks(found.picture), blocks(0.5 * (truth + other))), "energy": energy_error(found.picture, 0.5 * (truth + other))},
+        {"blocks": picture_error(blocks(found.picture), blocks(0.5 * (reference + other))), "energy": energy_error(found.picture, 0.5 * (reference + other))},
         {"blocks": chance + 0.03 + smeared, "energy": 0.03},
     )
     return measurement(severity, label, found, held)

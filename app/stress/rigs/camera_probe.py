@@ -1,4 +1,4 @@
-"""What the stress sweep's eye cases share: one picture by the eye pass with its fall-backs, closed forms to hold it against, and skies.
+"""What the stress sweep's camera cases share: one picture by the camera pass with its fall-backs, closed forms to hold it against, and skies.
 
 No light is traced: what a case is about lies between the camera and what shines by itself, or is lit directly. Pictures
 are small, and most of them of the same few programs, which are kept while a case runs.
@@ -23,7 +23,7 @@ from ...model.optics.colorimetry import K_M, cmf_xyz, daylight_per_lumen, rgb709
 from ...model.scene import Camera, Scene, SceneObject
 from ...model.settings import RenderSettings
 from ...model.texture import Environment
-from ...passes.camera import EyePass
+from ...passes.camera import CameraPass
 from ...passes.spectrum_choice import Spectrum
 from ...render.light_pass import spectral_axis
 from ..case import Measurement
@@ -77,41 +77,41 @@ def sharing_programs(measure: Callable[[Context], Iterator[Measurement]]) -> Cal
 
 
 @contextmanager
-def eye_pass(context: Context, scene: Scene, settings: RenderSettings = LOOK) -> Iterator[EyePass]:
-    """The eye pass of `scene`, without caustics; freed afterwards."""
+def opened_camera_pass(context: Context, scene: Scene, settings: RenderSettings = LOOK) -> Iterator[CameraPass]:
+    """The camera pass of `scene`, without caustics; freed afterwards."""
     features = Features.of(scene, settings)
     buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
     edges = None if settings.bins is None else tuple(np.linspace(380.0, 780.0, settings.bins + 1).tolist())
     try:
-        eye = EyePass(context, buffers, settings.layer, maps=MapChannels(edges))
+        camera_pass = CameraPass(context, buffers, settings.layer, maps=MapChannels(edges))
         try:
-            yield eye
+            yield camera_pass
         finally:
-            eye.release()
+            camera_pass.release()
     finally:
         buffers.release()
 
 
 def look(context: Context, scene: Scene, settings: RenderSettings = LOOK, bands: int | None = None) -> Sight:
     """A picture of `scene` in so many bands (None: as many as a rendering would choose), `settings.spp` samples a pixel or a whole cycle more."""
-    with eye_pass(context, scene, settings) as eye:
-        return look_with(eye, scene.camera, settings, bands)
+    with opened_camera_pass(context, scene, settings) as camera_pass:
+        return look_with(camera_pass, scene.camera, settings, bands)
 
 
-def look_with(eye: EyePass, camera: Camera, settings: RenderSettings = LOOK, bands: int | None = None) -> Sight:
+def look_with(camera_pass: CameraPass, camera: Camera, settings: RenderSettings = LOOK, bands: int | None = None) -> Sight:
     """The same with a pass that is there already."""
     samples = settings.spp or 1
     if bands is not None:
-        eye.spectrum = Spectrum(bands)
+        camera_pass.spectrum = Spectrum(bands)
     else:
-        bands = eye.choose_spectrum(camera, settings.width, settings.height, samples).bands
-    before = eye.fallbacks
+        bands = camera_pass.choose_spectrum(camera, settings.width, settings.height, samples).bands
+    before = camera_pass.fallbacks
     samples = -(-samples // bands) * bands
-    eye.run(camera, settings.width, settings.height, samples, seed=settings.seed)
-    picture = eye.read_rgb()
-    spectral = eye.read_spectral() if settings.bins else None
+    camera_pass.run(camera, settings.width, settings.height, samples, seed=settings.seed)
+    picture = camera_pass.read_rgb()
+    spectral = camera_pass.read_spectral() if settings.bins else None
     bad = nonfinite(picture) + (0 if spectral is None else nonfinite(spectral))
-    taken = {name: count - before[name] for name, count in eye.fallbacks.items()}
+    taken = {name: count - before[name] for name, count in camera_pass.fallbacks.items()}
     in_bins = None if spectral is None else spectral.astype(float)
     return Sight(picture.astype(float), bad, taken, samples * settings.width * settings.height, bands, in_bins)
 

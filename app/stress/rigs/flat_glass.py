@@ -16,7 +16,7 @@ from .camera_probe import fresnel
 
 NOTHING = 1e-5
 """Weight of a path that is not followed on."""
-MOST_EVENTS = 600
+MAX_EVENTS = 600
 """Surfaces after which a path is not followed on, whatever it weighs."""
 
 
@@ -42,7 +42,7 @@ def ways(outline: np.ndarray, n: float, position: tuple[float, float], direction
     waiting = [(np.array(position, float), np.array(direction, float), inside, 1.0, 0, -1)]
     while waiting:
         p, d, within, weight, events, side = waiting.pop()
-        if weight < NOTHING or events > MOST_EVENTS:
+        if weight < NOTHING or events > MAX_EVENTS:
             continue
         met = _side_met(normal, offset, p, d, within, side)
         if met is None:

@@ -1,9 +1,9 @@
-"""Runs any pure GLSL function over arrays, so that it can be compared with its float64 twin.
+"""Runs any pure GLSL function over arrays, so that it can be compared with its float64 reference.
 
     out = evaluate(gl.ctx, ["lib/optics.glsl"], "r = reflect_direction(d, n, dot(d, n));",
                    {"d": directions, "n": normals}, {"r": "vec3"})["r"]
 
-Inputs are rounded to float32 first (`as_f32`), and the twin is given the rounded values cast up:
+Inputs are rounded to float32 first (`as_f32`), and the CPU reference is given the rounded values cast up:
 then the difference is the arithmetic's error alone.
 """
 

@@ -1,6 +1,6 @@
 """One small rendering for the stress sweep, with everything it made looked at: photons, maps, picture, flux.
 
-The product's own light half and eye pass do the work. What is added only reads: every photon
+The product's own light pass and camera pass do the work. What is added only reads: every photon
 record of every batch, every texel of every map, every pixel.
 """
 
@@ -16,8 +16,8 @@ import numpy as np
 from ...gpu import records
 from ...model.features import Features
 from ...model.settings import RenderSettings
-from ...passes.camera import CausticMaps, EyePass
-from ...render.light_pass import LightHalf, LightStats, spectral_axis
+from ...passes.camera import CausticMaps, CameraPass
+from ...render.light_pass import LightPass, LightStats, spectral_axis
 from ..case import Measurement
 
 if TYPE_CHECKING:
@@ -31,8 +31,8 @@ LOST_TO_NUMERICS = 1e-3
 """Largest share of the flux that may end for numerical reasons (cracks, overflows): a tenth of what a picture shows."""
 
 
-class WatchedLight(LightHalf):
-    """A light half whose photon records are read after every batch."""
+class WatchedLight(LightPass):
+    """A light pass whose photon records are read after every batch."""
 
     def __init__(self, *arguments) -> None:
         super().__init__(*arguments)
@@ -88,8 +88,8 @@ class Probe:
 
 
 @contextmanager
-def light_half(context: Context, scene: Scene, settings: RenderSettings) -> Iterator[WatchedLight]:
-    """The prepared light half of `scene`; everything is freed afterwards."""
+def light_pass(context: Context, scene: Scene, settings: RenderSettings) -> Iterator[WatchedLight]:
+    """The prepared light pass of `scene`; everything is freed afterwards."""
     from ...gpu.scene_buffers import SceneBuffers
 
     features = Features.of(scene, settings)
@@ -106,26 +106,26 @@ def light_half(context: Context, scene: Scene, settings: RenderSettings) -> Iter
 def probe(context: Context, scene: Scene, settings: RenderSettings = SMALL) -> Probe:
     """Render `scene` in one pass and look at everything."""
     photons = settings.photons or scene.render.photons
-    with light_half(context, scene, settings) as light:
+    with light_pass(context, scene, settings) as light:
         light.begin(photons, settings.seed)
         light.run_pass(0, photons, lambda _: True)
         light.finish()
         if light.watched != light.stats.splats:
             raise RuntimeError(f"{light.watched} of {light.stats.splats} photon records were seen")
-        eye = EyePass(context, light.buffers, settings.layer, light.reflectances, light.map_channels)
+        camera_pass = CameraPass(context, light.buffers, settings.layer, light.reflectances, light.map_channels)
         try:
             maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
-            eye.run(scene.camera, settings.width, settings.height, settings.spp or 1, 0, maps, settings.seed)
-            picture = eye.read_rgb()
-            spectral = eye.read_spectral() if settings.bins else None
+            camera_pass.run(scene.camera, settings.width, settings.height, settings.spp or 1, 0, maps, settings.seed)
+            picture = camera_pass.read_rgb()
+            spectral = camera_pass.read_spectral() if settings.bins else None
         finally:
-            eye.release()
+            camera_pass.release()
         bad = light.nonfinite_photons + nonfinite(picture) + nonfinite(read_maps(light))
         bad += 0 if spectral is None else nonfinite(spectral)
         return Probe(picture.astype(float), light.stats, bad, light.dropped, light.map_flux(), spectral)
 
 
-def read_maps(light: LightHalf) -> np.ndarray:
+def read_maps(light: LightPass) -> np.ndarray:
     """All maps as they are looked up, float32 (targets, height, width, 4)."""
     width, height = light.atlas.size
     textures = light.resolved_textures()

@@ -18,7 +18,7 @@ from ...edit.state import State
 from ...model.optics import catalogue
 from ...model.optics.catalogue import MAKER_ORDER, Entry
 from .. import item_rects, theme
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import widgets
 from .glass_picker import apply_glass, remark
 from .glass_values import abbe_text, glasses_of, own_numbers, selected_glass, with_abbe
@@ -65,7 +65,7 @@ class _Look:
 _look = _Look()
 
 
-def draw_abbe(state: State, facts: Facts) -> State:
+def draw_abbe(state: State, view_model: ViewModel) -> State:
     """The diagram with the makers to show; the state with the glass that was clicked or dragged to."""
     _draw_makers()
     selected = selected_glass(state)

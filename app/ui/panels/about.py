@@ -8,11 +8,11 @@ from ... import __version__
 from ...base.paths import assets_dir
 from ...edit.state import State
 from .. import theme
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import widgets
 
 
-def draw_about(state: State, facts: Facts) -> State:
+def draw_about(state: State, view_model: ViewModel) -> State:
     """Draw the window's contents."""
     with theme.heading(1.5):
         imgui.text_unformatted("SpectraSplat")
@@ -26,7 +26,7 @@ def draw_about(state: State, facts: Facts) -> State:
     imgui.pop_text_wrap_pos()
     imgui.dummy(imgui.ImVec2(0, theme.em(0.3)))
     for label, text in (
-        ("Draws with", facts.stats.renderer or "not started yet"),
+        ("Draws with", view_model.stats.renderer or "not started yet"),
         ("Licence", "MIT"),
         ("Data and fonts", str(assets_dir() / "LICENSES.md")),
     ):

@@ -12,7 +12,7 @@ from ...edit.state import Brush, State
 from ...model.local_dispersion import dab_weight
 from ...model.scene import Dab, Diffuse
 from .. import theme
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import widgets
 from .rows import begin_row
 
@@ -23,7 +23,7 @@ _MODES = {"widen": "Widen colours", "narrow": "Narrow colours", "erase": "Erase"
 _DEFAULT = Brush()
 
 
-def draw_brush(state: State, facts: Facts) -> State:
+def draw_brush(state: State, view_model: ViewModel) -> State:
     """The panel's contents; the window is the shell's."""
     state = _draw_tools(state)
     if widgets.section("Brush settings"):

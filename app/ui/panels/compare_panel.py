@@ -12,7 +12,7 @@ from ...edit.requests import ComputeReference
 from ...edit.state import Compare, State
 from ...model.settings import METHODS
 from .. import theme
-from ..view_model import ErrorCurve, Facts
+from ..view_model import ErrorCurve, ViewModel
 from . import rows, widgets
 from .methods import METHOD_NAMES, METHOD_TIPS
 
@@ -30,23 +30,23 @@ _WIDE_EM = 40.0
 _LEGEND_STEPS = 40
 
 
-def draw_compare(state: State, facts: Facts) -> State:
+def draw_compare(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents."""
     if imgui.get_content_region_avail().x < theme.em(_WIDE_EM):
-        return _plot(_controls(state, facts), facts, theme.em(13))
+        return _plot(_controls(state, view_model), view_model, theme.em(13))
     if imgui.begin_table("##compare", 2, imgui.TableFlags_.sizing_stretch_prop):
         imgui.table_setup_column("controls", imgui.TableColumnFlags_.width_stretch, 1.0)
         imgui.table_setup_column("plot", imgui.TableColumnFlags_.width_stretch, 1.3)
         imgui.table_next_row()
         imgui.table_next_column()
-        state = _controls(state, facts)
+        state = _controls(state, view_model)
         imgui.table_next_column()
-        state = _plot(state, facts, max(imgui.get_content_region_avail().y, theme.em(9)))
+        state = _plot(state, view_model, max(imgui.get_content_region_avail().y, theme.em(9)))
         imgui.end_table()
     return state
 
 
-def _controls(state: State, facts: Facts) -> State:
+def _controls(state: State, view_model: ViewModel) -> State:
     compare = state.compare
     _, mode = widgets.combo("Show", MODES, compare.mode, tip=MODE_TIPS[compare.mode])
     others = {REFERENCE: "Reference"} | {name: METHOD_NAMES[name] for name in METHODS if name != state.method}
@@ -65,22 +65,22 @@ def _controls(state: State, facts: Facts) -> State:
     state = replace(state, compare=replace(compare, plot=plot))
     if mode == "error":
         _legend()
-    return _progress(state, facts)
+    return _progress(state, view_model)
 
 
-def _progress(state: State, facts: Facts) -> State:
+def _progress(state: State, view_model: ViewModel) -> State:
     """How far the other picture is, and what it is."""
     if not is_comparing(state.compare):
         widgets.hint("Choose what to show to begin. The other picture is computed in the time that this one leaves.")
         return state
-    done = facts.reference_progress
+    done = view_model.reference_progress
     rows.begin_row("Progress")
     imgui.progress_bar(done or 0.0, imgui.ImVec2(-1, 0), "waiting" if done is None else f"{100 * done:.0f} %")
     rows.explain("Progress", "How far the picture it is compared with has come. It goes on while the window is open.")
-    if facts.compare_stale:
+    if view_model.compare_stale:
         widgets.note("Scene or view has changed: this is the picture from before.")
-    if facts.compare_text:
-        widgets.hint(facts.compare_text)
+    if view_model.compare_text:
+        widgets.hint(view_model.compare_text)
     if widgets.button("Start again", tip="Compute what it is compared with anew, for the present scene and view.", width=-1):
         state = state.asking(ComputeReference())
     return state
@@ -113,7 +113,7 @@ def _legend() -> None:
         drawing.add_text(imgui.ImVec2(at, start.y + 0.5 * (height - size.y)), theme.packed(tint), text)
 
 
-def _plot(state: State, facts: Facts, height: float) -> State:
+def _plot(state: State, view_model: ViewModel, height: float) -> State:
     if not state.compare.plot:
         return state
     flags = implot.Flags_.no_menus | implot.Flags_.no_mouse_text
@@ -122,7 +122,7 @@ def _plot(state: State, facts: Facts, height: float) -> State:
     implot.setup_axes("time traced and splatted (s)", "relMSE")
     for axis in (implot.ImAxis_.x1, implot.ImAxis_.y1):
         implot.setup_axis_scale(axis, implot.Scale_.log10)
-    curves = [shown for shown in map(_drawable, facts.curves) if shown is not None]
+    curves = [shown for shown in map(_drawable, view_model.curves) if shown is not None]
     x_range, y_range = _limits(curves)
     implot.setup_axis_limits(implot.ImAxis_.x1, *x_range, implot.Cond_.always)
     implot.setup_axis_limits(implot.ImAxis_.y1, *y_range, implot.Cond_.always)

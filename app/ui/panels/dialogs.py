@@ -14,7 +14,7 @@ from imgui_bundle import imgui
 from ...edit import requests
 from ...edit.state import State
 from .. import theme
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import file_browser, picture_choice, widgets
 
 OPENABLE = (".toml", ".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -40,67 +40,67 @@ def reset() -> None:
     _memory.is_saving = False
 
 
-def open_file(state: State, facts: Facts) -> State:
+def open_file(state: State, view_model: ViewModel) -> State:
     """Ask which file to open."""
-    start = facts.path.parent if facts.path is not None else _recent_folder(facts)
+    start = view_model.path.parent if view_model.path is not None else _recent_folder(view_model)
     file_browser.ask(file_browser.Question("open", "Open", OPENABLE, start))
     return state
 
 
-def open_path(state: State, facts: Facts, path: Path) -> State:
+def open_path(state: State, view_model: ViewModel, path: Path) -> State:
     """Open `path`; asks first when work would be lost. A picture becomes part of the scene instead."""
     if picture_choice.is_picture(path):
         return picture_choice.dropped(state, path)
-    return _unless_unsaved(state, facts, requests.Open(path))
+    return _unless_unsaved(state, view_model, requests.Open(path))
 
 
-def new_scene(state: State, facts: Facts) -> State:
+def new_scene(state: State, view_model: ViewModel) -> State:
     """Start from the default scene; asks first when work would be lost."""
-    return _unless_unsaved(state, facts, requests.NewScene())
+    return _unless_unsaved(state, view_model, requests.NewScene())
 
 
-def save_as(state: State, facts: Facts) -> State:
+def save_as(state: State, view_model: ViewModel) -> State:
     """Ask where to save."""
-    folder = facts.path.parent if facts.path is not None else _recent_folder(facts)
-    name = facts.path.name if facts.path is not None else f"{_file_stem(facts.title)}.toml"
+    folder = view_model.path.parent if view_model.path is not None else _recent_folder(view_model)
+    name = view_model.path.name if view_model.path is not None else f"{_file_stem(view_model.title)}.toml"
     file_browser.ask(file_browser.Question("save", "Save as", SAVEABLE, folder / name, saving=True))
     return state
 
 
-def draw_dialogs(state: State, facts: Facts) -> State:
+def draw_dialogs(state: State, view_model: ViewModel) -> State:
     """Draw what is open and carry its answers on."""
     file_browser.draw()
     state = picture_choice.answers(state)
     chosen = file_browser.take("open")
     if chosen is not None:
-        state = open_path(state, facts, chosen)
+        state = open_path(state, view_model, chosen)
     target = file_browser.take("save")
     if target is not None:
         state = state.asking(requests.Save(target))
     elif _memory.is_saving and not file_browser.is_open("save"):
-        state = _after_saving(state, facts)
-    if (_memory.pending and not _memory.is_saving) or facts.asks_to_quit:
-        state = _unsaved_question(state, facts)
+        state = _after_saving(state, view_model)
+    if (_memory.pending and not _memory.is_saving) or view_model.asks_to_quit:
+        state = _unsaved_question(state, view_model)
     return state
 
 
-def _unless_unsaved(state: State, facts: Facts, request: requests.Request) -> State:
-    if not facts.unsaved:
+def _unless_unsaved(state: State, view_model: ViewModel, request: requests.Request) -> State:
+    if not view_model.unsaved:
         return state.asking(request).with_panels(start_page=False)
     _memory.pending, _memory.is_saving = [request], False
     return state
 
 
-def _after_saving(state: State, facts: Facts) -> State:
+def _after_saving(state: State, view_model: ViewModel) -> State:
     """Saving was carried out last frame: go on, or, when it failed or was cancelled, keep everything as it is."""
     pending = tuple(_memory.pending)
     _memory.pending, _memory.is_saving = [], False
-    if facts.unsaved:
+    if view_model.unsaved:
         return state
     return state.asking(*pending).with_panels(start_page=False)
 
 
-def _unsaved_question(state: State, facts: Facts) -> State:
+def _unsaved_question(state: State, view_model: ViewModel) -> State:
     if not imgui.is_popup_open(_UNSAVED):
         imgui.open_popup(_UNSAVED)
     centre = imgui.get_main_viewport().get_center()
@@ -108,49 +108,49 @@ def _unsaved_question(state: State, facts: Facts) -> State:
     imgui.set_next_window_pos(centre, imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
     if not imgui.begin_popup_modal(_UNSAVED, None, imgui.WindowFlags_.always_auto_resize)[0]:
         return state
-    is_quitting = facts.asks_to_quit
-    imgui.text_unformatted(f"{facts.title} has changes that are not saved.")
+    is_quitting = view_model.asks_to_quit
+    imgui.text_unformatted(f"{view_model.title} has changes that are not saved.")
     widgets.hint("Save them before quitting?" if is_quitting else "Save them before another scene takes its place?")
     imgui.dummy(imgui.ImVec2(theme.em(26), theme.em(0.4)))
     width = theme.em(7)
     if widgets.button("Save##unsaved", tip="Save, then go on.", width=width):
-        state = _save_first(state, facts)
+        state = _save_first(state, view_model)
     imgui.same_line()
     if widgets.button("Discard", tip="Go on; the changes are lost.", width=width):
-        state = _go_on(state, facts)
+        state = _go_on(state, view_model)
     imgui.same_line()
     if widgets.button("Cancel##unsaved", tip="Stay, with everything as it is.", width=width) or imgui.is_key_pressed(imgui.Key.escape):
-        state = _stay(state, facts)
+        state = _stay(state, view_model)
     imgui.end_popup()
     return state
 
 
-def _go_on(state: State, facts: Facts) -> State:
+def _go_on(state: State, view_model: ViewModel) -> State:
     """Without saving."""
     imgui.close_current_popup()
-    if facts.asks_to_quit:
+    if view_model.asks_to_quit:
         return state.asking(requests.Quit(discard=True))
     pending, _memory.pending = tuple(_memory.pending), []
     return state.asking(*pending).with_panels(start_page=False)
 
 
-def _stay(state: State, facts: Facts) -> State:
+def _stay(state: State, view_model: ViewModel) -> State:
     imgui.close_current_popup()
     _memory.pending, _memory.is_saving = [], False
-    return state.asking(requests.CancelQuit()) if facts.asks_to_quit else state
+    return state.asking(requests.CancelQuit()) if view_model.asks_to_quit else state
 
 
-def _save_first(state: State, facts: Facts) -> State:
+def _save_first(state: State, view_model: ViewModel) -> State:
     imgui.close_current_popup()
-    if facts.asks_to_quit:
-        state = _stay(state, facts)
+    if view_model.asks_to_quit:
+        state = _stay(state, view_model)
         _memory.pending = [requests.Quit()]
     _memory.is_saving = True
-    return state.asking(requests.Save()) if facts.path is not None else save_as(state, facts)
+    return state.asking(requests.Save()) if view_model.path is not None else save_as(state, view_model)
 
 
-def _recent_folder(facts: Facts) -> Path:
-    return facts.recent[0].parent if facts.recent else Path.home()
+def _recent_folder(view_model: ViewModel) -> Path:
+    return view_model.recent[0].parent if view_model.recent else Path.home()
 
 
 def _file_stem(title: str) -> str:

@@ -16,7 +16,7 @@ from ...model.optics.glass import Dispersion
 from ...model.scene import Dielectric, SceneObject
 from ...model.scene_materials import MAX_PRIORITY
 from .. import theme
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import widgets
 from .absorption_rows import draw_absorption
 from .glass_picker import POPUP, draw_glass_picker
@@ -35,7 +35,7 @@ from .glass_values import (
 )
 from .index_curve import draw_index_curve
 
-MOST_GAIN = 10.0
+MAX_GAIN = 10.0
 
 
 @dataclass
@@ -49,7 +49,7 @@ class _Look:
 _look = _Look()
 
 
-def draw_dispersion(state: State, facts: Facts) -> State:
+def draw_dispersion(state: State, view_model: ViewModel) -> State:
     """The panel's contents; the window is the shell's."""
     selected = selected_glass(state)
     if selected is None:
@@ -59,11 +59,11 @@ def draw_dispersion(state: State, facts: Facts) -> State:
     if _look.of != item.name:
         _look.of, _look.refused = item.name, ""
     _draw_header(item, material.dispersion)
-    state = _draw_buttons(state, facts, index)
+    state = _draw_buttons(state, view_model, index)
     if widgets.section("Dispersion"):
-        state = _draw_numbers(state, facts, index)
+        state = _draw_numbers(state, view_model, index)
     if widgets.section("Index curve n(λ)"):
-        state = draw_index_curve(state, facts)
+        state = draw_index_curve(state, view_model)
     if widgets.section("Colour and overlap", is_open=False):
         state = draw_absorption(state, index)
         state = _draw_priority(state, index)
@@ -95,7 +95,7 @@ def _draw_header(item: SceneObject, dispersion: Dispersion) -> None:
 # ---- buttons ------------------------------------------------------------------------------
 
 
-def _draw_buttons(state: State, facts: Facts, index: int) -> State:
+def _draw_buttons(state: State, view_model: ViewModel, index: int) -> State:
     dispersion = selected_glass(state)[2].dispersion  # type: ignore[index]
     if widgets.button("Choose glass…", tip="Search 1,700 glasses, plastics, liquids and gems by name, maker or number."):
         imgui.open_popup(POPUP)
@@ -112,7 +112,7 @@ def _draw_buttons(state: State, facts: Facts, index: int) -> State:
     state = _draw_clipboard(state, index)
     if imgui.begin_popup(POPUP):
         imgui.begin_child("picker", ImVec2(theme.em(46.0), theme.em(30.0)))
-        state = draw_glass_picker(state, facts)
+        state = draw_glass_picker(state, view_model)
         imgui.end_child()
         imgui.end_popup()
     return state
@@ -141,13 +141,13 @@ def _draw_clipboard(state: State, index: int) -> State:
 # ---- numbers ------------------------------------------------------------------------------
 
 
-def _draw_numbers(state: State, facts: Facts, index: int) -> State:
+def _draw_numbers(state: State, view_model: ViewModel, index: int) -> State:
     item = state.scene.objects[index]
     dispersion = item.material.dispersion  # type: ignore[union-attr]
     sold = as_sold(dispersion)
     tip = "How many times stronger than in nature colours spread. 1 is the glass itself, 0 does not disperse; n_d stays."
     changed, gain, active = widgets.slider(
-        "Dispersion gain", dispersion.gain, 0.0, MOST_GAIN, unit="×", tip=tip, reset=1.0, format="%.2f", mark=1.0
+        "Dispersion gain", dispersion.gain, 0.0, MAX_GAIN, unit="×", tip=tip, reset=1.0, format="%.2f", mark=1.0
     )
     state = widgets.holding(state, active)
     if changed:
@@ -173,7 +173,7 @@ def _draw_numbers(state: State, facts: Facts, index: int) -> State:
     if _look.refused:
         widgets.error(_look.refused)
     _draw_lines(state.scene.objects[index].material.dispersion)  # type: ignore[union-attr]
-    if facts.stats.first_order:
+    if view_model.stats.first_order:
         widgets.hint("The caustic follows this edit to first order until it is traced again.")
     return state
 

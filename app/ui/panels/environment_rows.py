@@ -10,7 +10,7 @@ from ...edit.state import State
 from ...model.environment import up_and_rotation
 from ...model.scene import Vec3
 from ...model.texture import Environment
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import picture_choice, widgets
 
 _KINDS = {"constant": "Plain colour", "gradient": "Gradient", "sky": "Sky", "map": "Picture all round"}
@@ -24,21 +24,21 @@ _SKIES = {
 """The CIE's fifteen types of sky (ISO 15469), shortened."""
 
 
-def draw_surroundings(state: State, facts: Facts) -> State:
+def draw_environment(state: State, view_model: ViewModel) -> State:
     """Draw the rows. Whatever is chosen lights nothing: it is seen directly, in mirrors and through glass."""
     scene = state.scene
     tip = "What is seen behind everything, in mirrors and through glass. It lights nothing."
-    changed, kind = widgets.combo("Kind##environment", _KINDS, edit_surroundings.surroundings_kind(scene), tip=tip)
+    changed, kind = widgets.combo("Kind##environment", _KINDS, environments.environment_kind(scene), tip=tip)
     if changed and kind == "map":
-        picture_choice.ask_environment(state, facts)
+        picture_choice.ask_environment(state, view_model)
         return state
     if changed:
-        return edits.attempt(state, f"Environment: {_KINDS[kind].lower()}", edit_surroundings.set_surroundings_kind, kind)
+        return edits.attempt(state, f"Environment: {_KINDS[kind].lower()}", environments.set_environment_kind, kind)
     if scene.environment is None:
         return _constant(state)
     rows = {"gradient": _gradient, "sky": _sky}
     if scene.environment.kind == "map":
-        return _map(state, facts, scene.environment)
+        return _map(state, view_model, scene.environment)
     return rows[scene.environment.kind](state, scene.environment)
 
 
@@ -54,9 +54,9 @@ def _gradient(state: State, environment: Environment) -> State:
     for key, label, where in (("zenith", "Above", "straight up"), ("horizon", "Horizon", "all round"), ("nadir", "Below", "straight down")):
         changed, rgb, active = widgets.colour(label, _vector(told[key]), tip=f"Colour seen {where}; the intensity below makes it a radiance.")
         if changed:
-            state = edits.attempt(state, f"{label} of the gradient", edit_surroundings.set_gradient, **{key: tuple(max(c, 0.0) for c in rgb)})
+            state = edits.attempt(state, f"{label} of the gradient", environments.set_gradient, **{key: tuple(max(c, 0.0) for c in rgb)})
         state = widgets.holding(state, active)
-    return _intensity(state, float(told.get("intensity", 1.0)), edit_surroundings.set_gradient)
+    return _intensity(state, float(told.get("intensity", 1.0)), environments.set_gradient)
 
 
 def _sky(state: State, environment: Environment) -> State:
@@ -65,7 +65,7 @@ def _sky(state: State, environment: Environment) -> State:
     tip = "The CIE's fifteen types of sky: how bright it is towards the horizon and about the sun. Its disc is not drawn: a light shows it."
     changed, number = widgets.combo("Sky", skies, str(told["type"]), tip=tip)
     if changed:
-        return edits.attempt(state, "Type of sky", edit_surroundings.set_sky, type=int(number))
+        return edits.attempt(state, "Type of sky", environments.set_sky, type=int(number))
     rows = (
         ("sun_elevation_deg", "Sun's height", 0.0, 90.0, "How high the sun stands above the horizon."),
         ("sun_azimuth_deg", "Sun's azimuth", -180.0, 180.0, "Compass bearing of the sun, about the up direction from x."),
@@ -73,35 +73,35 @@ def _sky(state: State, environment: Environment) -> State:
     for key, label, low, high, tip in rows:
         changed, value, active = widgets.slider(label, float(told[key]), low, high, unit="°", tip=tip, format="%.1f")
         if changed:
-            state = edits.attempt(state, label, edit_surroundings.set_sky, **{key: value})
+            state = edits.attempt(state, label, environments.set_sky, **{key: value})
         state = widgets.holding(state, active)
     tip = "Luminance straight above."
     changed, value, active = widgets.drag("Luminance", float(told["luminance"]), 0.0, 1e9, unit=_RADIANCE, tip=tip, format="%.4g", logarithmic=True)
     if changed:
-        state = edits.attempt(state, "Luminance of the sky", edit_surroundings.set_sky, luminance=value)
+        state = edits.attempt(state, "Luminance of the sky", environments.set_sky, luminance=value)
     state = widgets.holding(state, active)
     changed, rgb, active = widgets.colour("Ground", _vector(told["ground"]), tip="Reflectance of the ground below the horizon, which the sky lights.")
     if changed:
         clipped = tuple(min(max(c, 0.0), 1.0) for c in rgb)
-        state = edits.attempt(state, "Ground of the sky", edit_surroundings.set_sky, ground=clipped)
+        state = edits.attempt(state, "Ground of the sky", environments.set_sky, ground=clipped)
     return widgets.holding(state, active)
 
 
-def _map(state: State, facts: Facts, environment: Environment) -> State:
+def _map(state: State, view_model: ViewModel, environment: Environment) -> State:
     height, width = environment.rgb.shape[:2]
     name = Path(environment.source).name if environment.source is not None else "From the scene's file"
     tip = "A picture of all directions, twice as wide as high (.hdr, .exr). Click to choose another; one may also be dropped on the window."
     if widgets.file_field("Picture", name, tip=tip):
-        picture_choice.ask_environment(state, facts)
+        picture_choice.ask_environment(state, view_model)
     widgets.read_out("Size", f"{width} × {height}", tip="Pixels across and down.")
     _, rotation_deg = up_and_rotation(environment)
     changed, angle, active = widgets.slider(
         "Rotation", round(rotation_deg, 4), -180.0, 180.0, unit="°", format="%.1f", reset=0.0, tip="Turns it about the up direction."
     )
     if changed:
-        state = edits.attempt(state, "Rotation of the environment", edit_surroundings.set_map_rotation, angle)
+        state = edits.attempt(state, "Rotation of the environment", environments.set_map_rotation, angle)
     state = widgets.holding(state, active)
-    return _intensity(state, edit_surroundings.map_intensity(environment), edit_surroundings.set_map_intensity)
+    return _intensity(state, environments.map_intensity(environment), environments.set_map_intensity)
 
 
 def _intensity(state: State, value: float, edit: Any) -> State:

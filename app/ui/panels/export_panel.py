@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 from ...edit.requests import Animate, Bake, CancelJob, Screenshot
 from ...edit.state import State
 from ...model.scene import Diffuse
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import file_browser, keys_editor, rows, widgets
 
 SIZES = {
@@ -47,22 +47,22 @@ class _Choices:
 _choices = _Choices()
 
 
-def draw_export(state: State, facts: Facts) -> State:
+def draw_export(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents."""
-    if facts.job is not None:
-        state = _running(state, facts)
-    idle = facts.job is None
+    if view_model.job is not None:
+        state = _running(state, view_model)
+    idle = view_model.job is None
     if widgets.section("Screenshot"):
-        _screenshot(facts, idle)
+        _screenshot(view_model, idle)
     if widgets.section("Caustic map"):
-        _bake(state, facts, idle)
+        _bake(state, view_model, idle)
     if widgets.section("Animation"):
-        state = _animation(state, facts, idle)
+        state = _animation(state, view_model, idle)
     return _answers(state)
 
 
-def _running(state: State, facts: Facts) -> State:
-    job = facts.job
+def _running(state: State, view_model: ViewModel) -> State:
+    job = view_model.job
     assert job is not None
     imgui.text_unformatted(job.title)
     imgui.progress_bar(job.fraction, imgui.ImVec2(-1, 0), f"{100 * job.fraction:.0f} %")
@@ -75,7 +75,7 @@ def _running(state: State, facts: Facts) -> State:
     return state
 
 
-def _screenshot(facts: Facts, idle: bool) -> None:
+def _screenshot(view_model: ViewModel, idle: bool) -> None:
     _, _choices.spectral = widgets.toggle(
         "Spectral bins", _choices.spectral, tip="Write an EXR with 20 spectral channels (W/(m² sr) in each bin), rendered anew in the background."
     )
@@ -84,10 +84,10 @@ def _screenshot(facts: Facts, idle: bool) -> None:
     suffixes = (".exr",) if _choices.spectral else (".png",) if _choices.with_interface else (".png", ".exr", ".npy")
     tip = "PNG: as displayed. EXR and NPY: linear Rec.709 radiance, lm/(sr unit²), without tone curve."
     if widgets.button("Save screenshot…", tip=tip, enabled=idle, width=-1):
-        _ask("screenshot", "Save screenshot", suffixes, facts, facts.title)
+        _ask("screenshot", "Save screenshot", suffixes, view_model, view_model.title)
 
 
-def _bake(state: State, facts: Facts, idle: bool) -> None:
+def _bake(state: State, view_model: ViewModel, idle: bool) -> None:
     names = list(dict.fromkeys(item.name for item in state.scene.objects if isinstance(item.material, Diffuse)))
     if not names:
         widgets.hint("Nothing in this scene is diffuse, so nothing carries a caustic.")
@@ -99,10 +99,10 @@ def _bake(state: State, facts: Facts, idle: bool) -> None:
     _, _choices.map_photons = widgets.combo("Photons##map", PHOTONS, _choices.map_photons, tip="Photons emitted for the map.")
     tip = "Irradiance of the caustic, lm/unit², as EXR or NPY (linear) or PNG (to look at). A .json beside it says where the texture lies in the world."
     if widgets.button("Bake map…", tip=tip, enabled=idle, width=-1):
-        _ask("bake", "Bake caustic map", (".exr", ".png", ".npy"), facts, f"{facts.title}_{_choices.receiver}")
+        _ask("bake", "Bake caustic map", (".exr", ".png", ".npy"), view_model, f"{view_model.title}_{_choices.receiver}")
 
 
-def _animation(state: State, facts: Facts, idle: bool) -> State:
+def _animation(state: State, view_model: ViewModel, idle: bool) -> State:
     kind_tips = {
         "turntable": "The camera goes once round its target; photons are traced once.",
         "keys": "Parameters of the scene move from key to key.",
@@ -112,7 +112,7 @@ def _animation(state: State, facts: Facts, idle: bool) -> State:
     _, _choices.fps, _ = widgets.slider("Frame rate", _choices.fps, 1.0, 120.0, unit="fps", format="%.0f", reset=24.0, tip="Pictures a second.")
     _choices.fps = float(round(_choices.fps))
     if _choices.kind == "keys":
-        state = keys_editor.draw_keys(state, facts)
+        state = keys_editor.draw_keys(state, view_model)
         frames = keys_editor.frame_count(state.animation, _choices.fps)
     else:
         _, count, _ = widgets.slider("Frames", _choices.frames, 2, 720, unit="", format="%.0f", reset=120, tip="Pictures of one turn.", clamp=False)
@@ -124,12 +124,12 @@ def _animation(state: State, facts: Facts, idle: bool) -> State:
     can = idle and (_choices.kind == "turntable" or bool(state.animation))
     tip = "Render all pictures with the present tone curve and exposure. The viewer stays usable meanwhile."
     if widgets.button("Render animation…", tip=tip if can or not idle else "Add keys first.", enabled=can, width=-1):
-        _ask("animate", "Render animation", (".mp4",) if _choices.format == "mp4" else (".png",), facts, f"{facts.title}_{_choices.kind}")
+        _ask("animate", "Render animation", (".mp4",) if _choices.format == "mp4" else (".png",), view_model, f"{view_model.title}_{_choices.kind}")
     return state
 
 
-def _ask(identity: str, title: str, suffixes: tuple[str, ...], facts: Facts, name: str) -> None:
-    folder = facts.path.parent if facts.path is not None else Path.home()
+def _ask(identity: str, title: str, suffixes: tuple[str, ...], view_model: ViewModel, name: str) -> None:
+    folder = view_model.path.parent if view_model.path is not None else Path.home()
     stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)
     file_browser.ask(file_browser.Question(f"export {identity}", title, suffixes, folder / f"{stem}{suffixes[0]}", saving=True))
 

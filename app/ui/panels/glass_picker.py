@@ -17,7 +17,7 @@ from ...model.optics import catalogue, glass
 from ...model.optics.catalogue import Entry
 from ...model.scene import Scene
 from .. import item_rects, theme
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import widgets
 from .glass_values import abbe_text, selected_glass
 
@@ -43,7 +43,7 @@ class _Look:
 _look = _Look()
 
 
-def draw_glass_picker(state: State, facts: Facts) -> State:
+def draw_glass_picker(state: State, view_model: ViewModel) -> State:
     """Search field, maker and table; the state with the chosen glass, or as it was."""
     if selected_glass(state) is None:
         widgets.hint("Select an object of glass to choose its material.")

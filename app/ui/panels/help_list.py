@@ -6,14 +6,14 @@ from imgui_bundle import imgui
 
 from ...edit.state import State
 from .. import item_rects, shortcuts, theme
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import widgets
 
 _search = {"text": ""}
 """What is typed in the search field: memory of the interface."""
 
 
-def draw_shortcuts(state: State, _facts: Facts) -> State:
+def draw_shortcuts(state: State, _view_model: ViewModel) -> State:
     """Draw the list's contents."""
     imgui.set_next_item_width(-1)
     _, _search["text"] = imgui.input_text_with_hint("##search", "Search", _search["text"])

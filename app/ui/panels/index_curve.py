@@ -14,7 +14,7 @@ from ...edit.state import State
 from ...model.optics import glass
 from ...model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM, Dispersion
 from .. import item_rects, theme
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import widgets
 from .glass_values import CONTROL_NM, as_sold, natural, selected_glass, with_point
 from .rows import begin_row
@@ -22,7 +22,7 @@ from .spectral_colour import colour_of_nm, draw_strip
 
 _CURVE_NM = np.linspace(380.0, 780.0, 161)
 _LINES = {LINE_F_NM: "F", LINE_D_NM: "d", LINE_C_NM: "C"}
-_LEAST_SPAN = 0.004
+_MIN_SPAN = 0.004
 """Least height of the plot in n: a constant index is shown as a level line, not as noise."""
 
 
@@ -57,7 +57,7 @@ def _curves(dispersion: Dispersion) -> tuple[np.ndarray, np.ndarray]:
     return dispersion.index(_CURVE_NM), dispersion.derivative(_CURVE_NM)
 
 
-def draw_index_curve(state: State, facts: Facts) -> State:
+def draw_index_curve(state: State, view_model: ViewModel) -> State:
     """The plot, its switches and the way back; the state with the curve as it was dragged."""
     selected = selected_glass(state)
     if selected is None:
@@ -97,7 +97,7 @@ def _fit(dispersion: Dispersion) -> None:
     sold = as_sold(dispersion)
     values = [_curves(each)[0] for each in (dispersion, sold) if each is not None]
     low, high = float(np.min(values)), float(np.max(values))
-    middle, span = (low + high) / 2, max(high - low, _LEAST_SPAN)
+    middle, span = (low + high) / 2, max(high - low, _MIN_SPAN)
     _look.of, _look.limits = dispersion, (middle - 0.72 * span, middle + 0.62 * span)
 
 

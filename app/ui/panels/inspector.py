@@ -20,9 +20,9 @@ from ...model.scene import (
     Vec3,
 )
 from .. import theme
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import outliner, picture_choice, widgets
-from .environment_rows import draw_surroundings
+from .environment_rows import draw_environment
 
 _KINDS: dict[str, type] = {"Glass": Dielectric, "Diffuse": Diffuse, "Mirror": Mirror, "Black": Black}
 _NEW_GLASS = "N-BK7"
@@ -33,19 +33,19 @@ _keeps_proportions = {"on": True}
 """Whether the three scales move together: memory of the interface."""
 
 
-def draw_inspector(state: State, facts: Facts) -> State:
+def draw_inspector(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents."""
     selection = state.selection
     if selection.kind == "object" and selection.index < len(state.scene.objects):
-        return _object(state, facts, selection.index)
+        return _object(state, view_model, selection.index)
     if selection.kind == "light" and selection.index < len(state.scene.lights):
         from .light_panel import draw_light
 
-        return draw_light(state, facts)
-    return _scene(state, facts)
+        return draw_light(state, view_model)
+    return _scene(state, view_model)
 
 
-def _object(state: State, facts: Facts, index: int) -> State:
+def _object(state: State, view_model: ViewModel, index: int) -> State:
     thing = state.scene.objects[index]
     with theme.heading():
         imgui.text_unformatted(f"{outliner.icon_of(thing)}  {thing.name}")
@@ -55,7 +55,7 @@ def _object(state: State, facts: Facts, index: int) -> State:
     if widgets.section("Placement"):
         state = _place(state, index)
     if widgets.section("Material"):
-        state = _material(state, facts, index)
+        state = _material(state, view_model, index)
     if widgets.section("Mesh", is_open=False):
         _mesh(thing)
     return state
@@ -101,7 +101,7 @@ def _in_proportion(before: Vec3, after: Vec3) -> Vec3:
     return (before[0] * factor, before[1] * factor, before[2] * factor)
 
 
-def _material(state: State, facts: Facts, index: int) -> State:
+def _material(state: State, view_model: ViewModel, index: int) -> State:
     thing = state.scene.objects[index]
     material = thing.material
     kind = next(name for name, made in _KINDS.items() if isinstance(material, made))
@@ -113,7 +113,7 @@ def _material(state: State, facts: Facts, index: int) -> State:
     if isinstance(material, Dielectric):
         return _glass(state, material)
     if isinstance(material, Diffuse):
-        state = _texture(state, facts, index, material)
+        state = _texture(state, view_model, index, material)
         return _colour(state, index, material)
     if isinstance(material, Mirror):
         return _colour(state, index, material)
@@ -137,7 +137,7 @@ def _glass(state: State, material: Dielectric) -> State:
     return state
 
 
-def _texture(state: State, facts: Facts, index: int, material: Diffuse) -> State:
+def _texture(state: State, view_model: ViewModel, index: int, material: Diffuse) -> State:
     """The picture that the surface wears."""
     thing = state.scene.objects[index]
     worn = material.texture
@@ -146,13 +146,13 @@ def _texture(state: State, facts: Facts, index: int, material: Diffuse) -> State
     tip = "A picture laid on the surface (.png, .jpg, .exr). Click to choose one." if can else "This mesh has no texture coordinates to lay a picture on."
     pressed = widgets.file_field("Picture", name, tip=tip, enabled=can, clear_tip="" if worn is None else "Back to the plain colour.")
     if pressed is None:
-        return edits.attempt(state, f"Picture of {thing.name}", edit_surroundings.clear_texture, index)
+        return edits.attempt(state, f"Picture of {thing.name}", environments.clear_texture, index)
     if pressed:
-        picture_choice.ask_texture(state, facts, index)
+        picture_choice.ask_texture(state, view_model, index)
     if worn is not None:
         changed, wrap = widgets.combo("Beyond its edge", _WRAPS, worn.wrap, tip="What lies where the picture ends.")
         if changed:
-            state = edits.attempt(state, f"Picture of {thing.name}", edit_surroundings.set_texture_wrap, index, wrap)
+            state = edits.attempt(state, f"Picture of {thing.name}", environments.set_texture_wrap, index, wrap)
     return state
 
 
@@ -183,7 +183,7 @@ def _mesh(thing: SceneObject) -> None:
     widgets.read_out("Closed", "yes" if mesh.is_closed else "no", tip="Glass must be closed: light needs an inside.")
 
 
-def _scene(state: State, facts: Facts) -> State:
+def _scene(state: State, view_model: ViewModel) -> State:
     scene = state.scene
     with theme.heading():
         imgui.text_unformatted(scene.name)
@@ -201,7 +201,7 @@ def _scene(state: State, facts: Facts) -> State:
             state = edits.attempt(state, "Longest path", edits.set_render_defaults, max_depth=round(depth))
         state = widgets.holding(state, active)
     if widgets.section("Environment"):
-        state = draw_surroundings(state, facts)
+        state = draw_environment(state, view_model)
     if scene.notes and widgets.section("Notes"):
         for note in scene.notes:
             widgets.hint(note)

@@ -13,7 +13,7 @@ from ...edit.parameters import Parameter, Stage, parts, paths, value_of
 from ...edit.state import Key, State
 from ...model.scene import Scene
 from .. import item_rects, theme
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import widgets
 
 MAX_TIME_S = 3600.0
@@ -31,9 +31,9 @@ class _Memory:
 _memory = _Memory()
 
 
-def draw_keys(state: State, facts: Facts) -> State:
+def draw_keys(state: State, view_model: ViewModel) -> State:
     """Draw the chooser of parameters and the table of keys."""
-    stage = Stage(state.scene, state.camera, facts.exposure_ev, state.solo_nm)
+    stage = Stage(state.scene, state.camera, view_model.exposure_ev, state.solo_nm)
     known = paths(stage.scene, stage.camera)
     if _memory.path not in known:
         _memory.path = next((path for path in known if path.endswith(".dispersion_gain")), next(iter(known)))

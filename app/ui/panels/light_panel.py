@@ -10,9 +10,9 @@ import numpy as np
 from ...edit import edits
 from ...edit.state import State
 from ...model.scene import Light, Vec3
-from ...model.scene_defaults import surroundings_of
+from ...model.scene_defaults import environment_of
 from ...model.scene_lights import POWER_KEYS
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import widgets
 from .light_spectrum import draw_spectrum_choice
 
@@ -48,7 +48,7 @@ _power_key: dict[str, str] = {}
 """Kind of light -> the quantity in which its power is shown. A way of looking, not part of the document."""
 
 
-def draw_light(state: State, facts: Facts) -> State:
+def draw_light(state: State, view_model: ViewModel) -> State:
     """Rows for the selected light; a hint where none is selected."""
     index = state.selection.index
     if state.selection.kind != "light" or not 0 <= index < len(state.scene.lights):
@@ -87,7 +87,7 @@ def _edit(state: State, index: int, light: Light, what: str) -> State:
 def _draw_place(state: State, index: int) -> State:
     light = state.scene.lights[index]
     if light.kind != "directional":
-        speed = 0.005 * surroundings_of(state.scene.objects).radius
+        speed = 0.005 * environment_of(state.scene.objects).radius
         tip = "Where the light stands: x, y, z in scene units."
         changed, position, active = widgets.vec3("Position", light.position, unit="units", tip=tip, speed=speed)
         state = widgets.holding(state, active)
@@ -111,7 +111,7 @@ def _draw_direction(state: State, index: int) -> State:
         return state
     tip = "Turn the light towards the middle of the objects that are not receivers."
     if widgets.button("Aim at the objects", tip=tip):
-        toward = surroundings_of(state.scene.objects).centre - np.array(light.position)
+        toward = environment_of(state.scene.objects).centre - np.array(light.position)
         x, y, z = (float(v) for v in toward)
         return _edit(state, index, replace(light, direction=(x, y, z)), "Aim")
     return state
@@ -189,7 +189,7 @@ def _draw_power(state: State, index: int) -> State:
     light = state.scene.lights[index]
     keys = POWER_KEYS[light.kind]
     key = _power_key.get(light.kind, edits.photometric_key(light))
-    tip = "In which quantity the power is shown and typed. Photometric ones weigh each colour as the eye does."
+    tip = "In which quantity the power is shown and typed. Photometric ones weigh each colour as the camera does."
     _, key = widgets.combo("Quantity", {k: _POWER_NAMES[k] for k in keys}, key, tip=tip)
     _power_key[light.kind] = key
     power = edits.light_power(light, key)

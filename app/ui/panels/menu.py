@@ -9,14 +9,14 @@ from imgui_bundle import imgui
 from ...edit.state import Panels, State
 from .. import commands, item_rects, layout, theme
 from ..commands import Command
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import dialogs, outliner, widgets
 from .methods import METHOD_NAMES, METHOD_TIPS
 
 _SCALES = (0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.0)
 
 
-def draw_menu(state: State, facts: Facts) -> State:
+def draw_menu(state: State, view_model: ViewModel) -> State:
     """Draw the menu bar at the top of the window."""
     if not imgui.begin_main_menu_bar():
         return state
@@ -24,48 +24,48 @@ def draw_menu(state: State, facts: Facts) -> State:
         opened = imgui.begin_menu(title)
         item_rects.note(f"Menu: {title}")
         if opened:
-            state = contents(state, facts)
+            state = contents(state, view_model)
             imgui.end_menu()
-    _title(facts)
+    _title(view_model)
     imgui.end_main_menu_bar()
     return state
 
 
-def _item(command: Command, state: State, facts: Facts, label: str | None = None) -> State:
-    checked = command.checked is not None and command.checked(state, facts)
+def _item(command: Command, state: State, view_model: ViewModel, label: str | None = None) -> State:
+    checked = command.checked is not None and command.checked(state, view_model)
     keys = command.keys[0] if command.keys else ""
-    pressed, _ = imgui.menu_item(label or command.name, keys, checked, command.enabled(state, facts))
+    pressed, _ = imgui.menu_item(label or command.name, keys, checked, command.enabled(state, view_model))
     item_rects.note(command.name)
     widgets.tooltip(command.tip)
-    return command.act(state, facts) if pressed else state
+    return command.act(state, view_model) if pressed else state
 
 
-def _items(names: tuple[str, ...], state: State, facts: Facts) -> State:
+def _items(names: tuple[str, ...], state: State, view_model: ViewModel) -> State:
     """Several commands; an empty name is a line between them."""
     for name in names:
         if name:
-            state = _item(commands.command(name), state, facts)
+            state = _item(commands.command(name), state, view_model)
         else:
             imgui.separator()
     return state
 
 
-def _file(state: State, facts: Facts) -> State:
-    state = _items(("New scene", "Start page", "", "Open…"), state, facts)
-    if imgui.begin_menu("Open recent", bool(facts.recent)):
-        for path in facts.recent:
+def _file(state: State, view_model: ViewModel) -> State:
+    state = _items(("New scene", "Start page", "", "Open…"), state, view_model)
+    if imgui.begin_menu("Open recent", bool(view_model.recent)):
+        for path in view_model.recent:
             if imgui.menu_item(f"{path.name}##{path}", "", False)[0]:
-                state = dialogs.open_path(state, facts, path)
+                state = dialogs.open_path(state, view_model, path)
             widgets.tooltip(str(path))
         imgui.end_menu()
-    return _items(("", "Save", "Save as…", "", "Export…", "", "Quit"), state, facts)
+    return _items(("", "Save", "Save as…", "", "Export…", "", "Quit"), state, view_model)
 
 
-def _edit(state: State, facts: Facts) -> State:
-    for name, label in (("Undo", facts.undo), ("Redo", facts.redo)):
+def _edit(state: State, view_model: ViewModel) -> State:
+    for name, label in (("Undo", view_model.undo), ("DirtyLevel", view_model.dirty_level)):
         shown = f"{name} {_lowered(label)}" if label else name
-        state = _item(commands.command(name), state, facts, f"{shown}###{name}")
-    state = _items(("", "Duplicate", "Delete", "", "Copy material", "Paste material"), state, facts)
+        state = _item(commands.command(name), state, view_model, f"{shown}###{name}")
+    state = _items(("", "Duplicate", "Delete", "", "Copy material", "Paste material"), state, view_model)
     imgui.separator()
     if imgui.begin_menu("Add"):
         state = outliner.draw_add_items(state)
@@ -73,19 +73,19 @@ def _edit(state: State, facts: Facts) -> State:
     return state
 
 
-def _view(state: State, facts: Facts) -> State:
-    state = _items(("Frame selection", "Frame everything", "Scene's own view", "Keep as scene's view"), state, facts)
+def _view(state: State, view_model: ViewModel) -> State:
+    state = _items(("Frame selection", "Frame everything", "Scene's own view", "Keep as scene's view"), state, view_model)
     for title, prefix in (("Go to view", "View"), ("Store view", "Store view")):
         if imgui.begin_menu(title):
-            state = _items(tuple(f"{prefix} {number}" for number in range(1, 10)), state, facts)
+            state = _items(tuple(f"{prefix} {number}" for number in range(1, 10)), state, view_model)
             imgui.end_menu()
     imgui.separator()
-    state = _items(("Automatic exposure", "False colour", "Single wavelength", "Ray overlay", "Magnifier"), state, facts)
+    state = _items(("Automatic exposure", "False colour", "Single wavelength", "Ray overlay", "Magnifier"), state, view_model)
     imgui.separator()
     if imgui.begin_menu("Panels"):
-        state = _items(tuple(f"Panel: {command.name}" for command in commands.PANELS), state, facts)
+        state = _items(tuple(f"Panel: {command.name}" for command in commands.PANELS), state, view_model)
         imgui.end_menu()
-    state = _items(("Hide panels",), state, facts)
+    state = _items(("Hide panels",), state, view_model)
     if imgui.menu_item("Reset layout", "", False)[0]:
         layout.reset()
         state = replace(state, preferences=replace(state.preferences, panels=Panels()))
@@ -112,8 +112,8 @@ def _appearance(state: State) -> State:
     return state if preferences == state.preferences else replace(state, preferences=preferences)
 
 
-def _render(state: State, facts: Facts) -> State:
-    state = _items(("Accumulate photons", "Trace again", "Physical picture", ""), state, facts)
+def _render(state: State, view_model: ViewModel) -> State:
+    state = _items(("Accumulate photons", "Trace again", "Physical picture", ""), state, view_model)
     if imgui.begin_menu("Method"):
         for method, name in METHOD_NAMES.items():
             if imgui.menu_item(name, "", state.method == method)[0]:
@@ -122,15 +122,15 @@ def _render(state: State, facts: Facts) -> State:
             widgets.tooltip(METHOD_TIPS[method])
         imgui.end_menu()
     imgui.separator()
-    return _items(("Reload shaders",), state, facts)
+    return _items(("Reload shaders",), state, view_model)
 
 
-def _tools(state: State, facts: Facts) -> State:
-    return _items(("Select", "Move", "Rotate", "Scale", "", "Dispersion brush", "Pull a colour"), state, facts)
+def _tools(state: State, view_model: ViewModel) -> State:
+    return _items(("Select", "Move", "Rotate", "Scale", "", "Dispersion brush", "Pull a colour"), state, view_model)
 
 
-def _help(state: State, facts: Facts) -> State:
-    return _items(("Shortcuts", "About SpectraSplat"), state, facts)
+def _help(state: State, view_model: ViewModel) -> State:
+    return _items(("Shortcuts", "About SpectraSplat"), state, view_model)
 
 
 _MENUS = (
@@ -143,18 +143,18 @@ _MENUS = (
 )
 
 
-def _title(facts: Facts) -> None:
+def _title(view_model: ViewModel) -> None:
     """The scene's name at the right end, with a dot while it is not saved."""
-    text = facts.path.name if facts.path is not None else facts.title
-    mark = "  •" if facts.unsaved else ""
+    text = view_model.path.name if view_model.path is not None else view_model.title
+    mark = "  •" if view_model.unsaved else ""
     width = imgui.calc_text_size(text + mark).x + theme.em(0.8)
     free = imgui.get_window_width() - imgui.get_cursor_pos_x()
     if free < width + theme.em(1):
         return
     imgui.set_cursor_pos_x(imgui.get_window_width() - width)
     imgui.text_disabled(text)
-    widgets.tooltip(str(facts.path) if facts.path is not None else "Not saved to a file yet.")
-    if facts.unsaved:
+    widgets.tooltip(str(view_model.path) if view_model.path is not None else "Not saved to a file yet.")
+    if view_model.unsaved:
         imgui.same_line(0, 0)
         with theme.coloured(theme.palette().warning):
             imgui.text_unformatted(mark)

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 from ...edit.requests import DismissMessage, ReloadShaders
 from ...edit.state import State
 from .. import item_rects, theme
-from ..view_model import Facts, Message
+from ..view_model import ViewModel, Message
 from . import status_bar, widgets
 
 _FADE_FROM_S, _FADE_S = 4.5, 1.5
@@ -27,14 +27,14 @@ _closed_shader_error = {"text": ""}
 """The shader error whose window was closed: it comes back with the next, different one."""
 
 
-def draw_messages(state: State, facts: Facts) -> State:
+def draw_messages(state: State, view_model: ViewModel) -> State:
     """Draw what there is to say, newest at the bottom of the right corner."""
-    state = _shader_error(state, facts)
+    state = _shader_error(state, view_model)
     viewport = imgui.get_main_viewport()
     bottom = viewport.work_pos.y + viewport.work_size.y - status_bar.height() - theme.em(0.6)
     right = viewport.work_pos.x + viewport.work_size.x - theme.em(0.8)
-    for index in reversed(range(len(facts.messages))):
-        message = facts.messages[index]
+    for index in reversed(range(len(view_model.messages))):
+        message = view_model.messages[index]
         imgui.set_next_window_pos((right, bottom), imgui.Cond_.always, imgui.ImVec2(1.0, 1.0))
         state, height = _toast(state, message, index)
         bottom -= height + theme.em(0.4)
@@ -69,8 +69,8 @@ def _toast(state: State, message: Message, index: int) -> tuple[State, float]:
     return state, height
 
 
-def _shader_error(state: State, facts: Facts) -> State:
-    text = facts.shader_error
+def _shader_error(state: State, view_model: ViewModel) -> State:
+    text = view_model.shader_error
     if text is None:
         _closed_shader_error["text"] = ""
         return state

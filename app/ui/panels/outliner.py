@@ -20,7 +20,7 @@ from ...model.scene import (
 )
 from ...model.scene_lights import KINDS
 from .. import item_rects, theme
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import widgets
 
 _SEARCH_FROM = 12
@@ -30,7 +30,7 @@ _memory: dict[str, object] = {"renaming": None, "text": "", "search": ""}
 """What is being typed: memory of the interface, no part of the state."""
 
 
-def draw_outliner(state: State, _facts: Facts) -> State:
+def draw_outliner(state: State, _view_model: ViewModel) -> State:
     """Draw the panel's contents."""
     state = _toolbar(state)
     wanted = str(_memory["search"]).strip().lower()

@@ -8,7 +8,7 @@ from ...edit import edits, environments
 from ...edit.requests import Notice
 from ...edit.state import State
 from ...model.scene import Diffuse, Scene
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import file_browser
 
 _ENVIRONMENT = "environment"
@@ -20,20 +20,20 @@ _memory = {"worn by": ""}
 """Name of the object that is to wear the picture asked for."""
 
 
-def ask_environment(state: State, facts: Facts) -> None:
+def ask_environment(state: State, view_model: ViewModel) -> None:
     """Ask for a panorama."""
     now = state.scene.environment
-    start = _folder(facts, None if now is None else now.source)
-    file_browser.ask(file_browser.Question(_ENVIRONMENT, "Choose environment", edit_surroundings.ENVIRONMENT_SUFFIXES, start))
+    start = _folder(view_model, None if now is None else now.source)
+    file_browser.ask(file_browser.Question(_ENVIRONMENT, "Choose environment", environments.ENVIRONMENT_SUFFIXES, start))
 
 
-def ask_texture(state: State, facts: Facts, index: int) -> None:
+def ask_texture(state: State, view_model: ViewModel, index: int) -> None:
     """Ask for a picture that object `index` is to wear."""
     item = state.scene.objects[index]
     worn = item.material.texture if isinstance(item.material, Diffuse) else None
     _memory["worn by"] = item.name
-    start = _folder(facts, None if worn is None else worn.source)
-    file_browser.ask(file_browser.Question(_TEXTURE, f"Picture for {item.name}", edit_surroundings.TEXTURE_SUFFIXES, start))
+    start = _folder(view_model, None if worn is None else worn.source)
+    file_browser.ask(file_browser.Question(_TEXTURE, f"Picture for {item.name}", environments.TEXTURE_SUFFIXES, start))
 
 
 def answers(state: State) -> State:
@@ -50,7 +50,7 @@ def answers(state: State) -> State:
 
 def is_picture(path: Path) -> bool:
     """Whether a dropped file is one for `dropped`."""
-    return path.suffix.lower() in {*edit_surroundings.ENVIRONMENT_SUFFIXES, *edit_surroundings.TEXTURE_SUFFIXES}
+    return path.suffix.lower() in {*environments.ENVIRONMENT_SUFFIXES, *environments.TEXTURE_SUFFIXES}
 
 
 def dropped(state: State, path: Path) -> State:
@@ -64,21 +64,21 @@ def dropped(state: State, path: Path) -> State:
 
 
 def _as_environment(state: State, path: Path) -> State:
-    return edits.attempt(state, f"Environment {path.name}", edit_surroundings.set_environment_map, path)
+    return edits.attempt(state, f"Environment {path.name}", environments.set_environment_map, path)
 
 
 def _as_texture(state: State, path: Path, index: int) -> State:
-    return edits.attempt(state, f"Picture of {state.scene.objects[index].name}", edit_surroundings.set_texture, index, path)
+    return edits.attempt(state, f"Picture of {state.scene.objects[index].name}", environments.set_texture, index, path)
 
 
 def _index(scene: Scene, name: str) -> int | None:
     return next((i for i, item in enumerate(scene.objects) if item.name == name), None)
 
 
-def _folder(facts: Facts, source: str | None) -> Path:
+def _folder(view_model: ViewModel, source: str | None) -> Path:
     """Where to look first: beside the present picture, else beside the scene."""
     if source is not None and Path(source).parent.is_dir():
         return Path(source).parent
-    if facts.path is not None:
-        return facts.path.parent
-    return facts.recent[0].parent if facts.recent else Path.home()
+    if view_model.path is not None:
+        return view_model.path.parent
+    return view_model.recent[0].parent if view_model.recent else Path.home()

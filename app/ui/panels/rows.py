@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 from .. import item_rects, theme
 
 _LABEL_EM, _LABEL_SHARE = 8.4, 0.42
-_LEAST_FIELD_EM = 4.5
+_MIN_FIELD_EM = 4.5
 _TIP_EM = 26.0
 
 
@@ -29,7 +29,7 @@ def begin_row(label: str) -> bool:
         imgui.text_unformatted(shown)
         hit = double_clicked()
         column = max(column, imgui.calc_text_size(shown).x)
-        if room - column - gap >= theme.em(_LEAST_FIELD_EM):
+        if room - column - gap >= theme.em(_MIN_FIELD_EM):
             imgui.same_line(start + column + gap)
     else:
         imgui.set_cursor_pos_x(start + column + gap)

@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import imgui, implot
 
-from ...edit.chromaticity import ColourFacts, colour_facts
+from ...edit.chromaticity import ColourInfo, colour_info
 from ...edit.state import State
 from .. import theme
-from ..view_model import CursorFacts, Facts
+from ..view_model import CursorInfo, ViewModel
 from . import numbers, rows, spectral_colour, widgets
 
 
-def draw_spectrum(state: State, facts: Facts) -> State:
+def draw_spectrum(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents."""
-    cursor = facts.cursor
+    cursor = view_model.cursor
     if cursor is None:
         widgets.hint("Point at a receiver in the picture to see the spectrum of the light that falls there.")
         return state
     colour = None
     if cursor.spectrum is not None and cursor.spectrum_nm is not None:
-        colour = colour_facts(cursor.spectrum_nm, cursor.spectrum)
+        colour = colour_info(cursor.spectrum_nm, cursor.spectrum)
     _told(state, cursor, colour)
     if cursor.spectrum is None or cursor.spectrum_nm is None:
         widgets.hint("The surface under the cursor is no receiver: caustics are recorded on diffuse objects only.")
@@ -31,7 +31,7 @@ def draw_spectrum(state: State, facts: Facts) -> State:
     return state
 
 
-def _told(state: State, cursor: CursorFacts, colour: ColourFacts | None) -> None:
+def _told(state: State, cursor: CursorInfo, colour: ColourInfo | None) -> None:
     parts = [("Radiance", "  ".join(f"{c:.3g}" for c in cursor.rgb), "Linear Rec.709 radiance of the pixel, lm/(sr unit²).")]
     if colour is not None:
         parts += [
@@ -59,7 +59,7 @@ def _told(state: State, cursor: CursorFacts, colour: ColourFacts | None) -> None
         rows.explain(label, tip)
 
 
-def _dominant_text(colour: ColourFacts) -> str:
+def _dominant_text(colour: ColourInfo) -> str:
     if colour.dominant_nm is None:
         return "none (white)"
     return f"{colour.dominant_nm:.0f} nm" + (" c" if colour.is_complementary else "")

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 from ...edit.requests import Recover
 from ...edit.state import State
 from .. import item_rects, theme
-from ..view_model import Facts, SceneEntry
+from ..view_model import ViewModel, SceneEntry
 from . import dialogs, widgets
 
 _CARD_EM, _GAP_EM = 17.0, 1.1
@@ -22,7 +22,7 @@ _FLAGS = (
 )
 
 
-def draw_start_page(state: State, facts: Facts) -> State:
+def draw_start_page(state: State, view_model: ViewModel) -> State:
     """Draw the page over the whole window below the menu bar; it closes itself when something is opened."""
     viewport = imgui.get_main_viewport()
     imgui.set_next_window_pos(viewport.work_pos)
@@ -32,27 +32,27 @@ def draw_start_page(state: State, facts: Facts) -> State:
     imgui.push_style_var(imgui.StyleVar_.window_border_size, 0.0)
     imgui.begin("##start page", None, _FLAGS)
     imgui.pop_style_var(3)
-    _title(facts)
-    if facts.recovery is not None:
+    _title(view_model)
+    if view_model.recovery is not None:
         state = _recovery(state)
     imgui.dummy(imgui.ImVec2(0, theme.em(0.4)))
     imgui.begin_child("##side", imgui.ImVec2(theme.em(15), 0))
-    state = _side(state, facts)
+    state = _side(state, view_model)
     imgui.end_child()
     imgui.same_line(0, theme.em(2))
     imgui.begin_child("##cards", imgui.ImVec2(0, 0))
-    state = _cards(state, facts)
+    state = _cards(state, view_model)
     imgui.end_child()
     imgui.end()
     return state
 
 
-def _title(facts: Facts) -> None:
+def _title(view_model: ViewModel) -> None:
     with theme.heading(1.9):
         imgui.text_unformatted("SpectraSplat")
     widgets.hint("Dispersive caustics, live. Choose a scene, or drop a scene, a GLB or a mesh on the window.")
-    if facts.stats.renderer:
-        widgets.hint(f"Draws with {facts.stats.renderer}")
+    if view_model.stats.renderer:
+        widgets.hint(f"Draws with {view_model.stats.renderer}")
 
 
 def _recovery(state: State) -> State:
@@ -75,43 +75,43 @@ def _recovery(state: State) -> State:
     return state
 
 
-def _side(state: State, facts: Facts) -> State:
+def _side(state: State, view_model: ViewModel) -> State:
     if widgets.button(f"{icons.ICON_FA_FOLDER_OPEN}  Open…", tip="Scenes, glTF and meshes (Ctrl+O).", width=-1):
-        state = dialogs.open_file(state, facts)
+        state = dialogs.open_file(state, view_model)
     if widgets.button(f"{icons.ICON_FA_FILE}  New scene", tip="Start from the default scene (Ctrl+N).", width=-1):
-        state = dialogs.new_scene(state, facts)
-    if widgets.button(f"{icons.ICON_FA_ARROW_RIGHT}  Continue", tip=f"On with {facts.title}.", width=-1):
+        state = dialogs.new_scene(state, view_model)
+    if widgets.button(f"{icons.ICON_FA_ARROW_RIGHT}  Continue", tip=f"On with {view_model.title}.", width=-1):
         state = state.with_panels(start_page=False)
     imgui.dummy(imgui.ImVec2(0, theme.em(0.5)))
     with theme.heading():
         imgui.text_unformatted("Recent")
-    if not facts.recent:
+    if not view_model.recent:
         widgets.hint("Files that you open or save appear here.")
-    for index, path in enumerate(facts.recent):
+    for index, path in enumerate(view_model.recent):
         pressed, _ = imgui.selectable(f"{path.name}##recent {index}", False)
         item_rects.note(f"Recent: {path.name}")
         widgets.tooltip(str(path))
         if pressed:
-            state = dialogs.open_path(state, facts, path)
+            state = dialogs.open_path(state, view_model, path)
     return state
 
 
-def _cards(state: State, facts: Facts) -> State:
-    if not facts.scenes:
+def _cards(state: State, view_model: ViewModel) -> State:
+    if not view_model.scenes:
         widgets.hint("No scenes were found.")
         return state
     room, gap = imgui.get_content_region_avail().x, theme.em(_GAP_EM)
     columns = max(1, int((room + gap) / (theme.em(_CARD_EM) + gap)))
     width = (room - gap * (columns - 1)) / columns
     width = min(width, theme.em(_CARD_EM * 1.6))
-    for index, entry in enumerate(facts.scenes):
+    for index, entry in enumerate(view_model.scenes):
         if index % columns:
             imgui.same_line(0, gap)
         imgui.push_id(index)
         pressed = _card(entry, width)
         imgui.pop_id()
         if pressed:
-            state = dialogs.open_path(state, facts, entry.path)
+            state = dialogs.open_path(state, view_model, entry.path)
         if index % columns == columns - 1:
             imgui.dummy(imgui.ImVec2(0, theme.em(0.3)))
     return state

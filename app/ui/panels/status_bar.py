@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 from ...edit.requests import CancelJob
 from ...edit.state import State
 from .. import item_rects, theme
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import numbers, rows, widgets
 
 _FLAGS = (
@@ -28,7 +28,7 @@ def height() -> float:
     return imgui.get_frame_height() + theme.em(0.3)
 
 
-def draw_status_bar(state: State, facts: Facts) -> State:
+def draw_status_bar(state: State, view_model: ViewModel) -> State:
     """Draw the bar along the lower edge of the window."""
     viewport = imgui.get_main_viewport()
     imgui.set_next_window_pos((viewport.work_pos.x, viewport.work_pos.y + viewport.work_size.y - height()))
@@ -39,19 +39,19 @@ def draw_status_bar(state: State, facts: Facts) -> State:
     imgui.push_style_color(imgui.Col_.window_bg, theme.palette().raised)
     imgui.begin("##status", None, _FLAGS)
     imgui.align_text_to_frame_padding()
-    state = _progress(state, facts)
+    state = _progress(state, view_model)
     _selection(state)
-    if facts.job is not None:
-        state = _job(state, facts)
-    _right_end(facts)
+    if view_model.job is not None:
+        state = _job(state, view_model)
+    _right_end(view_model)
     imgui.end()
     imgui.pop_style_color()
     imgui.pop_style_var(3)
     return state
 
 
-def _progress(state: State, facts: Facts) -> State:
-    stats, target = facts.stats, max(state.preferences.target_photons, 1)
+def _progress(state: State, view_model: ViewModel) -> State:
+    stats, target = view_model.stats, max(state.preferences.target_photons, 1)
     imgui.push_style_color(imgui.Col_.button, (0.0, 0.0, 0.0, 0.0))
     pressed = imgui.button((icons.ICON_FA_PAUSE if state.playing else icons.ICON_FA_PLAY) + "##play")
     imgui.pop_style_color()
@@ -82,8 +82,8 @@ def _selection(state: State) -> None:
         item_rects.note("Selected")
 
 
-def _job(state: State, facts: Facts) -> State:
-    job = facts.job
+def _job(state: State, view_model: ViewModel) -> State:
+    job = view_model.job
     if job is None:
         return state
     imgui.same_line(0, theme.em(1.6))
@@ -97,12 +97,12 @@ def _job(state: State, facts: Facts) -> State:
     return state
 
 
-def _right_end(facts: Facts) -> None:
+def _right_end(view_model: ViewModel) -> None:
     """Rate and frame time, flush with the window's edge, where there is room."""
-    recent = facts.frame_ms[-10:]
+    recent = view_model.frame_ms[-10:]
     parts = []
-    if facts.stats.photons_per_second > 0:
-        parts.append(f"{numbers.count(facts.stats.photons_per_second)} photons/s")
+    if view_model.stats.photons_per_second > 0:
+        parts.append(f"{numbers.count(view_model.stats.photons_per_second)} photons/s")
     if recent:
         parts.append(f"{numbers.milliseconds(sum(recent) / len(recent))} a frame")
     text = "    ".join(parts)

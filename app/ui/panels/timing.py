@@ -9,14 +9,14 @@ from ...edit.requests import Retrace
 from ...edit.state import State
 from ...render.viewer.stats import LiveStats
 from .. import theme
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import numbers, rows, widgets
 
 PASSES = {
     "trace": "Photons through the glass, to the receivers.",
     "splat": "Stored photons into the caustic maps.",
     "resolve": "Levels and seams of the maps put together.",
-    "eye": "Camera samples: what the picture shows, through glass and mirrors.",
+    "camera": "Camera samples: what the picture shows, through glass and mirrors.",
     "display": "Exposure, tone curve and comparison.",
     "interface": "Panels and plots.",
 }
@@ -42,25 +42,25 @@ _COUNTERS = {
 """What the engine counts -> its name on the screen, and what it means."""
 
 
-def draw_timing(state: State, facts: Facts) -> State:
+def draw_timing(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents."""
-    state = _first_order(state, facts.stats)
+    state = _first_order(state, view_model.stats)
     wide = imgui.get_content_region_avail().x > theme.em(34)
     if wide and imgui.begin_table("##columns", 3, imgui.TableFlags_.sizing_stretch_prop):
         for name, weight in (("frame", 1.15), ("passes", 1.0), ("numbers", 1.1)):
             imgui.table_setup_column(name, imgui.TableColumnFlags_.width_stretch, weight)
         imgui.table_next_row()
         imgui.table_next_column()
-        _frame_plot(facts, max(imgui.get_content_region_avail().y, theme.em(7)))
+        _frame_plot(view_model, max(imgui.get_content_region_avail().y, theme.em(7)))
         imgui.table_next_column()
-        _passes(facts)
+        _passes(view_model)
         imgui.table_next_column()
-        _numbers(state, facts.stats)
+        _numbers(state, view_model.stats)
         imgui.end_table()
     elif not wide:
-        _frame_plot(facts, theme.em(7))
-        _passes(facts)
-        _numbers(state, facts.stats)
+        _frame_plot(view_model, theme.em(7))
+        _passes(view_model)
+        _numbers(state, view_model.stats)
     return state
 
 
@@ -77,8 +77,8 @@ def _first_order(state: State, stats: LiveStats) -> State:
     return state
 
 
-def _frame_plot(facts: Facts, height: float) -> None:
-    times = np.asarray(facts.frame_ms[-240:], float)
+def _frame_plot(view_model: ViewModel, height: float) -> None:
+    times = np.asarray(view_model.frame_ms[-240:], float)
     latest = float(times[-10:].mean()) if times.size else 0.0
     rate = f"{1000 / latest:.0f} frames/s" if latest > 0 else "no frame yet"
     imgui.text_unformatted(f"Frame  {numbers.milliseconds(latest)}")
@@ -102,22 +102,22 @@ def _frame_plot(facts: Facts, height: float) -> None:
     rows.explain("Frame plot", "Durations of the last 240 frames in milliseconds. Lines: 16.7 ms (60 frames/s) and 50 ms.")
 
 
-def _passes(facts: Facts) -> None:
-    known = [name for name in PASSES if name in facts.pass_ms]
-    names = known + [name for name in facts.pass_ms if name not in PASSES]
+def _passes(view_model: ViewModel) -> None:
+    known = [name for name in PASSES if name in view_model.pass_ms]
+    names = known + [name for name in view_model.pass_ms if name not in PASSES]
     imgui.text_unformatted("By pass")
     rows.explain("By pass", "Time of each pass in the last frame, milliseconds: GPU timers, or the wall clock on a software renderer.")
     if not names:
         widgets.hint("Nothing was computed in the last frame.")
         return
-    longest = max(max(facts.pass_ms.values()), 1e-6)
+    longest = max(max(view_model.pass_ms.values()), 1e-6)
     if not imgui.begin_table("##passes", 3, imgui.TableFlags_.sizing_fixed_fit):
         return
     imgui.table_setup_column("pass")
     imgui.table_setup_column("bar", imgui.TableColumnFlags_.width_stretch)
     imgui.table_setup_column("ms")
     for name in names:
-        spent = facts.pass_ms[name]
+        spent = view_model.pass_ms[name]
         imgui.table_next_row()
         imgui.table_next_column()
         imgui.text_unformatted(name.capitalize())
@@ -159,7 +159,7 @@ def _numbers(state: State, stats: LiveStats) -> None:
     _table("##numbers", lines)
     dropped = [(_named(k), numbers.count(v), _tip(k)) for k, v in stats.fallbacks.items() if v]
     lost = [(_named(k), numbers.percent(v), _tip(k)) for k, v in stats.lost.items() if v]
-    looked = [(_named(k), numbers.count(v), _tip(k)) for k, v in stats.eye_fallbacks.items() if v]
+    looked = [(_named(k), numbers.count(v), _tip(k)) for k, v in stats.camera_fallbacks.items() if v]
     bands = [(name, f"{n} bands", "Spectral bands of this light.") for name, n in sorted(stats.bands.items())]
     for title, tip, told in (
         ("Fall-backs", "Photons that took a simpler way.", dropped),
@@ -177,7 +177,7 @@ def _numbers(state: State, stats: LiveStats) -> None:
 
 
 def _samples(stats: LiveStats) -> str:
-    bands = f", {stats.eye_bands} bands" if stats.eye_bands > 1 else ""
+    bands = f", {stats.camera_bands} bands" if stats.camera_bands > 1 else ""
     return f"{stats.camera_samples:.0f} a pixel{bands}"
 
 

@@ -8,12 +8,12 @@ from dataclasses import replace
 from ...edit.state import Display, Preferences, State
 from ...model.scene import Camera
 from .. import view_commands
-from ..view_model import Facts
+from ..view_model import ViewModel
 from . import false_colour, spectrum_strip, widgets
 from .methods import METHOD_NAMES, METHOD_TIPS
 
 SWEEP_NM = (400.0, 700.0)
-"""What the sweep runs through: where the eye sees something."""
+"""What the sweep runs through: where the camera sees something."""
 SWEEP_NM_PER_S = 45.0
 """Speed of the sweep through the spectrum."""
 _TONES = {"spectrasplat": "SpectraSplat", "aces": "ACES", "reinhard": "Reinhard", "linear": "Linear, clipped"}
@@ -24,11 +24,11 @@ _sweeping = {"on": False}
 """Whether the sweep runs: memory of the interface, like a scroll position."""
 
 
-def draw_view(state: State, facts: Facts) -> State:
+def draw_view(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents."""
-    state = _sweep(state, facts)
+    state = _sweep(state, view_model)
     if widgets.section("Exposure and tone"):
-        state = _exposure(state, facts)
+        state = _exposure(state, view_model)
     if widgets.section("Single wavelength"):
         state = _solo(state)
     if widgets.section("Overlays"):
@@ -40,9 +40,9 @@ def draw_view(state: State, facts: Facts) -> State:
     return state
 
 
-def _exposure(state: State, facts: Facts) -> State:
+def _exposure(state: State, view_model: ViewModel) -> State:
     display = state.display
-    in_use = facts.exposure_ev if display.auto_exposure else display.exposure_ev
+    in_use = view_model.exposure_ev if display.auto_exposure else display.exposure_ev
     changed, stops, active = widgets.slider(
         "Exposure", in_use, -16.0, 16.0, unit="EV", format="%+.2f", reset=0.0,
         tip="Brightness of the picture in stops. Moving it turns the automatic off.",
@@ -112,13 +112,13 @@ def _solo(state: State) -> State:
     return widgets.holding(state, active)
 
 
-def _sweep(state: State, facts: Facts) -> State:
+def _sweep(state: State, view_model: ViewModel) -> State:
     if not _sweeping["on"]:
         return state
     low, high = SWEEP_NM
     now = state.solo_nm if state.solo_nm is not None else low
     # A long frame (a dialogue, a slow machine) must not skip colours.
-    moved = now - low + SWEEP_NM_PER_S * min(facts.delta_s, 0.1)
+    moved = now - low + SWEEP_NM_PER_S * min(view_model.delta_s, 0.1)
     return widgets.holding(replace(state, solo_nm=low + moved % (high - low)), True)
 
 
