@@ -1,4 +1,5 @@
-"""Shared fixtures: strict floating point everywhere, and one headless OpenGL context; how many processes share the tests."""
+"""Shared fixtures: strict floating point everywhere, and one headless OpenGL context; how many processes share the
+tests."""
 
 from __future__ import annotations
 
@@ -10,7 +11,8 @@ import numpy as np
 import pytest
 
 PROCESS_BYTES = 3 << 30
-"""Memory that one process of the tests may come to need, mostly for compiled programs that are kept (1.7 GB were seen)."""
+"""Memory that one process of the tests may come to need, mostly for compiled programs that are kept (1.7 GB were
+seen)."""
 MAX_PROCESSES = 4
 """More would wait for the longest files, and crowd a graphics card that all share."""
 
@@ -27,7 +29,8 @@ if "PYTEST_XDIST_WORKER_COUNT" in os.environ:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """One process a core, as memory allows: compiling and Python take one thread. None (0) where there is nothing to share out."""
+    """One process a core, as memory allows: compiling and Python take one thread. None (0) where there is nothing to
+    share out."""
     files = {argument.split("::")[0] for argument in config.args}
     if len(files) == 1 and Path(*files).is_file():
         return 0
@@ -47,8 +50,8 @@ def strict_floating_point() -> Iterator[None]:
 def gl():
     """The session's OpenGL 4.3 context (`spectrasplat.gpu.context.Context`); `gl.ctx` is moderngl's.
 
-    Tests share compiled programs, as a viewer's edits and a stress run's cases do: most of what they draw are variants of
-    a few scenes, and a software renderer compiles longer than it draws.
+    Tests share compiled programs, as a viewer's edits and a stress run's cases do: most of what they draw are variants
+    of a few scenes, and a software renderer compiles longer than it draws.
     """
     from spectrasplat.gpu import shader
     from spectrasplat.gpu.context import create_context

@@ -95,15 +95,11 @@ def _refusal(target: Path, error: OSError) -> UserError:
         case errno.EISDIR:
             return UserError(f"cannot write {target}: it is a folder; give a file name inside it")
         case errno.ENOENT if not os.path.isdir(folder):
-            return UserError(
-                f"cannot write {target}: the folder {folder} does not exist; create it or choose another"
-            )
+            return UserError(f"cannot write {target}: the folder {folder} does not exist; create it or choose another")
         case errno.ENOTDIR:
             return UserError(f"cannot write {target}: {folder} is not a folder; choose another")
         case errno.EACCES | errno.EPERM | errno.EROFS | errno.ENOENT:  # ENOENT: /proc and the like
-            return UserError(
-                f"cannot write {target}: no permission; choose another place or make it writable"
-            )
+            return UserError(f"cannot write {target}: no permission; choose another place or make it writable")
         case errno.ENOSPC | errno.EDQUOT:
             return UserError(f"cannot write {target}: the disk is full; free some space or choose another disk")
         case errno.ENAMETOOLONG:

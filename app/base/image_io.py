@@ -41,7 +41,11 @@ def check_suffix(path: Path | str) -> str:
     """The suffix of `path` in lower case; raises `UserError` when no writer knows it."""
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
-        told = f"the suffix '{suffix}' is not a picture format" if suffix else "it has no suffix to tell the picture format"
+        told = (
+            f"the suffix '{suffix}' is not a picture format"
+            if suffix
+            else "it has no suffix to tell the picture format"
+        )
         raise UserError(f"cannot write {path}: {told}; use one of {', '.join(SUFFIXES)}")
     return suffix
 
@@ -91,7 +95,9 @@ def read_image(path: Path | str) -> Picture:
     try:
         return reader(path)
     except (OSError, EOFError, ValueError, RuntimeError, KeyError) as error:
-        raise UserError(f"cannot read {path}: it is not a whole {suffix[1:].upper()} picture ({error}); write it again") from error
+        raise UserError(
+            f"cannot read {path}: it is not a whole {suffix[1:].upper()} picture ({error}); write it again"
+        ) from error
 
 
 def channel_name(wavelength_nm: float) -> str:
@@ -134,11 +140,17 @@ def _spectral_channels(
     if spectral.shape[:2] != rgb.shape[:2] or edges.shape != (spectral.shape[2] + 1,) or np.any(np.diff(edges) <= 0):
         raise ValueError(f"spectral {spectral.shape} does not belong to rgb {rgb.shape} and {edges.shape} rising edges")
     centres = 0.5 * (edges[:-1] + edges[1:])
-    return {channel_name(centre): np.ascontiguousarray(spectral[:, :, i], np.float32) for i, centre in enumerate(centres)}
+    return {
+        channel_name(centre): np.ascontiguousarray(spectral[:, :, i], np.float32) for i, centre in enumerate(centres)
+    }
 
 
 def _write_exr(
-    path: Path, rgb: np.ndarray, spectral: dict[str, np.ndarray], bin_edges_nm: np.ndarray | None, metadata: dict[str, str]
+    path: Path,
+    rgb: np.ndarray,
+    spectral: dict[str, np.ndarray],
+    bin_edges_nm: np.ndarray | None,
+    metadata: dict[str, str],
 ) -> None:
     import OpenEXR
 
@@ -167,7 +179,9 @@ def _read_exr(path: Path) -> Picture:
         header, channels = dict(file.header()), file.channels()
         pixels = {name: np.array(channel.pixels, np.float32) for name, channel in channels.items()}
     rgb = np.stack([pixels[name] for name in "RGB"], axis=-1)
-    waves = {float(name[3:-2].replace(",", ".")): name for name in pixels if name.startswith("S0.") and name.endswith("nm")}
+    waves = {
+        float(name[3:-2].replace(",", ".")): name for name in pixels if name.startswith("S0.") and name.endswith("nm")
+    }
     wavelengths = np.array(sorted(waves), np.float64)
     spectral = np.stack([pixels[waves[w]] for w in wavelengths], axis=-1) if waves else None
     texts = {key: value for key, value in header.items() if isinstance(value, str)}

@@ -42,7 +42,9 @@ class Movie:
         temporary = self._output.__enter__()
         # A group of its own: Ctrl-C is for us, and the movie is finished then.
         command = [_ffmpeg(), *_arguments(size, fps), "-y", str(temporary)]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True)
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True
+        )
         self.frames = 0
 
     def has(self, index: int) -> bool:
@@ -86,7 +88,8 @@ class Frames:
     """A folder of `0000.png`, …; frames that are there are kept when the same animation goes on."""
 
     def __init__(self, folder: Path, description: Mapping[str, object], overwrite: bool = False) -> None:
-        """`description` says what is drawn: a folder with frames of anything else is refused, or emptied of them by `overwrite`."""
+        """`description` says what is drawn: a folder with frames of anything else is refused, or emptied of them by
+        `overwrite`."""
         if folder.exists() and not folder.is_dir():
             raise UserError(f"cannot write {folder}: it is a file; give a folder, or a name that ends in .mp4")
         try:
@@ -101,12 +104,16 @@ class Frames:
             self._empty()
         stored = self._stored()
         if stored is None and any(folder.glob("*.png")):
-            raise UserError(f"{folder} holds pictures of something else: choose another folder, or replace its frames with --overwrite")
+            raise UserError(
+                f"{folder} holds pictures of something else: choose another folder, or replace its frames with --overwrite"
+            )
         self.base_ev: float | None = None
         if stored is not None:
             self.base_ev = stored.pop("base_ev", None)
             if stored != json.loads(json.dumps(self.description)):
-                raise UserError(f"{folder} holds frames of another animation: choose another folder, or replace them with --overwrite")
+                raise UserError(
+                    f"{folder} holds frames of another animation: choose another folder, or replace them with --overwrite"
+                )
         self._save()
 
     def fix_exposure(self, base_ev: float) -> None:
@@ -141,7 +148,9 @@ class Frames:
 
     def _save(self) -> None:
         with atomic_output(self._manifest) as temporary:
-            temporary.write_text(json.dumps(self.description | {"base_ev": self.base_ev}, indent=1) + "\n", encoding="utf-8")
+            temporary.write_text(
+                json.dumps(self.description | {"base_ev": self.base_ev}, indent=1) + "\n", encoding="utf-8"
+            )
 
     def _empty(self) -> None:
         """Remove the frames of an earlier animation and nothing else."""
@@ -155,12 +164,40 @@ class Frames:
 def _arguments(size: tuple[int, int], fps: float) -> list[str]:
     width, height = size
     return [
-        "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:g}", "-i", "-",
+        "-loglevel",
+        "error",
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "rgb24",
+        "-s",
+        f"{width}x{height}",
+        "-r",
+        f"{fps:g}",
+        "-i",
+        "-",
         # Players want even sides; an odd one gets a black line. Colours are told, so that they come out as they are.
-        "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv",
-        "-c:v", "libx264", "-preset", "medium", "-crf", "16", "-pix_fmt", "yuv420p",
-        "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1", "-movflags", "+faststart", "-f", "mp4",
-    ]  # fmt: skip
+        "-vf",
+        "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv",
+        "-c:v",
+        "libx264",
+        "-preset",
+        "medium",
+        "-crf",
+        "16",
+        "-pix_fmt",
+        "yuv420p",
+        "-colorspace",
+        "bt709",
+        "-color_primaries",
+        "bt709",
+        "-color_trc",
+        "iec61966-2-1",
+        "-movflags",
+        "+faststart",
+        "-f",
+        "mp4",
+    ]
 
 
 def _ffmpeg() -> str:
@@ -169,7 +206,9 @@ def _ffmpeg() -> str:
     try:
         return imageio_ffmpeg.get_ffmpeg_exe()
     except RuntimeError as error:
-        raise UserError("no ffmpeg was found to write an MP4: install one, or give a folder for a sequence of PNGs") from error
+        raise UserError(
+            "no ffmpeg was found to write an MP4: install one, or give a folder for a sequence of PNGs"
+        ) from error
 
 
 def _last_line(told: bytes) -> str:
@@ -177,10 +216,14 @@ def _last_line(told: bytes) -> str:
     return f"ffmpeg says '{lines[-1].strip()}'" if lines else "ffmpeg ended without a word"
 
 
-def open_sink(path: Path, size: tuple[int, int], fps: float, description: Mapping[str, object], overwrite: bool = False) -> Movie | Frames:
+def open_sink(
+    path: Path, size: tuple[int, int], fps: float, description: Mapping[str, object], overwrite: bool = False
+) -> Movie | Frames:
     """The sink that `path` asks for: a `.mp4`, or a folder (a name without a suffix). Raises `UserError`."""
     if path.suffix.lower() == ".mp4":
         return Movie(path, size, fps)
     if path.suffix and not os.path.isdir(path):
-        raise UserError(f"cannot write {path}: the suffix '{path.suffix}' is not an animation; use .mp4, or a folder for PNGs")
+        raise UserError(
+            f"cannot write {path}: the suffix '{path.suffix}' is not an animation; use .mp4, or a folder for PNGs"
+        )
     return Frames(path, description, overwrite)

@@ -71,7 +71,7 @@ def to_display(rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
     # Products of float32 must not overflow however bright a firefly is.
     limit = np.float32(1e30)
     exposed = np.where(finite[..., None], np.clip(scene, -limit, limit), np.float32(0))
-    gain = np.float32(np.clip(2.0**float(np.clip(exposure_ev, -60, 60)), 1e-18, 1e18))
+    gain = np.float32(np.clip(2.0 ** float(np.clip(exposure_ev, -60, 60)), 1e-18, 1e18))
     exposed = np.clip(exposed * gain, -limit, limit)
     display = _roll_off(_into_gamut(exposed))
     display[~finite] = NOT_FINITE_RGB

@@ -1,4 +1,5 @@
-"""One method of the camera pass in one scene, ready to look again and again: what `bench --eye` times, and nothing else.
+"""One method of the camera pass in one scene, ready to look again and again: what `bench --eye` times, and nothing
+else.
 
 All methods look up the same caustic maps, which are made once and cost nothing here: they differ in how camera rays
 sample the spectrum. A rendering starts from nothing; what `srd` needs to choose the bands of its spectrum counts.
@@ -19,23 +20,33 @@ from ..model.features import Features
 from ..model.optics.colorimetry import rgb709_to_xyz
 from ..model.scene import Diffuse, Scene
 from ..model.settings import RenderSettings
-from ..passes.camera import CausticMaps, CameraPass
+from ..passes.camera import CameraPass, CausticMaps
 from ..passes.spectrum_choice import Spectrum
 from ..render.light_pass import LightPass, spectral_axis
 from .rendering import NothingToMeasure, Rendering, Rig
 
 LIGHT_PHOTONS = 1 << 22
-"""Photons of the caustic maps, traced by `srd`. In `ball_caustic` twice 2^20 photons change the picture by a relMSE of 2.6e-4, twice 2^18 by ten
-times that: with so many more, the maps' own error is far below what the camera's methods reach in the time."""
+"""Photons of the caustic maps, traced by `srd`. In `ball_caustic` twice 2^20 photons change the picture by a relMSE of
+2.6e-4, twice 2^18 by ten times that: with so many more, the maps' own error is far below what the camera's methods
+reach in the time."""
 LIGHT_SEED = 1
 _TRIAL_SHARE = 0.25
 """A trial this long, as a share of the time given, tells the rate of the longest rendering."""
 
 
 class SharedLight:
-    """The caustic maps that all eyes of a scene look up; none where the scene has no light or nothing that light could fall on."""
+    """The caustic maps that all eyes of a scene look up; none where the scene has no light or nothing that light could
+    fall on."""
 
-    def __init__(self, context: Context, scene: Scene, width: int, height: int, progress: Callable[[str], None], photons: int | None = None) -> None:
+    def __init__(
+        self,
+        context: Context,
+        scene: Scene,
+        width: int,
+        height: int,
+        progress: Callable[[str], None],
+        photons: int | None = None,
+    ) -> None:
         photons = photons or LIGHT_PHOTONS
         self.maps: CausticMaps | None = None
         self.channels = MapChannels()
@@ -74,12 +85,17 @@ class SharedLight:
 class CameraRig:
     """Owns the camera's buffers and programs for one scene, method and picture size; the maps are `light`'s."""
 
-    def __init__(self, context: Context, scene: Scene, method: str, width: int, height: int, light: SharedLight) -> None:
-        """Raises `NothingToMeasure` where the camera cannot see through dispersive glass: all methods are the same then."""
+    def __init__(
+        self, context: Context, scene: Scene, method: str, width: int, height: int, light: SharedLight
+    ) -> None:
+        """Raises `NothingToMeasure` where the camera cannot see through dispersive glass: all methods are the same
+        then."""
         self._context, self._scene, self._size, self._light = context, scene, (width, height), light
         features = Features.of(scene, _settings(scene, method, width, height))
         if not features.camera_disperses:
-            raise NothingToMeasure(f"scene '{scene.name}': the camera sees nothing through glass that disperses, so the camera's methods do not differ and there is nothing to measure")
+            raise NothingToMeasure(
+                f"scene '{scene.name}': the camera sees nothing through glass that disperses, so the camera's methods do not differ and there is nothing to measure"
+            )
         started = time.perf_counter()
         self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
         buffered = self._finished()
@@ -90,11 +106,16 @@ class CameraRig:
             self._camera_pass.may_be_single, self._camera_pass.spectrum = True, Spectrum(single=True)
             self._camera_pass.run(scene.camera, width, height, 1, 0, light.maps)
         compiled = self._finished()
-        self.setup_seconds = {"light pass": light.seconds, "buffers": buffered - started, "compile": compiled - buffered}
+        self.setup_seconds = {
+            "light pass": light.seconds,
+            "buffers": buffered - started,
+            "compile": compiled - buffered,
+        }
         self.buffers_mib = self._buffers.bytes / 2**20
 
     def render(self, budget: int, seed: int) -> Rendering:
-        """One picture from nothing: the way to sample the spectrum chosen for `budget` samples a pixel, then those, or what they buy in that way."""
+        """One picture from nothing: the way to sample the spectrum chosen for `budget` samples a pixel, then those, or
+        what they buy in that way."""
         started = self._finished()
         samples = self._choose(budget).samples(budget)
         chosen = self._finished()
@@ -109,11 +130,13 @@ class CameraRig:
         return max(budget // bands, 1) * bands
 
     def budgets(self, seconds: float, count: int) -> list[int]:
-        """Sample counts, about `count`: evenly spaced in the logarithm as far as whole multiples of the bands allow, the largest takes about `seconds`."""
+        """Sample counts, about `count`: evenly spaced in the logarithm as far as whole multiples of the bands allow,
+        the largest takes about `seconds`."""
         samples = 1
         while (took := self._seconds(samples))[1] < _TRIAL_SHARE * seconds:
             samples *= 2
-        # Few samples fit into the time, so a moment's disturbance of the trial would cost the curve its end: the better of two counts.
+        # Few samples fit into the time, so a moment's disturbance of the trial would cost the curve its end: the better
+        # of two counts.
         bands_s, all_s, taken = min(took, self._seconds(samples), key=lambda one: one[1])
         largest = max(taken * max(seconds - bands_s, 0.0) / (all_s - bands_s), 1.0)
         found: set[int] = set()
@@ -142,7 +165,9 @@ class CameraRig:
 
 
 @contextmanager
-def camera_rigs(context: Context, scene: Scene, methods: Sequence[str], width: int, height: int, progress: Callable[[str], None]) -> Iterator[dict[str, Rig]]:
+def camera_rigs(
+    context: Context, scene: Scene, methods: Sequence[str], width: int, height: int, progress: Callable[[str], None]
+) -> Iterator[dict[str, Rig]]:
     """The camera pass's rigs by method, freed at the end. Raises `NothingToMeasure`."""
     rigs: dict[str, Rig] = {}
     with ExitStack() as stack:

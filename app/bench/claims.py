@@ -50,7 +50,11 @@ def _speed_up_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> Claim:
         times = last.relmse / max(end.relmse, 1e-30)
         measured = f"not reached in {last.seconds:.2f} s: srd ends at {last.relmse:.3g}, {times:.2g} times that"
         return Claim("time to equal error", asked, measured, False, reason(scene, srd))
-    measured = f"{'at least ' if reached.at_once else ''}{reached.seconds:.3g} times sooner" if reached.seconds >= 1.0 else f"{1.0 / reached.seconds:.3g} times later"
+    measured = (
+        f"{'at least ' if reached.at_once else ''}{reached.seconds:.3g} times sooner"
+        if reached.seconds >= 1.0
+        else f"{1.0 / reached.seconds:.3g} times later"
+    )
     holds = reached.seconds >= half.asked_ratio
     why = ""
     if not holds and reached.at_once:
@@ -70,7 +74,13 @@ def _first_picture_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> C
     if early is None:
         first = srd.points[0]
         why = f"even {HALVES[scene.half].amount(first.photons)} take {first.seconds:.2f} s: {_stage_shares(scene, srd, first)}"
-        return Claim("first picture", asked, f"no picture before {first.seconds:.2f} s, then relMSE {first.relmse:.3g}", False, why)
+        return Claim(
+            "first picture",
+            asked,
+            f"no picture before {first.seconds:.2f} s, then relMSE {first.relmse:.3g}",
+            False,
+            why,
+        )
     holds = early < late
     why = "" if holds else f"{early / max(late, 1e-30):.2g} times stochastic's; {reason(scene, srd, EARLY_SECONDS)}"
     return Claim("first picture", asked, f"relMSE {early:.3g}", holds, why)
@@ -84,7 +94,13 @@ def _index_claim(scene: SceneResult, srd: Curve, linear: Curve) -> Claim:
     compared = [(t, a, b) for t, a, b in pairs if a is not None and b is not None]
     asked = f"smaller error than srd-lambda at equal time, the strongest glass being {scene.strongest_glass} (V_d {scene.strongest_abbe:.1f})"
     if not compared:
-        return Claim("index against wavelength", asked, "no time at which both have a picture", False, _stage_shares(scene, srd, srd.points[0]))
+        return Claim(
+            "index against wavelength",
+            asked,
+            "no time at which both have a picture",
+            False,
+            _stage_shares(scene, srd, srd.points[0]),
+        )
     measured = ", ".join(f"at {t:.2g} s {a:.3g} against {b:.3g} ({b / max(a, 1e-30):.2g}×)" for t, a, b in compared)
     lost = [t for t, a, b in compared if not a < b]
     why = "" if not lost else f"not at {', '.join(f'{t:.2g} s' for t in lost)}; {reason(scene, srd)}"
@@ -96,13 +112,17 @@ def reason(scene: SceneResult, curve: Curve, seconds: float | None = None) -> st
     point = curve.points[-1] if seconds is None else min(curve.points, key=lambda p: abs(p.seconds - seconds))
     parts = []
     if scene.reference is not None and scene.reference.relmse > 0.5 * point.relmse:
-        parts.append(f"the reference's own relMSE of {scene.reference.relmse:.2g} leaves the true error of {point.relmse:.2g} uncertain")
+        parts.append(
+            f"the reference's own relMSE of {scene.reference.relmse:.2g} leaves the true error of {point.relmse:.2g} uncertain"
+        )
     total = point.bias2 + point.variance
     if total > 0.0 and len({s.seed for s in curve.samples}) > 1:
         share = point.bias2 / total
         half = HALVES[scene.half]
         cause = half.bias_cause if share > 0.5 else half.noise_cause
-        parts.append(f"{100 * share:.0f} % of {curve.method}'s error at {point.seconds:.2g} s is bias² and {100 * (1 - share):.0f} % variance, so mostly {cause}")
+        parts.append(
+            f"{100 * share:.0f} % of {curve.method}'s error at {point.seconds:.2g} s is bias² and {100 * (1 - share):.0f} % variance, so mostly {cause}"
+        )
         parts += _common_share(scene, point) if share > 0.5 else []
     parts.append(_stage_shares(scene, curve, point))
     return "; ".join(parts)

@@ -63,7 +63,11 @@ def complete_curve(curve: Curve, mean_differences: Mapping[int, np.ndarray], ref
     by_budget: dict[int, list[Sample]] = {}
     for sample in curve.samples:
         by_budget.setdefault(sample.photons, []).append(sample)
-    curve.points = [make_point(by_budget[n], mean_differences[n], reference_image) for n in sorted(by_budget) if n in mean_differences]
+    curve.points = [
+        make_point(by_budget[n], mean_differences[n], reference_image)
+        for n in sorted(by_budget)
+        if n in mean_differences
+    ]
     slope, half_width = tail_slope(curve.samples, curve.budgets)
     curve.slope, curve.slope_half_width = (slope, half_width) if np.isfinite(slope) else (0.0, 0.0)
 
@@ -101,20 +105,25 @@ def error_at_time(points: Sequence[Point], seconds: float) -> float | None:
     if not points or seconds < points[0].seconds:
         return None
     order = sorted(points, key=lambda p: p.seconds)
-    return float(np.exp(np.interp(np.log(seconds), [np.log(p.seconds) for p in order], [_log(p.relmse) for p in order])))
+    return float(
+        np.exp(np.interp(np.log(seconds), [np.log(p.seconds) for p in order], [_log(p.relmse) for p in order]))
+    )
 
 
 def budget_at_time(points: Sequence[Point], seconds: float) -> int:
-    """Photons or samples that take about `seconds`: in proportion beyond the last point, at least those of the first."""
+    """Photons or samples that take about `seconds`: in proportion beyond the last point, at least those of the
+    first."""
     order = sorted(points, key=lambda p: p.seconds)
     if seconds > order[-1].seconds:
         return int(order[-1].photons * seconds / order[-1].seconds)
-    return int(np.exp(np.interp(np.log(seconds), [np.log(p.seconds) for p in order], [np.log(p.photons) for p in order])))
+    return int(
+        np.exp(np.interp(np.log(seconds), [np.log(p.seconds) for p in order], [np.log(p.photons) for p in order]))
+    )
 
 
 def speed_up(points: Sequence[Point], baseline: Sequence[Point]) -> Reached | None:
-    """How many times sooner than `baseline` `points` reach the error that `baseline` ends with, as `Reached` whose seconds
-    are the ratio; `at_once` then means "at least". None when they never get there.
+    """How many times sooner than `baseline` `points` reach the error that `baseline` ends with, as `Reached` whose
+    seconds are the ratio; `at_once` then means "at least". None when they never get there.
 
     A baseline that stopped improving is given the time at which it got there, not its last."""
     own = time_to_error(baseline, baseline[-1].relmse) if baseline else None

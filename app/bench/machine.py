@@ -13,7 +13,17 @@ from ..base.paths import shaders_dir
 if TYPE_CHECKING:
     from ..gpu.context import Context
 
-_MEASURING = ("light_pass.py", "renderer.py", "gpu/*.py", "model/*.py", "passes/*.py", "bench/metrics.py", "bench/camera_rendering.py", "bench/rendering.py", "bench/runner.py")
+_MEASURING = (
+    "light_pass.py",
+    "renderer.py",
+    "gpu/*.py",
+    "model/*.py",
+    "passes/*.py",
+    "bench/metrics.py",
+    "bench/camera_rendering.py",
+    "bench/rendering.py",
+    "bench/runner.py",
+)
 """Sources beside the shaders whose change changes a picture, its time or its error."""
 
 

@@ -41,7 +41,8 @@ class MeasuredPass:
     compared_seconds: tuple[float, ...]
     """Times at which errors are told and compared, as far as a run reaches."""
     pictures: tuple[tuple[str, float], ...]
-    """Endings of the names of the equal-time pictures, with the share of the time given that each is made after; the last picture first."""
+    """Endings of the names of the equal-time pictures, with the share of the time given that each is made after; the
+    last picture first."""
     bias_cause: str
     noise_cause: str
     """What bias² and variance of `srd` come from, and what reduces them."""
@@ -51,12 +52,16 @@ class MeasuredPass:
     """Why a part of `srd`'s bias² is found there too."""
 
     def amount(self, budget: int) -> str:
-        """"1 sample", "2,048 photons"."""
+        """ "1 sample", "2,048 photons"."""
         return f"{budget:,} {self.each if budget == 1 else self.units}"
 
 
 LIGHT = MeasuredPass(
-    "light", "photons", "photons", "photon", "photon time",
+    "light",
+    "photons",
+    "photons",
+    "photon",
+    "photon time",
     stages=("trace", "splat", "resolve"),
     counted=("trace", "splat"),  # putting the maps together is part of display, the same for every method
     stage_names={"trace": "emission and trace"},
@@ -70,10 +75,14 @@ LIGHT = MeasuredPass(
     noise_cause="noise, which more photons reduce",
     bare_method="stochastic-point",
     bare_text="which has neither footprints nor bands: the texels of the maps, common to all methods",
-)  # fmt: skip
+)
 
 CAMERA = MeasuredPass(
-    "camera", "camera samples a pixel", "samples", "sample", "camera time",
+    "camera",
+    "camera samples a pixel",
+    "samples",
+    "sample",
+    "camera time",
     stages=("bands", "looks"),
     counted=("bands", "looks"),
     stage_names={"bands": "choosing the bands", "looks": "looking"},
@@ -87,7 +96,7 @@ CAMERA = MeasuredPass(
     noise_cause="noise, which more samples reduce",
     bare_method="stochastic",
     bare_text="which has neither columns nor bands: places within a pixel, caustic maps and the noise of the reference's caustic, common to all methods",
-)  # fmt: skip
+)
 
 HALVES = {half.key: half for half in (LIGHT, CAMERA)}
 COUNTED_STAGES = frozenset(stage for half in HALVES.values() for stage in half.counted)

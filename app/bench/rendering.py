@@ -1,5 +1,5 @@
-"""One method in one scene, ready to render again and again: what the bench times, and nothing else. This is the light pass's; the
-camera pass's is `camera_rendering`.
+"""One method in one scene, ready to render again and again: what the bench times, and nothing else. This is the light
+pass's; the camera pass's is `camera_rendering`.
 
 Programs, buffers, pilot and maps are made once. Then each rendering starts from nothing with one lattice of the
 photons asked for. Times are wall clock between points where the device has finished, on software and GPU alike; on
@@ -23,7 +23,7 @@ from ..model.features import Features
 from ..model.optics.colorimetry import rgb709_to_xyz
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
-from ..passes.camera import CausticMaps, CameraPass
+from ..passes.camera import CameraPass, CausticMaps
 from ..render.light_pass import LightPass, spectral_axis
 from ..render.still import DEFAULT_SAMPLES
 
@@ -74,7 +74,9 @@ class Rig(Protocol):
 
 
 @contextmanager
-def light_rigs(context: Context, scene: Scene, methods: Sequence[str], width: int, height: int, progress: Callable[[str], None]) -> Iterator[dict[str, Rig]]:
+def light_rigs(
+    context: Context, scene: Scene, methods: Sequence[str], width: int, height: int, progress: Callable[[str], None]
+) -> Iterator[dict[str, Rig]]:
     """The light pass's rigs by method, freed at the end. Raises `NothingToMeasure`."""
     rigs: dict[str, Rig] = {}
     with ExitStack() as stack:
@@ -91,7 +93,9 @@ class MethodRig:
     def __init__(self, context: Context, scene: Scene, method: str, width: int, height: int) -> None:
         self._context = context
         self._scene = scene
-        self._settings = RenderSettings(width=width, height=height, method=method, layer="caustic", max_depth=scene.render.max_depth)
+        self._settings = RenderSettings(
+            width=width, height=height, method=method, layer="caustic", max_depth=scene.render.max_depth
+        )
         features = Features.of(scene, self._settings)
         started = time.perf_counter()
         self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
@@ -105,8 +109,15 @@ class MethodRig:
         seen = self.render(WARM_UP_PHOTONS, 1).xyz.any()
         if not seen:
             self.release()
-            raise NothingToMeasure(f"scene '{scene.name}': no light that glass or mirrors throw falls on what the camera sees directly, so there is nothing to measure")
-        self.setup_seconds = {"buffers": buffered - started, "compile": compiled - buffered, "pilot": piloted - compiled, "warm-up": self._finished() - piloted}
+            raise NothingToMeasure(
+                f"scene '{scene.name}': no light that glass or mirrors throw falls on what the camera sees directly, so there is nothing to measure"
+            )
+        self.setup_seconds = {
+            "buffers": buffered - started,
+            "compile": compiled - buffered,
+            "pilot": piloted - compiled,
+            "warm-up": self._finished() - piloted,
+        }
         self.buffers_mib = (self._buffers.bytes + self._light.trace.bytes) / 2**20
 
     def render(self, photons: int, seed: int) -> Rendering:
@@ -128,7 +139,8 @@ class MethodRig:
         while (took := self._photon_seconds(photons)) < _TRIAL_SHARE * seconds:
             photons *= _TRIAL_GROWTH
         largest = max(photons * seconds / took, SMALLEST_BUDGET)
-        # Few photons have broad splats: the time of a rendering grows more slowly than its photons, so the other end is tried out too.
+        # Few photons have broad splats: the time of a rendering grows more slowly than its photons, so the other end is
+        # tried out too.
         smallest = float(WARM_UP_PHOTONS)
         first_seconds = min(FIRST_SECONDS, 0.5 * seconds)
         took = self._photon_seconds(WARM_UP_PHOTONS)
@@ -165,7 +177,12 @@ class MethodRig:
         resolved = self._finished()
         self._context.check("a rendering of the bench")
         trace = light.stats.trace_seconds
-        return {"plan": planned - started, "trace": trace, "splat": filled - planned - trace, "resolve": resolved - filled}
+        return {
+            "plan": planned - started,
+            "trace": trace,
+            "splat": filled - planned - trace,
+            "resolve": resolved - filled,
+        }
 
     def _wait(self, _: float) -> bool:
         """Finish a slice before the next is traced, so that its time is told to the right stage."""

@@ -24,8 +24,8 @@ class BenchSettings(msgspec.Struct, frozen=True):
     reference_seconds: float = 60.0
     """Most time that one run spends on a scene's reference; what earlier runs made is used as well."""
     half: str = "light"
-    """Which half of the renderer is measured, a key of `halves.HALVES`. Below, what is said of photons and photon time holds for
-    camera samples a pixel and camera time where it is the camera's."""
+    """Which half of the renderer is measured, a key of `halves.HALVES`. Below, what is said of photons and photon time
+    holds for camera samples a pixel and camera time where it is the camera's."""
 
 
 class Sample(msgspec.Struct, frozen=True):
@@ -37,11 +37,12 @@ class Sample(msgspec.Struct, frozen=True):
     emitted: int
     splats: int
     seconds: dict[str, float]
-    """By stage: `Half.stages`; and, not counted, the light pass's "plan" (bands and spectral tables, once before a rendering) and
-    "camera" (display, the same for every method)."""
+    """By stage: `Half.stages`; and, not counted, the light pass's "plan" (bands and spectral tables, once before a
+    rendering) and "camera" (display, the same for every method)."""
     metrics: dict[str, float]
-    """relmse, relmse_raw (the reference's own variance left in), relmse_trimmed, relmse_whole (ε from the whole picture's mean),
-    smape, chroma, nrmse, energy_ratio (Σ picture / Σ reference); "flip" for the equal-time pictures alone. See `metrics`."""
+    """relmse, relmse_raw (the reference's own variance left in), relmse_trimmed, relmse_whole (ε from the whole
+    picture's mean), smape, chroma, nrmse, energy_ratio (Σ picture / Σ reference); "flip" for the equal-time pictures
+    alone. See `metrics`."""
 
     @property
     def photon_seconds(self) -> float:
@@ -135,7 +136,8 @@ class SceneResult(msgspec.Struct):
     equal_time: float = 0.0
     """Photon seconds for which the pictures named by a method alone were made."""
     picture_samples: dict[str, Sample] = {}
-    """What each of `pictures` but the reference took and how far off it is, by the same name; "flip" among its metrics."""
+    """What each of `pictures` but the reference took and how far off it is, by the same name; "flip" among its
+    metrics."""
     reference_too_coarse: bool = False
     """The reference's own error is more than a tenth of the smallest error reported."""
     half: str = "light"

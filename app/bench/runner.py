@@ -46,6 +46,7 @@ def run_bench(
     Raises `UserError` when a scene has changed since `store` was begun, and where there is nothing to measure, unless
     `skipped` takes the reason."""
     for index, (name, scene) in enumerate(scenes.items()):
+
         def share(fraction: float, text: str, done: int = index, name: str = name) -> None:
             progress((done + fraction) / len(scenes), f"{name}: {text}")
 
@@ -67,14 +68,24 @@ def picture_size(scene: Scene, settings: BenchSettings) -> tuple[int, int]:
 class _SceneBench:
     """One scene's measurements."""
 
-    def __init__(self, context: Context, name: str, scene: Scene, store: Store, progress: Progress, subject: Subject) -> None:
-        self._context, self._scene, self._store, self._progress, self._subject = context, scene, store, progress, subject
+    def __init__(
+        self, context: Context, name: str, scene: Scene, store: Store, progress: Progress, subject: Subject
+    ) -> None:
+        self._context, self._scene, self._store, self._progress, self._subject = (
+            context,
+            scene,
+            store,
+            progress,
+            subject,
+        )
         self._settings = store.result.settings
         self._size = picture_size(scene, self._settings)
         key = subject.key(scene, *self._size)
         earlier = store.scene(name)
         if earlier is not None and earlier.reference is not None and earlier.reference.key != key:
-            raise UserError(f"scene '{name}' has changed since {store.path} was made: give --fresh to begin anew, or another -o")
+            raise UserError(
+                f"scene '{name}' has changed since {store.path} was made: give --fresh to begin anew, or another -o"
+            )
         self._result = earlier or _empty_result(name, scene, self._size, self._settings)
 
     def run(self) -> None:
@@ -83,7 +94,9 @@ class _SceneBench:
         if result.complete:
             return
         make = self._subject.rigs
-        with make(self._context, self._scene, settings.methods, *self._size, lambda text: self._progress(0.0, text)) as rigs:
+        with make(
+            self._context, self._scene, settings.methods, *self._size, lambda text: self._progress(0.0, text)
+        ) as rigs:
             self._reference_image = self._reference()
             self._set_budgets(rigs)
             for number in range(settings.seeds):
@@ -106,7 +119,10 @@ class _SceneBench:
         if kept is not None and result.reference is not None and kept.xyz.shape[:2] == (self._size[1], self._size[0]):
             return kept
         reference_image, result.reference = self._subject.reference_image(
-            self._scene, *self._size, self._settings.reference_seconds, lambda fraction, text: self._progress(_REFERENCE_SHARE * fraction, f"reference {text}")
+            self._scene,
+            *self._size,
+            self._settings.reference_seconds,
+            lambda fraction, text: self._progress(_REFERENCE_SHARE * fraction, f"reference {text}"),
         )
         # What was measured against another reference cannot be gone on from.
         result.curves = []
@@ -132,27 +148,47 @@ class _SceneBench:
         store, result, reference_image = self._store, self._result, self._reference_image
         if any(sample.seed == seed for sample in curve.samples):
             return
-        earlier = store.load_sums(result.scene, curve.method, seed - 1) if seed > 1 else np.zeros((len(curve.budgets), *reference_image.xyz.shape), np.float32)
+        earlier = (
+            store.load_sums(result.scene, curve.method, seed - 1)
+            if seed > 1
+            else np.zeros((len(curve.budgets), *reference_image.xyz.shape), np.float32)
+        )
         if earlier is None:
-            raise UserError(f"{store.directory}/partial has lost what going on with '{result.scene}' needs: give --fresh to begin anew")
+            raise UserError(
+                f"{store.directory}/partial has lost what going on with '{result.scene}' needs: give --fresh to begin anew"
+            )
         sums, samples = earlier, []
         for i, budget in enumerate(curve.budgets):
             step = (1.0 - _REFERENCE_SHARE) / (self._settings.seeds * len(self._settings.methods))
-            self._progress(_REFERENCE_SHARE + (1.0 - _REFERENCE_SHARE) * done + step * i / len(curve.budgets), f"{curve.method}, seed {seed} of {self._settings.seeds}")
+            self._progress(
+                _REFERENCE_SHARE + (1.0 - _REFERENCE_SHARE) * done + step * i / len(curve.budgets),
+                f"{curve.method}, seed {seed} of {self._settings.seeds}",
+            )
             rendering = rig.render(budget, seed)
             samples.append(self._sample(rendering, curve.method, budget, seed))
             sums[i] += rendering.xyz - reference_image.xyz
         store.save_sums(result.scene, curve.method, seed, sums)
         curve.samples.extend(samples)
-        complete_curve(curve, {n: sums[i].astype(np.float64) / seed for i, n in enumerate(curve.budgets)}, reference_image)
+        complete_curve(
+            curve, {n: sums[i].astype(np.float64) / seed for i, n in enumerate(curve.budgets)}, reference_image
+        )
         self._judge()
         store.save()
         store.drop_sums(result.scene, curve.method, seed - 1)
 
     def _sample(self, rendering: Rendering, method: str, budget: int, seed: int) -> Sample:
         if not np.isfinite(rendering.xyz).all():
-            raise RuntimeError(f"{method} gave a picture with numbers that are not finite ({self._result.scene}, {budget} {HALVES[self._result.half].units}, seed {seed})")
-        return Sample(budget, seed, rendering.emitted, rendering.splats, rendering.seconds, metrics.measure(rendering.xyz, self._reference_image))
+            raise RuntimeError(
+                f"{method} gave a picture with numbers that are not finite ({self._result.scene}, {budget} {HALVES[self._result.half].units}, seed {seed})"
+            )
+        return Sample(
+            budget,
+            seed,
+            rendering.emitted,
+            rendering.splats,
+            rendering.seconds,
+            metrics.measure(rendering.xyz, self._reference_image),
+        )
 
     def _judge(self) -> None:
         """What all curves so far say about each other."""
@@ -168,7 +204,9 @@ class _SceneBench:
         """Pictures at equal time, with FLIP."""
         result = self._result
         points = self._curve(method).points
-        made: dict[int, tuple[Rendering, Sample]] = {}  # a method whose shortest rendering takes longer than the early pictures has one for all
+        made: dict[
+            int, tuple[Rendering, Sample]
+        ] = {}  # a method whose shortest rendering takes longer than the early pictures has one for all
         for ending, share in HALVES[result.half].pictures:
             name = f"{method}{ending}"
             budget = rig.fitting(budget_at_time(points, share * self._settings.seconds))
@@ -185,10 +223,19 @@ class _SceneBench:
 
 def _empty_result(name: str, scene: Scene, size: tuple[int, int], settings: BenchSettings) -> SceneResult:
     glasses = [o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)]
-    strongest = min((g for g in glasses if g.is_dispersive and np.isfinite(g.V_d)), key=lambda g: abs(g.V_d), default=None)
+    strongest = min(
+        (g for g in glasses if g.is_dispersive and np.isfinite(g.V_d)), key=lambda g: abs(g.V_d), default=None
+    )
     return SceneResult(
-        name, scene.name, size, settings.seeds, settings.seconds, None, [],
+        name,
+        scene.name,
+        size,
+        settings.seeds,
+        settings.seconds,
+        None,
+        [],
         strongest_glass="" if strongest is None else strongest.name,
         strongest_abbe=0.0 if strongest is None else abs(strongest.V_d),
-        equal_time=settings.seconds, half=settings.half,
+        equal_time=settings.seconds,
+        half=settings.half,
     )

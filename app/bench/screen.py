@@ -18,7 +18,10 @@ def scene_table(scene: SceneResult) -> Table:
 
     width, height = scene.size
     own = "" if scene.reference is None else f", reference's own relMSE {scene.reference.relmse:.2g}"
-    table = Table(title=f"{scene.scene}, {width}×{height}, {scene.seeds} seed{'s' * (scene.seeds != 1)}{own}", title_justify="left")
+    table = Table(
+        title=f"{scene.scene}, {width}×{height}, {scene.seeds} seed{'s' * (scene.seeds != 1)}{own}",
+        title_justify="left",
+    )
     table.add_column("method")
     half = HALVES[scene.half]
     times = [t for t in half.compared_seconds if t < scene.seconds]
@@ -28,7 +31,9 @@ def scene_table(scene: SceneResult) -> Table:
         table.add_column(name, justify="right")
     for curve in scene.curves:
         if curve.points:
-            table.add_row(curve.method, *(_error(error_at_time(curve.points, t)) for t in times), *_ending(scene, curve))
+            table.add_row(
+                curve.method, *(_error(error_at_time(curve.points, t)) for t in times), *_ending(scene, curve)
+            )
     return table
 
 
@@ -36,14 +41,22 @@ def scene_lines(scene: SceneResult) -> list[str]:
     """Times to equal error by the other measures, one line a claim, and notes."""
     lines = []
     if scene.time_to_equal_other and any(curve.method == "srd" for curve in scene.curves):
-        told = ", ".join(f"{measure} {ratio_text(ratios.get('srd'))}" for measure, ratios in scene.time_to_equal_other.items())
+        told = ", ".join(
+            f"{measure} {ratio_text(ratios.get('srd'))}" for measure, ratios in scene.time_to_equal_other.items()
+        )
         lines.append(f"  srd's time to the error that stochastic ends with, by other measures: {told}")
     for claim in scene.claims:
-        lines.append(f"  {'holds' if claim.holds else 'FALLS SHORT'}: {claim.name}: {claim.asked}: {claim.measured}{f' ({claim.why})' if claim.why else ''}")
+        lines.append(
+            f"  {'holds' if claim.holds else 'FALLS SHORT'}: {claim.name}: {claim.asked}: {claim.measured}{f' ({claim.why})' if claim.why else ''}"
+        )
     if scene.reference_too_coarse and scene.reference is not None:
-        lines.append(f"  note: the reference's own relMSE, {scene.reference.relmse:.2g}, is above a tenth of the smallest error; --reference-seconds lowers it")
+        lines.append(
+            f"  note: the reference's own relMSE, {scene.reference.relmse:.2g}, is above a tenth of the smallest error; --reference-seconds lowers it"
+        )
     if scene.picture_samples and all("flip" not in sample.metrics for sample in scene.picture_samples.values()):
-        lines.append("  note: FLIP is not available; 'pip install flip-evaluator' brings it, on Pythons that it has wheels for")
+        lines.append(
+            "  note: FLIP is not available; 'pip install flip-evaluator' brings it, on Pythons that it has wheels for"
+        )
     return lines
 
 

@@ -84,7 +84,9 @@ def _trace_rates(context: Context) -> tuple[float, float]:
         features = replace(features, spectral_weights=True)
         buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
         trace = TracePass(context, features, buffers, LATTICE, settings.max_depth)
-        domain = emission_domain(scene.lights[0], scene, buffers.space, buffers.space.to_gpu(buffers.world_meshes[0].corners()))
+        domain = emission_domain(
+            scene.lights[0], scene, buffers.space, buffers.space.to_gpu(buffers.world_meshes[0].corners())
+        )
         assert domain is not None
         piece = LatticeSlice(0, (Band(0.0, 1.0, 0.5, 1.0),), LATTICE, 0, 1, LATTICE, (0, 0), (0, 0), 0, 1)
         runs.append((trace, piece, domain))
@@ -142,7 +144,16 @@ def _resident_bytes() -> tuple[int, float]:
         "sys.exit(code)\n"
     )
     with tempfile.TemporaryDirectory() as folder:
-        arguments = ["render", "default", "-o", str(Path(folder) / "m.png"), "--size", "1280x720", "--photons", str(MEMORY_PHOTONS)]
+        arguments = [
+            "render",
+            "default",
+            "-o",
+            str(Path(folder) / "m.png"),
+            "--size",
+            "1280x720",
+            "--photons",
+            str(MEMORY_PHOTONS),
+        ]
         started = time.perf_counter()
         done = subprocess.run([sys.executable, "-c", script, *arguments], check=True, capture_output=True, text=True)
         seconds = time.perf_counter() - started

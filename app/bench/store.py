@@ -85,7 +85,8 @@ class Store:
         return None if stored is None else ReferencePicture(stored[0], stored[1])
 
     def save_sums(self, scene: str, method: str, seeds: int, sums: np.ndarray) -> None:
-        """Keep Σ (I − R̂) over the first `seeds` seeds, float32 (budgets, H, W, 3). Earlier sums stay until `drop_sums`."""
+        """Keep Σ (I − R̂) over the first `seeds` seeds, float32 (budgets, H, W, 3). Earlier sums stay until
+        `drop_sums`."""
         self._save_array(self._sums_path(scene, method, seeds), sums)
 
     def load_sums(self, scene: str, method: str, seeds: int) -> np.ndarray | None:
@@ -124,17 +125,25 @@ class Store:
         try:
             return msgspec.json.decode(self.path.read_bytes(), type=BenchResult)
         except (OSError, msgspec.DecodeError) as error:
-            raise UserError(f"{self.path} cannot be read as earlier results ({error}): give --fresh to replace it, or another -o") from error
+            raise UserError(
+                f"{self.path} cannot be read as earlier results ({error}): give --fresh to replace it, or another -o"
+            ) from error
 
     def _refuse_mixture(self, earlier: BenchResult, wanted: BenchResult) -> None:
         difference = _settings_difference(earlier.settings, wanted.settings)
         if difference:
-            raise UserError(f"{self.path} was made with {difference}: give the same to go on, --fresh to begin anew, or another -o")
+            raise UserError(
+                f"{self.path} was made with {difference}: give the same to go on, --fresh to begin anew, or another -o"
+            )
         for key in _OF_ONE_MACHINE:
             before, now = earlier.machine.get(key, ""), wanted.machine.get(key, "")
             if before != now:
-                what = "another version of the program" if key == "program" else f"another {key} ('{before}', not '{now}')"
-                raise UserError(f"{self.path} was made with {what}, which cannot be mixed: give --fresh to begin anew, or another -o")
+                what = (
+                    "another version of the program" if key == "program" else f"another {key} ('{before}', not '{now}')"
+                )
+                raise UserError(
+                    f"{self.path} was made with {what}, which cannot be mixed: give --fresh to begin anew, or another -o"
+                )
 
     def _forget(self) -> None:
         self.path.unlink(missing_ok=True)
@@ -142,7 +151,8 @@ class Store:
 
 
 def _settings_difference(earlier: BenchSettings, wanted: BenchSettings) -> str:
-    """"--seconds 3 instead of 1", or "" when they agree."""
+    """ "--seconds 3 instead of 1", or "" when they agree."""
+
     def size(settings: BenchSettings) -> str:
         return "by the scene" if settings.size is None else f"{settings.size[0]}x{settings.size[1]}"
 

@@ -15,7 +15,9 @@ from .rendering import Rig, light_rigs
 from .results import ReferenceInfo
 
 Progress = Callable[[float, str], None]
-RigMaker = Callable[[Context, Scene, Sequence[str], int, int, Callable[[str], None]], AbstractContextManager[Mapping[str, Rig]]]
+RigMaker = Callable[
+    [Context, Scene, Sequence[str], int, int, Callable[[str], None]], AbstractContextManager[Mapping[str, Rig]]
+]
 ReferenceMaker = Callable[[Scene, int, int, float, Progress], tuple[ReferencePicture, ReferenceInfo]]
 KeyMaker = Callable[[Scene, int, int], str]
 

@@ -1,7 +1,8 @@
-"""How fast the viewer answers: frame times while light gathers, while walking round and while the dispersion is dragged.
+"""How fast the viewer answers: frame times while light gathers, while walking round and while the dispersion is
+dragged.
 
-The whole interface is drawn without a window and worked by a synthetic hand, so that the figures can be had on any machine, again
-and again. Every frame is finished on the device before its time is taken; no screen is waited for.
+The whole interface is drawn without a window and worked by a synthetic hand, so that the figures can be had on any
+machine, again and again. Every frame is finished on the device before its time is taken; no screen is waited for.
 """
 
 from __future__ import annotations
@@ -89,7 +90,9 @@ class _Bench:
         if glass is None:
             raise UserError(f"{scene}: nothing in it is glass, so there is no dispersion to drag")
         self._glass = glass
-        self.session.state = replace(self.session.state, selection=Selection("object", glass)).with_panels(start_page=False)
+        self.session.state = replace(self.session.state, selection=Selection("object", glass)).with_panels(
+            start_page=False
+        )
         self.interface = self._fitted(size)
         self._sampler = SamplePicture(context)
         self._turn = 0
@@ -157,7 +160,9 @@ class _Bench:
         self._turn += 1
         x, y = self.interface.find("Picture").centre
         angle = 0.05 * self._turn
-        self.interface.put_mouse((x + ORBIT_PX / 0.05 * math.sin(angle), y + 0.3 * ORBIT_PX / 0.05 * (1 - math.cos(angle))))
+        self.interface.put_mouse(
+            (x + ORBIT_PX / 0.05 * math.sin(angle), y + 0.3 * ORBIT_PX / 0.05 * (1 - math.cos(angle)))
+        )
 
     def holding_gain(self) -> _Held:
         """The slider of the dispersion gain is held."""
@@ -171,7 +176,9 @@ class _Bench:
     def pause(self) -> None:
         """Let everything come to rest, with what has been traced."""
         self.session.state = replace(
-            self.session.state, playing=False, preferences=replace(self.session.state.preferences, refine_when_still=False)
+            self.session.state,
+            playing=False,
+            preferences=replace(self.session.state.preferences, refine_when_still=False),
         )
         deadline = time.perf_counter() + PATIENCE_S
         while not self.session.picture.stats.converged and time.perf_counter() < deadline:
@@ -191,7 +198,9 @@ class _Bench:
         material = state.scene.objects[self._glass].material
         assert isinstance(material, Dielectric)
         gain = material.dispersion.gain
-        self.session.state = replace(state, scene=edits.set_dispersion_gain(state.scene, self._glass, min(gain * 1.07, 10.0)))
+        self.session.state = replace(
+            state, scene=edits.set_dispersion_gain(state.scene, self._glass, min(gain * 1.07, 10.0))
+        )
 
     def latency(self, nudge: Callable[[], None]) -> float:
         """Median milliseconds from a single input to the end of the first frame whose picture is another one.

@@ -55,5 +55,7 @@ def bake_command(request: BakeRequest) -> int:
                 print("spectrasplat: nothing was written: a map is whole or not at all", file=sys.stderr)
                 return INTERRUPTED
     place = request.output.resolve()
-    print(f"{place}: caustic map of '{request.receiver}' in {time.perf_counter() - started:.1f} s; where it lies is in {bake.placement_path(place).name}")
+    print(
+        f"{place}: caustic map of '{request.receiver}' in {time.perf_counter() - started:.1f} s; where it lies is in {bake.placement_path(place).name}"
+    )
     return 0

@@ -23,7 +23,8 @@ INTERRUPTED = 130
 MAX_SEEDS = 1000
 MAX_SECONDS = 3600.0
 CAMERA_SECONDS = 20.0
-"""Time of the largest rendering where the camera is measured and nothing else was asked for: the talk's stochastic picture had as much."""
+"""Time of the largest rendering where the camera is measured and nothing else was asked for: the talk's stochastic
+picture had as much."""
 CAMERA_SCENES = ("prism_edge", "lens_text", "brilliant_studio", "ball_caustic")
 """Shipped scenes that are about what is seen through glass; `bench --eye` without names measures these."""
 
@@ -62,13 +63,26 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
     from ..gpu.context import create_context
 
     with create_context() as context:
-        empty = BenchResult(__version__, datetime.now(UTC).isoformat(timespec="seconds"), repeat_command([*scenes], request), machine(context), [], settings)
+        empty = BenchResult(
+            __version__,
+            datetime.now(UTC).isoformat(timespec="seconds"),
+            repeat_command([*scenes], request),
+            machine(context),
+            [],
+            settings,
+        )
         store = Store(request.output, empty, request.fresh)
         stopped = False
         try:
             with ProgressReporter("bench") as progress:
                 # Who names scenes wants them measured; of all that there are, those that cannot be are told.
-                run_bench(context, scenes, store, progress, None if request.scenes else lambda reason: print(f"note: {reason}", file=sys.stderr))
+                run_bench(
+                    context,
+                    scenes,
+                    store,
+                    progress,
+                    None if request.scenes else lambda reason: print(f"note: {reason}", file=sys.stderr),
+                )
         except KeyboardInterrupt:
             stopped = True
             print(f"spectrasplat: stopped; {kept_text(store.result)}", file=sys.stderr)
@@ -80,7 +94,11 @@ def parse_settings(request: BenchRequest) -> BenchSettings:
     """The options checked, with defaults where nothing was said."""
     asked: dict[str, Any] = {}
     if request.camera_pass:
-        asked |= {"half": "camera", "seconds": CAMERA_SECONDS, "methods": tuple(name for name in DEFAULT_METHODS if name in CAMERA_METHODS)}
+        asked |= {
+            "half": "camera",
+            "seconds": CAMERA_SECONDS,
+            "methods": tuple(name for name in DEFAULT_METHODS if name in CAMERA_METHODS),
+        }
     if request.seconds is not None:
         asked["seconds"] = _seconds("--seconds", request.seconds)
     if request.reference_seconds is not None:
@@ -126,12 +144,18 @@ def load_scenes(names: Sequence[str]) -> dict[str, Scene]:
 
     if not names:
         shipped = {name: load_scene(path) for name, path in options.shipped_scenes().items()}
-        return {name: scene for name, scene in shipped.items() if any(isinstance(o.material, Dielectric) for o in scene.objects)}
+        return {
+            name: scene
+            for name, scene in shipped.items()
+            if any(isinstance(o.material, Dielectric) for o in scene.objects)
+        }
     files = [options.find_scene(name) for name in names]
     scenes: dict[str, Scene] = {}
     for name, file in zip(names, files, strict=True):
         if file.stem in scenes:
-            raise UserError(f"scene {name}: another scene of this run is called '{file.stem}' too; rename the file or run them apart")
+            raise UserError(
+                f"scene {name}: another scene of this run is called '{file.stem}' too; rename the file or run them apart"
+            )
         scenes[file.stem] = load_scene(file)
     return scenes
 
@@ -145,7 +169,14 @@ def repeat_command(scenes: Sequence[str], request: BenchRequest) -> str:
         "--size": request.size,
         "--reference-seconds": request.reference_seconds,
     }
-    words = ["spectrasplat", "bench", *(["--eye"] if request.camera_pass else []), *(request.scenes or scenes), "-o", request.output.name if request.output else ""]
+    words = [
+        "spectrasplat",
+        "bench",
+        *(["--eye"] if request.camera_pass else []),
+        *(request.scenes or scenes),
+        "-o",
+        request.output.name if request.output else "",
+    ]
     for option, value in given.items():
         words += [] if value is None else [option, value]
     return shlex.join(words)
@@ -166,7 +197,9 @@ def _features(request: BenchRequest) -> int:
     """What each feature costs in one scene."""
     assert request.features is not None
     if request.scenes:
-        raise UserError(f"--features measures one scene alone: give 'bench --features {request.features}' without further scenes")
+        raise UserError(
+            f"--features measures one scene alone: give 'bench --features {request.features}' without further scenes"
+        )
     scene = load_scenes([request.features])
 
     from ..bench.features import cost as features_cost
@@ -186,4 +219,6 @@ def _report(result: BenchResult, directory: Path, show: Callable[[object], None]
             show(line)
     if measured:
         write_report(result, directory)
-        show(f"{(directory / 'report.html').resolve()}: the report; {(directory / 'results.json').resolve()}: every number")
+        show(
+            f"{(directory / 'report.html').resolve()}: the report; {(directory / 'results.json').resolve()}: every number"
+        )

@@ -35,13 +35,20 @@ def list_glasses(query: str = "", limit: int | None = None) -> Table:
     if not found:
         raise UserError(f"no glass resembles '{query}'; 'spectrasplat glass' without a name lists all")
     table = Table(title=f"{len(found)} of {len(entries())} glasses and materials", title_justify="left")
-    for heading, justify in (("name", "left"), ("maker", "left"), ("n_d", "right"), ("V_d", "right"), ("range nm", "right"), ("also", "left")):  # fmt: skip
+    for heading, justify in (
+        ("name", "left"),
+        ("maker", "left"),
+        ("n_d", "right"),
+        ("V_d", "right"),
+        ("range nm", "right"),
+        ("also", "left"),
+    ):
         table.add_column(heading, justify=justify, no_wrap=heading != "also")
     for entry in found:
         glass = entry.dispersion
         table.add_row(
             entry.name, entry.maker, f"{glass.n_d:.5f}", _abbe(glass.V_d), _range(entry), ", ".join(entry.aliases)
-        )  # fmt: skip
+        )
     return table
 
 
@@ -111,15 +118,23 @@ def _draw_dispersion(axes: Axes, shown: Sequence[Entry], colours: Sequence[str])
     for name, line_nm, colour in _LINES:
         axes.axvline(line_nm, color=colour, lw=0.9, ls="--", zorder=1)
         axes.annotate(
-            name, (line_nm, 1.0), xycoords=("data", "axes fraction"), xytext=(3, -4), textcoords="offset points",
-            va="top", color=colour, fontweight="bold",
-        )  # fmt: skip
+            name,
+            (line_nm, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(3, -4),
+            textcoords="offset points",
+            va="top",
+            color=colour,
+            fontweight="bold",
+        )
     axes.set(xlim=(380.0, 780.0), xlabel="wavelength λ (nm)", ylabel="refractive index n")
     axes.margins(y=0.12)
     axes.ticklabel_format(axis="y", useOffset=False)
     if len(shown) == 1:
         glass = shown[0].dispersion
-        axes.set_title(f"{shown[0].qualified_name}    $n_d$ = {glass.n_d:.5f}    $V_d$ = {_abbe(glass.V_d)}", loc="left")
+        axes.set_title(
+            f"{shown[0].qualified_name}    $n_d$ = {glass.n_d:.5f}    $V_d$ = {_abbe(glass.V_d)}", loc="left"
+        )
     else:
         axes.set_title("refractive index", loc="left")
         axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.12), ncols=3, frameon=False, fontsize=9)
@@ -156,9 +171,14 @@ def _draw_abbe_diagram(axes: Axes, shown: Sequence[Entry], colours: Sequence[str
             continue
         axes.plot(glass.V_d, glass.n_d, "o", ms=9, color=colour, mec="black", mew=0.8, zorder=5)
         axes.annotate(
-            entry.name, (glass.V_d, glass.n_d), xytext=(8, 7), textcoords="offset points", zorder=6, fontweight="bold",
+            entry.name,
+            (glass.V_d, glass.n_d),
+            xytext=(8, 7),
+            textcoords="offset points",
+            zorder=6,
+            fontweight="bold",
             bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 0.8},
-        )  # fmt: skip
+        )
         v_limits = [min(v_limits[0], glass.V_d - 5.0), max(v_limits[1], glass.V_d + 5.0)]
         n_limits = [min(n_limits[0], glass.n_d - 0.05), max(n_limits[1], glass.n_d + 0.1)]
     axes.set(xlim=v_limits[::-1], ylim=n_limits, xlabel="Abbe number $V_d$", ylabel="$n_d$")

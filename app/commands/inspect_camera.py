@@ -1,4 +1,5 @@
-"""What camera rays look up in a scene, for `inspect`: environment, pictures, caustic maps, and how the spectrum is sampled."""
+"""What camera rays look up in a scene, for `inspect`: environment, pictures, caustic maps, and how the spectrum is
+sampled."""
 
 from __future__ import annotations
 
@@ -69,19 +70,36 @@ def _maps(scene: Scene, features: Features) -> Lookup:
         return Lookup("caustic maps", "XYZ and W", f"no spectra: {why}", "16 B a texel")
     peaks = tents(spectral_axis(scene, features), features.map_tents).tents_nm
     content = f"XYZ and W, tents at {', '.join(f'{nm:.0f}' for nm in peaks)} nm"
-    return Lookup("caustic maps", content, "each wavelength looks elsewhere behind dispersive glass; straight views take XYZ", f"{16 * features.targets} B a texel")
+    return Lookup(
+        "caustic maps",
+        content,
+        "each wavelength looks elsewhere behind dispersive glass; straight views take XYZ",
+        f"{16 * features.targets} B a texel",
+    )
 
 
 def _spectrum(features: Features) -> Lookup:
     if not features.camera_disperses:
         return Lookup("spectrum", "one stretch", "no dispersive glass is in view: one look a place", "")
     if features.random_wavelength:
-        return Lookup("spectrum", "one wavelength a sample behind glass", f"drawn anew for each ({features.method})", "")
+        return Lookup(
+            "spectrum", "one wavelength a sample behind glass", f"drawn anew for each ({features.method})", ""
+        )
     if features.point_spectrum:
-        return Lookup("spectrum", f"{features.method.removeprefix('regular-')} wavelengths in turn", f"evenly spaced ({features.method})", "")
+        return Lookup(
+            "spectrum",
+            f"{features.method.removeprefix('regular-')} wavelengths in turn",
+            f"evenly spaced ({features.method})",
+            "",
+        )
     if features.merged_groups:
         return Lookup("spectrum", "one band", f"swept along its columns ({features.method})", "")
-    return Lookup("spectrum", "bands", f"as many as a small picture of the view asks for, each swept along its columns ({features.method})", "")
+    return Lookup(
+        "spectrum",
+        "bands",
+        f"as many as a small picture of the view asks for, each swept along its columns ({features.method})",
+        "",
+    )
 
 
 def picture_words(picture: Texture | Environment) -> str:

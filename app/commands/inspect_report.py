@@ -97,8 +97,14 @@ def _objects_table(objects: tuple[SceneObject, ...]) -> Table:
     from ..model.geometry.mesh_health import examine
 
     table = _table(
-        "Objects", ("name", False), ("triangles", True), ("bounds", False), ("material", False), ("shading", False), ("mesh", False)
-    )  # fmt: skip
+        "Objects",
+        ("name", False),
+        ("triangles", True),
+        ("bounds", False),
+        ("material", False),
+        ("shading", False),
+        ("mesh", False),
+    )
     health: dict[int, str] = {}
     for item in objects:
         mesh = item.mesh
@@ -117,8 +123,14 @@ def _objects_table(objects: tuple[SceneObject, ...]) -> Table:
 
 def _glasses_table(glasses: list) -> Table:
     table = _table(
-        "Glasses", ("name", False), ("n_d", True), ("V_d", True), ("n at 400 nm", True), ("n at 700 nm", True), ("data", False)
-    )  # fmt: skip
+        "Glasses",
+        ("name", False),
+        ("n_d", True),
+        ("V_d", True),
+        ("n at 400 nm", True),
+        ("n at 700 nm", True),
+        ("data", False),
+    )
     for glass in glasses:
         low, high = glass.range_nm
         reach = "any wavelength" if math.isinf(high) else f"{low:g}–{high:g} nm"
@@ -136,8 +148,14 @@ def _glasses_table(glasses: list) -> Table:
 
 def _lights_table(lights: tuple[Light, ...]) -> Table:
     table = _table(
-        "Lights", ("name", False), ("kind", False), ("spectrum", False), ("photometric", True), ("radiometric", True), ("in all", False)
-    )  # fmt: skip
+        "Lights",
+        ("name", False),
+        ("kind", False),
+        ("spectrum", False),
+        ("photometric", True),
+        ("radiometric", True),
+        ("in all", False),
+    )
     for light in lights:
         lumen, watt = _QUANTITY[light.kind]
         flux = light_flux(light)
@@ -164,7 +182,11 @@ def _compiled(scene: Scene) -> list[RenderableType]:
     table = _table("Compiled into the programs", ("part", False), ("", False), ("why", False), ("costs", False))
     for name, included, reason in explain(scene, features):
         table.add_row(name, "in" if included else "out", reason, costs.get(name, ""))
-    return [table, f"{RecordSizes.of(features).words()} What each part costs in time: bench --features.", _lookups_table(scene, features)]
+    return [
+        table,
+        f"{RecordSizes.of(features).words()} What each part costs in time: bench --features.",
+        _lookups_table(scene, features),
+    ]
 
 
 def _lookups_table(scene: Scene, features: Features) -> Table:

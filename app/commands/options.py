@@ -33,7 +33,7 @@ _GIB = 1 << 30
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """"960x540" (or with ×, X) as (width, height) in pixels."""
+    """ "960x540" (or with ×, X) as (width, height) in pixels."""
     parts = text.strip().lower().replace("×", "x").split("x")
     if len(parts) != 2 or not all(_is_integer(part) for part in parts):
         raise UserError(f"--size '{text}' is not WIDTHxHEIGHT, for example --size 960x540")
@@ -90,7 +90,9 @@ def parse_exposure(text: str) -> float:
     """Stops."""
     value = _number("--exposure", text, "in stops, for example -1.5")
     if not abs(value) <= MAX_EXPOSURE_EV:
-        raise UserError(f"--exposure {text} is out of range: give between -{MAX_EXPOSURE_EV:.0f} and {MAX_EXPOSURE_EV:.0f} stops")
+        raise UserError(
+            f"--exposure {text} is out of range: give between -{MAX_EXPOSURE_EV:.0f} and {MAX_EXPOSURE_EV:.0f} stops"
+        )
     return value
 
 
@@ -121,7 +123,7 @@ def parse_camera_method(text: str) -> str:
 
 
 def check_layer(text: str, scene: Scene) -> str:
-    """"beauty", "caustic" or "map:RECEIVER" with a diffuse object of `scene`."""
+    """ "beauty", "caustic" or "map:RECEIVER" with a diffuse object of `scene`."""
     if text in ("beauty", "caustic"):
         return text
     receivers = list(dict.fromkeys(o.name for o in scene.objects if isinstance(o.material, Diffuse)))

@@ -42,7 +42,8 @@ app = typer.Typer(
 )
 
 SceneArgument = Annotated[
-    str, typer.Argument(metavar="SCENE", help="A scene file (.toml, .glb, .gltf, a bare mesh), or a shipped scene's name.")
+    str,
+    typer.Argument(metavar="SCENE", help="A scene file (.toml, .glb, .gltf, a bare mesh), or a shipped scene's name."),
 ]
 Text = str | None
 PIPE_WIDTH = 200
@@ -76,7 +77,9 @@ def _print_version(asked: bool) -> None:
 
 @app.callback()
 def program(
-    version: Annotated[bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)] = False,
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+    ] = False,
 ) -> None:
     """Dispersive caustics: light through glass, split into its colours."""
 
@@ -84,26 +87,71 @@ def program(
 @app.command()
 def render(
     scene: SceneArgument,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="The picture: .png (to look at), .exr or .npy (linear, to work on).")],
-    size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels, for example 1920x1080; default: the scene's.")] = None,
-    photons: Annotated[Text, typer.Option(metavar="N", help="Photons to emit, for example 4M; default: the scene's.")] = None,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="OUT", help="The picture: .png (to look at), .exr or .npy (linear, to work on)."
+        ),
+    ],
+    size: Annotated[
+        Text, typer.Option(metavar="WxH", help="Pixels, for example 1920x1080; default: the scene's.")
+    ] = None,
+    photons: Annotated[
+        Text, typer.Option(metavar="N", help="Photons to emit, for example 4M; default: the scene's.")
+    ] = None,
     seconds: Annotated[Text, typer.Option(metavar="S", help="Emit photons for this long instead.")] = None,
     seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
-    method: Annotated[Text, typer.Option(metavar="NAME", help=f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.")] = None,
-    camera_method: Annotated[Text, typer.Option("--eye-method", metavar="NAME", help=f"The same for the camera's rays: {', '.join(CAMERA_METHODS)}; default: as --method.")] = None,
+    method: Annotated[
+        Text, typer.Option(metavar="NAME", help=f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.")
+    ] = None,
+    camera_method: Annotated[
+        Text,
+        typer.Option(
+            "--eye-method",
+            metavar="NAME",
+            help=f"The same for the camera's rays: {', '.join(CAMERA_METHODS)}; default: as --method.",
+        ),
+    ] = None,
     layer: Annotated[Text, typer.Option(metavar="LAYER", help="beauty (default), caustic, or map:RECEIVER.")] = None,
-    bins: Annotated[Text, typer.Option(metavar="N", help=f"Keep {options.MIN_BINS} to {options.MAX_BINS} spectral bins (written to .exr).")] = None,
-    exposure: Annotated[Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than automatic; .png only.")] = None,
-    max_depth: Annotated[Text, typer.Option("--max-depth", metavar="N", help="Most specular events on a light path; default: 64.")] = None,
+    bins: Annotated[
+        Text,
+        typer.Option(
+            metavar="N", help=f"Keep {options.MIN_BINS} to {options.MAX_BINS} spectral bins (written to .exr)."
+        ),
+    ] = None,
+    exposure: Annotated[
+        Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than automatic; .png only.")
+    ] = None,
+    max_depth: Annotated[
+        Text, typer.Option("--max-depth", metavar="N", help="Most specular events on a light path; default: 64.")
+    ] = None,
     spp: Annotated[Text, typer.Option(metavar="N", help="Camera samples a pixel.")] = None,
-    batch: Annotated[Text, typer.Option(metavar="N", help="Photons in flight at once (never changes the picture).")] = None,
-    stats: Annotated[bool, typer.Option("--stats", help="Print the energy balance and the times of all stages.")] = False,
+    batch: Annotated[
+        Text, typer.Option(metavar="N", help="Photons in flight at once (never changes the picture).")
+    ] = None,
+    stats: Annotated[
+        bool, typer.Option("--stats", help="Print the energy balance and the times of all stages.")
+    ] = False,
 ) -> None:
     """Render a scene to a picture file."""
     from .render import RenderRequest, render_command
 
     request = RenderRequest(
-        scene, output, size, photons, seconds, seed, method, camera_method, layer, bins, exposure, max_depth, spp, batch, stats
+        scene,
+        output,
+        size,
+        photons,
+        seconds,
+        seed,
+        method,
+        camera_method,
+        layer,
+        bins,
+        exposure,
+        max_depth,
+        spp,
+        batch,
+        stats,
     )
     raise typer.Exit(render_command(request))
 
@@ -111,36 +159,93 @@ def render(
 @app.command()
 def animate(
     scene: SceneArgument,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="A movie (.mp4), or a folder for numbered PNGs, which can be resumed.")],
-    turntable: Annotated[bool, typer.Option("--turntable", help="Turn the camera once about its target; what happens when nothing else is asked for.")] = False,
-    keys: Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Keys of any parameter: tables named keys with time_s, parameter, value, interpolation.")] = None,
-    ranges: Annotated[list[str] | None, typer.Option("--set", metavar="P=A:B", help="Let a parameter go from A to B, for example objects.prism.dispersion_gain=0:3; may be repeated.")] = None,
-    frames: Annotated[Text, typer.Option(metavar="N", help="Pictures in all; default: 120, or as many as the keys last.")] = None,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="OUT", help="A movie (.mp4), or a folder for numbered PNGs, which can be resumed."
+        ),
+    ],
+    turntable: Annotated[
+        bool,
+        typer.Option(
+            "--turntable", help="Turn the camera once about its target; what happens when nothing else is asked for."
+        ),
+    ] = False,
+    keys: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.toml",
+            help="Keys of any parameter: tables named keys with time_s, parameter, value, interpolation.",
+        ),
+    ] = None,
+    ranges: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="P=A:B",
+            help="Let a parameter go from A to B, for example objects.prism.dispersion_gain=0:3; may be repeated.",
+        ),
+    ] = None,
+    frames: Annotated[
+        Text, typer.Option(metavar="N", help="Pictures in all; default: 120, or as many as the keys last.")
+    ] = None,
     fps: Annotated[Text, typer.Option(metavar="F", help="Pictures a second; default: 24.")] = None,
     size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: the scene's.")] = None,
-    photons: Annotated[Text, typer.Option(metavar="N", help="Photons of each traced frame; default: the scene's.")] = None,
+    photons: Annotated[
+        Text, typer.Option(metavar="N", help="Photons of each traced frame; default: the scene's.")
+    ] = None,
     spp: Annotated[Text, typer.Option(metavar="N", help="Camera samples a pixel; default: 16.")] = None,
-    exposure: Annotated[Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than is automatic in the first frame.")] = None,
-    seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers, the same for all frames; default: 1.")] = None,
-    method: Annotated[Text, typer.Option(metavar="NAME", help=f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the frames of another animation in the folder.")] = False,
+    exposure: Annotated[
+        Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than is automatic in the first frame.")
+    ] = None,
+    seed: Annotated[
+        Text, typer.Option(metavar="K", help="Seed of the random numbers, the same for all frames; default: 1.")
+    ] = None,
+    method: Annotated[
+        Text, typer.Option(metavar="NAME", help=f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.")
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace the frames of another animation in the folder.")
+    ] = False,
 ) -> None:
     """Render an animation: a turntable, or any parameters over time."""
     from .animate import AnimateRequest, animate_command
 
     request = AnimateRequest(
-        scene, output, turntable, keys, tuple(ranges or ()), frames, fps, size, photons, spp, exposure, seed, method, overwrite
+        scene,
+        output,
+        turntable,
+        keys,
+        tuple(ranges or ()),
+        frames,
+        fps,
+        size,
+        photons,
+        spp,
+        exposure,
+        seed,
+        method,
+        overwrite,
     )
     raise typer.Exit(animate_command(request))
 
 
 @app.command()
 def view(
-    scene: Annotated[Text, typer.Argument(metavar="[SCENE]", help="A scene file, a bare mesh, or a shipped scene's name; default: the default scene.")] = None,
+    scene: Annotated[
+        Text,
+        typer.Argument(
+            metavar="[SCENE]", help="A scene file, a bare mesh, or a shipped scene's name; default: the default scene."
+        ),
+    ] = None,
     size: Annotated[Text, typer.Option(metavar="WxH", help="Of the window; default: as it was last.")] = None,
     theme: Annotated[Text, typer.Option(metavar="NAME", help="dark or light; default: as it was last.")] = None,
-    screenshot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Write a picture of the window and close.")] = None,
-    after: Annotated[Text, typer.Option(metavar="S", help="Seconds from the first picture until --screenshot; default: 10.")] = None,
+    screenshot: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Write a picture of the window and close.")
+    ] = None,
+    after: Annotated[
+        Text, typer.Option(metavar="S", help="Seconds from the first picture until --screenshot; default: 10.")
+    ] = None,
 ) -> None:
     """Open the viewer: edit dispersion and caustics on the screen."""
     from .view import ViewRequest, view_command
@@ -152,7 +257,15 @@ def view(
 def bake(
     scene: SceneArgument,
     receiver: Annotated[str, typer.Argument(metavar="RECEIVER", help="The diffuse object whose caustic is baked.")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="The texture: .exr or .npy (linear irradiance), .png (to look at); where it lies is written to a .json beside it.")],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="OUT",
+            help="The texture: .exr or .npy (linear irradiance), .png (to look at); where it lies is written to a .json beside it.",
+        ),
+    ],
     size: Annotated[Text, typer.Option(metavar="WxH", help="Texels; default: 1024x1024.")] = None,
     photons: Annotated[Text, typer.Option(metavar="N", help="Photons to emit; default: the scene's.")] = None,
     seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
@@ -174,8 +287,13 @@ def inspect(scene: SceneArgument) -> None:
 
 @app.command()
 def glass(
-    query: Annotated[Text, typer.Argument(metavar="[QUERY]", help="Part of a name or maker; nothing lists all.")] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Plot n over the wavelength and the place in the Abbe diagram.")] = None,
+    query: Annotated[
+        Text, typer.Argument(metavar="[QUERY]", help="Part of a name or maker; nothing lists all.")
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.png", help="Plot n over the wavelength and the place in the Abbe diagram."),
+    ] = None,
 ) -> None:
     """Search the glass catalogue; show one glass in full."""
     from .glass import glass_command
@@ -195,30 +313,65 @@ def doctor() -> None:
 
 @app.command()
 def bench(
-    scenes: Annotated[list[str] | None, typer.Argument(metavar="[SCENE]...", help="Scenes to measure; default: every shipped one that holds glass.")] = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder for results.json, plots and report.html.")] = None,
-    seconds: Annotated[Text, typer.Option(metavar="S", help="Photon time of each method's and seed's largest rendering; default: 3, with --eye 20.")] = None,
+    scenes: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[SCENE]...", help="Scenes to measure; default: every shipped one that holds glass."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="Folder for results.json, plots and report.html."),
+    ] = None,
+    seconds: Annotated[
+        Text,
+        typer.Option(
+            metavar="S", help="Photon time of each method's and seed's largest rendering; default: 3, with --eye 20."
+        ),
+    ] = None,
     seeds: Annotated[Text, typer.Option(metavar="N", help="Independent repeats; default: 5.")] = None,
     methods: Annotated[Text, typer.Option(metavar="A,B", help="Methods to compare; default: all.")] = None,
     size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: 480 wide, in the scene's aspect.")] = None,
-    reference_seconds: Annotated[Text, typer.Option("--reference-seconds", metavar="S", help="Time added to each scene's cached reference; default: 60.")] = None,
-    features: Annotated[Text, typer.Option(metavar="SCENE", help="Measure instead what each feature of the programs costs in this scene.")] = None,
+    reference_seconds: Annotated[
+        Text,
+        typer.Option(
+            "--reference-seconds", metavar="S", help="Time added to each scene's cached reference; default: 60."
+        ),
+    ] = None,
+    features: Annotated[
+        Text,
+        typer.Option(metavar="SCENE", help="Measure instead what each feature of the programs costs in this scene."),
+    ] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Begin anew instead of going on from what DIR holds.")] = False,
-    camera_pass: Annotated[bool, typer.Option("--eye", help="Measure the camera's half, by samples a pixel, instead of the light's by photons.")] = False,
+    camera_pass: Annotated[
+        bool,
+        typer.Option("--eye", help="Measure the camera's half, by samples a pixel, instead of the light's by photons."),
+    ] = False,
 ) -> None:
     """Measure every method's error against its run time, and write a report."""
     from .bench import BenchRequest, bench_command
 
-    request = BenchRequest(tuple(scenes or ()), output, seconds, seeds, methods, size, reference_seconds, features, fresh, camera_pass)
+    request = BenchRequest(
+        tuple(scenes or ()), output, seconds, seeds, methods, size, reference_seconds, features, fresh, camera_pass
+    )
     raise typer.Exit(bench_command(request, _print))
 
 
 @app.command()
 def stress(
-    scenes: Annotated[list[str] | None, typer.Argument(metavar="[SCENE]...", help="Sweep these scenes; default: all stiff cases, and a sweep over shipped scenes.")] = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder for stress.json and stress.html.")] = None,
-    cases: Annotated[Text, typer.Option(metavar="A,B", help="Only these cases; 'prism/' is all of that scene's.")] = None,
-    list_cases: Annotated[bool, typer.Option("--list", help="List the cases with their number of severities, and measure nothing.")] = False,
+    scenes: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[SCENE]...", help="Sweep these scenes; default: all stiff cases, and a sweep over shipped scenes."
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder for stress.json and stress.html.")
+    ] = None,
+    cases: Annotated[
+        Text, typer.Option(metavar="A,B", help="Only these cases; 'prism/' is all of that scene's.")
+    ] = None,
+    list_cases: Annotated[
+        bool, typer.Option("--list", help="List the cases with their number of severities, and measure nothing.")
+    ] = False,
 ) -> None:
     """Measure stiff and extreme cases against their promises; exits with 1 where one is broken."""
     from .stress import StressRequest, stress_command
@@ -238,7 +391,9 @@ def bench_speed() -> None:
 @app.command("bench-view")
 def bench_view(
     scene: Annotated[Text, typer.Argument(metavar="[SCENE]", help="Default: the default scene.")] = None,
-    size: Annotated[Text, typer.Option(metavar="WxH", help="Of the viewport; default: 960x540, on a GPU 1920x1080.")] = None,
+    size: Annotated[
+        Text, typer.Option(metavar="WxH", help="Of the viewport; default: 960x540, on a GPU 1920x1080.")
+    ] = None,
     seconds: Annotated[Text, typer.Option(metavar="S", help="For each phase; default: 6.")] = None,
 ) -> None:
     """Measure the viewer's frame times: accumulating, orbiting, dragging the dispersion."""

@@ -80,7 +80,10 @@ def render_command(request: RenderRequest) -> int:
         bin_edges_nm=result.bin_edges_nm,
     )
     if not np.isfinite(result.rgb).all():
-        print(f"note: {request.output} holds numbers that are not finite: a power or a size is beyond float32", file=sys.stderr)
+        print(
+            f"note: {request.output} holds numbers that are not finite: a power or a size is beyond float32",
+            file=sys.stderr,
+        )
     print(_summary(request, settings, result.stats, stopped))
     if request.stats:
         print("\n".join(result.stats.lines()))

@@ -35,7 +35,8 @@ class StressRequest:
 
 
 def stress_command(request: StressRequest, show: Callable[[object], None]) -> int:
-    """Run the cases; returns 0 where every promise holds, 1 where one is broken, 130 after Ctrl-C. Raises `UserError`."""
+    """Run the cases; returns 0 where every promise holds, 1 where one is broken, 130 after Ctrl-C. Raises
+    `UserError`."""
     from ..stress.runner import choose
 
     files = [options.find_scene(name) for name in request.scenes]
@@ -87,7 +88,9 @@ def _cases(files: Sequence[Path]) -> tuple[Case, ...]:
     scenes = {}
     for file in files:
         if file.stem in scenes:
-            raise UserError(f"scene {file}: another scene of this run is called '{file.stem}' too; rename the file or run them apart")
+            raise UserError(
+                f"scene {file}: another scene of this run is called '{file.stem}' too; rename the file or run them apart"
+            )
         scenes[file.stem] = load_scene(file)
     return sweeps(list(scenes.items()))
 
@@ -99,7 +102,9 @@ def _prepare(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise UserError(f"cannot make the folder {folder}: {error.strerror or error}; give another one with -o") from error
+        raise UserError(
+            f"cannot make the folder {folder}: {error.strerror or error}; give another one with -o"
+        ) from error
     for name in (JSON, HTML):
         check_writable(folder / name)
 

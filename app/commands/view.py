@@ -93,7 +93,8 @@ def _run(window: Window, scene: Path | None, theme: str | None, screenshot: tupl
 def _take_screenshot(window: Window, viewer: Viewer, session: Session, path: Path, after_s: float) -> None:
     """Let the picture gather light for `after_s` seconds, then write the window to `path`.
 
-    They count from the first picture on: a driver may compile for longer than that. What has none is written as it is after `LONGEST_WAIT_S`.
+    They count from the first picture on: a driver may compile for longer than that. What has none is written as it is
+    after `LONGEST_WAIT_S`.
     """
     from PIL import Image
 
@@ -123,7 +124,9 @@ def _rescued(session: Session, error: Exception) -> UserError:
     what = " ".join(str(error).split()) or type(error).__name__
     from ..edit.preferences import config_dir
 
-    return UserError(f"the window had to close ({type(error).__name__}: {what[:200]}).{kept} Details are in {config_dir() / 'crash.log'}")
+    return UserError(
+        f"the window had to close ({type(error).__name__}: {what[:200]}).{kept} Details are in {config_dir() / 'crash.log'}"
+    )
 
 
 def _place(window: Window, before: WindowPlace) -> WindowPlace:

@@ -17,8 +17,19 @@ from ..model.scene_objects import make_shape
 from .names import free_name
 
 SHAPES = (
-    "sphere", "ellipsoid", "box", "slab", "prism", "polygon_prism", "lens", "brilliant", "torus", "rippled_water", "plane", "disc",
-)  # fmt: skip
+    "sphere",
+    "ellipsoid",
+    "box",
+    "slab",
+    "prism",
+    "polygon_prism",
+    "lens",
+    "brilliant",
+    "torus",
+    "rippled_water",
+    "plane",
+    "disc",
+)
 """What can be added, by its name in the scene file."""
 RECEIVERS = ("plane", "disc")
 """Those of them that are open and become diffuse."""
@@ -77,7 +88,10 @@ def _standing(scene: Scene, item: SceneObject, below: bool) -> SceneObject:
     """`item` with its lowest point where the other objects have theirs, or a hair below that."""
     up = up_frame(scene)[:, 2]
     around = environment_of(scene.objects)
-    floor = min(float(corner @ up) for corner in bounds_of([o for o in scene.objects if not isinstance(o.material, Diffuse)] or scene.objects))
+    floor = min(
+        float(corner @ up)
+        for corner in bounds_of([o for o in scene.objects if not isinstance(o.material, Diffuse)] or scene.objects)
+    )
     lowest = float((item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]).dot(up).min())
     # As for the default table: two surfaces must not coincide.
     hair = -1e-3 if below else 1e-3

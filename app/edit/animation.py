@@ -59,7 +59,12 @@ class Track:
         step = times[left + 1] - times[left]
         slope_a, slope_b = self._slope(left) * step, self._slope(left + 1) * step
         # Cubic Hermite, counted from a so that equal keys give exactly their value.
-        return a + (b - a) * share**2 * (3 - 2 * share) + slope_a * share * (1 - share) ** 2 - slope_b * share**2 * (1 - share)
+        return (
+            a
+            + (b - a) * share**2 * (3 - 2 * share)
+            + slope_a * share * (1 - share) ** 2
+            - slope_b * share**2 * (1 - share)
+        )
 
     def _slope(self, index: int) -> float:
         """Slope at a key: 0 at the ends and at turning points, so that nothing overshoots [Fritsch, Butland 1984]."""
@@ -123,7 +128,9 @@ def keyed(stage: Stage, tracks: Sequence[Track], frames: int | None, fps: float)
     last = max(track.times_s[-1] for track in tracks)
     count = frames if frames is not None else max(1, round((last - first) * fps) + 1)
     if count > MAX_FRAMES:
-        raise UserError(f"the keys span {last - first:g} s, which is {count} frames: give at most {MAX_FRAMES}, or fewer a second")
+        raise UserError(
+            f"the keys span {last - first:g} s, which is {count} frames: give at most {MAX_FRAMES}, or fewer a second"
+        )
     # The last frame is the last key, whatever the number of frames.
     times = np.linspace(first, last, count) if count > 1 else np.array([first])
     made = Animation(stage, tuple(tracks), tuple(float(t) for t in times))
@@ -171,14 +178,20 @@ def read_keys(path: Path, stage: Stage) -> tuple[Track, ...]:
         where = table.where("parameter") + ": "
         name = table.string("parameter")
         parameter(stage, name, where)
-        keys.append(Key(table.number("time_s", at_least=0.0, at_most=1e6), name, check_value(stage, name, table.number("value"), where)))
+        keys.append(
+            Key(
+                table.number("time_s", at_least=0.0, at_most=1e6),
+                name,
+                check_value(stage, name, table.number("value"), where),
+            )
+        )
         kinds.append(table.choice("interpolation", INTERPOLATIONS, "smooth"))
         table.finish("a key")
     return tracks_of(keys, kinds)
 
 
 def parse_range(text: str, stage: Stage, duration_s: float) -> Track:
-    """"objects.prism.dispersion_gain=0:3" (or more values, evenly spaced) as a track over `duration_s`."""
+    """ "objects.prism.dispersion_gain=0:3" (or more values, evenly spaced) as a track over `duration_s`."""
     path, equals, numbers = text.partition("=")
     try:
         values = tuple(float(number) for number in numbers.split(":"))

@@ -80,7 +80,9 @@ class Autosave:
     `problem`, one sentence, since losing the safety net must not stop the work.
     """
 
-    def __init__(self, folder: Path, interval_s: float = INTERVAL_S, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, folder: Path, interval_s: float = INTERVAL_S, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         """`folder`: the config folder."""
         self.problem: str | None = None
         self._interval_s = interval_s
@@ -155,7 +157,8 @@ class Autosave:
 
 
 def recoveries(folder: Path) -> tuple[Recovery, ...]:
-    """Autosaves in the config folder `folder` whose process is gone, the newest first; what is unreadable is passed over."""
+    """Autosaves in the config folder `folder` whose process is gone, the newest first; what is unreadable is passed
+    over."""
     found = []
     for entry in sorted((folder / _FOLDER).glob("*.json")):
         scene = entry.with_suffix(".toml")

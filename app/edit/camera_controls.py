@@ -42,7 +42,8 @@ def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
 
 
 def _rotated(camera: Camera, pivot: np.ndarray, yaw: float, pitch: float) -> Camera:
-    """Turned by `yaw` about `up` and by `pitch` (positive looks further up) about the camera's right, both through `pivot`."""
+    """Turned by `yaw` about `up` and by `pitch` (positive looks further up) about the camera's right, both through
+    `pivot`."""
     axis = np.asarray(camera.up, float) / np.linalg.norm(camera.up)
     right, _, forward = camera_frame(camera)
     elevation = float(np.arcsin(np.clip(forward @ axis, -1.0, 1.0)))
@@ -53,7 +54,9 @@ def _rotated(camera: Camera, pivot: np.ndarray, yaw: float, pitch: float) -> Cam
     new_position = pivot + turn @ (position - pivot)
     # The distance is restored, so that thousands of small turns do not drift.
     direction = turn @ forward
-    return replace(camera, position=_vec3(new_position), target=_vec3(new_position + np.linalg.norm(target - position) * direction))
+    return replace(
+        camera, position=_vec3(new_position), target=_vec3(new_position + np.linalg.norm(target - position) * direction)
+    )
 
 
 def orbit(camera: Camera, dx: float, dy: float, pivot: Vec3 | np.ndarray | None = None) -> Camera:
@@ -75,10 +78,18 @@ def pan(camera: Camera, dx: float, dy: float, depth: float | None = None) -> Cam
 
 
 def _moved(camera: Camera, step: np.ndarray) -> Camera:
-    return replace(camera, position=_vec3(np.asarray(camera.position) + step), target=_vec3(np.asarray(camera.target) + step))
+    return replace(
+        camera, position=_vec3(np.asarray(camera.position) + step), target=_vec3(np.asarray(camera.target) + step)
+    )
 
 
-def zoom_to(camera: Camera, amount: float, cursor: tuple[float, float] = (0.5, 0.5), aspect: float = 1.0, hit: Vec3 | np.ndarray | None = None) -> Camera:
+def zoom_to(
+    camera: Camera,
+    amount: float,
+    cursor: tuple[float, float] = (0.5, 0.5),
+    aspect: float = 1.0,
+    hit: Vec3 | np.ndarray | None = None,
+) -> Camera:
     """Come nearer by `amount` notches (negative: go back) while the point under `cursor` stays there.
 
     `cursor` is in picture coordinates; `hit` the world position under it (else on the plane through the target).
@@ -117,7 +128,9 @@ def fly(camera: Camera, keys: tuple[float, float, float], speed: float, dt: floa
     axis = np.asarray(camera.up, float) / np.linalg.norm(camera.up)
     across = wish[0] * right + wish[1] * axis
     if camera.kind == "orthographic":
-        return replace(_moved(camera, speed * dt * across), vertical_extent=camera.vertical_extent * float(np.exp(-wish[2] * dt)))
+        return replace(
+            _moved(camera, speed * dt * across), vertical_extent=camera.vertical_extent * float(np.exp(-wish[2] * dt))
+        )
     return _moved(camera, speed * dt * (across + wish[2] * forward))
 
 
@@ -126,7 +139,9 @@ def frame(camera: Camera, low: Vec3 | np.ndarray, high: Vec3 | np.ndarray, aspec
     low, high = np.asarray(low, float), np.asarray(high, float)
     centre = 0.5 * (low + high)
     view = View.of(camera, aspect)
-    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]) - centre
+    corners = (
+        np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]) - centre
+    )
     across, upward, ahead = np.abs(corners @ view.right) / aspect, np.abs(corners @ view.up), corners @ view.forward
     radius = float(np.linalg.norm(corners, axis=1).max())
     if radius == 0.0:
@@ -134,7 +149,9 @@ def frame(camera: Camera, low: Vec3 | np.ndarray, high: Vec3 | np.ndarray, aspec
     if view.is_orthographic:
         extent = 2.0 * FRAME_MARGIN * max(float(across.max()), float(upward.max()), 0.05 * radius)
         distance = max(view.target_distance, 2.0 * radius)
-        return replace(camera, position=_vec3(centre - distance * view.forward), target=_vec3(centre), vertical_extent=extent)
+        return replace(
+            camera, position=_vec3(centre - distance * view.forward), target=_vec3(centre), vertical_extent=extent
+        )
     distance = float((np.maximum(across, upward) * FRAME_MARGIN / view.half_height - ahead).max())
     return replace(camera, position=_vec3(centre - distance * view.forward), target=_vec3(centre))
 

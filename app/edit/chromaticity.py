@@ -70,7 +70,8 @@ def _dominant(x: float, y: float) -> tuple[float | None, bool, float]:
 
 
 def _crossing(white: np.ndarray, direction: np.ndarray) -> tuple[float, float] | None:
-    """(wavelength nm, distance from white) where the ray leaves the spectral locus; None where it leaves between its ends."""
+    """(wavelength nm, distance from white) where the ray leaves the spectral locus; None where it leaves between its
+    ends."""
     relative = _locus() - white
     across = direction[0] * relative[:, 1] - direction[1] * relative[:, 0]
     along = relative @ direction

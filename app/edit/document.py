@@ -84,7 +84,9 @@ class Document:
             raise UserError("the scene has no file yet; choose a name ending in .toml or .glb")
         suffix = target.suffix.lower()
         if suffix not in SAVE_SUFFIXES:
-            raise UserError(f"{target.name}: a scene is saved as .toml or .glb; choose a name with one of these endings")
+            raise UserError(
+                f"{target.name}: a scene is saved as .toml or .glb; choose a name with one of these endings"
+            )
         scene = self.scene
         if suffix in GLTF_SUFFIXES:
             save_gltf(scene, target, self._readable_original())

@@ -59,13 +59,48 @@ from .requests import Notice
 from .state import State
 
 __all__ = [
-    "POWER_UNITS", "RECEIVERS", "SHAPES", "abbe_numbers", "add_dabs", "add_light", "add_object", "attempt", "clear_dabs",
-    "compose", "decompose", "delete", "delete_light", "duplicate", "duplicate_light", "index_points", "light_power",
-    "photometric_key", "rename", "rename_light", "set_abbe", "set_absorption", "set_background", "set_camera",
-    "set_diffuse_colour", "set_dispersion", "set_dispersion_gain", "set_index_points", "set_light", "set_light_kind",
-    "set_light_power", "set_light_spectrum", "set_material", "set_position", "set_priority", "set_render_defaults",
-    "set_rotation", "set_scale", "set_transform", "spectrum_words", "with_object",
-]  # fmt: skip
+    "POWER_UNITS",
+    "RECEIVERS",
+    "SHAPES",
+    "abbe_numbers",
+    "add_dabs",
+    "add_light",
+    "add_object",
+    "attempt",
+    "clear_dabs",
+    "compose",
+    "decompose",
+    "delete",
+    "delete_light",
+    "duplicate",
+    "duplicate_light",
+    "index_points",
+    "light_power",
+    "photometric_key",
+    "rename",
+    "rename_light",
+    "set_abbe",
+    "set_absorption",
+    "set_background",
+    "set_camera",
+    "set_diffuse_colour",
+    "set_dispersion",
+    "set_dispersion_gain",
+    "set_index_points",
+    "set_light",
+    "set_light_kind",
+    "set_light_power",
+    "set_light_spectrum",
+    "set_material",
+    "set_position",
+    "set_priority",
+    "set_render_defaults",
+    "set_rotation",
+    "set_scale",
+    "set_transform",
+    "spectrum_words",
+    "with_object",
+]
 
 
 def attempt(state: State, label: str, edit: Callable[..., Scene], *args: object, **kwargs: object) -> State:
@@ -97,7 +132,8 @@ def set_render_defaults(scene: Scene, **changes: float) -> Scene:
 
 
 def set_camera(scene: Scene, camera: Camera) -> Scene:
-    """Make `camera` the view the scene is saved with; an up direction along the view, which a file may not hold, is turned aside."""
+    """Make `camera` the view the scene is saved with; an up direction along the view, which a file may not hold, is
+    turned aside."""
     forward = np.subtract(camera.target, camera.position)
     if not np.isfinite(forward).all() or np.linalg.norm(forward) < 1e-150:
         raise UserError("the camera looks at its own position; choose another target")

@@ -1,7 +1,8 @@
-"""Edits of what lies behind everything, and of the pictures that surfaces wear: pure functions from a scene to the scene that results.
+"""Edits of what lies behind everything, and of the pictures that surfaces wear: pure functions from a scene to the
+scene that results.
 
-An environment is one picture whatever it was made of (`model.environment`), so an edit makes it anew from its parameters. Where only the
-way it hangs changes, the picture itself stays: the renderer then keeps it on the device.
+An environment is one picture whatever it was made of (`model.environment`), so an edit makes it anew from its
+parameters. Where only the way it hangs changes, the picture itself stays: the renderer then keeps it on the device.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ def environment_kind(scene: Scene) -> str:
 
 
 def set_environment_kind(scene: Scene, kind: str) -> Scene:
-    """A plain background, a first gradient or a first sky as bright as suits the scene's lights. A map wants a file: `set_environment_map`.
+    """A plain background, a first gradient or a first sky as bright as suits the scene's lights. A map wants a file:
+    `set_environment_map`.
 
     Raises UserError where the environment is all that there is to be seen.
     """
@@ -46,26 +48,37 @@ def set_environment_kind(scene: Scene, kind: str) -> Scene:
     if kind == "constant":
         return _without_environment(scene)
     if kind not in ("gradient", "sky"):
-        raise UserError(f"'{kind}' is no kind of environment that can be made without a file; choose constant, gradient or sky")
+        raise UserError(
+            f"'{kind}' is no kind of environment that can be made without a file; choose constant, gradient or sky"
+        )
     level = _usual_radiance(scene)
-    made = gradient(_ZENITH, _HORIZON, _NADIR, intensity=level) if kind == "gradient" else sky(**_sun_of(scene), luminance=level)
+    made = (
+        gradient(_ZENITH, _HORIZON, _NADIR, intensity=level)
+        if kind == "gradient"
+        else sky(**_sun_of(scene), luminance=level)
+    )
     return replace(scene, environment=made)
 
 
 def set_gradient(scene: Scene, **changes: object) -> Scene:
-    """With other `zenith`, `horizon`, `nadir` (linear Rec.709) or `intensity`. Raises UserError for what is negative or not finite."""
+    """With other `zenith`, `horizon`, `nadir` (linear Rec.709) or `intensity`. Raises UserError for what is negative or
+    not finite."""
     now = dict(_of_kind(scene, "gradient").parameters)
     return replace(scene, environment=gradient(**_vectors(now | changes)))
 
 
 def set_sky(scene: Scene, **changes: object) -> Scene:
-    """With another `type`, `sun_elevation_deg`, `sun_azimuth_deg`, `luminance` or `ground`. Raises UserError for what is out of range."""
+    """With another `type`, `sun_elevation_deg`, `sun_azimuth_deg`, `luminance` or `ground`. Raises UserError for what
+    is out of range."""
     now = _vectors(dict(_of_kind(scene, "sky").parameters) | changes)
-    return replace(scene, environment=sky(**{("sky_type" if key == "type" else key): value for key, value in now.items()}))
+    return replace(
+        scene, environment=sky(**{("sky_type" if key == "type" else key): value for key, value in now.items()})
+    )
 
 
 def set_environment_map(scene: Scene, path: Path) -> Scene:
-    """The panorama in `path`, hung as the present one is; a first one as bright as suits the scene's lights. Raises UserError where it cannot be used."""
+    """The panorama in `path`, hung as the present one is; a first one as bright as suits the scene's lights. Raises
+    UserError where it cannot be used."""
     now, notes = scene.environment, list(scene.notes)
     if now is not None and now.kind == "map":
         up, rotation_deg = up_and_rotation(now)
@@ -75,7 +88,11 @@ def set_environment_map(scene: Scene, path: Path) -> Scene:
     changed = replace(scene, environment=made, notes=tuple(notes))
     # Few panoramas are in absolute units; those that seem to be are left alone.
     factor = _usual_radiance(scene) / max(_mean_luminance(made), 1e-30)
-    return changed if 1.0 / _ABSOLUTE < factor < _ABSOLUTE or factor > 1e20 else set_map_intensity(changed, float(f"{factor:.2g}"))
+    return (
+        changed
+        if 1.0 / _ABSOLUTE < factor < _ABSOLUTE or factor > 1e20
+        else set_map_intensity(changed, float(f"{factor:.2g}"))
+    )
 
 
 def set_map_rotation(scene: Scene, rotation_deg: float) -> Scene:
@@ -102,7 +119,9 @@ def set_map_intensity(scene: Scene, intensity: float) -> Scene:
     with np.errstate(over="ignore"):
         rgb = now.rgb * np.float32(intensity / before)
     if not np.isfinite(rgb).all():
-        raise UserError(f"an intensity of {intensity:g} takes the environment's brightest value out of range; choose a smaller one")
+        raise UserError(
+            f"an intensity of {intensity:g} takes the environment's brightest value out of range; choose a smaller one"
+        )
     rgb.setflags(write=False)
     told = {"rotation_deg": rotation_deg, "up": list(up)} | dict(now.parameters) | {"intensity": float(intensity)}
     return replace(scene, environment=replace(now, rgb=rgb, parameters=told))
@@ -117,9 +136,11 @@ def map_intensity(environment: Environment) -> float:
 
 
 def set_texture(scene: Scene, index: int, path: Path, wrap: Literal["repeat", "clamp"] = "repeat") -> Scene:
-    """Let diffuse object `index` wear the picture in `path`; a first picture is shown in its own colours, not tinted by the object's.
+    """Let diffuse object `index` wear the picture in `path`; a first picture is shown in its own colours, not tinted by
+    the object's.
 
-    Raises UserError for an object that is not diffuse or has no texture coordinates, and for a picture that cannot be used."""
+    Raises UserError for an object that is not diffuse or has no texture coordinates, and for a picture that cannot be
+    used."""
     item = scene.objects[index]
     material = _diffuse(scene, index)
     if item.mesh.uv is None:
@@ -150,7 +171,9 @@ def _without_environment(scene: Scene) -> Scene:
     if not scene.lights:
         raise UserError("the environment is the scene's only light; add a light before taking it away")
     if not any(isinstance(o.material, Diffuse) for o in scene.objects):
-        raise UserError("nothing in the scene receives light, so the environment is all there is to see; add a diffuse object before taking it away")
+        raise UserError(
+            "nothing in the scene receives light, so the environment is all there is to see; add a diffuse object before taking it away"
+        )
     return replace(scene, environment=None)
 
 
@@ -211,7 +234,13 @@ def _illuminance(light: Light, scene: Scene) -> float:
         return power
     around = environment_of(scene.objects)
     distance2 = float(np.sum((around.centre - np.array(light.position)) ** 2)) + around.radius**2
-    area = 1.0 if light.kind != "area" else math.pi * light.radius**2 if light.shape == "disc" else light.width * light.height
+    area = (
+        1.0
+        if light.kind != "area"
+        else math.pi * light.radius**2
+        if light.shape == "disc"
+        else light.width * light.height
+    )
     return power * area / distance2
 
 
@@ -223,4 +252,7 @@ def _sun_of(scene: Scene) -> dict[str, float]:
     x, y, z = -np.asarray(sun.direction, float) / np.linalg.norm(sun.direction)
     if z < 0.0:
         return {}
-    return {"sun_elevation_deg": math.degrees(math.asin(min(z, 1.0))), "sun_azimuth_deg": math.degrees(math.atan2(y, x)) if math.hypot(x, y) > 1e-9 else 0.0}
+    return {
+        "sun_elevation_deg": math.degrees(math.asin(min(z, 1.0))),
+        "sun_azimuth_deg": math.degrees(math.atan2(y, x)) if math.hypot(x, y) > 1e-9 else 0.0,
+    }

@@ -81,14 +81,19 @@ def index_points(dispersion: Dispersion, count: int = 9) -> tuple[np.ndarray, np
 
 
 def set_absorption(scene: Scene, index: int, colour: Vec3 | None, distance: float = 1.0) -> Scene:
-    """White light takes this colour (linear Rec.709, 0 to 1) after `distance` scene units of object `index`; None is clear."""
+    """White light takes this colour (linear Rec.709, 0 to 1) after `distance` scene units of object `index`; None is
+    clear."""
     if colour is None:
         return _with_glass(scene, index, replace(_glass(scene, index), absorption=None))
     if not (math.isfinite(distance) and distance > 0.0):
-        raise UserError(f"{_where(scene, index)}: the distance of the absorption is {distance:g}; give a length above 0")
+        raise UserError(
+            f"{_where(scene, index)}: the distance of the absorption is {distance:g}; give a length above 0"
+        )
     alpha = attenuation_from_colour(colour, distance, _where(scene, index))
     if alpha.max() > MAX_ATTENUATION:
-        raise UserError(f"{_where(scene, index)}: the glass would be opaque within {1.0 / MAX_ATTENUATION:g} units; choose a longer distance")
+        raise UserError(
+            f"{_where(scene, index)}: the glass would be opaque within {1.0 / MAX_ATTENUATION:g} units; choose a longer distance"
+        )
     alpha.setflags(write=False)
     return _with_glass(scene, index, replace(_glass(scene, index), absorption=Absorption(alpha)))
 
@@ -96,7 +101,9 @@ def set_absorption(scene: Scene, index: int, colour: Vec3 | None, distance: floa
 def set_priority(scene: Scene, index: int, priority: int) -> Scene:
     """Which of overlapping solids decides the medium: the higher priority."""
     if abs(priority) > MAX_PRIORITY:
-        raise UserError(f"{_where(scene, index)}: the priority is {priority}; give a whole number within ±{MAX_PRIORITY}")
+        raise UserError(
+            f"{_where(scene, index)}: the priority is {priority}; give a whole number within ±{MAX_PRIORITY}"
+        )
     return _with_glass(scene, index, replace(_glass(scene, index), priority=int(priority)))
 
 

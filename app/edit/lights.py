@@ -34,9 +34,15 @@ LightKind = Literal["point", "spot", "directional", "collimated", "area"]
 SpectrumKind = Literal["illuminant", "blackbody", "laser", "lines", "csv", "table"]
 
 POWER_UNITS = {
-    "intensity_cd": "cd", "intensity_w_sr": "W/sr", "flux_lm": "lm", "flux_w": "W",
-    "illuminance_lx": "lm/unit²", "irradiance_w_m2": "W/unit²", "luminance_nt": "cd/unit²", "radiance_w_sr_m2": "W/(sr unit²)",
-}  # fmt: skip
+    "intensity_cd": "cd",
+    "intensity_w_sr": "W/sr",
+    "flux_lm": "lm",
+    "flux_w": "W",
+    "illuminance_lx": "lm/unit²",
+    "irradiance_w_m2": "W/unit²",
+    "luminance_nt": "cd/unit²",
+    "radiance_w_sr_m2": "W/(sr unit²)",
+}
 """Unit of each power key of a scene file; areas count in scene units."""
 
 _DARK = 1e-9
@@ -88,7 +94,9 @@ def duplicate_light(scene: Scene, index: int) -> Scene:
 def delete_light(scene: Scene, index: int) -> Scene:
     """Without light `index`. Raises UserError for the last one where there is no environment to see by."""
     if len(scene.lights) == 1 and scene.environment is None:
-        raise UserError(f"'{scene.lights[index].name}' is the only light; add another or an environment before deleting it")
+        raise UserError(
+            f"'{scene.lights[index].name}' is the only light; add another or an environment before deleting it"
+        )
     return replace(scene, lights=scene.lights[:index] + scene.lights[index + 1 :])
 
 
@@ -139,7 +147,9 @@ def set_light_power(scene: Scene, index: int, value: float, key: str | None = No
         raise UserError(f"light '{light.name}': its power is {value:g}; give a number of 0 or more")
     own = max(value, _DARK) / (flux_factor(light) if quantity == FLUX else 1.0)
     power = light.spectral_power
-    return _with_power(scene, index, power.scaled_to_luminous(own) if measure == PHOTOMETRIC else power.scaled_to_power(own))
+    return _with_power(
+        scene, index, power.scaled_to_luminous(own) if measure == PHOTOMETRIC else power.scaled_to_power(own)
+    )
 
 
 def _power_key(light: Light, key: str | None) -> tuple[str, str]:
@@ -157,8 +167,8 @@ def set_light_spectrum(
 ) -> Scene:
     """Give light `index` another spectrum of the same photometric power.
 
-    `value` by kind: "illuminant" a CIE name, "blackbody" kelvin, "laser" nm, "lines" rows of (nm, relative power), "csv" a file of
-    wavelength_nm and power. Raises UserError for what is unknown, invisible or outside a glass's data.
+    `value` by kind: "illuminant" a CIE name, "blackbody" kelvin, "laser" nm, "lines" rows of (nm, relative power),
+    "csv" a file of wavelength_nm and power. Raises UserError for what is unknown, invisible or outside a glass's data.
     """
     light = scene.lights[index]
     shape = _spectrum(light, kind, value)
@@ -194,13 +204,17 @@ def _spectrum(light: Light, kind: str, value: object) -> Spectrum:
             return _lines(light, rows)
         case "csv", (str() | Path()) as path:
             return spectra.from_csv(path)
-    raise UserError(f"light '{light.name}': '{kind}' with {value!r} is no spectrum; use illuminant, blackbody, laser, lines or csv")
+    raise UserError(
+        f"light '{light.name}': '{kind}' with {value!r} is no spectrum; use illuminant, blackbody, laser, lines or csv"
+    )
 
 
 def _lines(light: Light, rows: tuple[tuple[float, float], ...]) -> Spectrum:
     for wavelength, _ in rows:
         if not 380.0 <= wavelength <= 780.0:
-            raise UserError(f"light '{light.name}': a line at {wavelength:g} nm is not visible; choose one from 380 to 780 nm")
+            raise UserError(
+                f"light '{light.name}': a line at {wavelength:g} nm is not visible; choose one from 380 to 780 nm"
+            )
     return Spectrum(lines=rows)
 
 
@@ -245,7 +259,9 @@ def _check_values(light: Light) -> None:
     if min(light.radius, light.width, light.height) <= 0.0:
         raise UserError(f"light '{light.name}': its size must be above 0")
     if not 0.0 <= light.inner_half_angle_deg <= light.outer_half_angle_deg <= 90.0 or light.outer_half_angle_deg == 0.0:
-        raise UserError(f"light '{light.name}': its half angles must lie above 0 and up to 90°, the inner one within the outer")
+        raise UserError(
+            f"light '{light.name}': its half angles must lie above 0 and up to 90°, the inner one within the outer"
+        )
     if not 0.0 <= light.angular_diameter_deg <= 90.0:
         raise UserError(f"light '{light.name}': its angular diameter must lie between 0 and 90°")
 

@@ -70,14 +70,17 @@ def duplicate(scene: Scene, index: int) -> Scene:
 
 
 def delete(scene: Scene, index: int) -> Scene:
-    """Without object `index`. Raises UserError for the last one, and for the last that receives light where no environment is seen instead."""
+    """Without object `index`. Raises UserError for the last one, and for the last that receives light where no
+    environment is seen instead."""
     rest = scene.objects[:index] + scene.objects[index + 1 :]
     name = scene.objects[index].name
     if not rest:
         raise UserError(f"'{name}' is the only object; add another before deleting it")
     without = replace(scene, objects=rest)
     if _shows_nothing(without):
-        raise UserError(f"'{name}' is the only surface that receives light; add another diffuse object or an environment before deleting it")
+        raise UserError(
+            f"'{name}' is the only surface that receives light; add another diffuse object or an environment before deleting it"
+        )
     return without
 
 
@@ -87,13 +90,16 @@ def set_material(scene: Scene, index: int, material: Material) -> Scene:
     dabs = item.local_dispersion if isinstance(material, Diffuse) else ()
     changed = _replaced(scene, index, replace(item, material=material, local_dispersion=dabs))
     if _shows_nothing(changed):
-        raise UserError(f"'{item.name}' is the only surface that receives light; make another object diffuse or add an environment before changing it")
+        raise UserError(
+            f"'{item.name}' is the only surface that receives light; make another object diffuse or add an environment before changing it"
+        )
     check_scene(changed, scene.name)
     return changed
 
 
 def set_diffuse_colour(scene: Scene, index: int, rgb: Vec3) -> Scene:
-    """Linear Rec.709 reflectance, 0 to 1, of a diffuse object or a mirror; a spectral reflectance gives way to it, a texture is tinted by it."""
+    """Linear Rec.709 reflectance, 0 to 1, of a diffuse object or a mirror; a spectral reflectance gives way to it, a
+    texture is tinted by it."""
     item = scene.objects[index]
     if not all(math.isfinite(c) and 0.0 <= c <= 1.0 for c in rgb):
         raise UserError(f"'{item.name}': every channel of a reflectance must lie between 0 and 1")
@@ -157,7 +163,10 @@ def add_dabs(scene: Scene, index: int, dabs: Sequence[Dab]) -> Scene:
 def clear_dabs(scene: Scene, index: int | None = None) -> Scene:
     """Without what was painted on object `index`, or on any (None)."""
     chosen = range(len(scene.objects)) if index is None else (index,)
-    objects = [replace(o, local_dispersion=()) if i in chosen and o.local_dispersion else o for i, o in enumerate(scene.objects)]
+    objects = [
+        replace(o, local_dispersion=()) if i in chosen and o.local_dispersion else o
+        for i, o in enumerate(scene.objects)
+    ]
     return replace(scene, objects=tuple(objects))
 
 
@@ -219,6 +228,8 @@ def _check_dabs(item: SceneObject, dabs: Sequence[Dab] | None = None) -> None:
         if not all(map(math.isfinite, (*dab.position, dab.radius, dab.log2_gain, dab.falloff, dab.erase))):
             raise UserError(f"'{item.name}': a touch of the brush holds a number that is not finite")
         if not (0.0 < dab.radius <= MAX_LENGTH and abs(dab.log2_gain) <= MAX_DAB_LOG2):
-            raise UserError(f"'{item.name}': a touch of the brush needs a radius above 0 and a gain within ±{MAX_DAB_LOG2:g} doublings")
+            raise UserError(
+                f"'{item.name}': a touch of the brush needs a radius above 0 and a gain within ±{MAX_DAB_LOG2:g} doublings"
+            )
         if not (0.0 <= dab.falloff <= 1.0 and 0.0 <= dab.erase <= 1.0):
             raise UserError(f"'{item.name}': falloff and eraser of the brush lie between 0 and 1")

@@ -91,11 +91,15 @@ def save_own_presets(presets: OwnPresets) -> None:
 
 
 def _read(table: SceneTable) -> OwnPresets:
-    materials = tuple(MaterialPreset(name, read_material(entry)) for name, entry in table.named_tables("materials").items())
+    materials = tuple(
+        MaterialPreset(name, read_material(entry)) for name, entry in table.named_tables("materials").items()
+    )
     lights = []
     for name, entry in table.named_tables("lights").items():
         lights.append(LightPreset(name, None, None, light=read_light(entry, 0, _NOWHERE)))
-    views = tuple(ViewPreset(name, camera=read_camera(entry, _NOWHERE)) for name, entry in table.named_tables("views").items())
+    views = tuple(
+        ViewPreset(name, camera=read_camera(entry, _NOWHERE)) for name, entry in table.named_tables("views").items()
+    )
     table.finish("a file of presets")
     return OwnPresets(materials, tuple(lights), views)
 

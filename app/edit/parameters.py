@@ -1,8 +1,8 @@
 """Every number of a scene that can be animated, by a path such as `objects.prism.dispersion_gain`.
 
 A `Stage` is what an animation changes. `apply` sets one parameter, always starting from the stage as it was
-drawn up, so a frame depends on its time alone. Angles called `rotation` and `orbit_deg`, and the light's `power`, are relative to the
-stage as it stands (0 and 1 leave it); all other parameters are the values themselves.
+drawn up, so a frame depends on its time alone. Angles called `rotation` and `orbit_deg`, and the light's `power`, are
+relative to the stage as it stands (0 and 1 leave it); all other parameters are the values themselves.
 """
 
 from __future__ import annotations
@@ -59,7 +59,9 @@ class Parameter:
 
 _ORBIT = {
     "orbit_deg": Parameter("Turn of the camera about its target, seen from above", "°", -1e5, 1e5, 2),
-    "elevation_deg": Parameter("Camera's height above the target as an angle, added to what it is", "°", -180.0, 180.0, 1),
+    "elevation_deg": Parameter(
+        "Camera's height above the target as an angle, added to what it is", "°", -180.0, 180.0, 1
+    ),
     "distance": Parameter("Distance from the camera to its target", "units", 1e-6, _FAR, 1),
     "fov_deg": Parameter("Vertical field of view", "°", 0.01, 179.0),
     "extent": Parameter("Height of the picture of an orthographic camera", "units", 1e-9, _FAR),
@@ -67,7 +69,9 @@ _ORBIT = {
 _PLACE = {f"position.{axis}": Parameter(f"Position along {axis}", "units", -_FAR, _FAR) for axis in _AXES}
 _TARGET = {f"target.{axis}": Parameter(f"Point looked at, along {axis}", "units", -_FAR, _FAR) for axis in _AXES}
 _TURN = {
-    f"rotation.{axis}": Parameter(f"Turn about the world's {axis} axis through its own position, added to what it is", "°", -1e5, 1e5, 3 + i)
+    f"rotation.{axis}": Parameter(
+        f"Turn about the world's {axis} axis through its own position, added to what it is", "°", -1e5, 1e5, 3 + i
+    )
     for i, axis in enumerate(_AXES)
 }
 _GLASS = {
@@ -109,10 +113,14 @@ def parameter(stage: Stage, path: str, where: str = "") -> Parameter:
     known = paths(stage.scene, stage.camera)
     if path not in known:
         # A name that is right and a parameter that is not deserves the parameters of that name.
-        beginning = max((p.rpartition(".")[0] for p in known if path.startswith(p.rpartition(".")[0] + ".")), key=len, default="")
+        beginning = max(
+            (p.rpartition(".")[0] for p in known if path.startswith(p.rpartition(".")[0] + ".")), key=len, default=""
+        )
         near = [p for p in known if beginning and p.startswith(beginning + ".")]
         hint = suggestion(path, near or known) or suggestion(path, known)
-        raise UserError(f"{where}'{path}' is no parameter of scene '{stage.scene.name}'{hint or '; known are ' + ', '.join(near or sorted(_GLOBAL)) + ' and others'}")
+        raise UserError(
+            f"{where}'{path}' is no parameter of scene '{stage.scene.name}'{hint or '; known are ' + ', '.join(near or sorted(_GLOBAL)) + ' and others'}"
+        )
     return known[path]
 
 
@@ -120,7 +128,9 @@ def check_value(stage: Stage, path: str, value: float, where: str = "") -> float
     """`value` where `path` can take it; raises `UserError` otherwise."""
     known = parameter(stage, path, where)
     if not (math.isfinite(value) and known.low <= value <= known.high):
-        raise UserError(f"{where}{path} = {value:g} is out of range: give between {known.low:g} and {known.high:g} {known.unit}".rstrip())
+        raise UserError(
+            f"{where}{path} = {value:g} is out of range: give between {known.low:g} and {known.high:g} {known.unit}".rstrip()
+        )
     return value
 
 
@@ -159,7 +169,8 @@ def apply_all(stage: Stage, values: Mapping[str, float]) -> Stage:
 
 
 def parts(scene: Scene, path: str) -> tuple[str, str, str]:
-    """Group ("camera", "objects", "lights" or ""), name ("" outside of the last two) and field of a path that `paths` knows."""
+    """Group ("camera", "objects", "lights" or ""), name ("" outside of the last two) and field of a path that `paths`
+    knows."""
     head, _, rest = path.partition(".")
     if head not in ("objects", "lights"):
         return (head, "", rest) if rest else ("", "", head)
@@ -210,7 +221,11 @@ def _raised(arm: np.ndarray, up: np.ndarray, degrees: float) -> np.ndarray:
     if np.linalg.norm(level) < 1e-9 * length:
         return arm
     level /= np.linalg.norm(level)
-    angle = np.clip(math.asin(np.clip(arm @ up / length, -1.0, 1.0)) + math.radians(degrees), -math.radians(89.9), math.radians(89.9))
+    angle = np.clip(
+        math.asin(np.clip(arm @ up / length, -1.0, 1.0)) + math.radians(degrees),
+        -math.radians(89.9),
+        math.radians(89.9),
+    )
     return length * (math.cos(angle) * level + math.sin(angle) * up)
 
 

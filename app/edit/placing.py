@@ -118,7 +118,10 @@ def moved_light(light: Light, delta: np.ndarray) -> Light:
     # A disc stays round: whichever of its two directions was pulled counts.
     across = stretched[:2][np.argmax(np.abs(np.log(stretched[:2])))]
     return replace(
-        moved, radius=light.radius * float(across), width=light.width * float(stretched[0]), height=light.height * float(stretched[1])
+        moved,
+        radius=light.radius * float(across),
+        width=light.width * float(stretched[0]),
+        height=light.height * float(stretched[1]),
     )
 
 

@@ -83,7 +83,10 @@ def load_settings() -> tuple[Settings, str | None]:
     except FileNotFoundError:
         return Settings(), None
     except OSError as error:
-        return Settings(), f"The settings in {path} cannot be read ({error.strerror}); those of a new installation are used."
+        return (
+            Settings(),
+            f"The settings in {path} cannot be read ({error.strerror}); those of a new installation are used.",
+        )
     try:
         settings = msgspec.json.decode(data, type=Settings, dec_hook=_decode_path)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:

@@ -85,11 +85,18 @@ _GLASSES = (
 )
 
 _MERCURY = ((404.656, 11.0), (435.833, 20.2), (546.074, 24.5), (576.960, 10.0), (579.066, 10.0))
-"""Watts by line of a medium-pressure lamp, after Calvert and Pitts, Photochemistry, Wiley 1966; the yellow pair shared evenly."""
+"""Watts by line of a medium-pressure lamp, after Calvert and Pitts, Photochemistry, Wiley 1966; the yellow pair shared
+evenly."""
 
 _LIGHTS = (
     LightPreset("Daylight", "illuminant", "D65", "CIE D65, average daylight of 6500 K"),
-    LightPreset("Sun", "blackbody", 5772.0, "A black body of 5772 K; a directional light becomes as wide as the sun, 0.53°", SUN_DIAMETER_DEG),
+    LightPreset(
+        "Sun",
+        "blackbody",
+        5772.0,
+        "A black body of 5772 K; a directional light becomes as wide as the sun, 0.53°",
+        SUN_DIAMETER_DEG,
+    ),
     LightPreset("Equal energy", "illuminant", "E", "As much power at every wavelength"),
     LightPreset("Candle", "blackbody", 1900.0, "A black body of 1900 K"),
     LightPreset("Tungsten", "illuminant", "A", "CIE A, a bulb of 2856 K"),
@@ -99,13 +106,25 @@ _LIGHTS = (
     LightPreset("Fluorescent tube", "illuminant", "FL11", "CIE F11, narrow bands of 4000 K"),
     LightPreset("Sodium street lamp", "illuminant", "HP1", "CIE HP1, high-pressure sodium"),
     LightPreset("Mercury lamp", "lines", _MERCURY, "Lines at 405, 436, 546, 577 and 579 nm"),
-    LightPreset("Sodium lamp", "lines", ((588.995, 2.0), (589.592, 1.0)), "The yellow pair at 589.0 and 589.6 nm, low pressure"),
-    LightPreset("Fraunhofer F, d, C", "lines", ((486.1327, 1.0), (587.5618, 1.0), (656.2725, 1.0)), "The three lines that define V_d, equally strong"),
-    LightPreset("RGB lasers", "lines", ((450.0, 1.0), (532.0, 1.0), (638.0, 1.0)), "Lines at 450, 532 and 638 nm, equally strong"),
+    LightPreset(
+        "Sodium lamp", "lines", ((588.995, 2.0), (589.592, 1.0)), "The yellow pair at 589.0 and 589.6 nm, low pressure"
+    ),
+    LightPreset(
+        "Fraunhofer F, d, C",
+        "lines",
+        ((486.1327, 1.0), (587.5618, 1.0), (656.2725, 1.0)),
+        "The three lines that define V_d, equally strong",
+    ),
+    LightPreset(
+        "RGB lasers",
+        "lines",
+        ((450.0, 1.0), (532.0, 1.0), (638.0, 1.0)),
+        "Lines at 450, 532 and 638 nm, equally strong",
+    ),
     LightPreset("Blue laser", "laser", 450.0, "One line at 450 nm"),
     LightPreset("Green laser", "laser", 532.0, "One line at 532 nm"),
     LightPreset("Red laser", "laser", 632.8, "Helium and neon, one line at 632.8 nm"),
-)  # fmt: skip
+)
 
 _DIAGONAL = (0.45, -0.75, 0.5)
 _VIEWS = (
@@ -144,10 +163,13 @@ def apply_material(scene: Scene, index: int, preset: MaterialPreset) -> Scene:
 
 
 def apply_light(scene: Scene, index: int, preset: LightPreset) -> Scene:
-    """Give light `index` the preset's spectrum at the brightness it had; a user's light brings kind, shape and power too."""
+    """Give light `index` the preset's spectrum at the brightness it had; a user's light brings kind, shape and power
+    too."""
     light = scene.lights[index]
     if preset.light is not None:
-        placed = replace(preset.light, name=light.name, position=light.position, direction=light.direction, tangent=light.tangent)
+        placed = replace(
+            preset.light, name=light.name, position=light.position, direction=light.direction, tangent=light.tangent
+        )
         return set_light(scene, index, placed)
     assert preset.kind is not None and preset.value is not None
     changed = set_light_spectrum(scene, index, preset.kind, preset.value)
@@ -171,7 +193,11 @@ def view_camera(scene: Scene, camera: Camera, preset: ViewPreset) -> Camera:
     away = away / np.linalg.norm(away)
     target = _vec3(around.centre)
     return replace(
-        camera, position=_vec3(around.centre + distance * away), target=target, up=_vec3(frame @ preset.up), vertical_extent=2.0 * reach
+        camera,
+        position=_vec3(around.centre + distance * away),
+        target=target,
+        up=_vec3(frame @ preset.up),
+        vertical_extent=2.0 * reach,
     )
 
 

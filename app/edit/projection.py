@@ -32,7 +32,11 @@ class View:
     def of(camera: Camera, aspect: float) -> View:
         """The view of a picture `aspect` times as wide as high."""
         right, up, forward = camera_frame(camera)
-        half = 0.5 * camera.vertical_extent if camera.kind == "orthographic" else float(np.tan(np.radians(0.5 * camera.vertical_fov_deg)))
+        half = (
+            0.5 * camera.vertical_extent
+            if camera.kind == "orthographic"
+            else float(np.tan(np.radians(0.5 * camera.vertical_fov_deg)))
+        )
         return View(camera, aspect, right, up, forward, half)
 
     @property
@@ -67,7 +71,9 @@ class View:
 
     def ray(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
         """Origin and unit direction through a point of the picture."""
-        across = (2.0 * x - 1.0) * self.aspect * self.half_height * self.right + (1.0 - 2.0 * y) * self.half_height * self.up
+        across = (2.0 * x - 1.0) * self.aspect * self.half_height * self.right + (
+            1.0 - 2.0 * y
+        ) * self.half_height * self.up
         if self.is_orthographic:
             return self.position + across, self.forward
         direction = self.forward + across
@@ -87,7 +93,8 @@ class View:
         return 2.0 * self.half_height * (1.0 if self.is_orthographic else depth)
 
     def view_matrix(self, origin: np.ndarray | None = None) -> np.ndarray:
-        """World to camera space (x right, y up, z backwards), (4, 4). `origin`: where the world's zero is put, so that float32 loses nothing."""
+        """World to camera space (x right, y up, z backwards), (4, 4). `origin`: where the world's zero is put, so that
+        float32 loses nothing."""
         matrix = np.eye(4)
         matrix[:3, :3] = np.stack([self.right, self.up, -self.forward])
         matrix[:3, 3] = -matrix[:3, :3] @ (self.position - (0.0 if origin is None else np.asarray(origin, float)))
@@ -100,5 +107,9 @@ class View:
         if self.is_orthographic:
             matrix[2, 2], matrix[2, 3], matrix[3, 3] = -2.0 / (far - near), -(far + near) / (far - near), 1.0
         else:
-            matrix[2, 2], matrix[2, 3], matrix[3, 2] = -(far + near) / (far - near), -2.0 * far * near / (far - near), -1.0
+            matrix[2, 2], matrix[2, 3], matrix[3, 2] = (
+                -(far + near) / (far - near),
+                -2.0 * far * near / (far - near),
+                -1.0,
+            )
         return matrix

@@ -1,4 +1,5 @@
-"""Pull a colour: a point of the caustic is taken hold of and dragged, and the dispersion that puts it there is solved for.
+"""Pull a colour: a point of the caustic is taken hold of and dragged, and the dispersion that puts it there is solved
+for.
 
 To first order light of wavelength λ lands at p(λ) = p(d) + Σ_g D_g (n_g(λ) − n_g(d)), where D_g is the stored
 derivative of the landing point by the index of glass g. A glass with gain k has n(λ) − n(d) k times as
@@ -61,14 +62,19 @@ class PullPhotons:
 
     def landing(self, wavelength_nm: np.ndarray) -> np.ndarray:
         """Where each photon's light of some wavelengths (w,) lands: (n, w, 3) world."""
-        shift = np.stack([variable(wavelength_nm) for variable in self.variables], axis=0)[None] - self.n_anchor[:, :, None]
+        shift = (
+            np.stack([variable(wavelength_nm) for variable in self.variables], axis=0)[None] - self.n_anchor[:, :, None]
+        )
         return self.position[:, None] + np.einsum("ngj,ngw->nwj", self.dposition_dn, shift)
 
     def displacement(self, wavelength_nm: float, group: int | None) -> np.ndarray:
         """From the d line's landing point to that of a wavelength, by one group's glass or by all: (n, 3)."""
         groups = range(len(self.variables)) if group is None else [group]
         line = np.array([wavelength_nm, LINE_D_NM])
-        return sum((self.dposition_dn[:, g] * float(np.subtract(*self.variables[g](line))) for g in groups), np.zeros_like(self.position))
+        return sum(
+            (self.dposition_dn[:, g] * float(np.subtract(*self.variables[g](line))) for g in groups),
+            np.zeros_like(self.position),
+        )
 
 
 def dominant_nm(xyz: np.ndarray) -> float | None:
@@ -128,14 +134,22 @@ def begin_pull(
     reference = point - moved
     receiver = scene.objects[receiver_index]
     pull = Pull(
-        source, receiver_index, _vec3(point), _vec3(reference), _vec3(moved / length), wavelength_nm, material.dispersion.gain,
-        material.dispersion.V_d, local,
-    )  # fmt: skip
+        source,
+        receiver_index,
+        _vec3(point),
+        _vec3(reference),
+        _vec3(moved / length),
+        wavelength_nm,
+        material.dispersion.gain,
+        material.dispersion.V_d,
+        local,
+    )
     return replace(pull, gain_at_start=local_gain(receiver, pull)) if local else pull
 
 
 def _candidates(photons: PullPhotons, point: np.ndarray, radius: float, receiver: int) -> PullPhotons:
-    """Photons of the receiver whose band passes within three radii of the point, thinned evenly where there are many."""
+    """Photons of the receiver whose band passes within three radii of the point, thinned evenly where there are
+    many."""
     index = np.flatnonzero((photons.receiver == receiver) & (photons.flux_w > 0.0))
     if not len(index) or not photons.variables:
         return photons.chosen(index[:0])
@@ -160,7 +174,12 @@ def _weights(photons: PullPhotons, point: np.ndarray, radius: float, wavelength_
     inside = np.clip(np.minimum(_GRID_NM + 0.5 * step, high) - np.maximum(_GRID_NM - 0.5 * step, low), 0.0, step)
     density = photons.flux_w / np.maximum(photons.band_nm[:, 1] - photons.band_nm[:, 0], 1e-9)
     distance2 = np.sum((photons.landing(_GRID_NM) - point) ** 2, axis=2)
-    weights = density[:, None] * inside * np.exp(np.maximum(-2.0 * distance2 / radius**2, -50.0)) * (distance2 < (3.0 * radius) ** 2)
+    weights = (
+        density[:, None]
+        * inside
+        * np.exp(np.maximum(-2.0 * distance2 / radius**2, -50.0))
+        * (distance2 < (3.0 * radius) ** 2)
+    )
     if wavelength_nm is None:
         return weights
     around = weights * (np.abs(_GRID_NM - wavelength_nm) <= _AROUND_NM)
@@ -182,7 +201,9 @@ def _owner(photons: PullPhotons) -> np.ndarray:
 
 def _source(photons: PullPhotons, weight: np.ndarray, prefer: int | None) -> int:
     owner = _owner(photons)
-    sums = {int(item): float(weight[owner == item].sum()) for item in np.unique(owner) if item in photons.group_of_object}
+    sums = {
+        int(item): float(weight[owner == item].sum()) for item in np.unique(owner) if item in photons.group_of_object
+    }
     if not sums:
         raise UserError("the light here has passed no dispersive glass; choose a glass with dispersion first")
     if prefer is not None and sums.get(prefer, 0.0) > _PREFERRED_SHARE * sum(sums.values()):
@@ -203,7 +224,9 @@ def solve(pull: Pull, point: Vec3 | np.ndarray) -> float:
     """The gain, 0 to 10, with which the held colour lands where `point` (world) stands along the pull's direction."""
     direction, reference = np.asarray(pull.direction), np.asarray(pull.reference)
     held = float((np.asarray(pull.start) - reference) @ direction)
-    return float(np.clip(pull.gain_at_start * ((np.asarray(point, float) - reference) @ direction) / held, 0.0, MAX_GAIN))
+    return float(
+        np.clip(pull.gain_at_start * ((np.asarray(point, float) - reference) @ direction) / held, 0.0, MAX_GAIN)
+    )
 
 
 def abbe_number(pull: Pull, gain: float) -> float:
@@ -214,16 +237,21 @@ def abbe_number(pull: Pull, gain: float) -> float:
 def apply(scene: Scene, pull: Pull, point: Vec3 | np.ndarray, radius: float, falloff: float) -> tuple[Scene, str]:
     """The scene with the colour pulled to `point`, and the edit's name.
 
-    A local pull lays one dab of `radius` (world) where the held light's d line lands, or changes the one it laid before.
+    A local pull lays one dab of `radius` (world) where the held light's d line lands, or changes the one it laid
+    before.
     """
     from . import edits
 
     gain = solve(pull, point)
     if not pull.local:
-        return edits.set_dispersion_gain(scene, pull.object_index, gain), f"Pull colour of {scene.objects[pull.object_index].name}"
+        return edits.set_dispersion_gain(
+            scene, pull.object_index, gain
+        ), f"Pull colour of {scene.objects[pull.object_index].name}"
     receiver = scene.objects[pull.receiver_index]
     dabs = local_dabs(receiver, pull, gain, radius, falloff)
-    return edits.with_object(scene, pull.receiver_index, replace(receiver, local_dispersion=dabs)), "Pull colour locally"
+    return edits.with_object(
+        scene, pull.receiver_index, replace(receiver, local_dispersion=dabs)
+    ), "Pull colour locally"
 
 
 def local_dabs(receiver: SceneObject, pull: Pull, gain: float, radius: float, falloff: float) -> tuple[Dab, ...]:
@@ -234,7 +262,11 @@ def local_dabs(receiver: SceneObject, pull: Pull, gain: float, radius: float, fa
     place = _to_object(receiver, reference)
     rest = receiver.local_dispersion
     # The dab that this pull laid in the frame before: on the very same place, on top.
-    if rest and np.allclose(rest[-1].position, place, rtol=0.0, atol=1e-12 * (1.0 + np.abs(place).max())) and not rest[-1].erase:
+    if (
+        rest
+        and np.allclose(rest[-1].position, place, rtol=0.0, atol=1e-12 * (1.0 + np.abs(place).max()))
+        and not rest[-1].erase
+    ):
         rest = rest[:-1]
     before = float(np.log2(gain_at(rest, place[None])[0]))
     wanted = float(np.clip(np.log2(max(gain, 1e-9)), MIN_LOG2_GAIN, MAX_LOG2_GAIN))

@@ -175,9 +175,29 @@ class DismissMessage:
 
 
 Request = (
-    NewScene | Open | Save | Undo | DirtyLevel | GoTo | Quit | CancelQuit | Recover | SelectAt | BeginPull | FrameSelection | Retrace | ReloadShaders
-    | Screenshot | Bake | Animate | CancelJob | ComputeReference | CopyMaterial | Notice | DismissMessage
-)  # fmt: skip
+    NewScene
+    | Open
+    | Save
+    | Undo
+    | DirtyLevel
+    | GoTo
+    | Quit
+    | CancelQuit
+    | Recover
+    | SelectAt
+    | BeginPull
+    | FrameSelection
+    | Retrace
+    | ReloadShaders
+    | Screenshot
+    | Bake
+    | Animate
+    | CancelJob
+    | ComputeReference
+    | CopyMaterial
+    | Notice
+    | DismissMessage
+)
 
 
 @dataclass(frozen=True)

@@ -143,7 +143,8 @@ class State:
     interacting: bool = False
     """Something is being dragged: answer quickly, refine later, and keep undo steps together."""
     edit_label: str = ""
-    """What the last change of `scene` is called in the undo menu ("Move prism"); same label while dragging is one step."""
+    """What the last change of `scene` is called in the undo menu ("Move prism"); same label while dragging is one
+    step."""
     requests: tuple[Request, ...] = ()
 
     def edited(self, scene: Scene, label: str) -> State:
@@ -162,4 +163,6 @@ class State:
     def live_inputs(self) -> LiveInputs:
         """What the picture depends on."""
         width, height = self.viewport_size
-        return LiveInputs(self.scene, self.camera, width, height, self.method, self.smoothing, self.solo_nm, not self.physical)
+        return LiveInputs(
+            self.scene, self.camera, width, height, self.method, self.smoothing, self.solo_nm, not self.physical
+        )

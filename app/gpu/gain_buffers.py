@@ -27,7 +27,9 @@ _BIND_BOXES, _BIND_GAINS = 9, 10
 class GainBuffers:
     """Owns the buffers; `update` takes new dabs and computes only what they touch."""
 
-    def __init__(self, ctx: moderngl.Context, scene: Scene, receivers: list[int], space: GpuSpace, axis: SpectralAxis) -> None:
+    def __init__(
+        self, ctx: moderngl.Context, scene: Scene, receivers: list[int], space: GpuSpace, axis: SpectralAxis
+    ) -> None:
         """`receivers`: object indices, as in `SceneBuffers`."""
         self._ctx = ctx
         self._receivers = receivers

@@ -1,8 +1,9 @@
 """What the channels of a caustic map stand for.
 
 A picture in colour needs the map's XYZ only, unless the camera sees it through glass that disperses: then every
-wavelength is looked up at another place, and the map holds coarse spectra beside XYZ. Their bins overlap by half (tents), so that a
-pure colour between two of them is a mixture of both and no step shows. A spectral picture asks for the bins it wants.
+wavelength is looked up at another place, and the map holds coarse spectra beside XYZ. Their bins overlap by half
+(tents), so that a pure colour between two of them is a mixture of both and no step shows. A spectral picture asks for
+the bins it wants.
 """
 
 from __future__ import annotations
@@ -79,11 +80,16 @@ class MapChannels:
 
     def spectra(self, lights: Sequence[Light]) -> list[Spectrum]:
         """Spectral density of one watt in each spectral channel: the lights' own, within it."""
-        power = np.sum([light.spectral_power.density for light in lights], axis=0) if lights else np.zeros(len(VISIBLE_NM))
+        power = (
+            np.sum([light.spectral_power.density for light in lights], axis=0) if lights else np.zeros(len(VISIBLE_NM))
+        )
         lines = [line for light in lights for line in light.spectral_power.lines]
         line_nm, line_power = np.array(lines, float).reshape(-1, 2).T
         first = 4 * self.first_target
-        cells, at_lines = self.cell_weights()[:, first : first + self.count], self.line_weights(line_nm)[:, first : first + self.count]
+        cells, at_lines = (
+            self.cell_weights()[:, first : first + self.count],
+            self.line_weights(line_nm)[:, first : first + self.count],
+        )
         spectra = []
         for k in range(self.count):
             density, weights = power * cells[:, k], line_power * at_lines[:, k]

@@ -105,7 +105,8 @@ _kept: dict[tuple[int, bool], tuple[weakref.ref[_Array], list[_Array]]] = {}
 
 
 def kept_levels(rgb: _Array, *, on_sphere: bool) -> list[_Array]:
-    """The levels of `rgb`, worked out once in the life of the array: edits of a scene leave its pictures as they are."""
+    """The levels of `rgb`, worked out once in the life of the array: edits of a scene leave its pictures as they
+    are."""
     key = id(rgb), on_sphere
     if key not in _kept:
         levels = environment_levels(rgb) if on_sphere else texture_levels(rgb)

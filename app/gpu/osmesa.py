@@ -66,9 +66,7 @@ class OSMesaLoader:
         """Stays current, as with moderngl's standalone contexts."""
 
     def _make_current(self) -> None:
-        if not self._library.OSMesaMakeCurrent(
-            self._handle, self._pixels, _GL_UNSIGNED_BYTE, _SIDE_PX, _SIDE_PX
-        ):
+        if not self._library.OSMesaMakeCurrent(self._handle, self._pixels, _GL_UNSIGNED_BYTE, _SIDE_PX, _SIDE_PX):
             raise OSError("OSMesaMakeCurrent failed")
 
 

@@ -28,7 +28,9 @@ def photon_record(groups: int) -> Struct:
     The photon covers the spectral band [x_lo, x_hi]; its path was traced at x_anchor. At spectral
     coordinate x it lies at position + sum_g dposition_dvar[g] (var_g(x) - var_g(x_anchor)).
     """
-    spectral = tuple(Field(f"dposition_dvar{g}", "vec4", "xyz: GPU space per unit of the group's variable") for g in range(groups))
+    spectral = tuple(
+        Field(f"dposition_dvar{g}", "vec4", "xyz: GPU space per unit of the group's variable") for g in range(groups)
+    )
     return Struct(
         "PhotonRecord",
         (
@@ -71,7 +73,11 @@ RECEIVER = Struct(
     "Receiver",
     (
         Field("reflectance_rgb", "vec3", "linear Rec.709; 1 where the spectral table already holds it"),
-        Field("kind", "uint", "0 flat: `placement` is the finest window; 1 charts: placement + (triangle - first_triangle)"),
+        Field(
+            "kind",
+            "uint",
+            "0 flat: `placement` is the finest window; 1 charts: placement + (triangle - first_triangle)",
+        ),
         Field("placement", "uint", "index of the first placement"),
         Field("first_triangle", "uint", "global index of the object's first triangle"),
         Field("reflectance_class", "uint", "which reflectance the spectral tables were folded with"),
@@ -82,10 +88,16 @@ RECEIVER = Struct(
 GAIN_BOX = Struct(
     "GainBox",
     (
-        Field("row_x", "vec4", "voxel x = dot(row_x.xyz, position) + row_x.w; position in GPU space; voxel centres at integers"),
+        Field(
+            "row_x",
+            "vec4",
+            "voxel x = dot(row_x.xyz, position) + row_x.w; position in GPU space; voxel centres at integers",
+        ),
         Field("row_y", "vec4", "voxel y likewise"),
         Field("row_z", "vec4", "voxel z likewise"),
-        Field("voxels", "uvec4", "their numbers along x, y, z (0: no local gain), and the first one's index in the gains"),
+        Field(
+            "voxels", "uvec4", "their numbers along x, y, z (0: no local gain), and the first one's index in the gains"
+        ),
     ),
 )
 """Where one receiver's local gains of dispersion lie (`model.local_dispersion.GainGrid`)."""
@@ -115,7 +127,9 @@ def ray_record(columns: int) -> Struct:
     ]
     if columns:
         fields += [
-            Field("dposition", "vec4", "xyz: GPU space per lattice spacing, or per unit of a group's variable", columns),
+            Field(
+                "dposition", "vec4", "xyz: GPU space per lattice spacing, or per unit of a group's variable", columns
+            ),
             Field("ddirection", "vec4", "xyz: per the same", columns),
         ]
     return Struct("RayRecord", tuple(fields), texels=True)
@@ -124,7 +138,11 @@ def ray_record(columns: int) -> Struct:
 OUTCOME = Struct(
     "Outcome",
     (
-        Field("what", "uint", "bits 0, 1: child rays; 2: photon; 3: `flux_w` starts here; 8-15: fall-backs; 16-23: where `flux_w` went"),
+        Field(
+            "what",
+            "uint",
+            "bits 0, 1: child rays; 2: photon; 3: `flux_w` starts here; 8-15: fall-backs; 16-23: where `flux_w` went",
+        ),
         Field("flux_w", "float", "flux that ended (emission: started) here, W"),
         Field("absorbed_w", "float", "flux absorbed on the way here, W"),
         Field("roulette_w", "float", "flux that roulette took (> 0) or gave (< 0), W"),
@@ -209,7 +227,12 @@ EMIT_PARAMETERS = Struct(
         Field("has_aperture", "uint", "plane: the beam ends at its aperture"),
         Field("spacing", "vec2", "of one sub-lattice along the domain's axes, domain coordinates"),
         Field("bands", "vec4", "x_lo, x_hi, x_anchor, W per unit weight", MAX_BANDS),
-        Field("mask", "uint", "one bit a cell of the domain: may a ray from it meet a specular object?", MASK_SIZE * MASK_SIZE // 32),
+        Field(
+            "mask",
+            "uint",
+            "one bit a cell of the domain: may a ray from it meet a specular object?",
+            MASK_SIZE * MASK_SIZE // 32,
+        ),
     ),
 )
 TRACE_PARAMETERS = Struct(

@@ -1,11 +1,12 @@
 """Photons by index instead of by wavelength: what an edited glass sends along the paths that were traced.
 
-Where one glass alone disperses, a path is a function of its index. Photons of a band stand for an interval of it; after an
-edit of n(λ) the same interval belongs to other wavelengths, and those are what its photons carry then. Positions stay as
-exact as they were traced, bands keep meeting each other, and nothing is extrapolated except where the edited glass
-reaches indices that no band had. A local gain (the brush) is an edit of n(λ) that differs from place to place.
+Where one glass alone disperses, a path is a function of its index. Photons of a band stand for an interval of it; after
+an edit of n(λ) the same interval belongs to other wavelengths, and those are what its photons carry then. Positions
+stay as exact as they were traced, bands keep meeting each other, and nothing is extrapolated except where the edited
+glass reaches indices that no band had. A local gain (the brush) is an edit of n(λ) that differs from place to place.
 
-The coordinate of the spectral tables is then y, affine in the index of the glass that is shown: 0 at 380 nm, 1 at 780 nm.
+The coordinate of the spectral tables is then y, affine in the index of the glass that is shown: 0 at 380 nm, 1 at 780
+nm.
 """
 
 from __future__ import annotations
@@ -46,7 +47,8 @@ class Reindexing:
 
     @classmethod
     def of(cls, traced: Dispersion, shown: Dispersion) -> Reindexing | None:
-        """For paths that were traced through `traced`; None where n of either is no monotone function of λ, or they run opposite ways."""
+        """For paths that were traced through `traced`; None where n of either is no monotone function of λ, or they run
+        opposite ways."""
         if not shown.is_dispersive:
             shown = with_gain(traced, MIN_GAIN * traced.gain)
         axes = [SpectralAxis.build([glass]) for glass in (traced, shown)]
@@ -77,7 +79,8 @@ class Reindexing:
     def spans(self, traced: Spans, axis: SpectralAxis, lights: Sequence[Spectrum]) -> Spans:
         """The bands' intervals of y, cut to their light's spectrum, the outermost stretched to its ends.
 
-        `traced`: in the coordinate of `axis`, photons' own. A band wholly beyond the spectrum keeps its interval, in which there is no light.
+        `traced`: in the coordinate of `axis`, photons' own. A band wholly beyond the spectrum keeps its interval, in
+        which there is no light.
         """
         edges = np.array([edge for bands in traced for edge in bands])
         indices = iter(self.offset + self.scale * self.traced.index(axis.nm_of_x(edges)))
@@ -100,8 +103,17 @@ class Reindexing:
 class ReindexBuffer:
     """What footprint.comp needs to know of every band: two vec4 a table."""
 
-    def __init__(self, ctx: moderngl.Context, reindexing: Reindexing, traced: Spans, shown: Spans, lights: Sequence[Spectrum], classes: int) -> None:
-        """`classes`: reflectance classes of the tables; bands are padded to the light that has most, as the tables are."""
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        reindexing: Reindexing,
+        traced: Spans,
+        shown: Spans,
+        lights: Sequence[Spectrum],
+        classes: int,
+    ) -> None:
+        """`classes`: reflectance classes of the tables; bands are padded to the light that has most, as the tables
+        are."""
         count = max(len(bands) for bands in traced)
         rows = np.zeros((len(traced), classes, count, 2, 4), np.float32)
         for i, (bands, mine, support) in enumerate(zip(traced, shown, reindexing.supports(lights), strict=True)):

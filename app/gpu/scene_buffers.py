@@ -58,7 +58,9 @@ OBJECT = Struct(
         Field("kind", "uint", "0 black, 1 diffuse, 2 mirror, 3 dielectric"),
         Field("medium", "uint", "row of the index table (dielectric)"),
         Field("weight_row", "uint", "row of absorption (1/GPU unit) or reflectance over x, or NONE"),
-        Field("stack_bit", "uint", "bit of this solid in a ray's inside mask, by priority; NONE where it overlaps nothing"),
+        Field(
+            "stack_bit", "uint", "bit of this solid in a ray's inside mask, by priority; NONE where it overlaps nothing"
+        ),
         Field("receiver", "uint", "receiver index, or NONE"),
         Field("group", "uint", "spectral group of the glass, or NONE"),
         Field("first_triangle", "uint", "global source index of its first triangle"),
@@ -154,12 +156,15 @@ class SceneBuffers:
         self.space = GpuSpace.of(scene)
         self.groups = Groups.of(scene, features)
         self.receivers = [i for i, o in enumerate(scene.objects) if isinstance(o.material, Diffuse)]
-        self.traced_glasses = [o.material.dispersion if isinstance(o.material, Dielectric) else None for o in scene.objects]
+        self.traced_glasses = [
+            o.material.dispersion if isinstance(o.material, Dielectric) else None for o in scene.objects
+        ]
         """Each object's glass as the records number it, whatever `scene` is replaced by to be shown."""
         self.first_triangle = np.cumsum([0] + [len(o.mesh.triangles) for o in scene.objects])
         self.world_meshes = [o.mesh.transformed(o.object_to_world) for o in scene.objects]
         self.corner_turn = np.tile(np.arange(3), (self.first_triangle[-1], 1))
-        """int (T, 3): which of its own corners each triangle's first, second and third are on the GPU; T counts all objects' triangles."""
+        """int (T, 3): which of its own corners each triangle's first, second and third are on the GPU; T counts all
+        objects' triangles."""
         self._buffers: dict[int, moderngl.Buffer] = {}
         self._sections: dict[str, np.ndarray] = {}
         self.defines = bindings.SCENE_DEFINES | {"SPECTRAL_SAMPLES": SAMPLES}
@@ -191,7 +196,9 @@ class SceneBuffers:
     def bytes(self) -> int:
         """GPU memory held."""
         pixels = (self.texels.texture, 16), (self._spectra, 8)
-        return sum(buffer.size for buffer in self._buffers.values()) + sum(t.width * t.height * size for t, size in pixels)
+        return sum(buffer.size for buffer in self._buffers.values()) + sum(
+            t.width * t.height * size for t, size in pixels
+        )
 
     def _pack_geometry(self) -> None:
         corners, owner, source, normals = [], [], [], []
@@ -223,7 +230,10 @@ class SceneBuffers:
         if self._in_storage:
             self.defines["SOLIDS_IN_STORAGE"] = 1
         if planes:
-            self._buffers = {bindings.SOLIDS: self.ctx.buffer(solid_records), bindings.PLANES: self.ctx.buffer(all_planes)}
+            self._buffers = {
+                bindings.SOLIDS: self.ctx.buffer(solid_records),
+                bindings.PLANES: self.ctx.buffer(all_planes),
+            }
 
         self.triangle_count = sum(len(c) for c in corners)
         if not corners:
@@ -303,9 +313,21 @@ class SceneBuffers:
 
         index_rows = index_table(self.axis, media, SAMPLES) if media else np.ones((0, SAMPLES))
         variables = self.groups.variables(self.axis)
-        slopes = [index_slope(self.groups, self.groups.glasses.index(g) if g in self.groups.glasses else None, self.axis, variables) for g in media]
-        rows = [np.asarray(index_rows, float), np.array(slopes).reshape(-1, SAMPLES), variables, np.array(weights).reshape(-1, SAMPLES)]
-        self.light_power: list[CumulativeSpectrum] = [cumulative(self.axis, light.spectral_power) for light in self.scene.lights]
+        slopes = [
+            index_slope(
+                self.groups, self.groups.glasses.index(g) if g in self.groups.glasses else None, self.axis, variables
+            )
+            for g in media
+        ]
+        rows = [
+            np.asarray(index_rows, float),
+            np.array(slopes).reshape(-1, SAMPLES),
+            variables,
+            np.array(weights).reshape(-1, SAMPLES),
+        ]
+        self.light_power: list[CumulativeSpectrum] = [
+            cumulative(self.axis, light.spectral_power) for light in self.scene.lights
+        ]
         rows.append(np.array([power.at(x)[:, 3] for power in self.light_power]).reshape(-1, SAMPLES))
         counts = np.cumsum([0] + [len(r) for r in rows])
         self.layout = SpectraLayout(*counts[:5].tolist(), rows=int(counts[5]))
@@ -325,7 +347,8 @@ class SceneBuffers:
 
 
 def index_slope(groups: Groups, glass: int | None, axis: SpectralAxis, variables: np.ndarray) -> np.ndarray:
-    """dn/dvar over x of a glass (its number in `groups`) with respect to its group's variable: 1 where n is the variable, 0 without a group."""
+    """dn/dvar over x of a glass (its number in `groups`) with respect to its group's variable: 1 where n is the
+    variable, 0 without a group."""
     if glass is None or not groups.count:
         return np.zeros(SAMPLES)
     variable = variables[groups.group[glass]]
@@ -366,7 +389,9 @@ def _stack_bits(scene: Scene) -> dict[int, int]:
     """Object → bit in a ray's inside mask; a higher bit wins. Raises UserError beyond 32 solids.
 
     Where no two solids meet, yet a stack is wanted (to measure it), all of them are on it."""
-    overlapping = overlapping_solids(scene) or [i for i, o in enumerate(scene.objects) if isinstance(o.material, Dielectric)]
+    overlapping = overlapping_solids(scene) or [
+        i for i, o in enumerate(scene.objects) if isinstance(o.material, Dielectric)
+    ]
     if len(overlapping) > 32:
         raise UserError(
             f"scene '{scene.name}': {len(overlapping)} transparent solids nest or touch and at most 32 may; "

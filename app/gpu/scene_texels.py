@@ -29,7 +29,8 @@ class SceneTexels:
     """One RGBA32UI texture of sections that follow one another; `defines` holds each one's first texel."""
 
     def __init__(self, ctx: moderngl.Context, sections: Mapping[str, np.ndarray], as_image: bool | None = None) -> None:
-        """`sections`: name (of SECTIONS; those not given are empty) → array of whole texels, 16 bytes each, of any dtype.
+        """`sections`: name (of SECTIONS; those not given are empty) → array of whole texels, 16 bytes each, of any
+        dtype.
         `as_image` chooses how shaders read them (None: what suits the renderer).
 
         Raises `UserError` when the scene does not fit a texture of this device.
@@ -85,13 +86,18 @@ def tree_texels(nodes: np.ndarray) -> np.ndarray:
     leaf = nodes["count"] > 0
     inner = np.flatnonzero(~leaf)
     number = np.cumsum(~leaf) - 1
-    link = np.where(leaf, _LEAF_BIT | (nodes["count"].astype(np.int64) << _LEAF_COUNT_SHIFT) | nodes["left_or_first"], number).astype("<u4")
+    link = np.where(
+        leaf, _LEAF_BIT | (nodes["count"].astype(np.int64) << _LEAF_COUNT_SHIFT) | nodes["left_or_first"], number
+    ).astype("<u4")
     box = np.concatenate([nodes["bounds_min"], nodes["bounds_max"]], axis=1).astype("<f4")
     if len(inner) == 0:
         boxes, links = np.concatenate([box[0], _EMPTY_BOX])[None], np.array([[link[0], link[0]]], "<u4")
     else:
         left = nodes["left_or_first"][inner].astype(np.int64)
-        boxes, links = np.concatenate([box[left], box[left + 1]], axis=1), np.stack([link[left], link[left + 1]], axis=1)
+        boxes, links = (
+            np.concatenate([box[left], box[left + 1]], axis=1),
+            np.stack([link[left], link[left + 1]], axis=1),
+        )
     words = np.zeros((len(boxes), 16), "<u4")
     words[:, :12] = boxes.view("<u4")
     words[:, 12:14] = links

@@ -109,7 +109,9 @@ def load_source(
 
     flatten(name, "the program")
     kept = stripped(lines)
-    source = Source(name, "\n".join(line.text for line in kept) + "\n", tuple((line.file, line.number) for line in kept), len(lines))
+    source = Source(
+        name, "\n".join(line.text for line in kept) + "\n", tuple((line.file, line.number) for line in kept), len(lines)
+    )
     if _kept:
         _sources[asked] = source
         while len(_sources) > 2 * KEPT_PROGRAMS:
@@ -131,8 +133,9 @@ KEPT_PROGRAMS = 96
 def keep_programs(ctx: moderngl.Context) -> None:
     """From now on a program whose text was compiled before in `ctx` is not compiled again.
 
-    For a viewer, where an edit makes all passes anew: compiling takes a software renderer longer than tracing. Programs then
-    have several owners, who set every uniform before each use and give them back with `release`. Every call wants one of
+    For a viewer, where an edit makes all passes anew: compiling takes a software renderer longer than tracing. Programs
+    then have several owners, who set every uniform before each use and give them back with `release`. Every call wants
+    one of
     `forget_programs`.
     """
     _kept.setdefault(id(ctx), OrderedDict())
@@ -158,7 +161,8 @@ def drop_programs(ctx: moderngl.Context) -> None:
 
 
 def release(owned: Releasable) -> None:
-    """Give a program (or any other resource) back; a program is freed when its last owner does so and its context keeps it no longer."""
+    """Give a program (or any other resource) back; a program is freed when its last owner does so and its context keeps
+    it no longer."""
     owners = _owners.get(id(owned))
     if owners is None:
         owned.release()
@@ -209,7 +213,10 @@ def _handed_over(source: Source) -> str:
 
 
 def compute(
-    ctx: moderngl.Context, name: str, defines: Mapping[str, int | float | str] | None = None, structs: Sequence[Struct] = ()
+    ctx: moderngl.Context,
+    name: str,
+    defines: Mapping[str, int | float | str] | None = None,
+    structs: Sequence[Struct] = (),
 ) -> moderngl.ComputeShader:
     """Compile the compute shader `name`; raises `ShaderError` with file and line."""
     source = load_source(name, defines, structs)

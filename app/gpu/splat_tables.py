@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 CUT = 3.0
 """Standard deviations that a splat reaches beyond its sweep (as in footprint.comp)."""
 SIGMAS = np.concatenate([2.0 ** (np.arange(16) / 4.0 - 8.0), 2.0 ** (np.arange(73) / 8.0 - 4.0)])
-"""Standard deviation / sweep length of each row: 2^-8 to 2^5, closer together from 2^-4 on (as in footprint.comp), where
-it shapes the splat. The footprint pass makes every
-splat fit a row, so that the nearest texel serves; filtering would cost a software renderer a fifth of its rate."""
+"""Standard deviation / sweep length of each row: 2^-8 to 2^5, closer together from 2^-4 on (as in footprint.comp),
+where it shapes the splat. The footprint pass makes every splat fit a row, so that the nearest texel serves; filtering
+would cost a software renderer a fifth of its rate."""
 WIDTH, WIDTH_WITH_LINES = 512, 1024
 """Samples along xi; a line needs more, since nothing but the splat's width blurs it."""
 FINEST = 512
@@ -38,7 +38,8 @@ DENSITY_CELLS, CUMULATIVE_SAMPLES = 1024, 2049
 
 @dataclass(frozen=True)
 class SplatTables:
-    """GPU tables of every (light, reflectance class, band). Layers: ((light · classes + class) · bands + band) · targets + g."""
+    """GPU tables of every (light, reflectance class, band). Layers: ((light · classes + class) · bands + band) ·
+    targets + g."""
 
     texture: moderngl.TextureArray
     """RGBA32F (layers, rows, width): T(xi), whose integral over xi in [-1, 1] is the band's energy."""
@@ -70,7 +71,8 @@ class SplatTables:
         """Tables for the lights' spectra under each reflectance (401,) or None.
 
         `bands[light]`: (x_lo, x_hi) of its bands; a band of no width stands for a line. Lights with fewer
-        bands than others are padded with empty ones. `channels`: X, Y, Z (lm) and radiant W, what follows them, or bins (W), four a target.
+        bands than others are padded with empty ones. `channels`: X, Y, Z (lm) and radiant W, what follows them, or bins
+        (W), four a target.
         `width`: samples along xi, None for what a finished picture needs.
         """
         import moderngl
@@ -99,10 +101,18 @@ class SplatTables:
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         texture.repeat_x = texture.repeat_y = False
         buffers = (ctx.buffer(np.ascontiguousarray(a)) for a in (spans, integrals, density, running))
-        return cls(texture, *buffers, classes=shape[1], bands=band_count, targets=targets, rows=len(SIGMAS), width=width)
+        return cls(
+            texture, *buffers, classes=shape[1], bands=band_count, targets=targets, rows=len(SIGMAS), width=width
+        )
 
     def release(self) -> None:
-        for resource in (self.texture, self.band_buffer, self.integral_buffer, self.density_buffer, self.cumulative_buffer):
+        for resource in (
+            self.texture,
+            self.band_buffer,
+            self.integral_buffer,
+            self.density_buffer,
+            self.cumulative_buffer,
+        ):
             resource.release()
 
 
@@ -134,7 +144,12 @@ class _Source:
         line_nm, power = np.array(light.lines, np.float64).reshape(-1, 2).T
         weights = channels.line_weights(line_nm)
         energy = (power * np.interp(line_nm, VISIBLE_NM, folded))[:, None] * weights
-        return cls(smooth, np.atleast_1d(axis.x_of_nm(line_nm)), energy, slice(1, 2) if channels.edges_nm is None else slice(None))
+        return cls(
+            smooth,
+            np.atleast_1d(axis.x_of_nm(line_nm)),
+            energy,
+            slice(1, 2) if channels.edges_nm is None else slice(None),
+        )
 
     def cumulative(self, x: np.ndarray) -> np.ndarray:
         """Energy up to and with each x: (n, columns)."""
@@ -167,14 +182,18 @@ class _Source:
         lines = self._lines_of_bands(edges)
         x = lo + (hi - lo) * np.linspace(0.0, 1.0, FINEST + 1)
         finest = np.diff(self.smooth.at(x), axis=1).transpose(1, 0, 2)
-        masses = {n: finest.reshape(n, -1, finest[0].size).sum(axis=1).astype(np.float32) for n in {_cells(s) for s in SIGMAS}}
+        masses = {
+            n: finest.reshape(n, -1, finest[0].size).sum(axis=1).astype(np.float32) for n in {_cells(s) for s in SIGMAS}
+        }
         kernels = _kernels(width)
         rows = np.empty((len(SIGMAS), width, finest[0].size), np.float32)
         for row, sigma in zip(rows, SIGMAS, strict=True):
             cells = _cells(sigma)
             np.matmul(kernels[cells, float(sigma)], masses[cells], out=row)
             for band, place, energy in lines:
-                row[:, band * columns : (band + 1) * columns] += _kernel(width, sigma, np.array([place]), sigma) * energy
+                row[:, band * columns : (band + 1) * columns] += (
+                    _kernel(width, sigma, np.array([place]), sigma) * energy
+                )
         energies = finest.sum(axis=0)
         places = (np.arange(len(finest)) + 0.5) / len(finest)
         weights = finest[..., self.brightness].reshape(len(finest), len(edges), -1).sum(axis=-1)
@@ -201,8 +220,8 @@ class _Source:
 
 
 def _cells(sigma: float) -> int:
-    """Cells of a band, a power of two, each at most a quarter of a standard deviation wide (then they add up to 1 % to the variance)
-    unless the spectrum itself is no finer."""
+    """Cells of a band, a power of two, each at most a quarter of a standard deviation wide (then they add up to 1 % to
+    the variance) unless the spectrum itself is no finer."""
     return int(min(FINEST, max(8, 2 ** np.ceil(np.log2(4.0 / sigma)))))
 
 
@@ -217,7 +236,9 @@ def _kernels(width: int) -> dict[tuple[int, float], np.ndarray]:
     for sigma in SIGMAS:
         cells = _cells(sigma)
         places = (np.arange(cells) + 0.5) / cells
-        kernels[cells, float(sigma)] = _kernel(width, sigma, places.astype(np.float32), np.sqrt(sigma**2 + 1.0 / (12.0 * cells**2)))
+        kernels[cells, float(sigma)] = _kernel(
+            width, sigma, places.astype(np.float32), np.sqrt(sigma**2 + 1.0 / (12.0 * cells**2))
+        )
     return kernels
 
 

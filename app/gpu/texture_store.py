@@ -1,4 +1,5 @@
-"""The scene's pictures on the GPU: textures of its surfaces and the map of its environment, for shaders/lib/textures.glsl.
+"""The scene's pictures on the GPU: textures of its surfaces and the map of its environment, for
+shaders/lib/textures.glsl.
 
 All of them with all their levels lie in one texture, each texel a whole colour, because a software renderer gathers
 a texel for eight rays at once; which level is read, and how, the shader decides, so that the filter is the same on
@@ -26,11 +27,19 @@ from .schema import Field, Struct
 PICTURE = Struct(
     "Picture",
     (
-        Field("origin", "uvec2", "first texel of level 0; level k is at the right of it (level_origin in lib/textures.glsl)"),
+        Field(
+            "origin",
+            "uvec2",
+            "first texel of level 0; level k is at the right of it (level_origin in lib/textures.glsl)",
+        ),
         Field("size", "uvec2", "of level 0, texels"),
         Field("repeats", "uvec2", "1 where the picture repeats across, and downwards; else its border goes on"),
         Field("levels", "uint", "down to a single texel"),
-        Field("corners", "uint", "texture coordinates of triangle `source` are the texels corners + 2 source (modulo 2³²) and the next"),
+        Field(
+            "corners",
+            "uint",
+            "texture coordinates of triangle `source` are the texels corners + 2 source (modulo 2³²) and the next",
+        ),
     ),
 )
 ROW_TEXELS = 4096
@@ -41,7 +50,9 @@ MAX_BYTES = 1 << 30
 
 def textured_objects(scene: Scene) -> list[int]:
     """Indices of the objects that wear a texture, in order; `Object.texture` counts along this list."""
-    return [i for i, o in enumerate(scene.objects) if isinstance(o.material, Diffuse) and o.material.texture is not None]
+    return [
+        i for i, o in enumerate(scene.objects) if isinstance(o.material, Diffuse) and o.material.texture is not None
+    ]
 
 
 def place_defines(binding: int, unit: int) -> dict[str, int]:
@@ -80,10 +91,16 @@ class TextureStore:
     """Owns the textures and the records; where a scene has no pictures nothing is made and no symbol defined."""
 
     def __init__(
-        self, ctx: moderngl.Context, scene: Scene, first_triangle: np.ndarray, corner_turn: np.ndarray,
-        max_side: int | None = None, as_image: bool | None = None,
-    ) -> None:  # fmt: skip
-        """`first_triangle`, `corner_turn`: as in `SceneBuffers`. `max_side`: of a texture, None for what the device allows;
+        self,
+        ctx: moderngl.Context,
+        scene: Scene,
+        first_triangle: np.ndarray,
+        corner_turn: np.ndarray,
+        max_side: int | None = None,
+        as_image: bool | None = None,
+    ) -> None:
+        """`first_triangle`, `corner_turn`: as in `SceneBuffers`. `max_side`: of a texture, None for what the device
+        allows;
         `as_image` chooses how shaders read texels (None: what suits the renderer).
 
         Raises `UserError` where the pictures do not fit, or a textured mesh has no usable texture coordinates.
@@ -112,15 +129,17 @@ class TextureStore:
         False, and nothing done, where its pictures are others: then a new store is needed.
         """
         sources = _sources(scene)
-        if len(sources) != len(self._sources) or not all(_same_picture(a.owner, b.owner) for a, b in zip(sources, self._sources, strict=True)):
+        if len(sources) != len(self._sources) or not all(
+            _same_picture(a.owner, b.owner) for a, b in zip(sources, self._sources, strict=True)
+        ):
             return False
         if self._sources:
             self._fill(scene, first_triangle, corner_turn)
         return True
 
     def bind(self, binding: int, unit: int) -> None:
-        """Bind the records to the storage buffer `binding`, the pictures to `unit` and the texture coordinates to `unit` + 1
-        (image units where TEXTURES_IMAGE is defined). Shaders learn the numbers from `place_defines`."""
+        """Bind the records to the storage buffer `binding`, the pictures to `unit` and the texture coordinates to
+        `unit` + 1 (image units where TEXTURES_IMAGE is defined). Shaders learn the numbers from `place_defines`."""
         if self._records is not None:
             self._records.bind_to_storage_buffer(binding)
         for place, texture in ((unit, self._pictures), (unit + 1, self._corners)):
@@ -156,7 +175,11 @@ class TextureStore:
         for tile, source in zip(self._tiles, self._sources, strict=True):
             levels = kept_levels(source.rgb, on_sphere=isinstance(source.owner, Environment))
             for k, level in enumerate(levels):
-                x, y = (tile.x, tile.y) if k == 0 else (tile.x + levels[0].shape[1], tile.y + _level_row(len(levels[0]), k))
+                x, y = (
+                    (tile.x, tile.y)
+                    if k == 0
+                    else (tile.x + levels[0].shape[1], tile.y + _level_row(len(levels[0]), k))
+                )
                 texels[y : y + level.shape[0], x : x + level.shape[1], :3] = level
         return _texture(self.ctx, texels)
 
@@ -185,7 +208,11 @@ class TextureStore:
         self._records = self.ctx.buffer(np.ascontiguousarray(records))
         self._corners = None if texels is None else _texture(self.ctx, texels)
         self.defines = {"TEXTURE_COUNT": len(textured)}
-        switches = {"HAS_TEXTURES": textured, "HAS_ENVIRONMENT_MAP": scene.environment is not None, "TEXTURES_IMAGE": self._as_image}
+        switches = {
+            "HAS_TEXTURES": textured,
+            "HAS_ENVIRONMENT_MAP": scene.environment is not None,
+            "TEXTURES_IMAGE": self._as_image,
+        }
         self.defines |= {name: 1 for name, on in switches.items() if on}
 
     def _describe(self, record: np.void, owner: Texture | Environment) -> None:
@@ -213,12 +240,17 @@ def _same_picture(one: Texture | Environment, other: Texture | Environment) -> b
 
 
 def _corner_texels(item: SceneObject, turn: np.ndarray, *, repeats: bool) -> np.ndarray:
-    """float32 (2 T, 4): per triangle the (u, v) of the GPU's first corner, then from it to the second and to the third."""
+    """float32 (2 T, 4): per triangle the (u, v) of the GPU's first corner, then from it to the second and to the
+    third."""
     uv = item.mesh.transformed(item.object_to_world).uv
     if uv is None:
-        raise UserError(f"object '{item.name}': it wears a texture, but its mesh has no texture coordinates; add them or give it a plain colour")
+        raise UserError(
+            f"object '{item.name}': it wears a texture, but its mesh has no texture coordinates; add them or give it a plain colour"
+        )
     if not np.isfinite(uv).all() or np.abs(uv).max(initial=0.0) > 1e9:
-        raise UserError(f"object '{item.name}': texture coordinates of its mesh are not finite or beyond 1e9; export the mesh again")
+        raise UserError(
+            f"object '{item.name}': texture coordinates of its mesh are not finite or beyond 1e9; export the mesh again"
+        )
     uv = np.take_along_axis(uv, turn[..., None], axis=1)
     if repeats:
         uv = uv - np.floor(uv.min(axis=1, keepdims=True))  # small numbers keep more digits
@@ -234,7 +266,9 @@ def _in_rows(corners: Sequence[np.ndarray], max_side: int, first: SceneObject) -
     count = sum(map(len, corners))
     rows = -(-count // ROW_TEXELS)
     if rows > max_side:
-        raise UserError(f"object '{first.name}': textured objects have more triangles than this device's textures hold; simplify their meshes")
+        raise UserError(
+            f"object '{first.name}': textured objects have more triangles than this device's textures hold; simplify their meshes"
+        )
     image = np.zeros((rows * ROW_TEXELS, 4), np.float32)
     image[:count] = np.concatenate(corners)
     return image.reshape(rows, ROW_TEXELS, 4)

@@ -36,9 +36,10 @@ def from_map(
 ) -> Environment:
     """The latitude-longitude picture in `path`, its values times `intensity` taken as lm/(sr unit²).
 
-    `rotation_deg` turns it about `up`, anticlockwise seen from above; at 0 the picture's middle lies in the direction of
-    the world's x (`world_to_local` says what happens where `up` is x). A picture larger than MAX_WIDTH × MAX_HEIGHT is averaged down.
-    What was assumed goes to `notes`. Raises UserError for a picture that cannot be read or an impossible number.
+    `rotation_deg` turns it about `up`, anticlockwise seen from above; at 0 the picture's middle lies in the direction
+    of the world's x (`world_to_local` says what happens where `up` is x). A picture larger than MAX_WIDTH × MAX_HEIGHT
+    is averaged down. What was assumed goes to `notes`. Raises UserError for a picture that cannot be read or an
+    impossible number.
     """
     from .io.picture_files import read_picture
 
@@ -49,7 +50,9 @@ def from_map(
     height, width = rgb.shape[:2]
     told = list(said)
     if width != 2 * height:
-        told.append(f"{path.name} is {width} × {height}; a latitude-longitude picture is twice as wide as high, so it is stretched.")
+        told.append(
+            f"{path.name} is {width} × {height}; a latitude-longitude picture is twice as wide as high, so it is stretched."
+        )
     if width > MAX_WIDTH or height > MAX_HEIGHT:
         rgb = _averaged(_averaged(rgb, min(height, MAX_HEIGHT)).swapaxes(0, 1), min(width, MAX_WIDTH)).swapaxes(0, 1)
         told.append(f"{path.name} is {width} × {height}; it was averaged down to {rgb.shape[1]} × {rgb.shape[0]}.")
@@ -78,7 +81,10 @@ def gradient(zenith: Vec3, horizon: Vec3, nadir: Vec3, up: Vec3 = Z_UP, intensit
     blend = (sine**2 * (3.0 - 2.0 * np.abs(sine)))[..., None]
     pole = np.where(sine[..., None] > 0.0, colours["zenith"], colours["nadir"])
     rgb = colours["horizon"] + blend * (pole - colours["horizon"])
-    parameters = {key: _listed(value) for key, value in told.items()} | {"intensity": float(intensity), "up": _listed(up)}
+    parameters = {key: _listed(value) for key, value in told.items()} | {
+        "intensity": float(intensity),
+        "up": _listed(up),
+    }
     return Environment(_frozen(rgb), world_to_local(up), "gradient", parameters)
 
 
@@ -92,14 +98,18 @@ def sky(
 ) -> Environment:
     """A CIE standard general sky of the colour of D65, without the sun's disc (a directional light shows that).
 
-    sun_azimuth_deg: anticlockwise about `up`, 0 in the direction of the world's x. luminance: of the zenith, in lm/(sr unit²).
-    ground: reflectance, linear Rec.709, of a Lambertian ground that the sky alone lights. Raises UserError for a type
-    other than 1 to 15, a sun below the horizon, and colours or luminances out of range.
+    sun_azimuth_deg: anticlockwise about `up`, 0 in the direction of the world's x. luminance: of the zenith, in lm/(sr
+    unit²). ground: reflectance, linear Rec.709, of a Lambertian ground that the sky alone lights. Raises UserError for
+    a type other than 1 to 15, a sun below the horizon, and colours or luminances out of range.
     """
     if sky_type not in SKY_TYPES:
-        raise UserError(f"sky: type {sky_type} is not known; the CIE's are 1 (overcast) to {len(SKY_TYPES)}, 12 is clear")
+        raise UserError(
+            f"sky: type {sky_type} is not known; the CIE's are 1 (overcast) to {len(SKY_TYPES)}, 12 is clear"
+        )
     if not 0.0 <= sun_elevation_deg <= 90.0:
-        raise UserError(f"sky: sun_elevation_deg is {sun_elevation_deg:g}; the sun must stand at 0 to 90 degrees above the horizon")
+        raise UserError(
+            f"sky: sun_elevation_deg is {sun_elevation_deg:g}; the sun must stand at 0 to 90 degrees above the horizon"
+        )
     if not math.isfinite(sun_azimuth_deg):
         raise UserError(f"sky: sun_azimuth_deg is {sun_azimuth_deg}; give an angle")
     if not (math.isfinite(luminance) and luminance >= 0.0):
@@ -108,7 +118,9 @@ def sky(
     if not ((reflectance >= 0.0).all() and (reflectance <= 1.0).all()):
         raise UserError("sky: ground must be a reflectance, every channel between 0 and 1")
     elevation, azimuth = math.radians(sun_elevation_deg), math.radians(sun_azimuth_deg)
-    toward_sun = np.array([math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation)])
+    toward_sun = np.array(
+        [math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation)]
+    )
     half = BAKED_HEIGHT // 2
     directions = _baked_directions()
     upper = luminance * relative_luminance(sky_type, directions[:half], toward_sun)
@@ -167,7 +179,9 @@ def up_and_rotation(environment: Environment) -> tuple[Vec3, float]:
 def direction_of(environment: Environment, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """World directions (…, 3) of picture coordinates: the inverse of the mapping `texture.Environment` states."""
     azimuth, polar = 2.0 * np.pi * (0.5 - np.asarray(u)), np.pi * np.asarray(v)
-    local = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar) + 0.0 * azimuth], axis=-1)
+    local = np.stack(
+        [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar) + 0.0 * azimuth], axis=-1
+    )
     return local @ environment.world_to_local
 
 
@@ -175,7 +189,9 @@ def _baked_directions() -> np.ndarray:
     """Local unit directions of the texels' centres of a baked picture, float64 (BAKED_HEIGHT, BAKED_WIDTH, 3)."""
     u = (np.arange(BAKED_WIDTH) + 0.5) / BAKED_WIDTH
     v = (np.arange(BAKED_HEIGHT)[:, None] + 0.5) / BAKED_HEIGHT
-    return direction_of(Environment(np.zeros((1, 1, 3), np.float32)), np.broadcast_to(u, (BAKED_HEIGHT, BAKED_WIDTH)), v + 0.0 * u)
+    return direction_of(
+        Environment(np.zeros((1, 1, 3), np.float32)), np.broadcast_to(u, (BAKED_HEIGHT, BAKED_WIDTH)), v + 0.0 * u
+    )
 
 
 def _averaged(rgb: np.ndarray, rows: int) -> np.ndarray:

@@ -81,11 +81,13 @@ class Features:
     local_gain: bool = False
     """The dispersion brush scales spectral displacements on some receiver."""
     reindexed: bool = False
-    """Photons stand for intervals of the one index that disperses, and carry whatever wavelengths an edit puts there."""
+    """Photons stand for intervals of the one index that disperses, and carry whatever wavelengths an edit puts
+    there."""
     camera_specular: bool = False
     """The camera may see glass or a mirror: its rays go on behind them."""
     camera_disperses: bool = False
-    """The camera may see through glass that disperses: its rays carry a band of the spectrum, and look up along their sweep."""
+    """The camera may see through glass that disperses: its rays carry a band of the spectrum, and look up along their
+    sweep."""
     map_tents: int = 0
     """Spectral channels of the caustic maps beside XYZ, for light whose dispersion the camera's adds to."""
     anchor_weights: bool = False
@@ -93,7 +95,11 @@ class Features:
 
     def defines(self) -> dict[str, int]:
         """Preprocessor symbols; a feature that is out is not defined at all (use #ifdef) — counts are numbers."""
-        numbers = {"SPECTRAL_GROUPS": self.spectral_groups, "TARGETS": self.targets, "COLUMNS": (2 if self.footprints else 0) + self.spectral_groups}
+        numbers = {
+            "SPECTRAL_GROUPS": self.spectral_groups,
+            "TARGETS": self.targets,
+            "COLUMNS": (2 if self.footprints else 0) + self.spectral_groups,
+        }
         switches = {
             "MERGED_GROUPS": self.merged_groups,
             "SPECTRAL_WEIGHTS": self.spectral_weights,
@@ -125,11 +131,23 @@ class Features:
         loose = [o for o in scene.objects if not is_convex_solid(o)]
         loose_triangles = sum(len(o.mesh.triangles) for o in loose)
         absorbing = any(o.material.absorption is not None for o in dielectrics)
-        smooth = any(o.mesh.corner_normals is not None for o in scene.objects if isinstance(o.material, Dielectric | Mirror))
+        smooth = any(
+            o.mesh.corner_normals is not None for o in scene.objects if isinstance(o.material, Dielectric | Mirror)
+        )
         footprints = settings.method != "stochastic-point"
         camera_specular, camera_disperses = camera_needs(scene, settings)
-        tents = MAP_TENTS if camera_disperses and settings.layer == "beauty" and not settings.bins and scene.lights and _has_receivers(scene) else 0
-        coloured_mirror = any(isinstance(o.material, Mirror) and len(set(o.material.reflectance_rgb)) > 1 for o in scene.objects)
+        tents = (
+            MAP_TENTS
+            if camera_disperses
+            and settings.layer == "beauty"
+            and not settings.bins
+            and scene.lights
+            and _has_receivers(scene)
+            else 0
+        )
+        coloured_mirror = any(
+            isinstance(o.material, Mirror) and len(set(o.material.reflectance_rgb)) > 1 for o in scene.objects
+        )
         return Features(
             method=settings.method,
             spectral_groups=groups,
@@ -162,13 +180,16 @@ class Features:
 
 
 def _reindexed(scene: Scene, settings: RenderSettings, groups: int, *, coloured: bool) -> bool:
-    """Whether an edit of the dispersion, or the brush, moves wavelengths between paths: where n alone says what a path is and weighs."""
+    """Whether an edit of the dispersion, or the brush, moves wavelengths between paths: where n alone says what a path
+    is and weighs."""
     from .optics.spectral_tables import SpectralAxis
 
     edited = settings.anchor_weights or (settings.local_gain and any(o.local_dispersion for o in scene.objects))
     if not edited or groups != 1 or coloured or settings.method != "srd":
         return False
-    (turning,) = SpectralAxis.build([o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)]).turning_nm
+    (turning,) = SpectralAxis.build(
+        [o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)]
+    ).turning_nm
     return len(turning) == 2
 
 
@@ -182,21 +203,32 @@ def camera_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:
         # What is refracted or reflected first must be seen first; all else follows from it.
         seen = [o for o in glass if in_view(o, scene.camera, settings.width / settings.height)]
         glass = glass if seen else []
-    return bool(glass) or mirrors, any(isinstance(o.material, Dielectric) and o.material.dispersion.is_dispersive for o in glass)
+    return bool(glass) or mirrors, any(
+        isinstance(o.material, Dielectric) and o.material.dispersion.is_dispersive for o in glass
+    )
 
 
 def in_view(item: SceneObject, camera: Camera, aspect: float) -> bool:
-    """Whether the camera may see the object's bounding box: False only where one side of the view leaves out all of it."""
+    """Whether the camera may see the object's bounding box: False only where one side of the view leaves out all of
+    it."""
     right, up, forward = camera_frame(camera)
     low, high = world_bounds(item)
-    corners = np.array(np.meshgrid(*zip(low, high, strict=True), indexing="ij")).reshape(3, 8).T - np.array(camera.position)
+    corners = np.array(np.meshgrid(*zip(low, high, strict=True), indexing="ij")).reshape(3, 8).T - np.array(
+        camera.position
+    )
     x, y, depth = corners @ right, corners @ up, corners @ forward
     if camera.kind == "orthographic":
         half = 0.5 * camera.vertical_extent
         outside = [x > half * aspect, x < -half * aspect, y > half, y < -half, depth < 0.0]
     else:
         half = np.tan(np.radians(0.5 * camera.vertical_fov_deg))
-        outside = [x > half * aspect * depth, x < -half * aspect * depth, y > half * depth, y < -half * depth, depth < 0.0]
+        outside = [
+            x > half * aspect * depth,
+            x < -half * aspect * depth,
+            y > half * depth,
+            y < -half * depth,
+            depth < 0.0,
+        ]
     return not any(side.all() for side in outside)
 
 
@@ -264,33 +296,119 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
         return ", ".join(items[:4]) + (f" and {len(items) - 4} more" if len(items) > 4 else "")
 
     return [
-        ("spectral columns", features.spectral_groups > 0,
-         f"{features.spectral_groups} column(s): {names(glasses)}" if features.spectral_groups else
-         ("one wavelength a photon" if features.point_spectrum else "nothing disperses")),
-        ("shared spectral variable", features.merged_groups, "more glasses than columns, or the λ-column was asked for" if features.merged_groups else "each glass has a column of its own"),
-        ("weights over the band", features.spectral_weights, "Fresnel, absorption or mirrors differ over a band" if features.spectral_weights else "nothing differs over a band"),
-        ("band cuts", features.band_cuts, "total internal reflection may cut a band" if features.band_cuts else "no band to cut"),
-        ("spatial columns", features.footprints, "footprints are anisotropic" if features.footprints else "the method splats single texels"),
+        (
+            "spectral columns",
+            features.spectral_groups > 0,
+            f"{features.spectral_groups} column(s): {names(glasses)}"
+            if features.spectral_groups
+            else ("one wavelength a photon" if features.point_spectrum else "nothing disperses"),
+        ),
+        (
+            "shared spectral variable",
+            features.merged_groups,
+            "more glasses than columns, or the λ-column was asked for"
+            if features.merged_groups
+            else "each glass has a column of its own",
+        ),
+        (
+            "weights over the band",
+            features.spectral_weights,
+            "Fresnel, absorption or mirrors differ over a band"
+            if features.spectral_weights
+            else "nothing differs over a band",
+        ),
+        (
+            "band cuts",
+            features.band_cuts,
+            "total internal reflection may cut a band" if features.band_cuts else "no band to cut",
+        ),
+        (
+            "spatial columns",
+            features.footprints,
+            "footprints are anisotropic" if features.footprints else "the method splats single texels",
+        ),
         ("refraction", features.dielectrics, "there is glass" if features.dielectrics else "there is no glass"),
         ("mirrors", features.mirrors, "there are mirrors" if features.mirrors else "there are no mirrors"),
-        ("interpolated normals", features.smooth_normals, "some specular surface is smooth" if features.smooth_normals else "all specular facets are flat"),
-        ("normal derivatives", features.normal_derivatives, "columns bend with the normals" if features.normal_derivatives else
-         ("no columns" if features.smooth_normals else "all specular facets are flat")),
+        (
+            "interpolated normals",
+            features.smooth_normals,
+            "some specular surface is smooth" if features.smooth_normals else "all specular facets are flat",
+        ),
+        (
+            "normal derivatives",
+            features.normal_derivatives,
+            "columns bend with the normals"
+            if features.normal_derivatives
+            else ("no columns" if features.smooth_normals else "all specular facets are flat"),
+        ),
         ("absorption", features.absorption, "some glass absorbs" if features.absorption else "all glass is clear"),
-        ("medium stack", features.medium_stack, f"{names(touching)} nest or touch" if features.medium_stack else "no two solids nest or touch"),
-        ("triangle tree", features.tree, f"{loose} triangles" if features.tree else f"{loose} loose triangle(s) are looped over"),
-        ("half-space solids", features.convex_solids, names(solids) if features.convex_solids else "no convex faceted solid"),
-        ("charts", features.charts, f"{sum(not is_flat(o) for o in diffuse)} curved receiver(s)" if features.charts else "all receivers are flat"),
-        ("nested windows", features.nested_windows, "flat receivers may get a fine window inside a coarse one" if features.nested_windows else "no receiver has two windows"),
-        ("local gain", features.local_gain, "the dispersion brush was used on a receiver" if features.local_gain else "no receiver was painted on"),
-        ("photons by index", features.reindexed, "an edit or the brush may move wavelengths between paths" if features.reindexed else "every path keeps its wavelengths"),
-        ("camera refraction", features.camera_specular, "the camera may see glass or mirrors" if features.camera_specular else "no glass and no mirror is in view"),
-        ("camera spectral taps", features.camera_disperses, "the camera may see through dispersive glass" if features.camera_disperses else
-         ("no dispersive glass is in view" if glasses else "nothing disperses")),
-        ("spectral maps", features.map_tents > 0, f"{features.map_tents} channels beside XYZ: light and camera disperse" if features.map_tents else "no caustic is seen through dispersive glass"),
+        (
+            "medium stack",
+            features.medium_stack,
+            f"{names(touching)} nest or touch" if features.medium_stack else "no two solids nest or touch",
+        ),
+        (
+            "triangle tree",
+            features.tree,
+            f"{loose} triangles" if features.tree else f"{loose} loose triangle(s) are looped over",
+        ),
+        (
+            "half-space solids",
+            features.convex_solids,
+            names(solids) if features.convex_solids else "no convex faceted solid",
+        ),
+        (
+            "charts",
+            features.charts,
+            f"{sum(not is_flat(o) for o in diffuse)} curved receiver(s)"
+            if features.charts
+            else "all receivers are flat",
+        ),
+        (
+            "nested windows",
+            features.nested_windows,
+            "flat receivers may get a fine window inside a coarse one"
+            if features.nested_windows
+            else "no receiver has two windows",
+        ),
+        (
+            "local gain",
+            features.local_gain,
+            "the dispersion brush was used on a receiver" if features.local_gain else "no receiver was painted on",
+        ),
+        (
+            "photons by index",
+            features.reindexed,
+            "an edit or the brush may move wavelengths between paths"
+            if features.reindexed
+            else "every path keeps its wavelengths",
+        ),
+        (
+            "camera refraction",
+            features.camera_specular,
+            "the camera may see glass or mirrors" if features.camera_specular else "no glass and no mirror is in view",
+        ),
+        (
+            "camera spectral taps",
+            features.camera_disperses,
+            "the camera may see through dispersive glass"
+            if features.camera_disperses
+            else ("no dispersive glass is in view" if glasses else "nothing disperses"),
+        ),
+        (
+            "spectral maps",
+            features.map_tents > 0,
+            f"{features.map_tents} channels beside XYZ: light and camera disperse"
+            if features.map_tents
+            else "no caustic is seen through dispersive glass",
+        ),
         ("spectral bins", features.targets > 1, _target_words(features)),
         ("textures", bool(worn), f"on {names(worn)}" if worn else "no surface wears a picture"),
-        ("environment map", scene.environment is not None, f"a {scene.environment.kind} lies beyond" if scene.environment is not None else "one colour lies beyond"),
+        (
+            "environment map",
+            scene.environment is not None,
+            f"a {scene.environment.kind} lies beyond" if scene.environment is not None else "one colour lies beyond",
+        ),
         ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
     ]
 

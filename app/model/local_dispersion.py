@@ -42,14 +42,16 @@ def gain_at(dabs: Sequence[Dab], points: np.ndarray) -> np.ndarray:
 
 
 def dab_weight(dab: Dab, distance: np.ndarray) -> np.ndarray:
-    """How much of a dab is felt at a distance from its centre: 1 inside, a smoothstep over the falloff, 0 from its radius on."""
+    """How much of a dab is felt at a distance from its centre: 1 inside, a smoothstep over the falloff, 0 from its
+    radius on."""
     share = np.asarray(distance, dtype=np.float64) / dab.radius
     fade = np.clip((share - (1.0 - dab.falloff)) / max(dab.falloff, 1e-9), 0.0, 1.0)
     return np.where(share < 1.0, 1.0 - fade * fade * (3.0 - 2.0 * fade), 0.0)
 
 
 def _touched(log2: np.ndarray, dab: Dab, distance: np.ndarray) -> np.ndarray:
-    """The doublings after one more dab. Held in range after each, so that painting on past an end and back is felt at once."""
+    """The doublings after one more dab. Held in range after each, so that painting on past an end and back is felt at
+    once."""
     weight = dab_weight(dab, distance)
     log2 = log2 * (1.0 - dab.erase * weight) if dab.erase > 0.0 else log2 + dab.log2_gain * weight
     return np.clip(log2, MIN_LOG2_GAIN, MAX_LOG2_GAIN)
@@ -84,7 +86,8 @@ class GainGrid:
     first: tuple[int, int, int]
     """Lattice numbers of the lowest voxel; a flat receiver's layer axis has 0."""
     box: tuple[np.ndarray, np.ndarray]
-    """Low and high corner, float64 (3,) each, object space. Across a flat receiver it holds the plane with room to spare."""
+    """Low and high corner, float64 (3,) each, object space. Across a flat receiver it holds the plane with room to
+    spare."""
     log2: np.ndarray
     """Doublings of the gain, float64 (nz, ny, nx)."""
 
@@ -159,7 +162,8 @@ class GainGrid:
         return replace(self, dabs=dabs)._painted(new_dabs)
 
     def sample(self, points: np.ndarray) -> np.ndarray:
-        """Gain at `points` (n, 3), float64 (n,): trilinear between voxel centres, held at the rim, 1 outside the box."""
+        """Gain at `points` (n, 3), float64 (n,): trilinear between voxel centres, held at the rim, 1 outside the
+        box."""
         points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         dims = np.array(self.dims)
         inside = np.all((points >= self.low) & (points <= self.high), axis=1) & bool(self.dabs)
@@ -196,7 +200,9 @@ class GainGrid:
 
     def _centres(self, x: slice, y: slice, z: slice) -> np.ndarray:
         """Sample positions of a block of voxels, float64 (nz, ny, nx, 3)."""
-        along = [(np.arange(s.start, s.stop) + f + 0.5) * self.voxel for s, f in zip((x, y, z), self.first, strict=True)]
+        along = [
+            (np.arange(s.start, s.stop) + f + 0.5) * self.voxel for s, f in zip((x, y, z), self.first, strict=True)
+        ]
         zs, ys, xs = np.meshgrid(*along[::-1], indexing="ij")
         centres = np.stack([xs, ys, zs], axis=-1)
         axis = _layer_axis(self.plane)

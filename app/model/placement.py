@@ -13,7 +13,14 @@ import numpy as np
 from .io.scene_table import SceneTable, Vec3
 
 PLACEMENT_KEYS = (
-    "position", "scale", "rotation_deg", "axis", "angle_deg", "z_axis", "x_axis", "matrix",
+    "position",
+    "scale",
+    "rotation_deg",
+    "axis",
+    "angle_deg",
+    "z_axis",
+    "x_axis",
+    "matrix",
 )
 _ROTATIONS = ("rotation_deg", "axis", "z_axis")
 
@@ -92,9 +99,7 @@ def _read_rotation(table: SceneTable) -> np.ndarray:
     if kind == "rotation_deg":
         x, y, z = (math.radians(angle) for angle in table.vector("rotation_deg"))
         return (
-            rotation_about((0.0, 0.0, 1.0), z)
-            @ rotation_about((0.0, 1.0, 0.0), y)
-            @ rotation_about((1.0, 0.0, 0.0), x)
+            rotation_about((0.0, 0.0, 1.0), z) @ rotation_about((0.0, 1.0, 0.0), y) @ rotation_about((1.0, 0.0, 0.0), x)
         )
     if kind == "axis":
         return rotation_about(table.unit_vector("axis"), math.radians(table.number("angle_deg")))

@@ -114,7 +114,8 @@ Material = Dielectric | Mirror | Diffuse | Black
 
 @dataclass(frozen=True)
 class Dab:
-    """One touch of the dispersion brush on a receiver: a local gain of dispersion. Not physical; `local_dispersion` says how dabs add up."""
+    """One touch of the dispersion brush on a receiver: a local gain of dispersion. Not physical; `local_dispersion`
+    says how dabs add up."""
 
     position: Vec3
     """Centre, in the receiver's own coordinates, so that it moves with the object."""

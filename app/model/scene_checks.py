@@ -1,4 +1,5 @@
-"""What must hold for a whole scene, whichever file it came from: something to land on, light outside glass, data in range."""
+"""What must hold for a whole scene, whichever file it came from: something to land on, light outside glass, data in
+range."""
 
 from __future__ import annotations
 
@@ -42,7 +43,8 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
 
 
 def contains(item: SceneObject, point: np.ndarray) -> bool:
-    """Whether `point` (3,), in the world, lies inside the object's closed surface; slightly open meshes are judged too."""
+    """Whether `point` (3,), in the world, lies inside the object's closed surface; slightly open meshes are judged
+    too."""
     local = np.linalg.solve(item.object_to_world[:3, :3], np.asarray(point) - item.object_to_world[:3, 3])
     if item.mesh.is_closed:
         return _crossings(item.mesh, local) != 0
@@ -119,7 +121,9 @@ def check_texture(item: SceneObject, file_name: str) -> None:
             "UVs, use a shape that has them (plane, disc, box, slab, sphere), or leave the texture out"
         )
     if not np.isfinite(item.mesh.uv).all():
-        raise UserError(f"{file_name}: object '{item.name}' has texture coordinates that are not finite; export its mesh again")
+        raise UserError(
+            f"{file_name}: object '{item.name}' has texture coordinates that are not finite; export its mesh again"
+        )
 
 
 def check_outside(light: Light, glasses: Sequence[SceneObject], file_name: str) -> None:

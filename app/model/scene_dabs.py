@@ -1,4 +1,5 @@
-"""What the dispersion brush painted, in the words of a scene file: `local_dispersion = [{ position, radius, … }, …]`."""
+"""What the dispersion brush painted, in the words of a scene file: `local_dispersion = [{ position, radius, … },
+…]`."""
 
 from __future__ import annotations
 

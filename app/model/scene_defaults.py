@@ -44,9 +44,7 @@ def default_camera(around: Surroundings) -> Camera:
 def default_light() -> Light:
     """A white sun."""
     power = illuminant("D65").scaled_to_luminous(DEFAULT_ILLUMINANCE)
-    return Light(
-        "sun", "directional", power, direction=default_direction(), angular_diameter_deg=SUN_DIAMETER_DEG
-    )
+    return Light("sun", "directional", power, direction=default_direction(), angular_diameter_deg=SUN_DIAMETER_DEG)
 
 
 def default_table(objects: Sequence[SceneObject]) -> SceneObject:

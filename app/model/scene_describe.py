@@ -88,7 +88,10 @@ def describe_material(material: Material) -> dict[str, Any]:
         return {"kind": "black"}
     if isinstance(material, Diffuse):
         if material.texture is not None:
-            texture = {"file": material.texture.source or picture_name(material.texture.rgb), "wrap": material.texture.wrap}
+            texture = {
+                "file": material.texture.source or picture_name(material.texture.rgb),
+                "wrap": material.texture.wrap,
+            }
             return {"kind": "diffuse", "colour": list(material.reflectance_rgb), "texture": texture}
         if material.reflectance is None:
             return {"kind": "diffuse", "colour": list(material.reflectance_rgb)}

@@ -41,7 +41,9 @@ def read_materials(table: SceneTable, textures: TextureReader | None = None) -> 
     return {name: read_material(entry, textures) for name, entry in table.named_tables("materials").items()}
 
 
-def read_object_material(table: SceneTable, named: dict[str, Material], textures: TextureReader | None = None) -> Material:
+def read_object_material(
+    table: SceneTable, named: dict[str, Material], textures: TextureReader | None = None
+) -> Material:
     """The material of one object: `glass = "…"`, `material = "NAME"`, `material = {…}` or the default glass.
 
     "mirror", "diffuse" and "black" are known without being defined. The object's `priority`
@@ -209,7 +211,10 @@ def _read_absorption(table: SceneTable) -> Absorption | None:
     if alpha.min() < 0.0:
         inner.fail("coefficient", "is negative somewhere; glass cannot amplify light")
     if alpha.max() > MAX_ATTENUATION:
-        inner.fail("distance", f"makes the glass opaque within {1.0 / MAX_ATTENUATION:g} units; use material = \"black\" for that")
+        inner.fail(
+            "distance",
+            f'makes the glass opaque within {1.0 / MAX_ATTENUATION:g} units; use material = "black" for that',
+        )
     inner.finish("absorption")
     return Absorption(alpha)
 

@@ -142,9 +142,23 @@ def _file_recipe(table: SceneTable) -> dict[str, Any]:
 # -- shapes: the keys are the parameters of the functions in `primitives` --------------------
 
 _SHAPES = (
-    "sphere", "ellipsoid", "box", "slab", "prism", "polygon_prism", "lens", "doublet", "brilliant",
-    "torus", "revolution", "height_field", "rippled_water", "plane", "disc", INLINE,
-)  # fmt: skip
+    "sphere",
+    "ellipsoid",
+    "box",
+    "slab",
+    "prism",
+    "polygon_prism",
+    "lens",
+    "doublet",
+    "brilliant",
+    "torus",
+    "revolution",
+    "height_field",
+    "rippled_water",
+    "plane",
+    "disc",
+    INLINE,
+)
 _FUNCTION = {"revolution": "solid_of_revolution"}
 _HIDDEN = {"name", "names", "gradient"}
 
@@ -228,14 +242,18 @@ def _make_shape(recipe: dict[str, Any]) -> Mesh:
     return made
 
 
-def _inline_mesh(vertices: list[list[float]], triangles: list[list[float]], uv: list[list[float]] | None = None) -> Mesh:
+def _inline_mesh(
+    vertices: list[list[float]], triangles: list[list[float]], uv: list[list[float]] | None = None
+) -> Mesh:
     from .geometry.mesh import make_mesh
 
     indices = np.array(triangles)
     if np.any(indices != np.floor(indices)):
         raise UserError("triangles must hold whole numbers, counted from 0")
     if uv is not None and len(uv) != 3 * len(triangles):
-        raise UserError(f"uv has {len(uv)} rows for {len(triangles)} triangles; give one for each corner, three a triangle")
+        raise UserError(
+            f"uv has {len(uv)} rows for {len(triangles)} triangles; give one for each corner, three a triangle"
+        )
     corners = None if uv is None else np.array(uv).reshape(-1, 3, 2)
     return make_mesh("mesh", np.array(vertices), indices.astype(np.int64), uv=corners, uv_unwraps=False)
 

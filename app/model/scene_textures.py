@@ -25,7 +25,8 @@ class TextureReader:
         self.notes: list[str] = []
 
     def read(self, table: SceneTable, key: str = "texture") -> Texture:
-        """The texture under `key`: a file name, or a table {file, wrap}. Raises UserError for one that cannot be used."""
+        """The texture under `key`: a file name, or a table {file, wrap}. Raises UserError for one that cannot be
+        used."""
         if isinstance(table.raw(key), str):
             return self._checked(table, key, table.existing_file(key), "repeat")
         inner = table.table(key)
@@ -57,7 +58,9 @@ def as_reflectance(rgb: np.ndarray, where: str) -> np.ndarray:
     """`rgb` float32 (H, W, 3), read-only, at most 1. Raises UserError that counts what lies above."""
     count = int((rgb > 1.0 + _ABOVE_ONE).sum())
     if count:
-        raise UserError(f"{where}: {count} values lie above 1 (up to {rgb.max():.3g}), which no surface reflects; scale the picture down")
+        raise UserError(
+            f"{where}: {count} values lie above 1 (up to {rgb.max():.3g}), which no surface reflects; scale the picture down"
+        )
     rgb = np.minimum(rgb, np.float32(1.0))
     rgb.setflags(write=False)
     return rgb

@@ -32,13 +32,14 @@ class RenderSettings:
     batch: int | None = None
     """Photons in flight at once; None lets the device's limits decide. Never changes the picture."""
     smoothing: float = 0.45
-    """Standard deviation of a footprint in lattice spacings. From 0.5 on a square lattice of Gaussians is flat to a per cent; a little
-    less ripples by a few, below what a pixel shows, and blurs edges less (prism, 4000 photons: relMSE 0.0051 at 0.6, 0.0025 at 0.4)."""
+    """Standard deviation of a footprint in lattice spacings. From 0.5 on a square lattice of Gaussians is flat to a per
+    cent; a little less ripples by a few, below what a pixel shows, and blurs edges less (prism, 4000 photons: relMSE
+    0.0051 at 0.6, 0.0025 at 0.4)."""
     local_gain: bool = True
     """Whether the dispersion brush's dabs count; False is the physical picture."""
     anchor_weights: bool = False
-    """Take Fresnel's weights at a band's anchor for the whole band (the viewer: an edit of the dispersion then leaves every photon's
-    weight). The weights of a band's ends differ from it by less than a thousandth."""
+    """Take Fresnel's weights at a band's anchor for the whole band (the viewer: an edit of the dispersion then leaves
+    every photon's weight). The weights of a band's ends differ from it by less than a thousandth."""
     any_view: bool = False
     """The camera may go anywhere (viewer, animation): what a scene needs is not judged by what its camera sees."""
     tally: bool = False

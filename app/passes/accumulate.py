@@ -81,7 +81,9 @@ class SeamFold:
             target.bind_to_image(1, read=True, write=True)
             self._source_buffer.bind_to_storage_buffer(1)
             self._ratio_buffer.bind_to_storage_buffer(2)
-            for program, buffer, count in zip((self._gather, self._fill), (self._gather_buffer, self._fill_buffer), self._counts, strict=True):
+            for program, buffer, count in zip(
+                (self._gather, self._fill), (self._gather_buffer, self._fill_buffer), self._counts, strict=True
+            ):
                 if count:
                     buffer.bind_to_storage_buffer(0)
                     program["count"].value = count
@@ -90,7 +92,14 @@ class SeamFold:
         self._ctx.memory_barrier()
 
     def release(self) -> None:
-        for resource in (self._gather, self._fill, self._gather_buffer, self._fill_buffer, self._source_buffer, self._ratio_buffer):
+        for resource in (
+            self._gather,
+            self._fill,
+            self._gather_buffer,
+            self._fill_buffer,
+            self._source_buffer,
+            self._ratio_buffer,
+        ):
             shader.release(resource)
 
 

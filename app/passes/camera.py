@@ -1,8 +1,8 @@
 """The camera's pass: pictures of the scene from the caustic maps and the lights.
 
-A dispatch adds one camera sample to the pixels of a band of rows, or to some of those that see glass or mirrors there, so that none takes
-long on a software renderer: between two of them there is time for progress and for a stop.
-Samples form a lattice inside the pixel that later launches refine (box filter).
+A dispatch adds one camera sample to the pixels of a band of rows, or to some of those that see glass or mirrors there,
+so that none takes long on a software renderer: between two of them there is time for progress and for a stop. Samples
+form a lattice inside the pixel that later launches refine (box filter).
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from .camera_programs import (
     BIND_RECEIVERS,
     UNIT_EMISSION,
     UNIT_PICTURES,
-    direct_defines,
     camera_defines,
+    direct_defines,
     single_defines,
 )
 from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
@@ -95,11 +95,15 @@ class CameraPass:
         """`layer`: "beauty", or "caustic" (the maps on what is seen directly, no other light).
 
         `reflectances`: reflectance classes as the splat tables were built with; the first is
-        None, the others (401,) are folded into the maps. `maps`: what their channels are; those of a picture in bins are its own.
-        `pictures`: textures and environment of `scene.scene`, the caller's; None makes them. The camera's method is that of `scene.features`.
+        None, the others (401,) are folded into the maps. `maps`: what their channels are; those of a picture in bins
+        are its own.
+        `pictures`: textures and environment of `scene.scene`, the caller's; None makes them. The camera's method is
+        that of `scene.features`.
         """
         if reflectances[0] is not None:
-            raise ValueError("reflectance class 0 must be None: it stands for receivers whose maps hold plain irradiance")
+            raise ValueError(
+                "reflectance class 0 must be None: it stands for receivers whose maps hold plain irradiance"
+            )
         self.context = context
         self.scene = scene
         self.channels = Channels(maps.edges_nm)
@@ -131,14 +135,29 @@ class CameraPass:
         self.spectrum = Spectrum(self.fixed_bands or 1)
         """How samples see the spectrum; one of `single` wavelengths needs `may_be_single`."""
         self.may_be_single = False
-        """Where bands serve a scene badly, wavelengths may be taken one by one. That takes a program of its own, which is compiled when it is needed."""
+        """Where bands serve a scene badly, wavelengths may be taken one by one. That takes a program of its own, which
+        is compiled when it is needed."""
         self.max_taps = MAX_TAPS
         self.primary_samples = PRIMARY_SAMPLES if self.chooses else 1
         """Of a sample, at what is seen directly, while a pixel has few samples."""
         self.split_threshold = SPLIT_THRESHOLD
-        structs = (*SCENE_STRUCTS, CAMERA_LIGHT, CAMERA_PARAMETERS, RECEIVER, PLACEMENT, *([PICTURE] if self.pictures.structs else []))
+        structs = (
+            *SCENE_STRUCTS,
+            CAMERA_LIGHT,
+            CAMERA_PARAMETERS,
+            RECEIVER,
+            PLACEMENT,
+            *([PICTURE] if self.pictures.structs else []),
+        )
         shown = camera_defines(scene, self.channels, layer, maps) | self._tables.defines | self.pictures.defines
-        shown |= {name: 1 for name, on in (("LIGHTS_IN_STORAGE", self._lights_in_storage), ("HAS_IMAGES", bool(self.pictures.structs))) if on}
+        shown |= {
+            name: 1
+            for name, on in (
+                ("LIGHTS_IN_STORAGE", self._lights_in_storage),
+                ("HAS_IMAGES", bool(self.pictures.structs)),
+            )
+            if on
+        }
         self._listed: moderngl.Buffer | None = None
         self._beyond: moderngl.ComputeShader | None = None
         self._single: moderngl.ComputeShader | None = None
@@ -175,7 +194,14 @@ class CameraPass:
         return True
 
     def samples(
-        self, camera: Camera, width: int, height: int, samples: int, sample_offset: int = 0, maps: CausticMaps | None = None, seed: int = 1
+        self,
+        camera: Camera,
+        width: int,
+        height: int,
+        samples: int,
+        sample_offset: int = 0,
+        maps: CausticMaps | None = None,
+        seed: int = 1,
     ) -> Iterator[float]:
         """`run`, pausing after every dispatch with the share done: whoever draws meanwhile may bind what it likes."""
         if sample_offset == 0 or self._size != (width, height):
@@ -188,7 +214,9 @@ class CameraPass:
         # Where samples are of one band each, fewer of them share a pixel in that band.
         parameters["band_side"] = min(1.0, np.sqrt(self.spectrum.bands / (samples + sample_offset)))
         parameters["taps_per_pixel"] = TAPS_PER_PIXEL * (samples + sample_offset) ** 0.25
-        parameters["primary_samples"] = 1 if self.spectrum.single or samples + sample_offset > PRIMARY_SAMPLES_UNTIL else self.primary_samples
+        parameters["primary_samples"] = (
+            1 if self.spectrum.single or samples + sample_offset > PRIMARY_SAMPLES_UNTIL else self.primary_samples
+        )
         for index, place in enumerate(_pixel_lattice(samples, sample_offset)):
             parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
             parameters["within_pixel"] = place
@@ -201,16 +229,20 @@ class CameraPass:
         """`choose_spectrum` has something to choose: the method leaves it open."""
         return self.disperses and self.fixed_bands is None and not self.scene.features.random_wavelength
 
-    def choose_spectrum(self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None) -> Spectrum:
-        """Sample the spectrum in the way that leaves the least error after so many samples, as far as a coarse grid of the picture's own
-        pixels tells.
+    def choose_spectrum(
+        self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None
+    ) -> Spectrum:
+        """Sample the spectrum in the way that leaves the least error after so many samples, as far as a coarse grid of
+        the picture's own pixels tells.
 
         Sets and returns `spectrum`; what was summed up is forgotten. A method that prescribes its way keeps it."""
         for _ in self.choosing_spectrum(camera, width, height, samples, maps):
             pass
         return self.spectrum
 
-    def choosing_spectrum(self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None) -> Iterator[float]:
+    def choosing_spectrum(
+        self, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps | None = None
+    ) -> Iterator[float]:
         """`choose_spectrum`, pausing after every dispatch."""
         if not self.chooses:
             return
@@ -225,13 +257,20 @@ class CameraPass:
             picture = yield from self._coarse_picture(look, camera, width, height, samples, maps or self._no_maps())
         self._clear(*self._size)
 
-    def _coarse_picture(self, look: PilotRender, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps) -> Generator[float, None, np.ndarray]:
+    def _coarse_picture(
+        self, look: PilotRender, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps
+    ) -> Generator[float, None, np.ndarray]:
         """Few pixels of the picture, each as large as the picture's own."""
         columns, rows = grid_of(width, height)
         self._clear(columns, rows)
         self.spectrum = look.spectrum
         parameters = self._parameters(camera, columns, rows, maps.scale, look.seed)
-        parameters["dithered"], parameters["counts_turns"], parameters["sample_side"], parameters["band_side"] = 0, 0, 1.0, 1.0
+        parameters["dithered"], parameters["counts_turns"], parameters["sample_side"], parameters["band_side"] = (
+            0,
+            0,
+            1.0,
+            1.0,
+        )
         parameters["pixel_width"] = parameters["pixel_height"] = columns / width
         parameters["taps_per_pixel"] = TAPS_PER_PIXEL * samples**0.25
         # Within the picture's pixel, which is a small part of the grid's.
@@ -257,7 +296,9 @@ class CameraPass:
         else:
             self._lights.bind_to_uniform_block(BIND_LIGHTS)
         buffers = (tables.object_colours, tables.cell_cdf, maps.receivers, maps.placements)
-        for binding, buffer in zip((BIND_OBJECT_COLOURS, BIND_CELL_CDF, BIND_RECEIVERS, BIND_PLACEMENTS), buffers, strict=True):
+        for binding, buffer in zip(
+            (BIND_OBJECT_COLOURS, BIND_CELL_CDF, BIND_RECEIVERS, BIND_PLACEMENTS), buffers, strict=True
+        ):
             buffer.bind_to_storage_buffer(binding)
         self._counters.bind_to_storage_buffer(BIND_COUNTERS)
         if self._listed is not None:
@@ -270,7 +311,8 @@ class CameraPass:
 
     @property
     def fallbacks(self) -> dict[str, int]:
-        """How often, since the pass was made, a path lost its columns, was left at its greatest depth, could not wait, or kept a band that should have been cut."""
+        """How often, since the pass was made, a path lost its columns, was left at its greatest depth, could not wait,
+        or kept a band that should have been cut."""
         return dict(zip(FALLBACKS, np.frombuffer(self._counters.read(), "u4").tolist(), strict=True))
 
     @property
@@ -317,7 +359,11 @@ class CameraPass:
         space = self.scene.space
         right, up, forward = camera_frame(camera)
         orthographic = camera.kind == "orthographic"
-        half_height = 0.5 * camera.vertical_extent * space.scale if orthographic else np.tan(np.radians(0.5 * camera.vertical_fov_deg))
+        half_height = (
+            0.5 * camera.vertical_extent * space.scale
+            if orthographic
+            else np.tan(np.radians(0.5 * camera.vertical_fov_deg))
+        )
         parameters = CAMERA_PARAMETERS.zeros(1)
         parameters["position"] = space.to_gpu(np.array(camera.position))
         parameters["orthographic"] = orthographic
@@ -332,7 +378,9 @@ class CameraPass:
         parameters["background"][0, :3] = self.scene.scene.background_rgb
         environment = self.scene.scene.environment
         if environment is not None:
-            for name, column in zip(("sky_x", "sky_y", "sky_z"), np.asarray(environment.world_to_local, float).T, strict=True):
+            for name, column in zip(
+                ("sky_x", "sky_y", "sky_z"), np.asarray(environment.world_to_local, float).T, strict=True
+            ):
                 parameters[name] = column
         bands = self.spectrum.bands
         parameters["bands"], parameters["dithered"], parameters["counts_turns"] = bands, bands > 1, 1
@@ -357,7 +405,11 @@ class CameraPass:
             self._pixels = DispatchBudget(_FIRST_LISTED, _LISTED_GROUP, max(width * height, _LISTED_GROUP))
             if self._listed is not None:
                 self._listed.release()
-            self._listed = self._ctx.buffer(reserve=4 + 4 * width * (-(-height // _GROUP) * _GROUP)) if self._beyond is not None else None
+            self._listed = (
+                self._ctx.buffer(reserve=4 + 4 * width * (-(-height // _GROUP) * _GROUP))
+                if self._beyond is not None
+                else None
+            )
         zeros = bytes(width * height * 16)
         for picture in self._pictures:
             picture.write(zeros)
@@ -365,7 +417,8 @@ class CameraPass:
         self._within_rows = False
 
     def _add_sample(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
-        """Dispatch one sample, yielding the share done after each dispatch: a band of rows, or some of its listed pixels."""
+        """Dispatch one sample, yielding the share done after each dispatch: a band of rows, or some of its listed
+        pixels."""
         row = 0
         while row < height:
             # Groups that overlap the next band would add its rows twice, so bands are whole groups.
@@ -373,7 +426,11 @@ class CameraPass:
             parameters["first_row"] = row
             if self._listed is not None:
                 self._listed.write(_NOTHING_LISTED)
-            self._rows.learn(rows, self._dispatch(self._program, parameters, maps, -(-width // _GROUP), -(-rows // _GROUP)), self.dispatch_seconds)
+            self._rows.learn(
+                rows,
+                self._dispatch(self._program, parameters, maps, -(-width // _GROUP), -(-rows // _GROUP)),
+                self.dispatch_seconds,
+            )
             for share in self._follow_listed(parameters, maps):
                 self._within_rows = True
                 yield (row + share * rows) / height
@@ -383,7 +440,8 @@ class CameraPass:
             yield row / height
 
     def _follow_listed(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
-        """Follow what the listed pixels of a band of rows see, yielding the share done after each dispatch but the last."""
+        """Follow what the listed pixels of a band of rows see, yielding the share done after each dispatch but the
+        last."""
         if self._listed is None:
             return
         count, done = int(np.frombuffer(self._listed.read(4), "u4")[0]), 0
@@ -396,7 +454,9 @@ class CameraPass:
             if done < count:
                 yield done / count
 
-    def _dispatch(self, program: moderngl.ComputeShader, parameters: np.ndarray, maps: CausticMaps, groups_x: int, groups_y: int) -> float:
+    def _dispatch(
+        self, program: moderngl.ComputeShader, parameters: np.ndarray, maps: CausticMaps, groups_x: int, groups_y: int
+    ) -> float:
         """Run a program to its end; seconds it took."""
         self._bind(maps)
         self._parameters_buffer.write(parameters.tobytes())
@@ -433,21 +493,23 @@ class CameraPass:
             receivers = RECEIVER.zeros(max(1, len(self.scene.receivers)))
             receivers["placement"] = NONE
             textures = [self._ctx.texture((1, 1), 4, bytes(16), dtype="f4") for _ in range(self._map_targets)]
-            self._empty = CausticMaps(textures, self._ctx.buffer(receivers.tobytes()), self._ctx.buffer(reserve=PLACEMENT.stride))
+            self._empty = CausticMaps(
+                textures, self._ctx.buffer(receivers.tobytes()), self._ctx.buffer(reserve=PLACEMENT.stride)
+            )
         return self._empty
 
 
 def _is_in_strips(samples: int, offset: int) -> bool:
-    """Whether samples share the pixel in upright strips. Two or three squares of the same area do not fill it: what is small and bright, and
-    letters, would count twice or not at all. With more, outlines want different heights."""
+    """Whether samples share the pixel in upright strips. Two or three squares of the same area do not fill it: what is
+    small and bright, and letters, would count twice or not at all. With more, outlines want different heights."""
     return offset == 0 and samples in (2, 3)
 
 
 def _pixel_lattice(samples: int, offset: int) -> np.ndarray:
     """(samples, 2) places in a pixel: ordered as in a golden-ratio lattice, shifted as a whole from launch to launch.
 
-    Every row and every column of the pixel cut into `samples` holds one sample, so that edges of any slant are filtered well,
-    and the first launch's lie about the pixel's middle, so that the picture does not move.
+    Every row and every column of the pixel cut into `samples` holds one sample, so that edges of any slant are filtered
+    well, and the first launch's lie about the pixel's middle, so that the picture does not move.
     """
     if _is_in_strips(samples, offset):
         return np.column_stack([(np.arange(samples) + 0.5) / samples, np.full(samples, 0.5)])

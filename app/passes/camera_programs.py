@@ -1,7 +1,7 @@
 """The programs of the camera's pass: what each is compiled with, and how far a sample is followed.
 
-A scene that shows glass or mirrors has two: one for what is seen directly, which lists the pixels that meet something specular first, and
-one for those, which holds all that is dear. A third is for samples of single wavelengths.
+A scene that shows glass or mirrors has two: one for what is seen directly, which lists the pixels that meet something
+specular first, and one for those, which holds all that is dear. A third is for samples of single wavelengths.
 """
 
 from __future__ import annotations
@@ -32,22 +32,43 @@ CUT_THRESHOLD = 0.004
 TINT_STEPS = 48
 """Stretches that the whole spectrum is cut into behind coloured glass."""
 
-BIND_LIGHTS, BIND_OBJECT_COLOURS, BIND_CELL_CDF, BIND_RECEIVERS, BIND_PLACEMENTS, BIND_PICTURES, BIND_COUNTERS, BIND_LISTED = range(8, 16)
+(
+    BIND_LIGHTS,
+    BIND_OBJECT_COLOURS,
+    BIND_CELL_CDF,
+    BIND_RECEIVERS,
+    BIND_PLACEMENTS,
+    BIND_PICTURES,
+    BIND_COUNTERS,
+    BIND_LISTED,
+) = range(8, 16)
 UNIT_EMISSION, UNIT_PICTURES = 10, 11
-_BEYOND_ONLY = ("HAS_DISPERSION", "SPECTRAL_SWEEP", "RANDOM_WAVELENGTH", "EVEN_WAVELENGTHS", "MAP_BINS", "ABSORPTION", "NORMAL_DERIVATIVES")
+_BEYOND_ONLY = (
+    "HAS_DISPERSION",
+    "SPECTRAL_SWEEP",
+    "RANDOM_WAVELENGTH",
+    "EVEN_WAVELENGTHS",
+    "MAP_BINS",
+    "ABSORPTION",
+    "NORMAL_DERIVATIVES",
+)
 """What only rays beyond glass and mirrors need."""
 
 
 def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: MapChannels) -> Defines:
-    """What the scene needs of the shader, for a picture in `channels` and `maps` of these channels; tables and pictures add theirs.
+    """What the scene needs of the shader, for a picture in `channels` and `maps` of these channels; tables and pictures
+    add theirs.
 
-    `CAMERA_SPECULAR` is among them where rays go on beyond glass or mirrors: these are then for the listed pixels, and `direct_defines` has the others'.
+    `CAMERA_SPECULAR` is among them where rays go on beyond glass or mirrors: these are then for the listed pixels, and
+    `direct_defines` has the others'.
     """
     lights, features = scene.scene.lights, scene.features
     beauty = layer != "caustic"
     specular = beauty and features.camera_specular
     disperses = specular and features.camera_disperses
-    defines: Defines = dict(features.defines() | bindings.SCENE_DEFINES | scene.defines | place_defines(BIND_PICTURES, UNIT_PICTURES))
+    defines: Defines = dict(
+        features.defines() | bindings.SCENE_DEFINES | scene.defines | place_defines(BIND_PICTURES, UNIT_PICTURES)
+    )
     # A method that follows single wavelengths has no columns for them; nor has a scene where nothing disperses.
     groups = features.spectral_groups if disperses else 0
     defines |= {
@@ -100,9 +121,17 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
 def direct_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     """For what is seen directly, from what the listed pixels are compiled with."""
     left_out = {"CAMERA_SPECULAR", *_BEYOND_ONLY}
-    return {name: value for name, value in beyond.items() if name not in left_out} | {"SPECTRAL_GROUPS": 0, "LISTS_SPECULAR": 1, "MAX_EVENTS": 1}
+    return {name: value for name, value in beyond.items() if name not in left_out} | {
+        "SPECTRAL_GROUPS": 0,
+        "LISTS_SPECULAR": 1,
+        "MAX_EVENTS": 1,
+    }
 
 
 def single_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     """For listed pixels whose samples are of one wavelength each."""
-    return {name: value for name, value in beyond.items() if name != "SPECTRAL_SWEEP"} | {"SPECTRAL_GROUPS": 0, "RANDOM_WAVELENGTH": 1, "EVEN_WAVELENGTHS": 1}
+    return {name: value for name, value in beyond.items() if name != "SPECTRAL_SWEEP"} | {
+        "SPECTRAL_GROUPS": 0,
+        "RANDOM_WAVELENGTH": 1,
+        "EVEN_WAVELENGTHS": 1,
+    }

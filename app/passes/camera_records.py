@@ -81,7 +81,10 @@ def light_record(light: Light, scene: SceneBuffers) -> np.void:
     record["kind"] = _LIGHT_KINDS[light.kind]
     record["axis"] = axis
     record["is_disc"] = light.shape == "disc" or light.kind == "directional"
-    half = np.array([light.radius, light.radius] if light.shape == "disc" else [0.5 * light.width, 0.5 * light.height]) * scene.space.scale
+    half = (
+        np.array([light.radius, light.radius] if light.shape == "disc" else [0.5 * light.width, 0.5 * light.height])
+        * scene.space.scale
+    )
     if light.kind == "directional":
         radius = np.radians(0.5 * light.angular_diameter_deg)
         half = np.full(2, np.tan(radius))

@@ -1,4 +1,5 @@
-"""Spectra as the camera's rays meet them: indices of the glass that is shown, absorption, and emission times the observer.
+"""Spectra as the camera's rays meet them: indices of the glass that is shown, absorption, and emission times the
+observer.
 
 The emission table holds running sums over the spectral coordinate x. A look at a stretch of the spectrum is then the
 difference of two of its samples in every channel of the picture, however many wavelengths lie between them.
@@ -31,7 +32,8 @@ from ..model.scene import (
 from .present import Channels
 
 EMISSION_CELLS = SAMPLES - 1
-"""Cells of x that a stretch of the spectrum begins and ends with; a wavelength is told to 1/1024 of the indices' variation."""
+"""Cells of x that a stretch of the spectrum begins and ends with; a wavelength is told to 1/1024 of the indices'
+variation."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,12 @@ class CameraTables:
 
     @classmethod
     def build(
-        cls, ctx: moderngl.Context, scene: SceneBuffers, channels: Channels, reflectances: Sequence[np.ndarray | None], maps: MapChannels
+        cls,
+        ctx: moderngl.Context,
+        scene: SceneBuffers,
+        channels: Channels,
+        reflectances: Sequence[np.ndarray | None],
+        maps: MapChannels,
     ) -> CameraTables:
         """`scene.scene` is what is shown; its geometry and its partition into glasses are those of `scene`.
 
@@ -99,7 +106,8 @@ def _axis(scene: SceneBuffers, shown: list[Dispersion]) -> SpectralAxis:
 
 
 def _absorptions(scene: Scene, scale: float) -> list[np.ndarray]:
-    """Distinct absorption coefficients (401,) of glasses, 1/GPU unit, and of coloured mirrors, a reflection, in the order of the objects."""
+    """Distinct absorption coefficients (401,) of glasses, 1/GPU unit, and of coloured mirrors, a reflection, in the
+    order of the objects."""
     distinct: list[np.ndarray] = []
     for item in scene.objects:
         coefficient = _absorption(item.material, scale)
@@ -118,14 +126,22 @@ def _absorption(material: Material, scale: float) -> np.ndarray | None:
 
 
 def _spectra(
-    scene: SceneBuffers, glasses: dict[Dispersion, Dispersion], axis: SpectralAxis, absorptions: list[np.ndarray], cell_cdf: np.ndarray, maps: MapChannels
+    scene: SceneBuffers,
+    glasses: dict[Dispersion, Dispersion],
+    axis: SpectralAxis,
+    absorptions: list[np.ndarray],
+    cell_cdf: np.ndarray,
+    maps: MapChannels,
 ) -> tuple[np.ndarray, dict[str, int]]:
     """Rows over x as `lib/scene.glsl` reads them, and where they begin."""
     x = np.linspace(0.0, 1.0, SAMPLES)
     nm = axis.nm_of_samples(SAMPLES)
     groups = replace(scene.groups, glasses=tuple(glasses[g] for g in scene.groups.glasses))
     variables = groups.variables(axis)
-    slopes = [index_slope(groups, scene.groups.glasses.index(g) if g in scene.groups.glasses else None, axis, variables) for g in glasses]
+    slopes = [
+        index_slope(groups, scene.groups.glasses.index(g) if g in scene.groups.glasses else None, axis, variables)
+        for g in glasses
+    ]
     sections = {
         "INDEX_ROW": np.asarray(index_table(axis, list(glasses.values()), SAMPLES), float),
         "SLOPE_ROW": np.array(slopes).reshape(-1, SAMPLES),
@@ -141,7 +157,12 @@ def _spectra(
 
 
 def _emission(
-    scene: Scene, axis: SpectralAxis, channels: Channels, reflectances: Sequence[np.ndarray | None], maps: MapChannels, scale: float
+    scene: Scene,
+    axis: SpectralAxis,
+    channels: Channels,
+    reflectances: Sequence[np.ndarray | None],
+    maps: MapChannels,
+    scale: float,
 ) -> tuple[np.ndarray, dict[str, int]]:
     """Running sums (rows, EMISSION_CELLS + 1, 4·targets) and where each kind of row begins."""
     x = np.linspace(0.0, 1.0, EMISSION_CELLS + 1)
@@ -160,7 +181,10 @@ def _emission(
     for light in scene.lights:
         # Intensity over distance² in GPU units needs the square of the scale; the other kinds are free of lengths.
         unit = scale**2 if light.kind in ("point", "spot") else 1.0
-        rows += [unit * running(light.spectral_power), *(unit * running(light.spectral_power, column) for column in basis.T)]
+        rows += [
+            unit * running(light.spectral_power),
+            *(unit * running(light.spectral_power, column) for column in basis.T),
+        ]
         rows += [unit * running(light.spectral_power, reflectance) for reflectance in reflectances[1:]]
     defines["BIN_SPECTRUM_ROW"] = len(rows)
     rows += [running(spectrum) for spectrum in maps.spectra(scene.lights)]
@@ -181,7 +205,8 @@ def _texture(ctx: moderngl.Context, rows: np.ndarray) -> moderngl.Texture:
 
 
 def _cell_cdf(axis: SpectralAxis, channels: Channels) -> np.ndarray:
-    """How much of what looks bright lies below each border of the cells of x: what daylight adds to X + Y + Z there, or evenly to all bins.
+    """How much of what looks bright lies below each border of the cells of x: what daylight adds to X + Y + Z there, or
+    evenly to all bins.
 
     Random wavelengths are drawn by it, and looks along a sweep shared out."""
     x = np.linspace(0.0, 1.0, EMISSION_CELLS + 1)
@@ -189,7 +214,9 @@ def _cell_cdf(axis: SpectralAxis, channels: Channels) -> np.ndarray:
         seen = cumulative(axis, Spectrum(daylight_per_lumen())).at(x)[:, :3].sum(axis=1)
     else:
         white = daylight_per_lumen()
-        seen = cumulative(axis, Spectrum(white), (channels.observer().sum(axis=1) / white)[:, None] * np.ones(4)).at(x)[:, 0]
+        seen = cumulative(axis, Spectrum(white), (channels.observer().sum(axis=1) / white)[:, None] * np.ones(4)).at(x)[
+            :, 0
+        ]
     # No cell is impossible: another light may be brighter there.
     mixed = 0.98 * seen / seen[-1] + 0.02 * x
     mixed[0], mixed[-1] = 0.0, 1.0

@@ -36,7 +36,8 @@ Shows = Literal["picture", "other", "wipe", "error"]
 ERROR_RANGE = 0.5
 """Relative error at the ends of the error map's scale."""
 ERROR_FLOOR = 0.02
-"""Share of display white added to the reference's brightness there: what is nearly black on the screen is not called wrong."""
+"""Share of display white added to the reference's brightness there: what is nearly black on the screen is not called
+wrong."""
 NEAREST_FROM = 4.0
 """Enlarged more than this, pixels are shown as squares."""
 _MAX_TAPS = 4
@@ -55,11 +56,17 @@ class _Variant:
 
     def defines(self) -> dict[str, int | str]:
         table = ERROR if self.shows == "error" else FALSE_COLOUR
-        return {"COLOUR_TABLE": glsl_table(table), "TAPS": self.taps, f"TONE_{self.tone.upper()}": 1, f"SHOW_{self.shows.upper()}": 1}
+        return {
+            "COLOUR_TABLE": glsl_table(table),
+            "TAPS": self.taps,
+            f"TONE_{self.tone.upper()}": 1,
+            f"SHOW_{self.shows.upper()}": 1,
+        }
 
 
 class Display:
-    """Owns the programs, made when first needed, and the textures they write; a texture stays valid until the next call that writes it."""
+    """Owns the programs, made when first needed, and the textures they write; a texture stays valid until the next call
+    that writes it."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
@@ -67,7 +74,8 @@ class Display:
         self._programs: dict[_Variant, moderngl.ComputeShader] = {}
         self._parameters = self._ctx.buffer(reserve=DISPLAY_PARAMETERS.stride)
         self._samplers = {
-            kind: self._ctx.sampler(repeat_x=False, repeat_y=False, filter=(kind, kind)) for kind in (moderngl.NEAREST, moderngl.LINEAR)
+            kind: self._ctx.sampler(repeat_x=False, repeat_y=False, filter=(kind, kind))
+            for kind in (moderngl.NEAREST, moderngl.LINEAR)
         }
         self._outputs: dict[str, moderngl.Texture] = {}
 
@@ -80,10 +88,11 @@ class Display:
         other: moderngl.Texture | None = None,
         compare: Compare | None = None,
     ) -> moderngl.Texture:
-        """`picture` (RGBA32F, linear Rec.709, row 0 on top) as an RGBA8 texture of `size` (width, height), sRGB codes, row 0 on top.
+        """`picture` (RGBA32F, linear Rec.709, row 0 on top) as an RGBA8 texture of `size` (width, height), sRGB codes,
+        row 0 on top.
 
-        `exposure_ev` is absolute (as `tone_map.to_display` takes it). `other` is what `compare` shows beside it, over it or
-        takes the error against; without it the picture alone is shown.
+        `exposure_ev` is absolute (as `tone_map.to_display` takes it). `other` is what `compare` shows beside it, over
+        it or takes the error against; without it the picture alone is shown.
         """
         parameters = self._develop(settings, exposure_ev)
         parameters["step_uv"] = 1.0 / size[0], 1.0 / size[1]
@@ -101,9 +110,16 @@ class Display:
         return self._dispatch("picture", variant, parameters, (picture, other or picture), size, nearest)
 
     def magnify(
-        self, picture: moderngl.Texture, pixel: tuple[int, int], settings: Settings, exposure_ev: float, zoom: int = 12, pixels: int = 15
+        self,
+        picture: moderngl.Texture,
+        pixel: tuple[int, int],
+        settings: Settings,
+        exposure_ev: float,
+        zoom: int = 12,
+        pixels: int = 15,
     ) -> moderngl.Texture:
-        """`pixels`² pixels of `picture` about `pixel` (column, row from the top), each `zoom`² large, as `run` would show them.
+        """`pixels`² pixels of `picture` about `pixel` (column, row from the top), each `zoom`² large, as `run` would
+        show them.
 
         Beyond the border the outermost pixels go on.
         """
@@ -112,10 +128,13 @@ class Display:
         parameters["origin"] = corner / picture.size
         parameters["step_uv"] = 1.0 / (zoom * np.array(picture.size, float))
         variant = _Variant(_tone(settings), "picture", 1)
-        return self._dispatch("magnifier", variant, parameters, (picture, picture), (pixels * zoom, pixels * zoom), nearest=True)
+        return self._dispatch(
+            "magnifier", variant, parameters, (picture, picture), (pixels * zoom, pixels * zoom), nearest=True
+        )
 
     def reload(self) -> None:
-        """Compile the programs from disk again; raises `ShaderError` and keeps all of them when one does not compile."""
+        """Compile the programs from disk again; raises `ShaderError` and keeps all of them when one does not
+        compile."""
         fresh: dict[_Variant, moderngl.ComputeShader] = {}
         try:
             for variant in self._programs:

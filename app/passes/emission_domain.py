@@ -21,10 +21,11 @@ _COARSE_ANGLE = 0.15
 """Triangles that look larger than this from the light (rad, or of the unit sphere) are subdivided before projection."""
 _MAX_SUBDIVIDED = 400_000
 _NEAR_ANTIPODE = 3.0 * _COARSE_ANGLE
-"""Triangles this close (rad) to the point behind a light are bent too much on the plane to be held by their corners' box."""
+"""Triangles this close (rad) to the point behind a light are bent too much on the plane to be held by their corners'
+box."""
 _SOFT_EDGE = 1.0 / 64.0
-"""Room about an aperture, as a share of its size: emission spreads its edge over half a lattice spacing on both sides, and what
-does not fit is lost. Enough for lattices of 1024 points."""
+"""Room about an aperture, as a share of its size: emission spreads its edge over half a lattice spacing on both sides,
+and what does not fit is lost. Enough for lattices of 1024 points."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,8 @@ class EmissionDomain:
         """Distances (2,) along the axes between neighbours of a lattice of `count` points over the rectangle.
 
         In proportion to the rectangle: what light outlines there (an aperture, a solid) is as long as
-        the rectangle along each axis, so that the blur of all its edges is least. The golden lattice is as even under every
-        such stretch.
+        the rectangle along each axis, so that the blur of all its edges is least. The golden lattice is as even under
+        every such stretch.
         """
         return self.rect[2:] / np.sqrt(count)
 
@@ -79,7 +80,9 @@ def azimuthal_plane(directions: np.ndarray) -> np.ndarray:
     return directions[..., :2] / k[..., None]
 
 
-def emission_domain(light: Light, scene: Scene, space: GpuSpace, specular_triangles: np.ndarray) -> EmissionDomain | None:
+def emission_domain(
+    light: Light, scene: Scene, space: GpuSpace, specular_triangles: np.ndarray
+) -> EmissionDomain | None:
     """The domain of `light`, or None where it cannot reach a specular object.
 
     `specular_triangles`: float64 (T, 3, 3) in GPU space.
@@ -96,7 +99,13 @@ def emission_domain(light: Light, scene: Scene, space: GpuSpace, specular_triang
 
 
 def _plane_domain(
-    light: Light, scene: Scene, space: GpuSpace, triangles: np.ndarray, position: np.ndarray, direction: np.ndarray, middle: np.ndarray
+    light: Light,
+    scene: Scene,
+    space: GpuSpace,
+    triangles: np.ndarray,
+    position: np.ndarray,
+    direction: np.ndarray,
+    middle: np.ndarray,
 ) -> EmissionDomain | None:
     tangent, bitangent = orthonormal_frame(direction, light.tangent)
     frame = np.stack([tangent, bitangent])
@@ -123,11 +132,31 @@ def _plane_domain(
     if is_disc:
         mask &= _disc_mask(rect, (position - middle) @ frame.T, half[0] + rim[0])
     area = rect[2] * rect[3] / space.scale**2
-    return EmissionDomain("plane", centre, direction, tangent, bitangent, rect, mask, area, back, light_u, light_v, position, is_disc, (float(tilt), 0.0))
+    return EmissionDomain(
+        "plane",
+        centre,
+        direction,
+        tangent,
+        bitangent,
+        rect,
+        mask,
+        area,
+        back,
+        light_u,
+        light_v,
+        position,
+        is_disc,
+        (float(tilt), 0.0),
+    )
 
 
 def _diverging_domain(
-    light: Light, space: GpuSpace, triangles: np.ndarray, position: np.ndarray, direction: np.ndarray, middle: np.ndarray
+    light: Light,
+    space: GpuSpace,
+    triangles: np.ndarray,
+    position: np.ndarray,
+    direction: np.ndarray,
+    middle: np.ndarray,
 ) -> EmissionDomain | None:
     to_middle = middle - position
     distance = np.linalg.norm(to_middle)
@@ -160,7 +189,10 @@ def _diverging_domain(
     behind = np.pi - farthest < _NEAR_ANTIPODE
     ring = np.inf
     if behind.any():
-        nearest = np.arccos(np.clip(relative[behind, :, 2] / np.maximum(lengths[behind], 1e-12), -1.0, 1.0)).min(axis=1) - shift[behind]
+        nearest = (
+            np.arccos(np.clip(relative[behind, :, 2] / np.maximum(lengths[behind], 1e-12), -1.0, 1.0)).min(axis=1)
+            - shift[behind]
+        )
         ring = 2.0 * float(np.sin(0.5 * max(nearest.min(), 0.0)))
         box_low, box_high = np.full(2, -2.0), np.full(2, 2.0)
     outer = np.radians(light.outer_half_angle_deg) if light.kind == "spot" else 4.0
@@ -181,7 +213,20 @@ def _diverging_domain(
     measure = float(rect[2] * rect[3]) * area
     kind = "area" if light.kind == "area" else "point"
     return EmissionDomain(
-        kind, position, axis, tangent, bitangent, rect, mask, measure, 0.0, light_u, light_v, position, light.shape == "disc", (float(inner), float(outer))
+        kind,
+        position,
+        axis,
+        tangent,
+        bitangent,
+        rect,
+        mask,
+        measure,
+        0.0,
+        light_u,
+        light_v,
+        position,
+        light.shape == "disc",
+        (float(inner), float(outer)),
     )
 
 
@@ -194,7 +239,9 @@ def _world_corners(item) -> np.ndarray:
     return item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]
 
 
-def _rect_and_mask(low: np.ndarray, high: np.ndarray, box_low: np.ndarray, box_high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _rect_and_mask(
+    low: np.ndarray, high: np.ndarray, box_low: np.ndarray, box_high: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The rectangle with a small margin, and the cells that boxes [low, high] (T, 2) touch, grown by one."""
     margin = 1e-3 * (box_high - box_low)
     corner, size = box_low - margin, (box_high - box_low) + 2 * margin

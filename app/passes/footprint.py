@@ -40,14 +40,22 @@ SPLAT = Struct(
     (
         Field("centre", "vec2", "middle of the swept chord, atlas texels"),
         Field("along", "vec2", "swept: texels per unit of xi; small: half extents in texels"),
-        Field("across", "vec2", "swept: texels per unit of eta (edge at 1); small: 1 / (sqrt(2) sigma) along x, y, 1/texel"),
+        Field(
+            "across",
+            "vec2",
+            "swept: texels per unit of eta (edge at 1); small: 1 / (sqrt(2) sigma) along x, y, 1/texel",
+        ),
         Field("amplitude", "float", "swept: 1/texel², all normalisation; small: mean throughput"),
         Field("table_row", "float", "swept: texture coordinate of sigma over sweep length"),
         Field("y_edge", "float", "swept: across half extent, units of sqrt(2) standard deviations"),
         Field("y_box", "float", "swept: half width of the texel across, same units"),
         Field("layer", "uint", "first layer of the spectral tables"),
         Field("kind", "uint", "0 nothing, 1 small, 2 swept, 3 swept with a cut band, 4 swept over the edge of rect"),
-        Field("throughput", "vec4", "anchor, value there, slope below and above it; by xi (cut, point spectrum, small: by x)"),
+        Field(
+            "throughput",
+            "vec4",
+            "anchor, value there, slope below and above it; by xi (cut, point spectrum, small: by x)",
+        ),
         Field("x_range", "vec2", "the photon's band, spectral coordinate"),
         Field("xi_half", "float", "half of the band in xi (small: 1 where the band was cut, else 0)"),
         Field("inverse_sigma_xi", "float", "1 / (sqrt(2) standard deviations along, in xi)"),
@@ -141,7 +149,11 @@ def splat_defines(features: SplatFeatures) -> dict[str, int]:
 def footprint_defines(features: SplatFeatures) -> dict[str, int]:
     """Defines of footprint.comp."""
     switches = {"LOCAL_GAIN": features.local_gain, "REINDEXED": features.reindexed}
-    return splat_defines(features) | {"GROUPS": features.spectral_groups} | {name: 1 for name, on in switches.items() if on}
+    return (
+        splat_defines(features)
+        | {"GROUPS": features.spectral_groups}
+        | {name: 1 for name, on in switches.items() if on}
+    )
 
 
 class Footprints:
@@ -193,11 +205,36 @@ class Footprints:
             scale, x_reference = reindex.reindexing.scale, reindex.reindexing.y_reference
             offset = reindex.reindexing.y(variables.base[0])
             reindex.bind()
-        values[0] = (first, count, tables.classes, tables.bands, variables.samples, tables.rows, smoothing, extent_limit, variables.traced_row, x_reference, stride, 0, scale, offset, (0.0, 0.0))
+        values[0] = (
+            first,
+            count,
+            tables.classes,
+            tables.bands,
+            variables.samples,
+            tables.rows,
+            smoothing,
+            extent_limit,
+            variables.traced_row,
+            x_reference,
+            stride,
+            0,
+            scale,
+            offset,
+            (0.0, 0.0),
+        )
         self._parameters.write(values.tobytes())
         self._parameters.bind_to_uniform_block(0)
         for binding, buffer in enumerate(
-            (photons, self.splats, atlas.placements, receivers, variables.buffer, tables.band_buffer, self._unusual, self.commands)
+            (
+                photons,
+                self.splats,
+                atlas.placements,
+                receivers,
+                variables.buffer,
+                tables.band_buffer,
+                self._unusual,
+                self.commands,
+            )
         ):
             buffer.bind_to_storage_buffer(binding)
         if gains is not None:
@@ -214,7 +251,9 @@ class Footprints:
     def counts(self) -> dict[str, float]:
         """Since the last reset: `outside_map_w` (flux of photons whose centre no window holds, W),
         `footprints_dropped` (number of photons), `dropped_w` (their flux, W)."""
-        outside, dropped_w = np.frombuffer(self._unusual.read(), np.float32).reshape(-1, 2).sum(axis=0, dtype=np.float64)
+        outside, dropped_w = (
+            np.frombuffer(self._unusual.read(), np.float32).reshape(-1, 2).sum(axis=0, dtype=np.float64)
+        )
         dropped = int(np.frombuffer(self.commands.read(), np.uint32)[20])
         return {"outside_map_w": float(outside), "footprints_dropped": dropped, "dropped_w": float(dropped_w)}
 
@@ -223,5 +262,13 @@ class Footprints:
         self.commands.clear()
 
     def release(self) -> None:
-        for resource in (self._program, self._list, self.lists, self._parameters, self._unusual, self.commands, self.splats):
+        for resource in (
+            self._program,
+            self._list,
+            self.lists,
+            self._parameters,
+            self._unusual,
+            self.commands,
+            self.splats,
+        ):
             shader.release(resource)

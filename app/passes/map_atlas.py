@@ -56,7 +56,9 @@ def pack(sizes: Sequence[tuple[int, int]], max_side: int = MAX_SIDE) -> tuple[li
         if size[0] <= max_side and size[1] <= max_side and (best is None or size[0] * size[1] < best[0]):
             best = (size[0] * size[1], tiles, size)
     if best is None:
-        raise UserError(f"the caustic maps need {area / 1e6:.1f} M texels and do not fit a texture of {max_side}²; ask for a smaller picture or map")
+        raise UserError(
+            f"the caustic maps need {area / 1e6:.1f} M texels and do not fit a texture of {max_side}²; ask for a smaller picture or map"
+        )
     return best[1], best[2]
 
 
@@ -75,7 +77,9 @@ def _shelves(sizes: Sequence[tuple[int, int]], limit: int) -> tuple[list[Tile], 
     return tiles, (widest, y + shelf + GUARD)
 
 
-def placement_rows(tile: Tile, world_to_texel: np.ndarray, texel_area: np.ndarray | float, rects: np.ndarray | None = None) -> np.ndarray:
+def placement_rows(
+    tile: Tile, world_to_texel: np.ndarray, texel_area: np.ndarray | float, rects: np.ndarray | None = None
+) -> np.ndarray:
     """Chart placements, one a triangle: `world_to_texel` (n, 2, 4) or (2, 4) maps GPU space to the tile's own texels.
 
     `rects` (n, 4): the part of the tile each may draw to, in its own texels; None is all of it.
@@ -106,7 +110,9 @@ class MapAtlas:
         self.ctx = ctx
         self.size = size
         self.targets = targets
-        self.placements = ctx.buffer(np.ascontiguousarray(placements)) if len(placements) else ctx.buffer(reserve=PLACEMENT.stride)
+        self.placements = (
+            ctx.buffer(np.ascontiguousarray(placements)) if len(placements) else ctx.buffer(reserve=PLACEMENT.stride)
+        )
         self.scratch_textures = [self._texture() for _ in range(targets)]
         self.total_textures = [self._texture() for _ in range(targets)]
         self.framebuffer = ctx.framebuffer(self.scratch_textures)

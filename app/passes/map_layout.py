@@ -70,7 +70,8 @@ class PlaneFrame:
 
 @dataclass(frozen=True)
 class MapLayout:
-    """Everything the atlas and the lookups need; `tiles[receiver]` lists each window's finest texels, fine window first."""
+    """Everything the atlas and the lookups need; `tiles[receiver]` lists each window's finest texels, fine window
+    first."""
 
     size: tuple[int, int]
     placements: np.ndarray
@@ -116,12 +117,20 @@ def layout_maps(
         if is_flat(item):
             frame = plane_frame(points)
             extent = _extent(frame.project(points))
-            windows = _flat_windows(scene.camera, buffers, frame, extent, landed, None if map_receiver is not None else picture)
+            windows = _flat_windows(
+                scene.camera, buffers, frame, extent, landed, None if map_receiver is not None else picture
+            )
             if receiver == map_receiver:
-                windows = [_with_aspect(windows[-1] if landed is None else _extent_of_light(frame, extent, landed), picture)]
+                windows = [
+                    _with_aspect(windows[-1] if landed is None else _extent_of_light(frame, extent, landed), picture)
+                ]
             for level, window in enumerate(windows):
                 largest = tile_max[1] if level else tile_max[0]
-                size = picture if receiver == map_receiver else _tile_size(scene.camera, buffers, frame, window, picture, largest)
+                size = (
+                    picture
+                    if receiver == map_receiver
+                    else _tile_size(scene.camera, buffers, frame, window, picture, largest)
+                )
                 sizes += [(-(-size[0] // step), -(-size[1] // step)) for step in LEVEL_STEPS]
             plans.append((receiver, frame, windows, None))
         else:
@@ -136,7 +145,14 @@ def layout_maps(
     return _place(scene, buffers, plans, tiles, size, reflectance_class)
 
 
-def _place(scene: Scene, buffers: SceneBuffers, plans, tiles: list[Tile], size: tuple[int, int], reflectance_class: dict[int, int]) -> MapLayout:
+def _place(
+    scene: Scene,
+    buffers: SceneBuffers,
+    plans,
+    tiles: list[Tile],
+    size: tuple[int, int],
+    reflectance_class: dict[int, int],
+) -> MapLayout:
     placements: list[np.ndarray] = []
     receivers = RECEIVER.zeros(len(plans))
     tile_of: dict[int, list[Tile]] = {}
@@ -164,7 +180,10 @@ def _place(scene: Scene, buffers: SceneBuffers, plans, tiles: list[Tile], size: 
                     # Wider texels are exactly `step` of the finest, also where those do not fill the last one.
                     texels = np.array([of_window[0].width, of_window[0].height]) / step
                     scale = texels / window.size
-                    rows = np.concatenate([frame.axes, (-(frame.axes @ frame.origin) - window.low)[:, None]], axis=1) * scale[:, None]
+                    rows = (
+                        np.concatenate([frame.axes, (-(frame.axes @ frame.origin) - window.low)[:, None]], axis=1)
+                        * scale[:, None]
+                    )
                     placed = placement_rows(tile, rows, float(np.prod(window.size / texels)) / buffers.space.scale**2)
                     first = count + level * len(LEVEL_STEPS)
                     placed["next"] = first + len(LEVEL_STEPS) if level + 1 < len(windows) else NONE
@@ -181,7 +200,15 @@ def _place(scene: Scene, buffers: SceneBuffers, plans, tiles: list[Tile], size: 
             placements.append(placement_rows(own[0], rows, atlas.texel_area, atlas.triangle_rects))
             count += len(atlas.rows)
             charts[receiver] = atlas
-    return MapLayout(size, np.concatenate(placements) if placements else PLACEMENT.zeros(1), receivers, tile_of, {r: w for r, _, w, _ in plans}, charts, tuple(folds))
+    return MapLayout(
+        size,
+        np.concatenate(placements) if placements else PLACEMENT.zeros(1),
+        receivers,
+        tile_of,
+        {r: w for r, _, w, _ in plans},
+        charts,
+        tuple(folds),
+    )
 
 
 def _extent(points: np.ndarray) -> Window:
@@ -223,7 +250,12 @@ def _quantile_box(points: np.ndarray, weights: np.ndarray, share: float) -> Wind
 
 
 def _flat_windows(
-    camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, extent: Window, landed: Landings | None, picture: tuple[int, int] | None
+    camera: Camera,
+    buffers: SceneBuffers,
+    frame: PlaneFrame,
+    extent: Window,
+    landed: Landings | None,
+    picture: tuple[int, int] | None,
 ) -> list[Window]:
     """Fine (where it pays) and coarse window, finest first."""
     if landed is None or len(landed.positions) == 0:

@@ -38,12 +38,14 @@ class Picker:
         self._paths = paths or RayPaths(context, scene)
 
     def pick(self, camera: Camera, width: int, height: int, x: float, y: float) -> PickHit | None:
-        """First surface at (x, y), 0..1 from the top left of a picture of width × height; glass is not looked through."""
+        """First surface at (x, y), 0..1 from the top left of a picture of width × height; glass is not looked
+        through."""
         path = self._path(camera, width / height, x, y)
         return None if path.first_object is None else self._hit(path, 1, path.first_object, path.first_normal)
 
     def pick_receiver(self, camera: Camera, width: int, height: int, x: float, y: float) -> PickHit | None:
-        """The diffuse surface that is seen at (x, y), through glass (refracted at the d line) and in mirrors, as the camera draws it."""
+        """The diffuse surface that is seen at (x, y), through glass (refracted at the d line) and in mirrors, as the
+        camera draws it."""
         path = self._path(camera, width / height, x, y)
         if path.last_object is None or not isinstance(self._scene.objects[path.last_object].material, Diffuse):
             return None

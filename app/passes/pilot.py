@@ -23,7 +23,8 @@ PHOTONS = 4096
 PLACES = (0.02, 0.25, 0.75, 0.98)
 """Spectral coordinates traced one by one."""
 MAX_DEPTH = 12
-"""Specular events of a pilot photon: what comes after them is too faint to fit anything to, unless most light is still on its way then."""
+"""Specular events of a pilot photon: what comes after them is too faint to fit anything to, unless most light is still
+on its way then."""
 RIM = ((1.0, 0.5), (0.5, 1.0))
 """Places on an extended light, its middle being (0.5, 0.5)."""
 BAND_TOLERANCE = 0.25
@@ -59,12 +60,15 @@ def has_extent(light: Light) -> bool:
 def pilot_steps(
     trace: TracePass, scene: Scene, light: int, domain: EmissionDomain, power_w: float, spectral: bool
 ) -> Generator[None, None, Pilot]:
-    """Trace the pilots of one light, pausing after every event of the rays; `power_w`: its whole power per unit weight."""
+    """Trace the pilots of one light, pausing after every event of the rays; `power_w`: its whole power per unit
+    weight."""
     count = min(max(1, int(PHOTONS / domain.active_share)), MAX_POINTS)
     # In as many slices as the batch asks for: what a pilot finds must not depend on it.
     slices = -(-count // trace.batch)
 
-    def traced(band: Band, depth: int, place: tuple[float, float] = (0.5, 0.5)) -> Generator[None, None, tuple[np.ndarray, FluxTally]]:
+    def traced(
+        band: Band, depth: int, place: tuple[float, float] = (0.5, 0.5)
+    ) -> Generator[None, None, tuple[np.ndarray, FluxTally]]:
         raw, tally = b"", FluxTally()
         for first in range(slices):
             points = len(range(first, count, slices))

@@ -39,7 +39,9 @@ class Channels:
 
     def of_reflectance(self, rgb: tuple[float, float, float]) -> np.ndarray:
         """Factors (4·targets,) of a surface with linear Rec.709 reflectance `rgb`."""
-        return self._padded(np.asarray(rgb, float) if self.edges_nm is None else self._mean(rgb_basis() @ np.asarray(rgb, float)))
+        return self._padded(
+            np.asarray(rgb, float) if self.edges_nm is None else self._mean(rgb_basis() @ np.asarray(rgb, float))
+        )
 
     def to_rgb709(self, values: np.ndarray) -> np.ndarray:
         """(…, ≥ count) channel sums → linear Rec.709 float32 (…, 3), negatives kept."""

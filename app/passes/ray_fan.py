@@ -52,11 +52,14 @@ class RayFan:
         self._points = [_world_points(item) for item in self._scene.objects]
         self._low, self._high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
 
-    def trace(self, light_index: int | None, object_index: int, rays: int, wavelengths_nm: Sequence[float]) -> list[RayLine]:
+    def trace(
+        self, light_index: int | None, object_index: int, rays: int, wavelengths_nm: Sequence[float]
+    ) -> list[RayLine]:
         """`rays` rays from a light to an object, each at every wavelength: rays × wavelengths paths.
 
         A path ends on the first surface that is neither glass nor mirror, after 24 segments, or a scene's radius beyond
-        the last surface. `light_index` None takes the light that shines on the object most. Empty where the light's beam passes the object by.
+        the last surface. `light_index` None takes the light that shines on the object most. Empty where the light's
+        beam passes the object by.
         """
         light_index = self.brightest_light(object_index) if light_index is None else light_index
         if light_index is None or rays < 1 or not len(wavelengths_nm):
@@ -71,7 +74,8 @@ class RayFan:
         return [RayLine(float(w), path.points) for w, path in zip(np.tile(nm, len(starts[0])), paths, strict=True)]
 
     def brightest_light(self, object_index: int) -> int | None:
-        """The light with the largest illuminance at an object among those whose beam meets it; None where there is none."""
+        """The light with the largest illuminance at an object among those whose beam meets it; None where there is
+        none."""
         centre = self._points[object_index].mean(axis=0)
         best: tuple[float, int] | None = None
         for index, light in enumerate(self._scene.lights):
@@ -115,8 +119,11 @@ class RayFan:
         way = centre - position
         return _Beam(position, way / max(float(np.linalg.norm(way)), 1e-12), False, None)
 
-    def _fan(self, light: Light, beam: _Beam, object_index: int, rays: int, across: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray] | None:
-        """Starts and directions (rays, 3); None where the beam misses the object. `across`: direction of the spread, found where None."""
+    def _fan(
+        self, light: Light, beam: _Beam, object_index: int, rays: int, across: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Starts and directions (rays, 3); None where the beam misses the object. `across`: direction of the spread,
+        found where None."""
         middle = self._middle(beam, self._points[object_index])
         if middle is None:
             return None
@@ -134,7 +141,8 @@ class RayFan:
         return (np.broadcast_to(beam.origin, directions[kept].shape).copy(), directions[kept]) if kept.any() else None
 
     def _seen(self, beam: _Beam, points: np.ndarray) -> np.ndarray:
-        """Points as the light sees them: offsets across its axis (n, 3), lengths for parallel light, tangents for a point."""
+        """Points as the light sees them: offsets across its axis (n, 3), lengths for parallel light, tangents for a
+        point."""
         relative = points - beam.origin
         along = relative @ beam.axis
         across = relative - along[:, None] * beam.axis
@@ -149,11 +157,17 @@ class RayFan:
     def _middle(self, beam: _Beam, points: np.ndarray) -> np.ndarray | None:
         """Middle of what the beam and the object share, as an offset; None where they share nothing."""
         seen = self._seen(beam, points)
-        if not len(seen) or (beam.is_parallel and beam.aperture is not None and not ((points - beam.origin) @ beam.axis > 0.0).any()):
+        if not len(seen) or (
+            beam.is_parallel and beam.aperture is not None and not ((points - beam.origin) @ beam.axis > 0.0).any()
+        ):
             return None
         first, second = orthonormal_frame(beam.axis) if beam.aperture is None else (_unit(v) for v in beam.aperture)
         middle = np.zeros(3)
-        for side, half in zip((first, second), (np.inf, np.inf) if beam.aperture is None else np.linalg.norm(beam.aperture, axis=1), strict=True):
+        for side, half in zip(
+            (first, second),
+            (np.inf, np.inf) if beam.aperture is None else np.linalg.norm(beam.aperture, axis=1),
+            strict=True,
+        ):
             low, high = max(float((seen @ side).min()), -half), min(float((seen @ side).max()), half)
             if low >= high:
                 return None
@@ -161,8 +175,11 @@ class RayFan:
         return middle
 
     def _plane_of_bending(self, beam: _Beam, middle: np.ndarray) -> np.ndarray:
-        """Unit vector across the beam along which the object deviates its middle ray; the level one where it goes straight on."""
-        origin, direction = (beam.origin + middle, beam.axis) if beam.is_parallel else (beam.origin, _unit(beam.axis + middle))
+        """Unit vector across the beam along which the object deviates its middle ray; the level one where it goes
+        straight on."""
+        origin, direction = (
+            (beam.origin + middle, beam.axis) if beam.is_parallel else (beam.origin, _unit(beam.axis + middle))
+        )
         path = self._follow(origin[None], direction[None], np.array([LINE_D_NM]))[0]
         bend = np.zeros(3)
         if len(path.points) > 2:

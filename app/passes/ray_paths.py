@@ -78,7 +78,12 @@ class RayPaths:
         self._context = context
         defines = scene.features.defines() | bindings.SCENE_DEFINES | scene.defines
         # Without glass no slopes are asked for, and with it only indices are.
-        defines |= {"BIND_STARTS": _BIND_STARTS, "BIND_PATHS": _BIND_PATHS, "BIND_POINTS": _BIND_POINTS, "MAX_POINTS": _MAX_POINTS}
+        defines |= {
+            "BIND_STARTS": _BIND_STARTS,
+            "BIND_PATHS": _BIND_PATHS,
+            "BIND_POINTS": _BIND_POINTS,
+            "MAX_POINTS": _MAX_POINTS,
+        }
         structs = (*SCENE_STRUCTS, PATH_PARAMETERS, PATH_START, PATH_END)
         self._program = shader.compute(context.ctx, "camera/ray_paths.comp", defines, structs)
         self._parameters = context.ctx.buffer(reserve=PATH_PARAMETERS.stride)
@@ -97,7 +102,9 @@ class RayPaths:
         self._paths = ctx.buffer(reserve=self._room * PATH_END.stride)
         self._points = ctx.buffer(reserve=self._room * _MAX_POINTS * 16)
 
-    def trace(self, origins: np.ndarray, directions: np.ndarray, wavelengths_nm: np.ndarray, escape: float) -> list[Path]:
+    def trace(
+        self, origins: np.ndarray, directions: np.ndarray, wavelengths_nm: np.ndarray, escape: float
+    ) -> list[Path]:
         """Follow rays from `origins` along unit `directions` (n, 3), world, each at a wavelength (n,).
 
         All start in the medium that the first one starts in. A path that leaves the scene ends `escape` scene units
@@ -127,19 +134,25 @@ class RayPaths:
 
     def _read(self, count: int, origins: np.ndarray) -> list[Path]:
         ends = np.frombuffer(self._paths.read(count * PATH_END.stride), PATH_END.dtype)
-        points = np.frombuffer(self._points.read(count * _MAX_POINTS * 16), np.float32).reshape(count, _MAX_POINTS, 4)[..., :3]
+        points = np.frombuffer(self._points.read(count * _MAX_POINTS * 16), np.float32).reshape(count, _MAX_POINTS, 4)[
+            ..., :3
+        ]
         world = self.scene.space.to_world(points.astype(float))
         world[:, 0] = origins
         return [
             Path(
-                world[i, : int(end["points"])], _object(end["first_object"]), end["first_normal"].astype(float),
-                _object(end["last_object"]), end["last_normal"].astype(float),
+                world[i, : int(end["points"])],
+                _object(end["first_object"]),
+                end["first_normal"].astype(float),
+                _object(end["last_object"]),
+                end["last_normal"].astype(float),
             )
             for i, end in enumerate(ends)
         ]
 
     def _media_at(self, point: np.ndarray) -> tuple[int, int]:
-        """Bits of the medium stack and the solid outside of it that hold a world point; the last answer is remembered."""
+        """Bits of the medium stack and the solid outside of it that hold a world point; the last answer is
+        remembered."""
         key = point.tobytes()
         if self._inside is None or self._inside[0] != key:
             mask, alone = 0, NONE

@@ -25,7 +25,9 @@ class SamplePicture:
     def __init__(self, context: Context, lattice: tuple[int, int] = LATTICE) -> None:
         self._ctx = context.ctx
         self._lattice = lattice
-        self._program = shader.compute(self._ctx, "display/sample_picture.comp", {"GROUP": _GROUP, "BIND_PIXELS": _BIND_PIXELS})
+        self._program = shader.compute(
+            self._ctx, "display/sample_picture.comp", {"GROUP": _GROUP, "BIND_PIXELS": _BIND_PIXELS}
+        )
         self._pixels = self._ctx.buffer(reserve=16 * lattice[0] * lattice[1])
 
     def run(self, picture: moderngl.Texture) -> np.ndarray:

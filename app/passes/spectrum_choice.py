@@ -43,7 +43,8 @@ class Spectrum:
         return "of the whole spectrum" if self.bands == 1 else f"in {self.bands} bands"
 
     def samples(self, budget: int) -> int:
-        """Samples a pixel that a budget of so many of one band buys, whole turns of the bands: as many or a few more, and more of single wavelengths."""
+        """Samples a pixel that a budget of so many of one band buys, whole turns of the bands: as many or a few more,
+        and more of single wavelengths."""
         return SINGLE_SPEED * budget if self.single else -(-budget // self.bands) * self.bands
 
 
@@ -89,8 +90,8 @@ def difference(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def sure_bias(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> float:
-    """Squared relative difference of what two ways of sampling expect, from two independent pictures (H, W, C) each; chance cancels in the
-    product of both differences. Less what it may be by accident, and never below 0."""
+    """Squared relative difference of what two ways of sampling expect, from two independent pictures (H, W, C) each;
+    chance cancels in the product of both differences. Less what it may be by accident, and never below 0."""
     product = np.clip(_relative(a[0] - b[0], a[1] - b[1], (*a, *b)), -_MOST, _MOST)
     error = product.std() / np.sqrt(product.size)
     return max(float(product.mean() - _SURE * error), 0.0)

@@ -1,8 +1,8 @@
 """Draws splat records into the caustic maps: additive blending, a program a class, fixed order.
 
-Small splats, swept ones and those of a cut band have a program each because a software renderer runs both sides of a branch. A group of
-photons is made into splats and drawn before the next, so the splat records of a few ten thousand photons are all
-that exists at a time, and the order of all sums is the photons' own order.
+Small splats, swept ones and those of a cut band have a program each because a software renderer runs both sides of a
+branch. A group of photons is made into splats and drawn before the next, so the splat records of a few ten thousand
+photons are all that exists at a time, and the order of all sums is the photons' own order.
 """
 
 from __future__ import annotations
@@ -74,7 +74,13 @@ class Splatter:
             classes[3] = ("light/splat_cut.frag", {"CUT": 1, "CLIPPED": 1})
         self._draws: dict[int, moderngl.VertexArray] = {}
         for kind, (fragment, chosen) in sorted(classes.items()):
-            program = shader.program(ctx, "light/splat.vert", fragment, defines | chosen | {"FIRST_OF_KIND": f"{(kind - 1) * self._footprints.capacity}u"}, (SPLAT,))
+            program = shader.program(
+                ctx,
+                "light/splat.vert",
+                fragment,
+                defines | chosen | {"FIRST_OF_KIND": f"{(kind - 1) * self._footprints.capacity}u"},
+                (SPLAT,),
+            )
             corners_shared = VERTICES[kind - 1] == 6
             self._draws[kind] = ctx.vertex_array(program, [], index_buffer=self._indices if corners_shared else None)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
@@ -95,9 +101,9 @@ class Splatter:
     ) -> None:
         """Deposit the `count` photons start, start + stride, … of `photons` (photon_record(groups)).
 
-        `variables`: each group's variable at equally spaced x; `receivers`: RECEIVER records; `smoothing`: standard deviation
-        of a footprint in lattice spacings; `gains`: the brush's, `reindex`: which
-        wavelengths the paths carry, where the features have them.
+        `variables`: each group's variable at equally spaced x; `receivers`: RECEIVER records; `smoothing`: standard
+        deviation of a footprint in lattice spacings; `gains`: the brush's, `reindex`: which wavelengths the paths
+        carry, where the features have them.
         """
         chunk = int(np.clip(atlas.size[0] * atlas.size[1] // FLUSH_SHARE, SMALLEST_CHUNK, CHUNK))
         group = min(GROUP, chunk)
@@ -105,7 +111,20 @@ class Splatter:
             part = min(group, count - done)
             first = start + done * stride
             self._ctx.memory_barrier()
-            self._footprints.run(photons, first, part, variables, tables, atlas, receivers, smoothing, EXTENT_LIMIT, gains, stride, reindex)
+            self._footprints.run(
+                photons,
+                first,
+                part,
+                variables,
+                tables,
+                atlas,
+                receivers,
+                smoothing,
+                EXTENT_LIMIT,
+                gains,
+                stride,
+                reindex,
+            )
             self._ctx.memory_barrier()
             self.draw(tables, atlas)
             atlas.pending += part
@@ -113,7 +132,9 @@ class Splatter:
                 atlas.flush()
         error = self._ctx.error
         if error != "GL_NO_ERROR":
-            raise RuntimeError(f"{error} while splatting {count} photons into a {atlas.size[0]} x {atlas.size[1]} atlas")
+            raise RuntimeError(
+                f"{error} while splatting {count} photons into a {atlas.size[0]} x {atlas.size[1]} atlas"
+            )
 
     def draw(self, tables: SplatTables, atlas: MapAtlas) -> None:
         """Add the splats of the last group of photons to the atlas's scratch textures."""
@@ -127,7 +148,13 @@ class Splatter:
         self._parameters.write(values.tobytes())
         self._parameters.bind_to_uniform_block(0)
         curve = tables.density_buffer if self._features.point_spectrum else tables.cumulative_buffer
-        for binding, buffer in ((1, self._footprints.splats), (5, tables.band_buffer), (6, tables.integral_buffer), (7, curve), (8, self._footprints.lists)):
+        for binding, buffer in (
+            (1, self._footprints.splats),
+            (5, tables.band_buffer),
+            (6, tables.integral_buffer),
+            (7, curve),
+            (8, self._footprints.lists),
+        ):
             buffer.bind_to_storage_buffer(binding)
         tables.texture.use(0)
         atlas.framebuffer.use()
@@ -141,7 +168,8 @@ class Splatter:
 
     def counts(self) -> dict[str, float]:
         """Since the last reset: `outside_map_w` (flux of photons whose centre no map holds, W) and
-        `footprints_dropped` (photons splatted as one texel for want of a usable footprint; `dropped_w`: their flux, W)."""
+        `footprints_dropped` (photons splatted as one texel for want of a usable footprint; `dropped_w`: their flux,
+        W)."""
         return self._footprints.counts()
 
     def reset_counts(self) -> None:

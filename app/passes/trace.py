@@ -107,7 +107,15 @@ class LatticeSlice:
 class TracePass:
     """Owns the programs and queue buffers of emission and tracing; `photons` is the output buffer."""
 
-    def __init__(self, context: Context, features: Features, scene: SceneBuffers, batch: int, max_depth: int, split_threshold: float = 0.3) -> None:
+    def __init__(
+        self,
+        context: Context,
+        features: Features,
+        scene: SceneBuffers,
+        batch: int,
+        max_depth: int,
+        split_threshold: float = 0.3,
+    ) -> None:
         self.context = context
         self.scene = scene
         self.batch = batch
@@ -119,16 +127,23 @@ class TracePass:
         self.photon = records.photon_record(features.spectral_groups)
         ctx = context.ctx
         structs = (*SCENE_STRUCTS, self._ray, self.photon, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE)
-        copies = " ".join(f"photon.dposition_dvar{g} = ray.dposition[SPATIAL + {g}];" for g in range(features.spectral_groups))
-        defines = features.defines() | bindings.LIGHT_HALF_DEFINES | scene.defines | {
-            "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",
-            "FLAG_BAND_FINAL": f"{records.FLAG_BAND_FINAL}u",
-            "FLAG_INSIDE": f"{records.FLAG_INSIDE}u",
-            "MASK_SIZE": records.MASK_SIZE,
-            "CATEGORY_COUNT": f"{len(records.CATEGORIES)}u",
-            "FALLBACK_COUNT": f"{len(records.FALLBACKS)}u",
-            "SPECTRAL_COPY": copies,
-        }
+        copies = " ".join(
+            f"photon.dposition_dvar{g} = ray.dposition[SPATIAL + {g}];" for g in range(features.spectral_groups)
+        )
+        defines = (
+            features.defines()
+            | bindings.LIGHT_HALF_DEFINES
+            | scene.defines
+            | {
+                "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",
+                "FLAG_BAND_FINAL": f"{records.FLAG_BAND_FINAL}u",
+                "FLAG_INSIDE": f"{records.FLAG_INSIDE}u",
+                "MASK_SIZE": records.MASK_SIZE,
+                "CATEGORY_COUNT": f"{len(records.CATEGORIES)}u",
+                "FALLBACK_COUNT": f"{len(records.FALLBACKS)}u",
+                "SPECTRAL_COPY": copies,
+            }
+        )
         if features.tree and context.is_software:
             defines["LOOPS_MAY_END"] = 1
         self._features = features
@@ -137,7 +152,10 @@ class TracePass:
         self._emit: dict[str, moderngl.ComputeShader] = {}
         self._orders: dict[tuple[int, int, int], moderngl.Buffer] = {}
         self._trace = shader.compute(ctx, "light/trace.comp", defines, (*structs, records.TRACE_PARAMETERS))
-        queue = {name: shader.compute(ctx, f"queue_{name}.comp", defines, structs) for name in ("count", "scan", "scatter", "gather", "advance")}
+        queue = {
+            name: shader.compute(ctx, f"queue_{name}.comp", defines, structs)
+            for name in ("count", "scan", "scatter", "gather", "advance")
+        }
         self._count, self._scan, self._scatter, self._gather, self._advance = queue.values()
 
         ray_capacity = RAY_ROOM * batch
@@ -159,16 +177,32 @@ class TracePass:
     def release(self) -> None:
         """Free every buffer and program."""
         for owned in (
-            *self._rays, self._outcomes, self._slots, self._indices, self._counts, self._state, self.photons,
-            self._emit_parameters, self._trace_parameters, self._trace, self._count, self._scan, self._scatter,
-            self._gather, self._advance, *self._emit.values(), *self._orders.values(),
+            *self._rays,
+            self._outcomes,
+            self._slots,
+            self._indices,
+            self._counts,
+            self._state,
+            self.photons,
+            self._emit_parameters,
+            self._trace_parameters,
+            self._trace,
+            self._count,
+            self._scan,
+            self._scatter,
+            self._gather,
+            self._advance,
+            *self._emit.values(),
+            *self._orders.values(),
         ):
             shader.release(owned)
 
     @property
     def bytes(self) -> int:
         """GPU memory held."""
-        return sum(b.size for b in (*self._rays, self._outcomes, self._slots, self._indices, self._counts, self.photons))
+        return sum(
+            b.size for b in (*self._rays, self._outcomes, self._slots, self._indices, self._counts, self.photons)
+        )
 
     def run(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int | None = None) -> Batch:
         """Trace `piece.count` ≤ batch lattice points; their photons replace the buffer's content.
@@ -181,7 +215,9 @@ class TracePass:
             except StopIteration as done:
                 return done.value
 
-    def steps(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int | None = None) -> Generator[None, None, Batch]:
+    def steps(
+        self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int | None = None
+    ) -> Generator[None, None, Batch]:
         """`run`, pausing after every event of all rays: whoever draws meanwhile may bind what it likes."""
         max_depth = self.max_depth if max_depth is None else min(max_depth, self.max_depth)
         if piece.count > self.batch:
@@ -227,7 +263,12 @@ class TracePass:
         self._state.write(state.tobytes())
         self._counts.write(self._counts_zero)
         p = records.EMIT_PARAMETERS.zeros(1)
-        p["origin"], p["axis"], p["tangent"], p["bitangent"] = domain.origin, domain.axis, domain.tangent, domain.bitangent
+        p["origin"], p["axis"], p["tangent"], p["bitangent"] = (
+            domain.origin,
+            domain.axis,
+            domain.tangent,
+            domain.bitangent,
+        )
         p["weight"] = domain.measure * piece.weight / (piece.lattice_count * piece.light_points)
         p["spacing"] = spacing = domain.spacing(piece.lattice_count)
         p["mean_spacing"] = np.sqrt(np.prod(spacing))
@@ -241,7 +282,12 @@ class TracePass:
         p["bands"][0, : len(piece.bands)] = [(b.x_lo, b.x_hi, b.x_anchor, b.power_w) for b in piece.bands]
         p["band_count"], p["light_points"] = len(piece.bands), piece.light_points
         p["shift"], p["shift_light"], p["shift_spectral"] = piece.shift, piece.shift_light, piece.shift_spectral
-        p["seed"], p["first"], p["count"], p["lattice_count"] = piece.seed, piece.first, piece.count, piece.lattice_count
+        p["seed"], p["first"], p["count"], p["lattice_count"] = (
+            piece.seed,
+            piece.first,
+            piece.count,
+            piece.lattice_count,
+        )
         p["light_place"] = piece.light_place
         p["light"], p["stride"] = piece.light, piece.stride
         p["mask"] = np.packbits(domain.mask.ravel(), bitorder="little").view("<u4")
@@ -268,7 +314,10 @@ class TracePass:
 
     def _list_children(self, *, first: bool, chunks: int = 0) -> None:
         ctx = self.context.ctx
-        offsets = {name: records.QUEUE_STATE.dtype.fields[name][1] for name in ("chunk_groups", "next_chunk_groups", "gather_groups")}
+        offsets = {
+            name: records.QUEUE_STATE.dtype.fields[name][1]
+            for name in ("chunk_groups", "next_chunk_groups", "gather_groups")
+        }
         ctx.memory_barrier()
         if first:
             self._count.run(-(-chunks // _GROUP))
@@ -300,7 +349,9 @@ class TracePass:
                 defines["RANDOM_WAVELENGTH"] = 1
                 if self._features.even_wavelengths:
                     defines["EVEN_WAVELENGTHS"] = 1
-            self._emit[kind] = shader.compute(self.context.ctx, "light/emit.comp", defines, (*self._structs, records.EMIT_PARAMETERS))
+            self._emit[kind] = shader.compute(
+                self.context.ctx, "light/emit.comp", defines, (*self._structs, records.EMIT_PARAMETERS)
+            )
         return self._emit[kind]
 
     def _read_state(self) -> np.void:
@@ -318,4 +369,3 @@ class TracePass:
         tally.fallbacks = dict(zip(records.FALLBACKS, counts["fallbacks"].sum(axis=0, dtype=int).tolist(), strict=True))
         tally.fallbacks["queue_overflow"] += overflow
         return tally
-

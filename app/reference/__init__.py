@@ -1,4 +1,5 @@
-"""The float64 reference: slow, readable CPU references of what the shaders compute, and the rigs that hold shaders against them.
+"""The float64 reference: slow, readable CPU references of what the shaders compute, and the rigs that hold shaders
+against them.
 
 `optics`, `surfaces`, `tracer`, `splat`, `glasses` are plain numpy and share no code with the
 shaders or with the rest of the program. `glsl_function`, `gpu_paths`, `far_field` and

@@ -3,7 +3,8 @@
 Reflection or refraction is drawn with Fresnel's probability, so that a path's weight changes by
 absorption and mirrors only; lights are seen along the way, the environment at its end. At a diffuse surface one
 random point of every light is asked for (anything between hides it, glass too: what comes through glass is the
-caustic's), and the spectral caustic is looked up. Numbers: a scrambled Sobol sequence a part, shifted from pixel to pixel.
+caustic's), and the spectral caustic is looked up. Numbers: a scrambled Sobol sequence a part, shifted from pixel to
+pixel.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from .camera_optics import (
     camera_ray,
     choice,
     inlined,
-    stripped,
     scatter,
     sobol_next,
     sobol_start,
+    stripped,
     transmitted,
 )
 from .camera_scene import beyond, picture_at
@@ -36,7 +37,8 @@ LOST_DEPTH, LOST_NUMERIC = range(2)
 
 
 class CausticTables(NamedTuple):
-    """The spectral caustic as paths look it up: S sides of flat receivers, each a coarse window (0) and a fine one (1)."""
+    """The spectral caustic as paths look it up: S sides of flat receivers, each a coarse window (0) and a fine one
+    (1)."""
 
     side: np.ndarray
     """int32 (O, 2): S of an object's front and back, or −1."""
@@ -101,7 +103,9 @@ def _surface(scene, pictures, triangle, u, v):
     r, g, b = pictures.colour[thing, 0], pictures.colour[thing, 1], pictures.colour[thing, 2]
     if pictures.texture[thing] >= 0 and pictures.uv_row[triangle] >= 0:
         uv, w = pictures.uv[pictures.uv_row[triangle]], 1.0 - u - v
-        tr, tg, tb = picture_at(pictures, pictures.texture[thing], w * uv[0] + u * uv[2] + v * uv[4], w * uv[1] + u * uv[3] + v * uv[5])
+        tr, tg, tb = picture_at(
+            pictures, pictures.texture[thing], w * uv[0] + u * uv[2] + v * uv[4], w * uv[1] + u * uv[3] + v * uv[5]
+        )
         r, g, b = r * tr, g * tg, b * tb
     return scene.reflectance_class[thing], r, g, b
 
@@ -124,12 +128,15 @@ def _gain(scene, lights, i, triangle, side, px, py, pz, a, b, stack):
 def _added(table, i, row, red, green, blue, factor, xyz):
     """Add row i of a table of XYZ by reflectance (`Spectra.light_xyz`) to `xyz` (3,)."""
     for c in range(3):
-        xyz[c] += factor * (table[i, 2 + row, c] if row > 0 else red * table[i, 0, c] + green * table[i, 1, c] + blue * table[i, 2, c])
+        xyz[c] += factor * (
+            table[i, 2 + row, c] if row > 0 else red * table[i, 0, c] + green * table[i, 1, c] + blue * table[i, 2, c]
+        )
 
 
 @inlined
 def _diffuse(scene, lights, spectra, pictures, tables, atom, triangle, u, v, px, py, pz, side, a, b, stack, xyz):
-    """Radiance in an atom that a diffuse surface sends back from a side; without atom (−1) all wavelengths go to `xyz`."""
+    """Radiance in an atom that a diffuse surface sends back from a side; without atom (−1) all wavelengths go to
+    `xyz`."""
     row, red, green, blue = _surface(scene, pictures, triangle, u, v)
     white = atom < 0
     total = 0.0
@@ -164,7 +171,28 @@ def _wavelength(spectra, chance):
 
 
 @inlined
-def sample(scene, lights, spectra, pictures, tables, start, px, py, pz, dx, dy, dz, state, shift, noise, max_depth, tally, stack, stack_distance, xyz):
+def sample(
+    scene,
+    lights,
+    spectra,
+    pictures,
+    tables,
+    start,
+    px,
+    py,
+    pz,
+    dx,
+    dy,
+    dz,
+    state,
+    shift,
+    noise,
+    max_depth,
+    tally,
+    stack,
+    stack_distance,
+    xyz,
+):
     """Add what a camera ray sees to `xyz` (3,).
 
     Up to the first event at glass or a mirror nothing depends on a wavelength, and all are added at once;
@@ -175,7 +203,9 @@ def sample(scene, lights, spectra, pictures, tables, start, px, py, pz, dx, dy, 
     if mask != np.uint64(0) or alone != AIR:  # in glass wavelengths part at once
         atom, nm = _wavelength(spectra, _unit(state[2] ^ shift[2]))
     while True:
-        t, triangle, u, v = nearest(scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance)
+        t, triangle, u, v = nearest(
+            scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance
+        )
         far = t if triangle >= 0 else np.inf
         for i in range(lights.kind.shape[0]):
             seen = light_seen(lights, i, px, py, pz, dx, dy, dz, far)
@@ -205,7 +235,23 @@ def sample(scene, lights, spectra, pictures, tables, start, px, py, pz, dx, dy, 
             facing = dx * scene.normals[triangle, 0] + dy * scene.normals[triangle, 1] + dz * scene.normals[triangle, 2]
             a, b = _unit(state[3] ^ shift[3]), _unit(state[4] ^ shift[4])
             found += weight * _diffuse(
-                scene, lights, spectra, pictures, tables, atom, triangle, u, v, px, py, pz, 1 if facing > 0.0 else 0, a, b, stack, xyz
+                scene,
+                lights,
+                spectra,
+                pictures,
+                tables,
+                atom,
+                triangle,
+                u,
+                v,
+                px,
+                py,
+                pz,
+                1 if facing > 0.0 else 0,
+                a,
+                b,
+                stack,
+                xyz,
             )
             break
         if events >= max_depth:
@@ -226,7 +272,9 @@ def sample(scene, lights, spectra, pictures, tables, start, px, py, pz, dx, dy, 
 
 
 @stripped
-def trace_camera(scene, camera, lights, spectra, pictures, tables, start, sequence, first, count, max_depth, sums, tally, scratch):
+def trace_camera(
+    scene, camera, lights, spectra, pictures, tables, start, sequence, first, count, max_depth, sums, tally, scratch
+):
     """Add samples [first, first + count) of every pixel to `sums` (H, W, 3), XYZ of each: divide by their number."""
     stack, stack_distance, xyz = scratch.stack, scratch.stack_distance, scratch.xyz
     beginning, state, shift = scratch.beginning, scratch.state, scratch.shift
@@ -241,12 +289,32 @@ def trace_camera(scene, camera, lights, spectra, pictures, tables, start, sequen
             for i in range(first, first + count):
                 if i > first:
                     sobol_next(sequence, i, state)
-                ox, oy, oz, dx, dy, dz = camera_ray(camera, column + _unit(state[0] ^ shift[0]), row + _unit(state[1] ^ shift[1]))
+                ox, oy, oz, dx, dy, dz = camera_ray(
+                    camera, column + _unit(state[0] ^ shift[0]), row + _unit(state[1] ^ shift[1])
+                )
                 noise = _mixed(key ^ _mixed(np.uint64(i)))
                 sample(
-                    scene, lights, spectra, pictures, tables, start, ox, oy, oz, dx, dy, dz,
-                    state, shift, noise, max_depth, tally, stack, stack_distance, xyz,
-                )  # fmt: skip
+                    scene,
+                    lights,
+                    spectra,
+                    pictures,
+                    tables,
+                    start,
+                    ox,
+                    oy,
+                    oz,
+                    dx,
+                    dy,
+                    dz,
+                    state,
+                    shift,
+                    noise,
+                    max_depth,
+                    tally,
+                    stack,
+                    stack_distance,
+                    xyz,
+                )
             for c in range(3):
                 sums[row, column, c] += xyz[c]
                 xyz[c] = 0.0
@@ -254,9 +322,11 @@ def trace_camera(scene, camera, lights, spectra, pictures, tables, start, sequen
 
 @stripped
 def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, points, which, scratch):
-    """Where `count` camera paths spread over the picture end on sides of receivers, for fitting windows: the number found.
+    """Where `count` camera paths spread over the picture end on sides of receivers, for fitting windows: the number
+    found.
 
-    `side` (O, 2) as in `CausticTables`; fills `points` (count, 4): place, and length of the way there; `which` (count, 2):
+    `side` (O, 2) as in `CausticTables`; fills `points` (count, 4): place, and length of the way there; `which` (count,
+    2):
     side, events on the way.
     """
     stack, stack_distance, state, shift = scratch.stack, scratch.stack_distance, scratch.state, scratch.shift
@@ -269,14 +339,18 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, poin
         noise = _mixed(sequence.key ^ _mixed(np.uint64(i)))
         last, last_object, within, mask, alone, events, way = -1, -1, False, start.mask, start.alone, 0, 0.0
         while events <= max_depth:
-            t, triangle, u, v = nearest(scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance)
+            t, triangle, u, v = nearest(
+                scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance
+            )
             if triangle < 0:
                 break
             px, py, pz, way = px + t * dx, py + t * dy, pz + t * dz, way + t
             thing = scene.owner[triangle]
             kind = scene.kind[thing]
             if kind == DIFFUSE:
-                facing = dx * scene.normals[triangle, 0] + dy * scene.normals[triangle, 1] + dz * scene.normals[triangle, 2]
+                facing = (
+                    dx * scene.normals[triangle, 0] + dy * scene.normals[triangle, 1] + dz * scene.normals[triangle, 2]
+                )
                 at = side[thing, 1 if facing > 0.0 else 0]
                 if at >= 0:
                     points[found, 0], points[found, 1], points[found, 2], points[found, 3] = px, py, pz, way

@@ -1,4 +1,5 @@
-"""Lights as the camera's reference meets them, compiled in float64: from a surface point, and where a ray runs into one.
+"""Lights as the camera's reference meets them, compiled in float64: from a surface point, and where a ray runs into
+one.
 
 Written from the scene's own quantities (`model.scene.Light`); a light's disc or rectangle is no
 geometry: rays pass through it and gain its radiance.
@@ -44,9 +45,15 @@ def camera_lights(lights: Sequence[Light], centre: np.ndarray) -> CameraLights:
     """The arrays for `lights`, about the world position `centre` (3,)."""
     count = len(lights)
     packed = CameraLights(
-        np.zeros(count, np.int32), np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3)),
-        np.zeros(count, np.bool_), np.zeros(count), np.full((count, 2), 4.0),
-    )  # fmt: skip
+        np.zeros(count, np.int32),
+        np.zeros((count, 3)),
+        np.zeros((count, 3)),
+        np.zeros((count, 3)),
+        np.zeros((count, 3)),
+        np.zeros(count, np.bool_),
+        np.zeros(count),
+        np.full((count, 2), 4.0),
+    )
     for i, light in enumerate(lights):
         axis = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
         frame = frame_of(axis, light.tangent)

@@ -35,7 +35,8 @@ _LEAN = {"nogil": True, "error_model": "numpy", "_nrt": False}
 
 
 def stripped(function: Callable) -> Callable:
-    """`compiled` without counting references: a scene is some sixty arrays, and counting them took 60 % of a path's time.
+    """`compiled` without counting references: a scene is some sixty arrays, and counting them took 60 % of a path's
+    time.
 
     Nothing may be allocated inside: scratch comes from the caller.
     """
@@ -63,7 +64,8 @@ class Scratch(NamedTuple):
     beginning: np.ndarray
     state: np.ndarray
     shift: np.ndarray
-    """uint32 (DIMENSIONS,): a first point of the sequence, the present one, and what is added to it (all zero at first)."""
+    """uint32 (DIMENSIONS,): a first point of the sequence, the present one, and what is added to it (all zero at
+    first)."""
     xyz: np.ndarray
     """float64 (3,)."""
 
@@ -75,7 +77,8 @@ def scratch() -> Scratch:
 
 
 FIRST_CHOICE = 5
-"""Dimension of the sequence that the first Fresnel choice takes; below it are place, wavelength and place on a light."""
+"""Dimension of the sequence that the first Fresnel choice takes; below it are place, wavelength and place on a
+light."""
 
 
 @inlined
@@ -101,7 +104,8 @@ def sobol_next(sequence, index, state):
 
 @inlined
 def choice(state, shift, event, noise):
-    """Uniform number of a path's Fresnel choice `event` (0, 1, …): of the sequence while it has dimensions, then a hash."""
+    """Uniform number of a path's Fresnel choice `event` (0, 1, …): of the sequence while it has dimensions, then a
+    hash."""
     dimension = FIRST_CHOICE + event
     if dimension < DIMENSIONS:
         return _unit(state[dimension] ^ shift[dimension])
@@ -158,7 +162,8 @@ def _shading_normal(scene, triangle, u, v, dx, dy, dz, gx, gy, gz, entering):
 
 @inlined
 def scatter(scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw):
-    """One event at glass or a mirror: (direction (3), mask, alone, on the object's inner side, is an event, share kept).
+    """One event at glass or a mirror: (direction (3), mask, alone, on the object's inner side, is an event, share
+    kept).
 
     `draw` in [0, 1) decides by Fresnel's reflectance. "Is an event" is false where the same substance
     lies on both sides; a mirror keeps its reflectance, glass everything.

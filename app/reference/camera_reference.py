@@ -39,7 +39,8 @@ _CAUSTIC_SHARE = 0.5
 
 
 def camera_scene_key(scene: Scene, width: int, height: int, max_depth: int, caustic: CausticPlan | None) -> str:
-    """SHA-256 over everything the picture depends on, textures and what lies beyond included; names and notes do not count."""
+    """SHA-256 over everything the picture depends on, textures and what lies beyond included; names and notes do not
+    count."""
     key = ContentKey(scene_key(scene, width, height, max_depth))
     key.add("camera", CAMERA_REFERENCE_VERSION, None if caustic is None else (CAUSTIC_VERSION, *astuple(caustic)))
     if scene.environment is None:
@@ -66,14 +67,17 @@ def render_camera_reference(
     progress: Progress = lambda fraction, text: None,
     cancelled: Cancelled = lambda: False,
 ) -> CameraPicture:
-    """What the camera of `scene` sees, until `samples` a pixel, `seconds` or `target_relmse` is reached, whichever comes first.
+    """What the camera of `scene` sees, until `samples` a pixel, `seconds` or `target_relmse` is reached, whichever
+    comes first.
 
-    `caustic` (`spectral_caustic.build_caustic`, made of the same scene) adds the light that came by glass and mirrors; without it
-    such light is missing. What was done when `cancelled()` turned true is kept. Raises ValueError without any limit, UserError
-    without numba or where too many solids nest.
+    `caustic` (`spectral_caustic.build_caustic`, made of the same scene) adds the light that came by glass and mirrors;
+    without it such light is missing. What was done when `cancelled()` turned true is kept. Raises ValueError without
+    any limit, UserError without numba or where too many solids nest.
     """
     progress(0.0, "preparing")
-    return continue_run(CameraRun(scene, width, height, max_depth, seed, caustic), samples, seconds, target_relmse, progress, cancelled)
+    return continue_run(
+        CameraRun(scene, width, height, max_depth, seed, caustic), samples, seconds, target_relmse, progress, cancelled
+    )
 
 
 def cached_camera_reference(
@@ -92,17 +96,23 @@ def cached_camera_reference(
 ) -> CameraPicture:
     """The stored picture where it is good enough, otherwise what is stored and more samples, stored again.
 
-    Limits as in `render_camera_reference`; `samples` counts those that are stored, `seconds` only the time spent now, the
-    caustic's not counted. That is given as a plan and loaded, or made, only when samples are needed. A damaged
-    file is ignored; a folder that cannot be written costs only the saving; an interrupt stores what is done.
+    Limits as in `render_camera_reference`; `samples` counts those that are stored, `seconds` only the time spent now,
+    the caustic's not counted. That is given as a plan and loaded, or made, only when samples are needed. A damaged file
+    is ignored; a folder that cannot be written costs only the saving; an interrupt stores what is done.
     """
     path = kept_path(camera_scene_key(scene, width, height, max_depth, caustic), folder)
     shapes = {"sums": (PARTS, height, width, 3), "units": (PARTS,), "tallies": (PARTS, TALLY_SIZE), "seconds": ()}
     stored = load_kept(path, shapes if caustic is None else shapes | {"caustic_photons": (), "caustic_relmse": ()})
-    looked_up = None if stored is None or caustic is None else (int(stored["caustic_photons"]), float(stored["caustic_relmse"]))
+    looked_up = (
+        None if stored is None or caustic is None else (int(stored["caustic_photons"]), float(stored["caustic_relmse"]))
+    )
     if stored is not None:
-        picture = summed_camera(stored["sums"], stored["units"], stored["tallies"], float(stored["seconds"]), caustic is not None)
-        if (samples is not None and picture.samples >= samples) or (target_relmse is not None and picture.is_within(target_relmse)):
+        picture = summed_camera(
+            stored["sums"], stored["units"], stored["tallies"], float(stored["seconds"]), caustic is not None
+        )
+        if (samples is not None and picture.samples >= samples) or (
+            target_relmse is not None and picture.is_within(target_relmse)
+        ):
             return _with_caustic(picture, looked_up)
     progress(0.0, "preparing")
     tables = None
@@ -116,7 +126,14 @@ def cached_camera_reference(
     before = run.samples
     begin = 0.0 if caustic is None else _CAUSTIC_SHARE
     try:
-        picture = continue_run(run, samples, seconds, target_relmse, lambda done, text: progress(begin + (1.0 - begin) * done, text), cancelled)
+        picture = continue_run(
+            run,
+            samples,
+            seconds,
+            target_relmse,
+            lambda done, text: progress(begin + (1.0 - begin) * done, text),
+            cancelled,
+        )
     finally:
         if run.samples > before:
             more = {} if looked_up is None else {"caustic_photons": looked_up[0], "caustic_relmse": looked_up[1]}
@@ -136,4 +153,6 @@ def _caustic(
 
     any_number = replace(plan, photons=0, target_relmse=0.0)
     key = camera_scene_key(scene, width, height, max_depth, any_number)
-    return CachedCaustic(scene, width, height, max_depth, plan, key, folder).grown(lambda done, text: progress(_CAUSTIC_SHARE * done, text))
+    return CachedCaustic(scene, width, height, max_depth, plan, key, folder).grown(
+        lambda done, text: progress(_CAUSTIC_SHARE * done, text)
+    )

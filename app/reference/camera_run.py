@@ -33,7 +33,8 @@ class CameraPicture:
     xyz: np.ndarray
     """float64 (H, W, 3): CIE XYZ, the mean over each pixel; Y in lm/(sr unit²)."""
     variance: np.ndarray
-    """float64 (H, W, 3): of `xyz` as an estimate, from PARTS independent pictures, or two where the caustic's halves are told apart."""
+    """float64 (H, W, 3): of `xyz` as an estimate, from PARTS independent pictures, or two where the caustic's halves
+    are told apart."""
     samples: int
     """Of each pixel."""
     seconds: float
@@ -64,9 +65,16 @@ class CameraRun:
     """Samples of one picture, added round by round; `picture()` at any time."""
 
     def __init__(
-        self, scene: Scene, width: int, height: int, max_depth: int = MAX_DEPTH, seed: int = 1, caustic: SpectralCaustic | None = None
+        self,
+        scene: Scene,
+        width: int,
+        height: int,
+        max_depth: int = MAX_DEPTH,
+        seed: int = 1,
+        caustic: SpectralCaustic | None = None,
     ) -> None:
-        """Even and odd parts look up one half each of the caustic's photons, so that the picture's variance holds the caustic's too.
+        """Even and odd parts look up one half each of the caustic's photons, so that the picture's variance holds the
+        caustic's too.
 
         Raises UserError where numba is missing or solids nest beyond reach."""
         try:
@@ -81,7 +89,9 @@ class CameraRun:
                 spectral_caustic,
             )
         except ImportError as error:
-            raise UserError(f"the camera's reference renderer needs numba ({error}); install it with: pip install numba") from error
+            raise UserError(
+                f"the camera's reference renderer needs numba ({error}); install it with: pip install numba"
+            ) from error
         self._kernel, self._scratch = camera_kernel, camera_optics.scratch
         photons, centre = photon_scene.photon_scene(scene)
         self._scene = camera_scene.with_upsampled_mirrors(photons, scene)
@@ -89,7 +99,9 @@ class CameraRun:
         self._start = camera_start.camera_start(scene, photons)
         self._lights = camera_lights.camera_lights(scene.lights, centre)
         self._pictures = camera_scene.pictures(scene, photons, centre)
-        self._tables = [caustic.half(number).tables for number in range(2)] if caustic else [spectral_caustic.no_caustic(scene)]
+        self._tables = (
+            [caustic.half(number).tables for number in range(2)] if caustic else [spectral_caustic.no_caustic(scene)]
+        )
         self._spectra = camera_scene.spectra(scene, caustic.plan.bins if caustic else 1)
         self._sequences = [photon_kernel.scrambled(seed, part) for part in range(PARTS)]
         self._max_depth = max_depth
@@ -118,7 +130,8 @@ class CameraRun:
         return int(self.units.max()) >= _LAST_SAMPLE
 
     def advance(self, samples_left: int | None = None, seconds_left: float | None = None) -> None:
-        """One round of all parts, about half a second or what is left. An interrupt keeps the parts that were finished."""
+        """One round of all parts, about half a second or what is left. An interrupt keeps the parts that were
+        finished."""
         count = self._pace.units
         if samples_left is not None:
             count = min(count, max(1, -(-samples_left // PARTS)))
@@ -132,16 +145,32 @@ class CameraRun:
 
     def _trace_part(self, part: int, count: int) -> None:
         self._kernel.trace_camera(
-            self._scene, self._camera, self._lights, self._spectra, self._pictures, self._tables[part % len(self._tables)], self._start,
-            self._sequences[part], int(self.units[part]), count, self._max_depth, self.sums[part], self.tallies[part], self._scratch(),
-        )  # fmt: skip
+            self._scene,
+            self._camera,
+            self._lights,
+            self._spectra,
+            self._pictures,
+            self._tables[part % len(self._tables)],
+            self._start,
+            self._sequences[part],
+            int(self.units[part]),
+            count,
+            self._max_depth,
+            self.sums[part],
+            self.tallies[part],
+            self._scratch(),
+        )
         self.units[part] += count
 
 
-def summed_camera(sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, seconds: float, measured_passes: bool = False) -> CameraPicture:
-    """The picture from the sums (PARTS, H, W, 3) and tallies (PARTS, TALLY_SIZE) of parts with `units` (PARTS,) samples a pixel.
+def summed_camera(
+    sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, seconds: float, measured_passes: bool = False
+) -> CameraPicture:
+    """The picture from the sums (PARTS, H, W, 3) and tallies (PARTS, TALLY_SIZE) of parts with `units` (PARTS,) samples
+    a pixel.
 
-    `halves`: even parts have one thing in common, the caustic they looked up, and so have odd ones: two independent pictures."""
+    `halves`: even parts have one thing in common, the caustic they looked up, and so have odd ones: two independent
+    pictures."""
     total = max(int(units.sum()), 1)
     mean = sums.sum(axis=0) / total
     variance = np.zeros_like(mean)
@@ -153,4 +182,6 @@ def summed_camera(sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, seco
             variance += units[part] / total * (sums[part] / units[part] - mean) ** 2
         variance /= len(used) - 1
     lost = tallies.sum(axis=0)[:2] / (total * mean.shape[0] * mean.shape[1])
-    return CameraPicture(mean, variance, total if used.size else 0, seconds, {"depth": float(lost[0]), "numeric": float(lost[1])})
+    return CameraPicture(
+        mean, variance, total if used.size else 0, seconds, {"depth": float(lost[0]), "numeric": float(lost[1])}
+    )

@@ -1,4 +1,5 @@
-"""What the camera's reference sees beyond shapes, as flat float64 arrays: spectra by wavelength cell, textures, the environment.
+"""What the camera's reference sees beyond shapes, as flat float64 arrays: spectra by wavelength cell, textures, the
+environment.
 
 A path has one wavelength, drawn from *atoms*: the nanometre cells of the visible grid and the
 lines of the scene's lights. Colours given as RGB become spectra by `colorimetry.rgb_basis`, which is linear: a
@@ -47,7 +48,8 @@ class Spectra(NamedTuple):
     share: np.ndarray
     """float64 (A,): the atom's part of its bin's power, by the lights' summed spectra."""
     light_xyz: np.ndarray
-    """float64 (L, 2 + K, 3): XYZ of a light's whole spectrum seen by the three reflectances of the basis, then by classes 1, 2, …."""
+    """float64 (L, 2 + K, 3): XYZ of a light's whole spectrum seen by the three reflectances of the basis, then by
+    classes 1, 2, …."""
     bin_xyz: np.ndarray
     """float64 (bins, 2 + K, 3): likewise of one watt in a bin."""
     beyond_xyz: np.ndarray
@@ -60,7 +62,8 @@ class Pictures(NamedTuple):
     rgb: np.ndarray
     """float32 (N, 3), linear Rec.709."""
     size: np.ndarray
-    """int64 (P, 4): first texel, width, height, 1 where it repeats; the environment comes last, and may be a single texel."""
+    """int64 (P, 4): first texel, width, height, 1 where it repeats; the environment comes last, and may be a single
+    texel."""
     texture: np.ndarray
     """int32 (O,): picture of an object, or −1."""
     colour: np.ndarray
@@ -107,16 +110,27 @@ def spectra(scene: Scene, bins: int) -> Spectra:
     part = np.divide(total, in_bin[bin_of], out=np.zeros_like(total), where=in_bin[bin_of] > 0.0)
     surfaces = np.concatenate([basis.T, reflectance[1:]])
     in_bins = part * (np.arange(bins + len(lines))[:, None] == bin_of)
-    by_surface = [K_M * np.einsum("la,sa,ac->lsc", rows, surfaces, seen, optimize=True) for rows in (power, in_bins, daylight[None])]
+    by_surface = [
+        K_M * np.einsum("la,sa,ac->lsc", rows, surfaces, seen, optimize=True)
+        for rows in (power, in_bins, daylight[None])
+    ]
     order = np.argsort(start, kind="stable")
     order = order[share[order] > 0.0]  # what no source emits is never drawn
     cdf = np.concatenate([[0.0], np.cumsum(share[order])])
     cdf[-1] = 1.0
     return Spectra(
-        cdf, start[order], width[order], K_M * seen[order] / share[order, None], np.ascontiguousarray(power[:, order]), daylight[order],
-        basis[order], np.ascontiguousarray(reflectance[:, order]), bin_of[order], part[order],
+        cdf,
+        start[order],
+        width[order],
+        K_M * seen[order] / share[order, None],
+        np.ascontiguousarray(power[:, order]),
+        daylight[order],
+        basis[order],
+        np.ascontiguousarray(reflectance[:, order]),
+        bin_of[order],
+        part[order],
         *(np.ascontiguousarray(table) for table in by_surface),
-    )  # fmt: skip
+    )
 
 
 def _probability(sources: list[np.ndarray], seen: np.ndarray) -> np.ndarray:
@@ -135,14 +149,18 @@ def with_upsampled_mirrors(photons: PhotonScene, scene: Scene) -> PhotonScene:
     for index, item in enumerate(scene.objects):
         if isinstance(item.material, Mirror):
             weight[index] = sum(len(r) for r in rows)
-            rows.append(np.interp(TABLE_NM, VISIBLE_NM, rgb_basis() @ np.asarray(item.material.reflectance_rgb, float))[None])
+            rows.append(
+                np.interp(TABLE_NM, VISIBLE_NM, rgb_basis() @ np.asarray(item.material.reflectance_rgb, float))[None]
+            )
     return photons._replace(weights=np.concatenate(rows), weight=weight)
 
 
 def pictures(scene: Scene, photons: PhotonScene, centre: np.ndarray) -> Pictures:
     """Texels and texture coordinates; `photons`, `centre`: what `photon_scene` made of the scene."""
     beyond = scene.environment
-    far = np.asarray(scene.background_rgb if beyond is None else beyond.rgb, np.float32).reshape(*(beyond.rgb.shape if beyond else (1, 1, 3)))
+    far = np.asarray(scene.background_rgb if beyond is None else beyond.rgb, np.float32).reshape(
+        *(beyond.rgb.shape if beyond else (1, 1, 3))
+    )
     textures: list[Texture] = []
     texture = np.full(len(scene.objects), -1, np.int32)
     colour = np.ones((len(scene.objects), 3))
@@ -160,12 +178,19 @@ def pictures(scene: Scene, photons: PhotonScene, centre: np.ndarray) -> Pictures
     size = np.array([[f, a.shape[1], a.shape[0], r] for f, a, r in zip(first, arrays, repeats, strict=False)], np.int64)
     uv_row, uv = _coordinates(scene, photons, centre, texture)
     return Pictures(
-        np.concatenate([a.reshape(-1, 3) for a in arrays]), size, texture, colour, uv_row, uv,
+        np.concatenate([a.reshape(-1, 3) for a in arrays]),
+        size,
+        texture,
+        colour,
+        uv_row,
+        uv,
         np.array(beyond.world_to_local, float) if beyond else np.eye(3),
-    )  # fmt: skip
+    )
 
 
-def _coordinates(scene: Scene, photons: PhotonScene, centre: np.ndarray, texture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _coordinates(
+    scene: Scene, photons: PhotonScene, centre: np.ndarray, texture: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Each triangle's row of texture coordinates (−1: none), in the order of the tree, and the rows (U, 6)."""
     row = np.full(len(photons.owner), -1, np.int32)
     if not (texture >= 0).any():
@@ -175,7 +200,9 @@ def _coordinates(scene: Scene, photons: PhotonScene, centre: np.ndarray, texture
     order = build_bvh(corners.astype(np.float32)).order  # the same tree again: building is deterministic
     if not np.array_equal(corners[order][:, 0], photons.corners[:, :3]):
         raise AssertionError("the tree's order changed between two builds")
-    uv = np.concatenate([np.zeros((len(m.triangles), 6)) if m.uv is None else m.uv.reshape(-1, 6) for m in meshes])[order]
+    uv = np.concatenate([np.zeros((len(m.triangles), 6)) if m.uv is None else m.uv.reshape(-1, 6) for m in meshes])[
+        order
+    ]
     worn = np.flatnonzero(texture[photons.owner] >= 0)
     row[worn] = np.arange(len(worn))
     return row, np.ascontiguousarray(uv[worn])
@@ -197,13 +224,18 @@ def _blend(rgb, a, b, c, d, fx, fy):
         wa * rgb[a, 0] + wb * rgb[b, 0] + wc * rgb[c, 0] + wd * rgb[d, 0],
         wa * rgb[a, 1] + wb * rgb[b, 1] + wc * rgb[c, 1] + wd * rgb[d, 1],
         wa * rgb[a, 2] + wb * rgb[b, 2] + wc * rgb[c, 2] + wd * rgb[d, 2],
-    )  # fmt: skip
+    )
 
 
 @inlined
 def picture_at(pictures, which, u, v):
     """Linear Rec.709 of a texture at (u, v), v upwards, between the four nearest texels."""
-    first, width, height, repeats = pictures.size[which, 0], pictures.size[which, 1], pictures.size[which, 2], pictures.size[which, 3] != 0
+    first, width, height, repeats = (
+        pictures.size[which, 0],
+        pictures.size[which, 1],
+        pictures.size[which, 2],
+        pictures.size[which, 3] != 0,
+    )
     x, y = u * width - 0.5, (1.0 - v) * height - 0.5
     x0, y0 = math.floor(x), math.floor(y)
     column, row = int(x0), int(y0)
@@ -216,7 +248,8 @@ def picture_at(pictures, which, u, v):
 
 @inlined
 def beyond(pictures, dx, dy, dz):
-    """Linear Rec.709 radiance from infinitely far along a unit direction, lm/(sr unit²): columns join, the poles end the picture."""
+    """Linear Rec.709 radiance from infinitely far along a unit direction, lm/(sr unit²): columns join, the poles end
+    the picture."""
     which = pictures.size.shape[0] - 1
     first, width, height = pictures.size[which, 0], pictures.size[which, 1], pictures.size[which, 2]
     if width == 1 and height == 1:

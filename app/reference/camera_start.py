@@ -12,7 +12,8 @@ from .photon_scene import PhotonScene
 
 
 def camera_start(scene: Scene, photons: PhotonScene) -> Start:
-    """The medium at the camera's position (of an orthographic camera too: its rays all begin as the middle one does)."""
+    """The medium at the camera's position (of an orthographic camera too: its rays all begin as the middle one
+    does)."""
     mask, alone = 0, _AIR
     for index, item in enumerate(scene.objects):
         if isinstance(item.material, Dielectric) and contains(item, np.array(scene.camera.position)):

@@ -1,7 +1,7 @@
 """The spectral caustic kept in the user's cache folder, as large as a picture needs it.
 
-What counts is how much noise it leaves in the picture, and that is measured: the same camera paths look up either half of the
-photons. A caustic in plain view needs a hundred times the photons of one that covers a corner.
+What counts is how much noise it leaves in the picture, and that is measured: the same camera paths look up either half
+of the photons. A caustic in plain view needs a hundred times the photons of one that covers a corner.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ _FIRST_LOOK = 1 << 22
 _NOISE_SAMPLES = 128
 """Of each pixel, by which it is measured."""
 _SPARE, _MIN_STEP = 1.1, 1.25
-"""Factors on the photons that should be enough, as noise falls as one over their number, about; and on those that were not."""
+"""Factors on the photons that should be enough, as noise falls as one over their number, about; and on those that were
+not."""
 _SAVE_SECONDS = 120.0
 """A run that is killed loses no more."""
 
@@ -32,15 +33,26 @@ _SAVE_SECONDS = 120.0
 class CachedCaustic:
     """A caustic on disk that grows as far as its plan asks for."""
 
-    def __init__(self, scene: Scene, width: int, height: int, max_depth: int, plan: CausticPlan, picture_key: str, folder: Path | None) -> None:
-        """`max_depth`: of camera paths; `picture_key`: hash of everything that a picture with this caustic depends on, but for the number of photons."""
+    def __init__(
+        self,
+        scene: Scene,
+        width: int,
+        height: int,
+        max_depth: int,
+        plan: CausticPlan,
+        picture_key: str,
+        folder: Path | None,
+    ) -> None:
+        """`max_depth`: of camera paths; `picture_key`: hash of everything that a picture with this caustic depends on,
+        but for the number of photons."""
         self._scene, self._size, self._max_depth, self._plan = scene, (width, height), max_depth, plan
         key = ContentKey(picture_key)
         key.add("caustic alone")
         self._path = kept_path(key.hexdigest(), folder)
 
     def grown(self, progress: Progress) -> tuple[SpectralCaustic, float]:
-        """The caustic, and the noise it leaves in the picture as relMSE; traced as far as the disk has less than planned, and stored.
+        """The caustic, and the noise it leaves in the picture as relMSE; traced as far as the disk has less than
+        planned, and stored.
 
         An interrupt stores what is done and goes on upwards. Raises UserError as `build_caustic` does.
         """
@@ -82,15 +94,23 @@ class CachedCaustic:
 
     def _save(self, run: CausticRun, measured: int, noise: float) -> None:
         save_kept(
-            self._path, sums=run.sums, units=run.units, flux=run.flux, counts=run.counts, low=run.tables.low, texels=run.tables.texels_per_unit,
-            noise=noise, measured=measured,
-        )  # fmt: skip
+            self._path,
+            sums=run.sums,
+            units=run.units,
+            flux=run.flux,
+            counts=run.counts,
+            low=run.tables.low,
+            texels=run.tables.texels_per_unit,
+            noise=noise,
+            measured=measured,
+        )
 
 
 def picture_noise(scene: Scene, width: int, height: int, max_depth: int, caustic: SpectralCaustic) -> float:
     """relMSE that the caustic's noise adds to a picture, mean[var/(R² + ε)].
 
-    Both passes are looked up by the same paths, and what the parts' differences have in common is no noise of the paths.
+    Both passes are looked up by the same paths, and what the parts' differences have in common is no noise of the
+    paths.
     """
     runs = [CameraRun(scene, width, height, max_depth, caustic=caustic.half(number)) for number in range(2)]
     for run in runs:

@@ -13,10 +13,10 @@ from .camera_kernel import on_plane, texel_of
 from .camera_optics import (
     AIR,
     choice,
-    stripped,
     scatter,
     sobol_next,
     sobol_start,
+    stripped,
     transmitted,
 )
 from .photon_emit import emit, search
@@ -29,7 +29,8 @@ from .photon_scene import BLACK, DIFFUSE
 def land(scene, domain, colour, band_of, side, sequence, first, count, share, max_depth, points, watts, ends, scratch):
     """Trace photons [first, first + count) of a domain and note those that land after glass or a mirror: their number.
 
-    `band_of` int32 (A,): bin of each atom of `colour`; `side` (O, 2): number of a receiver's front and back (−1: not counted);
+    `band_of` int32 (A,): bin of each atom of `colour`; `side` (O, 2): number of a receiver's front and back (−1: not
+    counted);
     `share`: factor on every weight. Fills `points` (count, 3), `watts` (count,) and `ends` int32 (count, 4): side, bin,
     and the cell of the domain they came from (row, column).
     """
@@ -45,12 +46,16 @@ def land(scene, domain, colour, band_of, side, sequence, first, count, share, ma
             continue
         chance = _unit(state[2])
         atom = search(colour.cdf, chance)
-        nm = colour.start_nm[atom] + colour.width_nm[atom] * (chance - colour.cdf[atom]) / (colour.cdf[atom + 1] - colour.cdf[atom])
+        nm = colour.start_nm[atom] + colour.width_nm[atom] * (chance - colour.cdf[atom]) / (
+            colour.cdf[atom + 1] - colour.cdf[atom]
+        )
         watt *= colour.watt[atom] * share
         noise = _mixed(sequence.key ^ _mixed(np.uint64(i)))
         last, last_object, within, mask, alone, events = -1, -1, False, np.uint64(0), AIR, 0
         while watt > 0.0:
-            t, triangle, u, v = nearest(scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance)
+            t, triangle, u, v = nearest(
+                scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance
+            )
             if triangle < 0:
                 break
             watt *= transmitted(scene, mask, alone, nm, t)
@@ -60,7 +65,9 @@ def land(scene, domain, colour, band_of, side, sequence, first, count, share, ma
             if kind == BLACK or (kind != DIFFUSE and events >= max_depth):
                 break
             if kind == DIFFUSE:
-                facing = dx * scene.normals[triangle, 0] + dy * scene.normals[triangle, 1] + dz * scene.normals[triangle, 2]
+                facing = (
+                    dx * scene.normals[triangle, 0] + dy * scene.normals[triangle, 1] + dz * scene.normals[triangle, 2]
+                )
                 at = side[thing, 1 if facing > 0.0 else 0]
                 if events > 0 and at >= 0:  # straight from the light it is no caustic
                     points[landed, 0], points[landed, 1], points[landed, 2] = px, py, pz

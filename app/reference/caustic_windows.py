@@ -1,7 +1,8 @@
 """Where the spectral caustic is counted: the planes of flat receivers, and windows of texels on them.
 
-Each side of a receiver that is both lit by glass or mirrors and seen gets two windows: a coarse one over all that the camera
-sees of it, and a fine one over nearly all the light where it looks most. Where they overlap only the fine one counts.
+Each side of a receiver that is both lit by glass or mirrors and seen gets two windows: a coarse one over all that the
+camera sees of it, and a fine one over nearly all the light where it looks most. Where they overlap only the fine one
+counts.
 """
 
 from __future__ import annotations
@@ -18,11 +19,13 @@ from .photon_emission import frame_of
 from .photon_scene import PhotonScene
 
 TEXELS_A_PIXEL = 2.0
-"""Side of a pixel in texels of a fine window, where the plan says nothing else: more would blur less, and share out the photons more thinly."""
+"""Side of a pixel in texels of a fine window, where the plan says nothing else: more would blur less, and share out the
+photons more thinly."""
 _FLAT = 1e-6
 """Share of a receiver's size that its corners may leave a plane."""
 _SPREAD = 0.005
-"""Of the looks, and of the power where these end, beyond each side of a fine window: a lens shows some of a floor as far as it goes."""
+"""Of the looks, and of the power where these end, beyond each side of a fine window: a lens shows some of a floor as
+far as it goes."""
 _MARGIN_SEEN, _MARGIN_LIT = 0.1, 0.05
 """Shares of their sizes by which windows are larger than what the pilots found."""
 _COARSE = 0.05
@@ -88,7 +91,11 @@ def receiver_planes(scene: Scene, photons: PhotonScene) -> Planes:
         normal = normal / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
         height = float(np.ptp((points - points[0]) @ normal))
         # Facets that face either way would make front and back one.
-        is_flat = length > 0.0 and height <= _FLAT * float(np.ptp(points, axis=0).max()) and bool((photons.normals[chosen] @ normal > 0.5).all())
+        is_flat = (
+            length > 0.0
+            and height <= _FLAT * float(np.ptp(points, axis=0).max())
+            and bool((photons.normals[chosen] @ normal > 0.5).all())
+        )
         frame = frame_of(normal, None)
         plane = (points - points[0]) @ frame[:2].T
         for back in range(2):
@@ -98,19 +105,39 @@ def receiver_planes(scene: Scene, photons: PhotonScene) -> Planes:
             extents.append(np.array([plane.min(axis=0), plane.max(axis=0)]))
             flat.append(is_flat)
     count = len(owner)
-    return Planes(side, np.array(owner, np.int64), np.array(frames).reshape(count, 3, 3), np.array(extents).reshape(count, 2, 2), np.array(flat, bool))
+    return Planes(
+        side,
+        np.array(owner, np.int64),
+        np.array(frames).reshape(count, 3, 3),
+        np.array(extents).reshape(count, 2, 2),
+        np.array(flat, bool),
+    )
 
 
 def no_caustic(scene: Scene) -> CausticTables:
     """Tables that hold no light."""
-    return _tables(np.full((len(scene.objects), 2), -1, np.int32), np.zeros((1, 3, 3)), np.zeros((1, 2, 2)), np.ones((1, 2, 2)), np.zeros((1, 2, 2), np.int64), 1)
+    return _tables(
+        np.full((len(scene.objects), 2), -1, np.int32),
+        np.zeros((1, 3, 3)),
+        np.zeros((1, 2, 2)),
+        np.ones((1, 2, 2)),
+        np.zeros((1, 2, 2), np.int64),
+        1,
+    )
 
 
-def fit_windows(planes: Planes, seen: SurfaceInteraction, lit: Landed, bins: int, texel_at: Callable[[float], float], max_texels: int) -> tuple[CausticTables, np.ndarray]:
+def fit_windows(
+    planes: Planes,
+    seen: SurfaceInteraction,
+    lit: Landed,
+    bins: int,
+    texel_at: Callable[[float], float],
+    max_texels: int,
+) -> tuple[CausticTables, np.ndarray]:
     """Tables of zeros over what both pilots found, and which sides have any, bool (S,) (at least one).
 
-    `texel_at`: size of a fine texel at a distance along the camera's way; where all fine windows together had more than `max_texels`,
-    each has the share that it has of the looks.
+    `texel_at`: size of a fine texel at a distance along the camera's way; where all fine windows together had more than
+    `max_texels`, each has the share that it has of the looks.
     """
     count = len(planes.owner)
     low, high, texel, looks = np.zeros((count, 2, 2)), np.ones((count, 2, 2)), np.ones(count), np.zeros(count)
@@ -173,15 +200,25 @@ def free_areas(tables: CausticTables, side: int, window: int) -> np.ndarray:
     return np.where(left > 1e-9 * area, left, 0.0)
 
 
-def _tables(side: np.ndarray, frame: np.ndarray, low: np.ndarray, texels_per_unit: np.ndarray, size: np.ndarray, bins: int) -> CausticTables:
+def _tables(
+    side: np.ndarray, frame: np.ndarray, low: np.ndarray, texels_per_unit: np.ndarray, size: np.ndarray, bins: int
+) -> CausticTables:
     first = np.concatenate([[0], np.cumsum(np.prod(size, axis=2).ravel() * bins)]).astype(np.int64)
     return CausticTables(
-        side, np.ascontiguousarray(frame), low, texels_per_unit, size, first[:-1].reshape(len(size), 2).copy(), np.zeros(int(first[-1]), np.float32), bins
+        side,
+        np.ascontiguousarray(frame),
+        low,
+        texels_per_unit,
+        size,
+        first[:-1].reshape(len(size), 2).copy(),
+        np.zeros(int(first[-1]), np.float32),
+        bins,
     )
 
 
 def _shared(asked: np.ndarray, weight: np.ndarray, most: float) -> np.ndarray:
-    """What each gets of `most` in all: as much as `asked` for, or a share by `weight` of what those leave that ask for less than theirs."""
+    """What each gets of `most` in all: as much as `asked` for, or a share by `weight` of what those leave that ask for
+    less than theirs."""
     if asked.sum() <= most:
         return asked
     content = asked <= 0.0
@@ -203,4 +240,6 @@ def _quantiles(values: np.ndarray, weights: np.ndarray) -> tuple[float, float]:
     order = np.argsort(values)
     share = np.cumsum(weights[order]) / weights.sum()
     last = len(order) - 1
-    return float(values[order[min(np.searchsorted(share, _SPREAD), last)]]), float(values[order[min(np.searchsorted(share, 1.0 - _SPREAD), last)]])
+    return float(values[order[min(np.searchsorted(share, _SPREAD), last)]]), float(
+        values[order[min(np.searchsorted(share, 1.0 - _SPREAD), last)]]
+    )

@@ -1,4 +1,5 @@
-"""Which pixels see a surface directly, and not behind glass or in a mirror: where the reference's caustic layer is the whole caustic."""
+"""Which pixels see a surface directly, and not behind glass or in a mirror: where the reference's caustic layer is the
+whole caustic."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ import numpy as np
 
 from ..model.scene import Scene
 from .photon_intersect import STACK_SIZE, compiled, nearest
-from .photon_scene import MIRROR, viewpoint, photon_scene
+from .photon_scene import MIRROR, photon_scene, viewpoint
 
 
 def seen_directly(scene: Scene, width: int, height: int) -> np.ndarray:

@@ -75,7 +75,11 @@ class Emitter:
 
         if light.kind == "spot":
             inner, outer = np.radians([light.inner_half_angle_deg, light.outer_half_angle_deg])
-            return share * (covered(outer - angle_between(direction, axis), radial) if inner == outer else spot_falloff(direction, axis, inner, outer))
+            return share * (
+                covered(outer - angle_between(direction, axis), radial)
+                if inner == outer
+                else spot_falloff(direction, axis, inner, outer)
+            )
         if light.kind == "area":
             return share * np.maximum(direction @ axis, 0.0)
         if light.kind == "collimated":

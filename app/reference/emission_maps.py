@@ -1,4 +1,5 @@
-"""Float64 references of the functions of shaders/lib/emission.glsl and spot.glsl: lattice, equal-area plane, disc, spot edge.
+"""Float64 references of the functions of shaders/lib/emission.glsl and spot.glsl: lattice, equal-area plane, disc, spot
+edge.
 
 Written from the definitions (the azimuthal equal-area map by its chord, the angle by chords) and
 not from the shaders. Points of the plane or the square have shape (..., 2), directions (..., 3).

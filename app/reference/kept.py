@@ -1,6 +1,7 @@
 """What the references keep in the user's cache folder: arrays in one `.npz` a key, the least recently used forgotten.
 
-A cache may only save time: a damaged file is as good as none, and a folder that cannot be written costs the saving alone.
+A cache may only save time: a damaged file is as good as none, and a folder that cannot be written costs the saving
+alone.
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 
 EPSILON_SHARE = 1e-2
-"""ε of relMSE = mean[(I−R)²/(R²+ε)] is this times mean(R)², the mean taken over lit pixels and all channels: it then does not
-depend on how much darkness surrounds a caustic (nor does darkness itself outweigh it)."""
+"""ε of relMSE = mean[(I−R)²/(R²+ε)] is this times mean(R)², the mean taken over lit pixels and all channels: it then
+does not depend on how much darkness surrounds a caustic (nor does darkness itself outweigh it)."""
 TRIMMED_SHARE = 1e-3
 """Share of the largest terms that relmse_trimmed leaves out."""
 LIT_FLOOR = 1e-4
@@ -24,7 +24,8 @@ LIT_SHARE = 0.1
 _GREY_UV = (0.19783, 0.46832)
 """u′v′ of D65, taken for black pixels, which have no colour."""
 _FLIP_WHITE = 2.119
-"""Luminance that FLIP's ACES curve shows at 85 %, from which FLIP counts its exposures (Andersson et al. 2021, sec. 3.2)."""
+"""Luminance that FLIP's ACES curve shows at 85 %, from which FLIP counts its exposures (Andersson et al. 2021, sec.
+3.2)."""
 _HIGHLIGHT_QUANTILE = 0.999
 
 
@@ -71,8 +72,8 @@ def relmse_raw(xyz: np.ndarray, reference_image: ReferencePicture) -> float:
 def measure(xyz: np.ndarray, reference_image: ReferencePicture) -> dict[str, float]:
     """All measures of `xyz` (H, W, 3) that `results.Sample.metrics` lists, but FLIP.
 
-    relmse, relmse_whole and nrmse are freed of the reference's variance and never below 0; smape = mean |I−R|/(|I|+|R|+√ε), from
-    0 to 1; chroma = mean distance in CIE 1976 u′v′ over lit pixels.
+    relmse, relmse_whole and nrmse are freed of the reference's variance and never below 0; smape = mean
+    |I−R|/(|I|+|R|+√ε), from 0 to 1; chroma = mean distance in CIE 1976 u′v′ over lit pixels.
     """
     difference = xyz - reference_image.xyz
     terms = reference_image.weight * difference**2
@@ -87,7 +88,9 @@ def measure(xyz: np.ndarray, reference_image: ReferencePicture) -> dict[str, flo
         "relmse": max(raw - reference_image.own_relmse, 0.0),
         "relmse_raw": raw,
         "relmse_trimmed": _trimmed(terms, noise),
-        "relmse_whole": max(float(np.mean(reference_image.whole_weight * (difference**2 - reference_image.variance))), 0.0),
+        "relmse_whole": max(
+            float(np.mean(reference_image.whole_weight * (difference**2 - reference_image.variance))), 0.0
+        ),
         "smape": float(np.mean(np.abs(difference) / np.where(sums > 0.0, sums, 1.0))),
         "chroma": _chroma(xyz, reference_image.xyz),
         "nrmse": float(np.sqrt(max(np.sum(difference**2 - reference_image.variance), 0.0) / square)) if square else 0.0,
@@ -121,10 +124,11 @@ def _uv(xyz: np.ndarray) -> np.ndarray:
 
 
 def flip(xyz: np.ndarray, reference_image: ReferencePicture) -> float | None:
-    """Mean HDR-FLIP on linear Rec.709 (Andersson et al. 2021), 0 to 1; None where the package is missing or nothing is lit.
+    """Mean HDR-FLIP on linear Rec.709 (Andersson et al. 2021), 0 to 1; None where the package is missing or nothing is
+    lit.
 
-    FLIP takes its exposures from the reference's median, which is black in most caustics: here it is the median of the lit
-    pixels, and the 99.9 % quantile stands for the maximum, which in a caustic is a matter of luck.
+    FLIP takes its exposures from the reference's median, which is black in most caustics: here it is the median of the
+    lit pixels, and the 99.9 % quantile stands for the maximum, which in a caustic is a matter of luck.
     """
     try:
         import flip_evaluator
@@ -137,8 +141,14 @@ def flip(xyz: np.ndarray, reference_image: ReferencePicture) -> float | None:
     if not lit.size:
         return None
     brightest, median = float(np.quantile(lit, _HIGHLIGHT_QUANTILE)), float(np.median(lit))
-    exposures = {"startExposure": float(np.log2(_FLIP_WHITE / brightest)), "stopExposure": float(np.log2(_FLIP_WHITE / median))}
-    reference, test = (np.ascontiguousarray(np.clip(xyz_to_rgb709(picture), 0.0, None), dtype=np.float32) for picture in (reference_image.xyz, xyz))
+    exposures = {
+        "startExposure": float(np.log2(_FLIP_WHITE / brightest)),
+        "stopExposure": float(np.log2(_FLIP_WHITE / median)),
+    }
+    reference, test = (
+        np.ascontiguousarray(np.clip(xyz_to_rgb709(picture), 0.0, None), dtype=np.float32)
+        for picture in (reference_image.xyz, xyz)
+    )
     _, mean, _ = flip_evaluator.evaluate(reference, test, "HDR", applyMagma=False, parameters=exposures)
     return float(mean)
 

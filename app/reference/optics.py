@@ -138,7 +138,9 @@ def barycentric_weights(triangle: Array, point: Array) -> Array:
     return areas / (normal @ normal)
 
 
-def shading_normal_column(triangle: Array, corner_normals: Array, point: Array, dposition: Array) -> tuple[Array, Array]:
+def shading_normal_column(
+    triangle: Array, corner_normals: Array, point: Array, dposition: Array
+) -> tuple[Array, Array]:
     """(n̂, ∂n̂) of normals interpolated over a triangle; ∂n̂ for dposition (..., 3) in its plane.
 
     The weights are linear in the point, so their change is found by weighing a moved point:

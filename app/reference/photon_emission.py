@@ -112,11 +112,37 @@ def frame_of(axis: np.ndarray, tangent: np.ndarray | None) -> np.ndarray:
     return np.stack([first, np.cross(axis, first), axis])
 
 
-def _domain(kind: int, frame: np.ndarray, origin: np.ndarray, rect: np.ndarray, mask: np.ndarray, measure: float, axis: np.ndarray) -> Domain:
+def _domain(
+    kind: int,
+    frame: np.ndarray,
+    origin: np.ndarray,
+    rect: np.ndarray,
+    mask: np.ndarray,
+    measure: float,
+    axis: np.ndarray,
+) -> Domain:
     rows, columns = _distribution(mask / mask.sum())
     none = np.zeros(3)
     return Domain(
-        kind, frame, origin, rect, rows, columns, measure, axis, np.array([4.0, 4.0]), 0.0, 0.0, np.zeros(4), False, False, False, none, none, none, 0.0
+        kind,
+        frame,
+        origin,
+        rect,
+        rows,
+        columns,
+        measure,
+        axis,
+        np.array([4.0, 4.0]),
+        0.0,
+        0.0,
+        np.zeros(4),
+        False,
+        False,
+        False,
+        none,
+        none,
+        none,
+        0.0,
     )
 
 
@@ -135,7 +161,9 @@ def _half_extent(light: Light) -> tuple[float, float]:
     return (light.radius, light.radius) if light.shape == "disc" else (0.5 * light.width, 0.5 * light.height)
 
 
-def _plane(light: Light, triangles: np.ndarray, position: np.ndarray, direction: np.ndarray, reach: float) -> list[Domain]:
+def _plane(
+    light: Light, triangles: np.ndarray, position: np.ndarray, direction: np.ndarray, reach: float
+) -> list[Domain]:
     frame = frame_of(direction, light.tangent)
     flat, depth = triangles @ frame[:2].T, triangles @ direction
     tilt = math.tan(math.radians(0.5 * light.angular_diameter_deg)) if light.kind == "directional" else 0.0
@@ -155,7 +183,11 @@ def _plane(light: Light, triangles: np.ndarray, position: np.ndarray, direction:
     domain = _domain(PLANE, frame, np.zeros(3), rect, mask, float(rect[2] * rect[3]), direction)
     if light.kind == "collimated":
         aperture = np.concatenate([at, half])
-        return [domain._replace(back=-float(position @ direction), aperture=aperture, has_aperture=True, is_disc=light.shape == "disc")]
+        return [
+            domain._replace(
+                back=-float(position @ direction), aperture=aperture, has_aperture=True, is_disc=light.shape == "disc"
+            )
+        ]
     # Beyond the sphere that holds everything, also for the most slanted ray to the rectangle's corner.
     corner = float(np.hypot(*np.maximum(np.abs(box_low), np.abs(box_high))))
     return [domain._replace(back=1.01 * (reach + corner), tilt=tilt, extended=tilt > 0.0)]
@@ -168,8 +200,16 @@ def _directions(light: Light, triangles: np.ndarray, position: np.ndarray, direc
     size = np.linalg.norm(axis)
     lengths = np.linalg.norm(corners, axis=1)
     narrow = size > 0.0 and lengths.min() > 0.0 and ((corners @ axis) / (lengths * size)).min() > _WIDEST_COSINE
-    charts = [frame_of(axis / size, None)] if narrow else [frame_of(side * e, None) for e in np.eye(3) for side in (1.0, -1.0)]
-    cone = np.radians([light.inner_half_angle_deg, light.outer_half_angle_deg]) if light.kind == "spot" else np.array([4.0, 4.0])
+    charts = (
+        [frame_of(axis / size, None)]
+        if narrow
+        else [frame_of(side * e, None) for e in np.eye(3) for side in (1.0, -1.0)]
+    )
+    cone = (
+        np.radians([light.inner_half_angle_deg, light.outer_half_angle_deg])
+        if light.kind == "spot"
+        else np.array([4.0, 4.0])
+    )
     found = []
     for frame in charts:
         limit = np.array([[-np.inf] * 2, [np.inf] * 2]) if narrow else np.array([[-1.0] * 2, [1.0] * 2])
@@ -179,7 +219,14 @@ def _directions(light: Light, triangles: np.ndarray, position: np.ndarray, direc
     return found
 
 
-def _chart(frame: np.ndarray, local: np.ndarray, limit: np.ndarray, position: np.ndarray, direction: np.ndarray, cone: np.ndarray) -> Domain | None:
+def _chart(
+    frame: np.ndarray,
+    local: np.ndarray,
+    limit: np.ndarray,
+    position: np.ndarray,
+    direction: np.ndarray,
+    cone: np.ndarray,
+) -> Domain | None:
     """One plane's domain from triangles (S, 3, 3) in its frame."""
     height = local[..., 2]
     local = local[(height > 0.0).any(axis=1)]
@@ -242,7 +289,9 @@ def _area(light: Light, triangles: np.ndarray, position: np.ndarray, direction: 
     length = np.linalg.norm(way)
     aim = frame_of(way / length if length > 0.0 else direction, None)
     domain = _domain(AREA, aim, position, np.zeros(4), np.ones((GRID, GRID), bool), float(area), direction)
-    return [domain._replace(is_disc=light.shape == "disc", extended=True, half_u=u, half_v=v, target=target, radius=radius)]
+    return [
+        domain._replace(is_disc=light.shape == "disc", extended=True, half_u=u, half_v=v, target=target, radius=radius)
+    ]
 
 
 def _touched(low: np.ndarray, high: np.ndarray, rect: np.ndarray) -> np.ndarray:

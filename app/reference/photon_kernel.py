@@ -40,9 +40,16 @@ class Sequence(NamedTuple):
 
 # Primitive polynomials (degree, coefficients) and initial numbers of dimensions 2 to 10: Joe and Kuo 2008.
 _JOE_KUO = (
-    (1, 0, (1,)), (2, 1, (1, 3)), (3, 1, (1, 3, 1)), (3, 2, (1, 1, 1)), (4, 1, (1, 1, 3, 3)), (4, 4, (1, 3, 5, 13)),
-    (5, 2, (1, 1, 5, 5, 17)), (5, 4, (1, 1, 5, 5, 5)), (5, 7, (1, 1, 7, 11, 19)),
-)  # fmt: skip
+    (1, 0, (1,)),
+    (2, 1, (1, 3)),
+    (3, 1, (1, 3, 1)),
+    (3, 2, (1, 1, 1)),
+    (4, 1, (1, 1, 3, 3)),
+    (4, 4, (1, 3, 5, 13)),
+    (5, 2, (1, 1, 5, 5, 17)),
+    (5, 4, (1, 1, 5, 5, 5)),
+    (5, 7, (1, 1, 7, 11, 19)),
+)
 
 
 def sobol_directions() -> np.ndarray:
@@ -124,7 +131,8 @@ def fresnel(cosine_i, eta):
 
 @compiled
 def project(camera, px, py, pz):
-    """(row, column, film area per area across the way to the camera, toward the camera (3), its distance); row −1: not seen.
+    """(row, column, film area per area across the way to the camera, toward the camera (3), its distance); row −1: not
+    seen.
 
     The factor is 1/(d² cos³) for a pinhole and 1 for an orthographic camera; on a film at distance one.
     """
@@ -152,7 +160,8 @@ def project(camera, px, py, pz):
 
 @compiled
 def _deposit(scene, camera, colour, atom, triangle, px, py, pz, from_front, watt, picture, stack):
-    """Add a landed photon to its pixel; returns (row, column, luminance added), row −1 where the camera does not see it."""
+    """Add a landed photon to its pixel; returns (row, column, luminance added), row −1 where the camera does not see
+    it."""
     row, column, factor, tx, ty, tz, distance = project(camera, px, py, pz)
     if row < 0:
         return -1, -1, 0.0
@@ -177,7 +186,9 @@ def _deposit(scene, camera, colour, atom, triangle, px, py, pz, from_front, watt
 
 
 @compiled
-def trace(scene, camera, domain, colour, sequence, first, count, share, max_depth, picture, tally, pixel_weight, importance):
+def trace(
+    scene, camera, domain, colour, sequence, first, count, share, max_depth, picture, tally, pixel_weight, importance
+):
     """Trace photons [first, first + count) of one domain.
 
     `share`: factor on every weight. `picture` (H, W, 3) and `tally` (9,) are added to. With a non-empty
@@ -209,7 +220,9 @@ def trace(scene, camera, domain, colour, sequence, first, count, share, max_dept
             continue
         u = _unit(state[2])
         atom = search(colour.cdf, u)
-        nm = colour.start_nm[atom] + colour.width_nm[atom] * (u - colour.cdf[atom]) / (colour.cdf[atom + 1] - colour.cdf[atom])
+        nm = colour.start_nm[atom] + colour.width_nm[atom] * (u - colour.cdf[atom]) / (
+            colour.cdf[atom + 1] - colour.cdf[atom]
+        )
         watt *= colour.watt[atom] * share
         tally[EMITTED] += watt
         tally[COUNTED] += 1.0
@@ -217,7 +230,9 @@ def trace(scene, camera, domain, colour, sequence, first, count, share, max_dept
 
         last, last_object, within, mask, alone, depth = -1, -1, False, np.uint64(0), _AIR, 0
         while True:
-            t, triangle, u, v = nearest(scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance)
+            t, triangle, u, v = nearest(
+                scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance
+            )
             if triangle < 0:
                 tally[ESCAPED if mask == np.uint64(0) and alone == _AIR else LOST_NUMERIC] += watt
                 break
@@ -241,7 +256,9 @@ def trace(scene, camera, domain, colour, sequence, first, count, share, max_dept
                     tally[DIRECT] += watt
                     break
                 tally[DEPOSITED] += watt
-                y, x, added = _deposit(scene, camera, colour, atom, triangle, px, py, pz, entering, watt, picture, stack)
+                y, x, added = _deposit(
+                    scene, camera, colour, atom, triangle, px, py, pz, entering, watt, picture, stack
+                )
                 if y >= 0:
                     tally[COUNTED + 1] += 1.0
                     if pilot:

@@ -45,7 +45,12 @@ def scene_key(scene: Scene, width: int, height: int, max_depth: int) -> str:
         key.add("material", type(item.material).__name__)
         match item.material:
             case Dielectric(dispersion=dispersion, absorption=absorption, priority=priority):
-                key.add("glass", dispersion.index(VISIBLE_NM), priority, None if absorption is None else absorption.coefficient)
+                key.add(
+                    "glass",
+                    dispersion.index(VISIBLE_NM),
+                    priority,
+                    None if absorption is None else absorption.coefficient,
+                )
             case Mirror(reflectance_rgb=rgb):
                 key.add("mirror", *(float(v) for v in rgb))
             case Diffuse(reflectance_rgb=rgb, reflectance=reflectance):
@@ -72,7 +77,9 @@ def render_reference(
     without numba or where too many solids nest.
     """
     progress(0.0, "preparing")
-    return continue_run(ReferenceRun(scene, width, height, max_depth, seed), photons, seconds, target_relmse, progress, cancelled)
+    return continue_run(
+        ReferenceRun(scene, width, height, max_depth, seed), photons, seconds, target_relmse, progress, cancelled
+    )
 
 
 def cached_reference(
@@ -95,9 +102,20 @@ def cached_reference(
     costs only the saving. An interrupt (KeyboardInterrupt) stores what is done and goes on upwards.
     """
     path = kept_path(scene_key(scene, width, height, max_depth), folder)
-    stored = load_kept(path, {"sums": (PARTS, height, width, 3), "units": (PARTS,), "tallies": (PARTS, TALLY_SIZE), "seconds": (), "unit": ()})
+    stored = load_kept(
+        path,
+        {
+            "sums": (PARTS, height, width, 3),
+            "units": (PARTS,),
+            "tallies": (PARTS, TALLY_SIZE),
+            "seconds": (),
+            "unit": (),
+        },
+    )
     if stored is not None:
-        picture = summed(stored["sums"], stored["units"], stored["tallies"], int(stored["unit"]), float(stored["seconds"]))
+        picture = summed(
+            stored["sums"], stored["units"], stored["tallies"], int(stored["unit"]), float(stored["seconds"])
+        )
         if _suffices(picture, photons, target_relmse):
             return picture
     progress(0.0, "preparing")

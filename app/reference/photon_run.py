@@ -42,7 +42,8 @@ class ReferencePicture:
     """A converged picture and what is known of its error; row 0 on top."""
 
     rgb: np.ndarray
-    """float64 (H, W, 3): linear Rec.709, lm/(sr unit²) for white, as `render(… layer="caustic").rgb`: the mean over each pixel."""
+    """float64 (H, W, 3): linear Rec.709, lm/(sr unit²) for white, as `render(… layer="caustic").rgb`: the mean over
+    each pixel."""
     covariance: np.ndarray
     """float64 (H, W, 3, 3): of a pixel's channels as estimates, from PARTS independent pictures."""
     photons: int
@@ -88,7 +89,9 @@ class ReferenceRun:
         try:
             from . import photon_emission, photon_kernel, photon_scene
         except ImportError as error:
-            raise UserError(f"the reference renderer needs numba ({error}); install it with: pip install numba") from error
+            raise UserError(
+                f"the reference renderer needs numba ({error}); install it with: pip install numba"
+            ) from error
         self._kernel = photon_kernel
         self._scene, centre = photon_scene.photon_scene(scene)
         self._camera_pass = photon_scene.viewpoint(scene.camera, width, height, centre)
@@ -96,7 +99,10 @@ class ReferenceRun:
         classes, _ = photon_scene.reflectance_classes(scene)
         corners = photon_scene.specular_corners(self._scene)
         points = self._scene.corners[:, :3]
-        reach = float(np.linalg.norm(points, axis=1).max() + np.linalg.norm(self._scene.corners[:, 3:].reshape(-1, 3), axis=1).max())
+        reach = float(
+            np.linalg.norm(points, axis=1).max()
+            + np.linalg.norm(self._scene.corners[:, 3:].reshape(-1, 3), axis=1).max()
+        )
         domains: list[Domain] = []
         self._colours: list[Colours] = []
         for light in scene.lights:
@@ -111,7 +117,9 @@ class ReferenceRun:
         self.tallies = np.zeros((PARTS, TALLY_SIZE))
         self.seconds = 0.0
         self._domains, self._points = self._aimed(domains)
-        self._sequences = [[photon_kernel.scrambled(seed, part, d) for d in range(len(domains))] for part in range(PARTS)]
+        self._sequences = [
+            [photon_kernel.scrambled(seed, part, d) for d in range(len(domains))] for part in range(PARTS)
+        ]
         self._pace = Pace(max(1, 1024 // max(self.unit, 1)))
 
     @property
@@ -137,7 +145,8 @@ class ReferenceRun:
         return not self._points or int(self.units.max()) * max(self._points) >= _LAST_POINT
 
     def advance(self, photons_left: int | None = None, seconds_left: float | None = None) -> None:
-        """One round of all parts, about half a second or what is left. An interrupt keeps the parts that were finished."""
+        """One round of all parts, about half a second or what is left. An interrupt keeps the parts that were
+        finished."""
         units = self._pace.units
         if photons_left is not None:
             units = min(units, max(1, -(-photons_left // (self.unit * PARTS))))
@@ -152,11 +161,24 @@ class ReferenceRun:
 
     def _trace_part(self, part: int, units: int) -> None:
         none = np.zeros((0, 0))
-        for domain, colour, points, sequence in zip(self._domains, self._colours, self._points, self._sequences[part], strict=True):
+        for domain, colour, points, sequence in zip(
+            self._domains, self._colours, self._points, self._sequences[part], strict=True
+        ):
             self._kernel.trace(
-                self._scene, self._camera_pass, domain, colour, sequence, int(self.units[part]) * points, units * points, 1.0 / points,
-                self._max_depth, self.sums[part], self.tallies[part], none, none,
-            )  # fmt: skip
+                self._scene,
+                self._camera_pass,
+                domain,
+                colour,
+                sequence,
+                int(self.units[part]) * points,
+                units * points,
+                1.0 / points,
+                self._max_depth,
+                self.sums[part],
+                self.tallies[part],
+                none,
+                none,
+            )
         self.units[part] += units
 
     def _aimed(self, domains: list[Domain]) -> tuple[list[Domain], list[int]]:
@@ -188,14 +210,26 @@ class ReferenceRun:
         for d, (domain, colour) in enumerate(zip(domains, self._colours, strict=True)):
             sequence = self._kernel.scrambled(self._seed, PARTS + number, d)
             self._kernel.trace(
-                self._scene, self._camera_pass, domain, colour, sequence, 0, _PILOT_PHOTONS, 1.0 / _PILOT_PHOTONS,
-                self._max_depth, picture, np.zeros(TALLY_SIZE), weight, importance[d],
-            )  # fmt: skip
+                self._scene,
+                self._camera_pass,
+                domain,
+                colour,
+                sequence,
+                0,
+                _PILOT_PHOTONS,
+                1.0 / _PILOT_PHOTONS,
+                self._max_depth,
+                picture,
+                np.zeros(TALLY_SIZE),
+                weight,
+                importance[d],
+            )
         return picture, importance
 
 
 def summed(sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, unit: int, seconds: float) -> ReferencePicture:
-    """The picture from the sums (PARTS, H, W, 3) and tallies (PARTS, TALLY_SIZE) of parts that traced `units` (PARTS,) of `unit` photons."""
+    """The picture from the sums (PARTS, H, W, 3) and tallies (PARTS, TALLY_SIZE) of parts that traced `units` (PARTS,)
+    of `unit` photons."""
     total = max(int(units.sum()), 1)
     flux = tallies.sum(axis=0) / total
     balance = {name: float(value) for name, value in zip(TALLY, flux, strict=False)}
@@ -211,7 +245,8 @@ def summed(sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, unit: int, 
 
 
 def _error_weight(luminance: np.ndarray) -> np.ndarray:
-    """1/(R² + ε) of a noisy picture (H, W), R averaged over blocks: what a squared error counts in relMSE, up to a factor."""
+    """1/(R² + ε) of a noisy picture (H, W), R averaged over blocks: what a squared error counts in relMSE, up to a
+    factor."""
     height, width = luminance.shape
     rows, columns = np.arange(height) // _PILOT_BLOCK, np.arange(width) // _PILOT_BLOCK
     index = rows[:, None] * (columns[-1] + 1) + columns

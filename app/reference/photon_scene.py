@@ -137,19 +137,32 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
             weight[-1] = weights.add(np.interp(TABLE_NM, VISIBLE_NM, reflectance))
     _, reflectance_class = reflectance_classes(scene)
     factor = [
-        np.asarray(o.material.reflectance_rgb, float) if isinstance(o.material, Diffuse) and o.material.reflectance is None else np.ones(3)
+        np.asarray(o.material.reflectance_rgb, float)
+        if isinstance(o.material, Diffuse) and o.material.reflectance is None
+        else np.ones(3)
         for o in scene.objects
     ]
     bounds, first, count = _exact_nodes(tree, corners)
     return PhotonScene(
-        bounds, first, count,
+        bounds,
+        first,
+        count,
         np.concatenate([corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1),
-        np.ascontiguousarray(normals), owner, smooth, corner_normals,
-        np.array(kinds, np.int32), np.array(medium, np.int32), np.array(weight, np.int32),
+        np.ascontiguousarray(normals),
+        owner,
+        smooth,
+        corner_normals,
+        np.array(kinds, np.int32),
+        np.array(medium, np.int32),
+        np.array(weight, np.int32),
         np.array([rank.get(i, -1) for i in range(len(meshes))], np.int32),
         np.array(sorted(rank, key=lambda i: rank[i]) or [OUTSIDE], np.int32),
-        np.array(factor), reflectance_class, media.array(), weights.array(), _NEAR * size,
-    ), centre  # fmt: skip
+        np.array(factor),
+        reflectance_class,
+        media.array(),
+        weights.array(),
+        _NEAR * size,
+    ), centre
 
 
 def viewpoint(camera: Camera, width: int, height: int, centre: np.ndarray) -> Viewpoint:
@@ -164,7 +177,17 @@ def viewpoint(camera: Camera, width: int, height: int, centre: np.ndarray) -> Vi
     right /= np.linalg.norm(right)
     orthographic = camera.kind == "orthographic"
     half = 0.5 * camera.vertical_extent if orthographic else np.tan(np.radians(0.5 * camera.vertical_fov_deg))
-    return Viewpoint(position - centre, right, np.cross(right, forward), forward, float(half * width / height), float(half), orthographic, width, height)
+    return Viewpoint(
+        position - centre,
+        right,
+        np.cross(right, forward),
+        forward,
+        float(half * width / height),
+        float(half),
+        orthographic,
+        width,
+        height,
+    )
 
 
 def colours(spectrum: Spectrum, classes: list[np.ndarray | None]) -> Colours:
@@ -180,7 +203,9 @@ def colours(spectrum: Spectrum, classes: list[np.ndarray | None]) -> Colours:
     width = np.concatenate([high - low, np.zeros(len(line_nm))])
     power = np.concatenate([spectrum.density[lit], line_power])
     if not len(power):
-        return Colours(np.array([0.0, 1.0]), np.array([560.0]), np.zeros(1), np.zeros(1), np.zeros((len(classes), 1, 3)))
+        return Colours(
+            np.array([0.0, 1.0]), np.array([560.0]), np.zeros(1), np.zeros(1), np.zeros((len(classes), 1, 3))
+        )
     seen = np.concatenate([cmf_xyz()[lit], cmf_at(line_nm).reshape(-1, 3)])
     share = 0.2 * power / power.sum()
     bright = power * seen.sum(axis=1)
@@ -237,7 +262,9 @@ class _Rows:
 
 def _middle(scene: Scene, meshes: list[Mesh]) -> tuple[np.ndarray, float]:
     """Middle and half diagonal of the specular objects, or of everything."""
-    chosen = [m for m, o in zip(meshes, scene.objects, strict=True) if isinstance(o.material, Dielectric | Mirror)] or meshes
+    chosen = [
+        m for m, o in zip(meshes, scene.objects, strict=True) if isinstance(o.material, Dielectric | Mirror)
+    ] or meshes
     low = np.min([m.bounds()[0] for m in chosen], axis=0)
     high = np.max([m.bounds()[1] for m in chosen], axis=0)
     return 0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), 1e-300)
@@ -265,11 +292,17 @@ def _ranks(scene: Scene, meshes: list[Mesh]) -> dict[int, int]:
     bounds = {i: np.array(meshes[i].bounds()) for i in solids}
     slack = 1e-5 * np.ptp(np.concatenate(list(bounds.values())), axis=0).max()
     meeting = [
-        i for i in solids
-        if any(j != i and (bounds[i][0] <= bounds[j][1] + slack).all() and (bounds[j][0] <= bounds[i][1] + slack).all() for j in solids)
-    ]  # fmt: skip
+        i
+        for i in solids
+        if any(
+            j != i and (bounds[i][0] <= bounds[j][1] + slack).all() and (bounds[j][0] <= bounds[i][1] + slack).all()
+            for j in solids
+        )
+    ]
     if len(meeting) > _MAX_STACK:
-        raise UserError(f"scene '{scene.name}': {len(meeting)} transparent solids nest or touch and at most {_MAX_STACK} may; move some apart")
+        raise UserError(
+            f"scene '{scene.name}': {len(meeting)} transparent solids nest or touch and at most {_MAX_STACK} may; move some apart"
+        )
     ranked = sorted(meeting, key=lambda i: (scene.objects[i].material.priority, i))  # type: ignore[union-attr]
     return {index: rank for rank, index in enumerate(ranked)}
 

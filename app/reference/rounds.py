@@ -74,7 +74,8 @@ class Pace:
 
 
 def trace_parts(trace_part: Callable[[int, int], None], units: int) -> float:
-    """`trace_part(part, units)` for every part, side by side; seconds it took. An interrupt keeps the parts that were finished."""
+    """`trace_part(part, units)` for every part, side by side; seconds it took. An interrupt keeps the parts that were
+    finished."""
     started = time.perf_counter()
     with ThreadPoolExecutor(min(PARTS, os.cpu_count() or 1)) as pool:
         jobs: list[Future] = []
@@ -89,7 +90,12 @@ def trace_parts(trace_part: Callable[[int, int], None], units: int) -> float:
 
 
 def continue_run(
-    run: Run[EstimateT], amount: int | None, seconds: float | None, target_relmse: float | None, progress: Progress, cancelled: Cancelled
+    run: Run[EstimateT],
+    amount: int | None,
+    seconds: float | None,
+    target_relmse: float | None,
+    progress: Progress,
+    cancelled: Cancelled,
 ) -> EstimateT:
     """Add rounds to `run` up to the first limit; `amount` counts all of the run's, `seconds` from now on.
 

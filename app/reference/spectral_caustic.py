@@ -1,8 +1,9 @@
 """The caustic as the camera's reference looks it up: histograms of photons on flat receivers, by place and wavelength.
 
-The photons start as those of the light's reference do. A pilot of camera paths, through glass too, finds which sides of which
-receivers are seen and how finely; a pilot of photons finds where light lands there (`caustic_windows`). Receivers must be
-flat: a curved one that is both lit by way of glass and seen raises UserError. `caustic_cache` keeps what was traced.
+The photons start as those of the light's reference do. A pilot of camera paths, through glass too, finds which sides of
+which receivers are seen and how finely; a pilot of photons finds where light lands there (`caustic_windows`). Receivers
+must be flat: a curved one that is both lit by way of glass and seen raises UserError. `caustic_cache` keeps what was
+traced.
 """
 
 from __future__ import annotations
@@ -85,20 +86,31 @@ class SpectralCaustic:
     """Of it, power where the camera's pilot saw nothing."""
 
     def irradiance(self, side: int, window: int) -> np.ndarray:
-        """W/unit² of each bin on a side's window (0 coarse, 1 fine), float32 (rows, columns, bins); row 0 at the window's lower corner."""
+        """W/unit² of each bin on a side's window (0 coarse, 1 fine), float32 (rows, columns, bins); row 0 at the
+        window's lower corner."""
         return _window(self.tables, self.tables.irradiance, side, window)
 
     def half(self, number: int) -> SpectralCaustic:
         """The caustic by the photons of one half alone."""
         alone = self.measured_passes[number]
-        return SpectralCaustic(self.plan, self.tables._replace(irradiance=alone), np.broadcast_to(alone, self.measured_passes.shape), self.photons // _HALVES, self.landed_w, self.outside_w)
+        return SpectralCaustic(
+            self.plan,
+            self.tables._replace(irradiance=alone),
+            np.broadcast_to(alone, self.measured_passes.shape),
+            self.photons // _HALVES,
+            self.landed_w,
+            self.outside_w,
+        )
 
     @cached_property
     def relmse(self) -> float:
         """Own error of the fine windows, averaged over blocks of the side of a pixel: mean[var/(E² + ε)] on power."""
         error, count = 0.0, 0
         for side in range(len(self.tables.first)):
-            mean, apart = (_blocks(_window(self.tables, values, side, 1)) for values in (self.tables.irradiance, self.measured_passes[0] - self.measured_passes[1]))
+            mean, apart = (
+                _blocks(_window(self.tables, values, side, 1))
+                for values in (self.tables.irradiance, self.measured_passes[0] - self.measured_passes[1])
+            )
             epsilon = RELMSE_EPSILON * float(mean.mean()) ** 2 if mean.size else 0.0
             if epsilon > 0.0:
                 error += float((0.25 * apart**2 / (mean**2 + epsilon)).sum())
@@ -106,8 +118,15 @@ class SpectralCaustic:
         return error / count if count else 0.0
 
 
-def build_caustic(scene: Scene, width: int, height: int, plan: CausticPlan | None = None, progress: Progress = lambda fraction, text: None) -> SpectralCaustic:
-    """Trace `plan.photons`, up to whole rounds, and sort them, for pictures of about `width` × `height` pixels by the scene's camera.
+def build_caustic(
+    scene: Scene,
+    width: int,
+    height: int,
+    plan: CausticPlan | None = None,
+    progress: Progress = lambda fraction, text: None,
+) -> SpectralCaustic:
+    """Trace `plan.photons`, up to whole rounds, and sort them, for pictures of about `width` × `height` pixels by the
+    scene's camera.
 
     Raises UserError where light comes by way of glass or mirrors to a curved diffuse object that is seen.
     """
@@ -176,16 +195,26 @@ class CausticRun:
         return SpectralCaustic(self.plan, tables, measured_passes, self.photons, float(landed), float(outside))
 
     def _trace_part(self, part: int, units: int) -> None:
-        found = [self._land(d, self._sequences[part][d], int(self.units[part]) * n, units * n, 1.0 / n) for d, n in enumerate(self.counts.tolist())]
+        found = [
+            self._land(d, self._sequences[part][d], int(self.units[part]) * n, units * n, 1.0 / n)
+            for d, n in enumerate(self.counts.tolist())
+        ]
         with self._counting:
             for landed in found:
-                self.flux[part] += float(landed.watts.sum()), caustic_kernel.gather(self.tables, *landed, len(landed.watts), self.sums[part % _HALVES])
+                self.flux[part] += (
+                    float(landed.watts.sum()),
+                    caustic_kernel.gather(self.tables, *landed, len(landed.watts), self.sums[part % _HALVES]),
+                )
             self.units[part] += units
 
     def _prepared(self) -> tuple[CausticTables, np.ndarray, np.ndarray]:
-        """Windows, the sides that have any, and photons of each domain in a unit (D,), by the pilots; none where nothing is lit and seen."""
+        """Windows, the sides that have any, and photons of each domain in a unit (D,), by the pilots; none where
+        nothing is lit and seen."""
         seen = self._seen()
-        pilot = [self._land(d, scrambled(self.plan.seed, PARTS, d), 0, _PILOT, 1.0 / _PILOT) for d in range(len(self.domains))]
+        pilot = [
+            self._land(d, scrambled(self.plan.seed, PARTS, d), 0, _PILOT, 1.0 / _PILOT)
+            for d in range(len(self.domains))
+        ]
         nothing = no_caustic(self.scene), np.zeros(0, bool), np.zeros(0, np.int64)
         if not pilot or not len(seen.side):
             return nothing
@@ -198,7 +227,9 @@ class CausticRun:
     def _domains(self, centre: np.ndarray) -> tuple[list[Domain], list[Colours]]:
         specular = photon_scene.specular_corners(self.photon_scene)
         corners = self.photon_scene.corners
-        reach = float(np.linalg.norm(corners[:, :3], axis=1).max() + np.linalg.norm(corners[:, 3:].reshape(-1, 3), axis=1).max())
+        reach = float(
+            np.linalg.norm(corners[:, :3], axis=1).max() + np.linalg.norm(corners[:, 3:].reshape(-1, 3), axis=1).max()
+        )
         classes, _ = photon_scene.reflectance_classes(self.scene)
         domains: list[Domain] = []
         colours: list[Colours] = []
@@ -212,17 +243,36 @@ class CausticRun:
     def _seen(self) -> SurfaceInteraction:
         points, which = np.empty((_PILOT, 4)), np.empty((_PILOT, 2), np.int32)
         found = camera_kernel.seen_points(
-            self.photon_scene, self.camera, camera_start(self.scene, self.photon_scene), scrambled(self.plan.seed, PARTS + 1, 0),
-            _PILOT, _PILOT_NM, self.plan.max_depth, self.planes.side, points, which, scratch(),
-        )  # fmt: skip
+            self.photon_scene,
+            self.camera,
+            camera_start(self.scene, self.photon_scene),
+            scrambled(self.plan.seed, PARTS + 1, 0),
+            _PILOT,
+            _PILOT_NM,
+            self.plan.max_depth,
+            self.planes.side,
+            points,
+            which,
+            scratch(),
+        )
         return SurfaceInteraction(points[:found, :3], points[:found, 3], which[:found, 0])
 
     def _land(self, d: int, sequence: Sequence, first: int, count: int, share: float) -> Landed:
         found = Landed(np.empty((count, 3)), np.empty(count), np.empty((count, 4), np.int32))
         landed = caustic_kernel.land(
-            self.photon_scene, self.domains[d], self.colours[d], self.bands[d], self.planes.side, sequence,
-            first, count, share, self.plan.max_depth, *found, scratch(),
-        )  # fmt: skip
+            self.photon_scene,
+            self.domains[d],
+            self.colours[d],
+            self.bands[d],
+            self.planes.side,
+            sequence,
+            first,
+            count,
+            share,
+            self.plan.max_depth,
+            *found,
+            scratch(),
+        )
         return Landed(*(values[:landed] for values in found))
 
     def _refuse_curved(self, seen: SurfaceInteraction, lit: Landed) -> None:
@@ -241,7 +291,8 @@ class CausticRun:
         return (pixel if self.camera.orthographic else pixel * distance) / TEXELS_A_PIXEL
 
     def _aim(self, pilot: list[Landed], tables: CausticTables, wanted: np.ndarray) -> np.ndarray:
-        """Sets the domains' densities by what the pilot brought to the windows; photons of each domain in a unit, none where it brought nothing."""
+        """Sets the domains' densities by what the pilot brought to the windows; photons of each domain in a unit, none
+        where it brought nothing."""
         weight = []
         for d, found in enumerate(pilot):
             useful = np.zeros(len(found.watts), bool)

@@ -83,7 +83,10 @@ def description(animation: Animation, settings: RenderSettings, fps: float, phot
 def _pictures(scene: Scene) -> list[str]:
     """Hashes of the environment and of every texture, which `scene_key` does not know."""
     found = [item.material.texture for item in scene.objects if isinstance(item.material, Diffuse)]
-    hashes = ["" if t is None else hashlib.sha256(np.ascontiguousarray(t.rgb).tobytes() + t.wrap.encode()).hexdigest() for t in found]
+    hashes = [
+        "" if t is None else hashlib.sha256(np.ascontiguousarray(t.rgb).tobytes() + t.wrap.encode()).hexdigest()
+        for t in found
+    ]
     if scene.environment is not None:
         turned = np.asarray(scene.environment.world_to_local, float).tobytes()
         hashes.append(hashlib.sha256(np.ascontiguousarray(scene.environment.rgb).tobytes() + turned).hexdigest())

@@ -1,8 +1,8 @@
 """A receiver's caustic map as a texture, with the place where it belongs in a `.json` beside it.
 
-What is written is irradiance: the light that glass and mirrors throw on the receiver, before its own reflectance, linear
-Rec.709 in lm/unit² for white. A flat receiver gets the rectangle on which its light lands; a curved one its charts, with the texture
-coordinates of every triangle.
+What is written is irradiance: the light that glass and mirrors throw on the receiver, before its own reflectance,
+linear Rec.709 in lm/unit² for white. A flat receiver gets the rectangle on which its light lands; a curved one its
+charts, with the texture coordinates of every triangle.
 """
 
 from __future__ import annotations
@@ -56,7 +56,8 @@ def check_output(path: Path) -> Path:
 
 
 def bake(context: Context, stage: Stage, settings: RenderSettings, receiver: str, path: Path) -> Iterator[float]:
-    """Bake in steps, pausing with the share done; writes `path` and its placement at the end, or nothing if it is left before.
+    """Bake in steps, pausing with the share done; writes `path` and its placement at the end, or nothing if it is left
+    before.
 
     `settings.width`, `height`: texels. Raises `UserError`.
     """
@@ -81,7 +82,8 @@ def bake(context: Context, stage: Stage, settings: RenderSettings, receiver: str
 
 
 def baked(light: LightPass) -> tuple[np.ndarray, dict[str, object]]:
-    """Irradiance float32 (H, W, 3), row 0 on top, and where it lies; of a light pass whose settings ask for a map layer."""
+    """Irradiance float32 (H, W, 3), row 0 on top, and where it lies; of a light pass whose settings ask for a map
+    layer."""
     receiver = light.map_receiver
     assert receiver is not None
     charts = light.layout.charts.get(receiver)
@@ -122,7 +124,9 @@ def _rectangle(light: LightPass, receiver: int, width: int, height: int) -> Mapp
         "top_right": (high[0], high[1]),
         "top_left": (low[0], high[1]),
     }
-    world = {name: space.to_world(frame.origin + np.array(place) @ frame.axes).tolist() for name, place in corners.items()}
+    world = {
+        name: space.to_world(frame.origin + np.array(place) @ frame.axes).tolist() for name, place in corners.items()
+    }
     size = (high - low) / space.scale
     return {
         "kind": "rectangle",

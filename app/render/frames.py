@@ -1,4 +1,5 @@
-"""Pictures of a stage that changes, frame after frame, keeping what stays: for animations and other work beside the window.
+"""Pictures of a stage that changes, frame after frame, keeping what stays: for animations and other work beside the
+window.
 
 Where only the camera moves, photons are traced once: caustic maps do not depend on it. Where light changes,
 every frame is traced anew with the same counters, and maps are fitted once to all frames, so that what
@@ -22,12 +23,12 @@ from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Camera, Scene
 from ..model.settings import RenderSettings
-from ..passes.camera import CausticMaps, CameraPass
+from ..passes.camera import CameraPass, CausticMaps
 from ..passes.pilot import Pilot
 from ..passes.trace import Band
 from .light_pass import LightPass, spectral_axis
 from .light_plan import LightPlan
-from .viewer.inputs import LiveInputs, DirtyLevel
+from .viewer.inputs import DirtyLevel, LiveInputs
 from .viewer.invalidation import dirty_level
 from .viewer.live_camera import solo_scene
 
@@ -61,7 +62,9 @@ class _FramedLight(LightPass):
         """Maps for all landings, as `view` sees them."""
         own = self.pilots
         space = self.buffers.space
-        everywhere = [(space, pilot) for pilot in own.values()] + [(s.space, pilot) for s in self.surveys for pilot in s.pilots]
+        everywhere = [(space, pilot) for pilot in own.values()] + [
+            (s.space, pilot) for s in self.surveys for pilot in s.pilots
+        ]
         self.pilots = {i: _landings(pilot, at, space) for i, (at, pilot) in enumerate(everywhere)}
         super().lay_out(self.view or camera)
         self.pilots = own
@@ -116,8 +119,12 @@ class FrameRenderer:
         """Render a frame, pausing with the share done."""
         yield from self._survey()
         inputs = self._inputs(stage)
-        # A change of what is merely looked at may still concern the maps' records, so only a moved camera keeps the light.
-        if self._shown is None or dirty_level(self._shown, self._shown, replace(inputs, camera=self._shown.camera)) != DirtyLevel.NOTHING:
+        # A change of what is merely looked at may still concern the maps' records, so only a moved camera keeps the
+        # light.
+        if (
+            self._shown is None
+            or dirty_level(self._shown, self._shown, replace(inputs, camera=self._shown.camera)) != DirtyLevel.NOTHING
+        ):
             yield from self._trace(stage)
         self._shown = inputs
         if self._settings.layer.startswith("map:"):
@@ -130,7 +137,9 @@ class FrameRenderer:
         if camera_pass.chooses:
             for _ in camera_pass.choosing_spectrum(stage.camera, settings.width, settings.height, samples, maps):
                 yield _LIGHT_SHARE
-        for share in camera_pass.samples(stage.camera, settings.width, settings.height, samples, 0, maps, settings.seed):
+        for share in camera_pass.samples(
+            stage.camera, settings.width, settings.height, samples, 0, maps, settings.seed
+        ):
             yield _LIGHT_SHARE + (1.0 - _LIGHT_SHARE) * share
 
     def run(self, stage: Stage) -> np.ndarray:
@@ -158,10 +167,13 @@ class FrameRenderer:
 
     def _inputs(self, stage: Stage) -> LiveInputs:
         s = self._settings
-        return LiveInputs(stage.scene, stage.camera, s.width, s.height, s.method, s.smoothing, stage.solo_nm, s.local_gain, s.seed)
+        return LiveInputs(
+            stage.scene, stage.camera, s.width, s.height, s.method, s.smoothing, stage.solo_nm, s.local_gain, s.seed
+        )
 
     def _distinct(self, stages: Sequence[Stage]) -> list[Stage]:
-        """Stages, evenly spread, whose light differs; none where all share it, for then a frame's own pilot says everything."""
+        """Stages, evenly spread, whose light differs; none where all share it, for then a frame's own pilot says
+        everything."""
         found: list[Stage] = []
         for index in np.unique(np.linspace(0, len(stages) - 1, _SURVEYED).astype(int)):
             new = self._inputs(stages[index])
@@ -196,7 +208,9 @@ class FrameRenderer:
             yield _LIGHT_SHARE * step.fraction
         light.finish()
         self.traces += 1
-        self._camera_pass = CameraPass(self._context, buffers, self._settings.layer, light.reflectances, light.map_channels)
+        self._camera_pass = CameraPass(
+            self._context, buffers, self._settings.layer, light.reflectances, light.map_channels
+        )
 
     def _photons(self, scene: Scene) -> int:
         return self._settings.photons or scene.render.photons
@@ -217,7 +231,8 @@ class FrameRenderer:
 
 
 def _whole_cycles(camera_pass: CameraPass, samples: int) -> int:
-    """`samples` or a few more, in which every band of the spectrum has its turn equally often, however many bands a frame chooses:
+    """`samples` or a few more, in which every band of the spectrum has its turn equally often, however many bands a
+    frame chooses:
     all frames then have as many samples, and what stands still in them stays."""
     cycle = camera_pass.fixed_bands or (1 << (samples.bit_length() - 1) if camera_pass.chooses else 1)
     return -(-samples // cycle) * cycle
@@ -234,7 +249,13 @@ def _map_view(cameras: Sequence[Camera], settings: RenderSettings) -> tuple[Came
     first = cameras[0]
     if settings.layer.startswith("map:") or all(camera == first for camera in cameras):
         return None, settings
-    nearest = min(cameras, key=lambda c: np.linalg.norm(np.subtract(c.position, c.target)) * (c.vertical_extent if c.kind == "orthographic" else math.tan(math.radians(0.5 * c.vertical_fov_deg))))
+    nearest = min(
+        cameras,
+        key=lambda c: (
+            np.linalg.norm(np.subtract(c.position, c.target))
+            * (c.vertical_extent if c.kind == "orthographic" else math.tan(math.radians(0.5 * c.vertical_fov_deg)))
+        ),
+    )
     if nearest.kind == "orthographic":
         factor, view = 8.0, replace(nearest, vertical_extent=8.0 * nearest.vertical_extent)
     else:
@@ -253,8 +274,12 @@ def _landings(pilot: Pilot, old: GpuSpace, new: GpuSpace) -> Pilot:
 
     def moved(records: np.ndarray) -> np.ndarray:
         found = np.zeros(len(records), _LANDING)
-        found["position"] = records["position"] if old is new else new.to_gpu(old.to_world(records["position"].astype(float)))
+        found["position"] = (
+            records["position"] if old is new else new.to_gpu(old.to_world(records["position"].astype(float)))
+        )
         found["flux_w"], found["receiver"] = records["flux_w"], records["receiver"]
         return found
 
-    return replace(pilot, whole=moved(pilot.whole), spectral=[moved(r) for r in pilot.spectral], rim=[moved(r) for r in pilot.rim])
+    return replace(
+        pilot, whole=moved(pilot.whole), spectral=[moved(r) for r in pilot.spectral], rim=[moved(r) for r in pilot.rim]
+    )

@@ -27,7 +27,9 @@ class LightMaps:
         self.features = replace(features, nested_windows=any(len(windows) > 1 for windows in layout.windows.values()))
         self.splatter = Splatter(ctx, self.features)
         self.atlas = MapAtlas(ctx, layout.size, layout.placements, features.targets)
-        self.receivers = ctx.buffer(np.ascontiguousarray(layout.receivers if len(layout.receivers) else RECEIVER.zeros(1)).tobytes())
+        self.receivers = ctx.buffer(
+            np.ascontiguousarray(layout.receivers if len(layout.receivers) else RECEIVER.zeros(1)).tobytes()
+        )
         self.photon_weight = 0.0
         """What was deposited is energy times this."""
         self._resolved = [ctx.texture(self.atlas.size, 4, dtype="f4") for _ in range(features.targets)]
@@ -117,6 +119,13 @@ class LightMaps:
 
     def release(self) -> None:
         """Free everything."""
-        owned: Iterable[Releasable] = (self.splatter, self.atlas, self.receivers, *self._resolved, self._levels_fold, self._seam_fold)
+        owned: Iterable[Releasable] = (
+            self.splatter,
+            self.atlas,
+            self.receivers,
+            *self._resolved,
+            self._levels_fold,
+            self._seam_fold,
+        )
         for resource in owned:
             resource.release()

@@ -37,6 +37,8 @@ from .light_maps import LightMaps
 from .light_plan import SMALLEST_BATCH, Planner
 
 DEFAULT_BATCH = 1 << 16
+
+
 @dataclass
 class LightStats:
     """What the light pass did."""
@@ -98,7 +100,9 @@ class LightPass:
     min_batch = SMALLEST_BATCH
     """With fewer rays in flight the plan would depend on the batch."""
 
-    def __init__(self, context: Context, scene: Scene, settings: RenderSettings, features: Features, buffers: SceneBuffers) -> None:
+    def __init__(
+        self, context: Context, scene: Scene, settings: RenderSettings, features: Features, buffers: SceneBuffers
+    ) -> None:
         self.context = context
         self.scene = scene
         self.settings = settings
@@ -109,7 +113,11 @@ class LightPass:
         batch = max(min(batch, _largest_batch(context, features)), self.min_batch)
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
         self.variables = SpectralVariables.build(context.ctx, buffers.variables)
-        self.gains = GainBuffers(context.ctx, scene, buffers.receivers, buffers.space, buffers.axis) if features.local_gain else None
+        self.gains = (
+            GainBuffers(context.ctx, scene, buffers.receivers, buffers.space, buffers.axis)
+            if features.local_gain
+            else None
+        )
         self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
         edges = None if settings.bins is None else tuple(np.linspace(380.0, 780.0, settings.bins + 1).tolist())
         self.map_channels = tents(buffers.axis, features.map_tents) if features.map_tents else MapChannels(edges)
@@ -120,25 +128,37 @@ class LightPass:
         self.splat_part = 1 << 30
         """Photons splatted without a pause."""
         self._shown_spectra: Sequence[Spectrum] = [light.spectral_power for light in scene.lights]
-        self._reindexing = Reindexing.of(buffers.axis.glasses[0], buffers.axis.glasses[0]) if features.reindexed else None
+        self._reindexing = (
+            Reindexing.of(buffers.axis.glasses[0], buffers.axis.glasses[0]) if features.reindexed else None
+        )
         self._tables: ShownTables | None = None
         self._spans: Spans = []
 
     def prepare(self) -> None:
-        """Pilots and maps, once for a scene. Afterwards `layout` and `atlas` exist, and `features` are those of the maps too."""
+        """Pilots and maps, once for a scene. Afterwards `layout` and `atlas` exist, and `features` are those of the
+        maps too."""
         for _ in self.preparing():
             pass
 
     def preparing(self) -> Iterator[None]:
         """`prepare`, pausing often: whoever draws meanwhile may bind what it likes."""
-        specular = [self.buffers.space.to_gpu(m.corners()) for m, o in zip(self.buffers.world_meshes, self.scene.objects, strict=True) if isinstance(o.material, Dielectric | Mirror)]
+        specular = [
+            self.buffers.space.to_gpu(m.corners())
+            for m, o in zip(self.buffers.world_meshes, self.scene.objects, strict=True)
+            if isinstance(o.material, Dielectric | Mirror)
+        ]
         triangles = np.concatenate(specular) if specular else np.zeros((0, 3, 3))
-        domains = {i: emission_domain(light, self.scene, self.buffers.space, triangles) for i, light in enumerate(self.scene.lights)}
+        domains = {
+            i: emission_domain(light, self.scene, self.buffers.space, triangles)
+            for i, light in enumerate(self.scene.lights)
+        }
         self.domains: dict[int, EmissionDomain] = {i: d for i, d in domains.items() if d is not None}
         self.pilots: dict[int, Pilot] = {}
         for i, domain in self.domains.items():
             yield
-            self.pilots[i] = yield from pilot_steps(self.trace, self.scene, i, domain, self._full_power(i), self._needs_spectral_pilot)
+            self.pilots[i] = yield from pilot_steps(
+                self.trace, self.scene, i, domain, self._full_power(i), self._needs_spectral_pilot
+            )
         yield
         shows_map = self.settings.layer.startswith("map:")
         self.map_receiver = check_map_receiver(self.scene, self.buffers, self.settings.layer[4:]) if shows_map else None
@@ -151,11 +171,16 @@ class LightPass:
         self.maps = self.maps_for(camera, self.settings.width, self.settings.height, self.tile_max)
         self.features = self.maps.features
 
-    def maps_for(self, camera: Camera, width: int, height: int, tile_max: tuple[int, int] = (FINE_TILE_MAX, COARSE_TILE_MAX)) -> LightMaps:
-        """Maps fitted to what `camera` sees in a picture of `width` × `height`; the caller's to release. `tile_max`: see `layout_maps`."""
+    def maps_for(
+        self, camera: Camera, width: int, height: int, tile_max: tuple[int, int] = (FINE_TILE_MAX, COARSE_TILE_MAX)
+    ) -> LightMaps:
+        """Maps fitted to what `camera` sees in a picture of `width` × `height`; the caller's to release. `tile_max`:
+        see `layout_maps`."""
         seen = replace(self.scene, camera=camera)
         landings = landings_of(self.pilots.values())
-        layout = layout_maps(seen, self.buffers, landings, (width, height), self.reflectance_class, self.map_receiver, tile_max=tile_max)
+        layout = layout_maps(
+            seen, self.buffers, landings, (width, height), self.reflectance_class, self.map_receiver, tile_max=tile_max
+        )
         return LightMaps(self.context.ctx, layout, self.features)
 
     @property
@@ -212,7 +237,9 @@ class LightPass:
         self.seed = seed
         self.stats = LightStats()
         self._maps.clear()
-        planner = Planner(self.scene, self.settings, self.features, self.buffers, self.domains, self.pilots, self.trace.batch)
+        planner = Planner(
+            self.scene, self.settings, self.features, self.buffers, self.domains, self.pilots, self.trace.batch
+        )
         self.plans = planner.plans(photons, self._texel_size())
         for plan in self.plans:
             name = self.scene.lights[plan.index].name
@@ -228,7 +255,9 @@ class LightPass:
         channels = self.map_channels
         ctx, spectra, reindexing = self.context.ctx, self._shown_spectra, self._reindexing
         if reindexing is None:
-            return ShownTables(SplatTables.build(ctx, self.buffers.axis, spectra, self.reflectances, spans, channels, width), None)
+            return ShownTables(
+                SplatTables.build(ctx, self.buffers.axis, spectra, self.reflectances, spans, channels, width), None
+            )
         shown = reindexing.spans(spans, self.buffers.axis, spectra)
         tables = SplatTables.build(ctx, reindexing.axis, spectra, self.reflectances, shown, channels, width)
         return ShownTables(tables, ReindexBuffer(ctx, reindexing, spans, shown, spectra, tables.classes))
@@ -264,7 +293,8 @@ class LightPass:
         return True
 
     def pass_steps(self, number: int, photons: int, first_round: int = 0) -> Generator[PassStep, None, None]:
-        """`run_pass`, pausing after every event of the rays and after every splatting: whoever draws meanwhile may bind what it likes.
+        """`run_pass`, pausing after every event of the rays and after every splatting: whoever draws meanwhile may bind
+        what it likes.
 
         `first_round`: where a pass goes on that was left before."""
         if not self.plans:
@@ -294,7 +324,9 @@ class LightPass:
             except StopIteration as finished:
                 batch: Batch = finished.value
                 break
-            if self.waits and not self.context.is_software:  # there the queue's length is read at every step, which waits
+            if (
+                self.waits and not self.context.is_software
+            ):  # there the queue's length is read at every step, which waits
                 self.context.finish()
             self.stats.trace_seconds += time.perf_counter() - started
             yield
@@ -317,17 +349,29 @@ class LightPass:
         maps: LightMaps | None = None,
         stride: int = 1,
     ) -> Iterator[None]:
-        """Add every `stride`-th photon record to the maps, with footprints `coarsening` times as wide, pausing after every `splat_part` of them.
+        """Add every `stride`-th photon record to the maps, with footprints `coarsening` times as wide, pausing after
+        every `splat_part` of them.
 
-        `count`: of those that are added. `tables` of another plan than the one begun, `maps` of another layout than the light pass's own."""
+        `count`: of those that are added. `tables` of another plan than the one begun, `maps` of another layout than the
+        light pass's own."""
         maps, tables = maps or self._maps, tables or self.tables
         smoothing = self.settings.smoothing * coarsening
         for start in range(0, count, self.splat_part):
             started = time.perf_counter()
             part = min(self.splat_part, count - start)
             maps.splatter.run(
-                photons, part, self.variables, tables.tables, maps.atlas, maps.receivers, smoothing, self.gains, start * stride, stride, tables.reindex
-            )  # fmt: skip
+                photons,
+                part,
+                self.variables,
+                tables.tables,
+                maps.atlas,
+                maps.receivers,
+                smoothing,
+                self.gains,
+                start * stride,
+                stride,
+                tables.reindex,
+            )
             if self.waits:
                 self.context.finish()
             self.stats.splat_seconds += time.perf_counter() - started
@@ -374,7 +418,10 @@ def reflectance_classes(scene: Scene, buffers: SceneBuffers) -> tuple[list[np.nd
         if material.reflectance is None:
             chosen[receiver] = 0
             continue
-        chosen[receiver] = next((i for i, known in enumerate(classes) if known is not None and np.array_equal(known, material.reflectance)), len(classes))
+        chosen[receiver] = next(
+            (i for i, known in enumerate(classes) if known is not None and np.array_equal(known, material.reflectance)),
+            len(classes),
+        )
         if chosen[receiver] == len(classes):
             classes.append(material.reflectance)
     return classes, chosen

@@ -42,15 +42,27 @@ class LightPlan:
         """Points of each sub-lattice over the whole rectangle, so that about the light's share of `photons` starts."""
         return max(1, round(photons * self.share / self.lattices / self.domain.active_share))
 
-    def piece(self, seed: int, number: int, lattice: int, first: int, stride: int, points: int, weight: float) -> LatticeSlice:
+    def piece(
+        self, seed: int, number: int, lattice: int, first: int, stride: int, points: int, weight: float
+    ) -> LatticeSlice:
         """Points first, first + stride, … of pass `number`'s lattices of `lattice` points each."""
         # Successive passes follow a Kronecker sequence, so their union is again even.
         start = (seed * 0x9E3779B1 + self.index * 0x85EBCA6B) & 0xFFFFFFFF
         shifts = [(start + (number + 1) * g) & 0xFFFFFFFF for g in _SHIFT_GENERATORS]
         return LatticeSlice(
-            self.index, self.bands, lattice, first, stride, points, (shifts[0], shifts[1]), (shifts[2], shifts[3]), shifts[4],
-            (seed + 7919 * number) & 0xFFFFFFFF, self.light_points, weight=weight,
-        )  # fmt: skip
+            self.index,
+            self.bands,
+            lattice,
+            first,
+            stride,
+            points,
+            (shifts[0], shifts[1]),
+            (shifts[2], shifts[3]),
+            shifts[4],
+            (seed + 7919 * number) & 0xFFFFFFFF,
+            self.light_points,
+            weight=weight,
+        )
 
 
 @dataclass(frozen=True)
@@ -67,8 +79,12 @@ class Planner:
     """Rays in flight at once: a sub-lattice of each kind must have a point in them."""
 
     def plans(self, photons: int, texel: np.ndarray) -> list[LightPlan]:
-        """Photons, bands and points of each light that reaches a receiver; `texel`: side of each receiver's finest window, GPU units."""
-        power = {i: max(float(self.buffers.light_power[i].band(0.0, 1.0)[1]) * d.measure * d.active_share, 0.0) for i, d in self.domains.items()}
+        """Photons, bands and points of each light that reaches a receiver; `texel`: side of each receiver's finest
+        window, GPU units."""
+        power = {
+            i: max(float(self.buffers.light_power[i].band(0.0, 1.0)[1]) * d.measure * d.active_share, 0.0)
+            for i, d in self.domains.items()
+        }
         lit = [i for i in self.domains if power[i] > 0.0 and len(self.pilots[i].whole)]
         total = sum(power[i] for i in lit)
         plans = []
@@ -78,14 +94,20 @@ class Planner:
             budget = int(photons * share)
             fit = PilotFit(self.pilots[i], texel, self.buffers.variable_table, self.settings.smoothing, budget)
             bands = self._bands(i, fit)
-            points = fit.light_points(len(bands)) if self.features.footprints else self._scattered_points(i, len(bands), budget)
+            points = (
+                fit.light_points(len(bands))
+                if self.features.footprints
+                else self._scattered_points(i, len(bands), budget)
+            )
             points = max(1, min(points, self.batch // len(bands)))
             plans.append(LightPlan(i, self.domains[i], bands, points, share))
         return plans
 
     def _scattered_points(self, light: int, bands: int, budget: int) -> int:
         """Points on an extended light for photons without footprints, which need no lattice of their own."""
-        return min(SMALLEST_BATCH // bands, max(1, budget // (16 * bands))) if has_extent(self.scene.lights[light]) else 1
+        return (
+            min(SMALLEST_BATCH // bands, max(1, budget // (16 * bands))) if has_extent(self.scene.lights[light]) else 1
+        )
 
     def _bands(self, light: int, fit: PilotFit) -> tuple[Band, ...]:
         power = self.buffers.light_power[light]
@@ -106,11 +128,14 @@ class Planner:
             if self._tinted and count < TINTED_BANDS:
                 # Three weights a band cannot follow a colour over the whole spectrum; steps even in both measures.
                 nm = np.linspace(lo_nm, hi_nm, 401)
-                even = 0.5 * (nm - lo_nm) / (hi_nm - lo_nm) + 0.5 * (axis.x_of_nm(nm) - edges[0]) / (edges[-1] - edges[0])
+                even = 0.5 * (nm - lo_nm) / (hi_nm - lo_nm) + 0.5 * (axis.x_of_nm(nm) - edges[0]) / (
+                    edges[-1] - edges[0]
+                )
                 edges = axis.x_of_nm(np.interp(np.linspace(0.0, 1.0, TINTED_BANDS + 1), even, nm))
             middles = 0.5 * (edges[:-1] + edges[1:])
         return tuple(
-            Band(float(lo), float(hi), float(mid), float(power.band(lo, hi)[3])) for lo, hi, mid in zip(edges[:-1], edges[1:], middles, strict=True)
+            Band(float(lo), float(hi), float(mid), float(power.band(lo, hi)[3]))
+            for lo, hi, mid in zip(edges[:-1], edges[1:], middles, strict=True)
         )
 
     @property

@@ -14,7 +14,7 @@ from ..model.features import Features
 from ..model.optics.colorimetry import xyz_to_rgb709
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
-from ..passes.camera import CausticMaps, CameraPass
+from ..passes.camera import CameraPass, CausticMaps
 from ..passes.present import Channels
 from ..passes.spectrum_choice import Spectrum
 from .light_pass import LightPass, LightStats, spectral_axis
@@ -75,10 +75,15 @@ class RenderStats:
             f"  {'unaccounted':<17} {tally.imbalance:10.2e}   (emitted − all of the above)",
             f"map holds           {self.map_flux_w / max(tally.ended['deposited'], 1e-300):10.6f} of what was deposited; "
             f"outside every map {self.light.outside_map_w / max(tally.ended['deposited'], 1e-300):.6f}",
-            "fall-backs          " + ", ".join(f"{name} {count}" for name, count in tally.fallbacks.items())
+            "fall-backs          "
+            + ", ".join(f"{name} {count}" for name, count in tally.fallbacks.items())
             + f", splat_footprint_dropped {self.light.footprints_dropped} ({self.light.dropped_w / max(tally.ended['deposited'], 1e-300):.1e} of what was deposited)",
-            "bands × points      " + ", ".join(f"{name} {count} × {self.light.light_points[name]}" for name, count in self.light.bands.items()),
-            f"camera                 {self.camera_pass.samples} samples a pixel, {self.camera_pass.spectrum.words}; " + ", ".join(f"{name} {count}" for name, count in self.camera_pass.fallbacks.items()),
+            "bands × points      "
+            + ", ".join(
+                f"{name} {count} × {self.light.light_points[name]}" for name, count in self.light.bands.items()
+            ),
+            f"camera                 {self.camera_pass.samples} samples a pixel, {self.camera_pass.spectrum.words}; "
+            + ", ".join(f"{name} {count}" for name, count in self.camera_pass.fallbacks.items()),
             f"maps                {self.atlas_size[0]}×{self.atlas_size[1]} texels, buffers {self.bytes / 2**20:.0f} MiB",
             f"seconds             prepare {self.prepare_seconds:.2f}, emit and trace {self.light.trace_seconds:.2f}, "
             f"splat {self.light.splat_seconds:.2f}, camera {self.camera_seconds:.2f}, all {self.seconds:.2f}",
@@ -116,7 +121,9 @@ def render(
             context.release()
 
 
-def _render(context: Context, scene: Scene, settings: RenderSettings, progress: Progress, cancelled: Cancelled, started: float) -> RenderResult:
+def _render(
+    context: Context, scene: Scene, settings: RenderSettings, progress: Progress, cancelled: Cancelled, started: float
+) -> RenderResult:
     progress(0.0, "preparing")
     features = Features.of(scene, settings)
     buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
@@ -207,7 +214,14 @@ def camera_features(scene: Scene, settings: RenderSettings) -> Features:
 
 
 def _camera_layer(
-    context: Context, scene: Scene, settings: RenderSettings, buffers: SceneBuffers, light: LightPass, stats: RenderStats, progress: Progress, cancelled: Cancelled
+    context: Context,
+    scene: Scene,
+    settings: RenderSettings,
+    buffers: SceneBuffers,
+    light: LightPass,
+    stats: RenderStats,
+    progress: Progress,
+    cancelled: Cancelled,
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """The camera's picture and, where asked for, its spectral bins."""
     own = None
@@ -223,12 +237,23 @@ def _camera_layer(
         if not stop_at_once:
             # Every stretch of the spectrum has its turn equally often.
             camera_pass.may_be_single = True
-            samples = camera_pass.choose_spectrum(scene.camera, settings.width, settings.height, samples, maps).samples(samples)
+            samples = camera_pass.choose_spectrum(scene.camera, settings.width, settings.height, samples, maps).samples(
+                samples
+            )
         camera_pass.run(
-            scene.camera, settings.width, settings.height, 1 if stop_at_once else samples, 0, maps, settings.seed,
-            lambda fraction: progress(0.9 + 0.1 * fraction, "looking"), None if stop_at_once else cancelled,
+            scene.camera,
+            settings.width,
+            settings.height,
+            1 if stop_at_once else samples,
+            0,
+            maps,
+            settings.seed,
+            lambda fraction: progress(0.9 + 0.1 * fraction, "looking"),
+            None if stop_at_once else cancelled,
         )
-        stats.camera_pass = CameraStats(camera_pass.samples_taken, camera_pass.spectrum, camera_pass.fallbacks if settings.tally else {})
+        stats.camera_pass = CameraStats(
+            camera_pass.samples_taken, camera_pass.spectrum, camera_pass.fallbacks if settings.tally else {}
+        )
         return camera_pass.read_rgb(), camera_pass.read_spectral() if light.bin_edges_nm is not None else None
     finally:
         camera_pass.release()

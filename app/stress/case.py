@@ -50,7 +50,9 @@ class Measurement:
             if not error <= bound:
                 found.append(f"error of {name} {error:.2e} > {bound:.2e}")
         if self.dropped > sum(self.fallbacks.values()):
-            found.append(f"{self.dropped} photons were degraded but only {sum(self.fallbacks.values())} fall-backs counted")
+            found.append(
+                f"{self.dropped} photons were degraded but only {sum(self.fallbacks.values())} fall-backs counted"
+            )
         return found
 
 

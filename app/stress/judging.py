@@ -1,4 +1,5 @@
-"""What every stress case needs to judge its errors: rounding units, worst offenders, and counts of what is not finite."""
+"""What every stress case needs to judge its errors: rounding units, worst offenders, and counts of what is not
+finite."""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ def worst(error: np.ndarray, bound: np.ndarray | float) -> tuple[float, float]:
 
 
 def judged(rows: dict[str, tuple[np.ndarray, np.ndarray | float]]) -> tuple[dict[str, float], dict[str, float]]:
-    """(errors, bounds) of a `Measurement` from {name: (error of each row, bound of each row)}; what has no row is left out."""
+    """(errors, bounds) of a `Measurement` from {name: (error of each row, bound of each row)}; what has no row is left
+    out."""
     pairs = {name: worst(error, bound) for name, (error, bound) in rows.items() if np.size(error)}
     return {name: pair[0] for name, pair in pairs.items()}, {name: pair[1] for name, pair in pairs.items()}
 

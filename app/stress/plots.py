@@ -1,7 +1,8 @@
 """One plot a case: every error against severity, its bound dashed in the same colour, breaches marked by red crosses.
 
 Severities on a scale go along x; severities that are names (a scene, a fault) go down the y axis. Axes of errors are
-logarithmic. An error of exactly zero is a hollow marker on the plot's floor; one that is not finite lies on its ceiling.
+logarithmic. An error of exactly zero is a hollow marker on the plot's floor; one that is not finite lies on its
+ceiling.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-COLOURS = [PALETTE[name][0] for name in ("srd", "srd-lambda", "progressive", "regular-16", "other-1", "other-2", "stochastic")]
+COLOURS = [
+    PALETTE[name][0] for name in ("srd", "srd-lambda", "progressive", "regular-16", "other-1", "other-2", "stochastic")
+]
 BAD, MUTED, GRID, PAPER = (PALETTE[name][0] for name in ("bad", "muted", "grid", "paper"))
 MARKERS = "osD^vPp"
 SMALLEST, LARGEST = 1e-12, 1e6
@@ -66,13 +69,19 @@ def drawn_names(result: CaseResult) -> list[str]:
 
 
 def _scale(result: CaseResult, names: Sequence[str]) -> _Scale:
-    values = [values[name] for m in result.measurements for values in (m.errors, m.bounds) for name in names if name in values]
+    values = [
+        values[name] for m in result.measurements for values in (m.errors, m.bounds) for name in names if name in values
+    ]
     shown = [v for v in values if math.isfinite(v) and SMALLEST <= v <= LARGEST] or [1e-6, 1.0]
     return _Scale(min(shown) / 4.0, max(shown) * 4.0)
 
 
 def _draw(axes: Axes, result: CaseResult, name: str, colour: str, marker: str, named: bool, scale: _Scale) -> None:
-    shown = [(_place(result, i, named), m.errors[name], m.bounds.get(name)) for i, m in enumerate(result.measurements) if name in m.errors]
+    shown = [
+        (_place(result, i, named), m.errors[name], m.bounds.get(name))
+        for i, m in enumerate(result.measurements)
+        if name in m.errors
+    ]
 
     def curve(points: Sequence[tuple[float, float]], **style) -> None:
         places, values = [p for p, _ in points], [scale.place(v) for _, v in points]
@@ -84,9 +93,28 @@ def _draw(axes: Axes, result: CaseResult, name: str, colour: str, marker: str, n
     else:
         curve(bounded, color=colour, ls=(0, (4, 2)), lw=1.0, alpha=0.8, zorder=2)
     curve([(p, e) for p, e, _ in shown], color=colour, lw=0.0 if named else 1.5, zorder=3)
-    curve([(p, e) for p, e, _ in shown if e != 0.0], color=colour, ls="none", marker=marker, ms=4.5, mec="none", zorder=4, label=name)
-    curve([(p, e) for p, e, _ in shown if e == 0.0], color=colour, ls="none", marker=marker, ms=4.5, mfc=PAPER, zorder=4)
-    curve([(p, e) for p, e, bound in shown if bound is not None and not e <= bound], color=BAD, ls="none", marker="x", ms=11.0, mew=2.4, zorder=5)
+    curve(
+        [(p, e) for p, e, _ in shown if e != 0.0],
+        color=colour,
+        ls="none",
+        marker=marker,
+        ms=4.5,
+        mec="none",
+        zorder=4,
+        label=name,
+    )
+    curve(
+        [(p, e) for p, e, _ in shown if e == 0.0], color=colour, ls="none", marker=marker, ms=4.5, mfc=PAPER, zorder=4
+    )
+    curve(
+        [(p, e) for p, e, bound in shown if bound is not None and not e <= bound],
+        color=BAD,
+        ls="none",
+        marker="x",
+        ms=11.0,
+        mew=2.4,
+        zorder=5,
+    )
 
 
 def _place(result: CaseResult, index: int, named: bool) -> float:
@@ -135,8 +163,18 @@ def _legend(figure: Figure, axes: Axes) -> None:
     from matplotlib.lines import Line2D
 
     handles, labels = axes.get_legend_handles_labels()
-    handles += [Line2D([], [], color=MUTED, ls=(0, (4, 2)), lw=1.0), Line2D([], [], color=BAD, ls="none", marker="x", ms=8.0, mew=2.0)]
-    figure.legend(handles, [*labels, "bound, same colour", "beyond its bound"], loc="outside right upper", frameon=False, fontsize=8.0, handlelength=1.8)
+    handles += [
+        Line2D([], [], color=MUTED, ls=(0, (4, 2)), lw=1.0),
+        Line2D([], [], color=BAD, ls="none", marker="x", ms=8.0, mew=2.0),
+    ]
+    figure.legend(
+        handles,
+        [*labels, "bound, same colour", "beyond its bound"],
+        loc="outside right upper",
+        frameon=False,
+        fontsize=8.0,
+        handlelength=1.8,
+    )
 
 
 def _is_number(label: str) -> bool:

@@ -15,7 +15,9 @@ from .runner import CaseResult, StressResult
 def write_json(result: StressResult, path: Path) -> None:
     """The whole result, in one piece or not at all. Raises `UserError` where it cannot be written."""
     with atomic_output(path) as temporary:
-        temporary.write_text(json.dumps(_result(result), indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+        temporary.write_text(
+            json.dumps(_result(result), indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8"
+        )
 
 
 def _result(result: StressResult) -> dict[str, Any]:

@@ -33,11 +33,20 @@ def _head(result: StressResult) -> list[Html]:
     view_model = {"version": result.version, "date": result.date, **result.machine}
     parts = [
         element("p", "SpectraSplat stress report", cls="muted"),
-        element("h1", "Every promise holds" if not broken else f"{len(broken)} broken promise{'s' if len(broken) > 1 else ''}"),
+        element(
+            "h1",
+            "Every promise holds" if not broken else f"{len(broken)} broken promise{'s' if len(broken) > 1 else ''}",
+        ),
         element("p", summary(result) + ".", cls="lead"),
     ]
     if result.partial:
-        parts.append(element("div", element("p", "This report is partial: the run was stopped before everything was measured."), cls="warning"))
+        parts.append(
+            element(
+                "div",
+                element("p", "This report is partial: the run was stopped before everything was measured."),
+                cls="warning",
+            )
+        )
     if broken:
         parts.append(element("div", [element("p", sentence) for sentence in broken], cls="warning"))
     parts += [
@@ -48,7 +57,11 @@ def _head(result: StressResult) -> list[Html]:
             "stated beside it. Errors are relative unless their name says a unit.",
         ),
         element("pre", result.command),
-        element("dl", [element("div", element("dt", name), element("dd", value)) for name, value in view_model.items()], cls="facts"),
+        element(
+            "dl",
+            [element("div", element("dt", name), element("dd", value)) for name, value in view_model.items()],
+            cls="facts",
+        ),
     ]
     return parts
 
@@ -70,36 +83,79 @@ def _overview(result: StressResult) -> list[Html]:
                 _verdict(case.broken()),
             )
         )
-    headings = ("case", "severities", "not finite", "flux off, at most", "fall-backs", "nearest to its bound", "seconds", "verdict")
+    headings = (
+        "case",
+        "severities",
+        "not finite",
+        "flux off, at most",
+        "fall-backs",
+        "nearest to its bound",
+        "seconds",
+        "verdict",
+    )
     return [element("h2", "All cases"), table(headings, rows)]
 
 
 def _section(number: int, result: CaseResult) -> Html:
     case = result.case
-    parts: list[Html] = [element("h2", case.name, id=f"case-{number}", cls="flow"), element("p", case.title + "."), element("p", case.why, cls="muted")]
+    parts: list[Html] = [
+        element("h2", case.name, id=f"case-{number}", cls="flow"),
+        element("p", case.title + "."),
+        element("p", case.why, cls="muted"),
+    ]
     drawn = case_plot(result)
     if drawn is not None:
         label = html.escape(f"{case.name}: errors and bounds against {case.severity_name}", quote=True)
-        parts.append(figure(Html(inline_svg(svg_text(drawn), f"case-{number}", label)), "Errors as markers, bounds dashed or as bars. Zero lies on the plot's floor.", "half"))
+        parts.append(
+            figure(
+                Html(inline_svg(svg_text(drawn), f"case-{number}", label)),
+                "Errors as markers, bounds dashed or as bars. Zero lies on the plot's floor.",
+                "half",
+            )
+        )
     if result.failure:
         parts.append(element("div", element("p", f"Stopped by an error: {result.failure}"), cls="warning"))
     elif not result.complete:
-        parts.append(element("div", element("p", f"Stopped after {len(result.measurements)} of {case.steps} severities."), cls="warning"))
+        parts.append(
+            element(
+                "div",
+                element("p", f"Stopped after {len(result.measurements)} of {case.steps} severities."),
+                cls="warning",
+            )
+        )
     if result.measurements:
         rows = [
-            (m.label, m.nonfinite, "–" if m.flux_imbalance is None else _power(m.flux_imbalance), _fallbacks(m), _errors(m), m.note, _verdict(m.broken()))
+            (
+                m.label,
+                m.nonfinite,
+                "–" if m.flux_imbalance is None else _power(m.flux_imbalance),
+                _fallbacks(m),
+                _errors(m),
+                m.note,
+                _verdict(m.broken()),
+            )
             for m in result.measurements
         ]
-        parts.append(table((case.severity_name, "not finite", "flux off", "fall-backs", "errors / bounds", "note", "verdict"), rows, left=8))
+        parts.append(
+            table(
+                (case.severity_name, "not finite", "flux off", "fall-backs", "errors / bounds", "note", "verdict"),
+                rows,
+                left=8,
+            )
+        )
     return element("section", parts)
 
 
 def _errors(m: Measurement) -> list[Html]:
     return [
-        element("div", f"{name} {_power(error)}" + (f" / {_power(m.bounds[name])}" if name in m.bounds else ""), cls="no" if name in m.bounds and not error <= m.bounds[name] else None)
+        element(
+            "div",
+            f"{name} {_power(error)}" + (f" / {_power(m.bounds[name])}" if name in m.bounds else ""),
+            cls="no" if name in m.bounds and not error <= m.bounds[name] else None,
+        )
         for name, error in m.errors.items()
         if error or name not in m.bounds
-    ]  # fmt: skip
+    ]
 
 
 def _fallbacks(m: Measurement) -> str:
@@ -108,7 +164,12 @@ def _fallbacks(m: Measurement) -> str:
 
 def _tightest(case: CaseResult) -> str:
     """The error that comes nearest to its bound (or exceeds it most), as a share of it."""
-    shares = [(m.errors[name] / bound if math.isfinite(m.errors[name]) else math.inf, name) for m in case.measurements for name, bound in m.bounds.items() if bound > 0.0]
+    shares = [
+        (m.errors[name] / bound if math.isfinite(m.errors[name]) else math.inf, name)
+        for m in case.measurements
+        for name, bound in m.bounds.items()
+        if bound > 0.0
+    ]
     if not shares:
         return "–"
     share, name = max(shares)
@@ -116,7 +177,9 @@ def _tightest(case: CaseResult) -> str:
 
 
 def _verdict(broken: list[str]) -> Html:
-    return element("span", "holds", cls="yes") if not broken else element("span", "broken: " + "; ".join(broken), cls="no")
+    return (
+        element("span", "holds", cls="yes") if not broken else element("span", "broken: " + "; ".join(broken), cls="no")
+    )
 
 
 def _power(value: float) -> str:

@@ -73,7 +73,8 @@ class StressResult:
 
 
 def all_cases() -> tuple[Case, ...]:
-    """The synthetic cases of the light, those of the camera, then those of whole scenes, then the sweep over shipped scenes."""
+    """The synthetic cases of the light, those of the camera, then those of whole scenes, then the sweep over shipped
+    scenes."""
     from .cases import camera_cases, optics_cases, path_cases, scene_cases, splat_cases
 
     modules = (optics_cases, path_cases, splat_cases, camera_cases, scene_cases)

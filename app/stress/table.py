@@ -56,12 +56,15 @@ def _add_case(shown: Table, result: CaseResult) -> None:
             _verdict(m.broken()),
         )
     if result.failure:
-        shown.add_row(result.case.name if not result.measurements else "", "", "", "", "", "", _verdict([result.failure]))
+        shown.add_row(
+            result.case.name if not result.measurements else "", "", "", "", "", "", _verdict([result.failure])
+        )
     shown.add_section()
 
 
 def _errors(m: Measurement) -> Text:
-    """ "energy 3e-04 / 1e-03", those beyond their bound in red; a bounded error of exactly zero is not worth the room."""
+    """ "energy 3e-04 / 1e-03", those beyond their bound in red; a bounded error of exactly zero is not worth the
+    room."""
     from rich.text import Text
 
     text = Text()

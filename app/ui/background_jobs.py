@@ -1,4 +1,5 @@
-"""What works beside the engine in a frame: comparison, exports, ray overlay, cursor, thumbnails. Each has its share of the time."""
+"""What works beside the engine in a frame: comparison, exports, ray overlay, cursor, thumbnails. Each has its share of
+the time."""
 
 from __future__ import annotations
 
@@ -66,11 +67,15 @@ class BackgroundJobs:
         self.cursor.update(state, picture, now_s)
         self.overlay.update(state)
 
-    def export(self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, picture: LivePicture) -> None:
+    def export(
+        self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, picture: LivePicture
+    ) -> None:
         """Begin what `request` asks for. Raises `UserError`."""
         if picture.shown is None or picture.radiance is None:
             raise UserError("there is no picture yet; wait a moment")
-        told = self.exports.begin(request, state, Shown(picture.shown, picture.radiance, picture.exposure_ev, picture.stats.photons))
+        told = self.exports.begin(
+            request, state, Shown(picture.shown, picture.radiance, picture.exposure_ev, picture.stats.photons)
+        )
         if told is not None:
             self.told.append((told, False))
 

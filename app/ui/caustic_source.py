@@ -15,7 +15,12 @@ MIN_SHARE = 0.2
 
 
 def source_at(
-    point: np.ndarray, receiver: int, position: np.ndarray, flux_w: np.ndarray, source: np.ndarray, photon_receiver: np.ndarray
+    point: np.ndarray,
+    receiver: int,
+    position: np.ndarray,
+    flux_w: np.ndarray,
+    source: np.ndarray,
+    photon_receiver: np.ndarray,
 ) -> int | None:
     """Index of the object that throws most of the light near a world `point` of object `receiver`, or None.
 

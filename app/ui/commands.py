@@ -100,75 +100,220 @@ def _can_paste(state: State, view_model: ViewModel) -> bool:
 
 
 def _tool(name: str, tool: Tool, key: str, tip: str) -> Command:
-    return Command(name, (key,), "Tools", tip, partial(_set_tool, tool), checked=lambda state, _view_model: state.tool == tool)
+    return Command(
+        name, (key,), "Tools", tip, partial(_set_tool, tool), checked=lambda state, _view_model: state.tool == tool
+    )
 
 
 def panel(name: str, field: str, tip: str, keys: tuple[str, ...] = ()) -> Command:
     """The command that opens and closes the panel `Panels.<field>`."""
     return Command(
-        name, keys, "Panels", tip, partial(_toggle_panel, field),
+        name,
+        keys,
+        "Panels",
+        tip,
+        partial(_toggle_panel, field),
         checked=lambda state, _view_model: getattr(state.preferences.panels, field),
-    )  # fmt: skip
+    )
 
 
 COMMANDS: tuple[Command, ...] = (
     Command("New scene", ("Ctrl+N",), "File", "Start from the default scene.", dialogs.new_scene),
-    Command("Start page", (), "File", "Scenes to begin with, recent files.", partial(_toggle_panel, "start_page"),
-            checked=lambda state, _view_model: state.preferences.panels.start_page),
-    Command("Open…", ("Ctrl+O",), "File", "Open a scene (.toml), glTF (.glb, .gltf) or a bare mesh (.obj, .ply, .stl).",
-            dialogs.open_file),
+    Command(
+        "Start page",
+        (),
+        "File",
+        "Scenes to begin with, recent files.",
+        partial(_toggle_panel, "start_page"),
+        checked=lambda state, _view_model: state.preferences.panels.start_page,
+    ),
+    Command(
+        "Open…",
+        ("Ctrl+O",),
+        "File",
+        "Open a scene (.toml), glTF (.glb, .gltf) or a bare mesh (.obj, .ply, .stl).",
+        dialogs.open_file,
+    ),
     Command("Save", ("Ctrl+S",), "File", "Save the scene where it came from.", _save),
-    Command("Save as…", ("Ctrl+Shift+S",), "File", "Save as scene TOML, or as GLB for other programs.", dialogs.save_as),
-    Command("Export…", ("Ctrl+E",), "File", "Screenshots, baked caustic maps and animations.",
-            partial(_toggle_panel, "export"), checked=lambda state, _view_model: state.preferences.panels.export),
-    Command("Quit", ("Ctrl+Q",), "File", "Close SpectraSplat; asks first where changes are unsaved.", _ask(requests.Quit())),
-    Command("Undo", ("Ctrl+Z",), "Edit", "Take back the last edit.", _ask(requests.Undo()),
-            enabled=lambda _state, view_model: view_model.undo is not None),
-    Command("DirtyLevel", ("Ctrl+Shift+Z", "Ctrl+Y"), "Edit", "Do again what was taken back.", _ask(requests.DirtyLevel()),
-            enabled=lambda _state, view_model: view_model.dirty_level is not None),
-    Command("Duplicate", ("Ctrl+D",), "Edit", "Copy the selected object or light in place.", _duplicate, enabled=_is_selected),
+    Command(
+        "Save as…", ("Ctrl+Shift+S",), "File", "Save as scene TOML, or as GLB for other programs.", dialogs.save_as
+    ),
+    Command(
+        "Export…",
+        ("Ctrl+E",),
+        "File",
+        "Screenshots, baked caustic maps and animations.",
+        partial(_toggle_panel, "export"),
+        checked=lambda state, _view_model: state.preferences.panels.export,
+    ),
+    Command(
+        "Quit", ("Ctrl+Q",), "File", "Close SpectraSplat; asks first where changes are unsaved.", _ask(requests.Quit())
+    ),
+    Command(
+        "Undo",
+        ("Ctrl+Z",),
+        "Edit",
+        "Take back the last edit.",
+        _ask(requests.Undo()),
+        enabled=lambda _state, view_model: view_model.undo is not None,
+    ),
+    Command(
+        "DirtyLevel",
+        ("Ctrl+Shift+Z", "Ctrl+Y"),
+        "Edit",
+        "Do again what was taken back.",
+        _ask(requests.DirtyLevel()),
+        enabled=lambda _state, view_model: view_model.dirty_level is not None,
+    ),
+    Command(
+        "Duplicate",
+        ("Ctrl+D",),
+        "Edit",
+        "Copy the selected object or light in place.",
+        _duplicate,
+        enabled=_is_selected,
+    ),
     Command("Delete", ("Delete",), "Edit", "Remove the selected object or light.", _delete, enabled=_is_selected),
-    Command("Copy material", ("Ctrl+C",), "Edit", "Copy the selected object's material.", _copy_material, enabled=_is_object),
-    Command("Paste material", ("Ctrl+V",), "Edit", "Give the selected object the copied material.", _paste_material,
-            enabled=_can_paste),
-    Command("Frame selection", ("F",), "View", "Move the camera so that the selection, or everything, fills the view.",
-            _ask(requests.FrameSelection())),
-    Command("Frame everything", ("Home",), "View", "Deselect, and fit the whole scene in the view.", view_commands.frame_all),
-    Command("Scene's own view", ("0",), "View", "Back to the camera that the scene was saved with.", view_commands.scene_view),
-    Command("Keep as scene's view", ("Ctrl+0",), "View", "Save the present camera with the scene.",
-            view_commands.keep_as_scene_view),
-    Command("Hide panels", ("H",), "View", "Leave only the picture; again brings the panels back.", view_commands.hide_panels),
-    Command("Select", ("Esc",), "Tools", "Click an object, or its caustic, to select what made it.",
-            partial(_set_tool, "select"), checked=lambda state, _view_model: state.tool == "select"),
+    Command(
+        "Copy material", ("Ctrl+C",), "Edit", "Copy the selected object's material.", _copy_material, enabled=_is_object
+    ),
+    Command(
+        "Paste material",
+        ("Ctrl+V",),
+        "Edit",
+        "Give the selected object the copied material.",
+        _paste_material,
+        enabled=_can_paste,
+    ),
+    Command(
+        "Frame selection",
+        ("F",),
+        "View",
+        "Move the camera so that the selection, or everything, fills the view.",
+        _ask(requests.FrameSelection()),
+    ),
+    Command(
+        "Frame everything", ("Home",), "View", "Deselect, and fit the whole scene in the view.", view_commands.frame_all
+    ),
+    Command(
+        "Scene's own view",
+        ("0",),
+        "View",
+        "Back to the camera that the scene was saved with.",
+        view_commands.scene_view,
+    ),
+    Command(
+        "Keep as scene's view",
+        ("Ctrl+0",),
+        "View",
+        "Save the present camera with the scene.",
+        view_commands.keep_as_scene_view,
+    ),
+    Command(
+        "Hide panels",
+        ("H",),
+        "View",
+        "Leave only the picture; again brings the panels back.",
+        view_commands.hide_panels,
+    ),
+    Command(
+        "Select",
+        ("Esc",),
+        "Tools",
+        "Click an object, or its caustic, to select what made it.",
+        partial(_set_tool, "select"),
+        checked=lambda state, _view_model: state.tool == "select",
+    ),
     _tool("Move", "move", "G", "Move the selection with the gizmo."),
     _tool("Rotate", "rotate", "T", "Turn the selection with the gizmo."),
     _tool("Scale", "scale", "Y", "Scale the selection with the gizmo."),
-    Command("Dispersion brush", ("B",), "Tools", "Paint a local gain of dispersion on a receiver. Not physical.", _take_brush,
-            checked=lambda state, _view_model: state.tool == "brush"),
+    Command(
+        "Dispersion brush",
+        ("B",),
+        "Tools",
+        "Paint a local gain of dispersion on a receiver. Not physical.",
+        _take_brush,
+        checked=lambda state, _view_model: state.tool == "brush",
+    ),
     _tool("Pull a colour", "pull", "P", "Drag a colour of the caustic: the dispersion follows."),
-    Command("Accumulate photons", ("Space",), "Render", "Go on or pause.", _toggle_playing,
-            checked=lambda state, _view_model: state.playing),
-    Command("Trace again", ("Ctrl+R",), "Render", "Trace photons anew with the present glass.", _ask(requests.Retrace())),
-    Command("Physical picture", ("V",), "Render", "Leave the dispersion brush out, to compare.", _toggle_physical,
-            checked=lambda state, _view_model: state.physical),
-    Command("Reload shaders", ("F5",), "Render", "Compile the shaders from disk again; the last good ones stay on errors.",
-            _ask(requests.ReloadShaders())),
+    Command(
+        "Accumulate photons",
+        ("Space",),
+        "Render",
+        "Go on or pause.",
+        _toggle_playing,
+        checked=lambda state, _view_model: state.playing,
+    ),
+    Command(
+        "Trace again", ("Ctrl+R",), "Render", "Trace photons anew with the present glass.", _ask(requests.Retrace())
+    ),
+    Command(
+        "Physical picture",
+        ("V",),
+        "Render",
+        "Leave the dispersion brush out, to compare.",
+        _toggle_physical,
+        checked=lambda state, _view_model: state.physical,
+    ),
+    Command(
+        "Reload shaders",
+        ("F5",),
+        "Render",
+        "Compile the shaders from disk again; the last good ones stay on errors.",
+        _ask(requests.ReloadShaders()),
+    ),
     Command("Brighter", ("=",), "Display", "Exposure up by a quarter stop.", partial(view_commands.expose, 0.25)),
     Command("Darker", ("-",), "Display", "Exposure down by a quarter stop.", partial(view_commands.expose, -0.25)),
-    Command("Automatic exposure", ("Shift+E",), "Display", "Let the exposure follow the picture.", view_commands.toggle_auto,
-            checked=lambda state, _view_model: state.display.auto_exposure),
-    Command("False colour", ("X",), "Display", "Luminance on a logarithmic colour scale.",
-            partial(view_commands.toggle_display, "false_colour"), checked=lambda state, _view_model: state.display.false_colour),
-    Command("Ray overlay", ("R",), "Display", "Draw a fan of rays through the selected object.",
-            partial(view_commands.toggle_display, "ray_overlay"), checked=lambda state, _view_model: state.display.ray_overlay),
-    Command("Magnifier", ("M",), "Display", "Magnify the pixels under the cursor.",
-            partial(view_commands.toggle_display, "magnifier"), checked=lambda state, _view_model: state.display.magnifier),
-    Command("Single wavelength", ("L",), "Display", "Show the light of one wavelength only.", view_commands.toggle_solo,
-            checked=lambda state, _view_model: state.solo_nm is not None),
-    Command("Shortcuts", ("F1",), "Help", "List the shortcuts.", partial(_toggle_panel, "shortcuts"),
-            checked=lambda state, _view_model: state.preferences.panels.shortcuts),
+    Command(
+        "Automatic exposure",
+        ("Shift+E",),
+        "Display",
+        "Let the exposure follow the picture.",
+        view_commands.toggle_auto,
+        checked=lambda state, _view_model: state.display.auto_exposure,
+    ),
+    Command(
+        "False colour",
+        ("X",),
+        "Display",
+        "Luminance on a logarithmic colour scale.",
+        partial(view_commands.toggle_display, "false_colour"),
+        checked=lambda state, _view_model: state.display.false_colour,
+    ),
+    Command(
+        "Ray overlay",
+        ("R",),
+        "Display",
+        "Draw a fan of rays through the selected object.",
+        partial(view_commands.toggle_display, "ray_overlay"),
+        checked=lambda state, _view_model: state.display.ray_overlay,
+    ),
+    Command(
+        "Magnifier",
+        ("M",),
+        "Display",
+        "Magnify the pixels under the cursor.",
+        partial(view_commands.toggle_display, "magnifier"),
+        checked=lambda state, _view_model: state.display.magnifier,
+    ),
+    Command(
+        "Single wavelength",
+        ("L",),
+        "Display",
+        "Show the light of one wavelength only.",
+        view_commands.toggle_solo,
+        checked=lambda state, _view_model: state.solo_nm is not None,
+    ),
+    Command(
+        "Shortcuts",
+        ("F1",),
+        "Help",
+        "List the shortcuts.",
+        partial(_toggle_panel, "shortcuts"),
+        checked=lambda state, _view_model: state.preferences.panels.shortcuts,
+    ),
     Command("About SpectraSplat", (), "Help", "Version, graphics driver, licences.", partial(_toggle_panel, "about")),
-)  # fmt: skip
+)
 """All but the numbered views and the panels, in the order of the menus."""
 
 PANELS: tuple[Command, ...] = (
@@ -189,13 +334,23 @@ VIEWS: tuple[Command, ...] = tuple(
     command
     for number in range(9)
     for command in (
-        Command(f"View {number + 1}", (str(number + 1),), "Views", "Go to this stored view.",
-                partial(view_commands.go_to_view, number),
-                enabled=lambda state, _view_model, number=number: state.views[number] is not None),
-        Command(f"Store view {number + 1}", (f"Ctrl+{number + 1}",), "Views", "Keep the present camera under this number.",
-                partial(view_commands.store_view, number)),
+        Command(
+            f"View {number + 1}",
+            (str(number + 1),),
+            "Views",
+            "Go to this stored view.",
+            partial(view_commands.go_to_view, number),
+            enabled=lambda state, _view_model, number=number: state.views[number] is not None,
+        ),
+        Command(
+            f"Store view {number + 1}",
+            (f"Ctrl+{number + 1}",),
+            "Views",
+            "Keep the present camera under this number.",
+            partial(view_commands.store_view, number),
+        ),
     )
-)  # fmt: skip
+)
 
 _BY_NAME = {command.name: command for command in (*COMMANDS, *VIEWS)} | {
     f"Panel: {command.name}": command for command in PANELS

@@ -1,8 +1,8 @@
 """What the picture is compared with: the reference, or another method, computed in the time that is left over.
 
 It belongs to the scene and view it was begun for. When those change it is kept and told to be stale; asking for
-it again begins anew. The reference is the caustic layer by independent light tracing (`reference_thread`), put on the picture
-without caustics; what is seen behind glass is not compared.
+it again begins anew. The reference is the caustic layer by independent light tracing (`reference_thread`), put on the
+picture without caustics; what is seen behind glass is not compared.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
 from ..passes.spectrum_choice import Spectrum
 from ..render.light_pass import reflectance_classes, spectral_axis
-from ..render.viewer.inputs import LiveInputs, DirtyLevel
+from ..render.viewer.inputs import DirtyLevel, LiveInputs
 from ..render.viewer.invalidation import dirty_level
 from .error_curves import ErrorCurves
 from .panels.methods import METHOD_NAMES
@@ -44,7 +44,8 @@ DISPATCH_SECONDS = 0.012
 SHOWN_FROM = 1.0
 """Photons a pixel from which on a reference is shown."""
 MEASURED_FROM = 6.0
-"""And from which on errors are measured against it: before, most lit pixels have not one photon, which looks like certainty."""
+"""And from which on errors are measured against it: before, most lit pixels have not one photon, which looks like
+certainty."""
 
 
 class Comparison:
@@ -88,7 +89,9 @@ class Comparison:
             return None
         if self._shows_reference:
             return None if self._thread is None else self._thread.fraction
-        return None if self._engine is None else min(self._engine.stats.photons / max(self._engine.target_photons, 1), 1.0)
+        return (
+            None if self._engine is None else min(self._engine.stats.photons / max(self._engine.target_photons, 1), 1.0)
+        )
 
     @property
     def text(self) -> str:
@@ -98,7 +101,9 @@ class Comparison:
         if not self._shows_reference:
             photons = 0 if self._engine is None else self._engine.stats.photons
             told = f"{METHOD_NAMES.get(self._method, self._method)}: {photons / 1e6:.2f} million photons."
-            return told if self._compare.method != REFERENCE else f"There is no reference: {self._thread_problem}. {told}"
+            return (
+                told if self._compare.method != REFERENCE else f"There is no reference: {self._thread_problem}. {told}"
+            )
         snapshot = self._thread.snapshot if self._thread is not None else None
         if snapshot is None:
             return "Reference: the first photons are on their way."
@@ -141,7 +146,9 @@ class Comparison:
             self._stop()
             self._begun = wanted
         assert self._begun is not None
-        self.is_stale = dirty_level(self._begun, self._begun, replace(wanted, method=self._begun.method)) != DirtyLevel.NOTHING
+        self.is_stale = (
+            dirty_level(self._begun, self._begun, replace(wanted, method=self._begun.method)) != DirtyLevel.NOTHING
+        )
         if self.is_stale:
             self._pause()
             return
@@ -218,7 +225,12 @@ class Comparison:
     def _compose(self, running: LiveEngine) -> None:
         """The reference's caustics on the picture without caustics; behind glass, the running picture."""
         snapshot = self._thread.snapshot if self._thread is not None else None
-        if snapshot is None or self._direct is None or snapshot.number == self._composed_from or not self._has(snapshot, SHOWN_FROM):
+        if (
+            snapshot is None
+            or self._direct is None
+            or snapshot.number == self._composed_from
+            or not self._has(snapshot, SHOWN_FROM)
+        ):
             return
         if not self._direct.advance():
             return
@@ -239,7 +251,9 @@ class Comparison:
     def _has(self, snapshot: Snapshot, photons_a_pixel: float) -> bool:
         """Whether the reference has come so far, or will not come farther."""
         height, width = snapshot.directly.shape
-        return snapshot.photons >= photons_a_pixel * width * height or (self._thread is not None and self._thread.is_done)
+        return snapshot.photons >= photons_a_pixel * width * height or (
+            self._thread is not None and self._thread.is_done
+        )
 
     def _measure(self, state: State, running: LiveEngine) -> None:
         engines = {state.method: running}
@@ -279,7 +293,9 @@ class _DirectPicture:
         self._camera_pass = CameraPass(context, self._buffers, "beauty", reflectances)
         self._camera_pass.spectrum = Spectrum()
         self._camera_pass.dispatch_seconds = DISPATCH_SECONDS
-        self._steps: Iterator[float] | None = self._camera_pass.samples(scene.camera, inputs.width, inputs.height, DIRECT_SAMPLES, 0, None, inputs.seed)
+        self._steps: Iterator[float] | None = self._camera_pass.samples(
+            scene.camera, inputs.width, inputs.height, DIRECT_SAMPLES, 0, None, inputs.seed
+        )
         self._rgb: np.ndarray | None = None
 
     def advance(self) -> bool:

@@ -58,7 +58,7 @@ class Cursor:
             return view_model
         return replace(
             view_model, object_index=index, position=hit.position, normal=hit.normal, is_receiver=hit.is_receiver
-        )  # fmt: skip
+        )
 
     def _take_spectrum(self, state: State, picture: LivePicture, before: CursorInfo | None, now_s: float) -> None:
         assert self.view_model is not None and self._hit is not None and picture.engine is not None

@@ -64,7 +64,10 @@ class ErrorCurves:
             self._pixels = np.sort(np.random.default_rng(_SEED).choice(directly.size, count, replace=False))
         self._chosen = directly.reshape(-1)[self._pixels]
         at = self._pixels[self._chosen]
-        self._reference_image = ReferencePicture(rgb709_to_xyz(rgb.reshape(-1, 3)[at][:, None].astype(float)), variance_xyz.reshape(-1, 3)[at][:, None].astype(float))
+        self._reference_image = ReferencePicture(
+            rgb709_to_xyz(rgb.reshape(-1, 3)[at][:, None].astype(float)),
+            variance_xyz.reshape(-1, 3)[at][:, None].astype(float),
+        )
         self._measure()
 
     def _measure(self) -> None:
@@ -73,6 +76,10 @@ class ErrorCurves:
             return
         curves = []
         for method, points in self._points.items():
-            errors = [relmse_raw(rgb709_to_xyz(p.rgb[self._chosen][:, None].astype(float)), reference_image) - reference_image.own_relmse for p in points]
+            errors = [
+                relmse_raw(rgb709_to_xyz(p.rgb[self._chosen][:, None].astype(float)), reference_image)
+                - reference_image.own_relmse
+                for p in points
+            ]
             curves.append(ErrorCurve(method, np.array([p.seconds for p in points]), np.maximum(errors, 0.0)))
         self.curves = tuple(curves)

@@ -1,4 +1,5 @@
-"""Screenshots at once; spectral pictures, baked maps and animations as one background job that works a little in every frame."""
+"""Screenshots at once; spectral pictures, baked maps and animations as one background job that works a little in every
+frame."""
 
 from __future__ import annotations
 
@@ -58,7 +59,9 @@ class Exports:
         """The running job, for panels."""
         return None if self._job is None else self._job.view_model
 
-    def begin(self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, shown: Shown) -> str | None:
+    def begin(
+        self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, shown: Shown
+    ) -> str | None:
         """Carry out `request`, or start it. Raises `UserError`; a running job is not disturbed."""
         if isinstance(request, requests.Screenshot) and not request.spectral:
             return save_screenshot(request.path, shown)
@@ -91,18 +94,36 @@ class Exports:
         """End the job."""
         self.cancel()
 
-    def _made(self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, shown: Shown) -> _Job:
+    def _made(
+        self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, shown: Shown
+    ) -> _Job:
         stage = Stage(state.scene, state.camera, shown.exposure_ev, state.solo_nm)
         name = request.path.name
         if isinstance(request, requests.Screenshot):
             work = _spectral(self._context, request.path, stage, state, shown.photons)
-            return _Job(f"Spectral picture: {name}", work, f"Saved {name}.", "Nothing was written: a picture is whole or not at all.")
+            return _Job(
+                f"Spectral picture: {name}",
+                work,
+                f"Saved {name}.",
+                "Nothing was written: a picture is whole or not at all.",
+            )
         if isinstance(request, requests.Bake):
             work = _bake(self._context, request, stage, state)
-            return _Job(f"Caustic map: {name}", work, f"Baked {name}; its place is in {request.path.with_suffix('.json').name}.", "Nothing was written: a map is whole or not at all.")
+            return _Job(
+                f"Caustic map: {name}",
+                work,
+                f"Baked {name}; its place is in {request.path.with_suffix('.json').name}.",
+                "Nothing was written: a map is whole or not at all.",
+            )
         work, frames = _animate(self._context, request, stage, state)
         title = "Turntable" if request.kind == "turntable" else "Animation"
-        return _Job(f"{title}: {name}", work, f"Saved {name}, {frames} frames.", f"Stopped {name}; the frames that are done stay.", frames)
+        return _Job(
+            f"{title}: {name}",
+            work,
+            f"Saved {name}, {frames} frames.",
+            f"Stopped {name}; the frames that are done stay.",
+            frames,
+        )
 
 
 class _Job:
@@ -136,7 +157,11 @@ class _Job:
         return self._cancelled
 
     def _text(self) -> str:
-        frame = f"Frame {min(int(self._fraction * self._frames) + 1, self._frames)} of {self._frames}" if self._frames else "Tracing and looking"
+        frame = (
+            f"Frame {min(int(self._fraction * self._frames) + 1, self._frames)} of {self._frames}"
+            if self._frames
+            else "Tracing and looking"
+        )
         if self._fraction < 0.02:
             return frame
         left = self._worked_s * (1.0 - self._fraction) / self._fraction
@@ -145,7 +170,8 @@ class _Job:
 
 
 def save_screenshot(path: Path, shown: Shown) -> str:
-    """Write what is shown: .png as it is on the screen, .exr and .npy linear without tone curve. Returns the sentence to tell."""
+    """Write what is shown: .png as it is on the screen, .exr and .npy linear without tone curve. Returns the sentence
+    to tell."""
     if check_suffix(path) == ".png":
         write_codes(path, texture_codes(shown.codes))
     else:
@@ -181,9 +207,15 @@ def _settings(state: State, size: tuple[int, int], photons: int, **changes: obje
     if not (1 <= width <= MAX_SIDE_PX and 1 <= height <= MAX_SIDE_PX):
         raise UserError(f"a size of {width} × {height} pixels is out of range: no side may exceed {MAX_SIDE_PX}")
     return RenderSettings(
-        width=width, height=height, photons=photons, method=state.method, smoothing=state.smoothing, max_depth=state.scene.render.max_depth,
-        local_gain=not state.physical, **changes,
-    )  # fmt: skip
+        width=width,
+        height=height,
+        photons=photons,
+        method=state.method,
+        smoothing=state.smoothing,
+        max_depth=state.scene.render.max_depth,
+        local_gain=not state.physical,
+        **changes,
+    )
 
 
 def _spectral(context: Context, path: Path, stage: Stage, state: State, photons: int) -> Iterator[float]:
@@ -193,7 +225,9 @@ def _spectral(context: Context, path: Path, stage: Stage, state: State, photons:
         raise UserError(f"cannot write {path}: spectral channels need an .exr")
     check_writable(path)
     check_picture_memory(*state.viewport_size, SPECTRAL_BINS)
-    settings = _settings(state, state.viewport_size, int(np.clip(photons, MIN_PHOTONS, MAX_PHOTONS)), bins=SPECTRAL_BINS)
+    settings = _settings(
+        state, state.viewport_size, int(np.clip(photons, MIN_PHOTONS, MAX_PHOTONS)), bins=SPECTRAL_BINS
+    )
 
     def work() -> Iterator[float]:
         renderer = FrameRenderer(context, settings, [stage])
@@ -230,7 +264,10 @@ def _animate(context: Context, request: requests.Animate, stage: Stage, state: S
     size = request.size or state.viewport_size
     settings = _settings(state, size, request.photons, spp=request.samples)
     check_picture_memory(*size, None)
-    told = dict(description(made, settings, request.fps, request.photons)) | {"look": repr(state.display), "smoothing": state.smoothing}
+    told = dict(description(made, settings, request.fps, request.photons)) | {
+        "look": repr(state.display),
+        "smoothing": state.smoothing,
+    }
     sink = open_sink(request.path, size, request.fps, told)
     develop = _Developer(context, state.display)
 
@@ -258,7 +295,9 @@ class _Developer:
         self._display = self._display or Display(self._context)
         height, width = rgb.shape[:2]
         texels = np.concatenate([rgb, np.ones((height, width, 1), np.float32)], axis=-1)
-        texture = self._context.ctx.texture((width, height), 4, np.ascontiguousarray(texels, np.float32).tobytes(), dtype="f4")
+        texture = self._context.ctx.texture(
+            (width, height), 4, np.ascontiguousarray(texels, np.float32).tobytes(), dtype="f4"
+        )
         try:
             return texture_codes(self._display.run(texture, self._look, exposure_ev, (width, height)))
         finally:
@@ -268,5 +307,3 @@ class _Developer:
         if self._display is not None:
             self._display.release()
             self._display = None
-
-

@@ -1,7 +1,8 @@
 """The scenes of the start page with their thumbnails, which another process renders one by one where they lack one.
 
-Shipped scenes come with a picture. Any other thumbnail is kept in the config folder under a name made of the scene's content, so it is rendered once. The process
-runs at the lowest priority: neither its start nor a broken scene can hold up the interface.
+Shipped scenes come with a picture. Any other thumbnail is kept in the config folder under a name made of the scene's
+content, so it is rendered once. The process runs at the lowest priority: neither its start nor a broken scene can hold
+up the interface.
 """
 
 from __future__ import annotations
@@ -47,7 +48,9 @@ class _Job:
 class Gallery:
     """Owns the thumbnails' textures. `scenes`: name → file."""
 
-    def __init__(self, context: Context, config: Path, scenes: Mapping[str, Path], render: Render | None = None) -> None:
+    def __init__(
+        self, context: Context, config: Path, scenes: Mapping[str, Path], render: Render | None = None
+    ) -> None:
         self._ctx = context.ctx
         self._folder = config / FOLDER
         self._render = render or _render
@@ -166,4 +169,4 @@ def _render(scene: Path, output: Path) -> subprocess.Popen[bytes]:
     nice = {"preexec_fn": lambda: os.nice(19)} if os.name == "posix" else {}
     return subprocess.Popen(
         command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **nice
-    )  # fmt: skip
+    )

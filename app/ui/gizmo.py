@@ -49,7 +49,8 @@ class _Drag:
 
 
 class Gizmo:
-    """Remembers, from frame to frame, what is being dragged and whose axes are shown; nothing of it is part of the scene."""
+    """Remembers, from frame to frame, what is being dragged and whose axes are shown; nothing of it is part of the
+    scene."""
 
     def __init__(self) -> None:
         self.is_local = False
@@ -91,13 +92,20 @@ class Gizmo:
 
     def _manipulate(self, operation: Operation, view: View, frame: np.ndarray, origin: np.ndarray) -> np.ndarray:
         depth = max(float(view.depth(frame[:3, 3])), 1e-6)
-        near, far = (-1e3 * view.half_height, 1e3 * view.half_height) if view.is_orthographic else (1e-3 * depth, 1e3 * depth)
+        near, far = (
+            (-1e3 * view.half_height, 1e3 * view.half_height) if view.is_orthographic else (1e-3 * depth, 1e3 * depth)
+        )
         model = _to_guizmo(_shifted(frame, -origin))
         mode = _IM.MODE.local if self.is_local or operation == "scale" else _IM.MODE.world
         _IM.manipulate(
-            _to_guizmo(view.view_matrix(origin)), _to_guizmo(view.projection_matrix(near, far)), _OPERATIONS[operation], mode, model,
-            None, self._snap(operation, view.height_at(depth)),
-        )  # fmt: skip
+            _to_guizmo(view.view_matrix(origin)),
+            _to_guizmo(view.projection_matrix(near, far)),
+            _OPERATIONS[operation],
+            mode,
+            model,
+            None,
+            self._snap(operation, view.height_at(depth)),
+        )
         return _shifted(_from_guizmo(model), origin)
 
     @staticmethod

@@ -117,7 +117,9 @@ class HeadlessInterface:
         """The control noted as `label` or "Window/label" in the last frame; LookupError names those that are there."""
         item = self.items.items.get(label)
         if item is None:
-            raise LookupError(f"no control '{label}' is drawn; there are {', '.join(sorted(self.items.items)) or 'none'}")
+            raise LookupError(
+                f"no control '{label}' is drawn; there are {', '.join(sorted(self.items.items)) or 'none'}"
+            )
         return item
 
     def _point(self, where: str | Point) -> Point:

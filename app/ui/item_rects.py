@@ -37,9 +37,7 @@ class ItemRect:
 
     def at(self, across: float, down: float = 0.5) -> tuple[float, float]:
         """The point at these shares of the width and the height."""
-        return self.left + across * (self.right - self.left), self.top + down * (
-            self.bottom - self.top
-        )
+        return self.left + across * (self.right - self.left), self.top + down * (self.bottom - self.top)
 
 
 class Recorder:

@@ -37,7 +37,8 @@ class Docked:
 
 
 def dockspace(windows: tuple[Docked, ...], bottom_margin: float) -> None:
-    """Submit the dock space below the menu bar, `bottom_margin` pixels above the lower edge; before every docked window."""
+    """Submit the dock space below the menu bar, `bottom_margin` pixels above the lower edge; before every docked
+    window."""
     viewport = imgui.get_main_viewport()
     size = imgui.ImVec2(viewport.work_size.x, viewport.work_size.y - bottom_margin)
     imgui.set_next_window_pos(viewport.work_pos)
@@ -60,7 +61,8 @@ def dockspace(windows: tuple[Docked, ...], bottom_margin: float) -> None:
 
 
 def reset() -> None:
-    """Forget where windows are docked: the next `dockspace` builds the default. Call it before that, in the same frame or not."""
+    """Forget where windows are docked: the next `dockspace` builds the default. Call it before that, in the same frame
+    or not."""
     host = imgui.internal.find_window_by_name(_HOST)
     if host is not None:
         imgui.internal.dock_builder_remove_node(host.get_id(_DOCKSPACE))

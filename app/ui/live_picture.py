@@ -108,7 +108,8 @@ class LivePicture:
         self.engine = self._make_engine(self._context)
 
     def reload_shaders(self) -> None:
-        """Compile from disk again, while the last good programs go on (`shader_error` tells what fails). Raises `EngineError`."""
+        """Compile from disk again, while the last good programs go on (`shader_error` tells what fails). Raises
+        `EngineError`."""
         if self.engine is None:
             self.restart()
             return
@@ -168,7 +169,8 @@ class LivePicture:
         self.exposure_ev = measured + state.scene.render.exposure_ev
 
     def pick(self, place: tuple[float, float]) -> PickHit | None:
-        """First surface at a place of the picture, 0..1 from the top left; its object is one of the scene that is shown."""
+        """First surface at a place of the picture, 0..1 from the top left; its object is one of the scene that is
+        shown."""
         return self.engine.pick(*place) if self.engine is not None else None
 
     def object_in(self, scene: Scene, index: int) -> int | None:

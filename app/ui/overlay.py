@@ -1,4 +1,5 @@
-"""What is drawn over the picture in scene coordinates: rays, the brush's ring, the held colour, lights, the selection's box.
+"""What is drawn over the picture in scene coordinates: rays, the brush's ring, the held colour, lights, the selection's
+box.
 
 Drawn with imgui's draw list, so it costs the renderer nothing and is no part of the picture.
 """
@@ -50,7 +51,8 @@ class Canvas:
         return self.cut(np.stack([points if closed else points[:-1], ends], axis=1))[0]
 
     def cut(self, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """World segments (n, 2, 3) as screen segments (m, 2, 2), cut at the near plane and a little outside the picture, and which (m,) of the n each was."""
+        """World segments (n, 2, 3) as screen segments (m, 2, 2), cut at the near plane and a little outside the
+        picture, and which (m,) of the n each was."""
         index = np.arange(len(pairs))
         if not self.view.is_orthographic:
             pairs, kept = _cut_near(pairs, self.view.depth(pairs), NEAR * self.view.target_distance)
@@ -94,7 +96,8 @@ def lines(canvas: Canvas, segments: Iterable[np.ndarray], colour: int, width: fl
 
 
 def draw_rays(canvas: Canvas, rays: Iterable[RayLine]) -> None:
-    """The ray overlay: every path in the colour of its wavelength, glowing softly; where several run together, in their mixture."""
+    """The ray overlay: every path in the colour of its wavelength, glowing softly; where several run together, in their
+    mixture."""
     rays = tuple(rays)
     if not rays:
         return
@@ -102,7 +105,9 @@ def draw_rays(canvas: Canvas, rays: Iterable[RayLine]) -> None:
     nm_of = np.repeat([ray.wavelength_nm for ray in rays], [len(ray.points) - 1 for ray in rays])
     segments, index = canvas.cut(pairs)
     together: dict[tuple[int, ...], tuple[np.ndarray, set[float]]] = {}
-    for segment, key, nm in zip(segments, np.round(2.0 * segments.reshape(-1, 4)).astype(int).tolist(), nm_of[index].tolist(), strict=True):
+    for segment, key, nm in zip(
+        segments, np.round(2.0 * segments.reshape(-1, 4)).astype(int).tolist(), nm_of[index].tolist(), strict=True
+    ):
         together.setdefault(tuple(key), (segment, set()))[1].add(nm)
     all_nm = tuple(sorted({ray.wavelength_nm for ray in rays}))
     coloured = [(segment, mixed_srgb(tuple(sorted(nm)), all_nm)) for segment, nm in together.values()]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 SOFTWARE_FRAME_S = 0.04
-"""A frame on the software renderer: with the piece of work that runs over its end, within the 50 ms in which input must be answered."""
+"""A frame on the software renderer: with the piece of work that runs over its end, within the 50 ms in which input must
+be answered."""
 GPU_SHARE = 0.75
 """Of the time between two pictures of the screen; the rest is the driver's and the window system's."""
 MIN_SHARE = 0.25

@@ -1,7 +1,7 @@
 """The independent reference in a thread of low priority: float64 light tracing that shares no code with the shaders.
 
-It computes the caustic layer on what the camera sees directly. Snapshots come as its error shrinks; `pause` and `stop` work
-after the round it is in.
+It computes the caustic layer on what the camera sees directly. Snapshots come as its error shrinks; `pause` and `stop`
+work after the round it is in.
 """
 
 from __future__ import annotations
@@ -97,7 +97,12 @@ class ReferenceThread:
             self.problem = f"the reference renderer needs numba ({error})"
         except MemoryError:
             self.problem = "there is not enough memory for a reference of this size"
-        except (RuntimeError, ValueError, ArithmeticError, LookupError) as error:  # a fault of ours must not die unseen in a thread
+        except (
+            RuntimeError,
+            ValueError,
+            ArithmeticError,
+            LookupError,
+        ) as error:  # a fault of ours must not die unseen in a thread
             self.problem = f"the reference renderer failed ({type(error).__name__}: {error})"
 
     def _compute(self) -> None:
@@ -124,5 +129,10 @@ class ReferenceThread:
     def _publish(self, picture: ReferencePicture, directly: np.ndarray) -> None:
         number = 1 if self.snapshot is None else self.snapshot.number + 1
         self.snapshot = Snapshot(
-            number, picture.rgb.astype(np.float32), picture.xyz_variance().astype(np.float32), directly, picture.photons, picture.relmse
+            number,
+            picture.rgb.astype(np.float32),
+            picture.xyz_variance().astype(np.float32),
+            directly,
+            picture.photons,
+            picture.relmse,
         )

@@ -83,7 +83,9 @@ class Session:
         self._told: str | None = None
         self._frame_started = self._last_start = clock()
         self.delta_s = 1 / 60
-        self.state = _first_state(self.document.scene, self.settings, welcome=path is None and self.recovery is not None)
+        self.state = _first_state(
+            self.document.scene, self.settings, welcome=path is None and self.recovery is not None
+        )
         if notice:
             self.messages.tell(notice, is_error=True)
         if path is not None and self.recovery is not None:
@@ -105,7 +107,8 @@ class Session:
             self.companions.gallery.step()
 
     def frame(self, draw: Draw, budget_s: float = DEFAULT_BUDGET_S) -> None:
-        """Draw the interface with `draw`, within imgui's frame, and answer it; the engine works for about `budget_s`."""
+        """Draw the interface with `draw`, within imgui's frame, and answer it; the engine works for about
+        `budget_s`."""
         from .view_model_builder import view_model_of
 
         view_model = view_model_of(self)
@@ -121,7 +124,8 @@ class Session:
         self._was_interacting = self.state.interacting
 
     def wait_for_layout(self) -> None:
-        """The window's size has changed before anything was made for it: leave the engine alone for some frames more."""
+        """The window's size has changed before anything was made for it: leave the engine alone for some frames
+        more."""
         self._frames = 0
 
     def finished(self) -> None:
@@ -150,7 +154,9 @@ class Session:
         """Take over what the panels returned; an edited scene is a step of undo."""
         self.state = replace(after, requests=())
         if after.scene is not before.scene:
-            self.document.history.push(after.edit_label or "Edit", after.scene, merge=after.interacting or self._was_interacting)
+            self.document.history.push(
+                after.edit_label or "Edit", after.scene, merge=after.interacting or self._was_interacting
+            )
         if not after.interacting:
             self.document.history.settle()
         if after.preferences != self.settings.preferences:
@@ -164,7 +170,9 @@ class Session:
             self.messages.tell(sentence(str(error)), is_error=True)
         except Exception as error:  # a bug: the work and the window outlive it
             self.save_from_crash(f"{type(request).__name__}", error)
-            self.messages.tell(f"{words(request)} failed by a fault of the program ({brief(error)}); your work is kept.", is_error=True)
+            self.messages.tell(
+                f"{words(request)} failed by a fault of the program ({brief(error)}); your work is kept.", is_error=True
+            )
 
     def _work(self, budget_s: float) -> None:
         """Let the engine work and show its picture."""
@@ -202,7 +210,9 @@ class Session:
         except Exception as error:  # a bug in a side line must not stop the picture
             self.companions.exports.cancel()
             self.save_from_crash("exporting or comparing", error)
-            self.messages.tell(f"Comparing or exporting failed by a fault of the program ({brief(error)}).", is_error=True)
+            self.messages.tell(
+                f"Comparing or exporting failed by a fault of the program ({brief(error)}).", is_error=True
+            )
             self.state = replace(self.state, compare=replace(self.state.compare, mode="off", plot=False))
             return budget_s
         finally:
@@ -212,7 +222,9 @@ class Session:
 
     def _renderer_stopped(self, error: Exception) -> None:
         self.save_from_crash("rendering", error)
-        self.messages.tell(f"The renderer stopped ({brief(error)}). Your work is kept; press F5 to try again.", is_error=True)
+        self.messages.tell(
+            f"The renderer stopped ({brief(error)}). Your work is kept; press F5 to try again.", is_error=True
+        )
 
     # What requests use
 
@@ -229,9 +241,16 @@ class Session:
         self.document = document
         kept = self.state
         self.state = replace(
-            kept, scene=document.scene, camera=document.scene.camera, views=State(document.scene, document.scene.camera).views,
-            selection=Selection(), pull=None, animation=(), solo_nm=None, edit_label="",
-        ).with_panels(start_page=False)  # fmt: skip
+            kept,
+            scene=document.scene,
+            camera=document.scene.camera,
+            views=State(document.scene, document.scene.camera).views,
+            selection=Selection(),
+            pull=None,
+            animation=(),
+            solo_nm=None,
+            edit_label="",
+        ).with_panels(start_page=False)
         self.picture.new_scene()
         self.tell_notes()
         self._remember_file(document.source)

@@ -32,9 +32,16 @@ def begin_pull_at(session: Session, request: BeginPull) -> Pull:
         raise UserError("there is no caustic here; take hold of a coloured part of one")
     stored = engine.stored_photons(PHOTONS)
     photons = PullPhotons(
-        stored.position, stored.dposition_dn, stored.n_anchor, stored.flux_w, stored.source, stored.receiver, stored.band_nm,
-        stored.variables, stored.group_of_object,
-    )  # fmt: skip
+        stored.position,
+        stored.dposition_dn,
+        stored.n_anchor,
+        stored.flux_w,
+        stored.source,
+        stored.receiver,
+        stored.band_nm,
+        stored.variables,
+        stored.group_of_object,
+    )
     rgb = np.array(session.picture.pixel((request.x, request.y)) or (0.0, 0.0, 0.0))
     return begin_pull(
         photons,

@@ -66,7 +66,8 @@ def chord(keys: str) -> int:
 
 
 def handle(state: State, view_model: ViewModel) -> State:
-    """Carry out the commands whose keys were pressed in this frame; nothing while a text field or a dialogue has them."""
+    """Carry out the commands whose keys were pressed in this frame; nothing while a text field or a dialogue has
+    them."""
     io = imgui.get_io()
     _close_menus()
     is_free = not io.want_text_input and not imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
@@ -85,7 +86,8 @@ def handle(state: State, view_model: ViewModel) -> State:
 
 
 def _close_menus() -> None:
-    """Esc closes menus and pickers; dialogues answer it themselves. (imgui does so only with its keyboard navigation on.)"""
+    """Esc closes menus and pickers; dialogues answer it themselves. (imgui does so only with its keyboard navigation
+    on.)"""
     is_menu = imgui.is_popup_open("", imgui.PopupFlags_.any_popup) and imgui.internal.get_top_most_popup_modal() is None
     if is_menu and imgui.is_key_pressed(imgui.Key.escape):
         imgui.internal.close_popup_to_level(0, True)

@@ -1,4 +1,5 @@
-"""The picture lags behind an edit that must be traced: what is pointed at in it is an object of the scene that it still shows."""
+"""The picture lags behind an edit that must be traced: what is pointed at in it is an object of the scene that it still
+shows."""
 
 from __future__ import annotations
 

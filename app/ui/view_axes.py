@@ -46,7 +46,9 @@ def draw_axes(state: State, view: View, right: float, top: float) -> State:
     return state
 
 
-def _draw(ends: list[tuple[float, int, float, np.ndarray]], centre: np.ndarray, ball: float, hovered: tuple[int, float] | None) -> None:
+def _draw(
+    ends: list[tuple[float, int, float, np.ndarray]], centre: np.ndarray, ball: float, hovered: tuple[int, float] | None
+) -> None:
     drawing, scale = imgui.get_window_draw_list(), theme.em(1.0) / theme.FONT_SIZE
     dark = theme.packed((0.06, 0.06, 0.06, 0.9))
     if hovered is not None:
@@ -65,6 +67,10 @@ def _draw(ends: list[tuple[float, int, float, np.ndarray]], centre: np.ndarray, 
         if sign > 0 or hovered == (axis, sign):
             text = _NAMES[axis] if sign > 0 else f"−{_NAMES[axis]}"
             size = imgui.calc_text_size(text)
-            drawing.add_text(ImVec2(at.x - 0.5 * size.x, at.y - 0.5 * size.y), dark if sign > 0 else theme.packed((0.92, 0.92, 0.92, 1.0)), text)
+            drawing.add_text(
+                ImVec2(at.x - 0.5 * size.x, at.y - 0.5 * size.y),
+                dark if sign > 0 else theme.packed((0.92, 0.92, 0.92, 1.0)),
+                text,
+            )
         if hovered == (axis, sign):
             drawing.add_circle(at, ball + 1.0 * scale, theme.packed((0.95, 0.95, 0.95, 0.9)), 24, 1.4 * scale)

@@ -1,4 +1,5 @@
-"""Commands about what is seen: camera, numbered views, panels, display. Functions of state and facts, see `commands`."""
+"""Commands about what is seen: camera, numbered views, panels, display. Functions of state and facts, see
+`commands`."""
 
 from __future__ import annotations
 
@@ -41,7 +42,9 @@ def go_to_view(number: int, state: State, _view_model: ViewModel) -> State:
 def store_view(number: int, state: State, _view_model: ViewModel) -> State:
     """Store the camera as numbered view `number` (0 to 8)."""
     views = (*state.views[:number], state.camera, *state.views[number + 1 :])
-    return replace(state, views=views).asking(Notice(f"Stored as view {number + 1}. Key {number + 1} comes back to it."))
+    return replace(state, views=views).asking(
+        Notice(f"Stored as view {number + 1}. Key {number + 1} comes back to it.")
+    )
 
 
 def hide_panels(state: State, _view_model: ViewModel) -> State:

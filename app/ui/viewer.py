@@ -77,6 +77,11 @@ class Viewer:
 def headless_viewer(viewer: Viewer, size: tuple[int, int] = (1280, 720)) -> HeadlessInterface:
     """`viewer` in a windowless interface of `size` pixels. Its session stays the caller's to release."""
     return HeadlessInterface(
-        viewer.session.context, viewer.draw, size, prepare=viewer.prepare, rendered=viewer.rendered, finished=viewer.finished,
+        viewer.session.context,
+        viewer.draw,
+        size,
+        prepare=viewer.prepare,
+        rendered=viewer.rendered,
+        finished=viewer.finished,
         preferences=lambda: viewer.preferences,
-    )  # fmt: skip
+    )

@@ -18,13 +18,18 @@ from .gizmo import Gizmo
 from .overlay import Canvas
 from .view_axes import draw_axes
 from .view_model import ViewModel
-from .viewport_input import ViewportInput, Mouse
+from .viewport_input import Mouse, ViewportInput
 from .viewport_marks import draw_lights, draw_magnifier, draw_marks, draw_wipe
 from .viewport_tools import MARGIN_EM, badges, draw_badges, draw_toolbar
 
 MIN_SIDE = 64
 """Pixels of the picture, however small the window."""
-_FLAGS = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_nav
+_FLAGS = (
+    imgui.WindowFlags_.no_scrollbar
+    | imgui.WindowFlags_.no_scroll_with_mouse
+    | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_nav
+)
 
 hand = ViewportInput()
 """What the mouse holds."""
@@ -98,14 +103,20 @@ def _draw_picture(state: State, view_model: ViewModel, corner: ImVec2, size: ImV
 def _canvas(state: State, corner: ImVec2, width: float, height: float) -> Canvas:
     wide, high = state.viewport_size
     scale = theme.em(1.0) / theme.FONT_SIZE
-    return Canvas(imgui.get_window_draw_list(), View.of(state.camera, wide / high), corner.x, corner.y, width, height, scale)
+    return Canvas(
+        imgui.get_window_draw_list(), View.of(state.camera, wide / high), corner.x, corner.y, width, height, scale
+    )
 
 
 def _mouse(canvas: Canvas) -> Mouse:
     io = imgui.get_io()
     position, delta = io.mouse_pos, io.mouse_delta
     known = abs(position.x) < 1e30 and abs(position.y) < 1e30
-    x, y = ((position.x - canvas.left) / canvas.width, (position.y - canvas.top) / canvas.height) if known else (-1.0, -1.0)
+    x, y = (
+        ((position.x - canvas.left) / canvas.width, (position.y - canvas.top) / canvas.height)
+        if known
+        else (-1.0, -1.0)
+    )
     inside = 0.0 <= x < 1.0 and 0.0 <= y < 1.0
     busy = imgui.is_any_item_hovered() or imgui.is_any_item_active() or gizmo.is_in_the_way()
     is_over = inside and imgui.is_window_hovered() and not busy
@@ -117,4 +128,6 @@ def _with_hover(state: State, mouse: Mouse) -> State:
     dragging = hand.grip in ("brush", "pull", "click", "wipe")
     inside = 0.0 <= mouse.x < 1.0 and 0.0 <= mouse.y < 1.0
     hovers = (mouse.is_over and hand.is_free) or (dragging and inside)
-    return replace(state, hover=(float(np.clip(mouse.x, 0.0, 1.0)), float(np.clip(mouse.y, 0.0, 1.0))) if hovers else None)
+    return replace(
+        state, hover=(float(np.clip(mouse.x, 0.0, 1.0)), float(np.clip(mouse.y, 0.0, 1.0))) if hovers else None
+    )

@@ -1,7 +1,7 @@
 """What the mouse and the keys do in the viewport: walk the camera, select, paint, pull, shift the wipe.
 
-`Hand` remembers what a drag that is under way holds; that is memory of the interface, like a scroll position, and no part of
-the state. The gizmo has its own.
+`Hand` remembers what a drag that is under way holds; that is memory of the interface, like a scroll position, and no
+part of the state. The gizmo has its own.
 """
 
 from __future__ import annotations
@@ -91,7 +91,10 @@ class ViewportInput:
             return self._grip(state, "fly", 1, position)
         if not imgui.is_mouse_clicked(0):
             return state
-        if state.compare.mode == "wipe" and abs(mouse.x - state.compare.wipe) * canvas.width < WIPE_REACH_PX * canvas.scale:
+        if (
+            state.compare.mode == "wipe"
+            and abs(mouse.x - state.compare.wipe) * canvas.width < WIPE_REACH_PX * canvas.scale
+        ):
             return self._grip(state, "wipe", 0, position)
         if state.tool == "brush":
             return self._begin_stroke(self._grip(state, "brush", 0, position), view_model)
@@ -137,8 +140,10 @@ class ViewportInput:
     def _flown(self, camera: controls.Camera, dt: float) -> controls.Camera:
         io, down = imgui.get_io(), imgui.is_key_down
         keys = (
-            float(down(_Key.d)) - float(down(_Key.a)), float(down(_Key.e)) - float(down(_Key.q)), float(down(_Key.w)) - float(down(_Key.s))
-        )  # fmt: skip
+            float(down(_Key.d)) - float(down(_Key.a)),
+            float(down(_Key.e)) - float(down(_Key.q)),
+            float(down(_Key.w)) - float(down(_Key.s)),
+        )
         haste = controls.FAST if io.key_shift else controls.SLOW if io.key_ctrl else 1.0
         return controls.fly(camera, keys, self.fly_speed * haste * FLY_SPEED * View.of(camera, 1.0).target_distance, dt)
 
@@ -151,7 +156,12 @@ class ViewportInput:
 
     def _paint(self, state: State, view_model: ViewModel) -> State:
         cursor, io = view_model.cursor, imgui.get_io()
-        if cursor is None or cursor.position is None or cursor.object_index is None or not brushes.can_paint(state.scene, cursor.object_index):
+        if (
+            cursor is None
+            or cursor.position is None
+            or cursor.object_index is None
+            or not brushes.can_paint(state.scene, cursor.object_index)
+        ):
             return state
         brush = brushes.mode_held(state.brush, io.key_shift, io.key_ctrl)
         stroke = self._stroke
@@ -180,7 +190,9 @@ class ViewportInput:
             self.fly_speed = float(np.clip(self.fly_speed * FLY_STEP**notches, 0.02, 50.0))
             return state
         if io.key_shift:
-            return replace(state, brush=brushes.resized(state.brush, notches, visible_height(canvas.view, view_model.cursor)))
+            return replace(
+                state, brush=brushes.resized(state.brush, notches, visible_height(canvas.view, view_model.cursor))
+            )
         hit = _position(view_model.cursor)
         camera = controls.zoom_to(state.camera, notches, (mouse.x, mouse.y), canvas.view.aspect, hit)
         return replace(state, camera=camera, interacting=True)
@@ -189,7 +201,11 @@ class ViewportInput:
         if imgui.get_io().want_text_input or not (mouse.is_over or self.grip == "brush"):
             return state
         steps = float(imgui.is_key_pressed(_Key.right_bracket)) - float(imgui.is_key_pressed(_Key.left_bracket))
-        return replace(state, brush=brushes.resized(state.brush, steps, visible_height(canvas.view, None))) if steps else state
+        return (
+            replace(state, brush=brushes.resized(state.brush, steps, visible_height(canvas.view, None)))
+            if steps
+            else state
+        )
 
 
 def visible_height(view: View, cursor: CursorInfo | None) -> float:

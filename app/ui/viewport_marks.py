@@ -1,4 +1,5 @@
-"""Marks over the picture that answer the cursor: the brush's ring, the held colour, lights, selection, wipe, magnifier."""
+"""Marks over the picture that answer the cursor: the brush's ring, the held colour, lights, selection, wipe,
+magnifier."""
 
 from __future__ import annotations
 
@@ -51,7 +52,12 @@ def _draw_ring(canvas: Canvas, state: State, cursor: CursorInfo, is_painting: bo
     io = imgui.get_io()
     brush: Brush = brushes.mode_held(state.brush, io.key_shift, io.key_ctrl)
     red, green, blue, opacity = _RING_COLOURS[brush.mode]
-    draw_outlined(canvas, brushes.ring(cursor.position, cursor.normal, brush.radius), (red, green, blue, opacity), 2.2 if is_painting else 1.6)
+    draw_outlined(
+        canvas,
+        brushes.ring(cursor.position, cursor.normal, brush.radius),
+        (red, green, blue, opacity),
+        2.2 if is_painting else 1.6,
+    )
     inner = brush.radius * (1.0 - brush.falloff)
     if 0.05 < 1.0 - brush.falloff < 0.95:
         draw_outlined(canvas, brushes.ring(cursor.position, cursor.normal, inner), (red, green, blue, 0.4), 1.0)
@@ -73,7 +79,9 @@ def _draw_pull(canvas: Canvas, state: State) -> None:
             canvas.drawing.add_circle_filled(ImVec2(x, y), 0.68 * radius, colour, 24)
     x, y = canvas.pixels(now)
     if np.isfinite(x):
-        what = f"local gain × {gain:.2f}" if held.local else f"gain × {gain:.2f}   V_d {pull.abbe_number(held, gain):.1f}"
+        what = (
+            f"local gain × {gain:.2f}" if held.local else f"gain × {gain:.2f}   V_d {pull.abbe_number(held, gain):.1f}"
+        )
         _label(canvas, x + theme.em(0.9), y - theme.em(1.6), f"{held.wavelength_nm:.0f} nm   {what}")
 
 
@@ -90,7 +98,12 @@ def _label(canvas: Canvas, x: float, y: float, text: str) -> None:
     palette, size, pad = theme.palette(), imgui.calc_text_size(text), theme.em(0.35)
     x = min(max(x, canvas.left + pad), canvas.left + canvas.width - size.x - pad)
     y = min(max(y, canvas.top + pad), canvas.top + canvas.height - size.y - pad)
-    canvas.drawing.add_rect_filled(ImVec2(x - pad, y - 0.5 * pad), ImVec2(x + size.x + pad, y + size.y + 0.5 * pad), theme.packed(palette.window, 0.88), 4.0)
+    canvas.drawing.add_rect_filled(
+        ImVec2(x - pad, y - 0.5 * pad),
+        ImVec2(x + size.x + pad, y + size.y + 0.5 * pad),
+        theme.packed(palette.window, 0.88),
+        4.0,
+    )
     canvas.drawing.add_text(ImVec2(x, y), theme.packed(palette.text), text)
 
 
@@ -104,7 +117,11 @@ def draw_lights(canvas: Canvas, state: State) -> State:
             continue  # it stands nowhere
         place = placing.light_place(state.scene, light)
         x, y = canvas.pixels(place)
-        inside = np.isfinite(x) and canvas.left < x < canvas.left + canvas.width and canvas.top < y < canvas.top + canvas.height
+        inside = (
+            np.isfinite(x)
+            and canvas.left < x < canvas.left + canvas.width
+            and canvas.top < y < canvas.top + canvas.height
+        )
         if not inside:
             continue
         half = theme.em(_LIGHT_EM)
@@ -118,7 +135,9 @@ def draw_lights(canvas: Canvas, state: State) -> State:
     return state
 
 
-def _draw_light(canvas: Canvas, state: State, index: int, place: np.ndarray, x: float, y: float, chosen: bool, hovered: bool) -> None:
+def _draw_light(
+    canvas: Canvas, state: State, index: int, place: np.ndarray, x: float, y: float, chosen: bool, hovered: bool
+) -> None:
     light = state.scene.lights[index]
     colour = theme.DARK.accent if chosen else (1.0, 0.92, 0.7, 1.0)
     opacity = 1.0 if chosen or hovered else 0.5
@@ -126,7 +145,9 @@ def _draw_light(canvas: Canvas, state: State, index: int, place: np.ndarray, x: 
         length = canvas.view.height_at(max(float(canvas.view.depth(place)), 1e-9)) * theme.em(_ARROW_EM) / canvas.height
         tip = place + length * placing.light_axes(light)[:, 2]
         draw_outlined(canvas, np.stack([place, tip]), (*colour[:3], 0.9), 1.6, closed=False)
-    canvas.drawing.add_circle_filled(ImVec2(x, y), theme.em(0.78), theme.packed((0.0, 0.0, 0.0, 1.0), 0.5 * opacity), 24)
+    canvas.drawing.add_circle_filled(
+        ImVec2(x, y), theme.em(0.78), theme.packed((0.0, 0.0, 0.0, 1.0), 0.5 * opacity), 24
+    )
     icon = icons.ICON_FA_SUN if light.kind == "directional" else icons.ICON_FA_LIGHTBULB
     size = imgui.calc_text_size(icon)
     canvas.drawing.add_text(ImVec2(x - 0.5 * size.x, y - 0.5 * size.y), theme.packed(colour, opacity), icon)
@@ -144,9 +165,13 @@ def draw_wipe(canvas: Canvas, state: State, view_model: ViewModel) -> None:
         imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
     palette = theme.palette()
     canvas.drawing.add_circle_filled(ImVec2(x, middle), radius, theme.packed(palette.window, 0.9), 32)
-    canvas.drawing.add_circle(ImVec2(x, middle), radius, theme.packed(palette.accent if near else palette.text, 0.9), 32, 1.6 * canvas.scale)
+    canvas.drawing.add_circle(
+        ImVec2(x, middle), radius, theme.packed(palette.accent if near else palette.text, 0.9), 32, 1.6 * canvas.scale
+    )
     size = imgui.calc_text_size(icons.ICON_FA_LEFT_RIGHT)
-    canvas.drawing.add_text(ImVec2(x - 0.5 * size.x, middle - 0.5 * size.y), theme.packed(palette.text), icons.ICON_FA_LEFT_RIGHT)
+    canvas.drawing.add_text(
+        ImVec2(x - 0.5 * size.x, middle - 0.5 * size.y), theme.packed(palette.text), icons.ICON_FA_LEFT_RIGHT
+    )
     y = canvas.top + theme.em(0.8)
     left, right = (METHOD_NAMES.get(name, "Reference") for name in (state.method, state.compare.method))
     gap = theme.em(1.0)
@@ -172,6 +197,10 @@ def draw_magnifier(canvas: Canvas, view_model: ViewModel) -> None:
     canvas.drawing.add_rect(low, high, theme.packed(palette.border), 4.0)
     middle, reach = ImVec2(left + 0.5 * side, y + 0.5 * side), theme.em(0.45)
     for colour, thickness in ((theme.packed((0, 0, 0, 0.7)), 3.0), (theme.packed((1, 1, 1, 0.9)), 1.0)):
-        canvas.drawing.add_line(ImVec2(middle.x - reach, middle.y), ImVec2(middle.x + reach, middle.y), colour, thickness)
-        canvas.drawing.add_line(ImVec2(middle.x, middle.y - reach), ImVec2(middle.x, middle.y + reach), colour, thickness)
+        canvas.drawing.add_line(
+            ImVec2(middle.x - reach, middle.y), ImVec2(middle.x + reach, middle.y), colour, thickness
+        )
+        canvas.drawing.add_line(
+            ImVec2(middle.x, middle.y - reach), ImVec2(middle.x, middle.y + reach), colour, thickness
+        )
     canvas.drawing.add_text(ImVec2(x + theme.em(0.4), y + side + theme.em(0.2)), theme.packed(palette.text), text)

@@ -1,4 +1,5 @@
-"""What lies over the picture and is clicked: the tools, play and pause, the physical switch, badges that say what one sees."""
+"""What lies over the picture and is clicked: the tools, play and pause, the physical switch, badges that say what one
+sees."""
 
 from __future__ import annotations
 
@@ -59,7 +60,11 @@ def draw_toolbar(state: State, gizmo: Gizmo, left: float, top: float) -> State:
         y += size + gap
     _ground(x, y, size, 2)
     what = command("Accumulate photons")
-    icon, tip = (icons.ICON_FA_PAUSE, "Pause: keep the picture as it is.") if state.playing else (icons.ICON_FA_PLAY, "Go on accumulating photons.")
+    icon, tip = (
+        (icons.ICON_FA_PAUSE, "Pause: keep the picture as it is.")
+        if state.playing
+        else (icons.ICON_FA_PLAY, "Go on accumulating photons.")
+    )
     if _button("Pause" if state.playing else "Play", icon, x, y, not state.playing, tip, what.keys):
         state = replace(state, playing=not state.playing)
     what = command("Physical picture")
@@ -96,15 +101,42 @@ def badges(state: State, view_model: ViewModel) -> list[Badge]:
     told = []
     painted = any(item.local_dispersion for item in state.scene.objects)
     if painted and not state.physical:
-        told.append(Badge(NOT_PHYSICAL, "The dispersion brush has changed how far colours spread on a receiver. V shows the physical picture."))
+        told.append(
+            Badge(
+                NOT_PHYSICAL,
+                "The dispersion brush has changed how far colours spread on a receiver. V shows the physical picture.",
+            )
+        )
     elif painted:
-        told.append(Badge("Physical: local gain left out", "What the dispersion brush painted is kept but not shown. V brings it back.", False))
+        told.append(
+            Badge(
+                "Physical: local gain left out",
+                "What the dispersion brush painted is kept but not shown. V brings it back.",
+                False,
+            )
+        )
     if view_model.stats.first_order:
-        told.append(Badge("First order", "Photons were traced through a glass of another dispersion; the picture follows the edit to first order until they are traced again (Ctrl+R)."))
+        told.append(
+            Badge(
+                "First order",
+                "Photons were traced through a glass of another dispersion; the picture follows the edit to first order until they are traced again (Ctrl+R).",
+            )
+        )
     if state.solo_nm is not None:
-        told.append(Badge(f"Only {state.solo_nm:.0f} nm", "The light of a single wavelength is shown. L goes back to all of it.", False))
+        told.append(
+            Badge(
+                f"Only {state.solo_nm:.0f} nm",
+                "The light of a single wavelength is shown. L goes back to all of it.",
+                False,
+            )
+        )
     if (state.compare.mode in ("wipe", "error") or state.compare.holding) and not view_model.compare_ready:
-        told.append(Badge("Nothing to compare with yet", "The other picture is being computed; the compare panel shows how far it is."))
+        told.append(
+            Badge(
+                "Nothing to compare with yet",
+                "The other picture is being computed; the compare panel shows how far it is.",
+            )
+        )
     elif state.compare.holding:
         told.append(Badge("Reference", "Shown while C is held down.", False))
     if not state.playing:

@@ -251,7 +251,9 @@ class Window:
 def _create(place: WindowPlace, visible: bool) -> object:
     """A glfw window with an OpenGL 4.3 core context, or a `UserError`."""
     problems: list[str] = []
-    glfw.set_error_callback(lambda _code, text: problems.append(text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)))
+    glfw.set_error_callback(
+        lambda _code, text: problems.append(text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text))
+    )
     if not glfw.init():
         raise UserError(NO_DISPLAY if not _has_display() else f"{NO_DISPLAY} ({_first(problems)})")
     glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, GL_VERSION[0])
@@ -294,4 +296,3 @@ def _has_display() -> bool:
 
 def _first(problems: list[str]) -> str:
     return " ".join(problems[0].split()) if problems else "the driver gives no reason"
-

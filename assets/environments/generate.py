@@ -90,12 +90,15 @@ def _window(point: np.ndarray) -> np.ndarray:
     across, up = (y + 0.75) / 1.5, (z + 0.35) / 1.3
     inside = (x < -ROOM[0] + 1e-6) & (across > 0.0) & (across < 1.0) & (up > 0.0) & (up < 1.0)
     bar = 0.04
-    in_pane = (np.abs((across * 3.0) % 1.0 - 0.5) < 0.5 - 3.0 * bar / 1.5) & (np.abs((up * 2.0) % 1.0 - 0.5) < 0.5 - 2.0 * bar / 1.3)
+    in_pane = (np.abs((across * 3.0) % 1.0 - 0.5) < 0.5 - 3.0 * bar / 1.5) & (
+        np.abs((up * 2.0) % 1.0 - 0.5) < 0.5 - 2.0 * bar / 1.3
+    )
     return inside & in_pane
 
 
 def _soft_box(direction: np.ndarray, middle: np.ndarray, size: tuple[float, float]) -> np.ndarray:
-    """How much of each ray meets a rectangle that faces the room's middle, 0 to 1, fading over a tenth of its short side."""
+    """How much of each ray meets a rectangle that faces the room's middle, 0 to 1, fading over a tenth of its short
+    side."""
     distance = np.linalg.norm(middle)
     axis = middle / distance
     right = np.cross(axis, (0.0, 0.0, 1.0))
@@ -105,7 +108,10 @@ def _soft_box(direction: np.ndarray, middle: np.ndarray, size: tuple[float, floa
     scale = np.where(ahead > 1e-6, distance / np.maximum(ahead, 1e-6), np.inf)
     edge = 0.1 * min(size)
     with np.errstate(invalid="ignore"):
-        inside = [0.5 * side - np.abs(np.where(ahead > 1e-6, scale * (direction @ along), np.inf)) for along, side in zip((right, up), size, strict=True)]
+        inside = [
+            0.5 * side - np.abs(np.where(ahead > 1e-6, scale * (direction @ along), np.inf))
+            for along, side in zip((right, up), size, strict=True)
+        ]
     return np.prod([np.clip(depth / edge, 0.0, 1.0) for depth in inside], axis=0)
 
 

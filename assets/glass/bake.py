@@ -37,7 +37,11 @@ MAKER_FOLDERS = {
 MAKER_ALIASES = {"Schott": {"N-BK7": ["BK7"]}}
 """The withdrawn BK7 (with arsenic) and its successor N-BK7 have the same n(λ)."""
 
-POLYMERS = "organic/(C5H8O2)n - poly(methyl methacrylate)", "organic/(C16H14O3)n - polycarbonate", "organic/(C8H8)n - polystyrene"
+POLYMERS = (
+    "organic/(C5H8O2)n - poly(methyl methacrylate)",
+    "organic/(C16H14O3)n - polycarbonate",
+    "organic/(C8H8)n - polystyrene",
+)
 # name: (file below data/, other names)
 MATERIALS: dict[str, tuple[str, list[str]]] = {
     "air": ("other/mixed gases/air/nk/Ciddor.yml", []),
@@ -86,7 +90,7 @@ MATERIALS: dict[str, tuple[str, list[str]]] = {
     "ZBLAN": ("glass/misc/ZBLAN/nk/Gan.yml", []),
     "zinc selenide": ("main/ZnSe/nk/Marple.yml", ["ZnSe"]),
     "zinc sulfide": ("main/ZnS/nk/Debenham.yml", ["ZnS", "sphalerite"]),
-}  # fmt: skip
+}
 
 
 def database() -> Path:
@@ -140,7 +144,9 @@ def ice(data: Path) -> dict[str, Any]:
     """Ice Ih from Warren and Brandt's table, whose four digits are too coarse to differentiate:
     a least-squares fit of a + b λ² + c λ⁻² + d λ⁻⁴ over 390–790 nm."""
     record = yaml.safe_load((data / "main/H2O/nk/Warren-2008.yml").read_text(encoding="utf-8"))
-    rows = np.array([[float(x) for x in line.split()] for line in record["DATA"][0]["data"].split("\n") if line.split()])
+    rows = np.array(
+        [[float(x) for x in line.split()] for line in record["DATA"][0]["data"].split("\n") if line.split()]
+    )
     rows = rows[(rows[:, 0] >= 0.39) & (rows[:, 0] <= 0.79)]
     powers = np.array([0.0, 2.0, -2.0, -4.0])
     design = rows[:, :1] ** powers

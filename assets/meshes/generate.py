@@ -37,8 +37,14 @@ def trefoil_knot(radius: float = 0.5, tube: float = 0.13, along: int = 168, arou
     without a twist; the normals are those of the tube.
     """
     t = 2.0 * np.pi * np.arange(along) / along
-    curve = radius / 3.0 * np.stack([np.sin(t) + 2.0 * np.sin(2.0 * t), np.cos(t) - 2.0 * np.cos(2.0 * t), -np.sin(3.0 * t)], axis=1)
-    first = np.stack([np.cos(t) + 4.0 * np.cos(2.0 * t), -np.sin(t) + 4.0 * np.sin(2.0 * t), -3.0 * np.cos(3.0 * t)], axis=1)
+    curve = (
+        radius
+        / 3.0
+        * np.stack([np.sin(t) + 2.0 * np.sin(2.0 * t), np.cos(t) - 2.0 * np.cos(2.0 * t), -np.sin(3.0 * t)], axis=1)
+    )
+    first = np.stack(
+        [np.cos(t) + 4.0 * np.cos(2.0 * t), -np.sin(t) + 4.0 * np.sin(2.0 * t), -3.0 * np.cos(3.0 * t)], axis=1
+    )
     tangent = normalised(first)
     # The curve winds about z and never runs straight away from it, so this is never along the tangent.
     across = normalised(curve * (1.0, 1.0, 0.0)) + np.array([0.0, 0.0, 0.35])
@@ -73,9 +79,15 @@ def gems() -> Scene:
     aim = np.array([0.35, -1.0, 0.3])
     aim /= np.linalg.norm(aim)
     lamp = Light(
-        "lamp", "spot", illuminant("D65").scaled_to_luminous(9000.0), tuple((-6.0 * aim + (0.0, 0.4, 0.0)).tolist()),
-        tuple(aim.tolist()), None, 18.0, 22.0,
-    )  # fmt: skip
+        "lamp",
+        "spot",
+        illuminant("D65").scaled_to_luminous(9000.0),
+        tuple((-6.0 * aim + (0.0, 0.4, 0.0)).tolist()),
+        tuple(aim.tolist()),
+        None,
+        18.0,
+        22.0,
+    )
     camera = Camera((0.6, 3.4, 5.4), (0.15, 0.2, 0.2), (0.0, 1.0, 0.0), vertical_fov_deg=34.0)
     return Scene("gems", camera, (lamp,), tuple(objects))
 

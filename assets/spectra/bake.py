@@ -19,10 +19,7 @@ def bake_colour_matching_functions() -> None:
     cmfs = colour.MSDS_CMFS[OBSERVER]
     wavelengths = np.arange(380, 781)
     keep = np.isin(cmfs.wavelengths, wavelengths)
-    header = (
-        f"{OBSERVER}, from colour-science {colour.__version__} (CIE 15)\n"
-        "wavelength_nm,x_bar,y_bar,z_bar"
-    )
+    header = f"{OBSERVER}, from colour-science {colour.__version__} (CIE 15)\nwavelength_nm,x_bar,y_bar,z_bar"
     rows = np.column_stack([cmfs.wavelengths[keep], cmfs.values[keep]])
     assert np.array_equal(rows[:, 0], wavelengths)
     np.savetxt(HERE / "cie_1931_2deg_1nm.csv", rows, fmt=["%d"] + ["%.12g"] * 3, delimiter=",", header=header)

@@ -1,4 +1,5 @@
-"""Bakes the three reflectances that every RGB of this program is a mixture of (`spectrasplat.model.optics.colorimetry.rgb_basis`).
+"""Bakes the three reflectances that every RGB of this program is a mixture of
+(`spectrasplat.model.optics.colorimetry.rgb_basis`).
 
 A reflectance that is linear in RGB can be filtered before or after it is made a spectrum, which no
 non-linear fit allows, and one whose basis sums to 1 leaves greys flat. Among all such bases the
@@ -14,7 +15,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from scipy.sparse import block_diag, bmat, csc_matrix, diags, viewpoint, hstack
+from scipy.sparse import block_diag, bmat, csc_matrix, diags, hstack, viewpoint
 from scipy.sparse.linalg import splu
 
 HERE = Path(__file__).resolve().parent
@@ -50,7 +51,9 @@ def smoothest_basis() -> np.ndarray:
     raise RuntimeError("the active set did not settle")
 
 
-def _solve(cost: csc_matrix, equations: csc_matrix, wanted: np.ndarray, zero: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _solve(
+    cost: csc_matrix, equations: csc_matrix, wanted: np.ndarray, zero: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Values (1203,) that minimise under the equations with those in `zero` held at 0, and the multipliers of these."""
     free = np.flatnonzero(~zero)
     rows = equations[:, free]

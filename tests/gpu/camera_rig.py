@@ -1,4 +1,5 @@
-"""What the tests of the camera's pass share: small scenes, pictures of them, and what simple surfaces should look like."""
+"""What the tests of the camera's pass share: small scenes, pictures of them, and what simple surfaces should look
+like."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from spectrasplat.model.optics import spectrum
 from spectrasplat.model.optics.colorimetry import K_M, cmf_xyz, daylight_per_lumen, rgb709_to_xyz, xyz_to_rgb709
 from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes.camera import CausticMaps, CameraPass
+from spectrasplat.passes.camera import CameraPass, CausticMaps
 from spectrasplat.render.light_pass import spectral_axis
 
 REFLECTANCE = 0.5
@@ -38,13 +39,28 @@ def floor(half=12.0) -> SceneObject:
 
 
 def opened_camera_pass(
-    gl, objects, lights=(), background=(0.0, 0.0, 0.0), camera=ABOVE, charts=False, environment=None, method="srd", split_threshold=None, channels=XYZ, **options
+    gl,
+    objects,
+    lights=(),
+    background=(0.0, 0.0, 0.0),
+    camera=ABOVE,
+    charts=False,
+    environment=None,
+    method="srd",
+    split_threshold=None,
+    channels=XYZ,
+    **options,
 ) -> CameraPass:
-    """A pass of its own buffers. `split_threshold` near 0 follows every part of a split path that weighs anything: no chance is left in the picture."""
+    """A pass of its own buffers. `split_threshold` near 0 follows every part of a split path that weighs anything: no
+    chance is left in the picture."""
     scene = Scene("test", camera, tuple(lights), tuple(objects), background, environment)
-    features = Features.of(scene, RenderSettings(method=method, bins=channels.count if channels.edges_nm else None, any_view=True))
+    features = Features.of(
+        scene, RenderSettings(method=method, bins=channels.count if channels.edges_nm else None, any_view=True)
+    )
     features = replace(features, charts=charts or features.charts)
-    camera_pass = CameraPass(gl, SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features)), maps=channels, **options)
+    camera_pass = CameraPass(
+        gl, SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features)), maps=channels, **options
+    )
     if split_threshold is not None:
         camera_pass.split_threshold = split_threshold
     return camera_pass
@@ -66,7 +82,8 @@ def render(gl, objects, lights=(), size=(32, 24), samples=1, camera=ABOVE, maps=
 
 
 def white_through(transmission: np.ndarray) -> np.ndarray:
-    """Linear Rec.709 of white light (1, 1, 1) of which (401,) is left: D65 times it over the observer, nanometre by nanometre."""
+    """Linear Rec.709 of white light (1, 1, 1) of which (401,) is left: D65 times it over the observer, nanometre by
+    nanometre."""
     return (daylight_per_lumen() * transmission) @ xyz_to_rgb709(K_M * cmf_xyz())
 
 
@@ -117,8 +134,12 @@ def flat_maps(gl, scene: SceneBuffers, windows, channels: np.ndarray, scale=1.0)
     receivers = RECEIVER.zeros(1)
     receivers["reflectance_rgb"] = REFLECTANCE
     height, width = channels.shape[:2]
-    textures = [gl.ctx.texture((width, height), 4, np.ascontiguousarray(channels[..., 4 * t : 4 * t + 4], np.float32).tobytes(), dtype="f4")
-                for t in range(channels.shape[2] // 4)]
+    textures = [
+        gl.ctx.texture(
+            (width, height), 4, np.ascontiguousarray(channels[..., 4 * t : 4 * t + 4], np.float32).tobytes(), dtype="f4"
+        )
+        for t in range(channels.shape[2] // 4)
+    ]
     return CausticMaps(textures, gl.ctx.buffer(receivers.tobytes()), gl.ctx.buffer(placements.tobytes()), scale)
 
 

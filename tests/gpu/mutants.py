@@ -10,7 +10,8 @@ from spectrasplat.base import paths
 
 
 def mutate(monkeypatch: pytest.MonkeyPatch, folder: Path, file: str, old: str, new: str) -> None:
-    """Until the test ends programs are built from a copy of the shaders in `folder` in which `old` is `new` in `file`."""
+    """Until the test ends programs are built from a copy of the shaders in `folder` in which `old` is `new` in
+    `file`."""
     copy = folder / "shaders"
     shutil.copytree(paths.shaders_dir(), copy)
     source = (copy / file).read_text(encoding="utf-8")

@@ -1,4 +1,5 @@
-"""Frames of an animation: steady to the bit, traced once where only the camera moves, resumed and stopped without loss."""
+"""Frames of an animation: steady to the bit, traced once where only the camera moves, resumed and stopped without
+loss."""
 
 from __future__ import annotations
 
@@ -143,7 +144,18 @@ def test_pictures_of_something_else_are_not_touched(stage: Stage, tmp_path: Path
 
 def read_movie(path: Path, width: int, height: int) -> np.ndarray:
     """uint8 (frames, H, W, 3)."""
-    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    command = [
+        imageio_ffmpeg.get_ffmpeg_exe(),
+        "-loglevel",
+        "error",
+        "-i",
+        str(path),
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "rgb24",
+        "-",
+    ]
     raw = subprocess.run(command, capture_output=True, check=True, timeout=30).stdout
     return np.frombuffer(raw, np.uint8).reshape(-1, height, width, 3)
 

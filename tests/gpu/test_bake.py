@@ -89,7 +89,11 @@ def test_a_curved_receiver_comes_with_the_place_of_every_triangle(gl, tmp_path: 
     corners = scene.objects[1].mesh.transformed(scene.objects[1].object_to_world).corners()
     points, places = (np.einsum("cp,tci->tpi", weights, x) for x in (corners, uv))
     height, width = rgb.shape[:2]
-    lit = rgb[np.minimum((places[..., 1] * height).astype(int), height - 1), np.minimum((places[..., 0] * width).astype(int), width - 1), 1]
+    lit = rgb[
+        np.minimum((places[..., 1] * height).astype(int), height - 1),
+        np.minimum((places[..., 0] * width).astype(int), width - 1),
+        1,
+    ]
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     flux = lit * area[:, None] / len(u)
     stage = Stage(scene, scene.camera)
@@ -110,7 +114,11 @@ def test_left_early_or_wrong_nothing_appears(gl, tmp_path: Path) -> None:
     work = bake(gl, stage, SETTINGS, "table", tmp_path / "x.png")
     next(work)
     work.close()
-    for receiver, name, told in (("tabel", "x.png", "did you mean 'table'"), ("prism", "x.png", "'table'"), ("table", "x.jpg", "picture format")):
+    for receiver, name, told in (
+        ("tabel", "x.png", "did you mean 'table'"),
+        ("prism", "x.png", "'table'"),
+        ("table", "x.jpg", "picture format"),
+    ):
         with pytest.raises(UserError, match=told):
             list(bake(gl, stage, SETTINGS, receiver, tmp_path / name))
     assert list(tmp_path.iterdir()) == []

@@ -38,12 +38,18 @@ def test_a_rig_renders_what_render_does_again_and_again(gl: Any, prism: Scene) -
         budgets = rig.budgets(0.02, 4)
     finally:
         rig.release()
-    settings = RenderSettings(width=WIDTH, height=HEIGHT, photons=3000, seed=5, layer="caustic", max_depth=prism.render.max_depth)
+    settings = RenderSettings(
+        width=WIDTH, height=HEIGHT, photons=3000, seed=5, layer="caustic", max_depth=prism.render.max_depth
+    )
     picture = rgb709_to_xyz(render(prism, settings, context=gl).rgb.astype(float))
     assert np.allclose(first.xyz, picture, rtol=1e-4, atol=1e-5 * picture.max())
-    assert np.allclose(again.xyz, first.xyz, rtol=1e-5, atol=1e-6 * picture.max())  # nothing is left of the rendering between
+    assert np.allclose(
+        again.xyz, first.xyz, rtol=1e-5, atol=1e-6 * picture.max()
+    )  # nothing is left of the rendering between
     assert not np.allclose(other.xyz, first.xyz, rtol=0.05, atol=1e-3 * picture.max())
-    assert set(first.seconds) == {"plan", *LIGHT.stages, "camera"} and all(seconds > 0.0 for seconds in first.seconds.values())
+    assert set(first.seconds) == {"plan", *LIGHT.stages, "camera"} and all(
+        seconds > 0.0 for seconds in first.seconds.values()
+    )
     assert 0.5 * 3000 < first.emitted < 2 * 3000 and other.emitted < first.emitted and first.splats > 0
     assert set(rig.setup_seconds) == {"buffers", "compile", "pilot", "warm-up"} and rig.buffers_mib > 1.0
     assert budgets == sorted(set(budgets)) and 1 <= len(budgets) <= 4 and budgets[-1] >= 64
@@ -73,7 +79,20 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     monkeypatch.setattr(runner, "POINTS", 3)
     monkeypatch.setattr("spectrasplat.bench.machine.program_hash", lambda: "as it is")  # an editor may be at work
     out = tmp_path / "out"
-    arguments = ["bench", "prism", "-o", str(out), "--seconds", "0.2", "--seeds", "2", "--methods", "stochastic,srd", "--size", f"{WIDTH}x{HEIGHT}"]
+    arguments = [
+        "bench",
+        "prism",
+        "-o",
+        str(out),
+        "--seconds",
+        "0.2",
+        "--seeds",
+        "2",
+        "--methods",
+        "stochastic,srd",
+        "--size",
+        f"{WIDTH}x{HEIGHT}",
+    ]
     assert main([*arguments, "--reference-seconds", "1"]) == 0
     shown = capsys.readouterr().out
     result = msgspec.json.decode((out / "results.json").read_bytes(), type=BenchResult)
@@ -82,7 +101,11 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     assert scene.reference is not None and scene.reference.photons > 1000 and 0.0 < scene.reference.relmse < 1.0
     for curve in scene.curves:
         assert len(curve.samples) == 2 * len(curve.budgets) == 2 * len(curve.points)
-        assert all(0.8 < sample.metrics["energy_ratio"] < 1.2 for sample in curve.samples if sample.photons == max(curve.budgets))  # 1 s of reference: its energy is known to a few %
+        assert all(
+            0.8 < sample.metrics["energy_ratio"] < 1.2
+            for sample in curve.samples
+            if sample.photons == max(curve.budgets)
+        )  # 1 s of reference: its energy is known to a few %
         assert curve.points[-1].relmse < curve.points[0].relmse and curve.points[0].seconds < curve.points[-1].seconds
     assert {"time to equal error"} == {claim.name for claim in scene.claims} and "time to equal error" in shown
     assert (out / "report.html").stat().st_size > 10_000 and (out / "plots" / "overview.svg").exists()

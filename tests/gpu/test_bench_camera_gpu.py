@@ -1,4 +1,5 @@
-"""The bench of the camera pass on the real renderer, small: rigs look again and again, and a tiny run ends in a report."""
+"""The bench of the camera pass on the real renderer, small: rigs look again and again, and a tiny run ends in a
+report."""
 
 from __future__ import annotations
 
@@ -45,14 +46,28 @@ def test_a_rig_looks_as_render_does_again_and_again(gl: Any, ball: Scene) -> Non
         for owned in (*rigs.values(), light):
             owned.release()
     for method in ("stochastic", "srd"):
-        settings = RenderSettings(width=WIDTH, height=HEIGHT, photons=PHOTONS, seed=1, camera_method=method, spp=16, max_depth=ball.render.max_depth)
+        settings = RenderSettings(
+            width=WIDTH,
+            height=HEIGHT,
+            photons=PHOTONS,
+            seed=1,
+            camera_method=method,
+            spp=16,
+            max_depth=ball.render.max_depth,
+        )
         picture = rgb709_to_xyz(render(ball, settings, context=gl).rgb.astype(float))
         assert np.allclose(first[method].xyz, picture, rtol=1e-3, atol=1e-4 * picture.max()), method
-    assert np.allclose(again.xyz, first["stochastic"].xyz, rtol=1e-5, atol=1e-6 * again.xyz.max())  # nothing is left of the picture between
+    assert np.allclose(
+        again.xyz, first["stochastic"].xyz, rtol=1e-5, atol=1e-6 * again.xyz.max()
+    )  # nothing is left of the picture between
     assert not np.allclose(other.xyz, again.xyz, rtol=0.05, atol=1e-3 * again.xyz.max())
     assert {method: r.emitted for method, r in first.items()} == {"stochastic": 16, "srd": 16, "regular-7": 21}
     assert fitting == 14 and budgets and all(n % 7 == 0 for n in budgets)
-    assert all(set(r.seconds) == {"bands", "looks"} and r.seconds["looks"] > 0.0 for r in first.values()) and light.seconds > 0.0 and told
+    assert (
+        all(set(r.seconds) == {"bands", "looks"} and r.seconds["looks"] > 0.0 for r in first.values())
+        and light.seconds > 0.0
+        and told
+    )
 
 
 def test_where_nothing_disperses_there_is_nothing_to_measure(gl: Any) -> None:
@@ -71,19 +86,44 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     monkeypatch.setattr(reference_picture, "caustic_plan", lambda _: CausticPlan(1 << 16))
     monkeypatch.setattr("spectrasplat.bench.machine.program_hash", lambda: "as it is")  # an editor may be at work
     out = tmp_path / "out"
-    arguments = ["bench", "--eye", "prism_edge", "-o", str(out), "--seconds", "0.4", "--seeds", "2", "--methods", "stochastic,srd", "--size", f"{WIDTH}x{HEIGHT}"]
+    arguments = [
+        "bench",
+        "--eye",
+        "prism_edge",
+        "-o",
+        str(out),
+        "--seconds",
+        "0.4",
+        "--seeds",
+        "2",
+        "--methods",
+        "stochastic,srd",
+        "--size",
+        f"{WIDTH}x{HEIGHT}",
+    ]
     assert main([*arguments, "--reference-seconds", "1"]) == 0
     shown = capsys.readouterr().out
     result = msgspec.json.decode((out / "results.json").read_bytes(), type=BenchResult)
     (scene,) = result.scenes
-    assert scene.complete and scene.half == result.settings.half == "camera" and [curve.method for curve in scene.curves] == ["stochastic", "srd"]
+    assert (
+        scene.complete
+        and scene.half == result.settings.half == "camera"
+        and [curve.method for curve in scene.curves] == ["stochastic", "srd"]
+    )
     assert scene.reference is not None and scene.reference.photons >= 8 and 0.0 < scene.reference.relmse < 0.1
     for curve in scene.curves:
         assert len(curve.samples) == 2 * len(curve.budgets) == 2 * len(curve.points)
-        assert all(sample.emitted == sample.photons and 0.97 < sample.metrics["energy_ratio"] < 1.03 for sample in curve.samples if sample.photons == max(curve.budgets))
+        assert all(
+            sample.emitted == sample.photons and 0.97 < sample.metrics["energy_ratio"] < 1.03
+            for sample in curve.samples
+            if sample.photons == max(curve.budgets)
+        )
     assert scene.curves[0].points[-1].relmse < scene.curves[0].points[0].relmse
     assert [claim.name for claim in scene.claims][:1] == ["time to equal error"] and "samples" in shown
-    assert set(scene.pictures) == {"reference", *(f"{method}{ending}" for method in ("stochastic", "srd") for ending in ("", " early", " first"))}
+    assert set(scene.pictures) == {
+        "reference",
+        *(f"{method}{ending}" for method in ("stochastic", "srd") for ending in ("", " early", " first")),
+    }
     assert (out / "report.html").stat().st_size > 10_000 and (out / "plots" / "prism_edge_error_samples.svg").exists()
     assert main(["bench", *arguments[2:]]) == 2  # the folder holds the other half
     assert "the camera pass measured instead of the light pass" in capsys.readouterr().err

@@ -63,7 +63,9 @@ def render(gl, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
 
     The function's `said` then holds stdout, its `notes` stderr.
     """
-    monkeypatch.setattr(spectrasplat.render.still, "render", functools.partial(spectrasplat.render.still.render, context=gl))
+    monkeypatch.setattr(
+        spectrasplat.render.still, "render", functools.partial(spectrasplat.render.still.render, context=gl)
+    )
 
     def call(scene: str | Path, options: str = "", suffix: str = ".npy") -> Picture:
         output = tmp_path / f"out{suffix}"
@@ -120,7 +122,9 @@ def test_bins_are_named_and_add_up_to_the_picture(render: Render, bins: int) -> 
     xyz = np.zeros(3)
     for i, watts in enumerate(spectral.spectral.sum(axis=(0, 1), dtype=np.float64)):
         fine = np.linspace(edges[i], edges[i + 1], 201)
-        mean = np.array([np.trapezoid(np.interp(fine, VISIBLE_NM, curve), fine) for curve in cmf_xyz().T]) / np.ptp(fine)
+        mean = np.array([np.trapezoid(np.interp(fine, VISIBLE_NM, curve), fine) for curve in cmf_xyz().T]) / np.ptp(
+            fine
+        )
         xyz += K_M * watts * mean
     total = plain.rgb.sum(axis=(0, 1), dtype=np.float64)
     assert xyz_to_rgb709(xyz) == pytest.approx(total, rel=0.03)
@@ -138,7 +142,9 @@ def test_bins_hold_the_spectrum_of_the_light(render: Render) -> None:
 
 def test_caustic_layer_is_beauty_without_direct_light(render: Render) -> None:
     # A beam wider than the slab: a bright ring round it, which is no caustic.
-    scene = beam(SLAB.format("").replace("1.0\nheight = 1.0", "0.3\nheight = 0.3").replace("thickness = 1.0", "thickness = 0.2"))
+    scene = beam(
+        SLAB.format("").replace("1.0\nheight = 1.0", "0.3\nheight = 0.3").replace("thickness = 1.0", "thickness = 0.2")
+    )
     scene = scene.replace("vertical_extent = 3.0", "vertical_extent = 0.6")  # a ring of some pixels
     caustic, beauty = luminance(render(scene, "--layer caustic")), luminance(render(scene))
     assert 0.0 < caustic.sum() < 0.95 * beauty.sum()
@@ -203,7 +209,10 @@ def test_seed_decides(render: Render) -> None:
 
 def test_stats_close_the_balance(render: Render) -> None:
     render(PRISM_SCENE, "--stats")
-    ended = {name: share(render, name) for name in ("deposited", "absorbed", "escaped", "direct", "lost_depth", "lost_numeric", "roulette")}
+    ended = {
+        name: share(render, name)
+        for name in ("deposited", "absorbed", "escaped", "direct", "lost_depth", "lost_numeric", "roulette")
+    }
     assert abs(share(render, "unaccounted")) <= 1e-4
     assert sum(ended.values()) == pytest.approx(1.0, abs=1e-4)
     assert ended["deposited"] > 0.3 and ended["escaped"] > 0.01
@@ -254,7 +263,9 @@ def test_a_mirror_casts_its_colour(render: Render) -> None:
     mirror = '[[objects]]\nshape = "plane"\nposition = [0, 0, 1]\naxis = [0, 1, 0]\nangle_deg = 60\nmaterial = {}\n'
     white = render(beam(mirror.format('"mirror"')), "--layer caustic --stats").rgb.sum(axis=(0, 1))
     assert share(render, "deposited") == pytest.approx(1.0, abs=0.002)
-    tinted = render(beam(mirror.format('{ kind = "mirror", reflectance = [0.9, 0.5, 0.2] }')), "--layer caustic").rgb.sum(axis=(0, 1))
+    tinted = render(
+        beam(mirror.format('{ kind = "mirror", reflectance = [0.9, 0.5, 0.2] }')), "--layer caustic"
+    ).rgb.sum(axis=(0, 1))
     assert tinted / white == pytest.approx([0.9, 0.5, 0.2], abs=0.05)
 
 
@@ -263,10 +274,15 @@ def test_instances_each_cast_a_caustic(render: Render) -> None:
     one = ball.format("position = [-0.5, 0, 0.6]")
     two = ball.format("instances = [{ position = [-0.5, 0, 0.6] }, { position = [0.5, 0, 0.6] }]")
     scene = beam("{}").replace("radius = 0.2", "radius = 2.0")
-    single, double = (luminance(render(scene.replace("{}", objects), "--layer map:floor --photons 40k --stats")) for objects in (one, two))
+    single, double = (
+        luminance(render(scene.replace("{}", objects), "--layer map:floor --photons 40k --stats"))
+        for objects in (one, two)
+    )
     assert share(render, "lost_numeric") < 1e-4
     assert single.max() > 0.0 and double.max() > 0.0
-    pictures = [luminance(render(scene.replace("{}", objects), "--layer caustic --photons 40k")) for objects in (one, two)]
+    pictures = [
+        luminance(render(scene.replace("{}", objects), "--layer caustic --photons 40k")) for objects in (one, two)
+    ]
     left, right = np.split(pictures[1], 2, axis=1)
     assert left.sum() == pytest.approx(right.sum(), rel=0.05)
     assert pictures[1].sum() == pytest.approx(2.0 * pictures[0].sum(), rel=0.05)

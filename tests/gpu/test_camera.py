@@ -1,4 +1,5 @@
-"""The camera's pass on diffuse surfaces: lights, shadows, the pixel's filter and how samples add up, against radiances that can be written down."""
+"""The camera's pass on diffuse surfaces: lights, shadows, the pixel's filter and how samples add up, against radiances
+that can be written down."""
 
 from __future__ import annotations
 
@@ -10,16 +11,17 @@ from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.optics import glass
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Light, SceneObject
+
 from tests.gpu.camera_rig import (
     ABOVE,
     DOWN,
     REFLECTANCE,
     WHITE,
     at,
-    opened_camera_pass,
     floor,
     floor_points,
     horizontal,
+    opened_camera_pass,
     point_light_radiance,
     quad,
     released,
@@ -59,7 +61,15 @@ def test_spot_edge_hard_and_soft(gl):
     points = floor_points((64, 64), ABOVE)
     angle = np.arctan2(np.linalg.norm(points[..., :2], axis=-1), 2.0)
     for inner, outer in ((25.0, 25.0), (15.0, 30.0)):
-        light = Light("spot", "spot", WHITE, position=(0, 0, 2), direction=DOWN, inner_half_angle_deg=inner, outer_half_angle_deg=outer)
+        light = Light(
+            "spot",
+            "spot",
+            WHITE,
+            position=(0, 0, 2),
+            direction=DOWN,
+            inner_half_angle_deg=inner,
+            outer_half_angle_deg=outer,
+        )
         rgb = render(gl, [floor()], [light], size=(64, 64))
         share = rgb[..., 1] / point_light_radiance(points, light.position)
         if inner == outer:
@@ -92,7 +102,9 @@ def test_sun_without_extent_has_a_sharp_shadow_and_the_right_cosine(gl):
     camera = replace(ABOVE, position=(0, 0, 0.5), vertical_extent=0.25)
     tilt = np.radians(30)
     light = Light("sun", "directional", WHITE, direction=(np.sin(tilt), 0, -np.cos(tilt)))
-    share = render(gl, [floor(), blocker], [light], size=(64, 8), camera=camera)[..., 1] / (REFLECTANCE / np.pi * 1000.0)
+    share = render(gl, [floor(), blocker], [light], size=(64, 8), camera=camera)[..., 1] / (
+        REFLECTANCE / np.pi * 1000.0
+    )
     x = floor_points((64, 8), camera)[..., 0]
     expected = np.where(x < np.tan(tilt), np.cos(tilt), 0.0)
     assert share == pytest.approx(expected, abs=1e-4)
@@ -100,7 +112,18 @@ def test_sun_without_extent_has_a_sharp_shadow_and_the_right_cosine(gl):
 
 @pytest.mark.parametrize("shape", ["disc", "rectangle"])
 def test_collimated_beam_ends_at_its_aperture(gl, shape):
-    light = Light("beam", "collimated", WHITE, position=(0.5, 0.2, 3), direction=DOWN, tangent=(1, 0, 0), shape=shape, radius=0.8, width=1.6, height=0.96)
+    light = Light(
+        "beam",
+        "collimated",
+        WHITE,
+        position=(0.5, 0.2, 3),
+        direction=DOWN,
+        tangent=(1, 0, 0),
+        shape=shape,
+        radius=0.8,
+        width=1.6,
+        height=0.96,
+    )
     rgb = render(gl, [floor()], [light], size=(40, 40))
     x, y = np.moveaxis(floor_points((40, 40), ABOVE)[..., :2] - (0.5, 0.2), -1, 0)
     lit = np.hypot(x, y) < 0.8 if shape == "disc" else (np.abs(x) < 0.8) & (np.abs(y) < 0.48)
@@ -137,7 +160,9 @@ def test_glass_throws_a_shadow(gl):
 def test_a_floor_is_lit_on_both_sides_but_not_through(gl):
     below = Camera(position=(0, 0, -5), target=(0, 0, 0), up=(0, 1, 0), kind="orthographic", vertical_extent=4.0)
     lamp = Light("lamp", "point", WHITE, position=(0, 0, -1.5))
-    assert render(gl, [floor()], [lamp], camera=below)[12, 16, 1] == pytest.approx(REFLECTANCE / np.pi * 1000 / 1.5**2, rel=0.01)
+    assert render(gl, [floor()], [lamp], camera=below)[12, 16, 1] == pytest.approx(
+        REFLECTANCE / np.pi * 1000 / 1.5**2, rel=0.01
+    )
     assert render(gl, [floor()], [lamp], camera=ABOVE).max() == 0
 
 
@@ -188,6 +213,8 @@ def test_a_stop_keeps_what_is_there(gl):
     whole = camera_pass.read_rgb()
     camera_pass.dispatch_seconds = 0.0
     camera_pass._rows.units = 8
-    assert not camera_pass.run(ABOVE, 32, 32, 4, sample_offset=1, progress=seen.append, cancelled=lambda: len(seen) >= 6)
+    assert not camera_pass.run(
+        ABOVE, 32, 32, 4, sample_offset=1, progress=seen.append, cancelled=lambda: len(seen) >= 6
+    )
     assert seen == sorted(seen) and len(seen) == 6
     assert np.array_equal(camera_pass.read_rgb(), whole)

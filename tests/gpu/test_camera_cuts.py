@@ -1,4 +1,5 @@
-"""Where the colours of a band part: each part goes its own way, weak ones by chance, and the picture is that of single wavelengths."""
+"""Where the colours of a band part: each part goes its own way, weak ones by chance, and the picture is that of single
+wavelengths."""
 
 from __future__ import annotations
 
@@ -18,8 +19,8 @@ from spectrasplat.passes import camera_programs
 from spectrasplat.passes.camera import CameraPass
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.render.light_pass import spectral_axis
-from tests.gpu.camera_rig import released
 
+from tests.gpu.camera_rig import released
 from tests.gpu.mutants import mutate
 
 SIZE = (81, 45)
@@ -27,11 +28,14 @@ SIZE = (81, 45)
 
 @pytest.fixture(scope="module")
 def edge() -> Scene:
-    """At its left face some colours of a column of pixels are reflected totally, and others meet another face behind."""
+    """At its left face some colours of a column of pixels are reflected totally, and others meet another face
+    behind."""
     return load_scene(assets_dir() / "scenes" / "prism_edge.toml")
 
 
-def picture(gl, scene: Scene, samples: int, method: str = "srd", seed: int = 1, primary_samples: int | None = None) -> np.ndarray:
+def picture(
+    gl, scene: Scene, samples: int, method: str = "srd", seed: int = 1, primary_samples: int | None = None
+) -> np.ndarray:
     """Linear Rec.709 (45, 81, 3), direct light only."""
     features = Features.of(scene, RenderSettings(method=method, any_view=True))
     camera_pass = CameraPass(gl, SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features)))
@@ -55,9 +59,12 @@ def drawn(gl, edge: Scene) -> np.ndarray:
 
 
 def test_parted_colours_go_their_own_ways(gl, edge: Scene, drawn, monkeypatch, tmp_path) -> None:
-    """One band, cut, has what single wavelengths have. A band that is never cut does not, however many samples it gets."""
+    """One band, cut, has what single wavelengths have. A band that is never cut does not, however many samples it
+    gets."""
     cut = error(picture(gl, edge, 32), drawn)
-    mutate(monkeypatch, tmp_path, "camera/cuts.glsl", "return parts && path.sound", "return false && parts && path.sound")
+    mutate(
+        monkeypatch, tmp_path, "camera/cuts.glsl", "return parts && path.sound", "return false && parts && path.sound"
+    )
     whole = error(picture(gl, edge, 32), drawn)
     assert cut < 1.2e-3 and whole > 1.5 * cut, (cut, whole)
 
@@ -89,7 +96,9 @@ def single_wavelengths(gl, edge: Scene) -> Iterator[CameraPass]:
     released(camera_pass)
 
 
-def test_single_wavelengths_of_a_pass_of_bands_are_those_of_their_own_method(gl, edge: Scene, drawn, single_wavelengths: CameraPass) -> None:
+def test_single_wavelengths_of_a_pass_of_bands_are_those_of_their_own_method(
+    gl, edge: Scene, drawn, single_wavelengths: CameraPass
+) -> None:
     """The same program but for the layout of its tables: agrees to the noise of both."""
     single_wavelengths.run(edge.camera, *SIZE, 1024, seed=2)
     assert error(single_wavelengths.read_rgb().astype(float), drawn) < 2.5e-3

@@ -9,7 +9,8 @@ import pytest
 from spectrasplat.gpu.dispatch_budget import DispatchBudget
 from spectrasplat.model.scene import Camera
 from spectrasplat.passes.camera import CameraPass
-from tests.gpu.camera_rig import opened_camera_pass, floor, released
+
+from tests.gpu.camera_rig import floor, opened_camera_pass, released
 from tests.gpu.test_camera_furnace import solids
 
 SIZE = 72, 50
@@ -42,8 +43,11 @@ def test_the_size_of_dispatches_changes_nothing(camera_pass: CameraPass) -> None
 
 @pytest.mark.parametrize("after", [2, 9, 30])
 def test_a_stop_leaves_whole_rows(gl, after: int) -> None:
-    """In a white room clear glass cannot be seen, unless a listed pixel has been begun and left without its further sample."""
-    camera_pass = opened_camera_pass(gl, solids("prism"), background=(1.0, 1.0, 1.0), camera=CAMERA, split_threshold=1e-9)
+    """In a white room clear glass cannot be seen, unless a listed pixel has been begun and left without its further
+    sample."""
+    camera_pass = opened_camera_pass(
+        gl, solids("prism"), background=(1.0, 1.0, 1.0), camera=CAMERA, split_threshold=1e-9
+    )
     begun(camera_pass, 8, 64)
     asked: list[int] = []
 
@@ -54,5 +58,7 @@ def test_a_stop_leaves_whole_rows(gl, after: int) -> None:
     assert not camera_pass.run(CAMERA, *SIZE, 4, sample_offset=1, cancelled=stops)
     samples = camera_pass._samples_of_row
     assert samples.min() < samples.max(), "it stopped between two samples"
-    assert np.abs(camera_pass.read_rgb() - 1.0).max() < 0.1  # a sample of one pixel is within 0.04; one too many or too few is a third
+    assert (
+        np.abs(camera_pass.read_rgb() - 1.0).max() < 0.1
+    )  # a sample of one pixel is within 0.04; one too many or too few is a third
     released(camera_pass)

@@ -1,4 +1,5 @@
-"""Clear glass in a world of one brightness cannot be seen, whatever its shape: nothing is lost, nothing is made, no ray ends at nothing.
+"""Clear glass in a world of one brightness cannot be seen, whatever its shape: nothing is lost, nothing is made, no ray
+ends at nothing.
 
 Also textures seen through glass, whose mean must be kept when pixels are far larger than their texels.
 """
@@ -24,8 +25,8 @@ from spectrasplat.model.scene import (
 from spectrasplat.model.texture import Environment, Texture
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.stress.rigs.gpu_paths import glass
-from tests.gpu.camera_rig import WHITE, at, opened_camera_pass, released, render
 
+from tests.gpu.camera_rig import WHITE, at, opened_camera_pass, released, render
 from tests.gpu.mutants import mutate
 
 FLINT = Dielectric(from_abbe(1.7, 20.0))
@@ -62,19 +63,31 @@ def covered(gl, objects: list[SceneObject]) -> np.ndarray:
     return 1.0 - render(gl, black, background=(1, 1, 1), camera=NEAR, size=SIZE, samples=64)[..., 1]
 
 
-@pytest.mark.parametrize(("name", "sky", "bands"), [
-    ("ball", "map", 1), ("ball", "background", 4), ("prism", "background", 1), ("slab", "background", 4),
-    ("brilliant", "map", 4), ("brilliant", "background", 1), ("nested", "background", 1),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "sky", "bands"),
+    [
+        ("ball", "map", 1),
+        ("ball", "background", 4),
+        ("prism", "background", 1),
+        ("slab", "background", 4),
+        ("brilliant", "map", 4),
+        ("brilliant", "background", 1),
+        ("nested", "background", 1),
+    ],
+)
 def test_clear_glass_vanishes_in_a_closed_white_room(gl, name: str, sky: str, bands: int) -> None:
-    """The mean to 1e-3 (one band: 4e-4), no pixel off by more than 1 % at 64 samples: chance moves light between branches, and every branch ends in white.
+    """The mean to 1e-3 (one band: 4e-4), no pixel off by more than 1 % at 64 samples: chance moves light between
+    branches, and every branch ends in white.
 
-    With several bands the bands' samples lie at different places of a pixel. Where glass covers only a part of it, or reflects more and more
-    toward its rim, they do not see the same share of it, and what is left at 64 samples is colour grain; the mean is as good.
+    With several bands the bands' samples lie at different places of a pixel. Where glass covers only a part of it, or
+    reflects more and more toward its rim, they do not see the same share of it, and what is left at 64 samples is
+    colour grain; the mean is as good.
     """
     surrounding = Environment(np.ones((8, 16, 3), np.float32)) if sky == "map" else None
     objects = solids(name)
-    camera_pass = opened_camera_pass(gl, objects, background=(1, 1, 1) if sky == "background" else (0, 0, 0), camera=NEAR, environment=surrounding)
+    camera_pass = opened_camera_pass(
+        gl, objects, background=(1, 1, 1) if sky == "background" else (0, 0, 0), camera=NEAR, environment=surrounding
+    )
     camera_pass.spectrum = Spectrum(bands)
     camera_pass.run(NEAR, *SIZE, 64)
     rgb, fallbacks = camera_pass.read_rgb().astype(float), camera_pass.fallbacks
@@ -93,8 +106,11 @@ def test_clear_glass_vanishes_in_a_closed_white_room(gl, name: str, sky: str, ba
 
 
 def test_a_loss_of_two_per_cent_a_surface_would_be_seen(gl, monkeypatch, tmp_path) -> None:
-    """The mutant: what goes on through a surface is 2 % too weak. The mean falls short by twenty times its tolerance."""
-    mutate(monkeypatch, tmp_path, "camera/camera.comp", "vec3(1.0) : 1.0 - reflectance;", "vec3(1.0) : 0.98 - reflectance;")
+    """The mutant: what goes on through a surface is 2 % too weak. The mean falls short by twenty times its
+    tolerance."""
+    mutate(
+        monkeypatch, tmp_path, "camera/camera.comp", "vec3(1.0) : 1.0 - reflectance;", "vec3(1.0) : 0.98 - reflectance;"
+    )
     rgb = render(gl, solids("slab"), background=(1, 1, 1), camera=NEAR, size=SIZE, samples=16)
     assert 1.0 - rgb[8:16, 8:16].mean() > 0.02
 
@@ -106,14 +122,19 @@ def checkered(cells: int, texels: int = 512) -> SceneObject:
     """A square of side 4 at z = 0 with black and white cells."""
     row = (np.arange(texels) * cells // texels) % 2
     grey = (row[:, None] ^ row[None, :]).astype(np.float32)
-    mesh = make_mesh("paper", np.array([[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]], float), np.array([[0, 1, 2], [0, 2, 3]]),
-                     uv=np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float32))
+    mesh = make_mesh(
+        "paper",
+        np.array([[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]], float),
+        np.array([[0, 1, 2], [0, 2, 3]]),
+        uv=np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float32),
+    )
     return SceneObject("paper", mesh, Diffuse((1, 1, 1), texture=Texture(np.repeat(grey[..., None], 3, axis=2))))
 
 
 @pytest.mark.parametrize("solid", ["none", "slab", "ball"])
 def test_a_checker_finer_than_pixels_is_grey_through_glass(gl, solid: str) -> None:
-    """Cells of an eighth of a pixel: one sample a pixel shows their mean to 2 %; a texture looked up without its footprint shows black or white."""
+    """Cells of an eighth of a pixel: one sample a pixel shows their mean to 2 %; a texture looked up without its
+    footprint shows black or white."""
     lamp = Light("low", "directional", WHITE, direction=(0.0, 0.98, -0.2))
     glassy = {
         "none": [],

@@ -1,8 +1,8 @@
 """The camera's pass through glass and over mirrors, against radiances that can be written down.
 
-Where light is thrown to and fro between surfaces a camera sees all of it: expectations sum up every inner reflection. A constant background
-seen through clear glass tells nothing of Fresnel's weights (glass then vanishes, which `test_camera_furnace.py` asks for), so these scenes have
-a black side.
+Where light is thrown to and fro between surfaces a camera sees all of it: expectations sum up every inner reflection. A
+constant background seen through clear glass tells nothing of Fresnel's weights (glass then vanishes, which
+`test_camera_furnace.py` asks for), so these scenes have a black side.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from spectrasplat.model.scene import (
     Mirror,
     SceneObject,
 )
+
 from tests.gpu.camera_rig import (
     ABOVE,
     DOWN,
@@ -57,7 +58,8 @@ def fresnel(n: float, incidence_rad: float = 0.0) -> float:
 
 
 def stack_reflectance(surfaces: list[float], kept: list[float]) -> float:
-    """Reflectance of surfaces behind each other, `kept` of the light left after each gap: incoherent sums over all inner reflections."""
+    """Reflectance of surfaces behind each other, `kept` of the light left after each gap: incoherent sums over all
+    inner reflections."""
     total = surfaces[-1]
     for surface, left in zip(surfaces[-2::-1], kept[::-1], strict=True):
         behind = total * left**2
@@ -72,7 +74,8 @@ def test_slab_before_a_black_floor_reflects_from_both_faces(gl):
 
 
 def test_chance_for_the_weak_parts_leaves_the_mean_as_it_is(gl):
-    """The usual threshold: what chance decides of a sample weighs 0.0384² / 0.96, so that 12 288 samples tell the mean to 6e-5 (one sigma).
+    """The usual threshold: what chance decides of a sample weighs 0.0384² / 0.96, so that 12 288 samples tell the mean
+    to 6e-5 (one sigma).
 
     Without the factor for what was not chosen the slab would be 4e-4 darker for each reflection that is lost.
     """
@@ -90,7 +93,8 @@ def test_absorption_follows_beers_law(gl):
 
 
 def test_coloured_glass_takes_away_wavelength_by_wavelength(gl):
-    """Two thicknesses of strongly coloured glass: what is seen is D65 · exp(−α(λ) d) over the observer, not each channel's own power law."""
+    """Two thicknesses of strongly coloured glass: what is seen is D65 · exp(−α(λ) d) over the observer, not each
+    channel's own power law."""
     alpha = attenuation_from_colour((0.9, 0.4, 0.1), 0.5)
     one = slab(1.0 + 1e-6, absorption=Absorption(alpha))
     thick = replace(one, mesh=primitives.box((8, 8, 1.5)))
@@ -116,13 +120,16 @@ def test_cemented_solids_have_no_film_of_air(gl):
     rgb = render(gl, objects, background=(1, 1, 1), split_threshold=EVERY_PART)
     surfaces = [(0.6 / 2.6) ** 2, (0.1 / 3.1) ** 2, 0.04]
     assert rgb[5, 5] == pytest.approx(stack_reflectance(surfaces, [1.0, 1.0]), rel=1e-3)
-    assert stack_reflectance([surfaces[0], (0.6 / 2.6) ** 2, 0.04, 0.04], [1.0] * 3) > 1.5 * stack_reflectance(surfaces, [1.0, 1.0])
+    assert stack_reflectance([surfaces[0], (0.6 / 2.6) ** 2, 0.04, 0.04], [1.0] * 3) > 1.5 * stack_reflectance(
+        surfaces, [1.0, 1.0]
+    )
 
 
 def test_a_smooth_glass_ball_is_a_lens(gl):
     """Through a smooth ball the ray at height h leaves by δ = 2 (i − r) and lands where optics says.
 
-    After one reflection inside it leaves upwards; after two, a thousandth of it lands on the floor: within the tolerance.
+    After one reflection inside it leaves upwards; after two, a thousandth of it lands on the floor: within the
+    tolerance.
     """
     n, height = 1.5168, 2.0
     ball = SceneObject("ball", primitives.sphere(1.0, 20_480), Dielectric(glass.constant(n)), at(0, 0, height))
@@ -148,7 +155,8 @@ def test_a_smooth_glass_ball_is_a_lens(gl):
 
 
 def test_refraction_shifts_what_lies_behind(gl):
-    """A point light's floor through a slab seen at 45°: shifted by the slab, and again, fainter, for every two reflections inside."""
+    """A point light's floor through a slab seen at 45°: shifted by the slab, and again, fainter, for every two
+    reflections inside."""
     n = 1.5168
     plate = SceneObject("slab", primitives.box((30, 30, 1.0)), Dielectric(glass.constant(n)), at(0, 0, 2.0))
     camera = Camera(position=(0, -8, 10), target=(0, -1, 3), up=(0, 0, 1), kind="orthographic", vertical_extent=1.0)
@@ -175,7 +183,8 @@ def test_total_reflection_loses_nothing(gl):
     camera = Camera(position=(0, 0, -10), target=(0, 0, 0), up=(0, 1, 0), kind="orthographic", vertical_extent=1.0)
     background = render(gl, [prism], camera=camera, background=(1, 1, 1), split_threshold=EVERY_PART)[..., 1]
     assert background == pytest.approx(1.0, rel=1e-4)
-    # It looks towards -x, where the black mirror now stands: what is left went back at one of the two faces that light passes, as from a plate.
+    # It looks towards -x, where the black mirror now stands: what is left went back at one of the two faces that light
+    # passes, as from a plate.
     turned = render(gl, [prism, screen], camera=camera, background=(1, 1, 1), split_threshold=EVERY_PART)[..., 1]
     r = fresnel(1.6)
     assert turned == pytest.approx(stack_reflectance([r, r], [1.0]), rel=1e-3)

@@ -1,6 +1,8 @@
-"""Pictures through dispersive glass that must not change, or only as rounding does: said in other coordinates, other portions, once more.
+"""Pictures through dispersive glass that must not change, or only as rounding does: said in other coordinates, other
+portions, once more.
 
-The scene has all that the camera's rays meet: a flint prism, a smooth ball, a coloured mirror, lit paper and a sky with a pattern.
+The scene has all that the camera's rays meet: a flint prism, a smooth ball, a coloured mirror, lit paper and a sky with
+a pattern.
 """
 
 from __future__ import annotations
@@ -26,19 +28,22 @@ from spectrasplat.passes.camera import CameraPass
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.render.light_pass import spectral_axis
 from spectrasplat.stress.rigs.gpu_paths import glass
-from tests.gpu.camera_rig import WHITE, at, quad
 
+from tests.gpu.camera_rig import WHITE, at, quad
 from tests.gpu.test_invariance import moved
 
 SIZE, SAMPLES, BANDS = (32, 20), 8, 4
 SAME_RAYS = 2e-3
-"""Relative root mean square: rays that pass an edge on the other side, in a picture of 640 pixels with 8 samples each."""
+"""Relative root mean square: rays that pass an edge on the other side, in a picture of 640 pixels with 8 samples
+each."""
 
 
 def pattern() -> np.ndarray:
     """A sky of soft coloured blotches, (16, 32, 3)."""
     v, u = np.meshgrid((np.arange(16) + 0.5) / 16 * np.pi, (np.arange(32) + 0.5) / 32 * 2 * np.pi, indexing="ij")
-    return np.stack([1.0 + np.cos(3 * u) * np.sin(v), 1.0 + np.sin(2 * u + 1.0) * np.sin(v), 1.0 + np.cos(2 * v)], axis=-1).astype(np.float32)
+    return np.stack(
+        [1.0 + np.cos(3 * u) * np.sin(v), 1.0 + np.sin(2 * u + 1.0) * np.sin(v), 1.0 + np.cos(2 * v)], axis=-1
+    ).astype(np.float32)
 
 
 def scene() -> Scene:
@@ -49,7 +54,13 @@ def scene() -> Scene:
         quad([[-2, -2, -1], [2, -2, -1], [2, 2, -1], [-2, 2, -1]], Mirror((0.9, 0.8, 0.5)), "mirror"),
     )
     lamp = Light("lamp", "point", WHITE.scaled(0.04), position=(1.0, -1.0, 3.0))
-    return Scene("invariance", Camera((0.2, -3.2, 0.9), (0.0, 0.0, -0.05), vertical_fov_deg=38.0), (lamp,), objects, environment=Environment(pattern()))
+    return Scene(
+        "invariance",
+        Camera((0.2, -3.2, 0.9), (0.0, 0.0, -0.05), vertical_fov_deg=38.0),
+        (lamp,),
+        objects,
+        environment=Environment(pattern()),
+    )
 
 
 def begun(gl, question: Scene) -> CameraPass:

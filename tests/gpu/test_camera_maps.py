@@ -11,16 +11,17 @@ from spectrasplat.gpu.records import NONE, PLACEMENT, RECEIVER
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.optics import glass, spectrum
 from spectrasplat.model.scene import Dielectric, Diffuse, Light, SceneObject
+
 from tests.gpu.camera_rig import (
     ABOVE,
     REFLECTANCE,
     WHITE,
     at,
-    opened_camera_pass,
     flat_maps,
     floor,
     floor_points,
     horizontal,
+    opened_camera_pass,
     point_light_radiance,
     released,
     render,
@@ -30,13 +31,24 @@ from tests.gpu.camera_rig import (
 DOWNWARD = replace(ABOVE, position=(0, 0, -0.5), target=(0, 0, -1))
 """From below the floor, away from it."""
 
+
 @pytest.mark.parametrize("layer", ["beauty", "caustic"])
 def test_nested_windows_show_the_finest_map_that_covers_a_place(gl, layer):
-    camera_pass = opened_camera_pass(gl, [floor(), SceneObject("far glass", primitives.box((1, 1, 1)), Dielectric(glass.constant(1.5)), at(40, 3, 0))], layer=layer)
+    camera_pass = opened_camera_pass(
+        gl,
+        [floor(), SceneObject("far glass", primitives.box((1, 1, 1)), Dielectric(glass.constant(1.5)), at(40, 3, 0))],
+        layer=layer,
+    )
     rng = np.random.default_rng(5)
     lumens = rng.uniform(1, 2, (16, 24))
     # A fine window of 8² texels over [-0.5, 0.5]², a coarse one of 6² over [-1.5, 1.5]².
-    maps = flat_maps(gl, camera_pass.scene, [(-0.5, -0.5, 1.0, 1, 2, 8), (-1.5, -1.5, 3.0, 12, 5, 6)], white_texels(lumens), scale=0.5)
+    maps = flat_maps(
+        gl,
+        camera_pass.scene,
+        [(-0.5, -0.5, 1.0, 1, 2, 8), (-1.5, -1.5, 3.0, 12, 5, 6)],
+        white_texels(lumens),
+        scale=0.5,
+    )
     size = (64, 64)
     camera_pass.run(ABOVE, *size, 1, maps=maps)
     rgb = camera_pass.read_rgb()
@@ -47,7 +59,9 @@ def test_nested_windows_show_the_finest_map_that_covers_a_place(gl, layer):
         i, j = np.minimum(u.astype(int), count - 2), np.minimum(v.astype(int), count - 2)
         tile = lumens[ay : ay + count, ax : ax + count]
         fu, fv = u - i, v - j
-        return (tile[j, i] * (1 - fu) + tile[j, i + 1] * fu) * (1 - fv) + (tile[j + 1, i] * (1 - fu) + tile[j + 1, i + 1] * fu) * fv
+        return (tile[j, i] * (1 - fu) + tile[j, i + 1] * fu) * (1 - fv) + (
+            tile[j + 1, i] * (1 - fu) + tile[j + 1, i + 1] * fu
+        ) * fv
 
     fine = bilinear((x + 0.5) * 8, (y + 0.5) * 8, 1, 2, 8) * 64
     coarse = bilinear((x + 1.5) * 2, (y + 1.5) * 2, 12, 5, 6) * 4
@@ -60,7 +74,9 @@ def test_nested_windows_show_the_finest_map_that_covers_a_place(gl, layer):
 def test_charts_have_a_placement_a_triangle(gl):
     """A receiver of two triangles whose charts lie apart in the atlas, after another object's triangles."""
     blocker = horizontal(50, 51, 50, 51, 1, Diffuse((0, 0, 0)), "elsewhere")
-    camera_pass = opened_camera_pass(gl, [blocker, horizontal(-2, 2, -2, 2, 0, Diffuse((REFLECTANCE,) * 3))], charts=True)
+    camera_pass = opened_camera_pass(
+        gl, [blocker, horizontal(-2, 2, -2, 2, 0, Diffuse((REFLECTANCE,) * 3))], charts=True
+    )
     lumens = np.zeros((16, 40))
     lumens[2:10, 2:10], lumens[5:13, 20:28] = 1.0, 3.0
     maps = flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 2, 2, 8), (-2, -2, 4.0, 20, 5, 8)], white_texels(lumens))
@@ -94,26 +110,36 @@ def test_small_texels_are_averaged_by_the_pixel_and_keep_their_energy(gl):
 
 @pytest.mark.parametrize("samples", [1, 2, 3])
 def test_few_samples_fill_the_pixel(gl, samples: int) -> None:
-    """Pixels of 2 by 2 texels: a bright one counts once, wherever in its pixel it lies (strips of a third meet it in parts)."""
+    """Pixels of 2 by 2 texels: a bright one counts once, wherever in its pixel it lies (strips of a third meet it in
+    parts)."""
     camera_pass = opened_camera_pass(gl, [floor()])
     for x, y in ((37, 40), (36, 40), (37, 41), (36, 41)):
         lumens = np.zeros((64, 64))
         lumens[y, x] = 3.0
-        camera_pass.run(ABOVE, 32, 32, samples, maps=flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 0, 0, 64)], white_texels(lumens)))
+        camera_pass.run(
+            ABOVE,
+            32,
+            32,
+            samples,
+            maps=flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 0, 0, 64)], white_texels(lumens)),
+        )
         rgb = camera_pass.read_rgb()[..., 1]
         assert rgb.sum() * (4 / 32) ** 2 * np.pi / REFLECTANCE == pytest.approx(3.0, rel=0.01), (x, y)
     released(camera_pass)
 
 
 def test_samples_weigh_texels_by_their_share_of_the_pixel(gl):
-    """Pixels of 2.3 texels, every texel different: 16 samples give the box-filtered map to 6 %, its mean to half a per cent."""
+    """Pixels of 2.3 texels, every texel different: 16 samples give the box-filtered map to 6 %, its mean to half a per
+    cent."""
     camera_pass = opened_camera_pass(gl, [floor()])
     rng = np.random.default_rng(3)
     lumens = rng.uniform(0.0, 1.0, (74, 74)) ** 4
     maps = flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 0, 0, 74)], white_texels(lumens))
     camera_pass.run(ABOVE, 32, 32, 16, maps=maps)
     edges = np.linspace(0, 74, 33)
-    share = np.clip(np.minimum(edges[1:, None], np.arange(1, 75)) - np.maximum(edges[:-1, None], np.arange(74)), 0, None)
+    share = np.clip(
+        np.minimum(edges[1:, None], np.arange(1, 75)) - np.maximum(edges[:-1, None], np.arange(74)), 0, None
+    )
     expected = (share @ lumens @ share.T)[::-1] / (4 / 32) ** 2 * REFLECTANCE / np.pi
     got = camera_pass.read_rgb()[..., 1]
     assert np.sqrt(np.mean((got - expected) ** 2)) < 0.06 * expected.mean()
@@ -164,7 +190,9 @@ def test_a_bin_is_shown_in_its_own_colour(gl, shown):
 def test_spectral_reflectance_class_acts_on_direct_light(gl):
     red_only = np.where(np.arange(380, 781) > 600, 1.0, 0.0)
     item = replace(floor(), material=Diffuse(reflectance=red_only))
-    camera_pass = opened_camera_pass(gl, [item], [Light("lamp", "point", WHITE, position=(0, 0, 1.5))], reflectances=(None, red_only))
+    camera_pass = opened_camera_pass(
+        gl, [item], [Light("lamp", "point", WHITE, position=(0, 0, 1.5))], reflectances=(None, red_only)
+    )
     maps = flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 0, 0, 4)], white_texels(np.zeros((4, 4))))
     receivers = RECEIVER.zeros(1)
     receivers["reflectance_class"] = 1

@@ -1,4 +1,5 @@
-"""Different ways to the same picture: sampling methods, spectral bins, spectral maps, and the light pass looked at in reverse.
+"""Different ways to the same picture: sampling methods, spectral bins, spectral maps, and the light pass looked at in
+reverse.
 
 Tolerances are those of chance, measured from runs with other seeds, and beside each stands a mutant that exceeds it.
 """
@@ -26,8 +27,8 @@ from spectrasplat.model.texture import Environment
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.render.still import render as render_scene
 from spectrasplat.stress.rigs.gpu_paths import extruded, glass
-from tests.gpu.camera_rig import at, opened_camera_pass, horizontal, released
 
+from tests.gpu.camera_rig import at, horizontal, opened_camera_pass, released
 from tests.gpu.mutants import mutate
 
 FLAT = illuminant("E").scaled_to_luminous(1000.0)
@@ -41,15 +42,23 @@ def stripes() -> np.ndarray:
     return np.broadcast_to((1.0 + np.cos(24 * u))[None, :, None], (32, 192, 3)).astype(np.float32).copy()
 
 
-UPRIGHT = extruded("prism", 0.9 * np.column_stack([np.cos(np.radians([90.0, 210.0, 330.0])), np.sin(np.radians([90.0, 210.0, 330.0]))]), 1.0)
+UPRIGHT = extruded(
+    "prism",
+    0.9 * np.column_stack([np.cos(np.radians([90.0, 210.0, 330.0])), np.sin(np.radians([90.0, 210.0, 330.0]))]),
+    1.0,
+)
 BEFORE = Camera((-2.6, -2.2, 0.1), (0.0, 0.0, 0.0), vertical_fov_deg=17.0)
 """Sees nothing but the prism's two faces, and through them far apart parts of the sky in red and in blue."""
 
 
-def seen(gl, method: str, samples: int, bands: int | None = None, seed: int = 1, channels: MapChannels = MapChannels()) -> np.ndarray:
+def seen(
+    gl, method: str, samples: int, bands: int | None = None, seed: int = 1, channels: MapChannels = MapChannels()
+) -> np.ndarray:
     """Means over 3×3 pixels (8, 8, 3) of the sky through a flint prism."""
     prism = SceneObject("prism", UPRIGHT, glass("N-SF11"))
-    camera_pass = opened_camera_pass(gl, [prism], camera=BEFORE, environment=Environment(stripes()), method=method, channels=channels)
+    camera_pass = opened_camera_pass(
+        gl, [prism], camera=BEFORE, environment=Environment(stripes()), method=method, channels=channels
+    )
     if bands is not None:
         camera_pass.spectrum = Spectrum(bands)
     camera_pass.run(BEFORE, *SIZE, samples, seed=seed)
@@ -65,19 +74,30 @@ def difference(a: np.ndarray, b: np.ndarray) -> float:
 
 @pytest.fixture(scope="module")
 def drawn(gl) -> tuple[np.ndarray, float]:
-    """The picture by evenly drawn random wavelengths, and its standard error, relative: from the scatter of eight seeds."""
+    """The picture by evenly drawn random wavelengths, and its standard error, relative: from the scatter of eight
+    seeds."""
     runs = np.array([seen(gl, "stochastic-even", 64, seed=seed) for seed in range(1, 9)])
     mean = runs.mean(axis=0)
     return mean, float(np.sqrt(np.mean(runs.var(axis=0, ddof=1) / len(runs)) / np.mean(mean**2)))
 
 
-WAYS = [("srd", 8, 64, 0.01), ("srd", 32, 64, 0.01), ("srd-lambda", 16, 64, 0.01), ("regular-16", None, 64, 0.01), ("stochastic", None, 512, 0.03)]
-"""Method, bands, samples, and the error it has itself: of grain that so many samples leave, and of sixteen fixed wavelengths."""
+WAYS = [
+    ("srd", 8, 64, 0.01),
+    ("srd", 32, 64, 0.01),
+    ("srd-lambda", 16, 64, 0.01),
+    ("regular-16", None, 64, 0.01),
+    ("stochastic", None, 512, 0.03),
+]
+"""Method, bands, samples, and the error it has itself: of grain that so many samples leave, and of sixteen fixed
+wavelengths."""
 
 
 @pytest.mark.parametrize(("method", "bands", "samples", "own"), WAYS, ids=[f"{way[0]}-{way[1]}" for way in WAYS])
-def test_methods_agree_with_random_wavelengths(gl, drawn, method: str, bands: int | None, samples: int, own: float) -> None:
-    """To three standard errors and the method's own error. One band is 3.2 % off for its third derivatives: that would be found."""
+def test_methods_agree_with_random_wavelengths(
+    gl, drawn, method: str, bands: int | None, samples: int, own: float
+) -> None:
+    """To three standard errors and the method's own error. One band is 3.2 % off for its third derivatives: that would
+    be found."""
     mean, error = drawn
     assert error < 0.006
     colour = float(np.sqrt(np.mean((mean - mean.mean(axis=-1, keepdims=True)) ** 2) / np.mean(mean**2)))
@@ -90,7 +110,13 @@ def test_methods_agree_with_random_wavelengths(gl, drawn, method: str, bands: in
 def test_a_column_of_the_wrong_sign_is_noticed(gl, drawn, monkeypatch, tmp_path, bands: int) -> None:
     mean, error = drawn
     right = difference(seen(gl, "srd", 64, bands), mean)
-    mutate(monkeypatch, tmp_path, "camera/crossing.glsl", "deta_it = index_ratio_derivative(", "deta_it = -index_ratio_derivative(")
+    mutate(
+        monkeypatch,
+        tmp_path,
+        "camera/crossing.glsl",
+        "deta_it = index_ratio_derivative(",
+        "deta_it = -index_ratio_derivative(",
+    )
     wrong = difference(seen(gl, "srd", 64, bands), mean)
     assert right < 0.06 and wrong > 3.0 * (3.0 * error + 0.01)
 
@@ -106,9 +132,12 @@ def test_bins_add_up_to_the_picture_in_colour(gl) -> None:
 
 @pytest.fixture(scope="module")
 def behind_panes(gl) -> tuple[np.ndarray, np.ndarray]:
-    """A prism's spectrum on the floor, seen through a pane that bends nothing: one that by law disperses, so that the camera looks up single
-    wavelengths in maps with spectra, and one that does not, so that it looks up XYZ whole. Means over 2×2 pixels, (12, 16, 3)."""
-    section = 0.35 * np.column_stack([np.cos(np.radians([90.0, 210.0, 330.0])), np.sin(np.radians([90.0, 210.0, 330.0]))])
+    """A prism's spectrum on the floor, seen through a pane that bends nothing: one that by law disperses, so that the
+    camera looks up single wavelengths in maps with spectra, and one that does not, so that it looks up XYZ whole. Means
+    over 2×2 pixels, (12, 16, 3)."""
+    section = 0.35 * np.column_stack(
+        [np.cos(np.radians([90.0, 210.0, 330.0])), np.sin(np.radians([90.0, 210.0, 330.0]))]
+    )
     upright = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 1.2], [0, 0, 0, 1]], float)
     prism = SceneObject("prism", extruded("prism", section, 0.4), glass("N-SF11"), upright)
     # From below at the angle of least deviation, 33° up; it leaves 33° down.
@@ -119,7 +148,11 @@ def behind_panes(gl) -> tuple[np.ndarray, np.ndarray]:
     pictures = []
     for abbe in (15.0, np.inf):
         objects = (prism, SceneObject("pane", pane, Dielectric(from_abbe(1.0005, abbe)), at(1.9, -1.6, 0.95)), floor)
-        result = render_scene(Scene("matched", camera, (beam,), objects), RenderSettings(width=32, height=24, photons=60_000, spp=16), context=gl)
+        result = render_scene(
+            Scene("matched", camera, (beam,), objects),
+            RenderSettings(width=32, height=24, photons=60_000, spp=16),
+            context=gl,
+        )
         pictures.append(result.rgb.astype(float).reshape(12, 2, 16, 2, 3).mean(axis=(1, 3)))
     return pictures[0], pictures[1]
 
@@ -144,25 +177,38 @@ EDGES_NM = tuple(np.linspace(380.0, 780.0, 9).tolist())
 
 
 def test_light_and_camera_half_agree_on_a_lamp_behind_a_slab(gl) -> None:
-    """Reciprocity to 1.2 %: the irradiance that the light pass throws through a slab onto paper is what a camera on the paper finds when it adds up
-    the lamp it sees through the slab, L cos θ dΩ, in every bin.
+    """Reciprocity to 1.2 %: the irradiance that the light pass throws through a slab onto paper is what a camera on the
+    paper finds when it adds up the lamp it sees through the slab, L cos θ dΩ, in every bin.
 
-    The light pass follows sixteen wavelengths by themselves and is within half a per cent (of photons' lattices and texels), the camera's eight
-    bands leave as much grain. Fresnel's loss is 15 %, the slab lets the lamp seem 9 % nearer, and both change by 2 % over the spectrum."""
+    The light pass follows sixteen wavelengths by themselves and is within half a per cent (of photons' lattices and
+    texels), the camera's eight bands leave as much grain. Fresnel's loss is 15 %, the slab lets the lamp seem 9 %
+    nearer, and both change by 2 % over the spectrum."""
     lamp = Light("lamp", "area", FLAT, position=(0.0, 0.0, 3.0), direction=(0.0, 0.0, -1.0), radius=0.25)
     turn = np.radians(25.0)
-    tilted = np.array([[np.cos(turn), 0, np.sin(turn), 0], [0, 1, 0, 0], [-np.sin(turn), 0, np.cos(turn), 1.5], [0, 0, 0, 1]])
+    tilted = np.array(
+        [[np.cos(turn), 0, np.sin(turn), 0], [0, 1, 0, 0], [-np.sin(turn), 0, np.cos(turn), 1.5], [0, 0, 0, 1]]
+    )
     slab = SceneObject("slab", primitives.box((9.0, 9.0, 0.6)), glass("N-SF11"), tilted)
     paper = horizontal(-0.6, 0.6, -0.6, 0.6, 0.0, Diffuse((1.0, 1.0, 1.0)), "paper")
     scene = Scene("reciprocity", Camera((0, -3, 1), (0, 0, 0)), (lamp,), (slab, paper))
-    maps = render_scene(scene, RenderSettings(width=64, height=64, photons=400_000, layer="map:paper", bins=8, method="regular-16"), context=gl).spectral
+    maps = render_scene(
+        scene,
+        RenderSettings(width=64, height=64, photons=400_000, layer="map:paper", bins=8, method="regular-16"),
+        context=gl,
+    ).spectral
     assert maps is not None
     side = len(maps)
     for x, y in ((0.0, 0.0), (0.35, -0.2)):
         column, row = int((x + 0.6) / 1.2 * side), int((0.6 - y) / 1.2 * side)
-        patch = maps[row - side // 20 : row + side // 20, column - side // 20 : column + side // 20].astype(float).mean(axis=(0, 1))
+        patch = (
+            maps[row - side // 20 : row + side // 20, column - side // 20 : column + side // 20]
+            .astype(float)
+            .mean(axis=(0, 1))
+        )
         camera = Camera((x, y, 1e-3), (0.12, 0.0, 3.0), up=(0, 1, 0), vertical_fov_deg=24.0)
-        camera_pass = opened_camera_pass(gl, [slab, paper], [lamp], camera=camera, channels=MapChannels(EDGES_NM), split_threshold=1e-4)
+        camera_pass = opened_camera_pass(
+            gl, [slab, paper], [lamp], camera=camera, channels=MapChannels(EDGES_NM), split_threshold=1e-4
+        )
         camera_pass.spectrum = Spectrum(8)
         camera_pass.run(camera, 48, 48, 32)
         radiance = camera_pass.read_spectral().astype(float)

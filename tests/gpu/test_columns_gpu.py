@@ -2,8 +2,8 @@
 
 From the emission domain of each kind of light, through refraction, internal and outer reflection at flat and
 smooth facets, glass that touches and nests, to a room's walls: ∂/∂s, ∂/∂t, and by each glass's
-index, by wavelength, or by a variable that glasses share. All branches up to a depth are there. Mutants of the shaders show
-which mistake each case would catch.
+index, by wavelength, or by a variable that glasses share. All branches up to a depth are there. Mutants of the shaders
+show which mistake each case would catch.
 """
 
 from __future__ import annotations
@@ -37,10 +37,14 @@ SMALL = 0.01
 def room() -> SceneObject:
     """A cube of side 16 without its wall towards -x, where sunlight comes in."""
     cube = box((16.0, 16.0, 16.0))
-    return placed("room", make_mesh("room", cube.vertices, cube.triangles[cube.corners()[:, :, 0].max(axis=1) > -7.9]), Diffuse())
+    return placed(
+        "room", make_mesh("room", cube.vertices, cube.triangles[cube.corners()[:, :, 0].max(axis=1) > -7.9]), Diffuse()
+    )
 
 
-def ball(name: str = "F2", centre: tuple[float, float, float] = (0, 0, 0), radius: float = 1.0, priority: int = 0) -> SceneObject:
+def ball(
+    name: str = "F2", centre: tuple[float, float, float] = (0, 0, 0), radius: float = 1.0, priority: int = 0
+) -> SceneObject:
     matrix = np.eye(4)
     matrix[:3, 3] = centre
     return placed(name, sphere(radius, 320).transformed(matrix), replace(glass(name), priority=priority))
@@ -56,7 +60,8 @@ def blocks(*names: str) -> tuple[SceneObject, ...]:
     faces = 0.9 * (np.arange(len(names) + 1) - 0.5 * len(names))
     left = [np.array([[x + 0.4 * t, -0.4], [x - 0.4 * t, 0.4]]) for x, t in zip(faces, tilts, strict=False)]
     return tuple(
-        placed(name, extruded(name, np.array([a[0], b[0], b[1], a[1]])), glass(name)) for name, a, b in zip(names, left[:-1], left[1:], strict=True)
+        placed(name, extruded(name, np.array([a[0], b[0], b[1], a[1]])), glass(name))
+        for name, a, b in zip(names, left[:-1], left[1:], strict=True)
     )
 
 
@@ -64,7 +69,9 @@ def cemented() -> tuple[SceneObject, ...]:
     """A coarse doublet, its axis turned to x."""
     turn = np.eye(4)[[2, 1, 0, 3]] * np.array([1, -1, 1, 1])[:, None]
     crown, flint = doublet(2.0, -1.6, 9.0, 0.5, 0.25, 1.4, triangles=600)
-    return placed("crown", crown.transformed(turn), glass("N-BK7")), placed("flint", flint.transformed(turn), glass("F2"))
+    return placed("crown", crown.transformed(turn), glass("N-BK7")), placed(
+        "flint", flint.transformed(turn), glass("F2")
+    )
 
 
 @dataclass(frozen=True)
@@ -85,26 +92,87 @@ class Case:
 
 def needle() -> Light:
     """A thin beam that goes through all blocks."""
-    return Light("light", "collimated", constant(1.0), position=(-4.0, 0.0, 0.0), direction=tuple(unit(np.array([1.0, 0.02, -0.03]))), radius=0.2)
+    return Light(
+        "light",
+        "collimated",
+        constant(1.0),
+        position=(-4.0, 0.0, 0.0),
+        direction=tuple(unit(np.array([1.0, 0.02, -0.03]))),
+        radius=0.2,
+    )
 
 
 SLANT = tuple(unit(np.array([1.0, -0.1, 0.2])))
 CASES = {
     "point": Case(lambda: (ball(),), point()),
-    "spot": Case(lambda: (ball(),), replace(point(), kind="spot", direction=SLANT, inner_half_angle_deg=5.0, outer_half_angle_deg=25.0)),
-    "sun": Case(lambda: (ball(),), Light("light", "directional", constant(1.0), direction=SLANT, angular_diameter_deg=8.0)),
-    "beam": Case(lambda: (ball(),), Light("light", "collimated", constant(1.0), position=(-3.0, 0.0, 0.0), direction=SLANT, radius=2.0)),
-    "panel": Case(lambda: (ball(),), Light("light", "area", constant(1.0), position=(-3.0, 0, 0), direction=SLANT, shape="rectangle", width=1.0, height=0.6)),
-    "disc": Case(lambda: (ball(),), Light("light", "area", constant(1.0), position=(-3.0, 0, 0), direction=SLANT, radius=0.6)),
+    "spot": Case(
+        lambda: (ball(),),
+        replace(point(), kind="spot", direction=SLANT, inner_half_angle_deg=5.0, outer_half_angle_deg=25.0),
+    ),
+    "sun": Case(
+        lambda: (ball(),), Light("light", "directional", constant(1.0), direction=SLANT, angular_diameter_deg=8.0)
+    ),
+    "beam": Case(
+        lambda: (ball(),),
+        Light("light", "collimated", constant(1.0), position=(-3.0, 0.0, 0.0), direction=SLANT, radius=2.0),
+    ),
+    "panel": Case(
+        lambda: (ball(),),
+        Light(
+            "light",
+            "area",
+            constant(1.0),
+            position=(-3.0, 0, 0),
+            direction=SLANT,
+            shape="rectangle",
+            width=1.0,
+            height=0.6,
+        ),
+    ),
+    "disc": Case(
+        lambda: (ball(),), Light("light", "area", constant(1.0), position=(-3.0, 0, 0), direction=SLANT, radius=0.6)
+    ),
     "inner reflections": Case(lambda: (ball("water"),), point(), depth=5, each=3, refractions=1),
-    "total reflection": Case(lambda: (placed("half cube", extruded("half cube", np.array([[0, -1.0], [0, 1.0], [-1, 0]])), glass("N-BK7")),), point(), depth=4, each=2),
-    "mirror ball": Case(lambda: (placed("mirror", sphere(0.8, 320), Mirror()), ball(centre=(-0.6, 1.9, 0.3), radius=0.9)), point(), depth=3, each=2),
+    "total reflection": Case(
+        lambda: (placed("half cube", extruded("half cube", np.array([[0, -1.0], [0, 1.0], [-1, 0]])), glass("N-BK7")),),
+        point(),
+        depth=4,
+        each=2,
+    ),
+    "mirror ball": Case(
+        lambda: (placed("mirror", sphere(0.8, 320), Mirror()), ball(centre=(-0.6, 1.9, 0.3), radius=0.9)),
+        point(),
+        depth=3,
+        each=2,
+    ),
     "doublet": Case(cemented, point(), groups=2, each=6, refractions=2),
     "three glasses": Case(lambda: blocks("N-BK7", "N-SF11", "F2"), needle(), depth=4, groups=3, each=6, refractions=4),
-    "four glasses": Case(lambda: blocks("N-BK7", "N-SF11", "F2", "water"), needle(), depth=5, groups=4, each=6, refractions=5),
-    "five glasses": Case(lambda: blocks("N-BK7", "N-SF11", "F2", "water", "fused silica"), needle(), depth=6, groups=4, each=6, refractions=6),
-    "nested": Case(lambda: (ball("water"), ball("N-SF11", (0.2, 0.1, 0.0), 0.5, priority=1)), point(), depth=4, groups=2, each=6, refractions=3),
-    "overlapping": Case(lambda: (ball("water", (0, 0.4, 0), 0.8, priority=1), ball("F2", (0.3, -0.3, 0), 0.8)), point(), groups=2, each=4, refractions=2),
+    "four glasses": Case(
+        lambda: blocks("N-BK7", "N-SF11", "F2", "water"), needle(), depth=5, groups=4, each=6, refractions=5
+    ),
+    "five glasses": Case(
+        lambda: blocks("N-BK7", "N-SF11", "F2", "water", "fused silica"),
+        needle(),
+        depth=6,
+        groups=4,
+        each=6,
+        refractions=6,
+    ),
+    "nested": Case(
+        lambda: (ball("water"), ball("N-SF11", (0.2, 0.1, 0.0), 0.5, priority=1)),
+        point(),
+        depth=4,
+        groups=2,
+        each=6,
+        refractions=3,
+    ),
+    "overlapping": Case(
+        lambda: (ball("water", (0, 0.4, 0), 0.8, priority=1), ball("F2", (0.3, -0.3, 0), 0.8)),
+        point(),
+        groups=2,
+        each=4,
+        refractions=2,
+    ),
     "by wavelength": Case(cemented, point(), method="srd-lambda", each=6, refractions=2),
     "no spectrum": Case(lambda: (ball(),), point(), method="regular-7", groups=0),
 }
@@ -139,8 +207,12 @@ def columns_agree(gl: Context, case: Case) -> None:
         want = reference.columns(photons, i, choices[i], path.triangles)
         got = np.array([photons.dposition_ds[i], photons.dposition_dt[i], *photons.dposition_dvar[i]])
         length = np.linalg.norm(want, axis=1)
-        assert (np.linalg.norm(got - want, axis=1) <= COLUMN * np.maximum(length, SMALL)).all(), f"column after {choices[i]}: {got - want}"
-        assert photons.records["flux_w"][i] == pytest.approx(photons.weight[i] * path.transmittance, rel=1e-4, abs=1e-6 * photons.flux_w)
+        assert (np.linalg.norm(got - want, axis=1) <= COLUMN * np.maximum(length, SMALL)).all(), (
+            f"column after {choices[i]}: {got - want}"
+        )
+        assert photons.records["flux_w"][i] == pytest.approx(
+            photons.weight[i] * path.transmittance, rel=1e-4, abs=1e-6 * photons.flux_w
+        )
         sensitive += length > SMALL
     assert compared >= 6 and skipped <= 1, f"paths differ: {compared} the same, {skipped} others"
     assert (sensitive >= 3).all(), sensitive
@@ -153,24 +225,77 @@ def test_columns_against_central_differences(gl, name: str) -> None:
 
 MUTANTS = {
     "sign of the index behind": ("lib/medium.glsl", "derivative -= n_i", "derivative += n_i", "point"),
-    "sign of the index before": ("lib/medium.glsl", "derivative += medium_slope", "derivative -= medium_slope", "point"),
+    "sign of the index before": (
+        "lib/medium.glsl",
+        "derivative += medium_slope",
+        "derivative -= medium_slope",
+        "point",
+    ),
     "another glass's slope": ("lib/medium.glsl", "object_at(crossing.before).group == g", "true", "doublet"),
-    "no slope of the medium": ("lib/medium.glsl", "return spectral_row(uint(SLOPE_ROW) + object_at(object).medium, x);", "return 1.0;", "by wavelength"),
-    "flat normals": ("light/trace.comp", "sign_n * normalised_derivative(summed, dsummed)", "vec3(0.0)", "inner reflections"),
-    "normal not turned inside": ("light/trace.comp", "float sign_n = entering ? 1.0 : -1.0", "float sign_n = 1.0", "beam"),
-    "mirror forgets the normal": ("lib/optics.glsl", "(dtheta * normal + theta * dnormal)", "(dtheta * normal)", "mirror ball"),
-    "position follows the shading normal": ("light/trace.comp", "ray.direction, hit.normal_g, hit.distance)", "ray.direction, normal, hit.distance)", "sun"),
-    "axes swapped": ("light/emit.comp", "ddirection_ds = p.spacing.x * to_world(dx)", "ddirection_ds = p.spacing.x * to_world(dy)", "spot"),
+    "no slope of the medium": (
+        "lib/medium.glsl",
+        "return spectral_row(uint(SLOPE_ROW) + object_at(object).medium, x);",
+        "return 1.0;",
+        "by wavelength",
+    ),
+    "flat normals": (
+        "light/trace.comp",
+        "sign_n * normalised_derivative(summed, dsummed)",
+        "vec3(0.0)",
+        "inner reflections",
+    ),
+    "normal not turned inside": (
+        "light/trace.comp",
+        "float sign_n = entering ? 1.0 : -1.0",
+        "float sign_n = 1.0",
+        "beam",
+    ),
+    "mirror forgets the normal": (
+        "lib/optics.glsl",
+        "(dtheta * normal + theta * dnormal)",
+        "(dtheta * normal)",
+        "mirror ball",
+    ),
+    "position follows the shading normal": (
+        "light/trace.comp",
+        "ray.direction, hit.normal_g, hit.distance)",
+        "ray.direction, normal, hit.distance)",
+        "sun",
+    ),
+    "axes swapped": (
+        "light/emit.comp",
+        "ddirection_ds = p.spacing.x * to_world(dx)",
+        "ddirection_ds = p.spacing.x * to_world(dy)",
+        "spot",
+    ),
     "flat map": ("lib/emission.glsl", "k - q.x * q.x / (4.0 * k)", "k", "disc"),
-    "tilted sun's plane": ("light/emit.comp", "dposition_ds = p.spacing.x * p.tangent", "dposition_ds = 1.01 * p.spacing.x * p.tangent", "sun"),
-    "lowest priority": ("lib/medium.glsl", "stack_objects[findMSB(mask)]", "stack_objects[findLSB(mask)]", "overlapping"),
+    "tilted sun's plane": (
+        "light/emit.comp",
+        "dposition_ds = p.spacing.x * p.tangent",
+        "dposition_ds = 1.01 * p.spacing.x * p.tangent",
+        "sun",
+    ),
+    "lowest priority": (
+        "lib/medium.glsl",
+        "stack_objects[findMSB(mask)]",
+        "stack_objects[findLSB(mask)]",
+        "overlapping",
+    ),
 }
 
 
-QUICK = ("sign of the index behind", "another glass's slope", "flat normals", "mirror forgets the normal", "axes swapped")
+QUICK = (
+    "sign of the index behind",
+    "another glass's slope",
+    "flat normals",
+    "mirror forgets the normal",
+    "axes swapped",
+)
 
 
-@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in MUTANTS if name not in QUICK)])
+@pytest.mark.parametrize(
+    "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in MUTANTS if name not in QUICK)]
+)
 def test_mutants_are_caught(gl, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file, old, new, case = MUTANTS[name]
     mutate(monkeypatch, tmp_path, file, old, new)

@@ -64,11 +64,19 @@ def test_pixels_behind_glass_are_known(state: State) -> None:
     assert seen[:4].all() and seen[-30:].all()
 
 
-def test_the_reference_agrees_with_the_picture_and_stops_when_the_scene_changes(gl, state: State, running: LiveEngine, comparison: Comparison) -> None:
+def test_the_reference_agrees_with_the_picture_and_stops_when_the_scene_changes(
+    gl, state: State, running: LiveEngine, comparison: Comparison
+) -> None:
     compared = replace(state, compare=Compare(mode="wipe", plot=True))
     thread = lambda: comparison._thread
-    until(lambda: comparison.picture is not None and thread().snapshot.relmse < 0.05, lambda: (comparison.advance(compared, running, 0.02), time.sleep(0.02)))
-    until(lambda: comparison._composed_from == thread().snapshot.number, lambda: comparison.advance(compared, running, 0.02))
+    until(
+        lambda: comparison.picture is not None and thread().snapshot.relmse < 0.05,
+        lambda: (comparison.advance(compared, running, 0.02), time.sleep(0.02)),
+    )
+    until(
+        lambda: comparison._composed_from == thread().snapshot.number,
+        lambda: comparison.advance(compared, running, 0.02),
+    )
     live, reference = read(running.picture), read(comparison.picture)
     directly = thread().snapshot.directly
     assert np.array_equal(reference[~directly], live[~directly])
@@ -91,9 +99,14 @@ def test_the_reference_agrees_with_the_picture_and_stops_when_the_scene_changes(
     assert not comparison.is_stale and comparison.picture is None and comparison.is_busy
 
 
-def test_another_method_runs_beside_in_its_own_engine(gl, state: State, running: LiveEngine, comparison: Comparison) -> None:
+def test_another_method_runs_beside_in_its_own_engine(
+    gl, state: State, running: LiveEngine, comparison: Comparison
+) -> None:
     compared = replace(state, compare=Compare(mode="hold", method="stochastic-even"))
-    until(lambda: (comparison.progress or 0.0) > 0.05 and comparison.picture is not None, lambda: comparison.advance(compared, running, 0.05))
+    until(
+        lambda: (comparison.progress or 0.0) > 0.05 and comparison.picture is not None,
+        lambda: comparison.advance(compared, running, 0.05),
+    )
     live, other = read(running.picture), read(comparison.picture)
     assert other.shape == live.shape and not np.array_equal(other, live)
     assert other.sum() == pytest.approx(live.sum(), rel=0.1)
@@ -103,7 +116,9 @@ def test_another_method_runs_beside_in_its_own_engine(gl, state: State, running:
     assert comparison.picture is None and running.stats.rays_traced == rays and not comparison.is_busy
 
 
-def test_without_a_reference_another_method_stands_in(gl, state: State, running: LiveEngine, comparison: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_reference_another_method_stands_in(
+    gl, state: State, running: LiveEngine, comparison: Comparison, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from spectrasplat.base.errors import UserError
     from spectrasplat.reference import photon_run
 
@@ -112,5 +127,8 @@ def test_without_a_reference_another_method_stands_in(gl, state: State, running:
 
     monkeypatch.setattr(photon_run, "ReferenceRun", missing)
     compared = replace(state, compare=Compare(mode="wipe"))
-    until(lambda: comparison.picture is not None and "no reference" in comparison.text, lambda: comparison.advance(compared, running, 0.05))
+    until(
+        lambda: comparison.picture is not None and "no reference" in comparison.text,
+        lambda: comparison.advance(compared, running, 0.05),
+    )
     assert "needs numba" in comparison.text and "Even random wavelengths" in comparison.text

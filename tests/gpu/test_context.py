@@ -155,9 +155,7 @@ class TestFailures:
     def test_both_fail_gives_the_remedy_of_egl(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.delenv("SPECTRASPLAT_BACKEND", raising=False)
         monkeypatch.setattr(context_module, "_first_loadable", lambda names: None)
-        monkeypatch.setattr(
-            "spectrasplat.gpu.osmesa.load_library", lambda: (_ for _ in ()).throw(OSError("not there"))
-        )
+        monkeypatch.setattr("spectrasplat.gpu.osmesa.load_library", lambda: (_ for _ in ()).throw(OSError("not there")))
         with pytest.raises(UserError, match="libegl1 libgl1 libgl1-mesa-dri"):
             create_context()
         with pytest.raises(UserError, match=r"OSMesa failed \(not there\).*libosmesa6"):

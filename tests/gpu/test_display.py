@@ -16,9 +16,17 @@ from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {
     "tone.glsl": (
-        "luminance_709", "p_norm", "into_gamut", "roll_off", "tone_spectrasplat", "tone_aces", "tone_reinhard", "srgb_encode", "signed_error",
+        "luminance_709",
+        "p_norm",
+        "into_gamut",
+        "roll_off",
+        "tone_spectrasplat",
+        "tone_aces",
+        "tone_reinhard",
+        "srgb_encode",
+        "signed_error",
     ),
-}  # fmt: skip
+}
 COUNT = 4096
 
 
@@ -39,7 +47,9 @@ def test_each_tone_function_has_its_twin(gl) -> None:
     own = tone_spectrasplat(rgb); aces = tone_aces(rgb); reinhard = tone_reinhard(rgb);
     code = srgb_encode(clamp(rgb, 0.0, 1.0)); error = signed_error(rgb, other, floor_value);
     """
-    outputs = {"y": "float", "norm": "float", "error": "float"} | dict.fromkeys(("inside", "rolled", "own", "aces", "reinhard", "code"), "vec3")
+    outputs = {"y": "float", "norm": "float", "error": "float"} | dict.fromkeys(
+        ("inside", "rolled", "own", "aces", "reinhard", "code"), "vec3"
+    )
     got = evaluate(gl.ctx, ["lib/tone.glsl"], body, {"rgb": rgb, "other": other, "floor_value": floor_value}, outputs)
     size = np.abs(rgb).max(axis=1)
     assert (np.abs(got["y"] - tone.luminance_709(rgb)) <= 1e-6 * size + 1e-9).all()
@@ -85,13 +95,18 @@ def test_the_own_curve_is_that_of_written_pictures(gl, display) -> None:
     want = tone_map.tone_map_8bit(rgb, -1.5).astype(int)
     apart = np.abs(shown - want).max(axis=-1)
     # Where luminance cancels to nothing, float32 itself does not tell the colour.
-    clear = ~np.isfinite(rgb).all(axis=-1) | (tone_map.luminance(np.nan_to_num(rgb, posinf=1e3)) > 0.02 * np.nan_to_num(np.abs(rgb), posinf=1e3).max(axis=-1))
+    clear = ~np.isfinite(rgb).all(axis=-1) | (
+        tone_map.luminance(np.nan_to_num(rgb, posinf=1e3)) > 0.02 * np.nan_to_num(np.abs(rgb), posinf=1e3).max(axis=-1)
+    )
     assert clear.mean() > 0.8
     assert apart[clear].max() <= 1
     assert (shown[3, 5] == (255, 0, 255)).all() and (shown[9, 1] == (255, 0, 255)).all()
 
 
-@pytest.mark.parametrize(("name", "curve"), [("aces", tone.tone_aces), ("reinhard", tone.tone_reinhard), ("linear", lambda rgb: np.clip(rgb, 0, 1))])
+@pytest.mark.parametrize(
+    ("name", "curve"),
+    [("aces", tone.tone_aces), ("reinhard", tone.tone_reinhard), ("linear", lambda rgb: np.clip(rgb, 0, 1))],
+)
 def test_other_curves(gl, display, name: str, curve) -> None:
     rgb = np.abs(colours(5)).reshape(64, 64, 3)
     source = texture_of(gl, rgb)
@@ -192,7 +207,11 @@ def test_a_broken_shader_keeps_the_last_good_programs(gl, display, monkeypatch, 
     with pytest.raises(ShaderError, match=r"display\.comp:\d+"):
         display.reload()
     assert (codes(display.run(picture, Settings(), 0.0, (40, 10))) == before).all()
-    source.write_text(source.read_text().replace("void main() oops", "void main()").replace("vec4(colour, 1.0)", "vec4(0.0, colour.gb, 1.0)"))
+    source.write_text(
+        source.read_text()
+        .replace("void main() oops", "void main()")
+        .replace("vec4(colour, 1.0)", "vec4(0.0, colour.gb, 1.0)")
+    )
     drop_programs(gl.ctx)
     display.reload()
     assert codes(display.run(picture, Settings(), 0.0, (40, 10)))[..., 0].max() == 0

@@ -56,7 +56,9 @@ def finished(exports: Exports) -> tuple[str, list[float]]:
     raise AssertionError("it never ends")
 
 
-def test_a_png_is_what_is_on_the_screen_and_an_exr_what_is_behind_it(exports: Exports, state: State, shown: Shown, tmp_path: Path) -> None:
+def test_a_png_is_what_is_on_the_screen_and_an_exr_what_is_behind_it(
+    exports: Exports, state: State, shown: Shown, tmp_path: Path
+) -> None:
     from PIL import Image
 
     assert exports.begin(Screenshot(tmp_path / "a.png"), state, shown) == "Saved a.png."
@@ -69,7 +71,9 @@ def test_a_png_is_what_is_on_the_screen_and_an_exr_what_is_behind_it(exports: Ex
         exports.begin(Screenshot(tmp_path / "a.jpg"), state, shown)
 
 
-def test_a_spectral_screenshot_adds_up_to_its_colours(exports: Exports, state: State, shown: Shown, tmp_path: Path, monkeypatch) -> None:
+def test_a_spectral_screenshot_adds_up_to_its_colours(
+    exports: Exports, state: State, shown: Shown, tmp_path: Path, monkeypatch
+) -> None:
     from spectrasplat.ui import export
 
     monkeypatch.setattr(export, "MIN_PHOTONS", 20_000)
@@ -89,12 +93,18 @@ def test_a_map_and_its_place(exports: Exports, state: State, shown: Shown, tmp_p
     assert json.loads((tmp_path / "m.json").read_text())["receiver"] == "table"
 
 
-def test_an_animation_looks_as_the_window_and_can_be_cancelled(exports: Exports, state: State, shown: Shown, tmp_path: Path) -> None:
+def test_an_animation_looks_as_the_window_and_can_be_cancelled(
+    exports: Exports, state: State, shown: Shown, tmp_path: Path
+) -> None:
     from dataclasses import replace
 
     from PIL import Image
 
-    false = replace(state, display=PilotRender(false_colour=True), animation=(Key(0.0, "camera.fov_deg", 30.0), Key(1.0, "camera.fov_deg", 40.0)))
+    false = replace(
+        state,
+        display=PilotRender(false_colour=True),
+        animation=(Key(0.0, "camera.fov_deg", 30.0), Key(1.0, "camera.fov_deg", 40.0)),
+    )
     request = Animate(tmp_path / "frames", "keys", 2, 2.0, SIZE, 10_000, 1)
     exports.begin(request, false, shown)
     told, _ = finished(exports)
@@ -113,7 +123,9 @@ def test_an_animation_looks_as_the_window_and_can_be_cancelled(exports: Exports,
     assert exports.job is None and len(list((tmp_path / "more").glob("*.png"))) >= 3
 
 
-def test_a_movie_cancelled_before_its_first_frame_leaves_nothing(exports: Exports, state: State, shown: Shown, tmp_path: Path) -> None:
+def test_a_movie_cancelled_before_its_first_frame_leaves_nothing(
+    exports: Exports, state: State, shown: Shown, tmp_path: Path
+) -> None:
     exports.begin(Animate(tmp_path / "a.mp4"), state, shown)
     assert len(list(tmp_path.iterdir())) == 1  # ffmpeg's temporary file
     exports.cancel()

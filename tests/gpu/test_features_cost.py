@@ -33,14 +33,19 @@ SCENES = {
     "coloured ball": BALL + 'glass = "N-SF11"\n',
     "plain box": GEM + "material = { n_d = 1.6 }\n",
     "box of flint": GEM + 'glass = "N-SF11"\n',
-    "nested": BALL + 'glass = "N-BK7"\n' + NEST + "material = { n_d = 1.33, V_d = 55.0, absorption = { colour = [0.5, 0.9, 0.9], distance = 1.0 }, priority = 4 }\n",
+    "nested": BALL
+    + 'glass = "N-BK7"\n'
+    + NEST
+    + "material = { n_d = 1.33, V_d = 55.0, absorption = { colour = [0.5, 0.9, 0.9], distance = 1.0 }, priority = 4 }\n",
     "mirror": BALL + 'material = { kind = "mirror", reflectance = 0.9 }\n',
 }
 
 
 def scene_of(tmp_path: Path, name: str) -> Scene:
     path = tmp_path / "scene.toml"
-    path.write_text(f'name = "{name}"\n[render]\nsize = [96, 54]\nphotons = 20000\nmax_depth = 12\n{LAMP}{FLOOR}{SCENES[name]}')
+    path.write_text(
+        f'name = "{name}"\n[render]\nsize = [96, 54]\nphotons = 20000\nmax_depth = 12\n{LAMP}{FLOOR}{SCENES[name]}'
+    )
     return load_scene(path)
 
 
@@ -51,7 +56,9 @@ def settings_of(scene: Scene) -> RenderSettings:
 def begun(gl: Context, scene: Scene) -> LightPass:
     settings = settings_of(scene)
     features = Features.of(scene, settings)
-    light = LightPass(gl, scene, settings, features, SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features)))
+    light = LightPass(
+        gl, scene, settings, features, SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
+    )
     light.prepare()
     light.begin(scene.render.photons, 1)
     return light
@@ -65,15 +72,41 @@ def released(light: LightPass) -> None:
 @pytest.mark.parametrize(
     ("name", "absent"),
     [
-        ("plain ball", {"camera spectral taps", "spectral maps", "spectral columns", "weights over the band", "band cuts", "absorption", "medium stack", "spectral bins", "mirrors", "half-space solids"}),
-        ("box of flint", {"interpolated normals", "normal derivatives", "triangle tree", "absorption", "medium stack", "local gain"}),
+        (
+            "plain ball",
+            {
+                "camera spectral taps",
+                "spectral maps",
+                "spectral columns",
+                "weights over the band",
+                "band cuts",
+                "absorption",
+                "medium stack",
+                "spectral bins",
+                "mirrors",
+                "half-space solids",
+            },
+        ),
+        (
+            "box of flint",
+            {"interpolated normals", "normal derivatives", "triangle tree", "absorption", "medium stack", "local gain"},
+        ),
         ("nested", {"half-space solids", "mirrors", "charts"}),
     ],
 )
-def test_running_programs_lack_what_the_scene_does_not_need(gl: Context, tmp_path: Path, name: str, absent: set[str]) -> None:
+def test_running_programs_lack_what_the_scene_does_not_need(
+    gl: Context, tmp_path: Path, name: str, absent: set[str]
+) -> None:
     scene = scene_of(tmp_path, name)
     sources = compiled_sources(gl, scene, settings_of(scene))
-    assert {"light/emit.comp", "light/trace.comp", "light/footprint.comp", "light/splat.vert", "light/splat_swept.frag", "camera/camera.comp"} <= {s.name for s in sources}
+    assert {
+        "light/emit.comp",
+        "light/trace.comp",
+        "light/footprint.comp",
+        "light/splat.vert",
+        "light/splat_swept.frag",
+        "camera/camera.comp",
+    } <= {s.name for s in sources}
     light = begun(gl, scene)
     included = {feature: inside for feature, inside, _ in explain(scene, light.features)}
     released(light)
@@ -164,12 +197,18 @@ def test_interval_of_the_median() -> None:
     percent = features_cost.percent_of(np.array([1.0, 1.5, 1.1, 1.2, 0.8, 1.3, 1.05, 1.15, 9.0]))
     assert (percent.median, percent.low, percent.high) == pytest.approx((15.0, 0.0, 50.0))
     rng = np.random.default_rng(5)
-    held = sum(p.low <= 100 * (np.exp(0.1) - 1) <= p.high for p in (features_cost.percent_of(np.exp(0.1 + rng.normal(0, 0.3, 9))) for _ in range(2000)))
-    # 0.961 in theory; the standard error is 0.0043. The outermost instead of the second values (the mutant) would hold 0.996.
+    held = sum(
+        p.low <= 100 * (np.exp(0.1) - 1) <= p.high
+        for p in (features_cost.percent_of(np.exp(0.1 + rng.normal(0, 0.3, 9))) for _ in range(2000))
+    )
+    # 0.961 in theory; the standard error is 0.0043. The outermost instead of the second values (the mutant) would hold
+    # 0.996.
     assert abs(held / 2000 - 0.961) < 0.015
 
 
-def test_the_report_tells_what_was_measured_before_a_stop(gl: Context, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_report_tells_what_was_measured_before_a_stop(
+    gl: Context, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     run = features_cost.measure(gl, scene_of(tmp_path, "plain box"), repeats=1, seconds=0.01)
     next(run)
     report, share = next(run)

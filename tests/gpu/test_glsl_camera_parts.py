@@ -1,4 +1,5 @@
-"""Parts of the camera's program that stand alone: the box that a look is averaged over, weights over a band, and when columns are dropped."""
+"""Parts of the camera's program that stand alone: the box that a look is averaged over, weights over a band, and when
+columns are dropped."""
 
 from __future__ import annotations
 
@@ -9,7 +10,8 @@ COUNT = 4096
 
 
 def test_the_box_of_three_sides_has_their_covariance(gl) -> None:
-    """Three sides of any slant, down to sides of no length and all of one direction: Σ s sᵀ is kept, the axes stand across each other."""
+    """Three sides of any slant, down to sides of no length and all of one direction: Σ s sᵀ is kept, the axes stand
+    across each other."""
     rng = np.random.default_rng(3)
     sides = rng.normal(size=(COUNT, 3, 2)) * 10.0 ** rng.uniform(-3, 1, (COUNT, 3, 1))
     sides[:200, 1:] = 0.0  # one side only
@@ -56,7 +58,9 @@ def test_weights_over_a_band_are_straight_between_its_ends_and_its_anchor(gl) ->
     x = as_f32(rng.uniform(-0.2, 1.2, (COUNT, 3)))
     x[200:400] = band[200:400]
     body = "EyePath path; path.band = band; path.weight = weight; at = weights_at(path, x);"
-    got = evaluate(gl.ctx, [], body, {"band": band, "weight": weight, "x": x}, {"at": "vec3"}, PATH, declarations=STANDALONE)["at"]
+    got = evaluate(
+        gl.ctx, [], body, {"band": band, "weight": weight, "x": x}, {"at": "vec3"}, PATH, declarations=STANDALONE
+    )["at"]
     wide = np.diff(band, axis=1).min(axis=1) > 1e-3
     want = np.array([np.interp(row, b, w) for row, b, w in zip(x[wide], band[wide], weight[wide], strict=True)])
     assert np.abs(got[wide] - want).max() < 1e-6 / 1e-3
@@ -83,4 +87,6 @@ def test_columns_that_are_no_numbers_or_without_bound_are_dropped(gl) -> None:
     clear = ~(np.abs(length - 1e4) < 1.0)
     assert (got["held"].astype(bool) == good)[clear].all()
     assert 0.3 < good.mean() < 0.95 and not got["held"][:150].any()
-    assert (got["left"][~good & clear] == 0.0).all() and np.array_equal(got["left"][good & clear], dp[good & clear].astype(float))
+    assert (got["left"][~good & clear] == 0.0).all() and np.array_equal(
+        got["left"][good & clear], dp[good & clear].astype(float)
+    )

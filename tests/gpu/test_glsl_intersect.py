@@ -12,7 +12,16 @@ from spectrasplat.model.geometry import bvh
 from spectrasplat.reference import optics
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {"intersect.glsl": ("try_triangle", "intersect_tree", "intersect_solid", "intersect", "hit_triangle", "intersect_closest")}
+COVERS = {
+    "intersect.glsl": (
+        "try_triangle",
+        "intersect_tree",
+        "intersect_solid",
+        "intersect",
+        "hit_triangle",
+        "intersect_closest",
+    )
+}
 BODY = """
     Hit hit;
     RayOrigin origin = RayOrigin(from, from_object, inside != 0u, 0u);
@@ -41,7 +50,9 @@ def soup(count: int, seed: int = 1) -> np.ndarray:
     return as_f32(rng.uniform(-1, 1, (count, 1, 3)) + rng.normal(0, 0.1, (count, 3, 3)))
 
 
-def nearest(triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+def nearest(
+    triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray, margin: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
     """(distance or inf, triangle) per ray; hits may lie `margin` (in barycentric weight) outside an edge."""
     distances, winners = [], []
     a, e1, e2 = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
@@ -63,7 +74,15 @@ def nearest(triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray, 
 class Shaders:
     """`intersect_closest` over one list of triangles."""
 
-    def __init__(self, gl, triangles: np.ndarray, tree: bool, defines: dict[str, int] | None = None, buffers: dict | None = None, binders: tuple = ()) -> None:
+    def __init__(
+        self,
+        gl,
+        triangles: np.ndarray,
+        tree: bool,
+        defines: dict[str, int] | None = None,
+        buffers: dict | None = None,
+        binders: tuple = (),
+    ) -> None:
         self.ctx = gl.ctx
         built = bvh.build_bvh(triangles.astype(np.float32), use_cache=False)
         self.order = built.order if tree else np.arange(len(triangles), dtype=np.int32)
@@ -72,15 +91,25 @@ class Shaders:
         records["vertex"] = ordered[:, 0]
         records["edge1"], records["edge2"] = ordered[:, 1] - ordered[:, 0], ordered[:, 2] - ordered[:, 0]
         records["normals"], records["source"] = NONE, self.order
-        self.texels = SceneTexels(gl.ctx, {"TREE": tree_texels(built.nodes), "TRIANGLES": records, "OBJECTS": OBJECT.zeros(1)})
+        self.texels = SceneTexels(
+            gl.ctx, {"TREE": tree_texels(built.nodes), "TRIANGLES": records, "OBJECTS": OBJECT.zeros(1)}
+        )
         self.buffers = buffers or {}
         self.binders = [self.texels.bind, *binders]
         chosen = {"HAS_TREE": 1, "LOOSE_TRIANGLES": 1, "TREE_STACK": bvh.MAX_DEPTH} if tree else {"LOOSE_TRIANGLES": 1}
         if defines is not None:
             chosen = defines
-        self.defines = {**bindings.SCENE_DEFINES, **self.texels.defines, "TRIANGLE_COUNT": len(triangles), "SPECTRAL_SAMPLES": 2, **chosen}
+        self.defines = {
+            **bindings.SCENE_DEFINES,
+            **self.texels.defines,
+            "TRIANGLE_COUNT": len(triangles),
+            "SPECTRAL_SAMPLES": 2,
+            **chosen,
+        }
 
-    def closest(self, origins: np.ndarray, directions: np.ndarray, slots: np.ndarray | None = None, inside: int = 0) -> dict[str, np.ndarray]:
+    def closest(
+        self, origins: np.ndarray, directions: np.ndarray, slots: np.ndarray | None = None, inside: int = 0
+    ) -> dict[str, np.ndarray]:
         """Per ray: distance (-1 where nothing was met), slot in the tree's order, normal, weights."""
         count = len(origins)
         inputs = {
@@ -90,7 +119,17 @@ class Shaders:
             "from_object": np.full(count, NONE if slots is None else 0, np.uint32),
             "inside": np.full(count, inside, np.uint32),
         }
-        return evaluate(self.ctx, ["lib/intersect.glsl"], BODY, inputs, OUTPUTS, self.defines, SCENE_STRUCTS, self.buffers, self.binders)
+        return evaluate(
+            self.ctx,
+            ["lib/intersect.glsl"],
+            BODY,
+            inputs,
+            OUTPUTS,
+            self.defines,
+            SCENE_STRUCTS,
+            self.buffers,
+            self.binders,
+        )
 
 
 def rays(count: int, seed: int, spread: float = 2.0) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,5 @@
-"""Random numbers, emission, spots, spectral tables, Gaussians and media of shaders/lib against their float64 references."""
+"""Random numbers, emission, spots, spectral tables, Gaussians and media of shaders/lib against their float64
+references."""
 
 from __future__ import annotations
 
@@ -26,7 +27,9 @@ def cpu_reference_hash(value: int) -> int:
 def test_hashes_are_the_published_generator(gl) -> None:
     values = np.random.default_rng(1).integers(0, WORD, 1000, dtype=np.uint32)
     values[:3] = 0, 1, WORD - 1
-    got = evaluate(gl.ctx, ["lib/random.glsl"], "h = hash_pcg(v); u = unit_float(h);", {"v": values}, {"h": "uint", "u": "float"})
+    got = evaluate(
+        gl.ctx, ["lib/random.glsl"], "h = hash_pcg(v); u = unit_float(h);", {"v": values}, {"h": "uint", "u": "float"}
+    )
     want = np.array([cpu_reference_hash(int(v)) for v in values], np.uint32)
     np.testing.assert_array_equal(got["h"], want)
     np.testing.assert_array_equal(got["u"], (want >> 8) / 2**24)
@@ -65,7 +68,13 @@ def test_azimuthal_directions_and_their_columns(gl) -> None:
     rng = np.random.default_rng(4)
     radius, turn = rng.uniform(1e-3, 1.99, COUNT), rng.uniform(0, 2 * np.pi, COUNT)
     q = as_f32(np.column_stack([radius * np.cos(turn), radius * np.sin(turn)]))
-    got = evaluate(gl.ctx, ["lib/emission.glsl"], "d = azimuthal_direction(q, dx, dy);", {"q": q}, {"d": "vec3", "dx": "vec3", "dy": "vec3"})
+    got = evaluate(
+        gl.ctx,
+        ["lib/emission.glsl"],
+        "d = azimuthal_direction(q, dx, dy);",
+        {"q": q},
+        {"d": "vec3", "dx": "vec3", "dy": "vec3"},
+    )
     assert np.abs(got["d"] - equal_area_direction(q)).max() < 1e-6
     step = 1e-6
     size = 1 / np.sqrt(1 - 0.25 * np.sum(q**2, -1))  # columns grow towards the antipode
@@ -80,7 +89,9 @@ def test_concentric_disc_keeps_area_and_rings(gl) -> None:
     grid = (np.arange(64) + 0.5) / 64
     unit = as_f32(np.stack(np.meshgrid(grid, grid), -1).reshape(-1, 2))
     step = 1 / 1024
-    body = f"p = concentric_disc(u); px = concentric_disc(u + vec2({step}, 0)); py = concentric_disc(u + vec2(0, {step}));"
+    body = (
+        f"p = concentric_disc(u); px = concentric_disc(u + vec2({step}, 0)); py = concentric_disc(u + vec2(0, {step}));"
+    )
     got = evaluate(gl.ctx, ["lib/emission.glsl"], body, {"u": unit}, {"p": "vec2", "px": "vec2", "py": "vec2"})
     p = 2 * unit - 1
     ring = np.abs(p).max(-1)
@@ -89,7 +100,9 @@ def test_concentric_disc_keeps_area_and_rings(gl) -> None:
     area = ax[:, 0] * ay[:, 1] - ax[:, 1] * ay[:, 0]
     away_from_seams = (np.abs(np.abs(p[:, 0]) - np.abs(p[:, 1])) > 0.05) & (ring > 0.2)
     np.testing.assert_allclose(area[away_from_seams], np.pi, rtol=2e-2)
-    centre = evaluate(gl.ctx, ["lib/emission.glsl"], "p = concentric_disc(u);", {"u": np.array([[0.5, 0.5]])}, {"p": "vec2"})["p"]
+    centre = evaluate(
+        gl.ctx, ["lib/emission.glsl"], "p = concentric_disc(u);", {"u": np.array([[0.5, 0.5]])}, {"p": "vec2"}
+    )["p"]
     np.testing.assert_array_equal(centre, 0)
 
 
@@ -111,7 +124,9 @@ def test_spot_edges(gl, inner_deg: float, outer_deg: float) -> None:
     a, d = as_f32(axis), as_f32(direction)
     angle = np.arctan2(np.linalg.norm(np.cross(d, a), axis=-1), optics.dot(d, a))
     cone = np.tile([inner, outer], (COUNT, 1))
-    got = evaluate(gl.ctx, ["lib/spot.glsl"], "f = spot_falloff(d, a, cone);", {"d": d, "a": a, "cone": cone}, {"f": "float"})["f"]
+    got = evaluate(
+        gl.ctx, ["lib/spot.glsl"], "f = spot_falloff(d, a, cone);", {"d": d, "a": a, "cone": cone}, {"f": "float"}
+    )["f"]
     want = cpu_reference_falloff(angle, inner, outer)
     clear = np.abs(angle - outer) > 1e-6
     # Unit vectors in float32 know an angle to 1e-7, a larger share of a narrow edge; llvmpipe's atan
@@ -124,7 +139,9 @@ def test_spot_edges(gl, inner_deg: float, outer_deg: float) -> None:
 def test_a_point_light_has_no_edge(gl) -> None:
     directions = optics.unit(np.random.default_rng(6).normal(size=(256, 3)))
     directions[:2] = [0, 0, 1], [0, 0, -1]
-    got = evaluate(gl.ctx, ["lib/spot.glsl"], "f = spot_falloff(d, vec3(0, 0, 1), vec2(4.0));", {"d": directions}, {"f": "float"})["f"]
+    got = evaluate(
+        gl.ctx, ["lib/spot.glsl"], "f = spot_falloff(d, vec3(0, 0, 1), vec2(4.0));", {"d": directions}, {"f": "float"}
+    )["f"]
     np.testing.assert_array_equal(got, 1)
 
 
@@ -139,7 +156,11 @@ def test_spectral_rows_are_linear_between_samples(gl) -> None:
         "a = spectral_row(0u, x); c = spectral_row(2u, x);",
         {"x": x},
         {"a": "float", "c": "float"},
-        {**bindings.SCENE_DEFINES, **dict.fromkeys(("TRIANGLES_AT", "NORMALS_AT", "OBJECTS_AT"), 0), "SPECTRAL_SAMPLES": samples},
+        {
+            **bindings.SCENE_DEFINES,
+            **dict.fromkeys(("TRIANGLES_AT", "NORMALS_AT", "OBJECTS_AT"), 0),
+            "SPECTRAL_SAMPLES": samples,
+        },
         SCENE_STRUCTS,
         binders=[lambda: texture.use(bindings.UNIT_SPECTRA)],
     )
@@ -168,7 +189,13 @@ def test_gaussian_integrals(gl) -> None:
     assert np.abs(got["s"][near] - np.sinc(z)).max() < 2e-6
 
 
-NESTED = {"MEDIUM_STACK": 1, "STACK_SIZE": 3, "STACK_OBJECTS": "uint[](4u, 0u, 2u)", "INDEX_ROW": 0, "SPECTRAL_GROUPS": 0}
+NESTED = {
+    "MEDIUM_STACK": 1,
+    "STACK_SIZE": 3,
+    "STACK_OBJECTS": "uint[](4u, 0u, 2u)",
+    "INDEX_ROW": 0,
+    "SPECTRAL_GROUPS": 0,
+}
 
 
 def test_the_highest_solid_around_a_ray_is_its_medium(gl) -> None:

@@ -11,8 +11,16 @@ from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {
     "optics.glsl": (
-        "transmitted_cosine2", "refraction_mu", "refract_direction", "reflect_direction", "reflect_column", "refract_column",
-        "transfer_column", "normalised_derivative", "barycentric_gradients", "fresnel_reflectance",
+        "transmitted_cosine2",
+        "refraction_mu",
+        "refract_direction",
+        "reflect_direction",
+        "reflect_column",
+        "refract_column",
+        "transfer_column",
+        "normalised_derivative",
+        "barycentric_gradients",
+        "fresnel_reflectance",
     ),
 }
 OPTICS = ["lib/optics.glsl"]
@@ -47,7 +55,9 @@ def relative_error(got: np.ndarray, want: np.ndarray, scale: np.ndarray | float 
     return np.linalg.norm(got - want, axis=-1) / np.maximum(np.linalg.norm(want, axis=-1), scale)
 
 
-def cpu_reference_refraction(e: dict[str, np.ndarray], eta: np.ndarray, deta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def cpu_reference_refraction(
+    e: dict[str, np.ndarray], eta: np.ndarray, deta: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """What float64 makes of the same float32 numbers. The rounded d and n are not quite unit vectors,
     which every formula treats in its own way: compare with the one that states the same algebra."""
     theta = dot(e["d"], e["n"])
@@ -85,14 +95,26 @@ def test_refraction_invariants(gl) -> None:
     lengths = 1 + np.linalg.norm(full["out_dd"], axis=-1)
     assert np.abs(dot(full["out_d"], full["out_dd"]) / lengths).max() < 3e-6
     assert np.abs(np.linalg.norm(full["out_d"], axis=-1) - 1).max() < 1e-6
-    bend = evaluate(gl.ctx, OPTICS, REFRACT, {**e, "dd": zero, "dn": zero, "eta": eta, "deta": deta}, {"out_d": "vec3", "out_dd": "vec3"})
+    bend = evaluate(
+        gl.ctx,
+        OPTICS,
+        REFRACT,
+        {**e, "dd": zero, "dn": zero, "eta": eta, "deta": deta},
+        {"out_d": "vec3", "out_dd": "vec3"},
+    )
     expected = np.linalg.norm(np.cross(e["d"], e["n"]), axis=-1) / -dot(bend["out_d"], e["n"])
     assert relative_error(np.linalg.norm(bend["out_dd"], axis=-1), expected, scale=0.05).max() < 5e-6
 
 
 def test_equal_indices_change_nothing_at_all(gl) -> None:
     e = events()
-    got = evaluate(gl.ctx, OPTICS, REFRACT, {**e, "eta": np.ones(COUNT), "deta": np.zeros(COUNT)}, {"out_d": "vec3", "out_dd": "vec3"})
+    got = evaluate(
+        gl.ctx,
+        OPTICS,
+        REFRACT,
+        {**e, "eta": np.ones(COUNT), "deta": np.zeros(COUNT)},
+        {"out_d": "vec3", "out_dd": "vec3"},
+    )
     np.testing.assert_array_equal(got["out_d"], e["d"])
     np.testing.assert_array_equal(got["out_dd"], e["dd"])
 
@@ -102,11 +124,19 @@ def test_nearly_equal_indices_keep_their_digits(gl, eta_minus_one: float) -> Non
     # What the two media do to the ray is of the size of eta - 1: judge the change, not the ray.
     eta = as_f32(np.full(COUNT, 1 + eta_minus_one))
     e = events(cosine=np.random.default_rng(6).uniform(0.2, 1, COUNT))
-    got = evaluate(gl.ctx, OPTICS, "mu = refraction_mu(t, eta, sqrt(transmitted_cosine2(t, eta)));", {"t": dot(e["d"], e["n"]), "eta": eta}, {"mu": "float"})
+    got = evaluate(
+        gl.ctx,
+        OPTICS,
+        "mu = refraction_mu(t, eta, sqrt(transmitted_cosine2(t, eta)));",
+        {"t": dot(e["d"], e["n"]), "eta": eta},
+        {"mu": "float"},
+    )
     theta = as_f32(dot(e["d"], e["n"]))
     omega = np.sqrt((1 - eta) * (1 + eta) + (eta * theta) ** 2)
     assert relative_error(got["mu"], eta * theta + omega).max() < 1e-6
-    full = evaluate(gl.ctx, OPTICS, REFRACT, {**e, "eta": eta, "deta": np.ones(COUNT)}, {"out_d": "vec3", "out_dd": "vec3"})
+    full = evaluate(
+        gl.ctx, OPTICS, REFRACT, {**e, "eta": eta, "deta": np.ones(COUNT)}, {"out_d": "vec3", "out_dd": "vec3"}
+    )
     want_d, want_dd = cpu_reference_refraction(e, eta, np.ones(COUNT))
     assert relative_error(full["out_d"], want_d).max() < 3e-7
     assert relative_error(full["out_dd"], want_dd, scale=1.0).max() < 3e-6
@@ -114,13 +144,16 @@ def test_nearly_equal_indices_keep_their_digits(gl, eta_minus_one: float) -> Non
 
 @pytest.mark.parametrize("margin_rad", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
 def test_near_total_reflection_the_column_loses_no_more_than_the_angle_does(gl, margin_rad: float) -> None:
-    # |∂d'/∂eta| = sin θi / cos θt, and cos² θt is known in float32 to a few eps: the relative error grows as eps / cos².
+    # |∂d'/∂eta| = sin θi / cos θt, and cos² θt is known in float32 to a few eps: the relative error grows as eps /
+    # cos².
     eta = as_f32(np.full(COUNT, float(index("N-BK7", D_NM))))
     critical = np.arcsin(1 / eta)
     e = events(cosine=np.cos(critical - margin_rad))
     zero = np.zeros((COUNT, 3))
     inputs = {**e, "dd": zero, "dn": zero, "eta": eta, "deta": np.ones(COUNT)}
-    got = evaluate(gl.ctx, OPTICS, REFRACT + "c2 = cosine2;", inputs, {"out_d": "vec3", "out_dd": "vec3", "c2": "float"})
+    got = evaluate(
+        gl.ctx, OPTICS, REFRACT + "c2 = cosine2;", inputs, {"out_d": "vec3", "out_dd": "vec3", "c2": "float"}
+    )
     theta = dot(e["d"], e["n"])
     cosine2 = (1 - eta) * (1 + eta) + (eta * theta) ** 2
     assert np.abs(got["c2"] - cosine2).max() < 6 * EPSILON
@@ -139,7 +172,13 @@ def test_grazing_incidence(gl, angle_deg: float) -> None:
     e = events(cosine=np.full(COUNT, np.cos(np.radians(angle_deg))))
     deta = np.ones(COUNT)
     body = REFRACT + "reflectance = fresnel_reflectance(theta, eta, cosine2);"
-    got = evaluate(gl.ctx, OPTICS, body, {**e, "eta": eta, "deta": deta}, {"out_d": "vec3", "out_dd": "vec3", "reflectance": "float"})
+    got = evaluate(
+        gl.ctx,
+        OPTICS,
+        body,
+        {**e, "eta": eta, "deta": deta},
+        {"out_d": "vec3", "out_dd": "vec3", "reflectance": "float"},
+    )
     want_d, want_dd = cpu_reference_refraction(e, eta, deta)
     assert relative_error(got["out_d"], want_d).max() < 1e-6
     assert relative_error(got["out_dd"], want_dd, scale=1.0).max() < 3e-6
@@ -152,14 +191,19 @@ def test_reflection(gl) -> None:
     body = "float t = dot(d, n); out_d = reflect_direction(d, n, t); out_dd = reflect_column(d, dd, n, dn, t);"
     got = evaluate(gl.ctx, OPTICS, body, e, {"out_d": "vec3", "out_dd": "vec3"})
     assert relative_error(got["out_d"], optics.reflect(e["d"], e["n"])).max() < 5e-7
-    assert relative_error(got["out_dd"], optics.reflect_column(*(e[k] for k in ("d", "dd", "n", "dn"))), scale=1.0).max() < 1e-6
+    assert (
+        relative_error(got["out_dd"], optics.reflect_column(*(e[k] for k in ("d", "dd", "n", "dn"))), scale=1.0).max()
+        < 1e-6
+    )
 
 
 def test_transfer(gl) -> None:
     rng = np.random.default_rng(7)
     e = events(cosine=rng.uniform(0.02, 1, COUNT))
     dp, distance = as_f32(rng.normal(size=(COUNT, 3))), as_f32(rng.uniform(0, 3, COUNT))
-    got = evaluate(gl.ctx, OPTICS, "q = transfer_column(dp, dd, d, n, t);", {**e, "dp": dp, "t": distance}, {"q": "vec3"})["q"]
+    got = evaluate(
+        gl.ctx, OPTICS, "q = transfer_column(dp, dd, d, n, t);", {**e, "dp": dp, "t": distance}, {"q": "vec3"}
+    )["q"]
     want = optics.transfer_column(dp, e["dd"], e["d"], e["n"], distance)
     size = np.linalg.norm(dp + times(distance, e["dd"]), axis=-1) / np.abs(dot(e["d"], e["n"]))
     assert relative_error(got, want, scale=size).max() < 3e-6
@@ -192,7 +236,9 @@ def test_interpolated_normals(gl, scale: float) -> None:
         **{f"n{c}": normals[:, c] for c in range(3)},
     }
     got = evaluate(gl.ctx, OPTICS, body, inputs, {"dn": "vec3"})["dn"]
-    want = np.array([optics.shading_normal_column(t, n, p, q)[1] for t, n, p, q in zip(triangles, normals, point, dp, strict=True)])
+    want = np.array(
+        [optics.shading_normal_column(t, n, p, q)[1] for t, n, p, q in zip(triangles, normals, point, dp, strict=True)]
+    )
     assert np.median(np.linalg.norm(want, axis=-1)) > 0.1
     assert relative_error(got, want, scale=1.0).max() < 1e-5
 

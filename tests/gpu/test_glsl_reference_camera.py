@@ -35,7 +35,9 @@ def test_camera_rays_go_through_their_pixels(gl) -> None:
     got = evaluate(gl.ctx, ["lib/camera.glsl"], body, inputs, {"p": "vec2", "start": "vec3", "d": "vec3"})
     point = camera.picture_point(pixel, within, size)
     assert np.abs(got["p"] - point).max() < 3e-7
-    start, direction = camera.camera_ray(vectors["camera"], forward, vectors["half_right"], vectors["half_up"], parallel, as_f32(got["p"]))
+    start, direction = camera.camera_ray(
+        vectors["camera"], forward, vectors["half_right"], vectors["half_up"], parallel, as_f32(got["p"])
+    )
     assert np.abs(got["start"] - start).max() < 2e-6
     assert np.abs(got["d"] - direction).max() < 1e-6
 
@@ -45,7 +47,9 @@ def random_lights(kind: int, rng: np.random.Generator) -> np.ndarray:
     records = CAMERA_LIGHT.zeros(COUNT)
     axis = unit(rng.normal(size=(COUNT, 3)))
     first = unit(np.cross(axis, rng.normal(size=(COUNT, 3))))
-    half = rng.uniform(0.01 if kind == lights.DIRECTIONAL else 0.1, 0.05 if kind == lights.DIRECTIONAL else 1.0, (COUNT, 2))
+    half = rng.uniform(
+        0.01 if kind == lights.DIRECTIONAL else 0.1, 0.05 if kind == lights.DIRECTIONAL else 1.0, (COUNT, 2)
+    )
     disc = rng.integers(0, 2, COUNT) if kind in (lights.COLLIMATED, lights.AREA) else np.full(COUNT, 1)
     half[disc == 1, 1] = half[disc == 1, 0]
     records["kind"], records["axis"], records["is_disc"] = kind, axis, disc
@@ -58,7 +62,11 @@ def random_lights(kind: int, rng: np.random.Generator) -> np.ndarray:
     return records
 
 
-@pytest.mark.parametrize("kind", [lights.POINT, lights.DIRECTIONAL, lights.COLLIMATED, lights.AREA], ids=["point", "directional", "collimated", "area"])
+@pytest.mark.parametrize(
+    "kind",
+    [lights.POINT, lights.DIRECTIONAL, lights.COLLIMATED, lights.AREA],
+    ids=["point", "directional", "collimated", "area"],
+)
 def test_lights_as_a_point_and_as_a_ray_see_them(gl, kind: int) -> None:
     rng = np.random.default_rng(10 + kind)
     records = random_lights(kind, rng)
@@ -69,9 +77,18 @@ def test_lights_as_a_point_and_as_a_ray_see_them(gl, kind: int) -> None:
     position = as_f32(position)
     uniform = as_f32(rng.random((COUNT, 2)))
     # Rays towards the light's middle, off by up to twice its size.
-    aim = records["position"] + rng.uniform(-2, 2, (COUNT, 1)) * records["half_u"] + rng.uniform(-2, 2, (COUNT, 1)) * records["half_v"] - position
+    aim = (
+        records["position"]
+        + rng.uniform(-2, 2, (COUNT, 1)) * records["half_u"]
+        + rng.uniform(-2, 2, (COUNT, 1)) * records["half_v"]
+        - position
+    )
     if kind == lights.DIRECTIONAL:
-        aim = rng.uniform(-1.5, 1.5, (COUNT, 1)) * records["half_u"] + rng.uniform(-1.5, 1.5, (COUNT, 1)) * records["half_v"] - records["axis"]
+        aim = (
+            rng.uniform(-1.5, 1.5, (COUNT, 1)) * records["half_u"]
+            + rng.uniform(-1.5, 1.5, (COUNT, 1)) * records["half_v"]
+            - records["axis"]
+        )
     direction = as_f32(unit(aim.astype(float)))
     far = as_f32(np.where(rng.random(COUNT) < 0.7, 1e30, rng.uniform(0, 3, COUNT)))
     # A third of the rays are sharp; the others' widths reach from a hair to more than the light.
@@ -86,13 +103,24 @@ def test_lights_as_a_point_and_as_a_ray_see_them(gl, kind: int) -> None:
     declared = "layout(std430, binding = 8) readonly buffer Lights { EyeLight lights[]; };"
     inputs = {"position": position, "unit": uniform, "direction": direction, "far": far, "width": width}
     outputs = {"toward": "vec3", "distance": "float", "gain": "float", "seen": "float"}
-    got = evaluate(gl.ctx, ["lib/lights.glsl"], body, inputs, outputs, structs=[CAMERA_LIGHT], buffers={8: records}, declarations=declared)
+    got = evaluate(
+        gl.ctx,
+        ["lib/lights.glsl"],
+        body,
+        inputs,
+        outputs,
+        structs=[CAMERA_LIGHT],
+        buffers={8: records},
+        declarations=declared,
+    )
     toward, distance, gain = lights.sample_light(records, position, uniform)
     seen = lights.light_seen(records, position, direction, far, width)
     near = distance > 0.05
     assert near.mean() > 0.3
     assert np.abs(got["toward"] - toward)[near].max() < 3e-5
-    assert (np.abs(got["distance"] - distance)[near] / distance[near]).max() < 2e-6 * (20 if kind == lights.COLLIMATED else 1)
+    assert (np.abs(got["distance"] - distance)[near] / distance[near]).max() < 2e-6 * (
+        20 if kind == lights.COLLIMATED else 1
+    )
     # An edge within rounding may fall either way: at most a few rows of 2048.
     wrong = np.abs(got["gain"] - gain)[near] > 1e-4 * np.maximum(gain[near], 1.0)
     assert wrong.mean() < 3e-3
@@ -108,13 +136,23 @@ def soft_amounts(gl, body: str, offset: np.ndarray, blur: float) -> np.ndarray:
     """What a soft look at the offsets sees, by the shader."""
     inputs = {"offset": offset, "blur": np.full(len(offset), blur)}
     declared = "layout(std430, binding = 8) readonly buffer Lights { EyeLight lights[]; };"
-    got = evaluate(gl.ctx, ["lib/lights.glsl"], body, inputs, {"seen": "float"}, structs=[CAMERA_LIGHT], buffers={8: CAMERA_LIGHT.zeros(1)}, declarations=declared)
+    got = evaluate(
+        gl.ctx,
+        ["lib/lights.glsl"],
+        body,
+        inputs,
+        {"seen": "float"},
+        structs=[CAMERA_LIGHT],
+        buffers={8: CAMERA_LIGHT.zeros(1)},
+        declarations=declared,
+    )
     return got["seen"]
 
 
 @pytest.mark.parametrize("blur", [0.0, 0.01, 0.3, 0.99, 1.0, 1.01, 3.0, 40.0])
 def test_a_soft_look_keeps_what_the_light_sends(gl, blur: float) -> None:
-    """Summed over all offsets it is the disc's area, or the stretch's length, however wide the look: no light is lost in small far lamps."""
+    """Summed over all offsets it is the disc's area, or the stretch's length, however wide the look: no light is lost
+    in small far lamps."""
     edge = max(1.0, blur) + blur
     offset = as_f32((np.arange(COUNT) + 0.5) / COUNT * 1.05 * edge)
     step = 1.05 * edge / COUNT
@@ -128,7 +166,14 @@ def test_a_soft_look_keeps_what_the_light_sends(gl, blur: float) -> None:
     assert disc[-1] == stretch[-1] == 0.0
 
 
-LOOKUP = {"MAP_TARGETS": 1, "CHARTS": 1, "NESTED_WINDOWS": 1, "BIND_RECEIVERS": 8, "BIND_PLACEMENTS": 9, "NONE": f"{NONE}u"}
+LOOKUP = {
+    "MAP_TARGETS": 1,
+    "CHARTS": 1,
+    "NESTED_WINDOWS": 1,
+    "BIND_RECEIVERS": 8,
+    "BIND_PLACEMENTS": 9,
+    "NONE": f"{NONE}u",
+}
 
 
 def test_the_finest_window_that_holds_a_place_is_found(gl) -> None:
@@ -157,8 +202,13 @@ def test_the_finest_window_that_holds_a_place_is_found(gl) -> None:
     body = "uint place; vec2 at; found = find_texel(receiver, source, position, place, at) ? 1u : 0u; placement = place; texel = at;"
     outputs = {"found": "uint", "placement": "uint", "texel": "vec2"}
     inputs = {"receiver": receiver, "source": source, "position": position}
-    got = evaluate(gl.ctx, ["lib/lookup.glsl"], body, inputs, outputs, LOOKUP, [RECEIVER, PLACEMENT], {8: receivers, 9: placements})
-    want = [maps.find_texel(receivers, placements, r, s, p) for r, s, p in zip(receiver.tolist(), source.tolist(), position, strict=True)]
+    got = evaluate(
+        gl.ctx, ["lib/lookup.glsl"], body, inputs, outputs, LOOKUP, [RECEIVER, PLACEMENT], {8: receivers, 9: placements}
+    )
+    want = [
+        maps.find_texel(receivers, placements, r, s, p)
+        for r, s, p in zip(receiver.tolist(), source.tolist(), position, strict=True)
+    ]
     found, placement = np.array([w[0] for w in want]), np.array([w[1] for w in want])
     texel = np.array([w[2] for w in want])
     agrees = (got["found"] == found) & (~found | (got["placement"] == placement))
@@ -182,13 +232,27 @@ def test_a_look_up_is_the_mean_over_its_box(gl) -> None:
     outputs = {"value": "vec4"}
     body = "value = caustic_irradiance(caustic_map[0], row, texel, box);"
     got = evaluate(
-        gl.ctx, ["lib/lookup.glsl"], body, {"texel": texel, "box": box}, outputs, LOOKUP, [RECEIVER, PLACEMENT],
-        {8: RECEIVER.zeros(1), 9: placements}, [lambda: texture.use(0)],
+        gl.ctx,
+        ["lib/lookup.glsl"],
+        body,
+        {"texel": texel, "box": box},
+        outputs,
+        LOOKUP,
+        [RECEIVER, PLACEMENT],
+        {8: RECEIVER.zeros(1), 9: placements},
+        [lambda: texture.use(0)],
     )
     texture.release()
-    want = np.array([maps.caustic_irradiance(texels.astype(float), p, t, b) for p, t, b in zip(placements, texel, box, strict=True)])
+    want = np.array(
+        [maps.caustic_irradiance(texels.astype(float), p, t, b) for p, t, b in zip(placements, texel, box, strict=True)]
+    )
     # The box's ends are known to an eps of the atlas coordinate, a larger share of a narrow box.
     room = 3e-6 * (1.0 + 1.0 / box.min(axis=1)) / placements["texel_area"]
     assert (np.abs(got["value"] - want).max(axis=1) / room).max() < 1.0
-    mutant = np.array([maps.caustic_irradiance(texels.astype(float), p, t + 0.01, b) for p, t, b in zip(placements, texel, box, strict=True)])
+    mutant = np.array(
+        [
+            maps.caustic_irradiance(texels.astype(float), p, t + 0.01, b)
+            for p, t, b in zip(placements, texel, box, strict=True)
+        ]
+    )
     assert (np.abs(got["value"] - mutant).max(axis=1) / room).max() > 10.0

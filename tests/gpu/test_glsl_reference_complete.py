@@ -1,6 +1,8 @@
-"""Every function of shaders/lib has a test: each CPU reference test declares in `COVERS` what it covers, and this reads the declarations.
+"""Every function of shaders/lib has a test: each CPU reference test declares in `COVERS` what it covers, and this reads
+the declarations.
 
-A declared function must be called by the module's own GLSL, or by a library function that is: a name alone does not count.
+A declared function must be called by the module's own GLSL, or by a library function that is: a name alone does not
+count.
 """
 
 from __future__ import annotations

@@ -26,7 +26,13 @@ def words(seed: int) -> np.ndarray:
 def test_random_numbers_are_the_same_to_the_bit(gl) -> None:
     a, b, c = (words(seed) for seed in (1, 2, 3))
     body = "h = hash_pcg(a); hc = hash_combine(a, b); u = unit_float(a); k = kronecker(a, b, c);"
-    got = evaluate(gl.ctx, ["lib/random.glsl"], body, {"a": a, "b": b, "c": c}, {"h": "uint", "hc": "uint", "u": "float", "k": "float"})
+    got = evaluate(
+        gl.ctx,
+        ["lib/random.glsl"],
+        body,
+        {"a": a, "b": b, "c": c},
+        {"h": "uint", "hc": "uint", "u": "float", "k": "float"},
+    )
     np.testing.assert_array_equal(got["h"], random_numbers.hash_pcg(a))
     np.testing.assert_array_equal(got["hc"], random_numbers.hash_combine(a, b))
     np.testing.assert_array_equal(got["u"], random_numbers.unit_float(a))
@@ -38,7 +44,9 @@ def test_random_numbers_are_the_same_to_the_bit(gl) -> None:
 def test_lattice_points(gl, count: int) -> None:
     i = words(4) % np.uint32(count)
     shift = np.column_stack([words(5), words(6)])
-    got = evaluate(gl.ctx, ["lib/emission.glsl"], f"p = lattice_point(i, {count}u, s);", {"i": i, "s": shift}, {"p": "vec2"})["p"]
+    got = evaluate(
+        gl.ctx, ["lib/emission.glsl"], f"p = lattice_point(i, {count}u, s);", {"i": i, "s": shift}, {"p": "vec2"}
+    )["p"]
     want = emission_maps.lattice_point(i, count, (shift[:, 0], shift[:, 1]))
     # float(i) + a fraction keeps 24 bits: an eps of the whole axis.
     assert np.abs(got[:, 0] - want[:, 0]).max() < 1.5e-7
@@ -50,19 +58,31 @@ def test_azimuthal_directions_reach_over_the_whole_sphere(gl) -> None:
     rng = np.random.default_rng(7)
     radius, turn = np.concatenate([rng.uniform(0.0, 1.999, COUNT - 2), [0.0, 1e-7]]), rng.uniform(0, 2 * np.pi, COUNT)
     q = as_f32(np.column_stack([radius * np.cos(turn), radius * np.sin(turn)]))
-    got = evaluate(gl.ctx, ["lib/emission.glsl"], "d = azimuthal_direction(q, dx, dy);", {"q": q}, {"d": "vec3", "dx": "vec3", "dy": "vec3"})
+    got = evaluate(
+        gl.ctx,
+        ["lib/emission.glsl"],
+        "d = azimuthal_direction(q, dx, dy);",
+        {"q": q},
+        {"d": "vec3", "dx": "vec3", "dy": "vec3"},
+    )
     # Towards the antipode a direction moves by 1/k of the plane's rounding, k the cosine of half the angle.
     k = np.sqrt(1.0 - 0.25 * np.sum(q**2, axis=-1))
     assert (np.abs(got["d"] - emission_maps.azimuthal_direction(q)).max(axis=-1) * k).max() < 3e-7
     step = 1e-5
     for axis, name in ((np.array([step, 0.0]), "dx"), (np.array([0.0, step]), "dy")):
         inner = np.linalg.norm(q, axis=-1) < 1.9
-        difference = (emission_maps.azimuthal_direction(q[inner] + axis) - emission_maps.azimuthal_direction(q[inner] - axis)) / (2.0 * step)
+        difference = (
+            emission_maps.azimuthal_direction(q[inner] + axis) - emission_maps.azimuthal_direction(q[inner] - axis)
+        ) / (2.0 * step)
         assert np.abs(got[name][inner] - difference).max() < 1e-5
 
 
 def test_concentric_disc(gl) -> None:
-    unit_square = as_f32(np.concatenate([np.random.default_rng(8).random((COUNT, 2)), [[0.5, 0.5], [0.0, 0.0], [1.0, 0.5], [0.25, 0.75]]]))
+    unit_square = as_f32(
+        np.concatenate(
+            [np.random.default_rng(8).random((COUNT, 2)), [[0.5, 0.5], [0.0, 0.0], [1.0, 0.5], [0.25, 0.75]]]
+        )
+    )
     got = evaluate(gl.ctx, ["lib/emission.glsl"], "p = concentric_disc(u);", {"u": unit_square}, {"p": "vec2"})["p"]
     assert np.abs(got - emission_maps.concentric_disc(unit_square)).max() < 1e-6
 
@@ -74,7 +94,9 @@ def test_angles_keep_their_digits_however_small(gl) -> None:
     angle = np.exp(rng.uniform(np.log(1e-5), np.log(3.1), COUNT))
     b = np.cos(angle)[:, None] * a + np.sin(angle)[:, None] * side
     a, b = as_f32(a), as_f32(b)
-    got = evaluate(gl.ctx, ["lib/spot.glsl"], "angle = angle_between(a, b);", {"a": a, "b": b}, {"angle": "float"})["angle"]
+    got = evaluate(gl.ctx, ["lib/spot.glsl"], "angle = angle_between(a, b);", {"a": a, "b": b}, {"angle": "float"})[
+        "angle"
+    ]
     want = emission_maps.angle_between(unit(a), unit(b))
     # Rounding of the cross product, and llvmpipe's atan (2e-5 of the angle).
     assert (np.abs(got - want) / (2.5e-7 + 3e-5 * want)).max() < 1.0
@@ -85,7 +107,13 @@ def test_spot_falloff(gl, inner: float, outer: float) -> None:
     rng = np.random.default_rng(10)
     axis, direction = as_f32(unit(rng.normal(size=(2, COUNT, 3))))
     cone = as_f32(np.tile([inner, outer], (COUNT, 1)))
-    got = evaluate(gl.ctx, ["lib/spot.glsl"], "f = spot_falloff(d, a, cone);", {"d": direction, "a": axis, "cone": cone}, {"f": "float"})["f"]
+    got = evaluate(
+        gl.ctx,
+        ["lib/spot.glsl"],
+        "f = spot_falloff(d, a, cone);",
+        {"d": direction, "a": axis, "cone": cone},
+        {"f": "float"},
+    )["f"]
     want = emission_maps.spot_falloff(unit(direction), unit(axis), cone[:, 0], cone[:, 1])
     clear = np.abs(emission_maps.angle_between(unit(direction), unit(axis)) - outer) > 2e-5
     assert clear.mean() > 0.99

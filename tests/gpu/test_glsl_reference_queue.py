@@ -1,4 +1,5 @@
-"""The queue between two trace steps (lib/queue.glsl and the five kernels over it) against its CPU reference in app/reference."""
+"""The queue between two trace steps (lib/queue.glsl and the five kernels over it) against its CPU reference in
+app/reference."""
 
 from __future__ import annotations
 
@@ -17,10 +18,21 @@ GROUP = 64
 class Queue:
     """The kernels with buffers for `count` rays."""
 
-    def __init__(self, gl, outcomes: np.ndarray, ray_capacity: int, photon_capacity: int, photon_first: int = 0, photons_new: int = 0) -> None:
+    def __init__(
+        self,
+        gl,
+        outcomes: np.ndarray,
+        ray_capacity: int,
+        photon_capacity: int,
+        photon_first: int = 0,
+        photons_new: int = 0,
+    ) -> None:
         self.ctx = gl.ctx
         structs = (*SCENE_STRUCTS, PHOTON, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE)
-        self.programs = {name: shader.compute(self.ctx, f"queue_{name}.comp", DEFINES, structs) for name in ("count", "scan", "scatter", "gather", "advance")}
+        self.programs = {
+            name: shader.compute(self.ctx, f"queue_{name}.comp", DEFINES, structs)
+            for name in ("count", "scan", "scatter", "gather", "advance")
+        }
         state = records.QUEUE_STATE.zeros(1)
         state["alive"] = state["dispatched"] = len(outcomes)
         state["ray_capacity"], state["photon_capacity"] = ray_capacity, photon_capacity
@@ -42,7 +54,13 @@ class Queue:
         for binding, buffer in self.buffers.items():
             buffer.bind_to_storage_buffer(binding)
         groups = -(-self.chunks // GROUP)
-        for name, size in (("count", groups), ("scan", 1), ("scatter", groups), ("gather", self.chunks), ("advance", 1)):
+        for name, size in (
+            ("count", groups),
+            ("scan", 1),
+            ("scatter", groups),
+            ("gather", self.chunks),
+            ("advance", 1),
+        ):
             self.programs[name].run(size)
             self.ctx.memory_barrier()
         self.ctx.finish()
@@ -58,7 +76,11 @@ class Queue:
 def random_outcomes(count: int, seed: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
     outcomes = records.OUTCOME.zeros(count)
-    outcomes["what"] = rng.integers(0, 8, count) | rng.integers(0, 1 << FALLBACKS, count) << 8 | rng.integers(0, CATEGORIES, count) << 16
+    outcomes["what"] = (
+        rng.integers(0, 8, count)
+        | rng.integers(0, 1 << FALLBACKS, count) << 8
+        | rng.integers(0, CATEGORIES, count) << 16
+    )
     for name in ("flux_w", "absorbed_w", "roulette_w"):
         outcomes[name] = rng.random(count)
     return outcomes
@@ -71,7 +93,12 @@ def test_children_and_photons_are_listed_in_order(gl, count: int) -> None:
     rig.step()
     children, photons = queue.children(outcomes["what"]), queue.photons(outcomes["what"])
     state = rig.read(bindings.STATE, records.QUEUE_STATE.dtype)[0]
-    assert (state["alive"], state["photons_new"], state["photon_first"], state["overflow"]) == (len(children), len(photons), 5, 0)
+    assert (state["alive"], state["photons_new"], state["photon_first"], state["overflow"]) == (
+        len(children),
+        len(photons),
+        5,
+        0,
+    )
     listed = rig.read(bindings.INDICES, np.dtype(np.uint32))
     np.testing.assert_array_equal(listed[: len(children)], children)
     assert (listed[len(children) : rig.ray_capacity] == 0xFFFFFFFF).all()
@@ -79,7 +106,9 @@ def test_children_and_photons_are_listed_in_order(gl, count: int) -> None:
     np.testing.assert_array_equal(moved[5 : 5 + len(photons)], 1000 + photons)
     assert not moved[:5].any()
     counts = rig.read(bindings.COUNTS, records.CHUNK_COUNT.dtype)
-    np.testing.assert_allclose(counts["flux_w"].sum(axis=0, dtype=float), queue.ended_flux(outcomes, CATEGORIES), rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(
+        counts["flux_w"].sum(axis=0, dtype=float), queue.ended_flux(outcomes, CATEGORIES), rtol=1e-5, atol=1e-9
+    )
     np.testing.assert_array_equal(counts["fallbacks"].sum(axis=0), queue.fallbacks(outcomes, FALLBACKS))
     for name in ("absorbed_w", "roulette_w"):
         assert counts[name].sum(dtype=float) == pytest.approx(outcomes[name].sum(dtype=float), rel=1e-5)

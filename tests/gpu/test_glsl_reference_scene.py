@@ -1,4 +1,5 @@
-"""Media, spectral rows, scene records, Gaussians and the small tests of an intersection against their CPU references in app/reference."""
+"""Media, spectral rows, scene records, Gaussians and the small tests of an intersection against their CPU references in
+app/reference."""
 
 from __future__ import annotations
 
@@ -15,7 +16,17 @@ from spectrasplat.gpu.schema import Struct
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {
-    "medium.glsl": ("medium_of", "ray_is_inside", "ray_medium", "medium_weight_row", "cross_boundary", "medium_index", "crossing_indices", "medium_slope", "index_ratio_derivative"),
+    "medium.glsl": (
+        "medium_of",
+        "ray_is_inside",
+        "ray_medium",
+        "medium_weight_row",
+        "cross_boundary",
+        "medium_index",
+        "crossing_indices",
+        "medium_slope",
+        "index_ratio_derivative",
+    ),
     "scene.glsl": ("scene_texel", "triangle_at", "object_at", "corner_normal", "spectral_row"),
     "gaussian.glsl": ("erf_approx", "gaussian_box", "gaussian_box_fast", "normal_excess", "sinc_pi"),
     "intersect.glsl": ("accept_hit", "crossing_key", "box_entry"),
@@ -26,7 +37,16 @@ ORDER = (4, 0, 2)
 """Objects of the stack by rising priority; 1 and 3 lie alone."""
 OBJECTS = 5
 STACK = {"MEDIUM_STACK": 1, "STACK_SIZE": len(ORDER), "STACK_OBJECTS": "uint[](4u, 0u, 2u)"}
-COMMON = {"SPECTRAL_SAMPLES": SAMPLES, "INDEX_ROW": 0, "SLOPE_ROW": 3, "VARIABLE_ROW": 0, "WEIGHT_ROW": 0, "SPECTRAL_GROUPS": 2, "MERGED_GROUPS": 1, "TRIANGLE_COUNT": 0}
+COMMON = {
+    "SPECTRAL_SAMPLES": SAMPLES,
+    "INDEX_ROW": 0,
+    "SLOPE_ROW": 3,
+    "VARIABLE_ROW": 0,
+    "WEIGHT_ROW": 0,
+    "SPECTRAL_GROUPS": 2,
+    "MERGED_GROUPS": 1,
+    "TRIANGLE_COUNT": 0,
+}
 
 
 class Scene:
@@ -45,16 +65,39 @@ class Scene:
         self.triangles = TRIANGLE.zeros(4500)
         for name in ("vertex", "edge1", "edge2"):
             self.triangles[name] = rng.normal(size=(4500, 3))
-        self.triangles["object"], self.triangles["normals"], self.triangles["source"] = np.arange(4500), np.arange(4500) * 3, np.arange(4500)[::-1]
+        self.triangles["object"], self.triangles["normals"], self.triangles["source"] = (
+            np.arange(4500),
+            np.arange(4500) * 3,
+            np.arange(4500)[::-1],
+        )
         self.normals = rng.normal(size=(900, 4)).astype(np.float32)
 
-    def evaluate(self, body: str, inputs: Mapping[str, np.ndarray], outputs: Mapping[str, str], stack: bool = False, as_image: bool | None = None, include: str = "lib/medium.glsl") -> dict[str, np.ndarray]:
-        texels = SceneTexels(self.ctx, {"TRIANGLES": self.triangles, "NORMALS": self.normals, "OBJECTS": self.objects}, as_image)
+    def evaluate(
+        self,
+        body: str,
+        inputs: Mapping[str, np.ndarray],
+        outputs: Mapping[str, str],
+        stack: bool = False,
+        as_image: bool | None = None,
+        include: str = "lib/medium.glsl",
+    ) -> dict[str, np.ndarray]:
+        texels = SceneTexels(
+            self.ctx, {"TRIANGLES": self.triangles, "NORMALS": self.normals, "OBJECTS": self.objects}, as_image
+        )
         spectra = spectra_texture(self.ctx, self.table)
         defines = {**bindings.SCENE_DEFINES, **texels.defines, **COMMON, **(STACK if stack else {})}
         structs: tuple[Struct, ...] = (*SCENE_STRUCTS, ray_record(0))
         try:
-            return evaluate(self.ctx, [include], body, inputs, outputs, defines, structs, binders=[texels.bind, lambda: texels.bind_spectra(spectra)])
+            return evaluate(
+                self.ctx,
+                [include],
+                body,
+                inputs,
+                outputs,
+                defines,
+                structs,
+                binders=[texels.bind, lambda: texels.bind_spectra(spectra)],
+            )
         finally:
             texels.release()
             spectra.release()
@@ -71,21 +114,41 @@ RAY = "RayRecord ray; ray.inside_mask = mask; ray.inside_object = alone;"
 @pytest.mark.parametrize("stack", [False, True], ids=["alone", "stack"])
 def test_media_on_both_sides_of_a_surface(scene: Scene, stack: bool) -> None:
     masks = range(8) if stack else (0,)
-    cases = [(mask, alone, hit, enters) for mask in masks for alone in (NONE, 1, 3) for hit in range(OBJECTS) for enters in (0, 1)]
+    cases = [
+        (mask, alone, hit, enters)
+        for mask in masks
+        for alone in (NONE, 1, 3)
+        for hit in range(OBJECTS)
+        for enters in (0, 1)
+    ]
     mask, alone, hit, enters = np.array(cases, np.uint32).T
-    body = RAY + """
+    body = (
+        RAY
+        + """
     Crossing c = cross_boundary(ray, hit, enters != 0u);
     before = c.before; after = c.after; mask_after = c.mask_after; object_after = c.object_after; changes = c.changes ? 1u : 0u;
     inside = ray_is_inside(ray) ? 1u : 0u; now = ray_medium(ray); weight = medium_weight_row(ray);
     """
+    )
     names = ("before", "after", "mask_after", "object_after", "changes", "inside", "now", "weight")
-    got = scene.evaluate(body, {"mask": mask, "alone": alone, "hit": hit, "enters": enters}, dict.fromkeys(names, "uint"), stack)
+    got = scene.evaluate(
+        body, {"mask": mask, "alone": alone, "hit": hit, "enters": enters}, dict.fromkeys(names, "uint"), stack
+    )
     for row, (held, solid, surface, entering) in enumerate(cases):
         ranks = frozenset(rank for rank in range(3) if held >> rank & 1)
         want = medium.cross(ranks, solid, surface, bool(entering), ORDER if stack else ())
         now = medium.medium(ranks, solid, ORDER)
         weight = NONE if now == NONE else int(scene.objects["weight_row"][now])
-        expected = (want.before, want.after, medium.mask_of(want.inside), want.object_after, want.changes, bool(ranks) or solid != NONE, now, weight)
+        expected = (
+            want.before,
+            want.after,
+            medium.mask_of(want.inside),
+            want.object_after,
+            want.changes,
+            bool(ranks) or solid != NONE,
+            now,
+            weight,
+        )
         assert tuple(int(got[name][row]) for name in names) == tuple(map(int, expected)), cases[row]
 
 
@@ -104,7 +167,9 @@ def test_indices_and_their_slopes_at_a_surface(scene: Scene, stack: bool) -> Non
     after = rng.choice(np.array([*range(OBJECTS), NONE], np.uint32), COUNT)
     if not stack:
         before = np.where(rng.random(COUNT) < 0.5, np.uint32(NONE), before)
-        after = np.where(before == NONE, np.where(after == NONE, np.uint32(0), after), np.uint32(NONE)).astype(np.uint32)
+        after = np.where(before == NONE, np.where(after == NONE, np.uint32(0), after), np.uint32(NONE)).astype(
+            np.uint32
+        )
     x = as_f32(rng.uniform(-0.05, 1.05, (COUNT, 3)))
     body = """
     Crossing c = Crossing(before, after, 0u, NONE, true);
@@ -115,7 +180,15 @@ def test_indices_and_their_slopes_at_a_surface(scene: Scene, stack: bool) -> Non
     d0 = index_ratio_derivative(c, 0u, x.y, n_i.y, n_t.y);
     d1 = index_ratio_derivative(c, 1u, x.y, n_i.y, n_t.y);
     """
-    outputs = {"n_i": "vec3", "n_t": "vec3", "single": "float", "row2": "float", "slope": "float", "d0": "float", "d1": "float"}
+    outputs = {
+        "n_i": "vec3",
+        "n_t": "vec3",
+        "single": "float",
+        "row2": "float",
+        "slope": "float",
+        "d0": "float",
+        "d1": "float",
+    }
     got = scene.evaluate(body, {"before": before, "after": after, "x": x}, outputs, stack)
 
     def rows(of: np.ndarray, first: int, at: np.ndarray, air: float) -> np.ndarray:
@@ -134,7 +207,10 @@ def test_indices_and_their_slopes_at_a_surface(scene: Scene, stack: bool) -> Non
     assert np.abs(got["slope"] - rows(after, 3, x[:, 1], 0.0))[glass_behind].max() < room
     for g in (0, 1):
         of_group = [np.isin(side, np.flatnonzero(scene.objects["group"] == g)) for side in (before, after)]
-        dn_i, dn_t = (np.where(member, rows(side, 3, x[:, 1], 0.0), 0.0) for member, side in zip(of_group, (before, after), strict=True))
+        dn_i, dn_t = (
+            np.where(member, rows(side, 3, x[:, 1], 0.0), 0.0)
+            for member, side in zip(of_group, (before, after), strict=True)
+        )
         want = medium.index_ratio_slope(n_i[:, 1], n_t[:, 1], dn_i, dn_t)
         assert np.abs(got[f"d{g}"] - want).max() < 2 * room
         assert (want != 0).mean() > 0.2
@@ -153,8 +229,20 @@ def test_scene_records_are_found_in_the_texture(scene: Scene, as_image: bool) ->
     medium = o.medium; weight = o.weight_row; bit_ = o.stack_bit; group_ = o.group;
     raw = scene_texel(uint(NORMALS_AT) + slot % 900u).w;
     """
-    outputs = {"vertex": "vec3", "edge1": "vec3", "edge2": "vec3", "object": "uint", "normals": "uint", "source": "uint", "corner": "vec3",
-               "medium": "uint", "weight": "uint", "bit_": "uint", "group_": "uint", "raw": "uint"}
+    outputs = {
+        "vertex": "vec3",
+        "edge1": "vec3",
+        "edge2": "vec3",
+        "object": "uint",
+        "normals": "uint",
+        "source": "uint",
+        "corner": "vec3",
+        "medium": "uint",
+        "weight": "uint",
+        "bit_": "uint",
+        "group_": "uint",
+        "raw": "uint",
+    }
     got = scene.evaluate(body, {"slot": slot}, outputs, as_image=as_image)
     for name in ("vertex", "edge1", "edge2", "object", "normals", "source"):
         np.testing.assert_array_equal(got[name], scene.triangles[name][slot], err_msg=name)
@@ -169,7 +257,13 @@ def test_gaussians(gl) -> None:
     x = as_f32(np.concatenate([rng.normal(0, 2.5, COUNT - 4), [0.0, 1e-20, 30.0, -30.0]]))
     width = as_f32(rng.uniform(0.01, 3.0, COUNT))
     body = "e = erf_approx(x); box = gaussian_box(x, w); fast = gaussian_box_fast(x, w); excess = normal_excess(x); s = sinc_pi(x);"
-    got = evaluate(gl.ctx, ["lib/gaussian.glsl"], body, {"x": x, "w": width}, dict.fromkeys(("e", "box", "fast", "excess", "s"), "float"))
+    got = evaluate(
+        gl.ctx,
+        ["lib/gaussian.glsl"],
+        body,
+        {"x": x, "w": width},
+        dict.fromkeys(("e", "box", "fast", "excess", "s"), "float"),
+    )
     assert np.abs(got["e"] - gaussians.erf(x)).max() < 2e-6
     want = gaussians.gaussian_box(x, width)
     assert np.abs(got["box"] - want).max() < 2e-6
@@ -180,7 +274,13 @@ def test_gaussians(gl) -> None:
     # Boxes side by side add up exactly by either formula.
     edges = as_f32(np.arange(-8, 8, 0.25))
     middles, half = 0.5 * (edges[1:] + edges[:-1]), np.full(len(edges) - 1, 0.125)
-    sides = evaluate(gl.ctx, ["lib/gaussian.glsl"], body, {"x": middles, "w": half}, dict.fromkeys(("e", "box", "fast", "excess", "s"), "float"))
+    sides = evaluate(
+        gl.ctx,
+        ["lib/gaussian.glsl"],
+        body,
+        {"x": middles, "w": half},
+        dict.fromkeys(("e", "box", "fast", "excess", "s"), "float"),
+    )
     assert abs(sides["box"].sum() - 1.0) < 1e-5 and abs(sides["fast"].sum() - 1.0) < 1e-5
 
 
@@ -197,7 +297,10 @@ def test_which_hits_count(scene: Scene) -> None:
     ]
     columns = list(zip(*cases, strict=True))
     inputs = {name: as_f32(np.array(column)) for name, column in zip(("distance", "facing"), columns[:2], strict=True)}
-    inputs |= {name: np.array(column, np.uint32) for name, column in zip(("object", "from_object", "inside", "mask"), columns[2:], strict=True)}
+    inputs |= {
+        name: np.array(column, np.uint32)
+        for name, column in zip(("object", "from_object", "inside", "mask"), columns[2:], strict=True)
+    }
     body = """
     RayOrigin o = RayOrigin(NONE, from_object, inside != 0u, mask);
     ok = accept_hit(distance, facing, object, o) ? 1u : 0u;
@@ -231,7 +334,16 @@ def test_where_a_ray_enters_a_box(scene: Scene) -> None:
     texels = SceneTexels(scene.ctx, {})
     defines = {**bindings.SCENE_DEFINES, **texels.defines, **COMMON, "HAS_TREE": 1, "TREE_STACK": 2}
     inputs = {"low": low, "high": high, "start": start, "direction": direction, "far": far}
-    got = evaluate(scene.ctx, ["lib/intersect.glsl"], body, inputs, {"entry": "float"}, defines, SCENE_STRUCTS, binders=[texels.bind])["entry"]
+    got = evaluate(
+        scene.ctx,
+        ["lib/intersect.glsl"],
+        body,
+        inputs,
+        {"entry": "float"},
+        defines,
+        SCENE_STRUCTS,
+        binders=[texels.bind],
+    )["entry"]
     texels.release()
     # By sampling the definition: the ray's parameters inside each slab, and their common part.
     t = np.stack([(low - start) / direction, (high - start) / direction])

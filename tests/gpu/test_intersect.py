@@ -30,11 +30,28 @@ class Tree:
     order: np.ndarray
     defines: dict[str, int]
 
-    def run(self, gl, body: str, inputs: dict[str, np.ndarray], outputs: dict[str, str], **defines: int | str) -> dict[str, np.ndarray]:
-        return evaluate(gl.ctx, ["lib/intersect.glsl"], body, inputs, outputs, self.defines | defines, SCENE_STRUCTS, binders=[self.texels.bind])
+    def run(
+        self, gl, body: str, inputs: dict[str, np.ndarray], outputs: dict[str, str], **defines: int | str
+    ) -> dict[str, np.ndarray]:
+        return evaluate(
+            gl.ctx,
+            ["lib/intersect.glsl"],
+            body,
+            inputs,
+            outputs,
+            self.defines | defines,
+            SCENE_STRUCTS,
+            binders=[self.texels.bind],
+        )
 
 
-def tree_of(gl, triangles: np.ndarray, owner: np.ndarray | None = None, objects: np.ndarray | None = None, as_image: bool | None = None) -> Tree:
+def tree_of(
+    gl,
+    triangles: np.ndarray,
+    owner: np.ndarray | None = None,
+    objects: np.ndarray | None = None,
+    as_image: bool | None = None,
+) -> Tree:
     """The tree over `triangles` (T, 3, 3), one object unless `owner` (T,) says otherwise."""
     built = build_bvh(triangles.astype(np.float32), use_cache=False)
     ordered = triangles[built.order]
@@ -43,9 +60,19 @@ def tree_of(gl, triangles: np.ndarray, owner: np.ndarray | None = None, objects:
     records["edge1"], records["edge2"] = ordered[:, 1] - ordered[:, 0], ordered[:, 2] - ordered[:, 0]
     records["normals"], records["source"] = NONE, built.order
     records["object"] = 0 if owner is None else owner[built.order]
-    sections = {"TREE": tree_texels(built.nodes), "TRIANGLES": records, "OBJECTS": OBJECT.zeros(1) if objects is None else objects}
+    sections = {
+        "TREE": tree_texels(built.nodes),
+        "TRIANGLES": records,
+        "OBJECTS": OBJECT.zeros(1) if objects is None else objects,
+    }
     texels = SceneTexels(gl.ctx, sections, as_image)
-    numbers = {"HAS_TREE": 1, "LOOSE_TRIANGLES": 1, "TREE_STACK": max(built.depth, 1), "TRIANGLE_COUNT": len(triangles), "SPECTRAL_SAMPLES": 2}
+    numbers = {
+        "HAS_TREE": 1,
+        "LOOSE_TRIANGLES": 1,
+        "TREE_STACK": max(built.depth, 1),
+        "TRIANGLE_COUNT": len(triangles),
+        "SPECTRAL_SAMPLES": 2,
+    }
     return Tree(texels, built.order, bindings.SCENE_DEFINES | texels.defines | numbers)
 
 
@@ -68,7 +95,9 @@ CLOSEST = """
 """
 
 
-def brute_force(triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
+def brute_force(
+    triangles: np.ndarray, origins: np.ndarray, directions: np.ndarray, margin: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Nearest (distance or inf, triangle) in float64 among hits at most `margin` outside an edge (barycentric)."""
     a, e1, e2 = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     distances, winners = np.empty(len(origins)), np.empty(len(origins), int)
@@ -109,7 +138,10 @@ def test_nearest_of_a_soup(gl, count: int, size: float) -> None:
 def test_an_image_and_a_texture_are_read_alike(gl) -> None:
     triangles = soup(2000, 0.1, 3)
     rays = soup_rays(3000, 4)
-    by_image, by_texture = (tree_of(gl, triangles, as_image=way).run(gl, CLOSEST, rays, {"distance": "float", "slot": "uint"}) for way in (True, False))
+    by_image, by_texture = (
+        tree_of(gl, triangles, as_image=way).run(gl, CLOSEST, rays, {"distance": "float", "slot": "uint"})
+        for way in (True, False)
+    )
     np.testing.assert_array_equal(by_image["distance"], by_texture["distance"])
     np.testing.assert_array_equal(by_image["slot"], by_texture["slot"])
     assert (by_image["distance"] > 0).mean() > 0.5
@@ -159,9 +191,17 @@ def test_a_million_rays_stay_in_a_ball(gl, ball: np.ndarray) -> None:
 
 def test_corners_and_edges_of_a_ball_are_closed(gl, ball: np.ndarray) -> None:
     rng = np.random.default_rng(9)
-    targets = np.concatenate([ball[:, 0], 0.5 * (ball[:, 0] + ball[:, 1]), ball[:, 1] + rng.random((len(ball), 1)) * (ball[:, 2] - ball[:, 1])])
+    targets = np.concatenate(
+        [
+            ball[:, 0],
+            0.5 * (ball[:, 0] + ball[:, 1]),
+            ball[:, 1] + rng.random((len(ball), 1)) * (ball[:, 2] - ball[:, 1]),
+        ]
+    )
     origins = as_f32(rng.uniform(-0.4, 0.4, targets.shape))
-    got = tree_of(gl, ball).run(gl, CLOSEST, {"o": origins, "d": unit(targets - origins)}, {"distance": "float", "slot": "uint"})
+    got = tree_of(gl, ball).run(
+        gl, CLOSEST, {"o": origins, "d": unit(targets - origins)}, {"distance": "float", "slot": "uint"}
+    )
     expected = np.linalg.norm(targets - origins, axis=1)
     assert (got["distance"] < 0).sum() == 0
     assert (np.abs(got["distance"] - expected) / expected).max() < 2e-5
@@ -184,7 +224,10 @@ def grid_box(low: np.ndarray, high: np.ndarray, cells: int) -> np.ndarray:
 
 def test_touching_boxes_are_left_and_entered_once_each(gl) -> None:
     """Straight through two boxes with a common face, meshed differently: four crossings, none lost or repeated."""
-    triangles = [grid_box(np.array([-1.0, -1, -1]), np.array([1.0, 1, 0]), 3), grid_box(np.array([-1.0, -1, 0]), np.array([1.0, 1, 1]), 5)]
+    triangles = [
+        grid_box(np.array([-1.0, -1, -1]), np.array([1.0, 1, 0]), 3),
+        grid_box(np.array([-1.0, -1, 0]), np.array([1.0, 1, 1]), 5),
+    ]
     owner = np.repeat([0, 1], [len(part) for part in triangles])
     objects = OBJECT.zeros(2)
     objects["stack_bit"] = [0, 1]

@@ -1,10 +1,10 @@
 """Pictures that must not change: no reference is needed, the same scene said in another way is the reference.
 
-Tolerances are relative root mean square differences of the caustic alone. `EXACT` is for changes that leave GPU space the
-same (lengths times a power of two, a shift by round numbers): rounding of float32 sums. `SAME_RAYS` is for changes in the order in
-which surfaces are met: a ray on an edge may go to the neighbour. `OTHER_LATTICE` is for changes that turn emission
-lattices and map texels: twice what was measured (0.015; two seeds differ by 0.007). Every tolerance stands
-beside a mutant: the scene with one thing not moved along differs by much more.
+Tolerances are relative root mean square differences of the caustic alone. `EXACT` is for changes that leave GPU space
+the same (lengths times a power of two, a shift by round numbers): rounding of float32 sums. `SAME_RAYS` is for changes
+in the order in which surfaces are met: a ray on an edge may go to the neighbour. `OTHER_LATTICE` is for changes that
+turn emission lattices and map texels: twice what was measured (0.015; two seeds differ by 0.007). Every tolerance
+stands beside a mutant: the scene with one thing not moved along differs by much more.
 """
 
 from __future__ import annotations
@@ -50,9 +50,28 @@ def scene() -> Scene:
     section = 0.6 * np.column_stack([np.cos(turn), np.sin(turn)])
     upright = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
     prism = SceneObject("prism", extruded("prism", section, half=0.6), glass("N-SF11"), upright)
-    pane = make_mesh("pane", np.array([[0.0, -0.4, 0.2], [0.0, 0.4, 0.2], [0.2, 0.4, 0.9], [0.2, -0.4, 0.9]]) + [-1.6, 0.5, 0.0], np.array([[0, 1, 2], [0, 2, 3]]))
-    spot = Light("spot", "spot", lit(20.0), position=(-5.0, 0.4, 3.2), direction=tuple(np.array([5.0, -0.4, -2.2]) / np.linalg.norm([5.0, -0.4, -2.2])), inner_half_angle_deg=3.0, outer_half_angle_deg=8.0)
-    beam = Light("beam", "collimated", lit(0.4), position=(-3.0, 0.1, 2.6), direction=tuple(np.array([3.0, 0.0, -1.6]) / 3.4), radius=0.25)
+    pane = make_mesh(
+        "pane",
+        np.array([[0.0, -0.4, 0.2], [0.0, 0.4, 0.2], [0.2, 0.4, 0.9], [0.2, -0.4, 0.9]]) + [-1.6, 0.5, 0.0],
+        np.array([[0, 1, 2], [0, 2, 3]]),
+    )
+    spot = Light(
+        "spot",
+        "spot",
+        lit(20.0),
+        position=(-5.0, 0.4, 3.2),
+        direction=tuple(np.array([5.0, -0.4, -2.2]) / np.linalg.norm([5.0, -0.4, -2.2])),
+        inner_half_angle_deg=3.0,
+        outer_half_angle_deg=8.0,
+    )
+    beam = Light(
+        "beam",
+        "collimated",
+        lit(0.4),
+        position=(-3.0, 0.1, 2.6),
+        direction=tuple(np.array([3.0, 0.0, -1.6]) / 3.4),
+        radius=0.25,
+    )
     objects = (prism, SceneObject("pane", pane, Mirror()), SceneObject("floor", floor(), Diffuse()))
     return Scene("invariance", Camera((1.0, -5.0, 4.0), (0.9, 0.0, 0.0)), (spot, beam), objects)
 
@@ -70,11 +89,27 @@ def moved(question: Scene, matrix: np.ndarray, lights: bool = True) -> Scene:
     def light(source: Light) -> Light:
         factor = scale**2 if source.kind in ("point", "spot") else 1.0
         spectrum = Spectrum(source.spectral_power.density * factor, source.spectral_power.lines)
-        return replace(source, position=point(source.position), direction=direction(source.direction), radius=source.radius * scale, spectral_power=spectrum)
+        return replace(
+            source,
+            position=point(source.position),
+            direction=direction(source.direction),
+            radius=source.radius * scale,
+            spectral_power=spectrum,
+        )
 
-    camera = replace(question.camera, position=point(question.camera.position), target=point(question.camera.target), up=direction(question.camera.up))
+    camera = replace(
+        question.camera,
+        position=point(question.camera.position),
+        target=point(question.camera.target),
+        up=direction(question.camera.up),
+    )
     objects = tuple(replace(o, object_to_world=matrix @ o.object_to_world) for o in question.objects)
-    return replace(question, camera=camera, objects=objects, lights=tuple(map(light, question.lights)) if lights else question.lights)
+    return replace(
+        question,
+        camera=camera,
+        objects=objects,
+        lights=tuple(map(light, question.lights)) if lights else question.lights,
+    )
 
 
 def placed(scale: float = 1.0, offset: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> np.ndarray:
@@ -92,7 +127,9 @@ def turned(axis: tuple[float, float, float], degrees: float) -> np.ndarray:
 
 
 def with_mesh(question: Scene, name: str, change) -> Scene:
-    return replace(question, objects=tuple(replace(o, mesh=change(o.mesh)) if o.name == name else o for o in question.objects))
+    return replace(
+        question, objects=tuple(replace(o, mesh=change(o.mesh)) if o.name == name else o for o in question.objects)
+    )
 
 
 def subdivided(mesh: Mesh) -> Mesh:
@@ -170,7 +207,11 @@ def test_any_unit_of_length_will_do(gl, original: np.ndarray, scale: float) -> N
     assert after.sum() == pytest.approx(original.sum(), rel=ENERGY)
 
 
-@pytest.mark.parametrize(("axis", "degrees"), [((0.0, 0.0, 1.0), 90.0), pytest.param((1.0, 2.0, 0.5), 71.0, marks=SLOW)], ids=["quarter", "askew"])
+@pytest.mark.parametrize(
+    ("axis", "degrees"),
+    [((0.0, 0.0, 1.0), 90.0), pytest.param((1.0, 2.0, 0.5), 71.0, marks=SLOW)],
+    ids=["quarter", "askew"],
+)
 def test_all_may_turn_together(gl, original: np.ndarray, axis: tuple[float, float, float], degrees: float) -> None:
     after = picture(gl, moved(scene(), turned(axis, degrees)))
     assert difference(after, original) < OTHER_LATTICE
@@ -188,7 +229,11 @@ def test_batches_do_not_show(gl, original: np.ndarray) -> None:
     assert difference(picture(gl, scene(), batch=8192), original) < EXACT
 
 
-@pytest.mark.parametrize("change", [pytest.param(subdivided, marks=SLOW), unwelded, pytest.param(shuffled, marks=SLOW)], ids=lambda f: f.__name__)
+@pytest.mark.parametrize(
+    "change",
+    [pytest.param(subdivided, marks=SLOW), unwelded, pytest.param(shuffled, marks=SLOW)],
+    ids=lambda f: f.__name__,
+)
 def test_how_a_flat_solid_is_cut_into_triangles_does_not_show(gl, original: np.ndarray, change) -> None:
     assert difference(picture(gl, with_mesh(scene(), "prism", change)), original) < SAME_RAYS
 
@@ -232,7 +277,11 @@ def test_order_of_lights_does_not_show(gl, original: np.ndarray) -> None:
 @pytest.mark.slow
 def test_two_halves_of_a_light_are_the_light(gl, original: np.ndarray) -> None:
     question = scene()
-    measured_passes = tuple(replace(light, name=f"{light.name} {k}", spectral_power=Spectrum(0.5 * light.spectral_power.density)) for light in question.lights for k in (1, 2))
+    measured_passes = tuple(
+        replace(light, name=f"{light.name} {k}", spectral_power=Spectrum(0.5 * light.spectral_power.density))
+        for light in question.lights
+        for k in (1, 2)
+    )
     after = picture(gl, replace(question, lights=measured_passes), photons=2 * SMALL.photons)
     assert difference(after, original) < OTHER_LATTICE
     assert after.sum() == pytest.approx(original.sum(), rel=ENERGY)
@@ -241,14 +290,16 @@ def test_two_halves_of_a_light_are_the_light(gl, original: np.ndarray) -> None:
 @pytest.mark.slow
 def test_resolution_of_a_map_does_not_change_what_it_holds(gl) -> None:
     """The window is the same, so the mean of its irradiance is; what blurs over its rim is all that may differ."""
-    coarse, fine = (picture(gl, scene(), layer="map:floor", width=side, height=side).mean(axis=(0, 1)) for side in (48, 160))
+    coarse, fine = (
+        picture(gl, scene(), layer="map:floor", width=side, height=side).mean(axis=(0, 1)) for side in (48, 160)
+    )
     np.testing.assert_allclose(fine, coarse, rtol=3e-3)
 
 
 @pytest.mark.slow
 def test_seeds_differ_and_their_means_agree(gl) -> None:
-    """Two sets of eight seeds: the difference of each block of pixels, and of the sum, in standard errors. Sums that differ by
-    2 % would be seen with probability 0.99."""
+    """Two sets of eight seeds: the difference of each block of pixels, and of the sum, in standard errors. Sums that
+    differ by 2 % would be seen with probability 0.99."""
     settings = {"photons": 8_000, "layer": "caustic", "method": "stochastic"}
     seeds = np.array([picture(gl, scene(), seed=seed, **settings) for seed in range(16)])
     assert not np.array_equal(seeds[0], seeds[1])

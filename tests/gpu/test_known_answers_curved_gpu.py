@@ -52,12 +52,15 @@ def lifted(mesh: Mesh, z: float) -> Mesh:
 
 
 def focal_lengths(gl: Context, lenses: tuple[SceneObject, ...], radius: float, near: float, far: float) -> list[float]:
-    """Effective focal length for F, d, C of lenses on the z axis: h over the slope of the rays that leave, on the axis."""
+    """Effective focal length for F, d, C of lenses on the z axis: h over the slope of the rays that leave, on the
+    axis."""
     surfaces = 2 * len(lenses)
 
     def traced_onto(target: Mesh):
         bands = [(nm, nm) for nm in LINES]
-        return trace_beam(gl, lenses, None, target, (0, 0, -1), (0, 0, 1), radius, bands, count=300, max_depth=surfaces).of_choices(*[REFRACTED] * surfaces)
+        return trace_beam(
+            gl, lenses, None, target, (0, 0, -1), (0, 0, 1), radius, bands, count=300, max_depth=surfaces
+        ).of_choices(*[REFRACTED] * surfaces)
 
     rays = outgoing(traced_onto, (0, 0, 1), near, far, half=3.0)
     across = rays.photons.start * [1, 1, 0]
@@ -89,7 +92,9 @@ def test_t6_aplanatic_sphere(gl) -> None:
     rays = outgoing(traced_onto, (1, 0, 0), 1.2, 3.2)
     angle = np.arccos(rays.photons.direction[:, 0])
     across = rays.photons.position * [0, 1, 1]
-    image = rays.photons.position[:, 0] - np.linalg.norm(across, axis=1) ** 2 * rays.direction[:, 0] / dot(rays.direction, across)
+    image = rays.photons.position[:, 0] - np.linalg.norm(across, axis=1) ** 2 * rays.direction[:, 0] / dot(
+        rays.direction, across
+    )
 
     def exact(angle_rad: float, nm: float) -> float:
         start = make_ray([-1 / N_BK7_D, 0, 0], [np.cos(angle_rad), np.sin(angle_rad), 0])
@@ -116,10 +121,12 @@ def test_t6_up_to_89_degrees_on_the_exact_sphere(gl) -> None:
         along = -direction @ source + np.sqrt((direction @ source) ** 2 + 1 - source @ source)
         point = source + along[:, None] * direction
         got = evaluate(
-            gl.ctx, ["lib/optics.glsl"],
+            gl.ctx,
+            ["lib/optics.glsl"],
             "float theta = dot(d, n); out_d = refract_direction(d, n, theta, eta, sqrt(transmitted_cosine2(theta, eta)));",
-            {"d": direction, "n": -point, "eta": np.full(len(angle), n)}, {"out_d": "vec3"},
-        )["out_d"]  # fmt: skip
+            {"d": direction, "n": -point, "eta": np.full(len(angle), n)},
+            {"out_d": "vec3"},
+        )["out_d"]
         image = point[:, 0] - point[:, 1] * got[:, 0] / got[:, 1]
         if nm == D_NM:
             np.testing.assert_allclose(image, -N_BK7_D, rtol=1e-4)
@@ -133,7 +140,9 @@ def test_t7_cartesian_ellipsoid(gl) -> None:
     solid = placed("ellipsoid", ellipsoid((1.0, short, short), 81_920), glass("N-BK7"))
     # The screen stands in the far focus, inside the glass.
     target = screen((eccentricity, 0, 0), (1, 0, 0), 0.1)
-    photons = trace_beam(gl, (solid,), None, target, (-2, 0, 0), (1, 0, 0), 0.6, [(nm, nm) for nm in LINES], count=400, max_depth=1)
+    photons = trace_beam(
+        gl, (solid,), None, target, (-2, 0, 0), (1, 0, 0), 0.6, [(nm, nm) for nm in LINES], count=400, max_depth=1
+    )
     across = photons.start * [0, 1, 1]
     height = np.linalg.norm(across, axis=1)
     miss = dot(photons.position, across) / height
@@ -161,7 +170,10 @@ def test_t9_mirror_nephroid(gl) -> None:
     dposition = frame[0] * photons.dposition_ds + frame[1] * photons.dposition_dt
     ddirection = frame[0] * rays.ddirection_ds + frame[1] * rays.ddirection_dt
     cross = lambda a, b: a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    caustic = photons.position - (cross(dposition, rays.direction) / cross(ddirection, rays.direction))[:, None] * rays.direction
+    caustic = (
+        photons.position
+        - (cross(dposition, rays.direction) / cross(ddirection, rays.direction))[:, None] * rays.direction
+    )
     t = np.arcsin(photons.start[:, 1])
     exact = np.column_stack([3 * np.cos(t) - np.cos(3 * t), 3 * np.sin(t) - np.sin(3 * t)]) / 4
     off = np.linalg.norm(caustic[:, :2] - exact, axis=1)
@@ -172,7 +184,9 @@ def test_t9_mirror_nephroid(gl) -> None:
     # The slope has both signs on a facet, so a fit through many is of second order again.
     near = np.abs(t - np.radians(30)) < np.radians(6)
     for axis, expected in ((0, 0.649519), (1, 0.125)):
-        assert np.polyval(np.polyfit(t[near] - np.radians(30), caustic[near, axis], 3), 0.0) == pytest.approx(expected, abs=2e-4)
+        assert np.polyval(np.polyfit(t[near] - np.radians(30), caustic[near, axis], 3), 0.0) == pytest.approx(
+            expected, abs=2e-4
+        )
     cusp = np.abs(t) < np.radians(6)
     assert np.polyval(np.polyfit(t[cusp], caustic[cusp, 0], 2), 0.0) == pytest.approx(0.5, abs=2e-4)
 
@@ -188,7 +202,9 @@ def rainbow(gl: Context, bounces: int, wavelengths_nm: tuple[float, ...]) -> Out
 
     def traced_onto(target: Mesh):
         bands = [(nm, nm) for nm in wavelengths_nm]
-        return trace_beam(gl, ball, None, target, (-4, height, 0), (1, 0, 0), 0.045, bands, count=300, max_depth=len(path)).of_choices(*path)
+        return trace_beam(
+            gl, ball, None, target, (-4, height, 0), (1, 0, 0), 0.045, bands, count=300, max_depth=len(path)
+        ).of_choices(*path)
 
     return outgoing(traced_onto, exact.direction, 3.0, 6.0, half=1.0)
 
@@ -203,7 +219,8 @@ def in_ball(height: float, n: float, bounces: int):
 
 
 @pytest.mark.parametrize(
-    ("bounces", "radii_deg", "dradius_dn"), [(1, (40.5674, 42.0195, 42.4405), -2.53492), (2, (53.6198, 50.9964, 50.2379), 4.57002)]
+    ("bounces", "radii_deg", "dradius_dn"),
+    [(1, (40.5674, 42.0195, 42.4405), -2.53492), (2, (53.6198, 50.9964, 50.2379), 4.57002)],
 )
 def test_t10_rainbows(gl, bounces: int, radii_deg: tuple[float, ...], dradius_dn: float) -> None:
     lines = (400.0, D_NM, 700.0)
@@ -256,5 +273,3 @@ def test_t11_achromat_of_two_thin_lenses(gl) -> None:
     # What an achromat is: F and C together, d a twentieth of a unit before them. Float32 leaves 2e-3.
     assert got[0] - got[2] == pytest.approx(exact(0) - exact(2), abs=4e-3)
     assert 0.5 * (got[0] + got[2]) - got[1] == pytest.approx(0.04996, abs=4e-3)
-
-

@@ -51,7 +51,12 @@ N_BK7_D = float(glasses.index("N-BK7", D_NM))
 )
 def test_t1_index_tables(gl, name: str, n_fdc: tuple[float, ...], abbe: float, slope_per_um: float) -> None:
     light = Light("light", "point", constant(1.0), position=(0, 0, 5))
-    scene = Scene("glass", Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), (light,), (placed("block", box(), glass(name)), placed("floor", screen((0, 0, -2), (0, 0, 1)), Diffuse())))
+    scene = Scene(
+        "glass",
+        Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)),
+        (light,),
+        (placed("block", box(), glass(name)), placed("floor", screen((0, 0, -2), (0, 0, 1)), Diffuse())),
+    )
     # By the λ-column, so that the table of slopes is dn/dλ.
     features = Features.of(scene, RenderSettings(method="srd-lambda"))
     axis = spectral_axis(scene, features)
@@ -61,9 +66,15 @@ def test_t1_index_tables(gl, name: str, n_fdc: tuple[float, ...], abbe: float, s
     buffers = SceneBuffers(gl.ctx, scene, features, axis)
     try:
         got = evaluate(
-            gl.ctx, ["lib/scene.glsl"], "n = spectral_row(uint(INDEX_ROW), x); slope = spectral_row(uint(SLOPE_ROW), x);",
-            {"x": x}, {"n": "float", "slope": "float"}, features.defines() | buffers.defines, SCENE_STRUCTS, binders=[buffers.bind],
-        )  # fmt: skip
+            gl.ctx,
+            ["lib/scene.glsl"],
+            "n = spectral_row(uint(INDEX_ROW), x); slope = spectral_row(uint(SLOPE_ROW), x);",
+            {"x": x},
+            {"n": "float", "slope": "float"},
+            features.defines() | buffers.defines,
+            SCENE_STRUCTS,
+            binders=[buffers.bind],
+        )
     finally:
         buffers.release()
     exact_nm = axis.nm_of_x(x.astype(float))
@@ -90,7 +101,9 @@ def test_t8_diacaustic_of_a_plane(gl) -> None:
     light = Light("light", "point", constant(1.0), position=(0.0, 0.0, 0.5))
 
     def traced_onto(target):
-        return trace_light(gl, (block, placed("screen", target, Diffuse())), light, [(D_NM, D_NM)], 2000, 1).of_choices(REFRACTED)
+        return trace_light(gl, (block, placed("screen", target, Diffuse())), light, [(D_NM, D_NM)], 2000, 1).of_choices(
+            REFRACTED
+        )
 
     rays = outgoing(traced_onto, (0, 0, 1), 1.6, 3.6)
     photons = rays.photons
@@ -110,7 +123,9 @@ def test_t8_diacaustic_of_a_plane(gl) -> None:
     # The table's own ray, from its neighbours.
     near = np.abs(angle - np.radians(25)) < np.radians(3)
     for got, expected in ((x, 0.131883), (y, -0.400415)):
-        assert np.polyval(np.polyfit(angle[near] - np.radians(25), got[near], 3), 0.0) == pytest.approx(expected, rel=1e-4)
+        assert np.polyval(np.polyfit(angle[near] - np.radians(25), got[near], 3), 0.0) == pytest.approx(
+            expected, rel=1e-4
+        )
 
 
 def amici_agrees(gl: Context) -> None:
@@ -118,7 +133,11 @@ def amici_agrees(gl: Context) -> None:
     tilts = np.tan(np.radians([31.388079, -45.0, 45.0, -31.388079]))
     ends = [np.array([[x + 0.3 * tilt, -0.3], [x - 0.3 * tilt, 0.3]]) for x, tilt in enumerate(tilts)]
     solids = [
-        placed(f"{k} {name}", extruded(name, np.array([ends[k][0], ends[k + 1][0], ends[k + 1][1], ends[k][1]])), glass(name))
+        placed(
+            f"{k} {name}",
+            extruded(name, np.array([ends[k][0], ends[k + 1][0], ends[k + 1][1], ends[k][1]])),
+            glass(name),
+        )
         for k, name in enumerate(("N-BK7", "N-SF11", "N-BK7"))
     ]
     lines = {F_NM: -2.21096, D_NM: 0.0, C_NM: 0.82305, 400.0: -6.65042}
@@ -132,7 +151,9 @@ def amici_agrees(gl: Context) -> None:
     for band, (nm, expected_deg) in enumerate(lines.items()):
         of_line = rays.photons.band == band
         assert np.count_nonzero(of_line) > 30, "paths"
-        assert np.degrees(rays.heading[of_line]) == pytest.approx(expected_deg, rel=1e-4, abs=1e-4), f"deviation at {nm}"
+        assert np.degrees(rays.heading[of_line]) == pytest.approx(expected_deg, rel=1e-4, abs=1e-4), (
+            f"deviation at {nm}"
+        )
         if nm == D_NM:
             slopes = [glasses.slope(name, nm) for name in ("N-BK7", "N-SF11")]
             assert rays.dheading_dn[of_line] @ slopes == pytest.approx(0.257201, rel=1e-4), "slope"
@@ -150,7 +171,9 @@ def test_t12_amici_prism_of_three_touching_solids(gl) -> None:
     ],
     ids=["sign of the slope", "a film of air"],
 )
-def test_t12_mutants_are_caught(gl, file: str, old: str, new: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_t12_mutants_are_caught(
+    gl, file: str, old: str, new: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     mutate(monkeypatch, tmp_path, file, old, new)
     with pytest.raises(AssertionError):
         amici_agrees(gl)
@@ -166,7 +189,11 @@ def test_t16_fresnel_function(gl) -> None:
     inside = -np.sqrt(1 - (1 - cosine**2) / N_BK7_D**2)
     theta, eta = np.append(-cosine, inside), np.repeat([1 / N_BK7_D, N_BK7_D], len(cosine))
     got = evaluate(
-        gl.ctx, ["lib/optics.glsl"], "r = fresnel_reflectance(theta, eta, transmitted_cosine2(theta, eta));", {"theta": theta, "eta": eta}, {"r": "float"}
+        gl.ctx,
+        ["lib/optics.glsl"],
+        "r = fresnel_reflectance(theta, eta, transmitted_cosine2(theta, eta));",
+        {"theta": theta, "eta": eta},
+        {"r": "float"},
     )["r"].reshape(2, -1)
     for side in got:
         assert side[:-1] == pytest.approx([r for _, r in FRESNEL], rel=1e-4)
@@ -184,7 +211,12 @@ def test_t16_fresnel_of_a_slab(gl, angle_deg: float, reflectance: float) -> None
     shares = {}
     for target in (below, above):
         photons = trace_beam(gl, block, glass("N-BK7"), target, start, direction, 0.2, D_NM, count=60, max_depth=5)
-        for path in ((REFLECTED,), (REFRACTED, REFRACTED), (REFRACTED, REFLECTED, REFRACTED), (REFRACTED, REFLECTED, REFLECTED, REFRACTED)):
+        for path in (
+            (REFLECTED,),
+            (REFRACTED, REFRACTED),
+            (REFRACTED, REFLECTED, REFRACTED),
+            (REFRACTED, REFLECTED, REFLECTED, REFRACTED),
+        ):
             taken = photons.of_choices(*path)
             if len(taken.records):
                 assert len(taken.records) == photons.lattice_in_disc
@@ -192,6 +224,6 @@ def test_t16_fresnel_of_a_slab(gl, angle_deg: float, reflectance: float) -> None
     assert shares[(REFLECTED,)] == pytest.approx(reflectance, rel=1e-4)
     assert shares[(REFRACTED, REFRACTED)] == pytest.approx((1 - reflectance) ** 2, rel=1e-4)
     assert shares[(REFRACTED, REFLECTED, REFRACTED)] == pytest.approx((1 - reflectance) ** 2 * reflectance, rel=1e-4)
-    assert shares[(REFRACTED, REFLECTED, REFLECTED, REFRACTED)] == pytest.approx((1 - reflectance) ** 2 * reflectance**2, rel=1e-4)
-
-
+    assert shares[(REFRACTED, REFLECTED, REFLECTED, REFRACTED)] == pytest.approx(
+        (1 - reflectance) ** 2 * reflectance**2, rel=1e-4
+    )

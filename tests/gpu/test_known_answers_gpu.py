@@ -107,7 +107,9 @@ def slab_agrees(gl: Context, name: str) -> None:
     assert np.abs(columns[1].mean(0) - columns[0].mean(0)).max() / 20 < 1e-6, "column"
 
 
-@pytest.mark.parametrize(("name", "x", "dx_dum"), [("N-BK7", 0.526946, 0.018554), ("F2", None, None), ("N-SF11", 0.431514, 0.043846)])
+@pytest.mark.parametrize(
+    ("name", "x", "dx_dum"), [("N-BK7", 0.526946, 0.018554), ("F2", None, None), ("N-SF11", 0.431514, 0.043846)]
+)
 def test_t3_slab_leaves_direction_without_dispersion(gl, name: str, x: float | None, dx_dum: float | None) -> None:
     slab_agrees(gl, name)
     if x is not None:
@@ -117,9 +119,13 @@ def test_t3_slab_leaves_direction_without_dispersion(gl, name: str, x: float | N
 
 
 @pytest.mark.parametrize(
-    ("old", "new"), [("derivative -= n_i", "derivative += n_i"), ("derivative += medium_slope", "derivative -= medium_slope")], ids=["entering", "leaving"]
+    ("old", "new"),
+    [("derivative -= n_i", "derivative += n_i"), ("derivative += medium_slope", "derivative -= medium_slope")],
+    ids=["entering", "leaving"],
 )
-def test_t3_catches_one_sign_at_both_faces(gl, old: str, new: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_t3_catches_one_sign_at_both_faces(
+    gl, old: str, new: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     mutate(monkeypatch, tmp_path, "lib/medium.glsl", old, new)
     with pytest.raises(AssertionError, match="^column"):
         slab_agrees(gl, "N-BK7")
@@ -137,7 +143,9 @@ def through_ball(height: float, index: Index) -> np.ndarray:
 @pytest.mark.parametrize("nm", [F_NM, D_NM, C_NM])
 def test_t4_ball_lens(gl, nm: float) -> None:
     ball = ball_mesh(327_680)
-    photons = trace_beam(gl, ball, glass("N-BK7"), screen([1.2, 0, 0], [1, 0, 0]), [-3, 0, 0], [1, 0, 0], 0.85, nm, count=600).of_depth(2)
+    photons = trace_beam(
+        gl, ball, glass("N-BK7"), screen([1.2, 0, 0], [1, 0, 0]), [-3, 0, 0], [1, 0, 0], 0.85, nm, count=600
+    ).of_depth(2)
     index = Index(float(glasses.index("N-BK7", nm)))
     height = np.linalg.norm(photons.start[:, 1:], axis=1)
     radial = photons.start / height[:, None]
@@ -149,7 +157,8 @@ def test_t4_ball_lens(gl, nm: float) -> None:
     assert np.median(np.abs(dot(photons.position, radial) - exact[:, 0, 1])) < 5e-5
     spectral = np.abs(dot(photons.dposition_dn, radial) - exact[:, 1, 1])
     assert np.median(spectral / np.abs(exact[:, 1, 1])) < 2e-3 and spectral.max() < 0.02
-    # Effective focal length from the innermost rays: y = h (1 - (x - principal plane)/f), principal plane in the centre.
+    # Effective focal length from the innermost rays: y = h (1 - (x - principal plane)/f), principal plane in the
+    # centre.
     inner = height < 0.12
     focal_length = 1.2 / (1 - dot(photons.position, radial) / height)[inner]
     assert np.median(focal_length) == pytest.approx(index.n / (2 * (index.n - 1)), rel=1e-2)
@@ -181,7 +190,9 @@ def test_t13_band_split_by_total_reflection(gl) -> None:
         ("N-SF11", (143.1368, 26.3026, -18.2710, -41.9603), None),
     ],
 )
-def test_t14_prism_spectrum_on_a_screen(gl, name: str, x_mm: tuple[float, ...], dnm_dmm: tuple[float, ...] | None) -> None:
+def test_t14_prism_spectrum_on_a_screen(
+    gl, name: str, x_mm: tuple[float, ...], dnm_dmm: tuple[float, ...] | None
+) -> None:
     incidence = float(np.arcsin(glasses.index(name, 550.0) / 2))
     straight = incidence - APEX / 2 - (2 * incidence - APEX)
     for i, nm in enumerate((400.0, 500.0, 600.0, 700.0)):
@@ -198,7 +209,15 @@ def test_t14_prism_spectrum_on_a_screen(gl, name: str, x_mm: tuple[float, ...], 
 def test_t15_energy_near_the_fold_of_a_ball(gl) -> None:
     # One photon a lattice point, all of the same weight before Fresnel: counting them leaves Fresnel out.
     photons = trace_beam(
-        gl, ball_mesh(81_920), glass("N-BK7"), screen([1.2, 0, 0], [1, 0, 0]), [-3, 0, 0], [1, 0, 0], 1.0, D_NM, count=60_000
+        gl,
+        ball_mesh(81_920),
+        glass("N-BK7"),
+        screen([1.2, 0, 0], [1, 0, 0]),
+        [-3, 0, 0],
+        [1, 0, 0],
+        1.0,
+        D_NM,
+        count=60_000,
     )
     emitted = photons.lattice_in_disc
     straight = photons.of_depth(2)
@@ -218,7 +237,15 @@ def test_t15_energy_near_the_fold_of_a_ball(gl) -> None:
 
 def test_t15_fold_of_each_line(gl) -> None:
     photons = trace_beam(
-        gl, ball_mesh(81_920), glass("N-BK7"), screen([1.2, 0, 0], [1, 0, 0]), [-3, 0, 0], [1, 0, 0], 0.55, [(nm, nm) for nm in (F_NM, D_NM, C_NM)], count=3000
+        gl,
+        ball_mesh(81_920),
+        glass("N-BK7"),
+        screen([1.2, 0, 0], [1, 0, 0]),
+        [-3, 0, 0],
+        [1, 0, 0],
+        0.55,
+        [(nm, nm) for nm in (F_NM, D_NM, C_NM)],
+        count=3000,
     ).of_depth(2)
     radius = np.linalg.norm(photons.position[:, 1:], axis=1)
     height = np.linalg.norm(photons.start[:, 1:], axis=1)
@@ -230,7 +257,9 @@ def test_t15_fold_of_each_line(gl) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "mirrored_at"), [("ball", ()), ("prism", ()), ("ball", (1,)), ("ball", (0,))], ids=["ball", "prism", "rainbow", "gloss"]
+    ("kind", "mirrored_at"),
+    [("ball", ()), ("prism", ()), ("ball", (1,)), ("ball", (0,))],
+    ids=["ball", "prism", "rainbow", "gloss"],
 )
 def test_whole_paths_against_the_reference_over_the_same_triangles(gl, kind: str, mirrored_at: tuple[int, ...]) -> None:
     """Position, every column and the flux with exact Fresnel of each photon on one kind of path."""
@@ -242,7 +271,9 @@ def test_whole_paths_against_the_reference_over_the_same_triangles(gl, kind: str
     # Gloss goes back from the front of the ball, a rainbow from its middle heights.
     radius = 0.25 if not ball else 0.4 if mirrored_at == (0,) else 0.7
     events = 1 if mirrored_at == (0,) else 2 + len(mirrored_at)
-    photons = trace_beam(gl, solid, glass("F2"), target, middle - 3 * direction, direction, radius, D_NM, count=120).of_depth(events)
+    photons = trace_beam(
+        gl, solid, glass("F2"), target, middle - 3 * direction, direction, radius, D_NM, count=120
+    ).of_depth(events)
     scene = TriangleList(
         np.concatenate([solid.corners(), target.corners()]),
         np.array([0] * len(solid.triangles) + [RECEIVER] * 2),
@@ -273,11 +304,18 @@ def test_the_same_scene_elsewhere_and_in_other_units(gl, scale: float, offset: f
     matrix[:3, 3] = centre
     plain, moved = (
         trace_beam(
-            gl, ball_mesh(1280).transformed(m), glass("N-BK7"), screen([1.2, 0, 0], [1, 0, 0]).transformed(m),
-            m[:3] @ [-3, 0, 0, 1], [1, 0, 0], 0.8 * m[0, 0], D_NM, count=300,
+            gl,
+            ball_mesh(1280).transformed(m),
+            glass("N-BK7"),
+            screen([1.2, 0, 0], [1, 0, 0]).transformed(m),
+            m[:3] @ [-3, 0, 0, 1],
+            [1, 0, 0],
+            0.8 * m[0, 0],
+            D_NM,
+            count=300,
         ).of_depth(2)
         for m in (np.eye(4), matrix)
-    )  # fmt: skip
+    )
     plain, moved = (photons.where(np.argsort(photons.records["photon_id"])) for photons in (plain, moved))
     assert np.array_equal(plain.records["photon_id"], moved.records["photon_id"])
     assert len(plain.records) > 200

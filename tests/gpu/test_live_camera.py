@@ -1,4 +1,5 @@
-"""The live camera before dispersive glass: smooth while the camera moves, whole cycles of bands once it rests, and edits that are only looked at."""
+"""The live camera before dispersive glass: smooth while the camera moves, whole cycles of bands once it rests, and
+edits that are only looked at."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ from spectrasplat.model.scene import Camera, Dielectric, Scene
 from spectrasplat.model.texture import Environment
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.render.viewer.engine import LOOK_S, Budget, LiveEngine
-from spectrasplat.render.viewer.inputs import LiveInputs, DirtyLevel
-from spectrasplat.render.viewer.invalidation import looks_other, dirty_level
+from spectrasplat.render.viewer.inputs import DirtyLevel, LiveInputs
+from spectrasplat.render.viewer.invalidation import dirty_level, looks_other
 from spectrasplat.render.viewer.live_camera import SCALES, _side, solo_scene
 from spectrasplat.render.viewer.spectrum_guess import guess_weights
 
@@ -34,7 +35,10 @@ def stage() -> Scene:
     scene = load_scene(assets_dir() / "scenes" / "prism.toml")
     below = np.eye(4)
     below[2, 3] = -30.0
-    objects = tuple(o if isinstance(o.material, Dielectric) else replace(o, object_to_world=below @ o.object_to_world) for o in scene.objects)
+    objects = tuple(
+        o if isinstance(o.material, Dielectric) else replace(o, object_to_world=below @ o.object_to_world)
+        for o in scene.objects
+    )
     glass = next(o for o in objects if isinstance(o.material, Dielectric))
     middle = glass.object_to_world[:3, :3] @ np.mean(glass.mesh.bounds(), axis=0) + glass.object_to_world[:3, 3]
     x, y, z = (float(v) for v in middle)
@@ -55,7 +59,9 @@ def edged(scene: Scene, turn_deg: float = 0.0) -> Scene:
 
 def with_dispersion(scene: Scene, gain: float) -> Scene:
     objects = [
-        replace(o, material=replace(o.material, dispersion=with_gain(o.material.dispersion, gain))) if isinstance(o.material, Dielectric) else o
+        replace(o, material=replace(o.material, dispersion=with_gain(o.material.dispersion, gain)))
+        if isinstance(o.material, Dielectric)
+        else o
         for o in scene.objects
     ]
     return replace(scene, objects=tuple(objects))
@@ -70,7 +76,9 @@ def engine(gl: Context) -> Iterator[LiveEngine]:
     made.release()
 
 
-def until(done: Callable[[], bool], engine: LiveEngine, each: Callable[[], None] = lambda: None, patience_s: float = 120.0) -> None:
+def until(
+    done: Callable[[], bool], engine: LiveEngine, each: Callable[[], None] = lambda: None, patience_s: float = 120.0
+) -> None:
     end = time.monotonic() + patience_s
     while not done():
         assert engine.problem is None, engine.problem
@@ -106,8 +114,12 @@ def colour_grain(rgb: np.ndarray, mask: np.ndarray) -> float:
     return float(np.sqrt((step**2).mean()))
 
 
-def test_a_moving_camera_sees_no_colour_grain_in_glass(engine: LiveEngine, stage: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("spectrasplat.render.viewer.live_camera.SCALES", (1.0,))  # a slow machine must not leave too few pixels to see grain in
+def test_a_moving_camera_sees_no_colour_grain_in_glass(
+    engine: LiveEngine, stage: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "spectrasplat.render.viewer.live_camera.SCALES", (1.0,)
+    )  # a slow machine must not leave too few pixels to see grain in
     settle(engine, inputs(stage))
     moved = replace(stage.camera, position=tuple(np.add(stage.camera.position, (0.02, 0.0, 0.0))))
     engine.set(replace(inputs(stage), camera=moved))
@@ -148,7 +160,12 @@ def test_better_maps_wait_for_a_cycle_and_the_last_are_shown(engine: LiveEngine,
     engine.target_photons = 1 << 16
     wanted = inputs(with_dispersion(edged(stage), 3.0))
     engine.set(wanted)
-    until(lambda: engine._camera_pass.is_within_cycle and engine._shown is not None and engine._shown.accumulation.number >= 1, engine)
+    until(
+        lambda: (
+            engine._camera_pass.is_within_cycle and engine._shown is not None and engine._shown.accumulation.number >= 1
+        ),
+        engine,
+    )
     maps = engine._maps
     engine._shown.accumulation.number += 1
     engine._publish_maps()
@@ -159,12 +176,17 @@ def test_better_maps_wait_for_a_cycle_and_the_last_are_shown(engine: LiveEngine,
     assert engine.stats.photons == pytest.approx(engine._shown.light.maps.photon_weight, abs=1)
 
 
-def test_an_edited_dispersion_changes_what_is_seen_in_glass_and_traces_nothing(engine: LiveEngine, gl: Context, stage: Scene) -> None:
+def test_an_edited_dispersion_changes_what_is_seen_in_glass_and_traces_nothing(
+    engine: LiveEngine, gl: Context, stage: Scene
+) -> None:
     scene = edged(stage)
     before = settle(engine, inputs(scene))
     rays, mask = engine.stats.rays_traced, in_glass(engine, before.shape)
     edited = with_dispersion(scene, 4.0)
-    assert looks_other(inputs(scene), inputs(edited)) and dirty_level(inputs(scene), inputs(scene), inputs(edited)) == DirtyLevel.SPLAT
+    assert (
+        looks_other(inputs(scene), inputs(edited))
+        and dirty_level(inputs(scene), inputs(scene), inputs(edited)) == DirtyLevel.SPLAT
+    )
     after = settle(engine, inputs(edited))
     assert engine.stats.rays_traced == rays and engine.stats.first_order
     change = np.abs(after - before).max(axis=-1)
@@ -180,7 +202,9 @@ def test_environments_are_only_looked_at_and_a_turned_one_is_not_sent_again(engi
     plain = settle(engine, inputs(stage))
     rays, shown = engine.stats.rays_traced, engine._shown
     striped = edged(stage)
-    turned = replace(striped, environment=replace(striped.environment, world_to_local=world_to_local((0.0, 0.0, 1.0), 4.0)))
+    turned = replace(
+        striped, environment=replace(striped.environment, world_to_local=world_to_local((0.0, 0.0, 1.0), 4.0))
+    )
     graded = replace(stage, environment=gradient((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
     for scene in (striped, turned, graded):
         assert dirty_level(engine._inputs, engine._inputs, inputs(scene)) == DirtyLevel.LOOK
@@ -219,14 +243,19 @@ def test_a_picture_in_motion_is_as_small_as_its_time_asks_for(engine: LiveEngine
     assert all(later > before for before, later in zip(pictures[:-4], pictures[4:], strict=True)), pictures
     viewpoint = engine._camera_pass
     pixels = viewpoint.picture.width * viewpoint.picture.height
-    assert viewpoint.shown_samples == 1 and (pixels <= 2.0 * viewpoint._rates[True] * LOOK_S or viewpoint.scale == SCALES[-1])
+    assert viewpoint.shown_samples == 1 and (
+        pixels <= 2.0 * viewpoint._rates[True] * LOOK_S or viewpoint.scale == SCALES[-1]
+    )
     # Ten times the aim leaves room for a machine that does other things besides.
     assert np.median(seconds[4:]) < 10 * 0.05
 
 
 def test_sides_in_motion_are_no_powers_of_two() -> None:
     sides = [_side(pixels) for pixels in range(1, 1100)]
-    assert all(side & (side - 1) for side in sides) and max(abs(side - pixels) for pixels, side in enumerate(sides[8:], start=9)) <= 1
+    assert (
+        all(side & (side - 1) for side in sides)
+        and max(abs(side - pixels) for pixels, side in enumerate(sides[8:], start=9)) <= 1
+    )
 
 
 def test_the_spectrum_guessed_for_a_colour_has_that_colour(gl: Context, engine: LiveEngine, stage: Scene) -> None:

@@ -1,4 +1,5 @@
-"""Stored photons shown through edited glass: nothing is traced, and the picture is the one a fresh trace at the same indices gives."""
+"""Stored photons shown through edited glass: nothing is traced, and the picture is the one a fresh trace at the same
+indices gives."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ from spectrasplat.model.scene import Dab, Dielectric, Diffuse, Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.light_pass import spectral_axis
 from spectrasplat.render.light_plan import LightPlan
-from spectrasplat.render.viewer.inputs import LiveInputs, DirtyLevel
+from spectrasplat.render.viewer.inputs import DirtyLevel, LiveInputs
 from spectrasplat.render.viewer.invalidation import dirty_level
 from spectrasplat.render.viewer.live_light import LiveLight
 
@@ -33,7 +34,9 @@ def shipped(name: str) -> Scene:
 
 def edited(scene: Scene, gain: float) -> Scene:
     objects = [
-        replace(o, material=replace(o.material, dispersion=with_gain(o.material.dispersion, gain))) if isinstance(o.material, Dielectric) else o
+        replace(o, material=replace(o.material, dispersion=with_gain(o.material.dispersion, gain)))
+        if isinstance(o.material, Dielectric)
+        else o
         for o in scene.objects
     ]
     return replace(scene, objects=tuple(objects))
@@ -42,7 +45,10 @@ def edited(scene: Scene, gain: float) -> Scene:
 def painted(scene: Scene, log2_gain: float) -> Scene:
     """A dab as large as everything on every receiver."""
     objects = [
-        replace(o, local_dispersion=(Dab((0.0, 0.0, 0.0), 100.0, log2_gain, falloff=0.0),)) if isinstance(o.material, Diffuse) else o for o in scene.objects
+        replace(o, local_dispersion=(Dab((0.0, 0.0, 0.0), 100.0, log2_gain, falloff=0.0),))
+        if isinstance(o.material, Diffuse)
+        else o
+        for o in scene.objects
     ]
     return replace(scene, objects=tuple(objects))
 
@@ -54,7 +60,14 @@ def inputs(scene: Scene, **changes) -> LiveInputs:
 @contextmanager
 def live(context: Context, scene: Scene, photons: int = PHOTONS) -> Iterator[LiveLight]:
     features = Features.of(scene, SETTINGS)
-    light = LiveLight(context, scene, SETTINGS, features, SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features)), 64 << 20)
+    light = LiveLight(
+        context,
+        scene,
+        SETTINGS,
+        features,
+        SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features)),
+        64 << 20,
+    )
     try:
         light.prepare()
         light.begin(photons, 1)
@@ -71,7 +84,10 @@ def trace(light: LiveLight, photons: int = PHOTONS) -> None:
 def maps(light: LiveLight) -> np.ndarray:
     """XYZ and W of every texel, scaled to energy."""
     texture, *_ = light.resolved_textures()  # what follows are spectral channels of the same light
-    return np.frombuffer(texture.read(), np.float32).reshape(texture.height, texture.width, 4).astype(float) * light.map_scale
+    return (
+        np.frombuffer(texture.read(), np.float32).reshape(texture.height, texture.width, 4).astype(float)
+        * light.map_scale
+    )
 
 
 def splat_again(light: LiveLight, wanted: LiveInputs) -> np.ndarray:
@@ -86,17 +102,29 @@ def difference(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def anchored_alike(fresh: LiveLight, light: LiveLight) -> list[LightPlan]:
-    """Plans of `fresh` with the intervals of the index, and the anchors in them, that `light`'s photons were traced for."""
+    """Plans of `fresh` with the intervals of the index, and the anchors in them, that `light`'s photons were traced
+    for."""
     reindexing = light._reindexing
     assert reindexing is not None and light._running is not None
-    spans = reindexing.spans(light._running.spans, light.buffers.axis, [lamp.spectral_power for lamp in fresh.scene.lights])
+    spans = reindexing.spans(
+        light._running.spans, light.buffers.axis, [lamp.spectral_power for lamp in fresh.scene.lights]
+    )
     plans = []
     for plan, old in zip(fresh.plans, light.plans, strict=True):
         # From y, affine in the index, to the fresh photons' own coordinate.
         nm = np.linspace(380.0, 780.0, 400_001)
         y, x = reindexing.axis.x_of_nm(nm), fresh.buffers.axis.x_of_nm(nm)
         bands = tuple(
-            replace(band, x_lo=float(np.interp(lo, y, x)), x_hi=float(np.interp(hi, y, x)), x_anchor=float(np.interp(reindexing.y(float(reindexing.traced.index(light.buffers.axis.nm_of_x(band.x_anchor)))), y, x)))
+            replace(
+                band,
+                x_lo=float(np.interp(lo, y, x)),
+                x_hi=float(np.interp(hi, y, x)),
+                x_anchor=float(
+                    np.interp(
+                        reindexing.y(float(reindexing.traced.index(light.buffers.axis.nm_of_x(band.x_anchor)))), y, x
+                    )
+                ),
+            )
             for band, (lo, hi) in zip(old.bands, spans[plan.index], strict=True)
         )
         plans.append(replace(plan, bands=bands, light_points=old.light_points))
@@ -120,7 +148,9 @@ def nrmse(a: np.ndarray, b: np.ndarray) -> float:
 
 # Gains at which the index at every anchor is the same float32 for both glasses: one digit more or less moves photons by
 # 2e-3 texels. Edits that bring total reflection into a band are left out: a fresh trace ends paths there.
-@pytest.mark.parametrize(("scene_name", "gain"), [("prism_case", 1.05), ("prism_case", 1.2), ("spectrum", 1.2), ("rod", 1.2)])
+@pytest.mark.parametrize(
+    ("scene_name", "gain"), [("prism_case", 1.05), ("prism_case", 1.2), ("spectrum", 1.2), ("rod", 1.2)]
+)
 def test_edited_dispersion_equals_a_fresh_trace_at_the_same_indices(gl: Context, scene_name: str, gain: float) -> None:
     scene = shipped(scene_name)
     changed = edited(scene, gain)
@@ -148,7 +178,12 @@ def test_edited_dispersion_is_what_a_rendering_of_the_edited_glass_shows(gl: Con
         followed = splat_again(light, inputs(edited(scene, gain)))
         trace(fresh, 100_000)
         expected = into(light, fresh)
-        blocks = [m[: m.shape[0] // 4 * 4, : m.shape[1] // 4 * 4, :3].reshape(m.shape[0] // 4, 4, m.shape[1] // 4, 4, 3).mean(axis=(1, 3)) for m in (followed, expected)]
+        blocks = [
+            m[: m.shape[0] // 4 * 4, : m.shape[1] // 4 * 4, :3]
+            .reshape(m.shape[0] // 4, 4, m.shape[1] // 4, 4, 3)
+            .mean(axis=(1, 3))
+            for m in (followed, expected)
+        ]
         assert nrmse(*blocks) < 0.06
         assert followed[..., 3].sum() == pytest.approx(expected[..., 3].sum(), rel=0.01)
 
@@ -199,7 +234,9 @@ def test_a_dab_only_touches_its_place(gl: Context) -> None:
         trace(light)
         before = splat_again(light, inputs(scene))
         photons = light.stored_records(100_000)
-        spot = light.buffers.space.to_world(np.average(photons["position"].astype(float), axis=0, weights=photons["flux_w"]))
+        spot = light.buffers.space.to_world(
+            np.average(photons["position"].astype(float), axis=0, weights=photons["flux_w"])
+        )
         item = scene.objects[table]
         local = np.linalg.inv(item.object_to_world) @ np.append(spot, 1.0)
         dab = Dab(tuple(local[:3].tolist()), 0.15, 2.0)
@@ -258,8 +295,22 @@ def test_records_beyond_the_store_leave_whole_rounds(gl: Context) -> None:
         (lambda s: replace(s, background_rgb=(0.1, 0.0, 0.0)), DirtyLevel.LOOK),
         (lambda s: edited(s, 2.0), DirtyLevel.SPLAT),
         (lambda s: painted(s, 1.0), DirtyLevel.SPLAT),
-        (lambda s: replace(s, lights=tuple(replace(x, spectral_power=x.spectral_power.scaled(2.0)) for x in s.lights)), DirtyLevel.SPLAT),
-        (lambda s: replace(s, objects=tuple(replace(o, object_to_world=o.object_to_world + np.eye(4)[3] * 0.0 + np.diag([0.1, 0, 0, 0])) for o in s.objects)), DirtyLevel.TRACE),
+        (
+            lambda s: replace(
+                s, lights=tuple(replace(x, spectral_power=x.spectral_power.scaled(2.0)) for x in s.lights)
+            ),
+            DirtyLevel.SPLAT,
+        ),
+        (
+            lambda s: replace(
+                s,
+                objects=tuple(
+                    replace(o, object_to_world=o.object_to_world + np.eye(4)[3] * 0.0 + np.diag([0.1, 0, 0, 0]))
+                    for o in s.objects
+                ),
+            ),
+            DirtyLevel.TRACE,
+        ),
         (lambda s: replace(s, objects=s.objects[:-1]), DirtyLevel.BUILD),
         (lambda s: replace(s, render=replace(s.render, max_depth=3)), DirtyLevel.BUILD),
     ],
@@ -274,8 +325,13 @@ def test_other_inputs_cost() -> None:
     before = inputs(shipped("prism"))
     moved = replace(before.camera, position=(0.0, 1.0, 2.0))
     costs = {
-        "camera": (moved, DirtyLevel.LOOK), "width": (80, DirtyLevel.LOOK), "smoothing": (0.6, DirtyLevel.SPLAT), "solo_nm": (500.0, DirtyLevel.SPLAT),
-        "local_gain": (False, DirtyLevel.SPLAT), "seed": (2, DirtyLevel.TRACE), "method": ("stochastic", DirtyLevel.BUILD),
-    }  # fmt: skip
+        "camera": (moved, DirtyLevel.LOOK),
+        "width": (80, DirtyLevel.LOOK),
+        "smoothing": (0.6, DirtyLevel.SPLAT),
+        "solo_nm": (500.0, DirtyLevel.SPLAT),
+        "local_gain": (False, DirtyLevel.SPLAT),
+        "seed": (2, DirtyLevel.TRACE),
+        "method": ("stochastic", DirtyLevel.BUILD),
+    }
     for name, (value, cost) in costs.items():
         assert dirty_level(before, before, replace(before, **{name: value})) == cost, name

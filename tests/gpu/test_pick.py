@@ -55,7 +55,11 @@ def place_of(camera: Camera, point) -> tuple[float, float]:
     """Where a world point is in the picture, by the textbook."""
     right, up, forward = camera_frame(camera)
     way = np.asarray(point, float) - camera.position
-    half = 0.5 * camera.vertical_extent if camera.kind == "orthographic" else np.tan(np.radians(0.5 * camera.vertical_fov_deg)) * (way @ forward)
+    half = (
+        0.5 * camera.vertical_extent
+        if camera.kind == "orthographic"
+        else np.tan(np.radians(0.5 * camera.vertical_fov_deg)) * (way @ forward)
+    )
     return 0.5 + 0.5 * (way @ right) / half * SIZE[1] / SIZE[0], 0.5 - 0.5 * (way @ up) / half
 
 

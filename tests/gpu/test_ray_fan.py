@@ -36,7 +36,9 @@ from spectrasplat.reference import optics
 from spectrasplat.render.light_pass import spectral_axis
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {"surface.glsl": ("facing_geometric", "facing_normal", "reflected_direction", "refracted_direction", "surface_point")}
+COVERS = {
+    "surface.glsl": ("facing_geometric", "facing_normal", "reflected_direction", "refracted_direction", "surface_point")
+}
 SCENES = Path(__file__).parents[2] / "assets" / "scenes"
 LINES_NM = (440.0, 546.0, 640.0)
 WHITE = spectrum.illuminant("D65").scaled_to_luminous(1000.0)
@@ -54,7 +56,9 @@ def tracing(gl, scene: Scene) -> Iterator[RayPaths]:
         buffers.release()
 
 
-def reference_of(scene: Scene, origin: np.ndarray, direction: np.ndarray, nm: float) -> tuple[tracer.Path, TriangleList]:
+def reference_of(
+    scene: Scene, origin: np.ndarray, direction: np.ndarray, nm: float
+) -> tuple[tracer.Path, TriangleList]:
     """The same ray in float64."""
     corners, material, normals, bodies = [], [], [], []
     for item in scene.objects:
@@ -128,8 +132,26 @@ GLASS = Dielectric(glass.from_abbe(1.6, 30.0, "flint"))
         Light("lamp", "point", WHITE, position=(0.3, 0.2, 6.0)),
         Light("sun", "directional", WHITE, direction=(0.2, 0.1, -0.97)),
         Light("beam", "collimated", WHITE, position=(0.1, 0.0, 6.0), direction=(0.0, 0.0, -1.0), radius=0.4),
-        Light("slit", "collimated", WHITE, position=(0.1, 0.0, 6.0), direction=(0.0, 0.0, -1.0), shape="rectangle", width=0.1, height=3.0, tangent=(1, 0, 0)),
-        Light("spot", "spot", WHITE, position=(0.0, 0.0, 6.0), direction=(0.0, 0.0, -1.0), inner_half_angle_deg=5.0, outer_half_angle_deg=6.0),
+        Light(
+            "slit",
+            "collimated",
+            WHITE,
+            position=(0.1, 0.0, 6.0),
+            direction=(0.0, 0.0, -1.0),
+            shape="rectangle",
+            width=0.1,
+            height=3.0,
+            tangent=(1, 0, 0),
+        ),
+        Light(
+            "spot",
+            "spot",
+            WHITE,
+            position=(0.0, 0.0, 6.0),
+            direction=(0.0, 0.0, -1.0),
+            inner_half_angle_deg=5.0,
+            outer_half_angle_deg=6.0,
+        ),
         Light("panel", "area", WHITE, position=(0.0, 0.0, 6.0), direction=(0.0, 0.0, -1.0), radius=0.3),
     ],
     ids=lambda light: light.name,
@@ -147,16 +169,26 @@ def test_every_kind_of_light_sends_its_rays_onto_the_object(gl, light: Light) ->
     assert len(np.unique(first.round(4), axis=0)) == len(lines)
     if light.kind == "collimated":
         across = starts - np.asarray(light.position)
-        assert np.abs(across @ [1.0, 0.0, 0.0]).max() <= 0.5 * light.width if light.shape == "rectangle" else np.linalg.norm(across, axis=1).max() <= light.radius
+        assert (
+            np.abs(across @ [1.0, 0.0, 0.0]).max() <= 0.5 * light.width
+            if light.shape == "rectangle"
+            else np.linalg.norm(across, axis=1).max() <= light.radius
+        )
     if light.kind == "spot":
         cosine = optics.unit(first - starts) @ np.array([0.0, 0.0, -1.0])
         assert np.degrees(np.arccos(cosine)).max() <= light.outer_half_angle_deg
 
 
 def test_a_beam_that_passes_by_gives_nothing_and_the_brighter_light_is_taken(gl) -> None:
-    aside = Light("aside", "collimated", WHITE.scaled(100.0), position=(5.0, 0.0, 6.0), direction=(0, 0, -1), radius=0.5)
-    behind = Light("behind", "collimated", WHITE.scaled(100.0), position=(0.0, 0.0, -1.5), direction=(0, 0, -1), radius=0.5)
-    dim, bright = (Light(n, "directional", WHITE.scaled(s), direction=(0, 0, -1)) for n, s in (("dim", 1.0), ("bright", 3.0)))
+    aside = Light(
+        "aside", "collimated", WHITE.scaled(100.0), position=(5.0, 0.0, 6.0), direction=(0, 0, -1), radius=0.5
+    )
+    behind = Light(
+        "behind", "collimated", WHITE.scaled(100.0), position=(0.0, 0.0, -1.5), direction=(0, 0, -1), radius=0.5
+    )
+    dim, bright = (
+        Light(n, "directional", WHITE.scaled(s), direction=(0, 0, -1)) for n, s in (("dim", 1.0), ("bright", 3.0))
+    )
     scene = Scene("test", CAMERA, (aside, behind, dim, bright), (ball(1.0, GLASS), quad(9.0, -2.0, Diffuse())))
     with tracing(gl, scene) as paths:
         fan = RayFan(gl, paths.scene, paths)
@@ -168,10 +200,17 @@ def test_a_beam_that_passes_by_gives_nothing_and_the_brighter_light_is_taken(gl)
 
 def test_paths_end_where_they_should(gl) -> None:
     """On black things, after a mirror, and a given way beyond the last surface."""
-    scene = Scene("test", CAMERA, (), (quad(2.0, 0.0, Mirror(), "mirror"), quad(0.5, 3.0, Black(), "stop"), ball(0.5, GLASS, (5.0, 0.0, 0.0))))
+    scene = Scene(
+        "test",
+        CAMERA,
+        (),
+        (quad(2.0, 0.0, Mirror(), "mirror"), quad(0.5, 3.0, Black(), "stop"), ball(0.5, GLASS, (5.0, 0.0, 0.0))),
+    )
     down, aslant = np.array([0.0, 0.0, -1.0]), optics.unit(np.array([0.6, 0.0, -0.8]))
     with tracing(gl, scene) as paths:
-        bounced, missed = paths.trace(np.array([[0.2, 0.1, 2.0], [0.0, 0.0, 2.0]]), np.array([down, aslant]), np.full(2, 550.0), 4.0)
+        bounced, missed = paths.trace(
+            np.array([[0.2, 0.1, 2.0], [0.0, 0.0, 2.0]]), np.array([down, aslant]), np.full(2, 550.0), 4.0
+        )
     assert bounced.points == pytest.approx(np.array([[0.2, 0.1, 2.0], [0.2, 0.1, 0.0], [0.2, 0.1, 3.0]]), abs=1e-5)
     assert (bounced.first_object, bounced.last_object) == (0, 1)
     assert missed.points == pytest.approx(np.array([[0, 0, 2.0], [1.5, 0, 0], [3.9, 0, 3.2]]), abs=1e-5)
@@ -211,9 +250,12 @@ def test_surface_functions_against_their_twins(gl) -> None:
     normals[:, :3] = corner.reshape(-1, 3)
     texels = SceneTexels(gl.ctx, {"TRIANGLES": records, "NORMALS": normals, "OBJECTS": OBJECT.zeros(1)})
     inputs = {
-        "d": as_f32(optics.unit(rng.normal(size=(count, 3)))), "n_g": as_f32(normal_g), "bary": as_f32(rng.uniform(0.05, 0.45, (count, 2))),
-        "eta": as_f32(rng.choice([1 / 1.6, 1.6, 1.0], count)), "slot": np.arange(count, dtype=np.uint32),
-    }  # fmt: skip
+        "d": as_f32(optics.unit(rng.normal(size=(count, 3)))),
+        "n_g": as_f32(normal_g),
+        "bary": as_f32(rng.uniform(0.05, 0.45, (count, 2))),
+        "eta": as_f32(rng.choice([1 / 1.6, 1.6, 1.0], count)),
+        "slot": np.arange(count, dtype=np.uint32),
+    }
     body = """
     Hit hit = Hit(1.0, slot, 0u, n_g, bary);
     vec3 n = facing_normal(hit, d);
@@ -225,8 +267,22 @@ def test_surface_functions_against_their_twins(gl) -> None:
     total = is_total ? 1u : 0u;
     place = surface_point(hit, vec3(0.0), d);
     """
-    outputs = {"facing": "vec3", "shading": "vec3", "mirrored": "vec3", "bent": "vec3", "total": "uint", "place": "vec3"}
-    defines = {**bindings.SCENE_DEFINES, **texels.defines, "TRIANGLE_COUNT": count, "SPECTRAL_SAMPLES": 2, "LOOSE_TRIANGLES": 1, "SMOOTH_NORMALS": 1}
+    outputs = {
+        "facing": "vec3",
+        "shading": "vec3",
+        "mirrored": "vec3",
+        "bent": "vec3",
+        "total": "uint",
+        "place": "vec3",
+    }
+    defines = {
+        **bindings.SCENE_DEFINES,
+        **texels.defines,
+        "TRIANGLE_COUNT": count,
+        "SPECTRAL_SAMPLES": 2,
+        "LOOSE_TRIANGLES": 1,
+        "SMOOTH_NORMALS": 1,
+    }
     got = evaluate(gl.ctx, ["lib/surface.glsl"], body, inputs, outputs, defines, SCENE_STRUCTS, binders=[texels.bind])
     texels.release()
 

@@ -28,7 +28,13 @@ ONE = 0x3F800000
 """Bits of 1.0: words just above are ordinary floats, so that no driver flushes them."""
 ROWS = 5
 GROUP = 64
-_BITS = {"float": ("floatBitsToUint", "uintBitsToFloat"), "vec": ("floatBitsToUint", "uintBitsToFloat"), "uint": ("", ""), "uvec": ("", ""), "int": ("uint", "int")}
+_BITS = {
+    "float": ("floatBitsToUint", "uintBitsToFloat"),
+    "vec": ("floatBitsToUint", "uintBitsToFloat"),
+    "uint": ("", ""),
+    "uvec": ("", ""),
+    "int": ("uint", "int"),
+}
 
 
 def structs() -> list[Struct]:
@@ -77,7 +83,15 @@ def by_name(struct: Struct, values: np.ndarray) -> np.ndarray:
     return filled
 
 
-def run(gl, declarations: str, body: str, known: tuple[Struct, ...], storage: dict[int, bytes], uniform: bytes | None = None, rows: int = ROWS) -> dict[int, bytes]:
+def run(
+    gl,
+    declarations: str,
+    body: str,
+    known: tuple[Struct, ...],
+    storage: dict[int, bytes],
+    uniform: bytes | None = None,
+    rows: int = ROWS,
+) -> dict[int, bytes]:
     """A kernel of one thread a row; returns what the storage buffers hold afterwards."""
     text = f"layout(local_size_x = {GROUP}) in;\n{declarations}\nvoid main() {{\n    uint row = gl_GlobalInvocationID.x;\n    if (row >= {rows}u) return;\n{body}\n}}\n"
     held = {binding: gl.ctx.buffer(content) for binding, content in storage.items()}
@@ -104,22 +118,36 @@ WORDS_OUT = "layout(std430, binding = 1) buffer Words { uint words[]; };"
 def read_words(struct: Struct, source: str) -> str:
     """GLSL that copies every member of `source` to words of its row."""
     count = struct.stride // 4
-    return "\n".join(f"    words[row * {count}u + {w}u] = {to_bits}({source}{name});" for w, (name, to_bits, _) in enumerate(members(struct)))
+    return "\n".join(
+        f"    words[row * {count}u + {w}u] = {to_bits}({source}{name});"
+        for w, (name, to_bits, _) in enumerate(members(struct))
+    )
 
 
 @pytest.mark.parametrize("struct", STRUCTS, ids=lambda s: f"{s.name}-{s.stride}")
 def test_a_kernel_reads_what_numpy_wrote_and_numpy_what_a_kernel_wrote(gl, struct: Struct) -> None:
     values = pattern(struct)
     items = f"layout(std430, binding = 0) buffer Items {{ {struct.name} items[]; }};\n" + WORDS_OUT
-    out = run(gl, items, read_words(struct, "items[row]."), (struct,), {0: by_name(struct, values).tobytes(), 1: bytes(values.nbytes)})
+    out = run(
+        gl,
+        items,
+        read_words(struct, "items[row]."),
+        (struct,),
+        {0: by_name(struct, values).tobytes(), 1: bytes(values.nbytes)},
+    )
     np.testing.assert_array_equal(np.frombuffer(out[1], np.uint32).reshape(values.shape), values)
     count = struct.stride // 4
-    writes = "\n".join(f"    items[row].{name} = {from_bits}({ONE}u + row * {count}u + {w}u);" for w, (name, _, from_bits) in enumerate(members(struct)))
+    writes = "\n".join(
+        f"    items[row].{name} = {from_bits}({ONE}u + row * {count}u + {w}u);"
+        for w, (name, _, from_bits) in enumerate(members(struct))
+    )
     out = run(gl, items, writes, (struct,), {0: bytes(ROWS * struct.stride), 1: bytes(4)})
     written = np.frombuffer(out[0], struct.dtype)
     expected = by_name(struct, values)
     for field in struct.fields:
-        np.testing.assert_array_equal(written[field.name].view(np.uint32), expected[field.name].view(np.uint32), err_msg=field.name)
+        np.testing.assert_array_equal(
+            written[field.name].view(np.uint32), expected[field.name].view(np.uint32), err_msg=field.name
+        )
 
 
 @pytest.mark.parametrize("struct", [s for s in STRUCTS if s.texels], ids=lambda s: f"{s.name}-{s.stride}")
@@ -139,7 +167,13 @@ def test_records_packed_as_texels_lie_as_in_a_buffer(gl, struct: Struct) -> None
 
 
 _BLOCK = re.compile(r"layout\(std140,[^)]*\)\s*uniform\s+(\w+)\s*\{([^}]*)\}")
-HAND_WRITTEN = {"light/footprint.comp": footprint.PARAMETERS, "light/splat.vert": splat.PARAMETERS, "light/splat_swept.frag": splat.PARAMETERS, "light/splat_cut.frag": splat.PARAMETERS, "light/splat_small.frag": splat.PARAMETERS}
+HAND_WRITTEN = {
+    "light/footprint.comp": footprint.PARAMETERS,
+    "light/splat.vert": splat.PARAMETERS,
+    "light/splat_swept.frag": splat.PARAMETERS,
+    "light/splat_cut.frag": splat.PARAMETERS,
+    "light/splat_small.frag": splat.PARAMETERS,
+}
 """Shaders whose parameter block lists its members itself: it must be this struct."""
 
 
@@ -167,15 +201,38 @@ def test_uniform_blocks_read_what_numpy_wrote(gl, file: str, name: str, text: st
         struct = HAND_WRITTEN[file]
         values = pattern(struct, 1)
         declared = f"layout(std140, binding = 0) uniform Block {{ {text} }};\n{WORDS_OUT}"
-        out = run(gl, declared, read_words(struct, ""), (), {1: bytes(values.nbytes)}, by_name(struct, values).tobytes(), 1)
+        out = run(
+            gl, declared, read_words(struct, ""), (), {1: bytes(values.nbytes)}, by_name(struct, values).tobytes(), 1
+        )
     np.testing.assert_array_equal(np.frombuffer(out[1], np.uint32).reshape(values.shape), values)
 
 
 def test_all_structs_are_found() -> None:
     names = {struct.name for struct in STRUCTS}
-    assert {"PhotonRecord", "RayRecord", "Outcome", "ChunkCount", "QueueState", "EmitParameters", "TraceParameters", "Placement", "Receiver"} <= names
-    assert {"Triangle", "Solid", "Object", "CameraLight", "CameraParameters", "SplatRecord", "FootprintParameters", "DrawParameters"} <= names
-    declared = "".join(file.read_text() for file in (Path(spectrasplat.__path__[0])).rglob("*.py") if file.name != "schema.py")
+    assert {
+        "PhotonRecord",
+        "RayRecord",
+        "Outcome",
+        "ChunkCount",
+        "QueueState",
+        "EmitParameters",
+        "TraceParameters",
+        "Placement",
+        "Receiver",
+    } <= names
+    assert {
+        "Triangle",
+        "Solid",
+        "Object",
+        "CameraLight",
+        "CameraParameters",
+        "SplatRecord",
+        "FootprintParameters",
+        "DrawParameters",
+    } <= names
+    declared = "".join(
+        file.read_text() for file in (Path(spectrasplat.__path__[0])).rglob("*.py") if file.name != "schema.py"
+    )
     assert set(re.findall(r'Struct\(\s*"(\w+)"', declared)) <= names
 
 

@@ -133,7 +133,12 @@ def moved(scene: Scene, matrix: np.ndarray) -> Scene:
     def direction(d: tuple[float, float, float]) -> tuple[float, float, float]:
         return tuple((matrix[:3, :3] @ d / scale).tolist())
 
-    camera = replace(scene.camera, position=point(scene.camera.position), target=point(scene.camera.target), up=direction(scene.camera.up))
+    camera = replace(
+        scene.camera,
+        position=point(scene.camera.position),
+        target=point(scene.camera.target),
+        up=direction(scene.camera.up),
+    )
     lights = tuple(
         replace(
             light,
@@ -190,7 +195,8 @@ def test_order_of_objects_does_not_matter(gl, tmp_path: Path) -> None:
 
 
 def test_subdividing_a_flat_face_does_not_matter(gl, tmp_path: Path) -> None:
-    """The same prism in four times the triangles is the same intersection of half-spaces, and as a soup the same solid."""
+    """The same prism in four times the triangles is the same intersection of half-spaces, and as a soup the same
+    solid."""
     scene = scene_of(tmp_path)
     glass = scene.objects[0]
     fine = replace(glass, mesh=subdivided(glass.mesh))

@@ -112,7 +112,9 @@ def test_cut_bands_add_up_to_the_whole(cut_rig: Rig) -> None:
         middle = 0.5 * (lo + hi)
         part = cut_rig.draw(photons(CUTS, centre + (middle - 0.5) * chord, *axes, chord, lo, hi))
         nm = 380.0 + 400.0 * np.array([lo, hi])
-        expected = np.diff(np.interp(nm, np.append(VISIBLE_NM - 0.5, 780.5), np.append(0.0, np.cumsum(cut_rig.light.density))))
+        expected = np.diff(
+            np.interp(nm, np.append(VISIBLE_NM - 0.5, 780.5), np.append(0.0, np.cumsum(cut_rig.light.density)))
+        )
         # A sliver of a band has a hard-edged box for its blur: 0.7 % by where that falls on the grid.
         assert part[..., 3].sum() == pytest.approx(expected[0], rel=1e-2)
         parts += part

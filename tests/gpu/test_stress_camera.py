@@ -1,4 +1,5 @@
-"""The camera's stress cases keep their promises, and break them where a shader is wrong; the sums they are held against are right."""
+"""The camera's stress cases keep their promises, and break them where a shader is wrong; the sums they are held against
+are right."""
 
 from __future__ import annotations
 
@@ -24,7 +25,18 @@ from spectrasplat.stress.rigs.camera_probe import daylight_mean, fresnel, sky
 from tests.gpu.mutants import mutate
 
 CASES = {case.name: case for case in camera_cases.CASES}
-QUICK = ("eye-tir-margin", "eye-corner", "eye-guide", "eye-room", "eye-mirrors", "eye-shells", "eye-inside", "eye-poles", "eye-slanting", "eye-absorption")
+QUICK = (
+    "eye-tir-margin",
+    "eye-corner",
+    "eye-guide",
+    "eye-room",
+    "eye-mirrors",
+    "eye-shells",
+    "eye-inside",
+    "eye-poles",
+    "eye-slanting",
+    "eye-absorption",
+)
 """Those that take a second or two; of the others one severity is looked at below, and all of it in the slow run."""
 
 
@@ -48,7 +60,9 @@ def test_a_stone_ten_thousand_extents_off_looks_the_same(gl, monkeypatch: pytest
     monkeypatch.setattr(camera_solid_cases, "CHANGES", camera_solid_cases.CHANGES[-1:])
     (found,) = camera_solid_cases.measure_scale(gl)
     assert found.broken() == []
-    monkeypatch.setattr(scene_buffers.GpuSpace, "of", staticmethod(lambda scene: scene_buffers.GpuSpace(np.zeros(3), 1.0)))
+    monkeypatch.setattr(
+        scene_buffers.GpuSpace, "of", staticmethod(lambda scene: scene_buffers.GpuSpace(np.zeros(3), 1.0))
+    )
     (found,) = camera_solid_cases.measure_scale(gl)
     assert "error of picture" in "; ".join(found.broken())
 
@@ -64,29 +78,108 @@ def broken(case: Case, gl) -> str:
 
 
 MUTANTS = {
-    "total reflection before its time": ("eye-tir-margin", "camera/camera.comp", "bool total = cosine2.y <= 0.0", "bool total = cosine2.y <= 0.01", "inside the edge"),
-    "a reflection that turns a little": (
-        "eye-corner", "camera/crossing.glsl", "path.direction = normalize(reflect_direction(path.direction, facing.normal, theta));",
-        "path.direction = normalize(reflect_direction(path.direction, facing.normal, theta) + vec3(5e-3, 0.0, 0.0));", "returned",
+    "total reflection before its time": (
+        "eye-tir-margin",
+        "camera/camera.comp",
+        "bool total = cosine2.y <= 0.0",
+        "bool total = cosine2.y <= 0.01",
+        "inside the edge",
     ),
-    "paths given up too early": ("eye-guide", "camera/camera.comp", "path.depth >= MAX_DEPTH", "path.depth >= 9", "transmittance"),
-    "paths given up and not counted": ("eye-room", "camera/camera.comp", "atomicAdd(fallbacks[FELL_DEPTH], 1u);", "", "paths not counted"),
-    "branches that could not wait and are not counted": ("eye-shells", "camera/camera.comp", "if (strong && !splits) atomicAdd(fallbacks[FELL_STACK], 1u);", "", "full stack not counted"),
-    "branches put away and forgotten": ("eye-shells", "camera/camera.comp", "aside = mirrored;\n        sets_aside = true;", "", "energy"),
-    "leaving taken for entering": ("eye-inside", "camera/camera.comp", "bool entering = dot(whole.direction, hit.normal_g) < 0.0;", "bool entering = true;", "wards"),
-    "a sky upside down": ("eye-poles", "camera/taps.glsl", "p.sky_z * direction.z", "p.sky_z * -direction.z", "radiance"),
-    "a texture looked up at a point": ("eye-slanting", "camera/receiver.glsl", "along)), ds, dt)", "along)), vec2(0.0), vec2(0.0))", "pixel"),
-    "a per cent of the way through glass lost": ("eye-absorption", "camera/camera.comp", "path.lengths[i] += hit.distance;", "path.lengths[i] += 0.99 * hit.distance;", "radiance"),
-    "bands that are not cut": ("eye-cut", "camera/camera.comp", "bool may_cut = path.narrowed", "bool may_cut = false && path.narrowed", "colour"),
-    "lamps as bright as they are where they only graze a sample": ("eye-lamps", "camera/taps.glsl", "? light_seen(lights[i], position, direction, far, width + sweep * part) :",
-        "? lights[i].measure * sign(light_seen(lights[i], position, direction, far, width + sweep / float(taps))) :", "light in all"),
-    "light that is not linear": ("eye-sun", "camera/taps.glsl", "add_colour(path, stretch, uint(WHITE_ROW), sky_colour(direction, columns));",
-                                 "add_colour(path, stretch, uint(WHITE_ROW), min(sky_colour(direction, columns), vec3(1e4)));", "not linear"),
-}  # fmt: skip
-SLOW_MUTANTS = ("bands that are not cut", "lamps as bright as they are where they only graze a sample", "light that is not linear")
+    "a reflection that turns a little": (
+        "eye-corner",
+        "camera/crossing.glsl",
+        "path.direction = normalize(reflect_direction(path.direction, facing.normal, theta));",
+        "path.direction = normalize(reflect_direction(path.direction, facing.normal, theta) + vec3(5e-3, 0.0, 0.0));",
+        "returned",
+    ),
+    "paths given up too early": (
+        "eye-guide",
+        "camera/camera.comp",
+        "path.depth >= MAX_DEPTH",
+        "path.depth >= 9",
+        "transmittance",
+    ),
+    "paths given up and not counted": (
+        "eye-room",
+        "camera/camera.comp",
+        "atomicAdd(fallbacks[FELL_DEPTH], 1u);",
+        "",
+        "paths not counted",
+    ),
+    "branches that could not wait and are not counted": (
+        "eye-shells",
+        "camera/camera.comp",
+        "if (strong && !splits) atomicAdd(fallbacks[FELL_STACK], 1u);",
+        "",
+        "full stack not counted",
+    ),
+    "branches put away and forgotten": (
+        "eye-shells",
+        "camera/camera.comp",
+        "aside = mirrored;\n        sets_aside = true;",
+        "",
+        "energy",
+    ),
+    "leaving taken for entering": (
+        "eye-inside",
+        "camera/camera.comp",
+        "bool entering = dot(whole.direction, hit.normal_g) < 0.0;",
+        "bool entering = true;",
+        "wards",
+    ),
+    "a sky upside down": (
+        "eye-poles",
+        "camera/taps.glsl",
+        "p.sky_z * direction.z",
+        "p.sky_z * -direction.z",
+        "radiance",
+    ),
+    "a texture looked up at a point": (
+        "eye-slanting",
+        "camera/receiver.glsl",
+        "along)), ds, dt)",
+        "along)), vec2(0.0), vec2(0.0))",
+        "pixel",
+    ),
+    "a per cent of the way through glass lost": (
+        "eye-absorption",
+        "camera/camera.comp",
+        "path.lengths[i] += hit.distance;",
+        "path.lengths[i] += 0.99 * hit.distance;",
+        "radiance",
+    ),
+    "bands that are not cut": (
+        "eye-cut",
+        "camera/camera.comp",
+        "bool may_cut = path.narrowed",
+        "bool may_cut = false && path.narrowed",
+        "colour",
+    ),
+    "lamps as bright as they are where they only graze a sample": (
+        "eye-lamps",
+        "camera/taps.glsl",
+        "? light_seen(lights[i], position, direction, far, width + sweep * part) :",
+        "? lights[i].measure * sign(light_seen(lights[i], position, direction, far, width + sweep / float(taps))) :",
+        "light in all",
+    ),
+    "light that is not linear": (
+        "eye-sun",
+        "camera/taps.glsl",
+        "add_colour(path, stretch, uint(WHITE_ROW), sky_colour(direction, columns));",
+        "add_colour(path, stretch, uint(WHITE_ROW), min(sky_colour(direction, columns), vec3(1e4)));",
+        "not linear",
+    ),
+}
+SLOW_MUTANTS = (
+    "bands that are not cut",
+    "lamps as bright as they are where they only graze a sample",
+    "light that is not linear",
+)
 
 
-@pytest.mark.parametrize("mistake", [pytest.param(m, marks=pytest.mark.slow) if m in SLOW_MUTANTS else m for m in MUTANTS])
+@pytest.mark.parametrize(
+    "mistake", [pytest.param(m, marks=pytest.mark.slow) if m in SLOW_MUTANTS else m for m in MUTANTS]
+)
 def test_case_notices_a_mistake_in_a_shader(gl, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, mistake: str) -> None:
     name, file, old, new, said = MUTANTS[mistake]
     mutate(monkeypatch, tmp_path, file, old, new)
@@ -109,7 +202,8 @@ def test_glass_of_other_dispersion_is_noticed(gl, monkeypatch: pytest.MonkeyPatc
 
 
 def test_ways_through_flat_glass_add_up() -> None:
-    """All light goes somewhere; a slab's ways sum up to the pile of plates; straight through a slab keeps the direction."""
+    """All light goes somewhere; a slab's ways sum up to the pile of plates; straight through a slab keeps the
+    direction."""
     slab = flat_glass.rectangle(40.0, 0.1)
     out = flat_glass.ways(slab, 1.5, (0.0, 1.0), (0.0, -1.0))
     assert sum(way.weight for way in out) == pytest.approx(1.0, abs=1e-4)
@@ -129,14 +223,20 @@ def test_ways_split_where_total_reflection_sets_in() -> None:
 
 def test_a_ray_past_a_polygon_meets_nothing() -> None:
     square = flat_glass.rectangle(1.0, 1.0)
-    for start, direction in (((-2.0, 0.7), (1.0, 0.0)), ((2.0, 0.0), (1.0, 0.0)), ((-2.0, -1.0), (np.sqrt(0.5), -np.sqrt(0.5)))):
+    for start, direction in (
+        ((-2.0, 0.7), (1.0, 0.0)),
+        ((2.0, 0.0), (1.0, 0.0)),
+        ((-2.0, -1.0), (np.sqrt(0.5), -np.sqrt(0.5))),
+    ):
         (only,) = flat_glass.ways(square, 1.5, start, direction)
         assert only.weight == 1.0 and only.events == 0
 
 
 def test_fresnel_and_daylight_are_those_of_the_books() -> None:
     """N-BK7 at 0, 45 and 75 degrees; a white that all arrives is white."""
-    assert fresnel(np.cos(np.radians([0.0, 45.0, 75.0])), 1.5168) == pytest.approx([0.042165, 0.052595, 0.256144], abs=1e-6)
+    assert fresnel(np.cos(np.radians([0.0, 45.0, 75.0])), 1.5168) == pytest.approx(
+        [0.042165, 0.052595, 0.256144], abs=1e-6
+    )
     assert fresnel(0.5, 1.0 / 1.5168) == 1.0
     assert daylight_mean(np.ones(401)) == pytest.approx(np.ones(3), abs=1e-4)
 

@@ -38,25 +38,77 @@ def broken(case: Case, gl) -> list[str]:
 
 
 MUTANTS = {
-    "wrong sign of the turning normal": ("tir-margin", "lib/optics.glsl", "- mu * dnormal", "+ mu * dnormal", "column s"),
-    "the textbook's mu": (
-        "index-matched", "lib/optics.glsl", "return (1.0 - eta_it) * (1.0 + eta_it) / (omega - eta_it * theta);", "return eta_it * theta + omega;", "bend mu",
+    "wrong sign of the turning normal": (
+        "tir-margin",
+        "lib/optics.glsl",
+        "- mu * dnormal",
+        "+ mu * dnormal",
+        "column s",
     ),
-    "the shading normal on a receiver": ("grazing", "lib/optics.glsl", "dot(direction, normal_g)) * direction", "dot(direction, normal_g)) * normal_g", "column on a receiver"),
+    "the textbook's mu": (
+        "index-matched",
+        "lib/optics.glsl",
+        "return (1.0 - eta_it) * (1.0 + eta_it) / (omega - eta_it * theta);",
+        "return eta_it * theta + omega;",
+        "bend mu",
+    ),
+    "the shading normal on a receiver": (
+        "grazing",
+        "lib/optics.glsl",
+        "dot(direction, normal_g)) * direction",
+        "dot(direction, normal_g)) * normal_g",
+        "column on a receiver",
+    ),
     "wrong sign of dispersion when leaving": (
-        "gem-bands", "lib/medium.glsl", "derivative += medium_slope(crossing.before, x)", "derivative -= medium_slope(crossing.before, x)", "band ends",
+        "gem-bands",
+        "lib/medium.glsl",
+        "derivative += medium_slope(crossing.before, x)",
+        "derivative -= medium_slope(crossing.before, x)",
+        "band ends",
     ),
     "overflow not seen": ("overflow", "light/footprint.comp", "bool accident = !(", "bool accident = false && !(", ""),
-    "lost footprints not counted": ("overflow", "light/footprint.comp", "atomicAdd(count_dropped, 1u);", "", "photons were degraded but only 0 fall-backs counted"),
-    "dropped columns not counted": ("far-screen", "light/trace.comp", "outcome.what |= FELL_FOOTPRINT;", "", "flags not counted"),
-    "brightness capped": ("collapse", "light/splat_small.frag", "share * splat_colour[g]", "min(share, 0.9) * splat_colour[g]", "energy"),
-    "rounding of the total lost": ("one-texel", "light/accumulate.comp", "imageStore(scratch, at, kept_out);", "imageStore(scratch, at, vec4(0.0));", "energy in the texel"),
-    "facets that do not overlap": ("slivers", "lib/intersect.glsl", "#define EDGE_ERROR 5e-7", "#define EDGE_ERROR -1e-4", "light leaked"),
-}  # fmt: skip
+    "lost footprints not counted": (
+        "overflow",
+        "light/footprint.comp",
+        "atomicAdd(count_dropped, 1u);",
+        "",
+        "photons were degraded but only 0 fall-backs counted",
+    ),
+    "dropped columns not counted": (
+        "far-screen",
+        "light/trace.comp",
+        "outcome.what |= FELL_FOOTPRINT;",
+        "",
+        "flags not counted",
+    ),
+    "brightness capped": (
+        "collapse",
+        "light/splat_small.frag",
+        "share * splat_colour[g]",
+        "min(share, 0.9) * splat_colour[g]",
+        "energy",
+    ),
+    "rounding of the total lost": (
+        "one-texel",
+        "light/accumulate.comp",
+        "imageStore(scratch, at, kept_out);",
+        "imageStore(scratch, at, vec4(0.0));",
+        "energy in the texel",
+    ),
+    "facets that do not overlap": (
+        "slivers",
+        "lib/intersect.glsl",
+        "#define EDGE_ERROR 5e-7",
+        "#define EDGE_ERROR -1e-4",
+        "light leaked",
+    ),
+}
 SLOW_MUTANTS = ("rounding of the total lost", "facets that do not overlap")
 
 
-@pytest.mark.parametrize("mistake", [pytest.param(m, marks=pytest.mark.slow) if m in SLOW_MUTANTS else m for m in MUTANTS])
+@pytest.mark.parametrize(
+    "mistake", [pytest.param(m, marks=pytest.mark.slow) if m in SLOW_MUTANTS else m for m in MUTANTS]
+)
 def test_case_notices_a_mistake_in_a_shader(gl, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, mistake: str) -> None:
     name, file, old, new, said = MUTANTS[mistake]
     mutate(monkeypatch, tmp_path, file, old, new)
@@ -66,7 +118,11 @@ def test_case_notices_a_mistake_in_a_shader(gl, monkeypatch: pytest.MonkeyPatch,
 
 
 def test_needles_notice_triangles_begun_at_any_corner(gl, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(scene_buffers, "_best_corner_first", lambda corners: np.broadcast_to(np.arange(3)[None, :, None], (len(corners), 3, 1)))
+    monkeypatch.setattr(
+        scene_buffers,
+        "_best_corner_first",
+        lambda corners: np.broadcast_to(np.arange(3)[None, :, None], (len(corners), 3, 1)),
+    )
     assert "error of landing" in "; ".join(broken(CASES["needles"], gl))
 
 
@@ -74,14 +130,21 @@ def test_triangles_begin_at_the_corner_nearest_to_a_right_angle() -> None:
     rng = np.random.default_rng(3)
     # A needle each way round, and a right-angled triangle.
     needle = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1e-4, 0.0]])
-    triangles = np.array([np.roll(needle, k, axis=0) for k in range(3)] + [[[0, 1, 0], [0, 0, 0], [1, 0, 0]]]) @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    triangles = (
+        np.array([np.roll(needle, k, axis=0) for k in range(3)] + [[[0, 1, 0], [0, 0, 0], [1, 0, 0]]])
+        @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    )
     order = scene_buffers._best_corner_first(triangles)
     turned = np.take_along_axis(triangles, order, axis=1)
     edges = turned[:, 1:] - turned[:, :1]
     cosine = np.abs(np.sum(edges[:, 0] * edges[:, 1], axis=1)) / np.prod(np.linalg.norm(edges, axis=2), axis=1)
     assert cosine.max() < 2e-4
     # Only turned, never mirrored.
-    assert np.allclose(np.cross(edges[:, 0], edges[:, 1]), np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), atol=1e-12)
+    assert np.allclose(
+        np.cross(edges[:, 0], edges[:, 1]),
+        np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]),
+        atol=1e-12,
+    )
     assert scene_buffers._best_corner_first(np.zeros((1, 3, 3))).shape == (1, 3, 1)
 
 

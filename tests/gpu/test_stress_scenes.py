@@ -33,7 +33,8 @@ def block():
 
 
 def test_a_pile_of_plates_transmits_what_reflections_add_up_to() -> None:
-    """Closed forms for one plate of n and for a film of air, and light that goes in comes out: reversed, the pile is as clear."""
+    """Closed forms for one plate of n and for a film of air, and light that goes in comes out: reversed, the pile is as
+    clear."""
     r = (0.5 / 2.5) ** 2
     assert contact_cases.plates([1.5]) == pytest.approx((1 - r) / (1 + r), abs=1e-14)
     assert contact_cases.plates([1.5, 1.0, 1.5]) == pytest.approx((1 - r) / (1 + 3 * r), abs=1e-14)
@@ -48,7 +49,8 @@ def test_gap_and_contact_hold(gl, monkeypatch) -> None:
 
 
 def test_a_pile_of_sixteen_keeps_its_light(gl, monkeypatch) -> None:
-    """Pilots once gave up after twelve events and saw nothing; roulette once drew the same numbers every eight events (1.6e-2)."""
+    """Pilots once gave up after twelve events and saw nothing; roulette once drew the same numbers every eight events
+    (1.6e-2)."""
     monkeypatch.setattr(contact_cases, "STACKS", (16,))
     (found,) = contact_cases.measure_stacks(gl)
     assert found.broken() == []
@@ -83,7 +85,9 @@ def test_every_nan_is_found_and_every_dropped_footprint_must_be_counted(gl, monk
     account = WatchedLight._account
 
     def spoil(self: WatchedLight, batch) -> None:
-        photons = np.frombuffer(self.trace.photons.read(batch.photons * self.trace.photon.stride), self.trace.photon.dtype).copy()
+        photons = np.frombuffer(
+            self.trace.photons.read(batch.photons * self.trace.photon.stride), self.trace.photon.dtype
+        ).copy()
         photons["position"][:3, 1] = np.nan
         photons["flags"][3:5] |= records.FLAG_FOOTPRINT_DROPPED
         photons["dposition_ds"][3:5] = np.inf
@@ -103,11 +107,14 @@ def test_nan_in_maps_and_pictures_are_counted() -> None:
     assert probe.nonfinite(values) == 4
     assert probe.picture_error(np.zeros((2, 2)), np.zeros((2, 2))) == 0.0
     assert probe.picture_error(np.ones((2, 2)), np.zeros((2, 2))) == np.inf
-    assert np.allclose(probe.blocks(np.arange(400.0).reshape(20, 20, 1)), np.array([[[94.5], [104.5]], [[294.5], [304.5]]]))
+    assert np.allclose(
+        probe.blocks(np.arange(400.0).reshape(20, 20, 1)), np.array([[[94.5], [104.5]], [[294.5], [304.5]]])
+    )
 
 
 def test_moved_scenes_are_the_same_scene() -> None:
-    """Distances and the solid's extent follow the scale; directions stay unit vectors; the sun's irradiance stays, a lamp's intensity grows."""
+    """Distances and the solid's extent follow the scale; directions stay unit vectors; the sun's irradiance stays, a
+    lamp's intensity grows."""
     scene = block()
     large = moved(scene, 10.0, (1.0, 2.0, 3.0), turn((0.0, 0.0, 1.0), 90.0))
     assert extent(large) == pytest.approx(10.0 * extent(scene))
@@ -116,7 +123,10 @@ def test_moved_scenes_are_the_same_scene() -> None:
     assert large.lights[0].spectral_power == scene.lights[0].spectral_power
     assert np.allclose(large.camera.position, (1.0, 2.0, 3.0 - 50.0))
     lamp = replace(BEAM, kind="point")
-    assert np.allclose(moved(replace(scene, lights=(lamp,)), 10.0).lights[0].spectral_power.density, 100.0 * lamp.spectral_power.density)
+    assert np.allclose(
+        moved(replace(scene, lights=(lamp,)), 10.0).lights[0].spectral_power.density,
+        100.0 * lamp.spectral_power.density,
+    )
 
 
 @pytest.mark.slow

@@ -10,7 +10,15 @@ from spectrasplat.stress.rigs.glsl_function import evaluate
 
 MIXED = Struct(
     "Mixed",
-    (Field("a", "vec3"), Field("b", "uint"), Field("c", "vec2"), Field("d", "uvec2"), Field("e", "float", "", 3), Field("f", "int"), Field("g", "vec4", "", 2)),
+    (
+        Field("a", "vec3"),
+        Field("b", "uint"),
+        Field("c", "vec2"),
+        Field("d", "uvec2"),
+        Field("e", "float", "", 3),
+        Field("f", "int"),
+        Field("g", "vec4", "", 2),
+    ),
     texels=True,
 )
 ONE = 0x3F800000
@@ -20,7 +28,9 @@ ROWS = 70
 def words(struct: Struct) -> np.ndarray:
     """A different word everywhere, each a float just above 1: uint32 (ROWS, words of the struct)."""
     count = struct.stride // 4
-    return (ONE + np.arange(ROWS, dtype=np.uint32)[:, None] * np.uint32(count) + np.arange(count, dtype=np.uint32)).astype(np.uint32)
+    return (
+        ONE + np.arange(ROWS, dtype=np.uint32)[:, None] * np.uint32(count) + np.arange(count, dtype=np.uint32)
+    ).astype(np.uint32)
 
 
 def fill(struct: Struct) -> str:
@@ -34,19 +44,34 @@ def fill(struct: Struct) -> str:
 
 @pytest.mark.parametrize("struct", [MIXED, OUTCOME, photon_record(2), ray_record(3)], ids=lambda s: s.name)
 def test_packing_again_gives_the_same_bits(gl, struct: Struct) -> None:
-    body = fill(struct) + f"""
+    body = (
+        fill(struct)
+        + f"""
     uvec4 again[{struct.name}_TEXELS];
     to_texels(value, again);
     for (int i = 0; i < {struct.name}_TEXELS; ++i) same += all(equal(texels[i], again[i])) ? 1u : 0u;
     """
-    got = evaluate(gl.ctx, ["lib/random.glsl"], body, {"number": np.arange(ROWS, dtype=np.uint32)}, {"same": "uint"}, structs=[struct])
+    )
+    got = evaluate(
+        gl.ctx,
+        ["lib/random.glsl"],
+        body,
+        {"number": np.arange(ROWS, dtype=np.uint32)},
+        {"same": "uint"},
+        structs=[struct],
+    )
     np.testing.assert_array_equal(got["same"], struct.stride // 16)
 
 
 def test_members_lie_where_numpy_has_them(gl) -> None:
-    body = fill(MIXED) + "a = value.a; b = value.b; c = value.c; d = value.d; e = value.e[2]; f = uint(value.f); g = value.g[1];"
+    body = (
+        fill(MIXED)
+        + "a = value.a; b = value.b; c = value.c; d = value.d; e = value.e[2]; f = uint(value.f); g = value.g[1];"
+    )
     outputs = {"a": "vec3", "b": "uint", "c": "vec2", "d": "uvec2", "e": "float", "f": "uint", "g": "vec4"}
-    got = evaluate(gl.ctx, ["lib/random.glsl"], body, {"number": np.arange(ROWS, dtype=np.uint32)}, outputs, structs=[MIXED])
+    got = evaluate(
+        gl.ctx, ["lib/random.glsl"], body, {"number": np.arange(ROWS, dtype=np.uint32)}, outputs, structs=[MIXED]
+    )
     want = words(MIXED).view(MIXED.dtype)[:, 0]
     for name in ("a", "b", "c", "d"):
         np.testing.assert_array_equal(got[name], want[name])

@@ -75,27 +75,56 @@ AXES = (0.8, 1.1, 0.9)
 TRIANGLES = (1280, 5120, 20_480, 81_920, 327_680)
 SHAPES = {
     "sphere": Shape(
-        lambda size: sphere_mesh(1.0, size), TRIANGLES, refracted_twice(sphere((0, 0, 0), 1), sphere((0, 0, 0), 1)), (-3, 0, 0), 0.7, 1.6
+        lambda size: sphere_mesh(1.0, size),
+        TRIANGLES,
+        refracted_twice(sphere((0, 0, 0), 1), sphere((0, 0, 0), 1)),
+        (-3, 0, 0),
+        0.7,
+        1.6,
     ),
-    "ellipsoid": Shape(lambda size: ellipsoid(AXES, size), TRIANGLES, refracted_twice(Quadric((0, 0, 0), AXES), Quadric((0, 0, 0), AXES)), (-3, 0, 0), 0.6, 2.0),
+    "ellipsoid": Shape(
+        lambda size: ellipsoid(AXES, size),
+        TRIANGLES,
+        refracted_twice(Quadric((0, 0, 0), AXES), Quadric((0, 0, 0), AXES)),
+        (-3, 0, 0),
+        0.6,
+        2.0,
+    ),
     "lens": Shape(
         lambda size: towards_x(lens(1.2, -0.9, 0.5, 1.2, size)),
         (12 * 8 * 9, 12 * 16 * 17, 12 * 32 * 33, 12 * 64 * 65, 12 * 128 * 129),
         refracted_twice(sphere((0.95, 0, 0), 1.2), sphere((-0.65, 0, 0), 0.9)),
-        (-3, 0, 0), 0.45, 1.5,
+        (-3, 0, 0),
+        0.45,
+        1.5,
     ),
     "mirror cylinder": Shape(
-        mirror_arc, (32, 64, 128, 256, 512),
+        mirror_arc,
+        (32, 64, 128, 256, 512),
         lambda ray: through(ray, Quadric((0, 0, 0), (1, 1, np.inf)), AIR, AIR, root=1, mirror=True),
-        (-0.8, 0, 0), 0.5, -1.0, (MIRRORED,),
+        (-0.8, 0, 0),
+        0.5,
+        -1.0,
+        (MIRRORED,),
     ),
-}  # fmt: skip
+}
 
 
 def traced(gl: Context, shape: Shape, mesh: Mesh) -> Photons:
     solid = placed("solid", mesh, Mirror() if MIRRORED in shape.path else glass("N-BK7"))
     target = screen((shape.screen_x, 0, 0), (1, 0, 0), 6.0)
-    return trace_beam(gl, (solid,), None, target, shape.start, (1, 0.02, 0.03), shape.radius, D_NM, count=160, max_depth=len(shape.path)).of_choices(*shape.path)
+    return trace_beam(
+        gl,
+        (solid,),
+        None,
+        target,
+        shape.start,
+        (1, 0.02, 0.03),
+        shape.radius,
+        D_NM,
+        count=160,
+        max_depth=len(shape.path),
+    ).of_choices(*shape.path)
 
 
 def errors(gl: Context, shape: Shape, mesh: Mesh) -> np.ndarray:
@@ -105,11 +134,15 @@ def errors(gl: Context, shape: Shape, mesh: Mesh) -> np.ndarray:
     domain = photons.emitter.domain
     seeds = [domain.tangent, domain.bitangent, np.zeros(3)]
     plane = Plane((shape.screen_x, 0, 0), (1, 0, 0))
-    exact = [onto(shape.exact(make_ray(p, d, seeds)), plane) for p, d in zip(photons.start, photons.direction, strict=True)]
+    exact = [
+        onto(shape.exact(make_ray(p, d, seeds)), plane) for p, d in zip(photons.start, photons.direction, strict=True)
+    ]
     position = photons.position - [ray.position for ray in exact]
     got = np.stack([photons.dposition_ds, photons.dposition_dt, photons.dposition_dn], axis=1)
     columns = np.sum((got - [ray.dposition for ray in exact]) ** 2, axis=2)
-    return np.array([np.median(np.linalg.norm(position, axis=1)), np.sqrt(columns[:, :2].mean()), np.sqrt(columns[:, 2].mean())])
+    return np.array(
+        [np.median(np.linalg.norm(position, axis=1)), np.sqrt(columns[:, :2].mean()), np.sqrt(columns[:, 2].mean())]
+    )
 
 
 def orders(gl: Context, shape: Shape, levels: int) -> np.ndarray:

@@ -42,9 +42,11 @@ def patches(ratio: float, width_texels: float, rng: np.random.Generator) -> tupl
 @pytest.mark.parametrize(("make", "limit"), [(noise, 0.42), (natural, 0.18)], ids=["noise", "natural"])
 @pytest.mark.parametrize("ratio", [1.0, 2.0, 4.0, 8.0])
 def test_a_patch_shows_its_mean(gl, make, limit: float, ratio: float) -> None:
-    """A lookup averages with a kernel about as wide as the patch but of another shape, and one that hangs on where texels lie. At white
-    noise that leaves up to 0.38 standard deviations of the picture (the means themselves spread by 0.46 to 0.16), at a natural
-    picture up to 0.16 (0.87 to 0.70): as sharp as the patch, at the price of some grain, which a pixel's samples average out; `ratio` lookups side by side err apart, so that their mean errs by 1/√ratio of it."""
+    """A lookup averages with a kernel about as wide as the patch but of another shape, and one that hangs on where
+    texels lie. At white noise that leaves up to 0.38 standard deviations of the picture (the means themselves spread by
+    0.46 to 0.16), at a natural picture up to 0.16 (0.87 to 0.70): as sharp as the patch, at the price of some grain,
+    which a pixel's samples average out; `ratio` lookups side by side err apart, so that their mean errs by 1/√ratio of
+    it."""
     rng = np.random.default_rng(int(ratio))
     rgb = make()
     store = store_of(gl, scene_of(Texture(rgb)))
@@ -72,7 +74,13 @@ def test_long_patches_blur_instead_of_missing_texels(gl) -> None:
     stripes[:, ::2] = 1.0
     store = store_of(gl, scene_of(Texture(stripes)))
     uv = as_f32(np.random.default_rng(3).random((COUNT, 2)))
-    got = run(gl, store, "rgb = texture_filtered(pictures[0], uv, vec2(1.0, 0.0), vec2(0.0, 1e-4));", {"uv": uv}, {"rgb": "vec3"})
+    got = run(
+        gl,
+        store,
+        "rgb = texture_filtered(pictures[0], uv, vec2(1.0, 0.0), vec2(0.0, 1e-4));",
+        {"uv": uv},
+        {"rgb": "vec3"},
+    )
     assert np.abs(got["rgb"] - 0.5).max() < 0.02
     store.release()
 
@@ -108,6 +116,7 @@ BANDS = {"north": (0.0, 0.06), "south": (np.pi - 0.06, np.pi), "between": (0.4, 
 def test_poles_and_seam_show_a_smooth_sky_as_it_is(gl, name: str) -> None:
     """Smooth over the sphere, so the mean over a patch is nearly the value at its middle; one wave round the pole is
     what a filter that smears along the picture's rows would lose."""
+
     def smooth(d: np.ndarray) -> np.ndarray:
         return 2.0 + d[:, 0] + 0.5 * d[:, 1] + 0.5 * d[:, 0] * d[:, 1]
 
@@ -130,7 +139,8 @@ def test_poles_and_seam_show_a_smooth_sky_as_it_is(gl, name: str) -> None:
 
 
 def test_a_patch_of_the_sky_shows_its_mean(gl) -> None:
-    """Noise. Towards a pole a patch covers more and more columns, so that means spread less (by 0.32, 0.20, 0.08), and so must errors."""
+    """Noise. Towards a pole a patch covers more and more columns, so that means spread less (by 0.32, 0.20, 0.08), and
+    so must errors."""
     rgb = noise()
     sky = np.concatenate([rgb, rgb[:, ::-1]], axis=1)
     store = store_of(gl, scene_of(environment=sky))
@@ -157,6 +167,7 @@ def test_a_patch_of_the_sky_shows_its_mean(gl) -> None:
 @pytest.mark.parametrize("width", [0.0, 0.05, 0.2, 0.6, 1.5])
 def test_filtering_keeps_the_light_of_the_whole_sky(gl, width: float) -> None:
     """A lamp near the zenith, a bright ground and noise; means over the sphere from 20 000 evenly spread directions."""
+
     def lit(d: np.ndarray) -> np.ndarray:
         lamp = np.exp(-np.sum((d - [0.2, 0.1, np.sqrt(0.95)]) ** 2, axis=1) / 0.02)
         return 0.3 + 10.0 * lamp + (d[:, 2] < -0.3)
@@ -169,7 +180,9 @@ def test_filtering_keeps_the_light_of_the_whole_sky(gl, width: float) -> None:
     d = as_f32(np.stack([np.sqrt(1 - z * z) * np.cos(azimuth), np.sqrt(1 - z * z) * np.sin(azimuth), z], axis=1))
     a = np.cross(d, [0.36, 0.48, 0.8])
     a /= np.linalg.norm(a, axis=1, keepdims=True)
-    got = run(gl, store, RADIANCE, {"d": d, "s": as_f32(width * a), "t": as_f32(width * np.cross(d, a))}, {"rgb": "vec3"})
+    got = run(
+        gl, store, RADIANCE, {"d": d, "s": as_f32(width * a), "t": as_f32(width * np.cross(d, a))}, {"rgb": "vec3"}
+    )
     borders = np.cos(np.pi * np.arange(129) / 128)
     whole = (-np.diff(borders)[:, None, None] * sky).sum(axis=(0, 1)) / 2.0 / 256
     np.testing.assert_allclose(got["rgb"].mean(axis=0), whole, rtol=0.012)  # directions alone leave 0.001

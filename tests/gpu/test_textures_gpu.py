@@ -1,6 +1,8 @@
-"""Pictures on surfaces and round the scene: the store, and every function of lib/textures.glsl against its CPU reference.
+"""Pictures on surfaces and round the scene: the store, and every function of lib/textures.glsl against its CPU
+reference.
 
-What the filter stands for is tested apart from how it does it: `test_textures_filter.py` compares with means by brute force.
+What the filter stands for is tested apart from how it does it: `test_textures_filter.py` compares with means by brute
+force.
 """
 
 from __future__ import annotations
@@ -33,10 +35,19 @@ from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {
     "textures.glsl": (
-        "picture_texel", "level_origin", "level_bilinear", "patch_axes", "filter_plan", "corner_texel",
-        "hit_uv", "uv_gradients", "texture_filtered", "environment_place", "environment_radiance",
+        "picture_texel",
+        "level_origin",
+        "level_bilinear",
+        "patch_axes",
+        "filter_plan",
+        "corner_texel",
+        "hit_uv",
+        "uv_gradients",
+        "texture_filtered",
+        "environment_place",
+        "environment_radiance",
     ),
-}  # fmt: skip
+}
 COUNT = 2048
 BINDING, UNIT = 9, 3
 LIB = ["lib/textures.glsl"]
@@ -67,9 +78,13 @@ def store_of(gl, scene: Scene, **options) -> TextureStore:
     return TextureStore(gl.ctx, scene, first, np.tile(np.arange(3), (first[-1], 1)), **options)
 
 
-def run(gl, store: TextureStore, body: str, inputs: dict[str, np.ndarray], outputs: dict[str, str]) -> dict[str, np.ndarray]:
+def run(
+    gl, store: TextureStore, body: str, inputs: dict[str, np.ndarray], outputs: dict[str, str]
+) -> dict[str, np.ndarray]:
     defines = store.defines | place_defines(BINDING, UNIT)
-    return evaluate(gl.ctx, LIB, body, inputs, outputs, defines, store.structs, binders=[lambda: store.bind(BINDING, UNIT)])
+    return evaluate(
+        gl.ctx, LIB, body, inputs, outputs, defines, store.structs, binders=[lambda: store.bind(BINDING, UNIT)]
+    )
 
 
 @pytest.mark.parametrize("as_image", [True, False], ids=["image", "texture"])
@@ -77,14 +92,22 @@ def test_every_texel_of_every_level_is_found(gl, as_image: bool) -> None:
     pictures = [Texture(picture(h, w, seed=h)) for h, w in ((16, 16), (7, 12), (1, 19), (23, 1), (1, 1), (33, 20))]
     store = store_of(gl, scene_of(*pictures, environment=picture(9, 18)), as_image=as_image)
     wanted, at = [], []
-    for index, levels in enumerate([mip_chain.texture_levels(p.rgb) for p in pictures] + [mip_chain.environment_levels(picture(9, 18))]):
+    for index, levels in enumerate(
+        [mip_chain.texture_levels(p.rgb) for p in pictures] + [mip_chain.environment_levels(picture(9, 18))]
+    ):
         for k, level in enumerate(levels):
             rows, columns = np.indices(level.shape[:2]).reshape(2, -1)
             at.append(np.column_stack([np.full(rows.size, index), np.full(rows.size, k), columns, rows]))
             wanted.append(level.reshape(-1, 3))
     which, level, column, row = np.concatenate(at).astype(np.uint32).T
     body = "rgb = picture_texel(level_origin(pictures[which], int(level)) + ivec2(column, line)); levels = pictures[which].levels;"
-    got = run(gl, store, body, {"which": which, "level": level, "column": column, "line": row}, {"rgb": "vec3", "levels": "uint"})
+    got = run(
+        gl,
+        store,
+        body,
+        {"which": which, "level": level, "column": column, "line": row},
+        {"rgb": "vec3", "levels": "uint"},
+    )
     np.testing.assert_array_equal(got["rgb"], np.concatenate(wanted))
     assert (got["levels"][:1] == 5).all()
     assert store.bytes > sum(p.rgb.size // 3 * 16 for p in pictures)
@@ -108,7 +131,9 @@ def test_a_patch_without_size_is_bilinear(gl, wrap: str) -> None:
     # Texel centres show their texel; row 0 is the top.
     rows, columns = np.indices(rgb.shape[:2]).reshape(2, -1)
     centres = np.column_stack([(columns + 0.5) / 50, 1.0 - (rows + 0.5) / 37])
-    got = run(gl, store, "rgb = texture_filtered(pictures[0], uv, vec2(0.0), vec2(0.0));", {"uv": centres}, {"rgb": "vec3"})
+    got = run(
+        gl, store, "rgb = texture_filtered(pictures[0], uv, vec2(0.0), vec2(0.0));", {"uv": centres}, {"rgb": "vec3"}
+    )
     assert np.abs(got["rgb"] - rgb.reshape(-1, 3)).max() < room
     store.release()
 
@@ -124,10 +149,21 @@ def test_repeated_pictures_go_on_and_clamped_ones_end(gl) -> None:
     here = texture_filtered(pictures[0], uv, side, side.yx); there = texture_filtered(pictures[0], beyond, side, side.yx);
     border = texture_filtered(pictures[1], far, vec2(0.0), vec2(0.0));
     """
-    got = run(gl, store, body, {"uv": uv, "side": side, "beyond": beyond, "far": far}, {"here": "vec3", "there": "vec3", "border": "vec3"})
+    got = run(
+        gl,
+        store,
+        body,
+        {"uv": uv, "side": side, "beyond": beyond, "far": far},
+        {"here": "vec3", "there": "vec3", "border": "vec3"},
+    )
     assert np.abs(got["here"] - got["there"]).max() < 1e-4
     edge = rgb[:, np.where(far[:, 0] < 0, 0, 39)].swapaxes(0, 1)  # (COUNT, 24, 3): the column it ends with
-    want = np.stack([cpu_reference.bilinear(e[:, None], np.array([[0.5, 1.0 - v]]), (False, False))[0] for e, v in zip(edge, far[:, 1], strict=True)])
+    want = np.stack(
+        [
+            cpu_reference.bilinear(e[:, None], np.array([[0.5, 1.0 - v]]), (False, False))[0]
+            for e, v in zip(edge, far[:, 1], strict=True)
+        ]
+    )
     assert np.abs(got["border"] - want).max() < 3e-5
     store.release()
 
@@ -149,9 +185,18 @@ def test_axes_and_plan_of_a_patch(gl) -> None:
     filter_plan(longer * 500.0, shorter * 500.0, l, r); level = l; taps = r;
     """
     store = store_of(gl, scene_of(Texture(picture(4, 4))))
-    got = run(gl, store, body, {"s": side_s, "t": side_t}, {"longer": "float", "shorter": "float", "axis": "vec2", "level": "float", "taps": "float"})
+    got = run(
+        gl,
+        store,
+        body,
+        {"s": side_s, "t": side_t},
+        {"longer": "float", "shorter": "float", "axis": "vec2", "level": "float", "taps": "float"},
+    )
     longer, shorter, axis = cpu_reference.patch_axes(side_s, side_t)
-    assert np.abs(got["longer"] - longer).max() < 1e-6 * longer.max() and (np.abs(got["longer"] - longer) <= 1e-6 * longer).all()
+    assert (
+        np.abs(got["longer"] - longer).max() < 1e-6 * longer.max()
+        and (np.abs(got["longer"] - longer) <= 1e-6 * longer).all()
+    )
     # The shorter one is a difference of squares: what is lost is far below an eighth of the longer one.
     assert (np.abs(got["shorter"] - shorter) <= 1e-3 * longer).all()
     clear = longer > 1.01 * shorter + 1e-9
@@ -206,7 +251,12 @@ def turned_scene() -> tuple[Scene, np.ndarray]:
     glass = SceneObject("block", primitives.box(), Dielectric(_glass()))
     texture = Texture(picture(8, 8), "clamp")
     worn = Diffuse(texture=texture)
-    objects = SceneObject("a", mesh, worn), glass, SceneObject("plain", mesh, Diffuse()), SceneObject("b", mesh, worn, mirrored)
+    objects = (
+        SceneObject("a", mesh, worn),
+        glass,
+        SceneObject("plain", mesh, Diffuse()),
+        SceneObject("b", mesh, worn, mirrored),
+    )
     return replace(scene_of(), objects=objects), affine
 
 
@@ -241,8 +291,16 @@ def test_texture_coordinates_follow_turned_and_mirrored_triangles(gl) -> None:
     outputs = {"texture_": "uint", "object": "uint", "uv": "vec2", "first": "vec2"}
     outputs |= dict.fromkeys(("point", "edge1", "edge2", "gradient_u", "gradient_v"), "vec3")
     defines = {**features.defines(), **buffers.defines, **store.defines, **place_defines(BINDING, UNIT)}
-    got = evaluate(gl.ctx, [*LIB, "lib/scene.glsl"], body, {"slot": slot, "bary": bary}, outputs, defines, (*SCENE_STRUCTS, *store.structs),
-                   binders=[buffers.bind, lambda: store.bind(BINDING, UNIT)])
+    got = evaluate(
+        gl.ctx,
+        [*LIB, "lib/scene.glsl"],
+        body,
+        {"slot": slot, "bary": bary},
+        outputs,
+        defines,
+        (*SCENE_STRUCTS, *store.structs),
+        binders=[buffers.bind, lambda: store.bind(BINDING, UNIT)],
+    )
     np.testing.assert_array_equal(got["texture_"], np.array([0, NO_PICTURE, NO_PICTURE, 1])[got["object"].astype(int)])
     for index in (0, 3):
         mine = got["object"] == index
@@ -261,14 +319,27 @@ def test_texture_coordinates_follow_turned_and_mirrored_triangles(gl) -> None:
         corners = np.stack([np.zeros_like(edges[0]), *edges], axis=1)
         gradient_u, gradient_v = cpu_reference.uv_gradients(corners, corners @ rows)
         for name, gradient in (("gradient_u", gradient_u), ("gradient_v", gradient_v)):
-            assert (np.linalg.norm(got[name][mine] * buffers.space.scale - gradient, axis=1) < 1e-3 * np.linalg.norm(gradient, axis=1)).all()
-        assert np.abs(cpu_reference.hit_uv(corners @ rows + got["first"][mine][:, None], bary[mine]) - got["uv"][mine]).max() < 3e-5
+            assert (
+                np.linalg.norm(got[name][mine] * buffers.space.scale - gradient, axis=1)
+                < 1e-3 * np.linalg.norm(gradient, axis=1)
+            ).all()
+        assert (
+            np.abs(
+                cpu_reference.hit_uv(corners @ rows + got["first"][mine][:, None], bary[mine]) - got["uv"][mine]
+            ).max()
+            < 3e-5
+        )
     store.release()
     buffers.release()
 
 
 def test_large_texture_coordinates_of_a_repeating_picture_keep_their_digits(gl) -> None:
-    mesh = make_mesh("far", [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], uv=np.array([[[1e6, -1e6], [1e6 + 1, -1e6], [1e6, -1e6 + 1]]]))
+    mesh = make_mesh(
+        "far",
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0]],
+        [[0, 1, 2]],
+        uv=np.array([[[1e6, -1e6], [1e6 + 1, -1e6], [1e6, -1e6 + 1]]]),
+    )
     store = store_of(gl, scene_of(Texture(picture(4, 4)), mesh=mesh))
     bary = as_f32(np.random.default_rng(7).dirichlet([1, 1, 1], COUNT)[:, :2])
     got = run(gl, store, "vec2 at; hit_uv(pictures[0], 0u, bary, at); uv = at;", {"bary": bary}, {"uv": "vec2"})
@@ -301,22 +372,36 @@ def test_a_scene_without_pictures_has_nothing(gl) -> None:
 def test_a_picture_used_twice_is_packed_once_and_edits_keep_it(gl) -> None:
     rgb = picture(64, 64)
     one, two = store_of(gl, scene_of(Texture(rgb))), store_of(gl, scene_of(Texture(rgb), None, Texture(rgb, "clamp")))
-    pictures = [store.bytes - store._records.size - store._corners.size[0] * store._corners.size[1] * 16 for store in (one, two)]
+    pictures = [
+        store.bytes - store._records.size - store._corners.size[0] * store._corners.size[1] * 16 for store in (one, two)
+    ]
     assert pictures[0] == pictures[1]
     packed = one._pictures
     longer = scene_of(None, Texture(rgb, "clamp"), mesh=quad(2.0))
     assert one.follow(longer, np.array([0, 2, 4]), np.tile(np.arange(3), (4, 1))) and one._pictures is packed
-    got = run(gl, one, "vec2 at; hit_uv(pictures[0], 2u + which, vec2(1.0, 0.0), at); uv = at;", {"which": np.arange(2, dtype=np.uint32)}, {"uv": "vec2"})
+    got = run(
+        gl,
+        one,
+        "vec2 at; hit_uv(pictures[0], 2u + which, vec2(1.0, 0.0), at); uv = at;",
+        {"which": np.arange(2, dtype=np.uint32)},
+        {"uv": "vec2"},
+    )
     np.testing.assert_allclose(got["uv"], [[2, 0], [2, 2]], atol=1e-6)
     assert not one.follow(scene_of(Texture(rgb.copy())), np.array([0, 2]), np.tile(np.arange(3), (2, 1)))
-    assert not one.follow(replace(longer, environment=Environment(rgb)), np.array([0, 2, 4]), np.tile(np.arange(3), (4, 1)))
+    assert not one.follow(
+        replace(longer, environment=Environment(rgb)), np.array([0, 2, 4]), np.tile(np.arange(3), (4, 1))
+    )
     for store in (one, two):
         store.release()
 
 
 def test_what_does_not_fit_or_has_no_coordinates_is_told(gl) -> None:
     with pytest.raises(UserError, match=r"wall\.png: its 100 x 40 pixels do not fit.*smaller"):
-        store_of(gl, scene_of(Texture(picture(40, 100), source="wall.png"), Texture(picture(8, 8), source="small.png")), max_side=128)
+        store_of(
+            gl,
+            scene_of(Texture(picture(40, 100), source="wall.png"), Texture(picture(8, 8), source="small.png")),
+            max_side=128,
+        )
     bare = replace(quad(), uv=None)
     with pytest.raises(UserError, match="object 'object 0'.*no texture coordinates"):
         store_of(gl, scene_of(Texture(picture(4, 4)), mesh=bare))
@@ -324,7 +409,13 @@ def test_what_does_not_fit_or_has_no_coordinates_is_told(gl) -> None:
     with pytest.raises(UserError, match="no texture coordinates"):
         store.follow(scene_of(Texture(rgb), mesh=bare), np.array([0, 2]), np.tile(np.arange(3), (2, 1)))
     store.bind(BINDING, UNIT)  # as it was
-    got = run(gl, store, "vec2 at; hit_uv(pictures[0], which, vec2(1.0, 0.0), at); uv = at;", {"which": np.arange(2, dtype=np.uint32)}, {"uv": "vec2"})
+    got = run(
+        gl,
+        store,
+        "vec2 at; hit_uv(pictures[0], which, vec2(1.0, 0.0), at); uv = at;",
+        {"which": np.arange(2, dtype=np.uint32)},
+        {"uv": "vec2"},
+    )
     np.testing.assert_array_equal(got["uv"], [[1, 0], [1, 1]])
     store.release()
     broken = replace(quad(), uv=np.full((2, 3, 2), np.nan))

@@ -43,7 +43,8 @@ from spectrasplat.stress.rigs.gpu_paths import (
 from tests.gpu.mutants import mutate
 
 BAND = (579.0, 581.0)
-"""So narrow that the columns' second order is below the tolerance, and what absorption gains by a path's change of length; absorption steep enough to differ within it."""
+"""So narrow that the columns' second order is below the tolerance, and what absorption gains by a path's change of
+length; absorption steep enough to differ within it."""
 HAZARD = 0.1
 """Paths with a smaller cosine at any surface are left to the stiff sweep."""
 
@@ -53,7 +54,9 @@ def ink(strength: float, slope_per_nm: float) -> Absorption:
     return Absorption(np.clip(strength + slope_per_nm * (VISIBLE_NM - 580.0), 0.0, 4.0))
 
 
-def ball(material: Dielectric | Mirror, centre: tuple[float, float, float] = (0, 0, 0), radius: float = 1.0) -> SceneObject:
+def ball(
+    material: Dielectric | Mirror, centre: tuple[float, float, float] = (0, 0, 0), radius: float = 1.0
+) -> SceneObject:
     matrix = np.eye(4)
     matrix[:3, 3] = centre
     return placed(f"ball {centre} {radius}", sphere(radius, 320).transformed(matrix), material)
@@ -96,24 +99,47 @@ class Case:
 
 CASES = {
     "absorption": Case(lambda: (ball(replace(glass("F2"), absorption=ink(0.4, 0.02))),), refractions=1),
-    "absorption without dispersion": Case(lambda: (ball(Dielectric(dispersion.constant(1.5), ink(0.4, 0.02))),), refractions=1),
-    "coloured mirror": Case(lambda: (ball(Mirror((1.0, 0.1, 0.02)), (0, 0.5, 0)), ball(glass("water"), (-0.6, -1.4, 0.2), 0.7)), depth=4, tolerance=1e-3),
+    "absorption without dispersion": Case(
+        lambda: (ball(Dielectric(dispersion.constant(1.5), ink(0.4, 0.02))),), refractions=1
+    ),
+    "coloured mirror": Case(
+        lambda: (ball(Mirror((1.0, 0.1, 0.02)), (0, 0.5, 0)), ball(glass("water"), (-0.6, -1.4, 0.2), 0.7)),
+        depth=4,
+        tolerance=1e-3,
+    ),
     "touching": Case(touching, refractions=3, lattice=200),
     "nested, the inner decides": Case(
-        lambda: (ball(replace(glass("water"), absorption=ink(0.2, 0.02))), ball(replace(glass("N-SF11"), absorption=ink(0.6, -0.02), priority=1), (0.2, 0.1, 0), 0.5)),
-        depth=4, refractions=3,
+        lambda: (
+            ball(replace(glass("water"), absorption=ink(0.2, 0.02))),
+            ball(replace(glass("N-SF11"), absorption=ink(0.6, -0.02), priority=1), (0.2, 0.1, 0), 0.5),
+        ),
+        depth=4,
+        refractions=3,
     ),
     "nested, the outer decides": Case(
-        lambda: (ball(replace(glass("water"), absorption=ink(0.4, 0.02), priority=1)), ball(replace(glass("N-SF11"), absorption=ink(3.0, 0.1)), (0.2, 0.1, 0), 0.5)),
-        refractions=2, covered=5,
+        lambda: (
+            ball(replace(glass("water"), absorption=ink(0.4, 0.02), priority=1)),
+            ball(replace(glass("N-SF11"), absorption=ink(3.0, 0.1)), (0.2, 0.1, 0), 0.5),
+        ),
+        refractions=2,
+        covered=5,
     ),
     "overlapping": Case(
-        lambda: (ball(replace(glass("water"), absorption=ink(0.4, 0.02), priority=1), (0, 0.4, 0), 0.8), ball(replace(glass("F2"), absorption=ink(0.2, 0.02)), (0.3, -0.3, 0), 0.8)),
-        refractions=2, covered=5,
+        lambda: (
+            ball(replace(glass("water"), absorption=ink(0.4, 0.02), priority=1), (0, 0.4, 0), 0.8),
+            ball(replace(glass("F2"), absorption=ink(0.2, 0.02)), (0.3, -0.3, 0), 0.8),
+        ),
+        refractions=2,
+        covered=5,
     ),
-    "two gains of one glass": Case(lambda: (ball(gained("F2", 4.0), (0, 0.7, 0), 0.65), ball(gained("F2", 0.25), (0, -0.7, 0), 0.65)), refractions=1, tinted=False, lattice=120),
+    "two gains of one glass": Case(
+        lambda: (ball(gained("F2", 4.0), (0, 0.7, 0), 0.65), ball(gained("F2", 0.25), (0, -0.7, 0), 0.65)),
+        refractions=1,
+        tinted=False,
+        lattice=120,
+    ),
     "steep Fresnel": Case(lambda: (ball(glass("N-SF11"), (0, 0, 0), 1.0),), tinted=False, lattice=120),
-}  # fmt: skip
+}
 
 
 def weights_agree(gl: Context, case: Case) -> None:
@@ -123,7 +149,9 @@ def weights_agree(gl: Context, case: Case) -> None:
     reference = ReferenceScene.of(objects)
     choices = photons.choices(case.depth)
     compared, covered, skipped, spread = 0, 0, 0, []
-    rows = [i for i in np.random.default_rng(2).permutation(len(choices)) if choices[i].count(REFRACTED) >= case.refractions]
+    rows = [
+        i for i in np.random.default_rng(2).permutation(len(choices)) if choices[i].count(REFRACTED) >= case.refractions
+    ]
     for i in rows[:24]:
         lo, anchor, hi = photons.nm[i]
         path = reference.path(photons, photons.q[i], choices[i], reference.bodies(anchor))
@@ -135,13 +163,18 @@ def weights_agree(gl: Context, case: Case) -> None:
         compared += 1
         covered += len(path.triangles) - 1 > len(path.reflections)
         assert np.linalg.norm(path.ray.position - photons.position[i]) < 1e-4, "position"
-        ends = [reference.path(photons, photons.q[i], choices[i], reference.bodies(nm), path.triangles).transmittance for nm in (lo, hi)]
+        ends = [
+            reference.path(photons, photons.q[i], choices[i], reference.bodies(nm), path.triangles).transmittance
+            for nm in (lo, hi)
+        ]
         want = photons.weight[i] * np.array([ends[0], path.transmittance, ends[1]])
         got = photons.records["throughput"][i]
         assert (np.abs(got - want) <= case.tolerance * want).all(), f"throughput after {choices[i]}: {got / want - 1}"
         assert photons.records["flux_w"][i] == pytest.approx(want[1], rel=case.tolerance), f"flux after {choices[i]}"
         spread.append(np.ptp(want) / want[1])
-    assert compared >= 12 and covered >= case.covered and skipped <= 2, f"paths differ: {compared} the same, {covered} of them through covered surfaces, {skipped} others"
+    assert compared >= 12 and covered >= case.covered and skipped <= 2, (
+        f"paths differ: {compared} the same, {covered} of them through covered surfaces, {skipped} others"
+    )
     assert not case.tinted or np.sort(spread)[-4] > 20 * case.tolerance, spread
 
 
@@ -151,19 +184,41 @@ def test_position_and_throughput_at_three_wavelengths(gl, name: str) -> None:
 
 
 MUTANTS = {
-    "one coefficient for the band": ("light/trace.comp", "exp(-alpha * hit.distance)", "vec3(exp(-alpha.y * hit.distance))", "absorption"),
-    "flux not absorbed": ("light/trace.comp", "ray.flux_w *= kept.y", "ray.flux_w *= 1.0", "absorption without dispersion"),
-    "absorption of the lower priority": ("lib/medium.glsl", "stack_objects[findMSB(mask)]", "stack_objects[findLSB(mask)]", "nested, the outer decides"),
+    "one coefficient for the band": (
+        "light/trace.comp",
+        "exp(-alpha * hit.distance)",
+        "vec3(exp(-alpha.y * hit.distance))",
+        "absorption",
+    ),
+    "flux not absorbed": (
+        "light/trace.comp",
+        "ray.flux_w *= kept.y",
+        "ray.flux_w *= 1.0",
+        "absorption without dispersion",
+    ),
+    "absorption of the lower priority": (
+        "lib/medium.glsl",
+        "stack_objects[findMSB(mask)]",
+        "stack_objects[findLSB(mask)]",
+        "nested, the outer decides",
+    ),
     "grey mirror": ("light/trace.comp", "child.throughput *= kept;", "child.throughput *= kept.y;", "coloured mirror"),
     "one polarisation": ("lib/optics.glsl", "0.5 * (rs * rs + rp * rp)", "rs * rs", "steep Fresnel"),
-    "covered surface is an event": ("lib/medium.glsl", "crossing.before != crossing.after", "true", "nested, the outer decides"),
+    "covered surface is an event": (
+        "lib/medium.glsl",
+        "crossing.before != crossing.after",
+        "true",
+        "nested, the outer decides",
+    ),
 }
 
 
 QUICK = ("one coefficient for the band", "absorption of the lower priority", "grey mirror")
 
 
-@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in MUTANTS if name not in QUICK)])
+@pytest.mark.parametrize(
+    "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in MUTANTS if name not in QUICK)]
+)
 def test_mutants_are_caught(gl, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file, old, new, case = MUTANTS[name]
     mutate(monkeypatch, tmp_path, file, old, new)
@@ -172,21 +227,33 @@ def test_mutants_are_caught(gl, name: str, tmp_path: Path, monkeypatch: pytest.M
 
 
 def cuts_agree(gl: Context) -> None:
-    """A band that total reflection cuts at a face where it arrives dispersed in place and direction; both parts against exact paths."""
+    """A band that total reflection cuts at a face where it arrives dispersed in place and direction; both parts against
+    exact paths."""
     apex, n = np.pi / 3, float(glasses.index("N-BK7", 503.0))
     turned = np.arcsin(n * np.sin(apex - np.arcsin(1 / n))) - apex / 2
     along, across = np.array([[np.cos(turned), np.sin(turned)], [-np.sin(turned), np.cos(turned)]])
     entry = np.array([-0.3, 0.35])
     # A slanting plate shifts colours against each other and leaves their direction, so the prism still cuts at 503 nm.
-    plate = np.array([entry - 2.2 * along + u * along + v * (across + 0.5 * along) for u, v in ((0, -0.8), (1.2, -0.8), (1.2, 0.8), (0, 0.8))])
+    plate = np.array(
+        [
+            entry - 2.2 * along + u * along + v * (across + 0.5 * along)
+            for u, v in ((0, -0.8), (1.2, -0.8), (1.2, 0.8), (0, 0.8))
+        ]
+    )
     prism = np.array([[-0.5, 0.0], [0.5, 0.0], [0.0, np.sqrt(0.75)]])
-    solids = placed("plate", extruded("plate", plate), glass("F2")), placed("prism", extruded("prism", prism), glass("N-BK7"))
+    solids = (
+        placed("plate", extruded("plate", plate), glass("F2")),
+        placed("prism", extruded("prism", prism), glass("N-BK7")),
+    )
     objects = (*solids, placed("room", box((16.0, 16.0, 16.0)), Diffuse()))
     light = beam_light(np.append(entry - 4 * along, 0.0), np.append(along, 0.0), 0.1)
     photons = trace_light(gl, objects, light, [(500.0, 506.0)], 150, 5)
     reference = ReferenceScene.of(objects)
     choices = photons.choices(7)
-    parts = {part: [i for i, made in enumerate(choices) if made[:4] == (REFRACTED, REFRACTED, REFRACTED, part)] for part in (CUT_LOW, CUT_HIGH)}
+    parts = {
+        part: [i for i, made in enumerate(choices) if made[:4] == (REFRACTED, REFRACTED, REFRACTED, part)]
+        for part in (CUT_LOW, CUT_HIGH)
+    }
     assert min(map(len, parts.values())) > 10
     # The longer part gets out and begins where nothing passes; the shorter one is reflected whole.
     for i in parts[CUT_HIGH][:8] + parts[CUT_LOW][:8]:
@@ -201,7 +268,9 @@ def cuts_agree(gl: Context) -> None:
         want = photons.weight[i] * np.array(shares)
         got = photons.records["throughput"][i]
         # Next to the cut T goes by a square root: 1e-7 of cosine² is 3e-4 of cosine, and four times that of T.
-        assert np.abs(got - want).max() < 3e-3 * photons.weight[i], f"throughput after {events}: {got / photons.weight[i]}, {want / photons.weight[i]}"
+        assert np.abs(got - want).max() < 3e-3 * photons.weight[i], (
+            f"throughput after {events}: {got / photons.weight[i]}, {want / photons.weight[i]}"
+        )
 
 
 def test_cut_bands_against_exact_paths(gl) -> None:

@@ -18,7 +18,15 @@ from spectrasplat.render.still import RenderResult, render
 from tests.image.metrics import LUMINANCE, normalised_rmse, relative_mse
 
 SCENE = assets_dir() / "scenes" / "prism_case.toml"
-FLOOR_X_CM = {400: 14.507781, 450: 18.587992, 500: 20.922858, 550: 22.456213, 600: 23.542016, 650: 24.350626, 700: 24.975810}
+FLOOR_X_CM = {
+    400: 14.507781,
+    450: 18.587992,
+    500: 20.922858,
+    550: 22.456213,
+    600: 23.542016,
+    650: 24.350626,
+    700: 24.975810,
+}
 """Where the beam's axis meets the floor, in double precision, by the reference's author."""
 
 
@@ -65,7 +73,12 @@ def test_wavelengths_arrive_within_a_pixel(gl, wavelength_nm: int) -> None:
     brightness = np.abs(result.rgb).sum(axis=2)
     rows, columns = np.indices(brightness.shape)
     keep = brightness > 0.05 * brightness.max()
-    centre = np.array([np.average(columns[keep], weights=brightness[keep]), np.average(rows[keep], weights=brightness[keep])]) + 0.5
+    centre = (
+        np.array(
+            [np.average(columns[keep], weights=brightness[keep]), np.average(rows[keep], weights=brightness[keep])]
+        )
+        + 0.5
+    )
     expected = _pixel_of(scene, np.array([FLOOR_X_CM[wavelength_nm], 0.0, 0.0]))
     # Along the slit's image the light is spread; across it the line must fall within a pixel.
 
@@ -94,5 +107,7 @@ def test_programs_leave_out_what_the_scene_does_not_need() -> None:
     features = Features.of(scene, RenderSettings())
     assert features.spectral_groups == 1
     assert features.convex_solids and not features.tree
-    assert not (features.smooth_normals or features.medium_stack or features.absorption or features.mirrors or features.charts)
+    assert not (
+        features.smooth_normals or features.medium_stack or features.absorption or features.mirrors or features.charts
+    )
     assert sum(isinstance(o.material, Dielectric) for o in scene.objects) == 1

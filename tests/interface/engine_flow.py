@@ -1,7 +1,8 @@
-"""Run in a process of its own by `test_imgui_test_engine`: the viewer under Dear ImGui's Test Engine, on GLFW's null platform.
+"""Run in a process of its own by `test_imgui_test_engine`: the viewer under Dear ImGui's Test Engine, on GLFW's null
+platform.
 
-Prints one line of JSON: what the flow saw. The test function runs on a thread of the engine's, without an OpenGL context,
-so pictures are taken by the frame function when the flow asks for one by name.
+Prints one line of JSON: what the flow saw. The test function runs on a thread of the engine's, without an OpenGL
+context, so pictures are taken by the frame function when the flow asks for one by name.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 from spectrasplat.gpu.context import Context
 from spectrasplat.passes.pick import PickHit
-from spectrasplat.render.viewer.inputs import LiveInputs, DirtyLevel
+from spectrasplat.render.viewer.inputs import DirtyLevel, LiveInputs
 from spectrasplat.render.viewer.photon_queries import StoredPhotons
 from spectrasplat.render.viewer.stats import LiveStats
 
@@ -58,7 +58,9 @@ class FakeEngine:
     def stored_photons(self, limit: int = 0) -> StoredPhotons:
         return self.photons or StoredPhotons.none()
 
-    def caustic_spectrum(self, receiver: int, position: np.ndarray, bins: int = 40) -> tuple[np.ndarray, np.ndarray] | None:
+    def caustic_spectrum(
+        self, receiver: int, position: np.ndarray, bins: int = 40
+    ) -> tuple[np.ndarray, np.ndarray] | None:
         return np.linspace(385, 775, bins), np.ones(bins)
 
     def retrace(self) -> None:

@@ -32,7 +32,8 @@ def receiver_of(state: State) -> int:
 
 
 class PanelRig(HeadlessInterface):
-    """Runs `draw` each frame and keeps what it returns; `labels` are those of the edits, `was_held` whether any frame was interacting."""
+    """Runs `draw` each frame and keeps what it returns; `labels` are those of the edits, `was_held` whether any frame
+    was interacting."""
 
     def __init__(self, gl: Context, draw: Draw, state: State, size: tuple[int, int] = (420, 900)) -> None:
         self.state = state

@@ -70,7 +70,8 @@ class Hands:
         return next(i for i, o in enumerate(self.session.state.scene.objects) if isinstance(o.material, Diffuse))
 
     def caustic_place(self, share: float = 0.5) -> tuple[float, float]:
-        """Where on the screen the light that came through the glass lands: its middle, or another percentile along its length."""
+        """Where on the screen the light that came through the glass lands: its middle, or another percentile along its
+        length."""
         photons = self.engine.stored_photons(100_000)
         state = self.session.state
         mine = (photons.source == self.glass()) & (photons.receiver == self.receiver())
@@ -109,7 +110,12 @@ def small_engine(photons: int) -> type[LiveEngine]:
 
 @contextmanager
 def viewer(
-    context: Context, scene: Path, photons: int = PHOTONS, size: tuple[int, int] = SIZE, refine: bool = False, draw: Draw = draw_interface
+    context: Context,
+    scene: Path,
+    photons: int = PHOTONS,
+    size: tuple[int, int] = SIZE,
+    refine: bool = False,
+    draw: Draw = draw_interface,
 ) -> Iterator[Hands]:
     """A viewer of `scene`; `photons` is the target."""
     session = Session(context, scene, make_engine=small_engine(photons))

@@ -21,7 +21,13 @@ SETTLED = 8
 class ShellRig(HeadlessInterface):
     """Draws the interface each frame; `asked` is every request so far."""
 
-    def __init__(self, gl: Context, state: State | None = None, view_model: ViewModel | None = None, size: tuple[int, int] = (1280, 720)) -> None:
+    def __init__(
+        self,
+        gl: Context,
+        state: State | None = None,
+        view_model: ViewModel | None = None,
+        size: tuple[int, int] = (1280, 720),
+    ) -> None:
         self.state = state or scene_state()
         self.view_model = view_model or ViewModel(title="prism")
         self.asked: list[Request] = []

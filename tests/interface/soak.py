@@ -1,4 +1,5 @@
-"""A hand that does anything to anything, seeded: the same actions every time, over every control that is on the screen."""
+"""A hand that does anything to anything, seeded: the same actions every time, over every control that is on the
+screen."""
 
 from __future__ import annotations
 
@@ -20,10 +21,43 @@ from tests.interface.rig import Hands
 
 Key = imgui.Key
 KEYS = (
-    Key.g, Key.t, Key.y, Key.b, Key.p, Key.v, Key.x, Key.r, Key.m, Key.l, Key.f, Key.h, Key.c, Key.space, Key.home, Key.escape, Key.delete,
-    Key.enter, Key.tab, Key.f1, Key.f5, Key._0, Key._1, Key._2, Key.left_bracket, Key.right_bracket, Key.equal, Key.minus,
-    Key.w, Key.a, Key.s, Key.d, Key.q, Key.e, Key.up_arrow, Key.down_arrow,
-)  # fmt: skip
+    Key.g,
+    Key.t,
+    Key.y,
+    Key.b,
+    Key.p,
+    Key.v,
+    Key.x,
+    Key.r,
+    Key.m,
+    Key.l,
+    Key.f,
+    Key.h,
+    Key.c,
+    Key.space,
+    Key.home,
+    Key.escape,
+    Key.delete,
+    Key.enter,
+    Key.tab,
+    Key.f1,
+    Key.f5,
+    Key._0,
+    Key._1,
+    Key._2,
+    Key.left_bracket,
+    Key.right_bracket,
+    Key.equal,
+    Key.minus,
+    Key.w,
+    Key.a,
+    Key.s,
+    Key.d,
+    Key.q,
+    Key.e,
+    Key.up_arrow,
+    Key.down_arrow,
+)
 CHORDS = (Key.z, Key.y, Key.c, Key.v, Key.d, Key.r, Key.e, Key.s, Key.n, Key.o, Key.q, Key._1, Key._2)
 MODIFIERS = ((), (), (), (Key.mod_shift,), (Key.mod_ctrl,), (Key.mod_alt,))
 TEXTS = ("1.5", "0", "-3", "1e9", "nan", "589.3", "N-BK7", "λ", "", "a" * 40)
@@ -74,10 +108,21 @@ class ViewportInput:
     def act(self) -> None:
         """One action."""
         actions: list[tuple[float, Callable[[], str]]] = [
-            (6, self._click), (5, self._drag_item), (1, self._double_click), (1, self._right_click), (2, self._wheel), (3, self._key),
-            (2, self._chord), (2, self._type), (4, self._drag_picture), (2, self._click_picture), (1, self._panel), (1, self._rest),
-            (9, self._edit), (2, self._undo),
-        ]  # fmt: skip
+            (6, self._click),
+            (5, self._drag_item),
+            (1, self._double_click),
+            (1, self._right_click),
+            (2, self._wheel),
+            (3, self._key),
+            (2, self._chord),
+            (2, self._type),
+            (4, self._drag_picture),
+            (2, self._click_picture),
+            (1, self._panel),
+            (1, self._rest),
+            (9, self._edit),
+            (2, self._undo),
+        ]
         weights = np.array([weight for weight, _ in actions])
         chosen = int(self._rng.choice(len(actions), p=weights / weights.sum()))
         self.log.append(actions[chosen][1]())
@@ -152,7 +197,9 @@ class ViewportInput:
 
     def _drag_picture(self) -> str:
         button = int(self._rng.integers(3))
-        self._hands.interface.drag(self._on_picture(), self._on_picture(), steps=3, button=button, keys=self._modifiers())
+        self._hands.interface.drag(
+            self._on_picture(), self._on_picture(), steps=3, button=button, keys=self._modifiers()
+        )
         return f"drag picture with button {button}, tool {self._hands.session.state.tool}"
 
     def _click_picture(self) -> str:
@@ -182,7 +229,11 @@ class ViewportInput:
         items = self._hands.interface.items.items
         if f"Window: {tab.capitalize()}" in items:
             self._hands.interface.click(f"Window: {tab.capitalize()}")
-        inside = sorted(k for k, item in items.items() if k.startswith(f"{tab.capitalize()}/") and item.is_visible and item.size[0] > 60)
+        inside = sorted(
+            k
+            for k, item in items.items()
+            if k.startswith(f"{tab.capitalize()}/") and item.is_visible and item.size[0] > 60
+        )
         if not inside:
             return f"look at {kind} {selection.index}, {tab}"
         item = inside[int(self._rng.integers(len(inside)))]

@@ -51,7 +51,9 @@ def test_titles_and_descriptions_come_from_the_files(gl: Context, tmp_path: Path
     gallery.release()
 
 
-def test_thumbnails_are_rendered_once_and_again_when_the_scene_changes(gl: Context, tmp_path: Path, scenes: dict[str, Path]) -> None:
+def test_thumbnails_are_rendered_once_and_again_when_the_scene_changes(
+    gl: Context, tmp_path: Path, scenes: dict[str, Path]
+) -> None:
     renderer = Renderer()
     for calls in (2, 2):
         gallery = Gallery(gl, tmp_path, scenes, renderer)
@@ -66,7 +68,9 @@ def test_thumbnails_are_rendered_once_and_again_when_the_scene_changes(gl: Conte
     gallery.release()
 
 
-def test_a_scene_that_fails_has_no_thumbnail_and_leaves_nothing(gl: Context, tmp_path: Path, scenes: dict[str, Path]) -> None:
+def test_a_scene_that_fails_has_no_thumbnail_and_leaves_nothing(
+    gl: Context, tmp_path: Path, scenes: dict[str, Path]
+) -> None:
     gallery = Gallery(gl, tmp_path, scenes, Renderer("raise SystemExit(2)"))
     finish(gallery)
     assert all(entry.thumbnail is None for entry in gallery.entries)

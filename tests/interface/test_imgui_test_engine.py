@@ -1,4 +1,5 @@
-"""The viewer under Dear ImGui's own Test Engine: items found by their ids, not by places, on a platform without a screen."""
+"""The viewer under Dear ImGui's own Test Engine: items found by their ids, not by places, on a platform without a
+screen."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from spectrasplat.edit.state import Compare, Key, State
 from spectrasplat.ui.panels import export_panel, file_browser
 from spectrasplat.ui.panels.compare_panel import draw_compare
 from spectrasplat.ui.panels.export_panel import draw_export
-from spectrasplat.ui.view_model import ErrorCurve, ViewModel, JobInfo
+from spectrasplat.ui.view_model import ErrorCurve, JobInfo, ViewModel
 
 
 def with_browser(state: State, view_model: ViewModel) -> State:
@@ -77,12 +77,17 @@ def test_keys_are_added_changed_and_deleted(rig: PanelRig, tmp_path: Path) -> No
     assert not file_browser.is_open("export animate")  # nothing to render yet
     rig.click("Add key")
     rig.click("Add key")
-    assert rig.state.animation == (Key(0.0, "objects.prism.dispersion_gain", 1.0), Key(2.0, "objects.prism.dispersion_gain", 1.0))
+    assert rig.state.animation == (
+        Key(0.0, "objects.prism.dispersion_gain", 1.0),
+        Key(2.0, "objects.prism.dispersion_gain", 1.0),
+    )
     rig.type_into("Key 1 value", "3")
     rig.type_into("Key 1 time", "1.5")
     assert rig.state.animation[1] == Key(1.5, "objects.prism.dispersion_gain", 3.0)
     rig.click("Key this view")
-    assert {key.path for key in rig.state.animation if key.path.startswith("camera")} == {f"camera.{f}.{a}" for f in ("position", "target") for a in "xyz"}
+    assert {key.path for key in rig.state.animation if key.path.startswith("camera")} == {
+        f"camera.{f}.{a}" for f in ("position", "target") for a in "xyz"
+    }
     count = len(rig.state.animation)
     rig.click("Key 0 delete")
     assert len(rig.state.animation) == count - 1
@@ -107,7 +112,11 @@ def test_comparing(gl) -> None:
         assert "Start again" not in rig.items.items
         choose(rig, "Show", "Wipe")
         rig.drag_slider("Line at", 0.5, 0.25)
-        assert rig.state.compare.mode == "wipe" and rig.state.compare.wipe == pytest.approx(0.25, abs=0.03) and rig.was_held
+        assert (
+            rig.state.compare.mode == "wipe"
+            and rig.state.compare.wipe == pytest.approx(0.25, abs=0.03)
+            and rig.was_held
+        )
         choose(rig, "With", "Even random wavelengths")
         assert rig.state.compare.method == "stochastic-even"
         rig.click("Start again")

@@ -57,7 +57,9 @@ class Rig:
 
     def rename(self, name: str, label: str = "Rename", interacting: bool = False) -> State:
         """A frame that edits the scene."""
-        return self.frame(lambda state: replace(state.edited(replace(state.scene, name=name), label), interacting=interacting))
+        return self.frame(
+            lambda state: replace(state.edited(replace(state.scene, name=name), label), interacting=interacting)
+        )
 
     @property
     def engine(self) -> FakeEngine:
@@ -101,7 +103,9 @@ def test_shown_texture_stays_valid_in_the_frame_in_which_the_size_changes(rig: R
     resized = rig.session.picture.shown
     assert resized is not None and resized.size == (128, 72)
     drawn: list[int | None] = []
-    rig.session.frame(lambda state, view_model: drawn.append(view_model.picture) or replace(state, viewport_size=(128, 72)))
+    rig.session.frame(
+        lambda state, view_model: drawn.append(view_model.picture) or replace(state, viewport_size=(128, 72))
+    )
     assert rig.session.picture.shown is resized and drawn == [resized.glo]
 
 
@@ -174,7 +178,9 @@ def test_quitting_with_nothing_unsaved_closes(rig: Rig) -> None:
     assert rig.session.wants_to_close
 
 
-def test_a_bug_in_a_request_is_logged_and_the_work_autosaved(rig: Rig, config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bug_in_a_request_is_logged_and_the_work_autosaved(
+    rig: Rig, config: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     rig.rename("precious")
 
     def bug(*_arguments: object) -> None:
@@ -252,9 +258,13 @@ def test_a_click_selects_glass_or_whose_caustic_it_is(rig: Rig) -> None:
     places = rng.normal(0, 0.3, (count, 3)) * [1, 1, 0]
     rig.engine.hit = hit
     rig.engine.photons = replace(
-        StoredPhotons.none(), position=places, flux_w=np.ones(count), source=np.full(count, glass), receiver=np.full(count, hit.object_index),
+        StoredPhotons.none(),
+        position=places,
+        flux_w=np.ones(count),
+        source=np.full(count, glass),
+        receiver=np.full(count, hit.object_index),
         dposition_dn=np.zeros((count, 0, 3)),
-    )  # fmt: skip
+    )
     assert rig.ask(requests.SelectAt(0.5, 0.5)).selection == Selection("object", glass)
     assert rig.ask(requests.SelectAt(0.5, 0.5, itself=True)).selection == Selection("object", hit.object_index)
     rig.engine.photons = None
@@ -290,7 +300,9 @@ def test_copy_material_and_frame_selection(rig: Rig) -> None:
 def test_settings_reach_the_engine_and_the_next_session(gl: Context, config: Path) -> None:
     rig = Rig(Session(gl, make_engine=FakeEngine))
     rig.settle()
-    rig.frame(lambda s: replace(s, playing=False, preferences=replace(s.preferences, theme="light", target_photons=5_000_000)))
+    rig.frame(
+        lambda s: replace(s, playing=False, preferences=replace(s.preferences, theme="light", target_photons=5_000_000))
+    )
     assert rig.engine.playing is False and rig.engine.target_photons == 5_000_000
     rig.session.close()
     second = Session(gl, make_engine=FakeEngine)

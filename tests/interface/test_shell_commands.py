@@ -65,7 +65,9 @@ def test_every_panel_has_a_command() -> None:
         (imgui.Key.c, [CTRL], requests.CopyMaterial(0)),
     ],
 )
-def test_shortcuts_ask_the_host_once(rig: ShellRig, key: imgui.Key, modifiers: list[imgui.Key], expected: requests.Request) -> None:
+def test_shortcuts_ask_the_host_once(
+    rig: ShellRig, key: imgui.Key, modifiers: list[imgui.Key], expected: requests.Request
+) -> None:
     rig.view_model = replace(rig.view_model, path=Path("prism.toml"), undo="Move prism", dirty_level="Move prism")
     rig.key(key, modifiers)
     assert rig.asked == [expected]

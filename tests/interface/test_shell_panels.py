@@ -17,11 +17,11 @@ from spectrasplat.render.viewer.stats import LiveStats
 from spectrasplat.ui.panels.view_panel import SWEEP_NM_PER_S
 from spectrasplat.ui.view_model import (
     CursorInfo,
-    ViewModel,
     HistoryEntry,
     JobInfo,
     Message,
     SceneEntry,
+    ViewModel,
 )
 
 from tests.interface.panel_rig import scene_state
@@ -34,17 +34,29 @@ NM = np.arange(385.0, 780.0, 10.0)
 def full_view_model() -> ViewModel:
     """Something in every fact that the shell's panels show."""
     stats = LiveStats(
-        renderer="llvmpipe", rays_traced=18_400_000, photons=12_345_678, photons_stored=1_000_000, photons_per_second=8e5,
-        first_order=True, bytes=180 << 20, fallbacks={"no_footprint": 12}, lost={"absorbed": 0.02}, bands={"slit": 4},
-    )  # fmt: skip
+        renderer="llvmpipe",
+        rays_traced=18_400_000,
+        photons=12_345_678,
+        photons_stored=1_000_000,
+        photons_per_second=8e5,
+        first_order=True,
+        bytes=180 << 20,
+        fallbacks={"no_footprint": 12},
+        lost={"absorbed": 0.02},
+        bands={"slit": 4},
+    )
     return ViewModel(
         stats=stats,
         frame_ms=tuple(float(v) for v in range(10, 30)),
         pass_ms={"trace": 8.0, "splat": 5.0, "interface": 2.0},
-        cursor=CursorInfo((10, 10), (0.8, 0.4, 0.0), 1, (0, 0, 0), (0, 0, 1), True, NM, 1e-3 * np.exp(-(((NM - 560) / 60) ** 2))),
+        cursor=CursorInfo(
+            (10, 10), (0.8, 0.4, 0.0), 1, (0, 0, 0), (0, 0, 1), True, NM, 1e-3 * np.exp(-(((NM - 560) / 60) ** 2))
+        ),
         title="prism",
         history=tuple(HistoryEntry(label, i == 1) for i, label in enumerate(("Open", "Move prism", "Brush"))),
-        scenes=tuple(SceneEntry(Path(f"/scenes/{name}.toml"), name, "Words about it.", None) for name in ("prism", "lens")),
+        scenes=tuple(
+            SceneEntry(Path(f"/scenes/{name}.toml"), name, "Words about it.", None) for name in ("prism", "lens")
+        ),
         job=JobInfo("Turntable", 0.4, "Frame 40 of 100"),
     )
 
@@ -181,7 +193,9 @@ def test_start_page_offers_the_recovery(rig: ShellRig) -> None:
 
 
 def test_errors_stay_until_closed_and_shader_errors_have_a_window(rig: ShellRig) -> None:
-    rig.view_model = replace(rig.view_model, messages=(Message("The disk is full.", True, 99.0),), shader_error="camera.comp:12: oh")
+    rig.view_model = replace(
+        rig.view_model, messages=(Message("The disk is full.", True, 99.0),), shader_error="camera.comp:12: oh"
+    )
     rig.frame(3)
     rig.click("Close message 0")
     assert rig.asked[-1] == requests.DismissMessage("The disk is full.")

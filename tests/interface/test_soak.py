@@ -1,4 +1,5 @@
-"""Random work on the real viewer for a long time: no exception, no OpenGL error, memory stays flat, undo leads back to the first picture."""
+"""Random work on the real viewer for a long time: no exception, no OpenGL error, memory stays flat, undo leads back to
+the first picture."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ LONG = 1000
 """Actions from which on memory must stand still; before, libraries are still being loaded."""
 GROWTH_BYTES = 96 << 20
 MORE_OBJECTS = 30
-"""Of textures, buffers and the like at the end over those at the start: an overlay or a magnifier may have been used since."""
+"""Of textures, buffers and the like at the end over those at the start: an overlay or a magnifier may have been used
+since."""
 SAME = 1e-5
 BLURRED = 0.04
 
@@ -31,7 +33,9 @@ BLURRED = 0.04
 def soak(gl: Context, folder: Path, actions: int, seed: int) -> None:
     """`actions` random actions, and back to the start."""
     guard = Guard(folder)
-    with viewer(gl, assets_dir() / "scenes" / "prism.toml", photons=1 << 12, size=(1100, 800), draw=guard.draw) as hands:
+    with viewer(
+        gl, assets_dir() / "scenes" / "prism.toml", photons=1 << 12, size=(1100, 800), draw=guard.draw
+    ) as hands:
         first = hands.settle()
         start, objects = hands.session.state, device_objects(DATA)
         hands.pace.frame_s = 0.006  # the picture may lag behind; the hand does not wait for it
@@ -50,8 +54,8 @@ def soak(gl: Context, folder: Path, actions: int, seed: int) -> None:
         back = undo_everything(hands, start)
         assert hands.session.state.scene is start.scene
         assert hands.session.state.viewport_size == start.viewport_size
-        # Maps stay as they were laid out for a view on the way as long as others would not be much finer (refit.PAYS): then a
-        # caustic's edges are blurred otherwise. All else is the same.
+        # Maps stay as they were laid out for a view on the way as long as others would not be much finer (refit.PAYS):
+        # then a caustic's edges are blurred otherwise. All else is the same.
         difference = np.abs(back - first)
         assert float(np.median(difference)) < SAME * float(first.max())
         assert float(difference.mean()) < BLURRED * float(first.mean())

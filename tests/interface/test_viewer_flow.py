@@ -1,4 +1,5 @@
-"""Whole flows through the real viewer, by mouse and keyboard: the picture follows each, and only what must be is redone."""
+"""Whole flows through the real viewer, by mouse and keyboard: the picture follows each, and only what must be is
+redone."""
 
 from __future__ import annotations
 
@@ -49,7 +50,9 @@ def hands(shared: Hands) -> Hands:
     session = shared.session
     session.show_scene(session.document.history.go_to(0))
     session.state = session.state.with_panels(brush=False)
-    session.state = replace(session.state, tool="select", selection=Selection(), camera=session.state.scene.camera, physical=False)
+    session.state = replace(
+        session.state, tool="select", selection=Selection(), camera=session.state.scene.camera, physical=False
+    )
     shared.settle()
     return shared
 
@@ -140,8 +143,15 @@ def test_saving_and_opening_again_keeps_what_was_edited(hands: Hands, scene_file
     scene = hands.session.state.scene
     with viewer(gl, scene_file) as again:
         opened = again.session.state.scene
-        assert opened.objects[again.glass()].material.dispersion.gain == scene.objects[hands.glass()].material.dispersion.gain
-        assert len(opened.objects[again.receiver()].local_dispersion) == len(scene.objects[hands.receiver()].local_dispersion) > 0
+        assert (
+            opened.objects[again.glass()].material.dispersion.gain
+            == scene.objects[hands.glass()].material.dispersion.gain
+        )
+        assert (
+            len(opened.objects[again.receiver()].local_dispersion)
+            == len(scene.objects[hands.receiver()].local_dispersion)
+            > 0
+        )
         reopened = again.settle()
         assert difference(reopened, edited) < SAME < difference(start, edited)
 

@@ -1,4 +1,5 @@
-"""The viewport with a synthetic hand and facts that the test sets: camera, selecting, gizmo, brush, pull, toolbar, wipe."""
+"""The viewport with a synthetic hand and facts that the test sets: camera, selecting, gizmo, brush, pull, toolbar,
+wipe."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from spectrasplat.model.scene import Diffuse
 from spectrasplat.render.viewer.stats import LiveStats
 from spectrasplat.ui import viewport, viewport_tools
 from spectrasplat.ui.headless import HeadlessInterface
-from spectrasplat.ui.view_model import CursorInfo, ViewModel, RayLine
+from spectrasplat.ui.view_model import CursorInfo, RayLine, ViewModel
 
 from tests.interface.panel_rig import receiver_of, scene_state
 
@@ -69,7 +70,9 @@ class ViewportRig(HeadlessInterface):
             return None
         point = self.view().on_plane(*self.state.hover, np.zeros(3), np.array([0.0, 0.0, 1.0]))
         floor = receiver_of(self.state)
-        return None if point is None else CursorInfo((0, 0), (1.0, 1.0, 1.0), floor, tuple(point), (0.0, 0.0, 1.0), True)
+        return (
+            None if point is None else CursorInfo((0, 0), (1.0, 1.0, 1.0), floor, tuple(point), (0.0, 0.0, 1.0), True)
+        )
 
     def at(self, point) -> tuple[float, float]:
         """Where a world point is on the screen."""
@@ -135,7 +138,10 @@ def test_shift_middle_drag_keeps_the_point_under_the_cursor(rig) -> None:
 def test_the_wheel_zooms_to_the_cursor(rig) -> None:
     rig.move(CENTRE)
     rig.frame()
-    point, before = np.array(rig.cursor().position), np.linalg.norm(np.subtract(rig.state.camera.position, rig.cursor().position))
+    point, before = (
+        np.array(rig.cursor().position),
+        np.linalg.norm(np.subtract(rig.state.camera.position, rig.cursor().position)),
+    )
     rig.wheel(CENTRE, 3.0)
     assert rig.at(point) == pytest.approx(CENTRE, abs=0.5)
     after = np.linalg.norm(point - rig.state.camera.position)
@@ -171,7 +177,14 @@ def test_an_axis_in_the_corner_turns_the_view(rig) -> None:
 
 
 def test_the_toolbar_sets_tools_and_switches(rig) -> None:
-    for name, tool in (("Move", "move"), ("Rotate", "rotate"), ("Scale", "scale"), ("Dispersion brush", "brush"), ("Pull a colour", "pull"), ("Select", "select")):
+    for name, tool in (
+        ("Move", "move"),
+        ("Rotate", "rotate"),
+        ("Scale", "scale"),
+        ("Dispersion brush", "brush"),
+        ("Pull a colour", "pull"),
+        ("Select", "select"),
+    ):
         rig.click(name)
         assert rig.state.tool == tool
     rig.click("Pause")
@@ -182,7 +195,13 @@ def test_the_toolbar_sets_tools_and_switches(rig) -> None:
 
 
 def looking_along_y(state: State, orthographic: bool) -> State:
-    camera = replace(state.camera, position=(0.0, -8.0, 0.6), target=(0.0, 0.0, 0.6), kind="orthographic" if orthographic else "pinhole", vertical_extent=4.0)
+    camera = replace(
+        state.camera,
+        position=(0.0, -8.0, 0.6),
+        target=(0.0, 0.0, 0.6),
+        kind="orthographic" if orthographic else "pinhole",
+        vertical_extent=4.0,
+    )
     return replace(state, camera=camera, tool="move")
 
 
@@ -221,7 +240,9 @@ def test_the_gizmo_snaps_with_ctrl_and_scales_about_the_middle(gl) -> None:
         rig.drag((x, y), (x + 60, y), steps=5)  # the middle scales evenly
         assert set(rig.labels) == {"Move prism", "Scale prism"}
         assert _middle(rig.state, 0) == pytest.approx(middle, abs=1e-6)
-        factor = np.linalg.det(rig.state.scene.objects[0].object_to_world[:3, :3]) / np.linalg.det(scene_state().scene.objects[0].object_to_world[:3, :3])
+        factor = np.linalg.det(rig.state.scene.objects[0].object_to_world[:3, :3]) / np.linalg.det(
+            scene_state().scene.objects[0].object_to_world[:3, :3]
+        )
         assert factor > 1.2
 
 
@@ -243,7 +264,9 @@ def test_the_gizmo_moves_a_light_that_is_clicked(gl) -> None:
         rig.frame(2)
         rig.drag((x, y - 35), (x, y - 75), steps=5)
         unit = rig.view().height_at(8.0) / SIZE[1]
-        assert np.subtract(rig.state.scene.lights[0].position, lamp.position) == pytest.approx([0, 0, 40 * unit], abs=1.5 * unit)
+        assert np.subtract(rig.state.scene.lights[0].position, lamp.position) == pytest.approx(
+            [0, 0, 40 * unit], abs=1.5 * unit
+        )
         assert rig.labels[-1] == f"Move {lamp.name}"
         assert rig.state.scene.lights[0].direction == pytest.approx(lamp.direction)
 
@@ -310,7 +333,9 @@ def test_the_ring_of_the_brush_lies_on_the_surface(gl) -> None:
 
 def held_colour(rig: ViewportRig, local: bool = False) -> Pull:
     start = rig.view().on_plane(0.5, 0.7, np.zeros(3), np.array([0.0, 0.0, 1.0]))
-    return Pull(0, receiver_of(rig.state), tuple(start), tuple(start - [0.4, 0, 0]), (1.0, 0.0, 0.0), 450.0, 1.0, 25.7, local)
+    return Pull(
+        0, receiver_of(rig.state), tuple(start), tuple(start - [0.4, 0, 0]), (1.0, 0.0, 0.0), 450.0, 1.0, 25.7, local
+    )
 
 
 @pytest.mark.parametrize("local", [False, True], ids=["glass", "local"])
@@ -375,7 +400,10 @@ def test_rays_are_drawn_in_their_colour_and_behind_the_camera_not_at_all(rig) ->
     a, b = (rig.view().on_plane(x, 0.85, np.zeros(3), np.array([0.0, 0.0, 1.0])) for x in (0.3, 0.7))
     behind = np.asarray(rig.state.camera.position) - 3.0 * rig.view().forward
     rig.state = replace(rig.state, display=replace(rig.state.display, ray_overlay=True))
-    rig.view_model = replace(rig.view_model, rays=(RayLine(650.0, np.stack([a, b])), RayLine(550.0, np.stack([behind, behind + [0.1, 0, 0]]))))
+    rig.view_model = replace(
+        rig.view_model,
+        rays=(RayLine(650.0, np.stack([a, b])), RayLine(550.0, np.stack([behind, behind + [0.1, 0, 0]]))),
+    )
     rig.move((5, 395))
     rig.frame()
     red, green, blue = rig.screenshot()[int(0.85 * SIZE[1]), SIZE[0] // 2].astype(int)

@@ -1,4 +1,5 @@
-"""A real window: on a virtual X server where there is no other, from the command line as a user would; and what is said where there is none."""
+"""A real window: on a virtual X server where there is no other, from the command line as a user would; and what is said
+where there is none."""
 
 from __future__ import annotations
 
@@ -20,17 +21,37 @@ def run(tmp_path: Path, *arguments: str, display: bool) -> subprocess.CompletedP
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     command = [sys.executable, "-P", "-m", "spectrasplat", *arguments]
     if display:
-        assert shutil.which("xvfb-run"), "install xvfb and xauth ('apt-get install xvfb xauth'): the window cannot be tested without"
+        assert shutil.which("xvfb-run"), (
+            "install xvfb and xauth ('apt-get install xvfb xauth'): the window cannot be tested without"
+        )
         command = ["xvfb-run", "-a", "-s", "-screen 0 1400x900x24", *command]
     return subprocess.run(
-        command, cwd=tmp_path, env=environment | {"SPECTRASPLAT_CONFIG": str(tmp_path / "config"), "PYTHONPATH": str(ROOT)},
-        capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
+        command,
+        cwd=tmp_path,
+        env=environment | {"SPECTRASPLAT_CONFIG": str(tmp_path / "config"), "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
 
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
 def test_the_window_shows_interface_and_caustic(tmp_path: Path, theme: str) -> None:
-    done = run(tmp_path, "view", "prism", "--size", "1000x700", "--theme", theme, "--screenshot", "window.png", "--after", "5", display=True)
+    done = run(
+        tmp_path,
+        "view",
+        "prism",
+        "--size",
+        "1000x700",
+        "--theme",
+        theme,
+        "--screenshot",
+        "window.png",
+        "--after",
+        "5",
+        display=True,
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == str(tmp_path / "window.png")
     picture = np.asarray(Image.open(tmp_path / "window.png").convert("RGB")).astype(int)

@@ -15,7 +15,9 @@ def picture_point(pixel: Array, within_pixel: Array, size: Array) -> Array:
     return np.stack([(2.0 * column - width) / width, (height - 2.0 * row) / height], axis=-1)
 
 
-def camera_ray(position: Array, forward: Array, half_right: Array, half_up: Array, orthographic: Array, picture: Array) -> tuple[Array, Array]:
+def camera_ray(
+    position: Array, forward: Array, half_right: Array, half_up: Array, orthographic: Array, picture: Array
+) -> tuple[Array, Array]:
     """Origins and unit directions (..., 3). `half_right`, `half_up`: the picture's middle to its border, on the film
     (orthographic) or on the plane at distance one (pinhole); `orthographic`: bool (...)."""
     on_film = picture[..., :1] * half_right + picture[..., 1:] * half_up

@@ -1,4 +1,5 @@
-"""Where a camera sees things through glass, in closed form or by an exact trace in one plane: float64, for tests of pictures.
+"""Where a camera sees things through glass, in closed form or by an exact trace in one plane: float64, for tests of
+pictures.
 
 The plane has x away from the camera and y upwards. `n` may be an array (of wavelengths, say); results broadcast. The
 closed forms are Born and Wolf's, Principles of Optics, 7th edition; sections are named where they stand.
@@ -52,7 +53,8 @@ def slab_offset(n: Array | float, thickness: float, incidence_rad: float) -> Arr
 
 
 def slab_displacement(n: Array | float, thickness: float, incidence_rad: float) -> Array:
-    """How far, along the slab, a point behind it lies nearer to the foot of the ray than it would without: t tan i − `slab_offset`."""
+    """How far, along the slab, a point behind it lies nearer to the foot of the ray than it would without: t tan i −
+    `slab_offset`."""
     return thickness * math.tan(incidence_rad) - slab_offset(n, thickness, incidence_rad)
 
 
@@ -61,7 +63,9 @@ def slab_lateral_shift(n: Array | float, thickness: float, incidence_rad: float)
     return slab_displacement(n, thickness, incidence_rad) * math.cos(incidence_rad)
 
 
-def slab_displacement_derivative(n: Array | float, dn_dnm: Array | float, thickness: float, incidence_rad: float) -> Array:
+def slab_displacement_derivative(
+    n: Array | float, dn_dnm: Array | float, thickness: float, incidence_rad: float
+) -> Array:
     """∂(`slab_displacement`)/∂λ, units per nm, for a glass of slope `dn_dnm`: t s n n'/(n² − s²)^1.5."""
     n, sine = np.asarray(n, float), math.sin(incidence_rad)
     return thickness * sine * n * np.asarray(dn_dnm, float) / (n**2 - sine**2) ** 1.5
@@ -82,13 +86,17 @@ def thin_lens_magnification(focal_length: Array | float, object_distance: float)
 
 
 def seen_tangent(focal_length: Array | float, camera_distance: float, object_distance: float, height: float) -> Array:
-    """tan of the angle at which a camera before a thin lens sees a point `height` off the axis behind it: m y/(d + m s)."""
+    """tan of the angle at which a camera before a thin lens sees a point `height` off the axis behind it: m y/(d + m
+    s)."""
     m = thin_lens_magnification(focal_length, object_distance)
     return m * height / (camera_distance + m * object_distance)
 
 
-def thick_seen_tangent(n: float, radius: float, thickness: float, camera_distance: float, object_distance: float, height: float) -> float:
-    """The same through a lens of finite thickness, its curved side toward the camera: paraxial matrices (§ 4.4.3 in matrix form)."""
+def thick_seen_tangent(
+    n: float, radius: float, thickness: float, camera_distance: float, object_distance: float, height: float
+) -> float:
+    """The same through a lens of finite thickness, its curved side toward the camera: paraxial matrices (§ 4.4.3 in
+    matrix form)."""
     refract = np.array([[1.0, 0.0], [-(n - 1.0) / (n * radius), 1.0 / n]])
     leave = np.array([[1.0, 0.0], [0.0, n]])
     system = _gap(object_distance) @ leave @ _gap(thickness) @ refract @ _gap(camera_distance)
@@ -131,10 +139,14 @@ def plano_convex_faces(radius: float, x: float, thickness: float) -> tuple[Arc, 
     return Arc((x + radius, 0.0), radius), Face((x + thickness, 0.0), (1.0, 0.0))
 
 
-def trace(surfaces: Sequence[Face | Arc], indices: Sequence[float], position: Sequence[float], angle_rad: float) -> tuple[Array, Array]:
-    """Point on the last surface and unit direction after it, (2,) each, of a ray from `position` upwards by `angle_rad` from x.
+def trace(
+    surfaces: Sequence[Face | Arc], indices: Sequence[float], position: Sequence[float], angle_rad: float
+) -> tuple[Array, Array]:
+    """Point on the last surface and unit direction after it, (2,) each, of a ray from `position` upwards by `angle_rad`
+    from x.
 
-    `indices`: behind each surface; before the first there is air. Raises ValueError where a surface is missed or reflects totally.
+    `indices`: behind each surface; before the first there is air. Raises ValueError where a surface is missed or
+    reflects totally.
     """
     p, d = np.array(position, float), np.array([math.cos(angle_rad), math.sin(angle_rad)])
     before = 1.0
@@ -163,13 +175,17 @@ def trace(surfaces: Sequence[Face | Arc], indices: Sequence[float], position: Se
     return p, d
 
 
-def height_on_screen(surfaces: Sequence[Face | Arc], indices: Sequence[float], angle_rad: float, screen_x: float) -> float:
+def height_on_screen(
+    surfaces: Sequence[Face | Arc], indices: Sequence[float], angle_rad: float, screen_x: float
+) -> float:
     """Where a ray from a camera at the origin, through the surfaces, meets the screen x = `screen_x`."""
     p, d = trace(surfaces, indices, (0.0, 0.0), angle_rad)
     return float(p[1] + d[1] / d[0] * (screen_x - p[0]))
 
 
-def viewing_angle(surfaces: Sequence[Face | Arc], indices: Sequence[float], screen_x: float, height: float, low: float, high: float) -> float:
+def viewing_angle(
+    surfaces: Sequence[Face | Arc], indices: Sequence[float], screen_x: float, height: float, low: float, high: float
+) -> float:
     """Angle at which a camera at the origin sees the screen's point at `height`, by bisection between two angles, rad.
 
     Raises ValueError where both ends see the point on the same side.

@@ -52,14 +52,18 @@ def outgoing(
     about: np.ndarray | tuple[float, ...] = (0.0, 0.0, 0.0),
     half: float = 50.0,
 ) -> OutgoingRays:
-    """Trace onto screens across `axis` at two distances from `about`; what met both, one path a lattice point, in the lattice's order."""
+    """Trace onto screens across `axis` at two distances from `about`; what met both, one path a lattice point, in the
+    lattice's order."""
     axis = unit(np.asarray(axis, float))
     first, second = (traced_onto(screen(about + distance * axis, axis, half)) for distance in (near, far))
-    _, in_first, in_second = np.intersect1d(first.records["photon_id"], second.records["photon_id"], return_indices=True)
+    _, in_first, in_second = np.intersect1d(
+        first.records["photon_id"], second.records["photon_id"], return_indices=True
+    )
     first, second = first.where(in_first), second.where(in_second)
     way = second.position - first.position
     columns = [
-        normalised_derivative(way, getattr(second, name) - getattr(first, name)) for name in ("dposition_ds", "dposition_dt")
+        normalised_derivative(way, getattr(second, name) - getattr(first, name))
+        for name in ("dposition_ds", "dposition_dt")
     ]
     spectral = normalised_derivative(way[:, None], second.dposition_dvar - first.dposition_dvar)
     return OutgoingRays(first, unit(way), *columns, spectral)

@@ -39,7 +39,11 @@ def sample_light(lights: Array, position: Array, uniform: Array) -> tuple[Array,
     return (
         np.where(diverging[:, None], toward, np.where((kind == DIRECTIONAL)[:, None], sun, -light.axis)),
         np.where(diverging, distance, np.where(kind == DIRECTIONAL, FAR, along)),
-        np.where(diverging, emitted / square, np.where(kind == DIRECTIONAL, 1.0, (in_beam & (along > 0.0)).astype(np.float64))),
+        np.where(
+            diverging,
+            emitted / square,
+            np.where(kind == DIRECTIONAL, 1.0, (in_beam & (along > 0.0)).astype(np.float64)),
+        ),
     )
 
 
@@ -56,7 +60,8 @@ def stretch_seen(offset: Array, half_side: Array, blur: Array) -> Array:
 
 
 def disc_seen(offset: Array, blur: Array) -> Array:
-    """The same for a disc of radius 1 and a round look: a frustum of height 1 and the disc's volume, or a cone where none has it: (N,)."""
+    """The same for a disc of radius 1 and a round look: a frustum of height 1 and the disc's volume, or a cone where
+    none has it: (N,)."""
     offset, blur = np.broadcast_arrays(offset, blur)
     # Volume of a frustum between radii m - b and m + b: π (m² + b²/3); of a cone of foot 2b and height h: 4π h b²/3.
     frustum = 3.0 - blur**2 > 3.0 * blur**2
@@ -76,7 +81,9 @@ def light_seen(lights: Array, position: Array, direction: Array, far: Array, wid
     tangent = np.linalg.norm(np.cross(direction, light.axis), axis=-1) / np.maximum(cosine, 1e-9)
     radius = np.maximum(np.linalg.norm(light.half_u, axis=-1), 1e-300)
     before = (cosine > 0.0) & (far >= FAR * (1.0 - 1e-6))
-    sun = np.where(before, light.measure * disc_seen(np.minimum(tangent / radius, 1e6), 0.5 * width[:, 1] / radius), 0.0)
+    sun = np.where(
+        before, light.measure * disc_seen(np.minimum(tangent / radius, 1e6), 0.5 * width[:, 1] / radius), 0.0
+    )
     facing = dot(direction, light.axis)
     distance = dot(light.position - position, light.axis) / np.where(facing == 0.0, 1.0, facing)
     off = position + distance[:, None] * direction - light.position
@@ -110,4 +117,6 @@ def _aperture(light: _Fields, point: Array) -> tuple[Array, Array]:
     offset = point - light.position
     lengths_u, lengths_v = (np.maximum(dot(half, half), 1e-300) for half in (light.half_u, light.half_v))
     u, v = dot(offset, light.half_u) / lengths_u, dot(offset, light.half_v) / lengths_v
-    return np.where(light.is_disc, u * u + v * v <= 1.0, np.maximum(np.abs(u), np.abs(v)) <= 1.0), dot(offset, light.axis)
+    return np.where(light.is_disc, u * u + v * v <= 1.0, np.maximum(np.abs(u), np.abs(v)) <= 1.0), dot(
+        offset, light.axis
+    )

@@ -12,7 +12,9 @@ from spectrasplat.gpu.records import NONE
 Array = np.ndarray
 
 
-def find_texel(receivers: Array, placements: Array, receiver: int, source: int, position: Array) -> tuple[bool, int, Array]:
+def find_texel(
+    receivers: Array, placements: Array, receiver: int, source: int, position: Array
+) -> tuple[bool, int, Array]:
     """(found, placement, texel (2,)): the finest window that holds the position (3,), float64."""
     owner = receivers[receiver]
     at = int(owner["placement"])

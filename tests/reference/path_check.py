@@ -48,7 +48,13 @@ class ReferenceScene:
         mirrors = [o for o in objects if isinstance(o.material, Mirror)]
         corners, material, normals = [], [], []
         for item in objects:
-            number = solids.index(item) if item in solids else RECEIVER - 1 - mirrors.index(item) if item in mirrors else RECEIVER
+            number = (
+                solids.index(item)
+                if item in solids
+                else RECEIVER - 1 - mirrors.index(item)
+                if item in mirrors
+                else RECEIVER
+            )
             corners.append(item.mesh.corners())
             material.append(np.full(len(item.mesh.triangles), number))
             smooth = item.mesh.corner_normals is not None and not isinstance(item.material, Diffuse)
@@ -70,23 +76,36 @@ class ReferenceScene:
         return [*found, Body(kind="receiver")]
 
     def path(
-        self, photons: Photons, q: np.ndarray, choices: Sequence[int], bodies: list[Body], along: Sequence[int] | None = None
+        self,
+        photons: Photons,
+        q: np.ndarray,
+        choices: Sequence[int],
+        bodies: list[Body],
+        along: Sequence[int] | None = None,
     ) -> Path:
         """The path from the emission domain's point `q` that takes a photon's choices."""
         events = [choice for choice in choices if choice in (REFLECTED, REFRACTED, MIRRORED)]
         position, direction = photons.emitter.start(q)
         return follow(
-            make_ray(position, direction), self.triangles, bodies,
-            lambda k: k < len(events) and events[k] == REFLECTED, len(events), along, self.around_light,
-        )  # fmt: skip
+            make_ray(position, direction),
+            self.triangles,
+            bodies,
+            lambda k: k < len(events) and events[k] == REFLECTED,
+            len(events),
+            along,
+            self.around_light,
+        )
 
     def columns(self, photons: Photons, i: int, choices: Sequence[int], along: Sequence[int]) -> np.ndarray:
-        """(2 + groups, 3): ∂position/∂s, /∂t and by each group's variable at photon i's anchor, by central differences."""
+        """(2 + groups, 3): ∂position/∂s, /∂t and by each group's variable at photon i's anchor, by central
+        differences."""
         nm = float(photons.nm[i, 1])
         same = self.bodies(nm)
         sides = [lambda x, e=e: self.path(photons, photons.q[i] + x * e, choices, same, along) for e in np.eye(2)]
         spectral = [
-            lambda x, g=g: self.path(photons, photons.q[i], choices, self.bodies(nm, shifted_indices(photons, g, nm, x)), along)
+            lambda x, g=g: self.path(
+                photons, photons.q[i], choices, self.bodies(nm, shifted_indices(photons, g, nm, x)), along
+            )
             for g in range(photons.groups.count)
         ]
         return np.array([central_difference(path_of, STEP)[0] for path_of in (*sides, *spectral)])

@@ -1,7 +1,7 @@
 """CPU reference of the queue between two trace steps (shaders/queue_*.comp): whose children go on, and in which order.
 
-In each chunk of 64 rays first the refracted children (odd slots), then the reflected ones (even slots), both in the order of
-their parents; photons in the order of their parents.
+In each chunk of 64 rays first the refracted children (odd slots), then the reflected ones (even slots), both in the
+order of their parents; photons in the order of their parents.
 """
 
 from __future__ import annotations

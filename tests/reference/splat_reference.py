@@ -19,8 +19,8 @@ def splat_image(
 ) -> np.ndarray:
     """Energy per texel (height, width, channels), float64.
 
-    `centre` (2,) of the chord and `chord` (2,) in texels; `covariance` (2, 2) texel²; `places` (n,) from -½ to ½ along the
-    chord with `energies` (n, channels). A texel is the sum of samples no further apart than the Gaussian's narrow
+    `centre` (2,) of the chord and `chord` (2,) in texels; `covariance` (2, 2) texel²; `places` (n,) from -½ to ½ along
+    the chord with `energies` (n, channels). A texel is the sum of samples no further apart than the Gaussian's narrow
     standard deviation, where the midpoint rule errs by 2 exp(-2 pi²) = 5e-9.
     """
     narrow = np.sqrt(np.linalg.eigvalsh(covariance)[0])

@@ -1,7 +1,7 @@
 """Float64 reference of shaders/lib/textures.glsl and of the levels it reads, and what both stand for: means over areas.
 
-The CPU reference finds the axes of a patch by a singular value decomposition and levels by summing overlaps texel by texel; the
-means by brute force know nothing of levels or lookups.
+The CPU reference finds the axes of a patch by a singular value decomposition and levels by summing overlaps texel by
+texel; the means by brute force know nothing of levels or lookups.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ MAX_TAPS, ROUND_RATIO, LEVEL_BIAS, SKY_WIDER = 8, 1.25, -0.8, 1.366
 
 
 def level_by_overlaps(rgb: Array, level: int, on_sphere: bool = False) -> Array:
-    """Level of a picture (H, W, channels) as the mean of what each texel covers, by area or by solid angle from pole to pole."""
+    """Level of a picture (H, W, channels) as the mean of what each texel covers, by area or by solid angle from pole to
+    pole."""
     height, width = rgb.shape[:2]
     rows, columns = max(1, height >> level), max(1, width >> level)
     out = np.zeros((rows, columns, rgb.shape[2]))
@@ -67,7 +68,13 @@ def filter_plan(longer: Array, shorter: Array) -> tuple[Array, Array]:
     return np.maximum(np.log2(width) + LEVEL_BIAS, 0.0), taps
 
 
-def _looked_up(levels: Sequence[Array], level: Array, taps: Array, place_of_tap: Callable[[Array], Array], repeats: tuple[bool, bool]) -> Array:
+def _looked_up(
+    levels: Sequence[Array],
+    level: Array,
+    taps: Array,
+    place_of_tap: Callable[[Array], Array],
+    repeats: tuple[bool, bool],
+) -> Array:
     """Mean over `taps` places, in (-½, ½) of the longer axis, of what lies between two levels there."""
     total = np.zeros((len(level), levels[0].shape[2]))
     level = np.minimum(level, len(levels) - 1)
@@ -99,16 +106,23 @@ def environment_place(direction: Array) -> Array:
     return np.stack([0.5 - np.arctan2(direction[:, 1], direction[:, 0]) / (2.0 * np.pi), polar / np.pi], axis=1)
 
 
-def environment_radiance(levels: Sequence[Array], direction: Array, ddirection_ds: Array, ddirection_dt: Array) -> Array:
+def environment_radiance(
+    levels: Sequence[Array], direction: Array, ddirection_ds: Array, ddirection_dt: Array
+) -> Array:
     """(N, channels) of an environment's levels about unit directions (N, 3) over patches with sides (N, 3)."""
     longer, shorter, axis = patch_axes(ddirection_ds, ddirection_dt)
     per_rad = levels[0].shape[0] / np.pi
     level, taps = filter_plan(SKY_WIDER * longer * per_rad, SKY_WIDER * shorter * per_rad)
-    return _looked_up(levels, level, taps, lambda share: environment_place(direction + share[:, None] * axis), (True, False))
+    return _looked_up(
+        levels, level, taps, lambda share: environment_place(direction + share[:, None] * axis), (True, False)
+    )
 
 
-def mean_by_force(value: Callable[[Array], Array], centre: Array, side_s: Array, side_t: Array, steps: int = 48) -> Array:
-    """Mean (N, channels) of `value` (points (N, d) → (N, channels)) over parallelograms about `centre` (N, d), from steps² points each."""
+def mean_by_force(
+    value: Callable[[Array], Array], centre: Array, side_s: Array, side_t: Array, steps: int = 48
+) -> Array:
+    """Mean (N, channels) of `value` (points (N, d) → (N, channels)) over parallelograms about `centre` (N, d), from
+    steps² points each."""
     shares = (np.arange(steps) + 0.5) / steps - 0.5
     total: Array | float = 0.0
     for s in shares:
@@ -118,13 +132,15 @@ def mean_by_force(value: Callable[[Array], Array], centre: Array, side_s: Array,
 
 
 def hit_uv(uv: Array, bary: Array) -> Array:
-    """(N, 2) at barycentric weights (N, 2) of the second and third corner of triangles with (N, 3, 2) texture coordinates."""
+    """(N, 2) at barycentric weights (N, 2) of the second and third corner of triangles with (N, 3, 2) texture
+    coordinates."""
     weights = np.column_stack([1.0 - bary.sum(axis=1), bary])
     return np.einsum("nc,ncj->nj", weights, uv)
 
 
 def uv_gradients(corners: Array, uv: Array) -> tuple[Array, Array]:
-    """Gradients (N, 3) of u and v in the planes of triangles (N, 3, 3): the least-norm solution of their edges' equations."""
+    """Gradients (N, 3) of u and v in the planes of triangles (N, 3, 3): the least-norm solution of their edges'
+    equations."""
     edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1)
     steps = np.stack([uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]], axis=1)
     gradients = np.linalg.pinv(edges) @ steps

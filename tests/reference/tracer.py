@@ -163,7 +163,10 @@ class TriangleList:
         """The glasses round a ray's start: those that it leaves once more than it enters them."""
         crossed, distance, leaves = self._crossings(ray)
         ahead = crossed & (distance > 0.0) & (self.material >= 0)
-        balance = {int(solid): np.sum(np.where(leaves, 1, -1)[ahead & (self.material == solid)]) for solid in np.unique(self.material[ahead])}
+        balance = {
+            int(solid): np.sum(np.where(leaves, 1, -1)[ahead & (self.material == solid)])
+            for solid in np.unique(self.material[ahead])
+        }
         return frozenset(solid for solid, exits in balance.items() if exits > 0)
 
     @cached_property
@@ -213,9 +216,9 @@ def follow(
     """Follow one path among glasses that may nest or touch, mirrors and receivers.
 
     A triangle's material is an index into `bodies`, and glass has one that is not negative: mirrors and
-    receivers stand at the end and are counted from there. `reflects(event)` chooses reflection at a specular event (total
-    reflection happens anyway). `along` forces a sequence of triangles: each is met on its whole
-    plane, inside its edges or not, as a difference quotient over one and the same path needs.
+    receivers stand at the end and are counted from there. `reflects(event)` chooses reflection at a specular event
+    (total reflection happens anyway). `along` forces a sequence of triangles: each is met on its whole plane, inside
+    its edges or not, as a difference quotient over one and the same path needs.
     `inside`: glasses that the ray starts in, found by counting boundaries where it is not given.
     """
     inside = scene.holding(ray) if inside is None else inside
@@ -224,7 +227,11 @@ def follow(
     factor, margin = 1.0, 1.0
     while len(reflections) <= max_depth:
         if along is not None:
-            hit = None if len(triangles) >= len(along) else (along[len(triangles)], _distance(ray, scene.facet(along[len(triangles)])))
+            hit = (
+                None
+                if len(triangles) >= len(along)
+                else (along[len(triangles)], _distance(ray, scene.facet(along[len(triangles)])))
+            )
         else:
             hit = scene.nearest(ray, triangles[-1] if triangles else None, inside)
         if hit is None:

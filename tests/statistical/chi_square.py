@@ -70,7 +70,8 @@ def star_discrepancy(values: np.ndarray) -> float:
 
 
 def box_discrepancy(points: np.ndarray, grid: int = 32) -> float:
-    """Largest error of the share in boxes from the origin to a `grid`² of corners: a lower bound of the 2D star discrepancy."""
+    """Largest error of the share in boxes from the origin to a `grid`² of corners: a lower bound of the 2D star
+    discrepancy."""
     counts, _, _ = np.histogram2d(points[:, 0], points[:, 1], bins=grid, range=((0, 1), (0, 1)))
     share = counts.cumsum(axis=0).cumsum(axis=1) / len(points)
     edge = np.arange(1, grid + 1) / grid

@@ -33,7 +33,8 @@ class Emitted:
     position: np.ndarray
     direction: np.ndarray
     weight: np.ndarray
-    """Flux per unit of the light's own quantity (and band), float64; passes average, so their sum is the whole measure."""
+    """Flux per unit of the light's own quantity (and band), float64; passes average, so their sum is the whole
+    measure."""
     x: np.ndarray
     """Spectral coordinate."""
     throughput: np.ndarray
@@ -48,9 +49,22 @@ def box(half: float, centre: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Me
     return make_mesh("box", corners, np.array(triangles))
 
 
-def emit(gl: Context, light: Light, solid: Mesh, passes: int, light_points: int = 1, band: tuple[float, float] = (0.2, 0.7), seed: int = 1, material: Dielectric | None = None) -> Emitted:
-    """`passes` lattices of `BATCH` points towards `solid`, each with shifts of its own, under method `stochastic-point`."""
-    objects = (SceneObject("solid", solid, material or glass("N-BK7")), SceneObject("floor", screen((0, 0, -60), (0, 0, 1)), Diffuse()))
+def emit(
+    gl: Context,
+    light: Light,
+    solid: Mesh,
+    passes: int,
+    light_points: int = 1,
+    band: tuple[float, float] = (0.2, 0.7),
+    seed: int = 1,
+    material: Dielectric | None = None,
+) -> Emitted:
+    """`passes` lattices of `BATCH` points towards `solid`, each with shifts of its own, under method
+    `stochastic-point`."""
+    objects = (
+        SceneObject("solid", solid, material or glass("N-BK7")),
+        SceneObject("floor", screen((0, 0, -60), (0, 0, 1)), Diffuse()),
+    )
     scene = Scene("emission", Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), (light,), objects)
     features = Features.of(scene, RenderSettings(method="stochastic-point"))
     buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
@@ -64,7 +78,19 @@ def emit(gl: Context, light: Light, solid: Mesh, passes: int, light_points: int 
             shifts = [int(s) for s in rng.integers(0, 2**32, 5)]
             points = BATCH // light_points
             bands = (Band(band[0], band[1], 0.5 * sum(band), 1.0),)
-            piece = LatticeSlice(0, bands, points, 0, 1, points, (shifts[0], shifts[1]), (shifts[2], shifts[3]), shifts[4], number, light_points)
+            piece = LatticeSlice(
+                0,
+                bands,
+                points,
+                0,
+                1,
+                points,
+                (shifts[0], shifts[1]),
+                (shifts[2], shifts[3]),
+                shifts[4],
+                number,
+                light_points,
+            )
             # With no depth left every ray ends at its first surface, and what emission wrote stays where it is.
             trace._rays[0].clear()
             trace.run(piece, domain, max_depth=0)
@@ -72,9 +98,13 @@ def emit(gl: Context, light: Light, solid: Mesh, passes: int, light_points: int 
             rows.append(rays[rays["flux_w"] > 0.0])
         rays = np.concatenate(rows)
         return Emitted(
-            buffers.space.to_world(rays["position"]), rays["direction"].astype(float), rays["flux_w"].astype(float) / passes,
-            rays["x_anchor"].astype(float), rays["throughput"][:, 1].astype(float), rays["photon_id"],
-        )  # fmt: skip
+            buffers.space.to_world(rays["position"]),
+            rays["direction"].astype(float),
+            rays["flux_w"].astype(float) / passes,
+            rays["x_anchor"].astype(float),
+            rays["throughput"][:, 1].astype(float),
+            rays["photon_id"],
+        )
     finally:
         trace.release()
         buffers.release()

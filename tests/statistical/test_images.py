@@ -2,11 +2,11 @@
 
 The scene has a closed form: a spot with a soft edge shines through two faces of an N-SF11 wedge onto a screen. The
 histogram is of float64 rays, with wavelength and direction from shifted Kronecker sequences of its own; it
-shares the scene's numbers with the renderer and nothing else. Means over independent seeds are compared by Welch's t; with the
-Šidák correction a right renderer is refused once in 10,000 runs. The smallest error of the total energy seen with probability 0.99 is
-asserted to be below 1 %. Mutants: 1 % more energy, half a texel aside, red and blue exchanged.
-Methods with footprints blur by part of a texel, and `srd` takes a chord for the path within a band (a quarter of a texel at
-most): `ALLOWED` gives texels that much, in shares of the brightest; the whole picture gets a tenth of it.
+shares the scene's numbers with the renderer and nothing else. Means over independent seeds are compared by Welch's t;
+with the Šidák correction a right renderer is refused once in 10,000 runs. The smallest error of the total energy seen
+with probability 0.99 is asserted to be below 1 %. Mutants: 1 % more energy, half a texel aside, red and blue exchanged.
+Methods with footprints blur by part of a texel, and `srd` takes a chord for the path within a band (a quarter of a
+texel at most): `ALLOWED` gives texels that much, in shares of the brightest; the whole picture gets a tenth of it.
 """
 
 from __future__ import annotations
@@ -52,10 +52,23 @@ def wedge() -> np.ndarray:
 
 def scene() -> Scene:
     direction = optics.unit(AIM - LAMP)
-    light = Light("lamp", "spot", SPECTRUM, position=tuple(LAMP), direction=tuple(direction), inner_half_angle_deg=0.0, outer_half_angle_deg=float(np.degrees(OUTER)))
+    light = Light(
+        "lamp",
+        "spot",
+        SPECTRUM,
+        position=tuple(LAMP),
+        direction=tuple(direction),
+        inner_half_angle_deg=0.0,
+        outer_half_angle_deg=float(np.degrees(OUTER)),
+    )
     solid = SceneObject("wedge", extruded("wedge", wedge(), half=1.0), glass("N-SF11"))
     sheet = screen((5.0, -2.1, -0.1), (1.0, -0.4, 0.0), half=2.0)
-    return Scene("wedge", Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), (light,), (solid, SceneObject("screen", make_mesh("screen", sheet.vertices, sheet.triangles), Diffuse())))
+    return Scene(
+        "wedge",
+        Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)),
+        (light,),
+        (solid, SceneObject("screen", make_mesh("screen", sheet.vertices, sheet.triangles), Diffuse())),
+    )
 
 
 @dataclass(frozen=True)
@@ -87,7 +100,13 @@ def rendered(gl: Context, method: str) -> tuple[np.ndarray, Window]:
         frame = plane_frame(buffers.space.to_gpu(buffers.world_meshes[1].vertices))
         (window,) = half.layout.windows[0]
         scale = buffers.space.scale
-        return np.array(maps), Window(buffers.space.to_world(frame.origin), frame.axes, np.cross(*frame.axes), window.low / scale, window.high / scale)
+        return np.array(maps), Window(
+            buffers.space.to_world(frame.origin),
+            frame.axes,
+            np.cross(*frame.axes),
+            window.low / scale,
+            window.high / scale,
+        )
     finally:
         half.release()
         buffers.release()
@@ -112,7 +131,9 @@ def histogram(window: Window) -> np.ndarray:
         u = (rng.random(3) + np.arange(RAYS)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0)) % 1.0
         cosine = 1.0 - u[:, 0] * (1.0 - np.cos(OUTER))
         turn, sine = 2.0 * np.pi * u[:, 1], np.sqrt(1.0 - cosine**2)
-        direction = cosine[:, None] * axis + (sine * np.cos(turn))[:, None] * first + (sine * np.sin(turn))[:, None] * second
+        direction = (
+            cosine[:, None] * axis + (sine * np.cos(turn))[:, None] * first + (sine * np.sin(turn))[:, None] * second
+        )
         t = 1.0 - np.arccos(cosine) / OUTER
         weight = solid_angle * t * t * (3.0 - 2.0 * t)
         cell = np.minimum((u[:, 2] * 401).astype(int), 400)
@@ -120,16 +141,28 @@ def histogram(window: Window) -> np.ndarray:
         n = index("N-SF11", nm)
         position = np.broadcast_to(LAMP, direction.shape)
         for (corner, normal), eta in zip(faces, (1.0 / n, n), strict=True):
-            position = position + (optics.dot(corner - position, normal) / optics.dot(direction, normal))[:, None] * direction
+            position = (
+                position + (optics.dot(corner - position, normal) / optics.dot(direction, normal))[:, None] * direction
+            )
             facing = normal if optics.dot(direction[0], normal) < 0 else -normal
             normals = np.broadcast_to(facing, direction.shape)
             weight = weight * (1.0 - optics.fresnel_reflectance(direction, normals, eta))
             direction = optics.refract(direction, normals, eta)
-        position = position + ((window.origin - position) @ window.normal / (direction @ window.normal))[:, None] * direction
+        position = (
+            position + ((window.origin - position) @ window.normal / (direction @ window.normal))[:, None] * direction
+        )
         at = (position - window.origin) @ window.axes.T
         xyz = (401.0 / RAYS) * weight[:, None] * SPECTRUM.density[cell, None] * K_M * cmf_xyz()[cell]
         bounds = [(window.low[1], window.high[1]), (window.low[0], window.high[0])]
-        maps.append(np.stack([np.histogram2d(at[:, 1], at[:, 0], bins=(SIZE[1], SIZE[0]), range=bounds, weights=xyz[:, c])[0] for c in range(3)], axis=-1))
+        maps.append(
+            np.stack(
+                [
+                    np.histogram2d(at[:, 1], at[:, 0], bins=(SIZE[1], SIZE[0]), range=bounds, weights=xyz[:, c])[0]
+                    for c in range(3)
+                ],
+                axis=-1,
+            )
+        )
     return np.array(maps)
 
 
@@ -177,7 +210,9 @@ def reference(gl) -> tuple[np.ndarray, np.ndarray, Window]:
 
 
 @pytest.mark.parametrize("method", ["stochastic-point", "stochastic", "stochastic-even", "srd"])
-def test_maps_are_the_histogram_of_random_photons(gl, reference: tuple[np.ndarray, np.ndarray, Window], method: str) -> None:
+def test_maps_are_the_histogram_of_random_photons(
+    gl, reference: tuple[np.ndarray, np.ndarray, Window], method: str
+) -> None:
     theirs, by_points, window = reference
     ours, own_window = (by_points, window) if method == "stochastic-point" else rendered(gl, method)
     if not np.array_equal(own_window.low, window.low):  # a method's pilot fits its own window
@@ -188,7 +223,10 @@ def test_maps_are_the_histogram_of_random_photons(gl, reference: tuple[np.ndarra
     limit = DETECTABLE[method]
     assert same.detectable < limit, same
     shifted = 0.5 * (ours + np.roll(ours, 1, axis=2))
-    mutants = {"a detectable share more": (1.0 + (limit if limit < 0.02 else 2.0 * limit)) * ours, "red for blue": ours[..., ::-1]}
+    mutants = {
+        "a detectable share more": (1.0 + (limit if limit < 0.02 else 2.0 * limit)) * ours,
+        "red for blue": ours[..., ::-1],
+    }
     if limit < 0.02:
         mutants["half a texel aside"] = shifted
     for name, mutant in mutants.items():

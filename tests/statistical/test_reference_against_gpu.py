@@ -50,7 +50,9 @@ def place(mesh, material, at=(0.0, 0.0, 0.0), scale=(1.0, 1.0, 1.0)) -> SceneObj
 
 FLOOR = place(primitives.plane(12.0, 12.0), Diffuse((0.7, 0.5, 0.4)))
 VIEW = Camera((0.0, -4.0, 4.0), (0.4, 0.0, 0.0), vertical_fov_deg=34.0)
-WINDOW = place(primitives.box((1.2, 1.2, 0.3)), Dielectric(FLINT, Absorption(np.linspace(0.2, 3.0, 401))), (-0.9, 0.0, 1.4))
+WINDOW = place(
+    primitives.box((1.2, 1.2, 0.3)), Dielectric(FLINT, Absorption(np.linspace(0.2, 3.0, 401))), (-0.9, 0.0, 1.4)
+)
 LAMP = Light("lamp", "point", illuminant("A").scaled_to_luminous(1000.0), (-2.4, -0.3, 3.6))
 
 
@@ -61,21 +63,53 @@ def tinted() -> Scene:
 
 def mirrored() -> Scene:
     """A sphere of copper in the light of a soft spot; the receiver has a spectral reflectance."""
-    spot = Light("spot", "spot", blackbody(3200.0).scaled_to_luminous(900.0), (-1.0, 0.5, 3.0), (0.3, -0.1, -0.9), inner_half_angle_deg=10.0, outer_half_angle_deg=40.0)
+    spot = Light(
+        "spot",
+        "spot",
+        blackbody(3200.0).scaled_to_luminous(900.0),
+        (-1.0, 0.5, 3.0),
+        (0.3, -0.1, -0.9),
+        inner_half_angle_deg=10.0,
+        outer_half_angle_deg=40.0,
+    )
     grey_to_red = Diffuse(reflectance=np.linspace(0.2, 0.9, 401))
-    return Scene("mirror", VIEW, (spot,), (place(sphere(0.5, 1280), Mirror((0.95, 0.6, 0.3)), (-0.4, 0.2, 0.8)), place(primitives.plane(12.0, 12.0), grey_to_red)))
+    return Scene(
+        "mirror",
+        VIEW,
+        (spot,),
+        (
+            place(sphere(0.5, 1280), Mirror((0.95, 0.6, 0.3)), (-0.4, 0.2, 0.8)),
+            place(primitives.plane(12.0, 12.0), grey_to_red),
+        ),
+    )
 
 
 def area_lit() -> Scene:
     """A ball of flint under a panel, seen by an orthographic camera."""
-    panel = Light("panel", "area", illuminant("D65").scaled_to_luminous(500.0), (-1.5, 0.0, 3.5), (0.35, 0.0, -0.94), shape="rectangle", width=0.8, height=0.5)
+    panel = Light(
+        "panel",
+        "area",
+        illuminant("D65").scaled_to_luminous(500.0),
+        (-1.5, 0.0, 3.5),
+        (0.35, 0.0, -0.94),
+        shape="rectangle",
+        width=0.8,
+        height=0.5,
+    )
     view = Camera((0.0, -4.0, 4.0), (0.5, 0.0, 0.0), kind="orthographic", vertical_extent=2.6)
     return Scene("panel", view, (panel,), (place(sphere(0.4, 1280), Dielectric(FLINT), (-0.3, 0.0, 1.2)), FLOOR))
 
 
 def nested() -> Scene:
-    """Water in a glass ball, the water reaching into the wall, an air bubble in the water, in the light of a broad sun."""
-    sun = Light("sun", "directional", illuminant("D65").scaled_to_luminous(100.0), direction=(0.5, 0.1, -0.8), angular_diameter_deg=4.0)
+    """Water in a glass ball, the water reaching into the wall, an air bubble in the water, in the light of a broad
+    sun."""
+    sun = Light(
+        "sun",
+        "directional",
+        illuminant("D65").scaled_to_luminous(100.0),
+        direction=(0.5, 0.1, -0.8),
+        angular_diameter_deg=4.0,
+    )
     water = sellmeier((0.75831,), (0.01007,))
     shells = (
         place(sphere(0.5, 1280), Dielectric(FLINT, None, 1), (-0.5, 0.0, 0.9)),
@@ -109,16 +143,25 @@ def blocks(picture: np.ndarray, side: int = BLOCK) -> np.ndarray:
 class Comparison:
     """Blocks of both pictures in XYZ, float64 (8, 12, 3), and the variance of their difference."""
 
-    def __init__(self, context, scene: Scene, photons: int = PHOTONS, reference_photons: int = REFERENCE_PHOTONS) -> None:
+    def __init__(
+        self, context, scene: Scene, photons: int = PHOTONS, reference_photons: int = REFERENCE_PHOTONS
+    ) -> None:
         reference = render_reference(scene, WIDTH, HEIGHT, photons=reference_photons)
-        settings = RenderSettings(width=WIDTH, height=HEIGHT, photons=photons, method="stochastic-point", layer="caustic", spp=4)
-        pictures = [blocks(rgb709_to_xyz(render(scene, replace(settings, seed=seed), context=context).rgb.astype(float))) for seed in range(1, SEEDS + 1)]
+        settings = RenderSettings(
+            width=WIDTH, height=HEIGHT, photons=photons, method="stochastic-point", layer="caustic", spp=4
+        )
+        pictures = [
+            blocks(rgb709_to_xyz(render(scene, replace(settings, seed=seed), context=context).rgb.astype(float)))
+            for seed in range(1, SEEDS + 1)
+        ]
         self.reference = blocks(reference.xyz())
         self.product = np.mean(pictures, axis=0)
         scatter = np.var(pictures, axis=0, ddof=1) / SEEDS
         # Three degrees of freedom a block are too few: neighbours and all blocks of like brightness share theirs.
         relative = (scatter.sum(axis=(0, 1)) / np.abs(self.product).sum(axis=(0, 1)))[None, None]
-        self.variance = np.maximum(scatter, relative * np.abs(self.product)) + blocks(reference.xyz_variance()) / BLOCK**2
+        self.variance = (
+            np.maximum(scatter, relative * np.abs(self.product)) + blocks(reference.xyz_variance()) / BLOCK**2
+        )
 
     def total_error(self, reference: np.ndarray | None = None) -> np.ndarray:
         """(product − reference)/reference of each channel's sum."""
@@ -140,7 +183,9 @@ class Comparison:
 SLOW = {"wine_glass"}
 
 
-@pytest.fixture(scope="module", params=[pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in SCENES])
+@pytest.fixture(
+    scope="module", params=[pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in SCENES]
+)
 def comparison(request, gl) -> Comparison:
     return Comparison(gl, SCENES[request.param]())
 

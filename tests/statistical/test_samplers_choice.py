@@ -2,7 +2,8 @@
 
 With roulette from full power on, a ray that goes on always carries the same flux, so photons count. N starts at 60°
 on N-BK7 leave by T² R^k after k reflections inside. At N = 262,144 the count for k = 0 is known to 0.1 %, for k = 1
-to 0.7 %, so that an error of 5 % in R is seen with probability 0.99; the mutants (Schlick's formula, one polarisation) are 20 % and more off.
+to 0.7 %, so that an error of 5 % in R is seen with probability 0.99; the mutants (Schlick's formula, one polarisation)
+are 20 % and more off.
 """
 
 from __future__ import annotations
@@ -37,7 +38,9 @@ def landed(gl) -> tuple[np.ndarray, float]:
     flat = box(1.0)
     slab = make_mesh("slab", flat.vertices * [8.0, 8.0, 0.5], flat.triangles)
     direction = np.array([np.sin(ANGLE), 0.0, -np.cos(ANGLE)])
-    light = Light("beam", "collimated", constant(1.0), position=tuple(-4.0 * direction), direction=tuple(direction), radius=0.2)
+    light = Light(
+        "beam", "collimated", constant(1.0), position=tuple(-4.0 * direction), direction=tuple(direction), radius=0.2
+    )
     objects = (
         SceneObject("slab", slab, glass("N-BK7")),
         SceneObject("above", screen((0, 0, 9), (0, 0, 1)), Diffuse()),
@@ -54,7 +57,9 @@ def landed(gl) -> tuple[np.ndarray, float]:
     depths, started = [], 0.0
     for number in range(PASSES):
         shift = [int(s) for s in rng.integers(0, 2**32, 5)]
-        piece = LatticeSlice(0, (Band(x, x, x, 1.0),), BATCH, 0, 1, BATCH, (shift[0], shift[1]), (0, 0), shift[4], seed=number)
+        piece = LatticeSlice(
+            0, (Band(x, x, x, 1.0),), BATCH, 0, 1, BATCH, (shift[0], shift[1]), (0, 0), shift[4], seed=number
+        )
         batch = trace.run(piece, domain)
         assert batch.tally.imbalance < 1e-5
         records = np.frombuffer(trace.photons.read(), trace.photon.dtype, batch.photons)

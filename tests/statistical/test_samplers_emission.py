@@ -91,7 +91,8 @@ def smoothstep(angle: np.ndarray, inner: float, outer: float) -> np.ndarray:
 
 
 def ring_integrals(intensity: np.ndarray, angle: np.ndarray, rings: int) -> np.ndarray:
-    """Integral of intensity dΩ over equal steps of the cosine from cos(angle[0]) to cos(angle[-1]), by a running sum."""
+    """Integral of intensity dΩ over equal steps of the cosine from cos(angle[0]) to cos(angle[-1]), by a running
+    sum."""
     density = intensity * np.sin(angle)
     running = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(angle))])
     edges = np.linspace(np.cos(angle[0]), np.cos(angle[-1]), rings + 1)
@@ -100,7 +101,9 @@ def ring_integrals(intensity: np.ndarray, angle: np.ndarray, rings: int) -> np.n
 
 def test_a_spot_has_its_penumbra(gl) -> None:
     inner, outer = np.radians([20.0, 50.0])
-    light = Light("l", "spot", WHITE, position=INSIDE, direction=tuple(AXIS), inner_half_angle_deg=20.0, outer_half_angle_deg=50.0)
+    light = Light(
+        "l", "spot", WHITE, position=INSIDE, direction=tuple(AXIS), inner_half_angle_deg=20.0, outer_half_angle_deg=50.0
+    )
     rays = emit(gl, light, box(1.0), passes=8)
     angle = np.linspace(0.0, outer, 100_001)
     rings = ring_integrals(smoothstep(angle, inner, outer), angle, 16)
@@ -114,7 +117,9 @@ def test_a_spot_has_its_penumbra(gl) -> None:
 
 
 def test_a_hard_spot_fills_its_cone(gl) -> None:
-    light = Light("l", "spot", WHITE, position=INSIDE, direction=tuple(AXIS), inner_half_angle_deg=35.0, outer_half_angle_deg=35.0)
+    light = Light(
+        "l", "spot", WHITE, position=INSIDE, direction=tuple(AXIS), inner_half_angle_deg=35.0, outer_half_angle_deg=35.0
+    )
     rays = emit(gl, light, box(1.0), passes=4)
     assert rays.weight.sum() == pytest.approx(2.0 * np.pi * (1.0 - np.cos(np.radians(35.0))), rel=MEASURE_ERROR)
     cosine, turn = polar(rays.direction, AXIS)
@@ -128,7 +133,18 @@ def test_a_hard_spot_fills_its_cone(gl) -> None:
 @pytest.mark.parametrize("shape", ["disc", "rectangle"])
 def test_an_area_light_is_lambertian_and_even(gl, shape: str) -> None:
     radius, width, height = 0.2, 0.3, 0.2
-    light = Light("l", "area", WHITE, position=INSIDE, direction=tuple(AXIS), shape=shape, radius=radius, width=width, height=height, tangent=(1.0, 0.0, 0.0))
+    light = Light(
+        "l",
+        "area",
+        WHITE,
+        position=INSIDE,
+        direction=tuple(AXIS),
+        shape=shape,
+        radius=radius,
+        width=width,
+        height=height,
+        tangent=(1.0, 0.0, 0.0),
+    )
     rays = emit(gl, light, box(1.0), passes=12, light_points=8192)
     area = np.pi * radius**2 if shape == "disc" else width * height
     assert rays.weight.sum() == pytest.approx(np.pi * area, rel=10 * MEASURE_ERROR)
@@ -163,7 +179,10 @@ def test_the_sun_is_even_over_its_disc_and_over_the_ground(gl) -> None:
     inner = 0.9
     chosen = np.abs(ground[:, :2]).max(axis=1) < inner
     assert rays.weight[chosen].sum() == pytest.approx(4.0 * inner**2, rel=5 * MEASURE_ERROR)
-    ring, turn = (tilt**2).sum(axis=1)[chosen].clip(0.0, 1.0), (np.arctan2(tilt[:, 1], tilt[:, 0]) / (2.0 * np.pi) % 1.0)[chosen]
+    ring, turn = (
+        (tilt**2).sum(axis=1)[chosen].clip(0.0, 1.0),
+        (np.arctan2(tilt[:, 1], tilt[:, 0]) / (2.0 * np.pi) % 1.0)[chosen],
+    )
     x, y = (0.5 + 0.5 * ground[chosen, :2] / inner).T
     accept(cells(x, y, bins=(8, 8)), uniform_expected((8, 8)))
     accept(cells(ring, turn, bins=(4, 8)), uniform_expected((4, 8)))
@@ -175,7 +194,18 @@ def test_the_sun_is_even_over_its_disc_and_over_the_ground(gl) -> None:
 @pytest.mark.parametrize("shape", ["disc", "rectangle"])
 def test_a_beam_fills_its_aperture(gl, shape: str) -> None:
     radius, width, height = 0.5, 0.9, 0.4
-    light = Light("l", "collimated", WHITE, position=(0.1, -0.1, 3.0), direction=(0.0, 0.0, -1.0), shape=shape, radius=radius, width=width, height=height, tangent=(1.0, 0.0, 0.0))
+    light = Light(
+        "l",
+        "collimated",
+        WHITE,
+        position=(0.1, -0.1, 3.0),
+        direction=(0.0, 0.0, -1.0),
+        shape=shape,
+        radius=radius,
+        width=width,
+        height=height,
+        tangent=(1.0, 0.0, 0.0),
+    )
     rays = emit(gl, light, box(1.0), passes=8)
     np.testing.assert_allclose(rays.direction, [[0.0, 0.0, -1.0]] * len(rays.weight), atol=1e-7)
     np.testing.assert_allclose(rays.position[:, 2], 3.0, atol=1e-6)

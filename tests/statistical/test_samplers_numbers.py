@@ -1,7 +1,7 @@
 """Random numbers, lattices and roulette's draws: uniform alone, in pairs and over passes.
 
-The numpy CPU references stand for the shaders here; tests/gpu holds them equal bit for bit. Independent draws are judged by
-chi² (a tilt of `tilt` is seen with probability 0.99), low-discrepancy ones by their discrepancy too, against
+The numpy CPU references stand for the shaders here; tests/gpu holds them equal bit for bit. Independent draws are
+judged by chi² (a tilt of `tilt` is seen with probability 0.99), low-discrepancy ones by their discrepancy too, against
 bounds a few times what golden-ratio lattices reach and a tenth of what random numbers of that count have.
 """
 
@@ -44,7 +44,15 @@ def test_hashes_are_uniform_and_neighbours_independent() -> None:
     i = np.arange(COUNT, dtype=np.uint32)
     hashed = hash_pcg(i)
     low = (hashed & np.uint32(0xFFFF)) / 65536.0
-    assert min(even(unit_float(hashed)), even(low), even(unit_float(hashed[:-1]), unit_float(hashed[1:])), even(unit_float(hashed), low)) > ALPHA
+    assert (
+        min(
+            even(unit_float(hashed)),
+            even(low),
+            even(unit_float(hashed[:-1]), unit_float(hashed[1:])),
+            even(unit_float(hashed), low),
+        )
+        > ALPHA
+    )
     # As the camera uses them: keys of pixels, then of lights.
     x, y = i % 512, i // 512
     pixel = hash_combine(hash_combine(np.uint32(1), x), y)
@@ -107,14 +115,19 @@ def test_sub_lattices_of_bands_and_places_are_shifted_evenly() -> None:
 
 @pytest.mark.parametrize("light_points", [1, 3, 16, 256, 4096, 8192])
 def test_one_wavelength_a_photon_is_even_whatever_the_number_of_places(light_points: int) -> None:
-    """`stochastic-even`: with every number of places on a light the wavelengths of a pass are even, alone and with the lattice."""
+    """`stochastic-even`: with every number of places on a light the wavelengths of a pass are even, alone and with the
+    lattice."""
     points = 65_536 // light_points
     photon = np.arange(points * light_points)
     colour = kronecker(photon, 3774877043, 0)
     assert star_discrepancy(colour) < 3.0 * np.log(len(photon)) / len(photon)
     point, place = photon // light_points, photon % light_points
     on_light = lattice_point(place, light_points, (0, 0))
-    for other in ([point / points] if points > 64 else []) + [kronecker(point, GOLDEN, 0)] * (points > 64) + [on_light[:, 0], on_light[:, 1]] * (light_points > 64):
+    for other in (
+        ([point / points] if points > 64 else [])
+        + [kronecker(point, GOLDEN, 0)] * (points > 64)
+        + [on_light[:, 0], on_light[:, 1]] * (light_points > 64)
+    ):
         assert box_discrepancy(np.column_stack([colour, other]), 16) < 0.02
 
 
@@ -135,7 +148,8 @@ def test_places_in_a_pixel_are_even_in_one_launch_and_over_many() -> None:
 
 
 def test_single_wavelengths_are_even_over_the_places_in_a_pixel() -> None:
-    """Of camera samples: with the places' own ratio every height in the pixel had a colour of its own, and more samples did not help."""
+    """Of camera samples: with the places' own ratio every height in the pixel had a colour of its own, and more samples
+    did not help."""
     shader = (paths.shaders_dir() / "camera" / "path.glsl").read_text()
     (generator,) = re.findall(r"#define WAVELENGTH_GENERATOR (\d+)u", shader)
     for samples in (64, 204, 1024):
@@ -160,7 +174,10 @@ def survives_source() -> str:
 
 def generators() -> list[int]:
     """Roulette's irrationals, one a depth up to 63: a table for the first, hashed ones below."""
-    table = [int(g) for g in re.search(r"generators\[\d+\] = uint\[\]\(([^)]*)\)", survives_source())[1].replace("u", "").split(",")]
+    table = [
+        int(g)
+        for g in re.search(r"generators\[\d+\] = uint\[\]\(([^)]*)\)", survives_source())[1].replace("u", "").split(",")
+    ]
     return table + [int(hash_pcg(depth)) | 1 for depth in range(len(table), 64)]
 
 
@@ -174,7 +191,9 @@ def draws(depth: int, key: np.ndarray | int, photon: np.ndarray, irrationals: li
     return kronecker(photon // LATTICES, irrationals[depth], shift)
 
 
-def play(gl, photon: np.ndarray, depth: np.ndarray, key: np.ndarray, survival: np.ndarray, share: np.ndarray) -> dict[str, np.ndarray]:
+def play(
+    gl, photon: np.ndarray, depth: np.ndarray, key: np.ndarray, survival: np.ndarray, share: np.ndarray
+) -> dict[str, np.ndarray]:
     body = """
     RayRecord ray;
     ray.flux_w = survival; ray.throughput = vec3(survival); ray.survival = survival; ray.photon_id = photon; ray.depth = depth; ray.branch_key = key;
@@ -184,20 +203,46 @@ def play(gl, photon: np.ndarray, depth: np.ndarray, key: np.ndarray, survival: n
     alive = survives(ray, roulette, share, 2u) ? 1u : 0u;
     flux = ray.flux_w; taken = roulette; left = ray.survival; next_key = ray.branch_key; throughput = ray.throughput.y;
     """
-    inputs = {"photon": photon.astype(np.uint32), "depth": depth.astype(np.uint32), "key": key.astype(np.uint32), "survival": survival, "share": share}
-    outputs = {"alive": "uint", "flux": "float", "taken": "float", "left": "float", "next_key": "uint", "throughput": "float"}
-    return evaluate(gl.ctx, ["lib/random.glsl"], body, inputs, outputs, structs=[ray_record(0), TRACE_PARAMETERS], declarations=survives_source())
+    inputs = {
+        "photon": photon.astype(np.uint32),
+        "depth": depth.astype(np.uint32),
+        "key": key.astype(np.uint32),
+        "survival": survival,
+        "share": share,
+    }
+    outputs = {
+        "alive": "uint",
+        "flux": "float",
+        "taken": "float",
+        "left": "float",
+        "next_key": "uint",
+        "throughput": "float",
+    }
+    return evaluate(
+        gl.ctx,
+        ["lib/random.glsl"],
+        body,
+        inputs,
+        outputs,
+        structs=[ray_record(0), TRACE_PARAMETERS],
+        declarations=survives_source(),
+    )
 
 
 def test_roulette_lets_the_right_share_live_and_keeps_the_flux(gl) -> None:
     rng = np.random.default_rng(3)
     photon, depth = rng.integers(0, 1 << 22, COUNT), rng.integers(2, 20, COUNT)
     key = rng.integers(0, WORD, COUNT)
-    survival, share = np.float32(rng.uniform(0.05, 1.0, COUNT)).astype(float), np.float32(rng.uniform(0.01, 1.0, COUNT)).astype(float)
+    survival, share = (
+        np.float32(rng.uniform(0.05, 1.0, COUNT)).astype(float),
+        np.float32(rng.uniform(0.01, 1.0, COUNT)).astype(float),
+    )
     got = play(gl, photon, depth, key, survival, share)
     np.testing.assert_array_equal(got["next_key"], hash_combine(key, np.uint32(2)))
     chance = np.minimum(survival * share / THRESHOLD, 1.0)
-    drawn = np.concatenate([draws(int(d), got["next_key"][depth == d], photon[depth == d], generators()) for d in np.unique(depth)])
+    drawn = np.concatenate(
+        [draws(int(d), got["next_key"][depth == d], photon[depth == d], generators()) for d in np.unique(depth)]
+    )
     alive = np.concatenate([got["alive"][depth == d] for d in np.unique(depth)])
     chances = np.concatenate([chance[depth == d] for d in np.unique(depth)])
     np.testing.assert_array_equal(alive == 1, (drawn < chances) | (chances >= 1.0))
@@ -205,7 +250,10 @@ def test_roulette_lets_the_right_share_live_and_keeps_the_flux(gl) -> None:
     plays = chance < 1.0
     classes = np.minimum((chance[plays] * 20).astype(int), 19)
     rays, living = np.bincount(classes, minlength=20), np.bincount(classes, got["alive"][plays], 20)
-    expected, variance = np.bincount(classes, chance[plays], 20), np.bincount(classes, chance[plays] * (1 - chance[plays]), 20)
+    expected, variance = (
+        np.bincount(classes, chance[plays], 20),
+        np.bincount(classes, chance[plays] * (1 - chance[plays]), 20),
+    )
     z = (living - expected) / np.sqrt(variance)
     assert (rays > 1000).all() and np.abs(z).max() < 4.5
     wrong = (living * 1.03 - expected) / np.sqrt(variance)  # a bias of 3 % of the chance is seen
@@ -256,7 +304,8 @@ def test_roulettes_draws_are_even_jointly_over_bounces() -> None:
 
 
 def test_draws_of_one_photon_are_uniform_over_passes() -> None:
-    """Keys differ from pass to pass: over many the draws of any two depths are even, those of the same irrational too."""
+    """Keys differ from pass to pass: over many the draws of any two depths are even, those of the same irrational
+    too."""
     passes = 1 << 18
     key = hash_combine(np.arange(passes), np.uint32(0))
     deeper = key

@@ -43,16 +43,45 @@ def synthetic_curve(method: str, difficulty: float, seeds: int, longest_s: float
         errors = bias2 * difficulty + spread
         for seed, error in enumerate(errors, 1):
             share = seconds - overhead_s
-            samples.append(Sample(
-                photons, seed, photons, int(photons * 1.7), {"trace": 0.6 * share, "splat": 0.4 * share, "resolve": overhead_s, "camera": 0.02},
-                {"relmse": float(error), "relmse_trimmed": float(error) * 0.7, "smape": 0.2, "chroma": 0.01, "nrmse": 0.1, "flip": 0.05,
-                 "energy_ratio": 0.999},
-            ))  # fmt: skip
-        points.append(Point(photons, float(seconds), float(errors.mean()), float(errors.min()), float(errors.max()), bias2 * difficulty, float(spread.mean())))
+            samples.append(
+                Sample(
+                    photons,
+                    seed,
+                    photons,
+                    int(photons * 1.7),
+                    {"trace": 0.6 * share, "splat": 0.4 * share, "resolve": overhead_s, "camera": 0.02},
+                    {
+                        "relmse": float(error),
+                        "relmse_trimmed": float(error) * 0.7,
+                        "smape": 0.2,
+                        "chroma": 0.01,
+                        "nrmse": 0.1,
+                        "flip": 0.05,
+                        "energy_ratio": 0.999,
+                    },
+                )
+            )
+        points.append(
+            Point(
+                photons,
+                float(seconds),
+                float(errors.mean()),
+                float(errors.min()),
+                float(errors.max()),
+                bias2 * difficulty,
+                float(spread.mean()),
+            )
+        )
     return Curve(
-        method, {"buffers": 0.05, "compile": 1.2, "pilot": 0.08}, samples, points=points, slope=exponent, slope_half_width=0.06, buffers_mib=42.0,
+        method,
+        {"buffers": 0.05, "compile": 1.2, "pilot": 0.08},
+        samples,
+        points=points,
+        slope=exponent,
+        slope_half_width=0.06,
+        buffers_mib=42.0,
         budgets=[p.photons for p in points],
-    )  # fmt: skip
+    )
 
 
 def synthetic_pictures(directory: Path, scene: str, methods: Sequence[str], rng: np.random.Generator) -> dict[str, str]:
@@ -64,7 +93,14 @@ def synthetic_pictures(directory: Path, scene: str, methods: Sequence[str], rng:
     position = np.clip((np.hypot(x - 0.9, y + 0.2) - 0.55) / 0.5, 0, 1)
     inside = np.exp(-(((np.arctan2(y + 0.2, x - 0.9) - 1.7) / 0.55) ** 4)) * (position > 0) * (position < 1)
     reference = inside[..., None] * cmf_xyz()[(20 + 300 * (1 - position)).astype(int)]
-    noise = {"stochastic": 0.35, "stochastic-point": 0.6, "regular-7": 0.1, "regular-16": 0.08, "srd-lambda": 0.05, "srd": 0.015}
+    noise = {
+        "stochastic": 0.35,
+        "stochastic-point": 0.6,
+        "regular-7": 0.1,
+        "regular-16": 0.08,
+        "srd-lambda": 0.05,
+        "srd": 0.015,
+    }
     files = {}
     for name in ("reference", *methods, *(f"{method} early" for method in methods)):
         level = noise.get(name.removesuffix(" early"), 0.0) * (3.0 if name.endswith("early") else 1.0)
@@ -74,23 +110,54 @@ def synthetic_pictures(directory: Path, scene: str, methods: Sequence[str], rng:
     return files
 
 
-def synthetic_scene(directory: Path, name: str, *, gain: float = 40.0, methods: Sequence[str] = tuple(METHODS), seeds: int = 5,
-                    difficulty: float = 1.0, own_error: float = 2e-5, longest_s: float = 3.0) -> SceneResult:  # fmt: skip
+def synthetic_scene(
+    directory: Path,
+    name: str,
+    *,
+    gain: float = 40.0,
+    methods: Sequence[str] = tuple(METHODS),
+    seeds: int = 5,
+    difficulty: float = 1.0,
+    own_error: float = 2e-5,
+    longest_s: float = 3.0,
+) -> SceneResult:
     rng = np.random.default_rng(sum(name.encode()))
     curves = [synthetic_curve(m, difficulty, seeds, longest_s, rng) for m in methods]
     scene = SceneResult(
-        name, f"A made-up {name}", SIZE, seeds, longest_s, ReferenceInfo("photon histogram", 400_000_000, 61.0, own_error, "a1b2c3"), curves,
-        strongest_glass="N-SF66", strongest_abbe=20.9, equal_time=longest_s, complete=True, pictures=synthetic_pictures(directory, name, methods, rng),
-    )  # fmt: skip
+        name,
+        f"A made-up {name}",
+        SIZE,
+        seeds,
+        longest_s,
+        ReferenceInfo("photon histogram", 400_000_000, 61.0, own_error, "a1b2c3"),
+        curves,
+        strongest_glass="N-SF66",
+        strongest_abbe=20.9,
+        equal_time=longest_s,
+        complete=True,
+        pictures=synthetic_pictures(directory, name, methods, rng),
+    )
     for curve in curves:
         scene.picture_samples[curve.method] = curve.samples[-1]
         scene.picture_samples[f"{curve.method} early"] = curve.samples[0]
     if {"srd", "stochastic"} <= set(methods):
-        scene.time_to_equal_error = {"stochastic": 1.0, "srd": gain, "stochastic-point": 0.4, "srd-lambda": 3.0, "regular-16": 1.7}
+        scene.time_to_equal_error = {
+            "stochastic": 1.0,
+            "srd": gain,
+            "stochastic-point": 0.4,
+            "srd-lambda": 3.0,
+            "regular-16": 1.7,
+        }
         holds = gain >= 30
         scene.time_to_equal_other = {"nrmse": {"srd": 61.0, "stochastic": 1.0}, "relmse_whole": {"srd": 17.0}}
         scene.claims = [
-            Claim("1/30 of the time", "at least 30×", f"{gain:.0f}×", holds, "" if holds else "bias² is 61 % of the remaining error"),
+            Claim(
+                "1/30 of the time",
+                "at least 30×",
+                f"{gain:.0f}×",
+                holds,
+                "" if holds else "bias² is 61 % of the remaining error",
+            ),
             Claim("first picture", "better at 0.1 s than stochastic at 3 s", "0.002 against 0.02", True),
             Claim("beats srd-lambda", "less error at equal time", "0.0006 against 0.015", True),
         ]
@@ -98,5 +165,13 @@ def synthetic_scene(directory: Path, name: str, *, gain: float = 40.0, methods: 
 
 
 def synthetic_result(scenes: list[SceneResult]) -> BenchResult:
-    machine = {"processor": "A processor", "cores": "2", "renderer": "llvmpipe", "driver": "Mesa", "opengl": "4.5", "system": "Linux", "python": "3.12"}
+    machine = {
+        "processor": "A processor",
+        "cores": "2",
+        "renderer": "llvmpipe",
+        "driver": "Mesa",
+        "opengl": "4.5",
+        "system": "Linux",
+        "python": "3.12",
+    }
     return BenchResult("0.1.0", "2026-11-21 10:00", "spectrasplat bench ball prism -o out --seeds 5", machine, scenes)

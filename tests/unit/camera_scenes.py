@@ -50,10 +50,17 @@ GRAZING = math.radians(5.0)
 
 def slab_scene(glass: Dispersion) -> Scene:
     """White for x > 0, black elsewhere; seen at 45° through a slab, which shades neither."""
-    light = Light("low", "directional", D65.scaled(1.0 / math.sin(GRAZING)), direction=(0.0, math.cos(GRAZING), -math.sin(GRAZING)))
+    light = Light(
+        "low",
+        "directional",
+        D65.scaled(1.0 / math.sin(GRAZING)),
+        direction=(0.0, math.cos(GRAZING), -math.sin(GRAZING)),
+    )
     white = place(primitives.plane(4.0, 8.0), Diffuse((1.0, 1.0, 1.0)), (2.0, 0.0, 0.0))
     black = place(primitives.plane(4.0, 8.0), Black(), (-2.0, 0.0, 0.0))
     slab = place(primitives.box((9.0, 2.0, THICKNESS)), Dielectric(glass), (0.0, 0.0, 2.0))
     edge = float(np.mean(camera_answers.slab_displacement(glass.index(VISIBLE_NM), THICKNESS, TILT)))
-    camera = Camera((-10.0 + edge, 0.0, 10.0), (edge, 0.0, 0.0), kind="orthographic", up=(1.0, 0.0, 0.0), vertical_extent=0.06)
+    camera = Camera(
+        (-10.0 + edge, 0.0, 10.0), (edge, 0.0, 0.0), kind="orthographic", up=(1.0, 0.0, 0.0), vertical_extent=0.06
+    )
     return scene_of(light, white, black, slab, camera=camera)

@@ -7,7 +7,9 @@ import numpy as np
 HEADER = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n"
 
 
-def hdr_file(body: bytes, width: int, height: int, header: bytes = HEADER, axes: tuple[str, str] = ("-Y", "+X")) -> bytes:
+def hdr_file(
+    body: bytes, width: int, height: int, header: bytes = HEADER, axes: tuple[str, str] = ("-Y", "+X")
+) -> bytes:
     """A whole file round `body`."""
     return header + f"\n{axes[0]} {height} {axes[1]} {width}\n".encode() + body
 

@@ -35,7 +35,14 @@ def stage() -> Stage:
 
 def test_every_parameter_reads_back_what_was_set_and_changes_nothing_else(stage: Stage) -> None:
     known = paths(stage.scene, stage.camera)
-    assert {GAIN, "camera.orbit_deg", "lights.slit.power", "objects.table.position.z", "objects.diamond.V_d", "solo_nm"} <= set(known)
+    assert {
+        GAIN,
+        "camera.orbit_deg",
+        "lights.slit.power",
+        "objects.table.position.z",
+        "objects.diamond.V_d",
+        "solo_nm",
+    } <= set(known)
     relative = {"orbit_deg", "elevation_deg", "power"}
     for path, known_parameter in known.items():
         before = value_of(stage, path)
@@ -65,7 +72,9 @@ def test_orbit_keeps_distance_and_height_and_comes_back(stage: Stage) -> None:
     whole = apply(stage, "camera.orbit_deg", 360.0).camera
     assert whole.position == pytest.approx(stage.camera.position)
     above = apply(stage, "camera.elevation_deg", 170.0).camera
-    assert np.subtract(above.position, above.target)[2] == pytest.approx(np.linalg.norm(arm) * math.sin(math.radians(89.9)))
+    assert np.subtract(above.position, above.target)[2] == pytest.approx(
+        np.linalg.norm(arm) * math.sin(math.radians(89.9))
+    )
 
 
 def test_turns_are_about_the_objects_own_place_and_the_order_of_keys_does_not_matter(stage: Stage) -> None:
@@ -91,7 +100,10 @@ def test_lights(stage: Stage) -> None:
 def test_names_that_hold_dots(stage: Stage) -> None:
     item = replace(stage.scene.objects[0], name="lens no. 1.5")
     dotted = replace(stage, scene=replace(stage.scene, objects=(item, *stage.scene.objects[1:])))
-    assert value_of(apply(dotted, "objects.lens no. 1.5.dispersion_gain", 3.0), "objects.lens no. 1.5.dispersion_gain") == 3.0
+    assert (
+        value_of(apply(dotted, "objects.lens no. 1.5.dispersion_gain", 3.0), "objects.lens no. 1.5.dispersion_gain")
+        == 3.0
+    )
 
 
 @pytest.mark.parametrize(
@@ -114,7 +126,17 @@ def test_wrong_paths_and_values_are_told(stage: Stage, path: str, value: float, 
 
 def test_interpolations() -> None:
     track = Track("p", (0.0, 1.0, 3.0, 4.0), (0.0, 2.0, 2.0, 6.0), ("linear", "smooth", "hold", "smooth"))
-    assert [track.at(t) for t in (-1.0, 0.0, 0.25, 1.0, 2.0, 3.5, 3.999, 4.0, 9.0)] == [0.0, 0.0, 0.5, 2.0, 2.0, 2.0, 2.0, 6.0, 6.0]
+    assert [track.at(t) for t in (-1.0, 0.0, 0.25, 1.0, 2.0, 3.5, 3.999, 4.0, 9.0)] == [
+        0.0,
+        0.0,
+        0.5,
+        2.0,
+        2.0,
+        2.0,
+        2.0,
+        6.0,
+        6.0,
+    ]
     smooth = Track("p", (0.0, 1.0, 2.0, 5.0), (0.0, 1.0, 4.0, 5.0), ("smooth",) * 4)
     fine = [smooth.at(t) for t in np.linspace(0, 5, 501)]
     assert all(b >= a - 1e-12 for a, b in pairwise(fine))  # rising keys: nothing overshoots
@@ -122,7 +144,9 @@ def test_interpolations() -> None:
     assert smooth.at(0.02) < 0.02 * 0.1  # eases in
     step = 1e-6
     for t in smooth.times_s[1:-1]:  # no kink at a key
-        assert (smooth.at(t + step) - smooth.at(t)) / step == pytest.approx((smooth.at(t) - smooth.at(t - step)) / step, rel=1e-4)
+        assert (smooth.at(t + step) - smooth.at(t)) / step == pytest.approx(
+            (smooth.at(t) - smooth.at(t - step)) / step, rel=1e-4
+        )
 
 
 def test_turntables_loop_and_leave_the_light_alone(stage: Stage) -> None:
@@ -148,7 +172,9 @@ def test_frames_of_keys(stage: Stage) -> None:
 
 def test_key_files(stage: Stage, tmp_path: Path) -> None:
     file = tmp_path / "keys.toml"
-    file.write_text(f'[[keys]]\ntime_s = 0\nparameter = "{GAIN}"\nvalue = 0\ninterpolation = "linear"\n[[keys]]\ntime_s = 2\nparameter = "{GAIN}"\nvalue = 3\n')
+    file.write_text(
+        f'[[keys]]\ntime_s = 0\nparameter = "{GAIN}"\nvalue = 0\ninterpolation = "linear"\n[[keys]]\ntime_s = 2\nparameter = "{GAIN}"\nvalue = 3\n'
+    )
     (track,) = read_keys(file, stage)
     assert track == Track(GAIN, (0.0, 2.0), (0.0, 3.0), ("linear", "smooth"))
 
@@ -163,7 +189,10 @@ def test_key_files(stage: Stage, tmp_path: Path) -> None:
         ('[[keys]]\nparameter = "solo_nm"\nvalue = 500\n', "keys[0].time_s is missing"),
         ('[[keys]]\ntime_s = 0\nparameter = "solo_nm"\nvalue = 5\n', "between 380 and 780"),
         ('[[keys]]\ntime_s = 0\nparameter = "solo"\nvalue = 500\n', "solo_nm"),
-        ('[[keys]]\ntime_s = 0\nparameter = "solo_nm"\nvalue = 500\ninterpolation = "smoth"\n', "did you mean 'smooth'"),
+        (
+            '[[keys]]\ntime_s = 0\nparameter = "solo_nm"\nvalue = 500\ninterpolation = "smoth"\n',
+            "did you mean 'smooth'",
+        ),
         ('[[keys]]\ntime_s = 0\nparameter = "solo_nm"\nvalue = 500\nease = 1\n', "unknown key 'keys[0].ease'"),
     ],
 )
@@ -177,7 +206,12 @@ def test_bad_key_files_name_file_and_key(stage: Stage, tmp_path: Path, text: str
 
 def test_ranges_on_the_command_line(stage: Stage) -> None:
     assert parse_range(f"{GAIN}=0:3:1", stage, 2.0) == Track(GAIN, (0.0, 1.0, 2.0), (0.0, 3.0, 1.0), ("smooth",) * 3)
-    for text, told in (("gain", "PARAMETER=FROM:TO"), (f"{GAIN}=3", "FROM:TO"), (f"{GAIN}=a:b", "FROM:TO"), (f"{GAIN}=0:999", "between 0 and 100")):
+    for text, told in (
+        ("gain", "PARAMETER=FROM:TO"),
+        (f"{GAIN}=3", "FROM:TO"),
+        (f"{GAIN}=a:b", "FROM:TO"),
+        (f"{GAIN}=0:999", "between 0 and 100"),
+    ):
         with pytest.raises(UserError, match=told):
             parse_range(text, stage, 1.0)
 

@@ -88,9 +88,7 @@ def test_folder_without_permission(tmp_path: Path) -> None:
     ("code", "sentence"),
     [(errno.EACCES, "no permission"), (errno.EROFS, "no permission"), (errno.ENOSPC, "disk is full")],
 )
-def test_refusals_of_the_system(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int, sentence: str
-) -> None:
+def test_refusals_of_the_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int, sentence: str) -> None:
     def refuse(*_: object) -> int:
         raise OSError(code, os.strerror(code))
 

@@ -130,7 +130,9 @@ SCENE_FILES = {
 }
 KEYS = {
     "unknown key": Case(VIEW + BALL + "raduis = 1\n" + FLOOR, said("scene.toml", "objects[0].raduis", "'radius'")),
-    "unknown key far from all": Case(VIEW + BALL + "qqq = 1\n" + FLOOR, said("objects[0].qqq", "knows", "rotation_deg")),
+    "unknown key far from all": Case(
+        VIEW + BALL + "qqq = 1\n" + FLOOR, said("objects[0].qqq", "knows", "rotation_deg")
+    ),
     "unknown choice": Case(PLAIN.replace('"point"', '"pont"'), said("lights[0].kind", "'point'")),
     "wrong type": Case(VIEW + BALL + 'radius = "1"\n' + FLOOR, said("objects[0].radius", "must be a number")),
     "NaN": Case(VIEW + BALL + "radius = nan\n" + FLOOR, said("objects[0].radius", "finite")),
@@ -138,18 +140,30 @@ KEYS = {
     "infinite": Case(VIEW + BALL + "scale = inf\n" + FLOOR, said("objects[0].scale", "finite")),
     "negative size": Case(VIEW + BALL + "radius = -1\n" + FLOOR, said("objects[0]", "radius", "greater than 0")),
     "no size": Case(VIEW + BALL + "scale = [1, 0, 1]\n" + FLOOR, said("objects[0].scale", "flatten")),
-    "too large for float32": Case(VIEW + BALL + "radius = 1e200\n" + FLOOR, said("objects[0].radius", "1e+30", "units")),
+    "too large for float32": Case(
+        VIEW + BALL + "radius = 1e200\n" + FLOOR, said("objects[0].radius", "1e+30", "units")
+    ),
     "too different": Case(VIEW + BALL + "radius = 1e-30\n" + FLOOR, said("'ball'", "'plane'", "check the units")),
-    "camera looks nowhere": Case(PLAIN.replace("2]", "2]\ntarget = [0, -5, 2]", 1), said("camera.target", "no direction")),
-    "field of view": Case(PLAIN.replace("2]", "2]\nvertical_fov_deg = 180", 1), said("camera.vertical_fov_deg", "below 180")),
+    "camera looks nowhere": Case(
+        PLAIN.replace("2]", "2]\ntarget = [0, -5, 2]", 1), said("camera.target", "no direction")
+    ),
+    "field of view": Case(
+        PLAIN.replace("2]", "2]\nvertical_fov_deg = 180", 1), said("camera.vertical_fov_deg", "below 180")
+    ),
     "negative background": Case("background = [-1, 0, 0]\n" + PLAIN, said("background", "0 or more")),
-    "bright colour": Case(VIEW + BALL + FLOOR.replace('"diffuse"', '{kind = "diffuse", colour = 2}'), said("objects[1].material.colour")),
+    "bright colour": Case(
+        VIEW + BALL + FLOOR.replace('"diffuse"', '{kind = "diffuse", colour = 2}'), said("objects[1].material.colour")
+    ),
     "zero-size picture": Case("render = {size = [0, 9]}\n" + PLAIN, said("render.size", "1 to 16384")),
     "too many photons": Case("render = {photons = 1e30}\n" + PLAIN, said("render.photons", "1e+12")),
 }
 GLASSES = {
-    "unknown glass": Case(VIEW + BALL + 'glass = "N-BK8"\n' + FLOOR, said("scene.toml", "objects[0].glass", "'Schott N-BK7'")),
-    "unknown glass far from all": Case(VIEW + BALL + 'glass = "qqqqqq"\n' + FLOOR, said("objects[0].glass", "spectrasplat glass")),
+    "unknown glass": Case(
+        VIEW + BALL + 'glass = "N-BK8"\n' + FLOOR, said("scene.toml", "objects[0].glass", "'Schott N-BK7'")
+    ),
+    "unknown glass far from all": Case(
+        VIEW + BALL + 'glass = "qqqqqq"\n' + FLOOR, said("objects[0].glass", "spectrasplat glass")
+    ),
     "n = 0": Case(glass("n_d = 0"), said("objects[0].material.n_d", "positive")),
     "n < 0": Case(glass("n_d = -1.5, V_d = 50"), said("objects[0].material.n_d", "positive")),
     "n NaN": Case(glass("n_d = nan"), said("objects[0].material.n_d", "finite")),
@@ -161,22 +175,34 @@ GLASSES = {
     "table of n out of order": Case(glass("table = [[500, 1.5], [400, 1.6]]"), said("table", "sort the rows")),
     "table of n below 0": Case(glass("table = [[400, 1.5], [500, -1.6]]"), said("table", "-1.6 at 500 nm")),
     "csv missing": Case(glass('csv = "n.csv"'), said("objects[0].material.csv", "n.csv", "not a file")),
-    "csv with words": Case(glass('csv = "n.csv"'), said("n.csv", "line 2", "two numbers"), files={"n.csv": b"nm,n\nfive,1\n"}),
+    "csv with words": Case(
+        glass('csv = "n.csv"'), said("n.csv", "line 2", "two numbers"), files={"n.csv": b"nm,n\nfive,1\n"}
+    ),
     "line outside the glass": Case(
         VIEW + "spectrum = {laser = 700}\n" + GLASS.format("table = [[500, 1.5], [600, 1.4]]") + FLOOR,
         said("700 nm", "'ball'", "500 to 600 nm", "choose another"),
     ),
-    "amplifying glass": Case(glass("n_d = 1.5, absorption = {nm = [400, 700], coefficient = [-1, 0]}"), said("absorption", "negative")),
-    "opaque glass": Case(glass("n_d = 1.5, absorption = {colour = 0.5, distance = 1e-300}"), said("absorption.distance", "black")),
+    "amplifying glass": Case(
+        glass("n_d = 1.5, absorption = {nm = [400, 700], coefficient = [-1, 0]}"), said("absorption", "negative")
+    ),
+    "opaque glass": Case(
+        glass("n_d = 1.5, absorption = {colour = 0.5, distance = 1e-300}"), said("absorption.distance", "black")
+    ),
 }
 LIGHTS = {
-    "inside glass": Case(PLAIN.replace("[0, 0, 4]", "[0, 0, 0.1]"), said("'point 1'", "inside the glass of 'ball'", "move")),
+    "inside glass": Case(
+        PLAIN.replace("[0, 0, 4]", "[0, 0, 0.1]"), said("'point 1'", "inside the glass of 'ball'", "move")
+    ),
     "infrared": Case(light("spectrum = {laser = 1064}"), said("lights[0].spectrum.laser", "380 to 780 nm")),
     "unknown illuminant": Case(light('spectrum = "D66"'), said("lights[0].spectrum", "'D65'")),
     "NaN power": Case(light("intensity_cd = nan"), said("lights[0].intensity_cd", "finite")),
     "negative power": Case(light("flux_w = -1"), said("lights[0].flux_w", "at least 0")),
     "power of another kind": Case(light("illuminance_lx = 3"), said("lights[0].illuminance_lx", "intensity_cd")),
-    "zero spectrum": Case(light('spectrum = {csv = "s.csv"}\nflux_lm = 1'), said("s.csv", "zero from 380 to 780 nm"), files={"s.csv": b"400,0\n700,0\n"}),
+    "zero spectrum": Case(
+        light('spectrum = {csv = "s.csv"}\nflux_lm = 1'),
+        said("s.csv", "zero from 380 to 780 nm"),
+        files={"s.csv": b"400,0\n700,0\n"},
+    ),
 }
 MESHES = {
     "missing": mesh_case(None, "scene.toml", "objects[0].mesh", "m.ply", "not a file"),
@@ -245,10 +271,16 @@ OUTPUTS = {
 CASES = {
     f"{group}: {name}": case
     for group, cases in {
-        "scene file": SCENE_FILES, "key": KEYS, "glass": GLASSES, "light": LIGHTS, "mesh": MESHES, "option": OPTIONS, "output": OUTPUTS,
+        "scene file": SCENE_FILES,
+        "key": KEYS,
+        "glass": GLASSES,
+        "light": LIGHTS,
+        "mesh": MESHES,
+        "option": OPTIONS,
+        "output": OUTPUTS,
     }.items()
     for name, case in cases.items()
-}  # fmt: skip
+}
 
 
 def lay_out(folder: Path, case: Case) -> None:
@@ -301,8 +333,14 @@ def test_one_sentence_and_nothing_touched(
 
 TWO_OPEN = CORNERS + "1 1 1\n" + FACES + "3 0 1 4\n"
 WARNINGS = {
-    "open": (ply(CORNERS + FACES[:24], faces=3), ["open mesh 'm': 3 boundary edges; the side is decided by the face normals"]),
-    "inside out": (ply(CORNERS + "3 0 1 2\n3 0 3 1\n3 1 3 2\n3 0 2 3\n"), ["mesh 'm' was inside out (volume -0.1667); it was turned to face outward"]),
+    "open": (
+        ply(CORNERS + FACES[:24], faces=3),
+        ["open mesh 'm': 3 boundary edges; the side is decided by the face normals"],
+    ),
+    "inside out": (
+        ply(CORNERS + "3 0 1 2\n3 0 3 1\n3 1 3 2\n3 0 2 3\n"),
+        ["mesh 'm' was inside out (volume -0.1667); it was turned to face outward"],
+    ),
     "non-manifold": (
         ply(TWO_OPEN, 5, 5),
         [
@@ -312,9 +350,14 @@ WARNINGS = {
     ),
     "wound inconsistently": (
         ply(CORNERS + "3 0 1 2\n3 0 1 3\n3 1 2 3\n3 0 3 2\n"),
-        ["inconsistently wound mesh 'm': 3 edges where neighbours face opposite ways; the side is decided by the face normals"],
+        [
+            "inconsistently wound mesh 'm': 3 edges where neighbours face opposite ways; the side is decided by the face normals"
+        ],
     ),
-    "degenerate triangles": (ply(CORNERS + FACES + "3 0 0 1\n3 1 1 1\n", faces=6), ["mesh 'm': 2 degenerate triangles dropped"]),
+    "degenerate triangles": (
+        ply(CORNERS + FACES + "3 0 0 1\n3 1 1 1\n", faces=6),
+        ["mesh 'm': 2 degenerate triangles dropped"],
+    ),
     "zero normals": (
         ply(CORNERS.replace("\n", " 0 0 0\n") + FACES, normals=True),
         ["mesh 'm': 12 zero normals replaced by the face normal"],
@@ -323,11 +366,16 @@ WARNINGS = {
         ply(CORNERS.replace("\n", " nan 0 0\n") + FACES, normals=True),
         ["mesh 'm': 12 zero normals replaced by the face normal"],
     ),
-}  # fmt: skip
+}
 
 
 def rendered(
-    scene: str, files: dict[str, bytes], options: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    scene: str,
+    files: dict[str, bytes],
+    options: list[str],
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> list[str]:
     """The lines on stderr of a rendering that ends well and replaces the old picture."""
     use_renderer(monkeypatch, grey_picture)
@@ -355,14 +403,18 @@ def test_glass_data_that_end_inside_the_visible_are_noted(
     assert told.startswith("note: mine: data reach from 500 to 600 nm") and "nearest value" in told
 
 
-def test_options_without_effect_are_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_options_without_effect_are_noted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     (told,) = rendered(PLAIN, {}, ["--bins", "8"], tmp_path, monkeypatch, capsys)
     assert told.startswith("note: --bins") and ".exr" in told
     assert main(["render", "scene.toml", "-o", "x.npy", "--size", "8x8", "--exposure", "1"]) == 0
     assert capsys.readouterr().err.startswith("note: --exposure does not change a .npy picture")
 
 
-def test_warnings_are_told_before_a_failure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_warnings_are_told_before_a_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     def fail(*_: object, **__: object) -> None:
         raise MemoryError
 
@@ -371,7 +423,11 @@ def test_warnings_are_told_before_a_failure(tmp_path: Path, monkeypatch: pytest.
     lay_out(tmp_path, mesh_case(WARNINGS["open"][0]))
     assert main(["render", "scene.toml", "-o", "out.png"]) == 2
     warning, error = capsys.readouterr().err.splitlines()
-    assert warning.startswith("note: open mesh") and error.startswith("spectrasplat: out of memory") and "fewer photons" in error
+    assert (
+        warning.startswith("note: open mesh")
+        and error.startswith("spectrasplat: out of memory")
+        and "fewer photons" in error
+    )
     assert (tmp_path / "out.png").read_bytes() == OLD
 
 
@@ -380,7 +436,10 @@ def test_warnings_are_told_before_a_failure(tmp_path: Path, monkeypatch: pytest.
 
 @pytest.mark.parametrize(
     ("problem", "told"),
-    [(None, "OpenGL is missing"), ("eglCreateContext failed (0x3009)", "OpenGL 4.3 is needed and this driver has less")],
+    [
+        (None, "OpenGL is missing"),
+        ("eglCreateContext failed (0x3009)", "OpenGL 4.3 is needed and this driver has less"),
+    ],
 )
 def test_opengl_missing_or_too_old(
     problem: str | None, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -408,7 +467,9 @@ def test_opengl_missing_or_too_old(
 
 
 @pytest.mark.parametrize("suffix", [".png", ".exr", ".npy"])
-def test_full_disk(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_full_disk(
+    suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """A limit on the size of files stands for the full disk: the same failing write, by a real system call."""
     use_renderer(monkeypatch, grey_picture)
     monkeypatch.chdir(tmp_path)
@@ -429,7 +490,9 @@ def test_full_disk(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     assert output.read_bytes() == OLD
 
 
-def test_no_space_left_is_told_as_such(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_space_left_is_told_as_such(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     def full(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -449,7 +512,12 @@ def test_the_program_itself(tmp_path: Path) -> None:
     output = tmp_path / "out.png"
     output.write_bytes(OLD)
     done = subprocess.run(
-        program("render", str(tmp_path / "gone.toml"), "-o", str(output)), cwd=ROOT, capture_output=True, text=True, timeout=60, check=False
+        program("render", str(tmp_path / "gone.toml"), "-o", str(output)),
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
     )
     assert (done.returncode, done.stdout) == (2, "")
     (line,) = done.stderr.splitlines()
@@ -478,7 +546,9 @@ def test_a_second_ctrl_c_leaves_the_old_picture(
 def test_ctrl_c_in_the_program_itself(tmp_path: Path) -> None:
     (tmp_path / "scene.toml").write_text(PLAIN)
     output = tmp_path / "out.npy"
-    arguments = program("render", str(tmp_path / "scene.toml"), "-o", str(output), "--size", "64x36", "--seconds", "60", "--spp", "1")
+    arguments = program(
+        "render", str(tmp_path / "scene.toml"), "-o", str(output), "--size", "64x36", "--seconds", "60", "--spp", "1"
+    )
     running = subprocess.Popen(arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         time.sleep(2.5)  # well within the minute; also fine when still starting

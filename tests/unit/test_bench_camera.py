@@ -1,4 +1,5 @@
-"""The bench of the camera pass without a GPU: made-up rigs and curves, budgets that keep to whole bands, a report that speaks of samples."""
+"""The bench of the camera pass without a GPU: made-up rigs and curves, budgets that keep to whole bands, a report that
+speaks of samples."""
 
 from __future__ import annotations
 
@@ -64,10 +65,19 @@ def run(directory: Path, settings: BenchSettings = SETTINGS) -> SceneResult:
         from spectrasplat.bench.results import ReferenceInfo
         from spectrasplat.reference.metrics import ReferencePicture
 
-        return ReferencePicture(reference_pixels(), np.full((HEIGHT, WIDTH, 3), 1e-9)), ReferenceInfo("made up", 2000, 1.0, 1e-9, "key", 1 << 20, 1e-5)
+        return ReferencePicture(reference_pixels(), np.full((HEIGHT, WIDTH, 3), 1e-9)), ReferenceInfo(
+            "made up", 2000, 1.0, 1e-9, "key", 1 << 20, 1e-5
+        )
 
     store = Store(directory, BenchResult("0", "today", "command", dict(MACHINE), [], settings))
-    runner.run_bench(None, {"one": glass_scene()}, store, lambda *_: None, None, Subject(WholeRigs().make, reference_image, lambda *_: "key"))  # type: ignore[arg-type]
+    runner.run_bench(
+        None,
+        {"one": glass_scene()},
+        store,
+        lambda *_: None,
+        None,
+        Subject(WholeRigs().make, reference_image, lambda *_: "key"),
+    )  # type: ignore[arg-type]
     return store.result.scenes[0]
 
 
@@ -87,7 +97,8 @@ def test_a_run_of_the_camera(tmp_path: Path) -> None:
 
 
 class CountedRig(CameraRig):
-    """The budgets of a real rig on a made-up device: 50 ms a sample, bands that double while there are samples for them, up to 8."""
+    """The budgets of a real rig on a made-up device: 50 ms a sample, bands that double while there are samples for
+    them, up to 8."""
 
     def __init__(self, max_bands: int, a_sample_s: float = 0.05) -> None:
         self._most, self._sample_s = max_bands, a_sample_s
@@ -97,7 +108,9 @@ class CountedRig(CameraRig):
 
     def render(self, budget: int, seed: int) -> Rendering:
         bands, samples = self._choose(budget).bands, self._choose(budget).samples(budget)
-        return Rendering(np.zeros((1, 1, 3)), {"bands": 0.01 * (2 * bands - 1), "looks": self._sample_s * samples}, samples, 0)
+        return Rendering(
+            np.zeros((1, 1, 3)), {"bands": 0.01 * (2 * bands - 1), "looks": self._sample_s * samples}, samples, 0
+        )
 
 
 @pytest.mark.parametrize(("max_bands", "seconds"), [(1, 20.0), (8, 20.0), (8, 2.0), (32, 1.0), (1, 0.01)])
@@ -115,7 +128,10 @@ def camera_scene(*curves: Curve, seconds: float = 20.0) -> SceneResult:
     made = scene(*curves, seconds=seconds)
     made.half = "camera"
     for one in made.curves:
-        one.samples = [msgspec.structs.replace(s, seconds={"bands": 0.2 * s.photon_seconds, "looks": 0.8 * s.photon_seconds}) for s in one.samples]
+        one.samples = [
+            msgspec.structs.replace(s, seconds={"bands": 0.2 * s.photon_seconds, "looks": 0.8 * s.photon_seconds})
+            for s in one.samples
+        ]
     return made
 
 
@@ -129,7 +145,11 @@ def test_claims_of_the_camera_ask_for_a_twentieth() -> None:
 
 def test_reasons_of_the_camera() -> None:
     (claim,) = claims_of(camera_scene(curve("stochastic", law(0.1, floor=0.05)), curve("srd", law(1e-4, floor=0.2))))
-    assert not claim.holds and "straight columns" in claim.why and "25 % of that bias² is found in stochastic too" in claim.why
+    assert (
+        not claim.holds
+        and "straight columns" in claim.why
+        and "25 % of that bias² is found in stochastic too" in claim.why
+    )
     assert "20 % bands, 80 % looks" in claim.why
     (claim,) = claims_of(camera_scene(curve("stochastic", law(1.0)), curve("srd", law(0.2))))
     assert not claim.holds and "more samples reduce" in claim.why
@@ -137,14 +157,18 @@ def test_reasons_of_the_camera() -> None:
 
 def test_the_report_speaks_of_samples(tmp_path: Path) -> None:
     names = ("stochastic", "regular-7", "srd-lambda", "srd")
-    made = [synthetic_scene(tmp_path, name, methods=names, longest_s=20.0) for name in ("edge", "text", "studio", "ball")]
+    made = [
+        synthetic_scene(tmp_path, name, methods=names, longest_s=20.0) for name in ("edge", "text", "studio", "ball")
+    ]
     for one in made:
         one.half, one.title = "camera", "made up"
         assert one.reference is not None
         one.reference.method, one.reference.photons, one.reference.caustic_photons = "camera paths", 900, 67_000_000
         for each in one.curves:
             each.setup_seconds = {"light pass": 2.0, "buffers": 0.1, "compile": 1.0}
-            each.samples = [msgspec.structs.replace(s, seconds={"bands": 0.1, "looks": s.photon_seconds}) for s in each.samples]
+            each.samples = [
+                msgspec.structs.replace(s, seconds={"bands": 0.1, "looks": s.photon_seconds}) for s in each.samples
+            ]
             one.picture_samples |= {f"{each.method}{ending}": each.samples[0] for ending, _ in CAMERA.pictures}
             one.pictures[f"{each.method} first"] = one.pictures[f"{each.method} early"]
         one.claims = claims_of(one)
@@ -153,13 +177,30 @@ def test_the_report_speaks_of_samples(tmp_path: Path) -> None:
     report.write_report(result, tmp_path)
     page = assert_stands_alone((tmp_path / "report.html").read_text(encoding="utf-8"))
     text = page.text
-    for told in ("the camera pass", "camera samples a pixel", "20 s of camera time", "0.5 s, part", "1 s, part", "asked of srd: at most 1/20 of the time", "its caustic: 67 M photons",
-                 "Stages of camera time", "choosing the bands", "bands s", "light pass s", *(PROSE["camera"].methods[name] for name in names)):  # fmt: skip
+    for told in (
+        "the camera pass",
+        "camera samples a pixel",
+        "20 s of camera time",
+        "0.5 s, part",
+        "1 s, part",
+        "asked of srd: at most 1/20 of the time",
+        "its caustic: 67 M photons",
+        "Stages of camera time",
+        "choosing the bands",
+        "bands s",
+        "light pass s",
+        *(PROSE["camera"].methods[name] for name in names),
+    ):
         assert told in text, told
     without_caustic = text.replace("67 M photons", "")
     assert not re.search(r"photon", without_caustic, re.IGNORECASE), re.findall(r".{40}photon.{40}", without_caustic)
     stems = {path.stem for path in (tmp_path / "plots").iterdir()}
-    assert {"edge_error_time", "edge_error_samples", "overview", "scenes"} <= stems and "edge_error_photons" not in stems
+    assert {
+        "edge_error_time",
+        "edge_error_samples",
+        "overview",
+        "scenes",
+    } <= stems and "edge_error_photons" not in stems
     # Four columns and the reference: three rows of parts and one of whole pictures, four error maps and their scale.
     assert page.tags["img"] == 4 * (4 * 5 + 4 + 1)
 

@@ -1,4 +1,5 @@
-"""`spectrasplat bench` on the command line: wrong options end in one sentence before any work, right ones in the runner."""
+"""`spectrasplat bench` on the command line: wrong options end in one sentence before any work, right ones in the
+runner."""
 
 from __future__ import annotations
 
@@ -49,7 +50,19 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> SurfaceInteraction:
         samples = [Sample(n, 1, n, n, {"trace": n / 1000}, {"relmse": 1 / n}) for n in (100, 1000)]
         for name in scenes:
             curve = Curve("srd", {}, samples, [100, 1000], points, -1.0, 0.1)
-            store.put_scene(SceneResult(name, name, (4, 4), 2, 1.0, None, [curve], time_to_equal_error={"srd": 40.0}, complete=not found.interrupt))
+            store.put_scene(
+                SceneResult(
+                    name,
+                    name,
+                    (4, 4),
+                    2,
+                    1.0,
+                    None,
+                    [curve],
+                    time_to_equal_error={"srd": 40.0},
+                    complete=not found.interrupt,
+                )
+            )
         store.save()
         if found.interrupt:
             raise KeyboardInterrupt
@@ -68,7 +81,10 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> SurfaceInteraction:
     [
         (["prism"], "give one with -o DIR"),
         (["prsm", "-o", "out"], "did you mean 'prism' or"),
-        (["prism", "-o", "out", "--methods", "srd,stochstic"], "--methods 'stochstic' is unknown, did you mean 'stochastic'"),
+        (
+            ["prism", "-o", "out", "--methods", "srd,stochstic"],
+            "--methods 'stochstic' is unknown, did you mean 'stochastic'",
+        ),
         (["prism", "-o", "out", "--methods", ""], "--methods '' is unknown, known are"),
         (["prism", "-o", "out", "--seeds", "0"], "--seeds 0 is out of range"),
         (["prism", "-o", "out", "--seeds", "2.5"], "--seeds '2.5' is not a whole number"),
@@ -79,13 +95,23 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> SurfaceInteraction:
         (["prism", "-o", "out", "--reference-seconds", "0"], "--reference-seconds 0 is out of range"),
         (["prism", "-o", "out", "--size", "64"], "--size '64' is not WIDTHxHEIGHT"),
         (["prism", "-o", "out", "--size", "16384x16384", "--seeds", "1"], ""),
-        (["prism", "-o", "out", "--eye", "--methods", "stochastic-point"], "--methods 'stochastic-point' is a method of the light pass alone"),
+        (
+            ["prism", "-o", "out", "--eye", "--methods", "stochastic-point"],
+            "--methods 'stochastic-point' is a method of the light pass alone",
+        ),
         (["--eye", "--features", "prism"], "--features and --eye exclude each other"),
         (["--features", "prism", "ball"], "'bench --features prism' without further scenes"),
         (["--features", "nowhere"], "neither a file nor shipped"),
     ],
 )
-def test_mistakes_are_one_sentence(arguments: list[str], told: str, seen: SurfaceInteraction, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_mistakes_are_one_sentence(
+    arguments: list[str],
+    told: str,
+    seen: SurfaceInteraction,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     monkeypatch.chdir(tmp_path)
     if not told:  # depends on the machine
         monkeypatch.setattr("spectrasplat.commands.options.memory_bytes", lambda: 1 << 30)
@@ -96,7 +122,9 @@ def test_mistakes_are_one_sentence(arguments: list[str], told: str, seen: Surfac
     assert seen.scenes == [] and list(tmp_path.iterdir()) == []
 
 
-def test_folders_that_cannot_be_used(seen: SurfaceInteraction, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_folders_that_cannot_be_used(
+    seen: SurfaceInteraction, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = tmp_path / "file"
     file.write_text("")
     assert main(["bench", "prism", "-o", str(file)]) == 2
@@ -118,14 +146,48 @@ def test_a_write_protected_folder(seen: SurfaceInteraction, tmp_path: Path, caps
 
 def test_options_reach_the_runner(seen: SurfaceInteraction, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
-    options = ["--seconds", "0.5", "--seeds", "2", "--methods", "srd, regular", "--size", "64x36", "--reference-seconds", "4"]
+    options = [
+        "--seconds",
+        "0.5",
+        "--seeds",
+        "2",
+        "--methods",
+        "srd, regular",
+        "--size",
+        "64x36",
+        "--reference-seconds",
+        "4",
+    ]
     assert main(["bench", "prism", "ball", "-o", str(out), *options]) == 0
     assert seen.scenes == ["prism", "ball"] and seen.reported == out
     assert seen.settings == BenchSettings(0.5, 2, ("srd", "regular-7", "regular-16"), (64, 36), 4.0)
     words = shlex.split(seen.command)
-    assert words == ["spectrasplat", "bench", "prism", "ball", "-o", "out", "--seconds", "0.5", "--seeds", "2", "--methods", "srd, regular", "--size", "64x36", "--reference-seconds", "4"]
+    assert words == [
+        "spectrasplat",
+        "bench",
+        "prism",
+        "ball",
+        "-o",
+        "out",
+        "--seconds",
+        "0.5",
+        "--seeds",
+        "2",
+        "--methods",
+        "srd, regular",
+        "--size",
+        "64x36",
+        "--reference-seconds",
+        "4",
+    ]
     shown = capsys.readouterr().out
-    assert "prism, 64" not in shown and "1/40" in shown and "-1.00 ± 0.10" in shown and "20 %" in shown and "report.html" in shown
+    assert (
+        "prism, 64" not in shown
+        and "1/40" in shown
+        and "-1.00 ± 0.10" in shown
+        and "20 %" in shown
+        and "report.html" in shown
+    )
 
 
 def test_defaults_are_all_scenes_with_glass_and_all_methods(seen: SurfaceInteraction, tmp_path: Path) -> None:
@@ -145,11 +207,15 @@ def test_the_camera_has_its_own_defaults(seen: SurfaceInteraction, tmp_path: Pat
     assert seen.settings == BenchSettings(2.0, methods=("srd",), half="camera") and seen.scenes == ["prism"]
 
 
-def test_ctrl_c_says_what_is_kept_and_reports_it(seen: SurfaceInteraction, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ctrl_c_says_what_is_kept_and_reports_it(
+    seen: SurfaceInteraction, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     seen.interrupt = True
     assert main(["bench", "prism", "-o", str(tmp_path)]) == 130
     told = capsys.readouterr()
-    assert "stopped; 0 scenes done, 1 of 14 method seeds of 'prism' kept; the same command goes on from there" in told.err
+    assert (
+        "stopped; 0 scenes done, 1 of 14 method seeds of 'prism' kept; the same command goes on from there" in told.err
+    )
     assert seen.reported == tmp_path and "1/40" in told.out
 
 
@@ -173,7 +239,14 @@ def test_features_has_its_own_command(monkeypatch: pytest.MonkeyPatch, tmp_path:
 
 def test_notes_under_the_table() -> None:
     sample = Sample(1, 1, 1, 1, {}, {"relmse": 0.1})
-    scene: Any = SimpleNamespace(claims=[], time_to_equal_other={"nrmse": {"srd": 33.0}, "chroma": {}}, curves=[Curve("srd", {}, [])], reference_too_coarse=True, reference=SimpleNamespace(relmse=0.02), picture_samples={"srd": sample})
+    scene: Any = SimpleNamespace(
+        claims=[],
+        time_to_equal_other={"nrmse": {"srd": 33.0}, "chroma": {}},
+        curves=[Curve("srd", {}, [])],
+        reference_too_coarse=True,
+        reference=SimpleNamespace(relmse=0.02),
+        picture_samples={"srd": sample},
+    )
     other, coarse, flip = screen.scene_lines(scene)
     assert "nrmse 1/33, chroma not reached" in other
     assert "above a tenth" in coarse and "--reference-seconds" in coarse and "flip-evaluator" in flip

@@ -31,13 +31,22 @@ RATE = 60_000.0
 
 def law(scale: float, exponent: float = -1.0, floor: float = 0.0) -> list[Point]:
     """relMSE = scale · t^exponent + floor."""
-    return [Point(n, n / RATE, e, e, e, floor, e - floor) for n in BUDGETS for e in [scale * (n / RATE) ** exponent + floor]]
+    return [
+        Point(n, n / RATE, e, e, e, floor, e - floor) for n in BUDGETS for e in [scale * (n / RATE) ** exponent + floor]
+    ]
 
 
 def curve(method: str, points: list[Point], seeds: int = 5) -> Curve:
     seconds = {"trace": 0.5, "splat": 0.4, "resolve": 0.1}
     samples = [
-        Sample(p.photons, s + 1, p.photons, p.photons, {k: v * p.seconds for k, v in seconds.items()}, {"relmse": p.relmse, "relmse_raw": p.relmse})
+        Sample(
+            p.photons,
+            s + 1,
+            p.photons,
+            p.photons,
+            {k: v * p.seconds for k, v in seconds.items()},
+            {"relmse": p.relmse, "relmse_raw": p.relmse},
+        )
         for p in points
         for s in range(seeds)
     ]
@@ -46,7 +55,9 @@ def curve(method: str, points: list[Point], seeds: int = 5) -> Curve:
 
 def scene(*curves: Curve, abbe: float = 25.7, seconds: float = 200_000 / RATE) -> SceneResult:
     reference = ReferenceInfo("made up", 1, 1.0, 1e-9, "key")
-    return SceneResult("made_up", "made up", (4, 4), 5, seconds, reference, list(curves), strongest_glass="N-SF11", strongest_abbe=abbe)
+    return SceneResult(
+        "made_up", "made up", (4, 4), 5, seconds, reference, list(curves), strongest_glass="N-SF11", strongest_abbe=abbe
+    )
 
 
 def test_time_to_equal_error_of_power_laws() -> None:
@@ -74,14 +85,26 @@ def test_a_curve_that_never_gets_there_and_one_that_is_there_at_once() -> None:
     slow = law(0.1)
     assert speed_up(law(0.01, floor=1.0), slow) is None
     at_once = speed_up(law(1e-6), slow)
-    assert at_once is not None and at_once.at_once and at_once.seconds == pytest.approx(slow[-1].seconds / slow[0].seconds)
+    assert (
+        at_once is not None and at_once.at_once and at_once.seconds == pytest.approx(slow[-1].seconds / slow[0].seconds)
+    )
     assert speed_up(law(1.0), []) is None and time_to_error([], 1.0) is None
 
 
 def test_ratios_by_another_measure() -> None:
     def measured(method: str, scale: float) -> Curve:
         plain = curve(method, law(1.0))
-        plain.samples = [Sample(s.photons, s.seed, 1, 1, s.seconds, {"nrmse": scale * (1.5 if s.seed == 1 else 0.875) * RATE / s.photons}) for s in plain.samples]
+        plain.samples = [
+            Sample(
+                s.photons,
+                s.seed,
+                1,
+                1,
+                s.seconds,
+                {"nrmse": scale * (1.5 if s.seed == 1 else 0.875) * RATE / s.photons},
+            )
+            for s in plain.samples
+        ]
         return plain
 
     curves = [measured("stochastic", 1.0), measured("srd", 0.05)]
@@ -119,8 +142,8 @@ def noisy_samples(rng: np.random.Generator, exponent: float) -> list[Sample]:
 
 
 def test_slope_and_its_interval() -> None:
-    """Of 1000 intervals 95 % must hold the reference; fewer than 93 % or more than 97 % is 3 standard errors off. Half as wide ones,
-    the mutant, hold it 68 times in 100."""
+    """Of 1000 intervals 95 % must hold the reference; fewer than 93 % or more than 97 % is 3 standard errors off. Half
+    as wide ones, the mutant, hold it 68 times in 100."""
     rng = np.random.default_rng(5)
     slopes = np.array([tail_slope(noisy_samples(rng, -0.8), BUDGETS) for _ in range(1000)])
     off = np.abs(slopes[:, 0] + 0.8)
@@ -132,11 +155,19 @@ def test_slope_and_its_interval() -> None:
 def test_points_hold_all_seeds() -> None:
     reference_image = ReferencePicture(np.ones((2, 2, 3)), np.full((2, 2, 3), 0.0101))
     errors = (0.04, 0.02, 0.03)
-    samples = [Sample(100, s + 1, 100, 90, {"trace": t, "camera": 5.0}, {"relmse": e - 0.01, "relmse_raw": e}) for s, (e, t) in enumerate(zip(errors, (1.0, 9.0, 2.0), strict=True))]
+    samples = [
+        Sample(100, s + 1, 100, 90, {"trace": t, "camera": 5.0}, {"relmse": e - 0.01, "relmse_raw": e})
+        for s, (e, t) in enumerate(zip(errors, (1.0, 9.0, 2.0), strict=True))
+    ]
     made = Curve("srd", {}, samples, [100, 200])
     complete_curve(made, {100: np.full((2, 2, 3), 0.15)}, reference_image)
     (point,) = made.points
-    assert (point.photons, point.seconds, point.relmse_low, point.relmse_high) == (100, 2.0, pytest.approx(0.01), pytest.approx(0.03))
+    assert (point.photons, point.seconds, point.relmse_low, point.relmse_high) == (
+        100,
+        2.0,
+        pytest.approx(0.01),
+        pytest.approx(0.03),
+    )
     of_mean = 0.15**2 / 1.01
     variance = 3 * (0.03 - of_mean) / 2
     assert point.variance == pytest.approx(variance) and point.bias2 == pytest.approx(of_mean - variance / 3 - 0.01)
@@ -148,7 +179,9 @@ def by_name(claims: list[Claim]) -> dict[str, Claim]:
 
 
 def test_claims_that_hold() -> None:
-    claims = by_name(claims_of(scene(curve("stochastic", law(1.0)), curve("srd-lambda", law(0.05)), curve("srd", law(0.001)))))
+    claims = by_name(
+        claims_of(scene(curve("stochastic", law(1.0)), curve("srd-lambda", law(0.05)), curve("srd", law(0.001))))
+    )
     assert set(claims) == {"time to equal error", "first picture", "index against wavelength"}
     assert all(claim.holds and not claim.why for claim in claims.values())
     assert "at least 200 times sooner" in claims["time to equal error"].measured
@@ -156,9 +189,16 @@ def test_claims_that_hold() -> None:
 
 
 def test_claims_that_fall_short_say_by_how_much_and_why() -> None:
-    claims = by_name(claims_of(scene(curve("stochastic", law(1.0)), curve("srd-lambda", law(0.05)), curve("srd", law(0.1)))))
+    claims = by_name(
+        claims_of(scene(curve("stochastic", law(1.0)), curve("srd-lambda", law(0.05)), curve("srd", law(0.1))))
+    )
     short = claims["time to equal error"]
-    assert not short.holds and "10 times sooner" in short.measured and "short by a factor of 3" in short.why and "variance" in short.why
+    assert (
+        not short.holds
+        and "10 times sooner" in short.measured
+        and "short by a factor of 3" in short.why
+        and "variance" in short.why
+    )
     assert not claims["first picture"].holds and "3 times" in claims["first picture"].why
     assert not claims["index against wavelength"].holds and "0.1 s" in claims["index against wavelength"].why
 
@@ -173,7 +213,10 @@ def test_the_texels_share_of_a_bias_is_told() -> None:
     srd, stochastic = curve("srd", law(1e-4, floor=0.2)), curve("stochastic", law(0.1))
     with_point = scene(stochastic, srd, curve("stochastic-point", law(1.0, floor=0.05)))
     assert "25 % of that bias² is found in stochastic-point too" in claims_of(with_point)[0].why
-    assert "stochastic-point" not in claims_of(scene(stochastic, srd, curve("stochastic-point", law(1.0, floor=0.01))))[0].why
+    assert (
+        "stochastic-point"
+        not in claims_of(scene(stochastic, srd, curve("stochastic-point", law(1.0, floor=0.01))))[0].why
+    )
 
 
 def test_claims_need_their_methods_their_time_and_their_glass() -> None:

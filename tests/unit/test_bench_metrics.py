@@ -30,7 +30,9 @@ def test_values_by_hand() -> None:
     relmse = (1.0 / 36.64 + 9.0 / 144.64 + 3 * 0.16 / 0.64) / 6.0
     assert found["relmse"] == pytest.approx(relmse, rel=1e-12) == found["relmse_raw"]
     assert found["relmse_trimmed"] == pytest.approx((relmse * 6.0 - 0.25) / 5.0, rel=1e-12)  # the largest of six goes
-    assert found["relmse_whole"] == pytest.approx((1.0 / 36.16 + 9.0 / 144.16 + 3 * 0.16 / 0.16) / 6.0, rel=1e-12)  # the mean over all is 4
+    assert found["relmse_whole"] == pytest.approx(
+        (1.0 / 36.16 + 9.0 / 144.16 + 3 * 0.16 / 0.16) / 6.0, rel=1e-12
+    )  # the mean over all is 4
     assert found["smape"] == pytest.approx((1.0 / 13.4 + 3.0 / 21.4 + 3 * 0.4 / 0.8) / 6.0, rel=1e-12)
     assert found["nrmse"] == pytest.approx(np.sqrt((1.0 + 9.0 + 3 * 0.16) / 216.0), rel=1e-12)
     assert found["energy_ratio"] == pytest.approx(23.2 / 24.0, rel=1e-12)
@@ -58,13 +60,15 @@ def noisy_reference(rng: np.random.Generator, xyz: np.ndarray, sigma: float) -> 
 
 
 def test_the_references_variance_is_taken_out() -> None:
-    """400 noisy references of 720 values: the mean of the freed error has a standard error of 0.3 %, so 1.5 % would show.
+    """400 noisy references of 720 values: the mean of the freed error has a standard error of 0.3 %, so 1.5 % would
+    show.
 
     Raw errors, the mutant, are 25 % too large here.
     """
     rng = np.random.default_rng(2)
     xyz = 10.0 + rng.random(SHAPE)
-    # Errors of both signs: the weight's own noise is correlated with the error, a second-order effect that one sign would show.
+    # Errors of both signs: the weight's own noise is correlated with the error, a second-order effect that one sign
+    # would show.
     picture = xyz * (1.0 + 0.02 * rng.choice((-1.0, 1.0), xyz.shape))
     true = measure(picture, exact(xyz))["relmse"]
     references = [noisy_reference(rng, xyz, 0.1) for _ in range(400)]
@@ -78,8 +82,8 @@ def test_the_references_variance_is_taken_out() -> None:
 def test_bias_and_variance_are_told_apart_without_bias(bias: float) -> None:
     """300 repeats of 4 seeds, noise 0.5, reference noise 0.1, all in units of a grey 10.
 
-    Standard errors, in units of 1e-4 of relMSE: variance 0.07 of 25, bias² 0.06 of 9; 0.3 of each would show. The mutant without
-    − V/n is 6.2 off, the one without the reference's variance 1.
+    Standard errors, in units of 1e-4 of relMSE: variance 0.07 of 25, bias² 0.06 of 9; 0.3 of each would show. The
+    mutant without − V/n is 6.2 off, the one without the reference's variance 1.
     """
     rng = np.random.default_rng(3)
     xyz = np.full(SHAPE, 10.0)
@@ -90,7 +94,13 @@ def test_bias_and_variance_are_told_apart_without_bias(bias: float) -> None:
         pictures = [xyz + bias + rng.normal(0.0, 0.5, SHAPE) for _ in range(4)]
         difference = np.mean(pictures, axis=0) - reference_image.xyz
         parts = bias_variance(difference, [relmse_raw(p, reference_image) for p in pictures], reference_image)
-        found.append((relmse_of_difference(difference, reference_image) - parts.variance / 4 - reference_image.own_relmse, parts.variance, parts.relmse))
+        found.append(
+            (
+                relmse_of_difference(difference, reference_image) - parts.variance / 4 - reference_image.own_relmse,
+                parts.variance,
+                parts.relmse,
+            )
+        )
         assert parts.bias2 == max(found[-1][0], 0.0)
         naive.append(relmse_of_difference(difference, reference_image) - reference_image.own_relmse)
     bias2, variance, relmse = np.mean(found, axis=0)
@@ -111,5 +121,7 @@ def test_flip_grows_with_noise_and_takes_mostly_black_pictures() -> None:
     rng = np.random.default_rng(4)
     xyz = np.zeros((48, 64, 3))
     xyz[20:30, 10:50] = 50.0 * rng.random((10, 40, 1)) + 20.0
-    values = [flip(xyz + amount * (xyz > 0.0) * rng.normal(0.0, 1.0, xyz.shape), exact(xyz)) for amount in (0.0, 3.0, 15.0)]
+    values = [
+        flip(xyz + amount * (xyz > 0.0) * rng.normal(0.0, 1.0, xyz.shape), exact(xyz)) for amount in (0.0, 3.0, 15.0)
+    ]
     assert values[0] == 0.0 and 0.0 < values[1] < values[2] < 1.0

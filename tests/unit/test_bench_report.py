@@ -1,4 +1,5 @@
-"""The bench report on made-up results: everything measured is in it, nothing from outside, and nothing odd breaks it."""
+"""The bench report on made-up results: everything measured is in it, nothing from outside, and nothing odd breaks
+it."""
 
 from __future__ import annotations
 
@@ -112,7 +113,9 @@ def svg_of(figure: object) -> str:
 def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[BenchResult, Path]:
     """A whole run of two scenes, reported once."""
     directory = tmp_path_factory.mktemp("bench")
-    result = synthetic_result([synthetic_scene(directory, "ball"), synthetic_scene(directory, "wine_glass", gain=12.5, difficulty=3.0)])
+    result = synthetic_result(
+        [synthetic_scene(directory, "ball"), synthetic_scene(directory, "wine_glass", gain=12.5, difficulty=3.0)]
+    )
     report.write_report(result, directory)
     return result, directory
 
@@ -136,8 +139,13 @@ def test_page_stands_alone_and_holds_everything(written: tuple[BenchResult, Path
 
 def test_files_are_whole_and_nothing_else_is_left(written: tuple[BenchResult, Path]) -> None:
     _, directory = written
-    stems = [f"{scene}_error_{over}" for scene in ("ball", "wine_glass") for over in ("time", "photons")] + ["overview", "scenes"]
-    assert sorted(p.name for p in (directory / "plots").iterdir()) == sorted(stem + suffix for stem in stems for suffix in (".png", ".svg"))
+    stems = [f"{scene}_error_{over}" for scene in ("ball", "wine_glass") for over in ("time", "photons")] + [
+        "overview",
+        "scenes",
+    ]
+    assert sorted(p.name for p in (directory / "plots").iterdir()) == sorted(
+        stem + suffix for stem in stems for suffix in (".png", ".svg")
+    )
     assert not [p for p in directory.rglob("*") if ".part" in p.name]
     for path in (directory / "plots").glob("*.svg"):
         assert_numbers_are_finite(path.read_text(encoding="utf-8"))
@@ -153,10 +161,17 @@ def test_limits_tell_each_claim_that_fails(written: tuple[BenchResult, Path]) ->
 
 
 def test_partial_run_of_one_method_and_one_seed(tmp_path: Path) -> None:
-    """Hostile names, no reference, no pictures, an unfinished curve: all is told, nothing breaks, nothing leaks into the page."""
+    """Hostile names, no reference, no pictures, an unfinished curve: all is told, nothing breaks, nothing leaks into
+    the page."""
     nasty = '<script>alert("1")</script> & $x_$ 桜'
     scene = synthetic_scene(tmp_path, "x", methods=["srd"], seeds=1)
-    scene.scene, scene.title, scene.reference, scene.pictures, scene.complete = nasty, nasty, None, {"reference": "pictures/gone.npy"}, False
+    scene.scene, scene.title, scene.reference, scene.pictures, scene.complete = (
+        nasty,
+        nasty,
+        None,
+        {"reference": "pictures/gone.npy"},
+        False,
+    )
     scene.claims = [Claim(nasty, nasty, nasty, False, nasty)]
     scene.curves.append(Curve(nasty, {}, []))
     result = synthetic_result([scene])
@@ -164,13 +179,22 @@ def test_partial_run_of_one_method_and_one_seed(tmp_path: Path) -> None:
     report.write_report(result, tmp_path)
     page = assert_stands_alone((tmp_path / "report.html").read_text(encoding="utf-8"))
     assert page.text.count(nasty) > 10
-    for words in ("There are no pictures", "There is no reference yet", "Only one seed", "stopped before this scene was complete", "No finished point yet"):
+    for words in (
+        "There are no pictures",
+        "There is no reference yet",
+        "Only one seed",
+        "stopped before this scene was complete",
+        "No finished point yet",
+    ):
         assert words in page.text, words
 
 
 def test_empty_run_and_refused_folder(tmp_path: Path) -> None:
     report.write_report(synthetic_result([]), tmp_path)
-    assert "Nothing has been compared yet" in assert_stands_alone((tmp_path / "report.html").read_text(encoding="utf-8")).text
+    assert (
+        "Nothing has been compared yet"
+        in assert_stands_alone((tmp_path / "report.html").read_text(encoding="utf-8")).text
+    )
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="cannot make the folder"):
         report.write_report(synthetic_result([]), tmp_path / "file")
@@ -193,13 +217,16 @@ def made_of(points: list[Point], tmp_path: Path) -> SceneResult:
 
 @pytest.mark.parametrize("abscissa", ["seconds", "photons"])
 def test_errors_that_have_no_logarithm(tmp_path: Path, abscissa: str) -> None:
-    """Zero and negative errors stand on the floor as triangles; NaN and infinity are left out; axes stay finite and sane."""
+    """Zero and negative errors stand on the floor as triangles; NaN and infinity are left out; axes stay finite and
+    sane."""
     good = [Point(10**k, 10.0 ** (k - 6), 10.0**-k, 0.5 * 10.0**-k, 2 * 10.0**-k, 0.0, 10.0**-k) for k in range(3, 6)]
     odd = [
-        Point(1_000_000, 1.0, 0.0, 0.0, 1e-6, 0.0, 0.0), Point(2_000_000, 2.0, -1e-7, -1e-6, 0.0, -1e-7, 0.0),
-        Point(3_000_000, 3.0, math.nan, 0.0, 1.0, math.nan, 0.0), Point(4_000_000, 4.0, math.inf, 0.0, math.inf, 0.0, math.inf),
+        Point(1_000_000, 1.0, 0.0, 0.0, 1e-6, 0.0, 0.0),
+        Point(2_000_000, 2.0, -1e-7, -1e-6, 0.0, -1e-7, 0.0),
+        Point(3_000_000, 3.0, math.nan, 0.0, 1.0, math.nan, 0.0),
+        Point(4_000_000, 4.0, math.inf, 0.0, math.inf, 0.0, math.inf),
         Point(0, 0.0, 1.0, 1.0, 1.0, 0.0, 1.0),
-    ]  # fmt: skip
+    ]
     scene = made_of(good + odd, tmp_path)
     with report_style.plot_style():
         figure = plots.error_against(scene, abscissa)
@@ -214,16 +241,23 @@ def test_errors_that_have_no_logarithm(tmp_path: Path, abscissa: str) -> None:
             svg_of(plots.error_against(scene, abscissa))
             if (drawn := report_plots.bias_and_variance(scene)) is not None:
                 svg_of(drawn)
-    assert any("cannot be told from the reference" in told for told in report_text.warnings_of(made_of(odd[:1], tmp_path)))
+    assert any(
+        "cannot be told from the reference" in told for told in report_text.warnings_of(made_of(odd[:1], tmp_path))
+    )
 
 
 def test_overview_and_readme_plot(tmp_path: Path) -> None:
-    """A method that never gets there stands at the left edge, and a shortest rendering that is already as good is marked ≥."""
+    """A method that never gets there stands at the left edge, and a shortest rendering that is already as good is
+    marked ≥."""
     near, far, none = (synthetic_scene(tmp_path, name) for name in ("near", "far", "none"))
     near.time_to_equal_error["srd"], far.time_to_equal_error = 120.0, {"stochastic": 1.0}
     near.curves[-1].points = [Point(1000, 0.025, 1e-6, 1e-6, 1e-6, 0.0, 1e-6)]
     none.curves = []
-    assert plots.is_lower_bound(near, "srd") and not plots.is_lower_bound(far, "srd") and not plots.is_lower_bound(none, "srd")
+    assert (
+        plots.is_lower_bound(near, "srd")
+        and not plots.is_lower_bound(far, "srd")
+        and not plots.is_lower_bound(none, "srd")
+    )
     with report_style.plot_style():
         svg = svg_of(overview(synthetic_result([near, far, none])))
     assert ">≥ 120×<" in svg and ">never<" in svg
@@ -231,7 +265,13 @@ def test_overview_and_readme_plot(tmp_path: Path) -> None:
     assert (tmp_path / "readme.png").stat().st_size > 10_000
     svg = (tmp_path / "readme.svg").read_text(encoding="utf-8")
     assert_numbers_are_finite(svg)
-    assert ">near<" in svg and ">far<" in svg and ">none<" not in svg and ">never as good<" in svg and ">regular-7<" not in svg
+    assert (
+        ">near<" in svg
+        and ">far<" in svg
+        and ">none<" not in svg
+        and ">never as good<" in svg
+        and ">regular-7<" not in svg
+    )
     report.readme_plot(synthetic_result([]), tmp_path / "empty")
 
 
@@ -245,8 +285,12 @@ def test_reference_warning_begins_at_a_tenth(tmp_path: Path) -> None:
 
 def test_busy_machine_is_told(tmp_path: Path) -> None:
     for factor, told in ((0.95, False), (0.85, True)):
-        scene = made_of([Point(n, s, 1e-3, 1e-3, 1e-3, 0.0, 1e-3) for n, s in ((1000, 1.0), (2000, factor), (4000, 2.0))], tmp_path)
-        assert any("the machine was busy" in words and "srd" in words for words in report_text.warnings_of(scene)) is told
+        scene = made_of(
+            [Point(n, s, 1e-3, 1e-3, 1e-3, 0.0, 1e-3) for n, s in ((1000, 1.0), (2000, factor), (4000, 2.0))], tmp_path
+        )
+        assert (
+            any("the machine was busy" in words and "srd" in words for words in report_text.warnings_of(scene)) is told
+        )
 
 
 def test_same_result_gives_the_same_svg_and_both_themes_read_well(tmp_path: Path) -> None:
@@ -255,12 +299,16 @@ def test_same_result_gives_the_same_svg_and_both_themes_read_well(tmp_path: Path
         first, second = (svg_of(plots.error_against(scene, "seconds")) for _ in range(2))
     assert first == second
     inline = report_style.inline_svg(first, "a", "label")
-    assert not re.search(r"#[0-9a-fA-F]{6}(?![0-9a-fA-F])", re.sub(r'(href="|url\()#', "", inline)), "a colour that dark screens do not exchange"
+    assert not re.search(r"#[0-9a-fA-F]{6}(?![0-9a-fA-F])", re.sub(r'(href="|url\()#', "", inline)), (
+        "a colour that dark screens do not exchange"
+    )
     on_paper = [pair[0] for pair in report_style.PALETTE.values()]
     assert len(set(on_paper)) == len(on_paper)
     for theme in (0, 1):
         colours = {name: pair[theme] for name, pair in report_style.PALETTE.items()}
-        texts = {"ink": 7.0, "muted": 4.5, "srd": 4.5, "good": 4.5, "bad": 4.5} | dict.fromkeys(("stochastic", *METHODS), 3.5)
+        texts = {"ink": 7.0, "muted": 4.5, "srd": 4.5, "good": 4.5, "bad": 4.5} | dict.fromkeys(
+            ("stochastic", *METHODS), 3.5
+        )
         for name, asked in texts.items():
             assert contrast(colours[name], colours["paper"]) >= asked, (name, theme)
 
@@ -269,12 +317,20 @@ def contrast(first: str, second: str) -> float:
     """Contrast ratio of two colours (WCAG 2.1)."""
     from spectrasplat.base.tone_map import luminance, srgb_eotf
 
-    levels = [float(luminance(srgb_eotf(np.array([int(c[i : i + 2], 16) for i in (1, 3, 5)]) / 255))) + 0.05 for c in (first, second)]
+    levels = [
+        float(luminance(srgb_eotf(np.array([int(c[i : i + 2], 16) for i in (1, 3, 5)]) / 255))) + 0.05
+        for c in (first, second)
+    ]
     return max(levels) / min(levels)
 
 
 def test_labels_are_pushed_apart_as_little_as_can_be() -> None:
-    for wanted, places in (([10, 40, 90], [10, 40, 90]), ([50, 50, 50], [38, 50, 62]), ([0, 0, 99], [0, 12, 99]), ([99, 99, 99], [76, 88, 100])):
+    for wanted, places in (
+        ([10, 40, 90], [10, 40, 90]),
+        ([50, 50, 50], [38, 50, 62]),
+        ([0, 0, 99], [0, 12, 99]),
+        ([99, 99, 99], [76, 88, 100]),
+    ):
         assert plots.spread(wanted, 12, 100) == pytest.approx(places)
 
 
@@ -296,7 +352,9 @@ def test_crop_finds_structure_and_error_maps_are_true() -> None:
     assert brighter[2].min() > 240 and abs(np.ptp(brighter[2])) < 4
     assert brighter[4, 0] > brighter[4, 2] + 50 and brighter[0, 2] > brighter[0, 0] + 50
     scale = pixels(report_pictures.error_scale())[0]
-    assert np.array_equal(scale[[0, 16, 32, 48, 64]], brighter), "the scale is marked at −1, 0 and 1; a quarter lies half-way"
+    assert np.array_equal(scale[[0, 16, 32, 48, 64]], brighter), (
+        "the scale is marked at −1, 0 and 1; a quarter lies half-way"
+    )
 
 
 def pixels(address: str) -> np.ndarray:
@@ -323,10 +381,30 @@ def test_broken_pictures_are_left_out(tmp_path: Path) -> None:
 
 
 def test_escaping_and_words() -> None:
-    assert element("p", "<&>", Html("<b>"), None, ["a", 1], title='"<') == '<p title="&quot;&lt;">&lt;&amp;&gt;<b>a1</p>'
-    assert report.file_names(["a/b c", "a_b_c", "", "overview", "桜"]) == ["a_b_c", "a_b_c_2", "scene", "overview_2", "scene_2"]
-    assert [report_text.number(v) for v in (0.0, math.nan, None, 0.01234, -5.678e-5, 123.0)] == ["0", "–", "–", "0.012", "−5.7·10⁻⁵", "120"]
+    assert (
+        element("p", "<&>", Html("<b>"), None, ["a", 1], title='"<') == '<p title="&quot;&lt;">&lt;&amp;&gt;<b>a1</p>'
+    )
+    assert report.file_names(["a/b c", "a_b_c", "", "overview", "桜"]) == [
+        "a_b_c",
+        "a_b_c_2",
+        "scene",
+        "overview_2",
+        "scene_2",
+    ]
+    assert [report_text.number(v) for v in (0.0, math.nan, None, 0.01234, -5.678e-5, 123.0)] == [
+        "0",
+        "–",
+        "–",
+        "0.012",
+        "−5.7·10⁻⁵",
+        "120",
+    ]
     assert [report_text.number(v) for v in (0.00999, 9.99e-5, 0.0009999)] == ["0.010", "1.0·10⁻⁴", "0.0010"]
     assert [report_text.superscript(v) for v in (1.0, 0.001, 3e-5)] == ["10⁰", "10⁻³", "3·10⁻⁵"]
     assert [report_text.count(v) for v in (999, 250_000, 16_400_000, 2e9)] == ["999", "250 k", "16.4 M", "2 G"]
-    assert [report_text.ratio_text(*v) for v in ((0.81,), (2.345,), (45.4,), (120.0, True))] == ["0.81×", "2.3×", "45×", "≥ 120×"]
+    assert [report_text.ratio_text(*v) for v in ((0.81,), (2.345,), (45.4,), (120.0, True))] == [
+        "0.81×",
+        "2.3×",
+        "45×",
+        "≥ 120×",
+    ]

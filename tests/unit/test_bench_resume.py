@@ -1,4 +1,5 @@
-"""A bench run that is stopped anywhere goes on without doing anything twice, to the same result; folders that do not fit are refused.
+"""A bench run that is stopped anywhere goes on without doing anything twice, to the same result; folders that do not
+fit are refused.
 
 The rigs are made up: pictures are the reference with a bias and noise that depend on method, photons and seed alone.
 """
@@ -79,7 +80,15 @@ class Rigs:
         self.refuses = False
 
     @contextmanager
-    def make(self, _context: object, _scene: Scene, methods: tuple[str, ...], width: int, height: int, progress: Callable[[str], None]) -> Iterator[dict[str, Rig]]:
+    def make(
+        self,
+        _context: object,
+        _scene: Scene,
+        methods: tuple[str, ...],
+        width: int,
+        height: int,
+        progress: Callable[[str], None],
+    ) -> Iterator[dict[str, Rig]]:
         assert (width, height) == (WIDTH, HEIGHT)
         if self.refuses:
             raise NothingToMeasure("nothing")
@@ -110,16 +119,33 @@ class Bench:
     def __init__(self, directory: Path, rigs: Rigs) -> None:
         self.directory, self.rigs, self.references, self.told, self.skipped = directory, rigs, 0, [], None
 
-    def run(self, settings: BenchSettings = SETTINGS, key: str = "key", fresh: bool = False, names: tuple[str, ...] = ("one", "two")) -> BenchResult:
+    def run(
+        self,
+        settings: BenchSettings = SETTINGS,
+        key: str = "key",
+        fresh: bool = False,
+        names: tuple[str, ...] = ("one", "two"),
+    ) -> BenchResult:
         store = Store(self.directory, BenchResult("0", "today", "command", dict(MACHINE), [], settings), fresh)
-        runner.run_bench(None, dict.fromkeys(names, glass_scene()), store, lambda f, t: self.told.append((f, t)), self.skipped, Subject(self.rigs.make, self._reference_image, lambda *_: key))  # type: ignore[arg-type]
+        runner.run_bench(
+            None,
+            dict.fromkeys(names, glass_scene()),
+            store,
+            lambda f, t: self.told.append((f, t)),
+            self.skipped,
+            Subject(self.rigs.make, self._reference_image, lambda *_: key),
+        )  # type: ignore[arg-type]
         return store.result
 
-    def _reference_image(self, _scene: Scene, width: int, height: int, seconds: float, progress: Callable[[float, str], None]) -> tuple[ReferencePicture, ReferenceInfo]:
+    def _reference_image(
+        self, _scene: Scene, width: int, height: int, seconds: float, progress: Callable[[float, str], None]
+    ) -> tuple[ReferencePicture, ReferenceInfo]:
         self.references += 1
         progress(0.5, "half")
         assert seconds == SETTINGS.reference_seconds
-        return ReferencePicture(reference_picture(), np.full((height, width, 3), 1e-9)), ReferenceInfo("made up", 1, 1.0, 1e-9, "key")
+        return ReferencePicture(reference_picture(), np.full((height, width, 3), 1e-9)), ReferenceInfo(
+            "made up", 1, 1.0, 1e-9, "key"
+        )
 
     def stored(self) -> BenchResult:
         return msgspec.json.decode((self.directory / "results.json").read_bytes(), type=BenchResult)
@@ -146,22 +172,39 @@ def test_one_whole_run(tmp_path: Path, rigs: Rigs) -> None:
     result = bench.run()
     assert bench.stored() == result and [s.scene for s in result.scenes] == ["one", "two"] and bench.references == 2
     scene = result.scenes[0]
-    assert scene.complete and scene.strongest_glass == "Schott N-SF11" and scene.strongest_abbe == pytest.approx(25.68, abs=0.01)
-    assert {len(curve.samples) for curve in scene.curves} == {12} and {len(curve.points) for curve in scene.curves} == {4}
+    assert (
+        scene.complete
+        and scene.strongest_glass == "Schott N-SF11"
+        and scene.strongest_abbe == pytest.approx(25.68, abs=0.01)
+    )
+    assert {len(curve.samples) for curve in scene.curves} == {12} and {len(curve.points) for curve in scene.curves} == {
+        4
+    }
     noise = {curve.method: curve for curve in scene.curves}
-    assert noise["srd"].points[-1].bias2 == pytest.approx(1e-4, rel=0.3) and noise["stochastic"].points[0].variance == pytest.approx(0.09, rel=0.3)
-    assert scene.time_to_equal_error["srd"] > 1.0 and {c.name for c in scene.claims} == {"time to equal error", "first picture"}
+    assert noise["srd"].points[-1].bias2 == pytest.approx(1e-4, rel=0.3) and noise["stochastic"].points[
+        0
+    ].variance == pytest.approx(0.09, rel=0.3)
+    assert scene.time_to_equal_error["srd"] > 1.0 and {c.name for c in scene.claims} == {
+        "time to equal error",
+        "first picture",
+    }
     assert len(rigs.rendered) == 2 * (2 * 3 * 4 + 4) and rigs.released == 4
     first_of_seed = [next(m for m, _, seed in rigs.rendered if seed == s) for s in (1, 2, 3)]
     assert first_of_seed == ["stochastic", "srd", "stochastic"]  # who begins changes
     for name, file in scene.pictures.items():
         picture = np.load(bench.directory / file)
-        assert picture.shape == (HEIGHT, WIDTH, 3) and picture.dtype == np.float32 and (name == "reference" or name in scene.picture_samples)
+        assert (
+            picture.shape == (HEIGHT, WIDTH, 3)
+            and picture.dtype == np.float32
+            and (name == "reference" or name in scene.picture_samples)
+        )
     assert set(scene.pictures) == {"reference", "srd", "srd early", "stochastic", "stochastic early"}
     assert not (bench.directory / "partial").exists()
     fractions = [fraction for fraction, _ in bench.told]
     assert fractions == sorted(fractions) and 0.0 <= fractions[0] and fractions[-1] <= 1.0
-    assert bench.told[0][1] == "one: preparing stochastic" and any(text.startswith("one: reference") for _, text in bench.told)
+    assert bench.told[0][1] == "one: preparing stochastic" and any(
+        text.startswith("one: reference") for _, text in bench.told
+    )
 
 
 @pytest.mark.parametrize("stop_at", [0, 1, 5, 12, 13, 22, 25, 30])
@@ -213,7 +256,9 @@ def test_results_of_other_settings_are_refused(tmp_path: Path, rigs: Rigs, setti
     assert told in str(refused.value) and (tmp_path / "results.json").read_bytes() == before
 
 
-def test_another_program_machine_or_scene_is_refused(tmp_path: Path, rigs: Rigs, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_program_machine_or_scene_is_refused(
+    tmp_path: Path, rigs: Rigs, monkeypatch: pytest.MonkeyPatch
+) -> None:
     bench = Bench(tmp_path, rigs)
     bench.run(names=("one",))
     with pytest.raises(UserError, match="scene 'one' has changed .* --fresh"):
@@ -255,7 +300,9 @@ def test_a_lost_reference_begins_the_scene_anew(tmp_path: Path, rigs: Rigs) -> N
     assert bench.run(names=("one",)).scenes[0].complete and len(rigs.rendered) == 28
 
 
-def test_pictures_that_are_not_finite_are_no_result(tmp_path: Path, rigs: Rigs, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pictures_that_are_not_finite_are_no_result(
+    tmp_path: Path, rigs: Rigs, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(Rig, "render", lambda *_: Rendering(np.full((HEIGHT, WIDTH, 3), np.nan), {}, 1, 1))
     with pytest.raises(RuntimeError, match="stochastic .* not finite .*one"):
         Bench(tmp_path, rigs).run()

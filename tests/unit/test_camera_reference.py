@@ -1,8 +1,9 @@
-"""The camera's reference renderer against closed forms: lights, textures, what lies beyond, furnaces, its own error, the cache.
+"""The camera's reference renderer against closed forms: lights, textures, what lies beyond, furnaces, its own error,
+the cache.
 
 What is seen without glass is exact but for the pixel's area. Behind glass pictures are estimates: z is the distance
-from the closed form in the picture's own standard deviations (8 parts, so Student's t with 7 degrees of freedom: the mean of
-z² over many values is 7/5 = 1.4).
+from the closed form in the picture's own standard deviations (8 parts, so Student's t with 7 degrees of freedom: the
+mean of z² over many values is 7/5 = 1.4).
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ from spectrasplat.model.texture import Environment, Texture
 from spectrasplat.reference.camera_reference import cached_camera_reference, camera_scene_key, render_camera_reference
 from spectrasplat.reference.camera_run import CameraPicture, CameraRun
 from spectrasplat.reference.spectral_caustic import CausticPlan
+
 from tests.unit.camera_scenes import (
     ABOVE,
     D65,
@@ -88,27 +90,48 @@ def test_a_spectral_reflectance_meets_the_lights_spectrum() -> None:
         (Light("beam", "collimated", D65, (0.0, 0.0, 2.0), radius=0.9), 1.0),
         (Light("away", "collimated", D65, (3.0, 0.0, 2.0), radius=0.9), 0.0),
         (Light("spot", "spot", D65, (0.0, 0.0, 2.0), inner_half_angle_deg=40.0, outer_half_angle_deg=50.0), 0.25),
-        (Light("soft", "spot", D65, (0.0, 0.0, 2.0), (math.sin(0.3), 0.0, -math.cos(0.3)), inner_half_angle_deg=0.0, outer_half_angle_deg=math.degrees(0.6)), 0.125),
+        (
+            Light(
+                "soft",
+                "spot",
+                D65,
+                (0.0, 0.0, 2.0),
+                (math.sin(0.3), 0.0, -math.cos(0.3)),
+                inner_half_angle_deg=0.0,
+                outer_half_angle_deg=math.degrees(0.6),
+            ),
+            0.125,
+        ),
         (Light("disc", "area", D65, (0.0, 0.0, 2.0), radius=1.0), math.pi * 0.2),
         (Light("turned", "area", D65, (0.0, 0.0, 2.0), (0.0, 0.0, 1.0), radius=1.0), 0.0),
     ],
     ids=lambda value: value.name if isinstance(value, Light) else "",
 )
 def test_every_kind_of_light_gives_its_irradiance(light: Light, expected: float) -> None:
-    """On a plate below its middle: r²/(r² + h²) of the hemisphere for a disc, half a smoothstep half way down a spot's edge."""
+    """On a plate below its middle: r²/(r² + h²) of the hemisphere for a disc, half a smoothstep half way down a spot's
+    edge."""
     camera = Camera((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), kind="orthographic", vertical_extent=1e-3)
-    picture = render_camera_reference(scene_of(light, plate(Diffuse((1.0, 1.0, 1.0))), camera=camera), 3, 3, samples=2048)
+    picture = render_camera_reference(
+        scene_of(light, plate(Diffuse((1.0, 1.0, 1.0))), camera=camera), 3, 3, samples=2048
+    )
     assert picture.xyz[1, 1, 1] * math.pi == pytest.approx(expected, rel=1e-3, abs=1e-12)
 
 
 def test_lights_are_seen_from_the_front_through_each_other_and_hide_nothing() -> None:
     front = Light("a", "area", D65, (0.0, 0.0, 3.0), (0.0, 0.0, 1.0), radius=0.2)
-    through = Light("b", "area", D65.scaled(2.0), (0.0, 0.0, 2.0), (0.0, 0.0, 1.0), shape="rectangle", width=0.2, height=0.8)
+    through = Light(
+        "b", "area", D65.scaled(2.0), (0.0, 0.0, 2.0), (0.0, 0.0, 1.0), shape="rectangle", width=0.2, height=0.8
+    )
     from_behind = Light("c", "area", D65.scaled(4.0), (0.0, 0.0, 4.0), radius=3.0)
     below = replace(front, position=(0.0, 0.0, -1.0))
     picture = render_camera_reference(scene_of(front, through, from_behind, below, plate(Black())), 21, 21, samples=8)
     y = picture.xyz[..., 1]
-    assert y[10, 10] == pytest.approx(3.0) and y[10, 13] == pytest.approx(1.0) and y[4, 10] == pytest.approx(2.0) and y[4, 4] == 0.0
+    assert (
+        y[10, 10] == pytest.approx(3.0)
+        and y[10, 13] == pytest.approx(1.0)
+        and y[4, 10] == pytest.approx(2.0)
+        and y[4, 4] == 0.0
+    )
 
 
 def test_the_suns_disc_is_seen_where_nothing_hides_it() -> None:
@@ -119,7 +142,9 @@ def test_the_suns_disc_is_seen_where_nothing_hides_it() -> None:
     columns = picture.xyz[..., 1].sum(axis=0)
     hidden, seen = sorted([columns[:20].sum(), columns[20:].sum()])
     # Solid angle on the film: π tan² r of 4 tan² r, halved; its radiance 1/(π sin² r).
-    assert hidden == 0.0 and seen == pytest.approx(0.5 * math.pi / 4 * 1600 / (math.pi * math.sin(math.radians(4.0)) ** 2), rel=3e-3)
+    assert hidden == 0.0 and seen == pytest.approx(
+        0.5 * math.pi / 4 * 1600 / (math.pi * math.sin(math.radians(4.0)) ** 2), rel=3e-3
+    )
 
 
 def test_shadow_rays_stop_at_glass() -> None:
@@ -148,7 +173,9 @@ def test_a_texture_lies_upright_and_is_interpolated() -> None:
                     for dx in range(2):
                         r, c = math.floor(y) + dy, math.floor(x) + dx
                         r, c = (r % 4, c % 6) if wrap == "repeat" else (min(max(r, 0), 3), min(max(c, 0), 5))
-                        expected[i, j] += (1 - abs(y - math.floor(y) - dy)) * (1 - abs(x - math.floor(x) - dx)) * rgb[r, c]
+                        expected[i, j] += (
+                            (1 - abs(y - math.floor(y) - dy)) * (1 - abs(x - math.floor(x) - dx)) * rgb[r, c]
+                        )
         # The mean over a pixel of a bilinear patch is its middle; 32 samples leave a little of the slope.
         np.testing.assert_allclose(picture.rgb() * math.pi, expected * [1.0, 0.5, 1.0], atol=0.012)
 
@@ -215,7 +242,11 @@ def test_glass_in_a_white_room_is_white_path_by_path(scene: Scene) -> None:
     picture = run.picture()
     lost = picture.lost["depth"] + picture.lost["numeric"]
     assert lost < 1e-5
-    assert np.abs(picture.xyz - 1.0).max() < 1e-12 or lost > 0.0 and np.mean(np.abs(picture.xyz - 1.0) > 1e-12) <= lost * picture.samples * 3
+    assert (
+        np.abs(picture.xyz - 1.0).max() < 1e-12
+        or lost > 0.0
+        and np.mean(np.abs(picture.xyz - 1.0) > 1e-12) <= lost * picture.samples * 3
+    )
 
 
 def test_glass_in_a_white_room_is_white_in_colour() -> None:
@@ -230,7 +261,9 @@ def test_a_camera_inside_an_absorbing_ball_sees_the_room_by_way_of_its_radius() 
     alpha, n = 0.4, 1.5
     ball = place(sphere(1.0, 20480), Dielectric(constant_index(n), Absorption(np.full(401, alpha))))
     camera = Camera((0.0, 0.0, 0.0), (0.3, 1.0, 0.2), vertical_fov_deg=50.0)
-    picture = render_camera_reference(scene_of(ball, camera=camera, background_rgb=(1.0, 1.0, 1.0)), 24, 24, samples=512)
+    picture = render_camera_reference(
+        scene_of(ball, camera=camera, background_rgb=(1.0, 1.0, 1.0)), 24, 24, samples=512
+    )
     reflectance = ((n - 1) / (n + 1)) ** 2
     expected = (1 - reflectance) * math.exp(-alpha) / (1 - reflectance * math.exp(-2 * alpha))
     mean, error = picture.xyz[..., 1].mean(), math.sqrt(picture.variance[..., 1].mean() / 576)
@@ -248,7 +281,8 @@ def test_a_mirrors_tint_is_its_colour() -> None:
 
 
 def test_its_own_error_is_true() -> None:
-    """The scatter of ten whole pictures is the variance they claim: over 200 pixels behind glass the ratio's 4 σ is 0.3."""
+    """The scatter of ten whole pictures is the variance they claim: over 200 pixels behind glass the ratio's 4 σ is
+    0.3."""
     runs = [render_camera_reference(slab_scene(FLINT), 10, 20, samples=64, seed=seed) for seed in range(10)]
     observed = np.var([run.xyz[..., 1] for run in runs], axis=0, ddof=1).sum()
     claimed = np.mean([run.variance[..., 1] for run in runs], axis=0).sum()
@@ -293,9 +327,14 @@ def test_the_key_knows_textures_and_what_lies_beyond() -> None:
         camera_scene_key(replace(scene, objects=(plate(Diffuse(texture=Texture(rgb, "clamp"))),)), 8, 8, 64, None),
         camera_scene_key(replace(scene, background_rgb=(0.1, 0.1, 0.1)), 8, 8, 64, None),
         camera_scene_key(replace(scene, environment=room), 8, 8, 64, None),
-        camera_scene_key(replace(scene, environment=replace(room, world_to_local=np.diag([-1.0, -1.0, 1.0]))), 8, 8, 64, None),
+        camera_scene_key(
+            replace(scene, environment=replace(room, world_to_local=np.diag([-1.0, -1.0, 1.0]))), 8, 8, 64, None
+        ),
         camera_scene_key(replace(scene, environment=replace(room, rgb=2.0 * rgb)), 8, 8, 64, None),
     ]
     assert len(set(keys)) == len(keys)
-    assert camera_scene_key(replace(scene, name="other", environment=replace(room, source="elsewhere")), 8, 8, 64, None) == keys[6]
+    assert (
+        camera_scene_key(replace(scene, name="other", environment=replace(room, source="elsewhere")), 8, 8, 64, None)
+        == keys[6]
+    )
     np.testing.assert_allclose(K_M * (rgb_basis() @ np.ones(3) * daylight_per_lumen()) @ cmf_xyz(), WHITE, rtol=1e-9)

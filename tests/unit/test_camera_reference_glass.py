@@ -1,4 +1,5 @@
-"""What the camera's reference sees through glass: fringes by slabs and prisms against closed forms, caustics against the light's reference.
+"""What the camera's reference sees through glass: fringes by slabs and prisms against closed forms, caustics against
+the light's reference.
 
 Mutants of the closed forms (another Fresnel, dispersion the other way round) must be told apart.
 """
@@ -36,6 +37,7 @@ from spectrasplat.reference.camera_run import CameraPicture, CameraRun
 from spectrasplat.reference.direct_view import seen_directly
 from spectrasplat.reference.photon_reference import render_reference
 from spectrasplat.reference.spectral_caustic import CausticPlan, build_caustic
+
 from tests.unit.camera_scenes import (
     D65,
     FLINT,
@@ -57,7 +59,9 @@ def slab_column(glass: Dispersion, rows: int, fresnel: str = "exact", sign: floa
     n = glass.n_d + sign * (n - glass.n_d)
     cosine, inner = math.cos(TILT), np.sqrt(1.0 - (math.sin(TILT) / n) ** 2)
     if fresnel == "exact":
-        reflectance = 0.5 * (((cosine - n * inner) / (cosine + n * inner)) ** 2 + ((n * cosine - inner) / (n * cosine + inner)) ** 2)
+        reflectance = 0.5 * (
+            ((cosine - n * inner) / (cosine + n * inner)) ** 2 + ((n * cosine - inner) / (n * cosine + inner)) ** 2
+        )
     else:  # Schlick 1994
         reflectance = ((n - 1) / (n + 1)) ** 2
         reflectance = reflectance + (1 - reflectance) * (1 - cosine) ** 5
@@ -80,7 +84,8 @@ def slab_picture() -> CameraPicture:
 
 
 def slab_z_squared(picture: CameraPicture, expected: np.ndarray) -> float:
-    """Mean of z² over rows and channels; a row's twelve variances together have 84 degrees of freedom, so that 1.02 is right."""
+    """Mean of z² over rows and channels; a row's twelve variances together have 84 degrees of freedom, so that 1.02 is
+    right."""
     variance = picture.variance.sum(axis=1) / 144
     return float(np.mean((picture.xyz.mean(axis=1) - expected) ** 2 / variance))
 
@@ -98,7 +103,8 @@ def test_wrong_optics_would_show_in_the_fringe(slab_picture: CameraPicture, muta
 
 
 def test_a_pane_of_air_changes_nothing() -> None:
-    """Behind a pane of n = 1 every path carries one wavelength, without it all of them: both ways of adding must agree."""
+    """Behind a pane of n = 1 every path carries one wavelength, without it all of them: both ways of adding must
+    agree."""
     rgb = np.random.default_rng(5).random((5, 5, 3)).astype(np.float32)
     curve = np.linspace(0.1, 0.9, 401)
     lights = (
@@ -115,7 +121,10 @@ def test_a_pane_of_air_changes_nothing() -> None:
     behind = render_camera_reference(scene_of(*lights, *things, pane), 16, 16, samples=2048)
     assert behind.relmse > 3.0 * straight.relmse  # which is why
     np.testing.assert_allclose(behind.xyz, straight.xyz, rtol=0.03)
-    for half in (np.s_[:, :8], np.s_[:, 8:]):  # texture; spectral reflectance: means to 6e-4, so 3e-3 too much would show
+    for half in (
+        np.s_[:, :8],
+        np.s_[:, 8:],
+    ):  # texture; spectral reflectance: means to 6e-4, so 3e-3 too much would show
         error = np.sqrt((behind.variance + straight.variance)[half].sum(axis=(0, 1))) / 128
         mean = straight.xyz[half].mean(axis=(0, 1))
         assert (error < 6e-4 * mean).all()
@@ -126,14 +135,17 @@ def test_a_pane_of_air_changes_nothing() -> None:
 
 
 def test_an_edge_behind_a_prism_stands_where_the_exact_trace_puts_it() -> None:
-    """Two laser lines through 20° of flint: each line's edge, from the share of white it leaves, to a fiftieth of a pixel."""
+    """Two laser lines through 20° of flint: each line's edge, from the share of white it leaves, to a fiftieth of a
+    pixel."""
     apex, rows, lines = math.radians(20.0), 64, (486.1327, 656.2725)
     faces = camera_answers.prism_faces(apex, 5.0, 1.2)
     angle = {nm: camera_answers.viewing_angle(faces, (float(FLINT.index(nm)), 1.0), 9.0, 0.0, 0.0, 0.3) for nm in lines}
     middle = 0.5 * sum(angle.values())
     c, s = math.cos(apex / 2), math.sin(apex / 2)
     outline = np.array([(0.0, 0.6 / math.tan(apex / 2)), (-0.6 - 2 * s / c, -2.0), (0.6 + 2 * s / c, -2.0)])
-    vertices = np.concatenate([np.column_stack([outline[:, 0] + 5.6, np.full(3, w), outline[:, 1]]) for w in (-2.0, 2.0)])
+    vertices = np.concatenate(
+        [np.column_stack([outline[:, 0] + 5.6, np.full(3, w), outline[:, 1]]) for w in (-2.0, 2.0)]
+    )
     triangles = [(0, 1, 2), (3, 5, 4), (0, 3, 1), (1, 3, 4), (1, 4, 2), (2, 4, 5), (2, 5, 0), (0, 5, 3)]
     mesh = primitives.make_mesh("wedge", vertices, triangles)
     mesh = mesh if mesh.volume() > 0.0 else mesh.flipped()
@@ -146,7 +158,11 @@ def test_an_edge_behind_a_prism_stands_where_the_exact_trace_puts_it() -> None:
     edges = []
     for light in lit:
         glass = place(mesh, Dielectric(FLINT))
-        y = render_camera_reference(scene_of(light, glass, white, black, camera=camera), 3, rows, samples=2048).xyz[..., 1].mean(axis=1)
+        y = (
+            render_camera_reference(scene_of(light, glass, white, black, camera=camera), 3, rows, samples=2048)
+            .xyz[..., 1]
+            .mean(axis=1)
+        )
         whole = np.polyval(np.polyfit(np.arange(20), y[:20], 1), np.arange(rows))  # Fresnel's share changes a little
         at = 1.0 - 2.0 / rows * float(np.sum(y / whole))
         edges.append(middle + math.atan(at * math.tan(math.radians(1.5))))
@@ -160,16 +176,24 @@ def test_an_edge_behind_a_prism_stands_where_the_exact_trace_puts_it() -> None:
 def test_closed_forms_agree_with_each_other() -> None:
     n = np.array([1.5168, 1.62])
     # T2 of the known answers: N-BK7 at minimum deviation; a thin prism's limit is the thin formula.
-    assert math.degrees(camera_answers.prism_deviation(1.5168, math.pi / 3, math.radians(49.32335))) == pytest.approx(38.6467, abs=1e-5)
-    np.testing.assert_allclose(camera_answers.prism_deviation(n, 1e-4, 0.0), camera_answers.thin_prism_deviation(n, 1e-4), rtol=1e-6)
+    assert math.degrees(camera_answers.prism_deviation(1.5168, math.pi / 3, math.radians(49.32335))) == pytest.approx(
+        38.6467, abs=1e-5
+    )
+    np.testing.assert_allclose(
+        camera_answers.prism_deviation(n, 1e-4, 0.0), camera_answers.thin_prism_deviation(n, 1e-4), rtol=1e-6
+    )
     assert np.isnan(camera_answers.prism_deviation(1.7847, math.pi / 2, 0.0))
     apex = math.radians(0.2)
-    low, high = (camera_answers.height_on_screen(camera_answers.prism_faces(apex, 5.0, 0.001), (k, 1.0), 0.0, 15.0) for k in n)
+    low, high = (
+        camera_answers.height_on_screen(camera_answers.prism_faces(apex, 5.0, 0.001), (k, 1.0), 0.0, 15.0) for k in n
+    )
     assert low - high == pytest.approx(camera_answers.thin_prism_fringe(n[1], n[0], apex, 10.0), rel=1e-3)
     # T3: a slab at 45°.
     assert camera_answers.slab_offset(1.5168, 1.0, TILT) == pytest.approx(0.526946, abs=1e-6)
     assert camera_answers.slab_lateral_shift(1.5168, 1.0, TILT) == pytest.approx(0.334499, abs=1e-6)
-    assert camera_answers.slab_displacement_derivative(1.5168, -0.041799e-3, 1.0, TILT) == pytest.approx(-0.018554e-3, abs=1e-8)
+    assert camera_answers.slab_displacement_derivative(1.5168, -0.041799e-3, 1.0, TILT) == pytest.approx(
+        -0.018554e-3, abs=1e-8
+    )
     # A lens: matrices against the trace near the axis, thin against thick.
     faces = camera_answers.plano_convex_faces(10.0, 8.0, 0.5)
     for k in n:
@@ -186,7 +210,16 @@ def test_closed_forms_agree_with_each_other() -> None:
 
 def caustic_scene(*more: SceneObject) -> Scene:
     """A beam through a prism on to a plate that the camera sees from above."""
-    light = Light("beam", "collimated", D65.scaled(3.0), (-0.2, 0.0, 3.0), (0.0, 0.0, -1.0), shape="rectangle", width=0.3, height=0.6)
+    light = Light(
+        "beam",
+        "collimated",
+        D65.scaled(3.0),
+        (-0.2, 0.0, 3.0),
+        (0.0, 0.0, -1.0),
+        shape="rectangle",
+        width=0.3,
+        height=0.6,
+    )
     prism = place(primitives.prism(50.0, 1.0, 1.0), Dielectric(FLINT), (0.0, 0.0, 1.6))
     camera = Camera((0.9, -3.0, 4.0), (1.2, 0.0, 0.0), vertical_fov_deg=38.0)
     return scene_of(light, prism, plate(size=8.0), *more, camera=camera)
@@ -210,16 +243,23 @@ def test_the_caustic_is_that_of_the_light_reference() -> None:
     dark = render_camera_reference(scene, 36, 24, samples=256)
     light = render_reference(scene, 36, 24, photons=1 << 20)
     seen = seen_directly(scene, 36, 24)
-    blocks = [(np.where(seen[..., None], p, 0.0)).reshape(12, 2, 18, 2, 3).mean(axis=(1, 3)) for p in (lit.xyz - dark.xyz, light.xyz())]
+    blocks = [
+        (np.where(seen[..., None], p, 0.0)).reshape(12, 2, 18, 2, 3).mean(axis=(1, 3))
+        for p in (lit.xyz - dark.xyz, light.xyz())
+    ]
     assert blocks[1].max() > 0.1
     np.testing.assert_allclose(blocks[0], blocks[1], atol=0.03 * blocks[1].max())
     np.testing.assert_allclose(blocks[0].sum(axis=(0, 1)), blocks[1].sum(axis=(0, 1)), rtol=4e-3)
 
 
 def busy_scene() -> Scene:
-    """A smooth tinted ball with a bubble of other glass in it, a block that touches it, a mirror, over a plate of spectral reflectance."""
+    """A smooth tinted ball with a bubble of other glass in it, a block that touches it, a mirror, over a plate of
+    spectral reflectance."""
     tint = Absorption(np.linspace(0.3, 0.0, 401))
-    lights = (Light("sun", "directional", D65, direction=(0.3, 0.2, -1.0), angular_diameter_deg=3.0), Light("spot", "spot", laser(600.0, 0.02), (0.5, -1.0, 4.0), outer_half_angle_deg=30.0))
+    lights = (
+        Light("sun", "directional", D65, direction=(0.3, 0.2, -1.0), angular_diameter_deg=3.0),
+        Light("spot", "spot", laser(600.0, 0.02), (0.5, -1.0, 4.0), outer_half_angle_deg=30.0),
+    )
     return scene_of(
         *lights,
         place(sphere(0.5, 1280), Dielectric(FLINT, tint, 1), (0.0, 0.0, 0.6)),
@@ -232,7 +272,8 @@ def busy_scene() -> Scene:
 
 
 def test_nested_and_smooth_glass_throws_the_light_references_light() -> None:
-    """Both tracers' loops are written apart. Sums over what is seen directly agree to 2 %, blocks to 8 % of the brightest (a focus of few texels)."""
+    """Both tracers' loops are written apart. Sums over what is seen directly agree to 2 %, blocks to 8 % of the
+    brightest (a focus of few texels)."""
     scene = busy_scene()
     caustic = build_caustic(scene, 36, 24, replace(PLAN, photons=1 << 18, texel_size=0.02))
     lit, dark = (render_camera_reference(scene, 36, 24, samples=256, caustic=c).xyz for c in (caustic, None))
@@ -250,7 +291,14 @@ def test_a_caustic_behind_a_pane_of_air_is_the_same() -> None:
     scene, behind = caustic_scene(), caustic_scene(pane)
     caustic = build_caustic(scene, 24, 16, PLAN)
     straight = render_camera_reference(scene, 24, 16, samples=1024, caustic=caustic)
-    through = CameraRun(behind, 24, 16, caustic=replace(caustic, tables=caustic.tables._replace(side=np.vstack([caustic.tables.side, [[-1, -1]]]).astype(np.int32))))
+    through = CameraRun(
+        behind,
+        24,
+        16,
+        caustic=replace(
+            caustic, tables=caustic.tables._replace(side=np.vstack([caustic.tables.side, [[-1, -1]]]).astype(np.int32))
+        ),
+    )
     while through.samples < 1024:
         through.advance()
     picture = through.picture()

@@ -16,6 +16,7 @@ from spectrasplat.reference.caustic_cache import CachedCaustic, picture_noise
 from spectrasplat.reference.photon_run import TALLY_SIZE
 from spectrasplat.reference.rounds import PARTS
 from spectrasplat.reference.spectral_caustic import CausticPlan, CausticRun, build_caustic
+
 from tests.unit.camera_scenes import D65, FLINT, place, plate, scene_of
 
 SIZE = 24, 16
@@ -33,9 +34,20 @@ def short_pilots(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def scene() -> Scene:
     """A beam through a prism on to a plate that the camera sees from above."""
-    light = Light("beam", "collimated", D65.scaled(3.0), (-0.2, 0.0, 3.0), (0.0, 0.0, -1.0), shape="rectangle", width=0.3, height=0.6)
+    light = Light(
+        "beam",
+        "collimated",
+        D65.scaled(3.0),
+        (-0.2, 0.0, 3.0),
+        (0.0, 0.0, -1.0),
+        shape="rectangle",
+        width=0.3,
+        height=0.6,
+    )
     prism = place(primitives.prism(50.0, 1.0, 1.0), Dielectric(FLINT), (0.0, 0.0, 1.6))
-    return scene_of(light, prism, plate(size=8.0), camera=Camera((0.9, -3.0, 4.0), (1.2, 0.0, 0.0), vertical_fov_deg=38.0))
+    return scene_of(
+        light, prism, plate(size=8.0), camera=Camera((0.9, -3.0, 4.0), (1.2, 0.0, 0.0), vertical_fov_deg=38.0)
+    )
 
 
 @pytest.fixture
@@ -92,7 +104,9 @@ def test_an_interrupt_keeps_the_photons(scene: Scene, tmp_path: Path, rounds: li
     assert rounds[0] > stopped_at >= 0 and caustic.photons >= PLAN.photons
     whole = build_caustic(scene, *SIZE, PLAN)
     assert caustic.photons == whole.photons and caustic.landed_w == pytest.approx(whole.landed_w, rel=1e-12)
-    np.testing.assert_allclose(caustic.tables.irradiance, whole.tables.irradiance, rtol=1e-4, atol=1e-6 * whole.tables.irradiance.max())
+    np.testing.assert_allclose(
+        caustic.tables.irradiance, whole.tables.irradiance, rtol=1e-4, atol=1e-6 * whole.tables.irradiance.max()
+    )
 
 
 def test_a_larger_plan_goes_on_from_a_smaller_one(scene: Scene, tmp_path: Path, rounds: list[int]) -> None:
@@ -115,7 +129,8 @@ def test_photons_are_enough_when_the_picture_says_so(scene: Scene, tmp_path: Pat
 
 
 def test_the_noise_is_what_other_photons_would_change(scene: Scene) -> None:
-    """Half the mean square difference of pictures by the same paths and independent photons; their windows differ, so to a factor of 2."""
+    """Half the mean square difference of pictures by the same paths and independent photons; their windows differ, so
+    to a factor of 2."""
     caustics = [build_caustic(scene, *SIZE, replace(PLAN, seed=seed, texel_size=0.05)) for seed in (1, 2, 3)]
     pictures = [render_camera_reference(scene, *SIZE, samples=1024, caustic=c).xyz for c in caustics]
     mean = np.mean(pictures, axis=0)
@@ -140,7 +155,8 @@ def test_what_does_not_fit_is_made_anew(scene: Scene, tmp_path: Path, rounds: li
 
 
 def test_what_halves_of_the_caustic_have_apart_is_in_the_variance() -> None:
-    """Parts that look up one half of the photons share its error: 8 parts without noise of their own are two pictures, not 8."""
+    """Parts that look up one half of the photons share its error: 8 parts without noise of their own are two pictures,
+    not 8."""
     error = np.array([0.3, -0.3])
     sums = np.stack([np.full((1, 1, 3), 4.0 * (1.0 + error[part % 2])) for part in range(PARTS)])
     units, tallies = np.full(PARTS, 4), np.zeros((PARTS, TALLY_SIZE))

@@ -1,4 +1,5 @@
-"""Windows of the camera reference's caustic: fine where the camera looks, not where light or a stray look happens to go."""
+"""Windows of the camera reference's caustic: fine where the camera looks, not where light or a stray look happens to
+go."""
 
 from __future__ import annotations
 
@@ -15,7 +16,9 @@ def planes() -> Planes:
     """The front of a page from −1 to 1 and that of a floor from −20 to 20."""
     frame = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     extent = np.array([[[-1.0, -1.0], [1.0, 1.0]], [[-20.0, -20.0], [20.0, 20.0]]])
-    return Planes(np.array([[0, -1], [1, -1]], np.int32), np.arange(2), np.stack([frame, frame]), extent, np.ones(2, bool))
+    return Planes(
+        np.array([[0, -1], [1, -1]], np.int32), np.arange(2), np.stack([frame, frame]), extent, np.ones(2, bool)
+    )
 
 
 def points(count: int, half: float) -> np.ndarray:
@@ -27,13 +30,19 @@ def points(count: int, half: float) -> np.ndarray:
 def looks(stray: int) -> SurfaceInteraction:
     """3000 at the page, 1000 at the floor's middle, `stray` anywhere on the floor."""
     where = np.concatenate([points(3000, 1.0), points(1000, 1.5), points(stray, 20.0)])
-    return SurfaceInteraction(where, np.ones(len(where)), np.repeat(np.array([PAGE, FLOOR], np.int32), [3000, 1000 + stray]))
+    return SurfaceInteraction(
+        where, np.ones(len(where)), np.repeat(np.array([PAGE, FLOOR], np.int32), [3000, 1000 + stray])
+    )
 
 
 def light() -> Landed:
     """As much on the page as on all the floor."""
     side = np.repeat(np.array([PAGE, FLOOR], np.int32), 20_000)
-    return Landed(np.concatenate([points(20_000, 1.0), points(20_000, 20.0)]), np.ones(40_000), np.stack([side, *np.zeros((3, 40_000), np.int32)], axis=1))
+    return Landed(
+        np.concatenate([points(20_000, 1.0), points(20_000, 20.0)]),
+        np.ones(40_000),
+        np.stack([side, *np.zeros((3, 40_000), np.int32)], axis=1),
+    )
 
 
 @pytest.mark.parametrize("stray", [0, 5])

@@ -89,7 +89,10 @@ def small_scene() -> Scene:
 def renderer(monkeypatch: pytest.MonkeyPatch) -> FakeRenderer:
     """A renderer and a scene reader that need neither OpenGL nor files."""
     fake = FakeRenderer()
-    render_module, scene_module = ModuleType("spectrasplat.render.still"), ModuleType("spectrasplat.model.io.scene_file")
+    render_module, scene_module = (
+        ModuleType("spectrasplat.render.still"),
+        ModuleType("spectrasplat.model.io.scene_file"),
+    )
     render_module.render = fake.render  # type: ignore[attr-defined]
     scene_module.load_scene = lambda path: small_scene()  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "spectrasplat.render.still", render_module)
@@ -121,9 +124,7 @@ class TestRender:
     ) -> None:
         output = tmp_path / "out.npy"
         assert main(["render", str(scene_path), "-o", str(output)]) == 0
-        assert renderer.settings == RenderSettings(
-            width=32, height=16, photons=5000, exposure_ev=0.5, max_depth=20
-        )
+        assert renderer.settings == RenderSettings(width=32, height=16, photons=5000, exposure_ev=0.5, max_depth=20)
         assert np.load(output).shape == (16, 32, 3)
         captured = capsys.readouterr()
         assert str(output) in captured.out
@@ -155,9 +156,7 @@ class TestRender:
         )
         assert "deposited 40.0 %\nescaped 60.0 %\n" in capsys.readouterr().out
 
-    def test_seconds_replace_the_scenes_photons(
-        self, renderer: FakeRenderer, scene_path: Path, tmp_path: Path
-    ) -> None:
+    def test_seconds_replace_the_scenes_photons(self, renderer: FakeRenderer, scene_path: Path, tmp_path: Path) -> None:
         assert main(["render", str(scene_path), "-o", str(tmp_path / "out.npy"), "--seconds", "2.5"]) == 0
         assert renderer.settings is not None
         assert (renderer.settings.photons, renderer.settings.seconds) == (None, 2.5)
@@ -233,9 +232,7 @@ class TestRender:
         monkeypatch: pytest.MonkeyPatch,
     ) -> None:
         monkeypatch.setattr(cli_options, "memory_bytes", lambda: 1 << 30)
-        told = complaint(
-            capsys, "render", scene_path, "-o", tmp_path / "o.exr", "--size", "4096x4096", "--bins", "32"
-        )
+        told = complaint(capsys, "render", scene_path, "-o", tmp_path / "o.exr", "--size", "4096x4096", "--bins", "32")
         assert "--size 4096x4096 with --bins 32 needs about 6.8 GiB and this machine has 1.0 GiB" in told
 
     @pytest.mark.parametrize(
@@ -270,7 +267,11 @@ class TestRender:
         assert path.read_text() == "precious"
 
     def test_a_failing_renderer_leaves_the_old_picture(
-        self, renderer: FakeRenderer, scene_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+        self,
+        renderer: FakeRenderer,
+        scene_path: Path,
+        tmp_path: Path,
+        capsys: pytest.CaptureFixture[str],
         monkeypatch: pytest.MonkeyPatch,
     ) -> None:
         def fail(*_: object, **__: object) -> None:
@@ -439,12 +440,15 @@ class TestProgram:
             "heavy = {'colour', 'scipy', 'matplotlib', 'numba', 'trimesh', 'OpenEXR', 'imgui_bundle', 'glfw'};"
             "print(sorted(heavy & set(sys.modules)))"
         )
-        done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=30, check=True)
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=30, check=True
+        )
         assert done.stdout.strip() == "[]"
 
 
 @pytest.mark.parametrize(
-    ("text", "count"), [("1", 1), ("1000000", 10**6), ("1e6", 10**6), ("2M", 2 * 10**6), ("1.5k", 1500), ("1_000", 1000)]
+    ("text", "count"),
+    [("1", 1), ("1000000", 10**6), ("1e6", 10**6), ("2M", 2 * 10**6), ("1.5k", 1500), ("1_000", 1000)],
 )
 def test_photons_are_read(text: str, count: int) -> None:
     assert cli_options.parse_photons(text) == count

@@ -18,7 +18,16 @@ def made_up(*measurements: Measurement, fails: BaseException | None = None) -> t
         if fails is not None:
             raise fails
 
-    return (Case("made-up", "a made-up case", "to see what comes of it", "severity", measure, len(measurements) + (fails is not None)),)
+    return (
+        Case(
+            "made-up",
+            "a made-up case",
+            "to see what comes of it",
+            "severity",
+            measure,
+            len(measurements) + (fails is not None),
+        ),
+    )
 
 
 GOOD = Measurement(1.0, "one", 0, {"energy": 1e-4}, {"energy": 1e-3})
@@ -35,7 +44,9 @@ BAD = Measurement(2.0, "two", 0, {"energy": 1e-2}, {"energy": 1e-3})
         (made_up(BAD, fails=KeyboardInterrupt()), 1, True, "1 promise broken"),
     ],
 )
-def test_the_exit_code_is_the_verdict(monkeypatch, capsys, tmp_path: Path, cases: tuple[Case, ...], code: int, partial: bool, said: str) -> None:
+def test_the_exit_code_is_the_verdict(
+    monkeypatch, capsys, tmp_path: Path, cases: tuple[Case, ...], code: int, partial: bool, said: str
+) -> None:
     monkeypatch.setattr(runner, "all_cases", lambda: cases)
     assert main(["stress", "-o", str(tmp_path / "new" / "folder")]) == code
     assert said in capsys.readouterr().out

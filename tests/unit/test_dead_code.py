@@ -12,7 +12,9 @@ from spectrasplat.gpu.shader import ShaderError, load_source
 
 
 def stripped_source(text: str) -> list[str]:
-    return [line.text.strip() for line in stripped([Line(line, "t", i + 1) for i, line in enumerate(text.splitlines())])]
+    return [
+        line.text.strip() for line in stripped([Line(line, "t", i + 1) for i, line in enumerate(text.splitlines())])
+    ]
 
 
 def chosen(condition: str, defines: str = "") -> bool:
@@ -25,16 +27,28 @@ def chosen(condition: str, defines: str = "") -> bool:
 @pytest.mark.parametrize(
     ("condition", "reference"),
     [
-        ("GROUPS > 0", True), ("GROUPS == 2 && !defined(TREE)", True), ("GROUPS - 2", False), ("defined TREE || defined(GROUPS)", True),
-        ("1 + 2 * 3 == 7", True), ("(1 + 2) * 3 == 7", False), ("0x10 >> 2 == 4u", True), ("-GROUPS < -1", True), ("7 / 2 == 3 && 7 % 2", True),
-        ("TWICE == 4", True), ("!(GROUPS >= 3) // really", True), ("1 << 3 <= 7", False),
+        ("GROUPS > 0", True),
+        ("GROUPS == 2 && !defined(TREE)", True),
+        ("GROUPS - 2", False),
+        ("defined TREE || defined(GROUPS)", True),
+        ("1 + 2 * 3 == 7", True),
+        ("(1 + 2) * 3 == 7", False),
+        ("0x10 >> 2 == 4u", True),
+        ("-GROUPS < -1", True),
+        ("7 / 2 == 3 && 7 % 2", True),
+        ("TWICE == 4", True),
+        ("!(GROUPS >= 3) // really", True),
+        ("1 << 3 <= 7", False),
     ],
-)  # fmt: skip
+)
 def test_conditions(condition: str, reference: bool) -> None:
     assert chosen(condition, "#define GROUPS 2\n#define TWICE (2 * GROUPS)") is reference
 
 
-@pytest.mark.parametrize("condition", ["UNSEEN > 0", "__VERSION__ >= 430", "defined(GL_ARB_gpu_shader5)", "LOOP == 1", "1 / 0", "1 +", "2 $ 3"])
+@pytest.mark.parametrize(
+    "condition",
+    ["UNSEEN > 0", "__VERSION__ >= 430", "defined(GL_ARB_gpu_shader5)", "LOOP == 1", "1 / 0", "1 +", "2 $ 3"],
+)
 def test_what_only_the_driver_can_tell_stays_whole(condition: str) -> None:
     text = f"#define LOOP LOOP\n#if {condition}\n#define MAYBE 1\nvoid unused() {{}}\n#elif 1\n#endif\n#ifdef MAYBE\nint i;\n#endif"
     assert stripped_source(text) == text.splitlines()
@@ -67,7 +81,10 @@ def test_chains_nest_and_the_first_true_branch_wins() -> None:
 
 def test_comments_go_and_hide_directives() -> None:
     text = "uniform int a; // b\n/* #ifdef X\n#endif */ uniform int c; /* d */ uniform int e;\n"
-    assert [line.split() for line in stripped_source(text)] == [["uniform", "int", "a;"], ["uniform", "int", "c;", "uniform", "int", "e;"]]
+    assert [line.split() for line in stripped_source(text)] == [
+        ["uniform", "int", "a;"],
+        ["uniform", "int", "c;", "uniform", "int", "e;"],
+    ]
 
 
 LIBRARY = """
@@ -102,8 +119,14 @@ layout(std430, binding = 0) buffer Out { Ray rays[]; };
 
 
 def test_only_what_main_and_the_interface_reach_is_left() -> None:
-    kept = "\n".join(stripped_source(LIBRARY + "void main()\n{\n    float total = 0.0;\n    STEP(1.0)\n    pack(rays[0]);\n}\n"))
-    macros, constants, structs = ("define PI", "STEP(x)", "total += helper"), ("const float table", "1.0,"), ("struct Ray",)
+    kept = "\n".join(
+        stripped_source(LIBRARY + "void main()\n{\n    float total = 0.0;\n    STEP(1.0)\n    pack(rays[0]);\n}\n")
+    )
+    macros, constants, structs = (
+        ("define PI", "STEP(x)", "total += helper"),
+        ("const float table", "1.0,"),
+        ("struct Ray",),
+    )
     functions = ("pack(Ray", "pack_texel(vec3", "float helper(float", "float helper(vec3", "buffer Out")
     for present in (*macros, *constants, *structs, *functions):
         assert present in kept, present
@@ -113,10 +136,21 @@ def test_only_what_main_and_the_interface_reach_is_left() -> None:
 
 def test_messages_still_name_file_and_line(tmp_path: Path) -> None:
     (tmp_path / "lib.glsl").write_text("// a library\nfloat unused() { return 0.0; }\n\nfloat used() { return 1.0; }\n")
-    (tmp_path / "main.comp").write_text('#include "lib.glsl"\n#ifdef MISSING\nint gone;\n#endif\nvoid main() {\n    wrong = used();\n}\n')
+    (tmp_path / "main.comp").write_text(
+        '#include "lib.glsl"\n#ifdef MISSING\nint gone;\n#endif\nvoid main() {\n    wrong = used();\n}\n'
+    )
     source = load_source("main.comp", {"SPARE": 1}, (Struct("Spare", (Field("a", "vec4"),)),), tmp_path)
-    assert source.text.splitlines() == ["#version 430 core", "float used() { return 1.0; }", "void main() {", "    wrong = used();", "}"]
-    assert source.explain("0:4(5): error") == "main.comp:6 (5): error" and source.explain("0(2) : error") == "lib.glsl:4  : error"
+    assert source.text.splitlines() == [
+        "#version 430 core",
+        "float used() { return 1.0; }",
+        "void main() {",
+        "    wrong = used();",
+        "}",
+    ]
+    assert (
+        source.explain("0:4(5): error") == "main.comp:6 (5): error"
+        and source.explain("0(2) : error") == "lib.glsl:4  : error"
+    )
     with pytest.raises(ShaderError, match="nowhere.glsl asked for by main.comp:1"):
         (tmp_path / "main.comp").write_text('#include "nowhere.glsl"\n')
         load_source("main.comp", {}, (), tmp_path)

@@ -150,7 +150,13 @@ def test_program_files_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) 
 
 @pytest.mark.parametrize(
     ("version", "least", "enough"),
-    [("2.4.6", "2.0", True), ("2.0", "2.0.0", True), ("3.5.3rc1", "3.5.3", True), ("2.9", "2.10", False), ("10", "9.9", True)],
+    [
+        ("2.4.6", "2.0", True),
+        ("2.0", "2.0.0", True),
+        ("3.5.3rc1", "3.5.3", True),
+        ("2.9", "2.10", False),
+        ("10", "9.9", True),
+    ],
 )
 def test_versions_compare_as_numbers(version: str, least: str, enough: bool) -> None:
     assert (doctor._version_key(version) >= doctor._version_key(least)) is enough

@@ -114,7 +114,9 @@ def test_a_large_map_is_averaged_by_area(tmp_path: Path, size: tuple[int, int]) 
     environment = from_map(tmp_path / "a.npy", notes=notes)
     assert environment.rgb.shape == (min(height, 2048), min(width, 4096), 3)
     assert "averaged down" in notes[-1]
-    np.testing.assert_allclose(environment.rgb.mean(axis=(0, 1), dtype=float), rgb.mean(axis=(0, 1), dtype=float), rtol=1e-6)
+    np.testing.assert_allclose(
+        environment.rgb.mean(axis=(0, 1), dtype=float), rgb.mean(axis=(0, 1), dtype=float), rtol=1e-6
+    )
     # The first texel is the mean over its share of the source, weights by hand.
     step_x, step_y = max(1.0, width / 4096), max(1.0, height / 2048)
     across, down = ([1.0] * int(s) + ([s - int(s)] if s > int(s) else []) for s in (step_x, step_y))
@@ -161,7 +163,8 @@ def test_a_gradient_refuses_what_is_no_radiance() -> None:
 
 
 def test_the_overcast_sky_is_three_times_as_bright_at_the_zenith() -> None:
-    """Type 1 replaces Moon and Spencer's (1 + 2 sin γ)/3: it keeps the 1/3 at the horizon and stays within 0.055 above 20°."""
+    """Type 1 replaces Moon and Spencer's (1 + 2 sin γ)/3: it keeps the 1/3 at the horizon and stays within 0.055 above
+    20°."""
     elevation = np.radians(np.linspace(0.0, 90.0, 91))
     towards = np.stack([np.cos(elevation), 0.0 * elevation, np.sin(elevation)], axis=1)
     found = relative_luminance(1, towards, np.array([0.0, 0.6, 0.8]))
@@ -207,14 +210,18 @@ def test_the_ground_is_lit_by_the_sky() -> None:
     environment = sky(40.0, 0.0, 7.0, 5, (0.1, 0.2, 0.4))
     half = environment.rgb.shape[0] // 2
     np.testing.assert_allclose(environment.rgb[:half], 7.0, rtol=1e-6)
-    np.testing.assert_allclose(environment.rgb[half:], np.broadcast_to([0.7, 1.4, 2.8], (half, environment.rgb.shape[1], 3)), rtol=1e-6)
+    np.testing.assert_allclose(
+        environment.rgb[half:], np.broadcast_to([0.7, 1.4, 2.8], (half, environment.rgb.shape[1], 3)), rtol=1e-6
+    )
 
 
 def test_the_horizontal_illuminance_of_an_overcast_sky() -> None:
     """7π/9 of the zenith's luminance for Moon and Spencer's law, which the rows hold here."""
     height = 400
     sine = np.cos(0.5 * np.pi * (np.arange(height) + 0.5) / height)
-    assert horizontal_illuminance(np.tile((1.0 + 2.0 * sine) / 3.0, (8, 1)).T) == pytest.approx(7.0 * np.pi / 9.0, rel=1e-5)
+    assert horizontal_illuminance(np.tile((1.0 + 2.0 * sine) / 3.0, (8, 1)).T) == pytest.approx(
+        7.0 * np.pi / 9.0, rel=1e-5
+    )
 
 
 @pytest.mark.parametrize(

@@ -24,21 +24,67 @@ from spectrasplat.passes.camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS
 from spectrasplat.passes.footprint import SPLAT, footprint_defines, splat_defines
 
 EVERYTHING = Features(
-    method="srd", spectral_groups=2, merged_groups=True, spectral_weights=True, footprints=True, point_spectrum=False, random_wavelength=False, even_wavelengths=False, band_cuts=True,
-    dielectrics=True, mirrors=True, smooth_normals=True, normal_derivatives=True, absorption=True, medium_stack=True, tree=True,
-    loose_triangles=True, convex_solids=True, charts=True, nested_windows=True, targets=3,
-    local_gain=True, reindexed=True, camera_specular=True, camera_disperses=True, map_tents=8,
-)  # fmt: skip
+    method="srd",
+    spectral_groups=2,
+    merged_groups=True,
+    spectral_weights=True,
+    footprints=True,
+    point_spectrum=False,
+    random_wavelength=False,
+    even_wavelengths=False,
+    band_cuts=True,
+    dielectrics=True,
+    mirrors=True,
+    smooth_normals=True,
+    normal_derivatives=True,
+    absorption=True,
+    medium_stack=True,
+    tree=True,
+    loose_triangles=True,
+    convex_solids=True,
+    charts=True,
+    nested_windows=True,
+    targets=3,
+    local_gain=True,
+    reindexed=True,
+    camera_specular=True,
+    camera_disperses=True,
+    map_tents=8,
+)
 PLAIN_CAMERA = {"camera_disperses": False, "map_tents": 0}
 """What the camera sees disperses nothing: the camera carries the spectrum in the same way as the light pass."""
 WITHOUT = {
-    "spectral columns": {"spectral_groups": 0, "merged_groups": False, "band_cuts": False, "local_gain": False, "reindexed": False, **PLAIN_CAMERA},
+    "spectral columns": {
+        "spectral_groups": 0,
+        "merged_groups": False,
+        "band_cuts": False,
+        "local_gain": False,
+        "reindexed": False,
+        **PLAIN_CAMERA,
+    },
     "shared spectral variable": {"merged_groups": False},
-    "weights over the band": {"spectral_weights": False, "spectral_groups": 0, "merged_groups": False, "band_cuts": False},
+    "weights over the band": {
+        "spectral_weights": False,
+        "spectral_groups": 0,
+        "merged_groups": False,
+        "band_cuts": False,
+    },
     "band cuts": {"band_cuts": False, **PLAIN_CAMERA},
-    "spatial columns": {"footprints": False, "spectral_groups": 0, "merged_groups": False, "band_cuts": False, "normal_derivatives": False},
+    "spatial columns": {
+        "footprints": False,
+        "spectral_groups": 0,
+        "merged_groups": False,
+        "band_cuts": False,
+        "normal_derivatives": False,
+    },
     "refraction": {
-        "dielectrics": False, "absorption": False, "band_cuts": False, "spectral_weights": False, "spectral_groups": 0, "merged_groups": False, **PLAIN_CAMERA,
+        "dielectrics": False,
+        "absorption": False,
+        "band_cuts": False,
+        "spectral_weights": False,
+        "spectral_groups": 0,
+        "merged_groups": False,
+        **PLAIN_CAMERA,
     },
     "mirrors": {"mirrors": False},
     "interpolated normals": {"smooth_normals": False, "normal_derivatives": False},
@@ -55,41 +101,108 @@ WITHOUT = {
     "camera refraction": {"camera_specular": False, **PLAIN_CAMERA},
     "camera spectral taps": PLAIN_CAMERA,
     "spectral maps": {"map_tents": 0},
-}  # fmt: skip
+}
 
 
 def sources(features: Features) -> list[shader.Source]:
     """The light pass's and the camera's sources, with stand-ins for the numbers that only a scene's data give."""
     ray, photon = records.ray_record(features.defines()["COLUMNS"]), records.photon_record(features.spectral_groups)
     structs = (*SCENE_STRUCTS, ray, photon, records.OUTCOME, records.TRACE_PARAMETERS, records.EMIT_PARAMETERS)
-    copies = " ".join(f"photon.dposition_dvar{g} = ray.dposition[SPATIAL + {g}];" for g in range(features.spectral_groups))
-    numbers = {"SPECTRAL_COPY": copies, "TREE_AT": 0, "TREE_STACK": 9, "NORMALS_AT": 0, "INDEX_ROW": 0, "SLOPE_ROW": 1, "VARIABLE_ROW": 2}
+    copies = " ".join(
+        f"photon.dposition_dvar{g} = ray.dposition[SPATIAL + {g}];" for g in range(features.spectral_groups)
+    )
+    numbers = {
+        "SPECTRAL_COPY": copies,
+        "TREE_AT": 0,
+        "TREE_STACK": 9,
+        "NORMALS_AT": 0,
+        "INDEX_ROW": 0,
+        "SLOPE_ROW": 1,
+        "VARIABLE_ROW": 2,
+    }
     numbers |= {"STACK_SIZE": 1, "STACK_OBJECTS": "uint[](0u)", "SOLID_COUNT": 1, "PLANE_COUNT": 6, "TRIANGLE_COUNT": 9}
     light = features.defines() | numbers
     splat = splat_defines(features) | {"GROUPS": features.spectral_groups}
-    made = [shader.load_source("light/trace.comp", light, structs), shader.load_source("light/emit.comp", light | {"LIGHT_POINT": 1}, structs)]
-    made.append(shader.load_source("light/footprint.comp", footprint_defines(features), (photon, records.PLACEMENT, records.RECEIVER, SPLAT, records.GAIN_BOX)))
-    draws = {"light/splat_small.frag": "SMALL", "light/splat_swept.frag": "SWEPT"} | ({"light/splat_cut.frag": "CUT"} if features.band_cuts else {})
+    made = [
+        shader.load_source("light/trace.comp", light, structs),
+        shader.load_source("light/emit.comp", light | {"LIGHT_POINT": 1}, structs),
+    ]
+    made.append(
+        shader.load_source(
+            "light/footprint.comp",
+            footprint_defines(features),
+            (photon, records.PLACEMENT, records.RECEIVER, SPLAT, records.GAIN_BOX),
+        )
+    )
+    draws = {"light/splat_small.frag": "SMALL", "light/splat_swept.frag": "SWEPT"} | (
+        {"light/splat_cut.frag": "CUT"} if features.band_cuts else {}
+    )
     for fragment, kind in draws.items():
         made += [shader.load_source(name, splat | {kind: 1}, (SPLAT,)) for name in ("light/splat.vert", fragment)]
     return made + camera_sources(features, light)
 
 
-def camera_sources(features: Features, light: dict[str, int | float | str], images: dict[str, int] | None = None) -> list[shader.Source]:
-    """The camera's one program, or two where it sees glass or mirrors; `light`: symbols of the scene, `images`: of the texture store."""
+def camera_sources(
+    features: Features, light: dict[str, int | float | str], images: dict[str, int] | None = None
+) -> list[shader.Source]:
+    """The camera's one program, or two where it sees glass or mirrors; `light`: symbols of the scene, `images`: of the
+    texture store."""
     single = features.spectral_groups if features.camera_specular and features.camera_disperses else 0
-    rows = ("WHITE_ROW", "LIGHT_ROW", "ROWS_PER_LIGHT", "BIN_ROW", "BIN_SPECTRUM_ROW", "REFLECTANCE_ROW", "BASIS_ROW", "ABSORPTION_ROW")
-    camera_pass = light | dict.fromkeys(rows, 1) | {"TARGETS": 1, "MAP_TARGETS": features.targets, "SPECTRAL_GROUPS": single, "ABSORBERS": 1, "EMISSION_CELLS": 1023}
-    camera_pass |= {"BIN_TARGET": 1, "BIN_OVERLAP": 0, "STACK": 6, "MAX_DEPTH": 48, "MAX_EVENTS": 160, "LIGHT_COUNT": 1, "TINT_STEPS": 48, "BIN_COUNT": features.map_tents}
+    rows = (
+        "WHITE_ROW",
+        "LIGHT_ROW",
+        "ROWS_PER_LIGHT",
+        "BIN_ROW",
+        "BIN_SPECTRUM_ROW",
+        "REFLECTANCE_ROW",
+        "BASIS_ROW",
+        "ABSORPTION_ROW",
+    )
+    camera_pass = (
+        light
+        | dict.fromkeys(rows, 1)
+        | {
+            "TARGETS": 1,
+            "MAP_TARGETS": features.targets,
+            "SPECTRAL_GROUPS": single,
+            "ABSORBERS": 1,
+            "EMISSION_CELLS": 1023,
+        }
+    )
+    camera_pass |= {
+        "BIN_TARGET": 1,
+        "BIN_OVERLAP": 0,
+        "STACK": 6,
+        "MAX_DEPTH": 48,
+        "MAX_EVENTS": 160,
+        "LIGHT_COUNT": 1,
+        "TINT_STEPS": 48,
+        "BIN_COUNT": features.map_tents,
+    }
     switches = {
-        "LAYER_BEAUTY": True, "RGB_CHANNELS": True, "HAS_RECEIVERS": True, "VISIBLE_LIGHTS": True, "MAP_BINS": features.map_tents > 0,
-        "CAMERA_SPECULAR": features.camera_specular, "HAS_DISPERSION": features.camera_disperses, "SPECTRAL_SWEEP": single > 0,
-        "ABSORPTION": features.absorption and features.camera_specular, "NORMAL_DERIVATIVES": features.smooth_normals, **(images or {}),
-    }  # fmt: skip
+        "LAYER_BEAUTY": True,
+        "RGB_CHANNELS": True,
+        "HAS_RECEIVERS": True,
+        "VISIBLE_LIGHTS": True,
+        "MAP_BINS": features.map_tents > 0,
+        "CAMERA_SPECULAR": features.camera_specular,
+        "HAS_DISPERSION": features.camera_disperses,
+        "SPECTRAL_SWEEP": single > 0,
+        "ABSORPTION": features.absorption and features.camera_specular,
+        "NORMAL_DERIVATIVES": features.smooth_normals,
+        **(images or {}),
+    }
     for name in switches:
         camera_pass.pop(name, None)
     camera_pass |= {name: 1 for name, on in switches.items() if on}
-    structs = (*SCENE_STRUCTS, CAMERA_LIGHT, CAMERA_PARAMETERS, records.RECEIVER, records.PLACEMENT, *([PICTURE] if images else []))
+    structs = (
+        *SCENE_STRUCTS,
+        CAMERA_LIGHT,
+        CAMERA_PARAMETERS,
+        records.RECEIVER,
+        records.PLACEMENT,
+        *([PICTURE] if images else []),
+    )
     programs = [camera_pass, direct_defines(camera_pass)] if "CAMERA_SPECULAR" in camera_pass else [camera_pass]
     return [shader.load_source("camera/camera.comp", defines, structs) for defines in programs]
 
@@ -109,8 +222,27 @@ def test_symbols_come_and_go_with_their_feature(feature: str) -> None:
 
 
 SHIPPED = {
-    "ball_plain": ("camera spectral taps", "spectral maps", "spectral columns", "weights over the band", "band cuts", "absorption", "medium stack", "spectral bins", "mirrors", "charts"),
-    "prism": ("interpolated normals", "normal derivatives", "triangle tree", "absorption", "medium stack", "mirrors", "charts"),
+    "ball_plain": (
+        "camera spectral taps",
+        "spectral maps",
+        "spectral columns",
+        "weights over the band",
+        "band cuts",
+        "absorption",
+        "medium stack",
+        "spectral bins",
+        "mirrors",
+        "charts",
+    ),
+    "prism": (
+        "interpolated normals",
+        "normal derivatives",
+        "triangle tree",
+        "absorption",
+        "medium stack",
+        "mirrors",
+        "charts",
+    ),
     "brilliant": ("interpolated normals", "normal derivatives", "triangle tree", "absorption", "medium stack"),
 }
 
@@ -137,11 +269,22 @@ def test_a_scene_without_dispersion_has_no_spectral_code_nor_columns() -> None:
 
 
 IMAGES = {"HAS_IMAGES": 1, "TEXTURE_COUNT": 1, "BIND_PICTURES": 13, "UNIT_PICTURES": 11, "UNIT_CORNERS": 12}
-PICTURED = {"HAS_TEXTURES": ("painted", "texture_filtered", "uv_gradients", "pictures"), "HAS_ENVIRONMENT_MAP": ("environment_radiance", "pictures", "box_of_three")}
+PICTURED = {
+    "HAS_TEXTURES": ("painted", "texture_filtered", "uv_gradients", "pictures"),
+    "HAS_ENVIRONMENT_MAP": ("environment_radiance", "pictures", "box_of_three"),
+}
 
 
 def test_pictures_are_looked_up_only_where_there_are_any() -> None:
-    light = EVERYTHING.defines() | {"TREE_AT": 0, "TREE_STACK": 9, "NORMALS_AT": 0, "INDEX_ROW": 0, "SLOPE_ROW": 1, "VARIABLE_ROW": 2, "STACK_SIZE": 1}
+    light = EVERYTHING.defines() | {
+        "TREE_AT": 0,
+        "TREE_STACK": 9,
+        "NORMALS_AT": 0,
+        "INDEX_ROW": 0,
+        "SLOPE_ROW": 1,
+        "VARIABLE_ROW": 2,
+        "STACK_SIZE": 1,
+    }
     light |= {"STACK_OBJECTS": "uint[](0u)", "SOLID_COUNT": 1, "PLANE_COUNT": 6, "TRIANGLE_COUNT": 9}
     names = {name for symbols in PICTURED.values() for name in symbols}
     assert all(occurring(source.text, sorted(names)) == () for source in camera_sources(EVERYTHING, light))

@@ -69,9 +69,13 @@ def test_every_catalogue_entry_is_sound() -> None:
 def test_catalogue_agrees_with_makers_data_sheets() -> None:
     """n_d and V_d as the makers print them (five and two decimals)."""
     sheets = {
-        "Schott N-SF66": (1.92286, 20.88), "Ohara S-BSL7": (1.51633, 64.14), "Hoya TAF1": (1.77250, 49.62),
-        "CDGM H-K9L": (1.51680, 64.20), "Sumita K-BK7": (1.51633, 64.06), "Hikari J-BK7A": (1.51680, 64.13),
-    }  # fmt: skip
+        "Schott N-SF66": (1.92286, 20.88),
+        "Ohara S-BSL7": (1.51633, 64.14),
+        "Hoya TAF1": (1.77250, 49.62),
+        "CDGM H-K9L": (1.51680, 64.20),
+        "Sumita K-BK7": (1.51633, 64.06),
+        "Hikari J-BK7A": (1.51680, 64.13),
+    }
     for name, (n_d, v_d) in sheets.items():
         found = catalogue.find(name)
         assert (found.n_d, found.V_d) == (pytest.approx(n_d, abs=1e-5), pytest.approx(v_d, abs=0.02)), name
@@ -264,7 +268,10 @@ def test_distinct_gains_are_distinct_glasses_to_the_renderer() -> None:
 
     def scene(*gains: float) -> Scene:
         plain = catalogue.find("N-SF11")
-        balls = [SceneObject(f"ball {i}", primitives.box(), Dielectric(glass.with_gain(plain, gain))) for i, gain in enumerate(gains)]
+        balls = [
+            SceneObject(f"ball {i}", primitives.box(), Dielectric(glass.with_gain(plain, gain)))
+            for i, gain in enumerate(gains)
+        ]
         floor = SceneObject("floor", primitives.plane(), Diffuse())
         return Scene("s", Camera((0, -3, 1), (0, 0, 0)), (default_light(),), (*balls, floor))
 

@@ -138,7 +138,9 @@ def test_strided_sparse_and_normalised_accessors(tmp_path: Path) -> None:
     )
     attributes = builder.json["meshes"][0]["primitives"][0]["attributes"]
     attributes["POSITION"] = len(builder.json["accessors"]) - 1
-    attributes["NORMAL"] = builder.accessor(np.array([(0, 0, 127, 0)] * 4, "i1")[:, :3].copy(), "VEC3", 5120, normalized=True)
+    attributes["NORMAL"] = builder.accessor(
+        np.array([(0, 0, 127, 0)] * 4, "i1")[:, :3].copy(), "VEC3", 5120, normalized=True
+    )
     mesh = load_gltf(builder.glb(tmp_path / "m.glb")).objects[0].mesh
     assert mesh.volume() == pytest.approx(1.0 / 6.0)
     np.testing.assert_allclose(mesh.corner_normals, np.broadcast_to([0.0, 0.0, 1.0], (4, 3, 3)))
@@ -185,7 +187,11 @@ def test_cameras_and_lights(tmp_path: Path) -> None:
     builder.json["scenes"][0]["nodes"] = [0, 1, 2, 3, 4]
     builder.json["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}}]
     spot = {"type": "spot", "name": "spot", "intensity": 40.0, "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.4}}
-    lamps = [spot, {"type": "point", "intensity": 8.0, "color": [1.0, 0.5, 0.25]}, {"type": "directional", "intensity": 3.0}]
+    lamps = [
+        spot,
+        {"type": "point", "intensity": 8.0, "color": [1.0, 0.5, 0.25]},
+        {"type": "directional", "intensity": 3.0},
+    ]
     builder.json["extensions"] = {"KHR_lights_punctual": {"lights": lamps}}
     scene = load_gltf(builder.glb(tmp_path / "m.glb"))
     assert scene.camera.vertical_fov_deg == pytest.approx(math.degrees(0.5))
@@ -204,7 +210,9 @@ def test_cameras_and_lights(tmp_path: Path) -> None:
 def test_orthographic_camera(tmp_path: Path) -> None:
     builder = Builder().tetrahedron()
     builder.json["nodes"][0]["camera"] = 0
-    builder.json["cameras"] = [{"type": "orthographic", "orthographic": {"xmag": 2, "ymag": 1.5, "znear": 0, "zfar": 9}}]
+    builder.json["cameras"] = [
+        {"type": "orthographic", "orthographic": {"xmag": 2, "ymag": 1.5, "znear": 0, "zfar": 9}}
+    ]
     camera = load_gltf(builder.glb(tmp_path / "m.glb")).camera
     assert camera.kind == "orthographic" and camera.vertical_extent == 3.0
 
@@ -212,10 +220,12 @@ def test_orthographic_camera(tmp_path: Path) -> None:
 MATERIALS: dict[str, tuple[dict[str, Any], Any]] = {
     "default": ({}, Diffuse((1.0, 1.0, 1.0))),
     "diffuse": (
-        {"pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3, 1], "metallicFactor": 0}}, Diffuse((0.1, 0.2, 0.3))
+        {"pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3, 1], "metallicFactor": 0}},
+        Diffuse((0.1, 0.2, 0.3)),
     ),
     "mirror": (
-        {"pbrMetallicRoughness": {"baseColorFactor": [0.9, 0.8, 0.7, 1], "roughnessFactor": 0.05}}, Mirror((0.9, 0.8, 0.7))
+        {"pbrMetallicRoughness": {"baseColorFactor": [0.9, 0.8, 0.7, 1], "roughnessFactor": 0.05}},
+        Mirror((0.9, 0.8, 0.7)),
     ),
     "named": ({"extras": {"spectrasplat": {"glass": "n-sf11"}}}, Dielectric(catalogue.find("N-SF11"))),
     "short": ({"extras": {"glass": "Schott N-BK7"}}, Dielectric(catalogue.find("N-BK7"))),
@@ -228,7 +238,7 @@ MATERIALS: dict[str, tuple[dict[str, Any], Any]] = {
         {"extras": {"spectrasplat": {"material": {"n_d": 1.7, "V_d": 30.0, "priority": 2}}}},
         Dielectric(glass.from_abbe(1.7, 30.0), priority=2),
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", MATERIALS)
@@ -274,15 +284,26 @@ BROKEN: dict[str, tuple[Any, str]] = {
     "empty": (_spoiled(lambda j: j.update(nodes=[{}])), "no triangles"),
     "glass": (_spoiled(lambda j: j.update(materials=[{"extras": {"glass": "N-BK8"}}])), "N-BK7"),
     "ior": (
-        _spoiled(lambda j: j.update(materials=[_glass_material() | {"extensions": {
-            "KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_ior": {"ior": -1.0}}}])),
+        _spoiled(
+            lambda j: j.update(
+                materials=[
+                    _glass_material()
+                    | {
+                        "extensions": {
+                            "KHR_materials_transmission": {"transmissionFactor": 1},
+                            "KHR_materials_ior": {"ior": -1.0},
+                        }
+                    }
+                ]
+            )
+        ),
         "materials.0.",
     ),
     "material key": (
         _spoiled(lambda j: j.update(materials=[{"extras": {"spectrasplat": {"material": {"glas": "F2"}}}}])),
         r"materials\[0\].extras.spectrasplat.material",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", BROKEN)
@@ -356,22 +377,40 @@ def _rich_scene() -> Scene:
         "rich",
         Camera((1.0, 2.0, 5.0), (0.0, 0.5, 0.0), (0.0, 1.0, 0.0), vertical_fov_deg=28.0),
         (
-            Light("sun", "directional", illuminant("D65").scaled_to_luminous(2e4), direction=(0.0, -0.6, -0.8), angular_diameter_deg=0.5),
+            Light(
+                "sun",
+                "directional",
+                illuminant("D65").scaled_to_luminous(2e4),
+                direction=(0.0, -0.6, -0.8),
+                angular_diameter_deg=0.5,
+            ),
             Light("bulb", "point", blackbody(2900.0).scaled_to_luminous(80.0), position=(1.0, 3.0, 0.5)),
             Light("spot", "spot", laser(532.0, 2.0), (0.0, 4.0, 0.0), (0.0, -1.0, 0.0), None, 12.0, 12.0),
-            Light("panel", "area", illuminant("A").scaled_to_power(3.0), (0.0, 5.0, 0.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0), shape="rectangle", width=2.0, height=0.5),
+            Light(
+                "panel",
+                "area",
+                illuminant("A").scaled_to_power(3.0),
+                (0.0, 5.0, 0.0),
+                (0.0, -1.0, 0.0),
+                (1.0, 0.0, 0.0),
+                shape="rectangle",
+                width=2.0,
+                height=0.5,
+            ),
             Light("beam", "collimated", laser(633.0), (-4.0, 1.0, 0.0), (1.0, 0.0, 0.0), radius=0.1),
         ),
         (
             SceneObject("ball", ball, Dielectric(catalogue.find("N-SF11"), tint, 3)),
             SceneObject("CPU reference", ball, Dielectric(catalogue.find("N-SF11"), tint, 3), moved),
-            SceneObject("coefficients", primitives.box(), Dielectric(glass.sellmeier((1.1, 0.2), (0.01, 0.02))), mirrored),
+            SceneObject(
+                "coefficients", primitives.box(), Dielectric(glass.sellmeier((1.1, 0.2), (0.01, 0.02))), mirrored
+            ),
             SceneObject("mirror", primitives.disc(), Mirror((0.9, 0.8, 0.7))),
             SceneObject("stop", primitives.plane(), Black()),
             SceneObject("paint", primitives.plane(4.0, 4.0), Diffuse((0.4, 0.4, 0.4), grey)),
             SceneObject("floor", primitives.plane(9.0, 9.0), Diffuse((0.5, 0.6, 0.7))),
         ),
-    )  # fmt: skip
+    )
 
 
 def _rounded(value: Any) -> Any:
@@ -425,7 +464,9 @@ def test_saved_file_is_read_by_others(tmp_path: Path) -> None:
     assert dispersion == pytest.approx(20.0 / catalogue.find("N-SF11").V_d)
     assert document.materials[0].extensions["KHR_materials_ior"]["ior"] == pytest.approx(1.78472, abs=1e-4)
     assert set(document.extensionsUsed) >= {"KHR_lights_punctual", "KHR_materials_dispersion"}
-    assert document.accessors[document.meshes[0].primitives[0].attributes.POSITION].max == pytest.approx([0.5] * 3, abs=0.01)
+    assert document.accessors[document.meshes[0].primitives[0].attributes.POSITION].max == pytest.approx(
+        [0.5] * 3, abs=0.01
+    )
 
 
 def _foreign(path: Path) -> Path:
@@ -495,7 +536,10 @@ def test_edits_change_what_they_mean_and_no_more(tmp_path: Path) -> None:
 
 def test_one_of_two_instances_can_change(tmp_path: Path) -> None:
     builder = Builder().tetrahedron({"name": "paint"})
-    builder.json["nodes"] = [{"mesh": 0, "name": "a", "children": [1]}, {"mesh": 0, "name": "b", "translation": [3, 0, 0]}]
+    builder.json["nodes"] = [
+        {"mesh": 0, "name": "a", "children": [1]},
+        {"mesh": 0, "name": "b", "translation": [3, 0, 0]},
+    ]
     path = builder.glb(tmp_path / "a.glb")
     scene = load_gltf(path)
     first, second = scene.objects
@@ -560,7 +604,11 @@ def test_gain_dabs_background_and_render_defaults_come_back_exactly(tmp_path: Pa
 def test_other_viewers_get_the_effective_abbe_number(tmp_path: Path) -> None:
     save_gltf(_painted_scene(), tmp_path / "a.gltf")
     materials = json.loads((tmp_path / "a.gltf").read_text())["materials"]
-    told = [m["extensions"]["KHR_materials_dispersion"]["dispersion"] for m in materials if "KHR_materials_dispersion" in m.get("extensions", {})]
+    told = [
+        m["extensions"]["KHR_materials_dispersion"]["dispersion"]
+        for m in materials
+        if "KHR_materials_dispersion" in m.get("extensions", {})
+    ]
     plain = 20.0 / catalogue.find("N-SF11").V_d
     assert told[:2] == [pytest.approx(3.0 * plain), pytest.approx(plain)]
 
@@ -586,7 +634,10 @@ def test_dabs_follow_their_primitive_when_others_leave_the_node(tmp_path: Path) 
     mesh["primitives"] = [dict(mesh["primitives"][0]) for _ in range(3)]
     path = tmp_path / "a.gltf"
     builder.json["buffers"] = [
-        {"byteLength": len(builder.data), "uri": "data:application/octet-stream;base64," + base64.b64encode(builder.data).decode()}
+        {
+            "byteLength": len(builder.data),
+            "uri": "data:application/octet-stream;base64," + base64.b64encode(builder.data).decode(),
+        }
     ]
     path.write_text(json.dumps(builder.json))
     scene = load_gltf(path)
@@ -594,7 +645,10 @@ def test_dabs_follow_their_primitive_when_others_leave_the_node(tmp_path: Path) 
     dabs = [(Dab((float(i), 0.0, 0.0), 1.0, 1.0),) for i in range(3)]
     moved = np.array(second.object_to_world)
     moved[0, 3] += 5.0
-    objects = (replace(second, object_to_world=moved, local_dispersion=dabs[1]), replace(third, local_dispersion=dabs[2]))
+    objects = (
+        replace(second, object_to_world=moved, local_dispersion=dabs[1]),
+        replace(third, local_dispersion=dabs[2]),
+    )
     save_gltf(replace(scene, objects=objects), tmp_path / "b.gltf", path)
     again = {float(o.object_to_world[0, 3]): o.local_dispersion for o in load_gltf(tmp_path / "b.gltf").objects}
     assert again == {5.0: dabs[1], 0.0: dabs[2]}

@@ -34,7 +34,8 @@ def png(levels: np.ndarray = LEVELS) -> bytes:
 
 
 def quad(folder: Path, image: dict[str, Any] | None, data: bytes = b"", uv: bool = True, **more: Any) -> Path:
-    """A unit quad in z = 0 facing +z, glTF's (0, 0) at its upper left, written by hand; `data` goes behind its accessors."""
+    """A unit quad in z = 0 facing +z, glTF's (0, 0) at its upper left, written by hand; `data` goes behind its
+    accessors."""
     positions = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], "<f4")
     coordinates = np.array([(0, 1), (1, 1), (1, 0), (0, 0)], "<f4")
     indices = np.array([0, 1, 2, 0, 2, 3], "<u4")
@@ -46,20 +47,30 @@ def quad(folder: Path, image: dict[str, Any] | None, data: bytes = b"", uv: bool
     document = {
         "asset": {"version": "2.0"},
         "buffers": [{"byteLength": len(buffer), "uri": "data:;base64," + base64.b64encode(buffer).decode()}],
-        "bufferViews": [{"buffer": 0, "byteOffset": s, "byteLength": len(p)} for s, p in zip(starts, parts, strict=False) if p],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": s, "byteLength": len(p)} for s, p in zip(starts, parts, strict=False) if p
+        ],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
             {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2"},
             {"bufferView": 2, "componentType": 5125, "count": 6, "type": "SCALAR"},
         ],
         "meshes": [{"primitives": [{"attributes": attributes, "indices": 2, "material": 0}]}],
-        "materials": [{"name": "poster", "pbrMetallicRoughness": {
-            "baseColorFactor": [0.5, 1, 1, 1], "metallicFactor": 0, "baseColorTexture": {"index": 0}}}],
+        "materials": [
+            {
+                "name": "poster",
+                "pbrMetallicRoughness": {
+                    "baseColorFactor": [0.5, 1, 1, 1],
+                    "metallicFactor": 0,
+                    "baseColorTexture": {"index": 0},
+                },
+            }
+        ],
         "nodes": [{"mesh": 0, "name": "quad"}],
         "scenes": [{"nodes": [0]}],
         "textures": [texture],
         "images": [image] if image else [],
-    }  # fmt: skip
+    }
     path = folder / "quad.gltf"
     path.write_text(json.dumps(document | more))
     return path
@@ -78,7 +89,11 @@ def poster_of(scene: Scene) -> Texture:
 @pytest.mark.parametrize("where", ["data uri", "file", "buffer view"])
 def test_the_image_is_found_wherever_it_lies(tmp_path: Path, where: str) -> None:
     (tmp_path / "a poster.png").write_bytes(png())
-    image = {"data uri": data_uri(png()), "file": {"uri": "a%20poster.png"}, "buffer view": {"bufferView": 3, "mimeType": "image/png"}}[where]
+    image = {
+        "data uri": data_uri(png()),
+        "file": {"uri": "a%20poster.png"},
+        "buffer view": {"bufferView": 3, "mimeType": "image/png"},
+    }[where]
     scene = load_gltf(quad(tmp_path, image, png() if where == "buffer view" else b""))
     texture = poster_of(scene)
     assert texture.wrap == "repeat" and scene.objects[0].material.reflectance_rgb == (0.5, 1.0, 1.0)
@@ -123,7 +138,9 @@ def test_what_is_not_shown_is_told(tmp_path: Path) -> None:
     more = {"normalTexture": {"index": 0}, "pbrMetallicRoughness": {"metallicFactor": 0, "baseColorTexture": moved}}
     scene = load_gltf(quad(tmp_path, data_uri(png()), materials=[more]))
     assert poster_of(scene).rgb.shape == (4, 6, 3)
-    assert "without its KHR_texture_transform" in " ".join(scene.notes) and "its other textures are not shown" in " ".join(scene.notes)
+    assert "without its KHR_texture_transform" in " ".join(
+        scene.notes
+    ) and "its other textures are not shown" in " ".join(scene.notes)
 
 
 @pytest.mark.parametrize(
@@ -139,7 +156,9 @@ def test_what_is_not_shown_is_told(tmp_path: Path) -> None:
         (data_uri(png()), {"samplers": []}, "refers to samplers[0], but there are 0"),
     ],
 )
-def test_bad_images_are_refused(tmp_path: Path, image: dict[str, Any] | None, more: dict[str, Any], expected: str) -> None:
+def test_bad_images_are_refused(
+    tmp_path: Path, image: dict[str, Any] | None, more: dict[str, Any], expected: str
+) -> None:
     with pytest.raises(UserError) as caught:
         load_gltf(quad(tmp_path, image, **more))
     assert expected in str(caught.value) and "\n" not in str(caught.value)
@@ -169,7 +188,10 @@ def test_textures_survive_saving_as_gltf(tmp_path: Path, suffix: str) -> None:
     back = load_gltf(tmp_path / f"walls{suffix}")
     assert back.notes == ()
     for old, new in zip(scene.objects, back.objects, strict=True):
-        assert new.material.reflectance_rgb == old.material.reflectance_rgb and new.material.texture.wrap == old.material.texture.wrap
+        assert (
+            new.material.reflectance_rgb == old.material.reflectance_rgb
+            and new.material.texture.wrap == old.material.texture.wrap
+        )
         np.testing.assert_array_equal(new.material.texture.rgb, old.material.texture.rgb)
         np.testing.assert_allclose(new.mesh.uv, old.mesh.uv, atol=1e-7)
     assert back.objects[0].material.texture is back.objects[1].material.texture
@@ -201,7 +223,9 @@ def test_another_texture_takes_the_place_of_the_documents(tmp_path: Path) -> Non
     path = quad(tmp_path, data_uri(png()))
     scene = load_gltf(path)
     other = replace(scene.objects[0].material, texture=Texture(poster_of(scene).rgb[:, ::-1], "clamp"))
-    save_gltf(replace(scene, objects=(replace(scene.objects[0], material=other),)), tmp_path / "edited.glb", original=path)
+    save_gltf(
+        replace(scene, objects=(replace(scene.objects[0], material=other),)), tmp_path / "edited.glb", original=path
+    )
     texture = poster_of(load_gltf(tmp_path / "edited.glb"))
     assert texture.wrap == "clamp"
     np.testing.assert_array_equal(texture.rgb, other.texture.rgb)

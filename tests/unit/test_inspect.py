@@ -67,7 +67,9 @@ def test_objects_glasses_and_lights_are_listed_with_their_numbers(tmp_path: Path
     gem = row(text, "gem")
     assert "110" in gem and "diamond" in gem and "flat" in gem and "watertight" in gem
     ball = row(text, "ball")
-    assert "320" in ball and "1 × 1 × 1 about (3, 0, 0)" in ball and "absorbing, priority 4" in ball and "smooth" in ball
+    assert (
+        "320" in ball and "1 × 1 × 1 about (3, 0, 0)" in ball and "absorbing, priority 4" in ball and "smooth" in ball
+    )
     assert "4 boundary edges" in row(text, "floor") and "diffuse 0.18" in row(text, "floor")
     assert "2.417486" in text and "55.30" in text and "226–760 nm" in text
     lamp = row(text, "lamp")
@@ -91,7 +93,10 @@ def test_features_that_are_in_tell_what_they_add(tmp_path: Path) -> None:
     assert " B" not in row(text, "mirrors")
     # Both glasses stand before the camera: the maps hold eight spectral channels beside XYZ.
     assert "32 B a texel" in row(text, "spectral maps") and "a second program" in row(text, "camera refraction")
-    assert "A ray is 224 bytes with 4 derivative column(s), a photon record 128, its splats 192, a map's texel 48." in " ".join(text.split())
+    assert (
+        "A ray is 224 bytes with 4 derivative column(s), a photon record 128, its splats 192, a map's texel 48."
+        in " ".join(text.split())
+    )
     assert "bench --features" in text
 
 
@@ -107,9 +112,21 @@ def test_notes_of_the_loader_are_shown(tmp_path: Path) -> None:
     [
         ('kind = "point"\nposition = [0, 0, 9]\nspectrum = {laser = 532}\nflux_lm = 5', "laser 532 nm", 5.0),
         ('kind = "area"\nposition = [0, 0, 9]\nsize = [2, 3]\nluminance_nt = 7', "D65", 7.0 * 6.0 * math.pi),
-        ('kind = "collimated"\nposition = [0, 0, 9]\nradius = 2\nspectrum = "A"\nilluminance_lx = 7', "A", 28.0 * math.pi),
-        ('kind = "directional"\ndirection = [0, 0, -1]\nspectrum = {lines = [[450, 1], [650, 1]]}', "lines at 450, 650 nm", None),
-        ('kind = "directional"\ndirection = [0, 0, -1]\nspectrum = {nm = [400, 700], values = [0, 1]}', "table 401–700 nm", None),
+        (
+            'kind = "collimated"\nposition = [0, 0, 9]\nradius = 2\nspectrum = "A"\nilluminance_lx = 7',
+            "A",
+            28.0 * math.pi,
+        ),
+        (
+            'kind = "directional"\ndirection = [0, 0, -1]\nspectrum = {lines = [[450, 1], [650, 1]]}',
+            "lines at 450, 650 nm",
+            None,
+        ),
+        (
+            'kind = "directional"\ndirection = [0, 0, -1]\nspectrum = {nm = [400, 700], values = [0, 1]}',
+            "table 401–700 nm",
+            None,
+        ),
     ],
 )
 def test_spectra_and_fluxes_in_words(tmp_path: Path, light: str, words: str, lumen: float | None) -> None:
@@ -127,12 +144,20 @@ def looked_up(value: Scene, **settings: object) -> dict[str, Lookup]:
 
 def test_pictures_are_listed_with_size_filter_and_memory() -> None:
     text = said(load_scene(find_scene("lens_text")))
-    assert "wears a picture" in row(text, "page") and " in " in row(text, "textures") and "on page" in row(text, "textures")
+    assert (
+        "wears a picture" in row(text, "page")
+        and " in " in row(text, "textures")
+        and "on page" in row(text, "textures")
+    )
     # 1024 rows of 1024 + 512 texels of 16 bytes.
-    assert "text.png, 1024 × 1024, 11 level(s), on page" in row(text, "texture") and "about 24.0 MiB" in row(text, "texture")
+    assert "text.png, 1024 × 1024, 11 level(s), on page" in row(text, "texture") and "about 24.0 MiB" in row(
+        text, "texture"
+    )
     assert " out " in row(text, "environment map") and "left out" in row(text, "background")
     studio = said(load_scene(find_scene("brilliant_studio")))
-    assert "map studio.hdr, 1024 × 512, 11 level(s)" in row(studio, "environment  │") and "about 12.0 MiB" in row(studio, "environment map")
+    assert "map studio.hdr, 1024 × 512, 11 level(s)" in row(studio, "environment  │") and "about 12.0 MiB" in row(
+        studio, "environment map"
+    )
     assert " out " in row(studio, "textures") and "there is no light" in row(studio, "caustic maps")
 
 
@@ -146,9 +171,21 @@ def test_memory_told_is_what_is_packed(name: str) -> None:
 def test_what_the_maps_hold_comes_with_the_reason(tmp_path: Path) -> None:
     value = scene(tmp_path)
     maps = looked_up(value)["caustic maps"]
-    assert maps.content.startswith("XYZ and W, tents at 380, ") and maps.content.count(",") == 8 and maps.memory == "48 B a texel"
-    away = replace(value, camera=replace(value.camera, target=tuple(2 * p - t for p, t in zip(value.camera.position, value.camera.target, strict=True))))
-    assert looked_up(away)["caustic maps"] == Lookup("caustic maps", "XYZ and W", "no spectra: caustics are seen directly", "16 B a texel")
+    assert (
+        maps.content.startswith("XYZ and W, tents at 380, ")
+        and maps.content.count(",") == 8
+        and maps.memory == "48 B a texel"
+    )
+    away = replace(
+        value,
+        camera=replace(
+            value.camera,
+            target=tuple(2 * p - t for p, t in zip(value.camera.position, value.camera.target, strict=True)),
+        ),
+    )
+    assert looked_up(away)["caustic maps"] == Lookup(
+        "caustic maps", "XYZ and W", "no spectra: caustics are seen directly", "16 B a texel"
+    )
     assert looked_up(away)["spectrum"].content == "one stretch"
     bare = replace(value, objects=tuple(o for o in value.objects if not isinstance(o.material, Diffuse)))
     assert looked_up(bare)["caustic maps"].how == "nothing diffuse receives light"
@@ -156,7 +193,13 @@ def test_what_the_maps_hold_comes_with_the_reason(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("method", "words"),
-    [("srd", "bands"), ("srd-lambda", "one band"), ("regular-7", "7 wavelengths in turn"), ("regular-16", "16 wavelengths in turn"), ("stochastic", "one wavelength a sample behind glass")],
+    [
+        ("srd", "bands"),
+        ("srd-lambda", "one band"),
+        ("regular-7", "7 wavelengths in turn"),
+        ("regular-16", "16 wavelengths in turn"),
+        ("stochastic", "one wavelength a sample behind glass"),
+    ],
 )
 def test_every_method_samples_the_spectrum_its_own_way(tmp_path: Path, method: str, words: str) -> None:
     value = scene(tmp_path)

@@ -78,7 +78,9 @@ def tilted(x: float, angle_rad: float) -> Plane:
 
 def across_prism(incidence_rad: float, glass: Index, apex_rad: float = np.pi / 3) -> tuple[float, float]:
     """(deviation, its derivative along the glass's column) of a prism with its apex up; both positive down."""
-    start = make_ray([-1, 0, 0], [np.cos(incidence_rad - apex_rad / 2), np.sin(incidence_rad - apex_rad / 2), 0], [[0, 0, 0]])
+    start = make_ray(
+        [-1, 0, 0], [np.cos(incidence_rad - apex_rad / 2), np.sin(incidence_rad - apex_rad / 2), 0], [[0, 0, 0]]
+    )
     inside = through(start, tilted(0.0, np.pi - apex_rad / 2), AIR, glass)
     out = through(inside, tilted(1.0, apex_rad / 2), glass, AIR)
     return heading(start) - heading(out), -dheading(out)
@@ -110,7 +112,9 @@ def test_t1_glasses(glass: str, n_fdc: tuple[float, ...], abbe: float, slope_per
         ("N-SF11", 63.17131, (69.25084, 66.34263, 65.24956), -0.338731),
     ],
 )
-def test_t2_prism_at_minimum_deviation(glass: str, incidence_deg: float, deviations_deg: tuple[float, ...], slope_rad_um: float) -> None:
+def test_t2_prism_at_minimum_deviation(
+    glass: str, incidence_deg: float, deviations_deg: tuple[float, ...], slope_rad_um: float
+) -> None:
     apex = np.pi / 3
     incidence = float(np.arcsin(glasses.index(glass, D_NM) * np.sin(apex / 2)))
     assert np.degrees(incidence) == pytest.approx(incidence_deg, abs=6e-6)
@@ -148,7 +152,12 @@ def test_t3_slab_leaves_direction_without_dispersion(glass: str, x: float, dx_du
 @pytest.mark.parametrize("nm", [F_NM, D_NM, C_NM])
 def test_t3_t4_t5_formulas_in_every_glass(glass: str, nm: float) -> None:
     """Slab, ball and plano-convex lens against their formulas where the table prints no number."""
-    index, n, slope, s = per_um(glass, nm), float(glasses.index(glass, nm)), float(glasses.slope(glass, nm)), np.sin(np.pi / 4)
+    index, n, slope, s = (
+        per_um(glass, nm),
+        float(glasses.index(glass, nm)),
+        float(glasses.slope(glass, nm)),
+        np.sin(np.pi / 4),
+    )
     inside = through(make_ray([-1, 1, 0], [1, -1, 0], [[0, 0, 0]]), Plane((0, 0, 0), (0, 1, 0)), AIR, index)
     out = through(inside, Plane((0, -1, 0), (0, 1, 0)), index, AIR)
     assert out.position[0] == pytest.approx(s / np.sqrt(n * n - s * s), rel=1e-12)
@@ -252,7 +261,8 @@ def test_t9_mirror_nephroid(t_deg: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("bounces", "radii_deg", "dradius_dn"), [(1, (40.5674, 42.0195, 42.4405), -2.53492), (2, (53.6198, 50.9964, 50.2379), 4.57002)]
+    ("bounces", "radii_deg", "dradius_dn"),
+    [(1, (40.5674, 42.0195, 42.4405), -2.53492), (2, (53.6198, 50.9964, 50.2379), 4.57002)],
 )
 def test_t10_rainbows(bounces: int, radii_deg: tuple[float, ...], dradius_dn: float) -> None:
     def out(height: float, index: Index) -> Ray:
@@ -421,4 +431,6 @@ def test_t16_brewster() -> None:
     assert abs(beyond @ mirrored) < 1e-15  # the refracted and reflected rays are at right angles
     # There p-light is not reflected: half the s-reflectance is all there is.
     s = (np.cos(brewster) - N_BK7_D * -beyond[1]) / (np.cos(brewster) + N_BK7_D * -beyond[1])
-    assert optics.fresnel_reflectance(direction, np.array([0, 1.0, 0]), 1 / N_BK7_D) == pytest.approx(s * s / 2, rel=1e-12)
+    assert optics.fresnel_reflectance(direction, np.array([0, 1.0, 0]), 1 / N_BK7_D) == pytest.approx(
+        s * s / 2, rel=1e-12
+    )

@@ -7,7 +7,10 @@ import pytest
 from spectrasplat.passes.lattice_order import GOLDEN, morton_order
 
 
-@pytest.mark.parametrize(("points", "stride", "lattice"), [(1, 1, 1), (1000, 1, 1000), (4096, 3, 12_288), (777, 5, 3885), (20_000, 1, 65_536)])
+@pytest.mark.parametrize(
+    ("points", "stride", "lattice"),
+    [(1, 1, 1), (1000, 1, 1000), (4096, 3, 12_288), (777, 5, 3885), (20_000, 1, 65_536)],
+)
 def test_every_point_once(points: int, stride: int, lattice: int) -> None:
     order = morton_order(points, stride, lattice)
     assert order.dtype == np.uint32

@@ -141,7 +141,8 @@ def test_a_tilted_wall_is_sampled_on_its_own_plane() -> None:
     wall = SceneObject("wall", primitives.plane(4.0, 4.0).transformed(matrix), Diffuse())
     on_plane = strokes(20, spread=0.8)
     dabs = tuple(
-        Dab(tuple(float(v) for v in rotation @ d.position + matrix[:3, 3]), d.radius, d.log2_gain, d.falloff, d.erase) for d in on_plane
+        Dab(tuple(float(v) for v in rotation @ d.position + matrix[:3, 3]), d.radius, d.log2_gain, d.falloff, d.erase)
+        for d in on_plane
     )
     plane = plane_of(wall)
     grid = GainGrid.build(dabs, plane)
@@ -154,7 +155,9 @@ def test_a_tilted_wall_is_sampled_on_its_own_plane() -> None:
 def test_the_layer_of_a_floor_that_faces_y_lies_across_y() -> None:
     mesh = primitives.plane(2.0, 2.0)
     turned = np.eye(4)[[0, 2, 1, 3]]
-    floor = SceneObject("floor", mesh.transformed(turned), Diffuse(), local_dispersion=(Dab((0.3, 0.0, -0.2), 0.4, 1.0),))
+    floor = SceneObject(
+        "floor", mesh.transformed(turned), Diffuse(), local_dispersion=(Dab((0.3, 0.0, -0.2), 0.4, 1.0),)
+    )
     grid = GainGrid.of(floor)
     assert grid.dims[1] == 1 and min(grid.dims[0], grid.dims[2]) > 8
     assert grid.sample(np.array([(0.3, 0.0, -0.2)]))[0] == pytest.approx(2.0, rel=1e-3)

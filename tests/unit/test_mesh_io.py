@@ -146,7 +146,9 @@ def test_angle_weights_ignore_how_a_face_is_cut(tmp_path: Path) -> None:
     save_ply(primitives.box(), tmp_path / "box.ply")
     mesh = load_mesh(tmp_path / "box.ply", smooth=True)
     corners = mesh.corners()
-    np.testing.assert_allclose(mesh.corner_normals, corners / np.linalg.norm(corners, axis=2, keepdims=True), atol=1e-12)
+    np.testing.assert_allclose(
+        mesh.corner_normals, corners / np.linalg.norm(corners, axis=2, keepdims=True), atol=1e-12
+    )
     np.testing.assert_allclose(
         load_mesh(tmp_path / "box.ply", smooth=89.9).corner_normals,
         np.repeat(mesh.face_normals()[:, None], 3, axis=1),
@@ -181,10 +183,16 @@ LIES = {
     "corner.obj": (TETRAHEDRON_OBJ.replace("f 1 2 4", "f 1 two 4"), "line 7: 'two' is no face corner"),
     "points.obj": ("v 0 0 0\n", "no faces"),
     "text.obj": ("hello\n", "no vertices"),
-    "count.stl": (_binary_stl(primitives.box(), promised=1000), "promises 1000 triangles, but the file has room for 12"),
+    "count.stl": (
+        _binary_stl(primitives.box(), promised=1000),
+        "promises 1000 triangles, but the file has room for 12",
+    ),
     "short.stl": (b"abc", "too few"),
     "cut.stl": ("solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n", "truncated"),
-    "word.stl": ("solid x\nfacet normal 0 0 1\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 z 0\nendfacet\nendsolid", "three num"),
+    "word.stl": (
+        "solid x\nfacet normal 0 0 1\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 z 0\nendfacet\nendsolid",
+        "three num",
+    ),
     "mesh.fbx": ("x", "unknown mesh format"),
 }
 

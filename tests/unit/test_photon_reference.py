@@ -1,4 +1,5 @@
-"""The reference renderer against closed forms: places, Fresnel, Beer, every light's power, the pixel's measure, its own error.
+"""The reference renderer against closed forms: places, Fresnel, Beer, every light's power, the pixel's measure, its own
+error.
 
 Counts are about 1e5 photons of a scrambled Sobol sequence: fluxes scatter by 1e-4 to 2e-3, and each
 test's tolerance is at least four of its own standard deviations; the mutants at the end must fail.
@@ -73,7 +74,14 @@ def slab_scene(absorption: Absorption | None = None) -> tuple[Scene, float, floa
 
     Returns the scene, the pixel area and the length of the way through the glass.
     """
-    light = Light("pencil", "collimated", laser(550.0, 1.0 / (math.pi * 1e-12)), (-6.0, 0.0, 8.0), (math.sqrt(0.5), 0.0, -math.sqrt(0.5)), radius=1e-6)
+    light = Light(
+        "pencil",
+        "collimated",
+        laser(550.0, 1.0 / (math.pi * 1e-12)),
+        (-6.0, 0.0, 8.0),
+        (math.sqrt(0.5), 0.0, -math.sqrt(0.5)),
+        radius=1e-6,
+    )
     slab = place(primitives.box((4.0, 4.0, 1.0)), Dielectric(constant_index(N_SLAB), absorption), (0.0, 0.0, 2.5))
     floor = place(primitives.plane(40.0, 40.0), Diffuse((0.8, 0.8, 0.8)))
     sine = math.sqrt(0.5) / N_SLAB
@@ -123,20 +131,33 @@ def square_factor(side: float, distance: float) -> float:
     """Form factor of two equal coaxial squares (Howell, configuration C-11)."""
     x = side / distance
     q = math.sqrt(1.0 + x * x)
-    return 2.0 / (math.pi * x * x) * (math.log(q * q / math.sqrt(1.0 + 2.0 * x * x)) + 2.0 * x * q * math.atan(x / q) - 2.0 * x * math.atan(x))
+    return (
+        2.0
+        / (math.pi * x * x)
+        * (math.log(q * q / math.sqrt(1.0 + 2.0 * x * x)) + 2.0 * x * q * math.atan(x / q) - 2.0 * x * math.atan(x))
+    )
 
 
 @pytest.mark.parametrize(
     ("light", "expected"),
     [
         (Light("point", "point", ONE, (0.0, 0.0, 1.5)), 4.0 * math.atan(1.0 / (1.5 * math.sqrt(1.5**2 + 2.0)))),
-        (Light("spot", "spot", ONE, **DOWN, inner_half_angle_deg=10.0, outer_half_angle_deg=30.0), spot_solid_angle_sr(10.0, 30.0)),
-        (Light("hard", "spot", ONE, **DOWN, inner_half_angle_deg=25.0, outer_half_angle_deg=25.0), spot_solid_angle_sr(25.0, 25.0)),
+        (
+            Light("spot", "spot", ONE, **DOWN, inner_half_angle_deg=10.0, outer_half_angle_deg=30.0),
+            spot_solid_angle_sr(10.0, 30.0),
+        ),
+        (
+            Light("hard", "spot", ONE, **DOWN, inner_half_angle_deg=25.0, outer_half_angle_deg=25.0),
+            spot_solid_angle_sr(25.0, 25.0),
+        ),
         (Light("slanted", "directional", ONE, direction=(0.6, 0.0, -0.8)), 4.0 * 0.8),
         (Light("sun", "directional", ONE, direction=(0.0, 0.0, -1.0), angular_diameter_deg=8.0), 4.0),
         (Light("beam", "collimated", ONE, **DOWN, radius=0.7), math.pi * 0.49),
         (Light("sheet", "collimated", ONE, **DOWN, shape="rectangle", width=0.3, height=3.0), 0.6),
-        (Light("panel", "area", ONE, **DOWN, shape="rectangle", width=2.0, height=2.0), math.pi * 4.0 * square_factor(2.0, 1.5)),
+        (
+            Light("panel", "area", ONE, **DOWN, shape="rectangle", width=2.0, height=2.0),
+            math.pi * 4.0 * square_factor(2.0, 1.5),
+        ),
     ],
     ids=lambda value: value.name if isinstance(value, Light) else "",
 )
@@ -161,7 +182,8 @@ def test_light_that_nothing_specular_can_meet_is_none() -> None:
 
 @pytest.mark.parametrize("kind", ["pinhole", "orthographic"])
 def test_an_evenly_lit_floor_is_even_in_a_slanted_picture(kind: str) -> None:
-    """Sunlight that a large tilted mirror throws straight down: radiance E ρ/π in every pixel, wherever the camera stands."""
+    """Sunlight that a large tilted mirror throws straight down: radiance E ρ/π in every pixel, wherever the camera
+    stands."""
     light = Light("sun", "directional", ONE.scaled_to_luminous(100.0), direction=(1.0, 0.0, 0.0))
     mirror = place(primitives.plane(30.0, 30.0), Mirror(), (0.0, 0.0, 14.0), turned(1, 45.0))
     floor = place(primitives.plane(100.0, 100.0), Diffuse((0.5, 0.25, 0.75)))
@@ -182,7 +204,9 @@ def test_light_on_the_far_side_of_a_sheet_is_not_seen() -> None:
     pane = place(primitives.box((1.0, 1.0, 0.2)), Dielectric(constant_index(1.5)), (0.0, 0.0, -1.0))
     sheet = place(primitives.plane(4.0, 4.0), Diffuse())
     above = render_reference(scene_of(light, pane, sheet), 8, 8, photons=20_000)
-    below = render_reference(scene_of(light, pane, sheet, camera=replace(ABOVE, position=(0.0, 0.0, -0.5))), 8, 8, photons=20_000)
+    below = render_reference(
+        scene_of(light, pane, sheet, camera=replace(ABOVE, position=(0.0, 0.0, -0.5))), 8, 8, photons=20_000
+    )
     assert above.balance["deposited"] > 0.1 and not above.rgb.any() and below.rgb.any()
 
 
@@ -237,13 +261,16 @@ def test_touching_blocks_of_one_glass_are_one_block() -> None:
     light = Light("beam", "collimated", ONE, (0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=0.3)
     glass = Dielectric(constant_index(1.5))
     measured_passes = [place(primitives.box((1.0, 1.0, 0.5)), glass, (0.0, 0.0, z)) for z in (1.0, 1.5)]
-    balance = render_reference(scene_of(light, *measured_passes, place(primitives.plane(4.0, 4.0), Diffuse())), 4, 4, photons=20_000).balance
+    balance = render_reference(
+        scene_of(light, *measured_passes, place(primitives.plane(4.0, 4.0), Diffuse())), 4, 4, photons=20_000
+    ).balance
     rest = 0.04
     assert balance["deposited"] / balance["emitted"] == pytest.approx((1 - rest) ** 2 / (1 - rest**2), rel=3e-3)
 
 
 def test_its_own_error_is_true(busy: Scene) -> None:
-    """The scatter of eight whole runs is the variance they claim: the ratio's 4 σ is 25 % over 768 pixels and three seeds' noise."""
+    """The scatter of eight whole runs is the variance they claim: the ratio's 4 σ is 25 % over 768 pixels and three
+    seeds' noise."""
     runs = [render_reference(busy, 32, 24, photons=16_000, seed=seed) for seed in range(8)]
     observed = np.var([run.rgb[..., 1] for run in runs], axis=0, ddof=1).sum()
     claimed = np.mean([run.variance[..., 1] for run in runs], axis=0).sum()
@@ -258,7 +285,9 @@ def test_the_sequence_is_a_net_in_its_first_two_dimensions_and_stratified_in_all
     bits = (np.arange(256)[:, None] >> np.arange(32)) & 1
     words = np.zeros((photon_kernel.DIMENSIONS, 256), np.uint32)
     for d in range(photon_kernel.DIMENSIONS):
-        words[d] = np.bitwise_xor.reduce(np.where(bits == 1, sequence.directions[d], np.uint32(0)), axis=1) ^ sequence.shift[d]
+        words[d] = (
+            np.bitwise_xor.reduce(np.where(bits == 1, sequence.directions[d], np.uint32(0)), axis=1) ^ sequence.shift[d]
+        )
         assert len(np.unique(words[d] >> 24)) == 256
     for k in range(9):  # one point in each of the 256 boxes of 2^k × 2^(8−k)
         assert len(np.unique((words[0].astype(np.uint64) >> (32 - k) << 8) | (words[1] >> np.uint64(24 + k)))) == 256
@@ -266,7 +295,12 @@ def test_the_sequence_is_a_net_in_its_first_two_dimensions_and_stratified_in_all
 
 def _lamp_domain() -> photon_emission.Domain:
     triangles = np.array([[[-1, -1, 0], [1, -1, 0], [1, 1, 0]], [[-1, -1, 0], [1, 1, 0], [-1, 1, 0]]], float)
-    return photon_emission.domains(Light("spot", "spot", ONE, **DOWN, inner_half_angle_deg=10.0, outer_half_angle_deg=30.0), triangles, np.zeros(3), 2.0)[0]
+    return photon_emission.domains(
+        Light("spot", "spot", ONE, **DOWN, inner_half_angle_deg=10.0, outer_half_angle_deg=30.0),
+        triangles,
+        np.zeros(3),
+        2.0,
+    )[0]
 
 
 def emitted(domain: photon_emission.Domain, count: int = 20_000) -> float:
@@ -348,10 +382,24 @@ def test_the_key_tells_pictures_apart_and_nothing_else(small: Scene) -> None:
         scene_key(small, 16, 13, 64),
         scene_key(small, 16, 12, 63),
         scene_key(replace(small, camera=replace(small.camera, vertical_fov_deg=35.1)), 16, 12, 64),
-        scene_key(replace(small, lights=(replace(light, spectral_power=light.spectral_power.scaled(2.0)),)), 16, 12, 64),
+        scene_key(
+            replace(small, lights=(replace(light, spectral_power=light.spectral_power.scaled(2.0)),)), 16, 12, 64
+        ),
         scene_key(replace(small, lights=(replace(light, position=(0.4, -1.0, 4.1)),)), 16, 12, 64),
-        scene_key(replace(small, objects=(replace(glass, material=Dielectric(constant_index(1.51), None, 1)), small.objects[1])), 16, 12, 64),
-        scene_key(replace(small, objects=(replace(glass, object_to_world=np.diag([1.0, 1.0, 1.01, 1.0])), small.objects[1])), 16, 12, 64),
+        scene_key(
+            replace(
+                small, objects=(replace(glass, material=Dielectric(constant_index(1.51), None, 1)), small.objects[1])
+            ),
+            16,
+            12,
+            64,
+        ),
+        scene_key(
+            replace(small, objects=(replace(glass, object_to_world=np.diag([1.0, 1.0, 1.01, 1.0])), small.objects[1])),
+            16,
+            12,
+            64,
+        ),
     ]
     assert len({key, *others}) == 8
     assert photon_run.PARTS >= 8

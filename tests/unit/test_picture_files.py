@@ -186,7 +186,9 @@ def test_values_that_are_no_light_are_counted(tmp_path: Path, suffix: str) -> No
     write_image(tmp_path / f"b{suffix}", rgb)
     assert "4 values are negative (down to -0.01)" in refusal(tmp_path / f"b{suffix}")
     write_image(tmp_path / f"c{suffix}", np.full((2, 2, 3), -1e-9))
-    assert "12 values are negative" in refusal(tmp_path / f"c{suffix}"), "all-negative has no bright value to be noise of"
+    assert "12 values are negative" in refusal(tmp_path / f"c{suffix}"), (
+        "all-negative has no bright value to be noise of"
+    )
 
 
 def test_missing_empty_and_unknown_files_are_refused(tmp_path: Path) -> None:

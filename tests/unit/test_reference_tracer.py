@@ -191,7 +191,9 @@ def test_reflection_on_request_and_its_fresnel_share() -> None:
     assert not mirrored.landed and mirrored.reflections == (True,)
 
 
-def closed_form(points: np.ndarray, p0: np.ndarray, v: np.ndarray, covariance: np.ndarray, band: tuple[float, float]) -> np.ndarray:
+def closed_form(
+    points: np.ndarray, p0: np.ndarray, v: np.ndarray, covariance: np.ndarray, band: tuple[float, float]
+) -> np.ndarray:
     """The integral done by hand: along the sweep a difference of error functions, across it the Gaussian."""
     from math import erf
 
@@ -214,7 +216,9 @@ def test_swept_gaussian_equals_the_closed_form_and_keeps_the_flux() -> None:
     np.testing.assert_allclose(swept, closed_form(points, p0, v, covariance, band), atol=1e-12)
     x = np.linspace(-14, 14, 281)
     grid = np.stack(np.meshgrid(x, x), -1)
-    assert swept_gaussian(grid, p0, v, covariance, band, nodes=40, pieces=2).sum() * 0.01 == pytest.approx(2.5, rel=1e-6)
+    assert swept_gaussian(grid, p0, v, covariance, band, nodes=40, pieces=2).sum() * 0.01 == pytest.approx(
+        2.5, rel=1e-6
+    )
 
 
 def test_texel_average_of_a_gaussian_is_a_difference_of_erfs() -> None:

@@ -1,4 +1,5 @@
-"""Which wavelengths belong to which paths after an edit of n(λ): intervals of the index stay, bands keep meeting, no light is lost."""
+"""Which wavelengths belong to which paths after an edit of n(λ): intervals of the index stay, bands keep meeting, no
+light is lost."""
 
 from __future__ import annotations
 
@@ -50,7 +51,8 @@ def test_a_band_keeps_its_indices(gain: float) -> None:
         lo, hi = spans[k]
         if not (0.0 < lo < hi < 1.0):
             continue
-        # Wavelengths at the interval's ends under the edited glass have the index that the band's ends had when it was traced.
+        # Wavelengths at the interval's ends under the edited glass have the index that the band's ends had when it was
+        # traced.
         now = glass.index(np.interp([lo, hi], found.axis.x_of_nm(nm), nm))
         then = FLINT.index(axis.nm_of_x(np.array(traced[0][k])))
         assert np.allclose(now, then, atol=1e-7)

@@ -9,7 +9,21 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-TOOLS = ("bash", "readlink", "mktemp", "rm", "cat", "tail", "grep", "env", "mkdir", "chmod", "cp", "basename", "dirname")
+TOOLS = (
+    "bash",
+    "readlink",
+    "mktemp",
+    "rm",
+    "cat",
+    "tail",
+    "grep",
+    "env",
+    "mkdir",
+    "chmod",
+    "cp",
+    "basename",
+    "dirname",
+)
 
 # Plays python3, and `python -m venv` puts a copy of it into the new environment.
 PYTHON = """#!/bin/bash
@@ -69,7 +83,10 @@ def machine(tmp_path: Path) -> Machine:
 def test_first_run_sets_up_and_the_second_starts_at_once(machine: Machine) -> None:
     first = machine.call("run", "render", "prism", "-o", "a b.png")
     assert first.stdout == "program: render prism -o a b.png\n", first.stderr
-    assert "-m pip install" in machine.log.read_text() and "spectrasplat.model.geometry.bvh --warm" in machine.log.read_text()
+    assert (
+        "-m pip install" in machine.log.read_text()
+        and "spectrasplat.model.geometry.bvh --warm" in machine.log.read_text()
+    )
     second = machine.call("run", "doctor")
     assert (second.stdout, second.stderr) == ("program: doctor\n", "")
     assert machine.log.read_text() == "python -P -m spectrasplat doctor\n"
@@ -102,12 +119,17 @@ def test_a_moved_checkout_gets_a_new_environment(machine: Machine, tmp_path: Pat
 
 @pytest.mark.parametrize("script", ["test", ".ci/run"])
 def test_tests_pass_their_arguments_on(machine: Machine, script: str) -> None:
-    assert machine.call(script, "-k", "two words").stdout == "tests: -n auto --dist loadfile --no-loadscope-reorder -k two words\n"
+    assert (
+        machine.call(script, "-k", "two words").stdout
+        == "tests: -n auto --dist loadfile --no-loadscope-reorder -k two words\n"
+    )
     assert f"--editable {machine.root}[test]" in machine.log.read_text()
 
 
 def test_all_takes_the_marks_away(machine: Machine) -> None:
-    assert machine.call("test", "--all", "-x").stdout == "tests: -n auto --dist loadfile --no-loadscope-reorder -m  -x\n"
+    assert (
+        machine.call("test", "--all", "-x").stdout == "tests: -n auto --dist loadfile --no-loadscope-reorder -m  -x\n"
+    )
 
 
 def test_no_python(machine: Machine) -> None:
@@ -150,4 +172,6 @@ def test_without_opengl_the_program_runs_and_the_tests_do_not(machine: Machine) 
     done = machine.call("test", NO_OPENGL="1")
     assert (done.returncode, done.stdout) == (2, "")
     assert "run 'sudo apt-get install libegl1 libgl1 libgl1-mesa-dri'" in done.stderr
-    assert machine.call("test").stdout == "tests: -n auto --dist loadfile --no-loadscope-reorder\n"  # once it is there, it is found
+    assert (
+        machine.call("test").stdout == "tests: -n auto --dist loadfile --no-loadscope-reorder\n"
+    )  # once it is there, it is found

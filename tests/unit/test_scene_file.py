@@ -95,7 +95,10 @@ def test_a_missing_file_and_an_unknown_kind_are_told(tmp_path: Path) -> None:
         ('[[objects]]\nshape = "sphere"\nradius = nan', "objects[0].radius is nan but must be a finite number"),
         ('[[objects]]\nshape = "sphere"\nmaterial = {n_d = -1.5}', "objects[0].material.n_d: the refractive index is"),
         ('[[objects]]\nshape = "sphere"\nmaterial = {n_d = 1.5, V_d = 0}', "V_d is 0"),
-        ('[[objects]]\nshape = "sphere"\nmaterial = {sellmeier = {B = [1.0, nan], C = [0.1, 0.2]}}', "sellmeier.B[1] is nan"),
+        (
+            '[[objects]]\nshape = "sphere"\nmaterial = {sellmeier = {B = [1.0, nan], C = [0.1, 0.2]}}',
+            "sellmeier.B[1] is nan",
+        ),
         ('[[objects]]\nshape = "sphere"\nmaterial = {n_d = 1.5, abbe = 30}', "unknown key 'objects[0].material.abbe'"),
         ('[[objects]]\nshape = "sphere"\nmaterial = "milk"', "names 'milk', which is not defined under [materials]"),
         ('[[objects]]\nshape = "sphere"\nscale = [1, 0, 1]', "objects[0].scale is zero on an axis"),
@@ -103,17 +106,23 @@ def test_a_missing_file_and_an_unknown_kind_are_told(tmp_path: Path) -> None:
         ('[[objects]]\nshape = "sphere"\nangle_deg = 3', "objects[0].angle_deg needs 'axis' beside it"),
         ('[[objects]]\nshape = "sphere"\nmesh = "a.ply"', "objects[0].shape cannot stand beside 'mesh'"),
         ('[[objects]]\nmesh = "gone.ply"', "which is not a file"),
-        (THREE_LINES + "[[objects]]\nshape = \"box\"\nname = \"sphere\"", "which another object has already"),
+        (THREE_LINES + '[[objects]]\nshape = "box"\nname = "sphere"', "which another object has already"),
         (THREE_LINES + "[camera]\nposition = [0, 0, 1]\ntarget = [0, 0, 1]", "camera.target lies at the camera's own"),
         (THREE_LINES + "[camera]\nposition = [0, 0, 1]\ntarget = [0, 0, 0]", "camera.up is parallel"),
         (THREE_LINES + "[camera]\nposition = [0, -5, 1]\nvertical_fov_deg = 180", "must be below 180"),
         (THREE_LINES + "[render]\nsize = [0, 540]", "render.size is 0 × 540"),
         (THREE_LINES + "[render]\nphotons = 1.5", "render.photons is 1.5 but must be a whole number"),
-        (THREE_LINES + '[[lights]]\nkind = "spott"', "lights[0].kind is 'spott', which is not known: did you mean 'spot'?"),
+        (
+            THREE_LINES + '[[lights]]\nkind = "spott"',
+            "lights[0].kind is 'spott', which is not known: did you mean 'spot'?",
+        ),
         (THREE_LINES + "[[lights]]\nflux_lm = 3\nflux_w = 3", "lights[0].flux_w cannot stand beside 'flux_lm'"),
         (THREE_LINES + "[[lights]]\nradius = 3", "unknown key 'lights[0].radius', a light of kind 'point' knows"),
         (THREE_LINES + '[[lights]]\nspectrum = "D66"', "lights[0].spectrum is not known: unknown illuminant 'D66'"),
-        (THREE_LINES + "[[lights]]\nspectrum = {laser = 1064}", "lights[0].spectrum.laser is at 1064 nm, outside the visible"),
+        (
+            THREE_LINES + "[[lights]]\nspectrum = {laser = 1064}",
+            "lights[0].spectrum.laser is at 1064 nm, outside the visible",
+        ),
         (THREE_LINES + "[[lights]]\nspectrum = {blackbody = -3}", "must be at least 500"),
         (THREE_LINES + '[[lights]]\nkind = "directional"\ndirection = [0, 0, 0]', "direction is the zero vector"),
         (THREE_LINES + '[[lights]]\nkind = "spot"\nhalf_angle_deg = 0', "half_angle_deg is 0 but must be above 0"),
@@ -124,13 +133,15 @@ def test_a_missing_file_and_an_unknown_kind_are_told(tmp_path: Path) -> None:
         ("objects = []", "objects is missing or empty"),
         ("[[objects]\n", "is not valid TOML"),
     ],
-)  # fmt: skip
+)
 def test_every_mistake_has_its_sentence(tmp_path: Path, text: str, expected: str) -> None:
     assert expected in refusal(tmp_path, text)
 
 
 def test_a_laser_outside_the_glass_data_is_refused_and_a_broad_light_noted(tmp_path: Path) -> None:
-    glass = '[[objects]]\nshape = "sphere"\nmaterial = {name = "X", cauchy = [1.5, 0.01], range_nm = [450, 700]}\n' + FLOOR
+    glass = (
+        '[[objects]]\nshape = "sphere"\nmaterial = {name = "X", cauchy = [1.5, 0.01], range_nm = [450, 700]}\n' + FLOOR
+    )
     sun = '[[lights]]\nkind = "directional"\ndirection = [0, 0, -1]\nspectrum = '
     assert "line at 405 nm" in refusal(tmp_path, glass + sun + "{laser = 405}")
     load(tmp_path, glass + sun + "{laser = 532}")
@@ -166,7 +177,10 @@ def test_axis_frame_and_rest_place_an_object(tmp_path: Path) -> None:
 
 
 def test_instances_share_one_mesh_and_compose_with_the_objects_own_placement(tmp_path: Path) -> None:
-    text = THREE_LINES + "scale = 2\ninstances = [{position = [1, 0, 0]}, {name = \"far\", position = [9, 0, 0], scale = 0.5}]\n"
+    text = (
+        THREE_LINES
+        + 'scale = 2\ninstances = [{position = [1, 0, 0]}, {name = "far", position = [9, 0, 0], scale = 0.5}]\n'
+    )
     near, far, _ = load(tmp_path, text).objects
     assert near.mesh is far.mesh and far.name == "far"
     np.testing.assert_allclose(near.object_to_world[:3], [[2, 0, 0, 1], [0, 2, 0, 0], [0, 0, 2, 0]])
@@ -187,7 +201,9 @@ def test_all_kinds_of_material(tmp_path: Path) -> None:
         csv = "n.csv"
         priority = 3
         absorption = {csv = "t.csv", distance = 2.0}
-    """ + "".join(f'\n[[objects]]\nshape = "box"\nmaterial = "{name}"' for name in ("mirror1", "paint", "tinted", "black"))
+    """ + "".join(
+        f'\n[[objects]]\nshape = "box"\nmaterial = "{name}"' for name in ("mirror1", "paint", "tinted", "black")
+    )
     mirror, paint, tinted, black = (o.material for o in load(tmp_path, text).objects)
     assert mirror == Mirror((1.0, 1.0, 1.0)) and black == Black()
     assert paint.reflectance[170] == pytest.approx(0.5 - 0.25 * 150 / 300)
@@ -222,7 +238,9 @@ def test_spot_solid_angle_is_the_integral_of_its_fall_off(inner: float, outer: f
 
 
 def test_spectra_add_by_power(tmp_path: Path) -> None:
-    text = "[[lights]]\nposition = [0,0,5]\nintensity_w_sr = 4.0\nspectrum = [{laser = 450, weight = 3}, {laser = 650}]\n"
+    text = (
+        "[[lights]]\nposition = [0,0,5]\nintensity_w_sr = 4.0\nspectrum = [{laser = 450, weight = 3}, {laser = 650}]\n"
+    )
     lines = load(tmp_path, THREE_LINES + FLOOR + text).lights[0].spectral_power.lines
     assert lines == ((450.0, pytest.approx(3.0)), (650.0, pytest.approx(1.0)))
 
@@ -244,7 +262,8 @@ def test_counting_crossings_is_the_winding_number(scale: tuple[float, float, flo
     matrix[:3, 3] = (0.5, 0.25, -1.0)
     for mesh in (primitives.torus(0.5, 0.2, 900), primitives.brilliant(), primitives.box((1.5, 1.5, 1.0))):
         item = SceneObject("", mesh, Black(), matrix)
-        # The ray from a whole or half step runs through vertices and along edges: the diagonal of the box, the rows of the ring.
+        # The ray from a whole or half step runs through vertices and along edges: the diagonal of the box, the rows of
+        # the ring.
         random = np.random.default_rng(4).uniform(-0.8, 0.8, (150, 3))
         grid = np.array([(x, y, 0.05) for x in (-0.5, -0.25, 0.0, 0.25, 0.5) for y in (-0.5, -0.25, 0.0, 0.25, 0.5)])
         found = 0
@@ -327,10 +346,22 @@ position = [0, 0, -3]
 
 
 def assert_same(one: Scene, two: Scene) -> None:
-    assert (one.name, one.camera, one.background_rgb, one.render) == (two.name, two.camera, two.background_rgb, two.render)
+    assert (one.name, one.camera, one.background_rgb, one.render) == (
+        two.name,
+        two.camera,
+        two.background_rgb,
+        two.render,
+    )
     assert len(one.lights) == len(two.lights) and len(one.objects) == len(two.objects)
     for a, b in zip(one.lights, two.lights, strict=True):
-        assert (a.name, a.kind, a.shape, a.radius, a.width, a.height) == (b.name, b.kind, b.shape, b.radius, b.width, b.height)
+        assert (a.name, a.kind, a.shape, a.radius, a.width, a.height) == (
+            b.name,
+            b.kind,
+            b.shape,
+            b.radius,
+            b.width,
+            b.height,
+        )
         assert (a.inner_half_angle_deg, a.outer_half_angle_deg) == (b.inner_half_angle_deg, b.outer_half_angle_deg)
         assert a.angular_diameter_deg == b.angular_diameter_deg
         np.testing.assert_allclose(b.direction, a.direction, rtol=1e-14)
@@ -349,7 +380,9 @@ def assert_same(one: Scene, two: Scene) -> None:
             assert a.material.priority == b.material.priority
             assert a.material.dispersion == b.material.dispersion
             if a.material.absorption is not None:
-                np.testing.assert_allclose(b.material.absorption.coefficient, a.material.absorption.coefficient, rtol=1e-12)
+                np.testing.assert_allclose(
+                    b.material.absorption.coefficient, a.material.absorption.coefficient, rtol=1e-12
+                )
         else:
             assert a.material == b.material
 
@@ -379,11 +412,20 @@ def test_meshes_without_a_description_are_saved_as_triangles(tmp_path: Path) -> 
     scene = load(tmp_path, THREE_LINES)
     ball, table = scene.objects
     matrix = np.diag([1.0, 1.0, 2.0, 1.0])
-    edited = replace(scene, objects=(replace(ball, mesh=sphere(triangles=80).transformed(matrix)), replace(ball, name="b", mesh=box()), table))
+    edited = replace(
+        scene,
+        objects=(
+            replace(ball, mesh=sphere(triangles=80).transformed(matrix)),
+            replace(ball, name="b", mesh=box()),
+            table,
+        ),
+    )
     saved = tmp_path / "saved.toml"
     save_scene(edited, saved)
     again = load_scene(saved)
-    np.testing.assert_allclose(np.ptp(again.objects[0].mesh.vertices, axis=0), np.ptp(edited.objects[0].mesh.vertices, axis=0))
+    np.testing.assert_allclose(
+        np.ptp(again.objects[0].mesh.vertices, axis=0), np.ptp(edited.objects[0].mesh.vertices, axis=0)
+    )
     assert again.objects[0].mesh.volume() == pytest.approx(edited.objects[0].mesh.volume(), rel=1e-12)
     assert again.objects[0].mesh.corner_normals is not None
     np.testing.assert_array_equal(again.objects[1].mesh.vertices, box().vertices)
@@ -455,16 +497,31 @@ PAINT = '[[objects]]\nshape = "plane"\nmaterial = "diffuse"\nlocal_dispersion = 
         ("dispersion_gain = nan", "objects[0].dispersion_gain is nan but must be a finite number"),
         ("dispersion_gain = 1000", "objects[0].dispersion_gain: the refractive index is"),
         ("dispersion_gane = 2", "unknown key 'objects[0].dispersion_gane', did you mean 'dispersion_gain'?"),
-        ("local_dispersion = [{position = [0, 0, 0], radius = 1}]", "objects[0].local_dispersion is painted on what receives"),
-        ('[[objects]]\nshape = "plane"\nmaterial = "black"\ndispersion_gain = 2', "objects[1].dispersion_gain is for glass"),
-        ('[[objects]]\nshape = "plane"\nmaterial = {kind = "mirror", dispersion_gain = 2}', "unknown key 'objects[1].material.dispersion_gain'"),
-        (PAINT + "[{position = [0, 0, 0], radius = -1}]", "objects[1].local_dispersion[0].radius is -1 but must be above 0"),
+        (
+            "local_dispersion = [{position = [0, 0, 0], radius = 1}]",
+            "objects[0].local_dispersion is painted on what receives",
+        ),
+        (
+            '[[objects]]\nshape = "plane"\nmaterial = "black"\ndispersion_gain = 2',
+            "objects[1].dispersion_gain is for glass",
+        ),
+        (
+            '[[objects]]\nshape = "plane"\nmaterial = {kind = "mirror", dispersion_gain = 2}',
+            "unknown key 'objects[1].material.dispersion_gain'",
+        ),
+        (
+            PAINT + "[{position = [0, 0, 0], radius = -1}]",
+            "objects[1].local_dispersion[0].radius is -1 but must be above 0",
+        ),
         (PAINT + "[{position = [0, 0, nan], radius = 1}]", "objects[1].local_dispersion[0].position[2] is nan"),
         (PAINT + "[{position = [0, 0, 0]}]", "objects[1].local_dispersion[0].radius is missing"),
         (PAINT + "[{position = [0, 0, 0], radius = 1, falloff = 2}]", "falloff is 2 but must be at most 1"),
         (PAINT + "[{position = [0, 0, 0], radius = 1, erase = -1}]", "erase is -1 but must be at least 0"),
         (PAINT + "[{position = [0, 0, 0], radius = 1, log2_gain = 99}]", "log2_gain is 99 but must be at most 60"),
-        (PAINT + "[{position = [0, 0, 0], radius = 1, strength = 2}]", "unknown key 'objects[1].local_dispersion[0].strength'"),
+        (
+            PAINT + "[{position = [0, 0, 0], radius = 1, strength = 2}]",
+            "unknown key 'objects[1].local_dispersion[0].strength'",
+        ),
         (PAINT + "[3]", "objects[1].local_dispersion must be a list of tables"),
     ],
 )

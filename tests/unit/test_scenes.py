@@ -24,7 +24,19 @@ def shipped(name: str) -> Scene:
 
 def test_the_collection_is_complete() -> None:
     names = {path.stem for path in SCENES}
-    wanted = {"default", "prism", "prism_case", "ball", "ball_plain", "brilliant", "lens", "achromat", "amici", "water", "wine_glass"}
+    wanted = {
+        "default",
+        "prism",
+        "prism_case",
+        "ball",
+        "ball_plain",
+        "brilliant",
+        "lens",
+        "achromat",
+        "amici",
+        "water",
+        "wine_glass",
+    }
     wanted |= {"brilliant_studio", "prism_edge", "lens_text", "ball_caustic"}
     assert wanted <= names
 
@@ -55,7 +67,15 @@ def test_a_scene_loads_and_can_be_rendered(path: Path) -> None:
 
 def test_prism_case_sends_seven_wavelengths_where_the_reference_found_them() -> None:
     """Straight lines and Snell's law through the scene's own prism, float64, against the reference's list (cm)."""
-    expected = {400: 14.507781, 450: 18.587992, 500: 20.922858, 550: 22.456213, 600: 23.542016, 650: 24.350626, 700: 24.975810}
+    expected = {
+        400: 14.507781,
+        450: 18.587992,
+        500: 20.922858,
+        550: 22.456213,
+        600: 23.542016,
+        650: 24.350626,
+        700: 24.975810,
+    }
     scene = shipped("prism_case")
     prism, slit, floor = scene.objects
     assert isinstance(slit.material, Black) and floor.material.reflectance_rgb == (0.18, 0.18, 0.18)
@@ -193,8 +213,11 @@ def test_the_wine_reaches_into_the_wall_and_the_glass_has_priority() -> None:
 def test_the_studio_lights_the_brilliant_alone() -> None:
     """Values from 0.05 to 50, whatever the coding: the reader is ours, the file was written by a script."""
     scene = shipped("brilliant_studio")
-    assert scene.lights == () and len(scene.objects) == 1 and scene.environment is not None and scene.notes == (
-        "diamond: data reach from 226 to 760 nm; above 760 nm the nearest value is used.",
+    assert (
+        scene.lights == ()
+        and len(scene.objects) == 1
+        and scene.environment is not None
+        and scene.notes == ("diamond: data reach from 226 to 760 nm; above 760 nm the nearest value is used.",)
     )
     rgb = scene.environment.rgb
     assert rgb.shape == (512, 1024, 3)
@@ -212,7 +235,8 @@ def test_the_page_is_print_under_a_lens_and_upright() -> None:
 
 
 def _through_prism(scene: Scene, wavelength_nm: float, angle_rad: float) -> float | None:
-    """x on the cards of the camera's level ray `angle_rad` left of y, refracted twice by the prism, or None when it is not."""
+    """x on the cards of the camera's level ray `angle_rad` left of y, refracted twice by the prism, or None when it is
+    not."""
     prism = next(o for o in scene.objects if o.name == "prism")
     n = float(prism.material.dispersion.index(wavelength_nm))
     planes = prism.mesh.transformed(prism.object_to_world).convex_planes
@@ -221,7 +245,11 @@ def _through_prism(scene: Scene, wavelength_nm: float, angle_rad: float) -> floa
         facing = planes[:, :3] @ direction
         distance = (planes[:, 3] - planes[:, :3] @ point) / np.where(np.abs(facing) < 1e-12, np.nan, facing)
         entering = ratio < 1.0
-        face = int(np.nanargmax(np.where(facing < 0.0, distance, -np.inf)) if entering else np.nanargmin(np.where(facing > 0.0, distance, np.inf)))
+        face = int(
+            np.nanargmax(np.where(facing < 0.0, distance, -np.inf))
+            if entering
+            else np.nanargmin(np.where(facing > 0.0, distance, np.inf))
+        )
         point = point + distance[face] * direction
         if (planes[:, :3] @ point > planes[:, 3] + 1e-9).any():
             return None
@@ -257,7 +285,9 @@ def test_the_prisms_fringe_is_as_wide_as_promised_and_the_edge_in_its_middle() -
     direction = scene.lights[0].direction
     prism = next(o for o in scene.objects if o.name == "prism")
     top = prism.mesh.transformed(prism.object_to_world).bounds()[1]
-    assert top[2] + (3.0 - top[1]) * direction[2] / direction[1] < -5.0 * math.tan(math.radians(0.5 * scene.camera.vertical_fov_deg))
+    assert top[2] + (3.0 - top[1]) * direction[2] / direction[1] < -5.0 * math.tan(
+        math.radians(0.5 * scene.camera.vertical_fov_deg)
+    )
 
 
 def test_all_of_the_beam_meets_the_ball_before_its_caustic() -> None:

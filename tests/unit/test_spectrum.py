@@ -32,11 +32,19 @@ def test_observer_is_cie_1931() -> None:
 @pytest.mark.parametrize(
     ("name", "x", "y"),
     [  # CIE 15:2004, table T.3 and T.8.1 (2° observer)
-        ("A", 0.44758, 0.40745), ("C", 0.31006, 0.31616), ("D50", 0.34567, 0.35851), ("D55", 0.33243, 0.34744),
-        ("D65", 0.31272, 0.32903), ("D75", 0.29903, 0.31488), ("E", 0.33333, 0.33333), ("F2", 0.3721, 0.3751),
-        ("F7", 0.3129, 0.3292), ("FL11", 0.3805, 0.3769), ("LED-B1", 0.4560, 0.4078),
+        ("A", 0.44758, 0.40745),
+        ("C", 0.31006, 0.31616),
+        ("D50", 0.34567, 0.35851),
+        ("D55", 0.33243, 0.34744),
+        ("D65", 0.31272, 0.32903),
+        ("D75", 0.29903, 0.31488),
+        ("E", 0.33333, 0.33333),
+        ("F2", 0.3721, 0.3751),
+        ("F7", 0.3129, 0.3292),
+        ("FL11", 0.3805, 0.3769),
+        ("LED-B1", 0.4560, 0.4078),
     ],
-)  # fmt: skip
+)
 def test_illuminant_chromaticities(name: str, x: float, y: float) -> None:
     light = sp.illuminant(name)
     at_5nm = light.density[::5] @ sp.cmf_xyz()[::5]
@@ -220,8 +228,14 @@ def test_without_dispersion_x_is_linear() -> None:
 
 @pytest.mark.parametrize(
     ("names", "tolerance"),
-    [(["N-BK7"], 1e-9), (["N-BK7", "N-SF11"], 1e-9), (["N-SF11", "diamond", "water"], 1e-9), (["diamond"], 1e-6), (["wobbly"], 1e-6)],
-)  # fmt: skip
+    [
+        (["N-BK7"], 1e-9),
+        (["N-BK7", "N-SF11"], 1e-9),
+        (["N-SF11", "diamond", "water"], 1e-9),
+        (["diamond"], 1e-6),
+        (["wobbly"], 1e-6),
+    ],
+)
 def test_axis_is_strictly_monotone_and_inverts(names: list[str], tolerance: float) -> None:
     axis = SpectralAxis.build([_wobbly() if name == "wobbly" else catalogue.find(name) for name in names])
     x = axis.x_of_nm(np.sort(WAVES))
@@ -252,7 +266,13 @@ def test_index_table_interpolates_well() -> None:
 @pytest.mark.parametrize("names", [[], ["N-BK7"], ["N-BK7", "diamond"], ["diamond"]])
 def test_cumulative_keeps_all_energy(names: list[str]) -> None:
     axis = SpectralAxis.build([catalogue.find(name) for name in names])
-    light = sp.illuminant("D65") + sp.laser(380.0, 5e3) + sp.laser(780.0, 7e3) + sp.laser(550.5, 2e3) + sp.laser(601.23, 1e3)
+    light = (
+        sp.illuminant("D65")
+        + sp.laser(380.0, 5e3)
+        + sp.laser(780.0, 7e3)
+        + sp.laser(550.5, 2e3)
+        + sp.laser(601.23, 1e3)
+    )
     running = cumulative(axis, light)
     expected = np.array([*light.xyz(), light.power_w()])
     assert np.all(np.diff(running.x) >= 0.0) and np.all(np.diff(running.values, axis=0) >= 0.0)
@@ -282,4 +302,6 @@ def test_cumulative_with_own_weights() -> None:
     weights = np.column_stack([VISIBLE_NM, np.where(VISIBLE_NM < 500.0, -1.0, 1.0)])
     light = sp.constant(2.0) + sp.laser(450.0, 3.0)
     running = cumulative(SpectralAxis.build([]), light, weights)
-    assert running.at(1.0) == pytest.approx([2.0 * VISIBLE_NM.sum() + 1350.0, 2.0 * weights[:, 1].sum() - 3.0], rel=1e-13)
+    assert running.at(1.0) == pytest.approx(
+        [2.0 * VISIBLE_NM.sum() + 1350.0, 2.0 * weights[:, 1].sum() - 3.0], rel=1e-13
+    )

@@ -20,7 +20,8 @@ SHAPE = (28, 50, 3)
 
 
 class World:
-    """A picture with chance of its own, detail within a pixel, single wavelengths' noise, and a bias that shrinks with the bands."""
+    """A picture with chance of its own, detail within a pixel, single wavelengths' noise, and a bias that shrinks with
+    the bands."""
 
     def __init__(self, chance: float = 0.02, detail: float = 0.1, single: float = 0.8, bias: float = 0.0) -> None:
         rng = np.random.default_rng(1)
@@ -106,7 +107,10 @@ def test_budgets_buy_whole_turns_or_more_wavelengths() -> None:
     assert Spectrum(single=True).samples(10) == SINGLE_SPEED * 10
 
 
-@pytest.mark.parametrize(("size", "grid"), [((240, 135), (50, 28)), ((10, 4000), (10, 4000)), ((1920, 1080), (50, 28)), ((64, 8), (50, 6)), ((9, 1), (9, 2))])
+@pytest.mark.parametrize(
+    ("size", "grid"),
+    [((240, 135), (50, 28)), ((10, 4000), (10, 4000)), ((1920, 1080), (50, 28)), ((64, 8), (50, 6)), ((9, 1), (9, 2))],
+)
 def test_the_grid_has_the_pictures_shape_and_no_power_of_two(size: tuple[int, int], grid: tuple[int, int]) -> None:
     columns, rows = grid_of(*size)
     assert abs(rows - grid[1]) <= 1 and columns == grid[0]

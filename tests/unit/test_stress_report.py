@@ -1,4 +1,5 @@
-"""The stress runner and its reports on made-up measurements: verdicts, errors, stops, and numbers that JSON has no word for."""
+"""The stress runner and its reports on made-up measurements: verdicts, errors, stops, and numbers that JSON has no word
+for."""
 
 from __future__ import annotations
 
@@ -30,20 +31,38 @@ class NoContext:
 
 GOOD = Measurement(1e-3, "1e-3 rad", 0, {"energy": 2e-4, "shown only": 0.5}, {"energy": 1e-3}, 3e-8, {"band_cut": 7})
 BAD = Measurement(1e-4, "1e-4 rad", 0, {"energy": 2e-2}, {"energy": 1e-3}, 3e-8)
-NOT_FINITE = Measurement(1e-5, "1e-5 rad", 3, {"energy": math.nan, "other": math.inf}, {"energy": 1e-3, "other": 1.0}, math.nan)
+NOT_FINITE = Measurement(
+    1e-5, "1e-5 rad", 3, {"energy": math.nan, "other": math.inf}, {"energy": 1e-3, "other": 1.0}, math.nan
+)
 
 
-def case(name: str, *measurements: Measurement, steps: int | None = None, fails: BaseException | None = None, logarithmic: bool = True) -> Case:
+def case(
+    name: str,
+    *measurements: Measurement,
+    steps: int | None = None,
+    fails: BaseException | None = None,
+    logarithmic: bool = True,
+) -> Case:
     def measure(_: object) -> Iterator[Measurement]:
         yield from measurements
         if fails is not None:
             raise fails
 
-    return Case(name, f"the title of {name}", "why <it> matters & how", "margin, rad", measure, len(measurements) if steps is None else steps, logarithmic)
+    return Case(
+        name,
+        f"the title of {name}",
+        "why <it> matters & how",
+        "margin, rad",
+        measure,
+        len(measurements) if steps is None else steps,
+        logarithmic,
+    )
 
 
 def ran(*cases: Case) -> StressResult:
-    result = StressResult("0", "2026-01-01T00:00:00+00:00", "spectrasplat stress -o out", {"renderer": "made <up>"}, len(cases))
+    result = StressResult(
+        "0", "2026-01-01T00:00:00+00:00", "spectrasplat stress -o out", {"renderer": "made <up>"}, len(cases)
+    )
     result.finished = run(result, cases, NoContext(), lambda fraction, text: None, lambda so_far: None)  # type: ignore[attr-defined, arg-type]
     return result
 
@@ -97,7 +116,13 @@ def test_ctrl_c_keeps_what_is_done() -> None:
 def test_what_is_done_is_kept_after_every_case() -> None:
     kept: list[int] = []
     result = StressResult("0", "", "", {}, 2)
-    run(result, (case("a", GOOD), case("b", GOOD)), NoContext(), lambda *_: None, lambda so_far: kept.append(len(so_far.cases)))  # type: ignore[arg-type]
+    run(
+        result,
+        (case("a", GOOD), case("b", GOOD)),
+        NoContext(),
+        lambda *_: None,
+        lambda so_far: kept.append(len(so_far.cases)),
+    )  # type: ignore[arg-type]
     assert kept == [1, 2]
 
 
@@ -110,8 +135,16 @@ def test_json_holds_everything_and_no_nan(tmp_path: Path) -> None:
 
     held = json.loads(file.read_text(encoding="utf-8"), parse_constant=refuse)
     first, second = held["cases"][0]["measurements"]
-    assert first["errors"] == {"energy": 2e-4, "shown only": 0.5} and first["bounds"] == {"energy": 1e-3} and first["fallbacks"] == {"band_cut": 7}
-    assert second["errors"] == {"energy": "NaN", "other": "Infinity"} and second["flux_imbalance"] == "NaN" and second["nonfinite"] == 3
+    assert (
+        first["errors"] == {"energy": 2e-4, "shown only": 0.5}
+        and first["bounds"] == {"energy": 1e-3}
+        and first["fallbacks"] == {"band_cut": 7}
+    )
+    assert (
+        second["errors"] == {"energy": "NaN", "other": "Infinity"}
+        and second["flux_imbalance"] == "NaN"
+        and second["nonfinite"] == 3
+    )
     assert held["partial"] is False and len(held["broken"]) == 4
     assert number(-math.inf) == "-Infinity"
 
@@ -153,7 +186,14 @@ def test_nothing_to_draw_is_no_plot() -> None:
 
 
 def test_a_breach_is_marked_in_the_plot() -> None:
-    crosses = [sum(len(line.get_xdata()) for line in case_plot(ran(case("one", *m)).cases[0]).axes[0].lines if line.get_marker() == "x") for m in ((GOOD,), (GOOD, BAD))]
+    crosses = [
+        sum(
+            len(line.get_xdata())
+            for line in case_plot(ran(case("one", *m)).cases[0]).axes[0].lines
+            if line.get_marker() == "x"
+        )
+        for m in ((GOOD,), (GOOD, BAD))
+    ]
     assert crosses == [0, 1]
 
 

@@ -60,8 +60,14 @@ def test_a_texture_is_read_with_its_factor_and_wrap(folder: Path) -> None:
     plain = load(folder, text + 'material = { kind = "diffuse", texture = "poster.png" }').objects[1].material
     assert plain.reflectance_rgb == (1.0, 1.0, 1.0) and plain.texture.wrap == "repeat"
     assert plain.texture.rgb.shape == (6, 8, 3) and plain.texture.source == str((folder / "poster.png").resolve())
-    tinted = load(folder, text + 'material = { kind = "diffuse", texture = { file = "poster.png", wrap = "clamp" }, colour = 0.5 }')
-    assert tinted.objects[1].material.reflectance_rgb == (0.5, 0.5, 0.5) and tinted.objects[1].material.texture.wrap == "clamp"
+    tinted = load(
+        folder,
+        text + 'material = { kind = "diffuse", texture = { file = "poster.png", wrap = "clamp" }, colour = 0.5 }',
+    )
+    assert (
+        tinted.objects[1].material.reflectance_rgb == (0.5, 0.5, 0.5)
+        and tinted.objects[1].material.texture.wrap == "clamp"
+    )
     assert load(folder, text + 'material = "diffuse"').objects[1].material.reflectance_rgb == (0.8, 0.8, 0.8)
 
 
@@ -73,12 +79,16 @@ def test_one_picture_is_read_once(folder: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(scene_textures, "read_picture", lambda path: reads.append(path) or read(path))
     scene = load(
         folder,
-        LIGHT + BALL
+        LIGHT
+        + BALL
         + '[materials.a]\nkind = "diffuse"\ntexture = "poster.png"\n'
         + '[materials.b]\nkind = "diffuse"\ntexture = { file = "./poster.png", wrap = "clamp" }\n'
-        + TABLE + 'material = "a"\n'
-        + TABLE.replace("table", "wall") + 'material = { kind = "diffuse", texture = "poster.png" }\n'
-        + TABLE.replace("table", "shelf") + 'material = "b"\n',
+        + TABLE
+        + 'material = "a"\n'
+        + TABLE.replace("table", "wall")
+        + 'material = { kind = "diffuse", texture = "poster.png" }\n'
+        + TABLE.replace("table", "shelf")
+        + 'material = "b"\n',
     )
     table, wall, shelf = (o.material.texture for o in scene.objects[1:])
     assert len(reads) == 1 and table is wall and shelf is not table and shelf.rgb is table.rgb
@@ -90,16 +100,27 @@ def test_one_picture_is_read_once(folder: Path, monkeypatch: pytest.MonkeyPatch)
         ('{ kind = "diffuse", texture = "gone.png" }', "objects[1].material.texture names"),
         ('{ kind = "diffuse", texture = "bare.obj" }', "'.obj' is not a picture format"),
         ('{ kind = "diffuse", texture = 3 }', "objects[1].material.texture must be a table"),
-        ('{ kind = "diffuse", texture = { file = "poster.png", wrap = "mirror" } }', "texture.wrap is 'mirror', which is not known"),
-        ('{ kind = "diffuse", texture = { file = "poster.png", rap = "clamp" } }', "unknown key 'objects[1].material.texture.rap'"),
+        (
+            '{ kind = "diffuse", texture = { file = "poster.png", wrap = "mirror" } }',
+            "texture.wrap is 'mirror', which is not known",
+        ),
+        (
+            '{ kind = "diffuse", texture = { file = "poster.png", rap = "clamp" } }',
+            "unknown key 'objects[1].material.texture.rap'",
+        ),
         ('{ kind = "diffuse", texture = {} }', "objects[1].material.texture.file is missing"),
-        ('{ kind = "diffuse", texture = "poster.png", reflectance = { nm = [400, 700], values = [0.1, 0.9] } }',
-         "objects[1].material.texture cannot stand beside 'reflectance'"),
+        (
+            '{ kind = "diffuse", texture = "poster.png", reflectance = { nm = [400, 700], values = [0.1, 0.9] } }',
+            "objects[1].material.texture cannot stand beside 'reflectance'",
+        ),
         ('{ kind = "diffuse", texture = "room.exr" }', "values lie above 1"),
-        ('{ kind = "mirror", texture = "poster.png" }', "unknown key 'objects[1].material.texture', a material of kind 'mirror' knows"),
+        (
+            '{ kind = "mirror", texture = "poster.png" }',
+            "unknown key 'objects[1].material.texture', a material of kind 'mirror' knows",
+        ),
         ('{ glass = "N-BK7", texture = "poster.png" }', "unknown key 'objects[1].material.texture'"),
     ],
-)  # fmt: skip
+)
 def test_a_bad_texture_is_one_sentence(folder: Path, material: str, expected: str) -> None:
     assert expected in refusal(folder, LIGHT + BALL + TABLE + f"material = {material}")
 
@@ -111,7 +132,11 @@ def test_pictures_that_are_none_name_the_key(folder: Path) -> None:
 
 
 def test_a_mesh_without_texture_coordinates_cannot_wear_one(folder: Path) -> None:
-    text = LIGHT + BALL + '[[objects]]\nname = "sheet"\nmesh = "{}"\nmaterial = {{ kind = "diffuse", texture = "poster.png" }}\n'
+    text = (
+        LIGHT
+        + BALL
+        + '[[objects]]\nname = "sheet"\nmesh = "{}"\nmaterial = {{ kind = "diffuse", texture = "poster.png" }}\n'
+    )
     sentence = refusal(folder, text.format("bare.obj"))
     assert "object 'sheet' has a texture, but its mesh no texture coordinates; export it with UVs" in sentence
     assert load(folder, text.format("mapped.obj")).objects[1].mesh.uv is not None
@@ -125,7 +150,12 @@ def test_a_mesh_without_texture_coordinates_cannot_wear_one(folder: Path) -> Non
 def test_each_kind_of_environment_is_read(folder: Path) -> None:
     text = CAMERA + BALL
     scene = load(folder, text + '[environment]\nkind = "map"\nfile = "room.exr"\nintensity = 2.0\nrotation_deg = 30\n')
-    assert scene.environment.kind == "map" and scene.environment.rgb.max() > 60.0 and scene.lights == () and len(scene.objects) == 1
+    assert (
+        scene.environment.kind == "map"
+        and scene.environment.rgb.max() > 60.0
+        and scene.lights == ()
+        and len(scene.objects) == 1
+    )
     np.testing.assert_allclose(scene.environment.world_to_local, world_to_local((0, 0, 1), 30.0))
     scene = load(folder, text + '[environment]\nkind = "gradient"\nzenith = [1, 2, 30]\nhorizon = 4\nup = [0, 2, 0]\n')
     assert scene.environment.kind == "gradient"
@@ -152,12 +182,21 @@ def test_notes_on_a_map_reach_the_scene(folder: Path) -> None:
         ('kind = "map"\nfile = "bare.obj"', "environment.file cannot be used"),
         ('kind = "map"\nfile = "room.exr"\nintensity = -1', "environment.intensity is -1 but must be at least 0"),
         ('kind = "map"\nfile = "room.exr"\nup = [0, 0, 0]', "environment.up is the zero vector"),
-        ('kind = "map"\nfile = "room.exr"\nrotation = 3', "unknown key 'environment.rotation', did you mean 'rotation_deg'?"),
-        ('kind = "map"\nfile = "room.exr"\nzenith = 3', "unknown key 'environment.zenith', an environment of kind 'map' knows"),
+        (
+            'kind = "map"\nfile = "room.exr"\nrotation = 3',
+            "unknown key 'environment.rotation', did you mean 'rotation_deg'?",
+        ),
+        (
+            'kind = "map"\nfile = "room.exr"\nzenith = 3',
+            "unknown key 'environment.zenith', an environment of kind 'map' knows",
+        ),
         ('file = "room.exr"', "environment.kind is missing"),
         ('kind = "panorama"', "environment.kind is 'panorama', which is not known"),
         ('kind = "gradient"\nzenith = 1', "environment.horizon is missing"),
-        ('kind = "gradient"\nzenith = [1, -1, 1]\nhorizon = 1', "environment.zenith must be three radiances of 0 or more"),
+        (
+            'kind = "gradient"\nzenith = [1, -1, 1]\nhorizon = 1',
+            "environment.zenith must be three radiances of 0 or more",
+        ),
         ('kind = "sky"\ntype = 16', "environment.type is 16 but must be at most 15"),
         ('kind = "sky"\nsun_elevation_deg = -5', "environment.sun_elevation_deg is -5 but must be at least 0"),
         ('kind = "sky"\nground = 2', "every channel must lie between 0 and 1"),
@@ -189,12 +228,21 @@ def test_without_an_environment_light_and_receiver_are_still_needed(folder: Path
 
 
 def test_textures_survive_saving_elsewhere(folder: Path) -> None:
-    text = LIGHT + BALL + TABLE + 'material = { kind = "diffuse", colour = 0.25, texture = { file = "poster.png", wrap = "clamp" } }'
+    text = (
+        LIGHT
+        + BALL
+        + TABLE
+        + 'material = { kind = "diffuse", colour = 0.25, texture = { file = "poster.png", wrap = "clamp" } }'
+    )
     scene = load(folder, text)
     (folder / "deep" / "er").mkdir(parents=True)
     back = again(scene, folder / "deep" / "er" / "copy.toml")
     old, new = scene.objects[1].material, back.objects[1].material
-    assert new.reflectance_rgb == old.reflectance_rgb and new.texture.wrap == "clamp" and new.texture.source == old.texture.source
+    assert (
+        new.reflectance_rgb == old.reflectance_rgb
+        and new.texture.wrap == "clamp"
+        and new.texture.source == old.texture.source
+    )
     np.testing.assert_array_equal(new.texture.rgb, old.texture.rgb)
     assert 'file = "../../poster.png"' in (folder / "deep" / "er" / "copy.toml").read_text()
 
@@ -275,10 +323,15 @@ def test_a_disc_cuts_its_circle_out_of_the_picture() -> None:
 
 
 def test_a_globe_has_its_map_the_right_way_round() -> None:
-    for mesh, axes in ((primitives.sphere(2.0, 2_000), (2.0, 2.0, 2.0)), (primitives.ellipsoid((1.0, 2.0, 3.0), 2_000), (1.0, 2.0, 3.0))):
+    for mesh, axes in (
+        (primitives.sphere(2.0, 2_000), (2.0, 2.0, 2.0)),
+        (primitives.ellipsoid((1.0, 2.0, 3.0), 2_000), (1.0, 2.0, 3.0)),
+    ):
         direction = mesh.corners() / axes
         # v is the latitude; u the azimuth up to whole turns, continuous within each triangle.
-        np.testing.assert_allclose(mesh.uv[..., 1], 1.0 - np.arccos(np.clip(direction[..., 2], -1.0, 1.0)) / np.pi, atol=1e-7)
+        np.testing.assert_allclose(
+            mesh.uv[..., 1], 1.0 - np.arccos(np.clip(direction[..., 2], -1.0, 1.0)) / np.pi, atol=1e-7
+        )
         level = np.hypot(direction[..., 0], direction[..., 1])
         away = level > 1e-9
         azimuth = (mesh.uv[..., 0][away] - 0.5) * 2.0 * np.pi
@@ -290,7 +343,11 @@ def test_a_globe_has_its_map_the_right_way_round() -> None:
         assert (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0] > 0.0)[equator].all()
 
 
-@pytest.mark.parametrize("mesh", [primitives.box((1.0, 2.0, 0.5)), primitives.sphere(1.0, 320), primitives.disc(1.0)], ids=["box", "sphere", "disc"])
+@pytest.mark.parametrize(
+    "mesh",
+    [primitives.box((1.0, 2.0, 0.5)), primitives.sphere(1.0, 320), primitives.disc(1.0)],
+    ids=["box", "sphere", "disc"],
+)
 def test_pictures_on_primitives_leave_their_charts_alone(mesh) -> None:
     from spectrasplat.model.geometry.charts import build_charts
 

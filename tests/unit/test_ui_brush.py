@@ -63,20 +63,27 @@ def test_scrubbing_for_long_does_not_make_thousands_of_dabs() -> None:
     there_and_back = np.concatenate([line(0.0, 0.5, 30), line(0.5, 0.0, 30)] * 40)
     stroke = painted(BRUSH, there_and_back, 1 / 60)
     assert len(stroke.dabs) < 25
-    assert sum(dab.log2_gain for dab in stroke.dabs) == pytest.approx((len(there_and_back) - 1) / 60 + brushes.FIRST_TOUCH_S)
+    assert sum(dab.log2_gain for dab in stroke.dabs) == pytest.approx(
+        (len(there_and_back) - 1) / 60 + brushes.FIRST_TOUCH_S
+    )
 
 
 def test_dabs_lie_in_the_receivers_own_coordinates() -> None:
     angle = 0.7
     matrix = np.eye(4)
-    matrix[:3, :3] = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]) @ np.diag([4.0, 4.0, 0.3])
+    matrix[:3, :3] = np.array(
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    ) @ np.diag([4.0, 4.0, 0.3])
     matrix[:3, 3] = 5.0, -2.0, 1.0
     place = (matrix @ np.array([0.3, -0.2, 0.0, 1.0]))[:3]
     stroke = painted(BRUSH, [place], 0.1, scene(matrix))
     assert stroke.dabs[0].position == pytest.approx([0.3, -0.2, 0.0])
     # The plane is stretched four times whatever is done to heights above it.
     assert stroke.dabs[0].radius == pytest.approx(BRUSH.radius / 4.0)
-    bowl = replace(receiver(np.diag([2.0, 2.0, 2.0, 1.0])), mesh=make_mesh("bent", CORNERS + [[0, 0, 0.5], [0, 0, 0], [0, 0, 0], [0, 0, 0]], QUAD.triangles))
+    bowl = replace(
+        receiver(np.diag([2.0, 2.0, 2.0, 1.0])),
+        mesh=make_mesh("bent", CORNERS + [[0, 0, 0.5], [0, 0, 0], [0, 0, 0], [0, 0, 0]], QUAD.triangles),
+    )
     assert brushes.object_radius(bowl, 0.2) == pytest.approx(0.1)
 
 
@@ -110,8 +117,6 @@ def test_the_ring_lies_on_the_tangent_plane() -> None:
     points = brushes.ring((1.0, 2.0, 3.0), tuple(normal), 0.5) - [1.0, 2.0, 3.0]
     assert points @ normal == pytest.approx(0.0, abs=1e-12)
     assert np.linalg.norm(points, axis=1) == pytest.approx(0.5)
-
-
 
 
 def test_a_stroke_is_added_to_what_was_there() -> None:

@@ -171,7 +171,14 @@ def test_dabs_are_laid_on_receivers_only_and_go_with_the_material(scene: Scene) 
 
 @pytest.mark.parametrize(
     "change",
-    [{"radius": 0.0}, {"radius": math.nan}, {"position": (0.0, math.inf, 0.0)}, {"falloff": 1.5}, {"erase": -0.1}, {"log2_gain": 1e9}],
+    [
+        {"radius": 0.0},
+        {"radius": math.nan},
+        {"position": (0.0, math.inf, 0.0)},
+        {"falloff": 1.5},
+        {"erase": -0.1},
+        {"log2_gain": 1e9},
+    ],
 )
 def test_impossible_dabs_are_refused(scene: Scene, change: dict[str, object]) -> None:
     refusal(edits.add_dabs, scene, FLOOR, [replace(Dab((0, 0, 0), 0.5, 1.0), **change)])
@@ -274,7 +281,10 @@ def test_a_spectrum_is_set_keeps_the_brightness_and_is_told_back(scene: Scene, k
         assert told == value
 
 
-@pytest.mark.parametrize(("kind", "value"), [("illuminant", "D66"), ("laser", 1064.0), ("blackbody", 1.0), ("blackbody", "hot"), ("lines", ())])
+@pytest.mark.parametrize(
+    ("kind", "value"),
+    [("illuminant", "D66"), ("laser", 1064.0), ("blackbody", 1.0), ("blackbody", "hot"), ("lines", ())],
+)
 def test_an_impossible_spectrum_is_refused(scene: Scene, kind: str, value: object) -> None:
     refusal(edits.set_light_spectrum, scene, 1, kind, value)
 
@@ -284,7 +294,10 @@ def test_an_impossible_spectrum_is_refused(scene: Scene, kind: str, value: objec
 def test_another_kind_lights_the_objects_as_brightly(scene: Scene, start: str, kind: str) -> None:
     first = edits.set_light_kind(scene, 1, start)
     second = edits.set_light_kind(edits.set_light_kind(first, 1, kind), 1, start)
-    assert edits.light_power(second.lights[1]) == pytest.approx(edits.light_power(first.lights[1]), rel=1e-9) or kind == "directional"
+    assert (
+        edits.light_power(second.lights[1]) == pytest.approx(edits.light_power(first.lights[1]), rel=1e-9)
+        or kind == "directional"
+    )
     assert second.lights[1].kind == start
 
 
@@ -304,10 +317,17 @@ def test_lights_can_be_added_copied_saved_and_deleted(scene: Scene, kind: str, t
 @pytest.mark.parametrize(
     "change",
     [
-        {"position": (0.0, 0.0, 0.6)}, {"position": (math.nan, 0.0, 0.0)}, {"direction": (0.0, 0.0, 0.0)}, {"radius": 0.0},
-        {"inner_half_angle_deg": 50.0}, {"outer_half_angle_deg": 91.0}, {"angular_diameter_deg": -1.0}, {"name": "sun"}, {"name": ""},
+        {"position": (0.0, 0.0, 0.6)},
+        {"position": (math.nan, 0.0, 0.0)},
+        {"direction": (0.0, 0.0, 0.0)},
+        {"radius": 0.0},
+        {"inner_half_angle_deg": 50.0},
+        {"outer_half_angle_deg": 91.0},
+        {"angular_diameter_deg": -1.0},
+        {"name": "sun"},
+        {"name": ""},
     ],
-)  # fmt: skip
+)
 def test_impossible_lights_are_refused(scene: Scene, change: dict[str, object]) -> None:
     refusal(edits.set_light, scene, 1, replace(scene.lights[1], **change))
 
@@ -342,4 +362,9 @@ def test_an_attempt_is_an_edit_or_a_notice(scene: Scene) -> None:
     refused = edits.attempt(state, "Rename block", edits.rename, BLOCK, "floor")
     assert refused.scene is scene
     (notice,) = refused.requests
-    assert isinstance(notice, Notice) and notice.is_error and notice.text.startswith("Another object") and notice.text.endswith(".")
+    assert (
+        isinstance(notice, Notice)
+        and notice.is_error
+        and notice.text.startswith("Another object")
+        and notice.text.endswith(".")
+    )

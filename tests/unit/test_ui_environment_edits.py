@@ -1,4 +1,5 @@
-"""Edits of the environment and of pictures on surfaces: what they change, what they keep, what they refuse, and that they can be saved."""
+"""Edits of the environment and of pictures on surfaces: what they change, what they keep, what they refuse, and that
+they can be saved."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ from spectrasplat.model.environment import direction_of
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.scene import Black, Diffuse, Scene
-from spectrasplat.render.viewer.inputs import LiveInputs, DirtyLevel
+from spectrasplat.render.viewer.inputs import DirtyLevel, LiveInputs
 from spectrasplat.render.viewer.invalidation import dirty_level
 
 STUDIO = assets_dir() / "environments" / "studio.hdr"
@@ -50,7 +51,8 @@ def cost(before: Scene, after: Scene) -> DirtyLevel:
 
 
 def test_where_an_environment_is_seen_neither_receiver_nor_light_is_needed(scene: Scene, tmp_path: Path) -> None:
-    """Every way to do without them gives a scene that can be saved and opened again; without the environment all are refused."""
+    """Every way to do without them gives a scene that can be saved and opened again; without the environment all are
+    refused."""
     scene = edits.delete_light(scene, 1)
     sky, table = environment.set_environment_kind(scene, "sky"), table_of(scene)
     for edit, arguments in ((edits.delete, [table]), (edits.set_material, [table, Black()]), (edits.delete_light, [0])):
@@ -88,10 +90,14 @@ def test_a_first_sky_is_as_bright_as_the_light_asks_for_and_follows_the_sun() ->
 
 
 def test_parameters_are_changed_one_at_a_time(scene: Scene) -> None:
-    made = environment.set_gradient(environment.set_environment_kind(scene, "gradient"), zenith=(0.0, 0.0, 0.0), intensity=2.0)
+    made = environment.set_gradient(
+        environment.set_environment_kind(scene, "gradient"), zenith=(0.0, 0.0, 0.0), intensity=2.0
+    )
     told = made.environment.parameters
     assert told["zenith"] == [0.0, 0.0, 0.0] and told["intensity"] == 2.0 and made.environment.rgb[0].max() < 1e-3
-    np.testing.assert_allclose(made.environment.rgb[127:129].mean(axis=(0, 1)), 2.0 * np.array(told["horizon"]), rtol=1e-3)
+    np.testing.assert_allclose(
+        made.environment.rgb[127:129].mean(axis=(0, 1)), 2.0 * np.array(told["horizon"]), rtol=1e-3
+    )
     sky = environment.set_sky(environment.set_environment_kind(scene, "sky"), type=5, luminance=3.0)
     assert np.ptp(sky.environment.rgb[:128]) < 1e-5 and sky.environment.rgb[0, 0, 0] == pytest.approx(3.0)
     with pytest.raises(UserError, match="type 16"):
@@ -121,8 +127,12 @@ def test_intensity_scales_and_comes_back_from_nothing(with_map: Scene) -> None:
         environment.set_map_intensity(with_map, 1e39)
 
 
-def test_a_panorama_without_units_is_made_to_suit_the_lights_and_another_takes_its_place(with_map: Scene, scene: Scene) -> None:
-    bright = replace(scene, lights=tuple(replace(light, spectral_power=light.spectral_power.scaled(1e4)) for light in scene.lights))
+def test_a_panorama_without_units_is_made_to_suit_the_lights_and_another_takes_its_place(
+    with_map: Scene, scene: Scene
+) -> None:
+    bright = replace(
+        scene, lights=tuple(replace(light, spectral_power=light.spectral_power.scaled(1e4)) for light in scene.lights)
+    )
     fitted = environment.set_environment_map(bright, STUDIO).environment
     assert environment._mean_luminance(fitted) == pytest.approx(environment._usual_radiance(bright), rel=0.1)
     like_it = replace(scene, background_rgb=(0.5, 0.5, 0.5))
@@ -156,7 +166,10 @@ def test_a_picture_is_worn_tinted_shared_and_taken_off(scene: Scene, picture: Pa
     assert cpu_reference.objects[-1].material.texture is worn.objects[table].material.texture
     assert cost(scene, worn) == DirtyLevel.BUILD and cost(worn, tinted) == DirtyLevel.LOOK
     clamped = environment.set_texture_wrap(worn, table, "clamp")
-    assert cost(worn, clamped) == DirtyLevel.LOOK and clamped.objects[table].material.texture.rgb is worn.objects[table].material.texture.rgb
+    assert (
+        cost(worn, clamped) == DirtyLevel.LOOK
+        and clamped.objects[table].material.texture.rgb is worn.objects[table].material.texture.rgb
+    )
     plain = environment.clear_texture(worn, table)
     assert plain.objects[table].material.texture is None
 
@@ -166,7 +179,9 @@ def test_what_cannot_wear_a_picture_says_so(scene: Scene, picture: Path) -> None
     glass = next(i for i, item in enumerate(scene.objects) if not isinstance(item.material, Diffuse))
     bare = replace(scene.objects[table], mesh=replace(scene.objects[table].mesh, uv=None))
     with pytest.raises(UserError, match="no texture coordinates"):
-        environment.set_texture(replace(scene, objects=(*scene.objects[:table], bare, *scene.objects[table + 1 :])), table, picture)
+        environment.set_texture(
+            replace(scene, objects=(*scene.objects[:table], bare, *scene.objects[table + 1 :])), table, picture
+        )
     with pytest.raises(UserError, match="not diffuse"):
         environment.set_texture(scene, glass, picture)
     with pytest.raises(UserError, match="no picture"):

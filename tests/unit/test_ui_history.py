@@ -10,7 +10,9 @@ from spectrasplat.model.geometry import primitives
 from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.scene_defaults import default_light
 
-START = Scene("s", Camera((0, -3, 1), (0, 0, 0)), (default_light(),), (SceneObject("floor", primitives.plane(), Diffuse()),))
+START = Scene(
+    "s", Camera((0, -3, 1), (0, 0, 0)), (default_light(),), (SceneObject("floor", primitives.plane(), Diffuse()),)
+)
 
 
 def scene(grey: float) -> Scene:

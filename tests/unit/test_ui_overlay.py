@@ -33,11 +33,13 @@ def test_what_lies_behind_is_cut_away() -> None:
 
 def test_an_orthographic_camera_sees_what_lies_behind_it() -> None:
     flat = canvas(replace(CAMERA, kind="orthographic", vertical_extent=2.0))
-    assert flat.segments(np.array([[0.0, -1.0, 0.0], [1.0, -2.0, 0.5]])).reshape(4) == pytest.approx([210, 120, 310, 70])
+    assert flat.segments(np.array([[0.0, -1.0, 0.0], [1.0, -2.0, 0.5]])).reshape(4) == pytest.approx(
+        [210, 120, 310, 70]
+    )
 
 
 def test_lines_that_leave_the_picture_keep_their_slope() -> None:
-    (start, end), = canvas().segments(np.array([[0.0, 1.0, 0.0], [1e6, 1.0, 5e5]]))
+    ((start, end),) = canvas().segments(np.array([[0.0, 1.0, 0.0], [1e6, 1.0, 5e5]]))
     assert np.abs(end).max() < 1000.0
     assert (end - start)[1] / (end - start)[0] == pytest.approx(-0.5)
 

@@ -50,7 +50,9 @@ def test_recent_files_are_ten_newest_first_and_only_those_still_there(tmp_path: 
     assert settings.existing_recent()[:2] == (files[5], files[10]) and files[11] in settings.recent
 
 
-@pytest.mark.parametrize("content", [b"{", b"\xff\xfe", b'{"preferences": {"theme": "pink"}}', b'{"recent": 3}', b"[" * 100_000, b""])
+@pytest.mark.parametrize(
+    "content", [b"{", b"\xff\xfe", b'{"preferences": {"theme": "pink"}}', b'{"recent": 3}', b"[" * 100_000, b""]
+)
 def test_a_damaged_file_is_set_aside_and_told(config: Path, content: bytes) -> None:
     config.mkdir()
     (config / "settings.json").write_bytes(content)

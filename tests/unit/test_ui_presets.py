@@ -47,7 +47,12 @@ def test_every_glass_applies_and_its_remark_is_true(scene: Scene, preset: preset
 def test_every_light_applies_and_keeps_place_kind_and_brightness(scene: Scene, preset: presets.LightPreset) -> None:
     before = scene.lights[0]
     after = presets.apply_light(scene, 0, preset).lights[0]
-    assert (after.name, after.kind, after.position, after.direction) == (before.name, before.kind, before.position, before.direction)
+    assert (after.name, after.kind, after.position, after.direction) == (
+        before.name,
+        before.kind,
+        before.position,
+        before.direction,
+    )
     assert edits.light_power(after) == pytest.approx(edits.light_power(before))
     assert edits.spectrum_words(after.spectral_power)[0] == preset.kind
     for value in re.findall(r"(\d+) K", preset.remark):
@@ -65,17 +70,27 @@ def test_the_sun_widens_a_directional_light_only(scene: Scene) -> None:
 @pytest.mark.parametrize("up", [(0.0, 0.0, 1.0), (0.0, 1.0, 0.0)])
 @pytest.mark.parametrize("kind", ["pinhole", "orthographic"])
 @pytest.mark.parametrize("preset", presets.view_presets(), ids=lambda p: p.name)
-def test_every_view_sees_the_glass_upright(scene: Scene, preset: presets.ViewPreset, kind: str, up: tuple[float, float, float]) -> None:
+def test_every_view_sees_the_glass_upright(
+    scene: Scene, preset: presets.ViewPreset, kind: str, up: tuple[float, float, float]
+) -> None:
     turned = replace(scene, camera=replace(scene.camera, up=up))
     camera = presets.view_camera(turned, replace(scene.camera, kind=kind), preset)
     forward = np.subtract(camera.target, camera.position)
     distance = np.linalg.norm(forward)
     forward = forward / distance
     assert abs(forward @ camera.up) < 0.7 and camera.kind == kind
-    corners = np.concatenate([o.mesh.vertices @ o.object_to_world[:3, :3].T + o.object_to_world[:3, 3] for o in scene.objects if isinstance(o.material, Dielectric)])
+    corners = np.concatenate(
+        [
+            o.mesh.vertices @ o.object_to_world[:3, :3].T + o.object_to_world[:3, 3]
+            for o in scene.objects
+            if isinstance(o.material, Dielectric)
+        ]
+    )
     across = np.linalg.norm(np.cross(corners - camera.position, forward), axis=1)
     depth = (corners - camera.position) @ forward
-    half = np.tan(np.radians(0.5 * camera.vertical_fov_deg)) * depth if kind == "pinhole" else 0.5 * camera.vertical_extent
+    half = (
+        np.tan(np.radians(0.5 * camera.vertical_fov_deg)) * depth if kind == "pinhole" else 0.5 * camera.vertical_extent
+    )
     assert (depth > 0).all() and (across < half).all()
 
 

@@ -24,7 +24,11 @@ FLOOR, PRISM, OTHER = range(3)
 
 
 def scene(prism=FLINT, other=CROWN) -> Scene:
-    items = (SceneObject("floor", QUAD, Diffuse()), SceneObject("prism", QUAD, Dielectric(prism)), SceneObject("lens", QUAD, Dielectric(other)))
+    items = (
+        SceneObject("floor", QUAD, Diffuse()),
+        SceneObject("prism", QUAD, Dielectric(prism)),
+        SceneObject("lens", QUAD, Dielectric(other)),
+    )
     return Scene("test", Camera((0, 0, 9), (0, 0, 0)), (), items)
 
 
@@ -33,7 +37,9 @@ def place_of(nm: float, dispersion=FLINT, velocity=VELOCITY) -> np.ndarray:
     return velocity * float(dispersion.index(nm) - dispersion.n_d)
 
 
-def photons(count: int = 400, bands: int = 1, source: int = PRISM, velocity=VELOCITY, anchor_nm: float = 520.0) -> pulling.PullPhotons:
+def photons(
+    count: int = 400, bands: int = 1, source: int = PRISM, velocity=VELOCITY, anchor_nm: float = 520.0
+) -> pulling.PullPhotons:
     """A white beam of width 0.02 through the flint, one record a photon and band."""
     rng = np.random.default_rng(5)
     edges = np.linspace(400.0, 700.0, bands + 1)
@@ -95,12 +101,16 @@ def two_sources() -> pulling.PullPhotons:
     """The flint's rainbow along x, and twice as much light through the crown along y, crossing at 450 nm of both."""
     one, shift = photons(), place_of(450.0)
     velocity = np.array([0.0, 90.0, 0.0])
-    other_position = shift + velocity * float(CROWN.index(520.0) - CROWN.index(450.0)) + (one.position - place_of(520.0))
+    other_position = (
+        shift + velocity * float(CROWN.index(520.0) - CROWN.index(450.0)) + (one.position - place_of(520.0))
+    )
     n = len(one.position)
     zero = np.zeros((n, 3))
     return pulling.PullPhotons(
         position=np.concatenate([one.position, other_position]),
-        dposition_dn=np.concatenate([np.stack([one.dposition_dn[:, 0], zero], 1), np.stack([zero, zero + velocity], 1)]),
+        dposition_dn=np.concatenate(
+            [np.stack([one.dposition_dn[:, 0], zero], 1), np.stack([zero, zero + velocity], 1)]
+        ),
         n_anchor=np.tile([float(FLINT.index(520.0)), float(CROWN.index(520.0))], (2 * n, 1)),
         flux_w=np.concatenate([one.flux_w, 2.0 * one.flux_w]),
         source=np.concatenate([one.source, np.full(n, OTHER)]),
@@ -167,7 +177,9 @@ def test_where_there_is_nothing_to_pull_the_reason_is_said(point, nm, light, wor
 
 def test_a_glass_already_changed_is_pulled_from_its_gain() -> None:
     doubled = with_gain(FLINT, 2.0)
-    shown = replace(photons(), variables=(doubled.index,))  # traced with the plain glass, shown with twice its dispersion
+    shown = replace(
+        photons(), variables=(doubled.index,)
+    )  # traced with the plain glass, shown with twice its dispersion
     point = place_of(450.0, doubled)
     pull = pulling.begin_pull(shown, scene(doubled), point, UP, 0.05, FLOOR, 450.0)
     # To first order the d line's own landing point has not moved.

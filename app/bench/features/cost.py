@@ -31,8 +31,9 @@ if TYPE_CHECKING:
 
 REPEATS = 9
 MAP_TOLERANCE = 1e-2
-"""Two programs that must draw the same map may differ by this share of its energy. Most agree to the last bit; a Gaussian
-from a table and one in closed form differ by 3e-3, the sum of coarse bins and the radiant power of XYZ maps by 5e-3."""
+"""Two programs that must draw the same map may differ by this share of its energy. Most agree to the last bit; a
+Gaussian from a table and one in closed form differ by 3e-3, the sum of coarse bins and the radiant power of XYZ maps by
+5e-3."""
 _TARGET_SECONDS = 0.4
 """Time of one traced and splatted lattice: long against the clock, short against the patience."""
 _PHOTONS = (2048, 1 << 16)
@@ -135,14 +136,28 @@ def agrees(cost: FeatureCost) -> bool:
     return cost.map_difference is None or cost.map_difference <= MAP_TOLERANCE
 
 
-def measure(context: Context, scene: Scene, repeats: int = REPEATS, seconds: float = _TARGET_SECONDS) -> Iterator[tuple[FeatureReport, float]]:
+def measure(
+    context: Context, scene: Scene, repeats: int = REPEATS, seconds: float = _TARGET_SECONDS
+) -> Iterator[tuple[FeatureReport, float]]:
     """(the report so far, share done) after the proof and after each feature."""
     settings = RenderSettings(width=scene.render.width, height=scene.render.height, max_depth=scene.render.max_depth)
     features = Features.of(scene, settings)
     report = FeatureReport(
-        __version__, datetime.now(UTC).isoformat(timespec="seconds"), scene.name, context.renderer,
-        "processor time" if context.is_software else "wall clock", 0, repeats, 0.0, 0.0, "", [], [], [], complete=False,
-    )  # fmt: skip
+        __version__,
+        datetime.now(UTC).isoformat(timespec="seconds"),
+        scene.name,
+        context.renderer,
+        "processor time" if context.is_software else "wall clock",
+        0,
+        repeats,
+        0.0,
+        0.0,
+        "",
+        [],
+        [],
+        [],
+        complete=False,
+    )
     light = _begun(context, scene, settings, features)
     try:
         features = light.features
@@ -150,7 +165,9 @@ def measure(context: Context, scene: Scene, repeats: int = REPEATS, seconds: flo
         report.records = RecordSizes.of(features).words()
         _prove(report, context, scene, settings, features)
         if not light.plans:
-            raise UserError(f"scene '{scene.name}': no light meets glass or a mirror, so no feature costs anything; name a scene with a caustic")
+            raise UserError(
+                f"scene '{scene.name}': no light meets glass or a mirror, so no feature costs anything; name a scene with a caustic"
+            )
         work = _calibrated(report, light, seconds, context)
         told = static_costs(scene, features)
         for index, trial in enumerate(asked):
@@ -214,14 +231,23 @@ def cost_of(trial: Trial, bytes_told: str, context: Context, work: Work, repeats
         for rig in rigs:
             rig.release()
     trace, splat = (percent_of(ratios[:, stage]) for stage in range(2))
-    return FeatureCost(trial.feature, trial.included, trial.reason, bytes_told, trace, splat if trial.same_splats else None, difference, trial.note)
+    return FeatureCost(
+        trial.feature,
+        trial.included,
+        trial.reason,
+        bytes_told,
+        trace,
+        splat if trial.same_splats else None,
+        difference,
+        trial.note,
+    )
 
 
 def percent_of(ratios: np.ndarray) -> Percent:
     """Ratios with : without as a cost in percent; the interval holds the true median with 95 % at least.
 
-    Without the k outermost of n at each end it misses with 2 P(at most k of n coins show heads), whatever the distribution;
-    fewer than six ratios cannot promise that much and give their extremes.
+    Without the k outermost of n at each end it misses with 2 P(at most k of n coins show heads), whatever the
+    distribution; fewer than six ratios cannot promise that much and give their extremes.
     """
     ordered = 100.0 * (np.sort(ratios) - 1.0)
     count, dropped = len(ordered), 0

@@ -66,7 +66,9 @@ def show(report: FeatureReport) -> None:
         table = Table(title=title, title_justify="left")
         narrow = [index for index, heading in enumerate(headings) if heading not in _PAGE_ALONE]
         for index in narrow:
-            table.add_column(headings[index], justify="right" if headings[index] in _NUMBERS else "left", overflow="fold")
+            table.add_column(
+                headings[index], justify="right" if headings[index] in _NUMBERS else "left", overflow="fold"
+            )
         for row in rows:
             table.add_row(*(row[index] for index in narrow))
         console.print(table)
@@ -81,8 +83,12 @@ def page(report: FeatureReport) -> str:
         lines = []
         for row in rows:
             cells = zip(headings, row, strict=True)
-            lines.append("<tr>" + "".join(f'<td{_class(heading)}>{html.escape(cell)}</td>' for heading, cell in cells) + "</tr>")
-        parts.append(f'<h2>{html.escape(title)}</h2><div class="wide"><table><tr>{head}</tr>{"".join(lines)}</table></div>')
+            lines.append(
+                "<tr>" + "".join(f"<td{_class(heading)}>{html.escape(cell)}</td>" for heading, cell in cells) + "</tr>"
+            )
+        parts.append(
+            f'<h2>{html.escape(title)}</h2><div class="wide"><table><tr>{head}</tr>{"".join(lines)}</table></div>'
+        )
     parts.append(f'<p class="muted">{html.escape(_reading(report))}</p>')
     return _PAGE.format(title=html.escape(f"What each feature costs in '{report.scene}'"), body="\n".join(parts))
 
@@ -96,14 +102,27 @@ def _class(heading: str) -> str:
 
 def _tables(report: FeatureReport) -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
     costs = [
-        (c.feature, "in" if c.included else "out", c.reason, _percent(c.trace), _percent(c.splat), c.bytes, _note(c.note, c.map_difference))
+        (
+            c.feature,
+            "in" if c.included else "out",
+            c.reason,
+            _percent(c.trace),
+            _percent(c.splat),
+            c.bytes,
+            _note(c.note, c.map_difference),
+        )
         for c in report.costs
     ]
     proof = [
-        (p.feature, "in" if p.included else "out", ", ".join(s for s in p.symbols if " " not in s) or "more than one colour target",
-         ", ".join(p.programs) or "no program", "as it must be" if p.holds else "NOT as it must be")
+        (
+            p.feature,
+            "in" if p.included else "out",
+            ", ".join(s for s in p.symbols if " " not in s) or "more than one colour target",
+            ", ".join(p.programs) or "no program",
+            "as it must be" if p.holds else "NOT as it must be",
+        )
         for p in report.proof
-    ]  # fmt: skip
+    ]
     programs = [(p.name, str(p.lines), str(p.flattened_lines), ", ".join(p.features)) for p in report.programs]
     return [
         ("Cost of each feature (in: what it costs; out: what leaving it out saves)", _COST_HEADINGS, costs),

@@ -40,13 +40,27 @@ class Work:
 
     @staticmethod
     def of(light: LightPass, whole: int, photons: int) -> Work:
-        """About `photons` points, evenly taken from lattices of `whole` points, so that footprints have their usual size."""
+        """About `photons` points, evenly taken from lattices of `whole` points, so that footprints have their usual
+        size."""
         slices = []
         for plan in light.plans:
             lattice = max(1, round(whole * plan.share / plan.lattices / plan.domain.active_share))
             stride = max(1, round(whole / photons))
             points = len(range(0, lattice, stride))
-            piece = LatticeSlice(plan.index, plan.bands, lattice, 0, stride, points, (0, 0), (0, 0), 0, _SEED, plan.light_points, weight=float(whole))
+            piece = LatticeSlice(
+                plan.index,
+                plan.bands,
+                lattice,
+                0,
+                stride,
+                points,
+                (0, 0),
+                (0, 0),
+                0,
+                _SEED,
+                plan.light_points,
+                weight=float(whole),
+            )
             slices.append((piece, plan.domain))
         return Work(light, tuple(slices))
 
@@ -81,11 +95,20 @@ class Rig:
         self._variables = SpectralVariables.build(ctx, self._buffers.variables)
         spans = {plan.index: [(band.x_lo, band.x_hi) for band in plan.bands] for plan in light.plans}
         edges = None if variant.bins is None else tuple(np.linspace(380.0, 780.0, variant.bins + 1).tolist())
-        channels = tents(light.buffers.axis, variant.features.map_tents) if edges is None and variant.features.map_tents else MapChannels(edges)
+        channels = (
+            tents(light.buffers.axis, variant.features.map_tents)
+            if edges is None and variant.features.map_tents
+            else MapChannels(edges)
+        )
         spectra = [lamp.spectral_power for lamp in scene.lights]
         self._tables = SplatTables.build(
-            ctx, light.buffers.axis, spectra, light.reflectances, [spans.get(i, [(0.0, 1.0)]) for i in range(len(spectra))], channels
-        )  # fmt: skip
+            ctx,
+            light.buffers.axis,
+            spectra,
+            light.reflectances,
+            [spans.get(i, [(0.0, 1.0)]) for i in range(len(spectra))],
+            channels,
+        )
 
     def run(self) -> Cost:
         """Trace and splat everything once; deposits add up."""
@@ -97,9 +120,14 @@ class Rig:
             self._context.finish()
             middle = self._clock()
             self._splatter.run(
-                self._trace.photons, batch.photons, self._variables, self._tables, self._atlas,
-                self._work.light.receivers, self._work.light.settings.smoothing,
-            )  # fmt: skip
+                self._trace.photons,
+                batch.photons,
+                self._variables,
+                self._tables,
+                self._atlas,
+                self._work.light.receivers,
+                self._work.light.settings.smoothing,
+            )
             self._context.finish()
             splatted += self._clock() - middle
             traced += middle - started

@@ -35,7 +35,13 @@ class RecordSizes:
         """The sizes under `features`."""
         columns = features.defines()["COLUMNS"]
         slots = (2 if features.nested_windows else 1) * SPLAT.stride
-        return RecordSizes(ray_record(columns).stride, photon_record(features.spectral_groups).stride, slots, features.targets * _TEXEL, columns)
+        return RecordSizes(
+            ray_record(columns).stride,
+            photon_record(features.spectral_groups).stride,
+            slots,
+            features.targets * _TEXEL,
+            columns,
+        )
 
     def words(self) -> str:
         """One line for people."""
@@ -60,11 +66,21 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
     absorbing = sum(isinstance(o.material, Dielectric) and o.material.absorption is not None for o in scene.objects)
     mirrors = sum(isinstance(o.material, Mirror) for o in scene.objects)
     curved = [o for o in scene.objects if isinstance(o.material, Diffuse)]
-    worn = {id(o.material.texture.rgb): o.material.texture for o in scene.objects if isinstance(o.material, Diffuse) and o.material.texture is not None}
+    worn = {
+        id(o.material.texture.rgb): o.material.texture
+        for o in scene.objects
+        if isinstance(o.material, Diffuse) and o.material.texture is not None
+    }
     beyond = scene.environment
     told = {
-        "spectral columns": (features.spectral_groups > 0, f"{sizes.ray - unspectral.ray} B a ray, {sizes.photon - unspectral.photon} B a photon"),
-        "shared spectral variable": (features.merged_groups, f"one lookup of the slope a refraction, {size_words(row * len(glasses))}"),
+        "spectral columns": (
+            features.spectral_groups > 0,
+            f"{sizes.ray - unspectral.ray} B a ray, {sizes.photon - unspectral.photon} B a photon",
+        ),
+        "shared spectral variable": (
+            features.merged_groups,
+            f"one lookup of the slope a refraction, {size_words(row * len(glasses))}",
+        ),
         "weights over the band": (features.spectral_weights, "Fresnel and indices at 3 wavelengths instead of 1"),
         "band cuts": (features.band_cuts, "one program more; a cut ray becomes two"),
         "spatial columns": (features.footprints, f"{sizes.ray - unspatial.ray} B a ray"),
@@ -75,27 +91,43 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "absorption": (features.absorption, f"3 lookups a flight, {size_words(row * absorbing)}"),
         "medium stack": (features.medium_stack, f"{len(overlapping_solids(scene))} bit(s) of a ray's mask"),
         "triangle tree": (features.tree, f"about {size_words(triangles * (TRIANGLE.stride + _NODE // 2))}"),
-        "half-space solids": (features.convex_solids, f"{planes} planes, {size_words(planes * _TEXEL)}: each ray walks through all"),
+        "half-space solids": (
+            features.convex_solids,
+            f"{planes} planes, {size_words(planes * _TEXEL)}: each ray walks through all",
+        ),
         "charts": (features.charts, f"{len(curved)} receiver(s) with a placement a facet"),
         "local gain": (features.local_gain, "eight voxels a photon"),
         "photons by index": (features.reindexed, "32 B a band"),
         "nested windows": (features.nested_windows, f"{SPLAT.stride} B a photon: a splat for each window"),
         "camera refraction": (features.camera_specular, "a second program; 4 B a pixel list what it has to do"),
-        "camera spectral taps": (features.camera_disperses, f"{features.spectral_groups} column(s) a camera ray; looks along each sweep"),
+        "camera spectral taps": (
+            features.camera_disperses,
+            f"{features.spectral_groups} column(s) a camera ray; looks along each sweep",
+        ),
         "spectral maps": (features.map_tents > 0, f"{features.map_tents * _TEXEL // 4} B a texel"),
         "textures": (bool(worn), f"about {size_words(sum(map(picture_bytes, worn.values())))}"),
-        "environment map": (beyond is not None, f"about {size_words(picture_bytes(beyond))}" if beyond is not None else ""),
+        "environment map": (
+            beyond is not None,
+            f"about {size_words(picture_bytes(beyond))}" if beyond is not None else "",
+        ),
         "spectral bins": (features.targets > 1, f"{sizes.texel} B a texel instead of {_TEXEL}"),
     }
     return {name: words for name, (included, words) in told.items() if included}
 
 
 def picture_bytes(picture: Texture | Environment) -> int:
-    """What a picture takes on the device, its smaller copies in a column beside it (`TextureStore`); packing several adds a little."""
+    """What a picture takes on the device, its smaller copies in a column beside it (`TextureStore`); packing several
+    adds a little."""
     height, width = picture.rgb.shape[:2]
     return _TEXEL * height * (width + (max(width // 2, 1) if level_count(width, height) > 1 else 0))
 
 
 def size_words(count: int) -> str:
     """Bytes for people."""
-    return f"{count} B" if count < 2048 else f"{count / 1024:.0f} KiB" if count < 1 << 21 else f"{count / (1 << 20):.1f} MiB"
+    return (
+        f"{count} B"
+        if count < 2048
+        else f"{count / 1024:.0f} KiB"
+        if count < 1 << 21
+        else f"{count / (1 << 20):.1f} MiB"
+    )

@@ -21,14 +21,40 @@ if TYPE_CHECKING:
     from ...model.settings import RenderSettings
 
 FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
-    "spectral columns": ("variable_step", "index_ratio_derivative", "medium_slope", "dposition_dvar0", "spectral_variable", "VARIABLE_ROW"),
+    "spectral columns": (
+        "variable_step",
+        "index_ratio_derivative",
+        "medium_slope",
+        "dposition_dvar0",
+        "spectral_variable",
+        "VARIABLE_ROW",
+    ),
     "shared spectral variable": ("SLOPE_ROW",),
     "weights over the band": (r"crossing_indices\(crossing, x3",),
     "band cuts": ("anchor_at", "passes_x", "MIN_CUT_BAND", "FELL_BAND", "is_cut", "energy_below"),
-    "spatial columns": (r"ray\.dposition\[c\]\.xyz = transfer_column", r"photon\.dposition_ds = ray", r"ray\.ddirection\[0\]\.xyz = "),
-    "refraction": ("refract_direction", "fresnel_reflectance", "transmitted_cosine2", "medium_index", "cross_boundary", "cross_glass", "INDEX_ROW"),
+    "spatial columns": (
+        r"ray\.dposition\[c\]\.xyz = transfer_column",
+        r"photon\.dposition_ds = ray",
+        r"ray\.ddirection\[0\]\.xyz = ",
+    ),
+    "refraction": (
+        "refract_direction",
+        "fresnel_reflectance",
+        "transmitted_cosine2",
+        "medium_index",
+        "cross_boundary",
+        "cross_glass",
+        "INDEX_ROW",
+    ),
     "mirrors": (r"\(kind == KIND_MIRROR\) ",),
-    "interpolated normals": ("corner_normal", "smooth_facet", "summed", "NORMALS_AT", "normalised_derivative", "dsummed"),
+    "interpolated normals": (
+        "corner_normal",
+        "smooth_facet",
+        "summed",
+        "NORMALS_AT",
+        "normalised_derivative",
+        "dsummed",
+    ),
     "normal derivatives": ("normal_columns",),
     "absorption": ("medium_weight_row", "alpha"),
     "medium stack": ("medium_of", "stack_objects", "STACK_OBJECTS", "mask_before"),
@@ -43,8 +69,9 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "spectral maps": ("BIN_ROW", "BIN_SPECTRUM_ROW", "BIN_TARGET"),
     "spectral bins": ("define TARGETS [2-9]", "define TARGETS 1[0-9]"),
 }
-"""By `explain`'s names. Names that only this feature uses; one with a space is a pattern for a line, where the camera, whose rays always carry
-a pixel's columns and weights over a band, uses a name that in the light pass belongs to a feature."""
+"""By `explain`'s names. Names that only this feature uses; one with a space is a pattern for a line, where the camera,
+whose rays always carry a pixel's columns and weights over a band, uses a name that in the light pass belongs to a
+feature."""
 _PHOTONS = 4096
 
 
@@ -90,11 +117,17 @@ def program_texts(sources: Iterable[Source]) -> list[ProgramText]:
     """What each source holds."""
     return [
         ProgramText(
-            source.name, len(source.text.splitlines()), source.flattened_lines,
-            {feature: found for feature, symbols in FEATURE_SYMBOLS.items() if (found := occurring(source.text, symbols))},
+            source.name,
+            len(source.text.splitlines()),
+            source.flattened_lines,
+            {
+                feature: found
+                for feature, symbols in FEATURE_SYMBOLS.items()
+                if (found := occurring(source.text, symbols))
+            },
         )
         for source in sources
-    ]  # fmt: skip
+    ]
 
 
 def occurring(text: str, symbols: Sequence[str]) -> tuple[str, ...]:
@@ -106,6 +139,11 @@ def occurring(text: str, symbols: Sequence[str]) -> tuple[str, ...]:
 def prove(texts: Sequence[ProgramText], included: dict[str, bool]) -> list[Proof]:
     """One proof a feature of `FEATURE_SYMBOLS`; `included`: what `explain` says of each."""
     return [
-        Proof(feature, included[feature], symbols, tuple(dict.fromkeys(text.name for text in texts if feature in text.found)))
+        Proof(
+            feature,
+            included[feature],
+            symbols,
+            tuple(dict.fromkeys(text.name for text in texts if feature in text.found)),
+        )
         for feature, symbols in FEATURE_SYMBOLS.items()
     ]

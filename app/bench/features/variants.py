@@ -61,16 +61,35 @@ def trials(scene: Scene, features: Features) -> list[Trial]:
     for name, included, reason in explain(scene, features):
         carried, absent, note = _pair(name, included, scene, features)
         same = not included or name == "half-space solids"
-        found.append(Trial(name, included, reason, carried, absent, same and carried is not None, note, not included or name != "normal derivatives"))
+        found.append(
+            Trial(
+                name,
+                included,
+                reason,
+                carried,
+                absent,
+                same and carried is not None,
+                note,
+                not included or name != "normal derivatives",
+            )
+        )
     return found
 
 
 def _dispersion(scene: Scene, base: Features) -> Trial:
     included = base.spectral_groups > 0
-    plain = replace(base, spectral_groups=0, merged_groups=False, band_cuts=False, spectral_weights=base.spectral_weights and not included or base.absorption)
+    plain = replace(
+        base,
+        spectral_groups=0,
+        merged_groups=False,
+        band_cuts=False,
+        spectral_weights=base.spectral_weights and not included or base.absorption,
+    )
     forced = base if included else replace(base, spectral_groups=1, band_cuts=True, spectral_weights=True)
     if base.point_spectrum:
-        return Trial(DISPERSION, False, "one wavelength a photon", None, None, False, "cannot be forced in: photons have no band")
+        return Trial(
+            DISPERSION, False, "one wavelength a photon", None, None, False, "cannot be forced in: photons have no band"
+        )
     reason = "some glass disperses" if included else "nothing disperses"
     note = "columns, weights over the band and band cuts together"
     return Trial(DISPERSION, included, reason, Variant(scene, forced), Variant(scene, plain), not included, note)
@@ -93,14 +112,26 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
         case "shared spectral variable":
             return asked, Variant(scene, replace(base, merged_groups=False)), ""
         case "weights over the band":
-            return Variant(scene, plain), Variant(scene, replace(plain, spectral_weights=False)), "both without columns and cuts, which need weights"
+            return (
+                Variant(scene, plain),
+                Variant(scene, replace(plain, spectral_weights=False)),
+                "both without columns and cuts, which need weights",
+            )
         case "band cuts":
             return asked, Variant(scene, uncut), ""
         case "spatial columns":
             bare = replace(plain, footprints=False, normal_derivatives=False)
-            return Variant(scene, plain), Variant(scene, bare), "without them every splat is one texel; both without spectral columns"
+            return (
+                Variant(scene, plain),
+                Variant(scene, bare),
+                "without them every splat is one texel; both without spectral columns",
+            )
         case "normal derivatives":
-            return asked, Variant(scene, replace(base, normal_derivatives=False)), "without them footprints are wrong, but light goes the same ways"
+            return (
+                asked,
+                Variant(scene, replace(base, normal_derivatives=False)),
+                "without them footprints are wrong, but light goes the same ways",
+            )
         case "absorption":
             return asked, Variant(scene, replace(base, absorption=False)), ""
         case "medium stack":
@@ -114,7 +145,11 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             meshed = _as_triangles(scene)
             loose = sum(len(o.mesh.triangles) for o in meshed.objects)
             features = replace(base, convex_solids=False, loose_triangles=True, tree=loose > 24)
-            return asked, Variant(meshed, features), f"against {'a tree' if features.tree else 'a loop'} over the same facets"
+            return (
+                asked,
+                Variant(meshed, features),
+                f"against {'a tree' if features.tree else 'a loop'} over the same facets",
+            )
         case "nested windows":
             return asked, Variant(scene, replace(base, nested_windows=False)), "against the finest window alone"
         case "refraction" | "mirrors":
@@ -139,24 +174,40 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
         case _ if base.point_spectrum and name in ("spectral columns", "weights over the band", "band cuts"):
             return None, None, "cannot be forced in: photons have no band"
         case "spectral columns":
-            return Variant(scene, columns), Variant(scene, replace(base, spectral_weights=True)), "one column, which stays zero; both with weights, which it needs"
+            return (
+                Variant(scene, columns),
+                Variant(scene, replace(base, spectral_weights=True)),
+                "one column, which stays zero; both with weights, which it needs",
+            )
         case "weights over the band":
             return Variant(scene, replace(base, spectral_weights=True)), asked, ""
         case "band cuts":
-            return Variant(scene, replace(columns, band_cuts=True)), Variant(scene, columns), "both with a column, which cuts need"
+            return (
+                Variant(scene, replace(columns, band_cuts=True)),
+                Variant(scene, columns),
+                "both with a column, which cuts need",
+            )
         case "refraction":
             return Variant(scene, replace(base, dielectrics=True)), asked, ""
         case "mirrors":
             return Variant(scene, replace(base, mirrors=True)), asked, ""
         case "interpolated normals" | "normal derivatives":
             every = all(is_convex_solid(o) for o in _specular(scene))
-            note = "half-spaces have no corners to interpolate: the code is there and waits" if every else "every facet with three equal normals"
+            note = (
+                "half-spaces have no corners to interpolate: the code is there and waits"
+                if every
+                else "every facet with three equal normals"
+            )
             smooth = Variant(_with_normals(scene), replace(base, smooth_normals=True))
             if name == "interpolated normals":
                 return smooth, asked, note
             return replace(smooth, features=replace(smooth.features, normal_derivatives=True)), smooth, note
         case "absorption" if base.dielectrics:
-            return Variant(_with_absorption(scene), replace(base, absorption=True)), asked, "every glass with an absorption of zero"
+            return (
+                Variant(_with_absorption(scene), replace(base, absorption=True)),
+                asked,
+                "every glass with an absorption of zero",
+            )
         case "medium stack" if base.dielectrics:
             return Variant(scene, replace(base, medium_stack=True)), asked, "every solid on the stack"
         case "triangle tree" if base.loose_triangles:
@@ -166,7 +217,11 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
         case "nested windows":
             return Variant(scene, replace(base, nested_windows=True)), asked, ""
         case "spectral bins":
-            return Variant(scene, replace(base, targets=FORCED_BINS // 4), FORCED_BINS), asked, f"{FORCED_BINS} bins in {FORCED_BINS // 4} targets"
+            return (
+                Variant(scene, replace(base, targets=FORCED_BINS // 4), FORCED_BINS),
+                asked,
+                f"{FORCED_BINS} bins in {FORCED_BINS // 4} targets",
+            )
         case "shared spectral variable":
             return None, None, "cannot be forced in: light would be drawn another way"
         case "spectral maps":
@@ -190,7 +245,11 @@ def _with_normals(scene: Scene) -> Scene:
     """Every specular facet with its own normal at all three corners: smooth in name, flat in reference."""
 
     def smoothed(item: SceneObject) -> SceneObject:
-        if not isinstance(item.material, Dielectric | Mirror) or item.mesh.corner_normals is not None or is_convex_solid(item):
+        if (
+            not isinstance(item.material, Dielectric | Mirror)
+            or item.mesh.corner_normals is not None
+            or is_convex_solid(item)
+        ):
             return item
         normals = np.repeat(item.mesh.face_normals()[:, None, :], 3, axis=1)
         return replace(item, mesh=replace(item.mesh, corner_normals=normals))

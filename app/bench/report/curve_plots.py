@@ -29,7 +29,8 @@ BASELINE = "stochastic"
 
 @dataclass(frozen=True)
 class Series:
-    """What can be drawn of one curve; float64 arrays of one length, by rising number of photons (the last is the longest rendering)."""
+    """What can be drawn of one curve; float64 arrays of one length, by rising number of photons (the last is the
+    longest rendering)."""
 
     method: str
     x: np.ndarray
@@ -42,7 +43,10 @@ class Series:
 
 def series(curve: Curve, abscissa: str) -> Series:
     """The finite points of `curve` over `abscissa` ("seconds" or "photons")."""
-    rows = [(float(getattr(p, abscissa)), p.relmse, p.relmse_low, p.relmse_high) for p in sorted(curve.points, key=lambda p: p.photons)]
+    rows = [
+        (float(getattr(p, abscissa)), p.relmse, p.relmse_low, p.relmse_high)
+        for p in sorted(curve.points, key=lambda p: p.photons)
+    ]
     rows = [row for row in rows if row[0] > 0 and all(math.isfinite(value) for value in row)]
     x, mean, low, high = np.array(rows, float).reshape(-1, 4).T
     return Series(curve.method, x, mean, low, high)
@@ -55,7 +59,8 @@ def scene_series(scene: SceneResult, abscissa: str) -> list[Series]:
 
 
 def error_against(scene: SceneResult, abscissa: str) -> Figure:
-    """relMSE of all methods over "seconds" (photon or camera time) or "photons" (or samples); bands over seeds, dotted the reference's own error."""
+    """relMSE of all methods over "seconds" (photon or camera time) or "photons" (or samples); bands over seeds, dotted
+    the reference's own error."""
     figure = style.new_figure(6.6, 4.5)
     axes = figure.add_axes((0.105, 0.125, 0.70, 0.735))
     drawn = scene_series(scene, abscissa)
@@ -80,11 +85,16 @@ def error_against(scene: SceneResult, abscissa: str) -> Figure:
     return figure
 
 
-def set_limits(axes: Axes, groups: Sequence[Sequence[Series]], own_errors: Sequence[float], abscissa: str, half: str = "light") -> None:
+def set_limits(
+    axes: Axes, groups: Sequence[Sequence[Series]], own_errors: Sequence[float], abscissa: str, half: str = "light"
+) -> None:
     """Logarithmic axes around all that is positive, with ticks that read as plain numbers."""
     everything = [one for group in groups for one in group]
     x = np.concatenate([one.x for one in everything])
-    means, spans = np.concatenate([one.mean for one in everything]), np.concatenate([np.append(one.low, one.high) for one in everything])
+    means, spans = (
+        np.concatenate([one.mean for one in everything]),
+        np.concatenate([np.append(one.low, one.high) for one in everything]),
+    )
     min_mean = float(np.min(means, where=means > 0, initial=np.inf))
     if math.isinf(min_mean):
         min_mean = 1e-3
@@ -102,7 +112,7 @@ def set_limits(axes: Axes, groups: Sequence[Sequence[Series]], own_errors: Seque
 
 
 def axis_name(half: str, abscissa: str) -> str:
-    """"photon time (s)", "camera samples a pixel" and so on."""
+    """ "photon time (s)", "camera samples a pixel" and so on."""
     named = HALVES[half]
     return f"{named.time} (s)" if abscissa == "seconds" else named.unit
 
@@ -143,17 +153,29 @@ def draw_series(axes: Axes, one: Series, markers: bool = True) -> None:
     # A seed's error of zero or less reaches the floor; one point alone has a bar instead of a band.
     low, high = np.maximum(one.low, floor), np.maximum(one.high, floor)
     if one.x.size > 1:
-        axes.fill_between(one.x, low, high, color=look.colour, alpha=0.16 if one.method == "srd" else 0.10, lw=0, zorder=order)
+        axes.fill_between(
+            one.x, low, high, color=look.colour, alpha=0.16 if one.method == "srd" else 0.10, lw=0, zorder=order
+        )
     else:
         axes.vlines(one.x, low, high, color=look.colour, lw=4, alpha=0.2, zorder=order)
     size = (4.6 if one.method == "srd" else 3.4) if markers else 0.0
     axes.plot(
-        one.x, mean, color=look.colour, lw=look.width_pt, ls=look.dash, marker=look.marker, ms=size,
-        mec=style.PAPER if look.marker not in "x+" else look.colour, mew=0.6 if look.marker not in "x+" else 1.1, zorder=order + 0.5,
-    )  # fmt: skip
+        one.x,
+        mean,
+        color=look.colour,
+        lw=look.width_pt,
+        ls=look.dash,
+        marker=look.marker,
+        ms=size,
+        mec=style.PAPER if look.marker not in "x+" else look.colour,
+        mew=0.6 if look.marker not in "x+" else 1.1,
+        zorder=order + 0.5,
+    )
     if not shown.all():
         x = one.x[~shown]
-        axes.plot(x, np.full(x.size, floor), "v", ms=6, mfc=style.PAPER, mec=look.colour, mew=1.2, clip_on=False, zorder=12)
+        axes.plot(
+            x, np.full(x.size, floor), "v", ms=6, mfc=style.PAPER, mec=look.colour, mew=1.2, clip_on=False, zorder=12
+        )
 
 
 def _draw_reference_error(axes: Axes, own: float) -> None:
@@ -161,14 +183,29 @@ def _draw_reference_error(axes: Axes, own: float) -> None:
         return
     low, high = axes.get_ylim()
     if own < low:
-        axes.text(0.012, 0.012, f"reference's own error {number(own)}, below", transform=axes.transAxes, fontsize=8, color=style.INK, zorder=13)
+        axes.text(
+            0.012,
+            0.012,
+            f"reference's own error {number(own)}, below",
+            transform=axes.transAxes,
+            fontsize=8,
+            color=style.INK,
+            zorder=13,
+        )
         return
     axes.axhline(own, color=style.INK, lw=1.1, ls=(0.0, (1.0, 1.8)), zorder=2.5)
     under = own > math.sqrt(low * high)
     axes.annotate(
-        "reference's own error", (0.012, own), xycoords=("axes fraction", "data"), xytext=(0, -3 if under else 3),
-        textcoords="offset points", va="top" if under else "bottom", fontsize=8, color=style.INK, zorder=13,
-    )  # fmt: skip
+        "reference's own error",
+        (0.012, own),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, -3 if under else 3),
+        textcoords="offset points",
+        va="top" if under else "bottom",
+        fontsize=8,
+        color=style.INK,
+        zorder=13,
+    )
 
 
 def draw_ratio_arrow(axes: Axes, scene: SceneResult, named: bool) -> None:
@@ -182,18 +219,37 @@ def draw_ratio_arrow(axes: Axes, scene: SceneResult, named: bool) -> None:
     reached_s = max(end_s / ratio, axes.get_xlim()[0])
     colour = style.method_style("srd").colour
     axes.annotate(
-        "", (reached_s, error), (end_s, error), zorder=11,
-        arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.0, "ls": (0.0, (4.0, 2.0)), "shrinkA": 3, "shrinkB": 0},
-    )  # fmt: skip
+        "",
+        (reached_s, error),
+        (end_s, error),
+        zorder=11,
+        arrowprops={
+            "arrowstyle": "-|>",
+            "color": colour,
+            "lw": 1.0,
+            "ls": (0.0, (4.0, 2.0)),
+            "shrinkA": 3,
+            "shrinkB": 0,
+        },
+    )
     if named:
         axes.annotate(
-            f"{ratio_text(ratio, is_lower_bound(scene, 'srd'))} less time", (math.sqrt(end_s * reached_s), error), xytext=(0, -3.5),
-            textcoords="offset points", ha="center", va="top", color=colour, fontweight="bold", fontsize=9, zorder=13,
-        )  # fmt: skip
+            f"{ratio_text(ratio, is_lower_bound(scene, 'srd'))} less time",
+            (math.sqrt(end_s * reached_s), error),
+            xytext=(0, -3.5),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+            color=colour,
+            fontweight="bold",
+            fontsize=9,
+            zorder=13,
+        )
 
 
 def is_lower_bound(scene: SceneResult, method: str) -> bool:
-    """Whether the method's shortest rendering is already as good as the baseline's longest, so that the true ratio is larger still."""
+    """Whether the method's shortest rendering is already as good as the baseline's longest, so that the true ratio is
+    larger still."""
     points = {curve.method: curve.points for curve in scene.curves if curve.points}
     reached = speed_up(points.get(method, []), points.get(BASELINE, []))
     return reached is not None and reached.at_once and method != BASELINE
@@ -209,14 +265,31 @@ def label_ends(axes: Axes, drawn: Sequence[Series], gap_pt: float = 11.5) -> Non
     for place, (error, name, x) in zip(spread(wanted, gap_pt, height_pt), ends, strict=True):
         look = style.method_style(name)
         axes.annotate(
-            name, (x, error), xytext=(1.035, place / height_pt), textcoords="axes fraction", va="center", ha="left",
-            fontsize=9, color=look.colour, fontweight="bold" if name == "srd" else "normal", annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": look.colour, "lw": 0.6, "shrinkA": 1, "shrinkB": 3, "alpha": 0.7, "relpos": (0.0, 0.5)},
-        )  # fmt: skip
+            name,
+            (x, error),
+            xytext=(1.035, place / height_pt),
+            textcoords="axes fraction",
+            va="center",
+            ha="left",
+            fontsize=9,
+            color=look.colour,
+            fontweight="bold" if name == "srd" else "normal",
+            annotation_clip=False,
+            arrowprops={
+                "arrowstyle": "-",
+                "color": look.colour,
+                "lw": 0.6,
+                "shrinkA": 1,
+                "shrinkB": 3,
+                "alpha": 0.7,
+                "relpos": (0.0, 0.5),
+            },
+        )
 
 
 def spread(wanted: Sequence[float], gap: float, height: float) -> list[float]:
-    """Rising places as near to `wanted` (rising) as can be, at least `gap` apart: isotonic regression of wanted − i·gap.
+    """Rising places as near to `wanted` (rising) as can be, at least `gap` apart: isotonic regression of wanted −
+    i·gap.
 
     They stay within 0…height as long as there is room.
     """

@@ -1,4 +1,5 @@
-"""The little HTML that the bench report needs: elements that escape every text by construction, tables, and the page's look.
+"""The little HTML that the bench report needs: elements that escape every text by construction, tables, and the page's
+look.
 
 The page stands alone: its style is inside, it holds no script, and nothing is fetched.
 """
@@ -27,7 +28,9 @@ def element(tag: str, *children: object, **attributes: object) -> Html:
     """
     names = {"cls": "class"}
     written = "".join(
-        f' {names.get(key, key.replace("_", "-"))}="{html.escape(str(value), quote=True)}"' for key, value in attributes.items() if value is not None
+        f' {names.get(key, key.replace("_", "-"))}="{html.escape(str(value), quote=True)}"'
+        for key, value in attributes.items()
+        if value is not None
     )
     if tag in _VOID:
         return Html(f"<{tag}{written}>")
@@ -47,7 +50,8 @@ def _text(child: object) -> str:
 
 
 def table(headings: Sequence[object], rows: Iterable[Sequence[object]], caption: object = None, left: int = 1) -> Html:
-    """A table whose first `left` columns are flush left and the others numbers, flush right; it scrolls where it is too wide.
+    """A table whose first `left` columns are flush left and the others numbers, flush right; it scrolls where it is too
+    wide.
 
     The first cell of each row is its heading.
     """
@@ -56,8 +60,19 @@ def table(headings: Sequence[object], rows: Iterable[Sequence[object]], caption:
         return element(tag, content, cls="n" if index >= left else None, **more)
 
     head = element("tr", [cell("th", i, heading, scope="col") for i, heading in enumerate(headings)])
-    body = [element("tr", [cell("th" if i == 0 else "td", i, content, scope="row" if i == 0 else None) for i, content in enumerate(row)]) for row in rows]
-    inner = element("table", element("caption", caption) if caption else None, element("thead", head), element("tbody", body))
+    body = [
+        element(
+            "tr",
+            [
+                cell("th" if i == 0 else "td", i, content, scope="row" if i == 0 else None)
+                for i, content in enumerate(row)
+            ],
+        )
+        for row in rows
+    ]
+    inner = element(
+        "table", element("caption", caption) if caption else None, element("thead", head), element("tbody", body)
+    )
     return element("div", inner, cls="wide")
 
 
@@ -69,9 +84,12 @@ def figure(content: object, caption: object = None, size: str | None = None) -> 
 def page(title: str, body: object) -> Html:
     """A whole document."""
     head = element(
-        "head", element("meta", charset="utf-8"), element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        element("title", title), element("style", Html(css_variables() + _CSS)),
-    )  # fmt: skip
+        "head",
+        element("meta", charset="utf-8"),
+        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        element("title", title),
+        element("style", Html(css_variables() + _CSS)),
+    )
     return Html("<!doctype html>\n" + element("html", head, "\n", element("body", body), lang="en-GB") + "\n")
 
 

@@ -1,4 +1,5 @@
-"""Plots over all scenes of a bench run: the time ratios beside what was asked, and error against time as small multiples.
+"""Plots over all scenes of a bench run: the time ratios beside what was asked, and error against time as small
+multiples.
 
 Figures are to be made and saved inside `report_style.plot_style()`.
 """
@@ -35,7 +36,8 @@ _MULTIPLES_METHODS = ("stochastic", "srd-lambda", "srd")
 
 
 def overview(result: BenchResult) -> Figure:
-    """Per scene the time to equal error as a ratio to `stochastic`, a dot for each method; the line is what is asked of `srd`."""
+    """Per scene the time to equal error as a ratio to `stochastic`, a dot for each method; the line is what is asked of
+    `srd`."""
     scenes = sorted(result.scenes, key=lambda s: s.time_to_equal_error.get("srd", -1.0))
     height = 1.75 + 0.34 * max(len(scenes), 1)
     figure = style.new_figure(8.6, height)
@@ -49,14 +51,26 @@ def overview(result: BenchResult) -> Figure:
     axes.axvspan(asked, right, color=style.WASH, lw=0, zorder=0)
     axes.axvline(asked, color=style.INK, lw=1.2, zorder=2)
     axes.axvline(1.0, color=style.MUTED, lw=0.8, ls=(0.0, (3.0, 2.0)), zorder=1)
-    notes = [(right, f"asked of srd: at most 1/{asked:.0f} of the time", style.INK), (1.0, "as fast as stochastic", style.MUTED)]
-    if any(_ratio(scene, curve.method) is None for scene in scenes for curve in scene.curves if curve.method != BASELINE):
+    notes = [
+        (right, f"asked of srd: at most 1/{asked:.0f} of the time", style.INK),
+        (1.0, "as fast as stochastic", style.MUTED),
+    ]
+    if any(
+        _ratio(scene, curve.method) is None for scene in scenes for curve in scene.curves if curve.method != BASELINE
+    ):
         notes.append((left * _NEVER_PLACE, "never", style.MUTED))
     for x, text, colour in notes:
         axes.annotate(
-            text, (x, 1), xycoords=("data", "axes fraction"), xytext=(0, 3), textcoords="offset points",
-            ha="right" if x == right else "center", va="bottom", fontsize=8, color=colour,
-        )  # fmt: skip
+            text,
+            (x, 1),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 3),
+            textcoords="offset points",
+            ha="right" if x == right else "center",
+            va="bottom",
+            fontsize=8,
+            color=colour,
+        )
     style.title(axes, "Time to equal error", " ")
     for row, scene in enumerate(scenes):
         _draw_ratios(axes, row, scene, left)
@@ -75,12 +89,29 @@ def _draw_ratios(axes: Axes, row: int, scene: SceneResult, left: float) -> None:
         reached = ratio is not None
         x = left * _NEVER_PLACE if ratio is None else ratio
         axes.plot(
-            x, row, look.marker, ms=8.5 if strong else 5.0, zorder=5 + look.rank, clip_on=False, alpha=1.0 if reached else 0.75,
-            mfc=look.colour if reached else style.PAPER, mec=look.colour if not strong or not reached else style.PAPER, mew=1.0,
-        )  # fmt: skip
+            x,
+            row,
+            look.marker,
+            ms=8.5 if strong else 5.0,
+            zorder=5 + look.rank,
+            clip_on=False,
+            alpha=1.0 if reached else 0.75,
+            mfc=look.colour if reached else style.PAPER,
+            mec=look.colour if not strong or not reached else style.PAPER,
+            mew=1.0,
+        )
         if strong and ratio is not None:
-            axes.annotate(ratio_text(ratio, is_lower_bound(scene, "srd")), (x, row), xytext=(0, 5), textcoords="offset points", ha="center", color=look.colour,
-                          fontweight="bold", fontsize=9, zorder=14)  # fmt: skip
+            axes.annotate(
+                ratio_text(ratio, is_lower_bound(scene, "srd")),
+                (x, row),
+                xytext=(0, 5),
+                textcoords="offset points",
+                ha="center",
+                color=look.colour,
+                fontweight="bold",
+                fontsize=9,
+                zorder=14,
+            )
 
 
 def _ratio(scene: SceneResult, method: str) -> float | None:
@@ -117,12 +148,29 @@ def _method_key(axes: Axes, scenes: Sequence[SceneResult], height_in: float) -> 
     names = style.by_rank(sorted({c.method for s in scenes for c in s.curves} - {BASELINE}))
     if not names:
         return
-    handles = [Line2D([], [], ls="", marker=(look := style.method_style(name)).marker, ms=8 if name == "srd" else 5.5,
-                      mfc=look.colour, mec=look.colour, label=name) for name in names]  # fmt: skip
+    handles = [
+        Line2D(
+            [],
+            [],
+            ls="",
+            marker=(look := style.method_style(name)).marker,
+            ms=8 if name == "srd" else 5.5,
+            mfc=look.colour,
+            mec=look.colour,
+            label=name,
+        )
+        for name in names
+    ]
     axes.figure.legend(
-        handles=handles, loc="lower left", bbox_to_anchor=(0.26, 0.06 / height_in), ncols=len(handles), frameon=False,
-        fontsize=8, handletextpad=0.2, columnspacing=1.3,
-    )  # fmt: skip
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.26, 0.06 / height_in),
+        ncols=len(handles),
+        frameon=False,
+        fontsize=8,
+        handletextpad=0.2,
+        columnspacing=1.3,
+    )
 
 
 def small_multiples(result: BenchResult) -> Figure:
@@ -135,7 +183,9 @@ def small_multiples(result: BenchResult) -> Figure:
     width, height = 2.75 * columns + 1.75, 2.3 * rows + 0.75
     figure = style.new_figure(width, height)
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    figure.subplots_adjust(left=0.68 / width, right=1 - 1.02 / width, bottom=0.5 / height, top=1 - 0.35 / height, wspace=0.08, hspace=0.28)
+    figure.subplots_adjust(
+        left=0.68 / width, right=1 - 1.02 / width, bottom=0.5 / height, top=1 - 0.35 / height, wspace=0.08, hspace=0.28
+    )
     for axes in grid.flat[len(panels) :]:
         axes.set_visible(False)
     for index, (axes, (scene, drawn)) in enumerate(zip(grid.flat, panels, strict=False)):

@@ -1,4 +1,5 @@
-"""The pictures of the bench report: one exposure for all, the part worth looking at, and where a picture errs and by how much.
+"""The pictures of the bench report: one exposure for all, the part worth looking at, and where a picture errs and by
+how much.
 
 Arrays in, `data:` addresses out; pictures are XYZ float (H, W, 3), row 0 at the top.
 """
@@ -63,7 +64,8 @@ def _load(path: Path) -> np.ndarray | None:
 def choose_window(reference: np.ndarray) -> Window:
     """The 3:2 part of the reference that holds most light and most structure, in equal shares.
 
-    Light is Y compressed at its mean, so that one bright focus does not decide; structure the gradient of log(1 + Y/mean).
+    Light is Y compressed at its mean, so that one bright focus does not decide; structure the gradient of log(1 +
+    Y/mean).
     """
     height, width = reference.shape[:2]
     crop_width = min(max(round(_CROP_SHARE * width), 12), width)
@@ -79,7 +81,12 @@ def choose_window(reference: np.ndarray) -> Window:
     structure[1:] += np.abs(np.diff(level, axis=0))
     score = light / light.sum() + structure / max(float(structure.sum()), 1e-30)
     table = np.pad(score, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
-    sums = table[crop_height:, crop_width:] - table[:-crop_height, crop_width:] - table[crop_height:, :-crop_width] + table[:-crop_height, :-crop_width]
+    sums = (
+        table[crop_height:, crop_width:]
+        - table[:-crop_height, crop_width:]
+        - table[crop_height:, :-crop_width]
+        + table[:-crop_height, :-crop_width]
+    )
     row, column = np.unravel_index(int(sums.argmax()), sums.shape)
     return Window(int(row), int(column), crop_height, crop_width)
 
@@ -133,7 +140,9 @@ def _indexed(codes: np.ndarray) -> str:
     from PIL import Image
 
     image = Image.fromarray(codes).convert("P")
-    image.putpalette((255 * colormaps["RdBu_r"](np.linspace(0.0, 1.0, ERROR_STEPS))[:, :3]).round().astype(np.uint8).tobytes())
+    image.putpalette(
+        (255 * colormaps["RdBu_r"](np.linspace(0.0, 1.0, ERROR_STEPS))[:, :3]).round().astype(np.uint8).tobytes()
+    )
     return _png(image)
 
 

@@ -1,4 +1,5 @@
-"""What the bench report says of methods, metrics and protocol, for each half of the renderer. Plain text only; `report_html` escapes it."""
+"""What the bench report says of methods, metrics and protocol, for each half of the renderer. Plain text only;
+`report_html` escapes it."""
 
 from __future__ import annotations
 

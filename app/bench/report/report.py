@@ -42,19 +42,26 @@ def write_report(result: BenchResult, directory: Path) -> None:
             progress(index / (len(names) + 1), scene.scene)
             sections.append(report_scene.section(scene, f"scene-{name}", _curve_plots(scene, name, plots), directory))
         document = report_style.save(overview(result), plots / "overview")
-        glance = report_scene.inlined(document, "overview", "time to equal error of each method in each scene, as a ratio to stochastic")
+        glance = report_scene.inlined(
+            document, "overview", "time to equal error of each method in each scene, as a ratio to stochastic"
+        )
         readme_plot(result, plots / "scenes")
         progress(1.0, "page")
     body = [
-        report_sections.header(result), report_sections.contents(result, [f"scene-{name}" for name in names]), report_sections.claims(result, glance),
-        report_sections.definitions(result), sections, report_sections.limits(result),
-    ]  # fmt: skip
+        report_sections.header(result),
+        report_sections.contents(result, [f"scene-{name}" for name in names]),
+        report_sections.claims(result, glance),
+        report_sections.definitions(result),
+        sections,
+        report_sections.limits(result),
+    ]
     with atomic_output(directory / "report.html") as temporary:
         temporary.write_text(page(f"Error against run time, SpectraSplat {result.version}", body), encoding="utf-8")
 
 
 def readme_plot(result: BenchResult, stem: Path) -> None:
-    """Write the README's figure, error against time of `stochastic`, `srd-lambda` and `srd` in each scene, to `stem`.png and `stem`.svg."""
+    """Write the README's figure, error against time of `stochastic`, `srd-lambda` and `srd` in each scene, to
+    `stem`.png and `stem`.svg."""
     with report_style.plot_style():
         report_style.save(small_multiples(result), stem)
 
@@ -64,7 +71,9 @@ def _curve_plots(scene: SceneResult, name: str, plots: Path) -> dict[str, Html]:
     drawn, half = {}, HALVES[scene.half]
     for abscissa, ending, words in (("seconds", "time", half.time), ("photons", half.units, half.unit)):
         document = report_style.save(error_against(scene, abscissa), plots / f"{name}_error_{ending}")
-        drawn[abscissa] = report_scene.inlined(document, f"{name}-{ending}", f"{scene.scene}: relMSE of each method against {words}, logarithmic axes")
+        drawn[abscissa] = report_scene.inlined(
+            document, f"{name}-{ending}", f"{scene.scene}: relMSE of each method against {words}, logarithmic axes"
+        )
     return drawn
 
 

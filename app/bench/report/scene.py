@@ -42,14 +42,25 @@ def section(scene: SceneResult, anchor: str, curve_svgs: Mapping[str, Html], dir
 
 
 def _setting(scene: SceneResult) -> str:
-    glass = f"strongest glass {scene.strongest_glass} (Abbe number {scene.strongest_abbe:.1f})" if scene.strongest_abbe > 0 else "no dispersion"
+    glass = (
+        f"strongest glass {scene.strongest_glass} (Abbe number {scene.strongest_abbe:.1f})"
+        if scene.strongest_abbe > 0
+        else "no dispersion"
+    )
     half = HALVES[scene.half]
-    parts = [f"{scene.size[0]}×{scene.size[1]} pixels", text.seeds_text(scene.seeds), f"{scene.seconds:g} s of {half.time}", glass]
+    parts = [
+        f"{scene.size[0]}×{scene.size[1]} pixels",
+        text.seeds_text(scene.seeds),
+        f"{scene.seconds:g} s of {half.time}",
+        glass,
+    ]
     if scene.reference is not None:
         own = scene.reference
         parts.append(f"reference: {own.method}, {text.count(own.photons)} {half.unit} in {own.seconds:.0f} s")
         if own.caustic_photons:
-            parts.append(f"its caustic: {text.count(own.caustic_photons)} photons, whose noise is about {text.number(own.caustic_relmse)} of its relMSE")
+            parts.append(
+                f"its caustic: {text.count(own.caustic_photons)} photons, whose noise is about {text.number(own.caustic_relmse)} of its relMSE"
+            )
         parts.append(f"its own relMSE {text.number(own.relmse)}, its key {own.key[:12]}")
     return "; ".join(parts) + "."
 
@@ -84,14 +95,30 @@ def _speed_table(scene: SceneResult) -> Html:
             rows.append([_name(curve.method), *["–"] * 6])
             continue
         first, last = ends
-        rows.append([
-            _name(curve.method), ratio_cell, f"{text.number(first.relmse)} at {first.seconds:.2g} s", text.number(last.relmse),
-            f"{text.number(last.relmse_low)} to {text.number(last.relmse_high)}", f"{last.seconds:.3g}", text.count(last.photons),
-        ])  # fmt: skip
+        rows.append(
+            [
+                _name(curve.method),
+                ratio_cell,
+                f"{text.number(first.relmse)} at {first.seconds:.2g} s",
+                text.number(last.relmse),
+                f"{text.number(last.relmse_low)} to {text.number(last.relmse_high)}",
+                f"{last.seconds:.3g}",
+                text.count(last.photons),
+            ]
+        )
     return table(
-        ("method", "time ratio", "relMSE, shortest run", "relMSE, longest run", "over seeds", f"{half.time.split()[0]} s", half.units), rows,
+        (
+            "method",
+            "time ratio",
+            "relMSE, shortest run",
+            "relMSE, longest run",
+            "over seeds",
+            f"{half.time.split()[0]} s",
+            half.units,
+        ),
+        rows,
         "Time ratio: time of stochastic over time of the method, to the error that stochastic ends with; above 1 the method is faster.",
-    )  # fmt: skip
+    )
 
 
 def _other_measures_table(scene: SceneResult) -> Html | None:
@@ -100,9 +127,17 @@ def _other_measures_table(scene: SceneResult) -> Html | None:
     if not measures:
         return None
     columns = [scene.time_to_equal_error, *(scene.time_to_equal_other[name] for name in measures)]
-    rows = [[_name(c.method), *(_ratio_or_never(column.get(c.method)) for column in columns)] for c in _curves(scene) if c.method != BASELINE]
+    rows = [
+        [_name(c.method), *(_ratio_or_never(column.get(c.method)) for column in columns)]
+        for c in _curves(scene)
+        if c.method != BASELINE
+    ]
     headings = [text.MEASURES.get(name, name) for name in measures]
-    return table(("time ratio by", "relMSE", *headings), rows, "The same ratio by other measures: a finding that hangs on one measure is none.")
+    return table(
+        ("time ratio by", "relMSE", *headings),
+        rows,
+        "The same ratio by other measures: a finding that hangs on one measure is none.",
+    )
 
 
 def _ratio_or_never(ratio: float | None) -> str:
@@ -113,7 +148,11 @@ def _bias_figure(scene: SceneResult, anchor: str) -> Html | None:
     drawn = report_plots.bias_and_variance(scene)
     if drawn is None:
         return None
-    svg = inlined(report_style.svg_text(drawn), f"{anchor}-bias", f"{scene.scene}: bias squared and variance of each method against {HALVES[scene.half].time}")
+    svg = inlined(
+        report_style.svg_text(drawn),
+        f"{anchor}-bias",
+        f"{scene.scene}: bias squared and variance of each method against {HALVES[scene.half].time}",
+    )
     caption = (
         "relMSE told apart: variance is what differs between seeds, bias² what all seeds share, such as columns and bands that are too wide. "
         "A hollow triangle means that no bias could be detected there."
@@ -125,27 +164,58 @@ def _error_table(scene: SceneResult) -> Html:
     rows = []
     for curve in _curves(scene):
         samples, ends, share = report_plots.largest_samples(curve), _ends(curve), text.bias_share(curve)
-        metrics = {key: _mean([s.metrics[key] for s in samples if key in s.metrics]) for key in ("relmse_trimmed", "smape", "chroma", "nrmse", "energy_ratio")}
+        metrics = {
+            key: _mean([s.metrics[key] for s in samples if key in s.metrics])
+            for key in ("relmse_trimmed", "smape", "chroma", "nrmse", "energy_ratio")
+        }
         last = ends[1] if ends else None
         told_apart = last is not None and scene.seeds > 1
-        slope = f"{text.signed(curve.slope)} ± {curve.slope_half_width:.2f}" if curve.slope and math.isfinite(curve.slope) else "–"
-        rows.append([
-            _name(curve.method), text.number(last.bias2) if told_apart else "–", text.number(last.variance) if told_apart else "–",
-            "–" if share is None or not told_apart else f"{100 * share:.0f} %", slope,
-            text.number(metrics["relmse_trimmed"]), text.number(metrics["smape"]), text.number(metrics["chroma"]), text.number(metrics["nrmse"]),
-            "–" if metrics["energy_ratio"] is None else f"{metrics['energy_ratio']:.4f}",
-        ])  # fmt: skip
+        slope = (
+            f"{text.signed(curve.slope)} ± {curve.slope_half_width:.2f}"
+            if curve.slope and math.isfinite(curve.slope)
+            else "–"
+        )
+        rows.append(
+            [
+                _name(curve.method),
+                text.number(last.bias2) if told_apart else "–",
+                text.number(last.variance) if told_apart else "–",
+                "–" if share is None or not told_apart else f"{100 * share:.0f} %",
+                slope,
+                text.number(metrics["relmse_trimmed"]),
+                text.number(metrics["smape"]),
+                text.number(metrics["chroma"]),
+                text.number(metrics["nrmse"]),
+                "–" if metrics["energy_ratio"] is None else f"{metrics['energy_ratio']:.4f}",
+            ]
+        )
     return table(
-        ("method", "bias²", "variance", "bias's share", "tail slope (95 %)", "relMSE trimmed", "SMAPE", "Δu'v'", "nRMSE", "energy"), rows,
+        (
+            "method",
+            "bias²",
+            "variance",
+            "bias's share",
+            "tail slope (95 %)",
+            "relMSE trimmed",
+            "SMAPE",
+            "Δu'v'",
+            "nRMSE",
+            "energy",
+        ),
+        rows,
         "What the error of the longest run consists of, and the other metrics there (means over seeds).",
-    )  # fmt: skip
+    )
 
 
 def _stage_figure(scene: SceneResult, anchor: str) -> Html | None:
     drawn = report_plots.time_by_stage(scene)
     if drawn is None:
         return None
-    svg = inlined(report_style.svg_text(drawn), f"{anchor}-stages", f"{scene.scene}: {HALVES[scene.half].time} by stage for each method")
+    svg = inlined(
+        report_style.svg_text(drawn),
+        f"{anchor}-stages",
+        f"{scene.scene}: {HALVES[scene.half].time} by stage for each method",
+    )
     return figure(svg, "At the largest budget of each method, mean over seeds.", "half")
 
 
@@ -159,16 +229,22 @@ def _cost_table(scene: SceneResult) -> Html:
         seconds = [curve.setup_seconds.get(part) for part in half.setup]
         seconds += [_mean([s.seconds[stage] for s in samples if stage in s.seconds]) for stage in half.uncounted]
         splats = [text.number(_mean([s.splats / s.photons for s in samples if s.photons > 0]))] if is_light else []
-        rows.append([
-            _name(curve.method), *(text.number(value) for value in (*seconds, *(stages.get(stage) for stage in half.stages))),
-            f"{text.count(samples[0].photons / total)}/s" if total > 0 else "–", *splats, text.number(curve.buffers_mib or None, 3),
-        ])  # fmt: skip
+        rows.append(
+            [
+                _name(curve.method),
+                *(text.number(value) for value in (*seconds, *(stages.get(stage) for stage in half.stages))),
+                f"{text.count(samples[0].photons / total)}/s" if total > 0 else "–",
+                *splats,
+                text.number(curve.buffers_mib or None, 3),
+            ]
+        )
     headings = [f"{name} s" for name in (*half.setup, *half.uncounted, *half.stages)]
     uncounted = ", ".join((*half.setup, *half.uncounted))
     return table(
-        ("method", *headings, half.units, *(["splats a photon"] if is_light else []), "buffers MiB"), rows,
+        ("method", *headings, half.units, *(["splats a photon"] if is_light else []), "buffers MiB"),
+        rows,
         f"Not in {half.time}: {uncounted} (set-up once per scene; buffers are tree and uploads). Stages are those of the longest run.",
-    )  # fmt: skip
+    )
 
 
 def _mean(values: list[float]) -> float | None:
@@ -195,25 +271,42 @@ def _pictures(scene: SceneResult, directory: Path) -> Html:
     limit = pictures.error_limit(list(errors.values()))
 
     def crop(name: str) -> Html:
-        return _image(pictures.toned(window.of(found[name]), exposure), f"{scene.scene}, {name}: part of the picture", "crop")
+        return _image(
+            pictures.toned(window.of(found[name]), exposure), f"{scene.scene}, {name}: part of the picture", "crop"
+        )
 
     rows = []
     for ending, share in reversed(HALVES[scene.half].pictures):
         shown = {n: (crop(n + ending), _numbers(scene, n + ending, found)) for n in methods if n + ending in found}
         if shown or not ending:
-            rows.append(_picture_row(f"{share * scene.equal_time:.2g} s, part", names, shown | {"reference": (crop("reference"), None)}))
+            rows.append(
+                _picture_row(
+                    f"{share * scene.equal_time:.2g} s, part", names, shown | {"reference": (crop("reference"), None)}
+                )
+            )
     whole = {name: (_whole(scene, name, found[name], window, exposure), None) for name in names if name in found}
     rows.append(_picture_row(f"{scene.equal_time:.2g} s, whole", names, whole))
-    maps = {name: (_image(pictures.error_map(error, limit), f"{scene.scene}, {name}: signed error", None), None) for name, error in errors.items()}
+    maps = {
+        name: (_image(pictures.error_map(error, limit), f"{scene.scene}, {name}: signed error", None), None)
+        for name, error in errors.items()
+    }
     rows.append(_picture_row("signed error, whole", names, {"reference": (_scale(limit), None)} | maps))
-    head = element("tr", element("td", "", cls="row"), [element("th", name, scope="col", cls="srd" if name == "srd" else None) for name in names])
+    head = element(
+        "tr",
+        element("td", "", cls="row"),
+        [element("th", name, scope="col", cls="srd" if name == "srd" else None) for name in names],
+    )
     matrix = element("table", element("thead", head), element("tbody", rows), cls="pictures")
     return element("div", title, element("div", matrix, cls="wide"), element("p", _caption(exposure), cls="muted"))
 
 
 def _picture_row(heading: str, names: list[str], cells: Mapping[str, tuple[Html, Html | None]]) -> Html:
     missing = element("span", "no picture", cls="missing")
-    return element("tr", element("th", heading, scope="row", cls="row"), [element("td", *cells.get(name, (missing, None))) for name in names])
+    return element(
+        "tr",
+        element("th", heading, scope="row", cls="row"),
+        [element("td", *cells.get(name, (missing, None))) for name in names],
+    )
 
 
 def _image(address: str, label: str, cls: str | None) -> Html:
@@ -223,9 +316,19 @@ def _image(address: str, label: str, cls: str | None) -> Html:
 def _whole(scene: SceneResult, name: str, picture: np.ndarray, window: pictures.Window, exposure: float) -> Html:
     """A thumbnail with the crop's outline."""
     height, width = picture.shape[:2]
-    shares = {"left": window.column / width, "top": window.row / height, "width": window.width / width, "height": window.height / height}
+    shares = {
+        "left": window.column / width,
+        "top": window.row / height,
+        "width": window.width / width,
+        "height": window.height / height,
+    }
     outline = element("i", style=";".join(f"{side}:{100 * share:.2f}%" for side, share in shares.items()))
-    return element("span", _image(pictures.toned(pictures.halved(picture), exposure), f"{scene.scene}, {name}: whole picture", None), outline, cls="framed")
+    return element(
+        "span",
+        _image(pictures.toned(pictures.halved(picture), exposure), f"{scene.scene}, {name}: whole picture", None),
+        outline,
+        cls="framed",
+    )
 
 
 def _numbers(scene: SceneResult, name: str, found: Mapping[str, np.ndarray]) -> Html | None:
@@ -241,7 +344,10 @@ def _numbers(scene: SceneResult, name: str, found: Mapping[str, np.ndarray]) -> 
         epsilon = EPSILON_SHARE * max(lit_mean(reference), 1e-30) ** 2
         relmse, note = float(np.mean((found[name] - reference) ** 2 / (reference**2 + epsilon))), " (raw)"
     flip = metrics.get("flip", math.nan)
-    lines = [f"relMSE {text.number(relmse)}{note}", f"HDR-FLIP {flip:.3f}" if math.isfinite(flip) else "HDR-FLIP not measured"]
+    lines = [
+        f"relMSE {text.number(relmse)}{note}",
+        f"HDR-FLIP {flip:.3f}" if math.isfinite(flip) else "HDR-FLIP not measured",
+    ]
     if sample is not None:
         lines.append(f"{sample.photon_seconds:.2g} s, {text.count(sample.photons)} {HALVES[scene.half].units}")
     return element("div", [(line, element("br")) for line in lines], cls="numbers")
@@ -250,9 +356,12 @@ def _numbers(scene: SceneResult, name: str, found: Mapping[str, np.ndarray]) -> 
 def _scale(limit: float) -> Html:
     marks = (f"−{limit:g}", "0", f"+{limit:g}")
     return element(
-        "div", _image(pictures.error_scale(), "colour scale of the error maps", None), element("div", [element("span", mark) for mark in marks]),
-        element("p", "blue: too dark, red: too bright"), cls="scale",
-    )  # fmt: skip
+        "div",
+        _image(pictures.error_scale(), "colour scale of the error maps", None),
+        element("div", [element("span", mark) for mark in marks]),
+        element("p", "blue: too dark, red: too bright"),
+        cls="scale",
+    )
 
 
 def _caption(exposure: float) -> str:

@@ -27,7 +27,11 @@ def header(result: BenchResult) -> Html:
         element("p", f"SpectraSplat bench: the {result.settings.half} half", cls="muted"),
         element("h1", "Error against run time"),
         [element("p", sentence, cls="lead") for sentence in text.headline(result)],
-        element("dl", [element("div", element("dt", key), element("dd", value)) for key, value in view_model.items()], cls="facts"),
+        element(
+            "dl",
+            [element("div", element("dt", key), element("dd", value)) for key, value in view_model.items()],
+            cls="facts",
+        ),
         element("p", "The command that repeats it:"),
         element("pre", element("code", result.command)),
     )
@@ -45,7 +49,11 @@ def contents(result: BenchResult, anchors: list[str]) -> Html:
     """Links to every part of the page."""
     scenes = [(scene.scene, anchor) for scene, anchor in zip(result.scenes, anchors, strict=True)]
     links = [("Claims", "claims"), ("How it was measured", "method"), *scenes, ("Limits", "limits")]
-    return element("nav", element("ul", [element("li", element("a", name, href=f"#{target}")) for name, target in links]), aria_label="Contents")
+    return element(
+        "nav",
+        element("ul", [element("li", element("a", name, href=f"#{target}")) for name, target in links]),
+        aria_label="Contents",
+    )
 
 
 def claims(result: BenchResult, overview_svg: Html) -> Html:
@@ -54,14 +62,24 @@ def claims(result: BenchResult, overview_svg: Html) -> Html:
     for scene in result.scenes:
         for index, claim in enumerate(scene.claims):
             first = element("th", scene.scene, scope="rowgroup", rowspan=len(scene.claims)) if index == 0 else None
-            cells = [claim.name, claim.asked, claim.measured, element("span", "yes" if claim.holds else "no", cls="yes" if claim.holds else "no"), claim.why]
+            cells = [
+                claim.name,
+                claim.asked,
+                claim.measured,
+                element("span", "yes" if claim.holds else "no", cls="yes" if claim.holds else "no"),
+                claim.why,
+            ]
             rows.append(element("tr", first, [element("td", cell) for cell in cells]))
-    head = element("tr", [element("th", name, scope="col") for name in ("scene", "claim", "asked", "measured", "holds", "why not")])
+    head = element(
+        "tr", [element("th", name, scope="col") for name in ("scene", "claim", "asked", "measured", "holds", "why not")]
+    )
     body = element("table", element("thead", head), element("tbody", rows), cls="claims")
     return element(
         "section",
         element("h2", "Claims", id="claims", cls="flow"),
-        element("div", body, cls="wide") if rows else element("p", "No claim could be judged: it takes srd and a method to compare it with."),
+        element("div", body, cls="wide")
+        if rows
+        else element("p", "No claim could be judged: it takes srd and a method to compare it with."),
         figure(overview_svg, text.sentence(PROSE[result.settings.half].metrics["time to equal error"]), "most"),
     )
 
@@ -77,7 +95,13 @@ def definitions(result: BenchResult) -> Html:
         element("ul", [element("li", sentence) for sentence in prose.protocol]),
         element(
             "div",
-            element("div", element("h3", "Methods"), _terms(described), element("h3", f"Stages of {HALVES[result.settings.half].time}"), _terms(prose.stages)),
+            element(
+                "div",
+                element("h3", "Methods"),
+                _terms(described),
+                element("h3", f"Stages of {HALVES[result.settings.half].time}"),
+                _terms(prose.stages),
+            ),
             element("div", element("h3", "Metrics"), _terms(prose.metrics)),
             cls="two",
         ),
@@ -85,17 +109,29 @@ def definitions(result: BenchResult) -> Html:
 
 
 def _terms(entries: Mapping[str, str]) -> Html:
-    pairs = [(element("dt", term, cls="srd" if term == "srd" else None), element("dd", meaning)) for term, meaning in entries.items()]
+    pairs = [
+        (element("dt", term, cls="srd" if term == "srd" else None), element("dd", meaning))
+        for term, meaning in entries.items()
+    ]
     return element("dl", pairs, cls="terms")
 
 
 def limits(result: BenchResult) -> Html:
     """In words: each claim that does not hold, by how much and why; and what the run itself leaves open."""
     failed = text.limits(result)
-    told = [element("li", element("strong", f"{scene}, {claim.name}. "), text.limit_sentence(claim)) for scene, claim in failed]
-    doubts = [element("li", element("strong", f"{scene.scene}. "), warning) for scene in result.scenes for warning in text.warnings_of(scene)]
+    told = [
+        element("li", element("strong", f"{scene}, {claim.name}. "), text.limit_sentence(claim))
+        for scene, claim in failed
+    ]
+    doubts = [
+        element("li", element("strong", f"{scene.scene}. "), warning)
+        for scene in result.scenes
+        for warning in text.warnings_of(scene)
+    ]
     judged = any(scene.claims for scene in result.scenes)
-    sound = "Every reference is at least ten times better than the smallest error reported, and every scene is complete."
+    sound = (
+        "Every reference is at least ten times better than the smallest error reported, and every scene is complete."
+    )
     nothing = "Every claim that could be judged holds in every scene." if judged else "No claim was judged."
     return element(
         "section",

@@ -27,17 +27,31 @@ ON_LIGHT_BAR = "#1d2023"
 STAGE_COLOURS = {"trace": "#5f7a94", "splat": "#b9c6d2", "resolve": "#e0b46a", "looks": "#6d8f80", "bands": "#d8a878"}
 
 PALETTE = {
-    "paper": (PAPER, "#15171a"), "ink": (INK, "#e9eaec"), "muted": (MUTED, "#a4aab3"),
-    "grid": (GRID, "#33373d"), "wash": (WASH, "#1f2226"),
-    "srd": ("#c8380c", "#ff7a4d"), "srd-lambda": ("#2f6f9f", "#74b3e0"),
-    "stochastic": ("#3d4147", "#c3c7cd"), "stochastic-even": ("#575b62", "#aeb3bb"), "stochastic-point": ("#72777f", "#8d939c"),
-    "regular-7": ("#9a72a6", "#c39bcf"), "regular-16": ("#6a4c7d", "#a583b8"),
+    "paper": (PAPER, "#15171a"),
+    "ink": (INK, "#e9eaec"),
+    "muted": (MUTED, "#a4aab3"),
+    "grid": (GRID, "#33373d"),
+    "wash": (WASH, "#1f2226"),
+    "srd": ("#c8380c", "#ff7a4d"),
+    "srd-lambda": ("#2f6f9f", "#74b3e0"),
+    "stochastic": ("#3d4147", "#c3c7cd"),
+    "stochastic-even": ("#575b62", "#aeb3bb"),
+    "stochastic-point": ("#72777f", "#8d939c"),
+    "regular-7": ("#9a72a6", "#c39bcf"),
+    "regular-16": ("#6a4c7d", "#a583b8"),
     "progressive": ("#4d7f5f", "#86bf9b"),
-    "other-1": ("#8a6d3b", "#c9a96b"), "other-2": ("#2f8080", "#6fc0c0"), "other-3": ("#7d4c4c", "#c48d8d"),
-    "trace": (STAGE_COLOURS["trace"], "#5b7690"), "splat": (STAGE_COLOURS["splat"], "#93a5b6"),
-    "resolve": (STAGE_COLOURS["resolve"], "#c79a52"), "looks": (STAGE_COLOURS["looks"], "#67897a"), "bands": (STAGE_COLOURS["bands"], "#bd8f60"), "on-light-bar": (ON_LIGHT_BAR, "#101214"),
-    "good": ("#1f6f43", "#6fcf97"), "bad": ("#a3241b", "#ff8a80"),
-}  # fmt: skip
+    "other-1": ("#8a6d3b", "#c9a96b"),
+    "other-2": ("#2f8080", "#6fc0c0"),
+    "other-3": ("#7d4c4c", "#c48d8d"),
+    "trace": (STAGE_COLOURS["trace"], "#5b7690"),
+    "splat": (STAGE_COLOURS["splat"], "#93a5b6"),
+    "resolve": (STAGE_COLOURS["resolve"], "#c79a52"),
+    "looks": (STAGE_COLOURS["looks"], "#67897a"),
+    "bands": (STAGE_COLOURS["bands"], "#bd8f60"),
+    "on-light-bar": (ON_LIGHT_BAR, "#101214"),
+    "good": ("#1f6f43", "#6fcf97"),
+    "bad": ("#a3241b", "#ff8a80"),
+}
 """Name: (on paper, on a dark screen). Every colour on paper occurs once: it is the key for the exchange."""
 
 
@@ -82,19 +96,38 @@ def by_rank(names: list[str]) -> list[str]:
 
 @contextmanager
 def plot_style() -> Iterator[None]:
-    """Matplotlib's settings for drawing and for saving; figures must be made and saved inside. No text is parsed as mathematics."""
+    """Matplotlib's settings for drawing and for saving; figures must be made and saved inside. No text is parsed as
+    mathematics."""
     import matplotlib
 
     settings = {
-        "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"], "font.size": 9.0,
-        "text.color": INK, "axes.labelcolor": INK, "axes.edgecolor": MUTED, "axes.linewidth": 0.8,
-        "axes.facecolor": PAPER, "figure.facecolor": PAPER, "savefig.facecolor": PAPER,
-        "xtick.color": MUTED, "ytick.color": MUTED, "xtick.labelcolor": INK, "ytick.labelcolor": INK,
-        "xtick.labelsize": 8.5, "ytick.labelsize": 8.5, "axes.labelsize": 9.0,
-        "axes.spines.top": False, "axes.spines.right": False,
-        "xtick.minor.size": 0.0, "ytick.minor.size": 0.0, "xtick.major.size": 3.0, "ytick.major.size": 3.0,
-        "text.parse_math": False, "svg.fonttype": "none", "svg.hashsalt": "spectrasplat",
-    }  # fmt: skip
+        "font.family": "sans-serif",
+        "font.sans-serif": ["DejaVu Sans"],
+        "font.size": 9.0,
+        "text.color": INK,
+        "axes.labelcolor": INK,
+        "axes.edgecolor": MUTED,
+        "axes.linewidth": 0.8,
+        "axes.facecolor": PAPER,
+        "figure.facecolor": PAPER,
+        "savefig.facecolor": PAPER,
+        "xtick.color": MUTED,
+        "ytick.color": MUTED,
+        "xtick.labelcolor": INK,
+        "ytick.labelcolor": INK,
+        "xtick.labelsize": 8.5,
+        "ytick.labelsize": 8.5,
+        "axes.labelsize": 9.0,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "xtick.minor.size": 0.0,
+        "ytick.minor.size": 0.0,
+        "xtick.major.size": 3.0,
+        "ytick.major.size": 3.0,
+        "text.parse_math": False,
+        "svg.fonttype": "none",
+        "svg.hashsalt": "spectrasplat",
+    }
     with matplotlib.rc_context(settings), warnings.catch_warnings():
         # A scene may be named in any script; the SVG keeps the letters, the PNG draws a box.
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
@@ -115,14 +148,28 @@ def title(axes: Axes, text: str, detail: str = "") -> None:
     """A bold title, flush left, and a muted line of detail under it."""
     rise = 20.0 if detail else 8.0
     axes.annotate(
-        text, (0, 1), xycoords="axes fraction", xytext=(0, rise), textcoords="offset points",
-        fontsize=10.5, fontweight="bold", va="bottom", annotation_clip=False,
-    )  # fmt: skip
+        text,
+        (0, 1),
+        xycoords="axes fraction",
+        xytext=(0, rise),
+        textcoords="offset points",
+        fontsize=10.5,
+        fontweight="bold",
+        va="bottom",
+        annotation_clip=False,
+    )
     if detail:
         axes.annotate(
-            detail, (0, 1), xycoords="axes fraction", xytext=(0, 7), textcoords="offset points",
-            fontsize=8.5, color=MUTED, va="bottom", annotation_clip=False,
-        )  # fmt: skip
+            detail,
+            (0, 1),
+            xycoords="axes fraction",
+            xytext=(0, 7),
+            textcoords="offset points",
+            fontsize=8.5,
+            color=MUTED,
+            va="bottom",
+            annotation_clip=False,
+        )
 
 
 def svg_text(figure: Figure) -> str:
@@ -143,7 +190,8 @@ def save(figure: Figure, stem: Path) -> str:
 
 
 def inline_svg(document: str, prefix: str, label: str) -> str:
-    """An SVG document as an element for an HTML page: no name spaces, ids made unique by `prefix`, colours as CSS variables.
+    """An SVG document as an element for an HTML page: no name spaces, ids made unique by `prefix`, colours as CSS
+    variables.
 
     label: what the plot shows, for those who cannot see it; must already be escaped.
     """
@@ -164,4 +212,6 @@ def inline_svg(document: str, prefix: str, label: str) -> str:
 def css_variables() -> str:
     """The palette as CSS: for paper, and for a dark screen where the reader prefers one (never in print)."""
     light, dark = ("".join(f"--{name}:{pair[i]};" for name, pair in PALETTE.items()) for i in (0, 1))
-    return f":root{{color-scheme:light dark;{light}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n"
+    return (
+        f":root{{color-scheme:light dark;{light}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n"
+    )

@@ -12,7 +12,13 @@ import statistics
 from ..measured_passes import HALVES
 from ..results import BenchResult, Claim, Curve, SceneResult
 
-MEASURES = {"relmse_whole": "relMSE, ε of the whole picture", "relmse_trimmed": "relMSE trimmed", "nrmse": "nRMSE", "smape": "SMAPE", "chroma": "Δu'v'"}
+MEASURES = {
+    "relmse_whole": "relMSE, ε of the whole picture",
+    "relmse_trimmed": "relMSE trimmed",
+    "nrmse": "nRMSE",
+    "smape": "SMAPE",
+    "chroma": "Δu'v'",
+}
 """Names of `results.OTHER_MEASURES` as the reader sees them."""
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -81,7 +87,9 @@ def warnings_of(scene: SceneResult) -> list[str]:
     elif scene.reference_too_coarse:
         told.append("The reference's own error is above a tenth of the smallest error reported.")
     if any(p.relmse <= 0 for c in scene.curves for p in c.points):
-        told.append("Where a debiased error is zero or below, the picture cannot be told from the reference; the plots show a hollow triangle on the floor.")
+        told.append(
+            "Where a debiased error is zero or below, the picture cannot be told from the reference; the plots show a hollow triangle on the floor."
+        )
     busy = [curve.method for curve in scene.curves if _times_fall(curve)]
     if busy:
         half = HALVES[scene.half]
@@ -95,7 +103,9 @@ def warnings_of(scene: SceneResult) -> list[str]:
     if not scene.complete:
         told.append("The run was stopped before this scene was complete; the same command goes on where it stopped.")
     if scene.seeds < 5:
-        told.append(f"Only {seeds_text(scene.seeds)}: the band over seeds and the parting of bias and variance are weak; the protocol asks for five.")
+        told.append(
+            f"Only {seeds_text(scene.seeds)}: the band over seeds and the parting of bias and variance are weak; the protocol asks for five."
+        )
     return told
 
 
@@ -108,7 +118,9 @@ def _times_fall(curve: Curve) -> bool:
 def headline(result: BenchResult) -> list[str]:
     """The findings in two or three sentences."""
     claims = [claim for scene in result.scenes for claim in scene.claims]
-    compared = [s for s in result.scenes if {"srd", "stochastic"} <= {curve.method for curve in s.curves if curve.points}]
+    compared = [
+        s for s in result.scenes if {"srd", "stochastic"} <= {curve.method for curve in s.curves if curve.points}
+    ]
     ratios = sorted(r for s in compared if (r := s.time_to_equal_error.get("srd", 0.0)) > 0 and math.isfinite(r))
     told = []
     if compared:
@@ -121,7 +133,9 @@ def headline(result: BenchResult) -> list[str]:
         if len(ratios) < len(compared):
             told.append(f"In {len(compared) - len(ratios)} of them it never got there.")
     if claims:
-        told.append(f"{sum(claim.holds for claim in claims)} of {len(claims)} claims hold; what does not is told under Limits.")
+        told.append(
+            f"{sum(claim.holds for claim in claims)} of {len(claims)} claims hold; what does not is told under Limits."
+        )
     if not told:
         told.append("Nothing has been compared yet: the run was stopped early or had one method only.")
     return told
@@ -157,7 +171,7 @@ def bias_share(curve: Curve) -> float | None:
 
 
 def seeds_text(seeds: int) -> str:
-    """"one seed" or "5 seeds"."""
+    """ "one seed" or "5 seeds"."""
     return "one seed" if seeds == 1 else f"{seeds} seeds"
 
 

@@ -102,7 +102,9 @@ def _build(triangles: np.ndarray) -> Bvh:
     try:
         from . import bvh_build
     except ImportError as error:
-        raise UserError(f"building the triangle tree needs numba ({error}); install it with: pip install numba") from error
+        raise UserError(
+            f"building the triangle tree needs numba ({error}); install it with: pip install numba"
+        ) from error
     bounds = np.empty((2 * len(triangles) - 1, 6), np.float32)
     links = np.empty((2 * len(triangles) - 1, 2), np.uint32)
     order, node_count, depth = bvh_build.build(triangles, MAX_DEPTH, MAX_LEAF, bounds, links)
@@ -189,7 +191,9 @@ def _warm() -> None:
 if __name__ == "__main__":
     import argparse
 
-    parser = argparse.ArgumentParser(prog="python -m spectrasplat.model.geometry.bvh", description="Triangle tree builder")
+    parser = argparse.ArgumentParser(
+        prog="python -m spectrasplat.model.geometry.bvh", description="Triangle tree builder"
+    )
     parser.add_argument("--warm", action="store_true", required=True, help="compile ahead of time and time one tree")
     parser.parse_args()
     _warm()

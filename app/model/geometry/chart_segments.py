@@ -179,4 +179,3 @@ def _sheared(mesh: Mesh, corners: np.ndarray) -> bool:
     jacobian = np.stack([du, dv], axis=2)[solid]
     singular = np.linalg.svd(jacobian, compute_uv=False)
     return bool((singular[:, 0] > 10.0 * np.maximum(singular[:, 1], 1e-300)).any())
-

@@ -104,15 +104,17 @@ def build_charts(
     """Charts of `mesh` (in world space), with about `total_texels` in all or texels of `texel_size` units.
 
     The mesh's own texture coordinates are used when they neither overlap nor degenerate, and were
-    not made for pictures (`Mesh.uv_unwraps`); otherwise triangles are grouped by direction and projected, which shrinks areas by at
-    most about a half (recorded in `texel_area`). Raises UserError for a size that is not
-    positive or leads to more than MAX_TEXELS.
+    not made for pictures (`Mesh.uv_unwraps`); otherwise triangles are grouped by direction and projected, which shrinks
+    areas by at most about a half (recorded in `texel_area`). Raises UserError for a size that is not positive or leads
+    to more than MAX_TEXELS.
     """
     if (total_texels is None) == (texel_size is None):
         raise ValueError("give either total_texels or texel_size")
     chosen = total_texels if texel_size is None else texel_size
     if not (math.isfinite(chosen) and chosen > 0):
-        raise UserError(f"mesh '{mesh.name}': the texel number or size of its map must be greater than 0, not {chosen:g}")
+        raise UserError(
+            f"mesh '{mesh.name}': the texel number or size of its map must be greater than 0, not {chosen:g}"
+        )
     for own_uv in (True, False) if mesh.uv is not None and mesh.uv_unwraps else (False,):
         layout = lay_out(mesh, own_uv)
         # Charts by projection that still overlap are halved until none does.

@@ -38,7 +38,8 @@ class Mesh:
     source: str | None = None
     """Path of the file it came from, None for a primitive."""
     uv_unwraps: bool = True
-    """Whether `uv` may lay out the charts of a caustic map; not where it was made for pictures and stretches or repeats."""
+    """Whether `uv` may lay out the charts of a caustic map; not where it was made for pictures and stretches or
+    repeats."""
 
     def corners(self) -> np.ndarray:
         """Corner positions, float64 (T, 3, 3)."""

@@ -133,9 +133,7 @@ def examine(mesh: Mesh) -> MeshHealth:
     )
 
 
-def repair(
-    mesh: Mesh, health: MeshHealth | None = None, solid: bool = True
-) -> tuple[Mesh, tuple[str, ...]]:
+def repair(mesh: Mesh, health: MeshHealth | None = None, solid: bool = True) -> tuple[Mesh, tuple[str, ...]]:
     """Mend what can be mended without a guess, and say in one sentence each what was done or assumed.
 
     Welds vertices at equal positions, drops triangles without area, turns an inside-out
@@ -171,7 +169,9 @@ def repair(
     if turned:
         notes.append(f"{label}: its normals pointed away from its faces' outside; they were turned")
     notes += _warnings(label, health) if solid else []
-    return make_mesh(mesh.name, mesh.vertices, mesh.triangles, mesh.corner_normals, mesh.uv, mesh.source, mesh.uv_unwraps), tuple(notes)
+    return make_mesh(
+        mesh.name, mesh.vertices, mesh.triangles, mesh.corner_normals, mesh.uv, mesh.source, mesh.uv_unwraps
+    ), tuple(notes)
 
 
 def _warnings(label: str, health: MeshHealth) -> list[str]:

@@ -23,7 +23,9 @@ def angle_weighted_normals(mesh: Mesh, crease_deg: float = 180.0) -> np.ndarray:
     """
     triangles = weld_map(mesh.vertices)[1][mesh.triangles]
     faces = mesh.face_normals()
-    group = triangles if crease_deg >= 180.0 else _smoothing_groups(triangles, faces, math.cos(math.radians(crease_deg)))
+    group = (
+        triangles if crease_deg >= 180.0 else _smoothing_groups(triangles, faces, math.cos(math.radians(crease_deg)))
+    )
     group = group.ravel()
     weighted = (_corner_angles(mesh.corners())[..., None] * faces[:, None]).reshape(-1, 3)
     sums = np.stack([np.bincount(group, weighted[:, axis]) for axis in range(3)], axis=1)

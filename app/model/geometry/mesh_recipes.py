@@ -18,7 +18,8 @@ _RECIPES: WeakKeyDictionary[Mesh, Mapping[str, Any]] = WeakKeyDictionary()
 
 
 def note_recipe(mesh: Mesh, recipe: Mapping[str, Any]) -> None:
-    """Remember the scene-file keys that make `mesh`: `shape` with its sizes, or `mesh` (absolute path) with `smooth`."""
+    """Remember the scene-file keys that make `mesh`: `shape` with its sizes, or `mesh` (absolute path) with
+    `smooth`."""
     _RECIPES[mesh] = MappingProxyType(dict(recipe))
 
 

@@ -90,7 +90,9 @@ def disc(radius: float = 0.5, segments: int = 96, name: str = "disc") -> Mesh:
     radius = positive("disc", "radius", radius)
     vertices = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(segments)], axis=1)
     triangles = _fan(np.arange(segments))
-    return make_mesh(name, vertices, triangles, uv=(0.5 + vertices[:, :2] / (2.0 * radius))[triangles], uv_unwraps=False)
+    return make_mesh(
+        name, vertices, triangles, uv=(0.5 + vertices[:, :2] / (2.0 * radius))[triangles], uv_unwraps=False
+    )
 
 
 def _rectangle(width: float, height: float) -> np.ndarray:

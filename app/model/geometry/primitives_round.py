@@ -38,9 +38,7 @@ def ellipsoid(
     return make_mesh(name, directions * axes, faces, normals, globe_uv(directions, faces), uv_unwraps=False)
 
 
-def torus(
-    major_radius: float = 0.5, minor_radius: float = 0.15, triangles: int = 20_480, name: str = "torus"
-) -> Mesh:
+def torus(major_radius: float = 0.5, minor_radius: float = 0.15, triangles: int = 20_480, name: str = "torus") -> Mesh:
     """A ring about z: a circle of `minor_radius` whose centre runs round a circle of `major_radius`."""
     major, minor = positive("torus", "major_radius", major_radius), positive("torus", "minor_radius", minor_radius)
     if minor >= major:
@@ -128,7 +126,12 @@ def revolve(
     def index(row: np.ndarray, column: np.ndarray) -> np.ndarray:
         return first[row][:, None] + np.where(on_axis[row][:, None], 0, column[None, :])
 
-    corner = [index(low, columns[:, 0]), index(low, columns[:, 1]), index(high, columns[:, 1]), index(high, columns[:, 0])]
+    corner = [
+        index(low, columns[:, 0]),
+        index(low, columns[:, 1]),
+        index(high, columns[:, 1]),
+        index(high, columns[:, 0]),
+    ]
 
     def normal(of_profile: np.ndarray, column: np.ndarray) -> np.ndarray:
         radial = of_profile[:, None, :1] * turn[column][None]
@@ -189,20 +192,45 @@ def _icosphere(triangles: int) -> tuple[np.ndarray, np.ndarray]:
     corners = normalised(
         np.array(
             [
-                (-1, golden, 0), (1, golden, 0), (-1, -golden, 0), (1, -golden, 0),
-                (0, -1, golden), (0, 1, golden), (0, -1, -golden), (0, 1, -golden),
-                (golden, 0, -1), (golden, 0, 1), (-golden, 0, -1), (-golden, 0, 1),
+                (-1, golden, 0),
+                (1, golden, 0),
+                (-1, -golden, 0),
+                (1, -golden, 0),
+                (0, -1, golden),
+                (0, 1, golden),
+                (0, -1, -golden),
+                (0, 1, -golden),
+                (golden, 0, -1),
+                (golden, 0, 1),
+                (-golden, 0, -1),
+                (-golden, 0, 1),
             ]
         )
-    )  # fmt: skip
+    )
     base = np.array(
         [
-            (0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11),
-            (1, 5, 9), (5, 11, 4), (11, 10, 2), (10, 7, 6), (7, 1, 8),
-            (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9),
-            (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1),
+            (0, 11, 5),
+            (0, 5, 1),
+            (0, 1, 7),
+            (0, 7, 10),
+            (0, 10, 11),
+            (1, 5, 9),
+            (5, 11, 4),
+            (11, 10, 2),
+            (10, 7, 6),
+            (7, 1, 8),
+            (3, 9, 4),
+            (3, 4, 2),
+            (3, 2, 6),
+            (3, 6, 8),
+            (3, 8, 9),
+            (4, 9, 5),
+            (2, 4, 11),
+            (6, 2, 10),
+            (8, 6, 7),
+            (9, 8, 1),
         ]
-    )  # fmt: skip
+    )
     parts = max(1, round(math.sqrt(triangles / 20.0)))
     row, column = np.array([(i, j) for i in range(parts + 1) for j in range(parts + 1 - i)]).T
     weights = np.stack([parts - row - column, row, column], axis=1)
@@ -212,7 +240,9 @@ def _icosphere(triangles: int) -> tuple[np.ndarray, np.ndarray]:
     down = row + column < parts - 1
     local = np.concatenate(
         [
-            np.stack([number[row[up], column[up]], number[row[up] + 1, column[up]], number[row[up], column[up] + 1]], 1),
+            np.stack(
+                [number[row[up], column[up]], number[row[up] + 1, column[up]], number[row[up], column[up] + 1]], 1
+            ),
             np.stack(
                 [
                     number[row[down] + 1, column[down]],

@@ -1,7 +1,7 @@
 """Opens a .glb or .gltf file directly as a scene: geometry, transforms, camera, lights and glass.
 
-Coordinates stay as they are (y is up, one unit is one metre), but for those of textures, which run down in glTF. What the file lacks is fitted
-to its bounds and said in `Scene.notes`, and so is everything that is passed over.
+Coordinates stay as they are (y is up, one unit is one metre), but for those of textures, which run down in glTF. What
+the file lacks is fitted to its bounds and said in `Scene.notes`, and so is everything that is passed over.
 """
 
 from __future__ import annotations
@@ -153,7 +153,9 @@ class _Reader:
             index, parent = stack.pop()
             node = self.document.item("nodes", index)
             if index in seen:
-                raise self.document.fail(f"nodes[{index}] has two parents or is its own ancestor; export the file again")
+                raise self.document.fail(
+                    f"nodes[{index}] has two parents or is its own ancestor; export the file again"
+                )
             seen.add(index)
             world = parent @ self._local(node, index)
             yield index, world
@@ -164,7 +166,9 @@ class _Reader:
             matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T  # stored column by column
         else:
             matrix = np.eye(4)
-            matrix[:3, :3] = _rotation(node.get("rotation", (0, 0, 0, 1))) * np.array(node.get("scale", (1, 1, 1)), float)
+            matrix[:3, :3] = _rotation(node.get("rotation", (0, 0, 0, 1))) * np.array(
+                node.get("scale", (1, 1, 1)), float
+            )
             matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
         if not np.isfinite(matrix).all():
             raise self.document.fail(f"nodes[{index}] has a transform that is not finite; export the file again")
@@ -182,7 +186,9 @@ class _Reader:
         if light is not None:
             entries = self.document.json.get("extensions", {}).get(LIGHTS, {}).get("lights", [])
             if not isinstance(light, int) or not 0 <= light < len(entries):
-                raise self.document.fail(f"nodes[{index}] refers to light {light} of {len(entries)}; export the file again")
+                raise self.document.fail(
+                    f"nodes[{index}] refers to light {light} of {len(entries)}; export the file again"
+                )
             self.lights.append((index, entries[light], world))
 
     def _unique(self, name: str) -> str:
@@ -222,7 +228,9 @@ class _Reader:
         """`material`, without its texture where the mesh cannot say where it goes."""
         if not isinstance(material, Diffuse) or material.texture is None or mesh.uv is not None:
             return material
-        self.notes.append(f"node '{label}' has no texture coordinates; its texture is not shown (it is kept when saving).")
+        self.notes.append(
+            f"node '{label}' has no texture coordinates; its texture is not shown (it is kept when saving)."
+        )
         return replace(material, texture=None)
 
     def _mesh(self, index: int, number: int, primitive: dict[str, Any], entry: dict[str, Any]) -> Mesh | None:

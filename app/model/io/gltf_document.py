@@ -77,7 +77,9 @@ class GltfDocument:
             values = np.maximum(values.astype(np.float64) / np.iinfo(dtype).max, -1.0)
         return values[:, 0] if width == 1 else values
 
-    def _with_sparse(self, label: str, sparse: dict[str, Any], values: np.ndarray, dtype: np.dtype, width: int) -> np.ndarray:
+    def _with_sparse(
+        self, label: str, sparse: dict[str, Any], values: np.ndarray, dtype: np.dtype, width: int
+    ) -> np.ndarray:
         count, indices, data = sparse["count"], sparse["indices"], sparse["values"]
         index_type = np.dtype(_COMPONENTS[indices["componentType"]])
         where = self._view(label, indices["bufferView"], indices.get("byteOffset", 0), index_type, 1, count)[:, 0]
@@ -101,7 +103,9 @@ class GltfDocument:
                 f"the file is truncated, copy or export it again"
             )
         if count and offset + (count - 1) * stride + width * dtype.itemsize > length:
-            raise self.fail(f"{label} promises {count} elements, more than bufferViews[{index}] holds; export the file again")
+            raise self.fail(
+                f"{label} promises {count} elements, more than bufferViews[{index}] holds; export the file again"
+            )
         return np.ndarray((count, width), dtype, data, start + offset, (stride, dtype.itemsize))
 
     def view_bytes(self, index: Any) -> bytes:
@@ -160,10 +164,14 @@ def open_document(path: str | os.PathLike[str]) -> GltfDocument:
     if data[:4] == GLB_MAGIC:
         document = _open_glb(path, data)
     elif path.suffix.lower() == ".glb":
-        raise UserError(f"{path.name}: not a GLB file (it does not begin with 'glTF'); check the suffix or export it again")
+        raise UserError(
+            f"{path.name}: not a GLB file (it does not begin with 'glTF'); check the suffix or export it again"
+        )
     else:
         document = GltfDocument(path, _parsed(path, data))
-    version = str(document.json.get("asset", {}).get("version", "")) if isinstance(document.json.get("asset"), dict) else ""
+    version = (
+        str(document.json.get("asset", {}).get("version", "")) if isinstance(document.json.get("asset"), dict) else ""
+    )
     if not version.startswith("2."):
         raise document.fail(f"glTF version '{version}' is not supported; export it as glTF 2.0")
     return document
@@ -229,7 +237,9 @@ def save_document(document: GltfDocument, path: str | os.PathLike[str]) -> None:
         del content["buffers"]
     if path.parent.resolve() != document.path.parent.resolve():
         content = _with_embedded_images(document, content)
-    text = json.dumps(content, ensure_ascii=False, separators=(",", ":") if as_glb else None, indent=None if as_glb else 1)
+    text = json.dumps(
+        content, ensure_ascii=False, separators=(",", ":") if as_glb else None, indent=None if as_glb else 1
+    )
     with atomic_output(path) as temporary:
         temporary.write_bytes(_glb(text.encode(), binary, document.other_chunks) if as_glb else text.encode())
 

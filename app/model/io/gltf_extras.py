@@ -1,4 +1,5 @@
-"""What of a scene glTF has no place for, kept under `extras.spectrasplat`: the brush's dabs, what lies behind, render defaults.
+"""What of a scene glTF has no place for, kept under `extras.spectrasplat`: the brush's dabs, what lies behind, render
+defaults.
 
 Materials and lights keep theirs in `gltf_materials` and `gltf`; other programs' extras are left alone.
 """

@@ -65,7 +65,9 @@ class GltfTextures:
         sampler = self._document.item("samplers", entry["sampler"]) if "sampler" in entry else {}
         across, down = sampler.get("wrapS", _REPEAT), sampler.get("wrapT", _REPEAT)
         if _MIRRORED in (across, down) or across != down:
-            self._notes.append(f"{label}: its texture is repeated; mirroring, or clamping one way only, is not understood.")
+            self._notes.append(
+                f"{label}: its texture is repeated; mirroring, or clamping one way only, is not understood."
+            )
             return "repeat"
         return "clamp" if across == _CLAMP else "repeat"
 
@@ -74,7 +76,9 @@ class GltfTextures:
         if index not in self._pictures:
             entry = self._document.item("images", index)
             uri = entry.get("uri")
-            kind = entry.get("mimeType") or (uri[5:].partition(";")[0] if uri and uri.startswith("data:") else _FORMATS[0])
+            kind = entry.get("mimeType") or (
+                uri[5:].partition(";")[0] if uri and uri.startswith("data:") else _FORMATS[0]
+            )
             self._pictures[index] = self._decoded(entry, index) if kind in _FORMATS else None
         return self._pictures[index]
 
@@ -118,7 +122,8 @@ class TextureWriter:
 
 
 def turned_over(uv: np.ndarray) -> np.ndarray:
-    """Texture coordinates (…, 2) whose v runs the other way, from glTF's to ours or back; exact for float32 in [0, 1]."""
+    """Texture coordinates (…, 2) whose v runs the other way, from glTF's to ours or back; exact for float32 in [0,
+    1]."""
     return np.stack([uv[..., 0], 1.0 - uv[..., 1]], axis=-1)
 
 

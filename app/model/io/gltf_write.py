@@ -122,7 +122,9 @@ class _Writer:
                 own = {"name": item.name, "mesh": mesh}
                 write_node_dabs(own, {0: item.local_dispersion})
                 self._add_node(own, item.object_to_world)
-        write_node_dabs(entry, {at: new[names[number]].local_dispersion for at, number in enumerate(kept) if number in names})
+        write_node_dabs(
+            entry, {at: new[names[number]].local_dispersion for at, number in enumerate(kept) if number in names}
+        )
         remaining = list(kept.values())
         if not remaining:
             del entry["mesh"]
@@ -277,7 +279,10 @@ class _Writer:
             lens["orthographic"] |= {"znear": 0.0, "zfar": 100.0 * float(np.linalg.norm(offset))}
         else:
             near = 1e-3 * float(np.linalg.norm(offset))
-            lens = {"type": "perspective", "perspective": {"yfov": math.radians(camera.vertical_fov_deg), "znear": near}}
+            lens = {
+                "type": "perspective",
+                "perspective": {"yfov": math.radians(camera.vertical_fov_deg), "znear": near},
+            }
             lens["perspective"] |= aspect
         world = _look_world(camera.position, offset, camera.up)
         node = self.origins.camera

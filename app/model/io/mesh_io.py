@@ -41,7 +41,9 @@ def load_mesh(path: str | os.PathLike[str], smooth: bool | float | None = None, 
     raw = _read(path, suffix)
     mesh = make_mesh(name or path.stem, raw.vertices, raw.triangles, raw.corner_normals, raw.uv, str(path))
     if len(far := np.flatnonzero((np.abs(mesh.vertices) > MAX_COORDINATE).any(axis=1))):
-        raise UserError(f"{path}: vertex {far[0]} lies beyond {MAX_COORDINATE:g} units; export the mesh in larger units")
+        raise UserError(
+            f"{path}: vertex {far[0]} lies beyond {MAX_COORDINATE:g} units; export the mesh in larger units"
+        )
     if smooth is None:
         return mesh
     if smooth is False:

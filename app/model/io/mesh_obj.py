@@ -121,7 +121,9 @@ def _faces(kinds: dict[str, list[tuple[int, str]]], path: str) -> tuple[np.ndarr
                 for column, part in enumerate(word.split("/")):
                     corner[column] = int(part) if part or column == _POSITION else 0
             except (ValueError, IndexError):
-                raise UserError(f"{path}: line {number}: '{word[:40]}' is no face corner; export the mesh again") from None
+                raise UserError(
+                    f"{path}: line {number}: '{word[:40]}' is no face corner; export the mesh again"
+                ) from None
             for column, index in enumerate(corner):
                 if index < 0:  # counts back from the last one defined so far
                     corner[column] = max(index + 1 + int(np.searchsorted(defined[column], number)), -1)

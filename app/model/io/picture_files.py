@@ -33,7 +33,9 @@ def read_picture(path: str | os.PathLike[str]) -> tuple[np.ndarray, tuple[str, .
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in PICTURE_SUFFIXES:
-        raise UserError(f"cannot read {path}: '{suffix}' is not a picture format; use one of {', '.join(PICTURE_SUFFIXES)}")
+        raise UserError(
+            f"cannot read {path}: '{suffix}' is not a picture format; use one of {', '.join(PICTURE_SUFFIXES)}"
+        )
     if suffix in (".exr", ".npy"):
         from ...base.image_io import read_image
 
@@ -64,14 +66,20 @@ def decode_8bit(data: bytes, where: str) -> tuple[np.ndarray, tuple[str, ...]]:
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit below says it better
             image = Image.open(io.BytesIO(data), formats=("PNG", "JPEG"))
         if image.width * image.height > MAX_PIXELS:
-            raise UserError(f"{where}: {image.width} × {image.height} pixels are more than {MAX_PIXELS >> 20} million; make it smaller")
+            raise UserError(
+                f"{where}: {image.width} × {image.height} pixels are more than {MAX_PIXELS >> 20} million; make it smaller"
+            )
         if image.mode.startswith(("I", "F")):
-            raise UserError(f"{where}: more than 8 bits a channel in a grey PNG are not understood; save it as 8 bit or as .exr")
+            raise UserError(
+                f"{where}: more than 8 bits a channel in a grey PNG are not understood; save it as 8 bit or as .exr"
+            )
         image = ImageOps.exif_transpose(image)
         notes = _transparency(image, where)
         encoded = np.asarray(image.convert("RGB"))
     except UnidentifiedImageError as error:
-        raise UserError(f"{where}: this is neither a PNG nor a JPEG picture; check the suffix or export it again") from error
+        raise UserError(
+            f"{where}: this is neither a PNG nor a JPEG picture; check the suffix or export it again"
+        ) from error
     except (OSError, ValueError, SyntaxError, EOFError, Image.DecompressionBombError) as error:
         raise UserError(f"{where}: the picture is damaged ({error}); copy or export it again") from error
     return _decoded_levels()[encoded], notes
@@ -104,11 +112,17 @@ def _checked(rgb: np.ndarray, where: str) -> tuple[np.ndarray, tuple[str, ...]]:
     """`rgb` without the negative noise of lossy compression. Raises UserError that counts what is no radiance."""
     undefined, infinite = int(np.isnan(rgb).sum()), int(np.isinf(rgb).sum())
     if undefined or infinite:
-        raise UserError(f"{where}: {undefined} values are not a number and {infinite} infinite; export it with finite values")
+        raise UserError(
+            f"{where}: {undefined} values are not a number and {infinite} infinite; export it with finite values"
+        )
     negative = rgb < 0.0
     if not negative.any():
         return rgb, ()
     count, lowest, highest = int(negative.sum()), float(rgb.min()), float(rgb.max())
     if lowest <= -_NOISE * highest:
-        raise UserError(f"{where}: {count} values are negative (down to {lowest:.3g}), which light cannot be; export it without them")
-    return np.maximum(rgb, np.float32(0.0)), (f"{where}: {count} slightly negative values (down to {lowest:.3g}) were set to 0.",)
+        raise UserError(
+            f"{where}: {count} values are negative (down to {lowest:.3g}), which light cannot be; export it without them"
+        )
+    return np.maximum(rgb, np.float32(0.0)), (
+        f"{where}: {count} slightly negative values (down to {lowest:.3g}) were set to 0.",
+    )

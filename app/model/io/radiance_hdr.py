@@ -40,7 +40,9 @@ def _header(data: bytes, where: str) -> tuple[list[str], int]:
     """Lines of the header and where the resolution line begins."""
     end = data.find(b"\n\n", 0, 1 << 16)
     if not data.startswith(b"#?") or end < 0:
-        raise UserError(f"{where}: this is not a Radiance picture (it does not begin with '#?' and a header); check the suffix")
+        raise UserError(
+            f"{where}: this is not a Radiance picture (it does not begin with '#?' and a header); check the suffix"
+        )
     return data[:end].decode("ascii", "replace").split("\n"), end + 2
 
 
@@ -71,7 +73,9 @@ def _resolution(data: bytes, start: int, where: str) -> tuple[int, int, int]:
     if len(words) != 4 or not (words[1].isdecimal() and words[3].isdecimal()):
         raise UserError(f"{where}: the line that gives its size is missing; copy or export it again")
     if (words[0], words[2]) != ("-Y", "+X"):
-        raise UserError(f"{where}: its pixels run '{words[0]} {words[2]}', not from the top left ('-Y +X'); turn and export it again")
+        raise UserError(
+            f"{where}: its pixels run '{words[0]} {words[2]}', not from the top left ('-Y +X'); turn and export it again"
+        )
     height, width = int(words[1]), int(words[3])
     if not (0 < height <= _MAX_SIDE and 0 < width <= _MAX_SIDE):
         raise UserError(f"{where}: its size is {width} × {height}; each side must be 1 to {_MAX_SIDE} pixels")

@@ -72,7 +72,8 @@ def _new_row(data, at, row):
 
 @_compiled
 def _old_row(data, at, row):
-    """Whole pixels; one of mantissas 1, 1, 1 repeats the pixel before it, and in a row of such each counts 256 times the last."""
+    """Whole pixels; one of mantissas 1, 1, 1 repeats the pixel before it, and in a row of such each counts 256 times
+    the last."""
     width = row.shape[0]
     x = 0
     weight = 1

@@ -69,7 +69,9 @@ def _read_toml(path: Path) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise UserError(f"{path.name} is not valid TOML: {error}; texts need quotes and keys one line each") from error
     except RecursionError as error:
-        raise UserError(f"{path.name} is not a scene: its lists are nested too deeply; see assets/scenes for examples") from error
+        raise UserError(
+            f"{path.name} is not a scene: its lists are nested too deeply; see assets/scenes for examples"
+        ) from error
     except UnicodeDecodeError as error:
         raise UserError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8") from error
     except OSError as error:
@@ -100,7 +102,8 @@ def _scene_from_table(table: SceneTable) -> Scene:
 
 
 def _read_lights(table: SceneTable, around: Surroundings, notes: list[str], dark_without: bool) -> tuple[Light, ...]:
-    """The lights; a sun where none are given and nothing would be seen without (an environment shows glass and mirrors)."""
+    """The lights; a sun where none are given and nothing would be seen without (an environment shows glass and
+    mirrors)."""
     if not table.has("lights"):
         if not dark_without:
             return ()

@@ -16,7 +16,8 @@ def picture_file(rgb: np.ndarray, source: str | None, scene_path: Path) -> str:
     """Name, relative to the scene file `scene_path`, of a file that holds `rgb` float32 (H, W, 3), row 0 the top.
 
     That is `source` while it exists. A picture without one (out of a .glb, say) is written into the folder
-    `<stem>_pictures` beside the scene, as PNG where 8 bits hold it exactly, else as EXR. Raises UserError when it cannot be.
+    `<stem>_pictures` beside the scene, as PNG where 8 bits hold it exactly, else as EXR. Raises UserError when it
+    cannot be.
     """
     if source is not None and Path(source).is_file():
         return relative_name(source, scene_path.parent)
@@ -24,7 +25,9 @@ def picture_file(rgb: np.ndarray, source: str | None, scene_path: Path) -> str:
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
-        raise UserError(f"cannot write the pictures of {scene_path}: {folder} cannot be made ({error.strerror}); choose another name") from error
+        raise UserError(
+            f"cannot write the pictures of {scene_path}: {folder} cannot be made ({error.strerror}); choose another name"
+        ) from error
     levels = eight_bit_levels(rgb)
     target = folder / f"{picture_name(rgb)}{'.exr' if levels is None else '.png'}"
     if levels is None:

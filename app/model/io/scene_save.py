@@ -73,9 +73,7 @@ def scene_text(scene: Scene, path: Path) -> str:
         parts.append(toml_block(f"[{ENVIRONMENT}]", environment_values(scene.environment, path)))
     parts += [toml_block("[[lights]]", light_values(light)) for light in scene.lights]
     materials: dict[str, dict[str, Any]] = {}
-    objects = [
-        toml_block("[[objects]]", _objects(group, materials, path)) for group in _groups(scene.objects)
-    ]
+    objects = [toml_block("[[objects]]", _objects(group, materials, path)) for group in _groups(scene.objects)]
     parts += [toml_block(f"[materials.{toml_key(name)}]", values) for name, values in materials.items()]
     return "\n".join(parts + objects)
 
@@ -199,7 +197,9 @@ def _mesh(mesh: Mesh, path: Path) -> dict[str, Any]:
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
-        raise UserError(f"cannot write the meshes of {path}: {folder} cannot be made ({error.strerror}); choose another name") from error
+        raise UserError(
+            f"cannot write the meshes of {path}: {folder} cannot be made ({error.strerror}); choose another name"
+        ) from error
     target = folder / f"{_file_stem(mesh)}.ply"
     save_ply(mesh, target)
     return {"mesh": relative_name(str(target), path.parent)}

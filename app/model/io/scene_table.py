@@ -217,7 +217,7 @@ class SceneTable:
                 raise ValueError
             encoded = [byte / 255.0 for byte in bytes.fromhex(digits)]
         except ValueError:
-            self.fail(key, f"is {_show(text)} but a colour in quotes must read \"#rrggbb\"")
+            self.fail(key, f'is {_show(text)} but a colour in quotes must read "#rrggbb"')
         # IEC 61966-2-1 decoding.
         r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in encoded)
         return r, g, b
@@ -253,9 +253,7 @@ class SceneTable:
         value = self._values[key]
         if not isinstance(value, list) or not all(isinstance(entry, dict) for entry in value):
             self.fail(key, f"must be a list of tables: write [[{self.key_path(key)}]]")
-        return [
-            SceneTable(entry, self.file, f"{self.key_path(key)}[{i}]") for i, entry in enumerate(value)
-        ]
+        return [SceneTable(entry, self.file, f"{self.key_path(key)}[{i}]") for i, entry in enumerate(value)]
 
     def named_tables(self, key: str) -> dict[str, SceneTable]:
         """The tables inside the table under `key`, by name: [materials.NAME]."""

@@ -63,12 +63,19 @@ def entries() -> tuple[Entry, ...]:
     sources = raw["sources"]
     return tuple(
         Entry(
-            name, maker, fields["f"], tuple(fields["c"]), tuple(fields["r"]), sources[fields["s"]],
-            tuple(fields.get("a", ())), fields.get("t", ""), fields.get("n", ""),
+            name,
+            maker,
+            fields["f"],
+            tuple(fields["c"]),
+            tuple(fields["r"]),
+            sources[fields["s"]],
+            tuple(fields.get("a", ())),
+            fields.get("t", ""),
+            fields.get("n", ""),
         )
         for maker in MAKER_ORDER
         for name, fields in raw["makers"][maker].items()
-    )  # fmt: skip
+    )
 
 
 @cache

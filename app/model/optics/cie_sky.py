@@ -1,6 +1,7 @@
 """The CIE standard general sky: how bright each place of a sky is against its zenith, for fifteen kinds of weather.
 
-ISO 15469:2004 / CIE S 011/E:2003, Spatial Distribution of Daylight. It gives luminances only; the colour is the caller's.
+ISO 15469:2004 / CIE S 011/E:2003, Spatial Distribution of Daylight. It gives luminances only; the colour is the
+caller's.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ SKY_TYPES: dict[int, tuple[float, float, float, float, float]] = {
     14: (-1.0, -0.15, 16.0, -3.0, 0.30),
     15: (-1.0, -0.15, 24.0, -2.8, 0.15),
 }
-"""Type -> a, b (gradation) and c, d, e (indicatrix), table 1 of the standard. 1 is overcast, 5 uniform, 12 clear, 15 hazy and bright round the sun."""
+"""Type -> a, b (gradation) and c, d, e (indicatrix), table 1 of the standard. 1 is overcast, 5 uniform, 12 clear, 15
+hazy and bright round the sun."""
 
 
 def relative_luminance(sky_type: int, toward_sky: np.ndarray, toward_sun: np.ndarray) -> np.ndarray:

@@ -124,9 +124,7 @@ def rgb_partition() -> np.ndarray:
     return _frozen(np.stack([red, above_blue * (1.0 - red), (1.0 - above_blue) * (1.0 - red)], axis=-1))
 
 
-def attenuation_from_colour(
-    rgb: tuple[float, float, float], distance: float, where: str = ""
-) -> np.ndarray:
+def attenuation_from_colour(rgb: tuple[float, float, float], distance: float, where: str = "") -> np.ndarray:
     """Absorption coefficient α(λ) on `VISIBLE_NM`, float64 (401,), per unit of `distance`.
 
     White light that has travelled `distance` has the linear Rec.709 colour `rgb`

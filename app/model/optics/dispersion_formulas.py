@@ -16,9 +16,16 @@ from typing import Literal
 import numpy as np
 
 Kind = Literal[
-    "formula 1", "formula 2", "formula 3", "formula 4", "formula 5", "formula 6",
-    "abbe", "constant", "table",
-]  # fmt: skip
+    "formula 1",
+    "formula 2",
+    "formula 3",
+    "formula 4",
+    "formula 5",
+    "formula 6",
+    "abbe",
+    "constant",
+    "table",
+]
 Coefficients = tuple[float, ...]
 IndexAndSlope = tuple[np.ndarray, np.ndarray]
 

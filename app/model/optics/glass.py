@@ -95,14 +95,20 @@ class Dispersion:
         label = self.name or "the index"
         n = self.index(_CHECK_NM)
         if self.gain != 1.0:
-            told.append(f"{label}: its dispersion is {self.gain:g} times that of the material (dispersion_gain), which nature does not offer.")
+            told.append(
+                f"{label}: its dispersion is {self.gain:g} times that of the material (dispersion_gain), which nature does not offer."
+            )
         if n.min() < 1.0:
             at = _CHECK_NM[int(n.argmin())]
             told.append(f"{label}: the index falls below 1 (n = {n.min():.6g} at {at:g} nm), which is legal but rare.")
         if self.kind == "abbe" and self.coefficients[0] > 1.0 and n.min() == 1.0:
-            told.append(f"{label}: V_d = {self.coefficients[1]:g} is so small that the index is held at 1 in part of the range.")
+            told.append(
+                f"{label}: V_d = {self.coefficients[1]:g} is so small that the index is held at 1 in part of the range."
+            )
         if self.is_dispersive and np.any(np.diff(n) > 0.0):
-            told.append(f"{label}: the index rises with wavelength in part of the visible range (anomalous dispersion).")
+            told.append(
+                f"{label}: the index rises with wavelength in part of the visible range (anomalous dispersion)."
+            )
         return told
 
     def formula_text(self) -> str:
@@ -150,7 +156,9 @@ def sellmeier(
 ) -> Dispersion:
     """n² = 1 + Σ B λ²/(λ² − C), C in µm² (as glass makers print it)."""
     if len(b) != len(c_um2) or not b:
-        raise UserError(f"{_prefix(where)}Sellmeier needs as many C as B, at least one (got {len(b)} B and {len(c_um2)} C)")
+        raise UserError(
+            f"{_prefix(where)}Sellmeier needs as many C as B, at least one (got {len(b)} B and {len(c_um2)} C)"
+        )
     flat = [0.0] + [float(x) for pair in zip(b, c_um2, strict=True) for x in pair]
     return _checked(Dispersion(name, "formula 2", tuple(flat), range_nm or _ALL_WAVELENGTHS), where)
 
@@ -184,7 +192,9 @@ def from_formula(
         raise UserError(f"{_prefix(where)}unknown dispersion formula '{kind}'; known are {', '.join(known)}")
     lengths_fit = len(values) >= 9 if kind == "formula 4" else len(values) >= 1
     if not lengths_fit or len(values) % 2 == 0:
-        raise UserError(f"{_prefix(where)}{kind} does not take {len(values)} coefficients; see 'Dispersion formulas' of refractiveindex.info")
+        raise UserError(
+            f"{_prefix(where)}{kind} does not take {len(values)} coefficients; see 'Dispersion formulas' of refractiveindex.info"
+        )
     return _checked(Dispersion(name, kind, values, range_nm or _ALL_WAVELENGTHS), where)
 
 
@@ -199,7 +209,9 @@ def table(wavelength_nm: Sequence[float], n: Sequence[float], name: str = "", wh
         )
     lam = np.asarray(wavelength_nm, dtype=np.float64)
     if not np.all(np.isfinite(lam)) or lam[0] <= 0.0:
-        raise UserError(f"{_prefix(where)}a wavelength of the table is not a positive number; give nanometres, such as 587.56")
+        raise UserError(
+            f"{_prefix(where)}a wavelength of the table is not a positive number; give nanometres, such as 587.56"
+        )
     if np.any(np.diff(lam) <= 0.0):
         at = int(np.argmax(np.diff(lam) <= 0.0))
         raise UserError(
@@ -208,7 +220,9 @@ def table(wavelength_nm: Sequence[float], n: Sequence[float], name: str = "", wh
     values = [float(x) for x in n]
     for wavelength, value in zip(lam, values, strict=True):
         if not (math.isfinite(value) and value > 0.0):
-            raise UserError(f"{_prefix(where)}the table has n = {value:g} at {wavelength:g} nm; an index must be a positive number")
+            raise UserError(
+                f"{_prefix(where)}the table has n = {value:g} at {wavelength:g} nm; an index must be a positive number"
+            )
     flat = tuple(float(x) for pair in zip(lam * 1e-3, values, strict=True) for x in pair)
     return _checked(Dispersion(name, "table", flat, (float(lam[0]), float(lam[-1]))), where)
 
@@ -219,7 +233,9 @@ def with_gain(dispersion: Dispersion, gain: float, where: str = "") -> Dispersio
     Raises `UserError` for a gain that is not finite or negative, or that makes an index ≤ 0 in the visible range.
     """
     if not (math.isfinite(gain) and gain >= 0.0):
-        raise UserError(f"{_prefix(where)}dispersion_gain is {gain:g}; give a number from 0 (none) over 1 (as in nature) upwards")
+        raise UserError(
+            f"{_prefix(where)}dispersion_gain is {gain:g}; give a number from 0 (none) over 1 (as in nature) upwards"
+        )
     return _checked(replace(dispersion, gain=float(gain)), where)
 
 
@@ -263,5 +279,7 @@ def _checked(dispersion: Dispersion, where: str) -> Dispersion:
     if np.any(bad):
         at = int(np.argmax(bad))
         state = "imaginary or infinite" if not np.isfinite(n[at]) else f"{n[at]:.6g}"
-        raise UserError(f"{who}the refractive index is {state} at {_CHECK_NM[at]:g} nm; it must be a positive number from 380 to 780 nm")
+        raise UserError(
+            f"{who}the refractive index is {state} at {_CHECK_NM[at]:g} nm; it must be a positive number from 380 to 780 nm"
+        )
     return dispersion

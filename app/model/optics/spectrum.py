@@ -28,10 +28,25 @@ from .colorimetry import (
 )
 
 __all__ = [
-    "K_M", "VISIBLE_NM", "Spectrum", "attenuation_from_colour", "blackbody", "cmf_at", "cmf_xyz", "constant",
-    "from_csv", "from_table", "illuminant", "illuminant_names", "laser", "read_csv", "rgb709_to_xyz",
-    "rgb709_to_xyz_matrix", "xyz_to_rgb709", "xyz_to_rgb709_matrix",
-]  # fmt: skip
+    "K_M",
+    "VISIBLE_NM",
+    "Spectrum",
+    "attenuation_from_colour",
+    "blackbody",
+    "cmf_at",
+    "cmf_xyz",
+    "constant",
+    "from_csv",
+    "from_table",
+    "illuminant",
+    "illuminant_names",
+    "laser",
+    "read_csv",
+    "rgb709_to_xyz",
+    "rgb709_to_xyz_matrix",
+    "xyz_to_rgb709",
+    "xyz_to_rgb709_matrix",
+]
 
 _PLANCK_2HC2 = 1.191042972e-16
 """First radiation constant for radiance, 2hc², W m² (CODATA 2018)."""
@@ -54,7 +69,9 @@ class Spectrum:
             raise UserError(f"a spectrum needs 401 values, one for each nm from 380 to 780, not {density.shape}")
         if not np.all(np.isfinite(density)) or np.any(density < 0.0):
             at = int(np.argmin(np.where(np.isfinite(density), density, -np.inf)))
-            raise UserError(f"the spectrum is {density[at]:g} at {VISIBLE_NM[at]:g} nm; power must be a number of 0 or more")
+            raise UserError(
+                f"the spectrum is {density[at]:g} at {VISIBLE_NM[at]:g} nm; power must be a number of 0 or more"
+            )
         for wavelength, power in self.lines:
             if not 380.0 <= wavelength <= 780.0:
                 raise UserError(f"the line at {wavelength:g} nm is not visible; choose one from 380 to 780 nm")
@@ -117,7 +134,9 @@ class Spectrum:
         if not (math.isfinite(target) and target >= 0.0):
             raise UserError(f"a light's power is {target:g}; give a number of 0 or more")
         if present <= 0.0:
-            raise UserError(f"a spectrum that holds {lacking} cannot be brought to a given power; choose another spectrum")
+            raise UserError(
+                f"a spectrum that holds {lacking} cannot be brought to a given power; choose another spectrum"
+            )
         return self.scaled(target / present)
 
 
@@ -158,7 +177,9 @@ def _key(name: str) -> str:
 def blackbody(kelvin: float) -> Spectrum:
     """Planck's spectral radiance of a black body, W/(sr m² nm) in vacuum wavelengths."""
     if not (math.isfinite(kelvin) and 500.0 <= kelvin <= 1e7):
-        raise UserError(f"a black body of {kelvin:g} K is out of range; give 500 to 1e7 K (a candle has 1900, the sun 5800)")
+        raise UserError(
+            f"a black body of {kelvin:g} K is out of range; give 500 to 1e7 K (a candle has 1900, the sun 5800)"
+        )
     metres = VISIBLE_NM * 1e-9
     per_metre = _PLANCK_2HC2 / metres**5 / np.expm1(_PLANCK_C2 / (metres * kelvin))
     return Spectrum(per_metre * 1e-9)
@@ -200,7 +221,9 @@ def from_csv(path: str | os.PathLike[str]) -> Spectrum:
     """
     spectrum = from_table(*read_csv(path), where=os.fspath(path))
     if spectrum.power_w() == 0.0:
-        raise UserError(f"{os.fspath(path)}: the spectrum is zero from 380 to 780 nm; wavelengths must be in nanometres")
+        raise UserError(
+            f"{os.fspath(path)}: the spectrum is zero from 380 to 780 nm; wavelengths must be in nanometres"
+        )
     return spectrum
 
 
@@ -228,7 +251,9 @@ def read_csv(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
             continue
         header_allowed = False
         if len(parsed) != 2 or None in parsed:
-            raise UserError(f"{shown}, line {number}: expected two numbers, wavelength_nm and power, but found '{raw.strip()}'")
+            raise UserError(
+                f"{shown}, line {number}: expected two numbers, wavelength_nm and power, but found '{raw.strip()}'"
+            )
         wavelength, value = parsed
         if not (math.isfinite(wavelength) and math.isfinite(value)):
             raise UserError(f"{shown}, line {number}: '{raw.strip()}' holds no finite number; remove the row")

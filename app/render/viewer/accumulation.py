@@ -1,4 +1,5 @@
-"""The order in which a live rendering traces: coarse passes first, each four times as fine as the one before, then more of the finest.
+"""The order in which a live rendering traces: coarse passes first, each four times as fine as the one before, then more
+of the finest.
 
 Coarse footprints blur and what they blurred would stay in a sum: so a finer pass starts anew, and the maps
 are published only when it is complete.
@@ -35,7 +36,9 @@ class Accumulation:
     @property
     def is_done(self) -> bool:
         """The target is reached."""
-        return self.begun and self.number > 0 and self.photons >= self.largest and self.light.stats.photons >= self.target
+        return (
+            self.begun and self.number > 0 and self.photons >= self.largest and self.light.stats.photons >= self.target
+        )
 
     def aim_at(self, target: int, largest: int) -> None:
         """Another target; passes become no coarser for it."""

@@ -1,4 +1,5 @@
-"""From a scene to the first picture of its light: programs, buffers, pilots, maps and a first coarse pass, in pauses."""
+"""From a scene to the first picture of its light: programs, buffers, pilots, maps and a first coarse pass, in
+pauses."""
 
 from __future__ import annotations
 
@@ -56,9 +57,17 @@ def build(
     """
     width, height = quick_size(wanted.width, wanted.height)
     settings = RenderSettings(
-        width=width, height=height, method=wanted.method, seed=wanted.seed, smoothing=wanted.smoothing,
-        max_depth=wanted.scene.render.max_depth, batch=budget.batch, local_gain=wanted.local_gain, anchor_weights=True, any_view=True,
-    )  # fmt: skip
+        width=width,
+        height=height,
+        method=wanted.method,
+        seed=wanted.seed,
+        smoothing=wanted.smoothing,
+        max_depth=wanted.scene.render.max_depth,
+        batch=budget.batch,
+        local_gain=wanted.local_gain,
+        anchor_weights=True,
+        any_view=True,
+    )
     scene = replace(wanted.scene, camera=wanted.camera)
     features = Features.of(scene, settings)
     buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))

@@ -20,8 +20,8 @@ from ...passes.camera import CausticMaps
 from ...passes.pick import Picker, PickHit
 from ..light_maps import LightMaps
 from .building import Budget, Shown, build
-from .inputs import LiveInputs, DirtyLevel
-from .invalidation import looks_other, dirty_level
+from .inputs import DirtyLevel, LiveInputs
+from .invalidation import dirty_level, looks_other
 from .live_camera import LiveCamera, solo_scene
 from .live_light import LiveLight
 from .photon_queries import StoredPhotons, caustic_spectrum, reach_of, world_photons
@@ -54,7 +54,8 @@ class LiveEngine:
         self.budget = budget or Budget.of(context)
         self._target_photons = 32_000_000
         self.refine_when_still = True
-        """Trace again with the new glass once nothing changes, where the picture followed an edit to first order only."""
+        """Trace again with the new glass once nothing changes, where the picture followed an edit to first order
+        only."""
         self.playing = True
         """Photons accumulate."""
         self.problem: str | None = None
@@ -123,7 +124,8 @@ class LiveEngine:
         self._retrace = self._shown is not None and self._shown.light.first_order
 
     def rebuild(self) -> None:
-        """Compile every program again (shaders changed on disk). Raises `ShaderError`, and the present ones stay, where that fails."""
+        """Compile every program again (shaders changed on disk). Raises `ShaderError`, and the present ones stay, where
+        that fails."""
         shader.drop_programs(self.context.ctx)
         self.problem = None
         self._start_building(self._wanted)
@@ -137,7 +139,8 @@ class LiveEngine:
     # ---- work --------------------------------------------------------------------------------
 
     def advance(self, budget_s: float, interacting: bool = False) -> None:
-        """Work for about `budget_s` seconds. `interacting`: something is being dragged, so answer at once and coarsely."""
+        """Work for about `budget_s` seconds. `interacting`: something is being dragged, so answer at once and
+        coarsely."""
         started = time.perf_counter()
         deadline = started + budget_s
         self._times = dict.fromkeys(self._times, 0.0)
@@ -159,7 +162,10 @@ class LiveEngine:
 
     def _work(self, deadline: float, budget_s: float) -> None:
         if self._building is not None:
-            self._build(deadline - (CAMERA_SHARE * budget_s if self._maps is not None and self._camera_pass.owes_picture else 0.0))
+            self._build(
+                deadline
+                - (CAMERA_SHARE * budget_s if self._maps is not None and self._camera_pass.owes_picture else 0.0)
+            )
         elif self._has_work and not self._answering:
             camera_waits = not self._camera_pass.is_done
             self._run_job(deadline - (CAMERA_SHARE * budget_s if camera_waits else 0.0))
@@ -185,7 +191,8 @@ class LiveEngine:
 
     @property
     def _finishes_answer(self) -> bool:
-        """Where not even the smallest picture fits a frame, one that has begun is finished first: else nothing would be seen to move."""
+        """Where not even the smallest picture fits a frame, one that has begun is finished first: else nothing would be
+        seen to move."""
         return self._interacting and self._camera_pass.is_coarse and self._camera_pass.owes_picture
 
     def _follow(self, budget_s: float) -> None:
@@ -257,7 +264,8 @@ class LiveEngine:
         self._restart_camera(same_view=False)
 
     def _answer_quickly(self, seconds: float) -> None:
-        """As many stored photons as can be splatted in about `seconds`, in coarse maps of their own, as the picture for now."""
+        """As many stored photons as can be splatted in about `seconds`, in coarse maps of their own, as the picture for
+        now."""
         assert self._shown is not None and self._inputs is not None
         started = time.perf_counter()
         maps = self._shown.light.splat_quickly(self._quick_photons)
@@ -266,17 +274,23 @@ class LiveEngine:
         self._set_maps(maps)
         self._shows_quick_maps = True
         took = time.perf_counter() - started
-        self._quick_photons = int(np.clip(self._quick_photons * np.clip(seconds / max(took, 1e-4), 0.5, 2.0), 1 << 12, 1 << 24))
+        self._quick_photons = int(
+            np.clip(self._quick_photons * np.clip(seconds / max(took, 1e-4), 0.5, 2.0), 1 << 12, 1 << 24)
+        )
         self._restart_camera(same_view=False)
 
     def _only_camera_besides(self, wanted: LiveInputs) -> bool:
         assert self._inputs is not None
-        return wanted.camera != self._inputs.camera or (wanted.width, wanted.height) != (self._inputs.width, self._inputs.height)
+        return wanted.camera != self._inputs.camera or (wanted.width, wanted.height) != (
+            self._inputs.width,
+            self._inputs.height,
+        )
 
     def _restart_camera(self, *, same_view: bool, finer_maps: bool = False) -> None:
         if self._maps is None or self._inputs is None:
             return
-        # One coarse answer now; `advance` asks again in full size when things are still. Where photons are splatted again, they want time too.
+        # One coarse answer now; `advance` asks again in full size when things are still. Where photons are splatted
+        # again, they want time too.
         software = LOOK_S if not self._shows_quick_maps else 0.6 * LOOK_S
         seconds = None if same_view else software if self.context.is_software else 0.004
         view = self._inputs.camera, self._inputs.width, self._inputs.height
@@ -288,7 +302,9 @@ class LiveEngine:
         if wanted is None:
             return
         self._being_built = wanted
-        self._building = build(self.context, self.budget, wanted, self._largest, self._target_photons, self._publish_maps)
+        self._building = build(
+            self.context, self.budget, wanted, self._largest, self._target_photons, self._publish_maps
+        )
 
     def _build(self, deadline: float) -> None:
         assert self._building is not None
@@ -352,17 +368,22 @@ class LiveEngine:
         self._history.append((time.perf_counter(), max(stats.photons - before[2], 0), traced + splatted))
 
     def _publish_maps(self) -> None:
-        """The maps as they are become what the camera looks at; more photons of the same kind wait until it has seen every band of the spectrum."""
+        """The maps as they are become what the camera looks at; more photons of the same kind wait until it has seen
+        every band of the spectrum."""
         assert self._shown is not None
         maps, number = self._shown.light.maps, self._shown.accumulation.number
         assert maps is not None
         splatted_anew = self._shows_quick_maps or self._repair is not None
-        self._maps_wait = number > 1 and not splatted_anew and not self._interacting and self._camera_pass.is_within_cycle
+        self._maps_wait = (
+            number > 1 and not splatted_anew and not self._interacting and self._camera_pass.is_within_cycle
+        )
         if self._maps_wait:
             return
         self._set_maps(maps)
         self._shows_quick_maps = False
-        self._restart_camera(same_view=not self._interacting and self._camera_pass.scale == 1.0, finer_maps=number <= 1 or splatted_anew)
+        self._restart_camera(
+            same_view=not self._interacting and self._camera_pass.scale == 1.0, finer_maps=number <= 1 or splatted_anew
+        )
 
     @property
     def _last_maps_wait(self) -> bool:
@@ -371,7 +392,9 @@ class LiveEngine:
 
     def _set_maps(self, maps: LightMaps) -> None:
         assert self._shown is not None
-        self._maps = CausticMaps(self._shown.light.camera_textures(maps), maps.receivers, maps.atlas.placements, maps.scale)
+        self._maps = CausticMaps(
+            self._shown.light.camera_textures(maps), maps.receivers, maps.atlas.placements, maps.scale
+        )
         self._published_photons = maps.photon_weight
 
     # ---- what there is -----------------------------------------------------------------------
@@ -405,8 +428,13 @@ class LiveEngine:
         """This moment's."""
         context, camera_pass = self.context, self._camera_pass
         common = LiveStats(
-            renderer=context.renderer, is_software=context.is_software, camera_samples=float(camera_pass.shown_samples), resolution_scale=camera_pass.scale,
-            camera_bands=camera_pass.shown_bands, camera_fallbacks=camera_pass.fallbacks)  # fmt: skip
+            renderer=context.renderer,
+            is_software=context.is_software,
+            camera_samples=float(camera_pass.shown_samples),
+            resolution_scale=camera_pass.scale,
+            camera_bands=camera_pass.shown_bands,
+            camera_fallbacks=camera_pass.fallbacks,
+        )
         if self._shown is None:
             return common
         light = self._shown.light
@@ -435,7 +463,9 @@ class LiveEngine:
         """Nothing is left to do until an input changes."""
         waits = self._building is not None or self._urgent or self._has_work or self._last_maps_wait
         refines = self._shown is not None and self.refine_when_still and self._shown.light.first_order
-        unjudged = self._shown is not None and self._wanted is not None and not is_judged(self._shown.light, self._wanted)
+        unjudged = (
+            self._shown is not None and self._wanted is not None and not is_judged(self._shown.light, self._wanted)
+        )
         return self._wanted is None or not (waits or refines or unjudged or not self._camera_pass.is_done)
 
     def pick(self, x: float, y: float) -> PickHit | None:
@@ -450,8 +480,11 @@ class LiveEngine:
             return StoredPhotons.none()
         return world_photons(self._shown.light, self._inputs, limit)
 
-    def caustic_spectrum(self, receiver: int, position: np.ndarray, bins: int = 40) -> tuple[np.ndarray, np.ndarray] | None:
-        """Shape of the caustic's spectrum at a world position on object `receiver`: wavelengths (bins,) nm, relative irradiance (bins,)."""
+    def caustic_spectrum(
+        self, receiver: int, position: np.ndarray, bins: int = 40
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Shape of the caustic's spectrum at a world position on object `receiver`: wavelengths (bins,) nm, relative
+        irradiance (bins,)."""
         if self._shown is None or self._inputs is None or receiver not in self._shown.light.buffers.receivers:
             return None
         spectra = [light.spectral_power.density for light in self._inputs.scene.lights]

@@ -21,7 +21,7 @@ from ...model.scene import (
     Scene,
     SceneObject,
 )
-from .inputs import LiveInputs, DirtyLevel
+from .inputs import DirtyLevel, LiveInputs
 
 SAME_INDEX = 1e-6
 """Difference in n_d up to which a glass keeps the paths."""
@@ -109,7 +109,9 @@ def _object(old: SceneObject, new: SceneObject) -> DirtyLevel:
         return DirtyLevel.BUILD
     if isinstance(a, Dielectric) and isinstance(b, Dielectric):
         same_absorption = a.absorption is b.absorption or (
-            a.absorption is not None and b.absorption is not None and np.array_equal(a.absorption.coefficient, b.absorption.coefficient)
+            a.absorption is not None
+            and b.absorption is not None
+            and np.array_equal(a.absorption.coefficient, b.absorption.coefficient)
         )
         if not same_absorption:
             return DirtyLevel.BUILD if (a.absorption is None) != (b.absorption is None) else max(cost, DirtyLevel.TRACE)
@@ -127,7 +129,11 @@ def _glasses(old: Scene, new: Scene) -> DirtyLevel:
         return DirtyLevel.NOTHING
     if shown_glasses(old, new) is None:
         # Whether a glass disperses at all decides what photons carry.
-        return DirtyLevel.BUILD if any(a.is_dispersive != b.is_dispersive for a, b in pairs) or _partition(pairs, 0) != _partition(pairs, 1) else DirtyLevel.TRACE
+        return (
+            DirtyLevel.BUILD
+            if any(a.is_dispersive != b.is_dispersive for a, b in pairs) or _partition(pairs, 0) != _partition(pairs, 1)
+            else DirtyLevel.TRACE
+        )
     return DirtyLevel.SPLAT
 
 
@@ -140,7 +146,8 @@ def _partition(pairs: list[tuple[Dispersion, Dispersion]], side: int) -> list[in
 def shown_glasses(traced: Scene, shown: Scene) -> Mapping[Dispersion, Dispersion] | None:
     """The glass that stands in for each one photons were traced through; None where paths do not follow.
 
-    They follow where n_d stays, the glass was dispersive (photons carry its column), and objects of one glass are still of one.
+    They follow where n_d stays, the glass was dispersive (photons carry its column), and objects of one glass are still
+    of one.
     """
     found: dict[Dispersion, Dispersion] = {}
     for a, b in zip(traced.objects, shown.objects, strict=True):
@@ -173,7 +180,8 @@ def _light(old: Light, new: Light) -> DirtyLevel:
 
 
 def looks_other(old: LiveInputs, new: LiveInputs) -> bool:
-    """Whether what the camera sees without the maps differs: colours, lights, what lies behind everything, glass that bends its own rays otherwise."""
+    """Whether what the camera sees without the maps differs: colours, lights, what lies behind everything, glass that
+    bends its own rays otherwise."""
     a, b = old.scene, new.scene
     if old.solo_nm != new.solo_nm or a.background_rgb != b.background_rgb or a.environment is not b.environment:
         return True

@@ -3,8 +3,8 @@
 A picture is published when every pixel has a whole sample. While something moves the picture is as small as one
 sample in the time that is left asks for; once still it starts over in full size and is refined.
 
-Where glass disperses, a sample of a fine picture sees one band of the spectrum only, and such a picture is whole after as many
-samples as there are bands; before that it has grain in all colours. So samples of the whole spectrum, coarser
+Where glass disperses, a sample of a fine picture sees one band of the spectrum only, and such a picture is whole after
+as many samples as there are bands; before that it has grain in all colours. So samples of the whole spectrum, coarser
 along it but smooth, come first, in motion alone; pictures of bands are shown after whole cycles only.
 """
 
@@ -21,7 +21,7 @@ import numpy as np
 from ...gpu import shader
 from ...gpu.map_channels import MapChannels
 from ...gpu.texture_store import TextureStore
-from ...passes.camera import MAX_TAPS, CausticMaps, CameraPass
+from ...passes.camera import MAX_TAPS, CameraPass, CausticMaps
 from ...passes.spectrum_choice import Spectrum
 
 if TYPE_CHECKING:
@@ -39,9 +39,11 @@ SETTLED = 8
 MOVING_TAPS = 8
 """Looks along one spectral sweep at most, in a picture that must be there at once."""
 BANDED_SAMPLES = 16
-"""Samples whose error the number of bands is fitted to: a still picture shall be whole within seconds, so not to all that it gets in the end."""
+"""Samples whose error the number of bands is fitted to: a still picture shall be whole within seconds, so not to all
+that it gets in the end."""
 SMOOTH_SHARE = 1 / 4
-"""Samples of the whole spectrum that come before bands, over the number of these: edges are smooth while the bands are awaited."""
+"""Samples of the whole spectrum that come before bands, over the number of these: edges are smooth while the bands are
+awaited."""
 _FIRST_RATE = 0.5e6
 """Pixels per second before anything was measured: slow, so that the first picture comes at once."""
 _RATE_BLEND = 0.5
@@ -90,8 +92,11 @@ class LiveCamera:
         self.scale = 1.0
         self._wanted_scale = 1.0
 
-    def look_at(self, buffers: SceneBuffers, scene: Scene, reflectances: list[np.ndarray | None], maps: MapChannels) -> None:
-        """Take the scene as it is shown: `buffers` hold its geometry, `scene` its colours, glass, lights and pictures; `maps` is what caustic maps hold.
+    def look_at(
+        self, buffers: SceneBuffers, scene: Scene, reflectances: list[np.ndarray | None], maps: MapChannels
+    ) -> None:
+        """Take the scene as it is shown: `buffers` hold its geometry, `scene` its colours, glass, lights and pictures;
+        `maps` is what caustic maps hold.
 
         Raises `ShaderError`, and `UserError` where pictures do not fit the device; then everything stays as it was."""
         shown = copy.copy(buffers)
@@ -123,13 +128,20 @@ class LiveCamera:
         return TextureStore(self._context.ctx, *place)
 
     def restart(
-        self, camera: Camera, width: int, height: int, maps: CausticMaps, *,
-        seconds: float | None = None, same_view: bool = False, finer_maps: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        camera: Camera,
+        width: int,
+        height: int,
+        maps: CausticMaps,
+        *,
+        seconds: float | None = None,
+        same_view: bool = False,
+        finer_maps: bool = False,
+    ) -> None:
         """Start over. `seconds`: be done with one sample in about that time, however small the picture.
 
-        `same_view`: only the maps are better: what is shown stays until the new picture is as smooth. `finer_maps`: so much
-        better that more bands of the spectrum may be told apart in them."""
+        `same_view`: only the maps are better: what is shown stays until the new picture is as smooth. `finer_maps`: so
+        much better that more bands of the spectrum may be told apart in them."""
         assert self._pass is not None
         scale = 1.0
         if seconds is not None:
@@ -166,20 +178,28 @@ class LiveCamera:
 
     @property
     def is_within_cycle(self) -> bool:
-        """Part of the bands of the first whole picture since `restart` are there: with other maps they would be lost."""
+        """Part of the bands of the first whole picture since `restart` are there: with other maps they would be
+        lost."""
         begun = self._maps is not None and not (self._is_quick or self._is_smooth) and self._cycle > 1
         return begun and self._taken < self._publish_from
 
     @property
     def is_done(self) -> bool:
         """Every sample is taken, in full size."""
-        return self._maps is None or not (self.is_coarse or self._is_smooth or self._choosing or self._taken < self._target)
+        return self._maps is None or not (
+            self.is_coarse or self._is_smooth or self._choosing or self._taken < self._target
+        )
 
     def advance(self, deadline: float, *, one_sample: bool = False) -> float:
-        """Take samples until `deadline` (`time.perf_counter`), `one_sample` not beyond the next published one; returns the seconds it took."""
+        """Take samples until `deadline` (`time.perf_counter`), `one_sample` not beyond the next published one; returns
+        the seconds it took."""
         started = now = time.perf_counter()
         published = False
-        while now < deadline and (self._choosing is not None or self._taken < self._target) and not (published and one_sample):
+        while (
+            now < deadline
+            and (self._choosing is not None or self._taken < self._target)
+            and not (published and one_sample)
+        ):
             published = self._step()
             now = time.perf_counter()
         return now - started
@@ -293,13 +313,15 @@ class LiveCamera:
 
 
 def _side(pixels: float) -> int:
-    """Whole pixels of a picture in motion. Mesa's software renderer compiles its programs once more for textures whose side is a power of two."""
+    """Whole pixels of a picture in motion. Mesa's software renderer compiles its programs once more for textures whose
+    side is a power of two."""
     side = max(9, round(pixels))
     return side + 1 if side & (side - 1) == 0 else side
 
 
 def solo_scene(scene: Scene, wavelength_nm: float | None) -> Scene:
-    """`scene` as seen in the light of one wavelength: lights narrowed, what lies behind everything dark; itself for None."""
+    """`scene` as seen in the light of one wavelength: lights narrowed, what lies behind everything dark; itself for
+    None."""
     if wavelength_nm is None:
         return scene
     from .live_light import solo

@@ -1,4 +1,5 @@
-"""The light pass of a live rendering: photons are stored, and shown through an edited scene without being traced again."""
+"""The light pass of a live rendering: photons are stored, and shown through an edited scene without being traced
+again."""
 
 from __future__ import annotations
 
@@ -85,13 +86,22 @@ class Stored:
 class LiveLight(LightPass):
     """Photons of one traced scene and how they are shown.
 
-    Batches are small, so that they take little of a frame; extended lights make do with as many points. A pass that has only begun holds fewer photons than the one before it: until it has as many, the older ones stay.
+    Batches are small, so that they take little of a frame; extended lights make do with as many points. A pass that has
+    only begun holds fewer photons than the one before it: until it has as many, the older ones stay.
     """
 
     min_batch = 1024
     tile_max = QUICK_TILE_MAX
 
-    def __init__(self, context: Context, scene: Scene, settings: RenderSettings, features: Features, buffers: SceneBuffers, capacity_bytes: int) -> None:
+    def __init__(
+        self,
+        context: Context,
+        scene: Scene,
+        settings: RenderSettings,
+        features: Features,
+        buffers: SceneBuffers,
+        capacity_bytes: int,
+    ) -> None:
         super().__init__(context, scene, settings, features, buffers)
         self.capacity_bytes = capacity_bytes
         self.waits = True
@@ -155,17 +165,31 @@ class LiveLight(LightPass):
         return replace(self.features, map_tents=0, targets=1) if self.features.map_tents else self.features
 
     def maps_for(
-        self, camera: Camera, width: int, height: int, tile_max: tuple[int, int] = LightPass.tile_max, features: Features | None = None
+        self,
+        camera: Camera,
+        width: int,
+        height: int,
+        tile_max: tuple[int, int] = LightPass.tile_max,
+        features: Features | None = None,
     ) -> LightMaps:
         """As in `LightPass`; `features` that the maps' channels follow, where they are not the light pass's own."""
         seen = replace(self.scene, camera=camera)
-        layout = layout_maps(seen, self.buffers, landings_of(self.pilots.values()), (width, height), self.reflectance_class, tile_max=tile_max)
-        # Mesa's software renderer compiles what reads a texture once more, for seconds, where a side becomes a power of two.
+        layout = layout_maps(
+            seen,
+            self.buffers,
+            landings_of(self.pilots.values()),
+            (width, height),
+            self.reflectance_class,
+            tile_max=tile_max,
+        )
+        # Mesa's software renderer compiles what reads a texture once more, for seconds, where a side becomes a power of
+        # two.
         size = tuple(side + (side & (side - 1) == 0) for side in layout.size)
         return LightMaps(self.context.ctx, replace(layout, size=size), features or self.features)
 
     def camera_textures(self, maps: LightMaps) -> list[moderngl.Texture]:
-        """`maps`, this light pass's, as `map_channels` says: what was splatted in colour only gets a likely spectrum."""
+        """`maps`, this light pass's, as `map_channels` says: what was splatted in colour only gets a likely
+        spectrum."""
         textures = maps.resolved_textures()
         if maps is not self._quick or not self.features.map_tents:
             return textures
@@ -202,7 +226,8 @@ class LiveLight(LightPass):
         return self._running.store.rounds if self._running else 0
 
     def show(self, inputs: LiveInputs) -> None:
-        """Take over dispersion, spectra, solo and local gain of `inputs`; maps keep what was deposited until they are splatted again.
+        """Take over dispersion, spectra, solo and local gain of `inputs`; maps keep what was deposited until they are
+        splatted again.
 
         `inputs.scene` must be one that these photons can follow (`difference.redo` below TRACE).
         """
@@ -210,7 +235,10 @@ class LiveLight(LightPass):
         if glasses is None:
             raise ValueError("these photons cannot follow the scene: it must be traced")
         changed = {a: b for a, b in glasses.items() if a != b}
-        spectra = [light.spectral_power if inputs.solo_nm is None else solo(light.spectral_power, inputs.solo_nm) for light in inputs.scene.lights]
+        spectra = [
+            light.spectral_power if inputs.solo_nm is None else solo(light.spectral_power, inputs.solo_nm)
+            for light in inputs.scene.lights
+        ]
         stale = spectra != self._shown_spectra
         self._shown_spectra = spectra
         self._show_gains(inputs)
@@ -252,7 +280,11 @@ class LiveLight(LightPass):
         self.lay_out(self.view)
 
     def _show_gains(self, inputs: LiveInputs) -> None:
-        wanted = inputs.local_gain and self.features.spectral_groups > 0 and any(o.local_dispersion for o in inputs.scene.objects)
+        wanted = (
+            inputs.local_gain
+            and self.features.spectral_groups > 0
+            and any(o.local_dispersion for o in inputs.scene.objects)
+        )
         if wanted != self.features.local_gain:
             self.features = replace(self.features, local_gain=wanted)
             self._maps.take(self.features)
@@ -270,12 +302,20 @@ class LiveLight(LightPass):
             self.gains.update(inputs.scene)
 
     def splat_steps(
-        self, photons: moderngl.Buffer, count: int, coarsening: float = 1.0, tables: ShownTables | None = None,
-        maps: LightMaps | None = None, stride: int = 1,
-    ) -> Iterator[None]:  # fmt: skip
-        """As in `LightPass`; maps of several textures are summed up one by one before it has to be, as all together take longer than a frame."""
+        self,
+        photons: moderngl.Buffer,
+        count: int,
+        coarsening: float = 1.0,
+        tables: ShownTables | None = None,
+        maps: LightMaps | None = None,
+        stride: int = 1,
+    ) -> Iterator[None]:
+        """As in `LightPass`; maps of several textures are summed up one by one before it has to be, as all together
+        take longer than a frame."""
         atlas = (maps or self._maps).atlas
-        if atlas.targets > 1 and atlas.pending + count >= FLUSH_AHEAD * min(CHUNK, atlas.size[0] * atlas.size[1] / FLUSH_SHARE):
+        if atlas.targets > 1 and atlas.pending + count >= FLUSH_AHEAD * min(
+            CHUNK, atlas.size[0] * atlas.size[1] / FLUSH_SHARE
+        ):
             yield from self._summing(atlas)
         yield from super().splat_steps(photons, count, coarsening, tables, maps, stride)
 
@@ -306,8 +346,8 @@ class LiveLight(LightPass):
     def splat_stored(self, *, of_running: bool = False) -> Iterator[None]:
         """Empty maps, then the stored photons as they are shown now, pausing after every slab.
 
-        Where only the first rounds are stored, footprints are as much wider. `of_running`: those of the running pass as they
-        are, so that it can go on. Nothing is shown where nothing is stored.
+        Where only the first rounds are stored, footprints are as much wider. `of_running`: those of the running pass as
+        they are, so that it can go on. Nothing is shown where nothing is stored.
         """
         bundle = self._running if of_running else self._fuller
         maps = self._maps
@@ -319,12 +359,15 @@ class LiveLight(LightPass):
             store.drop_unfinished()
         share = store.rounds / store.rounds_of_pass
         for slab in store.of_rounds(0, store.rounds):
-            yield from self.splat_steps(slab.buffer, slab.count, 1.0 if of_running else share**-0.5, self._full_tables(bundle))
+            yield from self.splat_steps(
+                slab.buffer, slab.count, 1.0 if of_running else share**-0.5, self._full_tables(bundle)
+            )
             yield
         maps.photon_weight = bundle.pass_photons * share
 
     def splat_quickly(self, photons: int) -> LightMaps | None:
-        """About so many stored photons as they are shown now, in maps of their own with texels `QUICK` times as wide; None where none are stored.
+        """About so many stored photons as they are shown now, in maps of their own with texels `QUICK` times as wide;
+        None where none are stored.
 
         For answers while something is dragged: the maps that accumulate are left alone.
         """
@@ -332,7 +375,9 @@ class LiveLight(LightPass):
         if bundle is None or not bundle.store.rounds:
             return None
         if self._quick is None:
-            self._quick = self.maps_for(self.view, *quick_size(self.settings.width, self.settings.height), QUICK_TILE_MAX, self._quick_features)
+            self._quick = self.maps_for(
+                self.view, *quick_size(self.settings.width, self.settings.height), QUICK_TILE_MAX, self._quick_features
+            )
         self._quick.clear()
         rounds = bundle.store.first_rounds(photons)
         slabs = bundle.store.of_rounds(0, rounds)
@@ -355,7 +400,12 @@ class LiveLight(LightPass):
     def bytes(self) -> int:
         """Device memory of photons, queues, maps and scene."""
         stored = sum(bundle.store.bytes for bundle in self._bundles)
-        return stored + self.trace.bytes + self.buffers.bytes + sum(maps.bytes for maps in (self.maps, self._quick) if maps is not None)
+        return (
+            stored
+            + self.trace.bytes
+            + self.buffers.bytes
+            + sum(maps.bytes for maps in (self.maps, self._quick) if maps is not None)
+        )
 
     def release(self) -> None:
         """Free everything, the stored photons and the scene's buffers too."""
@@ -376,8 +426,11 @@ def quick_size(width: int, height: int) -> tuple[int, int]:
 
 
 def solo(spectrum: Spectrum, wavelength_nm: float) -> Spectrum:
-    """The part of `spectrum` about one wavelength; a continuum is shown as bright as `SOLO_GAIN_NM` of it, a line as itself."""
+    """The part of `spectrum` about one wavelength; a continuum is shown as bright as `SOLO_GAIN_NM` of it, a line as
+    itself."""
     window = np.exp(-0.5 * ((VISIBLE_NM - wavelength_nm) / SOLO_WIDTH_NM) ** 2)
     density = spectrum.density * window * (SOLO_GAIN_NM / window.sum())
-    lines = tuple((nm, power * float(np.exp(-0.5 * ((nm - wavelength_nm) / SOLO_WIDTH_NM) ** 2))) for nm, power in spectrum.lines)
+    lines = tuple(
+        (nm, power * float(np.exp(-0.5 * ((nm - wavelength_nm) / SOLO_WIDTH_NM) ** 2))) for nm, power in spectrum.lines
+    )
     return Spectrum(density, lines)

@@ -49,7 +49,9 @@ class StoredPhotons:
         """No photons."""
         empty = np.zeros(0)
         ints = np.zeros(0, int)
-        return StoredPhotons(np.zeros((0, 3)), np.zeros((0, 0, 3)), np.zeros((0, 0)), empty, ints, ints, np.zeros((0, 2)), ints, (), {})
+        return StoredPhotons(
+            np.zeros((0, 3)), np.zeros((0, 0, 3)), np.zeros((0, 0)), empty, ints, ints, np.zeros((0, 2)), ints, (), {}
+        )
 
     def landing(self, wavelength_nm: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         """Where the light of some wavelengths (w,) of the photons `chosen` (m,) lands: (m, w, 3) world."""
@@ -68,7 +70,12 @@ def world_photons(light: LiveLight, inputs: LiveInputs, limit: int) -> StoredPho
     glasses = shown_glasses(light.scene, inputs.scene) or {}
     samples = np.linspace(0.0, 1.0, buffers.variable_table.shape[1]) if groups.count else np.zeros(0)
     # Where glasses share a group its variable is no index, and the glass that is shown is the one that was traced.
-    alone = [glass for g in range(groups.count) for glass, owner in zip(groups.glasses, groups.group, strict=True) if owner == g]
+    alone = [
+        glass
+        for g in range(groups.count)
+        for glass, owner in zip(groups.glasses, groups.group, strict=True)
+        if owner == g
+    ]
     is_index = len(alone) == groups.count and not groups.by_wavelength
 
     def variable_of(g: int) -> Callable[[np.ndarray], np.ndarray]:
@@ -100,7 +107,12 @@ def world_photons(light: LiveLight, inputs: LiveInputs, limit: int) -> StoredPho
 
 
 def caustic_spectrum(
-    photons: StoredPhotons, receiver: int, position: np.ndarray, radius: float, spectra: list[np.ndarray], bins: int = 40
+    photons: StoredPhotons,
+    receiver: int,
+    position: np.ndarray,
+    radius: float,
+    spectra: list[np.ndarray],
+    bins: int = 40,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Shape of the spectrum that lands within `radius` of a world `position` on object `receiver`.
 
@@ -114,7 +126,11 @@ def caustic_spectrum(
     if not len(mine):
         return centres, power
     ends = np.array([380.0, 780.0])
-    reach = np.linalg.norm(np.diff(photons.landing(ends, mine), axis=1)[:, 0], axis=1) if photons.variables else np.zeros(len(mine))
+    reach = (
+        np.linalg.norm(np.diff(photons.landing(ends, mine), axis=1)[:, 0], axis=1)
+        if photons.variables
+        else np.zeros(len(mine))
+    )
     near = mine[np.linalg.norm(photons.position[mine] - position, axis=1) <= radius + reach]
     if not len(near):
         return centres, power
@@ -125,7 +141,9 @@ def caustic_spectrum(
     covered = np.clip(np.minimum(high, edges[1:]) - np.maximum(low, edges[:-1]), 0.0, None) / (edges[1] - edges[0])
     lines = (high - low)[:, 0] < 1e-6
     covered[lines] = (low[lines] >= edges[:-1]) & (low[lines] < edges[1:])
-    density = np.array([np.interp(centres, np.arange(380.0, 781.0), spectrum) for spectrum in spectra])[photons.light[near]]
+    density = np.array([np.interp(centres, np.arange(380.0, 781.0), spectrum) for spectrum in spectra])[
+        photons.light[near]
+    ]
     in_band = np.maximum((covered * density).sum(axis=1, keepdims=True), 1e-300)
     share = np.where(lines[:, None], covered, covered * density / in_band)
     power = (photons.flux_w[near, None] * share * inside).sum(axis=0)

@@ -1,8 +1,8 @@
 """Whether the maps still fit what the camera sees.
 
 Walking round traces nothing and keeps what is accumulated, so maps are only fitted again where that shows: the
-window has another size, the camera has come so near that texels are larger than pixels, or it looks beside the fine window at light that only
-the coarse one holds.
+window has another size, the camera has come so near that texels are larger than pixels, or it looks beside the fine
+window at light that only the coarse one holds.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ BESIDE = 0.25
 def layout_for(light: LiveLight, inputs: LiveInputs) -> MapLayout:
     """Maps as they would be laid out for the camera and picture of `inputs`."""
     seen = replace(light.scene, camera=inputs.camera)
-    return layout_maps(seen, light.buffers, landings_of(light.pilots.values()), (inputs.width, inputs.height), light.reflectance_class)
+    return layout_maps(
+        seen, light.buffers, landings_of(light.pilots.values()), (inputs.width, inputs.height), light.reflectance_class
+    )
 
 
 def is_judged(light: LiveLight, inputs: LiveInputs) -> bool:
@@ -48,7 +50,10 @@ def wants_new_maps(light: LiveLight, inputs: LiveInputs) -> bool:
 
 
 def _pays(now: MapLayout, then: MapLayout, receiver: int) -> bool:
-    side = [float(np.sqrt(layout.placements["texel_area"][layout.receivers[receiver]["placement"]])) for layout in (now, then)]
+    side = [
+        float(np.sqrt(layout.placements["texel_area"][layout.receivers[receiver]["placement"]]))
+        for layout in (now, then)
+    ]
     if side[0] > PAYS * side[1]:
         return True
     old, new = now.windows.get(receiver), then.windows.get(receiver)

@@ -1,6 +1,8 @@
-"""Spectral channels for maps that were splatted in colour only, so that a drag is answered as fast where the camera looks through dispersive glass.
+"""Spectral channels for maps that were splatted in colour only, so that a drag is answered as fast where the camera
+looks through dispersive glass.
 
-Such maps live for a moment. Each texel gets the smoothest spectrum that has its colour, in the channels that proper maps hold.
+Such maps live for a moment. Each texel gets the smoothest spectrum that has its colour, in the channels that proper
+maps hold.
 """
 
 from __future__ import annotations
@@ -19,13 +21,16 @@ if TYPE_CHECKING:
 
 _GROUP = 8
 _EVEN = 1e-4
-"""How much less a spectrum far from the lights' own level costs than an uneven one: decides where evenness leaves several."""
+"""How much less a spectrum far from the lights' own level costs than an uneven one: decides where evenness leaves
+several."""
 
 
 def guess_weights(channels: MapChannels, lights: Sequence[Light]) -> tuple[np.ndarray, np.ndarray]:
-    """Watts in each spectral channel for one unit of X, Y and Z (lm), float64 (channels, 3); luminance of a watt in each (channels,).
+    """Watts in each spectral channel for one unit of X, Y and Z (lm), float64 (channels, 3); luminance of a watt in
+    each (channels,).
 
-    The share of the lights' own spectrum that each channel has varies as little as the colour allows; some may come out negative.
+    The share of the lights' own spectrum that each channel has varies as little as the colour allows; some may come out
+    negative.
     """
     xyz = np.array([spectrum.xyz() for spectrum in channels.spectra(lights)]).T
     first = 4 * channels.first_target
@@ -47,7 +52,9 @@ def guess_weights(channels: MapChannels, lights: Sequence[Light]) -> tuple[np.nd
 class SpectrumGuess:
     """Owns the textures that it fills."""
 
-    def __init__(self, ctx: moderngl.Context, channels: MapChannels, lights: Sequence[Light], size: tuple[int, int]) -> None:
+    def __init__(
+        self, ctx: moderngl.Context, channels: MapChannels, lights: Sequence[Light], size: tuple[int, int]
+    ) -> None:
         """`channels`: with tents; `size` of the maps, texels."""
         self._ctx = ctx
         targets = channels.targets - channels.first_target

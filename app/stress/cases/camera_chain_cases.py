@@ -1,4 +1,5 @@
-"""The camera's paths at their longest: light guides, retroreflectors, gems, rooms of mirrors, and more branches than can wait.
+"""The camera's paths at their longest: light guides, retroreflectors, gems, rooms of mirrors, and more branches than
+can wait.
 
 What a path is given up for must be counted, and must cost no more light than it carried.
 """
@@ -53,7 +54,8 @@ SHELLS = (1, 2, 3)
 
 @sharing_programs
 def measure_guide(context: Context) -> Iterator[Measurement]:
-    """A square rod, looked into at 45°: all that enters is reflected totally from side to side and leaves at the far end."""
+    """A square rod, looked into at 45°: all that enters is reflected totally from side to side and leaves at the far
+    end."""
     direction = np.array([1.0, 1.0]) / np.sqrt(2.0)
     inner = np.array([np.sqrt(1.0 - 0.5 / GUIDE_N**2), np.sqrt(0.5) / GUIDE_N])
     glass = constant(GUIDE_N, "guide")
@@ -67,7 +69,8 @@ def measure_guide(context: Context) -> Iterator[Measurement]:
         sight = look(context, with_sky(guide, camera=camera, environment=half_sky((1.0, 0.0, 0.0))), FEW)
         out = ways(outline, GUIDE_N, tuple(start), tuple(direction))
         expected = sum(way.weight for way in out if way.direction[0] > 0.0)
-        # A path given up shines as if it left there, in the direction it has, without the 5 % that the end would have reflected.
+        # A path given up shines as if it left there, in the direction it has, without the 5 % that the end would have
+        # reflected.
         given_up = sum(way.weight for way in out if way.events > MAX_DEPTH)
         judged = Judged().hold("transmittance", np.abs(sight.mean - expected).max(), 0.08 * given_up + 3e-3)
         deep = any(way.events > MAX_DEPTH and way.weight > 0.5 for way in out)
@@ -78,7 +81,8 @@ def measure_guide(context: Context) -> Iterator[Measurement]:
 
 @sharing_programs
 def measure_corner(context: Context) -> Iterator[Measurement]:
-    """A corner cube throws light back where it came from; what its face reflects, outside or inside, goes to the mirrored side."""
+    """A corner cube throws light back where it came from; what its face reflects, outside or inside, goes to the
+    mirrored side."""
     corners = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
     corner = make_mesh("corner", corners, np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]))
     face = np.ones(3) / np.sqrt(3.0)
@@ -86,13 +90,23 @@ def measure_corner(context: Context) -> Iterator[Measurement]:
     for tilt_deg in TILTS_DEG:
         tilt = np.radians(tilt_deg)
         toward, mirrored = (np.cos(tilt) * face + sign * np.sin(tilt) * side for sign in (1.0, -1.0))
-        camera = Camera(tuple(face / np.sqrt(3.0) + 3.0 * toward), tuple(face / np.sqrt(3.0)), (0.0, 0.0, 1.0), "orthographic", vertical_extent=0.02)
-        sight = look(context, with_sky(solid("corner", corner, constant(CORNER_N)), camera=camera, environment=slope_sky()), FEW)
+        camera = Camera(
+            tuple(face / np.sqrt(3.0) + 3.0 * toward),
+            tuple(face / np.sqrt(3.0)),
+            (0.0, 0.0, 1.0),
+            "orthographic",
+            vertical_extent=0.02,
+        )
+        sight = look(
+            context, with_sky(solid("corner", corner, constant(CORNER_N)), camera=camera, environment=slope_sky()), FEW
+        )
         r = float(fresnel(np.cos(tilt), CORNER_N))
         back, across = slope(toward), slope(mirrored)
         expected = r * across + (1.0 - r) ** 2 * (back + r * across) / (1.0 - r * r)
         # The face is no larger than the cube: of what it reflects inside, some comes out another way.
-        judged = Judged().hold("returned", np.abs(sight.mean / expected - 1.0).max(), 1e-3 if tilt_deg <= 10.0 else r * r)
+        judged = Judged().hold(
+            "returned", np.abs(sight.mean / expected - 1.0).max(), 1e-3 if tilt_deg <= 10.0 else r * r
+        )
         yield seen(tilt_deg, f"tilted by {tilt_deg:g}°", sight, judged)
 
 
@@ -110,12 +124,19 @@ def measure_gems(context: Context) -> Iterator[Measurement]:
         camera = Camera((0.4, -4.0, 2.2), (0.0, 0.0, 0.0), vertical_fov_deg=26.0)
         sight = look(context, white_furnace(solid("stone", mesh, glass), camera=camera))
         judged = furnace_errors(Judged(), sight.picture, mean, 0.2)
-        yield seen(number, label, sight, judged, {"depth_reached": 0.3, "columns_dropped": UNCHECKED, "band_uncut": UNCHECKED, "stack_full": 1e-2})
+        yield seen(
+            number,
+            label,
+            sight,
+            judged,
+            {"depth_reached": 0.3, "columns_dropped": UNCHECKED, "band_uncut": UNCHECKED, "stack_full": 1e-2},
+        )
 
 
 @sharing_programs
 def measure_room(context: Context) -> Iterator[Measurement]:
-    """A closed room of mirrors: every path meets MAX_DEPTH of them, is counted, and is worth the product of their reflectances."""
+    """A closed room of mirrors: every path meets MAX_DEPTH of them, is counted, and is worth the product of their
+    reflectances."""
     camera = Camera((0.1, 0.2, 0.05), (1.0, 0.4, 0.3), vertical_fov_deg=60.0)
     for reflectance in REFLECTANCES:
         room = SceneObject("room", box((2.0, 2.0, 2.0)), Mirror((reflectance, reflectance, reflectance)))
@@ -128,7 +149,8 @@ def measure_room(context: Context) -> Iterator[Measurement]:
 
 @sharing_programs
 def measure_mirrors(context: Context) -> Iterator[Measurement]:
-    """Two coloured mirrors that face each other: their reflectances multiply wavelength by wavelength, not colour by colour."""
+    """Two coloured mirrors that face each other: their reflectances multiply wavelength by wavelength, not colour by
+    colour."""
     colours = (0.95, 0.85, 0.6), (0.98, 0.9, 0.97)
     for hops in HOPS:
         sight = look(context, white_furnace(*_corridor(colours, hops), camera=_into_corridor(hops)), FEW)
@@ -141,7 +163,10 @@ def measure_mirrors(context: Context) -> Iterator[Measurement]:
 def _corridor(colours: tuple, hops: int) -> list[SceneObject]:
     """Mirrors in x = 1 and x = −1, as long as a ray that climbs 0.1 at every crossing takes for `hops` of them."""
     found = []
-    for side, colour, last in ((1.0, colours[0], hops if hops % 2 else hops - 1), (-1.0, colours[1], hops if hops % 2 == 0 else hops - 1)):
+    for side, colour, last in (
+        (1.0, colours[0], hops if hops % 2 else hops - 1),
+        (-1.0, colours[1], hops if hops % 2 == 0 else hops - 1),
+    ):
         reach = 0.1 * last
         matrix = np.eye(4)
         matrix[:3, 3] = side * 1.05, 0.0, 0.5 * reach
@@ -157,7 +182,8 @@ def _into_corridor(hops: int) -> Camera:
 
 @sharing_programs
 def measure_shells(context: Context) -> Iterator[Measurement]:
-    """Shells of n = 3 with air between: every face splits strongly, more paths wait than there is room for, and white stays white."""
+    """Shells of n = 3 with air between: every face splits strongly, more paths wait than there is room for, and white
+    stays white."""
     camera = Camera((0.0, -5.0, 0.3), (0.0, 0.0, 0.0), vertical_fov_deg=24.0)
     for shells in SHELLS:
         items = []
@@ -167,7 +193,13 @@ def measure_shells(context: Context) -> Iterator[Measurement]:
         sight = look(context, white_furnace(*items, camera=camera), resized(LOOK, 24, 16))
         judged = furnace_errors(Judged(), sight.picture, 2e-3, 0.1)
         judged.hold("full stack not counted", float(shells > 1 and not sight.fallbacks["stack_full"]), 0.0)
-        yield seen(shells, f"{shells} shells", sight, judged, {"stack_full": UNCHECKED, "depth_reached": UNCHECKED, "columns_dropped": UNCHECKED})
+        yield seen(
+            shells,
+            f"{shells} shells",
+            sight,
+            judged,
+            {"stack_full": UNCHECKED, "depth_reached": UNCHECKED, "columns_dropped": UNCHECKED},
+        )
 
 
 CASES: tuple[Case, ...] = (

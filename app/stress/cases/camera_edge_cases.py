@@ -1,4 +1,5 @@
-"""The camera's rays at the stiffest single surfaces: the edge of total reflection, grazing views, and glass that is hardly there.
+"""The camera's rays at the stiffest single surfaces: the edge of total reflection, grazing views, and glass that is
+hardly there.
 
 All glass here has flat sides and is seen along one plane, so that every way of a ray is known (`flat_glass`).
 """
@@ -28,10 +29,10 @@ from ..rigs.camera_probe import (
     at,
     daylight_mean,
     difference,
-    opened_camera_pass,
     half_sky,
     look,
     look_with,
+    opened_camera_pass,
     resized,
     seen,
     sharing_programs,
@@ -75,12 +76,18 @@ def measure_margin(context: Context) -> Iterator[Measurement]:
         judged, total = Judged(), None
         for side in (-1.0, 1.0):
             outline = trapezium(critical + side * margin)
-            scene = with_sky(solid("prism", extruded(outline, 1.0, "prism"), constant(INDEX, "glass")), camera=along_x(0.02), environment=slope_sky())
+            scene = with_sky(
+                solid("prism", extruded(outline, 1.0, "prism"), constant(INDEX, "glass")),
+                camera=along_x(0.02),
+                environment=slope_sky(),
+            )
             sight = look(context, scene, FEW)
             expected = radiance_seen(outline, INDEX, (-3.0, 0.0), (1.0, 0.0), slope)
             # Fresnel's reflectance falls from 1 as the root of the margin, which rounding moves by about 2e-7.
             slack = 4.0 * (np.sqrt(margin + 4e-7) - np.sqrt(margin)) + 2e-3
-            judged.hold("inside the edge" if side < 0 else "beyond the edge", np.abs(sight.mean / expected - 1.0).max(), slack)
+            judged.hold(
+                "inside the edge" if side < 0 else "beyond the edge", np.abs(sight.mean / expected - 1.0).max(), slack
+            )
             total = sight if total is None else replace(total, nonfinite=total.nonfinite + sight.nonfinite)
         yield seen(margin, f"{margin:g} rad", total, judged)
 
@@ -89,19 +96,32 @@ def measure_margin(context: Context) -> Iterator[Measurement]:
 def measure_cut(context: Context) -> Iterator[Measurement]:
     """N-BK7 at 41.10° inside: what is longer than 503 nm leaves towards white, the rest is reflected towards black.
 
-    Fresnel's transmittance rises like a root at the cut, which a band carries as a straight line: the error falls with the bands.
+    Fresnel's transmittance rises like a root at the cut, which a band carries as a straight line: the error falls with
+    the bands.
     """
     outline = trapezium(CUT_INCIDENCE)
-    scene = with_sky(solid("prism", extruded(outline, 1.0, "prism"), BK7), camera=along_x(0.02), environment=half_sky((1.0, 0.0, 0.0)))
-    through = np.array([radiance_seen(outline, float(n), (-3.0, 0.0), (1.0, 0.0), _ahead) for n in BK7.index(VISIBLE_NM)])
+    scene = with_sky(
+        solid("prism", extruded(outline, 1.0, "prism"), BK7),
+        camera=along_x(0.02),
+        environment=half_sky((1.0, 0.0, 0.0)),
+    )
+    through = np.array(
+        [radiance_seen(outline, float(n), (-3.0, 0.0), (1.0, 0.0), _ahead) for n in BK7.index(VISIBLE_NM)]
+    )
     edges = np.linspace(380.0, 780.0, CUT_BINS + 1)
     cells = MapChannels(tuple(edges.tolist())).cell_weights()[:, :CUT_BINS] * daylight_per_lumen()[:, None]
     white = cells.sum(axis=0)
     want = through @ cells / white
     settings = replace(FEW, bins=CUT_BINS)
-    with opened_camera_pass(context, scene, FEW) as camera_pass, opened_camera_pass(context, scene, settings) as camera_in_bins:
+    with (
+        opened_camera_pass(context, scene, FEW) as camera_pass,
+        opened_camera_pass(context, scene, settings) as camera_in_bins,
+    ):
         for bands in BANDS:
-            sight, spectral = look_with(camera_pass, scene.camera, FEW, bands), look_with(camera_in_bins, scene.camera, settings, bands)
+            sight, spectral = (
+                look_with(camera_pass, scene.camera, FEW, bands),
+                look_with(camera_in_bins, scene.camera, settings, bands),
+            )
             got = spectral.spectral.mean(axis=(0, 1)) / white
             judged = Judged().hold("colour", np.abs(sight.mean - daylight_mean(through)).max(), 0.12 / bands + 2e-3)
             judged.hold("spectrum", np.abs(got - want).max(), 0.4 / bands + 2e-3)
@@ -116,7 +136,8 @@ def _ahead(d: np.ndarray) -> np.ndarray:
 
 @sharing_programs
 def measure_grazing(context: Context) -> Iterator[Measurement]:
-    """A slab between black walls that hide all below its middle: what is reflected is seen, what is let through is not."""
+    """A slab between black walls that hide all below its middle: what is reflected is seen, what is let through is
+    not."""
     glass = solid("slab", extruded(SLAB, 4.0, "slab"), FLINT)
     walls = [SceneObject(f"wall {x:+g}", box((0.1, 8.0, 20.0)), Black(), at(x, -4.0, 0.0)) for x in (-6.0, 6.0)]
     coarse = VISIBLE_NM[::40]
@@ -124,12 +145,20 @@ def measure_grazing(context: Context) -> Iterator[Measurement]:
         angle = np.radians(angle_deg)
         direction, foot = np.array([np.sin(angle), -np.cos(angle)]), np.array([0.0, 0.5 * SLAB_THICKNESS])
         start = foot - 3.0 * direction
-        camera = Camera((*start, 0.0), (*foot, 0.0), (0.0, 0.0, 1.0), "orthographic", vertical_extent=0.05 * np.cos(angle))
+        camera = Camera(
+            (*start, 0.0), (*foot, 0.0), (0.0, 0.0, 1.0), "orthographic", vertical_extent=0.05 * np.cos(angle)
+        )
         sight = look(context, Scene("slab", camera, (), (glass, *walls), background_rgb=WHITE), FEW)
         values = [radiance_seen(SLAB, float(n), tuple(start), tuple(direction), _upper) for n in FLINT.index(coarse)]
         expected = daylight_mean(np.interp(VISIBLE_NM, coarse, values))
         judged = Judged().hold("reflectance", np.abs(sight.mean - expected).max(), 4e-3)
-        yield seen(90.0 - angle_deg, f"{angle_deg:g}°", sight, judged, {"depth_reached": UNCHECKED, "stack_full": UNCHECKED, "band_uncut": UNCHECKED})
+        yield seen(
+            90.0 - angle_deg,
+            f"{angle_deg:g}°",
+            sight,
+            judged,
+            {"depth_reached": UNCHECKED, "stack_full": UNCHECKED, "band_uncut": UNCHECKED},
+        )
 
 
 def _upper(d: np.ndarray) -> np.ndarray:
@@ -138,7 +167,8 @@ def _upper(d: np.ndarray) -> np.ndarray:
 
 @sharing_programs
 def measure_index_matched(context: Context) -> Iterator[Measurement]:
-    """A ball whose index is 1 but for a little, before a sky that varies in every direction: it may be seen less and less.
+    """A ball whose index is 1 but for a little, before a sky that varies in every direction: it may be seen less and
+    less.
 
     The ray bends by some |n − 1|; at the limb, over a share of the ball of 2 |n − 1|, by as much as anything can.
     """
@@ -148,13 +178,18 @@ def measure_index_matched(context: Context) -> Iterator[Measurement]:
     empty = look(context, with_sky(behind_camera, camera=camera, environment=environment))
     for disperses in (False, True):
         for delta in DIFFERENCES:
-            glass = from_abbe(1.0 + delta, 0.5 if delta > 0.0 else 20.0, "hardly glass") if disperses else constant(1.0 + delta, "hardly glass")
+            glass = (
+                from_abbe(1.0 + delta, 0.5 if delta > 0.0 else 20.0, "hardly glass")
+                if disperses
+                else constant(1.0 + delta, "hardly glass")
+            )
             scene = with_sky(solid("ball", sphere(0.7, 1280), glass), camera=camera, environment=environment)
             sight = look(context, scene, LOOK, 1)
             bound = 10.0 * abs(delta) + 0.5 * np.sqrt(2.0 * abs(delta)) + 1e-5
             judged = Judged().hold("picture", difference(sight.picture, empty.picture), bound)
             if disperses:
-                # Of the samples of a pixel on the ball's rim some have a band and some the whole spectrum: that leaves grain.
+                # Of the samples of a pixel on the ball's rim some have a band and some the whole spectrum: that leaves
+                # grain.
                 in_bands = look(context, scene)
                 judged.hold("picture in bands", difference(in_bands.picture, empty.picture), bound + RIM_GRAIN)
                 sight = _both(sight, in_bands)
@@ -167,7 +202,9 @@ def measure_index_matched(context: Context) -> Iterator[Measurement]:
 def _both(sight: Sight, other: Sight) -> Sight:
     """The first, with what is not finite in either and both's fall-backs."""
     fallbacks = {name: count + other.fallbacks[name] for name, count in sight.fallbacks.items()}
-    return replace(sight, nonfinite=sight.nonfinite + other.nonfinite, fallbacks=fallbacks, samples=sight.samples + other.samples)
+    return replace(
+        sight, nonfinite=sight.nonfinite + other.nonfinite, fallbacks=fallbacks, samples=sight.samples + other.samples
+    )
 
 
 CASES: tuple[Case, ...] = (

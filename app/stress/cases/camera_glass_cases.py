@@ -1,4 +1,5 @@
-"""Glass that no maker sells, seen through, and what a lens's focus makes of a pixel: against the float64 reference of the camera.
+"""Glass that no maker sells, seen through, and what a lens's focus makes of a pixel: against the float64 reference of
+the camera.
 
 The reference (`reference.camera_reference`) follows one random wavelength a path and shares nothing with the shaders.
 """
@@ -71,24 +72,37 @@ def measure_glasses(context: Context) -> Iterator[Measurement]:
         wedge = solid("prism", prism(side=1.2), glass, (0.9, 0.0, 0.0), turned=turned)
         scene = with_sky(ball, wedge, camera=camera, environment=stripes)
         sight = look(context, scene, LOOK_LONG)
-        yield seen(number, label, sight, against_reference(scene, sight, bias + (1.0 / sight.bands if label == STEP else 0.0)), ANY)
+        yield seen(
+            number,
+            label,
+            sight,
+            against_reference(scene, sight, bias + (1.0 / sight.bands if label == STEP else 0.0)),
+            ANY,
+        )
 
 
 @sharing_programs
 def measure_focus(context: Context) -> Iterator[Measurement]:
-    """Parallel rays through a ball on to a checked wall through its focus; then a camera in the focus, whose rays leave in parallel."""
+    """Parallel rays through a ball on to a checked wall through its focus; then a camera in the focus, whose rays leave
+    in parallel."""
     focus = BALL_N / (2.0 * (BALL_N - 1.0))
     checks = np.where((np.indices((64, 64)) // 4).sum(axis=0) % 2 == 0, 0.9, 0.1).astype(np.float32)
     wall_material = Diffuse((1.0, 1.0, 1.0), texture=Texture(np.repeat(checks[..., None], 3, axis=-1)))
     upright = np.array([[0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
     # From above and behind: the ball's shadow falls beside what is seen.
-    lamp = Light("lamp", "directional", illuminant("D65").scaled_to_luminous(3.0), direction=(0.25881905, 0.0, -0.96592583))
+    lamp = Light(
+        "lamp", "directional", illuminant("D65").scaled_to_luminous(3.0), direction=(0.25881905, 0.0, -0.96592583)
+    )
     ball = solid("ball", sphere(1.0, 5120), constant(BALL_N))
     for defocus in DEFOCUS:
         place = upright.copy()
         place[0, 3] = focus + defocus
-        scene = Scene("focus", Camera((-5.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), "orthographic", vertical_extent=2.4), (lamp,),
-                      (ball, SceneObject("wall", plane(4.0, 4.0), wall_material, place)))  # fmt: skip
+        scene = Scene(
+            "focus",
+            Camera((-5.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), "orthographic", vertical_extent=2.4),
+            (lamp,),
+            (ball, SceneObject("wall", plane(4.0, 4.0), wall_material, place)),
+        )
         sight = look(context, scene, LOOK_FOCUS)
         yield seen(1.0 + defocus, f"wall {defocus:g} off the focus", sight, against_reference(scene, sight, 0.003), ANY)
     stripes = sky(lambda d: 1.0 + 0.9 * np.sin(40.0 * d[..., 2]) * np.sin(31.0 * d[..., 1]))
@@ -100,14 +114,26 @@ def measure_focus(context: Context) -> Iterator[Measurement]:
 
 
 def against_reference(scene: Scene, sight: Sight, bias: float) -> Judged:
-    """The picture in blocks, its colours (red less blue) and its sum against two passes of a reference; what these differ by is chance."""
+    """The picture in blocks, its colours (red less blue) and its sum against two passes of a reference; what these
+    differ by is chance."""
     height, width = sight.picture.shape[:2]
-    measured_passes = [blocks(render_camera_reference(scene, width, height, samples=REFERENCE_SAMPLES, seed=seed).rgb(), BLOCK) for seed in (1, 2)]
+    measured_passes = [
+        blocks(render_camera_reference(scene, width, height, samples=REFERENCE_SAMPLES, seed=seed).rgb(), BLOCK)
+        for seed in (1, 2)
+    ]
     want, apart = 0.5 * (measured_passes[0] + measured_passes[1]), 0.5 * (measured_passes[0] - measured_passes[1])
     error, size = blocks(sight.picture, BLOCK) - want, want.mean()
     judged = Judged().hold("picture", _root_mean_square(error) / size, bias + 2.0 * _root_mean_square(apart) / size)
-    judged.hold("colour", _root_mean_square(_red_less_blue(error)) / size, bias + 2.0 * _root_mean_square(_red_less_blue(apart)) / size)
-    return judged.hold("energy", abs(error.mean()) / size, 0.25 * bias + CHANCE * _root_mean_square(apart) / size / np.sqrt(want[..., 0].size))
+    judged.hold(
+        "colour",
+        _root_mean_square(_red_less_blue(error)) / size,
+        bias + 2.0 * _root_mean_square(_red_less_blue(apart)) / size,
+    )
+    return judged.hold(
+        "energy",
+        abs(error.mean()) / size,
+        0.25 * bias + CHANCE * _root_mean_square(apart) / size / np.sqrt(want[..., 0].size),
+    )
 
 
 def _red_less_blue(picture: np.ndarray) -> np.ndarray:

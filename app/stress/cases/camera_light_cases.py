@@ -1,4 +1,5 @@
-"""What shines or is lit, at its stiffest: suns in panoramas, tiny lamps, poles, textures far too fine, glass that swallows everything."""
+"""What shines or is lit, at its stiffest: suns in panoramas, tiny lamps, poles, textures far too fine, glass that
+swallows everything."""
 
 from __future__ import annotations
 
@@ -64,9 +65,11 @@ ANY = {"depth_reached": UNCHECKED, "columns_dropped": UNCHECKED, "band_uncut": U
 
 @sharing_programs
 def measure_sun(context: Context) -> Iterator[Measurement]:
-    """A panorama with one bright texel, which a brilliant's table reflects: the picture is linear, so less the one without a sun it grows with it.
+    """A panorama with one bright texel, which a brilliant's table reflects: the picture is linear, so less the one
+    without a sun it grows with it.
 
-    Radiance over n² is kept along a ray, so nothing seen in glass is brighter than what shines. In all, it is as bright as the reference's.
+    Radiance over n² is kept along a ray, so nothing seen in glass is brighter than what shines. In all, it is as bright
+    as the reference's.
     """
     stone = solid("stone", brilliant(1.6), FLINT)
 
@@ -80,15 +83,22 @@ def measure_sun(context: Context) -> Iterator[Measurement]:
     chance = CHANCE * np.sqrt(reference_image.variance.sum()) / want
     for sun in SUNS:
         sight = look(context, scene(sun), LOOK, 4)
-        judged = Judged().hold("brighter than the sun", max(0.0, sight.picture.max() / (1.02 * sun + without.picture.max()) - 1.0), 0.0)
+        judged = Judged().hold(
+            "brighter than the sun", max(0.0, sight.picture.max() / (1.02 * sun + without.picture.max()) - 1.0), 0.0
+        )
         judged.hold("not linear", difference((sight.picture - without.picture) / sun, added), 2e-3)
-        judged.hold("light in all", abs((sight.picture.sum() - without.picture.sum()) / sun * SUNS[0] / want - 1.0), 0.02 + chance)
+        judged.hold(
+            "light in all",
+            abs((sight.picture.sum() - without.picture.sum()) / sun * SUNS[0] / want - 1.0),
+            0.02 + chance,
+        )
         judged.tell("brightest over mean", sight.picture.max() / sight.picture.mean())
         yield seen(sun, f"{sun:.0e}", sight, judged, ANY)
 
 
 def _panorama(sun: float) -> Environment:
-    """A sky of 64 × 128 texels, 0.5 to 1.5, with one that shines `sun` more, where a level mirror shows it to the camera."""
+    """A sky of 64 × 128 texels, 0.5 to 1.5, with one that shines `sun` more, where a level mirror shows it to the
+    camera."""
     environment = sky(lambda d: 1.0 + 0.5 * d[..., 2], height=64)
     rgb = environment.rgb.copy()
     rgb[20, 30] += np.float32(sun)
@@ -97,7 +107,8 @@ def _panorama(sun: float) -> Environment:
 
 @sharing_programs
 def measure_lamps(context: Context) -> Iterator[Measurement]:
-    """A disc ever smaller and brighter, which a brilliant's table reflects: as much light in all, and never brighter than the lamp itself."""
+    """A disc ever smaller and brighter, which a brilliant's table reflects: as much light in all, and never brighter
+    than the lamp itself."""
     stone = solid("stone", brilliant(1.6), FLINT)
     toward = np.array([-0.3, 3.6, 2.4]) / np.linalg.norm([-0.3, 3.6, 2.4])
     settings = replace(LOOK, spp=32)
@@ -108,7 +119,9 @@ def measure_lamps(context: Context) -> Iterator[Measurement]:
         sight = look(context, Scene("lamp", STONE_SEEN_FROM, (lamp,), (stone,)), settings, 4)
         total = sight.picture.sum()
         first = first or total
-        judged = Judged().hold("brighter than the lamp", max(0.0, sight.picture.max() * np.pi * radius**2 / 1.02 - 1.0), 0.0)
+        judged = Judged().hold(
+            "brighter than the lamp", max(0.0, sight.picture.max() * np.pi * radius**2 / 1.02 - 1.0), 0.0
+        )
         judged.hold("light in all", abs(total / first - 1.0), 0.2)
         judged.tell("brightest over mean", sight.picture.max() / sight.picture.mean())
         yield seen(radius, f"radius {radius:g}", sight, judged, ANY)
@@ -116,13 +129,18 @@ def measure_lamps(context: Context) -> Iterator[Measurement]:
 
 @sharing_programs
 def measure_poles(context: Context) -> Iterator[Measurement]:
-    """A sky that is smooth in every direction, seen near straight up and straight down: the panorama's rows shrink to a point there."""
+    """A sky that is smooth in every direction, seen near straight up and straight down: the panorama's rows shrink to a
+    point there."""
     for elevation_deg in POLES_DEG:
         elevation = np.radians(elevation_deg)
         forward = np.array([np.cos(elevation) * 0.8, np.cos(elevation) * 0.6, np.sin(elevation)])
         camera = Camera((0.0, 0.0, 0.0), tuple(forward), (0.6, -0.8, 0.0), vertical_fov_deg=30.0)
         settings = resized(LOOK, 32, 32, 16)
-        scene = with_sky(SceneObject("far", box((0.1, 0.1, 0.1)), Diffuse(), at(-9.0, 0.0, 0.0)), camera=camera, environment=sky(_smooth))
+        scene = with_sky(
+            SceneObject("far", box((0.1, 0.1, 0.1)), Diffuse(), at(-9.0, 0.0, 0.0)),
+            camera=camera,
+            environment=sky(_smooth),
+        )
         sight = look(context, scene, settings)
         _, directions = camera_rays(camera, (32, 32), 32 * 16 + 1)
         middles = directions[8::16, 8::16][::-1]
@@ -136,7 +154,8 @@ def _smooth(d: np.ndarray) -> np.ndarray:
 
 @sharing_programs
 def measure_texels(context: Context) -> Iterator[Measurement]:
-    """A wall of checks far finer than a pixel, seen directly and through a ball of flint, before a sky as grey as their mean: all is grey."""
+    """A wall of checks far finer than a pixel, seen directly and through a ball of flint, before a sky as grey as their
+    mean: all is grey."""
     for texels in TEXELS:
         extent = LOOK.height * texels / 1024.0
         camera = Camera((0.05, 0.03, 9.0), (0.05, 0.03, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=extent)
@@ -155,7 +174,9 @@ def measure_slanting(context: Context) -> Iterator[Measurement]:
     for angle_deg in VIEWS_DEG:
         angle = np.radians(angle_deg)
         position = (0.0, -5.0 * np.sin(angle), 5.0 * np.cos(angle))
-        camera = Camera(position, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), "orthographic", vertical_extent=10.0 * np.cos(angle))
+        camera = Camera(
+            position, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), "orthographic", vertical_extent=10.0 * np.cos(angle)
+        )
         sight = look(context, replace(_checked(camera), background_rgb=(0.0, 0.0, 0.0)), resized(LOOK, 8, 24, 16))
         columns = sight.picture[4:-4]
         judged = Judged().hold("mean", np.abs(columns.mean(axis=(0, 1)) / GREY - 1.0).max(), 0.02)
@@ -164,7 +185,8 @@ def measure_slanting(context: Context) -> Iterator[Measurement]:
 
 
 def _checked(camera: Camera, *objects: SceneObject) -> Scene:
-    """A wall in z = 0 whose every other texel is white, the others black; lit so slantingly that no shadow falls into the view."""
+    """A wall in z = 0 whose every other texel is white, the others black; lit so slantingly that no shadow falls into
+    the view."""
     checks = (np.indices((1024, 1024)).sum(axis=0) % 2).astype(np.float32)
     side = 64.0
     uv_side = plane(side, side)
@@ -172,13 +194,16 @@ def _checked(camera: Camera, *objects: SceneObject) -> Scene:
     elevation = np.radians(1.0)
     power = illuminant("D65").scaled_to_luminous(2.0 * np.pi * GREY / np.sin(elevation))
     lamp = Light("lamp", "directional", power, direction=(np.cos(elevation), 0.0, -np.sin(elevation)))
-    wall = SceneObject("wall", mesh, Diffuse((1.0, 1.0, 1.0), texture=Texture(np.repeat(checks[..., None], 3, axis=-1))))
+    wall = SceneObject(
+        "wall", mesh, Diffuse((1.0, 1.0, 1.0), texture=Texture(np.repeat(checks[..., None], 3, axis=-1)))
+    )
     return Scene("checks", camera, (lamp,), (*objects, wall), background_rgb=(GREY, GREY, GREY))
 
 
 @sharing_programs
 def measure_absorption(context: Context) -> Iterator[Measurement]:
-    """A slab that absorbs nothing up to everything, before white; then one that absorbs everything below 550 nm and nothing above."""
+    """A slab that absorbs nothing up to everything, before white; then one that absorbs everything below 550 nm and
+    nothing above."""
     camera = Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=0.2)
     thickness, n = 0.3, 1.5
     step = VISIBLE_NM < 550.0
@@ -189,8 +214,8 @@ def measure_absorption(context: Context) -> Iterator[Measurement]:
         sight = look(context, Scene("slab", camera, (), (slab,), background_rgb=WHITE), FEW)
         r, kept = float(fresnel(1.0, n)), np.exp(-np.minimum(coefficient * thickness, 700.0))
         values = r + (1.0 - r) ** 2 * kept * (1.0 + r * kept) / (1.0 - (r * kept) ** 2)
-        # Over 1/TINT_STEPS of the spectrum a path lets through what it does in the middle: an edge may lie off by half of that, and near 550 nm
-        # a nanometre holds some 1.2 % of a channel.
+        # Over 1/TINT_STEPS of the spectrum a path lets through what it does in the middle: an edge may lie off by half
+        # of that, and near 550 nm a nanometre holds some 1.2 % of a channel.
         sharp = 0.012 * 0.5 * 400.0 / TINT_STEPS if "below" in label else 2e-4
         judged = Judged().hold("radiance", np.abs(sight.mean - daylight_mean(values)).max(), sharp)
         yield seen(number, label, sight, judged)

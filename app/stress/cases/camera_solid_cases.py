@@ -1,4 +1,5 @@
-"""Where the camera stands, and whole solids seen through: inside glass, on its face, at any scale, solids that nest or touch, spoilt meshes."""
+"""Where the camera stands, and whole solids seen through: inside glass, on its face, at any scale, solids that nest or
+touch, spoilt meshes."""
 
 from __future__ import annotations
 
@@ -43,7 +44,8 @@ FEW = resized(LOOK, 12, 8, 64)
 SEEN_FROM = Camera((2.6, -2.2, 2.6), (0.0, 0.0, 1.1), vertical_fov_deg=30.0)
 FROM_FACE = (0.3, 1e-2, 1e-3, 1e-5, 1e-7, 0.0, -1e-7, -1e-5, -1e-3, -1e-2, -0.3)
 SURE = 1e-3
-"""Nearer to a face than that the camera may be taken for inside or outside, for either is as true as float32 and a ray's safe distance tell."""
+"""Nearer to a face than that the camera may be taken for inside or outside, for either is as true as float32 and a
+ray's safe distance tell."""
 CUBE_N = 1.5
 CHOSEN_PAIRS = (
     "a bubble as a solid of n = 1, and as a cavity",
@@ -53,13 +55,19 @@ CHOSEN_PAIRS = (
 CHOSEN_FAULTS = tuple(fault for fault in FAULTS if fault.label not in ("nothing", "every face twice"))
 NOISE, SAME_PICTURE, SAME_ENERGY = 3.0, 5e-3, 3e-3
 """As in `contact_cases`: what chance makes of two seeds, times three; rounding's share of a picture; of its sum."""
-CHANGES = (("× 1e-4", 1e-4, 0.0), ("× 1e4", 1e4, 0.0), ("1e4 extents off the origin", 1.0, 1e4), ("× 1e-4, and 1e4 extents off", 1e-4, 1e4))
+CHANGES = (
+    ("× 1e-4", 1e-4, 0.0),
+    ("× 1e4", 1e4, 0.0),
+    ("1e4 extents off the origin", 1.0, 1e4),
+    ("× 1e-4, and 1e4 extents off", 1e-4, 1e4),
+)
 ANY = {"depth_reached": UNCHECKED, "columns_dropped": UNCHECKED, "band_uncut": UNCHECKED, "stack_full": UNCHECKED}
 
 
 @sharing_programs
 def measure_inside(context: Context) -> Iterator[Measurement]:
-    """A cube seen from within and from before it, across its face: outwards and inwards, against the sum over all ways."""
+    """A cube seen from within and from before it, across its face: outwards and inwards, against the sum over all
+    ways."""
     outline = rectangle(1.0, 1.0)
     glass = solid("cube", extruded(outline, 1.0, "cube"), constant(CUBE_N))
     angle = np.radians(20.0)
@@ -72,7 +80,10 @@ def measure_inside(context: Context) -> Iterator[Measurement]:
             sight = look(context, with_sky(glass, camera=camera, environment=slope_sky()), FEW)
             sights.append(sight)
             places = [distance > 0.0] if abs(distance) >= SURE else [True, False]
-            true = [radiance_seen(outline, CUBE_N, _clearly(start, distance, inside), tuple(direction), slope, inside) for inside in places]
+            true = [
+                radiance_seen(outline, CUBE_N, _clearly(start, distance, inside), tuple(direction), slope, inside)
+                for inside in places
+            ]
             judged.hold(name, min(np.abs(sight.mean / value - 1.0).max() for value in true), 5e-4)
         where = "inside" if distance > 0.0 else "outside"
         yield seen(number, f"{abs(distance):.0e} {where}" if distance else "on the face", _together(sights), judged)
@@ -90,7 +101,11 @@ def measure_pairs(context: Context) -> Iterator[Measurement]:
         joined, plain = _seen_through(pair.joined()), _seen_through(pair.plain())
         base, other = (look(context, plain, replace(LOOK, seed=seed), 1) for seed in (1, 2))
         sight = look(context, joined, LOOK, 1)
-        judged = Judged().hold("picture", difference(sight.picture, base.picture), NOISE * difference(other.picture, base.picture) + SAME_PICTURE)
+        judged = Judged().hold(
+            "picture",
+            difference(sight.picture, base.picture),
+            NOISE * difference(other.picture, base.picture) + SAME_PICTURE,
+        )
         judged.hold("energy", abs(sight.picture.mean() / base.picture.mean() - 1.0), SAME_ENERGY)
         yield seen(number, pair.label, sight, judged, ANY)
 
@@ -105,7 +120,11 @@ def _seen_through(scene: Scene) -> Scene:
 @sharing_programs
 def measure_scale(context: Context) -> Iterator[Measurement]:
     """A brilliant on a lit table: the same picture at any size and place."""
-    scene = replace(stage(*tilted(solid("stone", brilliant(1.2), FLINT)), lights=[SUN]), camera=SEEN_FROM, background_rgb=(0.3, 0.4, 0.6))
+    scene = replace(
+        stage(*tilted(solid("stone", brilliant(1.2), FLINT)), lights=[SUN]),
+        camera=SEEN_FROM,
+        background_rgb=(0.3, 0.4, 0.6),
+    )
     base = look(context, scene, LOOK, 4)
     size = extent(scene)
     for number, (label, scale, offset) in enumerate(CHANGES, 1):
@@ -118,10 +137,14 @@ def measure_scale(context: Context) -> Iterator[Measurement]:
 
 @sharing_programs
 def measure_faults(context: Context) -> Iterator[Measurement]:
-    """Spoilt meshes, loaded as a user would, against the sound solid. A hole lets rays in that no medium can follow: that only has to stay finite."""
+    """Spoilt meshes, loaded as a user would, against the sound solid. A hole lets rays in that no medium can follow:
+    that only has to stay finite."""
     clean: dict[bool, tuple[Sight, float]] = {}
     for smooth in (False, True):
-        base, other = (look(context, _solid_scene(Fault("", lambda mesh: mesh, smooth)), replace(LOOK, seed=seed), 1) for seed in (1, 2))
+        base, other = (
+            look(context, _solid_scene(Fault("", lambda mesh: mesh, smooth)), replace(LOOK, seed=seed), 1)
+            for seed in (1, 2)
+        )
         clean[smooth] = base, difference(other.picture, base.picture)
     for number, fault in enumerate(CHOSEN_FAULTS, 1):
         base, noise = clean[fault.smooth]
@@ -144,7 +167,12 @@ def _solid_scene(fault: Fault) -> Scene:
 def _together(sights: list[Sight]) -> Sight:
     """The first, with what is not finite in any of them and all their fall-backs."""
     fallbacks = {name: sum(s.fallbacks[name] for s in sights) for name in sights[0].fallbacks}
-    return replace(sights[0], nonfinite=sum(s.nonfinite for s in sights), fallbacks=fallbacks, samples=sum(s.samples for s in sights))
+    return replace(
+        sights[0],
+        nonfinite=sum(s.nonfinite for s in sights),
+        fallbacks=fallbacks,
+        samples=sum(s.samples for s in sights),
+    )
 
 
 CASES: tuple[Case, ...] = (

@@ -1,4 +1,5 @@
-"""Where light piles up: a perfect focus, a fold and a cusp, from the real tracer to the real splats, against closed forms."""
+"""Where light piles up: a perfect focus, a fold and a cusp, from the real tracer to the real splats, against closed
+forms."""
 
 from __future__ import annotations
 
@@ -35,10 +36,22 @@ def measure_focus(context: Context) -> Iterator[Measurement]:
     texel = 4e-3
     for triangles in (320, 1280, 5120, 20_480):
         mesh = ellipsoid((1.0, minor, minor), triangles)
-        beam = trace_beam(context, mesh, glass(GLASS), screen([1.0 / N, 0, 0], [1, 0, 0], 3.0), [-3, 0, 0], [1, 0, 0], 0.5, D_NM, count=1500, max_depth=1)
+        beam = trace_beam(
+            context,
+            mesh,
+            glass(GLASS),
+            screen([1.0 / N, 0, 0], [1, 0, 0], 3.0),
+            [-3, 0, 0],
+            [1, 0, 0],
+            0.5,
+            D_NM,
+            count=1500,
+            max_depth=1,
+        )
         landed = beam.of_choices(REFRACTED)
         # Linear interpolation over an edge h leaves |n''| h²/6 of a normal with |n''| ≤ 2 κ² (its direction and
-        # its length both bend), and |n''| h of its derivative; the ray turns by less than its normal, and lands `way` further.
+        # its length both bend), and |n''| h of its derivative; the ray turns by less than its normal, and lands `way`
+        # further.
         edge = longest_edge(mesh)
         column = np.stack([landed.dposition_ds, landed.dposition_dt], axis=1)[..., 1:]
         at = landed.position[:, 1:]
@@ -58,14 +71,22 @@ def measure_focus(context: Context) -> Iterator[Measurement]:
             }
         )
         yield Measurement(
-            float(triangles), f"{triangles:,} triangles", not_finite_in(landed.records) + not_finite([image]), errors, bounds,
-            landed.tally.imbalance, dict(landed.tally.fallbacks), note=f"{share.mean():.0%} of the light in one texel",
-        )  # fmt: skip
+            float(triangles),
+            f"{triangles:,} triangles",
+            not_finite_in(landed.records) + not_finite([image]),
+            errors,
+            bounds,
+            landed.tally.imbalance,
+            dict(landed.tally.fallbacks),
+            note=f"{share.mean():.0%} of the light in one texel",
+        )
 
 
 def inside_texel(at: np.ndarray, sigma: np.ndarray) -> np.ndarray:
     """Share of Gaussians about `at` within ±½."""
-    return np.array([0.5 * (erf((0.5 - a) / s / 2**0.5) + erf((0.5 + a) / s / 2**0.5)) for a, s in zip(at, sigma, strict=True)])
+    return np.array(
+        [0.5 * (erf((0.5 - a) / s / 2**0.5) + erf((0.5 + a) / s / 2**0.5)) for a, s in zip(at, sigma, strict=True)]
+    )
 
 
 def longest_edge(mesh: Mesh) -> float:
@@ -89,7 +110,15 @@ def ball_radius(height: np.ndarray) -> np.ndarray:
 
 def measure_fold(context: Context) -> Iterator[Measurement]:
     ball = trace_beam(
-        context, sphere_mesh(1.0, 81_920), glass(GLASS), screen([PLANE_X, 0, 0], [1, 0, 0], 3.0), [-3, 0, 0], [1, 0, 0], 0.99, D_NM, count=6000
+        context,
+        sphere_mesh(1.0, 81_920),
+        glass(GLASS),
+        screen([PLANE_X, 0, 0], [1, 0, 0], 3.0),
+        [-3, 0, 0],
+        [1, 0, 0],
+        0.99,
+        D_NM,
+        count=6000,
     )
     landed = ball.of_depth(2)
     # A disc of the beam, evenly; those from above 0.99 are left out on both sides.
@@ -101,9 +130,21 @@ def measure_fold(context: Context) -> Iterator[Measurement]:
     facets = 1e-4
     for size in (24, 48, 96, 192):
         yield caustic_energy(
-            context, ball, landed, landed.position[:, 1:], (1, 2), exact, size, 1.25 * FOLD_RADIUS, np.zeros(2),
-            {"outer tenth of the ring": (0.9 * FOLD_RADIUS, 1.15 * FOLD_RADIUS), "inner half": (0.0, 0.5 * FOLD_RADIUS)}, facets,
-        )  # fmt: skip
+            context,
+            ball,
+            landed,
+            landed.position[:, 1:],
+            (1, 2),
+            exact,
+            size,
+            1.25 * FOLD_RADIUS,
+            np.zeros(2),
+            {
+                "outer tenth of the ring": (0.9 * FOLD_RADIUS, 1.15 * FOLD_RADIUS),
+                "inner half": (0.0, 0.5 * FOLD_RADIUS),
+            },
+            facets,
+        )
 
 
 # ---- a cusp: the nephroid in a mirror's hollow --------------------------------------------------
@@ -137,7 +178,18 @@ def measure_cusp(context: Context) -> Iterator[Measurement]:
     direction = np.array([np.cos(SLOPE), 0.0, -np.sin(SLOPE)])
     # The axis meets the mirror half a unit above the floor and comes down on the cusp at x = ½.
     start = np.array([1.0, 0.0, 0.5]) - 1.6 * direction
-    beam = trace_beam(context, hollow_mirror(), Mirror(), screen([0, 0, 0], [0, 0, 1], 3.0), start, direction, BEAM_RADIUS, D_NM, count=6000, max_depth=1)
+    beam = trace_beam(
+        context,
+        hollow_mirror(),
+        Mirror(),
+        screen([0, 0, 0], [0, 0, 1], 3.0),
+        start,
+        direction,
+        BEAM_RADIUS,
+        D_NM,
+        count=6000,
+        max_depth=1,
+    )
     landed = beam.of_depth(1)
     count = 400_000
     radius = BEAM_RADIUS * np.sqrt((np.arange(count) + 0.5) / count)
@@ -148,10 +200,20 @@ def measure_cusp(context: Context) -> Iterator[Measurement]:
     missed = length(landed.position[:, :2] - mirrored_landing(landed.start, direction))
     for size in (24, 48, 96, 192):
         result = caustic_energy(
-            context, beam, landed, landed.position[:, :2], (0, 1), exact, size, 0.12, np.array([0.5, 0.0]),
-            {"round the cusp": (0.0, 0.04), "about it": (0.04, 0.1)}, 2e-6,
-        )  # fmt: skip
-        # Segments of h = 1.75e-3: their sagitta h²/8 and their normals' h²/8 displace a landing at 0.5 by less than h²/4.
+            context,
+            beam,
+            landed,
+            landed.position[:, :2],
+            (0, 1),
+            exact,
+            size,
+            0.12,
+            np.array([0.5, 0.0]),
+            {"round the cusp": (0.0, 0.04), "about it": (0.04, 0.1)},
+            2e-6,
+        )
+        # Segments of h = 1.75e-3: their sagitta h²/8 and their normals' h²/8 displace a landing at 0.5 by less than
+        # h²/4.
         result.errors["landing"], result.bounds["landing"] = float(missed.max()), 1.75e-3**2 / 4.0 + 16.0 * EPSILON
         yield result
 
@@ -202,10 +264,19 @@ def caustic_energy(
         blurred = length(exact + blur * noise - middle)
         sharp = length(exact - middle)
         crossing = abs(np.mean((blurred >= inner) & (blurred < outer)) - np.mean((sharp >= inner) & (sharp < outer)))
-        rows[name] = np.array([abs(held - wanted)]), crossing + beam.lattice_in_disc**-0.75 + (FAST_ERF + EDGE / size) * wanted
+        rows[name] = (
+            np.array([abs(held - wanted)]),
+            crossing + beam.lattice_in_disc**-0.75 + (FAST_ERF + EDGE / size) * wanted,
+        )
     errors, bounds = judged(rows)
     return Measurement(
-        float(size), f"{size}² texels", not_finite_in(beam.records) + not_finite([image]), errors, bounds, beam.tally.imbalance, dict(beam.tally.fallbacks)
+        float(size),
+        f"{size}² texels",
+        not_finite_in(beam.records) + not_finite([image]),
+        errors,
+        bounds,
+        beam.tally.imbalance,
+        dict(beam.tally.fallbacks),
     )
 
 

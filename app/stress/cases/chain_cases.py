@@ -34,7 +34,8 @@ DIAMOND = float(index("diamond", D_NM))
 SCREEN_REACH = 12.0
 """Half a screen's side over its height."""
 PER_EVENT = 8.0
-"""Roundings that an event adds to a direction: two of the mirror's own, those of θ twice, of the plane's normal twice, and of the scaling to length one."""
+"""Roundings that an event adds to a direction: two of the mirror's own, those of θ twice, of the plane's normal twice,
+and of the scaling to length one."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,9 @@ class Chain:
     """(N,): whether light can leave where it is to leave."""
 
 
-def follow_chain(planes: np.ndarray, position: np.ndarray, direction: np.ndarray, n: float, events: int, screen_z: float) -> Chain:
+def follow_chain(
+    planes: np.ndarray, position: np.ndarray, direction: np.ndarray, n: float, events: int, screen_z: float
+) -> Chain:
     """Rays into a convex solid n·x ≤ d of rows (n, d), `events` − 2 reflections, out, and on to z = `screen_z`.
 
     Written with the float64 references; a facet is never met twice in a row.
@@ -102,12 +105,22 @@ def follow_chain(planes: np.ndarray, position: np.ndarray, direction: np.ndarray
         safe = np.where(passes, eta, 1.0)
         deta = np.where(passes, -eta / n if entering else 1.0, 0.0)
         by_n = np.zeros((5, 1)) + np.array([0, 0, 0, 0, 1.0])[:, None]
-        dd = np.array([optics.refract_column_stable(direction, d, normal, zero, safe, deta * k) for d, k in zip(dd, by_n, strict=True)])
+        dd = np.array(
+            [
+                optics.refract_column_stable(direction, d, normal, zero, safe, deta * k)
+                for d, k in zip(dd, by_n, strict=True)
+            ]
+        )
         direction = optics.refract(direction, normal, safe)
     upward = np.array([0.0, 0.0, 1.0])
     # What leaves downwards is not among the photons that are asked about.
     distance = (screen_z - position[:, 2]) / np.where(np.abs(direction[:, 2]) > 1e-9, direction[:, 2], 1e-9)
-    dp = np.array([optics.transfer_column(p, d, direction, np.broadcast_to(upward, zero.shape), distance) for p, d in zip(dp, dd, strict=True)])
+    dp = np.array(
+        [
+            optics.transfer_column(p, d, direction, np.broadcast_to(upward, zero.shape), distance)
+            for p, d in zip(dp, dd, strict=True)
+        ]
+    )
     return Chain(position + times(distance, direction), direction, dp, dd, from_edge, steepest, inside_length, exists)
 
 
@@ -115,7 +128,18 @@ def chain_photons(context: Context, screen_z: float) -> Photons:
     """Light into a brilliant's table, and all of it that comes out upwards after up to 64 events."""
     direction = np.array([0.13, 0.07, -1.0])
     receiver = screen([0, 0, screen_z], [0, 0, 1], SCREEN_REACH * screen_z)
-    return trace_beam(context, brilliant(2.0), glass("diamond"), receiver, -1.2 * direction, direction, 0.6, D_NM, count=6000, max_depth=64)
+    return trace_beam(
+        context,
+        brilliant(2.0),
+        glass("diamond"),
+        receiver,
+        -1.2 * direction,
+        direction,
+        0.6,
+        D_NM,
+        count=6000,
+        max_depth=64,
+    )
 
 
 def measure_chain(context: Context) -> Iterator[Measurement]:
@@ -129,8 +153,9 @@ def measure_chain(context: Context) -> Iterator[Measurement]:
         both = np.intersect1d(low.records["photon_id"], high.records["photon_id"])
         low, high = (p.where(np.isin(p.records["photon_id"], both)) for p in (low, high))
         exact = follow_chain(planes, low.start, low.direction, DIAMOND, events, heights[0])
-        # Every event turns the ray by PER_EVENT roundings at most and moves it by half as many; what becomes of that by the
-        # end is what becomes of the start: the columns by position and, seen from inside, n times those by direction.
+        # Every event turns the ray by PER_EVENT roundings at most and moves it by half as many; what becomes of that by
+        # the end is what becomes of the start: the columns by position and, seen from inside, n times those by
+        # direction.
         moved = np.max(length(exact.dposition[:2]), axis=0) + np.max(length(exact.ddirection[:2]), axis=0)
         turned = DIAMOND * np.max(length(exact.dposition[2:4]), axis=0)
         position_bound = EPSILON * events * (0.5 * PER_EVENT * moved + PER_EVENT * turned)
@@ -138,8 +163,8 @@ def measure_chain(context: Context) -> Iterator[Measurement]:
         # A column's share of the error: each transfer divides by d·n twice.
         largest = np.max(length(exact.dposition), axis=0)
         column_bound = EPSILON * events * PER_EVENT * DIAMOND / exact.steepest**2
-        # Another facet anywhere on the way leaves another direction, coarsely. That may happen only where a hit lies closer
-        # to an edge than float32 knows it there.
+        # Another facet anywhere on the way leaves another direction, coarsely. That may happen only where a hit lies
+        # closer to an edge than float32 knows it there.
         seen_direction = optics.unit(high.position - low.position)
         astray = length(seen_direction - exact.direction)
         same = exact.exists & (astray < 1e-3)
@@ -158,9 +183,16 @@ def measure_chain(context: Context) -> Iterator[Measurement]:
             }
         )
         yield Measurement(
-            float(events), f"{events} events", not_finite_in(low.records), errors, bounds, near.tally.imbalance, dict(near.tally.fallbacks),
-            int(np.count_nonzero(dropped)), note=f"{np.count_nonzero(same)} paths; {np.count_nonzero(~same)} more over other facets, by an edge",
-        )  # fmt: skip
+            float(events),
+            f"{events} events",
+            not_finite_in(low.records),
+            errors,
+            bounds,
+            near.tally.imbalance,
+            dict(near.tally.fallbacks),
+            int(np.count_nonzero(dropped)),
+            note=f"{np.count_nonzero(same)} paths; {np.count_nonzero(~same)} more over other facets, by an edge",
+        )
 
 
 def by_id(photons: Photons) -> Photons:
@@ -182,20 +214,27 @@ def measure_smooth_chain(context: Context) -> Iterator[Measurement]:
     below = placed("screen", screen([0, 0, -1.5], [0, 0, 1], 20.0), Diffuse())
     light = beam_light((0.25, 0.1, 3.0), (0.05, 0.03, -1.0), 0.5)
     for events in (5, 10, 20, 40, 60):
-        yield outgrown(trace_light(context, (gem, below), light, [(450.0, 650.0)], 100, events), float(events), f"{events} events")
+        yield outgrown(
+            trace_light(context, (gem, below), light, [(450.0, 650.0)], 100, events), float(events), f"{events} events"
+        )
 
 
 def measure_far_screen(context: Context) -> Iterator[Measurement]:
     ball, light = placed("ball", sphere_mesh(1.0, 1280), glass("N-BK7")), beam_light((-3, 0, 0), (1, 0, 0), 0.8)
     for distance in (1e1, 1e3, 1e5, 1e7, 1e9):
         receiver = placed("screen", screen([distance, 0, 0], [1, 0, 0], 4.0 * distance), Diffuse())
-        yield outgrown(trace_light(context, (ball, receiver), light, [(450.0, 650.0)], 500, 2), distance, f"{distance:g} radii")
+        yield outgrown(
+            trace_light(context, (ball, receiver), light, [(450.0, 650.0)], 500, 2), distance, f"{distance:g} radii"
+        )
 
 
 def outgrown(photons: Photons, severity: float, label: str) -> Measurement:
-    """Columns that are not finite, or longer than a million glass sizes, must carry the flag, and flags must be counted."""
+    """Columns that are not finite, or longer than a million glass sizes, must carry the flag, and flags must be
+    counted."""
     records = photons.records
-    columns = [records[name][..., :3].astype(np.float64) for name in ("dposition_ds", "dposition_dt", "dposition_dvar0")]
+    columns = [
+        records[name][..., :3].astype(np.float64) for name in ("dposition_ds", "dposition_dt", "dposition_dvar0")
+    ]
     longest = np.max([length(column) for column in columns], axis=0)
     flagged = (records["flags"] & FLAG_FOOTPRINT_DROPPED) != 0
     counted = photons.tally.fallbacks["footprint_dropped"]
@@ -207,7 +246,17 @@ def outgrown(photons: Photons, severity: float, label: str) -> Measurement:
     )
     bad, finite = not_finite_in(records[~flagged]), longest[np.isfinite(longest)]
     note = f"{np.count_nonzero(flagged)} of {len(records)} footprints dropped, longest column {finite.max():.1e} glass sizes"
-    return Measurement(severity, label, bad, errors, bounds, photons.tally.imbalance, dict(photons.tally.fallbacks), int(flagged.sum()), note)
+    return Measurement(
+        severity,
+        label,
+        bad,
+        errors,
+        bounds,
+        photons.tally.imbalance,
+        dict(photons.tally.fallbacks),
+        int(flagged.sum()),
+        note,
+    )
 
 
 CASES = (

@@ -51,7 +51,8 @@ PLATES = 2e-3
 GAPS = (1e-1, 1e-3, 1e-4, 1e-5, 1e-7, 0.0)
 OVERLAPS = (1e-1, 1e-3, 1e-5, 1e-7, 0.0)
 CONTACT = 6e-5
-"""Surfaces nearer than 3e-5 GPU units (`NEAR_DISTANCE` of intersect.glsl; here twice that in scene units) are in optical contact."""
+"""Surfaces nearer than 3e-5 GPU units (`NEAR_DISTANCE` of intersect.glsl; here twice that in scene units) are in
+optical contact."""
 STACKS = (1, 4, 16, 32)
 _TILT = turn((1.0, 0.4, 0.2), 28.0)
 _CENTRE = np.array([0.0, 0.0, 1.2])
@@ -67,7 +68,8 @@ class Pair:
     redrawn: bool = False
     """Lattices, maps or roulette's dice of the two differ, so that chance does."""
     edges: float = 0.0
-    """Added to the bound on the picture where one of the two draws direct light by splats, which blur a shadow's edge."""
+    """Added to the bound on the picture where one of the two draws direct light by splats, which blur a shadow's
+    edge."""
     layer: str = "caustic"
     """"beauty" where what is caustic in one is direct light in the other."""
 
@@ -89,7 +91,10 @@ def measure_pairs(context: Context) -> Iterator[Measurement]:
         if pair.redrawn:
             bound = TEXELS + pair.edges + NOISE * picture_error(rendered(pair, 2).picture, base.picture)
         held = Held(
-            {"picture": picture_error(found.picture, base.picture), "energy": energy_error(found.picture, base.picture)},
+            {
+                "picture": picture_error(found.picture, base.picture),
+                "energy": energy_error(found.picture, base.picture),
+            },
             {"picture": bound, "energy": 5 * SAME_ENERGY if pair.redrawn else SAME_ENERGY},
         )
         yield measurement(number, pair.label, found, held)
@@ -101,7 +106,9 @@ def measure_gaps(context: Context) -> Iterator[Measurement]:
         found = probe(context, _plates([(1.5, 0.3, gap), (1.5, 0.3, 0.0)]), CAUSTIC)
         touching = gap < CONTACT
         error = abs(found.shares["deposited"] - plates([1.5] if touching else [1.5, 1.0, 1.5]))
-        held = Held({"transmittance": error}, {"transmittance": PLATES}, "optical contact" if touching else "a film of air")
+        held = Held(
+            {"transmittance": error}, {"transmittance": PLATES}, "optical contact" if touching else "a film of air"
+        )
         yield measurement(gap, f"{gap:.0e}" if gap else "contact", found, held)
 
 
@@ -111,14 +118,21 @@ def measure_overlaps(context: Context) -> Iterator[Measurement]:
     for overlap in OVERLAPS:
         found = probe(context, _plates([(1.5, 0.3, -overlap), (1.9, 0.3, 0.0)]), CAUSTIC)
         error = abs(found.shares["deposited"] - expected)
-        yield measurement(overlap, f"{overlap:.0e}" if overlap else "contact", found, Held({"transmittance": error}, {"transmittance": PLATES}))
+        yield measurement(
+            overlap,
+            f"{overlap:.0e}" if overlap else "contact",
+            found,
+            Held({"transmittance": error}, {"transmittance": PLATES}),
+        )
 
 
 def measure_stacks(context: Context) -> Iterator[Measurement]:
     """So many plates in contact, of two glasses in turn, and events enough that nothing is left on its way."""
     for count in STACKS:
         indices = [(1.5, 1.7)[i % 2] for i in range(count)]
-        found = probe(context, _plates([(n, 0.6 / count, 0.0) for n in indices]), replace(CAUSTIC, max_depth=64 + 8 * count))
+        found = probe(
+            context, _plates([(n, 0.6 / count, 0.0) for n in indices]), replace(CAUSTIC, max_depth=64 + 8 * count)
+        )
         error = abs(found.shares["deposited"] - plates(indices))
         yield measurement(count, f"{count} plates", found, Held({"transmittance": error}, {"transmittance": PLATES}))
 
@@ -126,8 +140,8 @@ def measure_stacks(context: Context) -> Iterator[Measurement]:
 def plates(indices: Sequence[float]) -> float:
     """Transmittance at normal incidence of layers of these indices in air, by adding reflections incoherently.
 
-    Each added face turns (R, T) into R + T² r/(1 − R r) seen from the front, and T t/(1 − R' r) through, with R' seen from
-    behind (Stokes 1862, "On the intensity of the light reflected from or transmitted through a pile of plates").
+    Each added face turns (R, T) into R + T² r/(1 − R r) seen from the front, and T t/(1 − R' r) through, with R' seen
+    from behind (Stokes 1862, "On the intensity of the light reflected from or transmitted through a pile of plates").
     """
     media = [1.0, *indices, 1.0]
     behind, through = 0.0, 1.0
@@ -156,7 +170,11 @@ def _plates(layers: Sequence[tuple[float, float, float]]) -> Scene:
     """Plates (index, thickness, gap above the next), the lowest first, over the table; light falls straight down."""
     items, z = [], 0.5
     for number, (n, thickness, gap) in enumerate(layers):
-        items.append(solid(f"plate {number}", box((2.0, 2.0, thickness)), constant(n, f"n {n:g}"), (0.3, 0.0, z + 0.5 * thickness)))
+        items.append(
+            solid(
+                f"plate {number}", box((2.0, 2.0, thickness)), constant(n, f"n {n:g}"), (0.3, 0.0, z + 0.5 * thickness)
+            )
+        )
         z += thickness + gap
     return stage(*items)
 
@@ -172,7 +190,9 @@ def _block(*others: SceneObject, priority: int = 0) -> Scene:
 
 def _seen(*others: SceneObject) -> Scene:
     """`_block` from above, where direct light shows."""
-    return replace(_block(*others), camera=Camera((3.0, -2.0, 5.0), (2.0, 0.0, 0.0), kind="orthographic", vertical_extent=3.0))
+    return replace(
+        _block(*others), camera=Camera((3.0, -2.0, 5.0), (2.0, 0.0, 0.0), kind="orthographic", vertical_extent=3.0)
+    )
 
 
 def _eighths() -> list[SceneObject]:
@@ -187,12 +207,19 @@ def _ball(radius: float, name: str = "ball", triangles: int = 1280) -> SceneObje
 def _prisms(gap: float) -> Scene:
     """Two prisms, base down, whose lower edges meet or nearly do."""
     half = 0.5 + 0.5 * gap
-    return stage(solid("left", prism(), FLINT, (-half, 0.0, 0.9)), solid("right", prism(), FLINT, (half, 0.0, 0.9)), lights=[SUN])
+    return stage(
+        solid("left", prism(), FLINT, (-half, 0.0, 0.9)), solid("right", prism(), FLINT, (half, 0.0, 0.9)), lights=[SUN]
+    )
 
 
 def _vessel(water: float, water_priority: int, hollow: bool) -> Scene:
     glass = cavity(box(), box((0.6, 0.6, 0.6))) if hollow else box()
-    return stage(*tilted(solid("vessel", glass, CROWN), solid("water", box((water, water, water)), WATER, priority=water_priority)), lights=[SUN])
+    return stage(
+        *tilted(
+            solid("vessel", glass, CROWN), solid("water", box((water, water, water)), WATER, priority=water_priority)
+        ),
+        lights=[SUN],
+    )
 
 
 def _doublet() -> Scene:
@@ -201,36 +228,98 @@ def _doublet() -> Scene:
 
 
 def _lens() -> Scene:
-    return stage(*tilted(solid("lens", lens(2.0, -6.0, 0.35, 1.0, triangles=2400), FLINT, (0.0, 0.0, -0.075))), lights=[SUN])
+    return stage(
+        *tilted(solid("lens", lens(2.0, -6.0, 0.35, 1.0, triangles=2400), FLINT, (0.0, 0.0, -0.075))), lights=[SUN]
+    )
 
 
 PAIRS = (
-    Pair("a block in two passes that share a face", lambda: stage(
-        *tilted(solid("a", box((0.5, 1.0, 1.0)), FLINT, (-0.25, 0.0, 0.0)), solid("b", box((0.5, 1.0, 1.0)), FLINT, (0.25, 0.0, 0.0))), lights=[SUN]), _block, redrawn=True),
+    Pair(
+        "a block in two passes that share a face",
+        lambda: stage(
+            *tilted(
+                solid("a", box((0.5, 1.0, 1.0)), FLINT, (-0.25, 0.0, 0.0)),
+                solid("b", box((0.5, 1.0, 1.0)), FLINT, (0.25, 0.0, 0.0)),
+            ),
+            lights=[SUN],
+        ),
+        _block,
+        redrawn=True,
+    ),
     Pair("a block in eight parts", lambda: stage(*tilted(*_eighths()), lights=[SUN]), _block, redrawn=True),
     Pair("the same block twice", lambda: _block(solid("again", box(), FLINT)), _block, redrawn=True),
     Pair("a ball of the same glass in a block", lambda: _block(_ball(0.4)), _block, redrawn=True),
-    Pair("a block of n = 1 half over a block", lambda: _seen(solid("air", box(), constant(1.0, "air"), (0.5, 0.0, 0.0), priority=-1)), _seen,
-         redrawn=True, edges=0.03, layer="beauty"),
-    Pair("eight nested shells of one glass", lambda: stage(*tilted(*(_ball(0.1 * k, f"shell {k}", 320) for k in range(8, 0, -1))), lights=[SUN]),
-         lambda: stage(*tilted(_ball(0.8, triangles=320)), lights=[SUN])),
-    Pair("a bubble as a solid of n = 1, and as a cavity", lambda: _block(solid("bubble", box((0.5, 0.5, 0.5)), constant(1.0, "air"), priority=1)),
-         lambda: stage(*tilted(solid("hollow", cavity(box(), box((0.5, 0.5, 0.5))), FLINT)), lights=[SUN])),
-    Pair("water that ends at the wall, and one that is carved out", lambda: _vessel(0.6, 0, True), lambda: _vessel(0.6, 1, False)),
-    Pair("water that reaches into the wall, and one that is carved out", lambda: _vessel(0.8, -1, True), lambda: _vessel(0.6, 1, False)),
+    Pair(
+        "a block of n = 1 half over a block",
+        lambda: _seen(solid("air", box(), constant(1.0, "air"), (0.5, 0.0, 0.0), priority=-1)),
+        _seen,
+        redrawn=True,
+        edges=0.03,
+        layer="beauty",
+    ),
+    Pair(
+        "eight nested shells of one glass",
+        lambda: stage(*tilted(*(_ball(0.1 * k, f"shell {k}", 320) for k in range(8, 0, -1))), lights=[SUN]),
+        lambda: stage(*tilted(_ball(0.8, triangles=320)), lights=[SUN]),
+    ),
+    Pair(
+        "a bubble as a solid of n = 1, and as a cavity",
+        lambda: _block(solid("bubble", box((0.5, 0.5, 0.5)), constant(1.0, "air"), priority=1)),
+        lambda: stage(*tilted(solid("hollow", cavity(box(), box((0.5, 0.5, 0.5))), FLINT)), lights=[SUN]),
+    ),
+    Pair(
+        "water that ends at the wall, and one that is carved out",
+        lambda: _vessel(0.6, 0, True),
+        lambda: _vessel(0.6, 1, False),
+    ),
+    Pair(
+        "water that reaches into the wall, and one that is carved out",
+        lambda: _vessel(0.8, -1, True),
+        lambda: _vessel(0.6, 1, False),
+    ),
     Pair("a cemented doublet of one glass, and a lens", _doublet, _lens, redrawn=True),
     Pair("two prisms that share an edge, and 1e-4 apart", lambda: _prisms(0.0), lambda: _prisms(1e-4)),
-    Pair("a block sunk by 0.1 in the table, and by 0.2", lambda: _standing(0.1), lambda: stage(
-        solid("block", box((1.0, 0.8, 1.0)), FLINT, (0.0, 0.0, 0.3)), lights=[SUN]), redrawn=True),
-)  # fmt: skip
+    Pair(
+        "a block sunk by 0.1 in the table, and by 0.2",
+        lambda: _standing(0.1),
+        lambda: stage(solid("block", box((1.0, 0.8, 1.0)), FLINT, (0.0, 0.0, 0.3)), lights=[SUN]),
+        redrawn=True,
+    ),
+)
 
 CASES: tuple[Case, ...] = (
-    Case("contacts", "Solids that share faces, nest or overlap, against a simpler scene of the same light", "Where faces coincide, rounding decides their order: "
-         "light leaks or sees a face that is not there. The medium stack goes by priority, not by order.", "pair", measure_pairs, len(PAIRS), logarithmic=False),
-    Case("gap", "Two plates with an ever thinner gap, against the sum over reflections", "A ray restarts a little off the surface it left; that must not jump the gap.",
-         "gap, scene units", measure_gaps, len(GAPS)),
-    Case("overlap", "Two plates of different glass that reach into each other ever less", "Entering the second before leaving the first, or at once.",
-         "overlap, scene units", measure_overlaps, len(OVERLAPS)),
-    Case("stack", "Up to 32 plates in contact, against the sum over reflections", "Many coincident faces in a row, many media in one stack.",
-         "plates", measure_stacks, len(STACKS)),
-)  # fmt: skip
+    Case(
+        "contacts",
+        "Solids that share faces, nest or overlap, against a simpler scene of the same light",
+        "Where faces coincide, rounding decides their order: "
+        "light leaks or sees a face that is not there. The medium stack goes by priority, not by order.",
+        "pair",
+        measure_pairs,
+        len(PAIRS),
+        logarithmic=False,
+    ),
+    Case(
+        "gap",
+        "Two plates with an ever thinner gap, against the sum over reflections",
+        "A ray restarts a little off the surface it left; that must not jump the gap.",
+        "gap, scene units",
+        measure_gaps,
+        len(GAPS),
+    ),
+    Case(
+        "overlap",
+        "Two plates of different glass that reach into each other ever less",
+        "Entering the second before leaving the first, or at once.",
+        "overlap, scene units",
+        measure_overlaps,
+        len(OVERLAPS),
+    ),
+    Case(
+        "stack",
+        "Up to 32 plates in contact, against the sum over reflections",
+        "Many coincident faces in a row, many media in one stack.",
+        "plates",
+        measure_stacks,
+        len(STACKS),
+    ),
+)

@@ -1,4 +1,5 @@
-"""Lights and cameras in places where geometry degenerates: on a face, along a face, in glass, far away, faint and fierce.
+"""Lights and cameras in places where geometry degenerates: on a face, along a face, in glass, far away, faint and
+fierce.
 
 Each is held to what every rendering promises (finite, closed, counted); where a neighbouring or a limiting
 scene has the same light, also to that.
@@ -85,7 +86,8 @@ def measure_refusals(_: Context) -> Iterator[Measurement]:
 
 
 def measure_powers(context: Context) -> Iterator[Measurement]:
-    """The same picture, so many times brighter. A factor is no power of two, so that it rounds; choices go by shares of power."""
+    """The same picture, so many times brighter. A factor is no power of two, so that it rounds; choices go by shares of
+    power."""
     scene = stage(solid("prism", prism(), FLINT, (0.0, 0.0, 0.9)), lights=[SUN])
     base = probe(context, scene)
     for factor in POWERS:
@@ -100,10 +102,11 @@ def measure_powers(context: Context) -> Iterator[Measurement]:
 
 
 def measure_distances(context: Context) -> Iterator[Measurement]:
-    """A point light ever farther away becomes a sun: what is left of the difference is parallax, and what float32 leaves of a far place.
+    """A point light ever farther away becomes a sun: what is left of the difference is parallax, and what float32
+    leaves of a far place.
 
-    Light from distance D moves a place 4 units from the axis by 4/D, and float32 knows the lamp's place and the direction of a ray to
-    D 2⁻²³; a pixel is 1/20 wide."""
+    Light from distance D moves a place 4 units from the axis by 4/D, and float32 knows the lamp's place and the
+    direction of a ray to D 2⁻²³; a pixel is 1/20 wide."""
     base = probe(context, _prism_under(SUN), CAUSTIC)
     noise = picture_error(probe(context, _prism_under(SUN), replace(CAUSTIC, seed=2)).picture, base.picture)
     for distance in DISTANCES:
@@ -111,8 +114,15 @@ def measure_distances(context: Context) -> Iterator[Measurement]:
         lamp = Light("lamp", "point", brighter(SUN.spectral_power, distance**2), (x, y, z + 0.9))
         found = probe(context, _prism_under(lamp), CAUSTIC)
         moved, rounded = 4.0 / distance, distance * 2.0**-23
-        held = Held({"picture": picture_error(found.picture, base.picture), "energy": energy_error(found.picture, base.picture)})
-        held.bounds.update({"picture": NOISE * noise + TEXELS + min(20.0 * (moved + rounded), 2.0), "energy": 0.01 + 2.0 * moved + rounded})
+        held = Held(
+            {"picture": picture_error(found.picture, base.picture), "energy": energy_error(found.picture, base.picture)}
+        )
+        held.bounds.update(
+            {
+                "picture": NOISE * noise + TEXELS + min(20.0 * (moved + rounded), 2.0),
+                "energy": 0.01 + 2.0 * moved + rounded,
+            }
+        )
         yield measurement(distance, f"{distance:.0e} units", found, held)
 
 
@@ -127,7 +137,9 @@ def _block(*lights: Light, camera: Camera | None = None, bottom: float = 0.4) ->
     return scene if camera is None else replace(scene, camera=camera)
 
 
-def _beam(position: tuple[float, float, float], direction: tuple[float, float, float] = (0.0, 0.0, -1.0), radius: float = 0.3) -> Light:
+def _beam(
+    position: tuple[float, float, float], direction: tuple[float, float, float] = (0.0, 0.0, -1.0), radius: float = 0.3
+) -> Light:
     return replace(BEAM, position=position, direction=direction, radius=radius)
 
 
@@ -166,10 +178,18 @@ PLACES = (
     Place("a table of a thousandth of the glass", _tiny_table),
     Place("the camera in the glass", lambda: _block(camera=Camera((0.1, 0.0, 0.7), (3.0, 0.0, 0.2)))),
     Place("the camera on a face", lambda: _block(camera=Camera((0.0, 0.0, TOP), (0.0, 0.5, 0.0)))),
-    Place("the camera on the table, looking along it", lambda: _block(camera=Camera((-3.0, 0.0, 0.0), (0.0, 0.0, 0.0)))),
+    Place(
+        "the camera on the table, looking along it", lambda: _block(camera=Camera((-3.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    ),
     Place("the camera looking straight down", lambda: _block(camera=Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0)))),
-    Place("a field of view of 179.9°", lambda: _block(camera=Camera((0.0, -3.0, 2.0), (0.0, 0.0, 0.5), vertical_fov_deg=179.9))),
-    Place("a field of view of 1e-3°", lambda: _block(camera=Camera((0.0, -3.0, 2.0), (0.0, 0.0, 0.5), vertical_fov_deg=1e-3))),
+    Place(
+        "a field of view of 179.9°",
+        lambda: _block(camera=Camera((0.0, -3.0, 2.0), (0.0, 0.0, 0.5), vertical_fov_deg=179.9)),
+    ),
+    Place(
+        "a field of view of 1e-3°",
+        lambda: _block(camera=Camera((0.0, -3.0, 2.0), (0.0, 0.0, 0.5), vertical_fov_deg=1e-3)),
+    ),
 )
 
 REFUSED: tuple[tuple[str, Callable[[], Scene]], ...] = (
@@ -180,12 +200,38 @@ REFUSED: tuple[tuple[str, Callable[[], Scene]], ...] = (
 )
 
 CASES: tuple[Case, ...] = (
-    Case("places", "Lights and cameras on faces, along faces, on corners, in glass", "Rays start at distance zero from a face, or run in its plane.",
-         "place", measure_places, len(PLACES), logarithmic=False),
-    Case("refusals", "Scenes that cannot be right", "A light in glass has no defined medium: better refused than drawn wrong.", "scene", measure_refusals,
-         len(REFUSED), logarithmic=False),
-    Case("power", "Light of any strength", "Weights, sums and colours must neither vanish nor overflow, nor thresholds know the unit.", "factor on the power",
-         measure_powers, len(POWERS)),
-    Case("distance", "A point light ever farther away, against the sun", "Float32 positions of far lights carry no digits of the glass; rays are met from nearby.",
-         "distance, scene units", measure_distances, len(DISTANCES)),
-)  # fmt: skip
+    Case(
+        "places",
+        "Lights and cameras on faces, along faces, on corners, in glass",
+        "Rays start at distance zero from a face, or run in its plane.",
+        "place",
+        measure_places,
+        len(PLACES),
+        logarithmic=False,
+    ),
+    Case(
+        "refusals",
+        "Scenes that cannot be right",
+        "A light in glass has no defined medium: better refused than drawn wrong.",
+        "scene",
+        measure_refusals,
+        len(REFUSED),
+        logarithmic=False,
+    ),
+    Case(
+        "power",
+        "Light of any strength",
+        "Weights, sums and colours must neither vanish nor overflow, nor thresholds know the unit.",
+        "factor on the power",
+        measure_powers,
+        len(POWERS),
+    ),
+    Case(
+        "distance",
+        "A point light ever farther away, against the sun",
+        "Float32 positions of far lights carry no digits of the glass; rays are met from nearby.",
+        "distance, scene units",
+        measure_distances,
+        len(DISTANCES),
+    ),
+)

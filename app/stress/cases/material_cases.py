@@ -1,4 +1,5 @@
-"""Refractive indices at the edge of what there is: a gas, germanium, dispersion without bound, and the gem of the literature."""
+"""Refractive indices at the edge of what there is: a gas, germanium, dispersion without bound, and the gem of the
+literature."""
 
 from __future__ import annotations
 
@@ -59,7 +60,18 @@ def measure_extremes(context: Context) -> Iterator[Measurement]:
     below = screen([0, 0, -1.5], [0, 0, 1], 10.0)
     tilt = np.array([1.0, 0.0, -1.0])
     for severity, label, dispersion in EXTREMES:
-        photons = trace_beam(context, block, Dielectric(dispersion), below, [-2, 0, 2.5], tilt, 0.3, (430.0, 680.0), count=300, max_depth=6)
+        photons = trace_beam(
+            context,
+            block,
+            Dielectric(dispersion),
+            below,
+            [-2, 0, 2.5],
+            tilt,
+            0.3,
+            (430.0, 680.0),
+            count=300,
+            max_depth=6,
+        )
         landed = photons.of_choices(REFRACTED, REFRACTED)
         anchor = landed.nm[:, 1]
         n = dispersion.index(anchor)
@@ -78,12 +90,26 @@ def measure_extremes(context: Context) -> Iterator[Measurement]:
         errors, bounds = judged(
             {
                 "position": (np.abs(landed.position[:, 0] - x), rounding + np.abs(slope) * of_n),
-                "column n": (np.abs(column - slope), 64.0 * EPSILON * (1.0 + np.abs(slope)) + 2.0 * of_cosine2 / n + np.abs(3.0 * slope * n / (n**2 - sine**2)) * of_n),
+                "column n": (
+                    np.abs(column - slope),
+                    64.0 * EPSILON * (1.0 + np.abs(slope))
+                    + 2.0 * of_cosine2 / n
+                    + np.abs(3.0 * slope * n / (n**2 - sine**2)) * of_n,
+                ),
                 "said aloud": (np.array([float(silent)]), 0.0),
                 "impossible indices accepted": (np.array([float(accepted())]), 0.0),
             }
         )
-        yield Measurement(severity, label, not_finite_in(photons.records), errors, bounds, photons.tally.imbalance, dict(photons.tally.fallbacks), note=f"{len(x)} photons")
+        yield Measurement(
+            severity,
+            label,
+            not_finite_in(photons.records),
+            errors,
+            bounds,
+            photons.tally.imbalance,
+            dict(photons.tally.fallbacks),
+            note=f"{len(x)} photons",
+        )
 
 
 def table_error(photons: Photons, dispersion: Dispersion) -> float:
@@ -118,7 +144,18 @@ def wedge_photons(context: Context, band_nm: tuple[float, float]) -> Photons:
     """Straight through the first face of a wedge, so that the second is met at the apex angle by every wavelength."""
     section = np.array([[0.0, -1.0], [2.0 * np.tan(APEX), -1.0], [0.0, 1.0]])
     wall = screen([4.0, 0, 0], [1, 0, 0], 40.0)
-    return trace_beam(context, extruded("wedge", section), Dielectric(GEM), wall, [-1.0, -0.2, 0.0], [1.0, 0.0, 0.0], 0.1, band_nm, count=200, max_depth=4)
+    return trace_beam(
+        context,
+        extruded("wedge", section),
+        Dielectric(GEM),
+        wall,
+        [-1.0, -0.2, 0.0],
+        [1.0, 0.0, 0.0],
+        0.1,
+        band_nm,
+        count=200,
+        max_depth=4,
+    )
 
 
 def wedge_landing(start: np.ndarray, n: np.ndarray) -> np.ndarray:
@@ -148,13 +185,22 @@ def measure_gem_bands(context: Context) -> Iterator[Measurement]:
             {
                 "anchor": (np.abs(landed.position[:, 1] - exact[:, 1]), rounding[:, 1]),
                 # The curvature between the samples may be a little more than at them.
-                "band ends": (np.abs(linear - exact[:, [0, 2]]).ravel(), (0.505 * curvature[:, None] * step**2 + rounding[:, [0, 2]]).ravel()),
+                "band ends": (
+                    np.abs(linear - exact[:, [0, 2]]).ravel(),
+                    (0.505 * curvature[:, None] * step**2 + rounding[:, [0, 2]]).ravel(),
+                ),
             }
         )
         yield Measurement(
-            width, f"{width:g} nm", not_finite_in(photons.records), errors, bounds, photons.tally.imbalance, dict(photons.tally.fallbacks),
+            width,
+            f"{width:g} nm",
+            not_finite_in(photons.records),
+            errors,
+            bounds,
+            photons.tally.imbalance,
+            dict(photons.tally.fallbacks),
             note=f"n {n[0, 0]:.3f} to {n[0, 2]:.3f} in one band",
-        )  # fmt: skip
+        )
 
 
 def measure_gem_cut(context: Context) -> Iterator[Measurement]:
@@ -162,30 +208,44 @@ def measure_gem_cut(context: Context) -> Iterator[Measurement]:
     gem = placed("gem", brilliant(2.0), Dielectric(GEM))
     above = placed("screen", screen([0, 0, 2.0], [0, 0, 1], 20.0), Diffuse())
     for width in (10.0, 50.0, 200.0, 380.0):
-        critical_nm = float(np.interp(-CRITICAL_N, -GEM.index(np.arange(380.0, 780.1, 0.01)), np.arange(380.0, 780.1, 0.01)))
+        critical_nm = float(
+            np.interp(-CRITICAL_N, -GEM.index(np.arange(380.0, 780.1, 0.01)), np.arange(380.0, 780.1, 0.01))
+        )
         band = max(390.0, critical_nm - 0.5 * width), min(770.0, critical_nm + 0.5 * width)
         photons = wedge_photons(context, band)
         # In through the one face; what the other lets out begins where reflection stops being total.
         let_out = photons.where((photons.records["depth"] == 2) & (photons.nm[:, 2] > band[1] - 1e-2))
         cut_n = GEM.index(let_out.nm[:, 0])
-        # c² = 1 − n² s² vanishes there: dn = dc²/(2 n s²), to which bisection in 22 steps, x's 24 bits and the table add theirs.
+        # c² = 1 − n² s² vanishes there: dn = dc²/(2 n s²), to which bisection in 22 steps, x's 24 bits and the table
+        # add theirs.
         of_cosine2 = EPSILON * (3.0 * (CRITICAL_N**2 - 1.0) + 5.0 * CRITICAL_N * np.sqrt(CRITICAL_N**2 - 1.0))
         allowed = 0.5 * of_cosine2 * CRITICAL_N + 4.0 * EPSILON * CRITICAL_N
-        whole = trace_light(context, (gem, above), beam_light(tuple(-1.2 * direction), tuple(direction), 0.6), [band], 60, 30)
+        whole = trace_light(
+            context, (gem, above), beam_light(tuple(-1.2 * direction), tuple(direction), 0.6), [band], 60, 30
+        )
         below = photons.where((photons.records["depth"] == 2) & (photons.nm[:, 2] < critical_nm - 0.5))
         errors, bounds = judged(
             {
                 "index at the cut": (np.abs(cut_n - CRITICAL_N), allowed),
                 "photons let out that reflect totally": (np.ones(len(below.records)), 0.0),
-                "cuts not counted": (np.array([float(photons.tally.fallbacks["band_cut"] < len(let_out.records))]), 0.0),
+                "cuts not counted": (
+                    np.array([float(photons.tally.fallbacks["band_cut"] < len(let_out.records))]),
+                    0.0,
+                ),
                 "flux out of balance, in a brilliant": (np.array([whole.tally.imbalance]), 1e-4),
             }
         )
         bad = not_finite_in(photons.records) + not_finite_in(whole.records)
         yield Measurement(
-            width, f"{band[0]:.0f} to {band[1]:.0f} nm", bad, errors, bounds, photons.tally.imbalance,
-            {name: count + whole.tally.fallbacks[name] for name, count in photons.tally.fallbacks.items()}, note=f"{len(cut_n)} cut bands, {len(whole.records)} landings in the brilliant",
-        )  # fmt: skip
+            width,
+            f"{band[0]:.0f} to {band[1]:.0f} nm",
+            bad,
+            errors,
+            bounds,
+            photons.tally.imbalance,
+            {name: count + whole.tally.fallbacks[name] for name, count in photons.tally.fallbacks.items()},
+            note=f"{len(cut_n)} cut bands, {len(whole.records)} landings in the brilliant",
+        )
 
 
 CASES = (

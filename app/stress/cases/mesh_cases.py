@@ -1,4 +1,5 @@
-"""Bad triangles: slivers and needles, triangles without area, normals that are zero, long or short. No light may leak."""
+"""Bad triangles: slivers and needles, triangles without area, normals that are zero, long or short. No light may
+leak."""
 
 from __future__ import annotations
 
@@ -36,20 +37,32 @@ def ball(triangles: int = 320) -> Mesh:
 
 
 def with_slivers(mesh: Mesh, height: float) -> Mesh:
-    """Each triangle in three: one a sliver whose apex stands `height` (a share of the triangle's) over the middle of an edge."""
+    """Each triangle in three: one a sliver whose apex stands `height` (a share of the triangle's) over the middle of an
+    edge."""
     a, b, c = np.moveaxis(mesh.corners(), 1, 0)
     middle = 0.5 * (a + b)
     apex = middle + height * (c - middle)
     first, count = len(mesh.vertices), len(mesh.triangles)
     p, t = first + np.arange(count), mesh.triangles
-    split = [np.column_stack([t[:, 0], t[:, 1], p]), np.column_stack([t[:, 1], t[:, 2], p]), np.column_stack([t[:, 2], t[:, 0], p])]
+    split = [
+        np.column_stack([t[:, 0], t[:, 1], p]),
+        np.column_stack([t[:, 1], t[:, 2], p]),
+        np.column_stack([t[:, 2], t[:, 0], p]),
+    ]
     return make_mesh("slivers", np.concatenate([mesh.vertices, apex]), np.concatenate(split))
 
 
 def through_ball(context: Context, mesh: Mesh, count: int = 1500) -> Photons:
     direction = np.array([1.0, 0.11, -0.23])
     wall = placed("wall", screen([1.6, 0, 0], [1, 0, 0], 6.0), Diffuse())
-    return trace_light(context, (placed("ball", mesh, glass("N-BK7")), wall), beam_light(tuple(-2.0 * direction), tuple(direction), 0.9), [(D_NM, D_NM)], count, 6)
+    return trace_light(
+        context,
+        (placed("ball", mesh, glass("N-BK7")), wall),
+        beam_light(tuple(-2.0 * direction), tuple(direction), 0.9),
+        [(D_NM, D_NM)],
+        count,
+        6,
+    )
 
 
 def dropped(photons: Photons) -> int:
@@ -80,25 +93,42 @@ def measure_slivers(context: Context) -> Iterator[Measurement]:
         photons = through_ball(context, mended)
         a, b = shared(plain, photons)
         apart = length(a.position - b.position)
-        # A sliver of height h tilts by u/h when its apex is rounded, and refraction twice bends light by less than that; but light meets it
-        # with the chance 2h/edge. On the mean over all light that leaves a few roundings over the edge, from each face.
+        # A sliver of height h tilts by u/h when its apex is rounded, and refraction twice bends light by less than
+        # that; but light meets it with the chance 2h/edge. On the mean over all light that leaves a few roundings over
+        # the edge, from each face.
         mean = np.array([np.average(apart, weights=a.weight)])
         errors, bounds = judged(
             {
                 "light leaked": (leak(photons), 0.0),
                 "light displaced, mean": (mean, 16.0 * EPSILON / edge * 2.6),
-                "light on other ways": (np.array([abs(len(a.records) - len(plain.of_choices(REFRACTED, REFRACTED).records)) / len(plain.records)]), 2e-3),
-                "faults not said": (np.array([float(bool(examine(cut).degenerate_triangles) and not _said(cut, notes))]), 0.0),
+                "light on other ways": (
+                    np.array(
+                        [abs(len(a.records) - len(plain.of_choices(REFRACTED, REFRACTED).records)) / len(plain.records)]
+                    ),
+                    2e-3,
+                ),
+                "faults not said": (
+                    np.array([float(bool(examine(cut).degenerate_triangles) and not _said(cut, notes))]),
+                    0.0,
+                ),
             }
         )
         yield Measurement(
-            min(aspect, 1e8), f"{aspect:g} : 1" if np.isfinite(aspect) else "no area", not_finite_in(photons.records), errors, bounds,
-            photons.tally.imbalance, dict(photons.tally.fallbacks), dropped(photons), examine(mended).summary(),
-        )  # fmt: skip
+            min(aspect, 1e8),
+            f"{aspect:g} : 1" if np.isfinite(aspect) else "no area",
+            not_finite_in(photons.records),
+            errors,
+            bounds,
+            photons.tally.imbalance,
+            dict(photons.tally.fallbacks),
+            dropped(photons),
+            examine(mended).summary(),
+        )
 
 
 def _said(mesh: Mesh, notes: tuple[str, ...]) -> bool:
-    """Whether triangles without area are told of: dropped with a note, or kept as a closed mesh's stitches and told by `inspect`."""
+    """Whether triangles without area are told of: dropped with a note, or kept as a closed mesh's stitches and told by
+    `inspect`."""
     return any("degenerate" in note for note in notes) or "degenerate" in examine(mesh).summary()
 
 
@@ -113,21 +143,47 @@ def measure_needles(context: Context) -> Iterator[Measurement]:
         width = 2.0 * np.pi / 3.0 / segments
         floor = screen([0, 0, 0], [0, 0, 1], 3.0).transformed(turn)
         photons = trace_beam(
-            context, hollow_mirror(segments).transformed(turn), Mirror(), floor, turn[:3, :3] @ start, turn[:3, :3] @ direction, BEAM_RADIUS, D_NM, count=800, max_depth=1
+            context,
+            hollow_mirror(segments).transformed(turn),
+            Mirror(),
+            floor,
+            turn[:3, :3] @ start,
+            turn[:3, :3] @ direction,
+            BEAM_RADIUS,
+            D_NM,
+            count=800,
+            max_depth=1,
         )
         landed = photons.of_choices(MIRRORED)
-        missed = length((landed.position @ turn[:3, :3])[:, :2] - mirrored_landing(landed.start @ turn[:3, :3], direction))
+        missed = length(
+            (landed.position @ turn[:3, :3])[:, :2] - mirrored_landing(landed.start @ turn[:3, :3], direction)
+        )
         errors, bounds = judged(
             {
                 # As in the cusp; what a needle's normal and place lose must not show.
                 "landing": (missed, width**2 / 4.0 + 24.0 * EPSILON),
-                "light that slipped through": (np.array([(photons.tally.ended["direct"] + photons.tally.ended["escaped"]) / photons.tally.emitted]), 0.0),
+                "light that slipped through": (
+                    np.array(
+                        [(photons.tally.ended["direct"] + photons.tally.ended["escaped"]) / photons.tally.emitted]
+                    ),
+                    0.0,
+                ),
             }
         )
         # Boxes of slanting needles all overlap, and llvmpipe stops a ray's walk after 65,535 rounds: lost, and said so.
         given_up = photons.tally.ended["lost_numeric"] / photons.tally.emitted
         note = f"{given_up:.0%} of the light given up by the software renderer" if given_up else ""
-        yield Measurement(2.3 / width, f"{2.3 / width:.0f} : 1", not_finite_in(photons.records), errors, bounds, photons.tally.imbalance, dict(photons.tally.fallbacks), dropped(photons), note)
+        yield Measurement(
+            2.3 / width,
+            f"{2.3 / width:.0f} : 1",
+            not_finite_in(photons.records),
+            errors,
+            bounds,
+            photons.tally.imbalance,
+            dict(photons.tally.fallbacks),
+            dropped(photons),
+            note,
+        )
 
 
 def measure_normals(context: Context) -> Iterator[Measurement]:
@@ -156,7 +212,15 @@ def measure_normals(context: Context) -> Iterator[Measurement]:
         rows["faults not said"] = (np.array([float(silent)]), 0.0)
         errors, bounds = judged(rows)
         yield Measurement(
-            float(number), label, not_finite_in(photons.records), errors, bounds, photons.tally.imbalance, dict(photons.tally.fallbacks), dropped(photons), "; ".join(notes)
+            float(number),
+            label,
+            not_finite_in(photons.records),
+            errors,
+            bounds,
+            photons.tally.imbalance,
+            dict(photons.tally.fallbacks),
+            dropped(photons),
+            "; ".join(notes),
         )
 
 

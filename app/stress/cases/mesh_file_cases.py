@@ -43,11 +43,13 @@ class Fault:
     """On a smooth ball instead of a block."""
     mendable: bool = True
     flattened: float = 0.0
-    """Added to the bound on the picture: facets whose lost normals become the face's no longer bend light as the ball does."""
+    """Added to the bound on the picture: facets whose lost normals become the face's no longer bend light as the ball
+    does."""
 
 
 def measure_faults(context: Context) -> Iterator[Measurement]:
-    """Each fault, through an OBJ file. A hole lets rays in and out that no medium can follow: what is lost there only has to be told."""
+    """Each fault, through an OBJ file. A hole lets rays in and out that no medium can follow: what is lost there only
+    has to be told."""
     clean = {}
     for smooth in (False, True):
         scene = stage(*tilted(solid("solid", sound_solid(smooth), FLINT)), lights=[SUN])
@@ -57,9 +59,18 @@ def measure_faults(context: Context) -> Iterator[Measurement]:
         mesh, notes = through_file(fault.spoil(sound_solid(fault.smooth)), fault.smooth)
         found = probe(context, stage(*tilted(solid("solid", mesh, FLINT)), lights=[SUN]), CAUSTIC)
         base, noise = clean[fault.smooth]
-        errors = {"picture": picture_error(found.picture, base.picture), "energy": energy_error(found.picture, base.picture)}
+        errors = {
+            "picture": picture_error(found.picture, base.picture),
+            "energy": energy_error(found.picture, base.picture),
+        }
         bounds = {"picture": NOISE * noise + TEXELS + fault.flattened, "energy": 0.01} if fault.mendable else {}
-        yield measurement(number, fault.label, found, Held(errors, bounds, "; ".join(notes)), LOST_TO_NUMERICS if fault.mendable else 1.0)
+        yield measurement(
+            number,
+            fault.label,
+            found,
+            Held(errors, bounds, "; ".join(notes)),
+            LOST_TO_NUMERICS if fault.mendable else 1.0,
+        )
 
 
 def through_file(mesh: Mesh, normals: bool) -> tuple[Mesh, list[str]]:
@@ -78,7 +89,9 @@ def _obj(mesh: Mesh, normals: bool) -> str:
     if not normals or mesh.corner_normals is None:
         return "\n".join(lines + ["f {} {} {}".format(*(t + 1)) for t in mesh.triangles]) + "\n"
     lines += ["vn " + " ".join(f"{c:.9g}" for c in normal) for normal in mesh.corner_normals.reshape(-1, 3)]
-    lines += ["f " + " ".join(f"{v + 1}//{3 * i + k + 1}" for k, v in enumerate(t)) for i, t in enumerate(mesh.triangles)]
+    lines += [
+        "f " + " ".join(f"{v + 1}//{3 * i + k + 1}" for k, v in enumerate(t)) for i, t in enumerate(mesh.triangles)
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -99,11 +112,17 @@ def _with_slivers(mesh: Mesh) -> Mesh:
 def _with_flat_triangles(mesh: Mesh) -> Mesh:
     """Triangles without area along existing edges, and of one point."""
     t = mesh.triangles
-    return make_mesh(mesh.name, mesh.vertices, np.concatenate([t, np.stack([t[:, 0], t[:, 1], t[:, 1]], axis=1), np.repeat(t[:, :1], 3, axis=1)]))
+    return make_mesh(
+        mesh.name,
+        mesh.vertices,
+        np.concatenate([t, np.stack([t[:, 0], t[:, 1], t[:, 1]], axis=1), np.repeat(t[:, :1], 3, axis=1)]),
+    )
 
 
 def _unwelded(mesh: Mesh) -> Mesh:
-    return make_mesh(mesh.name, mesh.corners().reshape(-1, 3), np.arange(len(mesh.triangles) * 3).reshape(-1, 3), mesh.corner_normals)
+    return make_mesh(
+        mesh.name, mesh.corners().reshape(-1, 3), np.arange(len(mesh.triangles) * 3).reshape(-1, 3), mesh.corner_normals
+    )
 
 
 def _with_normals(mesh: Mesh, change: Callable[[np.ndarray], np.ndarray]) -> Mesh:
@@ -121,7 +140,9 @@ def _stretched(normals: np.ndarray) -> np.ndarray:
 
 
 def _without_first(mesh: Mesh) -> Mesh:
-    return make_mesh(mesh.name, mesh.vertices, mesh.triangles[1:], None if mesh.corner_normals is None else mesh.corner_normals[1:])
+    return make_mesh(
+        mesh.name, mesh.vertices, mesh.triangles[1:], None if mesh.corner_normals is None else mesh.corner_normals[1:]
+    )
 
 
 def _doubled(mesh: Mesh) -> Mesh:
@@ -144,6 +165,13 @@ FAULTS = (
 )
 
 CASES: tuple[Case, ...] = (
-    Case("mesh-files", "Mesh files with slivers, zero normals, doubled vertices and holes, against the sound solid", "Normals of nothing are NaN; "
-         "slivers leak; holes confuse inside and outside.", "fault", measure_faults, len(FAULTS), logarithmic=False),
-)  # fmt: skip
+    Case(
+        "mesh-files",
+        "Mesh files with slivers, zero normals, doubled vertices and holes, against the sound solid",
+        "Normals of nothing are NaN; slivers leak; holes confuse inside and outside.",
+        "fault",
+        measure_faults,
+        len(FAULTS),
+        logarithmic=False,
+    ),
+)

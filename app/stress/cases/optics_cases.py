@@ -38,16 +38,31 @@ REFRACT = """
         by_s = refract_column(d, dd, n, dn, theta, eta, omega, 0.0);
     }
 """
-OUTPUTS = {"cosine2": "float", "reflectance": "float", "reflected": "vec3", "refracted": "vec3", "by_n": "vec3", "by_s": "vec3"}
+OUTPUTS = {
+    "cosine2": "float",
+    "reflectance": "float",
+    "reflected": "vec3",
+    "refracted": "vec3",
+    "by_n": "vec3",
+    "by_s": "vec3",
+}
 ROWS = 600
 Rows = dict[str, tuple[np.ndarray, np.ndarray | float]]
 """Errors and bounds of many rays by quantity, as `judged` takes them."""
-INDICES = (1.0003, float(index("water", D_NM)), float(index("N-BK7", D_NM)), float(index("N-SF11", D_NM)), float(index("diamond", D_NM)), 4.0)
+INDICES = (
+    1.0003,
+    float(index("water", D_NM)),
+    float(index("N-BK7", D_NM)),
+    float(index("N-SF11", D_NM)),
+    float(index("diamond", D_NM)),
+    4.0,
+)
 """Of the denser medium: from a warm gas to germanium."""
 
 
 def events(cosine: np.ndarray, eta: np.ndarray, seed: int) -> dict[str, np.ndarray]:
-    """Rays meeting surfaces at cosines (N,) in any direction of space, rounded to float32: d, n, their columns, eta and ∂eta/∂n."""
+    """Rays meeting surfaces at cosines (N,) in any direction of space, rounded to float32: d, n, their columns, eta and
+    ∂eta/∂n."""
     rng = np.random.default_rng(seed)
     n = optics.unit(rng.normal(size=(len(cosine), 3)))
     along = optics.unit(np.cross(n, rng.normal(size=(len(cosine), 3))))
@@ -56,7 +71,9 @@ def events(cosine: np.ndarray, eta: np.ndarray, seed: int) -> dict[str, np.ndarr
     dn = optics.normalised_derivative(n, rng.normal(size=(len(cosine), 3)))
     # Entering: the transmitting index varies, -eta/n = -eta²; leaving: the incident one, 1.
     deta = np.where(eta < 1.0, -(eta**2), 1.0)
-    return {name: as_f32(value) for name, value in {"d": d, "n": n, "dd": dd, "dn": dn, "eta": eta, "deta": deta}.items()}
+    return {
+        name: as_f32(value) for name, value in {"d": d, "n": n, "dd": dd, "dn": dn, "eta": eta, "deta": deta}.items()
+    }
 
 
 def refraction_errors(e: dict[str, np.ndarray], got: dict[str, np.ndarray]) -> Rows:
@@ -74,7 +91,8 @@ def refraction_errors(e: dict[str, np.ndarray], got: dict[str, np.ndarray]) -> R
     # mu = (1-eta²) / (omega - eta theta): a quotient's relative error is that of its parts.
     of_mu = np.abs(mu) * ((of_omega + 1.5 * EPSILON * eta) / (omega - eta * theta) + 4.0 * EPSILON)
     direction = times(eta, e["d"]) - times(mu, e["n"])
-    # |∂rs/∂omega| = 2 eta c/(eta c + omega)² and |∂rp/∂omega| = 2 eta c/(c + eta omega)², largest at the least omega there may be.
+    # |∂rs/∂omega| = 2 eta c/(eta c + omega)² and |∂rp/∂omega| = 2 eta c/(c + eta omega)², largest at the least omega
+    # there may be.
     c, least = -theta, np.sqrt(np.maximum(cosine2 - of_cosine2, 0.0))
     slope = 2.0 * eta * c / (eta * c + least) ** 2 + 2.0 * eta * c / (c + eta * least) ** 2
     slope_c = 2.0 * eta * omega / (eta * c + omega) ** 2 + 2.0 * eta * omega / (c + eta * omega) ** 2
@@ -84,13 +102,18 @@ def refraction_errors(e: dict[str, np.ndarray], got: dict[str, np.ndarray]) -> R
     return {
         "direction": (length(got["refracted"] - direction), of_mu + EPSILON * (2.0 * eta + 2.0 * np.abs(mu))),
         "Fresnel R, absolute": (np.abs(got["reflectance"] - fresnel_from(c, eta, omega)), of_reflectance),
-        "length of d'": (np.abs(length(got["refracted"]) - 1.0), np.minimum(of_mu, np.sqrt(of_cosine2)) + 8.0 * EPSILON * np.maximum(eta, 1.0)),
+        "length of d'": (
+            np.abs(length(got["refracted"]) - 1.0),
+            np.minimum(of_mu, np.sqrt(of_cosine2)) + 8.0 * EPSILON * np.maximum(eta, 1.0),
+        ),
         "column n": _chosen(known, *_column_n(e, got["by_n"], omega, of_cosine2 / cosine2)),
         "column s": _chosen(known, *_column_s(e, got["by_s"], omega, of_cosine2 / cosine2, of_mu)),
     }
 
 
-def _column_n(e: dict[str, np.ndarray], got: np.ndarray, omega: np.ndarray, relative: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _column_n(
+    e: dict[str, np.ndarray], got: np.ndarray, omega: np.ndarray, relative: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Both terms lose the relative error of 1/omega; d - theta n and (1-theta)(1+theta) cancel at normal incidence."""
     eta, theta, zero = e["eta"], dot(e["d"], e["n"]), np.zeros_like(e["d"])
     want = optics.refract_column_stable(e["d"], zero, e["n"], zero, eta, e["deta"])
@@ -100,7 +123,9 @@ def _column_n(e: dict[str, np.ndarray], got: np.ndarray, omega: np.ndarray, rela
     return length(got - want) / scale, bound / scale
 
 
-def _column_s(e: dict[str, np.ndarray], got: np.ndarray, omega: np.ndarray, relative: np.ndarray, of_mu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _column_s(
+    e: dict[str, np.ndarray], got: np.ndarray, omega: np.ndarray, relative: np.ndarray, of_mu: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """omega is twice in eta mu/omega, by mu too; the other terms lose a few roundings of their size."""
     eta, theta = e["eta"], dot(e["d"], e["n"])
     want = optics.refract_column_stable(e["d"], e["dd"], e["n"], e["dn"], eta, np.zeros_like(eta))
@@ -122,7 +147,8 @@ def refraction_mu(theta: np.ndarray, eta: np.ndarray, omega: np.ndarray) -> np.n
 
 
 def exact_cosine2(e: dict[str, np.ndarray]) -> np.ndarray:
-    """cos² of the transmitted angle in float64, of d and n as they are: after rounding they are not quite unit vectors."""
+    """cos² of the transmitted angle in float64, of d and n as they are: after rounding they are not quite unit
+    vectors."""
     return (1.0 - e["eta"]) * (1.0 + e["eta"]) + (e["eta"] * dot(e["d"], e["n"])) ** 2
 
 
@@ -174,12 +200,26 @@ def measure_grazing(context: Context) -> Iterator[Measurement]:
         rng = np.random.default_rng(3)
         q = {"dp": as_f32(rng.normal(size=e["d"].shape)), "t": as_f32(rng.uniform(0.0, 3.0, len(n)))}
         body = "moved = transfer_column(dp, dd, d, n, t);"
-        moved = glsl_function.evaluate(context.ctx, OPTICS, body, {**q, "dd": e["dd"], "d": e["d"], "n": e["n"]}, {"moved": "vec3"})["moved"]
+        moved = glsl_function.evaluate(
+            context.ctx, OPTICS, body, {**q, "dd": e["dd"], "d": e["d"], "n": e["n"]}, {"moved": "vec3"}
+        )["moved"]
         want = optics.transfer_column(q["dp"], e["dd"], e["d"], e["n"], q["t"])
         # (q·N)/(d·N) d: the quotient loses the 1.5 u of d·N over cos, its numerator 2 u over cos.
         cosine = np.abs(dot(e["d"], e["n"]))
         size = length(q["dp"]) + q["t"] * length(e["dd"])
-        bound = EPSILON * size * (np.abs(dot(q["dp"] + times(q["t"], e["dd"]), e["n"])) / size * 1.5 / cosine**2 / (1.0 - 1.5 * EPSILON / cosine) + 4.0 / cosine + 2.0)
+        bound = (
+            EPSILON
+            * size
+            * (
+                np.abs(dot(q["dp"] + times(q["t"], e["dd"]), e["n"]))
+                / size
+                * 1.5
+                / cosine**2
+                / (1.0 - 1.5 * EPSILON / cosine)
+                + 4.0 / cosine
+                + 2.0
+            )
+        )
         scale = np.maximum(length(want), 1.0)
         rows["column on a receiver"] = (length(moved - want) / scale, bound / scale)
         errors, bounds = judged(rows)
@@ -203,7 +243,10 @@ def measure_index_matched(context: Context) -> Iterator[Measurement]:
             omega = np.sqrt((1.0 - e["eta"]) * (1.0 + e["eta"]) + (e["eta"] * theta) ** 2)
             rows["bend mu, relative"] = (np.abs(mu / refraction_mu(theta, e["eta"], omega) - 1.0), 6.0 * EPSILON)
         else:
-            rows["change of the ray"] = (np.maximum(length(got["refracted"] - e["d"]), length(got["by_s"] - e["dd"])), 0.0)
+            rows["change of the ray"] = (
+                np.maximum(length(got["refracted"] - e["d"]), length(got["by_s"] - e["dd"])),
+                0.0,
+            )
         errors, bounds = judged(rows)
         label = f"1 ± {difference:g}" if difference else "1 exactly"
         yield Measurement(difference or 1e-8, label, not_finite(got.values()), errors, bounds)

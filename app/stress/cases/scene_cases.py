@@ -1,4 +1,5 @@
-"""Whole scenes: every shipped one, gems of impossible glass, and the sweep over scenes; gathers all whole-scene cases."""
+"""Whole scenes: every shipped one, gems of impossible glass, and the sweep over scenes; gathers all whole-scene
+cases."""
 
 from __future__ import annotations
 
@@ -21,12 +22,14 @@ from . import contact_cases, light_cases, mesh_file_cases
 from .sweep_cases import against_single_wavelengths, scene_sweep
 
 LEFT_IN_MAPS = {"lens_text": 0.05, "water": 0.05, "wine_glass": 0.03}
-"""Where light falls over a receiver's whole width, or on curved ones, footprints reach over edges: that share is lost and told."""
+"""Where light falls over a receiver's whole width, or on curved ones, footprints reach over edges: that share is lost
+and told."""
 MAP = 0.01
-"""What a map may lack or have too much elsewhere: splats are cut off at four standard deviations and at windows' borders."""
+"""What a map may lack or have too much elsewhere: splats are cut off at four standard deviations and at windows'
+borders."""
 DROPPED = 0.01
-"""Largest share of the deposited power splatted as one texel for want of a usable footprint: columns of light that is trapped
-between curved faces (`ripples`, about 18 events) grow exponentially."""
+"""Largest share of the deposited power splatted as one texel for want of a usable footprint: columns of light that is
+trapped between curved faces (`ripples`, about 18 events) grow exponentially."""
 FULL_SWEEP = "prism"
 """The scene whose sweep runs whole without being asked for."""
 ALSO = {"achromat": ("scale", "rotation"), "brilliant": ("depth",)}
@@ -35,7 +38,8 @@ ALSO = {"achromat": ("scale", "rotation"), "brilliant": ("depth",)}
 
 STEP = "a step from 1.7 to 1.5 within 1 nm"
 ONE_BAND = 1.0 / MAX_BANDS
-"""A band's light is swept evenly along its chord: a step of the index within it is smeared, at most that band's share of the light."""
+"""A band's light is swept evenly along its chord: a step of the index within it is smeared, at most that band's share
+of the light."""
 
 
 def gems() -> list[tuple[str, Dispersion]]:
@@ -59,7 +63,9 @@ def measure_gems(context: Context) -> Iterator[Measurement]:
             solid("diamond", brilliant(0.9), glass, (1.6, 0.0, 0.8)),
             solid("cube", box((0.5, 0.5, 0.5)), glass, (0.0, 1.2, 0.6)),
         )
-        yield against_single_wavelengths(context, stage(*stones, lights=[SUN]), number, label, ONE_BAND if label == STEP else 0.0)
+        yield against_single_wavelengths(
+            context, stage(*stones, lights=[SUN]), number, label, ONE_BAND if label == STEP else 0.0
+        )
 
 
 def measure_shipped(context: Context) -> Iterator[Measurement]:
@@ -67,7 +73,10 @@ def measure_shipped(context: Context) -> Iterator[Measurement]:
     for number, name in enumerate(shipped_names(), 1):
         found = probe(context, shipped(name))
         dropped = found.stats.dropped_w / max(found.stats.tally.ended["deposited"], 1e-300)
-        held = Held({"map": found.map_error, "footprints dropped": dropped}, {"map": LEFT_IN_MAPS.get(name, MAP), "footprints dropped": DROPPED})
+        held = Held(
+            {"map": found.map_error, "footprints dropped": dropped},
+            {"map": LEFT_IN_MAPS.get(name, MAP), "footprints dropped": DROPPED},
+        )
         yield measurement(number, name, found, held)
 
 
@@ -100,7 +109,22 @@ CASES: tuple[Case, ...] = (
     *contact_cases.CASES,
     *light_cases.CASES,
     *mesh_file_cases.CASES,
-    Case("gems", "A prism, a ball, a diamond and a cube of glass that no maker sells, against one-wavelength photons",
-         "A splat sweeps over half the table, total reflection cuts bands at every face, dn/dλ changes its sign.", "glass", measure_gems, len(gems()), logarithmic=False),
-    Case("shipped", "Every shipped scene with few photons", "What works in a test scene must work in a real one.", "scene", measure_shipped, len(shipped_names()), logarithmic=False),
-)  # fmt: skip
+    Case(
+        "gems",
+        "A prism, a ball, a diamond and a cube of glass that no maker sells, against one-wavelength photons",
+        "A splat sweeps over half the table, total reflection cuts bands at every face, dn/dλ changes its sign.",
+        "glass",
+        measure_gems,
+        len(gems()),
+        logarithmic=False,
+    ),
+    Case(
+        "shipped",
+        "Every shipped scene with few photons",
+        "What works in a test scene must work in a real one.",
+        "scene",
+        measure_shipped,
+        len(shipped_names()),
+        logarithmic=False,
+    ),
+)

@@ -4,12 +4,12 @@ Photon records made by hand go through the real splat pass; what they should dep
 their energy, and for a focus its share of each texel. Broken records and very many photons are in `sum_cases.py`.
 
 A map holds averages over texels, but a splat is sampled at their centres along its sweep and under a Gaussian of
-variance `SAMPLED` at least. A texel grid sees such a Gaussian through its harmonics: by Poisson's formula the first weighs
-exp(−2π² · SAMPLED), with a cosine of the place, and there are two of each direction. So one splat may be off by
+variance `SAMPLED` at least. A texel grid sees such a Gaussian through its harmonics: by Poisson's formula the first
+weighs exp(−2π² · SAMPLED), with a cosine of the place, and there are two of each direction. So one splat may be off by
 `ONE_SPLAT`, depending on where in a texel it lies. Over a lattice of places the cosines cancel. What is left is
-the fast erf's 5e-4 (Abramowitz and Stegun 1964, 7.1.27) at either end of a row of texels, `FAST_ERF`, and the edge: three
-standard deviations out a splat ends with exp(−4.5) of its peak, and where it lies in line with the grid whole rows enter or
-leave together, which P places average out to `EDGE`/P.
+the fast erf's 5e-4 (Abramowitz and Stegun 1964, 7.1.27) at either end of a row of texels, `FAST_ERF`, and the edge:
+three standard deviations out a splat ends with exp(−4.5) of its peak, and where it lies in line with the grid whole
+rows enter or leave together, which P places average out to `EDGE`/P.
 """
 
 from __future__ import annotations
@@ -38,7 +38,9 @@ PLACES = 6
 TURNS = np.radians([0.0, 7.0, 22.5, 45.0, 60.0, 90.0, 118.0, 135.0])
 
 
-def energies(rig: Rig, cell: int, centre: np.ndarray, axis_s: np.ndarray, axis_t: np.ndarray, chord: np.ndarray) -> tuple[np.ndarray, int]:
+def energies(
+    rig: Rig, cell: int, centre: np.ndarray, axis_s: np.ndarray, axis_t: np.ndarray, chord: np.ndarray
+) -> tuple[np.ndarray, int]:
     """(energy of each splat (N,) over what it brought, values not finite or negative).
 
     Each splat is drawn into a square of `cell` texels of its own, its centre (N, 2) given from the square's
@@ -80,7 +82,9 @@ def energy_rows(energy: np.ndarray) -> dict[str, tuple[np.ndarray, float]]:
 
 def joined(parts: Sequence[tuple[np.ndarray, float]]) -> tuple[np.ndarray, np.ndarray]:
     """Errors and bounds of several groups, each with a bound of its own, as rows."""
-    return np.concatenate([error for error, _ in parts]), np.concatenate([np.full(len(error), bound) for error, bound in parts])
+    return np.concatenate([error for error, _ in parts]), np.concatenate(
+        [np.full(len(error), bound) for error, bound in parts]
+    )
 
 
 def measure_stretched(context: Context) -> Iterator[Measurement]:
@@ -90,8 +94,19 @@ def measure_stretched(context: Context) -> Iterator[Measurement]:
         # Longest standard deviations from below a texel to a sixtieth of the map, plain and swept aside by as much.
         for longest, cell in ((0.3, 24), (3.0, 48), (20.0, 192)):
             centre, turn = places_and_turns(PLACES if cell < 100 else 2)
-            axis_s, axis_t, aside = longest * along(turn), longest / ratio * along(turn + 0.5 * np.pi), longest * along(turn + 0.6)
-            energy, wrong = energies(rig, cell, *(np.concatenate(pair) for pair in ((centre, centre), (axis_s, axis_s), (axis_t, axis_t), (0.0 * aside, aside))))
+            axis_s, axis_t, aside = (
+                longest * along(turn),
+                longest / ratio * along(turn + 0.5 * np.pi),
+                longest * along(turn + 0.6),
+            )
+            energy, wrong = energies(
+                rig,
+                cell,
+                *(
+                    np.concatenate(pair)
+                    for pair in ((centre, centre), (axis_s, axis_s), (axis_t, axis_t), (0.0 * aside, aside))
+                ),
+            )
             total.append(energy.reshape(2 * len(TURNS), -1))
             bad += wrong
         kinds = [energy_rows(energy) for energy in total]
@@ -101,7 +116,14 @@ def measure_stretched(context: Context) -> Iterator[Measurement]:
 
 def measure_sweeps(context: Context) -> Iterator[Measurement]:
     rig = Rig(context.ctx, PLAIN, size=(SIDE, SIDE))
-    for sweep, cell, places in ((0.0, 32, PLACES), (0.1, 32, PLACES), (1.0, 32, PLACES), (10.0, 48, PLACES), (100.0, 144, 2), (1000.0, SIDE, 1)):
+    for sweep, cell, places in (
+        (0.0, 32, PLACES),
+        (0.1, 32, PLACES),
+        (1.0, 32, PLACES),
+        (10.0, 48, PLACES),
+        (100.0, 144, 2),
+        (1000.0, SIDE, 1),
+    ):
         turns = TURNS if places > 1 else TURNS[::2]
         centre, turn = places_and_turns(places, turns)
         turned = along(0.3 - turn)

@@ -27,14 +27,17 @@ BLOCK = 1 << 16
 
 
 def measure_one_texel(context: Context) -> Iterator[Measurement]:
-    """Up to `REAL_PHOTONS` are splatted one by one; beyond, one real splat stands for a block of `BLOCK`, which the real flush adds."""
+    """Up to `REAL_PHOTONS` are splatted one by one; beyond, one real splat stands for a block of `BLOCK`, which the
+    real flush adds."""
     rig = Rig(context.ctx, PLAIN, size=(64, 64))
     at = np.array([[20.5, 20.5]])
 
     def deposited(count: int, energy: float) -> tuple[float, float]:
         """(largest texel, sum of the map) after `count` photons of that energy."""
         factor = energy / rig.light.power_w()
-        image = rig.draw(photons(PLAIN, np.repeat(at, count, axis=0), TINY, TINY[::-1], throughput=(factor,) * 3))[..., 3]
+        image = rig.draw(photons(PLAIN, np.repeat(at, count, axis=0), TINY, TINY[::-1], throughput=(factor,) * 3))[
+            ..., 3
+        ]
         return float(image.max()), float(image.sum())
 
     single = deposited(1, DEPOSIT)[1]
@@ -44,7 +47,9 @@ def measure_one_texel(context: Context) -> Iterator[Measurement]:
         chunk = min(count, 2048)
         error = np.abs(np.array([peak, total]) / (count * single) - 1.0)
         errors, bounds = judged({"energy in the texel": (error, chunk * HALF + EPSILON)})
-        yield Measurement(float(count), f"{count:,} photons", not_finite([error]), errors, bounds, note="every photon splatted")
+        yield Measurement(
+            float(count), f"{count:,} photons", not_finite([error]), errors, bounds, note="every photon splatted"
+        )
 
     for count in (10**6, 10**7, 10**8):
         blocks = count // BLOCK
@@ -61,7 +66,14 @@ def measure_one_texel(context: Context) -> Iterator[Measurement]:
         error = np.array([abs(total / (blocks * block) - 1.0)])
         # The flush carries over what it rounded off: the total is right to its own last place.
         errors, bounds = judged({"energy in the texel": (error, EPSILON)})
-        yield Measurement(float(count), f"{count:,} photons", not_finite([error]), errors, bounds, note=f"{blocks} flushes of a block of {BLOCK:,}")
+        yield Measurement(
+            float(count),
+            f"{count:,} photons",
+            not_finite([error]),
+            errors,
+            bounds,
+            note=f"{blocks} flushes of a block of {BLOCK:,}",
+        )
 
 
 def measure_one_chunk(context: Context) -> Iterator[Measurement]:
@@ -71,7 +83,9 @@ def measure_one_chunk(context: Context) -> Iterator[Measurement]:
         rng = np.random.default_rng(7)
         centre = 20.5 + rng.uniform(-0.3, 0.3, (count, 2))
         power = rig.light.power_w()
-        same = rig.draw(photons(PLAIN, np.full((count, 2), 20.5), TINY, TINY[::-1], throughput=(DEPOSIT / power,) * 3))[..., 3].sum()
+        same = rig.draw(photons(PLAIN, np.full((count, 2), 20.5), TINY, TINY[::-1], throughput=(DEPOSIT / power,) * 3))[
+            ..., 3
+        ].sum()
         share = rng.uniform(0.2, 1.0, count)
         records = photons(PLAIN, centre, TINY, TINY[::-1])
         records["throughput"] = share[:, None]
@@ -79,15 +93,27 @@ def measure_one_chunk(context: Context) -> Iterator[Measurement]:
         errors, bounds = judged(
             {
                 "equal photons": (np.array([abs(same / (DEPOSIT * count) - 1.0)]), count * HALF),
-                # Roundings of different numbers are independent: their sum grows as the root, here by five standard deviations.
-                "photons that differ": (np.array([abs(mixed / (power * share.sum()) - 1.0)]), 5.0 * np.sqrt(count) * HALF + 8.0 * EPSILON),
+                # Roundings of different numbers are independent: their sum grows as the root, here by five standard
+                # deviations.
+                "photons that differ": (
+                    np.array([abs(mixed / (power * share.sum()) - 1.0)]),
+                    5.0 * np.sqrt(count) * HALF + 8.0 * EPSILON,
+                ),
             }
         )
-        yield Measurement(float(count), f"{count:,} photons", not_finite([np.array([same, mixed])]), errors, bounds, note=f"map of {side}² texels")
+        yield Measurement(
+            float(count),
+            f"{count:,} photons",
+            not_finite([np.array([same, mixed])]),
+            errors,
+            bounds,
+            note=f"map of {side}² texels",
+        )
 
 
 def broken_records(value: float) -> np.ndarray:
-    """Photons far from each other, each with `value` in another component of its columns; the seventh is sound, the eighth flagged."""
+    """Photons far from each other, each with `value` in another component of its columns; the seventh is sound, the
+    eighth flagged."""
     names = ("dposition_ds", "dposition_dt", "dposition_dvar0")
     centre = np.array([[4.5 + 8.0 * i, 4.5 + 8.0 * j] for j in range(2) for i in range(4)])
     records = photons(PLAIN, centre, [0.3, 0.0], [0.0, 0.3], [0.5, 0.2])
@@ -99,7 +125,17 @@ def broken_records(value: float) -> np.ndarray:
 
 def measure_overflow(context: Context) -> Iterator[Measurement]:
     rig = Rig(context.ctx, PLAIN, size=(32, 16))
-    severe = {1.0: 1.0, 1e10: 1e10, 1e20: 1e20, 1e30: 1e30, 1e38: 1e38, -3e38: 3e38, float("inf"): 1e39, float("-inf"): 1e40, float("nan"): 1e41}
+    severe = {
+        1.0: 1.0,
+        1e10: 1e10,
+        1e20: 1e20,
+        1e30: 1e30,
+        1e38: 1e38,
+        -3e38: 3e38,
+        float("inf"): 1e39,
+        float("-inf"): 1e40,
+        float("nan"): 1e41,
+    }
     for value, severity in severe.items():
         records = broken_records(value)
         image = rig.draw(records)

@@ -1,4 +1,5 @@
-"""Cases for any whole scene: bend it (scale, place, turn, depth, blur, batch, size, glass) and see what must not change.
+"""Cases for any whole scene: bend it (scale, place, turn, depth, blur, batch, size, glass) and see what must not
+change.
 
 Invariance needs no reference picture. Its bounds follow from what may change: float32 rounding in GPU
 space turns a few of the photons' choices (hits next to an edge, roulette next to its threshold), and each
@@ -46,17 +47,19 @@ PASSES = (4, 64)
 AXIS = (1.0, 2.0, 0.5)
 
 SAME_PICTURE = 0.01
-"""nRMSE of a picture whose photons are the same but for rounding: one photon in a thousand may choose otherwise (√(2·1e-3) of
-its own contrast of about a fifth)."""
+"""nRMSE of a picture whose photons are the same but for rounding: one photon in a thousand may choose otherwise
+(√(2·1e-3) of its own contrast of about a fifth)."""
 SAME_ENERGY = 1e-3
 """The same, summed over the picture: one photon in a thousand."""
 SAME_TO_ROUNDING = 1e-5
 """Sums of the same float32 numbers in another order: 6e-8 by the root of some thousand additions."""
 NOISE = 3.0
-"""A picture drawn anew may differ by as much as two seeds do, times this: two seeds still share the lattice's shape and the texels."""
+"""A picture drawn anew may differ by as much as two seeds do, times this: two seeds still share the lattice's shape and
+the texels."""
 TEXELS = 0.05
-"""nRMSE of a picture read from maps whose texels (half a pixel) lie otherwise: where an edge crosses a pixel half a texel more or
-less of blur is a quarter of the contrast, and in so small a picture some 4 % of the pixels lie on edges: 0.25 √0.04."""
+"""nRMSE of a picture read from maps whose texels (half a pixel) lie otherwise: where an edge crosses a pixel half a
+texel more or less of blur is a quarter of the contrast, and in so small a picture some 4 % of the pixels lie on edges:
+0.25 √0.04."""
 ANEW_ENERGY = 0.01
 """The sum over a picture drawn anew: what enters or leaves over its borders and receivers' edges."""
 
@@ -79,34 +82,107 @@ def scene_sweep(scene: Scene, prefix: str = "") -> tuple[Case, ...]:
     """All cases for one scene; `prefix` goes before their names."""
     name, base = scene.name, Base(scene)
     cases = [
-        Case("scale", f"{name}: the whole scene larger and smaller", "Fixed epsilons leak or speckle; GPU space is scaled to the glass.",
-             "scale factor", lambda context: _scales(context, base), len(SCALES)),
-        Case("offset", f"{name}: the whole scene far from the origin", "float32 world coordinates would lose the glass; GPU space is centred in float64.",
-             "offset, scene extents", lambda context: _offsets(context, base), len(OFFSETS)),
-        Case("rotation", f"{name}: the whole scene turned", "Map axes, lattices and trees follow the axes; the picture must not.",
-             "angle, degrees", lambda context: _turns(context, base), len(TURNS), logarithmic=False),
-        Case("depth", f"{name}: paths cut short", "What a depth limit takes must be counted as lost, not vanish.",
-             "depth limit", lambda context: _depths(context, scene), len(DEPTHS)),
-        Case("smoothing", f"{name}: footprints far too narrow and far too wide", "A kernel's width must not change the energy.",
-             "footprint σ, lattice spacings", lambda context: _smoothings(context, base), len(SMOOTHINGS)),
-        Case("batch", f"{name}: the same photons in tiny batches", "How many photons are in flight must not change the picture.",
-             "photons in flight", lambda context: _batches(context, scene), len(BATCHES)),
-        Case("size", f"{name}: pictures of one pixel, one row, one column", "Aspect ratios and windows degenerate.",
-             "width / height", lambda context: _sizes(context, scene), len(SIZES)),
-        Case("photons", f"{name}: next to no photons", "Lattices of a single point; footprints as wide as the scene.",
-             "photons", lambda context: _counts(context, scene), len(COUNTS)),
-        Case("bins", f"{name}: 32 spectral bins", "Eight targets; their sum must be the same light.", "bins", lambda context: _bins(context, base), 1),
-        Case("passes", f"{name}: the same pass added again and again", "Running float32 sums stall; scratch textures are flushed into the total.",
-             "passes", lambda context: _passes(context, scene), len(PASSES)),
-        Case("dispersion", f"{name}: every glass with another Abbe number", "Wide swept splats, bands that total reflection cuts; energy and colours "
-             "must be those of one-wavelength photons.", "Abbe number V_d", lambda context: _dispersions(context, scene), len(ABBE_NUMBERS)),
-    ]  # fmt: skip
+        Case(
+            "scale",
+            f"{name}: the whole scene larger and smaller",
+            "Fixed epsilons leak or speckle; GPU space is scaled to the glass.",
+            "scale factor",
+            lambda context: _scales(context, base),
+            len(SCALES),
+        ),
+        Case(
+            "offset",
+            f"{name}: the whole scene far from the origin",
+            "float32 world coordinates would lose the glass; GPU space is centred in float64.",
+            "offset, scene extents",
+            lambda context: _offsets(context, base),
+            len(OFFSETS),
+        ),
+        Case(
+            "rotation",
+            f"{name}: the whole scene turned",
+            "Map axes, lattices and trees follow the axes; the picture must not.",
+            "angle, degrees",
+            lambda context: _turns(context, base),
+            len(TURNS),
+            logarithmic=False,
+        ),
+        Case(
+            "depth",
+            f"{name}: paths cut short",
+            "What a depth limit takes must be counted as lost, not vanish.",
+            "depth limit",
+            lambda context: _depths(context, scene),
+            len(DEPTHS),
+        ),
+        Case(
+            "smoothing",
+            f"{name}: footprints far too narrow and far too wide",
+            "A kernel's width must not change the energy.",
+            "footprint σ, lattice spacings",
+            lambda context: _smoothings(context, base),
+            len(SMOOTHINGS),
+        ),
+        Case(
+            "batch",
+            f"{name}: the same photons in tiny batches",
+            "How many photons are in flight must not change the picture.",
+            "photons in flight",
+            lambda context: _batches(context, scene),
+            len(BATCHES),
+        ),
+        Case(
+            "size",
+            f"{name}: pictures of one pixel, one row, one column",
+            "Aspect ratios and windows degenerate.",
+            "width / height",
+            lambda context: _sizes(context, scene),
+            len(SIZES),
+        ),
+        Case(
+            "photons",
+            f"{name}: next to no photons",
+            "Lattices of a single point; footprints as wide as the scene.",
+            "photons",
+            lambda context: _counts(context, scene),
+            len(COUNTS),
+        ),
+        Case(
+            "bins",
+            f"{name}: 32 spectral bins",
+            "Eight targets; their sum must be the same light.",
+            "bins",
+            lambda context: _bins(context, base),
+            1,
+        ),
+        Case(
+            "passes",
+            f"{name}: the same pass added again and again",
+            "Running float32 sums stall; scratch textures are flushed into the total.",
+            "passes",
+            lambda context: _passes(context, scene),
+            len(PASSES),
+        ),
+        Case(
+            "dispersion",
+            f"{name}: every glass with another Abbe number",
+            "Wide swept splats, bands that total reflection cuts; energy and colours "
+            "must be those of one-wavelength photons.",
+            "Abbe number V_d",
+            lambda context: _dispersions(context, scene),
+            len(ABBE_NUMBERS),
+        ),
+    ]
     return tuple(replace(case, name=prefix + case.name) for case in cases)
 
 
 def _compared(found: Probe, base: Probe, picture: float, energy: float) -> Held:
     return Held(
-        {"picture": picture_error(found.picture, base.picture), "energy": energy_error(found.picture, base.picture), "map": found.map_error},
+        {
+            "picture": picture_error(found.picture, base.picture),
+            "energy": energy_error(found.picture, base.picture),
+            "map": found.map_error,
+        },
         {"picture": picture, "energy": energy},
     )
 
@@ -131,7 +207,9 @@ def _turns(context: Context, whole: Base) -> Iterator[Measurement]:
     noise = picture_error(probe(context, scene, replace(SMALL, seed=2)).picture, base.picture)
     for degrees in TURNS:
         found = probe(context, moved(scene, rotation=turn(AXIS, degrees)))
-        yield measurement(degrees, f"{degrees:.0f}°", found, _compared(found, base, NOISE * noise + TEXELS, ANEW_ENERGY))
+        yield measurement(
+            degrees, f"{degrees:.0f}°", found, _compared(found, base, NOISE * noise + TEXELS, ANEW_ENERGY)
+        )
 
 
 def _depths(context: Context, scene: Scene) -> Iterator[Measurement]:
@@ -152,7 +230,8 @@ def _depths(context: Context, scene: Scene) -> Iterator[Measurement]:
 
 
 def _smoothings(context: Context, whole: Base) -> Iterator[Measurement]:
-    """Wider footprints reach over receivers' edges and the picture's border, and that is lost; narrow ones keep everything."""
+    """Wider footprints reach over receivers' edges and the picture's border, and that is lost; narrow ones keep
+    everything."""
     scene, base = whole.scene, whole.probe(context)
     for smoothing in SMOOTHINGS:
         found = probe(context, scene, replace(SMALL, smoothing=smoothing))
@@ -167,7 +246,9 @@ def _batches(context: Context, scene: Scene) -> Iterator[Measurement]:
     base = probe(context, scene, with_photons(photons))
     for batch in BATCHES:
         found = probe(context, scene, replace(with_photons(photons), batch=batch))
-        yield measurement(batch, f"{batch} in flight", found, _compared(found, base, SAME_TO_ROUNDING, SAME_TO_ROUNDING))
+        yield measurement(
+            batch, f"{batch} in flight", found, _compared(found, base, SAME_TO_ROUNDING, SAME_TO_ROUNDING)
+        )
 
 
 def _sizes(context: Context, scene: Scene) -> Iterator[Measurement]:
@@ -203,7 +284,13 @@ def _passes(context: Context, scene: Scene) -> Iterator[Measurement]:
             light.finish()
             sums = read_maps(light)
             error = float(np.abs(sums - passes * one).max() / (passes * np.abs(one).max())) if one.any() else 0.0
-            found = Probe(np.zeros((1, 1, 3)), light.stats, nonfinite(sums) + light.nonfinite_photons, light.dropped, light.map_flux())
+            found = Probe(
+                np.zeros((1, 1, 3)),
+                light.stats,
+                nonfinite(sums) + light.nonfinite_photons,
+                light.dropped,
+                light.map_flux(),
+            )
             yield measurement(passes, f"{passes} passes", found, Held({"sum": error}, {"sum": SAME_TO_ROUNDING}))
 
 
@@ -217,18 +304,26 @@ def _dispersive(glass: Dispersion, v_d: float) -> Dispersion:
     return from_abbe(glass.n_d, v_d, f"{glass.name} V_d {v_d:g}")
 
 
-def against_single_wavelengths(context: Context, scene: Scene, severity: float, label: str, smeared: float = 0.0) -> Measurement:
-    """The default method against `stochastic` (one random wavelength a photon, no spectral column) on blocks of ten pixels.
+def against_single_wavelengths(
+    context: Context, scene: Scene, severity: float, label: str, smeared: float = 0.0
+) -> Measurement:
+    """The default method against `stochastic` (one random wavelength a photon, no spectral column) on blocks of ten
+    pixels.
 
-    Its bound is the difference between two seeds of `stochastic`, which is what chance alone makes, and 3 % of the picture for
-    the kernel's tails across the blocks' borders, and `smeared`; the energy's is 3 %.
+    Its bound is the difference between two seeds of `stochastic`, which is what chance alone makes, and 3 % of the
+    picture for the kernel's tails across the blocks' borders, and `smeared`; the energy's is 3 %.
     """
     settings = replace(SMALL, layer="caustic")
     found = probe(context, scene, settings)
-    reference, other = (probe(context, scene, replace(settings, method="stochastic", seed=seed)).picture for seed in (1, 2))
+    reference, other = (
+        probe(context, scene, replace(settings, method="stochastic", seed=seed)).picture for seed in (1, 2)
+    )
     chance = picture_error(blocks(other), blocks(reference))
     held = Held(
-        {"blocks": picture_error(blocks(found.picture), blocks(0.5 * (reference + other))), "energy": energy_error(found.picture, 0.5 * (reference + other))},
+        {
+            "blocks": picture_error(blocks(found.picture), blocks(0.5 * (reference + other))),
+            "energy": energy_error(found.picture, 0.5 * (reference + other)),
+        },
         {"blocks": chance + 0.03 + smeared, "energy": 0.03},
     )
     return measurement(severity, label, found, held)

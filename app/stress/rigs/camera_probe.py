@@ -1,4 +1,5 @@
-"""What the stress sweep's camera cases share: one picture by the camera pass with its fall-backs, closed forms to hold it against, and skies.
+"""What the stress sweep's camera cases share: one picture by the camera pass with its fall-backs, closed forms to hold
+it against, and skies.
 
 No light is traced: what a case is about lies between the camera and what shines by itself, or is lit directly. Pictures
 are small, and most of them of the same few programs, which are kept while a case runs.
@@ -93,12 +94,15 @@ def opened_camera_pass(context: Context, scene: Scene, settings: RenderSettings 
 
 
 def look(context: Context, scene: Scene, settings: RenderSettings = LOOK, bands: int | None = None) -> Sight:
-    """A picture of `scene` in so many bands (None: as many as a rendering would choose), `settings.spp` samples a pixel or a whole cycle more."""
+    """A picture of `scene` in so many bands (None: as many as a rendering would choose), `settings.spp` samples a pixel
+    or a whole cycle more."""
     with opened_camera_pass(context, scene, settings) as camera_pass:
         return look_with(camera_pass, scene.camera, settings, bands)
 
 
-def look_with(camera_pass: CameraPass, camera: Camera, settings: RenderSettings = LOOK, bands: int | None = None) -> Sight:
+def look_with(
+    camera_pass: CameraPass, camera: Camera, settings: RenderSettings = LOOK, bands: int | None = None
+) -> Sight:
     """The same with a pass that is there already."""
     samples = settings.spp or 1
     if bands is not None:
@@ -134,15 +138,20 @@ class Judged:
         return self
 
 
-def seen(severity: float, label: str, sight: Sight, judged: Judged, shares: dict[str, float] | None = None, note: str = "") -> Measurement:
-    """A sight's measurement: finite, and no fall-back taken more often than `shares` says, as a share of the samples (those not named: never)."""
+def seen(
+    severity: float, label: str, sight: Sight, judged: Judged, shares: dict[str, float] | None = None, note: str = ""
+) -> Measurement:
+    """A sight's measurement: finite, and no fall-back taken more often than `shares` says, as a share of the samples
+    (those not named: never)."""
     allowed = dict.fromkeys(sight.fallbacks, 0.0) | (shares or {})
     for name, most in allowed.items():
         if np.isfinite(most):
             judged.hold(name.replace("_", " "), sight.share(name), most)
     bands = f"{sight.bands} band{'s' if sight.bands > 1 else ''}"
     told = f"{note}; {bands}" if note else bands
-    return Measurement(severity, label, sight.nonfinite, judged.errors, judged.bounds, fallbacks=dict(sight.fallbacks), note=told)
+    return Measurement(
+        severity, label, sight.nonfinite, judged.errors, judged.bounds, fallbacks=dict(sight.fallbacks), note=told
+    )
 
 
 # ---- what is to be seen ----------------------------------------------------------------------
@@ -193,7 +202,8 @@ def at(x: float, y: float, z: float) -> np.ndarray:
 
 
 def daylight_mean(values: np.ndarray) -> np.ndarray:
-    """Linear Rec.709 (…, 3) of white light of radiance 1 whose share `values` (…, 401) arrives at 380, 381, … 780 nm."""
+    """Linear Rec.709 (…, 3) of white light of radiance 1 whose share `values` (…, 401) arrives at 380, 381, … 780
+    nm."""
     return xyz_to_rgb709(np.asarray(values) @ (K_M * daylight_per_lumen()[:, None] * cmf_xyz()))
 
 

@@ -1,4 +1,5 @@
-"""Convex glass with flat sides between parallel lines: what a ray sees through it, all reflections summed up in float64.
+"""Convex glass with flat sides between parallel lines: what a ray sees through it, all reflections summed up in
+float64.
 
 A prism, a slab or a light guide whose rays stay in one plane is a polygon. Every way through it is followed
 until it weighs nothing, so that the sum is exact; nothing of the shaders' is used.
@@ -30,8 +31,11 @@ class Way:
     """Surfaces met."""
 
 
-def ways(outline: np.ndarray, n: float, position: tuple[float, float], direction: tuple[float, float], inside: bool = False) -> list[Way]:
-    """All ways of a ray from `position` (x, y) in `direction` that weigh something, out of the polygon `outline` (k, 2) of index `n`.
+def ways(
+    outline: np.ndarray, n: float, position: tuple[float, float], direction: tuple[float, float], inside: bool = False
+) -> list[Way]:
+    """All ways of a ray from `position` (x, y) in `direction` that weigh something, out of the polygon `outline` (k, 2)
+    of index `n`.
 
     The outline runs anticlockwise and is convex; round it there is air. Weights sum up to 1 less what was left off.
     """
@@ -56,7 +60,16 @@ def ways(outline: np.ndarray, n: float, position: tuple[float, float], direction
         waiting.append((p, d - 2.0 * cosine * m, within, weight * reflectance, events + 1, number))
         if reflectance < 1.0:
             along = (d - cosine * m) / relative
-            waiting.append((p, along + np.sqrt(1.0 - along @ along) * m, not within, weight * (1.0 - reflectance), events + 1, number))
+            waiting.append(
+                (
+                    p,
+                    along + np.sqrt(1.0 - along @ along) * m,
+                    not within,
+                    weight * (1.0 - reflectance),
+                    events + 1,
+                    number,
+                )
+            )
     return found
 
 
@@ -84,9 +97,12 @@ def extruded(outline: np.ndarray, length: float, name: str) -> Mesh:
 
 
 def trapezium(incidence_rad: float, height: float = 1.0) -> np.ndarray:
-    """An outline that a ray along x enters straight on through x = 0 and whose next face it meets at `incidence_rad`, at (½, 0)."""
+    """An outline that a ray along x enters straight on through x = 0 and whose next face it meets at `incidence_rad`,
+    at (½, 0)."""
     reach = 0.5 * height * np.tan(incidence_rad)
-    return np.array([(0.0, -0.5 * height), (0.5 + reach, -0.5 * height), (0.5 - reach, 0.5 * height), (0.0, 0.5 * height)])
+    return np.array(
+        [(0.0, -0.5 * height), (0.5 + reach, -0.5 * height), (0.5 - reach, 0.5 * height), (0.0, 0.5 * height)]
+    )
 
 
 def rectangle(width: float, height: float) -> np.ndarray:
@@ -95,7 +111,9 @@ def rectangle(width: float, height: float) -> np.ndarray:
     return np.array([(-x, -y), (x, -y), (x, y), (-x, y)])
 
 
-def _side_met(normal: np.ndarray, offset: np.ndarray, p: np.ndarray, d: np.ndarray, within: bool, last: int) -> tuple[int, float] | None:
+def _side_met(
+    normal: np.ndarray, offset: np.ndarray, p: np.ndarray, d: np.ndarray, within: bool, last: int
+) -> tuple[int, float] | None:
     """(side, distance) where the ray crosses the outline next; the side it starts on is not met again."""
     facing, gap = normal @ d, offset - normal @ p
     if within:

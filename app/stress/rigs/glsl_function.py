@@ -50,7 +50,8 @@ def evaluate(
 
     Inputs are (N,) or (N, 2..4) arrays (unsigned integers (N,) or (N, 2) stay integers) and appear
     in `body` as locals of their names; `body` assigns the outputs, named with their GLSL types. `buffers` fills
-    bindings of the included files, `binders` are called to bind their textures; `declarations` is GLSL put after the includes. Returns float64 (uint32 for unsigned) arrays of N rows.
+    bindings of the included files, `binders` are called to bind their textures; `declarations` is GLSL put after the
+    includes. Returns float64 (uint32 for unsigned) arrays of N rows.
     """
     count = len(next(iter(inputs.values())))
     fetched, words, offset = [], [], 0

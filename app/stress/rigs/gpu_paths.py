@@ -109,7 +109,18 @@ class Photons:
         return self.where(self.band == band)
 
     def where(self, chosen: np.ndarray) -> Photons:
-        names = ("records", "q", "start", "direction", "position", "dposition_ds", "dposition_dt", "dposition_dvar", "weight", "nm")
+        names = (
+            "records",
+            "q",
+            "start",
+            "direction",
+            "position",
+            "dposition_ds",
+            "dposition_dt",
+            "dposition_dvar",
+            "weight",
+            "nm",
+        )
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
     @property
@@ -139,8 +150,14 @@ def extruded(name: str, section: np.ndarray, half: float = 0.5) -> Mesh:
     """A closed convex solid: a polygon (P, 2), counter-clockwise in x-y, drawn out along z by ±half."""
     count = len(section)
     low, high = (np.column_stack([section, np.full(count, z)]) for z in (-half, half))
-    caps = [[0, k + 1, k] for k in range(1, count - 1)] + [[count, count + k, count + k + 1] for k in range(1, count - 1)]
-    sides = [t for k in range(count) for t in ([k, (k + 1) % count, count + k], [(k + 1) % count, count + (k + 1) % count, count + k])]
+    caps = [[0, k + 1, k] for k in range(1, count - 1)] + [
+        [count, count + k, count + k + 1] for k in range(1, count - 1)
+    ]
+    sides = [
+        t
+        for k in range(count)
+        for t in ([k, (k + 1) % count, count + k], [(k + 1) % count, count + (k + 1) % count, count + k])
+    ]
     return make_mesh(name, np.concatenate([low, high]), np.array(caps + sides))
 
 
@@ -167,7 +184,9 @@ def trace_light(
     scene = Scene("question", Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), (light,), tuple(objects))
     features = Features.of(scene, RenderSettings(method=method))
     buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
-    trace = TracePass(gl, features, buffers, batch=max(2 * count * len(bands_nm), 1024), max_depth=max_depth, split_threshold=0.0)
+    trace = TracePass(
+        gl, features, buffers, batch=max(2 * count * len(bands_nm), 1024), max_depth=max_depth, split_threshold=0.0
+    )
     try:
         space = buffers.space
         specular = [o.mesh.corners() for o in objects if not isinstance(o.material, Diffuse)]
@@ -187,12 +206,23 @@ def trace_light(
         per_s, per_t = 1.0 / (domain.spacing(count) * space.scale * emitter.unit_length)
         groups = [records[f"dposition_dvar{g}"][:, :3] for g in range(features.spectral_groups)]
         return Photons(
-            records, emitter, q, start, direction, space.to_world(records["position"]),
-            records["dposition_ds"] * per_s, records["dposition_dt"] * per_t,
+            records,
+            emitter,
+            q,
+            start,
+            direction,
+            space.to_world(records["position"]),
+            records["dposition_ds"] * per_s,
+            records["dposition_dt"] * per_t,
             np.stack(groups, axis=1) / space.scale if groups else np.zeros((len(records), 0, 3)),
-            emitter.weight(q, count), buffers.axis.nm_of_x(np.column_stack([records[f"x_{end}"] for end in ("lo", "anchor", "hi")])),
-            buffers.axis, buffers.groups, count * len(bands), domain.measure / count, batch.tally,
-        )  # fmt: skip
+            emitter.weight(q, count),
+            buffers.axis.nm_of_x(np.column_stack([records[f"x_{end}"] for end in ("lo", "anchor", "hi")])),
+            buffers.axis,
+            buffers.groups,
+            count * len(bands),
+            domain.measure / count,
+            batch.tally,
+        )
     finally:
         trace.release()
         buffers.release()
@@ -200,7 +230,14 @@ def trace_light(
 
 def beam_light(start: np.ndarray, direction: np.ndarray, radius: float) -> Light:
     """Collimated white light from a disc."""
-    return Light("beam", "collimated", constant(1.0), position=tuple(start), direction=tuple(unit(np.asarray(direction, float))), radius=radius)
+    return Light(
+        "beam",
+        "collimated",
+        constant(1.0),
+        position=tuple(start),
+        direction=tuple(unit(np.asarray(direction, float))),
+        radius=radius,
+    )
 
 
 def trace_beam(

@@ -16,7 +16,7 @@ import numpy as np
 from ...gpu import records
 from ...model.features import Features
 from ...model.settings import RenderSettings
-from ...passes.camera import CausticMaps, CameraPass
+from ...passes.camera import CameraPass, CausticMaps
 from ...render.light_pass import LightPass, LightStats, spectral_axis
 from ..case import Measurement
 
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from ...passes.trace import Batch
 
 SMALL = RenderSettings(width=160, height=90, photons=32_768, spp=16)
-"""What a sweep renders unless the case is about just that. Fewer than 16 samples a pixel would miss texels of a sharp focus."""
+"""What a sweep renders unless the case is about just that. Fewer than 16 samples a pixel would miss texels of a sharp
+focus."""
 LOST_TO_NUMERICS = 1e-3
 """Largest share of the flux that may end for numerical reasons (cracks, overflows): a tenth of what a picture shows."""
 
@@ -44,13 +45,17 @@ class WatchedLight(LightPass):
         super()._account(batch)
         if not batch.photons:
             return
-        photons = np.frombuffer(self.trace.photons.read(batch.photons * self.trace.photon.stride), self.trace.photon.dtype)
+        photons = np.frombuffer(
+            self.trace.photons.read(batch.photons * self.trace.photon.stride), self.trace.photon.dtype
+        )
         self.watched += len(photons)
         dropped = (photons["flags"] & records.FLAG_FOOTPRINT_DROPPED) != 0
         self.dropped += int(dropped.sum())
         # A dropped footprint's columns are never read again, everything else always is.
         columns = [name for name in photons.dtype.names if name.startswith("dposition")]
-        floats = [name for name in photons.dtype.names if photons.dtype[name].base == np.float32 and name not in columns]
+        floats = [
+            name for name in photons.dtype.names if photons.dtype[name].base == np.float32 and name not in columns
+        ]
         bad = np.zeros(len(photons), bool)
         for name in floats:
             bad |= ~_finite_rows(photons[name])
@@ -168,10 +173,16 @@ class Held:
     note: str = ""
 
 
-def measurement(severity: float, label: str, found: Probe, held: Held = Held(), lost: float = LOST_TO_NUMERICS) -> Measurement:
+def measurement(
+    severity: float, label: str, found: Probe, held: Held = Held(), lost: float = LOST_TO_NUMERICS
+) -> Measurement:
     """A rendering's measurement: finite, flux closed, every dropped footprint counted, little lost to numerics."""
     counted = found.stats.tally.fallbacks["footprint_dropped"]
-    errors = {"uncounted": float(max(0, found.dropped - counted)), "lost": found.shares.get("lost_numeric", 0.0), **held.errors}
+    errors = {
+        "uncounted": float(max(0, found.dropped - counted)),
+        "lost": found.shares.get("lost_numeric", 0.0),
+        **held.errors,
+    }
     return Measurement(
         severity=severity,
         label=label,

@@ -25,7 +25,9 @@ TABLE = SceneObject("table", plane(8.0, 8.0), Diffuse())
 """Receiver in z = 0."""
 FROM_BELOW = Camera((0.0, 0.0, -5.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=4.5)
 """Sees the table's caustic without any glass before it, on the same pixels whatever stands on the table."""
-BEAM = Light("beam", "collimated", illuminant("D65").scaled_to_luminous(10.0), (0.3, 0.0, 6.0), (0.0, 0.0, -1.0), radius=0.45)
+BEAM = Light(
+    "beam", "collimated", illuminant("D65").scaled_to_luminous(10.0), (0.3, 0.0, 6.0), (0.0, 0.0, -1.0), radius=0.45
+)
 """A beam straight down."""
 SUN = Light("sun", "directional", illuminant("D65").scaled_to_luminous(10.0), direction=(0.36, 0.0, -0.9329523))
 """Slanting light over everything."""
@@ -35,7 +37,12 @@ WATER = from_abbe(1.333, 55.0, "water")
 
 
 def solid(
-    name: str, mesh: Mesh, glass: Dispersion, at: tuple[float, float, float] = (0.0, 0.0, 0.0), priority: int = 0, turned: np.ndarray | None = None
+    name: str,
+    mesh: Mesh,
+    glass: Dispersion,
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    priority: int = 0,
+    turned: np.ndarray | None = None,
 ) -> SceneObject:
     """A piece of glass with its own origin at `at`, first turned by the matrix `turned` (3, 3)."""
     place = np.eye(4)
@@ -45,12 +52,19 @@ def solid(
     return SceneObject(name, mesh, Dielectric(glass, priority=priority), place)
 
 
-def stage(*objects: SceneObject, lights: Sequence[Light] = (BEAM,), camera: Camera = FROM_BELOW, table: SceneObject = TABLE) -> Scene:
+def stage(
+    *objects: SceneObject, lights: Sequence[Light] = (BEAM,), camera: Camera = FROM_BELOW, table: SceneObject = TABLE
+) -> Scene:
     """Objects over the table."""
     return Scene("stage", camera, tuple(lights), (*objects, table))
 
 
-def moved(scene: Scene, scale: float = 1.0, offset: tuple[float, float, float] = (0.0, 0.0, 0.0), rotation: np.ndarray | None = None) -> Scene:
+def moved(
+    scene: Scene,
+    scale: float = 1.0,
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    rotation: np.ndarray | None = None,
+) -> Scene:
     """The whole scene under a similarity; radiance stays, so the picture does.
 
     Lengths grow by `scale`, hence intensities by its square and absorption by its inverse.
@@ -83,11 +97,15 @@ def moved(scene: Scene, scale: float = 1.0, offset: tuple[float, float, float] =
             radius=scale * light.radius,
             width=scale * light.width,
             height=scale * light.height,
-            spectral_power=brighter(light.spectral_power, scale**2) if light.kind in ("point", "spot") else light.spectral_power,
+            spectral_power=brighter(light.spectral_power, scale**2)
+            if light.kind in ("point", "spot")
+            else light.spectral_power,
         )
         for light in scene.lights
     )
-    objects = tuple(replace(_thinner(item, scale), object_to_world=matrix @ item.object_to_world) for item in scene.objects)
+    objects = tuple(
+        replace(_thinner(item, scale), object_to_world=matrix @ item.object_to_world) for item in scene.objects
+    )
     return replace(scene, camera=camera, lights=lights, objects=objects)
 
 

@@ -32,9 +32,16 @@ _CROWN_FLINT = ((55.0, 0.0), (55.0, 1.6), (50.0, 1.6), (50.0, 9.0))
 _NEAR_EM = 0.7
 
 _COLOURS = (
-    (0.62, 0.62, 0.62), (0.36, 0.61, 0.84), (0.90, 0.60, 0.00), (0.17, 0.68, 0.48),
-    (0.84, 0.45, 0.68), (0.83, 0.37, 0.12), (0.60, 0.53, 0.86), (0.74, 0.70, 0.24), (0.45, 0.75, 0.75),
-)  # fmt: skip
+    (0.62, 0.62, 0.62),
+    (0.36, 0.61, 0.84),
+    (0.90, 0.60, 0.00),
+    (0.17, 0.68, 0.48),
+    (0.84, 0.45, 0.68),
+    (0.83, 0.37, 0.12),
+    (0.60, 0.53, 0.86),
+    (0.74, 0.70, 0.24),
+    (0.45, 0.75, 0.75),
+)
 """One for each maker, told apart by the colour-blind too (after Okabe and Ito)."""
 
 
@@ -195,7 +202,9 @@ def _draw_objects(state: State) -> None:
         # Names of objects of one glass stand below each other.
         line = sum(abs(at.x - other.x) < theme.em(2.0) and abs(at.y - other.y) < theme.em(1.0) for other in taken)
         taken.append(at)
-        _draw_name(drawing, ImVec2(at.x + theme.em(0.65), at.y - theme.em(0.55) + line * theme.em(1.1)), item.name, tint)
+        _draw_name(
+            drawing, ImVec2(at.x + theme.em(0.65), at.y - theme.em(0.55) + line * theme.em(1.1)), item.name, tint
+        )
     implot.pop_plot_clip_rect()
 
 

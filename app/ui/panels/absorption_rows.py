@@ -54,7 +54,15 @@ def _draw_colour(state: State, index: int, absorption: Absorption) -> State:
     colour_changed, rgb, colour_active = widgets.colour("Colour", rgb, tip=tip)
     tip = "How far white light travels inside the glass until it has this colour. Shorter is deeper."
     depth_changed, distance, depth_active = widgets.drag(
-        "At a depth of", distance, 1e-4, 1e6, unit="units", tip=tip, reset=_FIRST_DISTANCE, format="%.3f", logarithmic=True
+        "At a depth of",
+        distance,
+        1e-4,
+        1e6,
+        unit="units",
+        tip=tip,
+        reset=_FIRST_DISTANCE,
+        format="%.3f",
+        logarithmic=True,
     )
     state = widgets.holding(state, colour_active or depth_active)
     return _tinted(state, index, rgb, distance) if colour_changed or depth_changed else state

@@ -1,4 +1,5 @@
-"""The dispersion brush and pulling a colour: settings, what was painted where, and the physical picture to compare with."""
+"""The dispersion brush and pulling a colour: settings, what was painted where, and the physical picture to compare
+with."""
 
 from __future__ import annotations
 
@@ -68,7 +69,15 @@ def _draw_settings(state: State) -> State:
         tip = "How fast paint builds up under a still cursor: 1 doubles (or halves) the spread of colours every second."
         top, unit = 8.0, "doublings/s"
     moved, strength, strength_held = widgets.slider(
-        "Strength", min(brush.strength, top), 0.01, top, unit=unit, tip=tip, reset=_DEFAULT.strength, format="%.2f", logarithmic=True
+        "Strength",
+        min(brush.strength, top),
+        0.01,
+        top,
+        unit=unit,
+        tip=tip,
+        reset=_DEFAULT.strength,
+        format="%.2f",
+        logarithmic=True,
     )
     tip = "Share of the radius over which the brush fades out: 0 is a hard edge, 1 fades from the centre on."
     _, falloff, falloff_held = widgets.slider(
@@ -94,7 +103,8 @@ def _draw_profile(falloff: float) -> None:
     weight = dab_weight(Dab((0.0, 0.0, 0.0), 1.0, 1.0, falloff), np.abs(across))
     base, height = corner.y + size.y - 3.0, size.y - 6.0
     points = [
-        ImVec2(corner.x + size.x * (0.5 + 0.48 * float(x)), base - height * float(w)) for x, w in zip(across, weight, strict=True)
+        ImVec2(corner.x + size.x * (0.5 + 0.48 * float(x)), base - height * float(w))
+        for x, w in zip(across, weight, strict=True)
     ]
     drawing.add_polyline(points, theme.packed(colours.accent), 1.5, 0)
 
@@ -133,7 +143,9 @@ def _draw_pull_words(state: State) -> None:
         )
         return
     held, item = state.pull, state.scene.objects[state.pull.object_index]
-    widgets.read_out("Colour held", f"{held.wavelength_nm:.0f} nm", tip="Wavelength of the light under the cursor when it was taken.")
+    widgets.read_out(
+        "Colour held", f"{held.wavelength_nm:.0f} nm", tip="Wavelength of the light under the cursor when it was taken."
+    )
     widgets.read_out("Glass", item.name, tip="The object whose dispersion is solved for.")
     what = "Local gain, not physical" if held.local else "Dispersion gain of the glass"
     widgets.read_out("Changes", what, tip="What follows the cursor. Shift changes the place only.")

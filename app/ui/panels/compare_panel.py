@@ -50,17 +50,29 @@ def _controls(state: State, view_model: ViewModel) -> State:
     compare = state.compare
     _, mode = widgets.combo("Show", MODES, compare.mode, tip=MODE_TIPS[compare.mode])
     others = {REFERENCE: "Reference"} | {name: METHOD_NAMES[name] for name in METHODS if name != state.method}
-    tip = METHOD_TIPS.get(compare.method, "An independent rendering in float64 that shares no code with this one, refined in the background.")
+    tip = METHOD_TIPS.get(
+        compare.method,
+        "An independent rendering in float64 that shares no code with this one, refined in the background.",
+    )
     _, method = widgets.combo("With", others, compare.method, tip=tip)
     compare = replace(compare, mode=mode, method=method)
     if mode == "wipe":
         _, wipe, active = widgets.slider(
-            "Line at", 100.0 * compare.wipe, 0.0, 100.0, unit="%", format="%.0f", reset=50.0, tip="Place of the line, share of the picture's width."
+            "Line at",
+            100.0 * compare.wipe,
+            0.0,
+            100.0,
+            unit="%",
+            format="%.0f",
+            reset=50.0,
+            tip="Place of the line, share of the picture's width.",
         )
         compare = replace(compare, wipe=wipe / 100.0)
         state = widgets.holding(state, active)
     _, plot = widgets.toggle(
-        "Error over time", compare.plot, tip="Measure this method and the other against the reference while both run, and plot relMSE over time."
+        "Error over time",
+        compare.plot,
+        tip="Measure this method and the other against the reference while both run, and plot relMSE over time.",
     )
     state = replace(state, compare=replace(compare, plot=plot))
     if mode == "error":
@@ -81,7 +93,9 @@ def _progress(state: State, view_model: ViewModel) -> State:
         widgets.note("Scene or view has changed: this is the picture from before.")
     if view_model.compare_text:
         widgets.hint(view_model.compare_text)
-    if widgets.button("Start again", tip="Compute what it is compared with anew, for the present scene and view.", width=-1):
+    if widgets.button(
+        "Start again", tip="Compute what it is compared with anew, for the present scene and view.", width=-1
+    ):
         state = state.asking(ComputeReference())
     return state
 
@@ -98,14 +112,21 @@ def _legend() -> None:
     start = imgui.get_cursor_screen_pos()
     imgui.invisible_button("##scale", imgui.ImVec2(width, height))
     share = min(max((imgui.get_mouse_pos().x - start.x) / max(width, 1.0), 0.0), 1.0)
-    rows.explain("Scale", f"{100 * ERROR_RANGE * (2 * share - 1):+.0f} % of the reference. What is nearly black on the screen counts less; magenta is no number.")
+    rows.explain(
+        "Scale",
+        f"{100 * ERROR_RANGE * (2 * share - 1):+.0f} % of the reference. What is nearly black on the screen counts less; magenta is no number.",
+    )
     drawing = imgui.get_window_draw_list()
     colours = [theme.packed((*map(float, rgb), 1.0)) for rgb in sample(ERROR, np.linspace(0.0, 1.0, _LEGEND_STEPS + 1))]
     for i in range(_LEGEND_STEPS):
         low, high = start.x + width * i / _LEGEND_STEPS, start.x + width * (i + 1) / _LEGEND_STEPS
         corners = imgui.ImVec2(low, start.y), imgui.ImVec2(high, start.y + height)
         drawing.add_rect_filled_multi_color(*corners, colours[i], colours[i + 1], colours[i + 1], colours[i])
-    texts = (f"-{100 * ERROR_RANGE:.0f} %", (0.08, 0.08, 0.1, 1.0), 0.0), ("0", (0.9, 0.9, 0.9, 1.0), 0.5), (f"+{100 * ERROR_RANGE:.0f} %", (0.12, 0.06, 0.06, 1.0), 1.0)
+    texts = (
+        (f"-{100 * ERROR_RANGE:.0f} %", (0.08, 0.08, 0.1, 1.0), 0.0),
+        ("0", (0.9, 0.9, 0.9, 1.0), 0.5),
+        (f"+{100 * ERROR_RANGE:.0f} %", (0.12, 0.06, 0.06, 1.0), 1.0),
+    )
     pad = theme.em(0.35)
     for text, tint, place in texts:
         size = imgui.calc_text_size(text)
@@ -130,7 +151,9 @@ def _plot(state: State, view_model: ViewModel, height: float) -> State:
     for curve, tint in zip(curves, _tints(), strict=False):
         seconds, error = np.ascontiguousarray(curve.seconds, float), np.ascontiguousarray(curve.error, float)
         name = METHOD_NAMES.get(curve.method, curve.method)
-        spec = implot.Spec(line_color=tint, line_weight=1.8, marker=implot.Marker_.circle, marker_size=2.5, marker_fill_color=tint)
+        spec = implot.Spec(
+            line_color=tint, line_weight=1.8, marker=implot.Marker_.circle, marker_size=2.5, marker_fill_color=tint
+        )
         implot.plot_line(name, seconds, error, spec)
     implot.end_plot()
     rows.explain("Error over time", "")
@@ -157,7 +180,7 @@ def _limits(curves: list[ErrorCurve]) -> tuple[tuple[float, float], tuple[float,
 
 def _decades(values: np.ndarray) -> tuple[float, float]:
     low, high = np.floor(np.log10(values.min()) - 0.05), np.ceil(np.log10(values.max()) + 0.05)
-    return float(10.0**low), float(10.0**max(high, low + 1))
+    return float(10.0**low), float(10.0 ** max(high, low + 1))
 
 
 def _tints() -> tuple[imgui.ImVec4, ...]:

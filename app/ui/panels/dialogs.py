@@ -119,7 +119,9 @@ def _unsaved_question(state: State, view_model: ViewModel) -> State:
     if widgets.button("Discard", tip="Go on; the changes are lost.", width=width):
         state = _go_on(state, view_model)
     imgui.same_line()
-    if widgets.button("Cancel##unsaved", tip="Stay, with everything as it is.", width=width) or imgui.is_key_pressed(imgui.Key.escape):
+    if widgets.button("Cancel##unsaved", tip="Stay, with everything as it is.", width=width) or imgui.is_key_pressed(
+        imgui.Key.escape
+    ):
         state = _stay(state, view_model)
     imgui.end_popup()
     return state

@@ -97,7 +97,9 @@ def _draw_header(item: SceneObject, dispersion: Dispersion) -> None:
 
 def _draw_buttons(state: State, view_model: ViewModel, index: int) -> State:
     dispersion = selected_glass(state)[2].dispersion  # type: ignore[index]
-    if widgets.button("Choose glass…", tip="Search 1,700 glasses, plastics, liquids and gems by name, maker or number."):
+    if widgets.button(
+        "Choose glass…", tip="Search 1,700 glasses, plastics, liquids and gems by name, maker or number."
+    ):
         imgui.open_popup(POPUP)
     widgets.beside("Abbe diagram")
     abbe_open = state.preferences.panels.abbe
@@ -106,7 +108,11 @@ def _draw_buttons(state: State, view_model: ViewModel, index: int) -> State:
         state = state.with_panels(abbe=not abbe_open)
     widgets.beside("As sold")
     sold = as_sold(dispersion)
-    tip = f"Back to {base_name(dispersion)} as the catalogue has it, without gain." if sold else "This glass is not from the catalogue."
+    tip = (
+        f"Back to {base_name(dispersion)} as the catalogue has it, without gain."
+        if sold
+        else "This glass is not from the catalogue."
+    )
     if widgets.button("As sold", tip=tip, enabled=sold is not None and not is_as_sold(dispersion)) and sold:
         state = edits.attempt(state, f"{sold.name} as sold", edits.set_dispersion, index, sold)
     state = _draw_clipboard(state, index)
@@ -132,7 +138,9 @@ def _draw_clipboard(state: State, index: int) -> State:
         state = edits.attempt(state, f"Paste material on {item.name}", edits.set_material, index, held)
     widgets.beside("Presets…")
     ready = {p.name: p for p in presets.material_presets()}
-    chosen = widgets.menu_button("Presets…", {n: p.remark for n, p in ready.items()}, tip="Common glasses, liquids and gems by everyday names.")
+    chosen = widgets.menu_button(
+        "Presets…", {n: p.remark for n, p in ready.items()}, tip="Common glasses, liquids and gems by everyday names."
+    )
     if chosen is None:
         return state
     return edits.attempt(state, f"{chosen} for {item.name}", presets.apply_material, index, ready[chosen])
@@ -145,7 +153,9 @@ def _draw_numbers(state: State, view_model: ViewModel, index: int) -> State:
     item = state.scene.objects[index]
     dispersion = item.material.dispersion  # type: ignore[union-attr]
     sold = as_sold(dispersion)
-    tip = "How many times stronger than in nature colours spread. 1 is the glass itself, 0 does not disperse; n_d stays."
+    tip = (
+        "How many times stronger than in nature colours spread. 1 is the glass itself, 0 does not disperse; n_d stays."
+    )
     changed, gain, active = widgets.slider(
         "Dispersion gain", dispersion.gain, 0.0, MAX_GAIN, unit="×", tip=tip, reset=1.0, format="%.2f", mark=1.0
     )
@@ -198,9 +208,12 @@ def _draw_lines(dispersion: Dispersion) -> None:
         ("n_C", f"{lines.n_c:.5f}", "Index at the hydrogen C line, 656.27 nm (red)."),
         ("n_F − n_C", f"{lines.principal:.5f}", "Principal dispersion, gain included."),
         ("V_d", abbe_text(lines.v_d), "Abbe number of what is rendered, gain included."),
-        ("P_g,F", "–" if lines.partial_gf is None else f"{lines.partial_gf:.4f}",
-         "Relative partial dispersion (n_g − n_F)/(n_F − n_C), g at 435.83 nm: how blue stretches against red."),
-    )  # fmt: skip
+        (
+            "P_g,F",
+            "–" if lines.partial_gf is None else f"{lines.partial_gf:.4f}",
+            "Relative partial dispersion (n_g − n_F)/(n_F − n_C), g at 435.83 nm: how blue stretches against red.",
+        ),
+    )
     imgui.spacing()
     if imgui.begin_table("lines", 3, imgui.TableFlags_.sizing_stretch_same.value):
         for name, value, tip in cells:
@@ -222,7 +235,15 @@ def _draw_priority(state: State, index: int) -> State:
         return state
     tip = "Where solids overlap, the one of higher priority fills the place (a liquid in its vessel: lower than the glass)."
     changed, priority, active = widgets.drag(
-        "Priority", float(material.priority), -MAX_PRIORITY, MAX_PRIORITY, unit="", tip=tip, reset=0.0, format="%.0f", speed=0.05
+        "Priority",
+        float(material.priority),
+        -MAX_PRIORITY,
+        MAX_PRIORITY,
+        unit="",
+        tip=tip,
+        reset=0.0,
+        format="%.0f",
+        speed=0.05,
     )
     state = widgets.holding(state, active)
     rounded = math.floor(priority + 0.5)

@@ -16,11 +16,22 @@ from . import picture_choice, widgets
 _KINDS = {"constant": "Plain colour", "gradient": "Gradient", "sky": "Sky", "map": "Picture all round"}
 _RADIANCE = "cd/unit²"
 _SKIES = {
-    1: "Overcast, dark horizon", 2: "Overcast, brighter to the sun", 3: "Overcast, soft", 4: "Overcast, soft, brighter to the sun",
-    5: "Uniform", 6: "Cloudy, level, faint sun", 7: "Cloudy, level, bright about the sun", 8: "Cloudy, level, corona",
-    9: "Cloudy, sun hidden", 10: "Cloudy, bright about the sun", 11: "White-blue, corona", 12: "Clear",
-    13: "Clear, polluted", 14: "Cloudless, turbid, wide corona", 15: "White-blue, turbid, wide corona",
-}  # fmt: skip
+    1: "Overcast, dark horizon",
+    2: "Overcast, brighter to the sun",
+    3: "Overcast, soft",
+    4: "Overcast, soft, brighter to the sun",
+    5: "Uniform",
+    6: "Cloudy, level, faint sun",
+    7: "Cloudy, level, bright about the sun",
+    8: "Cloudy, level, corona",
+    9: "Cloudy, sun hidden",
+    10: "Cloudy, bright about the sun",
+    11: "White-blue, corona",
+    12: "Clear",
+    13: "Clear, polluted",
+    14: "Cloudless, turbid, wide corona",
+    15: "White-blue, turbid, wide corona",
+}
 """The CIE's fifteen types of sky (ISO 15469), shortened."""
 
 
@@ -43,7 +54,9 @@ def draw_environment(state: State, view_model: ViewModel) -> State:
 
 
 def _constant(state: State) -> State:
-    changed, rgb, active = widgets.colour("Background", state.scene.background_rgb, tip=f"Radiance behind everything, {_RADIANCE}.")
+    changed, rgb, active = widgets.colour(
+        "Background", state.scene.background_rgb, tip=f"Radiance behind everything, {_RADIANCE}."
+    )
     if changed:
         state = edits.attempt(state, "Background", edits.set_background, rgb)
     return widgets.holding(state, active)
@@ -51,10 +64,18 @@ def _constant(state: State) -> State:
 
 def _gradient(state: State, environment: Environment) -> State:
     told: Any = environment.parameters
-    for key, label, where in (("zenith", "Above", "straight up"), ("horizon", "Horizon", "all round"), ("nadir", "Below", "straight down")):
-        changed, rgb, active = widgets.colour(label, _vector(told[key]), tip=f"Colour seen {where}; the intensity below makes it a radiance.")
+    for key, label, where in (
+        ("zenith", "Above", "straight up"),
+        ("horizon", "Horizon", "all round"),
+        ("nadir", "Below", "straight down"),
+    ):
+        changed, rgb, active = widgets.colour(
+            label, _vector(told[key]), tip=f"Colour seen {where}; the intensity below makes it a radiance."
+        )
         if changed:
-            state = edits.attempt(state, f"{label} of the gradient", environments.set_gradient, **{key: tuple(max(c, 0.0) for c in rgb)})
+            state = edits.attempt(
+                state, f"{label} of the gradient", environments.set_gradient, **{key: tuple(max(c, 0.0) for c in rgb)}
+            )
         state = widgets.holding(state, active)
     return _intensity(state, float(told.get("intensity", 1.0)), environments.set_gradient)
 
@@ -68,7 +89,13 @@ def _sky(state: State, environment: Environment) -> State:
         return edits.attempt(state, "Type of sky", environments.set_sky, type=int(number))
     rows = (
         ("sun_elevation_deg", "Sun's height", 0.0, 90.0, "How high the sun stands above the horizon."),
-        ("sun_azimuth_deg", "Sun's azimuth", -180.0, 180.0, "Compass bearing of the sun, about the up direction from x."),
+        (
+            "sun_azimuth_deg",
+            "Sun's azimuth",
+            -180.0,
+            180.0,
+            "Compass bearing of the sun, about the up direction from x.",
+        ),
     )
     for key, label, low, high, tip in rows:
         changed, value, active = widgets.slider(label, float(told[key]), low, high, unit="°", tip=tip, format="%.1f")
@@ -76,11 +103,15 @@ def _sky(state: State, environment: Environment) -> State:
             state = edits.attempt(state, label, environments.set_sky, **{key: value})
         state = widgets.holding(state, active)
     tip = "Luminance straight above."
-    changed, value, active = widgets.drag("Luminance", float(told["luminance"]), 0.0, 1e9, unit=_RADIANCE, tip=tip, format="%.4g", logarithmic=True)
+    changed, value, active = widgets.drag(
+        "Luminance", float(told["luminance"]), 0.0, 1e9, unit=_RADIANCE, tip=tip, format="%.4g", logarithmic=True
+    )
     if changed:
         state = edits.attempt(state, "Luminance of the sky", environments.set_sky, luminance=value)
     state = widgets.holding(state, active)
-    changed, rgb, active = widgets.colour("Ground", _vector(told["ground"]), tip="Reflectance of the ground below the horizon, which the sky lights.")
+    changed, rgb, active = widgets.colour(
+        "Ground", _vector(told["ground"]), tip="Reflectance of the ground below the horizon, which the sky lights."
+    )
     if changed:
         clipped = tuple(min(max(c, 0.0), 1.0) for c in rgb)
         state = edits.attempt(state, "Ground of the sky", environments.set_sky, ground=clipped)
@@ -96,7 +127,14 @@ def _map(state: State, view_model: ViewModel, environment: Environment) -> State
     widgets.read_out("Size", f"{width} × {height}", tip="Pixels across and down.")
     _, rotation_deg = up_and_rotation(environment)
     changed, angle, active = widgets.slider(
-        "Rotation", round(rotation_deg, 4), -180.0, 180.0, unit="°", format="%.1f", reset=0.0, tip="Turns it about the up direction."
+        "Rotation",
+        round(rotation_deg, 4),
+        -180.0,
+        180.0,
+        unit="°",
+        format="%.1f",
+        reset=0.0,
+        tip="Turns it about the up direction.",
     )
     if changed:
         state = edits.attempt(state, "Rotation of the environment", environments.set_map_rotation, angle)
@@ -106,7 +144,9 @@ def _map(state: State, view_model: ViewModel, environment: Environment) -> State
 
 def _intensity(state: State, value: float, edit: Any) -> State:
     tip = "Factor on all of it."
-    changed, value, active = widgets.drag("Intensity", value, 0.0, 1e9, unit="×", tip=tip, reset=1.0, format="%.4g", logarithmic=True)
+    changed, value, active = widgets.drag(
+        "Intensity", value, 0.0, 1e9, unit="×", tip=tip, reset=1.0, format="%.4g", logarithmic=True
+    )
     if changed:
         state = edits.attempt(state, "Intensity of the environment", edit, intensity=value)
     return widgets.holding(state, active)

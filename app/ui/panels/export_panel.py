@@ -22,7 +22,13 @@ SIZES = {
     "3840x2160": "3840 × 2160",
 }
 MAP_SIZES = {"512x512": "512 × 512", "1024x1024": "1024 × 1024", "2048x2048": "2048 × 2048", "4096x4096": "4096 × 4096"}
-PHOTONS = {"250000": "250 thousand", "1000000": "1 million", "4000000": "4 million", "16000000": "16 million", "64000000": "64 million"}
+PHOTONS = {
+    "250000": "250 thousand",
+    "1000000": "1 million",
+    "4000000": "4 million",
+    "16000000": "16 million",
+    "64000000": "64 million",
+}
 _KINDS = {"turntable": "Turntable", "keys": "Keys"}
 _FORMATS = {"mp4": "Movie (MP4)", "png": "Sequence (PNG)"}
 
@@ -69,7 +75,11 @@ def _running(state: State, view_model: ViewModel) -> State:
     rows.explain("Export progress", "The export works in the time that the window leaves; editing does not change it.")
     if job.text:
         widgets.hint(job.text)
-    if widgets.button("Cancel export", tip="Stop the export. What is finished stays: a movie plays up to here, a sequence keeps its frames.", width=-1):
+    if widgets.button(
+        "Cancel export",
+        tip="Stop the export. What is finished stays: a movie plays up to here, a sequence keeps its frames.",
+        width=-1,
+    ):
         state = state.asking(CancelJob())
     imgui.separator()
     return state
@@ -77,10 +87,14 @@ def _running(state: State, view_model: ViewModel) -> State:
 
 def _screenshot(view_model: ViewModel, idle: bool) -> None:
     _, _choices.spectral = widgets.toggle(
-        "Spectral bins", _choices.spectral, tip="Write an EXR with 20 spectral channels (W/(m² sr) in each bin), rendered anew in the background."
+        "Spectral bins",
+        _choices.spectral,
+        tip="Write an EXR with 20 spectral channels (W/(m² sr) in each bin), rendered anew in the background.",
     )
     if not _choices.spectral:
-        _, _choices.with_interface = widgets.toggle("With interface", _choices.with_interface, tip="The whole window as it is on the screen (PNG).")
+        _, _choices.with_interface = widgets.toggle(
+            "With interface", _choices.with_interface, tip="The whole window as it is on the screen (PNG)."
+        )
     suffixes = (".exr",) if _choices.spectral else (".png",) if _choices.with_interface else (".png", ".exr", ".npy")
     tip = "PNG: as displayed. EXR and NPY: linear Rec.709 radiance, lm/(sr unit²), without tone curve."
     if widgets.button("Save screenshot…", tip=tip, enabled=idle, width=-1):
@@ -94,12 +108,23 @@ def _bake(state: State, view_model: ViewModel, idle: bool) -> None:
         return
     if _choices.receiver not in names:
         _choices.receiver = names[0]
-    _, _choices.receiver = widgets.combo("Receiver", names, _choices.receiver, tip="The diffuse object whose caustic is baked.")
-    _, _choices.map_size = widgets.combo("Texels", MAP_SIZES, _choices.map_size, tip="Size of the texture, texels. A curved receiver gets about as many in all.")
-    _, _choices.map_photons = widgets.combo("Photons##map", PHOTONS, _choices.map_photons, tip="Photons emitted for the map.")
+    _, _choices.receiver = widgets.combo(
+        "Receiver", names, _choices.receiver, tip="The diffuse object whose caustic is baked."
+    )
+    _, _choices.map_size = widgets.combo(
+        "Texels",
+        MAP_SIZES,
+        _choices.map_size,
+        tip="Size of the texture, texels. A curved receiver gets about as many in all.",
+    )
+    _, _choices.map_photons = widgets.combo(
+        "Photons##map", PHOTONS, _choices.map_photons, tip="Photons emitted for the map."
+    )
     tip = "Irradiance of the caustic, lm/unit², as EXR or NPY (linear) or PNG (to look at). A .json beside it says where the texture lies in the world."
     if widgets.button("Bake map…", tip=tip, enabled=idle, width=-1):
-        _ask("bake", "Bake caustic map", (".exr", ".png", ".npy"), view_model, f"{view_model.title}_{_choices.receiver}")
+        _ask(
+            "bake", "Bake caustic map", (".exr", ".png", ".npy"), view_model, f"{view_model.title}_{_choices.receiver}"
+        )
 
 
 def _animation(state: State, view_model: ViewModel, idle: bool) -> State:
@@ -109,29 +134,53 @@ def _animation(state: State, view_model: ViewModel, idle: bool) -> State:
     }
     _, kind = widgets.combo("Kind", _KINDS, _choices.kind, tip=kind_tips[_choices.kind])
     _choices.kind = "keys" if kind == "keys" else "turntable"
-    _, _choices.fps, _ = widgets.slider("Frame rate", _choices.fps, 1.0, 120.0, unit="fps", format="%.0f", reset=24.0, tip="Pictures a second.")
+    _, _choices.fps, _ = widgets.slider(
+        "Frame rate", _choices.fps, 1.0, 120.0, unit="fps", format="%.0f", reset=24.0, tip="Pictures a second."
+    )
     _choices.fps = float(round(_choices.fps))
     if _choices.kind == "keys":
         state = keys_editor.draw_keys(state, view_model)
         frames = keys_editor.frame_count(state.animation, _choices.fps)
     else:
-        _, count, _ = widgets.slider("Frames", _choices.frames, 2, 720, unit="", format="%.0f", reset=120, tip="Pictures of one turn.", clamp=False)
+        _, count, _ = widgets.slider(
+            "Frames",
+            _choices.frames,
+            2,
+            720,
+            unit="",
+            format="%.0f",
+            reset=120,
+            tip="Pictures of one turn.",
+            clamp=False,
+        )
         _choices.frames = frames = max(1, round(count))
     widgets.read_out("Length", f"{frames / _choices.fps:.2f} s, {frames} frames", tip="How long the animation plays.")
     _, _choices.size = widgets.combo("Size", SIZES, _choices.size, tip="Pixels of each picture.")
-    _, _choices.photons = widgets.combo("Photons##frame", PHOTONS, _choices.photons, tip="Photons of each traced frame.")
-    _, _choices.format = widgets.combo("File", _FORMATS, _choices.format, tip="An H.264 movie, or a folder of numbered PNGs that can be resumed.")
+    _, _choices.photons = widgets.combo(
+        "Photons##frame", PHOTONS, _choices.photons, tip="Photons of each traced frame."
+    )
+    _, _choices.format = widgets.combo(
+        "File", _FORMATS, _choices.format, tip="An H.264 movie, or a folder of numbered PNGs that can be resumed."
+    )
     can = idle and (_choices.kind == "turntable" or bool(state.animation))
     tip = "Render all pictures with the present tone curve and exposure. The viewer stays usable meanwhile."
     if widgets.button("Render animation…", tip=tip if can or not idle else "Add keys first.", enabled=can, width=-1):
-        _ask("animate", "Render animation", (".mp4",) if _choices.format == "mp4" else (".png",), view_model, f"{view_model.title}_{_choices.kind}")
+        _ask(
+            "animate",
+            "Render animation",
+            (".mp4",) if _choices.format == "mp4" else (".png",),
+            view_model,
+            f"{view_model.title}_{_choices.kind}",
+        )
     return state
 
 
 def _ask(identity: str, title: str, suffixes: tuple[str, ...], view_model: ViewModel, name: str) -> None:
     folder = view_model.path.parent if view_model.path is not None else Path.home()
     stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)
-    file_browser.ask(file_browser.Question(f"export {identity}", title, suffixes, folder / f"{stem}{suffixes[0]}", saving=True))
+    file_browser.ask(
+        file_browser.Question(f"export {identity}", title, suffixes, folder / f"{stem}{suffixes[0]}", saving=True)
+    )
 
 
 def _answers(state: State) -> State:
@@ -141,7 +190,9 @@ def _answers(state: State) -> State:
         state = state.asking(Screenshot(path, _choices.spectral, _choices.with_interface and not _choices.spectral))
     path = file_browser.take("export bake")
     if path is not None:
-        state = state.asking(Bake(path, _choices.receiver, _size(_choices.map_size, (1024, 1024)), int(_choices.map_photons)))
+        state = state.asking(
+            Bake(path, _choices.receiver, _size(_choices.map_size, (1024, 1024)), int(_choices.map_photons))
+        )
     path = file_browser.take("export animate")
     if path is not None:
         # A sequence is a folder: the name that was given, without its ending.

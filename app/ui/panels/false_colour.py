@@ -15,7 +15,8 @@ _STEPS = 48
 
 
 def legend(stops: tuple[float, float], exposure_ev: float) -> None:
-    """A bar as wide as the window, its ends labelled in stops; `exposure_ev` turns a stop into a luminance for the tooltip."""
+    """A bar as wide as the window, its ends labelled in stops; `exposure_ev` turns a stop into a luminance for the
+    tooltip."""
     low, high = stops
     width, height = imgui.get_content_region_avail().x, theme.em(0.9)
     start = imgui.get_cursor_screen_pos()

@@ -1,4 +1,5 @@
-"""Choosing a file to open or a place to save, drawn with imgui so that it works everywhere, without a window system too.
+"""Choosing a file to open or a place to save, drawn with imgui so that it works everywhere, without a window system
+too.
 
 Whoever needs a file calls `ask(Question(…))` once, and `take(id)` in every frame until it answers.
 One question is open at a time; a new one replaces it.

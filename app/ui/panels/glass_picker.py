@@ -103,9 +103,13 @@ def _draw_search() -> bool:
     imgui.set_next_item_width(theme.em(18.0))
     flags = imgui.InputTextFlags_.enter_returns_true.value | imgui.InputTextFlags_.escape_clears_all.value
     before = _look.query
-    by_enter, _look.query = imgui.input_text_with_hint("##search", "Search: N-BK7, flint, schott sf, diamond …", before, flags)
+    by_enter, _look.query = imgui.input_text_with_hint(
+        "##search", "Search: N-BK7, flint, schott sf, diamond …", before, flags
+    )
     item_rects.note("Search glasses")
-    widgets.tooltip("Words of a name, a maker or another name, in any order. Without a match, similar names are listed.")
+    widgets.tooltip(
+        "Words of a name, a maker or another name, in any order. Without a match, similar names are listed."
+    )
     imgui.same_line()
     imgui.set_next_item_width(-1.0)
     maker_before = _look.maker
@@ -136,7 +140,9 @@ def _move_by_keys(count: int) -> None:
 
 def _draw_table(found: tuple[Entry, ...]) -> Entry | None:
     kinds = imgui.TableFlags_
-    flags = kinds.sortable | kinds.sort_tristate | kinds.scroll_y | kinds.row_bg | kinds.borders_inner_v | kinds.resizable
+    flags = (
+        kinds.sortable | kinds.sort_tristate | kinds.scroll_y | kinds.row_bg | kinds.borders_inner_v | kinds.resizable
+    )
     if not imgui.begin_table("glasses", len(_COLUMNS), int(flags), ImVec2(0.0, -1.0)):
         return None
     widths = (2.6, 1.6, 1.2, 1.0, 3.6)

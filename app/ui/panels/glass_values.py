@@ -124,7 +124,8 @@ def with_abbe(dispersion: Dispersion, n_d: float, v_d: float) -> Dispersion:
 
 
 def with_point(dispersion: Dispersion, at: int, n: float, keep_n_d: bool) -> Dispersion:
-    """The curve drawn through `CONTROL_NM` with point `at` put to `n`; what is rendered is taken as it is, so the gain becomes 1.
+    """The curve drawn through `CONTROL_NM` with point `at` put to `n`; what is rendered is taken as it is, so the gain
+    becomes 1.
 
     With `keep_n_d` the point of the d line does not move. Raises `UserError` for an impossible index.
     """

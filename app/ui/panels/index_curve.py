@@ -80,7 +80,11 @@ def draw_index_curve(state: State, view_model: ViewModel) -> State:
 def _draw_reset(state: State, index: int, dispersion: Dispersion) -> State:
     sold = as_sold(dispersion)
     can_reset = sold is not None and natural(dispersion) != sold
-    tip = f"Back to the curve of {sold.name}; the dispersion gain stays." if sold else "This glass is not from the catalogue."
+    tip = (
+        f"Back to the curve of {sold.name}; the dispersion gain stays."
+        if sold
+        else "This glass is not from the catalogue."
+    )
     begin_row("")
     if widgets.button("Reset curve", tip=tip, enabled=can_reset) and sold is not None:
         _look.refused = ""
@@ -204,7 +208,10 @@ def _draw_handle(pixel: ImVec2, nm: float, radius: float, is_fixed: bool, is_lit
     drawing, colours = imgui.get_window_draw_list(), theme.palette()
     ring = theme.packed(colours.accent if is_lit else colours.text)
     if is_fixed:
-        corner, far = ImVec2(pixel.x - 0.8 * radius, pixel.y - 0.8 * radius), ImVec2(pixel.x + 0.8 * radius, pixel.y + 0.8 * radius)
+        corner, far = (
+            ImVec2(pixel.x - 0.8 * radius, pixel.y - 0.8 * radius),
+            ImVec2(pixel.x + 0.8 * radius, pixel.y + 0.8 * radius),
+        )
         drawing.add_rect_filled(corner, far, theme.packed(colours.muted))
         return
     drawing.add_circle_filled(pixel, radius, colour_of_nm(nm))

@@ -64,17 +64,29 @@ def _object(state: State, view_model: ViewModel, index: int) -> State:
 def _place(state: State, index: int) -> State:
     thing = state.scene.objects[index]
     position, rotation, scale = edits.decompose(thing.object_to_world)
-    moved, position, active = widgets.vec3("Position", position, unit=_UNITS, tip="Where the object's origin stands: x, y, z.", speed=_speed(thing))
+    moved, position, active = widgets.vec3(
+        "Position", position, unit=_UNITS, tip="Where the object's origin stands: x, y, z.", speed=_speed(thing)
+    )
     if moved:
         state = edits.attempt(state, f"Move {thing.name}", edits.set_position, index, position)
     turned, rotation, turning = widgets.vec3(
-        "Rotation", rotation, unit="°", format="%.2f", speed=0.25, reset=(0.0, 0.0, 0.0),
+        "Rotation",
+        rotation,
+        unit="°",
+        format="%.2f",
+        speed=0.25,
+        reset=(0.0, 0.0, 0.0),
         tip="Angles about the world's x, then y, then z axis.",
-    )  # fmt: skip
+    )
     if turned:
         state = edits.attempt(state, f"Rotate {thing.name}", edits.set_rotation, index, rotation)
     scaled, wanted, scaling = widgets.vec3(
-        "Scale", scale, unit="×", speed=0.005, reset=(1.0, 1.0, 1.0), tip="Factors along the object's own axes; a negative one mirrors."
+        "Scale",
+        scale,
+        unit="×",
+        speed=0.005,
+        reset=(1.0, 1.0, 1.0),
+        tip="Factors along the object's own axes; a negative one mirrors.",
     )
     if scaled:
         factors = _in_proportion(scale, wanted) if _keeps_proportions["on"] else wanted
@@ -106,7 +118,10 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
     material = thing.material
     kind = next(name for name, made in _KINDS.items() if isinstance(material, made))
     changed, wanted = widgets.combo(
-        "Kind", tuple(_KINDS), kind, tip="Glass refracts, diffuse surfaces receive caustics, mirrors reflect, black absorbs."
+        "Kind",
+        tuple(_KINDS),
+        kind,
+        tip="Glass refracts, diffuse surfaces receive caustics, mirrors reflect, black absorbs.",
     )
     if changed:
         return edits.attempt(state, f"Make {thing.name} {wanted.lower()}", edits.set_material, index, _fresh(wanted))
@@ -129,10 +144,18 @@ def _fresh(kind: str) -> Material:
 
 def _glass(state: State, material: Dielectric) -> State:
     dispersion = material.dispersion
-    widgets.read_out("Glass", dispersion.name or "unnamed", tip="Name of the glass. Its dispersion is edited in the Dispersion panel.")
+    widgets.read_out(
+        "Glass",
+        dispersion.name or "unnamed",
+        tip="Name of the glass. Its dispersion is edited in the Dispersion panel.",
+    )
     number = f"{dispersion.V_d:.2f}" if np.isfinite(dispersion.V_d) else "none"
-    widgets.read_out("n_d, V_d", f"{dispersion.n_d:.5f}, {number}", tip="Index at 587.56 nm and Abbe number, gain included. No unit.")
-    if not state.preferences.panels.dispersion and widgets.button("Edit dispersion", tip="Open the Dispersion panel.", width=-1):
+    widgets.read_out(
+        "n_d, V_d", f"{dispersion.n_d:.5f}, {number}", tip="Index at 587.56 nm and Abbe number, gain included. No unit."
+    )
+    if not state.preferences.panels.dispersion and widgets.button(
+        "Edit dispersion", tip="Open the Dispersion panel.", width=-1
+    ):
         state = state.with_panels(dispersion=True)
     return state
 
@@ -143,8 +166,14 @@ def _texture(state: State, view_model: ViewModel, index: int, material: Diffuse)
     worn = material.texture
     can = thing.mesh.uv is not None
     name = "None" if worn is None else Path(worn.source).name if worn.source else "From the scene's file"
-    tip = "A picture laid on the surface (.png, .jpg, .exr). Click to choose one." if can else "This mesh has no texture coordinates to lay a picture on."
-    pressed = widgets.file_field("Picture", name, tip=tip, enabled=can, clear_tip="" if worn is None else "Back to the plain colour.")
+    tip = (
+        "A picture laid on the surface (.png, .jpg, .exr). Click to choose one."
+        if can
+        else "This mesh has no texture coordinates to lay a picture on."
+    )
+    pressed = widgets.file_field(
+        "Picture", name, tip=tip, enabled=can, clear_tip="" if worn is None else "Back to the plain colour."
+    )
     if pressed is None:
         return edits.attempt(state, f"Picture of {thing.name}", environments.clear_texture, index)
     if pressed:
@@ -194,9 +223,15 @@ def _scene(state: State, view_model: ViewModel) -> State:
         widgets.read_out("Lights", str(len(scene.lights)), tip="Number of lights.")
         widgets.read_out("Triangles", f"{triangles:,}", tip="Triangles of all objects.")
         depth_changed, depth, active = widgets.slider(
-            "Longest path", scene.render.max_depth, 1, 64, unit="events", format="%.0f", reset=64,
+            "Longest path",
+            scene.render.max_depth,
+            1,
+            64,
+            unit="events",
+            format="%.0f",
+            reset=64,
             tip="Refractions and reflections after which a photon is given up.",
-        )  # fmt: skip
+        )
         if depth_changed and round(depth) != scene.render.max_depth:
             state = edits.attempt(state, "Longest path", edits.set_render_defaults, max_depth=round(depth))
         state = widgets.holding(state, active)

@@ -37,15 +37,29 @@ def draw_keys(state: State, view_model: ViewModel) -> State:
     known = paths(stage.scene, stage.camera)
     if _memory.path not in known:
         _memory.path = next((path for path in known if path.endswith(".dispersion_gain")), next(iter(known)))
-    _, _memory.path = widgets.combo("Parameter", _names(state.scene, known), _memory.path, tip=known[_memory.path].meaning + ".")
-    _, _memory.time_s, _ = widgets.drag("At", _memory.time_s, 0.0, MAX_TIME_S, unit="s", format="%.2f", reset=0.0, speed=0.02, tip="Time of the next key.")
+    _, _memory.path = widgets.combo(
+        "Parameter", _names(state.scene, known), _memory.path, tip=known[_memory.path].meaning + "."
+    )
+    _, _memory.time_s, _ = widgets.drag(
+        "At",
+        _memory.time_s,
+        0.0,
+        MAX_TIME_S,
+        unit="s",
+        format="%.2f",
+        reset=0.0,
+        speed=0.02,
+        tip="Time of the next key.",
+    )
     half = 0.5 * (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x)
     tip = "Add a key with the parameter's present value (turns: 0, power: 1)."
     if widgets.button("Add key", tip=tip, width=half):
         state = _with(state, [Key(_memory.time_s, _memory.path, value_of(stage, _memory.path))])
         _memory.time_s += _DEFAULT_STEP_S
     imgui.same_line()
-    if widgets.button("Key this view", tip="Add keys for the camera's position and target as they are now.", width=half):
+    if widgets.button(
+        "Key this view", tip="Add keys for the camera's position and target as they are now.", width=half
+    ):
         state = _with(state, [Key(_memory.time_s, path, value_of(stage, path)) for path in _VIEW])
         _memory.time_s += _DEFAULT_STEP_S
     return _table(state, known)
@@ -113,17 +127,29 @@ def _row(index: int, key: Key, names: dict[str, str], known: dict[str, Parameter
     imgui.align_text_to_frame_padding()
     with theme.coloured(theme.palette().text if parameter else theme.palette().warning):
         imgui.text_unformatted(names.get(key.path, key.path))
-    widgets.tooltip(f"{key.path}: {parameter.meaning}." if parameter else "This parameter is not in the scene any more.")
+    widgets.tooltip(
+        f"{key.path}: {parameter.meaning}." if parameter else "This parameter is not in the scene any more."
+    )
     imgui.table_next_column()
     imgui.set_next_item_width(-1)
-    moved, time_s = imgui.drag_float("##time", key.time_s, 0.02, 0.0, MAX_TIME_S, "%.2f s", imgui.SliderFlags_.always_clamp)
+    moved, time_s = imgui.drag_float(
+        "##time", key.time_s, 0.02, 0.0, MAX_TIME_S, "%.2f s", imgui.SliderFlags_.always_clamp
+    )
     active = imgui.is_item_active()
     item_rects.note(f"Key {index} time")
     widgets.tooltip("Time of this key.", "Unit: s", "Ctrl+click: type")
     imgui.table_next_column()
     imgui.set_next_item_width(-1)
     low, high = (parameter.low, parameter.high) if parameter else (-1e9, 1e9)
-    changed, value = imgui.drag_float("##value", key.value, max(abs(key.value) * 5e-3, 1e-3), low, high, "%.4g", imgui.SliderFlags_.always_clamp | imgui.SliderFlags_.no_round_to_format)
+    changed, value = imgui.drag_float(
+        "##value",
+        key.value,
+        max(abs(key.value) * 5e-3, 1e-3),
+        low,
+        high,
+        "%.4g",
+        imgui.SliderFlags_.always_clamp | imgui.SliderFlags_.no_round_to_format,
+    )
     active |= imgui.is_item_active()
     item_rects.note(f"Key {index} value")
     unit = parameter.unit if parameter else ""
@@ -134,5 +160,9 @@ def _row(index: int, key: Key, names: dict[str, str], known: dict[str, Parameter
     widgets.tooltip("Delete this key.")
     if deleted:
         return None, False
-    after = replace(key, time_s=float(f"{time_s:.7g}") if moved else key.time_s, value=float(f"{value:.7g}") if changed else key.value)
+    after = replace(
+        key,
+        time_s=float(f"{time_s:.7g}") if moved else key.time_s,
+        value=float(f"{value:.7g}") if changed else key.value,
+    )
     return after, active

@@ -174,11 +174,17 @@ def _draw_outline(light: Light) -> tuple[Light, bool]:
     sized = replace(light, shape=shape)  # type: ignore[arg-type]
     if shape == "disc":
         tip = "Radius of the disc."
-        _, radius, active = widgets.drag("Radius", light.radius, 1e-6, 1e6, unit="units", tip=tip, format="%.4g", logarithmic=True)
+        _, radius, active = widgets.drag(
+            "Radius", light.radius, 1e-6, 1e6, unit="units", tip=tip, format="%.4g", logarithmic=True
+        )
         return replace(sized, radius=radius), active
     tip = "Side of the rectangle."
-    _, width, width_held = widgets.drag("Width", light.width, 1e-6, 1e6, unit="units", tip=tip, format="%.4g", logarithmic=True)
-    _, height, height_held = widgets.drag("Height", light.height, 1e-6, 1e6, unit="units", tip=tip, format="%.4g", logarithmic=True)
+    _, width, width_held = widgets.drag(
+        "Width", light.width, 1e-6, 1e6, unit="units", tip=tip, format="%.4g", logarithmic=True
+    )
+    _, height, height_held = widgets.drag(
+        "Height", light.height, 1e-6, 1e6, unit="units", tip=tip, format="%.4g", logarithmic=True
+    )
     return replace(sized, width=width, height=height), width_held or height_held
 
 
@@ -194,7 +200,16 @@ def _draw_power(state: State, index: int) -> State:
     _power_key[light.kind] = key
     power = edits.light_power(light, key)
     changed, power, active = widgets.drag(
-        "Power", power, 0.0, 1e12, unit=edits.POWER_UNITS[key], tip=_POWER_TIPS[key.split("_")[0]], format="%.6g", logarithmic=True
+        "Power",
+        power,
+        0.0,
+        1e12,
+        unit=edits.POWER_UNITS[key],
+        tip=_POWER_TIPS[key.split("_")[0]],
+        format="%.6g",
+        logarithmic=True,
     )
     state = widgets.holding(state, active)
-    return edits.attempt(state, f"Power of {light.name}", edits.set_light_power, index, power, key) if changed else state
+    return (
+        edits.attempt(state, f"Power of {light.name}", edits.set_light_power, index, power, key) if changed else state
+    )

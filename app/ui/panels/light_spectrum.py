@@ -30,19 +30,34 @@ LAMPS: dict[str, tuple[tuple[float, float], ...]] = {
     **{preset.name: preset.value for preset in presets.light_presets() if preset.kind == "lines"},  # type: ignore[dict-item]
     "Hydrogen lamp": ((410.174, 0.05), (434.047, 0.09), (486.135, 0.36), (656.279, 1.0)),
     "Helium lamp": (
-        (447.148, 0.4), (471.314, 0.06), (492.193, 0.04), (501.568, 0.2), (587.562, 1.0), (667.815, 0.2), (706.519, 0.4),
+        (447.148, 0.4),
+        (471.314, 0.06),
+        (492.193, 0.04),
+        (501.568, 0.2),
+        (587.562, 1.0),
+        (667.815, 0.2),
+        (706.519, 0.4),
     ),
     "Cadmium lamp": ((467.815, 0.6), (479.991, 0.9), (508.582, 1.0), (643.847, 0.7)),
-}  # fmt: skip
+}
 """Lines in air, nm (NIST Atomic Spectra Database), with relative powers as low-pressure lamps roughly have them."""
 
 _COMMON = ("D65", "D50", "A", "E", "LED-B1", "LED-B3", "LED-RGB1", "FL2", "FL11", "HP1")
 _ABOUT = {
-    "A": "A, tungsten lamp", "D50": "D50, horizon daylight", "D55": "D55, mid-morning daylight", "D65": "D65, noon daylight",
-    "D75": "D75, north sky", "E": "E, equal energy", "FL2": "FL2, fluorescent, cool white", "FL11": "FL11, fluorescent, three bands",
-    "HP1": "HP1, sodium, high pressure", "LED-B1": "LED-B1, warm white LED", "LED-B3": "LED-B3, neutral white LED",
-    "LED-B5": "LED-B5, cold white LED", "LED-RGB1": "LED-RGB1, red, green and blue LEDs",
-}  # fmt: skip
+    "A": "A, tungsten lamp",
+    "D50": "D50, horizon daylight",
+    "D55": "D55, mid-morning daylight",
+    "D65": "D65, noon daylight",
+    "D75": "D75, north sky",
+    "E": "E, equal energy",
+    "FL2": "FL2, fluorescent, cool white",
+    "FL11": "FL11, fluorescent, three bands",
+    "HP1": "HP1, sodium, high pressure",
+    "LED-B1": "LED-B1, warm white LED",
+    "LED-B3": "LED-B3, neutral white LED",
+    "LED-B5": "LED-B5, cold white LED",
+    "LED-RGB1": "LED-RGB1, red, green and blue LEDs",
+}
 
 
 @dataclass
@@ -70,7 +85,12 @@ def draw_spectrum_choice(state: State, index: int) -> State:
         if chosen == "csv":
             _look.wants_file.add(light.name)
             return state
-        first: dict[str, object] = {"illuminant": "D65", "blackbody": 3200.0, "laser": 532.0, "lines": LAMPS["Mercury lamp"]}
+        first: dict[str, object] = {
+            "illuminant": "D65",
+            "blackbody": 3200.0,
+            "laser": 532.0,
+            "lines": LAMPS["Mercury lamp"],
+        }
         return _set(state, index, chosen, first[chosen]) if chosen in first else state
     if shown == "csv":
         state = _draw_file(state, index)
@@ -210,7 +230,9 @@ def _draw_lines(drawing: imgui.ImDrawList, lines: tuple[tuple[float, float], ...
 def _tell(spectrum: Spectrum, nm: float) -> None:
     near = min(spectrum.lines, key=lambda line: abs(line[0] - nm), default=None)
     if near is not None and abs(near[0] - nm) < 6.0:
-        imgui.set_tooltip(f"Line at {near[0]:.2f} nm, {100 * near[1] / max(spectrum.power_w(), 1e-300):.3g} % of the power")
+        imgui.set_tooltip(
+            f"Line at {near[0]:.2f} nm, {100 * near[1] / max(spectrum.power_w(), 1e-300):.3g} % of the power"
+        )
         return
     density = float(np.interp(nm, VISIBLE_NM, spectrum.density))
     strongest = float(spectrum.density.max())

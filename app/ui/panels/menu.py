@@ -74,13 +74,17 @@ def _edit(state: State, view_model: ViewModel) -> State:
 
 
 def _view(state: State, view_model: ViewModel) -> State:
-    state = _items(("Frame selection", "Frame everything", "Scene's own view", "Keep as scene's view"), state, view_model)
+    state = _items(
+        ("Frame selection", "Frame everything", "Scene's own view", "Keep as scene's view"), state, view_model
+    )
     for title, prefix in (("Go to view", "View"), ("Store view", "Store view")):
         if imgui.begin_menu(title):
             state = _items(tuple(f"{prefix} {number}" for number in range(1, 10)), state, view_model)
             imgui.end_menu()
     imgui.separator()
-    state = _items(("Automatic exposure", "False colour", "Single wavelength", "Ray overlay", "Magnifier"), state, view_model)
+    state = _items(
+        ("Automatic exposure", "False colour", "Single wavelength", "Ray overlay", "Magnifier"), state, view_model
+    )
     imgui.separator()
     if imgui.begin_menu("Panels"):
         state = _items(tuple(f"Panel: {command.name}" for command in commands.PANELS), state, view_model)

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 from ...edit.requests import DismissMessage, ReloadShaders
 from ...edit.state import State
 from .. import item_rects, theme
-from ..view_model import ViewModel, Message
+from ..view_model import Message, ViewModel
 from . import status_bar, widgets
 
 _FADE_FROM_S, _FADE_S = 4.5, 1.5

@@ -51,10 +51,15 @@ def draw_add_items(state: State) -> State:
             item_rects.note(f"Add {kind} light")
             widgets.tooltip(_LIGHT_TIPS.get(kind, ""))
             if pressed:
-                state = _added(state, Selection("light", len(state.scene.lights)), f"Add {kind} light", edits.add_light, kind)
+                state = _added(
+                    state, Selection("light", len(state.scene.lights)), f"Add {kind} light", edits.add_light, kind
+                )
         imgui.end_menu()
     item_rects.note("Add light")
-    for title, shapes in (("Glass", [s for s in edits.SHAPES if s not in edits.RECEIVERS]), ("Receiver", list(edits.RECEIVERS))):
+    for title, shapes in (
+        ("Glass", [s for s in edits.SHAPES if s not in edits.RECEIVERS]),
+        ("Receiver", list(edits.RECEIVERS)),
+    ):
         icon = icons.ICON_FA_GEM if title == "Glass" else icons.ICON_FA_SQUARE
         if imgui.begin_menu(f"{icon}  {title}"):
             for shape in shapes:
@@ -63,7 +68,9 @@ def draw_add_items(state: State) -> State:
                 item_rects.note(f"Add {words}")
                 widgets.tooltip(f"A {words} beside the other objects; lengths follow the scene.")
                 if pressed:
-                    state = _added(state, Selection("object", len(state.scene.objects)), f"Add {words}", edits.add_object, shape)
+                    state = _added(
+                        state, Selection("object", len(state.scene.objects)), f"Add {words}", edits.add_object, shape
+                    )
             imgui.end_menu()
         item_rects.note(f"Add {title.lower()}")
     return state
@@ -143,7 +150,9 @@ def _toolbar(state: State) -> State:
     return state
 
 
-def _group(state: State, title: str, kind: str, things: tuple[Light, ...] | tuple[SceneObject, ...], wanted: str) -> State:
+def _group(
+    state: State, title: str, kind: str, things: tuple[Light, ...] | tuple[SceneObject, ...], wanted: str
+) -> State:
     imgui.separator_text(f"{title}  {len(things)}")
     for index, thing in enumerate(things):
         if wanted in thing.name.lower():

@@ -1,4 +1,5 @@
-"""Choosing picture files for the environment and for surfaces: the questions, their answers, and pictures dropped on the window."""
+"""Choosing picture files for the environment and for surfaces: the questions, their answers, and pictures dropped on
+the window."""
 
 from __future__ import annotations
 
@@ -24,7 +25,9 @@ def ask_environment(state: State, view_model: ViewModel) -> None:
     """Ask for a panorama."""
     now = state.scene.environment
     start = _folder(view_model, None if now is None else now.source)
-    file_browser.ask(file_browser.Question(_ENVIRONMENT, "Choose environment", environments.ENVIRONMENT_SUFFIXES, start))
+    file_browser.ask(
+        file_browser.Question(_ENVIRONMENT, "Choose environment", environments.ENVIRONMENT_SUFFIXES, start)
+    )
 
 
 def ask_texture(state: State, view_model: ViewModel, index: int) -> None:
@@ -58,9 +61,15 @@ def dropped(state: State, path: Path) -> State:
     if path.suffix.lower() in _PANORAMAS:
         return _as_environment(state, path)
     selection = state.selection
-    if selection.kind == "object" and selection.index < len(state.scene.objects) and isinstance(state.scene.objects[selection.index].material, Diffuse):
+    if (
+        selection.kind == "object"
+        and selection.index < len(state.scene.objects)
+        and isinstance(state.scene.objects[selection.index].material, Diffuse)
+    ):
         return _as_texture(state, path, selection.index)
-    return state.asking(Notice(f"Select a diffuse object to lay {path.name} on it, or drop an .hdr or .exr for the environment."))
+    return state.asking(
+        Notice(f"Select a diffuse object to lay {path.name} on it, or drop an .hdr or .exr for the environment.")
+    )
 
 
 def _as_environment(state: State, path: Path) -> State:

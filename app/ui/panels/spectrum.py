@@ -32,12 +32,22 @@ def draw_spectrum(state: State, view_model: ViewModel) -> State:
 
 
 def _told(state: State, cursor: CursorInfo, colour: ColourInfo | None) -> None:
-    parts = [("Radiance", "  ".join(f"{c:.3g}" for c in cursor.rgb), "Linear Rec.709 radiance of the pixel, lm/(sr unit²).")]
+    parts = [
+        ("Radiance", "  ".join(f"{c:.3g}" for c in cursor.rgb), "Linear Rec.709 radiance of the pixel, lm/(sr unit²).")
+    ]
     if colour is not None:
         parts += [
-            ("Illuminance", f"{colour.illuminance:.4g} lm/unit²", "Luminous flux of the caustic per area of the receiver."),
+            (
+                "Illuminance",
+                f"{colour.illuminance:.4g} lm/unit²",
+                "Luminous flux of the caustic per area of the receiver.",
+            ),
             ("x, y", f"{colour.x:.4f}, {colour.y:.4f}", "CIE 1931 chromaticity of the caustic's light."),
-            ("Dominant", _dominant_text(colour), "Wavelength of the spectral colour of the same hue, from D65; c: of the opposite hue."),
+            (
+                "Dominant",
+                _dominant_text(colour),
+                "Wavelength of the spectral colour of the same hue, from D65; c: of the opposite hue.",
+            ),
             ("Purity", numbers.percent(colour.purity), "Excitation purity: 100 % is a spectral colour, 0 % is white."),
         ]
     if cursor.object_index is not None and cursor.object_index < len(state.scene.objects):
@@ -78,7 +88,12 @@ def _plot(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> None:
     _fill(wavelengths_nm, scaled)
     implot.pop_plot_clip_rect()
     outline = imgui.ImVec4(*theme.palette().text[:3], 0.85)
-    implot.plot_line("##outline", np.ascontiguousarray(wavelengths_nm, float), scaled, implot.Spec(line_color=outline, line_weight=1.2))
+    implot.plot_line(
+        "##outline",
+        np.ascontiguousarray(wavelengths_nm, float),
+        scaled,
+        implot.Spec(line_color=outline, line_weight=1.2),
+    )
     implot.end_plot()
     rows.explain("Spectrum plot", "")
 

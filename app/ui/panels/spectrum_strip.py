@@ -33,7 +33,9 @@ def strip(label: str, wavelength_nm: float | None, *, tip: str) -> tuple[bool, f
     return chosen != wavelength_nm, chosen, active
 
 
-def _draw_handle(drawing: imgui.ImDrawList, start: imgui.ImVec2, width: float, height: float, wavelength_nm: float) -> None:
+def _draw_handle(
+    drawing: imgui.ImDrawList, start: imgui.ImVec2, width: float, height: float, wavelength_nm: float
+) -> None:
     share = min(max((wavelength_nm - LOW_NM) / (HIGH_NM - LOW_NM), 0.0), 1.0)
     x, half = start.x + share * width, theme.em(0.16)
     low, high = imgui.ImVec2(x - half, start.y - half), imgui.ImVec2(x + half, start.y + height + half)

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 from ...edit.requests import Recover
 from ...edit.state import State
 from .. import item_rects, theme
-from ..view_model import ViewModel, SceneEntry
+from ..view_model import SceneEntry, ViewModel
 from . import dialogs, widgets
 
 _CARD_EM, _GAP_EM = 17.0, 1.1
@@ -65,7 +65,9 @@ def _recovery(state: State) -> State:
     with theme.coloured(chosen.warning), theme.heading():
         imgui.text_unformatted(f"{icons.ICON_FA_TRIANGLE_EXCLAMATION}  Unsaved work was found")
     widgets.hint("The last session ended without saving. Recover it, or discard it for good.")
-    if widgets.button("Recover", tip="Open the work as it was last written, at most 30 s before the end.", width=theme.em(7)):
+    if widgets.button(
+        "Recover", tip="Open the work as it was last written, at most 30 s before the end.", width=theme.em(7)
+    ):
         state = state.asking(Recover()).with_panels(start_page=False)
     imgui.same_line()
     if widgets.button("Discard##recovery", tip="Delete the recovered work.", width=theme.em(7)):
@@ -134,14 +136,18 @@ def _card(entry: SceneEntry, width: float) -> bool:
     _picture(drawing, entry, start, imgui.ImVec2(end.x, start.y + picture_height), rounding)
     drawing.add_rect(start, end, theme.packed(chosen.accent if hovered else chosen.border), rounding)
     left, top = start.x + padding, start.y + picture_height + padding
-    drawing.add_text(theme.bold(), imgui.get_font_size(), imgui.ImVec2(left, top), theme.packed(chosen.text), entry.title)
+    drawing.add_text(
+        theme.bold(), imgui.get_font_size(), imgui.ImVec2(left, top), theme.packed(chosen.text), entry.title
+    )
     words = _first_lines(entry.description, width - 2 * padding, 2)
     for number, text in enumerate(words):
         drawing.add_text(imgui.ImVec2(left, top + (number + 1) * line), theme.packed(chosen.muted), text)
     return pressed
 
 
-def _picture(drawing: imgui.ImDrawList, entry: SceneEntry, low: imgui.ImVec2, high: imgui.ImVec2, rounding: float) -> None:
+def _picture(
+    drawing: imgui.ImDrawList, entry: SceneEntry, low: imgui.ImVec2, high: imgui.ImVec2, rounding: float
+) -> None:
     if entry.thumbnail is None:
         drawing.add_rect_filled(low, high, theme.packed(theme.palette().canvas), rounding, imgui.ImDrawFlags_.round_top)
         word = "Drawing…"
@@ -155,7 +161,8 @@ def _picture(drawing: imgui.ImDrawList, entry: SceneEntry, low: imgui.ImVec2, hi
 
 
 def _first_lines(text: str, width: float, count: int) -> list[str]:
-    """`text` broken at blanks into at most `count` lines of `width` pixels, the last one ending in … when more follows."""
+    """`text` broken at blanks into at most `count` lines of `width` pixels, the last one ending in … when more
+    follows."""
     lines, words = [""], text.split()
     for position, word in enumerate(words):
         longer = f"{lines[-1]} {word}".strip()

@@ -60,7 +60,9 @@ def _progress(state: State, view_model: ViewModel) -> State:
         state = replace(state, playing=not state.playing)
     imgui.same_line()
     share = min(stats.photons / target, 1.0)
-    imgui.push_style_color(imgui.Col_.plot_histogram, theme.palette().good if stats.converged else theme.palette().accent)
+    imgui.push_style_color(
+        imgui.Col_.plot_histogram, theme.palette().good if stats.converged else theme.palette().accent
+    )
     imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + theme.em(0.55))
     imgui.progress_bar(share, imgui.ImVec2(theme.em(7), theme.em(0.4)), "")
     imgui.pop_style_color()

@@ -30,13 +30,28 @@ _COUNTERS = {
     "escaped": ("Left the scene", "Met nothing any more."),
     "lost_depth": ("Path too long", "Given up after the scene's largest number of refractions and reflections."),
     "lost_numeric": ("Not a number", "Lost to arithmetic; anything but zero here is a fault."),
-    "footprint_dropped": ("Footprint dropped", "The derivatives of the path overflowed: the photon keeps its light and becomes a point."),
-    "shading_normal": ("Flat normal used", "The smooth normal would have sent light to the wrong side: the facet's own was taken."),
-    "band_cut": ("Spectrum split", "Part of a photon's spectrum is totally reflected: the photon was split in two there."),
+    "footprint_dropped": (
+        "Footprint dropped",
+        "The derivatives of the path overflowed: the photon keeps its light and becomes a point.",
+    ),
+    "shading_normal": (
+        "Flat normal used",
+        "The smooth normal would have sent light to the wrong side: the facet's own was taken.",
+    ),
+    "band_cut": (
+        "Spectrum split",
+        "Part of a photon's spectrum is totally reflected: the photon was split in two there.",
+    ),
     "columns_dropped": ("Derivatives dropped", "They overflowed on a camera ray's path: it goes on as a single ray."),
     "depth_reached": ("Path too long", "Camera rays caught inside glass: what is left of them sees the environment."),
-    "stack_full": ("No room to split", "Glass split a camera ray more often than there is room for: one part was chosen by chance."),
-    "band_uncut": ("Spectrum not split", "Part of a camera ray's band is totally reflected, but too near its end or too far to tell where."),
+    "stack_full": (
+        "No room to split",
+        "Glass split a camera ray more often than there is room for: one part was chosen by chance.",
+    ),
+    "band_uncut": (
+        "Spectrum not split",
+        "Part of a camera ray's band is totally reflected, but too near its end or too far to tell where.",
+    ),
     "queue_overflow": ("Queue full", "Photons that found no room among those in flight."),
 }
 """What the engine counts -> its name on the screen, and what it means."""
@@ -89,24 +104,35 @@ def _frame_plot(view_model: ViewModel, height: float) -> None:
     size = imgui.ImVec2(-1, max(height - imgui.get_text_line_height_with_spacing(), theme.em(4)))
     if not implot.begin_plot("##frame time", size, flags):
         return
-    implot.setup_axes("", "ms", implot.AxisFlags_.no_tick_labels | implot.AxisFlags_.no_tick_marks, implot.AxisFlags_.no_highlight)
+    implot.setup_axes(
+        "", "ms", implot.AxisFlags_.no_tick_labels | implot.AxisFlags_.no_tick_marks, implot.AxisFlags_.no_highlight
+    )
     top = max(20.0, float(np.percentile(times, 98)) * 1.3) if times.size else 20.0
     implot.setup_axes_limits(0, 239, 0, top, implot.Cond_.always)
     muted = imgui.ImVec4(*theme.palette().muted)
-    implot.plot_inf_lines("##limits", np.array([1000 / 60, 50.0]), implot.Spec(line_color=muted, flags=implot.InfLinesFlags_.horizontal))
+    implot.plot_inf_lines(
+        "##limits", np.array([1000 / 60, 50.0]), implot.Spec(line_color=muted, flags=implot.InfLinesFlags_.horizontal)
+    )
     if times.size:
         start = 240 - times.size
         accent = imgui.ImVec4(*theme.palette().accent)
-        implot.plot_line("##frame", np.arange(start, 240, dtype=float), times, implot.Spec(line_color=accent, line_weight=1.5))
+        implot.plot_line(
+            "##frame", np.arange(start, 240, dtype=float), times, implot.Spec(line_color=accent, line_weight=1.5)
+        )
     implot.end_plot()
-    rows.explain("Frame plot", "Durations of the last 240 frames in milliseconds. Lines: 16.7 ms (60 frames/s) and 50 ms.")
+    rows.explain(
+        "Frame plot", "Durations of the last 240 frames in milliseconds. Lines: 16.7 ms (60 frames/s) and 50 ms."
+    )
 
 
 def _passes(view_model: ViewModel) -> None:
     known = [name for name in PASSES if name in view_model.pass_ms]
     names = known + [name for name in view_model.pass_ms if name not in PASSES]
     imgui.text_unformatted("By pass")
-    rows.explain("By pass", "Time of each pass in the last frame, milliseconds: GPU timers, or the wall clock on a software renderer.")
+    rows.explain(
+        "By pass",
+        "Time of each pass in the last frame, milliseconds: GPU timers, or the wall clock on a software renderer.",
+    )
     if not names:
         widgets.hint("Nothing was computed in the last frame.")
         return
@@ -148,14 +174,34 @@ def _right_aligned(text: str, width: float) -> None:
 def _numbers(state: State, stats: LiveStats) -> None:
     target = state.preferences.target_photons
     lines = [
-        ("Photons", f"{numbers.count(stats.photons)} of {numbers.count(target)}", "Emitted photons that the shown map holds, and where it stops."),
+        (
+            "Photons",
+            f"{numbers.count(stats.photons)} of {numbers.count(target)}",
+            "Emitted photons that the shown map holds, and where it stops.",
+        ),
         ("Rate", f"{numbers.count(stats.photons_per_second)}/s", "Emitted photons per second of trace and splat time."),
-        ("Stored", numbers.count(stats.photons_stored), "Photon records kept, to be splatted again after an edit of dispersion."),
-        ("Rays traced", numbers.count(stats.rays_traced), "Rays emitted since the start. Stands still when photons are only splatted again."),
-        ("Samples", _samples(stats), "Camera samples of the shown picture; where glass disperses, bands of the spectrum that they are divided over."),
-        ("Resolution", f"{stats.resolution_scale:.0%}", "Side of the shown picture over the viewport's: less while something moves."),
+        (
+            "Stored",
+            numbers.count(stats.photons_stored),
+            "Photon records kept, to be splatted again after an edit of dispersion.",
+        ),
+        (
+            "Rays traced",
+            numbers.count(stats.rays_traced),
+            "Rays emitted since the start. Stands still when photons are only splatted again.",
+        ),
+        (
+            "Samples",
+            _samples(stats),
+            "Camera samples of the shown picture; where glass disperses, bands of the spectrum that they are divided over.",
+        ),
+        (
+            "Resolution",
+            f"{stats.resolution_scale:.0%}",
+            "Side of the shown picture over the viewport's: less while something moves.",
+        ),
         ("Memory", numbers.size(stats.bytes), "GPU memory held by maps, photons and scene."),
-    ]  # fmt: skip
+    ]
     _table("##numbers", lines)
     dropped = [(_named(k), numbers.count(v), _tip(k)) for k, v in stats.fallbacks.items() if v]
     lost = [(_named(k), numbers.percent(v), _tip(k)) for k, v in stats.lost.items() if v]

@@ -44,18 +44,28 @@ def _exposure(state: State, view_model: ViewModel) -> State:
     display = state.display
     in_use = view_model.exposure_ev if display.auto_exposure else display.exposure_ev
     changed, stops, active = widgets.slider(
-        "Exposure", in_use, -16.0, 16.0, unit="EV", format="%+.2f", reset=0.0,
+        "Exposure",
+        in_use,
+        -16.0,
+        16.0,
+        unit="EV",
+        format="%+.2f",
+        reset=0.0,
         tip="Brightness of the picture in stops. Moving it turns the automatic off.",
-    )  # fmt: skip
+    )
     if changed:
         display = replace(display, exposure_ev=stops, auto_exposure=False)
-    toggled, is_auto = widgets.toggle("Automatic", display.auto_exposure, tip="Let the exposure follow the picture (Shift+E).")
+    toggled, is_auto = widgets.toggle(
+        "Automatic", display.auto_exposure, tip="Let the exposure follow the picture (Shift+E)."
+    )
     if toggled:
         display = replace(display, auto_exposure=is_auto, exposure_ev=in_use)
     _, tone = widgets.combo(
-        "Tone curve", _TONES, display.tone,
+        "Tone curve",
+        _TONES,
+        display.tone,
         tip="How light beyond display white is shown. SpectraSplat keeps hues of spectral colours; Linear clips each channel.",
-    )  # fmt: skip
+    )
     _, is_false = widgets.toggle(
         "False colour", display.false_colour, tip="Show luminance on a logarithmic colour scale instead of colours (X)."
     )
@@ -69,10 +79,24 @@ def _exposure(state: State, view_model: ViewModel) -> State:
 def _false_colour(display: Display, exposure_ev: float) -> tuple[Display, bool]:
     low, high = display.false_colour_stops
     moved_low, new_low, active_low = widgets.slider(
-        "Scale from", low, -20.0, 19.0, unit="stops", format="%+.1f", reset=-8.0, tip="Lower end of the scale, stops about display white."
+        "Scale from",
+        low,
+        -20.0,
+        19.0,
+        unit="stops",
+        format="%+.1f",
+        reset=-8.0,
+        tip="Lower end of the scale, stops about display white.",
     )
     moved_high, new_high, active_high = widgets.slider(
-        "Scale to", high, -19.0, 20.0, unit="stops", format="%+.1f", reset=4.0, tip="Upper end of the scale, stops about display white."
+        "Scale to",
+        high,
+        -19.0,
+        20.0,
+        unit="stops",
+        format="%+.1f",
+        reset=4.0,
+        tip="Upper end of the scale, stops about display white.",
     )
     if moved_low:
         high = max(high, new_low + 1.0)
@@ -86,28 +110,40 @@ def _false_colour(display: Display, exposure_ev: float) -> tuple[Display, bool]:
 
 def _solo(state: State) -> State:
     changed, is_on = widgets.toggle(
-        "Show one wavelength only", state.solo_nm is not None, tip="The light of a single wavelength, as through a narrow filter (L)."
+        "Show one wavelength only",
+        state.solo_nm is not None,
+        tip="The light of a single wavelength, as through a narrow filter (L).",
     )
     if changed:
         _sweeping["on"] = False
         state = replace(state, solo_nm=view_commands.SOLO_START_NM if is_on else None)
     moved, picked, active = spectrum_strip.strip(
-        "Spectrum strip", state.solo_nm, tip="Drag along the spectrum to decompose the caustic, wavelength by wavelength."
+        "Spectrum strip",
+        state.solo_nm,
+        tip="Drag along the spectrum to decompose the caustic, wavelength by wavelength.",
     )
     if moved:
         state = replace(state, solo_nm=picked)
     if state.solo_nm is not None:
         typed, wavelength, typing = widgets.slider(
-            "Wavelength", state.solo_nm, 380.0, 780.0, unit="nm", format="%.1f",
-            reset=view_commands.SOLO_START_NM, tip="Vacuum wavelength of the light shown.",
-        )  # fmt: skip
+            "Wavelength",
+            state.solo_nm,
+            380.0,
+            780.0,
+            unit="nm",
+            format="%.1f",
+            reset=view_commands.SOLO_START_NM,
+            tip="Vacuum wavelength of the light shown.",
+        )
         active = active or typing
         if typed:
             state = replace(state, solo_nm=wavelength)
     if active:
         _sweeping["on"] = False
     label = "Stop sweep" if _sweeping["on"] else "Sweep"
-    if widgets.button(f"{label}###sweep", tip="Run through the spectrum from violet to red, again and again.", width=-1):
+    if widgets.button(
+        f"{label}###sweep", tip="Run through the spectrum from violet to red, again and again.", width=-1
+    ):
         _sweeping["on"] = not _sweeping["on"]
     return widgets.holding(state, active)
 
@@ -124,38 +160,69 @@ def _sweep(state: State, view_model: ViewModel) -> State:
 
 def _overlays(state: State) -> State:
     display = state.display
-    _, magnifier = widgets.toggle("Magnifier", display.magnifier, tip="Enlarge the pixels under the cursor and tell their values (M).")
-    _, rays = widgets.toggle("Ray overlay", display.ray_overlay, tip="Draw a fan of rays through the selected object, coloured by wavelength (R).")
+    _, magnifier = widgets.toggle(
+        "Magnifier", display.magnifier, tip="Enlarge the pixels under the cursor and tell their values (M)."
+    )
+    _, rays = widgets.toggle(
+        "Ray overlay",
+        display.ray_overlay,
+        tip="Draw a fan of rays through the selected object, coloured by wavelength (R).",
+    )
     display = replace(display, magnifier=magnifier, ray_overlay=rays)
     if display.ray_overlay:
         _, count, _ = widgets.slider(
-            "Rays", display.ray_count, 1, 25, unit="", format="%.0f", reset=5, tip="How many rays the fan has across the object."
+            "Rays",
+            display.ray_count,
+            1,
+            25,
+            unit="",
+            format="%.0f",
+            reset=5,
+            tip="How many rays the fan has across the object.",
         )
         _, wavelengths, _ = widgets.slider(
-            "Wavelengths", display.ray_wavelengths, 1, 31, unit="", format="%.0f", reset=9,
+            "Wavelengths",
+            display.ray_wavelengths,
+            1,
+            31,
+            unit="",
+            format="%.0f",
+            reset=9,
             tip="Into how many wavelengths each ray is split, from 400 to 700 nm.",
-        )  # fmt: skip
+        )
         display = replace(display, ray_count=round(count), ray_wavelengths=round(wavelengths))
     return replace(state, display=display)
 
 
 def _sampling(state: State) -> State:
-    _, method = widgets.combo("Method", METHOD_NAMES, state.method, tip=METHOD_TIPS.get(state.method, "How wavelengths are sampled."))
+    _, method = widgets.combo(
+        "Method", METHOD_NAMES, state.method, tip=METHOD_TIPS.get(state.method, "How wavelengths are sampled.")
+    )
     changed, smoothing, active = widgets.slider(
-        "Smoothing", state.smoothing, 0.2, 1.5, unit="", format="%.2f", reset=0.45,
+        "Smoothing",
+        state.smoothing,
+        0.2,
+        1.5,
+        unit="",
+        format="%.2f",
+        reset=0.45,
         tip="Width of a photon's footprint in spacings of the photon lattice: less is sharper and noisier.",
-    )  # fmt: skip
+    )
     state = replace(state, method=method, smoothing=smoothing if changed else state.smoothing)
     preferences: Preferences = state.preferences
     targets = dict(_TARGETS)
     targets.setdefault(str(preferences.target_photons), f"{preferences.target_photons / 1e6:g} million")
     _, target = widgets.combo(
-        "Stop at", targets, str(preferences.target_photons), tip="Photons to accumulate. Then nothing is computed until something changes."
+        "Stop at",
+        targets,
+        str(preferences.target_photons),
+        tip="Photons to accumulate. Then nothing is computed until something changes.",
     )
     _, refine = widgets.toggle(
-        "Refine when still", preferences.refine_when_still,
+        "Refine when still",
+        preferences.refine_when_still,
         tip="After a dispersion edit, trace again with the new glass as soon as nothing is dragged any more.",
-    )  # fmt: skip
+    )
     preferences = replace(preferences, target_photons=int(target), refine_when_still=refine)
     return widgets.holding(replace(state, preferences=preferences), active)
 
@@ -167,7 +234,14 @@ def _camera(state: State) -> State:
         camera = _converted(camera, kind)
     if camera.kind == "pinhole":
         _, fov, active = widgets.slider(
-            "Field of view", camera.vertical_fov_deg, 2.0, 120.0, unit="°", format="%.1f", reset=35.0, tip="Vertical angle of view."
+            "Field of view",
+            camera.vertical_fov_deg,
+            2.0,
+            120.0,
+            unit="°",
+            format="%.1f",
+            reset=35.0,
+            tip="Vertical angle of view.",
         )
         camera = replace(camera, vertical_fov_deg=fov)
     else:
@@ -175,8 +249,12 @@ def _camera(state: State) -> State:
             "Height", camera.vertical_extent, 1e-4, 1e6, unit="units", tip="Height of what is seen, in scene units."
         )
         camera = replace(camera, vertical_extent=extent)
-    _, position, moving = widgets.vec3("Position", camera.position, unit="units", tip="Where the camera stands: x, y, z.", speed=0.02)
-    _, target, aiming = widgets.vec3("Target", camera.target, unit="units", tip="The point in the middle of the picture: x, y, z.", speed=0.02)
+    _, position, moving = widgets.vec3(
+        "Position", camera.position, unit="units", tip="Where the camera stands: x, y, z.", speed=0.02
+    )
+    _, target, aiming = widgets.vec3(
+        "Target", camera.target, unit="units", tip="The point in the middle of the picture: x, y, z.", speed=0.02
+    )
     if position != target:  # a camera looks at something else than itself
         camera = replace(camera, position=position, target=target)
     if widgets.button("Scene's own view", tip="Back to the camera that the scene was saved with (0).", width=-1):

@@ -34,9 +34,27 @@ from .rows import (
 )
 
 __all__ = [
-    "FloatResult", "beside", "button", "colour", "combo", "drag", "error", "file_field", "hint", "holding", "menu_button", "note", "read_out",
-    "reciprocal_slider", "section", "slider", "text_field", "toggle", "tooltip", "vec3",
-]  # fmt: skip
+    "FloatResult",
+    "beside",
+    "button",
+    "colour",
+    "combo",
+    "drag",
+    "error",
+    "file_field",
+    "hint",
+    "holding",
+    "menu_button",
+    "note",
+    "read_out",
+    "reciprocal_slider",
+    "section",
+    "slider",
+    "text_field",
+    "toggle",
+    "tooltip",
+    "vec3",
+]
 
 FloatResult = tuple[bool, float, bool]
 """Whether it changed, the value, whether it is being dragged or typed in."""
@@ -215,7 +233,8 @@ def text_field(label: str, value: str, *, tip: str) -> tuple[bool, str]:
 
 
 def file_field(label: str, name: str, *, tip: str, enabled: bool = True, clear_tip: str = "") -> bool | None:
-    """A file's name in the row's field, to be clicked for another one: True. With `clear_tip` a small button behind it takes the file away: None."""
+    """A file's name in the row's field, to be clicked for another one: True. With `clear_tip` a small button behind it
+    takes the file away: None."""
     begin_row(label)
     style = imgui.get_style()
     room = imgui.get_content_region_avail().x
@@ -224,7 +243,10 @@ def file_field(label: str, name: str, *, tip: str, enabled: bool = True, clear_t
     imgui.begin_disabled(not enabled)
     imgui.push_style_var(imgui.StyleVar_.button_text_align, ImVec2(0.0, 0.5))
     imgui.push_style_color(imgui.Col_.button, imgui.get_style_color_vec4(imgui.Col_.frame_bg))
-    pressed = imgui.button(f"{_fitting(f'{icons.ICON_FA_FOLDER_OPEN}  {name}', width - 2 * style.frame_padding.x)}##{label}", ImVec2(width, 0.0))
+    pressed = imgui.button(
+        f"{_fitting(f'{icons.ICON_FA_FOLDER_OPEN}  {name}', width - 2 * style.frame_padding.x)}##{label}",
+        ImVec2(width, 0.0),
+    )
     imgui.pop_style_color()
     imgui.pop_style_var()
     imgui.end_disabled()
