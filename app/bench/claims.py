@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from .curves import error_at_time, points_by, speed_up
-from .measured_passes import HALVES
+from .measured_passes import MEASURED_PASSES
 from .results import Claim, Curve, Point, SceneResult
 
 EARLY_SECONDS = 0.1
@@ -24,7 +24,7 @@ def claims_of(scene: SceneResult) -> list[Claim]:
     stochastic = curves.get("stochastic")
     if stochastic is not None:
         claims.append(_speed_up_claim(scene, srd, stochastic))
-        if scene.half == "light" and scene.seconds >= LATE_SECONDS:
+        if scene.measured_pass == "light" and scene.seconds >= LATE_SECONDS:
             claims.append(_first_picture_claim(scene, srd, stochastic))
     linear = curves.get("srd-lambda")
     if linear is not None and 0.0 < scene.strongest_abbe < STRONG_ABBE:
@@ -42,8 +42,8 @@ def ratios_of(curves: Sequence[Curve], measure: str = "relmse") -> dict[str, flo
 
 
 def _speed_up_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> Claim:
-    end, half = stochastic.points[-1], HALVES[scene.half]
-    asked = f"at most 1/{half.asked_ratio:.0f} of the time of stochastic to its error at the end ({end.relmse:.3g} after {end.seconds:.2f} s)"
+    end, one_pass = stochastic.points[-1], MEASURED_PASSES[scene.measured_pass]
+    asked = f"at most 1/{one_pass.asked_ratio:.0f} of the time of stochastic to its error at the end ({end.relmse:.3g} after {end.seconds:.2f} s)"
     reached = speed_up(srd.points, stochastic.points)
     if reached is None:
         last = srd.points[-1]
@@ -55,13 +55,13 @@ def _speed_up_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> Claim:
         if reached.seconds >= 1.0
         else f"{1.0 / reached.seconds:.3g} times later"
     )
-    holds = reached.seconds >= half.asked_ratio
+    holds = reached.seconds >= one_pass.asked_ratio
     why = ""
     if not holds and reached.at_once:
         first = srd.points[0]
-        why = f"srd's smallest rendering ({half.amount(first.photons)}, {first.seconds:.3f} s) is already as good: {_stage_shares(scene, srd, first)}; longer runs would tell more"
+        why = f"srd's smallest rendering ({one_pass.amount(first.photons)}, {first.seconds:.3f} s) is already as good: {_stage_shares(scene, srd, first)}; longer runs would tell more"
     elif not holds:
-        why = f"short by a factor of {half.asked_ratio / reached.seconds:.2g}; {reason(scene, srd)}"
+        why = f"short by a factor of {one_pass.asked_ratio / reached.seconds:.2g}; {reason(scene, srd)}"
     return Claim("time to equal error", asked, measured, holds, why)
 
 
@@ -73,7 +73,7 @@ def _first_picture_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> C
     early = error_at_time(srd.points, EARLY_SECONDS)
     if early is None:
         first = srd.points[0]
-        why = f"even {HALVES[scene.half].amount(first.photons)} take {first.seconds:.2f} s: {_stage_shares(scene, srd, first)}"
+        why = f"even {MEASURED_PASSES[scene.measured_pass].amount(first.photons)} take {first.seconds:.2f} s: {_stage_shares(scene, srd, first)}"
         return Claim(
             "first picture",
             asked,
@@ -89,7 +89,7 @@ def _first_picture_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> C
 def _index_claim(scene: SceneResult, srd: Curve, linear: Curve) -> Claim:
     """Smaller error than the column by wavelength, at every time compared."""
     common = min(srd.points[-1].seconds, linear.points[-1].seconds)
-    times = sorted({t for t in HALVES[scene.half].compared_seconds if t < common} | {common})
+    times = sorted({t for t in MEASURED_PASSES[scene.measured_pass].compared_seconds if t < common} | {common})
     pairs = [(t, error_at_time(srd.points, t), error_at_time(linear.points, t)) for t in times]
     compared = [(t, a, b) for t, a, b in pairs if a is not None and b is not None]
     asked = f"smaller error than srd-lambda at equal time, the strongest glass being {scene.strongest_glass} (V_d {scene.strongest_abbe:.1f})"
@@ -118,8 +118,8 @@ def reason(scene: SceneResult, curve: Curve, seconds: float | None = None) -> st
     total = point.bias2 + point.variance
     if total > 0.0 and len({s.seed for s in curve.samples}) > 1:
         share = point.bias2 / total
-        half = HALVES[scene.half]
-        cause = half.bias_cause if share > 0.5 else half.noise_cause
+        one_pass = MEASURED_PASSES[scene.measured_pass]
+        cause = one_pass.bias_cause if share > 0.5 else one_pass.noise_cause
         parts.append(
             f"{100 * share:.0f} % of {curve.method}'s error at {point.seconds:.2g} s is bias² and {100 * (1 - share):.0f} % variance, so mostly {cause}"
         )
@@ -129,17 +129,17 @@ def reason(scene: SceneResult, curve: Curve, seconds: float | None = None) -> st
 
 
 def _common_share(scene: SceneResult, point: Point) -> list[str]:
-    """How much of a bias² all methods have, as far as the half's bare method tells."""
-    half = HALVES[scene.half]
-    bare = next((curve.points[-1] for curve in scene.curves if curve.method == half.bare_method and curve.points), None)
+    """How much of a bias² all methods have, as far as the pass's bare method tells."""
+    one_pass = MEASURED_PASSES[scene.measured_pass]
+    bare = next((curve.points[-1] for curve in scene.curves if curve.method == one_pass.bare_method and curve.points), None)
     if bare is None or bare.bias2 < 0.1 * point.bias2:
         return []
     share = min(100.0 * bare.bias2 / point.bias2, 100.0)
-    return [f"{share:.0f} % of that bias² is found in {half.bare_method} too, {half.bare_text}"]
+    return [f"{share:.0f} % of that bias² is found in {one_pass.bare_method} too, {one_pass.bare_text}"]
 
 
 def _stage_shares(scene: SceneResult, curve: Curve, point: Point) -> str:
     samples = [s for s in curve.samples if s.photons == point.photons]
-    spent = {stage: sum(s.seconds.get(stage, 0.0) for s in samples) for stage in HALVES[scene.half].counted}
+    spent = {stage: sum(s.seconds.get(stage, 0.0) for s in samples) for stage in MEASURED_PASSES[scene.measured_pass].counted}
     total = sum(spent.values()) or 1.0
     return "its time is " + ", ".join(f"{100 * seconds / total:.0f} % {stage}" for stage, seconds in spent.items())

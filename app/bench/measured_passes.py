@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class MeasuredPass:
-    """How one half is measured and spoken of."""
+    """How one pass is measured and spoken of."""
 
     key: str
-    """As in `BenchSettings.half`."""
+    """As in `BenchSettings.measured_pass`."""
     unit: str
     """What a budget counts, in full."""
     units: str
@@ -98,6 +98,6 @@ CAMERA = MeasuredPass(
     bare_text="which has neither columns nor bands: places within a pixel, caustic maps and the noise of the reference's caustic, common to all methods",
 )
 
-HALVES = {half.key: half for half in (LIGHT, CAMERA)}
-COUNTED_STAGES = frozenset(stage for half in HALVES.values() for stage in half.counted)
-"""No name of a counted stage of one half is that of an uncounted one of the other."""
+MEASURED_PASSES = {measured.key: measured for measured in (LIGHT, CAMERA)}
+COUNTED_STAGES = frozenset(stage for each in MEASURED_PASSES.values() for stage in each.counted)
+"""No name of a counted stage of one pass is that of an uncounted one of the other."""

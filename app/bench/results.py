@@ -23,8 +23,8 @@ class BenchSettings(msgspec.Struct, frozen=True):
     """Width and height in pixels; None: 480 wide, in each scene's own aspect."""
     reference_seconds: float = 60.0
     """Most time that one run spends on a scene's reference; what earlier runs made is used as well."""
-    half: str = "light"
-    """Which half of the renderer is measured, a key of `halves.HALVES`. Below, what is said of photons and photon time
+    measured_pass: str = "light"
+    """Which pass of the renderer is measured, a key of `measured_passes.MEASURED_PASSES`. Below, what is said of photons and photon time
     holds for camera samples a pixel and camera time where it is the camera's."""
 
 
@@ -140,7 +140,7 @@ class SceneResult(msgspec.Struct):
     metrics."""
     reference_too_coarse: bool = False
     """The reference's own error is more than a tenth of the smallest error reported."""
-    half: str = "light"
+    measured_pass: str = "light"
     """As in the settings."""
     complete: bool = False
     """Every method has had every seed, and the pictures are made."""

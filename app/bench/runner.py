@@ -17,7 +17,7 @@ from ..reference import metrics
 from ..reference.metrics import ReferencePicture
 from .claims import claims_of, ratios_of
 from .curves import budget_at_time, complete_curve
-from .measured_passes import HALVES
+from .measured_passes import MEASURED_PASSES
 from .rendering import NothingToMeasure, Rendering, Rig
 from .results import OTHER_MEASURES, BenchSettings, Curve, Sample, SceneResult
 from .store import Store
@@ -41,7 +41,7 @@ def run_bench(
     subject: Subject | None = None,
 ) -> None:
     """Measure every scene by name that `store` does not hold yet; a KeyboardInterrupt loses one method's seed at most.
-    `subject`: what is measured; None: the half that the store's settings name.
+    `subject`: what is measured; None: the pass that the store's settings name.
 
     Raises `UserError` when a scene has changed since `store` was begun, and where there is nothing to measure, unless
     `skipped` takes the reason."""
@@ -51,7 +51,7 @@ def run_bench(
             progress((done + fraction) / len(scenes), f"{name}: {text}")
 
         try:
-            _SceneBench(context, name, scene, store, share, subject or SUBJECTS[store.result.settings.half]).run()
+            _SceneBench(context, name, scene, store, share, subject or SUBJECTS[store.result.settings.measured_pass]).run()
         except NothingToMeasure as reason:
             if skipped is None:
                 raise
@@ -179,7 +179,7 @@ class _SceneBench:
     def _sample(self, rendering: Rendering, method: str, budget: int, seed: int) -> Sample:
         if not np.isfinite(rendering.xyz).all():
             raise RuntimeError(
-                f"{method} gave a picture with numbers that are not finite ({self._result.scene}, {budget} {HALVES[self._result.half].units}, seed {seed})"
+                f"{method} gave a picture with numbers that are not finite ({self._result.scene}, {budget} {MEASURED_PASSES[self._result.measured_pass].units}, seed {seed})"
             )
         return Sample(
             budget,
@@ -207,7 +207,7 @@ class _SceneBench:
         made: dict[
             int, tuple[Rendering, Sample]
         ] = {}  # a method whose shortest rendering takes longer than the early pictures has one for all
-        for ending, share in HALVES[result.half].pictures:
+        for ending, share in MEASURED_PASSES[result.measured_pass].pictures:
             name = f"{method}{ending}"
             budget = rig.fitting(budget_at_time(points, share * self._settings.seconds))
             if budget not in made:
@@ -237,5 +237,5 @@ def _empty_result(name: str, scene: Scene, size: tuple[int, int], settings: Benc
         strongest_glass="" if strongest is None else strongest.name,
         strongest_abbe=0.0 if strongest is None else abs(strongest.V_d),
         equal_time=settings.seconds,
-        half=settings.half,
+        measured_pass=settings.measured_pass,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from .curves import error_at_time
-from .measured_passes import HALVES
+from .measured_passes import MEASURED_PASSES
 from .results import Curve, SceneResult
 
 if TYPE_CHECKING:
@@ -23,11 +23,11 @@ def scene_table(scene: SceneResult) -> Table:
         title_justify="left",
     )
     table.add_column("method")
-    half = HALVES[scene.half]
-    times = [t for t in half.compared_seconds if t < scene.seconds]
+    measured = MEASURED_PASSES[scene.measured_pass]
+    times = [t for t in measured.compared_seconds if t < scene.seconds]
     for t in times:
         table.add_column(f"relMSE at {t:g} s", justify="right")
-    for name in ("at the end", "after", half.units, "bias² share", "slope", "time to equal error"):
+    for name in ("at the end", "after", measured.units, "bias² share", "slope", "time to equal error"):
         table.add_column(name, justify="right")
     for curve in scene.curves:
         if curve.points:

@@ -156,8 +156,8 @@ def _settings_difference(earlier: BenchSettings, wanted: BenchSettings) -> str:
     def size(settings: BenchSettings) -> str:
         return "by the scene" if settings.size is None else f"{settings.size[0]}x{settings.size[1]}"
 
-    if earlier.half != wanted.half:
-        return f"the {earlier.half} half measured instead of the {wanted.half} half"
+    if earlier.measured_pass != wanted.measured_pass:
+        return f"the {earlier.measured_pass} pass measured instead of the {wanted.measured_pass} pass"
     pairs = {
         "--seconds": (f"{earlier.seconds:g}", f"{wanted.seconds:g}"),
         "--seeds": (f"{earlier.seeds}", f"{wanted.seeds}"),

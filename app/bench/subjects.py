@@ -1,4 +1,4 @@
-"""What is measured of a scene: for each half of the renderer where its rigs and its reference come from."""
+"""What is measured of a scene: for each pass of the renderer where its rigs and its reference come from."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ KeyMaker = Callable[[Scene, int, int], str]
 
 @dataclass(frozen=True)
 class Subject:
-    """One half's rigs and reference."""
+    """One pass's rigs and reference."""
 
     rigs: RigMaker
     """(context, scene, methods, width, height, progress) → every method's rig, as long as the context lasts."""

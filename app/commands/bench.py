@@ -95,7 +95,7 @@ def parse_settings(request: BenchRequest) -> BenchSettings:
     asked: dict[str, Any] = {}
     if request.camera_pass:
         asked |= {
-            "half": "camera",
+            "measured_pass": "camera",
             "seconds": CAMERA_SECONDS,
             "methods": tuple(name for name in DEFAULT_METHODS if name in CAMERA_METHODS),
         }

@@ -343,7 +343,7 @@ def bench(
     fresh: Annotated[bool, typer.Option("--fresh", help="Begin anew instead of going on from what DIR holds.")] = False,
     camera_pass: Annotated[
         bool,
-        typer.Option("--eye", help="Measure the camera's half, by samples a pixel, instead of the light's by photons."),
+        typer.Option("--eye", help="Measure the camera pass, by samples a pixel, instead of the light pass by photons."),
     ] = False,
 ) -> None:
     """Measure every method's error against its run time, and write a report."""

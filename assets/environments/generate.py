@@ -7,7 +7,6 @@ Run from the project's folder: python assets/environments/generate.py
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np

@@ -5,7 +5,6 @@ Run from the project's folder: `python -m assets.meshes.generate` (or `python as
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np

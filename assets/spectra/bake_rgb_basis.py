@@ -11,7 +11,6 @@ Run from the repository root: python assets/spectra/bake_rgb_basis.py
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np

@@ -107,7 +107,7 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     (scene,) = result.scenes
     assert (
         scene.complete
-        and scene.half == result.settings.half == "camera"
+        and scene.measured_pass == result.settings.measured_pass == "camera"
         and [curve.method for curve in scene.curves] == ["stochastic", "srd"]
     )
     assert scene.reference is not None and scene.reference.photons >= 8 and 0.0 < scene.reference.relmse < 0.1

@@ -14,7 +14,7 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.bench import reference_picture, runner
 from spectrasplat.bench.camera_rendering import CameraRig
 from spectrasplat.bench.claims import claims_of
-from spectrasplat.bench.measured_passes import CAMERA, HALVES
+from spectrasplat.bench.measured_passes import CAMERA, MEASURED_PASSES
 from spectrasplat.bench.rendering import Rendering
 from spectrasplat.bench.report import report
 from spectrasplat.bench.report.prose import PROSE
@@ -39,7 +39,7 @@ from tests.unit.test_bench_resume import (
     reference_picture as reference_pixels,
 )
 
-SETTINGS = BenchSettings(20.0, 2, ("stochastic", "srd"), (WIDTH, HEIGHT), half="camera")
+SETTINGS = BenchSettings(20.0, 2, ("stochastic", "srd"), (WIDTH, HEIGHT), measured_pass="camera")
 
 
 class WholeRig(Rig):
@@ -83,7 +83,7 @@ def run(directory: Path, settings: BenchSettings = SETTINGS) -> SceneResult:
 
 def test_a_run_of_the_camera(tmp_path: Path) -> None:
     done = run(tmp_path)
-    assert done.half == "camera" and done.complete and [c.budgets for c in done.curves] == [[4, 8, 16, 48, 200]] * 2
+    assert done.measured_pass == "camera" and done.complete and [c.budgets for c in done.curves] == [[4, 8, 16, 48, 200]] * 2
     assert done.curves[0].points[-1].seconds == pytest.approx(20.02)  # choosing the bands counts
     wanted = {"": 20.0, " early": 1.0, " first": 0.5}  # the talk's crops
     assert {ending: share * 20.0 for ending, share in CAMERA.pictures} == pytest.approx(wanted)
@@ -93,7 +93,7 @@ def test_a_run_of_the_camera(tmp_path: Path) -> None:
     stored = msgspec.json.decode((tmp_path / "results.json").read_bytes(), type=BenchResult)
     assert stored.scenes[0].reference is not None and stored.scenes[0].reference.caustic_photons == 1 << 20
     with pytest.raises(UserError, match="the camera pass measured instead of the light pass.*--fresh"):
-        run(tmp_path, msgspec.structs.replace(SETTINGS, half="light"))
+        run(tmp_path, msgspec.structs.replace(SETTINGS, measured_pass="light"))
 
 
 class CountedRig(CameraRig):
@@ -126,7 +126,7 @@ def test_budgets_are_whole_multiples_of_their_bands(max_bands: int, seconds: flo
 
 def camera_scene(*curves: Curve, seconds: float = 20.0) -> SceneResult:
     made = scene(*curves, seconds=seconds)
-    made.half = "camera"
+    made.measured_pass = "camera"
     for one in made.curves:
         one.samples = [
             msgspec.structs.replace(s, seconds={"bands": 0.2 * s.photon_seconds, "looks": 0.8 * s.photon_seconds})
@@ -161,7 +161,7 @@ def test_the_report_speaks_of_samples(tmp_path: Path) -> None:
         synthetic_scene(tmp_path, name, methods=names, longest_s=20.0) for name in ("edge", "text", "studio", "ball")
     ]
     for one in made:
-        one.half, one.title = "camera", "made up"
+        one.measured_pass, one.title = "camera", "made up"
         assert one.reference is not None
         one.reference.method, one.reference.photons, one.reference.caustic_photons = "camera paths", 900, 67_000_000
         for each in one.curves:
@@ -173,7 +173,7 @@ def test_the_report_speaks_of_samples(tmp_path: Path) -> None:
             one.pictures[f"{each.method} first"] = one.pictures[f"{each.method} early"]
         one.claims = claims_of(one)
     result = synthetic_result(made)
-    result.settings = BenchSettings(20.0, methods=names, half="camera")
+    result.settings = BenchSettings(20.0, methods=names, measured_pass="camera")
     report.write_report(result, tmp_path)
     page = assert_stands_alone((tmp_path / "report.html").read_text(encoding="utf-8"))
     text = page.text
@@ -206,8 +206,8 @@ def test_the_report_speaks_of_samples(tmp_path: Path) -> None:
 
 
 def test_halves_and_subjects_fit() -> None:
-    assert set(HALVES) == set(SUBJECTS) == set(PROSE)
-    for half in HALVES.values():
+    assert set(MEASURED_PASSES) == set(SUBJECTS) == set(PROSE)
+    for half in MEASURED_PASSES.values():
         assert set(half.counted) <= set(half.stages) == set(PROSE[half.key].stages) and half.pictures[0] == ("", 1.0)
 
 

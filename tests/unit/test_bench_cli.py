@@ -200,11 +200,11 @@ def test_defaults_are_all_scenes_with_glass_and_all_methods(seen: SurfaceInterac
 def test_the_camera_has_its_own_defaults(seen: SurfaceInteraction, tmp_path: Path) -> None:
     assert main(["bench", "--eye", "-o", str(tmp_path)]) == 0
     methods = ("stochastic", "stochastic-even", "regular-7", "regular-16", "srd-lambda", "srd")
-    assert seen.settings == BenchSettings(20.0, methods=methods, half="camera") and set(methods) == set(CAMERA_METHODS)
+    assert seen.settings == BenchSettings(20.0, methods=methods, measured_pass="camera") and set(methods) == set(CAMERA_METHODS)
     assert seen.scenes == ["prism_edge", "lens_text", "brilliant_studio", "ball_caustic"]
     assert shlex.split(seen.command)[:4] == ["spectrasplat", "bench", "--eye", "prism_edge"]
     assert main(["bench", "--eye", "prism", "-o", str(tmp_path / "other"), "--seconds", "2", "--methods", "srd"]) == 0
-    assert seen.settings == BenchSettings(2.0, methods=("srd",), half="camera") and seen.scenes == ["prism"]
+    assert seen.settings == BenchSettings(2.0, methods=("srd",), measured_pass="camera") and seen.scenes == ["prism"]
 
 
 def test_ctrl_c_says_what_is_kept_and_reports_it(

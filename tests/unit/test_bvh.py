@@ -283,7 +283,7 @@ def test_the_builder_compiles_where_no_cache_folder_can_be_written() -> None:
 import numpy as np
 from numba.core import caching
 caching.CacheImpl._locator_classes = []
-from spectrasplat.model import bvh_build
+from spectrasplat.model.geometry import bvh_build
 half_area = bvh_build._half_area(np.array([0.0, 0.0, 0.0, 1.0, 2.0, 3.0]))
 assert half_area == 11.0, half_area
 """

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..curves import speed_up, time_to_error
-from ..measured_passes import HALVES
+from ..measured_passes import MEASURED_PASSES
 from ..results import Curve, SceneResult
 from . import style as style
 from .text import number, ratio_text, superscript
@@ -64,18 +64,18 @@ def error_against(scene: SceneResult, abscissa: str) -> Figure:
     figure = style.new_figure(6.6, 4.5)
     axes = figure.add_axes((0.105, 0.125, 0.70, 0.735))
     drawn = scene_series(scene, abscissa)
-    half = HALVES[scene.half]
-    what = half.time if abscissa == "seconds" else half.unit
+    measured = MEASURED_PASSES[scene.measured_pass]
+    what = measured.time if abscissa == "seconds" else measured.unit
     seeds = "one seed" if scene.seeds == 1 else f"{scene.seeds} seeds; band: least to largest"
     style.title(axes, f"{scene.scene}: error against {what}", f"{scene.size[0]}×{scene.size[1]}, {seeds}")
     axes.set_ylabel("relMSE (dimensionless)")
     if not drawn:
-        axes.set_xlabel(axis_name(scene.half, abscissa))
+        axes.set_xlabel(axis_name(scene.measured_pass, abscissa))
         axes.text(0.5, 0.5, "no finished points yet", ha="center", color=style.MUTED, transform=axes.transAxes)
         axes.set(xticks=[], yticks=[])
         return figure
     own = scene.reference.relmse if scene.reference is not None else 0.0
-    set_limits(axes, [drawn], [own], abscissa, scene.half)
+    set_limits(axes, [drawn], [own], abscissa, scene.measured_pass)
     for one in drawn:
         draw_series(axes, one)
     _draw_reference_error(axes, own)
@@ -86,7 +86,7 @@ def error_against(scene: SceneResult, abscissa: str) -> Figure:
 
 
 def set_limits(
-    axes: Axes, groups: Sequence[Sequence[Series]], own_errors: Sequence[float], abscissa: str, half: str = "light"
+    axes: Axes, groups: Sequence[Sequence[Series]], own_errors: Sequence[float], abscissa: str, measured_pass: str = "light"
 ) -> None:
     """Logarithmic axes around all that is positive, with ticks that read as plain numbers."""
     everything = [one for group in groups for one in group]
@@ -105,15 +105,15 @@ def set_limits(
     axes.set_yscale("log")
     axes.set_xlim(float(x.min()) / 1.25, float(x.max()) * 1.12)
     axes.set_ylim(float(least) / 1.8, float(largest) * 1.6)
-    axes.set_xlabel(axis_name(half, abscissa))
+    axes.set_xlabel(axis_name(measured_pass, abscissa))
     _ticks(axes, abscissa)
     axes.grid(True, which="major", color=style.GRID, lw=0.7)
     axes.set_axisbelow(True)
 
 
-def axis_name(half: str, abscissa: str) -> str:
+def axis_name(measured: str, abscissa: str) -> str:
     """ "photon time (s)", "camera samples a pixel" and so on."""
-    named = HALVES[half]
+    named = MEASURED_PASSES[measured]
     return f"{named.time} (s)" if abscissa == "seconds" else named.unit
 
 

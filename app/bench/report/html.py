@@ -108,7 +108,7 @@ a{color:inherit}
 figcaption{max-width:90ch;margin-top:.3rem}
 figure{margin:1rem 0}
 figure svg{width:100%;height:auto;display:block}
-figure.half{max-width:42rem}
+figure.measured_pass{max-width:42rem}
 figure.most{max-width:62rem}
 pre{background:var(--wash);padding:.7rem .9rem;overflow-x:auto;white-space:pre-wrap;overflow-wrap:anywhere;border-radius:4px;font-size:.9rem}
 nav ul{display:flex;flex-wrap:wrap;gap:.2rem 1.1rem;list-style:none;padding:0;margin:1rem 0}

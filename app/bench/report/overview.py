@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ..measured_passes import HALVES
+from ..measured_passes import MEASURED_PASSES
 from ..results import BenchResult, SceneResult
 from . import style as style
 from .curve_plots import (
@@ -43,7 +43,7 @@ def overview(result: BenchResult) -> Figure:
     figure = style.new_figure(8.6, height)
     axes = figure.add_axes((0.27, 0.92 / height, 0.705, 1 - 1.6 / height))
     ratios = [r for s in scenes for r in s.time_to_equal_error.values() if r > 0 and math.isfinite(r)]
-    asked = HALVES[result.settings.half].asked_ratio
+    asked = MEASURED_PASSES[result.settings.measured_pass].asked_ratio
     left, right = min([0.5, *ratios]) / 2.2, max([asked * 2, *ratios]) * 2.2
     axes.set_xscale("log")
     axes.set_xlim(left, right)
@@ -189,10 +189,10 @@ def small_multiples(result: BenchResult) -> Figure:
     for axes in grid.flat[len(panels) :]:
         axes.set_visible(False)
     for index, (axes, (scene, drawn)) in enumerate(zip(grid.flat, panels, strict=False)):
-        set_limits(axes, [group for _, group in panels], [], "seconds", scene.half)
+        set_limits(axes, [group for _, group in panels], [], "seconds", scene.measured_pass)
         lowest, leftmost = index + columns >= len(panels), index % columns == 0
         last = index % columns == columns - 1 or index == len(panels) - 1
-        axes.set(xlabel=axis_name(scene.half, "seconds") if lowest else "", ylabel="relMSE" if leftmost else "")
+        axes.set(xlabel=axis_name(scene.measured_pass, "seconds") if lowest else "", ylabel="relMSE" if leftmost else "")
         axes.tick_params(labelbottom=lowest)
         _draw_panel(axes, scene, drawn, named=last)
     return figure

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..measured_passes import HALVES, MeasuredPass
+from ..measured_passes import MEASURED_PASSES, MeasuredPass
 from ..results import Curve, Sample, SceneResult
 from . import style as style
 from .curve_plots import Series, axis_name, scene_series, set_limits
@@ -45,8 +45,8 @@ def bias_and_variance(scene: SceneResult) -> Figure | None:
     for axes in grid.flat[len(names) :]:
         axes.set_visible(False)
     for index, (axes, name) in enumerate(zip(grid.flat, names, strict=False)):
-        set_limits(axes, [everything], [], "seconds", scene.half)
-        axes.set(xlabel=axis_name(scene.half, "seconds"), ylabel="share of relMSE" if index % columns == 0 else "")
+        set_limits(axes, [everything], [], "seconds", scene.measured_pass)
+        axes.set(xlabel=axis_name(scene.measured_pass, "seconds"), ylabel="share of relMSE" if index % columns == 0 else "")
         axes.set_title(
             name,
             loc="left",
@@ -113,21 +113,21 @@ def largest_samples(curve: Curve) -> list[Sample]:
     return [sample for sample in curve.samples if sample.photons == most]
 
 
-def stage_seconds(samples: list[Sample], half: str) -> dict[str, float]:
-    """Mean seconds of each stage of the half over `samples`; empty when there are none."""
+def stage_seconds(samples: list[Sample], measured: str) -> dict[str, float]:
+    """Mean seconds of each stage of the pass over `samples`; empty when there are none."""
     if not samples:
         return {}
     return {
         stage: float(np.mean([max(sample.seconds.get(stage, 0.0), 0.0) for sample in samples]))
-        for stage in HALVES[half].stages
+        for stage in MEASURED_PASSES[measured].stages
     }
 
 
 def time_by_stage(scene: SceneResult) -> Figure | None:
     """Stacked bars: time by stage for each photon or sample at the largest budget; None without samples."""
-    half = HALVES[scene.half]
+    measured = MEASURED_PASSES[scene.measured_pass]
     rows = [
-        (curve.method, samples, stage_seconds(samples, half.key))
+        (curve.method, samples, stage_seconds(samples, measured.key))
         for curve in scene.curves
         if (samples := largest_samples(curve))
     ]
@@ -139,9 +139,9 @@ def time_by_stage(scene: SceneResult) -> Figure | None:
     height = 1.2 + 0.36 * len(rows)
     figure = style.new_figure(6.6, height)
     axes = figure.add_axes((0.185, 0.5 / height, 0.55, 1 - 1.15 / height))
-    longest = max(sum(stages.values()) / samples[0].photons for _, samples, stages in rows) * half.tick[0]
+    longest = max(sum(stages.values()) / samples[0].photons for _, samples, stages in rows) * measured.tick[0]
     for place, (method, samples, stages) in enumerate(rows):
-        _draw_bar(axes, place, samples, stages, longest, half)
+        _draw_bar(axes, place, samples, stages, longest, measured)
         axes.text(
             -0.02,
             place,
@@ -156,7 +156,7 @@ def time_by_stage(scene: SceneResult) -> Figure | None:
         xlim=(0, longest * 1.02),
         ylim=(-0.6, len(rows) - 0.4),
         yticks=[],
-        xlabel=f"{half.time} for each {half.each} ({half.tick[1]})",
+        xlabel=f"{measured.time} for each {measured.each} ({measured.tick[1]})",
     )
     axes.spines["left"].set_visible(False)
     axes.grid(True, axis="x", color=style.GRID, lw=0.7)
@@ -166,12 +166,12 @@ def time_by_stage(scene: SceneResult) -> Figure | None:
 
 
 def _draw_bar(
-    axes: Axes, place: int, samples: list[Sample], stages: dict[str, float], longest: float, half: MeasuredPass
+    axes: Axes, place: int, samples: list[Sample], stages: dict[str, float], longest: float, measured: MeasuredPass
 ) -> None:
     photons, total = samples[0].photons, sum(stages.values())
     start = 0.0
-    for stage in half.stages:
-        length = stages[stage] / photons * half.tick[0]
+    for stage in measured.stages:
+        length = stages[stage] / photons * measured.tick[0]
         axes.barh(place, length, left=start, height=0.62, color=style.STAGE_COLOURS[stage], lw=0)
         if length > 0.11 * longest:
             ink = style.PAPER if stage in ("trace", "looks") else style.ON_LIGHT_BAR
@@ -188,7 +188,7 @@ def _draw_bar(
     axes.text(
         1.02,
         place,
-        f"{total:.2g} s, {count(photons)} {half.units}",
+        f"{total:.2g} s, {count(photons)} {measured.units}",
         transform=axes.get_yaxis_transform(),
         va="center",
         fontsize=8,
@@ -199,10 +199,10 @@ def _draw_bar(
 def _stage_key(axes: Axes, scene: SceneResult) -> None:
     from matplotlib.patches import Patch
 
-    half = HALVES[scene.half]
-    style.title(axes, f"{scene.scene}: where the {half.time} goes", " ")
+    measured = MEASURED_PASSES[scene.measured_pass]
+    style.title(axes, f"{scene.scene}: where the {measured.time} goes", " ")
     handles = [
-        Patch(color=style.STAGE_COLOURS[stage], label=half.stage_names.get(stage, stage)) for stage in half.stages
+        Patch(color=style.STAGE_COLOURS[stage], label=measured.stage_names.get(stage, stage)) for stage in measured.stages
     ]
     axes.legend(
         handles=handles,

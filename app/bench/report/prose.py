@@ -1,4 +1,4 @@
-"""What the bench report says of methods, metrics and protocol, for each half of the renderer. Plain text only;
+"""What the bench report says of methods, metrics and protocol, for each pass of the renderer. Plain text only;
 `report_html` escapes it."""
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Prose:
-    """One half's explanations."""
+    """One pass's explanations."""
 
     methods: Mapping[str, str]
     metrics: Mapping[str, str]

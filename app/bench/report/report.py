@@ -15,7 +15,7 @@ from pathlib import Path
 from ...base.atomic import atomic_output
 from ...base.errors import UserError
 from ...base.progress import ProgressReporter
-from ..measured_passes import HALVES
+from ..measured_passes import MEASURED_PASSES
 from ..results import BenchResult, SceneResult
 from . import scene as report_scene
 from . import sections as report_sections
@@ -68,8 +68,8 @@ def readme_plot(result: BenchResult, stem: Path) -> None:
 
 def _curve_plots(scene: SceneResult, name: str, plots: Path) -> dict[str, Html]:
     """Error over time and over photons or samples: saved, and as SVG for the page."""
-    drawn, half = {}, HALVES[scene.half]
-    for abscissa, ending, words in (("seconds", "time", half.time), ("photons", half.units, half.unit)):
+    drawn, measured = {}, MEASURED_PASSES[scene.measured_pass]
+    for abscissa, ending, words in (("seconds", "time", measured.time), ("photons", measured.units, measured.unit)):
         document = report_style.save(error_against(scene, abscissa), plots / f"{name}_error_{ending}")
         drawn[abscissa] = report_scene.inlined(
             document, f"{name}-{ending}", f"{scene.scene}: relMSE of each method against {words}, logarithmic axes"

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...reference.metrics import EPSILON_SHARE, lit_mean
-from ..measured_passes import HALVES
+from ..measured_passes import MEASURED_PASSES
 from ..results import OTHER_MEASURES, Curve, Point, SceneResult
 from . import pictures as pictures
 from . import plots as report_plots
@@ -47,16 +47,16 @@ def _setting(scene: SceneResult) -> str:
         if scene.strongest_abbe > 0
         else "no dispersion"
     )
-    half = HALVES[scene.half]
+    measured = MEASURED_PASSES[scene.measured_pass]
     parts = [
         f"{scene.size[0]}×{scene.size[1]} pixels",
         text.seeds_text(scene.seeds),
-        f"{scene.seconds:g} s of {half.time}",
+        f"{scene.seconds:g} s of {measured.time}",
         glass,
     ]
     if scene.reference is not None:
         own = scene.reference
-        parts.append(f"reference: {own.method}, {text.count(own.photons)} {half.unit} in {own.seconds:.0f} s")
+        parts.append(f"reference: {own.method}, {text.count(own.photons)} {measured.unit} in {own.seconds:.0f} s")
         if own.caustic_photons:
             parts.append(
                 f"its caustic: {text.count(own.caustic_photons)} photons, whose noise is about {text.number(own.caustic_relmse)} of its relMSE"
@@ -84,7 +84,7 @@ def _ends(curve: Curve) -> tuple[Point, Point] | None:
 
 def _speed_table(scene: SceneResult) -> Html:
     rows = []
-    half = HALVES[scene.half]
+    measured = MEASURED_PASSES[scene.measured_pass]
     compared = any(curve.method == BASELINE and curve.points for curve in scene.curves)
     for curve in _curves(scene):
         ends, ratio = _ends(curve), scene.time_to_equal_error.get(curve.method)
@@ -113,8 +113,8 @@ def _speed_table(scene: SceneResult) -> Html:
             "relMSE, shortest run",
             "relMSE, longest run",
             "over seeds",
-            f"{half.time.split()[0]} s",
-            half.units,
+            f"{measured.time.split()[0]} s",
+            measured.units,
         ),
         rows,
         "Time ratio: time of stochastic over time of the method, to the error that stochastic ends with; above 1 the method is faster.",
@@ -151,7 +151,7 @@ def _bias_figure(scene: SceneResult, anchor: str) -> Html | None:
     svg = inlined(
         report_style.svg_text(drawn),
         f"{anchor}-bias",
-        f"{scene.scene}: bias squared and variance of each method against {HALVES[scene.half].time}",
+        f"{scene.scene}: bias squared and variance of each method against {MEASURED_PASSES[scene.measured_pass].time}",
     )
     caption = (
         "relMSE told apart: variance is what differs between seeds, bias² what all seeds share, such as columns and bands that are too wide. "
@@ -214,36 +214,36 @@ def _stage_figure(scene: SceneResult, anchor: str) -> Html | None:
     svg = inlined(
         report_style.svg_text(drawn),
         f"{anchor}-stages",
-        f"{scene.scene}: {HALVES[scene.half].time} by stage for each method",
+        f"{scene.scene}: {MEASURED_PASSES[scene.measured_pass].time} by stage for each method",
     )
     return figure(svg, "At the largest budget of each method, mean over seeds.", "half")
 
 
 def _cost_table(scene: SceneResult) -> Html:
-    half, is_light = HALVES[scene.half], scene.half == "light"
+    measured, is_light = MEASURED_PASSES[scene.measured_pass], scene.measured_pass == "light"
     rows = []
     for curve in _curves(scene):
         samples = report_plots.largest_samples(curve)
-        stages = report_plots.stage_seconds(samples, half.key)
+        stages = report_plots.stage_seconds(samples, measured.key)
         total = sum(stages.values())
-        seconds = [curve.setup_seconds.get(part) for part in half.setup]
-        seconds += [_mean([s.seconds[stage] for s in samples if stage in s.seconds]) for stage in half.uncounted]
+        seconds = [curve.setup_seconds.get(part) for part in measured.setup]
+        seconds += [_mean([s.seconds[stage] for s in samples if stage in s.seconds]) for stage in measured.uncounted]
         splats = [text.number(_mean([s.splats / s.photons for s in samples if s.photons > 0]))] if is_light else []
         rows.append(
             [
                 _name(curve.method),
-                *(text.number(value) for value in (*seconds, *(stages.get(stage) for stage in half.stages))),
+                *(text.number(value) for value in (*seconds, *(stages.get(stage) for stage in measured.stages))),
                 f"{text.count(samples[0].photons / total)}/s" if total > 0 else "–",
                 *splats,
                 text.number(curve.buffers_mib or None, 3),
             ]
         )
-    headings = [f"{name} s" for name in (*half.setup, *half.uncounted, *half.stages)]
-    uncounted = ", ".join((*half.setup, *half.uncounted))
+    headings = [f"{name} s" for name in (*measured.setup, *measured.uncounted, *measured.stages)]
+    uncounted = ", ".join((*measured.setup, *measured.uncounted))
     return table(
-        ("method", *headings, half.units, *(["splats a photon"] if is_light else []), "buffers MiB"),
+        ("method", *headings, measured.units, *(["splats a photon"] if is_light else []), "buffers MiB"),
         rows,
-        f"Not in {half.time}: {uncounted} (set-up once per scene; buffers are tree and uploads). Stages are those of the longest run.",
+        f"Not in {measured.time}: {uncounted} (set-up once per scene; buffers are tree and uploads). Stages are those of the longest run.",
     )
 
 
@@ -276,7 +276,7 @@ def _pictures(scene: SceneResult, directory: Path) -> Html:
         )
 
     rows = []
-    for ending, share in reversed(HALVES[scene.half].pictures):
+    for ending, share in reversed(MEASURED_PASSES[scene.measured_pass].pictures):
         shown = {n: (crop(n + ending), _numbers(scene, n + ending, found)) for n in methods if n + ending in found}
         if shown or not ending:
             rows.append(
@@ -349,7 +349,7 @@ def _numbers(scene: SceneResult, name: str, found: Mapping[str, np.ndarray]) -> 
         f"HDR-FLIP {flip:.3f}" if math.isfinite(flip) else "HDR-FLIP not measured",
     ]
     if sample is not None:
-        lines.append(f"{sample.photon_seconds:.2g} s, {text.count(sample.photons)} {HALVES[scene.half].units}")
+        lines.append(f"{sample.photon_seconds:.2g} s, {text.count(sample.photons)} {MEASURED_PASSES[scene.measured_pass].units}")
     return element("div", [(line, element("br")) for line in lines], cls="numbers")
 
 

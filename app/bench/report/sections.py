@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..measured_passes import HALVES
+from ..measured_passes import MEASURED_PASSES
 from ..results import BenchResult
 from . import text as text
 from .html import Html, element, figure
@@ -24,7 +24,7 @@ def header(result: BenchResult) -> Html:
     }
     return element(
         "header",
-        element("p", f"SpectraSplat bench: the {result.settings.half} half", cls="muted"),
+        element("p", f"SpectraSplat bench: the {result.settings.measured_pass} pass", cls="muted"),
         element("h1", "Error against run time"),
         [element("p", sentence, cls="lead") for sentence in text.headline(result)],
         element(
@@ -40,7 +40,7 @@ def header(result: BenchResult) -> Html:
 def _effort(result: BenchResult) -> str:
     settings = result.settings
     return (
-        f"{settings.seconds:g} s of {HALVES[settings.half].time} for each method's longest rendering, {text.seeds_text(settings.seeds)}, "
+        f"{settings.seconds:g} s of {MEASURED_PASSES[settings.measured_pass].time} for each method's longest rendering, {text.seeds_text(settings.seeds)}, "
         f"{len(result.scenes)} scene{'' if len(result.scenes) == 1 else 's'}"
     )
 
@@ -80,14 +80,14 @@ def claims(result: BenchResult, overview_svg: Html) -> Html:
         element("div", body, cls="wide")
         if rows
         else element("p", "No claim could be judged: it takes srd and a method to compare it with."),
-        figure(overview_svg, text.sentence(PROSE[result.settings.half].metrics["time to equal error"]), "most"),
+        figure(overview_svg, text.sentence(PROSE[result.settings.measured_pass].metrics["time to equal error"]), "most"),
     )
 
 
 def definitions(result: BenchResult) -> Html:
     """The protocol in short; every method and every metric."""
     used = by_rank(sorted({curve.method for scene in result.scenes for curve in scene.curves}))
-    prose = PROSE[result.settings.half]
+    prose = PROSE[result.settings.measured_pass]
     described = {name: prose.methods.get(name, "Not described.") for name in used}
     return element(
         "section",
@@ -99,7 +99,7 @@ def definitions(result: BenchResult) -> Html:
                 "div",
                 element("h3", "Methods"),
                 _terms(described),
-                element("h3", f"Stages of {HALVES[result.settings.half].time}"),
+                element("h3", f"Stages of {MEASURED_PASSES[result.settings.measured_pass].time}"),
                 _terms(prose.stages),
             ),
             element("div", element("h3", "Metrics"), _terms(prose.metrics)),
@@ -141,5 +141,5 @@ def limits(result: BenchResult) -> Html:
         element("h3", "Doubts about the measurement"),
         element("ul", doubts) if doubts else element("p", sound),
         element("h3", "What this does not cover"),
-        _terms(PROSE[result.settings.half].not_covered),
+        _terms(PROSE[result.settings.measured_pass].not_covered),
     )

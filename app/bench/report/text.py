@@ -9,7 +9,7 @@ import itertools
 import math
 import statistics
 
-from ..measured_passes import HALVES
+from ..measured_passes import MEASURED_PASSES
 from ..results import BenchResult, Claim, Curve, SceneResult
 
 MEASURES = {
@@ -92,10 +92,10 @@ def warnings_of(scene: SceneResult) -> list[str]:
         )
     busy = [curve.method for curve in scene.curves if _times_fall(curve)]
     if busy:
-        half = HALVES[scene.half]
+        measured = MEASURED_PASSES[scene.measured_pass]
         told.append(
-            f"{sentence(half.time)} does not rise with the number of {half.unit} for {', '.join(busy)}: the machine was busy with other work, so times and time ratios "
-            f"here are rough. Errors against {half.units} are not touched by that."
+            f"{sentence(measured.time)} does not rise with the number of {measured.unit} for {', '.join(busy)}: the machine was busy with other work, so times and time ratios "
+            f"here are rough. Errors against {measured.units} are not touched by that."
         )
     unfinished = [curve.method for curve in scene.curves if not curve.points]
     if unfinished:
@@ -124,7 +124,7 @@ def headline(result: BenchResult) -> list[str]:
     ratios = sorted(r for s in compared if (r := s.time_to_equal_error.get("srd", 0.0)) > 0 and math.isfinite(r))
     told = []
     if compared:
-        asked = HALVES[result.settings.half].asked_ratio
+        asked = MEASURED_PASSES[result.settings.measured_pass].asked_ratio
         enough = sum(ratio >= asked for ratio in ratios)
         told.append(
             f"srd reached the error that stochastic ends with in at most 1/{asked:.0f} of its time in {enough} of {len(compared)} "
