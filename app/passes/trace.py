@@ -153,7 +153,7 @@ class TracePass:
         self._orders: dict[tuple[int, int, int], moderngl.Buffer] = {}
         self._trace = shader.compute(ctx, "light/trace.comp", defines, (*structs, records.TRACE_PARAMETERS))
         queue = {
-            name: shader.compute(ctx, f"queue_{name}.comp", defines, structs)
+            name: shader.compute(ctx, f"light/queue_{name}.comp", defines, structs)
             for name in ("count", "scan", "scatter", "gather", "advance")
         }
         self._count, self._scan, self._scatter, self._gather, self._advance = queue.values()
