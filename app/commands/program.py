@@ -16,7 +16,7 @@ from typer.core import TyperGroup
 from .. import __version__
 from ..base.errors import UserError
 from ..model.settings import CAMERA_METHODS, METHODS
-from . import options as options
+from . import options
 
 
 class _Interrupted(Exception):
@@ -343,7 +343,9 @@ def bench(
     fresh: Annotated[bool, typer.Option("--fresh", help="Begin anew instead of going on from what DIR holds.")] = False,
     camera_pass: Annotated[
         bool,
-        typer.Option("--eye", help="Measure the camera pass, by samples a pixel, instead of the light pass by photons."),
+        typer.Option(
+            "--eye", help="Measure the camera pass, by samples a pixel, instead of the light pass by photons."
+        ),
     ] = False,
 ) -> None:
     """Measure every method's error against its run time, and write a report."""

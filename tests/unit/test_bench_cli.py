@@ -114,7 +114,7 @@ def test_mistakes_are_one_sentence(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     if not told:  # depends on the machine
-        monkeypatch.setattr("spectrasplat.commands.options.memory_bytes", lambda: 1 << 30)
+        monkeypatch.setattr("spectrasplat.base.memory.memory_bytes", lambda: 1 << 30)
         told = "choose a smaller one"
     assert main(["bench", *arguments]) == 2
     error = capsys.readouterr().err
@@ -200,7 +200,9 @@ def test_defaults_are_all_scenes_with_glass_and_all_methods(seen: SurfaceInterac
 def test_the_camera_has_its_own_defaults(seen: SurfaceInteraction, tmp_path: Path) -> None:
     assert main(["bench", "--eye", "-o", str(tmp_path)]) == 0
     methods = ("stochastic", "stochastic-even", "regular-7", "regular-16", "srd-lambda", "srd")
-    assert seen.settings == BenchSettings(20.0, methods=methods, measured_pass="camera") and set(methods) == set(CAMERA_METHODS)
+    assert seen.settings == BenchSettings(20.0, methods=methods, measured_pass="camera") and set(methods) == set(
+        CAMERA_METHODS
+    )
     assert seen.scenes == ["prism_edge", "lens_text", "brilliant_studio", "ball_caustic"]
     assert shlex.split(seen.command)[:4] == ["spectrasplat", "bench", "--eye", "prism_edge"]
     assert main(["bench", "--eye", "prism", "-o", str(tmp_path / "other"), "--seconds", "2", "--methods", "srd"]) == 0
