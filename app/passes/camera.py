@@ -1,8 +1,9 @@
 """The camera's pass: pictures of the scene from the caustic maps and the lights.
 
 A dispatch adds one camera sample to the pixels of a band of rows, or to some of those that see glass or mirrors there,
-so that none takes long on a software renderer: between two of them there is time for progress and for a stop. Samples
-form a lattice inside the pixel that later launches refine (box filter).
+so that none takes long on a software renderer: between two of them there is time for progress and for a stop. There a
+sample that takes long halts and is taken up by a later dispatch, for the driver would cut it short
+(shaders/camera/halts.glsl). Samples form a lattice inside the pixel that later launches refine (box filter).
 """
 
 from __future__ import annotations

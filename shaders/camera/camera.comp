@@ -422,7 +422,7 @@ void main()
 #endif
 #ifdef HALTS
             halts = rounds >= uint(HALT_ROUNDS);
-            // One place stores both what is set aside and what halts.
+            // One place stores both what is set aside and, where it halts, what is followed.
             bool sets_path = halts && goes_on;
             if (!sets_aside) aside = path;
             for (bool stores = sets_aside || sets_path; stores;) {

@@ -10,8 +10,7 @@
 // Halvings between the middle of a band and an end: a cut is told to 1/256 of the band.
 #define CUT_HALVINGS 7
 #define EDGE_HALVINGS 10
-// Rays that a sample may trace to find out where its ways part: bounds what a sample costs, and llvmpipe ends all loops of an invocation once
-// they have run 65,535 rounds together.
+// Rays that a sample may trace to find out where its ways part: bounds what a sample costs.
 #define MAX_ASKED 96
 // Cosine of two normals, and distance (GPU units) from a plane, up to which two facets are one face.
 #define SAME_FACE_COSINE 0.999999
