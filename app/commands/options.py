@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ..base.errors import UserError, nearest_names, suggestion
 from ..base.paths import assets_dir
-from ..model.scene import Diffuse, Scene
+from ..model.scene import Scene
 from ..model.settings import CAMERA_METHODS, METHODS
 
 MAX_SIDE_PX = 16384
@@ -126,7 +126,7 @@ def check_layer(text: str, scene: Scene) -> str:
     """ "beauty", "caustic" or "map:RECEIVER" with a diffuse object of `scene`."""
     if text in ("beauty", "caustic"):
         return text
-    receivers = list(dict.fromkeys(o.name for o in scene.objects if isinstance(o.material, Diffuse)))
+    receivers = list(dict.fromkeys(o.name for o in scene.objects if o.material.receives))
     kind, _, name = text.partition(":")
     if kind != "map":
         hint = suggestion(text, ("beauty", "caustic", "map"))
