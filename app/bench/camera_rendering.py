@@ -18,7 +18,7 @@ from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import Features
 from ..model.optics.colorimetry import rgb709_to_xyz
-from ..model.scene import Diffuse, Scene
+from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass, CausticMaps
 from ..passes.spectrum_choice import Spectrum
@@ -53,7 +53,7 @@ class SharedLight:
         self.reflectances: Sequence[np.ndarray | None] = (None,)
         self.seconds = 0.0
         self._light: LightPass | None = None
-        if not scene.lights or not any(isinstance(o.material, Diffuse) for o in scene.objects):
+        if not scene.lights or not any(o.material.receives for o in scene.objects):
             return
         started = time.perf_counter()
         settings = _settings(scene, "srd", width, height)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ..model.scene import Diffuse, Scene
+from ..model.scene import Scene
 from ..reference.metrics import ReferencePicture
 from .results import ReferenceInfo
 
@@ -96,6 +96,6 @@ def caustic_plan(scene: Scene) -> CausticPlan | None:
     on."""
     from ..reference.spectral_caustic import CausticPlan
 
-    if not scene.lights or not any(isinstance(o.material, Diffuse) for o in scene.objects):
+    if not scene.lights or not any(o.material.receives for o in scene.objects):
         return None
     return CausticPlan(CAUSTIC_PHOTONS, CAUSTIC_RELMSE, max_depth=scene.render.max_depth)

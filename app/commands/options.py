@@ -13,7 +13,7 @@ from pathlib import Path
 from ..base.errors import UserError, nearest_names, suggestion
 from ..base.memory import MAX_SIDE_PX, memory_bytes
 from ..base.paths import SCENE_SUFFIXES, shipped_scenes
-from ..model.scene import Diffuse, Scene
+from ..model.scene import Scene
 from ..model.settings import CAMERA_METHODS, METHODS
 
 MAX_PHOTONS = 10**12
@@ -122,7 +122,7 @@ def check_layer(text: str, scene: Scene) -> str:
     """ "beauty", "caustic" or "map:RECEIVER" with a diffuse object of `scene`."""
     if text in ("beauty", "caustic"):
         return text
-    receivers = list(dict.fromkeys(o.name for o in scene.objects if isinstance(o.material, Diffuse)))
+    receivers = list(dict.fromkeys(o.name for o in scene.objects if o.material.receives))
     kind, _, name = text.partition(":")
     if kind != "map":
         hint = suggestion(text, ("beauty", "caustic", "map"))

@@ -14,9 +14,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..model.features import world_bounds
 from ..model.scene import (
-    Dielectric,
     Light,
-    Mirror,
     Scene,
     SceneObject,
     Vec3,
@@ -37,10 +35,10 @@ def can_do(scene: Scene, selection: Selection, operation: Operation) -> bool:
         return False
     light = scene.lights[selection.index]
     if operation == "move":
-        return light.kind != "directional"
+        return light.has_place
     if operation == "rotate":
-        return light.kind != "point"
-    return light.kind in ("collimated", "area")
+        return light.has_direction
+    return light.has_outline
 
 
 def frame_of(scene: Scene, selection: Selection, is_local: bool) -> np.ndarray:
@@ -61,9 +59,9 @@ def frame_of(scene: Scene, selection: Selection, is_local: bool) -> np.ndarray:
 
 def light_place(scene: Scene, light: Light) -> np.ndarray:
     """Where a light is drawn: a directional one, which is nowhere, beside what it shines on."""
-    if light.kind != "directional":
+    if light.has_place:
         return np.asarray(light.position, float)
-    chosen = [o for o in scene.objects if isinstance(o.material, Dielectric | Mirror)] or list(scene.objects)
+    chosen = [o for o in scene.objects if o.material.is_specular] or list(scene.objects)
     bounds = np.stack([world_bounds(item) for item in chosen])
     low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
     return 0.5 * (low + high) - 0.9 * float(np.linalg.norm(high - low)) * _unit(np.asarray(light.direction, float))
@@ -108,12 +106,12 @@ def moved_light(light: Light, delta: np.ndarray) -> Light:
     axes = light_axes(light)
     stretched = np.linalg.norm(linear @ axes, axis=0)
     position = (delta @ np.append(np.asarray(light.position, float), 1.0))[:3]
-    moved = replace(light, position=_vec3(position)) if light.kind != "directional" else light
-    if not np.allclose(linear, np.eye(3), atol=1e-12):
+    moved = replace(light, position=_vec3(position)) if light.has_place else light
+    if light.has_direction and not np.allclose(linear, np.eye(3), atol=1e-12):
         moved = replace(moved, direction=_vec3(_unit(linear @ axes[:, 2])))
-        if light.tangent is not None or light.shape == "rectangle":
+        if light.tangent is not None or (light.has_outline and not light.is_disc):
             moved = replace(moved, tangent=_vec3(_unit(linear @ axes[:, 0])))
-    if light.kind not in ("collimated", "area"):
+    if not light.has_outline:
         return moved
     # A disc stays round: whichever of its two directions was pulled counts.
     across = stretched[:2][np.argmax(np.abs(np.log(stretched[:2])))]

@@ -65,12 +65,6 @@ CAMERA_PARAMETERS = Struct(
         Field("queue", "uint", "of the two, the one that samples which halt are put on"),
     ),
 )
-_LIGHT_KINDS = {"point": 0, "spot": 0, "directional": 1, "collimated": 2, "area": 3}
-
-
-def has_extent(light: Light) -> bool:
-    """Whether a camera ray can run into it."""
-    return light.kind == "area" or (light.kind == "directional" and light.angular_diameter_deg > 0)
 
 
 def light_record(light: Light, scene: SceneBuffers) -> np.void:
@@ -79,20 +73,15 @@ def light_record(light: Light, scene: SceneBuffers) -> np.void:
     axis = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
     tangent, bitangent = orthonormal_frame(axis, None if light.tangent is None else np.asarray(light.tangent))
     record["position"] = scene.space.to_gpu(np.array(light.position))
-    record["kind"] = _LIGHT_KINDS[light.kind]
+    record["kind"] = light.gpu_code
     record["axis"] = axis
-    record["is_disc"] = light.shape == "disc" or light.kind == "directional"
-    half = (
-        np.array([light.radius, light.radius] if light.shape == "disc" else [0.5 * light.width, 0.5 * light.height])
-        * scene.space.scale
-    )
-    if light.kind == "directional":
-        radius = np.radians(0.5 * light.angular_diameter_deg)
-        half = np.full(2, np.tan(radius))
-        record["measure"] = 1.0 / (np.pi * np.sin(radius) ** 2) if radius > 0 else 0.0
-    elif light.kind == "area":
-        record["measure"] = half[0] * half[1] * (np.pi if light.shape == "disc" else 4.0)
+    record["is_disc"] = light.is_disc
+    half = np.array(light.half_extent) * scene.space.scale
+    if light.angular_radius > 0.0:
+        half = np.full(2, np.tan(light.angular_radius))
+        record["measure"] = 1.0 / (np.pi * np.sin(light.angular_radius) ** 2)
+    elif light.area > 0.0:
+        record["measure"] = light.area * scene.space.scale**2
     record["half_u"], record["half_v"] = tangent * half[0], bitangent * half[1]
-    angles = (light.inner_half_angle_deg, light.outer_half_angle_deg)
-    record["cone"] = np.radians(angles) if light.kind == "spot" else (4.0, 4.0)
+    record["cone"] = light.cone
     return record

@@ -15,11 +15,10 @@ import numpy as np
 
 from ..model.scene import Light
 from .camera_optics import inlined
-from .photon_emission import _half_extent, frame_of
+from .photon_emission import frame_of
 from .photon_emit import _disc, _falloff
 
 POINT, DIRECTIONAL, COLLIMATED, AREA = range(4)
-_KINDS = {"point": POINT, "spot": POINT, "directional": DIRECTIONAL, "collimated": COLLIMATED, "area": AREA}
 
 
 class CameraLights(NamedTuple):
@@ -57,17 +56,14 @@ def camera_lights(lights: Sequence[Light], centre: np.ndarray) -> CameraLights:
     for i, light in enumerate(lights):
         axis = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
         frame = frame_of(axis, light.tangent)
-        half = np.array(_half_extent(light))
-        packed.kind[i] = _KINDS[light.kind]
-        packed.is_disc[i] = light.shape == "disc" or light.kind == "directional"
-        if light.kind == "directional":
-            radius = math.radians(0.5 * light.angular_diameter_deg)
-            half[:] = math.tan(radius)
-            packed.measure[i] = 1.0 / (math.pi * math.sin(radius) ** 2) if radius > 0.0 else 0.0
-        elif light.kind == "area":
-            packed.measure[i] = half[0] * half[1] * (math.pi if light.shape == "disc" else 4.0)
-        elif light.kind == "spot":
-            packed.cone[i] = np.radians([light.inner_half_angle_deg, light.outer_half_angle_deg])
+        half = np.array(light.half_extent)
+        packed.kind[i] = light.gpu_code
+        packed.is_disc[i] = light.is_disc
+        packed.cone[i] = light.cone
+        packed.measure[i] = light.area
+        if light.angular_radius > 0.0:
+            half[:] = math.tan(light.angular_radius)
+            packed.measure[i] = 1.0 / (math.pi * math.sin(light.angular_radius) ** 2)
         packed.position[i], packed.axis[i] = np.asarray(light.position, float) - centre, axis
         packed.half_u[i], packed.half_v[i] = half[0] * frame[0], half[1] * frame[1]
     return packed

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..model.content_key import ContentKey
-from ..model.scene import Diffuse, Scene
+from ..model.scene import Scene
 from .camera_run import MAX_DEPTH, CameraPicture, CameraRun, summed_camera
 from .kept import kept_path, load_kept, save_kept
 from .photon_reference import scene_key
@@ -48,7 +48,7 @@ def camera_scene_key(scene: Scene, width: int, height: int, max_depth: int, caus
     else:
         key.add("environment", scene.environment.rgb, np.asarray(scene.environment.world_to_local, float))
     for index, item in enumerate(scene.objects):
-        if isinstance(item.material, Diffuse) and item.material.texture is not None:
+        if item.material.texture is not None:
             key.add("texture", index, item.material.texture.rgb, item.material.texture.wrap, item.mesh.uv)
     return key.hexdigest()
 

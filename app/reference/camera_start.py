@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model.scene import Dielectric, Scene
+from ..model.scene import Scene
 from ..model.scene_checks import contains
 from .camera_kernel import Start
 from .photon_kernel import _AIR
@@ -16,7 +16,7 @@ def camera_start(scene: Scene, photons: PhotonScene) -> Start:
     does)."""
     mask, alone = 0, _AIR
     for index, item in enumerate(scene.objects):
-        if isinstance(item.material, Dielectric) and contains(item, np.array(scene.camera.position)):
+        if item.material.transmits and contains(item, np.array(scene.camera.position)):
             if photons.bit[index] >= 0:
                 mask |= 1 << int(photons.bit[index])
             else:

@@ -12,7 +12,7 @@ from ..base.movie import Frames, Sink
 from ..base.tone_map import auto_exposure, tone_map_8bit
 from ..edit.animation import Animation
 from ..gpu.context import Context
-from ..model.scene import Diffuse, Scene
+from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from .frames import FrameRenderer
 
@@ -82,7 +82,7 @@ def description(animation: Animation, settings: RenderSettings, fps: float, phot
 
 def _pictures(scene: Scene) -> list[str]:
     """Hashes of the environment and of every texture, which `scene_key` does not know."""
-    found = [item.material.texture for item in scene.objects if isinstance(item.material, Diffuse)]
+    found = [item.material.texture for item in scene.objects if item.material.receives]
     hashes = [
         "" if t is None else hashlib.sha256(np.ascontiguousarray(t.rgb).tobytes() + t.wrap.encode()).hexdigest()
         for t in found

@@ -21,7 +21,7 @@ from ..edit.parameters import Stage
 from ..gpu.context import Context
 from ..model.geometry.charts import ChartAtlas
 from ..model.optics.colorimetry import xyz_to_rgb709
-from ..model.scene import Diffuse, Scene
+from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from .frames import FrameRenderer
 from .light_pass import LightPass
@@ -37,7 +37,7 @@ def placement_path(path: Path) -> Path:
 
 def receivers(scene: Scene) -> list[str]:
     """Names of what can be baked."""
-    return list(dict.fromkeys(item.name for item in scene.objects if isinstance(item.material, Diffuse)))
+    return list(dict.fromkeys(item.name for item in scene.objects if item.material.receives))
 
 
 def check_receiver(scene: Scene, name: str) -> str:

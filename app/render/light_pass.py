@@ -24,7 +24,7 @@ from ..gpu.splat_tables import SplatTables
 from ..model.features import Features
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.optics.spectrum import Spectrum
-from ..model.scene import Camera, Dielectric, Diffuse, Mirror, Scene
+from ..model.scene import Camera, Scene
 from ..model.settings import RenderSettings
 from ..passes.emission_domain import EmissionDomain, emission_domain
 from ..passes.footprint import SpectralVariables
@@ -145,7 +145,7 @@ class LightPass:
         specular = [
             self.buffers.space.to_gpu(m.corners())
             for m, o in zip(self.buffers.world_meshes, self.scene.objects, strict=True)
-            if isinstance(o.material, Dielectric | Mirror)
+            if o.material.is_specular
         ]
         triangles = np.concatenate(specular) if specular else np.zeros((0, 3, 3))
         domains = {
@@ -414,7 +414,6 @@ def reflectance_classes(scene: Scene, buffers: SceneBuffers) -> tuple[list[np.nd
     chosen: dict[int, int] = {}
     for receiver, index in enumerate(buffers.receivers):
         material = scene.objects[index].material
-        assert isinstance(material, Diffuse)
         if material.reflectance is None:
             chosen[receiver] = 0
             continue
@@ -431,7 +430,7 @@ def spectral_axis(scene: Scene, features: Features) -> SpectralAxis:
     """The axis of a rendering: by the scene's glasses, or plain wavelength for methods linear in λ."""
     if not features.spectral_groups or features.merged_groups and features.spectral_groups == 1:
         return SpectralAxis.build([])
-    return SpectralAxis.build([o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)])
+    return SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.transmits])
 
 
 def _largest_batch(context: Context, features: Features) -> int:

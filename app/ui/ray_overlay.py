@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..edit.state import State
-from ..model.scene import Dielectric
 from ..passes.ray_line import RayLine
 
 if TYPE_CHECKING:
@@ -70,9 +69,9 @@ class RayOverlay:
     def _object(state: State) -> int | None:
         """The selected glass; with a light or nothing selected, the first glass there is."""
         selection, objects = state.selection, state.scene.objects
-        if selection.kind == "object" and isinstance(objects[selection.index].material, Dielectric):
+        if selection.kind == "object" and objects[selection.index].material.transmits:
             return selection.index
-        return next((i for i, o in enumerate(objects) if isinstance(o.material, Dielectric)), None)
+        return next((i for i, o in enumerate(objects) if o.material.transmits), None)
 
 
 def wavelengths_of(state: State) -> list[float]:

@@ -11,6 +11,7 @@ import pytest
 from spectrasplat.__main__ import main
 from spectrasplat.gpu import records
 from spectrasplat.model.geometry.primitives import box
+from spectrasplat.model.lights import PointLight
 from spectrasplat.stress.cases import contact_cases, sweep_cases
 from spectrasplat.stress.rigs import probe
 from spectrasplat.stress.rigs.probe import WatchedLight, with_photons
@@ -122,7 +123,7 @@ def test_moved_scenes_are_the_same_scene() -> None:
     assert np.linalg.norm(large.lights[0].direction) == pytest.approx(1.0)
     assert large.lights[0].spectral_power == scene.lights[0].spectral_power
     assert np.allclose(large.camera.position, (1.0, 2.0, 3.0 - 50.0))
-    lamp = replace(BEAM, kind="point")
+    lamp = PointLight(BEAM.name, BEAM.spectral_power, BEAM.position)
     assert np.allclose(
         moved(replace(scene, lights=(lamp,)), 10.0).lights[0].spectral_power.density,
         100.0 * lamp.spectral_power.density,

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.model.geometry import primitives
-from spectrasplat.model.scene import Camera, Dielectric, Light, Scene
+from spectrasplat.model.lights import CollimatedLight
+from spectrasplat.model.scene import Camera, Dielectric, Scene
 from spectrasplat.reference import caustic_cache, photon_run, spectral_caustic
 from spectrasplat.reference.camera_reference import cached_camera_reference, render_camera_reference
 from spectrasplat.reference.camera_run import summed_camera
@@ -34,15 +35,8 @@ def short_pilots(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def scene() -> Scene:
     """A beam through a prism on to a plate that the camera sees from above."""
-    light = Light(
-        "beam",
-        "collimated",
-        D65.scaled(3.0),
-        (-0.2, 0.0, 3.0),
-        (0.0, 0.0, -1.0),
-        shape="rectangle",
-        width=0.3,
-        height=0.6,
+    light = CollimatedLight(
+        "beam", D65.scaled(3.0), (-0.2, 0.0, 3.0), (0.0, 0.0, -1.0), shape="rectangle", width=0.3, height=0.6
     )
     prism = place(primitives.prism(50.0, 1.0, 1.0), Dielectric(FLINT), (0.0, 0.0, 1.6))
     return scene_of(

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model.features import is_flat
-from ...model.scene import Dielectric
 from .invalidation import shown_glasses
 
 if TYPE_CHECKING:
@@ -90,7 +89,7 @@ def world_photons(light: LiveLight, inputs: LiveInputs, limit: int) -> StoredPho
     owner = {
         i: groups.group[groups.glasses.index(item.material.dispersion)]
         for i, item in enumerate(light.scene.objects)
-        if isinstance(item.material, Dielectric) and groups.count and item.material.dispersion in groups.glasses
+        if item.material.transmits and groups.count and item.material.dispersion in groups.glasses
     }
     return StoredPhotons(
         space.to_world(records["position"].astype(float)),
