@@ -51,7 +51,7 @@ def reference_key(scene: Scene, width: int, height: int) -> str:
     """Hash of everything that the reference depends on."""
     from ..reference import photon_reference
 
-    return photon_reference.scene_key(scene, width, height, scene.render.max_depth)
+    return photon_reference.reference_key(scene, width, height, scene.render.max_depth)
 
 
 def make_camera_reference(
@@ -88,7 +88,7 @@ def camera_reference_key(scene: Scene, width: int, height: int) -> str:
     """Hash of everything that the camera's reference depends on."""
     from ..reference import camera_reference
 
-    return camera_reference.camera_scene_key(scene, width, height, camera_reference.MAX_DEPTH, caustic_plan(scene))
+    return camera_reference.camera_reference_key(scene, width, height, camera_reference.MAX_DEPTH, caustic_plan(scene))
 
 
 def caustic_plan(scene: Scene) -> CausticPlan | None:
