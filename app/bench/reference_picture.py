@@ -17,7 +17,10 @@ Progress = Callable[[float, str], None]
 TARGET_RELMSE = 1e-5
 """Good enough for any method's error; time usually ends sooner."""
 METHOD = "photon tracing in float64: random wavelength, one photon one pixel, no footprint, no splat or map code shared"
-CAMERA_METHOD = "camera paths in float64: one random wavelength each, Fresnel by chance, textures looked up at points, no column, no map and no shader code shared"
+CAMERA_METHOD = (
+    "camera paths in float64: one random wavelength each, Fresnel by chance, textures looked up at points, "
+    "no column, no map and no shader code shared"
+)
 CAUSTIC_RELMSE = 3e-5
 """What the caustic's noise may add to the picture's error …"""
 CAUSTIC_PHOTONS = 1 << 27
