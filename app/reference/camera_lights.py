@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..model.scene import Light
-from .camera_optics import inlined
+from .compiling import inlined
 from .photon_emission import frame_of
-from .photon_emit import _disc, _falloff
+from .photon_emit import concentric_disc, spot_falloff
 
 POINT, DIRECTIONAL, COLLIMATED, AREA = range(4)
 
@@ -90,7 +90,7 @@ def sample_light(lights, i, px, py, pz, a, b):
     vx, vy, vz = lights.half_v[i, 0], lights.half_v[i, 1], lights.half_v[i, 2]
     kind = lights.kind[i]
     if kind == DIRECTIONAL:
-        s, t = _disc(a, b)
+        s, t = concentric_disc(a, b)
         tx, ty, tz = ax + s * ux + t * vx, ay + s * uy + t * vy, az + s * uz + t * vz
         length = math.sqrt(tx * tx + ty * ty + tz * tz)
         return -tx / length, -ty / length, -tz / length, np.inf, 1.0
@@ -102,7 +102,7 @@ def sample_light(lights, i, px, py, pz, a, b):
     if kind == AREA:
         s, t = 2.0 * a - 1.0, 2.0 * b - 1.0
         if lights.is_disc[i]:
-            s, t = _disc(a, b)
+            s, t = concentric_disc(a, b)
         wx, wy, wz = wx + s * ux + t * vx, wy + s * uy + t * vy, wz + s * uz + t * vz
     distance = max(math.sqrt(wx * wx + wy * wy + wz * wz), 1e-300)
     tx, ty, tz = wx / distance, wy / distance, wz / distance
@@ -111,7 +111,7 @@ def sample_light(lights, i, px, py, pz, a, b):
         return tx, ty, tz, distance, lights.measure[i] * max(facing, 0.0) / (distance * distance)
     kx, ky, kz = ty * az - tz * ay, tz * ax - tx * az, tx * ay - ty * ax
     angle = math.atan2(math.sqrt(kx * kx + ky * ky + kz * kz), facing)
-    return tx, ty, tz, distance, _falloff(lights.cone[i], angle) / (distance * distance)
+    return tx, ty, tz, distance, spot_falloff(lights.cone[i], angle) / (distance * distance)
 
 
 @inlined

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from .photon_intersect import compiled
+from .compiling import compiled, inlined
+from .sampling import unit
 
 GRID = 64
 """Cells a side of a domain's density."""
@@ -26,7 +27,7 @@ def search(cdf, value):
 
 
 @compiled
-def _disc(a, b):
+def concentric_disc(a, b):
     """Uniform point of the unit disc, neighbours kept together (Shirley and Chiu 1997)."""
     x, y = 2.0 * a - 1.0, 2.0 * b - 1.0
     if x == 0.0 and y == 0.0:
@@ -39,7 +40,7 @@ def _disc(a, b):
 
 
 @compiled
-def _falloff(cone, angle):
+def spot_falloff(cone, angle):
     """A spot's edge: 1 inside, 0 outside, a smoothstep of the angle between (a hard edge where there is none)."""
     if angle > cone[1]:
         return 0.0
@@ -71,7 +72,7 @@ def emit(domain, a, b, c, d):
             u, v = (x - domain.aperture[0]) / domain.aperture[2], (y - domain.aperture[1]) / domain.aperture[3]
             if u * u + v * v > 1.0:
                 weight = 0.0
-        tx, ty = _disc(c, d)
+        tx, ty = concentric_disc(c, d)
         tx, ty = tx * domain.tilt, ty * domain.tilt
         scale = 1.0 / math.sqrt(1.0 + tx * tx + ty * ty)
         dx = (tx * f[0, 0] + ty * f[1, 0] + f[2, 0]) * scale
@@ -93,11 +94,11 @@ def emit(domain, a, b, c, d):
             ax, ay, az = domain.axis[0], domain.axis[1], domain.axis[2]
             kx, ky, kz = dy * az - dz * ay, dz * ax - dx * az, dx * ay - dy * ax
             angle = math.atan2(math.sqrt(kx * kx + ky * ky + kz * kz), dx * ax + dy * ay + dz * az)
-            weight *= _falloff(domain.cone, angle)
+            weight *= spot_falloff(domain.cone, angle)
         return px, py, pz, dx, dy, dz, weight, row, column
     tx, ty = 2.0 * c - 1.0, 2.0 * d - 1.0
     if domain.is_disc:
-        tx, ty = _disc(c, d)
+        tx, ty = concentric_disc(c, d)
     px += tx * domain.half_u[0] + ty * domain.half_v[0]
     py += tx * domain.half_u[1] + ty * domain.half_v[1]
     pz += tx * domain.half_u[2] + ty * domain.half_v[2]
@@ -123,3 +124,16 @@ def emit(domain, a, b, c, d):
     facing = dx * domain.axis[0] + dy * domain.axis[1] + dz * domain.axis[2]
     weight *= 2.0 * math.pi * lack * max(facing, 0.0)
     return px, py, pz, dx, dy, dz, weight, row, column
+
+
+@inlined
+def emit_coloured(domain, colour, share, state):
+    """A photon of one wavelength from a point of the sequence: (as `emit`, weight in W times `share`, …, atom, nm)."""
+    c, d = (unit(state[3]), unit(state[4])) if domain.extended else (0.5, 0.5)
+    px, py, pz, dx, dy, dz, watt, row, column = emit(domain, unit(state[0]), unit(state[1]), c, d)
+    chance = unit(state[2])
+    atom = search(colour.cdf, chance)
+    nm = colour.start_nm[atom] + colour.width_nm[atom] * (chance - colour.cdf[atom]) / (
+        colour.cdf[atom + 1] - colour.cdf[atom]
+    )
+    return px, py, pz, dx, dy, dz, watt * (colour.watt[atom] * share), row, column, atom, nm

@@ -13,6 +13,7 @@ from ..base.tone_map import auto_exposure, tone_map_8bit
 from ..edit.animation import Animation
 from ..gpu.context import Context
 from ..model.scene import Scene
+from ..model.scene_key import scene_key
 from ..model.settings import RenderSettings
 from .frames import FrameRenderer
 
@@ -57,8 +58,6 @@ def render_animation(
 
 def description(animation: Animation, settings: RenderSettings, fps: float, photons: int) -> Mapping[str, object]:
     """All that decides how the frames look, as plain values: what a resumed folder must agree on."""
-    from ..reference.photon_reference import scene_key
-
     start = animation.start
     return {
         "scene": start.scene.name,
