@@ -12,14 +12,10 @@ independent parts and how far each went, so that a later call goes on with fresh
 
 from __future__ import annotations
 
-from dataclasses import astuple
 from pathlib import Path
 
-import numpy as np
-
-from ..model.content_key import ContentKey
-from ..model.optics.colorimetry import VISIBLE_NM
-from ..model.scene import Dielectric, Diffuse, Mirror, Scene
+from ..model.content_key import scene_key as model_scene_key
+from ..model.scene import Scene
 from .kept import kept_path, load_kept, save_kept
 from .photon_run import TALLY_SIZE, ReferencePicture, ReferenceRun, summed
 from .rounds import PARTS, Cancelled, Progress, continue_run
@@ -31,31 +27,7 @@ _SEED = 1
 
 def scene_key(scene: Scene, width: int, height: int, max_depth: int) -> str:
     """SHA-256 over everything the picture depends on: names, notes and the background do not count."""
-    key = ContentKey()
-    key.add("version", REFERENCE_VERSION, width, height, max_depth)
-    key.add("camera", *astuple(scene.camera))
-    for light in scene.lights:
-        spectrum = light.spectral_power
-        fields = {name: value for name, value in vars(light).items() if name not in ("name", "spectral_power")}
-        key.add("light", spectrum.density, spectrum.lines, *(_plain(fields[name]) for name in sorted(fields)))
-    for item in scene.objects:
-        mesh = item.mesh
-        key.add("mesh", mesh.vertices, mesh.triangles, np.asarray(item.object_to_world, float))
-        key.add("normals", mesh.corner_normals if mesh.corner_normals is not None else None)
-        key.add("material", type(item.material).__name__)
-        match item.material:
-            case Dielectric(dispersion=dispersion, absorption=absorption, priority=priority):
-                key.add(
-                    "glass",
-                    dispersion.index(VISIBLE_NM),
-                    priority,
-                    None if absorption is None else absorption.coefficient,
-                )
-            case Mirror(reflectance_rgb=rgb):
-                key.add("mirror", *(float(v) for v in rgb))
-            case Diffuse(reflectance_rgb=rgb, reflectance=reflectance):
-                key.add("diffuse", *(float(v) for v in rgb), reflectance)
-    return key.hexdigest()
+    return model_scene_key(scene, REFERENCE_VERSION, width, height, max_depth)
 
 
 def render_reference(
@@ -134,10 +106,3 @@ def cached_reference(
 def _suffices(picture: ReferencePicture, photons: int | None, target_relmse: float | None) -> bool:
     enough = photons is not None and picture.photons >= photons
     return enough or (target_relmse is not None and picture.is_within(target_relmse))
-
-
-def _plain(value: object) -> object:
-    """A light's field so that equal values print alike (1 and 1.0, tuples of numpy numbers)."""
-    if isinstance(value, str | bool) or value is None:
-        return value
-    return tuple(float(v) for v in np.ravel(value))

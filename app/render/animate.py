@@ -12,6 +12,7 @@ from ..base.movie import Frames, Sink
 from ..base.tone_map import auto_exposure, tone_map_8bit
 from ..edit.animation import Animation
 from ..gpu.context import Context
+from ..model.content_key import scene_key
 from ..model.scene import Diffuse, Scene
 from ..model.settings import RenderSettings
 from .frames import FrameRenderer
@@ -43,7 +44,7 @@ def render_animation(
             if not sink.has(index):
                 for share in renderer.steps(stage):
                     yield (index + 0.99 * share) / len(stages)  # the rest is developing and writing
-                rgb = renderer.rgb()
+                rgb = renderer.picture.rgb
                 if base_ev is None:
                     base_ev = auto_exposure(rgb)
                     if isinstance(sink, Frames):
@@ -57,8 +58,6 @@ def render_animation(
 
 def description(animation: Animation, settings: RenderSettings, fps: float, photons: int) -> Mapping[str, object]:
     """All that decides how the frames look, as plain values: what a resumed folder must agree on."""
-    from ..reference.photon_reference import scene_key
-
     start = animation.start
     return {
         "scene": start.scene.name,
