@@ -44,7 +44,7 @@ def render_animation(
             if not sink.has(index):
                 for share in renderer.steps(stage):
                     yield (index + 0.99 * share) / len(stages)  # the rest is developing and writing
-                rgb = renderer.rgb()
+                rgb = renderer.picture.rgb
                 if base_ev is None:
                     base_ev = auto_exposure(rgb)
                     if isinstance(sink, Frames):
