@@ -154,7 +154,8 @@ def load_scenes(names: Sequence[str]) -> dict[str, Scene]:
     for name, file in zip(names, files, strict=True):
         if file.stem in scenes:
             raise UserError(
-                f"scene {name}: another scene of this run is called '{file.stem}' too; rename the file or run them apart"
+                f"scene {name}: another scene of this run is called '{file.stem}' too; rename the file or run them "
+                "apart"
             )
         scenes[file.stem] = load_scene(file)
     return scenes
@@ -220,5 +221,6 @@ def _report(result: BenchResult, directory: Path, show: Callable[[object], None]
     if measured:
         write_report(result, directory)
         show(
-            f"{(directory / 'report.html').resolve()}: the report; {(directory / 'results.json').resolve()}: every number"
+            f"{(directory / 'report.html').resolve()}: the report; {(directory / 'results.json').resolve()}: every "
+            "number"
         )

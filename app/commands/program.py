@@ -263,7 +263,8 @@ def bake(
             "-o",
             "--output",
             metavar="OUT",
-            help="The texture: .exr or .npy (linear irradiance), .png (to look at); where it lies is written to a .json beside it.",
+            help="The texture: .exr or .npy (linear irradiance), .png (to look at); where it lies is written to a "
+            ".json beside it.",
         ),
     ],
     size: Annotated[Text, typer.Option(metavar="WxH", help="Texels; default: 1024x1024.")] = None,
@@ -343,7 +344,9 @@ def bench(
     fresh: Annotated[bool, typer.Option("--fresh", help="Begin anew instead of going on from what DIR holds.")] = False,
     camera_pass: Annotated[
         bool,
-        typer.Option("--eye", help="Measure the camera pass, by samples a pixel, instead of the light pass by photons."),
+        typer.Option(
+            "--eye", help="Measure the camera pass, by samples a pixel, instead of the light pass by photons."
+        ),
     ] = False,
 ) -> None:
     """Measure every method's error against its run time, and write a report."""

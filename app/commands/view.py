@@ -125,7 +125,8 @@ def _rescued(session: Session, error: Exception) -> UserError:
     from ..edit.preferences import config_dir
 
     return UserError(
-        f"the window had to close ({type(error).__name__}: {what[:200]}).{kept} Details are in {config_dir() / 'crash.log'}"
+        f"the window had to close ({type(error).__name__}: {what[:200]}).{kept} Details are in "
+        f"{config_dir() / 'crash.log'}"
     )
 
 

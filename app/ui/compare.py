@@ -109,10 +109,19 @@ class Comparison:
             return "Reference: the first photons are on their way."
         if not self._has(snapshot, SHOWN_FROM):
             least = SHOWN_FROM * self._begun.width * self._begun.height
-            return f"Reference: {snapshot.photons / 1e6:.2f} million photons so far. It is shown from {least / 1e6:.2f} million on."
-        told = f"Reference: light tracing in float64 without shared code, {snapshot.photons / 1e6:.1f} million photons, own relMSE {snapshot.relmse:.1e}."
+            return (
+                f"Reference: {snapshot.photons / 1e6:.2f} million photons so far. It is shown from {least / 1e6:.2f} "
+                "million on."
+            )
+        told = (
+            f"Reference: light tracing in float64 without shared code, {snapshot.photons / 1e6:.1f} million photons, "
+            f"own relMSE {snapshot.relmse:.1e}."
+        )
         if self._compare.plot and not self._has(snapshot, MEASURED_FROM):
-            told += f" Errors are measured from {MEASURED_FROM * self._begun.width * self._begun.height / 1e6:.1f} million on."
+            told += (
+                f" Errors are measured from {MEASURED_FROM * self._begun.width * self._begun.height / 1e6:.1f} "
+                "million on."
+            )
         if not snapshot.directly.all():
             told += " What is seen behind glass or in mirrors is not compared."
         if self._begun.local_gain and any(item.local_dispersion for item in self._begun.scene.objects):

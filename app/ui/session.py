@@ -168,7 +168,7 @@ class Session:
             session_requests.carry_out(self, request)
         except UserError as error:
             self.messages.tell(sentence(str(error)), is_error=True)
-        except Exception as error:  # a bug: the work and the window outlive it
+        except Exception as error:  # noqa: BLE001 - a bug: the work and the window outlive it
             self.save_from_crash(f"{type(request).__name__}", error)
             self.messages.tell(
                 f"{words(request)} failed by a fault of the program ({brief(error)}); your work is kept.", is_error=True
@@ -199,7 +199,7 @@ class Session:
             self.companions.look(self.state, self.picture, now)
         except UserError as error:
             self.messages.tell(sentence(str(error)), is_error=True)
-        except Exception as error:  # a bug, or the device is lost
+        except Exception as error:  # noqa: BLE001 - a bug, or the device is lost
             self.picture.give_up()
             self._renderer_stopped(error)
 
@@ -207,7 +207,7 @@ class Session:
         """Exports and comparison; returns the time that is left."""
         try:
             return self.companions.work(self.state, self.picture, budget_s)
-        except Exception as error:  # a bug in a side line must not stop the picture
+        except Exception as error:  # noqa: BLE001 - a bug in a side line must not stop the picture
             self.companions.exports.cancel()
             self.save_from_crash("exporting or comparing", error)
             self.messages.tell(

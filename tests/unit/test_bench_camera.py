@@ -83,7 +83,11 @@ def run(directory: Path, settings: BenchSettings = SETTINGS) -> SceneResult:
 
 def test_a_run_of_the_camera(tmp_path: Path) -> None:
     done = run(tmp_path)
-    assert done.measured_pass == "camera" and done.complete and [c.budgets for c in done.curves] == [[4, 8, 16, 48, 200]] * 2
+    assert (
+        done.measured_pass == "camera"
+        and done.complete
+        and [c.budgets for c in done.curves] == [[4, 8, 16, 48, 200]] * 2
+    )
     assert done.curves[0].points[-1].seconds == pytest.approx(20.02)  # choosing the bands counts
     wanted = {"": 20.0, " early": 1.0, " first": 0.5}  # the talk's crops
     assert {ending: share * 20.0 for ending, share in CAMERA.pictures} == pytest.approx(wanted)

@@ -7,7 +7,7 @@ import os
 import shlex
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import Any
+from typing import Any, Self
 
 import pytest
 from spectrasplat.__main__ import main
@@ -21,7 +21,7 @@ from spectrasplat.model.settings import CAMERA_METHODS
 class FakeContext:
     renderer, vendor, version = "llvmpipe", "Mesa", "4.5"
 
-    def __enter__(self) -> FakeContext:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -200,7 +200,9 @@ def test_defaults_are_all_scenes_with_glass_and_all_methods(seen: SurfaceInterac
 def test_the_camera_has_its_own_defaults(seen: SurfaceInteraction, tmp_path: Path) -> None:
     assert main(["bench", "--eye", "-o", str(tmp_path)]) == 0
     methods = ("stochastic", "stochastic-even", "regular-7", "regular-16", "srd-lambda", "srd")
-    assert seen.settings == BenchSettings(20.0, methods=methods, measured_pass="camera") and set(methods) == set(CAMERA_METHODS)
+    assert seen.settings == BenchSettings(20.0, methods=methods, measured_pass="camera") and set(methods) == set(
+        CAMERA_METHODS
+    )
     assert seen.scenes == ["prism_edge", "lens_text", "brilliant_studio", "ball_caustic"]
     assert shlex.split(seen.command)[:4] == ["spectrasplat", "bench", "--eye", "prism_edge"]
     assert main(["bench", "--eye", "prism", "-o", str(tmp_path / "other"), "--seconds", "2", "--methods", "srd"]) == 0

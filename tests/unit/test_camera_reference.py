@@ -242,10 +242,8 @@ def test_glass_in_a_white_room_is_white_path_by_path(scene: Scene) -> None:
     picture = run.picture()
     lost = picture.lost["depth"] + picture.lost["numeric"]
     assert lost < 1e-5
-    assert (
-        np.abs(picture.xyz - 1.0).max() < 1e-12
-        or lost > 0.0
-        and np.mean(np.abs(picture.xyz - 1.0) > 1e-12) <= lost * picture.samples * 3
+    assert np.abs(picture.xyz - 1.0).max() < 1e-12 or (
+        lost > 0.0 and np.mean(np.abs(picture.xyz - 1.0) > 1e-12) <= lost * picture.samples * 3
     )
 
 

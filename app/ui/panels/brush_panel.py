@@ -137,7 +137,8 @@ def _draw_painted(state: State) -> State:
 def _draw_pull_words(state: State) -> None:
     if state.pull is None:
         widgets.hint(
-            "Choose the tool (P), press on a colour of the caustic and drag it along the spectrum. The dispersion of the "
+            "Choose the tool (P), press on a colour of the caustic and drag it along the spectrum. The dispersion of "
+            "the "
             "glass that made it is solved so that the colour stays under the cursor; white light stays where it is. "
             "With Shift only the place is changed: a local gain, which is not physical."
         )

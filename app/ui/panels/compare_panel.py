@@ -114,7 +114,8 @@ def _legend() -> None:
     share = min(max((imgui.get_mouse_pos().x - start.x) / max(width, 1.0), 0.0), 1.0)
     rows.explain(
         "Scale",
-        f"{100 * ERROR_RANGE * (2 * share - 1):+.0f} % of the reference. What is nearly black on the screen counts less; magenta is no number.",
+        f"{100 * ERROR_RANGE * (2 * share - 1):+.0f} % of the reference. What is nearly black on the screen counts "
+        "less; magenta is no number.",
     )
     drawing = imgui.get_window_draw_list()
     colours = [theme.packed((*map(float, rgb), 1.0)) for rgb in sample(ERROR, np.linspace(0.0, 1.0, _LEGEND_STEPS + 1))]

@@ -148,7 +148,10 @@ def _draw_size(state: State, index: int) -> State:
 
 
 def _draw_sun(light: Light) -> tuple[Light, bool]:
-    tip = "How large the source looks from the scene. The sun has 0.53°; 0 is perfectly parallel and gives the sharpest colours."
+    tip = (
+        "How large the source looks from the scene. The sun has 0.53°; 0 is perfectly parallel and gives the "
+        "sharpest colours."
+    )
     _, angle, active = widgets.slider(
         "Angular diameter", light.angular_diameter_deg, 0.0, 20.0, unit="°", tip=tip, reset=0.53, format="%.2f"
     )

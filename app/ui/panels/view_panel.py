@@ -64,7 +64,8 @@ def _exposure(state: State, view_model: ViewModel) -> State:
         "Tone curve",
         _TONES,
         display.tone,
-        tip="How light beyond display white is shown. SpectraSplat keeps hues of spectral colours; Linear clips each channel.",
+        tip="How light beyond display white is shown. SpectraSplat keeps hues of spectral colours; Linear clips each "
+        "channel.",
     )
     _, is_false = widgets.toggle(
         "False colour", display.false_colour, tip="Show luminance on a logarithmic colour scale instead of colours (X)."
