@@ -26,7 +26,7 @@ CAMERA_SECONDS = 20.0
 """Time of the largest rendering where the camera is measured and nothing else was asked for: the talk's stochastic
 picture had as much."""
 CAMERA_SCENES = ("prism_edge", "lens_text", "brilliant_studio", "ball_caustic")
-"""Shipped scenes that are about what is seen through glass; `bench --eye` without names measures these."""
+"""Shipped scenes that are about what is seen through glass; `bench --camera` without names measures these."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
     """Run the bench; returns the exit code. Raises `UserError`."""
     if request.features is not None:
         if request.camera_pass:
-            raise UserError("--features and --eye exclude each other: give one of them")
+            raise UserError("--features and --camera exclude each other: give one of them")
         return _features(request)
     if request.output is None:
         raise UserError("bench needs a folder for what it finds: give one with -o DIR")
@@ -173,7 +173,7 @@ def repeat_command(scenes: Sequence[str], request: BenchRequest) -> str:
     words = [
         "spectrasplat",
         "bench",
-        *(["--eye"] if request.camera_pass else []),
+        *(["--camera"] if request.camera_pass else []),
         *(request.scenes or scenes),
         "-o",
         request.output.name if request.output else "",
