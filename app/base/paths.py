@@ -7,6 +7,7 @@ from pathlib import Path
 
 import platformdirs
 
+SCENE_SUFFIXES = (".toml", ".glb", ".gltf", ".ply", ".obj", ".stl")
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -26,6 +27,12 @@ def shaders_dir() -> Path:
 def assets_dir() -> Path:
     """Folder of scenes, glass tables and meshes."""
     return _data_root() / "assets"
+
+
+def shipped_scenes() -> dict[str, Path]:
+    """Name → file of the scenes that come with the program, sorted."""
+    files = sorted((assets_dir() / "scenes").glob("*"))
+    return {file.stem: file for file in files if file.suffix in SCENE_SUFFIXES[:3]}
 
 
 def cache_dir() -> Path:

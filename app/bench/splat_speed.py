@@ -16,10 +16,11 @@ import numpy as np
 from ..gpu import shader
 from ..gpu.records import RECEIVER, photon_record
 from ..gpu.splat_tables import SplatTables
+from ..gpu.tiles import pack
 from ..model.optics import spectrum
 from ..model.optics.spectral_tables import SpectralAxis
 from ..passes.footprint import SpectralVariables
-from ..passes.map_atlas import MapAtlas, pack, placement_rows
+from ..passes.map_atlas import MapAtlas, placement_rows
 from ..passes.splat import Splatter
 
 if TYPE_CHECKING:

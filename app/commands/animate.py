@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..base.errors import UserError
+from ..base.memory import check_picture_memory
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
-from . import options as options
+from . import options
 from .render import INTERRUPTED, interrupt_flag
 
 DEFAULT_FRAMES = 120
@@ -115,7 +116,7 @@ def _settings(request: AnimateRequest, scene: Scene) -> RenderSettings:
         settings = replace(settings, seed=options.parse_integer("--seed", request.seed, 0, options.MAX_SEED))
     if request.method is not None:
         settings = replace(settings, method=options.parse_method(request.method))
-    options.check_picture_memory(settings.width, settings.height, None)
+    check_picture_memory(settings.width, settings.height, None)
     return settings
 
 

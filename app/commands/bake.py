@@ -7,8 +7,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..base.memory import check_picture_memory
 from ..model.settings import RenderSettings
-from . import options as options
+from . import options
 from .render import INTERRUPTED, interrupt_flag
 
 
@@ -36,7 +37,7 @@ def bake_command(request: BakeRequest) -> int:
     width, height = bake.DEFAULT_SIZE if request.size is None else options.parse_size(request.size)
     photons = None if request.photons is None else options.parse_photons(request.photons)
     seed = 1 if request.seed is None else options.parse_integer("--seed", request.seed, 0, options.MAX_SEED)
-    options.check_picture_memory(width, height, None)
+    check_picture_memory(width, height, None)
     check_writable(request.output)
     check_writable(bake.placement_path(request.output))
     scene = load_scene(options.find_scene(request.scene))

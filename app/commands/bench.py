@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..base.errors import UserError, suggestion
+from ..base.memory import check_picture_memory
+from ..base.paths import shipped_scenes
 from ..bench.results import DEFAULT_METHODS, BenchResult, BenchSettings
 from ..model.settings import CAMERA_METHODS, METHODS
-from . import options as options
+from . import options
 
 if TYPE_CHECKING:
     from ..model.scene import Scene
@@ -109,7 +111,7 @@ def parse_settings(request: BenchRequest) -> BenchSettings:
         asked["methods"] = parse_methods(request.methods, CAMERA_METHODS if request.camera_pass else METHODS)
     if request.size is not None:
         asked["size"] = options.parse_size(request.size)
-        options.check_picture_memory(*asked["size"], None)
+        check_picture_memory(*asked["size"], None)
     return BenchSettings(**asked)
 
 
@@ -143,7 +145,7 @@ def load_scenes(names: Sequence[str]) -> dict[str, Scene]:
     from ..model.scene import Dielectric
 
     if not names:
-        shipped = {name: load_scene(path) for name, path in options.shipped_scenes().items()}
+        shipped = {name: load_scene(path) for name, path in shipped_scenes().items()}
         return {
             name: scene
             for name, scene in shipped.items()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from . import options as options
+from . import options
 
 DEFAULT_SCENE = "default"
 DEFAULT_SIZE = {True: (960, 540), False: (1920, 1080)}

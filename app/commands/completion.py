@@ -9,13 +9,14 @@ from __future__ import annotations
 import typer
 
 from ..base.errors import UserError
+from ..base.paths import shipped_scenes
 from ..model.settings import CAMERA_METHODS, METHODS
 from . import options
 
 
 def scenes() -> list[str]:
     """Shipped scenes."""
-    return list(options.shipped_scenes())
+    return list(shipped_scenes())
 
 
 def receivers(ctx: typer.Context) -> list[str]:

@@ -11,12 +11,11 @@ import os
 from pathlib import Path
 
 from ..base.errors import UserError, nearest_names, suggestion
-from ..base.paths import assets_dir
+from ..base.memory import MAX_SIDE_PX, memory_bytes
+from ..base.paths import SCENE_SUFFIXES, shipped_scenes
 from ..model.scene import Diffuse, Scene
 from ..model.settings import CAMERA_METHODS, METHODS
 
-MAX_SIDE_PX = 16384
-"""Largest texture side OpenGL 4.3 promises."""
 MAX_PHOTONS = 10**12
 MAX_SEED = 2**32 - 1
 MAX_SECONDS = 7 * 24 * 3600.0
@@ -24,12 +23,9 @@ MIN_BINS, MAX_BINS = 4, 32
 MAX_DEPTH = 4096
 MAX_SPP = 4096
 MAX_EXPOSURE_EV = 64.0
-SCENE_SUFFIXES = (".toml", ".glb", ".gltf", ".ply", ".obj", ".stl")
 _MULTIPLES = {"k": 10**3, "m": 10**6, "g": 10**9}
-_BYTES_PER_TARGET_PX = 16  # RGBA32F
 _BYTES_PER_PHOTON = 256
 """A photon record with several spectral columns, rounded up."""
-_GIB = 1 << 30
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -142,30 +138,6 @@ def receivers_of(scene: Scene) -> list[str]:
     return list(dict.fromkeys(item.name for item in scene.objects if isinstance(item.material, Diffuse)))
 
 
-def check_picture_memory(width: int, height: int, bins: int | None) -> None:
-    """Refuse a picture whose targets would not fit into the machine's memory."""
-    targets = 1 + math.ceil((bins or 0) / 4)
-    # Accumulation on the device, its read-back, and the float32 picture made from it.
-    needed = 3 * width * height * targets * _BYTES_PER_TARGET_PX
-    available = memory_bytes()
-    if needed > available:
-        with_bins = f" with --bins {bins}" if bins else ""
-        raise UserError(
-            f"--size {width}x{height}{with_bins} needs about {needed / _GIB:.1f} GiB "
-            f"and this machine has {available / _GIB:.1f} GiB: choose a smaller one"
-        )
-
-
-def memory_bytes() -> int:
-    """Memory this process may use: the machine's, or its control group's where that is less."""
-    total = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    try:
-        limit = Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii").strip()
-    except OSError:
-        return total
-    return min(total, int(limit)) if limit.isdigit() else total
-
-
 def find_scene(text: str) -> Path:
     """The file of a scene given by path, or by the bare name of a shipped one."""
     path = Path(text)
@@ -185,12 +157,6 @@ def find_scene(text: str) -> Path:
     hint = suggestion(text, shipped)
     names = ", ".join(shipped) or "none"
     raise UserError(f"scene '{text}' is neither a file nor shipped{hint or ','} shipped are {names}")
-
-
-def shipped_scenes() -> dict[str, Path]:
-    """Name → file of the scenes that come with the program, sorted."""
-    files = sorted((assets_dir() / "scenes").glob("*"))
-    return {file.stem: file for file in files if file.suffix in SCENE_SUFFIXES[:3]}
 
 
 def _files_beside(path: Path) -> list[str]:

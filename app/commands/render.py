@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import UserError
+from ..base.memory import check_picture_memory
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
-from . import options as options
+from . import options
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it (128 + SIGINT)."""
@@ -128,7 +129,7 @@ def _complete(asked: dict[str, Any], scene: Scene, stats: bool) -> RenderSetting
         }
     )
     options.check_layer(settings.layer, scene)
-    options.check_picture_memory(settings.width, settings.height, settings.bins)
+    check_picture_memory(settings.width, settings.height, settings.bins)
     return settings
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..base.errors import UserError
-from . import options as options
+from . import options
 
 if TYPE_CHECKING:
     from ..stress.case import Case

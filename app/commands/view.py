@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.errors import UserError, suggestion
-from . import options as options
+from . import options
 
 if TYPE_CHECKING:
     from ..edit.preferences import WindowPlace

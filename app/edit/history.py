@@ -9,9 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..model.scene import Scene
-from ..ui.view_model import HistoryEntry
 
 MAX_STEPS = 500
+
+
+@dataclass(frozen=True)
+class HistoryEntry:
+    """One step of undo."""
+
+    label: str
+    is_present: bool
 
 
 @dataclass(frozen=True)
@@ -60,7 +67,7 @@ class History:
         """One step back, if there is one; returns the present."""
         return self.go_to(max(self._at - 1, 0))
 
-    def dirty_level(self) -> Scene:
+    def redo(self) -> Scene:
         """One step forward again, if there is one; returns the present."""
         return self.go_to(min(self._at + 1, len(self._steps) - 1))
 

@@ -38,7 +38,7 @@ class Undo:
 
 
 @dataclass(frozen=True)
-class DirtyLevel:
+class Redo:
     """One step forward again."""
 
 
@@ -51,7 +51,7 @@ class GoTo:
 
 @dataclass(frozen=True)
 class Quit:
-    """Close; asks first where changes are unsaved (`Facts.asks_to_quit`)."""
+    """Close; asks first where changes are unsaved (`ViewModel.asks_to_quit`)."""
 
     discard: bool = False
     """The answer "Discard" to that question: close without saving."""
@@ -179,7 +179,7 @@ Request = (
     | Open
     | Save
     | Undo
-    | DirtyLevel
+    | Redo
     | GoTo
     | Quit
     | CancelQuit

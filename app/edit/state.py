@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from ..model.scene import Camera, Material, Scene
-from ..render.viewer.inputs import LiveInputs
+from .live_inputs import LiveInputs
 from .requests import Pull, Request
 
 Tool = Literal["select", "move", "rotate", "scale", "brush", "pull"]

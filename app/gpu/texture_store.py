@@ -18,11 +18,10 @@ import numpy as np
 from ..base.errors import UserError
 from ..model.scene import Diffuse, Scene, SceneObject
 from ..model.texture import Environment, Texture
-from ..passes import map_atlas
-from ..passes.map_atlas import Tile
 from .mip_chain import kept_levels, level_count
 from .records import NONE
 from .schema import Field, Struct
+from .tiles import Tile, pack
 
 PICTURE = Struct(
     "Picture",
@@ -166,7 +165,7 @@ class TextureStore:
         height, width = largest.rgb.shape[:2]
         remedy = f"{largest.name}: its {width} x {height} pixels do not fit this device's textures with all pictures of the scene; make it smaller"
         try:
-            self._tiles, size = map_atlas.pack([s.cell for s in self._sources], self._max_side)
+            self._tiles, size = pack([s.cell for s in self._sources], self._max_side)
         except UserError as error:
             raise UserError(remedy) from error
         if size[0] * size[1] * 16 > MAX_BYTES:

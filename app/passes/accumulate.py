@@ -12,8 +12,8 @@ from ..gpu import shader
 if TYPE_CHECKING:
     import moderngl
 
+    from ..gpu.tiles import Tile
     from ..model.geometry.charts import ChartAtlas
-    from .map_atlas import Tile
 
 ROWS = 16
 """Of a group, and its columns."""

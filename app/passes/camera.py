@@ -1,8 +1,9 @@
 """The camera's pass: pictures of the scene from the caustic maps and the lights.
 
 A dispatch adds one camera sample to the pixels of a band of rows, or to some of those that see glass or mirrors there,
-so that none takes long on a software renderer: between two of them there is time for progress and for a stop. Samples
-form a lattice inside the pixel that later launches refine (box filter).
+so that none takes long on a software renderer: between two of them there is time for progress and for a stop. There a
+sample that takes long halts and is taken up by a later dispatch, for the driver would cut it short
+(shaders/camera/halts.glsl). Samples form a lattice inside the pixel that later launches refine (box filter).
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from ..model.scene_checks import contains
 from .camera_programs import (
     BIND_CELL_CDF,
     BIND_COUNTERS,
+    BIND_HALTED,
     BIND_LIGHTS,
     BIND_LISTED,
     BIND_OBJECT_COLOURS,
@@ -38,6 +40,8 @@ from .camera_programs import (
     UNIT_PICTURES,
     camera_defines,
     direct_defines,
+    halted_bytes,
+    halting_defines,
     single_defines,
 )
 from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
@@ -61,8 +65,11 @@ _TARGET_SECONDS = 0.15
 _GROUP = 8
 _LISTED_GROUP = 64
 _FIRST_ROWS, _FIRST_LISTED = 16, 1024
-_NOTHING_LISTED = bytes(4)
-FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut")
+_PLACES = 8192
+"""Samples that may be under way, where they halt."""
+_LISTED_AT, _HALTED_AT = 0, 4
+_NOTHING_LISTED = bytes(8)
+FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut", "loops_ended")
 """What the shader counts, in its order."""
 
 
@@ -121,7 +128,7 @@ class CameraPass:
         self._empty: CausticMaps | None = None
         self._pictures: list[moderngl.Texture] = []
         self._samples_of_row = np.zeros(0, int)
-        self._rows = self._pixels = DispatchBudget(1, 1, 1)
+        self._rows = self._pixels = self._resumed = DispatchBudget(1, 1, 1)
         self._within_rows = False
         """Some listed pixels of a band of rows have this sample, others are still to get it."""
         self._map_targets = maps.targets
@@ -159,8 +166,12 @@ class CameraPass:
             if on
         }
         self._listed: moderngl.Buffer | None = None
+        self._halted: moderngl.Buffer | None = None
         self._beyond: moderngl.ComputeShader | None = None
         self._single: moderngl.ComputeShader | None = None
+        if "CAMERA_SPECULAR" in shown and context.is_software:
+            self._halted = self._ctx.buffer(reserve=_PLACES * halted_bytes(shown))
+            shown = halting_defines(shown)
         self._source = (shown, structs)
         if "CAMERA_SPECULAR" in shown:
             self._beyond = shader.compute(self._ctx, "camera/camera.comp", shown, structs)
@@ -303,6 +314,8 @@ class CameraPass:
         self._counters.bind_to_storage_buffer(BIND_COUNTERS)
         if self._listed is not None:
             self._listed.bind_to_storage_buffer(BIND_LISTED)
+        if self._halted is not None:
+            self._halted.bind_to_storage_buffer(BIND_HALTED)
         self._parameters_buffer.bind_to_uniform_block(bindings.PARAMETERS)
         for unit, texture in enumerate(maps.textures):
             texture.use(location=unit)
@@ -312,7 +325,7 @@ class CameraPass:
     @property
     def fallbacks(self) -> dict[str, int]:
         """How often, since the pass was made, a path lost its columns, was left at its greatest depth, could not wait,
-        or kept a band that should have been cut."""
+        kept a band that should have been cut, or was cut short by the driver."""
         return dict(zip(FALLBACKS, np.frombuffer(self._counters.read(), "u4").tolist(), strict=True))
 
     @property
@@ -340,8 +353,9 @@ class CameraPass:
         for program in (self._program, self._beyond, self._single):
             if program is not None:
                 shader.release(program)
-        if self._listed is not None:
-            self._listed.release()
+        for buffer in (self._listed, self._halted):
+            if buffer is not None:
+                buffer.release()
         if self._owns_pictures:
             self.pictures.release()
         if self._empty is not None:
@@ -403,10 +417,11 @@ class CameraPass:
             self._pictures = [self._ctx.texture((width, height), 4, dtype="f4") for _ in range(self.channels.targets)]
             self._rows = DispatchBudget(_FIRST_ROWS, _GROUP, -(-height // _GROUP) * _GROUP)
             self._pixels = DispatchBudget(_FIRST_LISTED, _LISTED_GROUP, max(width * height, _LISTED_GROUP))
+            self._resumed = DispatchBudget(_FIRST_LISTED, _LISTED_GROUP, _PLACES)
             if self._listed is not None:
                 self._listed.release()
             self._listed = (
-                self._ctx.buffer(reserve=4 + 4 * width * (-(-height // _GROUP) * _GROUP))
+                self._ctx.buffer(reserve=8 + 4 * width * (-(-height // _GROUP) * _GROUP))
                 if self._beyond is not None
                 else None
             )
@@ -444,15 +459,50 @@ class CameraPass:
         last."""
         if self._listed is None:
             return
-        count, done = int(np.frombuffer(self._listed.read(4), "u4")[0]), 0
+        count, done, place = self._counted(_LISTED_AT), 0, 0
         while done < count:
             pixels = min(self._pixels.units, count - done)
-            parameters["first_listed"] = done
-            took = self._dispatch(self._program_beyond(), parameters, maps, -(-pixels // _LISTED_GROUP), 1)
-            self._pixels.learn(pixels, took, self.dispatch_seconds)
-            done += pixels
+            if self._halted is not None:
+                pixels = min(pixels, _PLACES - place)
+            parameters["first_place"], parameters["queue"] = place, 0
+            self._follow(self._pixels, done, pixels, parameters, maps)
+            done, place = done + pixels, place + pixels
+            # Many portions' together, so that few are left without neighbours.
+            if self._halted is not None and (done == count or place == _PLACES):
+                for _ in self._take_up_halted(parameters, maps):
+                    yield done / count
+                place = 0
             if done < count:
                 yield done / count
+
+    def _take_up_halted(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[None]:
+        """Take up the samples that have halted until none is left, pausing before every dispatch."""
+        assert self._listed is not None
+        parameters["first_place"] = NONE
+        while count := self._counted(_HALTED_AT):
+            self._listed.write(bytes(4), offset=_HALTED_AT)
+            parameters["queue"] = 1 - parameters["queue"]
+            done = 0
+            while done < count:
+                yield
+                samples = min(self._resumed.units, count - done)
+                self._follow(self._resumed, done, samples, parameters, maps)
+                done += samples
+
+    def _follow(
+        self, dispatch_budget: DispatchBudget, first: int, count: int, parameters: np.ndarray, maps: CausticMaps
+    ) -> None:
+        """Dispatch a portion of the listed pixels, or of the halted samples."""
+        parameters["first_listed"], parameters["end_listed"] = first, first + count
+        dispatch_budget.learn(
+            count,
+            self._dispatch(self._program_beyond(), parameters, maps, -(-count // _LISTED_GROUP), 1),
+            self.dispatch_seconds,
+        )
+
+    def _counted(self, at: int) -> int:
+        assert self._listed is not None
+        return int(np.frombuffer(self._listed.read(4, offset=at), "u4")[0])
 
     def _dispatch(
         self, program: moderngl.ComputeShader, parameters: np.ndarray, maps: CausticMaps, groups_x: int, groups_y: int

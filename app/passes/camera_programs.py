@@ -29,6 +29,12 @@ ENDS_HELD = 8
 """Paths' ends of a sample that are looked at together."""
 CUT_THRESHOLD = 0.004
 """Share of a sample's power above which both parts of a cut band are followed."""
+HALT_ROUNDS = 3000
+"""Rounds of its loops after which a sample halts on a software renderer; see camera/halts.glsl. Eight side by side that
+have nothing in common then take 24,000 of the driver's 65,535, and what is left is for the surface they are at and the
+ends of paths they hold."""
+SPARE_ROUNDS = 0
+"""Rounds that must be left when it halts or ends; where they are not, it is counted."""
 TINT_STEPS = 48
 """Stretches that the whole spectrum is cut into behind coloured glass."""
 
@@ -41,7 +47,8 @@ TINT_STEPS = 48
     BIND_PICTURES,
     BIND_COUNTERS,
     BIND_LISTED,
-) = range(8, 16)
+    BIND_HALTED,
+) = range(8, 17)
 UNIT_EMISSION, UNIT_PICTURES = 10, 11
 _BEYOND_ONLY = (
     "HAS_DISPERSION",
@@ -116,6 +123,22 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
     for name in switches:
         defines.pop(name, None)
     return defines | {name: 1 for name, on in switches.items() if on}
+
+
+def halting_defines(beyond: Mapping[str, int | float | str]) -> Defines:
+    """For listed pixels whose samples halt when their loops have run long."""
+    return dict(beyond) | {
+        "HALTS": 1,
+        "HALT_ROUNDS": HALT_ROUNDS,
+        "SPARE_ROUNDS": SPARE_ROUNDS,
+        "BIND_HALTED": BIND_HALTED,
+    }
+
+
+def halted_bytes(beyond: Mapping[str, int | float | str]) -> int:
+    """Room that surely holds one halted sample: its paths, and what it knows besides."""
+    path = 304 + 40 * int(beyond["SPECTRAL_GROUPS"]) + 4 * int(beyond.get("ABSORBERS", 0))
+    return (STACK + 1) * path + 16 * int(beyond["TARGETS"]) + 64
 
 
 def direct_defines(beyond: Mapping[str, int | float | str]) -> Defines:

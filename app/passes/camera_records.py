@@ -60,8 +60,9 @@ CAMERA_PARAMETERS = Struct(
         Field("primary_samples", "uint", "of one sample, at what is seen directly"),
         Field("first_listed", "uint", "of the listed pixels, this dispatch's first"),
         Field("pixel_height", "float", "as pixel_width"),
-        Field("unused2", "float", ""),
-        Field("unused3", "vec2", ""),
+        Field("end_listed", "uint", "… and the one after its last"),
+        Field("first_place", "uint", "where the first of them waits; NONE where this dispatch takes up halted ones"),
+        Field("queue", "uint", "of the two, the one that samples which halt are put on"),
     ),
 )
 _LIGHT_KINDS = {"point": 0, "spot": 0, "directional": 1, "collimated": 2, "area": 3}

@@ -15,10 +15,11 @@ import numpy as np
 from ..base.errors import UserError
 from ..gpu.records import NONE, PLACEMENT, RECEIVER
 from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.tiles import Tile, pack
 from ..model.camera_rays import camera_rays
 from ..model.features import is_flat
 from ..model.scene import Camera, Diffuse, Scene
-from .map_atlas import Tile, pack, placement_rows
+from .map_atlas import placement_rows
 
 if TYPE_CHECKING:
     from ..model.geometry.charts import ChartAtlas

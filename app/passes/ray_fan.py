@@ -16,8 +16,8 @@ from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import world_bounds
 from ..model.optics.glass import LINE_D_NM
 from ..model.scene import Light, SceneObject
-from ..ui.view_model import RayLine
 from .emission_domain import orthonormal_frame
+from .ray_line import RayLine
 from .ray_paths import Path, RayPaths
 
 _MIN_BEND = 1e-3

@@ -92,6 +92,7 @@ class LatticeSlice:
     shift_light: tuple[int, int]
     shift_spectral: int
     seed: int
+    """Key of roulette's draws."""
     light_points: int = 1
     light_place: tuple[float, float] = (0.5, 0.5)
     """Place on an extended light when `light_points` is 1."""

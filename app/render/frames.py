@@ -15,6 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..edit.live_inputs import LiveInputs
 from ..edit.parameters import Stage
 from ..gpu.context import Context
 from ..gpu.scene_buffers import GpuSpace, SceneBuffers
@@ -28,7 +29,7 @@ from ..passes.pilot import Pilot
 from ..passes.trace import Band
 from .light_pass import LightPass, spectral_axis
 from .light_plan import LightPlan
-from .viewer.inputs import DirtyLevel, LiveInputs
+from .viewer.dirty_level import DirtyLevel
 from .viewer.invalidation import dirty_level
 from .viewer.live_camera import solo_scene
 

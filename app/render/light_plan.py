@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.random_words import PASS_GENERATORS, Dimension, random_word, shift
 from ..gpu.records import MAX_BANDS
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import Features
@@ -19,7 +20,6 @@ SMALLEST_BATCH = MAX_BANDS * MAX_LIGHT_POINTS
 """One point of every sub-lattice a light may have."""
 TINTED_BANDS = 16
 """Least number of bands where glass absorbs or mirrors are coloured."""
-_SHIFT_GENERATORS = (1116352409, 1899447441, 3141592653, 1640531527, 1359893119)
 
 
 @dataclass(frozen=True)
@@ -46,9 +46,8 @@ class LightPlan:
         self, seed: int, number: int, lattice: int, first: int, stride: int, points: int, weight: float
     ) -> LatticeSlice:
         """Points first, first + stride, … of pass `number`'s lattices of `lattice` points each."""
-        # Successive passes follow a Kronecker sequence, so their union is again even.
-        start = (seed * 0x9E3779B1 + self.index * 0x85EBCA6B) & 0xFFFFFFFF
-        shifts = [(start + (number + 1) * g) & 0xFFFFFFFF for g in _SHIFT_GENERATORS]
+        u, v, light_u, light_v, spectral = (shift(seed, self.index, number, dimension) for dimension in PASS_GENERATORS)
+        key = random_word(seed, self.index, number, Dimension.BRANCH)
         return LatticeSlice(
             self.index,
             self.bands,
@@ -56,10 +55,10 @@ class LightPlan:
             first,
             stride,
             points,
-            (shifts[0], shifts[1]),
-            (shifts[2], shifts[3]),
-            shifts[4],
-            (seed + 7919 * number) & 0xFFFFFFFF,
+            (u, v),
+            (light_u, light_v),
+            spectral,
+            key,
             self.light_points,
             weight=weight,
         )

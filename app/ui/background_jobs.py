@@ -7,7 +7,7 @@ import time
 from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
-from ..commands.options import shipped_scenes
+from ..base.paths import shipped_scenes
 from .compare import Comparison
 from .cursor_info import Cursor
 from .export import Exports, Shown

@@ -158,12 +158,12 @@ COMMANDS: tuple[Command, ...] = (
         enabled=lambda _state, view_model: view_model.undo is not None,
     ),
     Command(
-        "DirtyLevel",
+        "Redo",
         ("Ctrl+Shift+Z", "Ctrl+Y"),
         "Edit",
         "Do again what was taken back.",
-        _ask(requests.DirtyLevel()),
-        enabled=lambda _state, view_model: view_model.dirty_level is not None,
+        _ask(requests.Redo()),
+        enabled=lambda _state, view_model: view_model.redo is not None,
     ),
     Command(
         "Duplicate",

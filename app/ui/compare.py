@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..edit.live_inputs import LiveInputs
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import Features
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
 from ..passes.spectrum_choice import Spectrum
 from ..render.light_pass import reflectance_classes, spectral_axis
-from ..render.viewer.inputs import DirtyLevel, LiveInputs
+from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.invalidation import dirty_level
 from .error_curves import ErrorCurves
 from .panels.methods import METHOD_NAMES

@@ -14,7 +14,7 @@ import numpy as np
 from ..base.atomic import atomic_output, check_writable
 from ..base.errors import UserError
 from ..base.image_io import check_suffix, write_image
-from ..commands.options import MAX_SIDE_PX, check_picture_memory
+from ..base.memory import MAX_SIDE_PX, check_picture_memory
 from ..edit import requests
 from ..edit.parameters import Stage
 from ..edit.state import Display as PilotRender

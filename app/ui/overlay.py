@@ -14,8 +14,8 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from ..edit.projection import View
+from ..passes.ray_line import RayLine
 from .panels.spectral_colour import spectral_srgb
-from .view_model import RayLine
 
 Colour = tuple[float, float, float, float]
 NEAR = 1e-3

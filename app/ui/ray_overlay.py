@@ -8,7 +8,7 @@ import numpy as np
 
 from ..edit.state import State
 from ..model.scene import Dielectric
-from .view_model import RayLine
+from ..passes.ray_line import RayLine
 
 if TYPE_CHECKING:
     from ..gpu.context import Context

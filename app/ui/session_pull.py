@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..base.errors import UserError
@@ -11,10 +9,8 @@ from ..edit.projection import View
 from ..edit.pull import PullPhotons, begin_pull
 from ..edit.requests import BeginPull, Pull
 from ..model.optics.colorimetry import rgb709_to_xyz
+from .session import Session
 from .shown_scene import has_same_objects
-
-if TYPE_CHECKING:
-    from .session import Session
 
 PHOTONS = 400_000
 RADIUS = 0.01

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,9 +15,8 @@ from ..edit.state import Selection
 from ..model.scene import Diffuse
 from ..model.scene_defaults import bounds_of
 from .caustic_source import source_at
-
-if TYPE_CHECKING:
-    from .session import Session
+from .session import Session
+from .session_pull import begin_pull_at
 
 PICK_PHOTONS = 400_000
 """Stored photons that are asked whose caustic lies at a point."""
@@ -50,8 +48,8 @@ def _undo(session: Session, _request: requests.Undo) -> None:
     session.show_scene(session.document.history.undo())
 
 
-def _redo(session: Session, _request: requests.DirtyLevel) -> None:
-    session.show_scene(session.document.history.dirty_level())
+def _redo(session: Session, _request: requests.Redo) -> None:
+    session.show_scene(session.document.history.redo())
 
 
 def _go_to(session: Session, request: requests.GoTo) -> None:
@@ -59,10 +57,7 @@ def _go_to(session: Session, request: requests.GoTo) -> None:
 
 
 def _quit(session: Session, request: requests.Quit) -> None:
-    if session.document.unsaved and not request.discard:
-        session.asks_to_quit = True
-    else:
-        session.wants_to_close = True
+    session.quit(request.discard)
 
 
 def _cancel_quit(session: Session, _request: requests.CancelQuit) -> None:
@@ -106,8 +101,6 @@ def _source_at(session: Session, position: np.ndarray, receiver: int) -> int | N
 
 
 def _begin_pull(session: Session, request: requests.BeginPull) -> None:
-    from .session_pull import begin_pull_at
-
     session.state = replace(session.state, pull=begin_pull_at(session, request))
 
 
@@ -192,7 +185,7 @@ _HANDLERS: dict[type, Callable] = {
     requests.Open: _open,
     requests.Save: _save,
     requests.Undo: _undo,
-    requests.DirtyLevel: _redo,
+    requests.Redo: _redo,
     requests.GoTo: _go_to,
     requests.Quit: _quit,
     requests.CancelQuit: _cancel_quit,

@@ -14,7 +14,7 @@ from .view_model import ViewModel
 COMPARE_KEY = imgui.Key.c
 """Held down, the viewport shows the reference."""
 
-_REPEATING = ("Undo", "DirtyLevel", "Brighter", "Darker")
+_REPEATING = ("Undo", "Redo", "Brighter", "Darker")
 """A held key goes on."""
 
 _ON_START_PAGE = ("File", "Help")

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..edit.history import HistoryEntry
 from ..model.scene import Vec3
+from ..passes.ray_line import RayLine
 from ..render.viewer.stats import LiveStats
 
 
@@ -46,14 +48,6 @@ class SceneEntry:
 
 
 @dataclass(frozen=True)
-class HistoryEntry:
-    """One step of undo."""
-
-    label: str
-    is_present: bool
-
-
-@dataclass(frozen=True)
 class ErrorCurve:
     """Error of a running method against the reference."""
 
@@ -82,15 +76,6 @@ class JobInfo:
 
 
 @dataclass(frozen=True)
-class RayLine:
-    """One path of the ray overlay."""
-
-    wavelength_nm: float
-    points: np.ndarray
-    """float64 (n, 3), world."""
-
-
-@dataclass(frozen=True)
 class ViewModel:
     """One frame's."""
 
@@ -108,7 +93,7 @@ class ViewModel:
     unsaved: bool = False
     undo: str | None = None
     """Label of what undo would take back."""
-    dirty_level: str | None = None
+    redo: str | None = None
     history: tuple[HistoryEntry, ...] = ()
     recent: tuple[Path, ...] = ()
     scenes: tuple[SceneEntry, ...] = ()

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from .session import Session
 from .view_model import ViewModel
-
-if TYPE_CHECKING:
-    from .session import Session
 
 
 def view_model_of(session: Session) -> ViewModel:
@@ -26,7 +22,7 @@ def view_model_of(session: Session) -> ViewModel:
         path=document.path,
         unsaved=document.unsaved,
         undo=document.history.undo_label,
-        dirty_level=document.history.redo_label,
+        redo=document.history.redo_label,
         history=document.history.entries,
         recent=session.settings.existing_recent(),
         scenes=session.companions.gallery.entries,

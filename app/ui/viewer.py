@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from ..edit.state import Preferences
+from .frame import Draw, run_frame
 from .headless import HeadlessInterface
 from .pace import Pace
-from .session import Draw, Session
+from .session import Session
 from .shell import draw_interface
 
 
@@ -32,7 +33,7 @@ class Viewer:
 
     def draw(self) -> None:
         """One frame."""
-        self.session.frame(self._draw, self.pace.budget_s)
+        run_frame(self.session, self._draw, self.pace.budget_s)
 
     def rendered(self) -> None:
         """imgui has drawn; the screen has not been waited for."""

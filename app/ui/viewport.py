@@ -1,7 +1,7 @@
 """The picture with everything that is done in it: tools, camera, gizmo, brush, pulling, overlays.
 
 `draw_viewport` fills the window it is drawn in. It knows the picture only as a texture number and what lies under
-the cursor only from `Facts`; wishes that need the renderer are requests.
+the cursor only from `ViewModel`; wishes that need the renderer are requests.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ class Guest(Protocol):
     """What the window shows."""
 
     def prepare(self, interface_scale: float, framebuffer_scale: float) -> None:
-        """Before a frame, outside of imgui's; scales as in `Facts`."""
+        """Before a frame, outside of imgui's; scales as in `ViewModel`."""
 
     def draw(self) -> None:
         """One frame, within imgui's."""

@@ -11,6 +11,12 @@ layout(local_size_x = 64) in;
 layout(local_size_x = 8, local_size_y = 8) in;
 #endif
 
+#ifdef HALTS
+// Rounds that this invocation's loops have run in this dispatch; see camera/halts.glsl.
+uint rounds = 0u;
+#define COUNT_ROUNDS(count) rounds += uint(count)
+#endif
+
 #include "lib/intersect.glsl"
 #include "lib/camera.glsl"
 #include "lib/lights.glsl"
@@ -38,10 +44,10 @@ layout(std430, binding = BIND_OBJECT_COLOURS) readonly restrict buffer ObjectCol
 #ifdef HAS_DISPERSION
 layout(std430, binding = BIND_CELL_CDF) readonly restrict buffer CellCdf { float cell_cdf[]; };
 #endif
-layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallbacks[4]; };
+layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallbacks[5]; };
 #if defined(LISTS_SPECULAR) || defined(CAMERA_SPECULAR)
-// How many pixels are listed, and what is to be known of them.
-layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_count; uint listed[]; };
+// How many pixels are listed, how many of their paths have halted, and what is to be known of the listed ones.
+layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_count; uint halted_count; uint listed[]; };
 #endif
 layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
 
@@ -57,6 +63,7 @@ layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
 #define FELL_DEPTH 1
 #define FELL_STACK 2
 #define FELL_CUT 3
+#define FELL_LOOPS 4
 
 // Which of its turns a pixel's dispersed sample takes, and whether this sample took one. A picture in colour counts them beside its sums, since
 // where glass fills a pixel in part only some samples are dispersed, and all bands must have had as many.
@@ -69,8 +76,18 @@ bool took_turn = false;
 // copied there and back by some drivers.
 vec4 radiance[TARGETS];
 #ifdef CAMERA_SPECULAR
-CameraPath waiting[STACK];
 int waits;
+#ifdef SPECTRAL_SWEEP
+// Rays traced to find out where ways part.
+int asked = 0;
+#endif
+#ifdef HALTS
+#include "camera/halts.glsl"
+#define WAITING(i) halted[place].waiting[i]
+#else
+CameraPath waiting[STACK];
+#define WAITING(i) waiting[i]
+#endif
 // What this event adds to them, put there in one place: storing a path at an index takes a compiler long.
 CameraPath aside;
 bool sets_aside;
@@ -311,8 +328,15 @@ void main()
 {
 #ifdef CAMERA_SPECULAR
     uint at_listed = p.first_listed + gl_GlobalInvocationID.x;
-    if (at_listed >= listed_count) return;
-    uint entry = listed[at_listed], number = bitfieldExtract(entry, 0, int(LISTED_BITS)), look = bitfieldExtract(entry, int(LISTED_BITS), 3);
+    if (at_listed >= p.end_listed) return;
+#ifdef HALTS
+    bool resumes = p.first_place == NONE;
+    place = resumes ? halted[at_listed].queued[1u - p.queue] : p.first_place + gl_GlobalInvocationID.x;
+    uint entry = resumes ? halted[place].entry : listed[at_listed];
+#else
+    uint entry = listed[at_listed];
+#endif
+    uint number = bitfieldExtract(entry, 0, int(LISTED_BITS)), look = bitfieldExtract(entry, int(LISTED_BITS), 3);
     float gain = float((entry >> (LISTED_BITS + 3u)) + 1u) / float(p.primary_samples);
     uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
 #else
@@ -357,10 +381,19 @@ void main()
     }
 #elif defined(CAMERA_SPECULAR)
     int events = 0;
-    bool goes_on = true;
-    while (goes_on) {
+    bool goes_on = true, halts = false;
+#ifdef HALTS
+    WHEN(resumes) {
+        resume(events);
+        goes_on = false;
+    }
+#endif
+    while ((goes_on || waits > 0) && !halts) {
         int found = 0;
-        for (; goes_on && found < ENDS_HELD; ++events) {
+        for (; (goes_on || waits > 0) && found < ENDS_HELD && !halts; ++events) {
+            COUNT_ROUNDS(32);
+            WHEN(!goes_on) path = WAITING(--waits);
+            goes_on = true;
             Hit hit;
             bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
             uint kind = met ? object_at(hit.object).kind : NONE;
@@ -387,14 +420,31 @@ void main()
 #ifdef SPECTRAL_SWEEP
             WHEN(cut_at >= 0.0) cut_band(path, cut_at, pixel_key);
 #endif
-            WHEN(sets_aside) waiting[waits++] = aside;
-            WHEN(!goes_on && waits > 0) {
-                path = waiting[--waits];
-                goes_on = true;
+#ifdef HALTS
+            halts = rounds >= uint(HALT_ROUNDS);
+            // One place stores both what is set aside and, where it halts, what is followed.
+            bool sets_path = halts && goes_on;
+            if (!sets_aside) aside = path;
+            for (bool stores = sets_aside || sets_path; stores;) {
+                WAITING(waits++) = aside;
+                stores = sets_aside && sets_path;
+                sets_aside = false;
+                aside = path;
             }
+            goes_on = goes_on && !halts;
+#else
+            WHEN(sets_aside) WAITING(waits++) = aside;
+#endif
         }
         for (int e = 0; e < found; ++e) add_end(ended[e].path, ended[e].met, ended[e].hit, ended[e].alike, pixel_key);
     }
+#ifdef HALTS
+    if (!loops_run()) atomicAdd(fallbacks[FELL_LOOPS], 1u);
+    if (waits > 0) {
+        halt(entry, events);
+        return;
+    }
+#endif
 #else
     Hit hit;
     bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);

@@ -10,8 +10,7 @@
 // Halvings between the middle of a band and an end: a cut is told to 1/256 of the band.
 #define CUT_HALVINGS 7
 #define EDGE_HALVINGS 10
-// Rays that a sample may trace to find out where its ways part: bounds what a sample costs, and llvmpipe ends all loops of an invocation once
-// they have run 65,535 rounds together.
+// Rays that a sample may trace to find out where its ways part: bounds what a sample costs.
 #define MAX_ASKED 96
 // Cosine of two normals, and distance (GPU units) from a plane, up to which two facets are one face.
 #define SAME_FACE_COSINE 0.999999
@@ -27,9 +26,6 @@ bool may_cut_at(CameraPath path, float at)
 {
     return min(at - path.band.x, path.band.z - at) > 0.5 / float(EMISSION_CELLS);
 }
-
-// Rays traced so far.
-int asked = 0;
 
 // How much of what looks bright in the band lies below `at`.
 float share_below(CameraPath path, float at)
@@ -98,6 +94,7 @@ float where_ways_part(CameraPath path, bool met, bool ends, Hit hit, out bool al
     Hit other = hit;
     // One place asks for all, for whatever traces rays is long: both ends first, then between the middle and one of them.
     for (int i = 0; i < 2 + CUT_HALVINGS && bisects; ++i) {
+        COUNT_ROUNDS(8);
         float x = i == 0 ? path.band.x : (i == 1 ? path.band.z : 0.5 * (along + parted));
         bool here = true;
         Hit found;

@@ -71,6 +71,7 @@ void add_spectrum(CameraPath path, Stretch stretch, uint row, float factor)
     WHEN(stretch.steps == 1)
         for (int t = 0; t < TARGETS; ++t)
             radiance[t] += factor * stretch.through * (emission_until(row, t, stretch.cell_hi) - emission_until(row, t, stretch.cell_lo));
+    COUNT_ROUNDS(stretch.steps);
     float step_x = (stretch.hi - stretch.lo) / float(stretch.steps);
     for (int s = 0; s < stretch.steps && stretch.steps > 1; ++s) {
         float a = stretch.lo + float(s) * step_x, b = s + 1 == stretch.steps ? stretch.hi : a + step_x;
@@ -95,6 +96,7 @@ void channel_factors(CameraPath path, Stretch stretch, out vec4 factors[TARGETS]
     bool whole = stretch.steps == 1 && !path.narrowed;
     for (int t = 0; t < TARGETS; ++t) factors[t] = vec4(stretch.through);
     WHEN(!whole) {
+        COUNT_ROUNDS(stretch.steps * TARGETS);
         float step_x = (stretch.hi - stretch.lo) / float(stretch.steps);
         for (int t = 0; t < TARGETS; ++t) {
             vec4 kept = vec4(0.0);

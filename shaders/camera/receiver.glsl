@@ -177,6 +177,7 @@ void caustic_values(uint placement, vec2 texel, vec2 box, out vec4 values[MAP_TA
 {
     ivec2 looks = clamp(ivec2(ceil(box)), ivec2(1), ivec2(MAX_TEXELS));
     vec2 part = box / vec2(looks), corner = texel - 0.5 * (box - part);
+    COUNT_ROUNDS(looks.x * looks.y);
     float share = 1.0 / float(looks.x * looks.y);
     for (int t = 0; t < MAP_TARGETS; ++t) values[t] = vec4(0.0);
     for (int i = 0; i < looks.x * looks.y; ++i) {

@@ -202,6 +202,7 @@ void add_end(CameraPath path, bool met, Hit hit, bool alike, uint pixel_key)
 #endif
 #endif
     for (int i = 0; i < taps; ++i) {
+        COUNT_ROUNDS(16 + 8 * LIGHT_COUNT);
         float lo = hi, part = 1.0;
         vec3 direction = path.direction;
         bool ends = met;

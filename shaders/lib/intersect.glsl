@@ -5,6 +5,11 @@
 #ifndef INTERSECT_GLSL
 #define INTERSECT_GLSL
 
+// A program that must know how many rounds its loops run says how they are counted.
+#ifndef COUNT_ROUNDS
+#define COUNT_ROUNDS(count)
+#endif
+
 #include "lib/scene.glsl"
 
 // Set on `Hit.primitive` where it numbers a plane of a half-space solid, not a triangle.
@@ -121,6 +126,7 @@ void intersect_tree(vec3 near_p, float ahead, vec3 direction, RayOrigin origin, 
     uint current = 0u;
     while (true) {
         while (current < LEAF_BIT) {
+            COUNT_ROUNDS(1);
             uint at = uint(TREE_AT) + 4u * current;
             uvec4 a = scene_texel(at), b = scene_texel(at + 1u), c = scene_texel(at + 2u), links = scene_texel(at + 3u);
             float far = best_key + NEAR_DISTANCE - ahead;
@@ -134,6 +140,7 @@ void intersect_tree(vec3 near_p, float ahead, vec3 direction, RayOrigin origin, 
         }
         if (current == NONE) break;
         uint first = current & 0x0fffffffu, end = first + ((current >> 28u) & 7u);
+        COUNT_ROUNDS(end - first + 1u);
         for (; first < end; ++first)
             try_triangle(first, near_p, ahead, direction, origin, best_key, hit);
         if (any_hit && hit.primitive != NONE) break;
@@ -150,6 +157,7 @@ void intersect_solid(uint solid, vec3 origin_p, vec3 direction, RayOrigin origin
     float enter = -FAR_DISTANCE, leave = FAR_DISTANCE;
     uint enter_plane = NONE, leave_plane = NONE;
     uint first = solids[solid].first_plane, end = first + solids[solid].plane_count;
+    COUNT_ROUNDS(end - first + 1u);
     for (uint i = first; i < end; ++i) {
         vec4 plane = planes[i];
         float facing = dot(direction, plane.xyz);
@@ -201,6 +209,7 @@ bool intersect(vec3 origin_p, vec3 direction, float far, RayOrigin origin, bool 
 #ifdef HAS_TREE
     intersect_tree(near_p, ahead, direction, origin, any_hit, best_key, hit);
 #elif defined(LOOSE_TRIANGLES)
+    COUNT_ROUNDS(TRIANGLE_COUNT);
     for (uint i = 0u; i < uint(TRIANGLE_COUNT); ++i)
         try_triangle(i, near_p, ahead, direction, origin, best_key, hit);
 #endif

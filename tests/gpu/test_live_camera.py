@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.environment import gradient, world_to_local
 from spectrasplat.model.io.scene_file import load_scene
@@ -17,8 +18,8 @@ from spectrasplat.model.optics.glass import with_gain
 from spectrasplat.model.scene import Camera, Dielectric, Scene
 from spectrasplat.model.texture import Environment
 from spectrasplat.passes.spectrum_choice import Spectrum
+from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.render.viewer.engine import LOOK_S, Budget, LiveEngine
-from spectrasplat.render.viewer.inputs import DirtyLevel, LiveInputs
 from spectrasplat.render.viewer.invalidation import dirty_level, looks_other
 from spectrasplat.render.viewer.live_camera import SCALES, _side, solo_scene
 from spectrasplat.render.viewer.spectrum_guess import guess_weights

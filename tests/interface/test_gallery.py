@@ -89,7 +89,7 @@ def test_closing_ends_the_process(gl: Context, tmp_path: Path, scenes: dict[str,
 
 @pytest.mark.slow
 def test_a_shipped_scene_really_gets_one(gl: Context, tmp_path: Path) -> None:
-    from spectrasplat.commands.options import shipped_scenes
+    from spectrasplat.base.paths import shipped_scenes
 
     gallery = Gallery(gl, tmp_path, {"prism": shipped_scenes()["prism"]})
     while gallery.is_busy:

@@ -17,6 +17,7 @@ from spectrasplat.model.scene import Camera, Dielectric, Diffuse
 from spectrasplat.passes.pick import PickHit
 from spectrasplat.render.viewer.photon_queries import StoredPhotons
 from spectrasplat.ui.crash_log import FILE_NAME
+from spectrasplat.ui.frame import run_frame
 from spectrasplat.ui.live_picture import LivePicture
 from spectrasplat.ui.session import LAYOUT_FRAMES, Session
 from spectrasplat.ui.view_model import ViewModel
@@ -41,7 +42,7 @@ class Rig:
             return edit(replace(state, viewport_size=(64, 36)))
 
         self.session.prepare()
-        self.session.frame(draw)
+        run_frame(self.session, draw)
         self.session.finished()
         return self.session.state
 
@@ -97,14 +98,15 @@ def test_shown_texture_stays_valid_in_the_frame_in_which_the_size_changes(rig: R
     rig.frame()
     before = rig.session.picture.shown
     rig.session.prepare()
-    rig.session.frame(lambda state, _view_model: replace(state, viewport_size=(128, 72)))
+    run_frame(rig.session, lambda state, _view_model: replace(state, viewport_size=(128, 72)))
     assert rig.session.picture.shown is before  # imgui has yet to draw it
     rig.session.prepare()
     resized = rig.session.picture.shown
     assert resized is not None and resized.size == (128, 72)
     drawn: list[int | None] = []
-    rig.session.frame(
-        lambda state, view_model: drawn.append(view_model.picture) or replace(state, viewport_size=(128, 72))
+    run_frame(
+        rig.session,
+        lambda state, view_model: drawn.append(view_model.picture) or replace(state, viewport_size=(128, 72)),
     )
     assert rig.session.picture.shown is resized and drawn == [resized.glo]
 
@@ -122,8 +124,8 @@ def test_edits_are_undone_one_by_one_and_a_drag_is_one_step(rig: Rig) -> None:
     names = [rig.ask(requests.Undo()).scene.name for _ in range(4)]
     assert names[:2] == ["e", "a"]
     assert rig.session.state.scene is first
-    assert rig.view_model.undo is None and rig.view_model.dirty_level == "Rename" and not rig.view_model.unsaved
-    assert rig.ask(requests.DirtyLevel()).scene.name == "a"
+    assert rig.view_model.undo is None and rig.view_model.redo == "Rename" and not rig.view_model.unsaved
+    assert rig.ask(requests.Redo()).scene.name == "a"
     assert rig.ask(requests.GoTo(3)).scene.name == "f"
     assert rig.view_model.unsaved
 

@@ -57,8 +57,8 @@ def test_every_panel_has_a_command() -> None:
         (imgui.Key.s, [CTRL], requests.Save()),
         (imgui.Key.q, [CTRL], requests.Quit()),
         (imgui.Key.z, [CTRL], requests.Undo()),
-        (imgui.Key.z, [CTRL, SHIFT], requests.DirtyLevel()),
-        (imgui.Key.y, [CTRL], requests.DirtyLevel()),
+        (imgui.Key.z, [CTRL, SHIFT], requests.Redo()),
+        (imgui.Key.y, [CTRL], requests.Redo()),
         (imgui.Key.f, [], requests.FrameSelection()),
         (imgui.Key.f5, [], requests.ReloadShaders()),
         (imgui.Key.r, [CTRL], requests.Retrace()),
@@ -68,7 +68,7 @@ def test_every_panel_has_a_command() -> None:
 def test_shortcuts_ask_the_host_once(
     rig: ShellRig, key: imgui.Key, modifiers: list[imgui.Key], expected: requests.Request
 ) -> None:
-    rig.view_model = replace(rig.view_model, path=Path("prism.toml"), undo="Move prism", dirty_level="Move prism")
+    rig.view_model = replace(rig.view_model, path=Path("prism.toml"), undo="Move prism", redo="Move prism")
     rig.key(key, modifiers)
     assert rig.asked == [expected]
 

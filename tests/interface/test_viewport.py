@@ -15,10 +15,11 @@ from spectrasplat.edit.requests import BeginPull, Notice, Pull, SelectAt
 from spectrasplat.edit.state import Brush, Compare, Selection, State
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.scene import Diffuse
+from spectrasplat.passes.ray_line import RayLine
 from spectrasplat.render.viewer.stats import LiveStats
 from spectrasplat.ui import viewport, viewport_tools
 from spectrasplat.ui.headless import HeadlessInterface
-from spectrasplat.ui.view_model import CursorInfo, RayLine, ViewModel
+from spectrasplat.ui.view_model import CursorInfo, ViewModel
 
 from tests.interface.panel_rig import receiver_of, scene_state
 

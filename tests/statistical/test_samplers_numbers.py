@@ -12,11 +12,11 @@ import re
 import numpy as np
 import pytest
 from spectrasplat.base import paths
+from spectrasplat.base.random_words import PASS_GENERATORS
 from spectrasplat.gpu.records import TRACE_PARAMETERS, ray_record
 from spectrasplat.passes.camera import _pixel_lattice
 from spectrasplat.reference.emission_maps import GOLDEN, PLASTIC, lattice_point
 from spectrasplat.reference.random_numbers import hash_combine, hash_pcg, kronecker, unit_float
-from spectrasplat.render.light_plan import _SHIFT_GENERATORS
 from spectrasplat.stress.rigs.glsl_function import evaluate
 
 from tests.statistical.chi_square import (
@@ -97,8 +97,8 @@ def test_lattices_are_far_more_even_than_chance(count: int) -> None:
 def test_shifts_are_even_over_passes() -> None:
     """Where a given lattice point comes to lie from pass to pass, alone and for each pair of dimensions."""
     passes = 1024
-    shift = np.column_stack([kronecker(np.arange(1, passes + 1), g, 0) for g in _SHIFT_GENERATORS])
-    for first in range(len(_SHIFT_GENERATORS)):
+    shift = np.column_stack([kronecker(np.arange(1, passes + 1), g, 0) for g in PASS_GENERATORS.values()])
+    for first in range(len(PASS_GENERATORS)):
         assert star_discrepancy(shift[:, first]) < 3.0 * np.log(passes) / passes
         for second in range(first):
             assert box_discrepancy(shift[:, [second, first]], 16) < 0.02

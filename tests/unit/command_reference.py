@@ -1,4 +1,4 @@
-"""Writes the commands' part of docs/command-line.md from the program itself: `python tests/unit/command_reference.py`."""
+"""Writes the commands' part of docs/command-line.md from the program: `python tests/unit/command_reference.py`."""
 
 from __future__ import annotations
 

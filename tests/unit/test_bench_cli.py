@@ -114,7 +114,7 @@ def test_mistakes_are_one_sentence(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     if not told:  # depends on the machine
-        monkeypatch.setattr("spectrasplat.commands.options.memory_bytes", lambda: 1 << 30)
+        monkeypatch.setattr("spectrasplat.base.memory.memory_bytes", lambda: 1 << 30)
         told = "choose a smaller one"
     assert main(["bench", *arguments]) == 2
     error = capsys.readouterr().err
@@ -122,9 +122,7 @@ def test_mistakes_are_one_sentence(
     assert seen.scenes == [] and list(tmp_path.iterdir()) == []
 
 
-def test_folders_that_cannot_be_used(
-    seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_folders_that_cannot_be_used(seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "file"
     file.write_text("")
     assert main(["bench", "prism", "-o", str(file)]) == 2
@@ -205,7 +203,9 @@ def test_the_camera_has_its_own_defaults(seen: Seen, tmp_path: Path) -> None:
     )
     assert seen.scenes == ["prism_edge", "lens_text", "brilliant_studio", "ball_caustic"]
     assert shlex.split(seen.command)[:4] == ["spectrasplat", "bench", "--camera", "prism_edge"]
-    assert main(["bench", "--camera", "prism", "-o", str(tmp_path / "other"), "--seconds", "2", "--methods", "srd"]) == 0
+    assert (
+        main(["bench", "--camera", "prism", "-o", str(tmp_path / "other"), "--seconds", "2", "--methods", "srd"]) == 0
+    )
     assert seen.settings == BenchSettings(2.0, methods=("srd",), measured_pass="camera") and seen.scenes == ["prism"]
 
 

@@ -231,7 +231,7 @@ class TestRender:
         capsys: pytest.CaptureFixture[str],
         monkeypatch: pytest.MonkeyPatch,
     ) -> None:
-        monkeypatch.setattr(cli_options, "memory_bytes", lambda: 1 << 30)
+        monkeypatch.setattr("spectrasplat.base.memory.memory_bytes", lambda: 1 << 30)
         told = complaint(capsys, "render", scene_path, "-o", tmp_path / "o.exr", "--size", "4096x4096", "--bins", "32")
         assert "--size 4096x4096 with --bins 32 needs about 6.8 GiB and this machine has 1.0 GiB" in told
 
@@ -293,7 +293,7 @@ class TestFindScene:
         folder.mkdir(parents=True)
         for name in ("prism.toml", "ball.glb", "README.md"):
             (folder / name).write_text("")
-        monkeypatch.setattr(cli_options, "assets_dir", lambda: folder.parent)
+        monkeypatch.setattr("spectrasplat.base.paths.assets_dir", lambda: folder.parent)
         return folder
 
     def test_by_name(self, shipped: Path) -> None:

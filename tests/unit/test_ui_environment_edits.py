@@ -13,11 +13,12 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import edits
 from spectrasplat.edit import environments as environment
+from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.model.environment import direction_of
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.scene import Black, Diffuse, Scene
-from spectrasplat.render.viewer.inputs import DirtyLevel, LiveInputs
+from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.render.viewer.invalidation import dirty_level
 
 STUDIO = assets_dir() / "environments" / "studio.hdr"

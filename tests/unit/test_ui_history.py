@@ -32,7 +32,7 @@ def test_undo_and_redo_walk_the_steps_and_say_their_names() -> None:
     assert history.undo() is a and history.redo_label == "Rename prism"
     assert history.undo() is START and history.undo_label is None
     assert history.undo() is START
-    assert history.dirty_level() is a and history.dirty_level() is b and history.dirty_level() is b
+    assert history.redo() is a and history.redo() is b and history.redo() is b
     assert [entry.is_present for entry in history.entries] == [False, False, True]
 
 
@@ -95,7 +95,7 @@ def test_unsaved_follows_the_saved_step() -> None:
     history.undo()
     assert history.unsaved
     history.mark_unsaved()
-    history.dirty_level()
+    history.redo()
     assert history.unsaved
 
 

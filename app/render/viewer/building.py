@@ -15,8 +15,8 @@ from .accumulation import Accumulation
 from .live_light import LiveLight, quick_size
 
 if TYPE_CHECKING:
+    from ...edit.live_inputs import LiveInputs
     from ...gpu.context import Context
-    from .inputs import LiveInputs
 
 
 @dataclass(frozen=True)

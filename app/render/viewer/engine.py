@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...base.errors import UserError
+from ...edit.live_inputs import LiveInputs
 from ...gpu import shader
 from ...passes.camera import CausticMaps
 from ...passes.pick import Picker, PickHit
 from ..light_maps import LightMaps
 from .building import Budget, Shown, build
-from .inputs import DirtyLevel, LiveInputs
+from .dirty_level import DirtyLevel
 from .invalidation import dirty_level, looks_other
 from .live_camera import LiveCamera, solo_scene
 from .live_light import LiveLight

@@ -12,6 +12,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from ...edit.live_inputs import LiveInputs
 from ...model.optics.glass import Dispersion
 from ...model.scene import (
     Dielectric,
@@ -21,7 +22,7 @@ from ...model.scene import (
     Scene,
     SceneObject,
 )
-from .inputs import DirtyLevel, LiveInputs
+from .dirty_level import DirtyLevel
 
 SAME_INDEX = 1e-6
 """Difference in n_d up to which a glass keeps the paths."""

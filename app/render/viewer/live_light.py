@@ -31,6 +31,7 @@ from .spectrum_guess import SpectrumGuess
 if TYPE_CHECKING:
     import moderngl
 
+    from ...edit.live_inputs import LiveInputs
     from ...gpu.context import Context
     from ...gpu.scene_buffers import SceneBuffers
     from ...model.features import Features
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from ...model.scene import Camera, Scene
     from ...model.settings import RenderSettings
     from ...passes.map_atlas import MapAtlas
-    from .inputs import LiveInputs
 
 QUICK = 8
 """Pixels to a texel's side in the maps that answer a drag."""

@@ -13,7 +13,7 @@ from ...model.scene import Dielectric
 from .invalidation import shown_glasses
 
 if TYPE_CHECKING:
-    from .inputs import LiveInputs
+    from ...edit.live_inputs import LiveInputs
     from .live_light import LiveLight
 
 NO_OBJECT = 0xFFFF

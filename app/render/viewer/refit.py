@@ -16,7 +16,7 @@ from ...passes.map_layout import MapLayout, layout_maps
 from ...passes.pilot import landings_of
 
 if TYPE_CHECKING:
-    from .inputs import LiveInputs
+    from ...edit.live_inputs import LiveInputs
     from .live_light import LiveLight
 
 PAYS = 1.5

@@ -11,10 +11,11 @@ import numpy as np
 from ...gpu.map_channels import MapChannels
 from ...gpu.records import NONE, RECEIVER, photon_record
 from ...gpu.splat_tables import SplatTables
+from ...gpu.tiles import Tile, pack
 from ...model.optics import spectrum
 from ...model.optics.spectral_tables import SpectralAxis
 from ...passes.footprint import SpectralVariables
-from ...passes.map_atlas import MapAtlas, Tile, pack, placement_rows
+from ...passes.map_atlas import MapAtlas, placement_rows
 from ...passes.splat import Splatter
 
 IDENTITY_ROWS = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])

@@ -62,7 +62,7 @@ def _file(state: State, view_model: ViewModel) -> State:
 
 
 def _edit(state: State, view_model: ViewModel) -> State:
-    for name, label in (("Undo", view_model.undo), ("DirtyLevel", view_model.dirty_level)):
+    for name, label in (("Undo", view_model.undo), ("Redo", view_model.redo)):
         shown = f"{name} {_lowered(label)}" if label else name
         state = _item(commands.command(name), state, view_model, f"{shown}###{name}")
     state = _items(("", "Duplicate", "Delete", "", "Copy material", "Paste material"), state, view_model)

@@ -52,6 +52,7 @@ _COUNTERS = {
         "Spectrum not split",
         "Part of a camera ray's band is totally reflected, but too near its end or too far to tell where.",
     ),
+    "loops_ended": ("Path cut short", "The driver ended the loops of camera rays; anything but zero here is a fault."),
     "queue_overflow": ("Queue full", "Photons that found no room among those in flight."),
 }
 """What the engine counts -> its name on the screen, and what it means."""

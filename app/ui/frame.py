@@ -1,0 +1,124 @@
+"""One frame of the interface: panels, edits, requests, then the engine's work.
+
+`run_frame` tells the panels what there is (`ViewModel`), takes the state they return, records what they
+edited, carries their requests out and lets the engine work on it, so that the picture drawn in a
+frame already shows the input of that frame. No window is needed; `window` and `headless` show it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from ..base.errors import UserError
+from ..edit import requests
+from ..edit.state import State
+from . import session_requests
+from .live_picture import EngineError
+from .panels import dialogs
+from .sentences import brief, sentence, words
+from .session import LAYOUT_FRAMES, Session
+from .view_model import ViewModel
+from .view_model_builder import view_model_of
+
+Draw = Callable[[State, ViewModel], State]
+DEFAULT_BUDGET_S = 0.03
+
+
+def run_frame(session: Session, draw: Draw, budget_s: float = DEFAULT_BUDGET_S) -> None:
+    """Draw the interface with `draw`, within imgui's frame, and answer it; the engine works for about
+    `budget_s`."""
+    view_model = view_model_of(session)
+    before = replace(session.state, interacting=False, hover=None, requests=())
+    started = session.clock()
+    after = _with_dropped(session, draw(before, view_model), view_model)
+    session.interface_s = session.clock() - started
+    _accept(session, before, after)
+    for request in after.requests:
+        _carry_out(session, request)
+    session.autosave.update(
+        session.document.scene, session.document.title, session.document.source, session.document.unsaved
+    )
+    _work(session, budget_s)
+    session.was_interacting = session.state.interacting
+
+
+def _accept(session: Session, before: State, after: State) -> None:
+    """Take over what the panels returned; an edited scene is a step of undo."""
+    session.state = replace(after, requests=())
+    if after.scene is not before.scene:
+        session.document.history.push(
+            after.edit_label or "Edit", after.scene, merge=after.interacting or session.was_interacting
+        )
+    if not after.interacting:
+        session.document.history.settle()
+    if after.preferences != session.settings.preferences:
+        session.settings = replace(session.settings, preferences=after.preferences)
+
+
+def _carry_out(session: Session, request: requests.Request) -> None:
+    """One request; whatever goes wrong becomes a sentence."""
+    try:
+        session_requests.carry_out(session, request)
+    except UserError as error:
+        session.messages.tell(sentence(str(error)), is_error=True)
+    except Exception as error:  # noqa: BLE001 - a bug: the work and the window outlive it
+        session.save_from_crash(f"{type(request).__name__}", error)
+        session.messages.tell(
+            f"{words(request)} failed by a fault of the program ({brief(error)}); your work is kept.", is_error=True
+        )
+
+
+def _work(session: Session, budget_s: float) -> None:
+    """Let the engine work and show its picture."""
+    session.engine_s = 0.0
+    session.frames += 1
+    if session.frames <= LAYOUT_FRAMES or session.state.preferences.panels.start_page:  # which covers the picture
+        return
+    left = _work_beside(session, budget_s)
+    started = session.clock()
+    try:
+        session.picture.advance(session.state, left)
+    except EngineError as error:
+        session.renderer_stopped(error)
+        return
+    finally:
+        session.engine_s = session.clock() - started
+    problem = session.picture.problem
+    if problem is not None and problem != session.problem_said and session.picture.shader_error is None:
+        session.messages.tell(sentence(problem), is_error=True)
+    session.problem_said = problem
+    now = session.clock()
+    try:
+        session.picture.show(session.state, now, session.delta_s, session.companions.comparison)
+        session.companions.look(session.state, session.picture, now)
+    except UserError as error:
+        session.messages.tell(sentence(str(error)), is_error=True)
+    except Exception as error:  # noqa: BLE001 - a bug, or the device is lost
+        session.picture.give_up()
+        session.renderer_stopped(error)
+
+
+def _work_beside(session: Session, budget_s: float) -> float:
+    """Exports and comparison; returns the time that is left."""
+    try:
+        return session.companions.work(session.state, session.picture, budget_s)
+    except Exception as error:  # noqa: BLE001 - a bug in a side line must not stop the picture
+        session.companions.exports.cancel()
+        session.save_from_crash("exporting or comparing", error)
+        session.messages.tell(
+            f"Comparing or exporting failed by a fault of the program ({brief(error)}).", is_error=True
+        )
+        session.state = replace(session.state, compare=replace(session.state.compare, mode="off", plot=False))
+        return budget_s
+    finally:
+        for text, is_error in session.companions.told:
+            session.messages.tell(sentence(text), is_error)
+        session.companions.told.clear()
+
+
+def _with_dropped(session: Session, state: State, view_model: ViewModel) -> State:
+    if not session.dropped:
+        return state
+    path, session.dropped = session.dropped[0], []
+    return dialogs.open_path(state, view_model, path)

@@ -1,0 +1,145 @@
+"""The same seed gives the same picture, bit for bit: whichever pixels a path has for neighbours, and wherever it halts.
+
+The smallest fault these tests see is one bit of one pixel.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from spectrasplat.gpu.context import Context
+from spectrasplat.gpu.dispatch_budget import DispatchBudget
+from spectrasplat.gpu.scene_buffers import SceneBuffers
+from spectrasplat.model.features import Features
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.scene import Scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes import camera_programs
+from spectrasplat.passes.camera import CameraPass, CausticMaps
+from spectrasplat.render.light_pass import spectral_axis
+
+from tests.gpu.camera_rig import released
+
+SCENES = sorted(Path("assets/scenes").glob("*.toml"))
+SIZE = 96, 54
+RUNS = 5
+"""Of a process; there are two, with one thread and with two."""
+_HASHES = """
+import hashlib, sys
+import numpy as np
+from pathlib import Path
+from spectrasplat.gpu.context import create_context
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes import camera
+from spectrasplat.render.still import render
+context, scene = create_context(), load_scene(Path(sys.argv[1]))
+for run in range(int(sys.argv[2])):
+    camera._TARGET_SECONDS = (0.15, 0.02, 1.0, 0.003, 0.4)[run % 5]
+    settings = RenderSettings(width=96, height=54, photons=20_000, spp=4, seed=7, tally=True)
+    result = render(scene, settings, context=context)
+    assert result.stats.camera.fallbacks["loops_ended"] == 0, result.stats.camera.fallbacks
+    print(hashlib.sha256(np.ascontiguousarray(result.rgb).tobytes()).hexdigest())
+"""
+
+
+class Shuffled(CameraPass):
+    """Its pixels that see glass are followed in an order of chance, as on a device where atomics come in any order."""
+
+    order = 0
+
+    def _follow_listed(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
+        assert self._listed is not None
+        count = int(np.frombuffer(self._listed.read(4), "u4")[0])
+        if count:
+            listed = np.frombuffer(self._listed.read(4 * count, offset=8), "u4")
+            self._listed.write(np.random.default_rng(self.order).permutation(np.sort(listed)).tobytes(), offset=8)
+        yield from super()._follow_listed(parameters, maps)
+
+
+def shuffled(gl: Context, scene: Scene) -> Shuffled:
+    features = Features.of(scene, RenderSettings())
+    return Shuffled(gl, SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features)))
+
+
+def pictures(camera_pass: Shuffled, scene: Scene, orders: int, samples: int) -> list[np.ndarray]:
+    """One of each order of the pixels, in portions of different sizes."""
+    taken = []
+    for camera_pass.order in range(orders):
+        camera_pass.run(scene.camera, *SIZE, 1)  # which learns how fast this device is
+        camera_pass.dispatch_seconds = (0.15, 0.0, 0.02)[camera_pass.order % 3]
+        if camera_pass.order % 3 == 1:
+            camera_pass._pixels, camera_pass._resumed = (
+                DispatchBudget(64 * 7, 64, 1 << 20),
+                DispatchBudget(64 * 3, 64, 1 << 20),
+            )
+        camera_pass.run(scene.camera, *SIZE, samples)
+        taken.append(camera_pass.read_rgb())
+    return taken
+
+
+@pytest.mark.parametrize("name", ["default", "wine_glass"])
+def test_a_path_knows_nothing_of_its_neighbours(gl: Context, name: str) -> None:
+    scene = load_scene(Path(f"assets/scenes/{name}.toml"))
+    camera_pass = shuffled(gl, scene)
+    first, *others = pictures(camera_pass, scene, 3, 2)
+    assert camera_pass.fallbacks["loops_ended"] == 0
+    for other in others:
+        np.testing.assert_array_equal(other, first)
+    released(camera_pass)
+
+
+def picture_halting_after(
+    gl: Context, scene: Scene, rounds: int, monkeypatch: pytest.MonkeyPatch
+) -> tuple[np.ndarray, int]:
+    """And how many samples the driver cut short."""
+    monkeypatch.setattr(camera_programs, "HALT_ROUNDS", rounds)
+    camera_pass = shuffled(gl, scene)
+    [picture] = pictures(camera_pass, scene, 1, 2)
+    cut_short = camera_pass.fallbacks["loops_ended"]
+    released(camera_pass)
+    return picture, cut_short
+
+
+@pytest.mark.slow
+def test_where_a_sample_halts_changes_no_bit(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = load_scene(Path("assets/scenes/prism.toml"))
+    rarely, often = (picture_halting_after(gl, scene, rounds, monkeypatch)[0] for rounds in (1 << 14, 1))
+    np.testing.assert_array_equal(often, rarely)
+
+
+@pytest.mark.slow
+def test_without_halts_the_driver_cuts_samples_short(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The mutant: what the tests above guard against, and that it is counted."""
+    if not gl.is_software:
+        pytest.skip("a GPU ends no loops")
+    scene = load_scene(Path("assets/scenes/wine_glass.toml"))
+    monkeypatch.setattr(camera_programs, "HALT_ROUNDS", 1 << 30)
+    camera_pass = shuffled(gl, scene)
+    first, other = pictures(camera_pass, scene, 2, 2)
+    assert camera_pass.fallbacks["loops_ended"] > 100
+    assert (first != other).any(axis=-1).sum() > 10
+    released(camera_pass)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+def test_a_scene_repeats_with_any_portions_and_threads(path: Path) -> None:
+    hashes = set()
+    for threads in "12":
+        done = subprocess.run(
+            [sys.executable, "-c", _HASHES, str(path), str(RUNS)],
+            env=os.environ | {"LP_NUM_THREADS": threads},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        hashes |= set(done.stdout.split())
+    assert len(hashes) == 1
