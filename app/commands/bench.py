@@ -110,8 +110,9 @@ def parse_settings(request: BenchRequest) -> BenchSettings:
     if request.methods is not None:
         asked["methods"] = parse_methods(request.methods, CAMERA_METHODS if request.camera_pass else METHODS)
     if request.size is not None:
-        asked["size"] = options.parse_size(request.size)
-        check_picture_memory(*asked["size"], None)
+        width, height = options.parse_size(request.size)
+        check_picture_memory(width, height, None)
+        asked["size"] = (width, height)
     return BenchSettings(**asked)
 
 

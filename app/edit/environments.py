@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -184,7 +184,7 @@ def _of_kind(scene: Scene, kind: str) -> Environment:
     return scene.environment
 
 
-def _vectors(parameters: dict[str, object]) -> dict[str, object]:
+def _vectors(parameters: dict[str, Any]) -> dict[str, Any]:
     """Lists as tuples."""
     return {key: tuple(value) if isinstance(value, list) else value for key, value in parameters.items()}
 
@@ -245,7 +245,7 @@ def _illuminance(light: Light, scene: Scene) -> float:
     return power * area / distance2
 
 
-def _sun_of(scene: Scene) -> dict[str, float]:
+def _sun_of(scene: Scene) -> dict[str, Any]:
     """Where the scene's first directional light comes from, for a sky that fits it."""
     sun = next((light for light in scene.lights if light.kind == "directional"), None)
     if sun is None:

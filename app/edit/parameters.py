@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -159,8 +159,8 @@ def apply(stage: Stage, path: str, value: float) -> Stage:
     if name:
         change: Callable = _with_object if head == "objects" else _with_light
         items = tuple(change(x, field, value) if x.name == name else x for x in getattr(stage.scene, head))
-        return replace(stage, scene=replace(stage.scene, **{head: items}))
-    return replace(stage, **{path: value})
+        return replace(stage, scene=_changed(stage.scene, head, items))
+    return _changed(stage, path, value)
 
 
 def apply_all(stage: Stage, values: Mapping[str, float]) -> Stage:
@@ -200,7 +200,7 @@ def _camera_value(camera: Camera, name: str) -> float:
 def _with_camera(camera: Camera, name: str, value: float) -> Camera:
     match name.split("."):
         case ["position" | "target" as field, axis]:
-            return replace(camera, **{field: _with_axis(getattr(camera, field), axis, value)})
+            return _changed(camera, field, _with_axis(getattr(camera, field), axis, value))
         case ["fov_deg"]:
             return replace(camera, vertical_fov_deg=value)
         case ["extent"]:
@@ -302,10 +302,15 @@ def _with_light(light: Light, name: str, value: float) -> Light:
         spectrum = light.spectral_power
         lines = tuple((nm, power * value) for nm, power in spectrum.lines)
         return replace(light, spectral_power=Spectrum(spectrum.density * value, lines))
-    changed = replace(light, **{_field_of(field): value})
+    changed = _changed(light, _field_of(field), value)
     # A cone's bright part cannot be wider than the cone.
     inner = min(changed.inner_half_angle_deg, changed.outer_half_angle_deg)
     return replace(changed, inner_half_angle_deg=inner)
+
+
+def _changed(thing: Any, name: str, value: object) -> Any:
+    """A copy of a frozen `thing` with one field set."""
+    return replace(thing, **{name: value})
 
 
 def _field_of(name: str) -> str:

@@ -271,8 +271,9 @@ class Comparison:
             engines[self._method] = self._engine
         for method, engine in engines.items():
             stats, picture = engine.stats, engine.picture
-            whole = picture is not None and picture.size == (state.viewport_size[0], state.viewport_size[1])
-            if whole and stats.resolution_scale == 1.0 and self._curves.wants(method, stats.photons):
+            if picture is None or picture.size != (state.viewport_size[0], state.viewport_size[1]):
+                continue
+            if stats.resolution_scale == 1.0 and self._curves.wants(method, stats.photons):
                 self._curves.add(method, self._seconds[method][0], stats.photons, _read(picture))
 
     def _count_seconds(self, engine: LiveEngine | None, method: str) -> None:

@@ -288,7 +288,7 @@ def _sorted(entries: Sequence[_Entry], specs: imgui.TableSortSpecs | None) -> li
     return sorted(ordered, key=lambda e: not e.is_folder)
 
 
-def _size_text(size: int) -> str:
+def _size_text(size: float) -> str:
     for unit in ("B", "kB", "MB"):
         if size < 1000:
             return f"{size:.0f} {unit}" if unit == "B" else f"{size:.1f} {unit}"
