@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import astuple
 
 import numpy as np
@@ -28,7 +28,7 @@ def render_animation(
     sink: Sink,
     base_ev: float | None = None,
     develop: Develop = tone_map_8bit,
-) -> Iterator[float]:
+) -> Generator[float]:
     """Render all frames that `sink` lacks, pausing with the share done; the sink is closed however it ends.
 
     All frames share one exposure: `base_ev` plus the stage's own; `base_ev` None takes the automatic one of the first

@@ -110,10 +110,19 @@ class Comparison:
             return "Reference: the first photons are on their way."
         if not self._has(snapshot, SHOWN_FROM):
             least = SHOWN_FROM * self._begun.width * self._begun.height
-            return f"Reference: {snapshot.photons / 1e6:.2f} million photons so far. It is shown from {least / 1e6:.2f} million on."
-        told = f"Reference: light tracing in float64 without shared code, {snapshot.photons / 1e6:.1f} million photons, own relMSE {snapshot.relmse:.1e}."
+            return (
+                f"Reference: {snapshot.photons / 1e6:.2f} million photons so far. It is shown from {least / 1e6:.2f} "
+                "million on."
+            )
+        told = (
+            f"Reference: light tracing in float64 without shared code, {snapshot.photons / 1e6:.1f} million photons, "
+            f"own relMSE {snapshot.relmse:.1e}."
+        )
         if self._compare.plot and not self._has(snapshot, MEASURED_FROM):
-            told += f" Errors are measured from {MEASURED_FROM * self._begun.width * self._begun.height / 1e6:.1f} million on."
+            told += (
+                f" Errors are measured from {MEASURED_FROM * self._begun.width * self._begun.height / 1e6:.1f} "
+                "million on."
+            )
         if not snapshot.directly.all():
             told += " What is seen behind glass or in mirrors is not compared."
         if self._begun.local_gain and any(item.local_dispersion for item in self._begun.scene.objects):
@@ -262,8 +271,9 @@ class Comparison:
             engines[self._method] = self._engine
         for method, engine in engines.items():
             stats, picture = engine.stats, engine.picture
-            whole = picture is not None and picture.size == (state.viewport_size[0], state.viewport_size[1])
-            if whole and stats.resolution_scale == 1.0 and self._curves.wants(method, stats.photons):
+            if picture is None or picture.size != (state.viewport_size[0], state.viewport_size[1]):
+                continue
+            if stats.resolution_scale == 1.0 and self._curves.wants(method, stats.photons):
                 self._curves.add(method, self._seconds[method][0], stats.photons, _read(picture))
 
     def _count_seconds(self, engine: LiveEngine | None, method: str) -> None:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -201,7 +201,7 @@ def _texels(texture: moderngl.Texture) -> np.ndarray:
     return np.ascontiguousarray(texels[..., :3])
 
 
-def _settings(state: State, size: tuple[int, int], photons: int, **changes: object) -> RenderSettings:
+def _settings(state: State, size: tuple[int, int], photons: int, **changes: Any) -> RenderSettings:
     """What is shown, in another size and with so many photons."""
     width, height = size
     if not (1 <= width <= MAX_SIDE_PX and 1 <= height <= MAX_SIDE_PX):

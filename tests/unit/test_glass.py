@@ -98,7 +98,7 @@ def test_search_ranks_exact_then_prefix() -> None:
     assert found[0].qualified_name == "Schott N-SF6"
     assert found[1].name.startswith("N-SF6")
     assert all("sf6" in catalogue.search_key(e.maker + e.name) for e in found)
-    assert [e.name for e in catalogue.search("diamnod")][0] == "diamond"
+    assert next(e.name for e in catalogue.search("diamnod")) == "diamond"
     assert {e.maker for e in catalogue.search("hoya fcd")} == {"Hoya"}
     assert len(catalogue.search()) == len(catalogue.entries())
 
