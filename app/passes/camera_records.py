@@ -79,7 +79,7 @@ def light_record(light: Light, scene: SceneBuffers) -> np.void:
     if light.angular_radius > 0.0:
         half = np.full(2, np.tan(light.angular_radius))
         record["measure"] = 1.0 / (np.pi * np.sin(light.angular_radius) ** 2)
-    elif light.area > 0.0:
+    elif light.has_extent:
         record["measure"] = light.area * scene.space.scale**2
     record["half_u"], record["half_v"] = tangent * half[0], bitangent * half[1]
     record["cone"] = light.cone

@@ -60,7 +60,7 @@ def camera_lights(lights: Sequence[Light], centre: np.ndarray) -> CameraLights:
         packed.kind[i] = light.gpu_code
         packed.is_disc[i] = light.is_disc
         packed.cone[i] = light.cone
-        packed.measure[i] = light.area
+        packed.measure[i] = light.area if light.has_extent else 0.0
         if light.angular_radius > 0.0:
             half[:] = math.tan(light.angular_radius)
             packed.measure[i] = 1.0 / (math.pi * math.sin(light.angular_radius) ** 2)
