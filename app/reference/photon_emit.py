@@ -51,6 +51,41 @@ def spot_falloff(cone, angle):
 
 
 @compiled
+def _between(table, first, count, angle):
+    """Stretch of an ascending list of `count` angles at `first` that holds `angle`, and how far along it (0 to 1)."""
+    k = 0
+    while k < count - 2 and table[first + k + 1] <= angle:
+        k += 1
+    along = (angle - table[first + k]) / (table[first + k + 1] - table[first + k])
+    return k, min(max(along, 0.0), 1.0)
+
+
+@compiled
+def _shine(table, start, vertical, horizontal):
+    """Share of its peak that a lamp's table at `start` (`ies_file.Profile.packed`) has at these angles, rad (any turn).
+
+    Bilinear: the weighted sum of the four values round the angles."""
+    verticals, horizontals = int(table[start]), int(table[start + 1])
+    turn = horizontal - 2.0 * math.pi * math.floor(horizontal / (2.0 * math.pi))
+    j, t = _between(table, start + 2, verticals, vertical)
+    i, s = _between(table, start + 2 + verticals, horizontals, turn)
+    at = start + 2 + verticals + horizontals + i * verticals + j
+    below = (1.0 - s) * table[at] + s * table[at + verticals]
+    above = (1.0 - s) * table[at + 1] + s * table[at + verticals + 1]
+    return (1.0 - t) * below + t * above
+
+
+@compiled
+def shone(table, start, axis, u, v, dx, dy, dz):
+    """The same towards a unit direction; `u`, `v`: where the horizontal angle is 0 and 90°."""
+    ax, ay, az = axis[0], axis[1], axis[2]
+    kx, ky, kz = dy * az - dz * ay, dz * ax - dx * az, dx * ay - dy * ax
+    vertical = math.atan2(math.sqrt(kx * kx + ky * ky + kz * kz), dx * ax + dy * ay + dz * az)
+    across_u, across_v = dx * u[0] + dy * u[1] + dz * u[2], dx * v[0] + dy * v[1] + dz * v[2]
+    return _shine(table, start, vertical, math.atan2(across_v, across_u))
+
+
+@compiled
 def emit(domain, a, b, c, d):
     """A photon from four numbers of [0, 1): (px, py, pz, dx, dy, dz, weight, row, column).
 
@@ -95,6 +130,8 @@ def emit(domain, a, b, c, d):
             kx, ky, kz = dy * az - dz * ay, dz * ax - dx * az, dx * ay - dy * ax
             angle = math.atan2(math.sqrt(kx * kx + ky * ky + kz * kz), dx * ax + dy * ay + dz * az)
             weight *= spot_falloff(domain.cone, angle)
+        if domain.profile.shape[0] > 0:
+            weight *= shone(domain.profile, 0, domain.axis, domain.half_u, domain.half_v, dx, dy, dz)
         return px, py, pz, dx, dy, dz, weight, row, column
     tx, ty = 2.0 * c - 1.0, 2.0 * d - 1.0
     if domain.is_disc:
