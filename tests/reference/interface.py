@@ -1,4 +1,4 @@
-"""CPU reference of shaders/lib/interface.glsl and band.glsl: how a surface turns a ray, and what differs over a band."""
+"""CPU reference of shaders/lib/interface.glsl and band.glsl: how a surface turns a ray, and what a band is cut by."""
 
 from __future__ import annotations
 
