@@ -20,6 +20,7 @@ from ..model.scene import Diffuse, Scene, SceneObject
 from ..model.texture import Environment, Texture
 from ..passes import map_atlas
 from ..passes.map_atlas import Tile
+from .device_traits import DeviceTraits
 from .mip_chain import kept_levels, level_count
 from .records import NONE
 from .schema import Field, Struct
@@ -107,7 +108,7 @@ class TextureStore:
         """
         self.ctx = ctx
         self._max_side = min(max_side or MAX_BYTES, int(ctx.info["GL_MAX_TEXTURE_SIZE"]))
-        self._as_image = "llvmpipe" in ctx.info["GL_RENDERER"] if as_image is None else as_image
+        self._as_image = DeviceTraits.of(ctx.info["GL_RENDERER"]).texels_as_images if as_image is None else as_image
         self._pictures = self._corners = None
         self._records: moderngl.Buffer | None = None
         self._sources = _sources(scene)

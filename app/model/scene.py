@@ -68,6 +68,11 @@ class Light:
     width: float = 1.0
     height: float = 1.0
 
+    @property
+    def has_extent(self) -> bool:
+        """Whether it is more than a point or a strictly parallel beam, so that a camera ray can run into it."""
+        return self.kind == "area" or (self.kind == "directional" and self.angular_diameter_deg > 0.0)
+
 
 @dataclass(frozen=True)
 class Absorption:

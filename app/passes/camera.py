@@ -25,7 +25,11 @@ from ..model.camera_rays import camera_frame
 from ..model.optics.colorimetry import xyz_to_rgb709_matrix
 from ..model.scene import Camera, Dielectric
 from ..model.scene_checks import contains
-from .camera_programs import (
+from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
+from .camera_tables import CameraTables
+from .present import Channels
+from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
+from .variants import (
     BIND_CELL_CDF,
     BIND_COUNTERS,
     BIND_LIGHTS,
@@ -40,10 +44,6 @@ from .camera_programs import (
     direct_defines,
     single_defines,
 )
-from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
-from .camera_tables import CameraTables
-from .present import Channels
-from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
 
 SPLIT_THRESHOLD = 0.004
 """Share of a sample's power above which both parts of a split path are followed."""

@@ -67,11 +67,6 @@ CAMERA_PARAMETERS = Struct(
 _LIGHT_KINDS = {"point": 0, "spot": 0, "directional": 1, "collimated": 2, "area": 3}
 
 
-def has_extent(light: Light) -> bool:
-    """Whether a camera ray can run into it."""
-    return light.kind == "area" or (light.kind == "directional" and light.angular_diameter_deg > 0)
-
-
 def light_record(light: Light, scene: SceneBuffers) -> np.void:
     """The light in GPU space."""
     record = CAMERA_LIGHT.zeros(1)[0]

@@ -109,7 +109,7 @@ class LightPass:
         self.features = features
         self.buffers = buffers
         self.stats = LightStats()
-        batch = settings.batch or DEFAULT_BATCH * (1 if context.is_software else 4)
+        batch = settings.batch or DEFAULT_BATCH * context.traits.batch_scale
         batch = max(min(batch, _largest_batch(context, features)), self.min_batch)
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
         self.variables = SpectralVariables.build(context.ctx, buffers.variables)
@@ -123,7 +123,7 @@ class LightPass:
         self.map_channels = tents(buffers.axis, features.map_tents) if features.map_tents else MapChannels(edges)
         """What the maps' channels stand for."""
         self.maps: LightMaps | None = None
-        self.waits = context.is_software
+        self.waits = not context.traits.work_is_queued
         """Wait for the device at every pause: times are then what the work took, and a budget is kept."""
         self.splat_part = 1 << 30
         """Photons splatted without a pause."""
@@ -324,9 +324,7 @@ class LightPass:
             except StopIteration as finished:
                 batch: Batch = finished.value
                 break
-            if (
-                self.waits and not self.context.is_software
-            ):  # there the queue's length is read at every step, which waits
+            if self.waits and self.context.traits.work_is_queued:
                 self.context.finish()
             self.stats.trace_seconds += time.perf_counter() - started
             yield

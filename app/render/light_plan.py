@@ -12,7 +12,7 @@ from ..model.features import Features
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.emission_domain import EmissionDomain
-from ..passes.pilot import MAX_LIGHT_POINTS, Pilot, PilotFit, has_extent
+from ..passes.pilot import MAX_LIGHT_POINTS, Pilot, PilotFit
 from ..passes.trace import Band, LatticeSlice
 
 SMALLEST_BATCH = MAX_BANDS * MAX_LIGHT_POINTS
@@ -106,7 +106,7 @@ class Planner:
     def _scattered_points(self, light: int, bands: int, budget: int) -> int:
         """Points on an extended light for photons without footprints, which need no lattice of their own."""
         return (
-            min(SMALLEST_BATCH // bands, max(1, budget // (16 * bands))) if has_extent(self.scene.lights[light]) else 1
+            min(SMALLEST_BATCH // bands, max(1, budget // (16 * bands))) if self.scene.lights[light].has_extent else 1
         )
 
     def _bands(self, light: int, fit: PilotFit) -> tuple[Band, ...]:

@@ -105,7 +105,7 @@ class LiveLight(LightPass):
         super().__init__(context, scene, settings, features, buffers)
         self.capacity_bytes = capacity_bytes
         self.waits = True
-        self.splat_part = 1 << 12 if context.is_software else 1 << 18
+        self.splat_part = context.traits.viewer_splat_photons
         self.first_order = False
         """What is shown has another dispersion than what was traced."""
         self.view = scene.camera
