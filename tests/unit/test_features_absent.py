@@ -19,9 +19,9 @@ from spectrasplat.gpu.texture_store import PICTURE
 from spectrasplat.model.features import Features, explain
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes.camera_programs import direct_defines
 from spectrasplat.passes.camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS
-from spectrasplat.passes.footprint import SPLAT, footprint_defines, splat_defines
+from spectrasplat.passes.footprint import SPLAT
+from spectrasplat.passes.variants import direct_defines, footprint_defines, splat_defines
 
 EVERYTHING = Features(
     method="srd",

@@ -18,7 +18,7 @@ from ...model.geometry.primitives_round import ellipsoid, sphere
 from ...model.optics.colorimetry import rgb_basis
 from ...model.optics.glass import constant, from_abbe
 from ...model.scene import Camera, Mirror, SceneObject
-from ...passes.camera_programs import MAX_DEPTH
+from ...passes.variants import MAX_DEPTH
 from ..case import Case, Measurement
 from ..rigs.camera_probe import (
     LOOK,

@@ -26,7 +26,7 @@ from ...model.scene import (
     SceneObject,
 )
 from ...model.texture import Environment, Texture
-from ...passes.camera_programs import TINT_STEPS
+from ...passes.variants import TINT_STEPS
 from ...reference.camera_reference import render_camera_reference
 from ..case import Case, Measurement
 from ..rigs.camera_probe import (
