@@ -172,7 +172,8 @@ def _without_environment(scene: Scene) -> Scene:
         raise UserError("the environment is the scene's only light; add a light before taking it away")
     if not any(o.material.receives for o in scene.objects):
         raise UserError(
-            "nothing in the scene receives light, so the environment is all there is to see; add a diffuse object before taking it away"
+            "nothing in the scene receives light, so the environment is all there is to see; add a diffuse "
+            "object before taking it away"
         )
     return replace(scene, environment=None)
 

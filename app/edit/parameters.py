@@ -111,7 +111,8 @@ def parameter(stage: Stage, path: str, where: str = "") -> Parameter:
         near = [p for p in known if beginning and p.startswith(beginning + ".")]
         hint = suggestion(path, near or known) or suggestion(path, known)
         raise UserError(
-            f"{where}'{path}' is no parameter of scene '{stage.scene.name}'{hint or '; known are ' + ', '.join(near or sorted(_GLOBAL)) + ' and others'}"
+            f"{where}'{path}' is no parameter of scene "
+            f"'{stage.scene.name}'{hint or '; known are ' + ', '.join(near or sorted(_GLOBAL)) + ' and others'}"
         )
     return known[path]
 
@@ -120,9 +121,8 @@ def check_value(stage: Stage, path: str, value: float, where: str = "") -> float
     """`value` where `path` can take it; raises `UserError` otherwise."""
     known = parameter(stage, path, where)
     if not (math.isfinite(value) and known.low <= value <= known.high):
-        raise UserError(
-            f"{where}{path} = {value:g} is out of range: give between {known.low:g} and {known.high:g} {known.unit}".rstrip()
-        )
+        bounds = f"{known.low:g} and {known.high:g} {known.unit}".rstrip()
+        raise UserError(f"{where}{path} = {value:g} is out of range: give between {bounds}")
     return value
 
 

@@ -6,7 +6,7 @@ What is more than one key for one attribute (a cone's soft edge, an outline) is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -149,17 +149,6 @@ class Colour(Field):
     def value(self, table: SceneTable, key: str) -> tuple[float, float, float]:
         """The three channels."""
         return table.colour(key, self.default)
-
-
-@dataclass(frozen=True)
-class Choice(Field):
-    """One of a few words."""
-
-    options: Sequence[str] = ()
-
-    def value(self, table: SceneTable, key: str) -> str:
-        """The word."""
-        return table.choice(key, self.options, self.default)
 
 
 @dataclass(frozen=True)

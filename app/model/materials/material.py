@@ -69,10 +69,6 @@ class Material:
         """What it is, in a few words."""
         return self.kind
 
-    def is_like(self, other: Material) -> bool:
-        """Whether programs and buffers made for the one serve the other, so that only values differ."""
-        return self == other
-
 
 def colour_words(rgb: Vec3) -> str:
     """A colour in as few numbers as say it."""
