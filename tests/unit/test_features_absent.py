@@ -46,6 +46,7 @@ EVERYTHING = Features(
     nested_windows=True,
     targets=3,
     local_gain=True,
+    light_profiles=True,
     reindexed=True,
     camera_specular=True,
     camera_disperses=True,
@@ -54,6 +55,7 @@ EVERYTHING = Features(
 PLAIN_CAMERA = {"camera_disperses": False, "map_tents": 0}
 """What the camera sees disperses nothing: the camera carries the spectrum in the same way as the light pass."""
 WITHOUT = {
+    "light profiles": {"light_profiles": False},
     "spectral columns": {
         "spectral_groups": 0,
         "merged_groups": False,

@@ -75,6 +75,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "camera refraction": ("meet_surface", "reflect_path", "waiting", "waits", "listed"),
     "camera spectral taps": (r"narrow\(path, pixel_key\)", "taps_of", "onset_of"),
     "spectral maps": ("BIN_ROW", "BIN_SPECTRUM_ROW", "BIN_TARGET"),
+    "light profiles": ("profile_intensity", "profile_stretch"),
     "spectral bins": ("define TARGETS [2-9]", "define TARGETS 1[0-9]"),
 }
 """By `explain`'s names. Names that only this feature uses; one with a space is a pattern for a line, where the camera,
