@@ -204,6 +204,14 @@ def animate(
     method: Annotated[
         Text, typer.Option(metavar="NAME", help=f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.")
     ] = None,
+    camera_method: Annotated[
+        Text,
+        typer.Option(
+            "--eye-method",
+            metavar="NAME",
+            help=f"The same for the camera's rays: {', '.join(CAMERA_METHODS)}; default: as --method.",
+        ),
+    ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the frames of another animation in the folder.")
     ] = False,
@@ -225,6 +233,7 @@ def animate(
         exposure,
         seed,
         method,
+        camera_method,
         overwrite,
     )
     raise typer.Exit(animate_command(request))
