@@ -17,7 +17,7 @@ from ..base.image_io import check_suffix, write_image
 from ..base.memory import MAX_SIDE_PX, check_picture_memory
 from ..edit import requests
 from ..edit.parameters import Stage
-from ..edit.state import Display as PilotRender
+from ..edit.state import Display as DisplaySettings
 from ..edit.state import State
 from ..model.settings import RenderSettings
 from ..passes.display import Display
@@ -75,13 +75,13 @@ class Exports:
         if self._job is None:
             return None
         try:
-            told = self._job.step(budget_s)
+            note = self._job.step(budget_s)
         except BaseException:
             self._job = None
             raise
-        if told is not None:
+        if note is not None:
             self._job = None
-        return told
+        return note
 
     def cancel(self) -> str | None:
         """End the job; what is finished stays."""
@@ -127,7 +127,7 @@ class Exports:
 
 
 class _Job:
-    """A generator of shares, with what is told about it."""
+    """A generator of shares, with a note about it."""
 
     def __init__(self, title: str, work: Iterator[float], finished: str, cancelled: str, frames: int = 0) -> None:
         self._title, self._work = title, work
@@ -160,7 +160,7 @@ class _Job:
         frame = (
             f"Frame {min(int(self._fraction * self._frames) + 1, self._frames)} of {self._frames}"
             if self._frames
-            else "Tracing and looking"
+            else "Light and camera pass"
         )
         if self._fraction < 0.02:
             return frame
@@ -264,11 +264,11 @@ def _animate(context: Context, request: requests.Animate, stage: Stage, state: S
     size = request.size or state.viewport_size
     settings = _settings(state, size, request.photons, spp=request.samples)
     check_picture_memory(*size, None)
-    told = dict(description(made, settings, request.fps, request.photons)) | {
-        "look": repr(state.display),
+    description_ = dict(description(made, settings, request.fps, request.photons)) | {
+        "display": repr(state.display),
         "smoothing": state.smoothing,
     }
-    sink = open_sink(request.path, size, request.fps, told)
+    sink = open_sink(request.path, size, request.fps, description_)
     develop = _Developer(context, state.display)
 
     def work() -> Iterator[float]:
@@ -287,8 +287,8 @@ def _animate(context: Context, request: requests.Animate, stage: Stage, state: S
 class _Developer:
     """Linear pictures to codes as the window shows them: tone curve or false colour."""
 
-    def __init__(self, context: Context, look: PilotRender) -> None:
-        self._context, self._look = context, look
+    def __init__(self, context: Context, settings: DisplaySettings) -> None:
+        self._context, self._settings = context, settings
         self._display: Display | None = None
 
     def __call__(self, rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
@@ -299,7 +299,7 @@ class _Developer:
             (width, height), 4, np.ascontiguousarray(texels, np.float32).tobytes(), dtype="f4"
         )
         try:
-            return texture_codes(self._display.run(texture, self._look, exposure_ev, (width, height)))
+            return texture_codes(self._display.run(texture, self._settings, exposure_ev, (width, height)))
         finally:
             texture.release()
 

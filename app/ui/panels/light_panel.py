@@ -45,7 +45,7 @@ _POWER_TIPS = {
 }
 
 _power_key: dict[str, str] = {}
-"""Kind of light -> the quantity in which its power is shown. A way of looking, not part of the document."""
+"""Kind of light -> the quantity in which its power is shown. A way of display, not part of the document."""
 
 
 def draw_light(state: State, view_model: ViewModel) -> State:
@@ -198,7 +198,7 @@ def _draw_power(state: State, index: int) -> State:
     light = state.scene.lights[index]
     keys = POWER_KEYS[light.kind]
     key = _power_key.get(light.kind, edits.photometric_key(light))
-    tip = "In which quantity the power is shown and typed. Photometric ones weigh each colour as the camera does."
+    tip = "In which quantity the power is shown and typed. Photometric ones weight each colour as the eye does."
     _, key = widgets.combo("Quantity", {k: _POWER_NAMES[k] for k in keys}, key, tip=tip)
     _power_key[light.kind] = key
     power = edits.light_power(light, key)
