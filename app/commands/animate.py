@@ -57,8 +57,8 @@ def animate_command(request: AnimateRequest) -> int:
     photons = settings.photons or scene.render.photons
     for note in scene.notes:
         print(f"note: {note}", file=sys.stderr)
-    told = description(animation, settings, fps, photons)
-    sink = open_sink(request.output, (settings.width, settings.height), fps, told, request.overwrite)
+    manifest = description(animation, settings, fps, photons)
+    sink = open_sink(request.output, (settings.width, settings.height), fps, manifest, request.overwrite)
 
     from ..gpu.context import create_context
     from ..gpu.shader import keep_programs

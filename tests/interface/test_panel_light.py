@@ -24,7 +24,7 @@ from spectrasplat.ui.panels.light_spectrum import LAMPS
 @pytest.fixture(autouse=True)
 def fresh_looks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(light_panel, "_power_key", {})
-    monkeypatch.setattr(light_spectrum, "_look", light_spectrum._Look())
+    monkeypatch.setattr(light_spectrum, "_memory", light_spectrum._Memory())
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from .light_spectrum import draw_spectrum_choice
 _SHAPES = {"disc": "Disc", "rectangle": "Rectangle"}
 
 _power_key: dict[str, str] = {}
-"""Kind of light -> the quantity in which its power is shown. A way of looking, not part of the document."""
+"""Kind of light -> the quantity in which its power is shown. A way of display, not part of the document."""
 
 
 def draw_light(state: State, view_model: ViewModel) -> State:
@@ -164,7 +164,7 @@ def _draw_power(state: State, index: int) -> State:
     light = state.scene.lights[index]
     keys = {key.key: key for key in light.power_keys}
     key = _power_key.get(light.kind, edits.photometric_key(light))
-    tip = "In which quantity the power is shown and typed. Photometric ones weigh each colour as the camera does."
+    tip = "In which quantity the power is shown and typed. Photometric ones weigh each colour as the eye does."
     _, key = widgets.combo("Quantity", {k: each.label for k, each in keys.items()}, key, tip=tip)
     _power_key[light.kind] = key
     power = edits.light_power(light, key)
