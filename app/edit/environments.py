@@ -129,7 +129,7 @@ def set_map_intensity(scene: Scene, intensity: float) -> Scene:
 
 def map_intensity(environment: Environment) -> float:
     """Factor that the map's values carry already."""
-    return float(environment.parameters.get("intensity", 1.0))  # type: ignore[arg-type]
+    return float(environment.parameters.get("intensity", 1.0))
 
 
 # -- pictures on surfaces -------------------------------------------------------------------
@@ -191,7 +191,7 @@ def _vectors(parameters: dict[str, Any]) -> dict[str, Any]:
 
 def _diffuse(scene: Scene, index: int) -> Diffuse:
     material = scene.objects[index].material
-    if not material.receives:
+    if not isinstance(material, Diffuse):
         raise UserError(f"'{scene.objects[index].name}' is not diffuse and wears no picture; make it diffuse first")
     return material
 
@@ -207,7 +207,7 @@ def _worn_already(scene: Scene, path: Path, wrap: str) -> Texture | None:
     for item in scene.objects:
         texture = item.material.texture
         if texture is not None and texture.source == source:
-            return texture if texture.wrap == wrap else replace(texture, wrap=wrap)  # type: ignore[arg-type]
+            return texture if texture.wrap == wrap else replace(texture, wrap=wrap)
     return None
 
 

@@ -111,7 +111,7 @@ def set_priority(scene: Scene, index: int, priority: int) -> Scene:
 
 def _glass(scene: Scene, index: int) -> Dielectric:
     material = scene.objects[index].material
-    if not material.transmits:
+    if not isinstance(material, Dielectric):
         raise UserError(f"'{scene.objects[index].name}' is not made of glass; give it a glass first")
     return material
 

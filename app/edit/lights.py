@@ -42,9 +42,9 @@ def set_light(scene: Scene, index: int, light: Light) -> Scene:
     name = checked_name(light.name, others, "light")
     light = replace(light, name=name)
     if light.has_direction:
-        light = replace(light, direction=_unit(light, "direction", light.direction))
+        light = light.changed(direction=_unit(light, "direction", light.direction))
     if light.tangent is not None:
-        light = replace(light, tangent=_unit(light, "tangent", light.tangent))
+        light = light.changed(tangent=_unit(light, "tangent", light.tangent))
     light.check()
     _check_against_glass(scene, light, scene.lights[index] if index < len(scene.lights) else None)
     return replace(scene, lights=(*scene.lights[:index], light, *scene.lights[index + 1 :]))
@@ -81,9 +81,9 @@ def duplicate_light(scene: Scene, index: int) -> Scene:
     if not light.has_place:
         turn = math.radians(15.0)
         about_up = np.array([(math.cos(turn), -math.sin(turn), 0), (math.sin(turn), math.cos(turn), 0), (0, 0, 1)])
-        copy = replace(copy, direction=_vec3(frame @ about_up @ frame.T @ light.direction))
+        copy = copy.changed(direction=_vec3(frame @ about_up @ frame.T @ light.direction))
     else:
-        copy = replace(copy, position=_vec3(light.position + 0.5 * environment_of(scene.objects).radius * frame[:, 0]))
+        copy = copy.changed(position=_vec3(light.position + 0.5 * environment_of(scene.objects).radius * frame[:, 0]))
     return set_light(scene, len(scene.lights), copy)
 
 
@@ -125,7 +125,7 @@ def set_light_file(scene: Scene, index: int | None, path: Path) -> Scene:
         scene, index = add_light(scene, IesLight.kind), len(scene.lights)
     elif scene.lights[index].profile is None:
         scene = set_light_kind(scene, index, IesLight.kind)
-    light = replace(scene.lights[index], profile=profile)
+    light = scene.lights[index].changed(profile=profile)
     power = light.spectral_power.scaled_to_luminous(profile.peak_cd)
     return set_light(scene, index, replace(light, spectral_power=power))
 

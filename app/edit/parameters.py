@@ -245,7 +245,7 @@ def _with_object(item: SceneObject, name: str, value: float) -> SceneObject:
             matrix[:3, :3] = rotation_about(_AXES[axis], math.radians(value)) @ matrix[:3, :3]
         return replace(item, object_to_world=matrix)
     dispersion = _with_glass(item.material.dispersion, name, value)
-    return replace(item, material=replace(item.material, dispersion=dispersion))
+    return replace(item, material=item.material.changed(dispersion=dispersion))
 
 
 def _with_glass(dispersion: Dispersion, name: str, value: float) -> Dispersion:
@@ -281,19 +281,19 @@ def _light_value(light: Light, name: str) -> float:
 def _with_light(light: Light, name: str, value: float) -> Light:
     field, _, axis = name.partition(".")
     if field == "position":
-        return replace(light, position=_with_axis(light.position, axis, value))
+        return light.changed(position=_with_axis(light.position, axis, value))
     if field == "rotation":
         turn = rotation_about(_AXES[axis], math.radians(value))
-        turned = replace(light, direction=_vec3(turn @ np.asarray(light.direction)))
+        turned = light.changed(direction=_vec3(turn @ np.asarray(light.direction)))
         if light.tangent is None and not light.has_roll:
             return turned
         tangent = light.axes()[:, 0] if light.tangent is None else np.asarray(light.tangent)
-        return replace(turned, tangent=_vec3(turn @ tangent))
+        return turned.changed(tangent=_vec3(turn @ tangent))
     if field == "power":
         spectrum = light.spectral_power
         lines = tuple((nm, power * value) for nm, power in spectrum.lines)
         return replace(light, spectral_power=Spectrum(spectrum.density * value, lines))
-    return replace(light, **{_turned_by(light)[field].attribute: value}).fitted()
+    return light.changed(**{_turned_by(light)[field].attribute: value}).fitted()
 
 
 def _changed(thing: Any, name: str, value: object) -> Any:

@@ -160,7 +160,7 @@ def apply_material(scene: Scene, index: int, preset: MaterialPreset) -> Scene:
     """Give object `index` the preset's material; a glass keeps the priority among overlapping solids it had."""
     before, material = scene.objects[index].material, preset.material
     if before.transmits and material.transmits:
-        material = replace(material, priority=before.priority)
+        material = material.changed(priority=before.priority)
     return set_material(scene, index, material)
 
 
@@ -175,7 +175,7 @@ def apply_light(scene: Scene, index: int, preset: LightPreset) -> Scene:
     assert preset.kind is not None and preset.value is not None
     changed = set_light_spectrum(scene, index, preset.kind, preset.value)
     if preset.angular_diameter_deg is not None and not light.has_place:
-        wide = replace(changed.lights[index], angular_diameter_deg=preset.angular_diameter_deg)
+        wide = changed.lights[index].changed(angular_diameter_deg=preset.angular_diameter_deg)
         changed = set_light_power(set_light(changed, index, wide), index, light_power(light))
     return changed
 

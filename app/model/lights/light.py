@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
@@ -118,6 +118,8 @@ class Light:
     """Unit propagation direction of the axis."""
     tangent = None
     """Direction of a rectangle's width; None picks one."""
+    shape = "disc"
+    """Outline, where it has one."""
     is_disc = False
     half_extent = (0.0, 0.0)
     """Half of its width and height, scene units."""
@@ -166,6 +168,14 @@ class Light:
     def words(self) -> str:
         """Kind and shape in a few words."""
         return self.kind
+
+    def resized(self, across: float, wide: float, high: float) -> Self:
+        """With an outline so many times as large; a disc knows one factor only."""
+        return self
+
+    def changed(self, **values: Any) -> Self:
+        """The same with other values of its kind's fields."""
+        return replace(self, **values)
 
     def fitted(self) -> Light:
         """The same with numbers that bound each other brought in line."""
@@ -266,6 +276,10 @@ class OutlinedLight(Light):
     parts: ClassVar = (_OutlineFile(),)
     numbers: ClassVar = (RADIUS, _WIDTH, _HEIGHT)
     has_outline: ClassVar = True
+
+    def resized(self, across: float, wide: float, high: float) -> Self:
+        """With another opening."""
+        return self.changed(radius=self.radius * across, width=self.width * wide, height=self.height * high)
 
     @property
     def is_disc(self) -> bool:

@@ -151,7 +151,7 @@ def _draw_clipboard(state: State, index: int) -> State:
 
 def _draw_numbers(state: State, view_model: ViewModel, index: int) -> State:
     item = state.scene.objects[index]
-    dispersion = item.material.dispersion  # type: ignore[union-attr]
+    dispersion = item.material.dispersion
     sold = as_sold(dispersion)
     tip = (
         "How many times stronger than in nature colours spread. 1 is the glass itself, 0 does not disperse; n_d stays."
@@ -183,7 +183,7 @@ def _draw_numbers(state: State, view_model: ViewModel, index: int) -> State:
         state = _attempt(state, index, f"Abbe number of {item.name}", lambda: with_abbe(dispersion, n_d, new_v_d))
     if _memory.refused:
         widgets.error(_memory.refused)
-    _draw_lines(state.scene.objects[index].material.dispersion)  # type: ignore[union-attr]
+    _draw_lines(state.scene.objects[index].material.dispersion)
     if view_model.stats.first_order:
         widgets.hint("The caustic follows this edit to first order until it is traced again.")
     return state

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -69,7 +69,7 @@ def _draw_place(state: State, index: int) -> State:
         changed, position, active = widgets.vec3("Position", light.position, unit="units", tip=tip, speed=speed)
         state = widgets.holding(state, active)
         if changed:
-            state = _edit(state, index, replace(light, position=position), "Move")
+            state = _edit(state, index, light.changed(position=position), "Move")
     return _draw_direction(state, index) if light.has_direction else state
 
 
@@ -82,7 +82,7 @@ def _draw_direction(state: State, index: int) -> State:
     tilted, elevation, held_e = widgets.slider("Elevation", elevation, -90.0, 90.0, unit="°", tip=tip, format="%.1f")
     state = widgets.holding(state, held_a or held_e)
     if turned or tilted:
-        aimed = replace(light, direction=direction_of(azimuth, elevation))
+        aimed = light.changed(direction=direction_of(azimuth, elevation))
         return _edit(state, index, aimed, "Turn")
     if not light.has_place:
         return state
@@ -90,7 +90,7 @@ def _draw_direction(state: State, index: int) -> State:
     if widgets.button("Aim at the objects", tip=tip):
         toward = environment_of(state.scene.objects).centre - np.array(light.position)
         x, y, z = (float(v) for v in toward)
-        return _edit(state, index, replace(light, direction=(x, y, z)), "Aim")
+        return _edit(state, index, light.changed(direction=(x, y, z)), "Aim")
     return state
 
 
@@ -133,7 +133,7 @@ def _draw_size(state: State, index: int) -> State:
     changed, active = light, False
     if light.has_outline:
         _, shape = widgets.combo("Shape", _SHAPES, light.shape, tip="Outline of the beam or of the glowing surface.")
-        changed = replace(changed, shape=shape)
+        changed = changed.changed(shape=shape)
     for number in changed.shown_numbers():
         changed, held = _draw_number(changed, number)
         active = active or held
@@ -145,7 +145,7 @@ def _draw_number(light: Light, number: Number) -> tuple[Light, bool]:
     row, value = number.row, getattr(light, number.attribute)
     assert row is not None
     high = getattr(light, row.bounded_by) if row.bounded_by else row.high
-    shown = {"unit": number.unit, "tip": row.tip, "format": row.format}
+    shown: dict[str, Any] = {"unit": number.unit, "tip": row.tip, "format": row.format}
     if row.is_slider:
         if row.bounded_by:
             value, reset = min(value, high), high
@@ -154,7 +154,7 @@ def _draw_number(light: Light, number: Number) -> tuple[Light, bool]:
         _, value, active = widgets.slider(row.label, value, row.low, high, reset=reset, **shown)
     else:
         _, value, active = widgets.drag(row.label, value, row.low, row.high, logarithmic=True, **shown)
-    return replace(light, **{number.attribute: value}), active
+    return light.changed(**{number.attribute: value}), active
 
 
 # ---- power --------------------------------------------------------------------------------
