@@ -44,7 +44,7 @@ class Pace:
 
     @staticmethod
     def of(context: Context) -> Pace:
-        """For a rendering that nobody looks at meanwhile."""
+        """For a rendering that nobody watches."""
         return Pace(context.is_software)
 
     @staticmethod

@@ -62,7 +62,7 @@ class BackgroundJobs:
         self.comparison.advance(state, picture.engine, share * max(left, 0.0))
         return max(budget_s - (time.perf_counter() - started), 0.2 * budget_s)
 
-    def look(self, state: State, picture: LivePicture, now_s: float) -> None:
+    def update(self, state: State, picture: LivePicture, now_s: float) -> None:
         """After the picture is made: what lies under the cursor, where rays go. Raises `UserError`."""
         self.cursor.update(state, picture, now_s)
         self.overlay.update(state)

@@ -90,8 +90,8 @@ def _work(session: Session, budget_s: float) -> None:
     session.problem_said = problem
     now = session.clock()
     try:
-        session.picture.show(session.state, now, session.delta_s, session.companions.comparison)
-        session.companions.look(session.state, session.picture, now)
+        session.picture.show(session.state, now, session.delta_s, session.background_jobs.comparison)
+        session.background_jobs.update(session.state, session.picture, now)
     except UserError as error:
         session.messages.tell(sentence(str(error)), is_error=True)
     except Exception as error:  # a bug, or the device is lost
@@ -102,9 +102,9 @@ def _work(session: Session, budget_s: float) -> None:
 def _work_beside(session: Session, budget_s: float) -> float:
     """Exports and comparison; returns the time that is left."""
     try:
-        return session.companions.work(session.state, session.picture, budget_s)
+        return session.background_jobs.work(session.state, session.picture, budget_s)
     except Exception as error:  # a bug in a side line must not stop the picture
-        session.companions.exports.cancel()
+        session.background_jobs.exports.cancel()
         session.save_from_crash("exporting or comparing", error)
         session.messages.tell(
             f"Comparing or exporting failed by a fault of the program ({brief(error)}).", is_error=True
@@ -112,9 +112,9 @@ def _work_beside(session: Session, budget_s: float) -> float:
         session.state = replace(session.state, compare=replace(session.state.compare, mode="off", plot=False))
         return budget_s
     finally:
-        for text, is_error in session.companions.told:
+        for text, is_error in session.background_jobs.told:
             session.messages.tell(sentence(text), is_error)
-        session.companions.told.clear()
+        session.background_jobs.told.clear()
 
 
 def _with_dropped(session: Session, state: State, view_model: ViewModel) -> State:

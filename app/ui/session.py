@@ -59,7 +59,7 @@ class Session:
         self.autosave = Autosave(config_dir())
         self.recovery: Recovery | None = next(iter(recoveries(config_dir())), None)
         self.picture = LivePicture(context, make_engine)
-        self.companions = BackgroundJobs(context, config_dir())
+        self.background_jobs = BackgroundJobs(context, config_dir())
         self.window_picture: Path | None = None
         """Where a picture of the whole window is to be written once this frame is drawn."""
         self.interface_scale = self.framebuffer_scale = 1.0
@@ -97,11 +97,11 @@ class Session:
         now = self.clock()
         self.delta_s = min(max(now - self._last_start, 1e-4), 0.25)
         self._frame_started = self._last_start = now
-        self.picture.resize(self.state, self.companions.comparison)
+        self.picture.resize(self.state, self.background_jobs.comparison)
         if self._watch.changed():
             self.reload_shaders()
         if self.may_make_thumbnails():
-            self.companions.gallery.step()
+            self.background_jobs.gallery.step()
 
     def wait_for_layout(self) -> None:
         """The window's size has changed before anything was made for it: leave the engine alone for some frames
@@ -115,11 +115,11 @@ class Session:
     def wait_s(self) -> float:
         """Seconds the window may sleep when no event comes; 0 while anything moves."""
         state = self.state
-        if self.companions.gallery.is_busy and self.may_make_thumbnails():
+        if self.background_jobs.gallery.is_busy and self.may_make_thumbnails():
             return THUMBNAIL_S
         moves = (
             state.interacting
-            or self.companions.is_busy
+            or self.background_jobs.is_busy
             or self.messages.is_fading
             or (state.display.auto_exposure and self.picture.is_settling)
             or (state.playing and self.picture.engine is not None and not self.picture.stats.converged)
@@ -221,7 +221,7 @@ class Session:
 
     def release(self) -> None:
         """Free what the device holds."""
-        self.companions.release()
+        self.background_jobs.release()
         self.picture.release()
 
 

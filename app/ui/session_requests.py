@@ -155,15 +155,15 @@ def _export(session: Session, request: requests.Screenshot | requests.Bake | req
         check_writable(request.path)
         session.window_picture = request.path
         return
-    session.companions.export(request, session.state, session.picture)
+    session.background_jobs.export(request, session.state, session.picture)
 
 
 def _cancel_job(session: Session, _request: requests.CancelJob) -> None:
-    session.companions.cancel_export()
+    session.background_jobs.cancel_export()
 
 
 def _compute_reference(session: Session, _request: requests.ComputeReference) -> None:
-    session.companions.comparison.restart()
+    session.background_jobs.comparison.restart()
 
 
 def _copy_material(session: Session, request: requests.CopyMaterial) -> None:

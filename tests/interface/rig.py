@@ -15,8 +15,9 @@ from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.scene import Dielectric, Diffuse
 from spectrasplat.render.viewer.engine import Budget, LiveEngine
+from spectrasplat.ui.frame import Draw
 from spectrasplat.ui.headless import HeadlessInterface
-from spectrasplat.ui.session import Draw, Session
+from spectrasplat.ui.session import Session
 from spectrasplat.ui.shell import draw_interface
 from spectrasplat.ui.viewer import Viewer, headless_viewer
 
@@ -119,7 +120,7 @@ def viewer(
 ) -> Iterator[Hands]:
     """A viewer of `scene`; `photons` is the target."""
     session = Session(context, scene, make_engine=small_engine(photons))
-    session.companions.gallery.release()
+    session.background_jobs.gallery.release()
     preferences = replace(session.state.preferences, target_photons=target(photons), refine_when_still=refine)
     session.state = replace(session.state, preferences=preferences, selection=Selection())
     guest = Viewer(session, draw)
