@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..model.picture_key import picture_key
 from ..model.scene import Scene
-from ..model.scene_key import picture_key
 from .camera_run import MAX_DEPTH, CameraPicture, CameraRun, summed_camera
 from .code_key import code_key
 from .kept import continue_kept, kept_path

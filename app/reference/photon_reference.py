@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..model.content_key import scene_key
 from ..model.scene import Scene
-from ..model.scene_key import scene_key
 from .code_key import code_key
 from .kept import continue_kept, kept_path
 from .photon_run import TALLY_SIZE, ReferencePicture, ReferenceRun, summed

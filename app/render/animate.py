@@ -12,8 +12,8 @@ from ..base.movie import Frames, Sink
 from ..base.tone_map import auto_exposure, tone_map_8bit
 from ..edit.animation import Animation
 from ..gpu.context import Context
+from ..model.content_key import scene_key
 from ..model.scene import Diffuse, Scene
-from ..model.scene_key import scene_key
 from ..model.settings import RenderSettings
 from .frames import FrameRenderer
 

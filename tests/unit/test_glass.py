@@ -258,12 +258,12 @@ def test_an_impossible_gain_is_refused(gain: float) -> None:
 
 def test_distinct_gains_are_distinct_glasses_to_the_renderer() -> None:
     from spectrasplat.gpu.scene_buffers import Groups
+    from spectrasplat.model.content_key import scene_key
     from spectrasplat.model.features import Features, dispersive_materials
     from spectrasplat.model.geometry import primitives
     from spectrasplat.model.optics.spectral_tables import SpectralAxis
     from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
     from spectrasplat.model.scene_defaults import default_light
-    from spectrasplat.model.scene_key import scene_key
     from spectrasplat.model.settings import RenderSettings
 
     def scene(*gains: float) -> Scene:
