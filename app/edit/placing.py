@@ -17,8 +17,8 @@ from ..model.scene import (
     Light,
     Scene,
     SceneObject,
-    Vec3,
 )
+from ..model.vectors import vec3
 from . import edits
 from .state import Selection
 
@@ -98,11 +98,11 @@ def moved_light(light: Light, delta: np.ndarray) -> Light:
     axes = light.axes()
     stretched = np.linalg.norm(linear @ axes, axis=0)
     position = (delta @ np.append(np.asarray(light.position, float), 1.0))[:3]
-    moved = replace(light, position=_vec3(position)) if light.has_place else light
+    moved = replace(light, position=vec3(position)) if light.has_place else light
     if light.has_direction and not np.allclose(linear, np.eye(3), atol=1e-12):
-        moved = replace(moved, direction=_vec3(_unit(linear @ axes[:, 2])))
+        moved = replace(moved, direction=vec3(_unit(linear @ axes[:, 2])))
         if light.tangent is not None or light.has_roll:
-            moved = replace(moved, tangent=_vec3(_unit(linear @ axes[:, 0])))
+            moved = replace(moved, tangent=vec3(_unit(linear @ axes[:, 0])))
     if not light.has_outline:
         return moved
     # A disc stays round: whichever of its two directions was pulled counts.
@@ -131,8 +131,3 @@ def _nearest_rotation(linear: np.ndarray) -> np.ndarray:
 
 def _unit(vector: np.ndarray) -> np.ndarray:
     return vector / np.linalg.norm(vector)
-
-
-def _vec3(values: np.ndarray) -> Vec3:
-    x, y, z = (float(v) for v in values)
-    return (x, y, z)

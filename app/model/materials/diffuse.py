@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from ..io.scene_pictures import picture_file, picture_name
-from ..io.scene_table import SceneTable, Vec3
+from ..io.scene_table import SceneTable
 from ..optics.colorimetry import VISIBLE_NM
 from ..optics.spectrum import Spectrum, illuminant, xyz_to_rgb709
 from ..texture import Texture
+from ..vectors import Vec3
 from .absorption import read_curve
 from .material import Material, colour_words
 

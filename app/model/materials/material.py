@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from ..fields import Part, read_fields, write_fields
-from ..io.scene_table import SceneTable, Vec3
+from ..io.scene_table import SceneTable
+from ..vectors import Vec3
 
 if TYPE_CHECKING:
     from ..scene_textures import TextureReader
