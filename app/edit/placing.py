@@ -16,8 +16,8 @@ from ..model.scene import (
     Light,
     Scene,
     SceneObject,
-    Vec3,
 )
+from ..model.vectors import vec3
 from . import edits
 from .state import Selection
 
@@ -97,11 +97,11 @@ def moved_light(light: Light, delta: np.ndarray) -> Light:
     axes = light.axes()
     stretched = np.linalg.norm(linear @ axes, axis=0)
     position = (delta @ np.append(np.asarray(light.position, float), 1.0))[:3]
-    moved = light.changed(position=_vec3(position)) if light.has_place else light
+    moved = light.changed(position=vec3(position)) if light.has_place else light
     if light.has_direction and not np.allclose(linear, np.eye(3), atol=1e-12):
-        moved = moved.changed(direction=_vec3(_unit(linear @ axes[:, 2])))
+        moved = moved.changed(direction=vec3(_unit(linear @ axes[:, 2])))
         if light.tangent is not None or light.has_roll:
-            moved = moved.changed(tangent=_vec3(_unit(linear @ axes[:, 0])))
+            moved = moved.changed(tangent=vec3(_unit(linear @ axes[:, 0])))
     # A disc stays round: whichever of its two directions was pulled counts.
     across = stretched[:2][np.argmax(np.abs(np.log(stretched[:2])))]
     return moved.resized(float(across), float(stretched[0]), float(stretched[1]))
@@ -123,8 +123,3 @@ def _nearest_rotation(linear: np.ndarray) -> np.ndarray:
 
 def _unit(vector: np.ndarray) -> np.ndarray:
     return vector / np.linalg.norm(vector)
-
-
-def _vec3(values: np.ndarray) -> Vec3:
-    x, y, z = (float(v) for v in values)
-    return (x, y, z)

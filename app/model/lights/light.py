@@ -14,8 +14,9 @@ import numpy as np
 
 from ...base.errors import UserError
 from ..fields import Animated, Number, Part, Row
-from ..io.scene_table import MAX_MAGNITUDE, SceneTable, Vec3
+from ..io.scene_table import MAX_MAGNITUDE, SceneTable
 from ..optics.spectrum import Spectrum
+from ..vectors import Vec3
 
 DEFAULT_ILLUMINANCE = 3.0
 """Lumen per square unit on a plane across the light where a file states no power: with

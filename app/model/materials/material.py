@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
+from typing import Any, ClassVar, Self, cast
 
 from ..fields import Part, read_fields, write_fields
-from ..io.scene_table import SceneTable, Vec3
-
-if TYPE_CHECKING:
-    from ..scene_textures import TextureReader
+from ..io.scene_table import SceneTable
+from ..scene_textures import TextureReader
+from ..vectors import Vec3
 
 
 @dataclass(frozen=True)
