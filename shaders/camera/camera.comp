@@ -199,7 +199,7 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
     bool may_cut = path.narrowed && any(passes) && !all(passes) && !path.recut;
     bool cut = false;
     WHEN(may_cut) {
-        float at = cell_border(onset_of(path, frame, theta3, boundary, passes));
+        float at = cell_border(onset_of(path, theta3, boundary, passes));
         cut = may_cut_at(path, at);
         bool near = cut && (whole.sound || cut_is_near(whole, at, hit.distance));
         if (cut && !near) atomicAdd(fallbacks[FELL_CUT], 1u);
