@@ -72,8 +72,8 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "nested windows": ("only_fine", "outer"),
     "local gain": ("gain_boxes", "local_gain"),
     "photons by index": ("traced_bands", "v_path"),
-    "camera refraction": ("meet_surface", "reflect_path", "waiting", "waits", "listed"),
-    "camera spectral taps": (r"narrow\(path, pixel_key\)", "taps_of", "onset_of"),
+    "camera refraction": ("meet_surface", "reflect_path", "path_stack", "stack_size", "listed"),
+    "camera spectral taps": (r"restrict_to_band\(path, pixel_key\)", "taps_of", "onset_of"),
     "spectral maps": ("BIN_ROW", "BIN_SPECTRUM_ROW", "BIN_TARGET"),
     "spectral bins": ("define TARGETS [2-9]", "define TARGETS 1[0-9]"),
 }
