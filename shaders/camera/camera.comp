@@ -4,7 +4,7 @@
 // one is chosen by chance.
 //
 // Where the scene shows glass or mirrors this is two programs: one for what is seen directly, which lists the pixels that meet something
-// specular first (LISTS_SPECULAR), and one for the listed ones (CAMERA_SPECULAR), which holds all that is dear.
+// specular first (LISTS_SPECULAR), and one for the listed ones (CAMERA_SPECULAR), which holds all that is expensive.
 #ifdef CAMERA_SPECULAR
 layout(local_size_x = 64) in;
 #else
@@ -69,21 +69,21 @@ bool took_turn = false;
 // copied there and back by some drivers.
 vec4 radiance[TARGETS];
 #ifdef CAMERA_SPECULAR
-int waits;
+int stack_size;
 #ifdef SPECTRAL_SWEEP
-// Rays traced to find out where ways part.
+// Rays traced to find out where paths diverge.
 int asked = 0;
 #endif
 #ifdef HALTS
 #include "camera/halts.glsl"
-#define WAITING(i) halted[place].waiting[i]
+#define STACKED(i) halted[place].path_stack[i]
 #else
-CameraPath waiting[STACK];
-#define WAITING(i) waiting[i]
+CameraPath path_stack[STACK];
+#define STACKED(i) path_stack[i]
 #endif
 // What this event adds to them, put there in one place: storing a path at an index takes a compiler long.
-CameraPath aside;
-bool sets_aside;
+CameraPath pending_path;
+bool pushes_path;
 #ifdef SPECTRAL_SWEEP
 // Where this event cuts the path's band; negative: nowhere.
 float cut_at;
@@ -97,7 +97,7 @@ struct PathEnd {
     CameraPath path;
     Hit hit;
     bool met;
-    bool alike;
+    bool same_hit;
 };
 PathEnd ended[ENDS_HELD];
 #endif
@@ -114,23 +114,23 @@ PathEnd ended[ENDS_HELD];
 // Looks of one sample at what is seen directly, which costs little, lie round the sample's own place within its share of the pixel. Those that
 // meet something specular go on as one of them, chosen by chance; as the sample itself where all of them do.
 #define THE_SAMPLE 4u
-const vec2 direct_look[5] = vec2[](vec2(-0.125, -0.375), vec2(0.375, -0.125), vec2(0.125, 0.375), vec2(-0.375, 0.125), vec2(0.0));
+const vec2 primary_offsets[5] = vec2[](vec2(-0.125, -0.375), vec2(0.375, -0.125), vec2(0.125, 0.375), vec2(-0.375, 0.125), vec2(0.0));
 
-vec2 place_of_look(uint look)
+vec2 primary_sample_place(uint primary_sample)
 {
-    return p.within_pixel + p.sample_side * vec2(p.pixel_width, p.pixel_height) * direct_look[look];
+    return p.within_pixel + p.sample_side * vec2(p.pixel_width, p.pixel_height) * primary_offsets[primary_sample];
 }
 
-// A listed pixel: its number, the look that goes on, and of how many it is one.
+// A listed pixel: its number, the primary sample that goes on, and of how many it is one.
 const uint LISTED_BITS = 27u;
-uint listed_entry(uint number, uint look, uint count)
+uint listed_entry(uint number, uint primary_sample, uint count)
 {
-    return number | (look << LISTED_BITS) | ((count - 1u) << (LISTED_BITS + 3u));
+    return number | (primary_sample << LISTED_BITS) | ((count - 1u) << (LISTED_BITS + 3u));
 }
 
-CameraPath camera_path(uvec2 pixel, uint look, float gain)
+CameraPath camera_path(uvec2 pixel, uint primary_sample, float gain)
 {
-    vec2 place = picture_point(pixel, place_of_look(look), p.size);
+    vec2 place = picture_point(pixel, primary_sample_place(primary_sample), p.size);
     CameraRay ray = camera_ray(p.position, p.forward, p.half_right, p.half_up, p.orthographic != 0u, place);
     CameraPath path;
     path.position = ray.position;
@@ -150,13 +150,13 @@ CameraPath camera_path(uvec2 pixel, uint look, float gain)
     }
     path.band = vec3(0.0, 0.5, 1.0);
     path.weight = vec3(1.0);
-    path.gain = gain;
-    path.share = 1.0;
+    path.inverse_pdf = gain;
+    path.branch_weight = 1.0;
     path.key = 0u;
     path.depth = 0;
-    path.narrowed = false;
+    path.restricted = false;
     path.recut = false;
-    path.sound = true;
+    path.planar_so_far = true;
     path.cuts = 0;
 #ifdef SPECTRAL_SWEEP
     for (int end = 0; end < 2; ++end) {
@@ -203,9 +203,9 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
         mirror_weight = begins ? mirror_weight : reflectance;
 #ifdef HAS_DISPERSION
         // What is reflected off the outside of glass knows no wavelength but in its strength: it stays whole. What goes on is one band.
-        if (round == 1 || path.narrowed || (n_i.x == n_i.z && n_t.x == n_t.z)) break;
+        if (round == 1 || path.restricted || (n_i.x == n_i.z && n_t.x == n_t.z)) break;
         begins = all(greaterThan(cosine2, vec3(0.0)));
-        narrow(path, pixel_key);
+        restrict_to_band(path, pixel_key);
         if (!begins) mirrored = path;
 #else
         break;
@@ -213,12 +213,12 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
     }
 #ifdef SPECTRAL_SWEEP
     bvec3 passes = greaterThan(cosine2, vec3(0.0));
-    bool may_cut = path.narrowed && any(passes) && !all(passes) && !path.recut;
+    bool may_cut = path.restricted && any(passes) && !all(passes) && !path.recut;
     bool cut = false;
     WHEN(may_cut) {
-        float at = cell_border(onset_of(path, frame, theta3, boundary, passes));
+        float at = cell_border(onset_of(path, theta3, boundary, passes));
         cut = may_cut_at(path, at);
-        bool near = cut && (whole.sound || cut_is_near(whole, at, hit.distance));
+        bool near = cut && (whole.planar_so_far || cut_is_near(whole, at, hit.distance));
         if (cut && !near) atomicAdd(fallbacks[FELL_CUT], 1u);
         cut = near;
         WHEN(cut) {
@@ -234,17 +234,17 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
     Deflection refracted = refract_at(frame.shading, path.direction, n_i.y / n_t.y);
     bool total = !refracted.exists, reflects = total;
     float likely = total ? 1.0 : dot(reflectance, vec3(0.25, 0.5, 0.25));
-    bool strong = !total && (begins || path.depth <= 1 || min(path.share * likely, path.share * (1.0 - likely)) > p.split_threshold);
-    bool splits = strong && waits < STACK;
+    bool strong = !total && (begins || path.depth <= 1 || min(path.branch_weight * likely, path.branch_weight * (1.0 - likely)) > p.split_threshold);
+    bool splits = strong && stack_size < STACK;
     if (strong && !splits) atomicAdd(fallbacks[FELL_STACK], 1u);
     WHEN(splits && mirror_weight.y > 0.0) {
         mirrored.weight *= mirror_weight;
-        mirrored.share *= likely;
+        mirrored.branch_weight *= likely;
         mirrored.origin = origin_back;
         mirrored.key = hash_combine(mirrored.key, 1u);
         reflect_path(mirrored, frame);
-        aside = mirrored;
-        sets_aside = true;
+        pending_path = mirrored;
+        pushes_path = true;
     }
     if (!total && !splits) {
         reflects = choice(path, pixel_key) < likely;
@@ -252,7 +252,7 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
         path.key = hash_combine(path.key, reflects ? 3u : 4u);
     } else {
         path.weight *= total ? vec3(1.0) : 1.0 - reflectance;
-        path.share *= total ? 1.0 : 1.0 - likely;
+        path.branch_weight *= total ? 1.0 : 1.0 - likely;
     }
     WHEN(!reflects) {
         refract_path(path, refracted, frame, boundary, n_i, n_t);
@@ -279,9 +279,9 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
     path.position = surface_point(hit, facet, whole.position, whole.direction);
 #ifdef SPECTRAL_SWEEP
 #ifdef NORMAL_DERIVATIVES
-    path.sound = path.sound && ((hit.primitive & PLANE_BIT) != 0u || facet.normals == NONE);
+    path.planar_so_far = path.planar_so_far && ((hit.primitive & PLANE_BIT) != 0u || facet.normals == NONE);
 #endif
-    WHEN(path.narrowed) transfer_ends(path, hit.normal_g);
+    WHEN(path.restricted) transfer_ends(path, hit.normal_g);
 #endif
     path.depth += 1;
 #ifdef HAS_MIRROR
@@ -299,7 +299,7 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
 #else
         path.weight *= colour.g;
 #endif
-        path.share *= max(colour.r, max(colour.g, colour.b));
+        path.branch_weight *= max(colour.r, max(colour.g, colour.b));
     }
 #endif
 #ifdef HAS_DIELECTRIC
@@ -331,7 +331,7 @@ void main()
 #else
     uint entry = listed[at_listed];
 #endif
-    uint number = bitfieldExtract(entry, 0, int(LISTED_BITS)), look = bitfieldExtract(entry, int(LISTED_BITS), 3);
+    uint number = bitfieldExtract(entry, 0, int(LISTED_BITS)), primary_sample = bitfieldExtract(entry, int(LISTED_BITS), 3);
     float gain = float((entry >> (LISTED_BITS + 3u)) + 1u) / float(p.primary_samples);
     uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
 #else
@@ -341,10 +341,10 @@ void main()
     uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
 #ifndef LISTS_SPECULAR
 #ifndef CAMERA_SPECULAR
-    uint look = THE_SAMPLE;
+    uint primary_sample = THE_SAMPLE;
     float gain = 1.0;
 #endif
-    CameraPath path = camera_path(pixel, look, gain);
+    CameraPath path = camera_path(pixel, primary_sample, gain);
 #endif
 #ifdef RGB_CHANNELS
     turn = p.counts_turns != 0u ? uint(imageLoad(picture[0], ivec2(pixel)).w) : p.sample_index;
@@ -353,7 +353,7 @@ void main()
 #endif
     for (int t = 0; t < TARGETS; ++t) radiance[t] = vec4(0.0);
 #ifdef CAMERA_SPECULAR
-    waits = 0;
+    stack_size = 0;
 #endif
 #ifdef LISTS_SPECULAR
     uint specular_samples = 0u, chosen = THE_SAMPLE, draw = hash_combine(pixel_key, p.draw_index);
@@ -383,22 +383,22 @@ void main()
         goes_on = false;
     }
 #endif
-    while ((goes_on || waits > 0) && !halts) {
+    while ((goes_on || stack_size > 0) && !halts) {
         int found = 0;
-        for (; (goes_on || waits > 0) && found < ENDS_HELD && !halts; ++events) {
+        for (; (goes_on || stack_size > 0) && found < ENDS_HELD && !halts; ++events) {
             COUNT_ROUNDS(32);
-            WHEN(!goes_on) path = WAITING(--waits);
+            WHEN(!goes_on) path = STACKED(--stack_size);
             goes_on = true;
             Hit hit;
             bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
             uint kind = met ? object_at(hit.object).kind : NONE;
-            bool ends = !met || kind == KIND_DIFFUSE, alike = true, parts = false, tired = events >= MAX_EVENTS;
-            sets_aside = false;
+            bool ends = !met || kind == KIND_DIFFUSE, same_hit = true, parts = false, event_limit_reached = events >= MAX_EVENTS;
+            pushes_path = false;
 #ifdef SPECTRAL_SWEEP
             cut_at = -1.0;
-            bool asks = path.narrowed && !tired && (ends || (path.sound && kind != KIND_BLACK && asked < MAX_ASKED));
+            bool asks = path.restricted && !event_limit_reached && (ends || (path.planar_so_far && kind != KIND_BLACK && asked < MAX_ASKED));
             if (asks) asks = sweep_pixels(path, met ? hit.distance : FAR_DISTANCE) > (ends ? MIN_SWEEP : MIN_CUT_SWEEP * sample_side(path));
-            WHEN(asks) cut_at = where_ways_part(path, met, ends, hit, alike);
+            WHEN(asks) cut_at = where_paths_diverge(path, met, ends, hit, same_hit);
             parts = cut_at >= 0.0;
 #endif
             WHEN(!parts) {
@@ -406,9 +406,9 @@ void main()
                 WHEN(!path.recut) add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
                 // Light that would still be caught inside is as if it left here.
-                bool specular = !ends && kind != KIND_BLACK, leaves = specular && (tired || path.depth >= MAX_DEPTH);
+                bool specular = !ends && kind != KIND_BLACK, leaves = specular && (event_limit_reached || path.depth >= MAX_DEPTH);
                 if (leaves) atomicAdd(fallbacks[FELL_DEPTH], 1u);
-                WHEN(ends || leaves) ended[found++] = PathEnd(path, hit, met && ends, alike || leaves);
+                WHEN(ends || leaves) ended[found++] = PathEnd(path, hit, met && ends, same_hit || leaves);
                 goes_on = specular && !leaves;
                 WHEN(goes_on) meet_surface(path, hit, kind, pixel_key);
             }
@@ -417,25 +417,25 @@ void main()
 #endif
 #ifdef HALTS
             halts = rounds >= uint(HALT_ROUNDS);
-            // One place stores both what is set aside and, where it halts, what is followed.
+            // One place stores both what is pending and, where it halts, what is followed.
             bool sets_path = halts && goes_on;
-            if (!sets_aside) aside = path;
-            for (bool stores = sets_aside || sets_path; stores;) {
-                WAITING(waits++) = aside;
-                stores = sets_aside && sets_path;
-                sets_aside = false;
-                aside = path;
+            if (!pushes_path) pending_path = path;
+            for (bool stores = pushes_path || sets_path; stores;) {
+                STACKED(stack_size++) = pending_path;
+                stores = pushes_path && sets_path;
+                pushes_path = false;
+                pending_path = path;
             }
             goes_on = goes_on && !halts;
 #else
-            WHEN(sets_aside) WAITING(waits++) = aside;
+            WHEN(pushes_path) STACKED(stack_size++) = pending_path;
 #endif
         }
-        for (int e = 0; e < found; ++e) add_end(ended[e].path, ended[e].met, ended[e].hit, ended[e].alike, pixel_key);
+        for (int e = 0; e < found; ++e) add_end(ended[e].path, ended[e].met, ended[e].hit, ended[e].same_hit, pixel_key);
     }
 #ifdef HALTS
     if (!loops_run()) atomicAdd(fallbacks[FELL_LOOPS], 1u);
-    if (waits > 0) {
+    if (stack_size > 0) {
         halt(entry, events);
         return;
     }

@@ -1,16 +1,16 @@
-// Where the colours of a band part, its band is cut: each part then goes its own way. A band's middle decides which surface a path meets, and
+// Where the paths of a band's wavelengths diverge, its band is cut: each part then goes its own way. A band's middle decides which surface a path meets, and
 // sees for all of it; so at every surface the rays at the band's ends are asked whether they meet the same.
 #ifndef CAMERA_CUTS_GLSL
 #define CAMERA_CUTS_GLSL
 
-// Cuts of one path where its ways part.
+// Cuts of one path where its paths diverge.
 #define MAX_CUTS 4
 // Sweep, in sides of a sample's share of its pixel, below which nobody sees which colour went where.
 #define MIN_CUT_SWEEP 0.5
 // Halvings between the middle of a band and an end: a cut is told to 1/256 of the band.
 #define CUT_HALVINGS 7
 #define EDGE_HALVINGS 10
-// Rays that a sample may trace to find out where its ways part: bounds what a sample costs.
+// Rays that a sample may trace to find out where its paths diverge: bounds what a sample costs.
 #define MAX_ASKED 96
 // Cosine of two normals, and distance (GPU units) from a plane, up to which two facets are one face.
 #define SAME_FACE_COSINE 0.999999
@@ -34,33 +34,33 @@ float share_below(CameraPath path, float at)
     return clamp((cell_cdf[emission_cell(at)] - brightness.x) / max(brightness.y - brightness.x, 1e-9), 0.05, 0.95);
 }
 
-// Both parts of a cut band set out again from the path's last surface (`anchor_at`): `path` is one, the other is set aside. Of weak parts one is
+// Both parts of a cut band set out again from the path's last surface (`restrict_to_part`): `path` is one, the other is pending. Of weak parts one is
 // chosen by chance.
 void cut_band(inout CameraPath path, float at, uint pixel_key)
 {
     float below = share_below(path, at);
-    bool both = path.share * min(below, 1.0 - below) > CUT_THRESHOLD && waits < STACK;
+    bool both = path.branch_weight * min(below, 1.0 - below) > CUT_THRESHOLD && stack_size < STACK;
     bool takes_low = true;
     WHEN(!both) takes_low = unit_float(hash_combine(hash_combine(pixel_key, path.key + uint(path.depth + path.cuts) * 2654435769u), p.draw_index)) < below;
     path.cuts += 1;
     CameraPath whole = path;
-    // What waits first, then what goes on.
+    // What stack_size first, then what goes on.
     for (int part = both ? 0 : 1; part < 2; ++part) {
         bool low = part == 0 ? !takes_low : takes_low;
         float share = low ? below : 1.0 - below;
         path = whole;
         path.key = hash_combine(whole.key, part == 0 ? 6u : (takes_low ? 5u : 7u));
-        if (both) path.share *= share;
-        else path.gain /= share;
-        anchor_at(path, low ? whole.band.x : at, low ? at : whole.band.z);
-        WHEN(part == 0) aside = path;
+        if (both) path.branch_weight *= share;
+        else path.inverse_pdf /= share;
+        restrict_to_part(path, low ? whole.band.x : at, low ? at : whole.band.z);
+        WHEN(part == 0) pending_path = path;
     }
-    sets_aside = both;
+    pushes_path = both;
 }
 
 // Whether the ray at the wavelength x meets what the path's own ray met. `ends`: the path ends there; colours that end elsewhere, or in
-// nothing, then go along, for every look along the sweep finds out for itself; `alike` is made false by them.
-bool goes_along(CameraPath path, float x, bool met, bool ends, Hit hit, inout bool alike, out Hit found)
+// nothing, then go along, for every lookup along the sweep finds out for itself; `same_hit` is made false by them.
+bool follows_same_path(CameraPath path, float x, bool met, bool ends, Hit hit, inout bool same_hit, out Hit found)
 {
     asked += 1;
     vec3 position, direction;
@@ -70,9 +70,9 @@ bool goes_along(CameraPath path, float x, bool met, bool ends, Hit hit, inout bo
     if (same && met && found.primitive != hit.primitive) {
         vec3 apart = position + found.distance * direction - (path.position + hit.distance * path.direction);
         same = found.object == hit.object && dot(found.normal_g, hit.normal_g) > SAME_FACE_COSINE && abs(dot(apart, hit.normal_g)) < SAME_FACE_DISTANCE;
-        alike = false;
+        same_hit = false;
     }
-    alike = alike && same;
+    same_hit = same_hit && same;
     uint kind = meets ? object_at(found.object).kind : NONE;
     return same || (ends && kind != KIND_MIRROR && kind != KIND_DIELECTRIC);
 }
@@ -84,10 +84,10 @@ float sooner(vec3 position, vec3 direction, vec3 normal_a, vec3 on_a, vec3 norma
 }
 
 // Asks both ends; where the way of one of them parts from the middle's, the wavelength where it does, else a negative one.
-// `alike`: whether all of the band ends on the facet, or in the nothing, that its middle ends in.
-float where_ways_part(CameraPath path, bool met, bool ends, Hit hit, out bool alike)
+// `same_hit`: whether all of the band ends on the facet, or in the nothing, that its middle ends in.
+float where_paths_diverge(CameraPath path, bool met, bool ends, Hit hit, out bool same_hit)
 {
-    alike = true;
+    same_hit = true;
     bool parts = false, bisects = true;
     // From the middle to the end that parts; where both do, the other's cut comes next.
     float along = path.band.y, parted = path.band.x;
@@ -98,9 +98,9 @@ float where_ways_part(CameraPath path, bool met, bool ends, Hit hit, out bool al
         float x = i == 0 ? path.band.x : (i == 1 ? path.band.z : 0.5 * (along + parted));
         bool here = true;
         Hit found;
-        bool goes = goes_along(path, x, met, ends, hit, here, found);
+        bool goes = follows_same_path(path, x, met, ends, hit, here, found);
         if (i < 2) {
-            alike = alike && here;
+            same_hit = same_hit && here;
             if (!goes && !parts) {
                 parted = x;
                 other = found;
@@ -111,7 +111,7 @@ float where_ways_part(CameraPath path, bool met, bool ends, Hit hit, out bool al
             parted = goes ? parted : x;
         }
         if (i == 1) {
-            bisects = parts && path.sound && path.cuts < MAX_CUTS;
+            bisects = parts && path.planar_so_far && path.cuts < MAX_CUTS;
             WHEN(bisects && met && other.object == hit.object) {
                 // Two facets of one solid part in the edge where they meet: where both are as far.
                 vec3 position, direction;
@@ -131,7 +131,7 @@ float where_ways_part(CameraPath path, bool met, bool ends, Hit hit, out bool al
         }
     }
     float at = cell_border(0.5 * (along + parted));
-    return parts && path.sound && path.cuts < MAX_CUTS && may_cut_at(path, at) ? at : -1.0;
+    return parts && path.planar_so_far && path.cuts < MAX_CUTS && may_cut_at(path, at) ? at : -1.0;
 }
 
 #endif

@@ -1,5 +1,5 @@
 // Spectra as the picture's channels see them. Row r of the table is a spectrum times the observer, summed up from
-// x = 0 on; a difference of two of its samples is the light of a stretch of the spectrum in every channel.
+// x = 0 on; a difference of two of its samples is the light of a wavelength interval in every channel.
 #ifndef CAMERA_EMISSION_GLSL
 #define CAMERA_EMISSION_GLSL
 
@@ -39,8 +39,8 @@ float transmitted(CameraPath path, float x)
 // Stretches that the whole spectrum is cut into where Fresnel's reflectance varies over it.
 #define WEIGHT_STEPS 16
 
-// A stretch of a path's band, which a look stands for: its ends as cells of the table, and what the path lets through in its middle.
-struct Stretch {
+// A wavelength interval of a path, which a lookup stands for: its ends as cells of the table, and what the path lets through in its middle.
+struct WavelengthInterval {
     float lo;
     float hi;
     int cell_lo;
@@ -49,33 +49,33 @@ struct Stretch {
     int steps;      // parts that differ in what the path lets through
 };
 
-Stretch stretch_of(CameraPath path, float lo, float hi)
+WavelengthInterval wavelength_interval(CameraPath path, float lo, float hi)
 {
-    Stretch stretch;
-    stretch.lo = lo;
-    stretch.hi = hi;
-    stretch.cell_lo = emission_cell(lo);
-    stretch.cell_hi = emission_cell(hi);
-    stretch.through = path.gain * transmitted(path, 0.5 * (lo + hi));
+    WavelengthInterval interval;
+    interval.lo = lo;
+    interval.hi = hi;
+    interval.cell_lo = emission_cell(lo);
+    interval.cell_hi = emission_cell(hi);
+    interval.through = path.inverse_pdf * transmitted(path, 0.5 * (lo + hi));
 #ifdef ABSORPTION
-    stretch.steps = max(1, int(ceil((hi - lo) * float(TINT_STEPS))));
+    interval.steps = max(1, int(ceil((hi - lo) * float(TINT_STEPS))));
 #else
-    stretch.steps = path.weight.x == path.weight.z ? 1 : max(1, int(ceil((hi - lo) * float(WEIGHT_STEPS))));
+    interval.steps = path.weight.x == path.weight.z ? 1 : max(1, int(ceil((hi - lo) * float(WEIGHT_STEPS))));
 #endif
-    return stretch;
+    return interval;
 }
 
 // Adds a light whose spectrum is that of `row`, `factor` times.
-void add_spectrum(CameraPath path, Stretch stretch, uint row, float factor)
+void add_spectrum(CameraPath path, WavelengthInterval interval, uint row, float factor)
 {
-    WHEN(stretch.steps == 1)
+    WHEN(interval.steps == 1)
         for (int t = 0; t < TARGETS; ++t)
-            radiance[t] += factor * stretch.through * (emission_until(row, t, stretch.cell_hi) - emission_until(row, t, stretch.cell_lo));
-    COUNT_ROUNDS(stretch.steps);
-    float step_x = (stretch.hi - stretch.lo) / float(stretch.steps);
-    for (int s = 0; s < stretch.steps && stretch.steps > 1; ++s) {
-        float a = stretch.lo + float(s) * step_x, b = s + 1 == stretch.steps ? stretch.hi : a + step_x;
-        float amount = factor * path.gain * transmitted(path, 0.5 * (a + b));
+            radiance[t] += factor * interval.through * (emission_until(row, t, interval.cell_hi) - emission_until(row, t, interval.cell_lo));
+    COUNT_ROUNDS(interval.steps);
+    float step_x = (interval.hi - interval.lo) / float(interval.steps);
+    for (int s = 0; s < interval.steps && interval.steps > 1; ++s) {
+        float a = interval.lo + float(s) * step_x, b = s + 1 == interval.steps ? interval.hi : a + step_x;
+        float amount = factor * path.inverse_pdf * transmitted(path, 0.5 * (a + b));
         int cell_a = emission_cell(a), cell_b = emission_cell(b);
         for (int t = 0; t < TARGETS; ++t)
             radiance[t] += amount * (emission_until(row, t, cell_b) - emission_until(row, t, cell_a));
@@ -83,26 +83,26 @@ void add_spectrum(CameraPath path, Stretch stretch, uint row, float factor)
 }
 
 // The same under a colour: `row` holds the light itself, the three after it the light times the functions of the reflectance basis.
-void add_colour(CameraPath path, Stretch stretch, uint row, vec3 colour)
+void add_colour(CameraPath path, WavelengthInterval interval, uint row, vec3 colour)
 {
     bool grey = colour.r == colour.g && colour.g == colour.b;
-    WHEN(grey) add_spectrum(path, stretch, row, colour.r);
-    for (uint c = grey ? 3u : 0u; c < 3u; ++c) add_spectrum(path, stretch, row + 1u + c, c == 0u ? colour.r : (c == 1u ? colour.g : colour.b));
+    WHEN(grey) add_spectrum(path, interval, row, colour.r);
+    for (uint c = grey ? 3u : 0u; c < 3u; ++c) add_spectrum(path, interval, row + 1u + c, c == 0u ? colour.r : (c == 1u ? colour.g : colour.b));
 }
 
 // Factor on every channel of light whose spectrum is no longer known: that of white light along the same path.
-void channel_factors(CameraPath path, Stretch stretch, out vec4 factors[TARGETS])
+void channel_factors(CameraPath path, WavelengthInterval interval, out vec4 factors[TARGETS])
 {
-    bool whole = stretch.steps == 1 && !path.narrowed;
-    for (int t = 0; t < TARGETS; ++t) factors[t] = vec4(stretch.through);
+    bool whole = interval.steps == 1 && !path.restricted;
+    for (int t = 0; t < TARGETS; ++t) factors[t] = vec4(interval.through);
     WHEN(!whole) {
-        COUNT_ROUNDS(stretch.steps * TARGETS);
-        float step_x = (stretch.hi - stretch.lo) / float(stretch.steps);
+        COUNT_ROUNDS(interval.steps * TARGETS);
+        float step_x = (interval.hi - interval.lo) / float(interval.steps);
         for (int t = 0; t < TARGETS; ++t) {
             vec4 kept = vec4(0.0);
-            for (int s = 0; s < stretch.steps; ++s) {
-                float a = stretch.lo + float(s) * step_x, b = s + 1 == stretch.steps ? stretch.hi : a + step_x;
-                kept += path.gain * transmitted(path, 0.5 * (a + b)) * (emission_until(uint(WHITE_ROW), t, emission_cell(b)) - emission_until(uint(WHITE_ROW), t, emission_cell(a)));
+            for (int s = 0; s < interval.steps; ++s) {
+                float a = interval.lo + float(s) * step_x, b = s + 1 == interval.steps ? interval.hi : a + step_x;
+                kept += path.inverse_pdf * transmitted(path, 0.5 * (a + b)) * (emission_until(uint(WHITE_ROW), t, emission_cell(b)) - emission_until(uint(WHITE_ROW), t, emission_cell(a)));
             }
             factors[t] = kept / max(emission_until(uint(WHITE_ROW), t, EMISSION_CELLS), vec4(1e-20));
         }

@@ -1,4 +1,4 @@
-// What a look is averaged over: the sides of a sample's share of its pixel, and the way from one look along the sweep to the next.
+// What a lookup is averaged over: the sides of a sample's share of its pixel, and the way from one lookup along the sweep to the next.
 #ifndef CAMERA_FOOTPRINT_GLSL
 #define CAMERA_FOOTPRINT_GLSL
 

@@ -9,12 +9,12 @@
 struct Halted {
     uint queued[2];  // places of the samples that have halted: two queues, one is read while the other is written
     uint entry;      // of the list
-    int waits;
+    int stack_size;
     int events;
     int asked;
     bool took_turn;
     vec4 radiance[TARGETS];
-    CameraPath waiting[STACK + 1];
+    CameraPath path_stack[STACK + 1];
 };
 layout(std430, binding = BIND_HALTED) restrict buffer HaltedSamples { Halted halted[]; };
 uint place;
@@ -24,7 +24,7 @@ void halt(uint entry, int events)
 {
     halted[atomicAdd(halted_count, 1u)].queued[p.queue] = place;
     halted[place].entry = entry;
-    halted[place].waits = waits;
+    halted[place].stack_size = stack_size;
     halted[place].events = events;
     halted[place].took_turn = took_turn;
 #ifdef SPECTRAL_SWEEP
@@ -35,7 +35,7 @@ void halt(uint entry, int events)
 
 void resume(out int events)
 {
-    waits = halted[place].waits;
+    stack_size = halted[place].stack_size;
     events = halted[place].events;
     took_turn = halted[place].took_turn;
 #ifdef SPECTRAL_SWEEP

@@ -19,7 +19,7 @@ PathFrame path_frame(CameraPath path, Hit hit, Triangle facet)
     frame.shading = shading_frame(hit, facet, path.direction);
 #ifdef SPECTRAL_SWEEP
     for (int end = 0; end < 2; ++end)
-        frame.end_normal[end] = normal_beside(frame.shading, path.narrowed ? path.end_position[end] - path.position : vec3(0.0));
+        frame.end_normal[end] = normal_beside(frame.shading, path.restricted ? path.end_position[end] - path.position : vec3(0.0));
 #endif
 #ifdef NORMAL_DERIVATIVES
     for (int c = 0; c < COLUMNS_HELD; ++c) frame.columns[c] = normal_column(frame.shading, path.dposition[c]);
@@ -77,7 +77,7 @@ vec3 incidence_over_band(CameraPath path, PathFrame frame)
 {
     vec3 theta = vec3(dot(path.direction, frame.shading.normal));
 #ifdef SPECTRAL_SWEEP
-    if (path.narrowed) {
+    if (path.restricted) {
         theta.x = dot(path.end_direction[0], frame.end_normal[0]);
         theta.z = dot(path.end_direction[1], frame.end_normal[1]);
         theta.xz = clamp(theta.xz, -1.0, -1e-6);
@@ -87,16 +87,13 @@ vec3 incidence_over_band(CameraPath path, PathFrame frame)
 }
 
 #ifdef SPECTRAL_SWEEP
-// The wavelength within the path's band where total internal reflection sets in; `passes` says where it transmits.
-float onset_of(CameraPath path, PathFrame frame, vec3 theta, MediumInterface boundary, bvec3 passes)
+// The wavelength within the path's band where total internal reflection sets in; `passes` says where it transmits. The cosine is straight
+// between the three that are known exactly: bands are narrow, and a cut goes to the next border of the emission table's cells.
+float onset_of(CameraPath path, vec3 theta, MediumInterface boundary, bvec3 passes)
 {
     float dtheta[SPECTRAL_GROUPS];
-    vec2 bend = theta.xz - theta.y;
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-        dtheta[g] = dot(path.ddirection[SPATIAL + g], frame.shading.normal) + dot(path.direction, NORMAL_COLUMN(frame, SPATIAL + g));
-        bend -= dtheta[g] * path.end_step[g];
-    }
-    return total_reflection_onset(path.band, theta.y, dtheta, bend, boundary, passes);
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) dtheta[g] = 0.0;
+    return total_reflection_onset(path.band, theta.y, dtheta, theta.xz - theta.y, boundary, passes);
 }
 
 // Whether anchoring the parts [x, at] and [at, z] of the band leaves a path's start where it is known to be clear.

@@ -1,6 +1,6 @@
 // A camera path: a ray with its pixel columns and, where the scene disperses, one spectral column a group of glasses,
 // and what it has lost on its way. It stands for the whole spectrum until it is first bent by glass that disperses;
-// from there on for one band of it (`narrow`).
+// from there on for one band of it (`restrict_to_band`).
 #ifndef CAMERA_PATH_GLSL
 #define CAMERA_PATH_GLSL
 
@@ -18,14 +18,14 @@ struct CameraPath {
     vec3 ddirection[COLUMNS_HELD];
     vec3 band;                      // its lowest wavelength, the one it is traced at, its highest: as x
     vec3 weight;                    // throughput at these
-    float gain;                     // one over the probability of all choices made
-    float share;                    // throughput as far as branches are worth following
+    float inverse_pdf;                     // one over the probability of all choices made
+    float branch_weight;                    // throughput as far as branches are worth following
     uint key;                       // says which branch this is
     int depth;                      // surfaces met
-    bool narrowed;                  // stands for one band
+    bool restricted;                  // stands for one band
     bool recut;                     // its band was cut before the surface ahead, and is not again
-    bool sound;                     // its band's ends have kept to its own facets: it met flat ones only
-    int cuts;                       // of its band, where ways parted
+    bool planar_so_far;                     // its band's ends have kept to its own facets: it met flat ones only
+    int cuts;                       // of its band, where paths diverged
 #ifdef SPECTRAL_SWEEP
     // The rays at both ends of the band, by way of the same facets: what columns, being first derivatives, leave out of the sweep.
     vec3 end_position[2];
@@ -87,7 +87,7 @@ float sample_side(CameraPath path)
 #ifdef LISTS_SPECULAR
     return p.sample_side * inversesqrt(float(p.primary_samples));
 #else
-    return path.narrowed ? p.band_side : p.sample_side;
+    return path.restricted ? p.band_side : p.sample_side;
 #endif
 }
 
@@ -106,9 +106,9 @@ float quantile(vec2 brightness, float share)
 #endif
 
 // From here on the path stands for one band only; all others have their turn in other samples.
-void narrow(inout CameraPath path, uint pixel_key)
+void restrict_to_band(inout CameraPath path, uint pixel_key)
 {
-    path.narrowed = true;
+    path.restricted = true;
 #ifdef RANDOM_WAVELENGTH
     // One of the table's cells, by how bright it looks.
 #ifdef EVEN_WAVELENGTHS
@@ -123,7 +123,7 @@ void narrow(inout CameraPath path, uint pixel_key)
         if (cell_cdf[middle] <= u) low = middle;
         else high = middle;
     }
-    path.gain /= max(cell_cdf[low + 1u] - cell_cdf[low], 1e-9);
+    path.inverse_pdf /= max(cell_cdf[low + 1u] - cell_cdf[low], 1e-9);
     vec3 band = (float(low) + vec3(0.0, 0.5, 1.0)) / float(EMISSION_CELLS);
 #else
     // Neighbouring pixels begin with different bands, so that what is still missing shows as grain and not as a tint.
@@ -133,7 +133,7 @@ void narrow(inout CameraPath path, uint pixel_key)
     // Traced where half of what looks bright in the band lies on either side: what only this one wavelength decides, such as which facet is
     // met, is then right for most of what is seen.
     band.y = clamp(quantile(brightness_of(band), 0.5), mix(band.x, band.z, 0.1), mix(band.x, band.z, 0.9));
-    path.gain *= float(p.bands);
+    path.inverse_pdf *= float(p.bands);
 #endif
     path.weight = band_weights(path.band, path.weight, band);
     path.band = band;
@@ -154,7 +154,7 @@ float anchor_of(CameraPath path, float lo, float hi)
 }
 
 // The same path for a part of its band.
-void anchor_at(inout CameraPath path, float lo, float hi)
+void restrict_to_part(inout CameraPath path, float lo, float hi)
 {
     vec3 band = vec3(lo, anchor_of(path, lo, hi), hi);
     CameraPath before = path;

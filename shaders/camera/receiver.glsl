@@ -5,11 +5,11 @@
 
 const float INVERSE_PI = 0.31830988618;
 
-// One place on a diffuse surface, as a stretch [lo, hi] of the path's spectrum sees it.
+// One place on a diffuse surface, as a wavelength interval [lo, hi] of the path sees it.
 struct SurfaceInteraction {
     vec3 position;
     vec3 direction;      // of the ray that found it
-    vec3 dposition[3];   // what it is averaged over: a sample's two sides, and the way from this stretch to the next
+    vec3 dposition[3];   // what it is averaged over: a sample's two sides, and the way from this interval to the next
     vec3 normal_g;
     uint primitive;
     uint object;
@@ -53,7 +53,7 @@ Paint paint_of(uint picture, uint source, Triangle facet)
     return paint;
 }
 
-// Reflectance of a painted place, averaged over what a look is averaged over.
+// Reflectance of a painted place, averaged over what a lookup is averaged over.
 vec3 painted(Paint paint, SurfaceInteraction seen)
 {
     vec3 along = seen.position - paint.origin;
@@ -101,7 +101,7 @@ struct Steady {
 };
 
 // Adds the direct light of one place; that of `steady` lights as their ends have it.
-void add_direct(CameraPath path, SurfaceInteraction seen, Stretch stretch, uint pixel_key, Steady steady)
+void add_direct(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval, uint pixel_key, Steady steady)
 {
     uint reflectance_class = receivers[object_at(seen.object).receiver].reflectance_class;
     float share = clamp(dot(seen.position - steady.from, steady.along), 0.0, 1.0);
@@ -117,7 +117,7 @@ void add_direct(CameraPath path, SurfaceInteraction seen, Stretch stretch, uint 
         uint row = uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT);
         // Other classes than 0 have their reflectance in the light's own row.
         WHEN(gain > 0.0)
-            add_colour(path, stretch, reflectance_class == 0u ? row : row + 3u + reflectance_class, (reflectance_class == 0u ? seen.reflectance : vec3(1.0)) * (INVERSE_PI * gain));
+            add_colour(path, interval, reflectance_class == 0u ? row : row + 3u + reflectance_class, (reflectance_class == 0u ? seen.reflectance : vec3(1.0)) * (INVERSE_PI * gain));
     }
 }
 
@@ -169,19 +169,19 @@ vec4 map_to_channels(vec4 texel)
 #endif
 }
 
-// Texels that a look at a map averages across and down at most; what it covers beyond is met by the pixel's other samples.
+// Texels that a lookup in a map averages across and down at most; what it covers beyond is met by the pixel's other samples.
 #define MAX_TEXELS 4
 
 // Irradiance of the map's targets `first` to `last`: their mean over a box of this many texels.
 void caustic_values(uint placement, vec2 texel, vec2 box, out vec4 values[MAP_TARGETS], const int first, const int last)
 {
-    ivec2 looks = clamp(ivec2(ceil(box)), ivec2(1), ivec2(MAX_TEXELS));
-    vec2 part = box / vec2(looks), corner = texel - 0.5 * (box - part);
-    COUNT_ROUNDS(looks.x * looks.y);
-    float share = 1.0 / float(looks.x * looks.y);
+    ivec2 lookups = clamp(ivec2(ceil(box)), ivec2(1), ivec2(MAX_TEXELS));
+    vec2 part = box / vec2(lookups), corner = texel - 0.5 * (box - part);
+    COUNT_ROUNDS(lookups.x * lookups.y);
+    float share = 1.0 / float(lookups.x * lookups.y);
     for (int t = 0; t < MAP_TARGETS; ++t) values[t] = vec4(0.0);
-    for (int i = 0; i < looks.x * looks.y; ++i) {
-        vec2 at = corner + part * vec2(i % looks.x, i / looks.x);
+    for (int i = 0; i < lookups.x * lookups.y; ++i) {
+        vec2 at = corner + part * vec2(i % lookups.x, i / lookups.x);
 #if MAP_TARGETS > 0
     if (0 >= first && 0 <= last) values[0] += share * caustic_irradiance(caustic_map[0], placement, at, part);
 #endif
@@ -222,7 +222,7 @@ vec4 bin_reflectance(vec3 colour, int target)
 #endif
 
 // Irradiance by what glass and mirrors threw at a place of a map.
-void add_caustic_at(CameraPath path, SurfaceInteraction seen, Stretch stretch, uint receiver, uint placement, vec2 texel)
+void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval, uint receiver, uint placement, vec2 texel)
 {
     // Texels larger than pixels are interpolated, smaller ones weighed by their share of the sample.
     vec3 row_u = placements[placement].row_u.xyz, row_v = placements[placement].row_v.xyz;
@@ -237,10 +237,10 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, Stretch stretch, u
     bool plain = receivers[receiver].reflectance_class == 0u;
     float scale = p.map_scale * INVERSE_PI;
 #ifdef MAP_BINS
-    // The caustic's own dispersion meets the camera's: every spectral channel that the stretch touches is read by itself.
-    WHEN(path.narrowed) {
-        float x = 0.5 * (stretch.lo + stretch.hi);
-        float first = spectral_row(uint(BIN_ROW), stretch.lo), last = spectral_row(uint(BIN_ROW), stretch.hi);
+    // The caustic's own dispersion meets the camera's: every spectral channel that the interval touches is read by itself.
+    WHEN(path.restricted) {
+        float x = 0.5 * (interval.lo + interval.hi);
+        float first = spectral_row(uint(BIN_ROW), interval.lo), last = spectral_row(uint(BIN_ROW), interval.hi);
         int from = int(floor(first)), to = max(from, int(ceil(last)) - BIN_OVERLAP);
         float factor = scale * (plain ? dot(seen.reflectance, vec3(spectral_row(uint(BASIS_ROW), x), spectral_row(uint(BASIS_ROW + 1), x), spectral_row(uint(BASIS_ROW + 2), x))) : 1.0);
         vec4 watts[MAP_TARGETS];
@@ -265,7 +265,7 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, Stretch stretch, u
             bool within = k >= from && k <= to;
             for (int t = 0; t < TARGETS; ++t) {
                 vec4 all = emission_until(row, t, EMISSION_CELLS);
-                vec4 part = within ? emission_until(row, t, stretch.cell_hi) - emission_until(row, t, stretch.cell_lo) : vec4(0.0);
+                vec4 part = within ? emission_until(row, t, interval.cell_hi) - emission_until(row, t, interval.cell_lo) : vec4(0.0);
                 whole[t] += watt * all;
 #ifdef RGB_CHANNELS
                 // Luminance, which no wavelength has less than none of.
@@ -273,20 +273,20 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, Stretch stretch, u
                 part_sum += watt * dot(part.rgb, vec3(0.2126, 0.7152, 0.0722));
 #endif
             }
-            WHEN(within && watt != 0.0) add_spectrum(path, stretch, row, factor * watt);
+            WHEN(within && watt != 0.0) add_spectrum(path, interval, row, factor * watt);
         }
 #ifdef RGB_CHANNELS
         WHEN(lit) {
             vec4 lacking = map_to_channels(watts[0]) - whole[0];
-            radiance[0] += factor * stretch.through * (part_sum / max(whole_sum, 1e-30)) * lacking;
+            radiance[0] += factor * interval.through * (part_sum / max(whole_sum, 1e-30)) * lacking;
         }
 #endif
     }
-    WHEN(!path.narrowed)
+    WHEN(!path.restricted)
 #endif
     {
         vec4 factors[TARGETS], values[MAP_TARGETS];
-        channel_factors(path, stretch, factors);
+        channel_factors(path, interval, factors);
         caustic_values(placement, texel, box, values, 0, TARGETS - 1);
         for (int t = 0; t < TARGETS; ++t) {
             vec4 reflectance = vec4(1.0);
@@ -301,13 +301,13 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, Stretch stretch, u
 }
 
 // Irradiance by what glass and mirrors threw here, where a map covers it.
-void add_caustic(CameraPath path, SurfaceInteraction seen, Stretch stretch)
+void add_caustic(CameraPath path, SurfaceInteraction seen, WavelengthInterval interval)
 {
     uint placement;
     vec2 texel;
     uint receiver = object_at(seen.object).receiver;
     bool covered = find_texel(receiver, seen.source, seen.position, placement, texel);
-    WHEN(covered) add_caustic_at(path, seen, stretch, receiver, placement, texel);
+    WHEN(covered) add_caustic_at(path, seen, interval, receiver, placement, texel);
 }
 
 #endif

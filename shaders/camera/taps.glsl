@@ -1,10 +1,10 @@
 // Where a path ends in something that shines, it looks up along its spectral sweep what is there. A path that was never
-// bent by dispersive glass looks once; another as often as its sweep is long, and what lies between two looks is averaged.
+// bent by dispersive glass looks once; another as often as its sweep is long, and what lies between two lookups is averaged.
 #ifndef CAMERA_TAPS_GLSL
 #define CAMERA_TAPS_GLSL
 
 #ifdef SPECTRAL_SWEEP
-// Where the look number `tap` of so many begins: each stands for as much of what looks bright, and looks in the midst of it.
+// Where the lookup number `tap` of so many begins: each stands for as much of what looks bright, and looks in the midst of it.
 float tap_border(CameraPath path, vec2 brightness, float tap, int taps)
 {
     return tap <= 0.0 ? path.band.x : (tap >= float(taps) ? path.band.z : clamp(quantile(brightness, tap / float(taps)), path.band.x, path.band.z));
@@ -29,7 +29,7 @@ float sweep_pixels(CameraPath path, float distance)
 int taps_of(CameraPath path, float distance)
 {
     float pixels = sweep_pixels(path, distance);
-    return clamp(int(min(ceil(pixels * p.taps_per_pixel), float(p.max_taps)) * sqrt(min(path.share, 1.0)) + 0.99), pixels > MIN_SWEEP ? 2 : 1, int(p.max_taps));
+    return clamp(int(min(ceil(pixels * p.taps_per_pixel), float(p.max_taps)) * sqrt(min(path.branch_weight, 1.0)) + 0.99), pixels > MIN_SWEEP ? 2 : 1, int(p.max_taps));
 }
 #endif
 
@@ -54,13 +54,13 @@ vec3 sky_colour(vec3 direction, vec3 ddirection[3])
 }
 
 #ifdef LAYER_BEAUTY
-void add_sky(CameraPath path, Stretch stretch, vec3 direction, vec3 sweep)
+void add_sky(CameraPath path, WavelengthInterval interval, vec3 direction, vec3 sweep)
 {
     vec3 columns[3];
     columns[0] = sample_side(path) * path.ddirection[0];
     columns[1] = sample_side(path) * path.ddirection[1];
     columns[2] = sweep;
-    add_colour(path, stretch, uint(WHITE_ROW), sky_colour(direction, columns));
+    add_colour(path, interval, uint(WHITE_ROW), sky_colour(direction, columns));
 }
 
 #ifdef VISIBLE_LIGHTS
@@ -76,7 +76,7 @@ void add_lights(CameraPath path, float far)
     vec2 width = sample_width(path), sweep = vec2(0.0);
     int taps = 1;
 #ifdef SPECTRAL_SWEEP
-    if (path.narrowed) {
+    if (path.restricted) {
         vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1], d_hi = path.end_direction[1];
         sweep = vec2(distance(p_lo, p_hi), distance(d_lo, d_hi));
         taps = taps_of(path, far);
@@ -98,10 +98,10 @@ void add_lights(CameraPath path, float far)
             ray_at(path, tap_border(path, brightness, float(tap) + 0.5, taps), position, direction);
         }
 #endif
-        Stretch stretch = stretch_of(path, lo, hi);
+        WavelengthInterval interval = wavelength_interval(path, lo, hi);
         for (uint i = 0u; i < uint(LIGHT_COUNT); ++i) {
             float seen = lights[i].measure > 0.0 ? light_seen(lights[i], position, direction, far, width + sweep * part) : 0.0;
-            WHEN(seen > 0.0) add_spectrum(path, stretch, uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), seen);
+            WHEN(seen > 0.0) add_spectrum(path, interval, uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT), seen);
         }
     }
 }
@@ -111,7 +111,7 @@ void add_lights(CameraPath path, float far)
 
 #ifdef SPECTRAL_SWEEP
 // Where the rays of a band arrive on one facet: a parabola with the columns' slope, through both ends.
-struct Trace {
+struct ArrivalCurve {
     vec3 middle;
     vec3 columns[SPECTRAL_GROUPS];
     float anchors[SPECTRAL_GROUPS];  // of the groups' variables, at the middle
@@ -125,43 +125,43 @@ vec3 arrival(vec3 position, vec3 direction, Hit hit, vec3 middle)
     return position + dot(hit.normal_g, middle - position) / dot(hit.normal_g, direction) * direction;
 }
 
-Trace trace_of(CameraPath path, Hit hit)
+ArrivalCurve arrival_curve(CameraPath path, Hit hit)
 {
-    Trace trace;
-    trace.middle = path.position + hit.distance * path.direction;
-    trace.lo = arrival(path.end_position[0], path.end_direction[0], hit, trace.middle);
-    trace.hi = arrival(path.end_position[1], path.end_direction[1], hit, trace.middle);
-    trace.bends[0] = trace.lo - trace.middle;
-    trace.bends[1] = trace.hi - trace.middle;
+    ArrivalCurve curve;
+    curve.middle = path.position + hit.distance * path.direction;
+    curve.lo = arrival(path.end_position[0], path.end_direction[0], hit, curve.middle);
+    curve.hi = arrival(path.end_position[1], path.end_direction[1], hit, curve.middle);
+    curve.bends[0] = curve.lo - curve.middle;
+    curve.bends[1] = curve.hi - curve.middle;
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-        trace.columns[g] = transfer_column(path.dposition[SPATIAL + g], path.ddirection[SPATIAL + g], path.direction, hit.normal_g, hit.distance);
-        trace.anchors[g] = spectral_row(uint(VARIABLE_ROW) + g, path.band.y);
-        trace.bends[0] -= path.end_step[g].x * trace.columns[g];
-        trace.bends[1] -= path.end_step[g].y * trace.columns[g];
+        curve.columns[g] = transfer_column(path.dposition[SPATIAL + g], path.ddirection[SPATIAL + g], path.direction, hit.normal_g, hit.distance);
+        curve.anchors[g] = spectral_row(uint(VARIABLE_ROW) + g, path.band.y);
+        curve.bends[0] -= path.end_step[g].x * curve.columns[g];
+        curve.bends[1] -= path.end_step[g].y * curve.columns[g];
     }
-    return trace;
+    return curve;
 }
 
-vec3 arrival_at(CameraPath path, Trace trace, float x)
+vec3 arrival_at(CameraPath path, ArrivalCurve curve, float x)
 {
     bool below = x < path.band.y;
     float reach = (x - path.band.y) / max(abs((below ? path.band.x : path.band.z) - path.band.y), 1e-9);
-    vec3 at = trace.middle + reach * reach * (below ? trace.bends[0] : trace.bends[1]);
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) at += (spectral_row(uint(VARIABLE_ROW) + g, x) - trace.anchors[g]) * trace.columns[g];
+    vec3 at = curve.middle + reach * reach * (below ? curve.bends[0] : curve.bends[1]);
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) at += (spectral_row(uint(VARIABLE_ROW) + g, x) - curve.anchors[g]) * curve.columns[g];
     return at;
 }
 #endif
 
-// A path that has met nothing, or a diffuse surface. Without a sweep that is one look. Where all of a sweep ends on the facet that the path's own
-// wavelength met (`alike`), its looks are of that; else every look finds out for itself.
-void add_end(CameraPath path, bool met, Hit hit, bool alike, uint pixel_key)
+// A path that has met nothing, or a diffuse surface. Without a sweep that is one lookup. Where all of a sweep ends on the facet that the path's own
+// wavelength met (`same_hit`), its lookups are of that; else every lookup finds out for itself.
+void add_end(CameraPath path, bool met, Hit hit, bool same_hit, uint pixel_key)
 {
     int taps = 1;
 #ifdef SPECTRAL_SWEEP
-    if (path.narrowed) taps = taps_of(path, met ? hit.distance : FAR_DISTANCE);
+    if (path.restricted) taps = taps_of(path, met ? hit.distance : FAR_DISTANCE);
 #ifndef HAS_ENVIRONMENT_MAP
     // The same all round.
-    if (alike && !met) taps = 1;
+    if (same_hit && !met) taps = 1;
 #endif
     vec2 brightness = brightness_of(path.band);
     float per_x = 1.0 / (path.band.z - path.band.x), hi = path.band.x;
@@ -191,12 +191,12 @@ void add_end(CameraPath path, bool met, Hit hit, bool alike, uint pixel_key)
     }
     Steady steady = no_steady_lights();
 #ifdef SPECTRAL_SWEEP
-    Trace trace;
-    bool traced = taps > 1 && alike && met;
+    ArrivalCurve curve;
+    bool traced = taps > 1 && same_hit && met;
     WHEN(traced) {
-        trace = trace_of(path, hit);
+        curve = arrival_curve(path, hit);
 #ifdef LAYER_BEAUTY
-        steady = steady_lights(seen, trace.lo, trace.hi, pixel_key);
+        steady = steady_lights(seen, curve.lo, curve.hi, pixel_key);
 #endif
     }
 #endif
@@ -217,14 +217,14 @@ void add_end(CameraPath path, bool met, Hit hit, bool alike, uint pixel_key)
         }
 #ifdef HAS_RECEIVERS
         WHEN(traced) {
-            seen.position = arrival_at(path, trace, x);
-            seen.dposition[2] = part * (trace.hi - trace.lo);
+            seen.position = arrival_at(path, curve, x);
+            seen.dposition[2] = part * (curve.hi - curve.lo);
         }
 #endif
-        WHEN(taps > 1 && !(alike && met)) {
+        WHEN(taps > 1 && !(same_hit && met)) {
             ray_at(path, x, position, direction);
 #ifdef HAS_RECEIVERS
-            WHEN(!alike) {
+            WHEN(!same_hit) {
                 Hit found;
                 ends = intersect_closest(position, direction, FAR_DISTANCE, path.origin, found);
                 uint kind = ends ? object_at(found.object).kind : NONE;
@@ -248,25 +248,25 @@ void add_end(CameraPath path, bool met, Hit hit, bool alike, uint pixel_key)
 #endif
         }
 #endif
-        Stretch stretch = stretch_of(path, lo, hi);
+        WavelengthInterval interval = wavelength_interval(path, lo, hi);
 #ifdef HAS_RECEIVERS
         WHEN(ends && object_at(seen.object).kind == KIND_DIFFUSE) {
 #ifdef HAS_TEXTURES
             WHEN(texture != NONE) seen.reflectance = object_colours[seen.object].rgb * painted(paint, seen);
 #endif
-            add_caustic(path, seen, stretch);
+            add_caustic(path, seen, interval);
 #ifdef LAYER_BEAUTY
-            add_direct(path, seen, stretch, pixel_key, steady);
+            add_direct(path, seen, interval, pixel_key, steady);
 #endif
         }
 #endif
 #ifdef LAYER_BEAUTY
 #ifdef SPECTRAL_SWEEP
-        vec3 turn_of_look = part * (d_hi - d_lo);
+        vec3 direction_change = part * (d_hi - d_lo);
 #else
-        vec3 turn_of_look = vec3(0.0);
+        vec3 direction_change = vec3(0.0);
 #endif
-        WHEN(!ends) add_sky(path, stretch, direction, turn_of_look);
+        WHEN(!ends) add_sky(path, interval, direction, direction_change);
 #endif
     }
 }

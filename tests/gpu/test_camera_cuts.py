@@ -63,7 +63,7 @@ def test_parted_colours_go_their_own_ways(gl, edge: Scene, drawn, monkeypatch, t
     gets."""
     cut = error(picture(gl, edge, 32), drawn)
     mutate(
-        monkeypatch, tmp_path, "camera/cuts.glsl", "return parts && path.sound", "return false && parts && path.sound"
+        monkeypatch, tmp_path, "camera/cuts.glsl", "return parts && path.planar_so_far", "return false && parts && path.planar_so_far"
     )
     whole = error(picture(gl, edge, 32), drawn)
     assert cut < 1.2e-3 and whole > 1.5 * cut, (cut, whole)
@@ -80,9 +80,9 @@ def test_a_part_chosen_by_chance_stands_for_both(gl, edge: Scene, monkeypatch) -
 
 
 def test_a_part_that_is_lost_is_noticed(gl, edge: Scene, monkeypatch, tmp_path) -> None:
-    """Seeds and all else alike: what differs is the lost light."""
+    """Seeds and all else same_hit: what differs is the lost light."""
     right = picture(gl, edge, 32)
-    mutate(monkeypatch, tmp_path, "camera/cuts.glsl", "sets_aside = both;", "sets_aside = false;")
+    mutate(monkeypatch, tmp_path, "camera/cuts.glsl", "pushes_path = both;", "pushes_path = false;")
     lost = picture(gl, edge, 32)
     assert error(lost, right) > 2e-4 and lost.sum() < right.sum()
 

@@ -241,7 +241,7 @@ def test_where_total_reflection_sets_in(gl) -> None:
     n_at = medium.linear_row(TABLE[0], target)
     theta = as_f32(-np.sqrt(1.0 - 1.0 / n_at**2))  # total from n_at up, were the angle the same for all
     slope = as_f32(rng.uniform(-0.3, 0.3, COUNT))
-    bend = as_f32(1e-4 * rng.normal(size=(COUNT, 2)))
+    straight = as_f32(1e-4 * rng.normal(size=(COUNT, 2)))
     theta = as_f32(theta - slope * (n_at - medium.linear_row(TABLE[0], band[:, 1])))
 
     def passing(i: int, x: np.ndarray | float) -> np.ndarray:
@@ -249,7 +249,7 @@ def test_where_total_reflection_sets_in(gl) -> None:
         low = np.asarray(x) < band[i, 1]
         half = np.where(low, band[i, 1] - band[i, 0], band[i, 2] - band[i, 1])
         reach = (np.asarray(x) - band[i, 1]) / np.maximum(half, 1e-9)
-        cosine = theta[i] + slope[i] * (n - n_anchor) + reach**2 * np.where(low, bend[i, 0], bend[i, 1])
+        cosine = theta[i] + slope[i] * (n - n_anchor) + np.abs(reach) * np.where(low, straight[i, 0], straight[i, 1])
         return 1.0 - n**2 * (1.0 - cosine**2)
 
     passes = np.array([passing(i, band[i]) > 0 for i in range(COUNT)])
@@ -258,10 +258,10 @@ def test_where_total_reflection_sets_in(gl) -> None:
     float dtheta[SPECTRAL_GROUPS];
     dtheta[0] = slope;
     MediumInterface boundary = MediumInterface(0u, NONE, MediumStack(0u, NONE), true);
-    at = total_reflection_onset(band, theta, dtheta, bend, boundary, bvec3(passes.x > 0.5, passes.y > 0.5, passes.z > 0.5));
+    at = total_reflection_onset(band, theta, dtheta, straight, boundary, bvec3(passes.x > 0.5, passes.y > 0.5, passes.z > 0.5));
     step_ = variable_step(0u, band.x, band.z);
     """
-    inputs = {"band": band, "theta": theta, "slope": slope, "bend": bend, "passes": passes.astype(float)}
+    inputs = {"band": band, "theta": theta, "slope": slope, "straight": straight, "passes": passes.astype(float)}
     got = evaluated(gl, body, inputs, {"at": "float", "step_": "float"})
     steps = medium.linear_row(TABLE[0], band[:, 0]) - medium.linear_row(TABLE[0], band[:, 2])
     assert np.abs(got["step_"] - steps).max() < 4e-7

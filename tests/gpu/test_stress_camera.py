@@ -116,7 +116,7 @@ MUTANTS = {
     "branches put away and forgotten": (
         "eye-shells",
         "camera/camera.comp",
-        "aside = mirrored;\n        sets_aside = true;",
+        "pending_path = mirrored;\n        pushes_path = true;",
         "",
         "energy",
     ),
@@ -151,8 +151,8 @@ MUTANTS = {
     "bands that are not cut": (
         "eye-cut",
         "camera/camera.comp",
-        "bool may_cut = path.narrowed",
-        "bool may_cut = false && path.narrowed",
+        "bool may_cut = path.restricted",
+        "bool may_cut = false && path.restricted",
         "colour",
     ),
     "lamps as bright as they are where they only graze a sample": (
@@ -165,8 +165,8 @@ MUTANTS = {
     "light that is not linear": (
         "eye-sun",
         "camera/taps.glsl",
-        "add_colour(path, stretch, uint(WHITE_ROW), sky_colour(direction, columns));",
-        "add_colour(path, stretch, uint(WHITE_ROW), min(sky_colour(direction, columns), vec3(1e4)));",
+        "add_colour(path, interval, uint(WHITE_ROW), sky_colour(direction, columns));",
+        "add_colour(path, interval, uint(WHITE_ROW), min(sky_colour(direction, columns), vec3(1e4)));",
         "not linear",
     ),
 }
