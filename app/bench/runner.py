@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..gpu.context import Context
-from ..model.scene import Dielectric, Scene
+from ..model.scene import Scene
 from ..reference import metrics
 from ..reference.metrics import ReferencePicture
 from .claims import claims_of, ratios_of
@@ -51,7 +51,9 @@ def run_bench(
             progress((done + fraction) / len(scenes), f"{name}: {text}")
 
         try:
-            _SceneBench(context, name, scene, store, share, subject or SUBJECTS[store.result.settings.measured_pass]).run()
+            _SceneBench(
+                context, name, scene, store, share, subject or SUBJECTS[store.result.settings.measured_pass]
+            ).run()
         except NothingToMeasure as reason:
             if skipped is None:
                 raise
@@ -222,7 +224,7 @@ class _SceneBench:
 
 
 def _empty_result(name: str, scene: Scene, size: tuple[int, int], settings: BenchSettings) -> SceneResult:
-    glasses = [o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)]
+    glasses = [o.material.dispersion for o in scene.objects if o.material.transmits]
     strongest = min(
         (g for g in glasses if g.is_dispersive and np.isfinite(g.V_d)), key=lambda g: abs(g.V_d), default=None
     )

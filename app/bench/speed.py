@@ -22,6 +22,7 @@ from ..model.features import Features
 from ..model.geometry import primitives_round
 from ..model.geometry.bvh import build_bvh
 from ..model.geometry.primitives import plane
+from ..model.lights import PointLight
 from ..model.optics.catalogue import find
 from ..model.optics.glass import constant
 from ..model.optics.spectrum import illuminant
@@ -29,7 +30,6 @@ from ..model.scene import (
     Camera,
     Dielectric,
     Diffuse,
-    Light,
     Scene,
     SceneObject,
 )
@@ -68,7 +68,7 @@ def _ball(dispersive: bool) -> Scene:
     ball = primitives_round.sphere(1.0, triangles=TRIANGLES)
     lifted = np.eye(4)
     lifted[2, 3] = 2.0
-    light = Light("lamp", "point", illuminant("D65").scaled_to_luminous(100.0), position=(1.0, 0.5, 6.0))
+    light = PointLight("lamp", illuminant("D65").scaled_to_luminous(100.0), position=(1.0, 0.5, 6.0))
     objects = (SceneObject("ball", ball, Dielectric(glass), lifted), SceneObject("table", plane(10.0, 10.0), Diffuse()))
     return Scene("ball", Camera((0.0, -6.0, 4.0), (0.0, 0.0, 1.0)), (light,), objects)
 

@@ -18,7 +18,6 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..edit.state import Selection
-from ..model.scene import Dielectric
 from ..passes.sample_picture import SamplePicture
 from ..ui.headless import HeadlessInterface
 from ..ui.session import Session
@@ -86,7 +85,7 @@ class _Bench:
         self.session.companions.gallery.release()
         self.viewer = Viewer(self.session)
         objects = self.session.state.scene.objects
-        glass = next((i for i, o in enumerate(objects) if isinstance(o.material, Dielectric)), None)
+        glass = next((i for i, o in enumerate(objects) if o.material.transmits), None)
         if glass is None:
             raise UserError(f"{scene}: nothing in it is glass, so there is no dispersion to drag")
         self._glass = glass
@@ -196,7 +195,6 @@ class _Bench:
 
         state = self.session.state
         material = state.scene.objects[self._glass].material
-        assert isinstance(material, Dielectric)
         gain = material.dispersion.gain
         self.session.state = replace(
             state, scene=edits.set_dispersion_gain(state.scene, self._glass, min(gain * 1.07, 10.0))

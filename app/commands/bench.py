@@ -143,15 +143,10 @@ def parse_methods(text: str, known: Sequence[str] = METHODS) -> tuple[str, ...]:
 def load_scenes(names: Sequence[str]) -> dict[str, Scene]:
     """The scenes asked for by their files' stems, or every shipped one that holds glass."""
     from ..model.io.scene_file import load_scene
-    from ..model.scene import Dielectric
 
     if not names:
         shipped = {name: load_scene(path) for name, path in shipped_scenes().items()}
-        return {
-            name: scene
-            for name, scene in shipped.items()
-            if any(isinstance(o.material, Dielectric) for o in scene.objects)
-        }
+        return {name: scene for name, scene in shipped.items() if any(o.material.transmits for o in scene.objects)}
     files = [options.find_scene(name) for name in names]
     scenes: dict[str, Scene] = {}
     for name, file in zip(names, files, strict=True):

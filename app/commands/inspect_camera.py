@@ -10,7 +10,7 @@ from ..bench.features.static_costs import picture_bytes, size_words
 from ..gpu.map_channels import tents
 from ..gpu.mip_chain import level_count
 from ..model.features import Features
-from ..model.scene import Diffuse, Scene
+from ..model.scene import Scene
 from ..model.texture import Environment, Texture
 from ..render.light_pass import spectral_axis
 
@@ -45,7 +45,7 @@ def _beyond(scene: Scene) -> Lookup:
 def _pictures(scene: Scene) -> list[Lookup]:
     worn: dict[int, tuple[Texture, list[str]]] = {}
     for item in scene.objects:
-        texture = item.material.texture if isinstance(item.material, Diffuse) else None
+        texture = item.material.texture
         if texture is not None:
             worn.setdefault(id(texture.rgb), (texture, []))[1].append(item.name)
     if not worn:
@@ -62,7 +62,7 @@ def _pictures(scene: Scene) -> list[Lookup]:
 
 
 def _maps(scene: Scene, features: Features) -> Lookup:
-    if not scene.lights or not any(isinstance(o.material, Diffuse) for o in scene.objects):
+    if not scene.lights or not any(o.material.receives for o in scene.objects):
         why = "there is no light" if not scene.lights else "nothing diffuse receives light"
         return Lookup("caustic maps", "none", why, "")
     if not features.map_tents:

@@ -11,12 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..model.scene import (
-    Black,
     Camera,
-    Dielectric,
-    Diffuse,
     Light,
-    Material,
     Scene,
     SceneObject,
 )
@@ -27,15 +23,6 @@ if TYPE_CHECKING:
 
     from ..model.features import Features
     from ..model.optics.glass import Dispersion
-
-_QUANTITY = {
-    # kind: (photometric unit, radiometric unit) of Light.spectral_power; areas are in scene units
-    "point": ("cd", "W/sr"),
-    "spot": ("cd", "W/sr"),
-    "directional": ("lm/unit²", "W/unit²"),
-    "collimated": ("lm/unit²", "W/unit²"),
-    "area": ("cd/unit²", "W/(sr unit²)"),
-}
 
 
 def inspect_text(scene: Scene) -> RenderableType:
@@ -48,7 +35,7 @@ def inspect_text(scene: Scene) -> RenderableType:
         _lights_table(scene.lights),
         camera_line(scene),
     ]
-    glasses = list(dict.fromkeys(o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)))
+    glasses = list(dict.fromkeys(o.material.dispersion for o in scene.objects if o.material.transmits))
     if glasses:
         parts.insert(2, _glasses_table(glasses))
     parts += _compiled(scene)
@@ -72,9 +59,7 @@ def camera_line(scene: Scene) -> str:
 
 def light_flux(light: Light) -> tuple[float, float] | None:
     """(lumen, watt) a light sends out in all; None for a directional one, which has no end."""
-    from ..model.scene_lights import flux_factor
-
-    factor = flux_factor(light)
+    factor = light.flux_factor
     if math.isinf(factor):
         return None
     return light.spectral_power.luminous() * factor, light.spectral_power.power_w() * factor
@@ -114,7 +99,7 @@ def _objects_table(objects: tuple[SceneObject, ...]) -> Table:
             item.name,
             f"{len(mesh.triangles):,}",
             _box(*_bounds((item,))),
-            describe_material(item.material),
+            item.material.words(),
             "flat" if mesh.corner_normals is None else "smooth",
             health[id(mesh)],
         )
@@ -157,12 +142,12 @@ def _lights_table(lights: tuple[Light, ...]) -> Table:
         ("in all", False),
     )
     for light in lights:
-        lumen, watt = _QUANTITY[light.kind]
+        lumen, watt = (key.unit for key in light.own_keys)
         flux = light_flux(light)
         power = light.spectral_power
         table.add_row(
             light.name,
-            _light_kind(light),
+            light.words(),
             spectrum_words(light),
             f"{power.luminous():.5g} {lumen}",
             f"{power.power_w():.5g} {watt}",
@@ -205,26 +190,9 @@ def _gain_words(glass: Dispersion) -> str:
 # -- words --------------------------------------------------------------------------------
 
 
-def describe_material(material: Material) -> str:
-    """A material in a few words."""
-    if isinstance(material, Dielectric):
-        words = material.dispersion.name or f"glass of n_d {material.dispersion.n_d:.4f}"
-        words += _gain_words(material.dispersion)
-        words += ", absorbing" if material.absorption is not None else ""
-        return words + (f", priority {material.priority}" if material.priority else "")
-    if isinstance(material, Diffuse):
-        if material.reflectance is not None:
-            return "diffuse, spectral reflectance"
-        picture = "" if material.texture is None else ", wears a picture"
-        return f"diffuse {_colour(material.reflectance_rgb)}{picture}"
-    if isinstance(material, Black):
-        return "black"
-    return f"mirror {_colour(material.reflectance_rgb)}"
-
-
 def spectrum_words(light: Light) -> str:
     """A light's spectrum in a few words."""
-    from ..model.scene_describe import describe_spectrum
+    from ..model.spectrum_file import describe_spectrum
 
     said = describe_spectrum(light.spectral_power)
     if isinstance(said, str):
@@ -240,20 +208,6 @@ def spectrum_words(light: Light) -> str:
     return f"table {math.ceil(low)}–{math.floor(high)} nm" + (f" and {len(lines)} line(s)" if lines else "")
 
 
-def _light_kind(light: Light) -> str:
-    if light.kind == "spot":
-        inner, outer = light.inner_half_angle_deg, light.outer_half_angle_deg
-        edge = "hard edge" if inner == outer else f"soft from {inner:.4g}°"
-        return f"spot, half angle {outer:.4g}°, {edge}"
-    if light.kind == "directional":
-        return f"directional, {light.angular_diameter_deg:.4g}° wide"
-    if light.kind == "point":
-        return "point"
-    if light.shape == "disc":
-        return f"{light.kind} disc, radius {light.radius:.4g}"
-    return f"{light.kind} rectangle, {light.width:.4g} × {light.height:.4g}"
-
-
 def _bounds(objects: tuple[SceneObject, ...]) -> tuple[np.ndarray, np.ndarray]:
     from ..model.scene_defaults import bounds_of
 
@@ -267,7 +221,3 @@ def _box(low: np.ndarray, high: np.ndarray) -> str:
 
 def _point(point: tuple[float, float, float] | np.ndarray) -> str:
     return "(" + ", ".join(f"{v + 0.0:.4g}" for v in point) + ")"
-
-
-def _colour(rgb: tuple[float, float, float]) -> str:
-    return f"{rgb[0]:.3g}" if len(set(rgb)) == 1 else "(" + ", ".join(f"{c:.3g}" for c in rgb) + ")"

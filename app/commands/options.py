@@ -13,7 +13,7 @@ from pathlib import Path
 from ..base.errors import UserError, nearest_names, suggestion
 from ..base.memory import MAX_SIDE_PX, memory_bytes
 from ..base.paths import SCENE_SUFFIXES, shipped_scenes
-from ..model.scene import Diffuse, Scene
+from ..model.scene import Scene
 from ..model.settings import CAMERA_METHODS, METHODS
 
 MAX_PHOTONS = 10**12
@@ -135,7 +135,7 @@ def check_layer(text: str, scene: Scene) -> str:
 
 def receivers_of(scene: Scene) -> list[str]:
     """Names of the diffuse objects, in the scene's order."""
-    return list(dict.fromkeys(item.name for item in scene.objects if isinstance(item.material, Diffuse)))
+    return list(dict.fromkeys(item.name for item in scene.objects if item.material.receives))
 
 
 def find_scene(text: str) -> Path:

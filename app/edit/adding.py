@@ -8,11 +8,11 @@ import numpy as np
 
 from ..base.errors import UserError, suggestion
 from ..model.features import world_bounds
+from ..model.materials.dielectric import DEFAULT_GLASS
 from ..model.optics import catalogue
 from ..model.scene import Dielectric, Diffuse, Material, Scene, SceneObject
 from ..model.scene_checks import check_scene
 from ..model.scene_defaults import bounds_of, environment_of
-from ..model.scene_materials import DEFAULT_GLASS
 from ..model.scene_objects import make_shape
 from .names import free_name
 
@@ -71,8 +71,8 @@ def beside(scene: Scene, item: SceneObject) -> SceneObject:
     """`item` moved sideways to the first place where it overlaps no other object and holds no light."""
     low, high = world_bounds(item)
     sideways, forward, _ = up_frame(scene).T
-    solid = [world_bounds(o) for o in scene.objects if not isinstance(o.material, Diffuse)]
-    lights = [np.array(light.position) for light in scene.lights if light.kind != "directional"]
+    solid = [world_bounds(o) for o in scene.objects if not o.material.receives]
+    lights = [np.array(light.position) for light in scene.lights if light.has_place]
     step = 1.1 * np.abs(high - low)
     for ring in range(64):
         for direction in (sideways, -sideways, forward, -forward):
@@ -90,7 +90,7 @@ def _standing(scene: Scene, item: SceneObject, below: bool) -> SceneObject:
     around = environment_of(scene.objects)
     floor = min(
         float(corner @ up)
-        for corner in bounds_of([o for o in scene.objects if not isinstance(o.material, Diffuse)] or scene.objects)
+        for corner in bounds_of([o for o in scene.objects if not o.material.receives] or scene.objects)
     )
     lowest = float((item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]).dot(up).min())
     # As for the default table: two surfaces must not coincide.

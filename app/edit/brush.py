@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..model.local_dispersion import plane_of
-from ..model.scene import Dab, Diffuse, Scene, SceneObject, Vec3
+from ..model.scene import Dab, Scene, SceneObject, Vec3
 from .state import Brush
 
 SPACING = 0.25
@@ -60,7 +60,7 @@ def resized(brush: Brush, steps: float, visible_height: float) -> Brush:
 
 def can_paint(scene: Scene, object_index: int | None) -> bool:
     """Whether dabs may lie on an object: only receivers take them."""
-    return object_index is not None and isinstance(scene.objects[object_index].material, Diffuse)
+    return object_index is not None and scene.objects[object_index].material.receives
 
 
 def begin(scene: Scene, object_index: int, brush: Brush, position: Vec3) -> Stroke:

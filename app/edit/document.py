@@ -92,7 +92,7 @@ class Document:
             save_gltf(scene, target, self._readable_original())
             self._original = target
         else:
-            save_scene(scene, target)
+            save_scene(scene, target, over=True)
         self.path = self.source = target
         self.history.mark_saved(scene)
         return target

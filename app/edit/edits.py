@@ -27,7 +27,6 @@ from .glass import (
     set_priority,
 )
 from .lights import (
-    POWER_UNITS,
     add_light,
     delete_light,
     duplicate_light,
@@ -59,7 +58,6 @@ from .requests import Notice
 from .state import State
 
 __all__ = [
-    "POWER_UNITS",
     "RECEIVERS",
     "SHAPES",
     "abbe_numbers",

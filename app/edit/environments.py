@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 
@@ -170,7 +170,7 @@ def clear_texture(scene: Scene, index: int) -> Scene:
 def _without_environment(scene: Scene) -> Scene:
     if not scene.lights:
         raise UserError("the environment is the scene's only light; add a light before taking it away")
-    if not any(isinstance(o.material, Diffuse) for o in scene.objects):
+    if not any(o.material.receives for o in scene.objects):
         raise UserError(
             "nothing in the scene receives light, so the environment is all there is to see; add a diffuse object "
             "before taking it away"
@@ -191,9 +191,9 @@ def _vectors(parameters: dict[str, Any]) -> dict[str, Any]:
 
 def _diffuse(scene: Scene, index: int) -> Diffuse:
     material = scene.objects[index].material
-    if not isinstance(material, Diffuse):
+    if not material.receives:
         raise UserError(f"'{scene.objects[index].name}' is not diffuse and wears no picture; make it diffuse first")
-    return material
+    return cast(Diffuse, material)
 
 
 def _with_material(scene: Scene, index: int, material: Diffuse) -> Scene:
@@ -205,9 +205,9 @@ def _worn_already(scene: Scene, path: Path, wrap: str) -> Texture | None:
     """The same picture on another object: one on the device serves both."""
     source = str(path.resolve())
     for item in scene.objects:
-        texture = item.material.texture if isinstance(item.material, Diffuse) else None
+        texture = item.material.texture
         if texture is not None and texture.source == source:
-            return texture if texture.wrap == wrap else replace(texture, wrap=wrap)  # type: ignore[arg-type]
+            return texture if texture.wrap == wrap else replace(texture, wrap=wrap)
     return None
 
 
@@ -230,24 +230,14 @@ def _mean_luminance(environment: Environment) -> float:
 
 def _illuminance(light: Light, scene: Scene) -> float:
     """About what the light gives to a surface turned to it in the scene's middle, lm/unit²."""
-    power = light.spectral_power.luminous()
-    if light.kind in ("directional", "collimated"):
-        return power
     around = environment_of(scene.objects)
     distance2 = float(np.sum((around.centre - np.array(light.position)) ** 2)) + around.radius**2
-    area = (
-        1.0
-        if light.kind != "area"
-        else math.pi * light.radius**2
-        if light.shape == "disc"
-        else light.width * light.height
-    )
-    return power * area / distance2
+    return light.spectral_power.luminous() / light.reach(math.sqrt(distance2))
 
 
 def _sun_of(scene: Scene) -> dict[str, Any]:
     """Where the scene's first directional light comes from, for a sky that fits it."""
-    sun = next((light for light in scene.lights if light.kind == "directional"), None)
+    sun = next((light for light in scene.lights if not light.has_place), None)
     if sun is None:
         return {}
     x, y, z = -np.asarray(sun.direction, float) / np.linalg.norm(sun.direction)

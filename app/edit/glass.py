@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
 from ..base.errors import UserError
+from ..model.materials.absorption import MAX_ATTENUATION
+from ..model.materials.dielectric import MAX_PRIORITY
 from ..model.optics import glass
 from ..model.optics.colorimetry import attenuation_from_colour
 from ..model.optics.glass import Dispersion
 from ..model.scene import Absorption, Dielectric, Scene, Vec3
 from ..model.scene_checks import check_lines
-from ..model.scene_materials import MAX_ATTENUATION, MAX_PRIORITY
 
 
 def set_dispersion(scene: Scene, index: int, dispersion: Dispersion) -> Scene:
@@ -110,9 +112,9 @@ def set_priority(scene: Scene, index: int, priority: int) -> Scene:
 
 def _glass(scene: Scene, index: int) -> Dielectric:
     material = scene.objects[index].material
-    if not isinstance(material, Dielectric):
+    if not material.transmits:
         raise UserError(f"'{scene.objects[index].name}' is not made of glass; give it a glass first")
-    return material
+    return cast(Dielectric, material)
 
 
 def _with_glass(scene: Scene, index: int, material: Dielectric) -> Scene:

@@ -6,44 +6,25 @@ import math
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from ..base.errors import UserError
+from ..model.lights import LIGHT_KINDS
+from ..model.lights.light import DEFAULT_ILLUMINANCE, PowerKey, made
 from ..model.optics import spectrum as spectra
 from ..model.optics.spectrum import Spectrum
-from ..model.scene import Dielectric, Light, Scene, Vec3
+from ..model.placement import default_direction
+from ..model.scene import Light, Scene, Vec3
 from ..model.scene_checks import check_lines, check_outside
 from ..model.scene_defaults import environment_of
-from ..model.scene_describe import describe_spectrum
-from ..model.scene_lights import (
-    DEFAULT_ILLUMINANCE,
-    FLUX,
-    KINDS,
-    PHOTOMETRIC,
-    POWER_KEYS,
-    default_direction,
-    flux_factor,
-)
+from ..model.spectrum_file import describe_spectrum
 from .adding import up_frame
 from .names import checked_name, free_name
 from .objects import MAX_LENGTH
 
-LightKind = Literal["point", "spot", "directional", "collimated", "area"]
 SpectrumKind = Literal["illuminant", "blackbody", "laser", "lines", "csv", "table"]
-
-POWER_UNITS = {
-    "intensity_cd": "cd",
-    "intensity_w_sr": "W/sr",
-    "flux_lm": "lm",
-    "flux_w": "W",
-    "illuminance_lx": "lm/unit²",
-    "irradiance_w_m2": "W/unit²",
-    "luminance_nt": "cd/unit²",
-    "radiance_w_sr_m2": "W/(sr unit²)",
-}
-"""Unit of each power key of a scene file; areas count in scene units."""
 
 _DARK = 1e-9
 """Least power, in any unit: at none at all a light would forget its colour."""
@@ -56,25 +37,37 @@ def set_light(scene: Scene, index: int, light: Light) -> Scene:
     """
     others = [other.name for i, other in enumerate(scene.lights) if i != index]
     name = checked_name(light.name, others, "light")
-    light = replace(light, name=name, direction=_unit(light, "direction", light.direction))
+    light = replace(light, name=name)
+    if light.has_direction:
+        light = light.changed(direction=_unit(light, "direction", light.direction))
     if light.tangent is not None:
-        light = replace(light, tangent=_unit(light, "tangent", light.tangent))
-    _check_values(light)
+        light = light.changed(tangent=_unit(light, "tangent", light.tangent))
+    light.check()
     _check_against_glass(scene, light, scene.lights[index] if index < len(scene.lights) else None)
     return replace(scene, lights=(*scene.lights[:index], light, *scene.lights[index + 1 :]))
 
 
-def add_light(scene: Scene, kind: LightKind = "directional") -> Scene:
+def add_light(scene: Scene, kind: str = "directional") -> Scene:
     """With a white light at the end, aimed at the objects and as bright there as a scene file's default."""
-    if kind not in KINDS:
-        raise UserError(f"there is no light of kind '{kind}'; known are {', '.join(KINDS)}")
-    around = environment_of(scene.objects)
-    x, y, z = (float(v) for v in up_frame(scene) @ default_direction())
-    position = _vec3(around.centre - 6.0 * around.radius * np.array((x, y, z)))
+    cls = _class_of(kind)
     name = free_name(f"{kind} light", [light.name for light in scene.lights])
-    light = Light(name, kind, spectra.illuminant("D65"), position, (x, y, z), radius=0.5 * around.radius)
-    light = replace(light, width=around.radius, height=around.radius)
+    direction = _vec3(up_frame(scene) @ default_direction())
+    given = {"name": name, "spectral_power": spectra.illuminant("D65"), "direction": direction}
+    light = made(cls, _usual(scene, np.array(direction)) | given)
     return set_light(scene, len(scene.lights), _lighting(scene, light, DEFAULT_ILLUMINANCE))
+
+
+def _class_of(kind: str) -> type[Light]:
+    if kind not in LIGHT_KINDS:
+        raise UserError(f"there is no light of kind '{kind}'; known are {', '.join(LIGHT_KINDS)}")
+    return LIGHT_KINDS[kind]
+
+
+def _usual(scene: Scene, direction: np.ndarray) -> dict[str, Any]:
+    """Place and size that suit the scene's objects, for a light that shines along `direction`."""
+    around = environment_of(scene.objects)
+    position = _vec3(around.centre - 6.0 * around.radius * direction)
+    return {"position": position, "radius": 0.5 * around.radius, "width": around.radius, "height": around.radius}
 
 
 def duplicate_light(scene: Scene, index: int) -> Scene:
@@ -82,12 +75,12 @@ def duplicate_light(scene: Scene, index: int) -> Scene:
     light = scene.lights[index]
     frame = up_frame(scene)
     copy = replace(light, name=free_name(light.name, [other.name for other in scene.lights]))
-    if light.kind == "directional":
+    if not light.has_place:
         turn = math.radians(15.0)
         about_up = np.array([(math.cos(turn), -math.sin(turn), 0), (math.sin(turn), math.cos(turn), 0), (0, 0, 1)])
-        copy = replace(copy, direction=_vec3(frame @ about_up @ frame.T @ light.direction))
+        copy = copy.changed(direction=_vec3(frame @ about_up @ frame.T @ light.direction))
     else:
-        copy = replace(copy, position=_vec3(light.position + 0.5 * environment_of(scene.objects).radius * frame[:, 0]))
+        copy = copy.changed(position=_vec3(light.position + 0.5 * environment_of(scene.objects).radius * frame[:, 0]))
     return set_light(scene, len(scene.lights), copy)
 
 
@@ -105,22 +98,18 @@ def rename_light(scene: Scene, index: int, name: str) -> Scene:
     return set_light(scene, index, replace(scene.lights[index], name=name))
 
 
-def set_light_kind(scene: Scene, index: int, kind: LightKind) -> Scene:
+def set_light_kind(scene: Scene, index: int, kind: str) -> Scene:
     """Make light `index` of another kind that aims at the same place and lights it as brightly."""
     light = scene.lights[index]
-    if kind not in KINDS:
-        raise UserError(f"there is no light of kind '{kind}'; known are {', '.join(KINDS)}")
+    cls = _class_of(kind)
     around = environment_of(scene.objects)
-    illuminance = _illuminance(scene, light)
-    changed = replace(light, kind=kind)
-    if light.kind == "directional":
-        changed = replace(changed, position=_vec3(around.centre - 6.0 * around.radius * np.array(light.direction)))
-    if light.kind == "point":
+    direction = light.direction
+    if not light.has_direction:
         toward = around.centre - light.position
         if np.linalg.norm(toward) > 1e-9 * around.radius:
-            changed = replace(changed, direction=_vec3(toward))
-    changed = replace(changed, direction=_unit(changed, "direction", changed.direction))
-    return set_light(scene, index, _lighting(scene, changed, illuminance))
+            direction = _unit(light, "direction", _vec3(toward))
+    changed = made(cls, _usual(scene, np.array(direction)) | {"direction": direction} | light.given())
+    return set_light(scene, index, _lighting(scene, changed, _illuminance(scene, light)))
 
 
 # -- power ----------------------------------------------------------------------------------
@@ -128,32 +117,26 @@ def set_light_kind(scene: Scene, index: int, kind: LightKind) -> Scene:
 
 def photometric_key(light: Light) -> str:
     """The power key that a light of this kind is usually given in: cd, lm/unit² or cd/unit²."""
-    return next(iter(POWER_KEYS[light.kind]))
+    return light.power_keys[0].key
 
 
 def light_power(light: Light, key: str | None = None) -> float:
-    """Power of a light as the scene-file key `key` states it (its own photometric one if None; see `POWER_UNITS`)."""
-    measure, quantity = _power_key(light, key)
-    spectrum = light.spectral_power
-    value = spectrum.luminous() if measure == PHOTOMETRIC else spectrum.power_w()
-    return value * flux_factor(light) if quantity == FLUX else value
+    """Power of a light as the scene-file key `key` states it (its own photometric one if None)"""
+    return light.power(_power_key(light, key))
 
 
 def set_light_power(scene: Scene, index: int, value: float, key: str | None = None) -> Scene:
     """Give light `index` a power, in the unit of `key` (None: its photometric one). 0 is kept as a spark of 1e-9."""
     light = scene.lights[index]
-    measure, quantity = _power_key(light, key)
+    found = _power_key(light, key)
     if not (math.isfinite(value) and 0.0 <= value <= MAX_LENGTH):
         raise UserError(f"light '{light.name}': its power is {value:g}; give a number of 0 or more")
-    own = max(value, _DARK) / (flux_factor(light) if quantity == FLUX else 1.0)
-    power = light.spectral_power
-    return _with_power(
-        scene, index, power.scaled_to_luminous(own) if measure == PHOTOMETRIC else power.scaled_to_power(own)
-    )
+    return _with_power(scene, index, light.with_power(found, max(value, _DARK)).spectral_power)
 
 
-def _power_key(light: Light, key: str | None) -> tuple[str, str]:
-    keys = POWER_KEYS[light.kind]
+def _power_key(light: Light, key: str | None) -> PowerKey:
+    """The quantity called `key` (None: the light's usual one). Raises UserError where the light has none such."""
+    keys = {each.key: each for each in light.power_keys}
     if key is not None and key not in keys:
         raise UserError(f"light '{light.name}' is {light.kind} and has no {key}; its power is one of {', '.join(keys)}")
     return keys[key or photometric_key(light)]
@@ -229,10 +212,7 @@ def _with_power(scene: Scene, index: int, spectrum: Spectrum) -> Scene:
 def _reach(scene: Scene, light: Light) -> float:
     """Luminous quantity of the light over the illuminance it gives the objects' middle, on a plane across it."""
     around = environment_of(scene.objects)
-    distance = max(float(np.linalg.norm(around.centre - light.position)), 1e-3 * around.radius)
-    if light.kind in ("directional", "collimated"):
-        return 1.0
-    return distance**2 if light.kind != "area" else distance**2 * math.pi / flux_factor(light)
+    return light.reach(max(float(np.linalg.norm(around.centre - light.position)), 1e-3 * around.radius))
 
 
 def _illuminance(scene: Scene, light: Light) -> float:
@@ -245,25 +225,11 @@ def _lighting(scene: Scene, light: Light, illuminance: float) -> Light:
 
 
 def _check_against_glass(scene: Scene, light: Light, before: Light | None) -> None:
-    glasses = [o for o in scene.objects if isinstance(o.material, Dielectric)]
-    if light.kind != "directional":
+    glasses = [o for o in scene.objects if o.material.transmits]
+    if light.has_place:
         check_outside(light, glasses, scene.name)
     if before is None or before.spectral_power is not light.spectral_power:
         check_lines(light, glasses, scene.name)
-
-
-def _check_values(light: Light) -> None:
-    numbers = (*light.position, light.radius, light.width, light.height)
-    if not all(math.isfinite(v) and abs(v) <= MAX_LENGTH for v in numbers):
-        raise UserError(f"light '{light.name}': its place or size is not finite or too large; choose another")
-    if min(light.radius, light.width, light.height) <= 0.0:
-        raise UserError(f"light '{light.name}': its size must be above 0")
-    if not 0.0 <= light.inner_half_angle_deg <= light.outer_half_angle_deg <= 90.0 or light.outer_half_angle_deg == 0.0:
-        raise UserError(
-            f"light '{light.name}': its half angles must lie above 0 and up to 90°, the inner one within the outer"
-        )
-    if not 0.0 <= light.angular_diameter_deg <= 90.0:
-        raise UserError(f"light '{light.name}': its angular diameter must lie between 0 and 90°")
 
 
 def _unit(light: Light, what: str, vector: Vec3) -> Vec3:

@@ -16,7 +16,6 @@ import numpy as np
 from ..base.errors import UserError
 from ..model.scene import (
     Dab,
-    Dielectric,
     Diffuse,
     Material,
     Mirror,
@@ -45,7 +44,7 @@ def with_object(scene: Scene, index: int, item: SceneObject) -> Scene:
         check_scene(changed, scene.name)
     elif item.local_dispersion is not before.local_dispersion:
         _check_dabs(item, item.local_dispersion[_shared(before, item) :])
-    if item.material is not before.material and isinstance(item.material, Dielectric):
+    if item.material is not before.material and item.material.transmits:
         for light in scene.lights:
             check_lines(light, [item], scene.name)
     if item.object_to_world is not before.object_to_world:
@@ -88,7 +87,7 @@ def delete(scene: Scene, index: int) -> Scene:
 def set_material(scene: Scene, index: int, material: Material) -> Scene:
     """Give object `index` another material; what the dispersion brush painted goes with a diffuse one."""
     item = scene.objects[index]
-    dabs = item.local_dispersion if isinstance(material, Diffuse) else ()
+    dabs = item.local_dispersion if material.receives else ()
     changed = _replaced(scene, index, replace(item, material=material, local_dispersion=dabs))
     if _shows_nothing(changed):
         raise UserError(
@@ -181,7 +180,7 @@ def _free_name(scene: Scene, index: int, name: str) -> str:
 
 def _shows_nothing(scene: Scene) -> bool:
     """Nothing receives light, and there is no environment to be seen (as `check_scene` has it)."""
-    return scene.environment is None and not any(isinstance(o.material, Diffuse) for o in scene.objects)
+    return scene.environment is None and not any(o.material.receives for o in scene.objects)
 
 
 def _replaced(scene: Scene, index: int, item: SceneObject) -> Scene:
@@ -206,9 +205,9 @@ def _check_matrix(item: SceneObject) -> None:
 
 
 def _check_lights(scene: Scene, item: SceneObject) -> None:
-    if isinstance(item.material, Dielectric):
+    if item.material.transmits:
         for light in scene.lights:
-            if light.kind != "directional":
+            if light.has_place:
                 check_outside(light, [item], scene.name)
 
 
@@ -224,7 +223,7 @@ def _shared(before: SceneObject, after: SceneObject) -> int:
 
 def _check_dabs(item: SceneObject, dabs: Sequence[Dab] | None = None) -> None:
     """Raise UserError where dabs (all the object's, if not given) are not what a scene file could hold."""
-    if item.local_dispersion and not isinstance(item.material, Diffuse):
+    if item.local_dispersion and not item.material.receives:
         raise UserError(f"'{item.name}' is not diffuse: the dispersion brush paints on what receives the caustic")
     for dab in item.local_dispersion if dabs is None else dabs:
         if not all(map(math.isfinite, (*dab.position, dab.radius, dab.log2_gain, dab.falloff, dab.erase))):

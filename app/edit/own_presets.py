@@ -16,13 +16,13 @@ import numpy as np
 
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
-from ..model.io.scene_save import camera_values, light_values, toml_block, toml_key
 from ..model.io.scene_table import SceneTable
+from ..model.io.toml_text import toml_text
+from ..model.lights.light_file import light_values, read_light
+from ..model.materials.material_file import read_material
+from ..model.placement import Surroundings
 from ..model.scene import Camera, Light, Material
-from ..model.scene_camera import read_camera
-from ..model.scene_describe import describe_material
-from ..model.scene_lights import Surroundings, read_light
-from ..model.scene_materials import read_material
+from ..model.scene_camera import camera_values, read_camera
 from .preferences import config_dir
 from .presets import LightPreset, MaterialPreset, ViewPreset
 
@@ -79,15 +79,13 @@ def load_own_presets() -> tuple[OwnPresets, str | None]:
 
 def save_own_presets(presets: OwnPresets) -> None:
     """Keep `presets`, whole or not at all. Raises UserError when the folder is not writable."""
-    blocks = [toml_block(f"[materials.{toml_key(p.name)}]", describe_material(p.material)) for p in presets.materials]
-    for light in presets.lights:
-        assert light.light is not None
-        blocks.append(toml_block(f"[lights.{toml_key(light.name)}]", light_values(light.light)))
-    for view in presets.views:
-        assert view.camera is not None
-        blocks.append(toml_block(f"[views.{toml_key(view.name)}]", camera_values(view.camera)))
+    kept = {
+        "materials": {p.name: p.material.values() for p in presets.materials},
+        "lights": {p.name: light_values(p.light) for p in presets.lights if p.light is not None},
+        "views": {p.name: camera_values(p.camera) for p in presets.views if p.camera is not None},
+    }
     with atomic_output(config_dir() / _FILE) as temporary:
-        temporary.write_text("\n".join(blocks), encoding="utf-8")
+        temporary.write_text(toml_text({k: v for k, v in kept.items() if v}), encoding="utf-8")
 
 
 def _read(table: SceneTable) -> OwnPresets:

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.errors import UserError, suggestion
+from ..model.fields import Number
 from ..model.optics import glass
 from ..model.optics.spectrum import Spectrum
 from ..model.placement import rotation_about
 from ..model.scene import (
     Camera,
-    Dielectric,
     Light,
     Scene,
     SceneObject,
@@ -83,14 +83,6 @@ _GLOBAL = {
     "exposure_ev": Parameter("Exposure", "EV", -64.0, 64.0),
     "solo_nm": Parameter("Light of this wavelength only", "nm", 380.0, 780.0),
 }
-_LIGHT_SIZES = {
-    "radius": Parameter("Radius", "units", 1e-9, _FAR),
-    "width": Parameter("Width", "units", 1e-9, _FAR),
-    "height": Parameter("Height", "units", 1e-9, _FAR),
-    "half_angle_deg": Parameter("Half angle of the cone", "°", 0.01, 180.0),
-    "inner_half_angle_deg": Parameter("Half angle of the cone's full brightness", "°", 0.0, 180.0),
-    "angular_diameter_deg": Parameter("Angular diameter", "°", 0.0, 90.0),
-}
 _POWER = Parameter("Power, as a multiple of what it is", "×", 0.0, 1e6)
 
 
@@ -101,7 +93,7 @@ def paths(scene: Scene, camera: Camera) -> dict[str, Parameter]:
     own = {**_PLACE, **_TARGET, **_ORBIT}
     found |= {f"camera.{name}": parameter for name, parameter in own.items() if name != skipped}
     for item in scene.objects:
-        parts = {**_PLACE, **_TURN} | (_GLASS if isinstance(item.material, Dielectric) else {})
+        parts = {**_PLACE, **_TURN} | (_GLASS if item.material.transmits else {})
         found |= {f"objects.{item.name}.{name}": parameter for name, parameter in parts.items()}
     for light in scene.lights:
         found |= {f"lights.{light.name}.{name}": parameter for name, parameter in _of_light(light).items()}
@@ -240,7 +232,6 @@ def _object_value(item: SceneObject, name: str) -> float:
         return float(item.object_to_world["xyz".index(axis), 3])
     if field == "rotation":
         return 0.0
-    assert isinstance(item.material, Dielectric)
     dispersion = item.material.dispersion
     # The gain is a parameter of its own: V_d is the glass's without it.
     return {"dispersion_gain": dispersion.gain, "n_d": dispersion.n_d, "V_d": replace(dispersion, gain=1.0).V_d}[name]
@@ -255,9 +246,8 @@ def _with_object(item: SceneObject, name: str, value: float) -> SceneObject:
         else:
             matrix[:3, :3] = rotation_about(_AXES[axis], math.radians(value)) @ matrix[:3, :3]
         return replace(item, object_to_world=matrix)
-    assert isinstance(item.material, Dielectric)
     dispersion = _with_glass(item.material.dispersion, name, value)
-    return replace(item, material=replace(item.material, dispersion=dispersion))
+    return replace(item, material=item.material.changed(dispersion=dispersion))
 
 
 def _with_glass(dispersion: Dispersion, name: str, value: float) -> Dispersion:
@@ -269,17 +259,17 @@ def _with_glass(dispersion: Dispersion, name: str, value: float) -> Dispersion:
 
 
 def _of_light(light: Light) -> dict[str, Parameter]:
-    names = {
-        "point": (),
-        "spot": ("half_angle_deg", "inner_half_angle_deg"),
-        "directional": ("angular_diameter_deg",),
-        "collimated": ("radius",) if light.shape == "disc" else ("width", "height"),
-        "area": ("radius",) if light.shape == "disc" else ("width", "height"),
-    }[light.kind]
-    found = {"power": _POWER} | {name: _LIGHT_SIZES[name] for name in names}
-    if light.kind != "directional":
-        found |= _PLACE
-    return found if light.kind == "point" else found | _TURN
+    found = {"power": _POWER}
+    for name, number in _turned_by(light).items():
+        told = number.animated
+        assert told is not None
+        found[name] = Parameter(told.meaning, number.unit, told.low, told.high)
+    return found | (_PLACE if light.has_place else {}) | (_TURN if light.has_direction else {})
+
+
+def _turned_by(light: Light) -> dict[str, Number]:
+    """The numbers of its shape by their names in an animation."""
+    return {n.animated.name or n.attribute: n for n in light.shown_numbers() if n.animated is not None}
 
 
 def _light_value(light: Light, name: str) -> float:
@@ -287,34 +277,29 @@ def _light_value(light: Light, name: str) -> float:
     if field == "position":
         return light.position["xyz".index(axis)]
     relative = {"power": 1.0, "rotation": 0.0}
-    return relative[field] if field in relative else getattr(light, _field_of(field))
+    return relative[field] if field in relative else getattr(light, _turned_by(light)[field].attribute)
 
 
 def _with_light(light: Light, name: str, value: float) -> Light:
     field, _, axis = name.partition(".")
     if field == "position":
-        return replace(light, position=_with_axis(light.position, axis, value))
+        return light.changed(position=_with_axis(light.position, axis, value))
     if field == "rotation":
         turn = rotation_about(_AXES[axis], math.radians(value))
-        tangent = None if light.tangent is None else _vec3(turn @ np.asarray(light.tangent))
-        return replace(light, direction=_vec3(turn @ np.asarray(light.direction)), tangent=tangent)
+        turned = light.changed(direction=_vec3(turn @ np.asarray(light.direction)))
+        if not light.has_roll:
+            return turned
+        return turned.changed(tangent=_vec3(turn @ light.axes()[:, 0]))
     if field == "power":
         spectrum = light.spectral_power
         lines = tuple((nm, power * value) for nm, power in spectrum.lines)
         return replace(light, spectral_power=Spectrum(spectrum.density * value, lines))
-    changed = _changed(light, _field_of(field), value)
-    # A cone's bright part cannot be wider than the cone.
-    inner = min(changed.inner_half_angle_deg, changed.outer_half_angle_deg)
-    return replace(changed, inner_half_angle_deg=inner)
+    return light.changed(**{_turned_by(light)[field].attribute: value}).fitted()
 
 
 def _changed(thing: Any, name: str, value: object) -> Any:
     """A copy of a frozen `thing` with one field set."""
     return replace(thing, **{name: value})
-
-
-def _field_of(name: str) -> str:
-    return "outer_half_angle_deg" if name == "half_angle_deg" else name
 
 
 def _with_axis(vector: Vec3, axis: str, value: float) -> Vec3:

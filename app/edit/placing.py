@@ -6,17 +6,14 @@ change is worked out in float64 from where the drag began, so nothing drifts and
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from ..base.errors import UserError
 from ..model.features import world_bounds
 from ..model.scene import (
-    Dielectric,
     Light,
-    Mirror,
     Scene,
     SceneObject,
     Vec3,
@@ -37,10 +34,10 @@ def can_do(scene: Scene, selection: Selection, operation: Operation) -> bool:
         return False
     light = scene.lights[selection.index]
     if operation == "move":
-        return light.kind != "directional"
+        return light.has_place
     if operation == "rotate":
-        return light.kind != "point"
-    return light.kind in ("collimated", "area")
+        return light.has_direction
+    return light.has_outline
 
 
 def frame_of(scene: Scene, selection: Selection, is_local: bool) -> np.ndarray:
@@ -50,7 +47,7 @@ def frame_of(scene: Scene, selection: Selection, is_local: bool) -> np.ndarray:
         light = scene.lights[selection.index]
         frame[:3, 3] = light_place(scene, light)
         if is_local:
-            frame[:3, :3] = light_axes(light)
+            frame[:3, :3] = light.axes()
         return frame
     item = scene.objects[selection.index]
     frame[:3, 3] = world_bounds(item).mean(axis=0)
@@ -61,20 +58,12 @@ def frame_of(scene: Scene, selection: Selection, is_local: bool) -> np.ndarray:
 
 def light_place(scene: Scene, light: Light) -> np.ndarray:
     """Where a light is drawn: a directional one, which is nowhere, beside what it shines on."""
-    if light.kind != "directional":
+    if light.has_place:
         return np.asarray(light.position, float)
-    chosen = [o for o in scene.objects if isinstance(o.material, Dielectric | Mirror)] or list(scene.objects)
+    chosen = [o for o in scene.objects if o.material.is_specular] or list(scene.objects)
     bounds = np.stack([world_bounds(item) for item in chosen])
     low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
     return 0.5 * (low + high) - 0.9 * float(np.linalg.norm(high - low)) * _unit(np.asarray(light.direction, float))
-
-
-def light_axes(light: Light) -> np.ndarray:
-    """Columns: width, height and propagation direction of a light, right-handed (3, 3)."""
-    axis = _unit(np.asarray(light.direction, float))
-    guide = np.eye(3)[np.argmin(np.abs(axis))] if light.tangent is None else np.asarray(light.tangent, float)
-    first = _unit(guide - axis * (guide @ axis))
-    return np.column_stack([first, np.cross(axis, first), axis])
 
 
 def change(before: np.ndarray, after: np.ndarray, operation: Operation) -> np.ndarray:
@@ -105,23 +94,23 @@ def changed(scene: Scene, selection: Selection, delta: np.ndarray) -> Scene:
 def moved_light(light: Light, delta: np.ndarray) -> Light:
     """A light after a world matrix: its place, direction, and the size of what it opens with."""
     linear = delta[:3, :3]
-    axes = light_axes(light)
+    axes = light.axes()
     stretched = np.linalg.norm(linear @ axes, axis=0)
     position = (delta @ np.append(np.asarray(light.position, float), 1.0))[:3]
-    moved = replace(light, position=_vec3(position)) if light.kind != "directional" else light
-    if not np.allclose(linear, np.eye(3), atol=1e-12):
-        moved = replace(moved, direction=_vec3(_unit(linear @ axes[:, 2])))
-        if light.tangent is not None or light.shape == "rectangle":
-            moved = replace(moved, tangent=_vec3(_unit(linear @ axes[:, 0])))
-    if light.kind not in ("collimated", "area"):
+    moved = light.changed(position=_vec3(position)) if light.has_place else light
+    if light.has_direction and not np.allclose(linear, np.eye(3), atol=1e-12):
+        moved = moved.changed(direction=_vec3(_unit(linear @ axes[:, 2])))
+        if light.tangent is not None or light.has_roll:
+            moved = moved.changed(tangent=_vec3(_unit(linear @ axes[:, 0])))
+    if not light.has_outline:
         return moved
     # A disc stays round: whichever of its two directions was pulled counts.
     across = stretched[:2][np.argmax(np.abs(np.log(stretched[:2])))]
-    return replace(
-        moved,
-        radius=light.radius * float(across),
-        width=light.width * float(stretched[0]),
-        height=light.height * float(stretched[1]),
+    outline: Any = light
+    return moved.changed(
+        radius=outline.radius * float(across),
+        width=outline.width * float(stretched[0]),
+        height=outline.height * float(stretched[1]),
     )
 
 

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..model.lights.directional import SUN_DIAMETER_DEG
+from ..model.lights.light import made
 from ..model.optics import catalogue
 from ..model.scene import (
     Camera,
@@ -22,7 +24,7 @@ from ..model.scene import (
     Scene,
     Vec3,
 )
-from ..model.scene_defaults import SUN_DIAMETER_DEG, environment_of
+from ..model.scene_defaults import environment_of
 from .adding import up_frame
 from .lights import SpectrumKind, light_power, set_light, set_light_power, set_light_spectrum
 from .objects import set_material
@@ -157,8 +159,8 @@ def view_presets() -> tuple[ViewPreset, ...]:
 def apply_material(scene: Scene, index: int, preset: MaterialPreset) -> Scene:
     """Give object `index` the preset's material; a glass keeps the priority among overlapping solids it had."""
     before, material = scene.objects[index].material, preset.material
-    if isinstance(before, Dielectric) and isinstance(material, Dielectric):
-        material = replace(material, priority=before.priority)
+    if before.transmits and material.transmits:
+        material = material.changed(priority=before.priority)
     return set_material(scene, index, material)
 
 
@@ -167,14 +169,13 @@ def apply_light(scene: Scene, index: int, preset: LightPreset) -> Scene:
     too."""
     light = scene.lights[index]
     if preset.light is not None:
-        placed = replace(
-            preset.light, name=light.name, position=light.position, direction=light.direction, tangent=light.tangent
-        )
-        return set_light(scene, index, placed)
+        kept = ("name", "position", "direction", "tangent")
+        placed = {key: value for key, value in light.given().items() if key in kept}
+        return set_light(scene, index, made(type(preset.light), preset.light.given() | placed))
     assert preset.kind is not None and preset.value is not None
     changed = set_light_spectrum(scene, index, preset.kind, preset.value)
-    if preset.angular_diameter_deg is not None and light.kind == "directional":
-        wide = replace(changed.lights[index], angular_diameter_deg=preset.angular_diameter_deg)
+    if preset.angular_diameter_deg is not None and not light.has_place:
+        wide = changed.lights[index].changed(angular_diameter_deg=preset.angular_diameter_deg)
         changed = set_light_power(set_light(changed, index, wide), index, light_power(light))
     return changed
 

@@ -17,7 +17,7 @@ from ..base.errors import UserError
 from ..model.local_dispersion import MAX_LOG2_GAIN, MIN_LOG2_GAIN, gain_at
 from ..model.optics.colorimetry import VISIBLE_NM, cmf_xyz, illuminant_table
 from ..model.optics.glass import LINE_D_NM
-from ..model.scene import Dab, Dielectric, Scene, SceneObject, Vec3
+from ..model.scene import Dab, Scene, SceneObject, Vec3
 from .requests import Pull
 
 MAX_GAIN = 10.0
@@ -130,7 +130,6 @@ def begin_pull(
     if length < _SHORTEST * radius:
         raise UserError("the colour here hardly moves with the dispersion; take hold of one nearer to red or violet")
     material = scene.objects[source].material
-    assert isinstance(material, Dielectric)
     reference = point - moved
     receiver = scene.objects[receiver_index]
     pull = Pull(

@@ -21,10 +21,11 @@ from ..model.features import (
     world_bounds,
 )
 from ..model.geometry.bvh import build_bvh
+from ..model.lights import Light
 from ..model.optics.colorimetry import VISIBLE_NM, rgb_partition
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative, index_table
-from ..model.scene import Black, Dielectric, Diffuse, Mirror, Scene
+from ..model.scene import Scene
 from . import bindings
 from .records import NONE
 from .scene_texels import SceneTexels, spectra_texture, tree_texels
@@ -34,7 +35,6 @@ from .texture_store import textured_objects
 SAMPLES = 1025
 """Equally spaced samples of every spectral table over x in [0, 1]; linear interpolation errs below 2e-7 in n."""
 
-KIND_BLACK, KIND_DIFFUSE, KIND_MIRROR, KIND_DIELECTRIC = range(4)
 
 TRIANGLE = Struct(
     "Triangle",
@@ -82,7 +82,7 @@ class GpuSpace:
     @staticmethod
     def of(scene: Scene) -> GpuSpace:
         """The space in which the specular objects (else everything) have about unit radius."""
-        chosen = [o for o in scene.objects if isinstance(o.material, Dielectric | Mirror)] or list(scene.objects)
+        chosen = [o for o in scene.objects if o.material.is_specular] or list(scene.objects)
         bounds = np.stack([world_bounds(o) for o in chosen])
         low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
         radius = 0.5 * float(np.linalg.norm(high - low))
@@ -155,10 +155,8 @@ class SceneBuffers:
         self.axis = axis
         self.space = GpuSpace.of(scene)
         self.groups = Groups.of(scene, features)
-        self.receivers = [i for i, o in enumerate(scene.objects) if isinstance(o.material, Diffuse)]
-        self.traced_glasses = [
-            o.material.dispersion if isinstance(o.material, Dielectric) else None for o in scene.objects
-        ]
+        self.receivers = [i for i, o in enumerate(scene.objects) if o.material.receives]
+        self.traced_glasses = [o.material.dispersion for o in scene.objects]
         """Each object's glass as the records number it, whatever `scene` is replaced by to be shown."""
         self.first_triangle = np.cumsum([0] + [len(o.mesh.triangles) for o in scene.objects])
         self.world_meshes = [o.mesh.transformed(o.object_to_world) for o in scene.objects]
@@ -170,6 +168,7 @@ class SceneBuffers:
         self.defines = bindings.SCENE_DEFINES | {"SPECTRAL_SAMPLES": SAMPLES}
         self._pack_geometry()
         self._pack_objects()
+        self._pack_profiles()
         self.texels = SceneTexels(ctx, self._sections)
         self._sections.clear()
         self.defines |= self.texels.defines
@@ -179,7 +178,7 @@ class SceneBuffers:
         self.texels.bind()
         self.texels.bind_spectra(self._spectra)
         for binding, buffer in self._buffers.items():
-            if self._in_storage:
+            if self._in_storage or binding == bindings.PROFILES:
                 buffer.bind_to_storage_buffer(binding)
             else:
                 buffer.bind_to_uniform_block(binding)
@@ -200,6 +199,19 @@ class SceneBuffers:
             t.width * t.height * size for t, size in pixels
         )
 
+    def _pack_profiles(self) -> None:
+        """Intensity tables of lights that have one, each once."""
+        tables = list(dict.fromkeys(light.profile for light in self.scene.lights if light.profile is not None))
+        packed = [table.packed() for table in tables]
+        starts = np.cumsum([0] + [len(table) for table in packed])
+        self._profile_start = dict(zip(tables, starts.tolist(), strict=False))
+        if packed:
+            self._buffers[bindings.PROFILES] = self.ctx.buffer(np.concatenate(packed).astype("f4"))
+
+    def profile_start(self, light: Light) -> int:
+        """Where the light's intensity table begins among the profiles; 0 without one."""
+        return self._profile_start.get(light.profile, 0)
+
     def _pack_geometry(self) -> None:
         corners, owner, source, normals = [], [], [], []
         solids, planes = [], []
@@ -216,7 +228,7 @@ class SceneBuffers:
             corners.append(self.space.to_gpu(mesh.corners()))
             owner.append(np.full(len(mesh.triangles), index))
             source.append(self.first_triangle[index] + np.arange(len(mesh.triangles)))
-            specular = isinstance(item.material, Dielectric | Mirror)
+            specular = item.material.is_specular
             smooth = mesh.corner_normals is not None and specular
             normals.append(mesh.corner_normals if smooth else np.full((len(mesh.triangles), 3, 3), np.nan))
 
@@ -280,32 +292,26 @@ class SceneBuffers:
         for index, (record, item) in enumerate(zip(records, self.scene.objects, strict=True)):
             record["first_triangle"] = self.first_triangle[index]
             material = item.material
-            match material:
-                case Black():
-                    record["kind"] = KIND_BLACK
-                case Diffuse():
-                    record["kind"] = KIND_DIFFUSE
-                    record["receiver"] = self.receivers.index(index)
-                    record["colour"][:3] = material.reflectance_rgb
-                case Mirror():
-                    record["kind"] = KIND_MIRROR
-                    record["colour"][:3] = material.reflectance_rgb
-                    record["weight_row"] = len(weights)
-                    weights.append(mirror_reflectance(material.reflectance_rgb, nm))
-                case Dielectric():
-                    record["kind"] = KIND_DIELECTRIC
-                    if material.dispersion not in media:
-                        media.append(material.dispersion)
-                    record["medium"] = media.index(material.dispersion)
-                    record["colour"][3] = material.dispersion.n_d
-                    if index in stack_bits:
-                        record["stack_bit"] = stack_bits[index]
-                    if material.dispersion in self.groups.glasses and self.groups.count:
-                        record["group"] = self.groups.group[self.groups.glasses.index(material.dispersion)]
-                    if material.absorption is not None:
-                        record["weight_row"] = len(weights)
-                        coefficient = np.interp(nm, VISIBLE_NM, material.absorption.coefficient)
-                        weights.append(coefficient / self.space.scale)
+            record["kind"] = material.gpu_code
+            record["colour"][:3] = material.reflectance_rgb
+            if material.receives:
+                record["receiver"] = self.receivers.index(index)
+            if material.is_mirror:
+                record["weight_row"] = len(weights)
+                weights.append(mirror_reflectance(material.reflectance_rgb, nm))
+            if material.transmits:
+                if material.dispersion not in media:
+                    media.append(material.dispersion)
+                record["medium"] = media.index(material.dispersion)
+                record["colour"][3] = material.dispersion.n_d
+                if index in stack_bits:
+                    record["stack_bit"] = stack_bits[index]
+                if material.dispersion in self.groups.glasses and self.groups.count:
+                    record["group"] = self.groups.group[self.groups.glasses.index(material.dispersion)]
+            if material.absorption is not None:
+                record["weight_row"] = len(weights)
+                coefficient = np.interp(nm, VISIBLE_NM, material.absorption.coefficient)
+                weights.append(coefficient / self.space.scale)
         self._sections["OBJECTS"] = records
         # bit -> (medium, weight row) for the medium stack.
         by_bit = {bit: index for index, bit in stack_bits.items()}
@@ -389,9 +395,7 @@ def _stack_bits(scene: Scene) -> dict[int, int]:
     """Object → bit in a ray's inside mask; a higher bit wins. Raises UserError beyond 32 solids.
 
     Where no two solids meet, yet a stack is wanted (to measure it), all of them are on it."""
-    overlapping = overlapping_solids(scene) or [
-        i for i, o in enumerate(scene.objects) if isinstance(o.material, Dielectric)
-    ]
+    overlapping = overlapping_solids(scene) or [i for i, o in enumerate(scene.objects) if o.material.transmits]
     if len(overlapping) > 32:
         raise UserError(
             f"scene '{scene.name}': {len(overlapping)} transparent solids nest or touch and at most 32 may; "

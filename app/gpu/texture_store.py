@@ -16,7 +16,7 @@ import moderngl
 import numpy as np
 
 from ..base.errors import UserError
-from ..model.scene import Diffuse, Scene, SceneObject
+from ..model.scene import Scene, SceneObject
 from ..model.texture import Environment, Texture
 from .mip_chain import kept_levels, level_count
 from .records import NONE
@@ -49,9 +49,7 @@ MAX_BYTES = 1 << 30
 
 def textured_objects(scene: Scene) -> list[int]:
     """Indices of the objects that wear a texture, in order; `Object.texture` counts along this list."""
-    return [
-        i for i, o in enumerate(scene.objects) if isinstance(o.material, Diffuse) and o.material.texture is not None
-    ]
+    return [i for i, o in enumerate(scene.objects) if o.material.texture is not None]
 
 
 def place_defines(binding: int, unit: int) -> dict[str, int]:

@@ -12,11 +12,7 @@ import numpy as np
 
 from .camera_rays import camera_frame
 from .scene import (
-    Black,
     Camera,
-    Dielectric,
-    Diffuse,
-    Mirror,
     Scene,
     SceneObject,
 )
@@ -90,6 +86,8 @@ class Features:
     sweep."""
     map_tents: int = 0
     """Spectral channels of the caustic maps beside XYZ, for light whose dispersion the camera's adds to."""
+    light_profiles: bool = False
+    """Some light shines by a table of intensities over directions."""
     anchor_weights: bool = False
     """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
 
@@ -118,22 +116,21 @@ class Features:
             "CHARTS": self.charts,
             "NESTED_WINDOWS": self.nested_windows,
             "ANCHOR_WEIGHTS": self.anchor_weights,
+            "LIGHT_PROFILES": self.light_profiles,
         }
         return numbers | {name: 1 for name, on in switches.items() if on}
 
     @staticmethod
     def of(scene: Scene, settings: RenderSettings) -> Features:
         """The features that `scene` needs under `settings`."""
-        dielectrics = [o for o in scene.objects if isinstance(o.material, Dielectric)]
+        dielectrics = [o for o in scene.objects if o.material.transmits]
         dispersive = dispersive_materials(scene)
         single = settings.method.startswith(("stochastic", "regular"))
         groups = 0 if single else min(len(dispersive), 1 if settings.method == "srd-lambda" else MAX_GROUPS)
         loose = [o for o in scene.objects if not is_convex_solid(o)]
         loose_triangles = sum(len(o.mesh.triangles) for o in loose)
         absorbing = any(o.material.absorption is not None for o in dielectrics)
-        smooth = any(
-            o.mesh.corner_normals is not None for o in scene.objects if isinstance(o.material, Dielectric | Mirror)
-        )
+        smooth = any(o.mesh.corner_normals is not None for o in scene.objects if o.material.is_specular)
         footprints = settings.method != "stochastic-point"
         camera_specular, camera_disperses = camera_needs(scene, settings)
         tents = (
@@ -145,9 +142,7 @@ class Features:
             and _has_receivers(scene)
             else 0
         )
-        coloured_mirror = any(
-            isinstance(o.material, Mirror) and len(set(o.material.reflectance_rgb)) > 1 for o in scene.objects
-        )
+        coloured_mirror = any(o.material.is_mirror and o.material.is_coloured for o in scene.objects)
         return Features(
             method=settings.method,
             spectral_groups=groups,
@@ -159,7 +154,7 @@ class Features:
             even_wavelengths=settings.method == "stochastic-even",
             band_cuts=groups > 0,
             dielectrics=bool(dielectrics),
-            mirrors=any(isinstance(o.material, Mirror) for o in scene.objects),
+            mirrors=any(o.material.is_mirror for o in scene.objects),
             smooth_normals=smooth,
             normal_derivatives=smooth and (footprints or groups > 0),
             absorption=absorbing,
@@ -167,8 +162,8 @@ class Features:
             tree=loose_triangles > MAX_LOOSE_TRIANGLES,
             loose_triangles=loose_triangles > 0,
             convex_solids=len(loose) < len(scene.objects),
-            charts=any(isinstance(o.material, Diffuse) and not is_flat(o) for o in scene.objects),
-            nested_windows=any(isinstance(o.material, Diffuse) and is_flat(o) for o in scene.objects),
+            charts=any(o.material.receives and not is_flat(o) for o in scene.objects),
+            nested_windows=any(o.material.receives and is_flat(o) for o in scene.objects),
             targets=-(-settings.bins // 4) if settings.bins else 1 + -(-tents // 4),
             camera_specular=camera_specular,
             camera_disperses=camera_disperses,
@@ -176,6 +171,7 @@ class Features:
             reindexed=_reindexed(scene, settings, groups, coloured=absorbing or coloured_mirror),
             local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
             anchor_weights=settings.anchor_weights,
+            light_profiles=any(light.profile is not None for light in scene.lights),
         )
 
 
@@ -187,9 +183,7 @@ def _reindexed(scene: Scene, settings: RenderSettings, groups: int, *, coloured:
     edited = settings.anchor_weights or (settings.local_gain and any(o.local_dispersion for o in scene.objects))
     if not edited or groups != 1 or coloured or settings.method != "srd":
         return False
-    (turning,) = SpectralAxis.build(
-        [o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)]
-    ).turning_nm
+    (turning,) = SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.transmits]).turning_nm
     return len(turning) == 2
 
 
@@ -197,15 +191,13 @@ def camera_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:
     """Whether the camera may see glass or mirrors, and whether it may see through glass that disperses."""
     if settings.layer != "beauty":
         return False, False
-    mirrors = any(isinstance(o.material, Mirror) for o in scene.objects)
-    glass = [o for o in scene.objects if isinstance(o.material, Dielectric)]
+    mirrors = any(o.material.is_mirror for o in scene.objects)
+    glass = [o for o in scene.objects if o.material.transmits]
     if not (settings.any_view or mirrors):
         # What is refracted or reflected first must be seen first; all else follows from it.
         seen = [o for o in glass if in_view(o, scene.camera, settings.width / settings.height)]
         glass = glass if seen else []
-    return bool(glass) or mirrors, any(
-        isinstance(o.material, Dielectric) and o.material.dispersion.is_dispersive for o in glass
-    )
+    return bool(glass) or mirrors, any(o.material.transmits and o.material.dispersion.is_dispersive for o in glass)
 
 
 def in_view(item: SceneObject, camera: Camera, aspect: float) -> bool:
@@ -233,14 +225,14 @@ def in_view(item: SceneObject, camera: Camera, aspect: float) -> bool:
 
 
 def _has_receivers(scene: Scene) -> bool:
-    return any(isinstance(o.material, Diffuse) for o in scene.objects)
+    return any(o.material.receives for o in scene.objects)
 
 
 def dispersive_materials(scene: Scene) -> list[int]:
     """Object indices that first show each distinct dispersive glass, in order."""
     seen, first = set(), []
     for index, item in enumerate(scene.objects):
-        if isinstance(item.material, Dielectric) and item.material.dispersion.is_dispersive:
+        if item.material.transmits and item.material.dispersion.is_dispersive:
             if item.material.dispersion not in seen:
                 seen.add(item.material.dispersion)
                 first.append(index)
@@ -249,7 +241,7 @@ def dispersive_materials(scene: Scene) -> list[int]:
 
 def is_convex_solid(item: SceneObject) -> bool:
     """Whether the object is intersected as an intersection of half-spaces."""
-    if not isinstance(item.material, Dielectric):
+    if not item.material.transmits:
         return False
     planes = item.mesh.convex_planes
     return planes is not None and len(planes) <= MAX_SOLID_PLANES
@@ -271,7 +263,7 @@ def world_bounds(item: SceneObject) -> np.ndarray:
 
 def overlapping_solids(scene: Scene) -> list[int]:
     """Indices of dielectric objects whose bounds overlap or touch those of another one."""
-    indices = [i for i, o in enumerate(scene.objects) if isinstance(o.material, Dielectric)]
+    indices = [i for i, o in enumerate(scene.objects) if o.material.transmits]
     if len(indices) < 2:
         return []
     bounds = np.stack([world_bounds(scene.objects[i]) for i in indices])
@@ -288,9 +280,9 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
     loose = sum(len(o.mesh.triangles) for o in scene.objects if not is_convex_solid(o))
     solids = [o.name for o in scene.objects if is_convex_solid(o)]
     touching = [scene.objects[i].name for i in overlapping_solids(scene)]
-    diffuse = [o for o in scene.objects if isinstance(o.material, Diffuse)]
-    worn = [o.name for o in diffuse if isinstance(o.material, Diffuse) and o.material.texture is not None]
-    black = sum(isinstance(o.material, Black) for o in scene.objects)
+    diffuse = [o for o in scene.objects if o.material.receives]
+    worn = [o.name for o in diffuse if o.material.texture is not None]
+    black = sum(o.material.is_black for o in scene.objects)
 
     def names(items: list[str]) -> str:
         return ", ".join(items[:4]) + (f" and {len(items) - 4} more" if len(items) > 4 else "")
@@ -408,6 +400,13 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             "environment map",
             scene.environment is not None,
             f"a {scene.environment.kind} lies beyond" if scene.environment is not None else "one colour lies beyond",
+        ),
+        (
+            "light profiles",
+            features.light_profiles,
+            f"measured lamps: {names([light.name for light in scene.lights if light.profile is not None])}"
+            if features.light_profiles
+            else "no light comes from a photometric file",
         ),
         ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
     ]

@@ -7,10 +7,32 @@ turns about the fixed world axes x, then y, then z (R = Rz Ry Rx).
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from .io.scene_table import SceneTable, Vec3
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a light without a target, a distance or a power is fitted to."""
+
+    centre: np.ndarray
+    """float64 (3,), middle of the objects that are not receivers."""
+    radius: float
+    """Half the diagonal of their bounds, scene units."""
+
+
+def default_direction() -> Vec3:
+    """A low afternoon sun from behind on the left: long caustics that run towards the viewer."""
+    azimuth, elevation = math.radians(25.0), math.radians(38.0)
+    return (
+        math.cos(elevation) * math.cos(azimuth),
+        -math.cos(elevation) * math.sin(azimuth),
+        -math.sin(elevation),
+    )
+
 
 PLACEMENT_KEYS = (
     "position",

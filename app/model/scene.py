@@ -13,11 +13,26 @@ from typing import Literal
 import numpy as np
 
 from .geometry.mesh import Mesh
-from .optics.glass import Dispersion
-from .optics.spectrum import Spectrum
-from .texture import Environment, Texture
+from .io.scene_table import Vec3
+from .lights import Light
+from .materials import Absorption, Black, Dielectric, Diffuse, Material, Mirror
+from .texture import Environment
 
-Vec3 = tuple[float, float, float]
+__all__ = [
+    "Absorption",
+    "Black",
+    "Camera",
+    "Dab",
+    "Dielectric",
+    "Diffuse",
+    "Light",
+    "Material",
+    "Mirror",
+    "RenderDefaults",
+    "Scene",
+    "SceneObject",
+    "Vec3",
+]
 
 
 @dataclass(frozen=True)
@@ -31,85 +46,6 @@ class Camera:
     vertical_fov_deg: float = 35.0
     vertical_extent: float = 1.0
     """Height of the picture in scene units (orthographic only)."""
-
-
-@dataclass(frozen=True)
-class Light:
-    """One emitter.
-
-    `spectral_power` holds the spectral density per nanometre of the quantity that belongs
-    to the kind, already scaled to absolute units:
-
-    | kind | quantity | shape fields |
-    |---|---|---|
-    | point | radiant intensity, W/sr | – |
-    | spot | radiant intensity on the axis, W/sr | inner/outer half angle (equal = hard edge) |
-    | directional | irradiance on a plane across the direction, W/unit² | angular_diameter_deg |
-    | collimated | irradiance on a plane across the direction, W/unit² | shape, radius or size |
-    | area | radiance, W/(sr unit²), one-sided, Lambertian | shape, radius or size |
-
-    A photometric scene file (cd, lm, lux, nits) is converted with K_m = 683.002 lm/W, so the
-    renderer's Y is always in lm/(sr unit²).
-    """
-
-    name: str
-    kind: Literal["point", "spot", "directional", "collimated", "area"]
-    spectral_power: Spectrum
-    position: Vec3 = (0.0, 0.0, 0.0)
-    direction: Vec3 = (0.0, 0.0, -1.0)
-    """Unit propagation direction of the axis (spot, directional, collimated, area)."""
-    tangent: Vec3 | None = None
-    """Direction of a rectangle's width; None picks one."""
-    inner_half_angle_deg: float = 30.0
-    outer_half_angle_deg: float = 30.0
-    angular_diameter_deg: float = 0.0
-    shape: Literal["disc", "rectangle"] = "disc"
-    radius: float = 1.0
-    width: float = 1.0
-    height: float = 1.0
-
-
-@dataclass(frozen=True)
-class Absorption:
-    """Absorption coefficient alpha(wavelength), per scene unit, on the visible grid of `spectrum`."""
-
-    coefficient: np.ndarray
-    """float64 (401,), 1/unit, at 380, 381, … 780 nm."""
-
-
-@dataclass(frozen=True)
-class Dielectric:
-    """A transparent solid."""
-
-    dispersion: Dispersion
-    absorption: Absorption | None = None
-    priority: int = 0
-    """Where solids overlap, the higher priority decides; equal ones: the later object."""
-
-
-@dataclass(frozen=True)
-class Mirror:
-    """A perfect specular reflector with linear Rec.709 reflectance."""
-
-    reflectance_rgb: Vec3 = (1.0, 1.0, 1.0)
-
-
-@dataclass(frozen=True)
-class Diffuse:
-    """A two-sided Lambertian receiver; `reflectance` (401,) on the visible grid overrides RGB."""
-
-    reflectance_rgb: Vec3 = (0.8, 0.8, 0.8)
-    reflectance: np.ndarray | None = None
-    texture: Texture | None = None
-    """Multiplies `reflectance_rgb` by the mesh's texture coordinates; never beside `reflectance`."""
-
-
-@dataclass(frozen=True)
-class Black:
-    """A perfect absorber."""
-
-
-Material = Dielectric | Mirror | Diffuse | Black
 
 
 @dataclass(frozen=True)

@@ -2,33 +2,41 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from .fields import Number, Vector, read_fields, write_fields
 from .io.scene_table import SceneTable
+from .placement import Surroundings
 from .scene import Camera
-from .scene_lights import Surroundings
+
+_PLACE = (Vector("position"), Vector("target", None), Vector("up", (0.0, 0.0, 1.0), nonzero=True))
+_LENS = {
+    "pinhole": Number("vertical_fov_deg", 35.0, above=0.0, below=180.0),
+    "orthographic": Number("vertical_extent", None, above=0.0),
+}
 
 
 def read_camera(table: SceneTable, around: Surroundings) -> Camera:
     """A [camera] table; what it leaves out is fitted to `around`."""
-    kind = table.choice("kind", ("pinhole", "orthographic"), "pinhole")
-    position = table.vector("position")
+    kind = table.choice("kind", tuple(_LENS), "pinhole")
     x, y, z = (float(v) for v in around.centre)
-    target = table.vector("target", (x, y, z))
-    up = table.vector("up", (0.0, 0.0, 1.0), nonzero=True)
-    forward = np.subtract(target, position)
+    fitted: dict[str, Any] = {"target": (x, y, z)}
+    if kind == "orthographic":
+        fitted["vertical_extent"] = 4.0 * around.radius
+    given = read_fields((*_PLACE, _LENS[kind]), table)
+    camera = Camera(kind=kind, **fitted | {k: v for k, v in given.items() if v is not None})  # type: ignore[arg-type]
+    up, forward = camera.up, np.subtract(camera.target, camera.position)
     if np.linalg.norm(forward) < 1e-150:
         table.fail("target", "lies at the camera's own position and so gives no direction")
     sine = np.linalg.norm(np.cross(forward, up)) / (np.linalg.norm(forward) * np.linalg.norm(up))
     if sine < 1e-9:
         table.fail("up", "is parallel to the viewing direction; give a direction across it")
-    camera = Camera(position, target, up, kind)  # type: ignore[arg-type]
-    if kind == "pinhole":
-        camera = replace(camera, vertical_fov_deg=table.number("vertical_fov_deg", 35.0, above=0.0, below=180.0))
-    else:
-        extent = table.number("vertical_extent", 4.0 * around.radius, above=0.0)
-        camera = replace(camera, vertical_extent=extent)
     table.finish(f"a camera of kind '{kind}'")
     return camera
+
+
+def camera_values(camera: Camera) -> dict[str, Any]:
+    """The [camera] table of a scene file."""
+    return {"kind": camera.kind} | write_fields((*_PLACE, _LENS[camera.kind]), camera)

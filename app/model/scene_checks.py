@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.errors import UserError
 from .geometry.mesh import Mesh
-from .scene import Dielectric, Diffuse, Light, Scene, SceneObject
+from .scene import Light, Scene, SceneObject
 
 MAX_SIZE_RATIO = 1e12
 """Largest to smallest object."""
@@ -26,7 +26,7 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
         raise UserError(f"{file_name}: the scene holds no objects; add one with [[objects]]")
     if not scene.lights and scene.environment is None:
         raise UserError(f"{file_name}: the scene holds no light; add one with [[lights]]")
-    if scene.environment is None and not any(isinstance(o.material, Diffuse) for o in scene.objects):
+    if scene.environment is None and not any(o.material.receives for o in scene.objects):
         raise UserError(
             f"{file_name}: nothing receives the light; add a diffuse object, "
             'such as [[objects]] shape = "plane", material = "diffuse"'
@@ -34,9 +34,9 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
     for item in scene.objects:
         check_texture(item, file_name)
     _check_sizes(scene, file_name)
-    glasses = [o for o in scene.objects if isinstance(o.material, Dielectric)]
+    glasses = [o for o in scene.objects if o.material.transmits]
     for light in scene.lights:
-        if light.kind != "directional":
+        if light.has_place:
             check_outside(light, glasses, file_name)
         check_lines(light, glasses, file_name)
     return _glass_notes(glasses)
@@ -113,7 +113,7 @@ def _size(item: SceneObject) -> float:
 
 def check_texture(item: SceneObject, file_name: str) -> None:
     """Raise UserError for a texture on a mesh that does not say where it goes."""
-    if not isinstance(item.material, Diffuse) or item.material.texture is None:
+    if item.material.texture is None:
         return
     if item.mesh.uv is None:
         raise UserError(

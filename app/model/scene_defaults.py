@@ -12,11 +12,11 @@ import numpy as np
 
 from .geometry.mesh_recipes import note_recipe
 from .geometry.primitives import plane
+from .lights.directional import SUN_DIAMETER_DEG, DirectionalLight
+from .lights.light import DEFAULT_ILLUMINANCE
 from .optics.spectrum import illuminant
+from .placement import Surroundings, default_direction
 from .scene import Camera, Diffuse, Light, SceneObject
-from .scene_lights import DEFAULT_ILLUMINANCE, Surroundings, default_direction
-
-SUN_DIAMETER_DEG = 0.53
 
 
 def bounds_of(objects: Sequence[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
@@ -27,7 +27,7 @@ def bounds_of(objects: Sequence[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
 
 def environment_of(objects: Sequence[SceneObject]) -> Surroundings:
     """Middle and half diagonal of what is worth looking at: everything but the receivers, if there is more."""
-    interesting = [o for o in objects if not isinstance(o.material, Diffuse)] or list(objects)
+    interesting = [o for o in objects if not o.material.receives] or list(objects)
     low, high = bounds_of(interesting)
     return Surroundings(0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), 1e-12))
 
@@ -44,7 +44,7 @@ def default_camera(around: Surroundings) -> Camera:
 def default_light() -> Light:
     """A white sun."""
     power = illuminant("D65").scaled_to_luminous(DEFAULT_ILLUMINANCE)
-    return Light("sun", "directional", power, direction=default_direction(), angular_diameter_deg=SUN_DIAMETER_DEG)
+    return DirectionalLight("sun", power, default_direction(), SUN_DIAMETER_DEG)
 
 
 def default_table(objects: Sequence[SceneObject]) -> SceneObject:

@@ -15,10 +15,10 @@ from ..base.errors import UserError
 from .geometry.mesh import Mesh
 from .geometry.mesh_recipes import note_recipe
 from .io.scene_table import SceneTable
+from .materials.material_file import read_object_material
 from .placement import read_placement
-from .scene import Dielectric, Material, SceneObject
+from .scene import Material, SceneObject
 from .scene_dabs import read_dabs
-from .scene_materials import read_object_material
 from .scene_textures import TextureReader
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl")
@@ -39,7 +39,7 @@ class ObjectReader:
     def read(self, table: SceneTable) -> list[SceneObject]:
         """The object of one table, or its instances."""
         material = read_object_material(table, self._materials, self._textures)
-        mesh = self._read_mesh(table, solid=isinstance(material, Dielectric))
+        mesh = self._read_mesh(table, solid=material.transmits)
         base = read_placement(table)
         rest = table.number("rests_at_z", None)
         painted = read_dabs(table, material)

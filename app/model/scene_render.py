@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
+from .fields import Integer, Number, Part, read_fields, write_fields
 from .io.scene_table import SceneTable
 from .scene import RenderDefaults, Vec3
 
@@ -17,21 +21,41 @@ def read_background(table: SceneTable) -> Vec3:
     return background
 
 
+class _Size(Part):
+    """`size`, whole pixels."""
+
+    def read(self, table: SceneTable) -> dict[str, Any]:
+        """Width and height."""
+        width, height = table.numbers("size", (_USUAL.width, _USUAL.height), count=2)
+        for side in (width, height):
+            if side != int(side) or not 1 <= side <= MAX_PICTURE_SIDE:
+                limit = f"each side must be 1 to {MAX_PICTURE_SIDE} whole pixels"
+                table.fail("size", f"is {width:g} × {height:g} but {limit}")
+        return {"width": int(width), "height": int(height)}
+
+    def write(self, value: Any, path: Path | None) -> dict[str, Any]:
+        """Both."""
+        return {"size": [value.width, value.height]}
+
+
+_USUAL = RenderDefaults()
+_FIELDS = (
+    _Size(),
+    Integer("photons", _USUAL.photons, at_least=1, at_most=10**12),
+    Number("exposure_ev", _USUAL.exposure_ev, at_least=-64.0, at_most=64.0),
+    Integer("max_depth", _USUAL.max_depth, at_least=1, at_most=MAX_DEPTH),
+)
+
+
 def read_render(table: SceneTable | None) -> RenderDefaults:
     """The [render] table; the defaults without one."""
-    defaults = RenderDefaults()
     if table is None:
-        return defaults
-    width, height = table.numbers("size", (defaults.width, defaults.height), count=2)
-    for side in (width, height):
-        if side != int(side) or not 1 <= side <= MAX_PICTURE_SIDE:
-            table.fail("size", f"is {width:g} × {height:g} but each side must be 1 to {MAX_PICTURE_SIDE} whole pixels")
-    render = RenderDefaults(
-        width=int(width),
-        height=int(height),
-        photons=table.integer("photons", defaults.photons, at_least=1, at_most=10**12),
-        exposure_ev=table.number("exposure_ev", defaults.exposure_ev, at_least=-64.0, at_most=64.0),
-        max_depth=table.integer("max_depth", defaults.max_depth, at_least=1, at_most=MAX_DEPTH),
-    )
+        return RenderDefaults()
+    render = RenderDefaults(**read_fields(_FIELDS, table))
     table.finish("[render]")
     return render
+
+
+def render_values(render: RenderDefaults) -> dict[str, Any]:
+    """The [render] table of a scene file."""
+    return write_fields(_FIELDS, render)

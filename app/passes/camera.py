@@ -24,7 +24,7 @@ from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
 from ..gpu.texture_store import PICTURE, TextureStore
 from ..model.camera_rays import camera_frame
 from ..model.optics.colorimetry import xyz_to_rgb709_matrix
-from ..model.scene import Camera, Dielectric
+from ..model.scene import Camera
 from ..model.scene_checks import contains
 from .camera_programs import (
     BIND_CELL_CDF,
@@ -334,6 +334,11 @@ class CameraPass:
         return self._pictures
 
     @property
+    def is_even(self) -> bool:
+        """All pixels of a row have as many samples: `samples` may be left here."""
+        return not self._within_rows
+
+    @property
     def samples_taken(self) -> int:
         """Samples that every pixel has."""
         return int(self._samples_of_row.min()) if len(self._samples_of_row) else 0
@@ -403,7 +408,7 @@ class CameraPass:
         parameters["primary_samples"] = 1
         parameters["inside_object"] = NONE
         for index, item in enumerate(self.scene.scene.objects):
-            if isinstance(item.material, Dielectric) and contains(item, np.array(camera.position)):
+            if item.material.transmits and contains(item, np.array(camera.position)):
                 if index in self.scene.stack_objects:
                     parameters["inside_mask"] |= np.uint32(1 << self.scene.stack_objects.index(index))
                 else:

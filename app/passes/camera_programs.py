@@ -12,8 +12,6 @@ from ..gpu import bindings
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.texture_store import place_defines
-from ..model.scene import Black, Dielectric, Diffuse, Mirror
-from .camera_records import has_extent
 from .camera_tables import EMISSION_CELLS
 from .present import Channels
 
@@ -104,8 +102,8 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
         "ENDS_HELD": ENDS_HELD,
     }
     materials = [item.material for item in scene.scene.objects]
-    coloured = any(isinstance(m, Mirror) and len(set(m.reflectance_rgb)) > 1 for m in materials)
-    absorbs = any(isinstance(m, Dielectric) and m.absorption is not None for m in materials)
+    coloured = any(m.is_mirror and m.is_coloured for m in materials)
+    absorbs = any(m.absorption is not None for m in materials)
     switches = {
         "LAYER_BEAUTY": beauty,
         "CAMERA_SPECULAR": specular,
@@ -115,8 +113,8 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
         "EVEN_WAVELENGTHS": features.even_wavelengths,
         "RGB_CHANNELS": channels.edges_nm is None,
         "MAP_BINS": disperses and maps.count > 0,
-        "HAS_RECEIVERS": any(isinstance(m, Diffuse | Black) for m in materials),
-        "VISIBLE_LIGHTS": beauty and any(has_extent(light) for light in lights),
+        "HAS_RECEIVERS": any(not m.is_specular for m in materials),
+        "VISIBLE_LIGHTS": beauty and any(light.has_extent for light in lights),
         "ABSORPTION": specular and (coloured or absorbs),
         "NORMAL_DERIVATIVES": features.smooth_normals,
     }

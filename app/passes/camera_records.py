@@ -13,15 +13,16 @@ CAMERA_LIGHT = Struct(
     "CameraLight",
     (
         Field("position", "vec3", "GPU space"),
-        Field("kind", "uint", "0 point or spot, 1 directional, 2 collimated, 3 area"),
+        Field("kind", "uint", "0 point, spot or measured, 1 directional, 2 collimated, 3 area"),
         Field("axis", "vec3", "unit, propagation"),
         Field("is_disc", "uint"),
-        Field("half_u", "vec3", "centre to rim, GPU units; directional: tangent of the angular radius"),
+        Field("half_u", "vec3", "centre to rim, GPU units; directional: tangent of the angular radius; profile: C0"),
         Field("measure", "float", "area: GPU units²; directional: radiance per irradiance (0: no extent); else 0"),
         Field("half_v", "vec3", "as half_u, across it"),
-        Field("reserved", "float", ""),
+        Field("profile", "uint", "where its intensity table begins"),
         Field("cone", "vec2", "inner and outer half angle, rad"),
-        Field("reserved2", "vec2", ""),
+        Field("has_profile", "uint"),
+        Field("reserved", "uint", ""),
     ),
 )
 CAMERA_PARAMETERS = Struct(
@@ -65,12 +66,6 @@ CAMERA_PARAMETERS = Struct(
         Field("queue", "uint", "of the two, the one that samples which halt are put on"),
     ),
 )
-_LIGHT_KINDS = {"point": 0, "spot": 0, "directional": 1, "collimated": 2, "area": 3}
-
-
-def has_extent(light: Light) -> bool:
-    """Whether a camera ray can run into it."""
-    return light.kind == "area" or (light.kind == "directional" and light.angular_diameter_deg > 0)
 
 
 def light_record(light: Light, scene: SceneBuffers) -> np.void:
@@ -79,20 +74,18 @@ def light_record(light: Light, scene: SceneBuffers) -> np.void:
     axis = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
     tangent, bitangent = orthonormal_frame(axis, None if light.tangent is None else np.asarray(light.tangent))
     record["position"] = scene.space.to_gpu(np.array(light.position))
-    record["kind"] = _LIGHT_KINDS[light.kind]
+    record["kind"] = light.gpu_code
     record["axis"] = axis
-    record["is_disc"] = light.shape == "disc" or light.kind == "directional"
-    half = (
-        np.array([light.radius, light.radius] if light.shape == "disc" else [0.5 * light.width, 0.5 * light.height])
-        * scene.space.scale
-    )
-    if light.kind == "directional":
-        radius = np.radians(0.5 * light.angular_diameter_deg)
-        half = np.full(2, np.tan(radius))
-        record["measure"] = 1.0 / (np.pi * np.sin(radius) ** 2) if radius > 0 else 0.0
-    elif light.kind == "area":
-        record["measure"] = half[0] * half[1] * (np.pi if light.shape == "disc" else 4.0)
+    record["is_disc"] = light.is_disc
+    half = np.array(light.half_extent) * scene.space.scale
+    if light.angular_radius > 0.0:
+        half = np.full(2, np.tan(light.angular_radius))
+        record["measure"] = 1.0 / (np.pi * np.sin(light.angular_radius) ** 2)
+    elif light.has_extent:
+        record["measure"] = light.area * scene.space.scale**2
     record["half_u"], record["half_v"] = tangent * half[0], bitangent * half[1]
-    angles = (light.inner_half_angle_deg, light.outer_half_angle_deg)
-    record["cone"] = np.radians(angles) if light.kind == "spot" else (4.0, 4.0)
+    if light.profile is not None:
+        record["has_profile"], record["profile"] = 1, scene.profile_start(light)
+        record["half_u"], record["half_v"] = light.across
+    record["cone"] = light.cone
     return record

@@ -24,7 +24,6 @@ from ..model.optics.spectrum import Spectrum
 from ..model.scene import (
     Absorption,
     Dielectric,
-    Diffuse,
     Material,
     Mirror,
     Scene,
@@ -69,8 +68,7 @@ class CameraTables:
         colours = np.zeros((len(shown.objects), 4), "f4")
         colours[:, 3] = -1.0
         for row, item in zip(colours, shown.objects, strict=True):
-            if isinstance(item.material, Diffuse | Mirror):
-                row[:3] = item.material.reflectance_rgb
+            row[:3] = item.material.reflectance_rgb
             coefficient = _absorption(item.material, scene.space.scale)
             if coefficient is not None:
                 row[3] = next(i for i, known in enumerate(absorptions) if np.array_equal(known, coefficient))
@@ -95,7 +93,6 @@ def _shown_media(scene: SceneBuffers) -> dict[Dispersion, Dispersion]:
     for traced in scene.media:
         owner = next(i for i, material in enumerate(scene.traced_glasses) if material == traced)
         material = scene.scene.objects[owner].material
-        assert isinstance(material, Dielectric)
         shown[traced] = material.dispersion
     return shown
 
@@ -180,7 +177,7 @@ def _emission(
     defines = {"WHITE_ROW": 0, "LIGHT_ROW": len(rows), "ROWS_PER_LIGHT": 4 + len(reflectances) - 1}
     for light in scene.lights:
         # Intensity over distance² in GPU units needs the square of the scale; the other kinds are free of lengths.
-        unit = scale**2 if light.kind in ("point", "spot") else 1.0
+        unit = scale**2 if light.is_intensity else 1.0
         rows += [
             unit * running(light.spectral_power),
             *(unit * running(light.spectral_power, column) for column in basis.T),

@@ -33,7 +33,7 @@ class EmissionDomain:
     """One light's domain; positions in GPU space."""
 
     kind: str
-    """"point", "plane" or "area": which variant of emit.comp runs."""
+    """"point", "profile", "plane" or "area": which variant of emit.comp runs."""
     origin: np.ndarray
     axis: np.ndarray
     tangent: np.ndarray
@@ -93,7 +93,7 @@ def emission_domain(
     direction = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
     corners = specular_triangles.reshape(-1, 3)
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    if light.kind in ("directional", "collimated"):
+    if light.is_parallel:
         return _plane_domain(light, scene, space, specular_triangles, position, direction, middle)
     return _diverging_domain(light, space, specular_triangles, position, direction, middle)
 
@@ -111,14 +111,14 @@ def _plane_domain(
     frame = np.stack([tangent, bitangent])
     relative = triangles - middle
     flat = relative @ frame.T
-    tilt = np.tan(np.radians(0.5 * light.angular_diameter_deg)) if light.kind == "directional" else 0.0
+    tilt = np.tan(light.angular_radius)
     grow = tilt * np.abs(relative @ direction).max(axis=1)[:, None]
     low, high = flat.min(axis=1) - grow, flat.max(axis=1) + grow
     box_low, box_high = low.min(axis=0), high.max(axis=0)
     centre, light_u, light_v, is_disc, rim = middle, np.zeros(3), np.zeros(3), False, np.zeros(2)
-    if light.kind == "collimated":
-        half = _half_extent(light) * space.scale
-        light_u, light_v, is_disc = tangent / half[0], bitangent / half[1], light.shape == "disc"
+    if light.has_place:
+        half = np.array(light.half_extent) * space.scale
+        light_u, light_v, is_disc = tangent / half[0], bitangent / half[1], light.is_disc
         at = (position - middle) @ frame.T
         rim = _SOFT_EDGE * 2.0 * half
         box_low, box_high = np.maximum(box_low, at - half - rim), np.minimum(box_high, at + half + rim)
@@ -167,17 +167,17 @@ def _diverging_domain(
     relative = (triangles - position) @ frame.T
     lengths = np.linalg.norm(relative, axis=-1)
     flat = azimuthal_plane(relative / np.maximum(lengths, 1e-12)[..., None])
-    light_u = light_v = np.zeros(3)
+    light_u, light_v = light.across
     # Farthest from the axis, with what the extent of the light adds to it.
     farthest = np.arccos(np.clip((relative[..., 2] / np.maximum(lengths, 1e-12)).min(axis=1), -1.0, 1.0))
     shift = np.zeros(len(triangles))
     area = 1.0
-    if light.kind == "area":
-        half = _half_extent(light)
+    if light.has_outline:
+        half = np.array(light.half_extent)
         edge_u, edge_v = orthonormal_frame(direction, None if light.tangent is None else np.asarray(light.tangent))
         light_u, light_v = edge_u * half[0] * space.scale, edge_v * half[1] * space.scale
-        area = float(half[0] * half[1]) * (np.pi if light.shape == "disc" else 4.0)
-        reach = np.linalg.norm(half) * space.scale if light.shape == "rectangle" else half[0] * space.scale
+        area = light.area
+        reach = (half[0] if light.is_disc else np.linalg.norm(half)) * space.scale
         # Seen from the light's rim the object shifts by at most this angle.
         shift = np.arcsin(np.clip(reach / np.maximum(lengths.min(axis=1), 1e-12), 0.0, 1.0))
         farthest = np.minimum(farthest + shift, np.pi)
@@ -195,10 +195,9 @@ def _diverging_domain(
         )
         ring = 2.0 * float(np.sin(0.5 * max(nearest.min(), 0.0)))
         box_low, box_high = np.full(2, -2.0), np.full(2, 2.0)
-    outer = np.radians(light.outer_half_angle_deg) if light.kind == "spot" else 4.0
-    inner = np.radians(light.inner_half_angle_deg) if light.kind == "spot" else 4.0
+    inner, outer = light.cone
     cone_limit = None
-    if light.kind == "spot":
+    if outer < np.pi:
         cone_limit = (frame @ direction, outer)
         cone_low, cone_high = _cone_box(frame @ direction, outer)
         box_low, box_high = np.maximum(box_low, cone_low), np.minimum(box_high, cone_high)
@@ -211,9 +210,8 @@ def _diverging_domain(
     if not mask.any():
         return None
     measure = float(rect[2] * rect[3]) * area
-    kind = "area" if light.kind == "area" else "point"
     return EmissionDomain(
-        kind,
+        light.emission,
         position,
         axis,
         tangent,
@@ -225,14 +223,9 @@ def _diverging_domain(
         light_u,
         light_v,
         position,
-        light.shape == "disc",
+        light.is_disc,
         (float(inner), float(outer)),
     )
-
-
-def _half_extent(light: Light) -> np.ndarray:
-    """Half extents of a disc or rectangle, scene units (2,)."""
-    return np.array([light.radius, light.radius] if light.shape == "disc" else [0.5 * light.width, 0.5 * light.height])
 
 
 def _world_corners(item) -> np.ndarray:

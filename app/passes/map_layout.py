@@ -18,7 +18,7 @@ from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.tiles import Tile, pack
 from ..model.camera_rays import camera_rays
 from ..model.features import is_flat
-from ..model.scene import Camera, Diffuse, Scene
+from ..model.scene import Camera, Scene
 from .map_atlas import placement_rows
 
 if TYPE_CHECKING:
@@ -167,7 +167,6 @@ def _place(
         record["object"], record["placement"] = object_index, count
         record["first_triangle"] = buffers.first_triangle[object_index]
         record["reflectance_class"] = reflectance_class[receiver]
-        assert isinstance(material, Diffuse)
         record["reflectance_rgb"] = 1.0 if material.reflectance is not None else material.reflectance_rgb
         levels = [tiles[next_tile + i] for i in range(max(1, len(LEVEL_STEPS) * len(windows)))]
         next_tile += len(levels)

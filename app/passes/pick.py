@@ -10,7 +10,7 @@ from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.camera_rays import camera_frame
 from ..model.optics.glass import LINE_D_NM
-from ..model.scene import Camera, Diffuse, Vec3
+from ..model.scene import Camera, Vec3
 from .ray_paths import Path, RayPaths
 
 
@@ -47,7 +47,7 @@ class Picker:
         """The diffuse surface that is seen at (x, y), through glass (refracted at the d line) and in mirrors, as the
         camera draws it."""
         path = self._path(camera, width / height, x, y)
-        if path.last_object is None or not isinstance(self._scene.objects[path.last_object].material, Diffuse):
+        if path.last_object is None or not self._scene.objects[path.last_object].material.receives:
             return None
         return self._hit(path, len(path.points) - 1, path.last_object, path.last_normal)
 
@@ -62,7 +62,7 @@ class Picker:
 
     def _hit(self, path: Path, point: int, index: int, normal: np.ndarray) -> PickHit:
         steps = np.linalg.norm(np.diff(path.points[: point + 1], axis=0), axis=1)
-        is_receiver = isinstance(self._scene.objects[index].material, Diffuse)
+        is_receiver = self._scene.objects[index].material.receives
         return PickHit(index, _vec3(path.points[point]), _vec3(normal), float(steps.sum()), is_receiver)
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..gpu.records import MAX_BANDS
-from ..model.scene import Light, Scene
+from ..model.scene import Scene
 from .emission_domain import EmissionDomain
 from .map_layout import Landings
 from .trace import Band, FluxTally, LatticeSlice, TracePass
@@ -52,11 +52,6 @@ class Pilot:
     """One from each of `RIM` (empty for a light without extent)."""
 
 
-def has_extent(light: Light) -> bool:
-    """Whether the light is more than a point or a strictly parallel beam."""
-    return light.kind == "area" or (light.kind == "directional" and light.angular_diameter_deg > 0.0)
-
-
 def pilot_steps(
     trace: TracePass, scene: Scene, light: int, domain: EmissionDomain, power_w: float, spectral: bool
 ) -> Generator[None, None, Pilot]:
@@ -87,7 +82,7 @@ def pilot_steps(
     for x in PLACES if spectral else ():
         record, _ = yield from traced(Band(x, x, x, power_w), depth)
         at_places.append(record)
-    for place in RIM if has_extent(scene.lights[light]) else ():
+    for place in RIM if scene.lights[light].has_extent else ():
         record, _ = yield from traced(everything, depth, place)
         from_rim.append(record)
     return Pilot(count, whole, at_places, from_rim)

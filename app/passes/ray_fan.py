@@ -82,10 +82,7 @@ class RayFan:
             if self._fan(light, self._beam(light, object_index), object_index, 1, np.zeros(3)) is None:
                 continue
             power = float(light.spectral_power.xyz()[1])
-            if light.kind in ("point", "spot", "area"):
-                power /= max(float(np.sum((centre - np.asarray(light.position)) ** 2)), 1e-12)
-            if light.kind == "area":
-                power *= np.pi * light.radius**2 if light.shape == "disc" else light.width * light.height
+            power /= light.reach(max(float(np.linalg.norm(centre - np.asarray(light.position))), 1e-6))
             if best is None or power > best[0]:
                 best = power, index
         return None if best is None else best[1]
@@ -108,14 +105,14 @@ class RayFan:
     def _beam(self, light: Light, object_index: int) -> _Beam:
         points = self._points[object_index]
         position, centre = np.asarray(light.position, float), 0.5 * (points.min(axis=0) + points.max(axis=0))
-        if light.kind in ("directional", "collimated"):
+        if light.is_parallel:
             axis = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
-            if light.kind == "directional":
+            if not light.has_place:
                 # From outside of everything, so that whatever stands in the way is met.
                 return _Beam(centre - axis * float(np.linalg.norm(self._high - self._low)), axis, True, None)
             first, second = orthonormal_frame(axis, None if light.tangent is None else np.asarray(light.tangent, float))
-            half = (light.radius, light.radius) if light.shape == "disc" else (0.5 * light.width, 0.5 * light.height)
-            return _Beam(position, axis, True, np.stack([first * half[0], second * half[1]]), light.shape == "disc")
+            half = light.half_extent
+            return _Beam(position, axis, True, np.stack([first * half[0], second * half[1]]), light.is_disc)
         way = centre - position
         return _Beam(position, way / max(float(np.linalg.norm(way)), 1e-12), False, None)
 
@@ -137,7 +134,7 @@ class RayFan:
             return beam.origin + offsets, np.broadcast_to(beam.axis, offsets.shape).copy()
         directions = beam.axis + offsets
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-        kept = _inside_cone(light, directions)
+        kept = light.emits_toward(directions)
         return (np.broadcast_to(beam.origin, directions[kept].shape).copy(), directions[kept]) if kept.any() else None
 
     def _seen(self, beam: _Beam, points: np.ndarray) -> np.ndarray:
@@ -211,16 +208,6 @@ def _chord(aperture: np.ndarray, is_disc: bool, middle: np.ndarray, across: np.n
         return (-b - root) / a, (-b + root) / a
     limits = [((-1.0 - s) / d, (1.0 - s) / d) for s, d in zip(start, step, strict=True) if abs(d) > 1e-12]
     return max(min(pair) for pair in limits), min(max(pair) for pair in limits)
-
-
-def _inside_cone(light: Light, directions: np.ndarray) -> np.ndarray:
-    """Which directions a light emits into."""
-    axis = _unit(np.asarray(light.direction, float))
-    if light.kind == "spot":
-        return directions @ axis > np.cos(np.radians(light.outer_half_angle_deg))
-    if light.kind == "area":
-        return directions @ axis > 0.0
-    return np.ones(len(directions), bool)
 
 
 def _world_points(item: SceneObject) -> np.ndarray:

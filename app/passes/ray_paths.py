@@ -15,7 +15,6 @@ from ..gpu.context import Context
 from ..gpu.records import NONE
 from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
 from ..gpu.schema import Field, Struct
-from ..model.scene import Dielectric
 from ..model.scene_checks import contains
 
 MAX_SEGMENTS = 24
@@ -157,7 +156,7 @@ class RayPaths:
         if self._inside is None or self._inside[0] != key:
             mask, alone = 0, NONE
             for index, item in enumerate(self.scene.scene.objects):
-                if isinstance(item.material, Dielectric) and contains(item, point):
+                if item.material.transmits and contains(item, point):
                     if index in self.scene.stack_objects:
                         mask |= 1 << self.scene.stack_objects.index(index)
                     else:

@@ -16,9 +16,9 @@ import numpy as np
 from ..model.geometry.bvh import build_bvh
 from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, daylight_per_lumen, rgb_basis
 from ..model.optics.spectrum import cmf_at
-from ..model.scene import Diffuse, Mirror, Scene
+from ..model.scene import Scene
 from ..model.texture import Texture
-from .camera_optics import inlined
+from .compiling import inlined
 from .photon_scene import TABLE_NM, PhotonScene, reflectance_classes
 
 _EVEN_SHARE = 0.2
@@ -147,7 +147,7 @@ def with_upsampled_mirrors(photons: PhotonScene, scene: Scene) -> PhotonScene:
     """The same arrays with every mirror's reflectance as basis @ rgb, as the camera's RGB colours are meant."""
     rows, weight = [photons.weights], photons.weight.copy()
     for index, item in enumerate(scene.objects):
-        if isinstance(item.material, Mirror):
+        if item.material.is_mirror:
             weight[index] = sum(len(r) for r in rows)
             rows.append(
                 np.interp(TABLE_NM, VISIBLE_NM, rgb_basis() @ np.asarray(item.material.reflectance_rgb, float))[None]
@@ -165,7 +165,7 @@ def pictures(scene: Scene, photons: PhotonScene, centre: np.ndarray) -> Pictures
     texture = np.full(len(scene.objects), -1, np.int32)
     colour = np.ones((len(scene.objects), 3))
     for index, item in enumerate(scene.objects):
-        if not isinstance(item.material, Diffuse) or item.material.reflectance is not None:
+        if not item.material.receives or item.material.reflectance is not None:
             continue
         colour[index] = item.material.reflectance_rgb
         if item.material.texture is not None:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model.scene import Diffuse, Scene
+from ..model.scene import Scene
 from .camera_kernel import CausticTables
 from .photon_emission import frame_of
 from .photon_scene import PhotonScene
@@ -80,7 +80,7 @@ def receiver_planes(scene: Scene, photons: PhotonScene) -> Planes:
     side = np.full((len(scene.objects), 2), -1, np.int32)
     owner, frames, extents, flat = [], [], [], []
     for index, item in enumerate(scene.objects):
-        if not isinstance(item.material, Diffuse):
+        if not item.material.receives:
             continue
         chosen = photons.owner == index
         corners = photons.corners[chosen].reshape(-1, 3, 3).copy()

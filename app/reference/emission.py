@@ -73,20 +73,24 @@ class Emitter:
 
         radial = float(np.sqrt(np.prod(spacing)))
 
-        if light.kind == "spot":
-            inner, outer = np.radians([light.inner_half_angle_deg, light.outer_half_angle_deg])
+        if light.profile is not None:
+            u, v = light.across
+            horizontal = np.arctan2(direction @ v, direction @ u)
+            share = share * light.profile.at(angle_between(direction, axis), horizontal)
+        inner, outer = light.cone
+        if outer < np.pi:
             return share * (
                 covered(outer - angle_between(direction, axis), radial)
                 if inner == outer
                 else spot_falloff(direction, axis, inner, outer)
             )
-        if light.kind == "area":
+        if self.domain.kind == "area":
             return share * np.maximum(direction @ axis, 0.0)
-        if light.kind == "collimated":
+        if light.has_outline:
             offset = (start - np.array(light.position)) @ np.stack([self.domain.tangent, self.domain.bitangent]).T
-            if light.shape == "disc":
+            if light.is_disc:
                 return share * covered(light.radius - np.linalg.norm(offset, axis=-1), radial)
-            inside = 0.5 * np.array([light.width, light.height]) - np.abs(offset)
+            inside = np.array(light.half_extent) - np.abs(offset)
             return share * covered(inside[..., 0], spacing[0]) * covered(inside[..., 1], spacing[1])
         return np.full(direction.shape[:-1], share)
 

@@ -49,6 +49,8 @@ class Domain(NamedTuple):
     """The light's own axis."""
     cone: np.ndarray
     """float64 (2,): a spot's half angles, rad; beyond π for none."""
+    profile: np.ndarray
+    """float64: a lamp's intensities over directions, as `ies_file.Profile.packed` has them; empty without."""
     back: float
     """How far before the plane rays start (PLANE)."""
     tilt: float
@@ -61,7 +63,7 @@ class Domain(NamedTuple):
     """Two more random numbers place a photon on the light."""
     half_u: np.ndarray
     half_v: np.ndarray
-    """An area light's middle to its rim."""
+    """An area light's middle to its rim; where a profile's horizontal angle is 0 and 90°."""
     target: np.ndarray
     """Middle of the sphere round all specular objects (AREA)."""
     radius: float
@@ -77,9 +79,9 @@ def domains(light: Light, triangles: np.ndarray, centre: np.ndarray, reach: floa
     direction = np.asarray(light.direction, float)
     direction = direction / np.linalg.norm(direction)
     position = np.asarray(light.position, float) - centre
-    if light.kind in ("directional", "collimated"):
+    if light.is_parallel:
         return _plane(light, triangles, position, direction, reach)
-    if light.kind == "area":
+    if light.has_outline:
         return _area(light, triangles, position, direction)
     return _directions(light, triangles, position, direction)
 
@@ -133,6 +135,7 @@ def _domain(
         measure,
         axis,
         np.array([4.0, 4.0]),
+        np.zeros(0),
         0.0,
         0.0,
         np.zeros(4),
@@ -157,22 +160,18 @@ def _distribution(probability: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return rows, columns
 
 
-def _half_extent(light: Light) -> tuple[float, float]:
-    return (light.radius, light.radius) if light.shape == "disc" else (0.5 * light.width, 0.5 * light.height)
-
-
 def _plane(
     light: Light, triangles: np.ndarray, position: np.ndarray, direction: np.ndarray, reach: float
 ) -> list[Domain]:
     frame = frame_of(direction, light.tangent)
     flat, depth = triangles @ frame[:2].T, triangles @ direction
-    tilt = math.tan(math.radians(0.5 * light.angular_diameter_deg)) if light.kind == "directional" else 0.0
+    tilt = math.tan(light.angular_radius)
     grow = tilt * np.abs(depth)[..., None]
     low, high = (flat - grow).min(axis=1), (flat + grow).max(axis=1)
     box_low, box_high = low.min(axis=0), high.max(axis=0)
-    half = np.array(_half_extent(light))
+    half = np.array(light.half_extent)
     at = frame[:2] @ position
-    if light.kind == "collimated":
+    if light.has_place:
         box_low, box_high = np.maximum(box_low, at - half), np.minimum(box_high, at + half)
     if np.any(box_high <= box_low):
         return []
@@ -181,11 +180,11 @@ def _plane(
     if not mask.any():
         return []
     domain = _domain(PLANE, frame, np.zeros(3), rect, mask, float(rect[2] * rect[3]), direction)
-    if light.kind == "collimated":
+    if light.has_place:
         aperture = np.concatenate([at, half])
         return [
             domain._replace(
-                back=-float(position @ direction), aperture=aperture, has_aperture=True, is_disc=light.shape == "disc"
+                back=-float(position @ direction), aperture=aperture, has_aperture=True, is_disc=light.is_disc
             )
         ]
     # Beyond the sphere that holds everything, also for the most slanted ray to the rectangle's corner.
@@ -205,15 +204,14 @@ def _directions(light: Light, triangles: np.ndarray, position: np.ndarray, direc
         if narrow
         else [frame_of(side * e, None) for e in np.eye(3) for side in (1.0, -1.0)]
     )
-    cone = (
-        np.radians([light.inner_half_angle_deg, light.outer_half_angle_deg])
-        if light.kind == "spot"
-        else np.array([4.0, 4.0])
-    )
+    cone = np.array(light.cone)
     found = []
     for frame in charts:
         limit = np.array([[-np.inf] * 2, [np.inf] * 2]) if narrow else np.array([[-1.0] * 2, [1.0] * 2])
         domain = _chart(frame, relative @ frame.T, limit, position, direction, cone)
+        if domain is not None and light.profile is not None:
+            u, v = light.across
+            domain = domain._replace(profile=light.profile.packed(), half_u=u, half_v=v)
         if domain is not None:
             found.append(domain)
     return found
@@ -279,19 +277,16 @@ def _area(light: Light, triangles: np.ndarray, position: np.ndarray, direction: 
     target = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     radius = 1.0001 * float(np.linalg.norm(corners - target, axis=1).max())
     frame = frame_of(direction, light.tangent)
-    half = _half_extent(light)
+    half = light.half_extent
     u, v = half[0] * frame[0], half[1] * frame[1]
     rim = position + np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]]) @ np.stack([u, v])
     if ((target - rim) @ direction).max() <= -radius:
         return []  # everything lies behind the light
-    area = half[0] * half[1] * (math.pi if light.shape == "disc" else 4.0)
     way = target - position
     length = np.linalg.norm(way)
     aim = frame_of(way / length if length > 0.0 else direction, None)
-    domain = _domain(AREA, aim, position, np.zeros(4), np.ones((GRID, GRID), bool), float(area), direction)
-    return [
-        domain._replace(is_disc=light.shape == "disc", extended=True, half_u=u, half_v=v, target=target, radius=radius)
-    ]
+    domain = _domain(AREA, aim, position, np.zeros(4), np.ones((GRID, GRID), bool), light.area, direction)
+    return [domain._replace(is_disc=light.is_disc, extended=True, half_u=u, half_v=v, target=target, radius=radius)]
 
 
 def _touched(low: np.ndarray, high: np.ndarray, rect: np.ndarray) -> np.ndarray:

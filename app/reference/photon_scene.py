@@ -18,11 +18,7 @@ from ..model.geometry.mesh import Mesh
 from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, rgb_partition, xyz_to_rgb709_matrix
 from ..model.optics.spectrum import Spectrum, cmf_at
 from ..model.scene import (
-    Black,
     Camera,
-    Dielectric,
-    Diffuse,
-    Mirror,
     Scene,
 )
 
@@ -127,18 +123,18 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
     kinds, medium, weight = [], [], []
     for item in scene.objects:
         material = item.material
-        kinds.append({Black: BLACK, Diffuse: DIFFUSE, Mirror: MIRROR, Dielectric: DIELECTRIC}[type(material)])
-        medium.append(media.add(material.dispersion.index(TABLE_NM)) if isinstance(material, Dielectric) else -1)
+        kinds.append(material.gpu_code)
+        medium.append(media.add(material.dispersion.index(TABLE_NM)) if material.transmits else -1)
         weight.append(-1)
-        if isinstance(material, Dielectric) and material.absorption is not None:
+        if material.absorption is not None:
             weight[-1] = weights.add(np.interp(TABLE_NM, VISIBLE_NM, material.absorption.coefficient))
-        elif isinstance(material, Mirror):
+        elif material.is_mirror:
             reflectance = rgb_partition() @ np.asarray(material.reflectance_rgb, float)
             weight[-1] = weights.add(np.interp(TABLE_NM, VISIBLE_NM, reflectance))
     _, reflectance_class = reflectance_classes(scene)
     factor = [
         np.asarray(o.material.reflectance_rgb, float)
-        if isinstance(o.material, Diffuse) and o.material.reflectance is None
+        if o.material.receives and o.material.reflectance is None
         else np.ones(3)
         for o in scene.objects
     ]
@@ -230,7 +226,7 @@ def reflectance_classes(scene: Scene) -> tuple[list[np.ndarray | None], np.ndarr
     classes: list[np.ndarray | None] = [None]
     row = np.zeros(len(scene.objects), np.int32)
     for index, item in enumerate(scene.objects):
-        if isinstance(item.material, Diffuse) and item.material.reflectance is not None:
+        if item.material.reflectance is not None:
             row[index] = len(classes)
             classes.append(np.asarray(item.material.reflectance, float))
     return classes, row
@@ -262,9 +258,7 @@ class _Rows:
 
 def _middle(scene: Scene, meshes: list[Mesh]) -> tuple[np.ndarray, float]:
     """Middle and half diagonal of the specular objects, or of everything."""
-    chosen = [
-        m for m, o in zip(meshes, scene.objects, strict=True) if isinstance(o.material, Dielectric | Mirror)
-    ] or meshes
+    chosen = [m for m, o in zip(meshes, scene.objects, strict=True) if o.material.is_specular] or meshes
     low = np.min([m.bounds()[0] for m in chosen], axis=0)
     high = np.max([m.bounds()[1] for m in chosen], axis=0)
     return 0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), 1e-300)
@@ -274,7 +268,7 @@ def _corner_normals(scene: Scene, meshes: list[Mesh], order: np.ndarray) -> tupl
     """Row of each triangle's corner normals (−1: flat, or not specular), and the rows (S, 9)."""
     rows = []
     for mesh, item in zip(meshes, scene.objects, strict=True):
-        smooth = mesh.corner_normals is not None and isinstance(item.material, Dielectric | Mirror)
+        smooth = mesh.corner_normals is not None and item.material.is_specular
         rows.append(mesh.corner_normals if smooth else np.zeros((len(mesh.triangles), 3, 3)))
     normals = np.concatenate(rows)[order]
     known = (np.abs(normals).sum(axis=2) > 0.0).all(axis=1)
@@ -286,7 +280,7 @@ def _corner_normals(scene: Scene, meshes: list[Mesh], order: np.ndarray) -> tupl
 
 def _ranks(scene: Scene, meshes: list[Mesh]) -> dict[int, int]:
     """Rank of every transparent solid whose bounds meet another's: by priority, then by order."""
-    solids = [i for i, o in enumerate(scene.objects) if isinstance(o.material, Dielectric)]
+    solids = [i for i, o in enumerate(scene.objects) if o.material.transmits]
     if len(solids) < 2:
         return {}
     bounds = {i: np.array(meshes[i].bounds()) for i in solids}
@@ -301,7 +295,8 @@ def _ranks(scene: Scene, meshes: list[Mesh]) -> dict[int, int]:
     ]
     if len(meeting) > _MAX_STACK:
         raise UserError(
-            f"scene '{scene.name}': {len(meeting)} transparent solids nest or touch and at most {_MAX_STACK} may; move some apart"
+            f"scene '{scene.name}': {len(meeting)} transparent solids nest or touch and at most {_MAX_STACK} may; "
+            "move some apart"
         )
     ranked = sorted(meeting, key=lambda i: (scene.objects[i].material.priority, i))  # type: ignore[union-attr]
     return {index: rank for rank, index in enumerate(ranked)}

@@ -12,7 +12,8 @@ from ..base.movie import Frames, Sink
 from ..base.tone_map import auto_exposure, tone_map_8bit
 from ..edit.animation import Animation
 from ..gpu.context import Context
-from ..model.scene import Diffuse, Scene
+from ..model.scene import Scene
+from ..model.scene_key import scene_key
 from ..model.settings import RenderSettings
 from .frames import FrameRenderer
 
@@ -43,7 +44,7 @@ def render_animation(
             if not sink.has(index):
                 for share in renderer.steps(stage):
                     yield (index + 0.99 * share) / len(stages)  # the rest is developing and writing
-                rgb = renderer.rgb()
+                rgb = renderer.picture.rgb
                 if base_ev is None:
                     base_ev = auto_exposure(rgb)
                     if isinstance(sink, Frames):
@@ -57,8 +58,6 @@ def render_animation(
 
 def description(animation: Animation, settings: RenderSettings, fps: float, photons: int) -> Mapping[str, object]:
     """All that decides how the frames look, as plain values: what a resumed folder must agree on."""
-    from ..reference.photon_reference import scene_key
-
     start = animation.start
     return {
         "scene": start.scene.name,
@@ -82,7 +81,7 @@ def description(animation: Animation, settings: RenderSettings, fps: float, phot
 
 def _pictures(scene: Scene) -> list[str]:
     """Hashes of the environment and of every texture, which `scene_key` does not know."""
-    found = [item.material.texture for item in scene.objects if isinstance(item.material, Diffuse)]
+    found = [item.material.texture for item in scene.objects if item.material.receives]
     hashes = [
         "" if t is None else hashlib.sha256(np.ascontiguousarray(t.rgb).tobytes() + t.wrap.encode()).hexdigest()
         for t in found

@@ -12,7 +12,6 @@ from functools import partial
 
 from ..edit import requests
 from ..edit.state import State, Tool
-from ..model.scene import Dielectric
 from . import view_commands
 from .panels import dialogs
 from .view_model import ViewModel
@@ -368,4 +367,4 @@ def command(name: str) -> Command:
 
 def has_glass_selected(state: State, view_model: ViewModel) -> bool:
     """Whether the selection is an object of glass."""
-    return _is_object(state, view_model) and isinstance(state.scene.objects[state.selection.index].material, Dielectric)
+    return _is_object(state, view_model) and state.scene.objects[state.selection.index].material.transmits

@@ -160,7 +160,7 @@ class _Job:
         frame = (
             f"Frame {min(int(self._fraction * self._frames) + 1, self._frames)} of {self._frames}"
             if self._frames
-            else "Light and camera pass"
+            else "Tracing photons and taking camera samples"
         )
         if self._fraction < 0.02:
             return frame
@@ -234,8 +234,8 @@ def _spectral(context: Context, path: Path, stage: Stage, state: State, photons:
         try:
             for share in renderer.steps(stage):
                 yield 0.98 * share
-            spectral, edges = renderer.spectral()
-            write_image(path, renderer.rgb(), spectral=spectral, bin_edges_nm=edges)
+            picture = renderer.picture
+            write_image(path, picture.rgb, spectral=picture.spectral, bin_edges_nm=picture.bin_edges_nm)
         finally:
             renderer.release()
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..edit.state import State
-from ..model.scene import Dielectric
 from ..passes.ray_line import RayLine
 
 if TYPE_CHECKING:
@@ -52,17 +51,13 @@ class RayOverlay:
         self._fan = self._buffers = self._scene = None
 
     def _fan_of(self, scene: Scene) -> RayFan:
-        from ..gpu.scene_buffers import SceneBuffers
-        from ..model.features import Features
         from ..model.settings import RenderSettings
         from ..passes.ray_fan import RayFan
-        from ..render.light_pass import spectral_axis
+        from ..render.light_pass import scene_buffers
 
         if self._fan is None or scene is not self._scene:
             self.release()
-            features = Features.of(scene, RenderSettings())
-            self._scene = scene
-            self._buffers = SceneBuffers(self._context.ctx, scene, features, spectral_axis(scene, features))
+            self._scene, self._buffers = scene, scene_buffers(self._context, scene, RenderSettings())
             self._fan = RayFan(self._context, self._buffers)
         return self._fan
 
@@ -70,9 +65,9 @@ class RayOverlay:
     def _object(state: State) -> int | None:
         """The selected glass; with a light or nothing selected, the first glass there is."""
         selection, objects = state.selection, state.scene.objects
-        if selection.kind == "object" and isinstance(objects[selection.index].material, Dielectric):
+        if selection.kind == "object" and objects[selection.index].material.transmits:
             return selection.index
-        return next((i for i, o in enumerate(objects) if isinstance(o.material, Dielectric)), None)
+        return next((i for i, o in enumerate(objects) if o.material.transmits), None)
 
 
 def wavelengths_of(state: State) -> list[float]:

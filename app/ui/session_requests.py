@@ -12,7 +12,6 @@ from ..base.errors import UserError
 from ..edit import camera_controls, requests
 from ..edit.document import Document
 from ..edit.state import Selection
-from ..model.scene import Diffuse
 from ..model.scene_defaults import bounds_of
 from .caustic_source import source_at
 from .session import Session
@@ -87,7 +86,7 @@ def _select_at(session: Session, request: requests.SelectAt) -> None:
     if hit is None or chosen is None:
         session.state = replace(session.state, selection=Selection())
         return
-    if not request.itself and isinstance(scene.objects[chosen].material, Diffuse):
+    if not request.itself and scene.objects[chosen].material.receives:
         source = _source_at(session, np.asarray(hit.position), hit.object_index)
         found = None if source is None else picture.object_in(scene, source)
         chosen = chosen if found is None else found
@@ -129,7 +128,7 @@ def _looking_at(camera: camera_controls.Camera, position: np.ndarray) -> camera_
 
 def _without_endless_receivers(session: Session, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The box of what is worth seeing: a table forty times as wide as the prism on it would make that a dot."""
-    interesting = [o for o in session.state.scene.objects if not isinstance(o.material, Diffuse)]
+    interesting = [o for o in session.state.scene.objects if not o.material.receives]
     if not interesting:
         return low, high
     inner_low, inner_high = bounds_of(interesting)

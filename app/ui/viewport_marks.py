@@ -113,7 +113,7 @@ def draw_lights(canvas: Canvas, state: State) -> State:
         return state
     for index, light in enumerate(state.scene.lights):
         chosen = state.selection == Selection("light", index)
-        if light.kind == "directional" and not chosen:
+        if not light.has_place and not chosen:
             continue  # it stands nowhere
         place = placing.light_place(state.scene, light)
         x, y = canvas.pixels(place)
@@ -141,14 +141,14 @@ def _draw_light(
     light = state.scene.lights[index]
     colour = theme.DARK.accent if chosen else (1.0, 0.92, 0.7, 1.0)
     opacity = 1.0 if chosen or hovered else 0.5
-    if (chosen or hovered) and light.kind != "point":
+    if (chosen or hovered) and light.has_direction:
         length = canvas.view.height_at(max(float(canvas.view.depth(place)), 1e-9)) * theme.em(_ARROW_EM) / canvas.height
-        tip = place + length * placing.light_axes(light)[:, 2]
+        tip = place + length * light.axes()[:, 2]
         draw_outlined(canvas, np.stack([place, tip]), (*colour[:3], 0.9), 1.6, closed=False)
     canvas.drawing.add_circle_filled(
         ImVec2(x, y), theme.em(0.78), theme.packed((0.0, 0.0, 0.0, 1.0), 0.5 * opacity), 24
     )
-    icon = icons.ICON_FA_SUN if light.kind == "directional" else icons.ICON_FA_LIGHTBULB
+    icon = icons.ICON_FA_SUN if not light.has_place else icons.ICON_FA_LIGHTBULB
     size = imgui.calc_text_size(icon)
     canvas.drawing.add_text(ImVec2(x - 0.5 * size.x, y - 0.5 * size.y), theme.packed(colour, opacity), icon)
 

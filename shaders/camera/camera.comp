@@ -17,20 +17,13 @@ uint rounds = 0u;
 #define COUNT_ROUNDS(count) rounds += uint(count)
 #endif
 
-#include "lib/intersect.glsl"
+#include "lib/medium.glsl"
+#include "lib/band.glsl"
+#include "lib/interface.glsl"
 #include "lib/camera.glsl"
 #include "lib/lights.glsl"
 #include "lib/lookup.glsl"
 #include "lib/random.glsl"
-#include "lib/optics.glsl"
-#include "lib/surface.glsl"
-
-// All that medium.glsl needs to know of a ray.
-struct RayRecord {
-    uint inside_mask;
-    uint inside_object;
-};
-#include "lib/medium.glsl"
 
 layout(std140, binding = BIND_PARAMETERS) uniform Parameters { CameraParameters p; };
 // Every ray asks all lights: constants to all, where they fit a uniform block.
@@ -113,7 +106,7 @@ PathEnd ended[ENDS_HELD];
 #include "camera/footprint.glsl"
 #include "camera/receiver.glsl"
 #include "camera/taps.glsl"
-#include "camera/crossing.glsl"
+#include "camera/interface.glsl"
 #if defined(CAMERA_SPECULAR) && defined(SPECTRAL_SWEEP)
 #include "camera/cuts.glsl"
 #endif
@@ -143,7 +136,7 @@ CameraPath camera_path(uvec2 pixel, uint look, float gain)
     path.position = ray.position;
     path.direction = ray.direction;
     path.origin = RayOrigin(NONE, NONE, false, p.inside_mask);
-    path.medium = RayRecord(p.inside_mask, p.inside_object);
+    path.medium = MediumStack(p.inside_mask, p.inside_object);
     for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
     vec3 right = p.half_right * (2.0 * p.pixel_width / float(p.size.x)), up = p.half_up * (2.0 * p.pixel_height / float(p.size.y));
     if (p.orthographic != 0u) {
@@ -180,34 +173,31 @@ CameraPath camera_path(uvec2 pixel, uint look, float gain)
 
 #ifdef CAMERA_SPECULAR
 #ifdef HAS_DIELECTRIC
-// A number for a choice at this depth: a Kronecker sequence over a pixel's samples, one irrational a depth (the first is the wavelength's).
+// A number for a choice at this depth: a Kronecker sequence over a pixel's samples (the first generator is the wavelength's).
 float choice(CameraPath path, uint pixel_key)
 {
-    const uint generators[8] = uint[](1779033703u, 3144134277u, 2773480763u, 1359893119u, 2600822925u, 528734635u, 1541459225u, 3418070365u);
-    uint generator = path.depth < 8 ? generators[path.depth] : hash_pcg(uint(path.depth)) | 1u;
-    return kronecker(p.draw_index, generator, hash_combine(pixel_key, path.key + uint(path.depth) * 2654435769u));
+    return kronecker(p.draw_index, depth_generator(uint(path.depth)), hash_combine(pixel_key, path.key + uint(path.depth) * 2654435769u));
 }
 
 // One glass surface: `path` goes on, the other part is put on the stack or, if weak, one of them is chosen.
-void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, uint pixel_key)
+void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle facet, uint pixel_key)
 {
     bool entering = dot(whole.direction, hit.normal_g) < 0.0;
-    MediumInterface crossing = cross_boundary(path.medium, hit.object, entering);
-    RayRecord beyond = RayRecord(crossing.mask_after, crossing.object_after);
-    RayOrigin origin_beyond = RayOrigin(hit.primitive, hit.object, entering, crossing.mask_after);
-    RayOrigin origin_back = RayOrigin(hit.primitive, hit.object, !entering, path.medium.inside_mask);
-    if (!crossing.changes) {
-        path.medium = beyond;
+    MediumInterface boundary = cross_boundary(path.medium, hit.object, entering);
+    RayOrigin origin_beyond = RayOrigin(hit.primitive, hit.object, entering, boundary.behind.mask);
+    RayOrigin origin_back = RayOrigin(hit.primitive, hit.object, !entering, path.medium.mask);
+    if (!boundary.changes) {
+        path.medium = boundary.behind;
         path.origin = origin_beyond;
         return;
     }
-    ShadingFrame facing = shading_frame_of(hit, path);
+    ShadingFrame frame = shading_frame(hit, facet, path.direction);
     CameraPath mirrored = path;
     vec3 n_i, n_t, theta3, cosine2, reflectance, mirror_weight;
     bool begins = false;
     for (int round = 0; round < 2; ++round) {
-        crossing_indices(crossing, path.band, n_i, n_t);
-        theta3 = thetas(path, facing);
+        interface_indices(boundary, path.band, n_i, n_t);
+        theta3 = incidence_over_band(path, frame);
         cosine2 = transmitted_cosine2(theta3, n_i / n_t);
         reflectance = fresnel_reflectance(theta3, n_i / n_t, cosine2);
         mirror_weight = begins ? mirror_weight : reflectance;
@@ -226,7 +216,7 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, uint pixel_ke
     bool may_cut = path.narrowed && any(passes) && !all(passes) && !path.recut;
     bool cut = false;
     WHEN(may_cut) {
-        float at = cell_border(cut_of(path, theta3, crossing, passes));
+        float at = cell_border(onset_of(path, frame, theta3, boundary, passes));
         cut = may_cut_at(path, at);
         bool near = cut && (whole.sound || cut_is_near(whole, at, hit.distance));
         if (cut && !near) atomicAdd(fallbacks[FELL_CUT], 1u);
@@ -241,7 +231,8 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, uint pixel_ke
     if (cut) return;
 #endif
     path.recut = mirrored.recut = false;
-    bool total = cosine2.y <= 0.0, reflects = total;
+    Deflection refracted = refract_at(frame, path.direction, n_i.y / n_t.y);
+    bool total = !refracted.exists, reflects = total;
     float likely = total ? 1.0 : dot(reflectance, vec3(0.25, 0.5, 0.25));
     bool strong = !total && (begins || path.depth <= 1 || min(path.share * likely, path.share * (1.0 - likely)) > p.split_threshold);
     bool splits = strong && waits < STACK;
@@ -251,7 +242,7 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, uint pixel_ke
         mirrored.share *= likely;
         mirrored.origin = origin_back;
         mirrored.key = hash_combine(mirrored.key, 1u);
-        reflect_path(mirrored, facing);
+        reflect_path(mirrored, frame);
         aside = mirrored;
         sets_aside = true;
     }
@@ -263,11 +254,12 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, uint pixel_ke
         path.weight *= total ? vec3(1.0) : 1.0 - reflectance;
         path.share *= total ? 1.0 : 1.0 - likely;
     }
-    bool through = false;
-    WHEN(!reflects) through = refract_path(path, facing, crossing, n_i, n_t);
-    if (through) path.medium = beyond;
-    path.origin = through ? origin_beyond : origin_back;
-    WHEN(!through) reflect_path(path, facing);
+    WHEN(!reflects) {
+        refract_path(path, refracted, frame, boundary, n_i, n_t);
+        path.medium = boundary.behind;
+    }
+    path.origin = reflects ? origin_back : origin_beyond;
+    WHEN(reflects) reflect_path(path, frame);
 }
 #endif
 
@@ -276,22 +268,25 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
 {
     CameraPath whole = path;
 #ifdef ABSORPTION
-    uint filling = ray_medium(path.medium);
+    uint filling = current_medium(path.medium);
     int absorber = filling == NONE ? -1 : int(object_colours[filling].w);
     for (int i = 0; i < ABSORBERS; ++i)
         if (i == absorber) path.lengths[i] += hit.distance;
 #endif
     transfer_columns(path, hit.normal_g, hit.distance);
     if (!columns_hold(path)) atomicAdd(fallbacks[FELL_COLUMNS], 1u);
-    path.position = surface_point(hit, whole.position, whole.direction);
+    Triangle facet = hit_triangle(hit);
+    path.position = surface_point(hit, facet, whole.position, whole.direction);
 #ifdef SPECTRAL_SWEEP
-    path.sound = path.sound && !is_curved(hit);
+#ifdef NORMAL_DERIVATIVES
+    path.sound = path.sound && ((hit.primitive & PLANE_BIT) != 0u || facet.normals == NONE);
+#endif
     WHEN(path.narrowed) transfer_ends(path, hit.normal_g);
 #endif
     path.depth += 1;
 #ifdef HAS_MIRROR
     WHEN(kind == KIND_MIRROR) {
-        reflect_path(path, shading_frame_of(hit, path));
+        reflect_path(path, shading_frame(hit, facet, path.direction));
         path.origin = RayOrigin(hit.primitive, hit.object, dot(path.direction, hit.normal_g) < 0.0, path.origin.inside_mask);
         path.recut = false;
         vec3 colour = object_colours[hit.object].rgb;
@@ -308,7 +303,7 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
     }
 #endif
 #ifdef HAS_DIELECTRIC
-    WHEN(kind == KIND_DIELECTRIC) cross_glass(path, whole, hit, pixel_key);
+    WHEN(kind == KIND_DIELECTRIC) cross_glass(path, whole, hit, facet, pixel_key);
 #endif
 }
 #endif

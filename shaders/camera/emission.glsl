@@ -26,7 +26,7 @@ vec4 emission_until(uint row, int target, int cell)
 // What a path lets through at the wavelength x.
 float transmitted(CameraPath path, float x)
 {
-    float kept = weights_at(path, vec3(x)).x;
+    float kept = band_weights(path.band, path.weight, vec3(x)).x;
 #ifdef ABSORPTION
     float depth = 0.0;
     for (int i = 0; i < ABSORBERS; ++i)

@@ -6,10 +6,6 @@
 
 #define SPATIAL 2
 #define COLUMNS_HELD (SPATIAL + SPECTRAL_GROUPS)
-// A column longer than this (GPU units, the glass is about 1) has left the linear regime for good.
-#define COLUMN_LIMIT 1e4
-// Of the sequence of single wavelengths: the fraction of the square root of 2.
-#define WAVELENGTH_GENERATOR 1779033703u
 // An end of a band that arrives farther off (GPU units) is beyond the facet for good.
 #define END_LIMIT 1.0
 
@@ -17,7 +13,7 @@ struct CameraPath {
     vec3 position;
     vec3 direction;
     RayOrigin origin;
-    RayRecord medium;
+    MediumStack medium;
     vec3 dposition[COLUMNS_HELD];   // of the two sides of a pixel, then of each group's variable
     vec3 ddirection[COLUMNS_HELD];
     vec3 band;                      // its lowest wavelength, the one it is traced at, its highest: as x
@@ -40,14 +36,6 @@ struct CameraPath {
     float lengths[ABSORBERS];       // way through each absorbing glass, GPU units; reflections by each coloured mirror
 #endif
 };
-
-// Change of group g's variable from the path's own wavelength to x.
-#if SPECTRAL_GROUPS > 0
-float variable_step(uint g, float x, float x_anchor)
-{
-    return spectral_row(uint(VARIABLE_ROW) + g, x) - spectral_row(uint(VARIABLE_ROW) + g, x_anchor);
-}
-#endif
 
 #ifdef SPECTRAL_SWEEP
 // Where the columns alone put an end's ray.
@@ -103,14 +91,6 @@ float sample_side(CameraPath path)
 #endif
 }
 
-// Weights at other wavelengths of the same band.
-vec3 weights_at(CameraPath path, vec3 x)
-{
-    vec3 below = clamp((x - path.band.x) / max(path.band.y - path.band.x, 1e-9), 0.0, 1.0);
-    vec3 above = clamp((x - path.band.y) / max(path.band.z - path.band.y, 1e-9), 0.0, 1.0);
-    return mix(mix(vec3(path.weight.x), vec3(path.weight.y), below), vec3(path.weight.z), above);
-}
-
 #if defined(HAS_DISPERSION) && !defined(RANDOM_WAVELENGTH)
 // How much of what looks bright in the whole spectrum lies below either end of a band.
 vec2 brightness_of(vec3 band)
@@ -133,7 +113,7 @@ void narrow(inout CameraPath path, uint pixel_key)
     // One of the table's cells, by how bright it looks.
 #ifdef EVEN_WAVELENGTHS
     // Not by the golden ratio: the places in a pixel go by that, and each height would have a colour of its own.
-    float u = kronecker(p.draw_index, WAVELENGTH_GENERATOR, hash_combine(pixel_key, 77u));
+    float u = kronecker(p.draw_index, depth_generator(0u), hash_combine(pixel_key, 77u));
 #else
     float u = unit_float(hash_combine(hash_combine(pixel_key, 77u), p.draw_index));
 #endif
@@ -155,7 +135,7 @@ void narrow(inout CameraPath path, uint pixel_key)
     band.y = clamp(quantile(brightness_of(band), 0.5), mix(band.x, band.z, 0.1), mix(band.x, band.z, 0.9));
     path.gain *= float(p.bands);
 #endif
-    path.weight = weights_at(path, band);
+    path.weight = band_weights(path.band, path.weight, band);
     path.band = band;
 #ifdef SPECTRAL_SWEEP
     set_steps(path);
@@ -178,7 +158,7 @@ void anchor_at(inout CameraPath path, float lo, float hi)
 {
     vec3 band = vec3(lo, anchor_of(path, lo, hi), hi);
     CameraPath before = path;
-    path.weight = weights_at(before, band);
+    path.weight = band_weights(before.band, before.weight, band);
     if (band.y != path.band.y) ray_at(before, band.y, path.position, path.direction);
     path.band = band;
 #ifdef SPECTRAL_SWEEP

@@ -179,7 +179,7 @@ void add_end(CameraPath path, bool met, Hit hit, bool alike, uint pixel_key)
     WHEN(met) {
         facet = triangle_at(hit.primitive);
 #ifdef LAYER_BEAUTY
-        vec3 at = surface_point(hit, path.position, path.direction);
+        vec3 at = surface_point(hit, facet, path.position, path.direction);
 #else
         vec3 at = path.position + hit.distance * path.direction;
 #endif

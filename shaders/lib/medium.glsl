@@ -6,11 +6,17 @@
 
 #include "lib/scene.glsl"
 
+// The solids that a ray is inside of.
+struct MediumStack {
+    uint mask;          // one bit a solid that nests or touches others
+    uint object;        // the solid that stands alone, NONE: none
+};
+
+// What a surface separates.
 struct MediumInterface {
     uint before;        // object whose medium the ray comes from, NONE: air
     uint after;         // object whose medium lies behind
-    uint mask_after;
-    uint object_after;
+    MediumStack behind; // of a ray that goes through
     bool changes;       // false: another solid of higher priority covers this surface
 };
 
@@ -23,50 +29,49 @@ uint medium_of(uint mask)
 }
 #endif
 
-bool ray_is_inside(RayRecord ray)
+bool is_inside(MediumStack stack)
 {
 #ifdef MEDIUM_STACK
-    return ray.inside_mask != 0u || ray.inside_object != NONE;
+    return stack.mask != 0u || stack.object != NONE;
 #else
-    return ray.inside_object != NONE;
+    return stack.object != NONE;
 #endif
 }
 
-uint ray_medium(RayRecord ray)
+// Object whose medium fills the place, NONE: air.
+uint current_medium(MediumStack stack)
 {
 #ifdef MEDIUM_STACK
-    if (ray.inside_mask != 0u) return medium_of(ray.inside_mask);
+    if (stack.mask != 0u) return medium_of(stack.mask);
 #endif
-    return ray.inside_object;
+    return stack.object;
 }
 
-uint medium_weight_row(RayRecord ray)
+uint medium_weight_row(MediumStack stack)
 {
-    uint object = ray_medium(ray);
+    uint object = current_medium(stack);
     return object == NONE ? NONE : object_at(object).weight_row;
 }
 
-MediumInterface cross_boundary(RayRecord ray, uint object, bool entering)
+MediumInterface cross_boundary(MediumStack stack, uint object, bool entering)
 {
-    MediumInterface crossing;
-    crossing.mask_after = ray.inside_mask;
-    crossing.object_after = entering ? object : NONE;
-    crossing.before = entering ? NONE : object;
-    crossing.after = entering ? object : NONE;
-    crossing.changes = true;
+    MediumInterface boundary;
+    boundary.behind = MediumStack(stack.mask, entering ? object : NONE);
+    boundary.before = entering ? NONE : object;
+    boundary.after = entering ? object : NONE;
+    boundary.changes = true;
 #ifdef MEDIUM_STACK
     uint bit_index = object_at(object).stack_bit;
     if (bit_index != NONE) {
         uint bit = 1u << bit_index;
-        uint mask_before = entering ? ray.inside_mask & ~bit : ray.inside_mask | bit;
-        crossing.mask_after = entering ? ray.inside_mask | bit : ray.inside_mask & ~bit;
-        crossing.object_after = ray.inside_object;
-        crossing.before = medium_of(mask_before);
-        crossing.after = medium_of(crossing.mask_after);
-        crossing.changes = crossing.before != crossing.after;
+        uint mask_before = entering ? stack.mask & ~bit : stack.mask | bit;
+        boundary.behind = MediumStack(entering ? stack.mask | bit : stack.mask & ~bit, stack.object);
+        boundary.before = medium_of(mask_before);
+        boundary.after = medium_of(boundary.behind.mask);
+        boundary.changes = boundary.before != boundary.after;
     }
 #endif
-    return crossing;
+    return boundary;
 }
 
 // Refractive index at x of an object's medium (NONE: air, 1).
@@ -77,15 +82,15 @@ float medium_index(uint object, float x)
 }
 
 // Indices before and behind a surface at three places of the spectrum.
-void crossing_indices(MediumInterface crossing, vec3 x, out vec3 n_i, out vec3 n_t)
+void interface_indices(MediumInterface boundary, vec3 x, out vec3 n_i, out vec3 n_t)
 {
 #ifdef MEDIUM_STACK
-    n_i = vec3(medium_index(crossing.before, x.x), medium_index(crossing.before, x.y), medium_index(crossing.before, x.z));
-    n_t = vec3(medium_index(crossing.after, x.x), medium_index(crossing.after, x.y), medium_index(crossing.after, x.z));
+    n_i = vec3(medium_index(boundary.before, x.x), medium_index(boundary.before, x.y), medium_index(boundary.before, x.z));
+    n_t = vec3(medium_index(boundary.after, x.x), medium_index(boundary.after, x.y), medium_index(boundary.after, x.z));
 #else
     // One side is air.
-    bool entering = crossing.before == NONE;
-    uint glass = entering ? crossing.after : crossing.before;
+    bool entering = boundary.before == NONE;
+    uint glass = entering ? boundary.after : boundary.before;
     vec3 n = vec3(medium_index(glass, x.x), medium_index(glass, x.y), medium_index(glass, x.z));
     n_i = entering ? vec3(1.0) : n;
     n_t = entering ? n : vec3(1.0);
@@ -105,13 +110,13 @@ float medium_slope(uint object, float x)
 
 // d(n_i / n_t) / d(variable of group g) [physics: -eta/n_t for the transmitting glass, 1/n_t for the
 // incident one].
-float index_ratio_derivative(MediumInterface crossing, uint g, float x, float n_i, float n_t)
+float index_ratio_derivative(MediumInterface boundary, uint g, float x, float n_i, float n_t)
 {
     float derivative = 0.0;
-    if (crossing.after != NONE && object_at(crossing.after).group == g)
-        derivative -= n_i / (n_t * n_t) * medium_slope(crossing.after, x);
-    if (crossing.before != NONE && object_at(crossing.before).group == g)
-        derivative += medium_slope(crossing.before, x) / n_t;
+    if (boundary.after != NONE && object_at(boundary.after).group == g)
+        derivative -= n_i / (n_t * n_t) * medium_slope(boundary.after, x);
+    if (boundary.before != NONE && object_at(boundary.before).group == g)
+        derivative += medium_slope(boundary.before, x) / n_t;
     return derivative;
 }
 #endif

@@ -28,4 +28,12 @@ float kronecker(uint i, uint generator, uint shift)
     return unit_float(i * generator + shift);
 }
 
+// Generator of a path's draws at this depth, one irrational a depth: the square roots of primes, as far from rational as from the light's
+// golden-ratio lattice. Deeper ones are hashed: with one that comes again a path's later draws would follow from its earlier ones.
+uint depth_generator(uint depth)
+{
+    const uint generators[8] = uint[](1779033703u, 3144134277u, 2773480763u, 1359893119u, 2600822925u, 528734635u, 1541459225u, 3418070365u);
+    return depth < 8u ? generators[depth] : hash_pcg(depth) | 1u;
+}
+
 #endif

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
 from spectrasplat.model.optics import glass
-from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Light, SceneObject
+from spectrasplat.model.scene import Camera, Dielectric, Diffuse, SceneObject
 
 from tests.gpu.camera_rig import (
     ABOVE,
@@ -34,7 +35,7 @@ TILTED = Camera(position=(1.0, -6.0, 3.5), target=(0.3, 0.2, 0.0), up=(0, 0, 1),
 @pytest.mark.parametrize("camera", [ABOVE, TILTED, replace(TILTED, kind="orthographic", vertical_extent=3.0)])
 def test_lambert_floor_under_a_point_light(gl, camera):
     """Off-centre light and a picture that is not square: every axis of the camera's map counts."""
-    light = Light("lamp", "point", WHITE, position=(0.7, -0.4, 1.5))
+    light = PointLight("lamp", WHITE, position=(0.7, -0.4, 1.5))
     rgb = render(gl, [floor()], [light], camera=camera)
     expected = point_light_radiance(floor_points((32, 24), camera), light.position)
     assert rgb[..., 1] == pytest.approx(expected, rel=1e-4)
@@ -50,7 +51,7 @@ def test_units_and_origin_of_the_scene_do_not_matter(gl, scale, offset):
 
     item = floor()
     mesh = make_mesh("floor", item.mesh.vertices * scale + move, item.mesh.triangles)
-    light = Light("lamp", "point", WHITE.scaled(scale**2), position=moved((0.7, -0.4, 1.5)))
+    light = PointLight("lamp", WHITE.scaled(scale**2), position=moved((0.7, -0.4, 1.5)))
     camera = replace(TILTED, position=moved(TILTED.position), target=moved(TILTED.target))
     rgb = render(gl, [replace(item, mesh=mesh)], [light], camera=camera)
     expected = point_light_radiance(floor_points((32, 24), TILTED), (0.7, -0.4, 1.5))
@@ -61,14 +62,8 @@ def test_spot_edge_hard_and_soft(gl):
     points = floor_points((64, 64), ABOVE)
     angle = np.arctan2(np.linalg.norm(points[..., :2], axis=-1), 2.0)
     for inner, outer in ((25.0, 25.0), (15.0, 30.0)):
-        light = Light(
-            "spot",
-            "spot",
-            WHITE,
-            position=(0, 0, 2),
-            direction=DOWN,
-            inner_half_angle_deg=inner,
-            outer_half_angle_deg=outer,
+        light = SpotLight(
+            "spot", WHITE, position=(0, 0, 2), direction=DOWN, inner_half_angle_deg=inner, outer_half_angle_deg=outer
         )
         rgb = render(gl, [floor()], [light], size=(64, 64))
         share = rgb[..., 1] / point_light_radiance(points, light.position)
@@ -85,7 +80,7 @@ def test_sun_penumbra_is_as_wide_as_its_disc(gl):
     diameter = 20.0
     blocker = horizontal(0.0, 6.0, -6, 6, 1.0, Diffuse((0, 0, 0)), "blocker")
     camera = replace(ABOVE, position=(0, 0, 0.5), vertical_extent=1.0)  # below the blocker
-    light = Light("sun", "directional", WHITE, direction=DOWN, angular_diameter_deg=diameter)
+    light = DirectionalLight("sun", WHITE, direction=DOWN, angular_diameter_deg=diameter)
     rgb = render(gl, [floor(), blocker], [light], size=(64, 64), samples=64, camera=camera)
     share = rgb[..., 1].mean(axis=0) / (REFLECTANCE / np.pi * 1000.0)
     radius = np.tan(np.radians(diameter / 2))
@@ -101,7 +96,7 @@ def test_sun_without_extent_has_a_sharp_shadow_and_the_right_cosine(gl):
     blocker = horizontal(0.0, 6.0, -6, 6, 1.0, Diffuse((0, 0, 0)), "blocker")
     camera = replace(ABOVE, position=(0, 0, 0.5), vertical_extent=0.25)
     tilt = np.radians(30)
-    light = Light("sun", "directional", WHITE, direction=(np.sin(tilt), 0, -np.cos(tilt)))
+    light = DirectionalLight("sun", WHITE, direction=(np.sin(tilt), 0, -np.cos(tilt)))
     share = render(gl, [floor(), blocker], [light], size=(64, 8), camera=camera)[..., 1] / (
         REFLECTANCE / np.pi * 1000.0
     )
@@ -112,9 +107,8 @@ def test_sun_without_extent_has_a_sharp_shadow_and_the_right_cosine(gl):
 
 @pytest.mark.parametrize("shape", ["disc", "rectangle"])
 def test_collimated_beam_ends_at_its_aperture(gl, shape):
-    light = Light(
+    light = CollimatedLight(
         "beam",
-        "collimated",
         WHITE,
         position=(0.5, 0.2, 3),
         direction=DOWN,
@@ -132,7 +126,7 @@ def test_collimated_beam_ends_at_its_aperture(gl, shape):
 
 def test_area_disc_lights_the_floor_and_is_seen_from_its_front_only(gl):
     luminance, radius, height = 1000.0, 0.7, 1.0
-    light = Light("panel", "area", WHITE, position=(0, 0, height), direction=DOWN, radius=radius)
+    light = AreaLight("panel", WHITE, position=(0, 0, height), direction=DOWN, radius=radius)
     camera = replace(ABOVE, position=(0, 0, 0.5), vertical_extent=0.02)
     rgb = render(gl, [floor()], [light], size=(16, 16), samples=64, camera=camera)
     irradiance = np.pi * luminance * radius**2 / (radius**2 + height**2)
@@ -149,7 +143,7 @@ def test_glass_throws_a_shadow(gl):
     """Light through glass comes back through the caustic map; the direct part must be gone, all of it."""
     solid = SceneObject("cube", primitives.box((1, 1, 0.2)), Dielectric(glass.constant(1.5)), at(0, 0, 1))
     camera = replace(ABOVE, position=(0, 0, 0.5))
-    light = Light("lamp", "point", WHITE, position=(0, 0, 3))
+    light = PointLight("lamp", WHITE, position=(0, 0, 3))
     rgb = render(gl, [floor(), solid], [light], size=(40, 40), camera=camera)[..., 1]
     x, y = np.moveaxis(np.abs(floor_points((40, 40), camera)[..., :2]), -1, 0)
     shadow = np.maximum(x, y) < 0.5 * 3.0 / 1.9  # the upper rim is nearest to the light
@@ -159,7 +153,7 @@ def test_glass_throws_a_shadow(gl):
 
 def test_a_floor_is_lit_on_both_sides_but_not_through(gl):
     below = Camera(position=(0, 0, -5), target=(0, 0, 0), up=(0, 1, 0), kind="orthographic", vertical_extent=4.0)
-    lamp = Light("lamp", "point", WHITE, position=(0, 0, -1.5))
+    lamp = PointLight("lamp", WHITE, position=(0, 0, -1.5))
     assert render(gl, [floor()], [lamp], camera=below)[12, 16, 1] == pytest.approx(
         REFLECTANCE / np.pi * 1000 / 1.5**2, rel=0.01
     )
@@ -181,7 +175,7 @@ def test_box_filter_over_a_slanted_edge(gl):
 
 
 def test_launches_accumulate_and_repeat_bit_for_bit(gl, monkeypatch):
-    lamp = Light("panel", "area", WHITE, position=(0, 0, 2), direction=DOWN, radius=0.5)
+    lamp = AreaLight("panel", WHITE, position=(0, 0, 2), direction=DOWN, radius=0.5)
     blocker = horizontal(-0.5, 0.5, -0.5, 0.5, 1.0, Diffuse((0, 0, 0)), "blocker")
     camera_pass = opened_camera_pass(gl, [floor(), blocker], [lamp])
     camera_pass.run(ABOVE, 40, 30, 8)

@@ -13,13 +13,13 @@ import pytest
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.mesh import Mesh, make_mesh
 from spectrasplat.model.geometry.primitives_gem import brilliant
+from spectrasplat.model.lights import DirectionalLight
 from spectrasplat.model.optics.glass import from_abbe
 from spectrasplat.model.scene import (
     Black,
     Camera,
     Dielectric,
     Diffuse,
-    Light,
     SceneObject,
 )
 from spectrasplat.model.texture import Environment, Texture
@@ -135,7 +135,7 @@ def checkered(cells: int, texels: int = 512) -> SceneObject:
 def test_a_checker_finer_than_pixels_is_grey_through_glass(gl, solid: str) -> None:
     """Cells of an eighth of a pixel: one sample a pixel shows their mean to 2 %; a texture looked up without its
     footprint shows black or white."""
-    lamp = Light("low", "directional", WHITE, direction=(0.0, 0.98, -0.2))
+    lamp = DirectionalLight("low", WHITE, direction=(0.0, 0.98, -0.2))
     glassy = {
         "none": [],
         "slab": [SceneObject("slab", primitives.box((3, 3, 0.4)), FLINT, at(0, 0, 1.5))],

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.lights import DirectionalLight, PointLight
 from spectrasplat.model.optics import glass
 from spectrasplat.model.optics.colorimetry import attenuation_from_colour, rgb_basis
 from spectrasplat.model.scene import (
@@ -20,7 +21,6 @@ from spectrasplat.model.scene import (
     Black,
     Camera,
     Dielectric,
-    Light,
     Mirror,
     SceneObject,
 )
@@ -134,7 +134,7 @@ def test_a_smooth_glass_ball_is_a_lens(gl):
     n, height = 1.5168, 2.0
     ball = SceneObject("ball", primitives.sphere(1.0, 20_480), Dielectric(glass.constant(n)), at(0, 0, height))
     camera = replace(ABOVE, vertical_extent=1.1)
-    lamp = Light("lamp", "point", WHITE, position=(2.5, 0, 0.6))
+    lamp = PointLight("lamp", WHITE, position=(2.5, 0, 0.6))
     rgb = render(gl, [floor(0.8), ball], [lamp], size=(24, 24), camera=camera, split_threshold=EVERY_PART)[..., 1]
     points = floor_points((24, 24), camera)
     h = np.linalg.norm(points[..., :2], axis=-1)
@@ -160,7 +160,7 @@ def test_refraction_shifts_what_lies_behind(gl):
     n = 1.5168
     plate = SceneObject("slab", primitives.box((30, 30, 1.0)), Dielectric(glass.constant(n)), at(0, 0, 2.0))
     camera = Camera(position=(0, -8, 10), target=(0, -1, 3), up=(0, 0, 1), kind="orthographic", vertical_extent=1.0)
-    lamp = Light("lamp", "point", WHITE, position=(0, 3.0, 0.8))
+    lamp = PointLight("lamp", WHITE, position=(0, 3.0, 0.8))
     rgb = render(gl, [floor(20), plate], [lamp], camera=camera, split_threshold=EVERY_PART)[..., 1]
     direct = floor_points((32, 24), camera)
     inside = np.arcsin(np.sin(np.radians(45)) / n)
@@ -210,7 +210,7 @@ def test_mirrors_chain_and_tint(gl):
 
 def test_the_sun_glints_in_a_mirror(gl):
     flat = horizontal(-6, 6, -6, 6, 0, Mirror((0.5, 0.5, 0.5)), "mirror")
-    sun = Light("sun", "directional", WHITE, direction=DOWN, angular_diameter_deg=2.0)
+    sun = DirectionalLight("sun", WHITE, direction=DOWN, angular_diameter_deg=2.0)
     camera = Camera(position=(0, 0, 4), target=(0, 0, 0), up=(0, 1, 0), vertical_fov_deg=4.0)
     rgb = render(gl, [flat], [sun], size=(48, 48), camera=camera)[..., 1]
     solid_angle = np.pi * np.sin(np.radians(1.0)) ** 2

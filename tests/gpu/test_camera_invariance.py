@@ -14,10 +14,10 @@ import pytest
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.model.features import Features
 from spectrasplat.model.geometry import primitives
+from spectrasplat.model.lights import PointLight
 from spectrasplat.model.scene import (
     Camera,
     Diffuse,
-    Light,
     Mirror,
     Scene,
     SceneObject,
@@ -53,7 +53,7 @@ def scene() -> Scene:
         quad([[-2, 1.5, -1], [2, 1.5, -1], [2, 1.5, 0.4], [-2, 1.5, 0.4]], Diffuse((0.8, 0.6, 0.3)), "paper"),
         quad([[-2, -2, -1], [2, -2, -1], [2, 2, -1], [-2, 2, -1]], Mirror((0.9, 0.8, 0.5)), "mirror"),
     )
-    lamp = Light("lamp", "point", WHITE.scaled(0.04), position=(1.0, -1.0, 3.0))
+    lamp = PointLight("lamp", WHITE.scaled(0.04), position=(1.0, -1.0, 3.0))
     return Scene(
         "invariance",
         Camera((0.2, -3.2, 0.9), (0.0, 0.0, -0.05), vertical_fov_deg=38.0),

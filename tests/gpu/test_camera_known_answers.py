@@ -18,6 +18,7 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.primitives_lens import lens
+from spectrasplat.model.lights import DirectionalLight
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import Camera, Diffuse, Light, SceneObject
 from spectrasplat.passes.camera import TAPS_PER_PIXEL
@@ -111,7 +112,7 @@ def prism_scene(name: str) -> tuple[list[SceneObject], Camera, tuple]:
     return objects, camera, faces
 
 
-LOW = Light("low", "directional", FLAT, direction=(np.sin(1.1), 0.0, np.cos(1.1)))
+LOW = DirectionalLight("low", FLAT, direction=(np.sin(1.1), 0.0, np.cos(1.1)))
 """Falls on the paper past the glass."""
 
 
@@ -183,7 +184,7 @@ def test_shift_of_an_edge_behind_a_slab_at_45_degrees(gl, name: str, offset_d: f
     white = quad([[0, -2, 0], [2, -2, 0], [2, 2, 0], [0, 2, 0]], Diffuse((1, 1, 1)), "white")
     black = quad([[-4, -2, 0], [0, -2, 0], [0, 2, 0], [-4, 2, 0]], Diffuse((0, 0, 0)), "black")
     grazing = np.radians(5.0)
-    low = Light("low", "directional", FLAT, direction=(0.0, np.cos(grazing), -np.sin(grazing)))
+    low = DirectionalLight("low", FLAT, direction=(0.0, np.cos(grazing), -np.sin(grazing)))
     # Aimed at where yellow light sees the edge.
     shift_d = float(camera_answers.slab_lateral_shift(glasses.index(name, D_NM), 1.0, np.pi / 4))
     across = shift_d * np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0)

@@ -9,8 +9,9 @@ import pytest
 from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.gpu.records import NONE, PLACEMENT, RECEIVER
 from spectrasplat.model.geometry import primitives
+from spectrasplat.model.lights import AreaLight, PointLight
 from spectrasplat.model.optics import glass, spectrum
-from spectrasplat.model.scene import Dielectric, Diffuse, Light, SceneObject
+from spectrasplat.model.scene import Dielectric, Diffuse, SceneObject
 
 from tests.gpu.camera_rig import (
     ABOVE,
@@ -147,7 +148,7 @@ def test_samples_weigh_texels_by_their_share_of_the_pixel(gl):
 
 
 def test_caustic_layer_has_no_direct_light_and_beauty_adds_it(gl):
-    lamp = Light("lamp", "point", WHITE, position=(0, 0, 1.5))
+    lamp = PointLight("lamp", WHITE, position=(0, 0, 1.5))
     pictures = {}
     for layer in ("beauty", "caustic"):
         camera_pass = opened_camera_pass(gl, [floor()], [lamp], layer=layer, background=(5, 5, 5))
@@ -162,7 +163,7 @@ def test_caustic_layer_has_no_direct_light_and_beauty_adds_it(gl):
 def test_spectral_bins(gl):
     """Six bins over two targets: map and light land in their bins and give the same white as XYZ does."""
     edges = (380.0, 450.0, 500.0, 550.0, 600.0, 650.0, 780.0)
-    lamp = Light("lamp", "point", spectrum.laser(532.0, 2.0), position=(0, 0, 2))
+    lamp = PointLight("lamp", spectrum.laser(532.0, 2.0), position=(0, 0, 2))
     camera_pass = opened_camera_pass(gl, [floor()], [lamp], channels=MapChannels(edges))
     energy = np.zeros((4, 4, 8))
     energy[..., :6] = [1, 2, 3, 4, 5, 6]
@@ -181,7 +182,7 @@ def test_spectral_bins(gl):
 def test_a_bin_is_shown_in_its_own_colour(gl, shown):
     """White light cut into 32 bins is still white: each bin's colour is that of its own waves."""
     bins = MapChannels(tuple(np.linspace(380, 780, 33)))
-    lamp = Light("panel", "area", WHITE, position=(0, 0, -2), direction=(0, 0, 1), radius=9.0)
+    lamp = AreaLight("panel", WHITE, position=(0, 0, -2), direction=(0, 0, 1), radius=9.0)
     lights, background = ([lamp], 0.0) if shown == "light" else ([], 1000.0)
     rgb = render(gl, [floor()], lights, camera=DOWNWARD, background=(background,) * 3, channels=bins)
     assert rgb[12, 16] == pytest.approx([1000, 1000, 1000], rel=0.02)
@@ -191,7 +192,7 @@ def test_spectral_reflectance_class_acts_on_direct_light(gl):
     red_only = np.where(np.arange(380, 781) > 600, 1.0, 0.0)
     item = replace(floor(), material=Diffuse(reflectance=red_only))
     camera_pass = opened_camera_pass(
-        gl, [item], [Light("lamp", "point", WHITE, position=(0, 0, 1.5))], reflectances=(None, red_only)
+        gl, [item], [PointLight("lamp", WHITE, position=(0, 0, 1.5))], reflectances=(None, red_only)
     )
     maps = flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 0, 0, 4)], white_texels(np.zeros((4, 4))))
     receivers = RECEIVER.zeros(1)

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.model.geometry import primitives
+from spectrasplat.model.lights import AreaLight, CollimatedLight
 from spectrasplat.model.optics.glass import from_abbe
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import (
     Camera,
     Dielectric,
     Diffuse,
-    Light,
     Scene,
     SceneObject,
 )
@@ -141,7 +141,7 @@ def behind_panes(gl) -> tuple[np.ndarray, np.ndarray]:
     upright = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 1.2], [0, 0, 0, 1]], float)
     prism = SceneObject("prism", extruded("prism", section, 0.4), glass("N-SF11"), upright)
     # From below at the angle of least deviation, 33° up; it leaves 33° down.
-    beam = Light("beam", "collimated", FLAT, position=(-1.2, 0.0, 0.42), direction=(1.2, 0.0, 0.78), radius=0.12)
+    beam = CollimatedLight("beam", FLAT, position=(-1.2, 0.0, 0.42), direction=(1.2, 0.0, 0.78), radius=0.12)
     pane = primitives.box((3.0, 0.05, 1.8))
     floor = horizontal(-2, 6, -3, 3, 0.0, Diffuse((0.8, 0.8, 0.8)), "floor")
     camera = Camera((1.9, -4.0, 2.2), (1.9, 0.0, 0.0), vertical_fov_deg=14.0)
@@ -183,7 +183,7 @@ def test_light_and_camera_half_agree_on_a_lamp_behind_a_slab(gl) -> None:
     The light pass follows sixteen wavelengths by themselves and is within half a per cent (of photons' lattices and
     texels), the camera's eight bands leave as much grain. Fresnel's loss is 15 %, the slab lets the lamp seem 9 %
     nearer, and both change by 2 % over the spectrum."""
-    lamp = Light("lamp", "area", FLAT, position=(0.0, 0.0, 3.0), direction=(0.0, 0.0, -1.0), radius=0.25)
+    lamp = AreaLight("lamp", FLAT, position=(0.0, 0.0, 3.0), direction=(0.0, 0.0, -1.0), radius=0.25)
     turn = np.radians(25.0)
     tilted = np.array(
         [[np.cos(turn), 0, np.sin(turn), 0], [0, 1, 0, 0], [-np.sin(turn), 0, np.cos(turn), 1.5], [0, 0, 0, 1]]

@@ -20,6 +20,7 @@ from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.geometry.primitives_lens import doublet
 from spectrasplat.model.geometry.primitives_round import sphere
+from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
 from spectrasplat.model.optics.spectrum import constant
 from spectrasplat.model.scene import Diffuse, Light, Mirror, SceneObject
 from spectrasplat.reference.optics import unit
@@ -51,7 +52,7 @@ def ball(
 
 
 def point() -> Light:
-    return Light("light", "point", constant(1.0), position=(-3.0, 0.4, 0.3))
+    return PointLight("light", constant(1.0), position=(-3.0, 0.4, 0.3))
 
 
 def blocks(*names: str) -> tuple[SceneObject, ...]:
@@ -92,9 +93,8 @@ class Case:
 
 def needle() -> Light:
     """A thin beam that goes through all blocks."""
-    return Light(
+    return CollimatedLight(
         "light",
-        "collimated",
         constant(1.0),
         position=(-4.0, 0.0, 0.0),
         direction=tuple(unit(np.array([1.0, 0.02, -0.03]))),
@@ -107,30 +107,28 @@ CASES = {
     "point": Case(lambda: (ball(),), point()),
     "spot": Case(
         lambda: (ball(),),
-        replace(point(), kind="spot", direction=SLANT, inner_half_angle_deg=5.0, outer_half_angle_deg=25.0),
+        SpotLight(
+            "light",
+            point().spectral_power,
+            point().position,
+            SLANT,
+            inner_half_angle_deg=5.0,
+            outer_half_angle_deg=25.0,
+        ),
     ),
-    "sun": Case(
-        lambda: (ball(),), Light("light", "directional", constant(1.0), direction=SLANT, angular_diameter_deg=8.0)
-    ),
+    "sun": Case(lambda: (ball(),), DirectionalLight("light", constant(1.0), direction=SLANT, angular_diameter_deg=8.0)),
     "beam": Case(
         lambda: (ball(),),
-        Light("light", "collimated", constant(1.0), position=(-3.0, 0.0, 0.0), direction=SLANT, radius=2.0),
+        CollimatedLight("light", constant(1.0), position=(-3.0, 0.0, 0.0), direction=SLANT, radius=2.0),
     ),
     "panel": Case(
         lambda: (ball(),),
-        Light(
-            "light",
-            "area",
-            constant(1.0),
-            position=(-3.0, 0, 0),
-            direction=SLANT,
-            shape="rectangle",
-            width=1.0,
-            height=0.6,
+        AreaLight(
+            "light", constant(1.0), position=(-3.0, 0, 0), direction=SLANT, shape="rectangle", width=1.0, height=0.6
         ),
     ),
     "disc": Case(
-        lambda: (ball(),), Light("light", "area", constant(1.0), position=(-3.0, 0, 0), direction=SLANT, radius=0.6)
+        lambda: (ball(),), AreaLight("light", constant(1.0), position=(-3.0, 0, 0), direction=SLANT, radius=0.6)
     ),
     "inner reflections": Case(lambda: (ball("water"),), point(), depth=5, each=3, refractions=1),
     "total reflection": Case(

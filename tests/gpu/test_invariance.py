@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from spectrasplat.model.geometry.mesh import Mesh, make_mesh
+from spectrasplat.model.lights import CollimatedLight, SpotLight
 from spectrasplat.model.optics.spectrum import Spectrum, illuminant
 from spectrasplat.model.scene import (
     Camera,
@@ -55,8 +56,7 @@ def scene() -> Scene:
         np.array([[0.0, -0.4, 0.2], [0.0, 0.4, 0.2], [0.2, 0.4, 0.9], [0.2, -0.4, 0.9]]) + [-1.6, 0.5, 0.0],
         np.array([[0, 1, 2], [0, 2, 3]]),
     )
-    spot = Light(
-        "spot",
+    spot = SpotLight(
         "spot",
         lit(20.0),
         position=(-5.0, 0.4, 3.2),
@@ -64,13 +64,8 @@ def scene() -> Scene:
         inner_half_angle_deg=3.0,
         outer_half_angle_deg=8.0,
     )
-    beam = Light(
-        "beam",
-        "collimated",
-        lit(0.4),
-        position=(-3.0, 0.1, 2.6),
-        direction=tuple(np.array([3.0, 0.0, -1.6]) / 3.4),
-        radius=0.25,
+    beam = CollimatedLight(
+        "beam", lit(0.4), position=(-3.0, 0.1, 2.6), direction=tuple(np.array([3.0, 0.0, -1.6]) / 3.4), radius=0.25
     )
     objects = (prism, SceneObject("pane", pane, Mirror()), SceneObject("floor", floor(), Diffuse()))
     return Scene("invariance", Camera((1.0, -5.0, 4.0), (0.9, 0.0, 0.0)), (spot, beam), objects)

@@ -19,8 +19,9 @@ from spectrasplat.model.geometry.mesh import Mesh
 from spectrasplat.model.geometry.primitives_lens import lens
 from spectrasplat.model.geometry.primitives_round import ellipsoid
 from spectrasplat.model.geometry.primitives_round import sphere as sphere_mesh
+from spectrasplat.model.lights import PointLight
 from spectrasplat.model.optics.spectrum import constant
-from spectrasplat.model.scene import Diffuse, Light, Mirror, SceneObject
+from spectrasplat.model.scene import Diffuse, Mirror, SceneObject
 from spectrasplat.reference import glasses
 from spectrasplat.reference.glasses import C_NM, D_NM, F_NM
 from spectrasplat.reference.optics import dot
@@ -82,7 +83,7 @@ def test_t5_plano_convex_lens_on_the_axis(gl) -> None:
 
 def test_t6_aplanatic_sphere(gl) -> None:
     # The light stands inside the glass.
-    light = Light("light", "point", constant(1.0), position=(-1 / N_BK7_D, 0.0, 0.0))
+    light = PointLight("light", constant(1.0), position=(-1 / N_BK7_D, 0.0, 0.0))
     ball = placed("ball", ball_mesh(81_920), glass("N-BK7"))
 
     def traced_onto(target: Mesh):

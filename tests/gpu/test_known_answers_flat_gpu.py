@@ -14,8 +14,9 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
 from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.primitives import box, slab
+from spectrasplat.model.lights import PointLight
 from spectrasplat.model.optics.spectrum import constant
-from spectrasplat.model.scene import Camera, Diffuse, Light, Scene
+from spectrasplat.model.scene import Camera, Diffuse, Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference import glasses
 from spectrasplat.reference.glasses import C_NM, D_NM, F_NM
@@ -50,7 +51,7 @@ N_BK7_D = float(glasses.index("N-BK7", D_NM))
     ],
 )
 def test_t1_index_tables(gl, name: str, n_fdc: tuple[float, ...], abbe: float, slope_per_um: float) -> None:
-    light = Light("light", "point", constant(1.0), position=(0, 0, 5))
+    light = PointLight("light", constant(1.0), position=(0, 0, 5))
     scene = Scene(
         "glass",
         Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)),
@@ -98,7 +99,7 @@ def cross2(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def test_t8_diacaustic_of_a_plane(gl) -> None:
     # A point one unit under the top of a block of glass.
     block = placed("block", box((8.0, 8.0, 3.0)), glass("N-BK7"))
-    light = Light("light", "point", constant(1.0), position=(0.0, 0.0, 0.5))
+    light = PointLight("light", constant(1.0), position=(0.0, 0.0, 0.5))
 
     def traced_onto(target):
         return trace_light(gl, (block, placed("screen", target, Diffuse())), light, [(D_NM, D_NM)], 2000, 1).of_choices(

@@ -18,6 +18,7 @@ from spectrasplat.model.features import Features
 from spectrasplat.model.geometry import primitives_round
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
 from spectrasplat.model.optics import glass, spectrum
 from spectrasplat.model.scene import (
     Black,
@@ -129,22 +130,20 @@ GLASS = Dielectric(glass.from_abbe(1.6, 30.0, "flint"))
 @pytest.mark.parametrize(
     "light",
     [
-        Light("lamp", "point", WHITE, position=(0.3, 0.2, 6.0)),
-        Light("sun", "directional", WHITE, direction=(0.2, 0.1, -0.97)),
-        Light("beam", "collimated", WHITE, position=(0.1, 0.0, 6.0), direction=(0.0, 0.0, -1.0), radius=0.4),
-        Light(
+        PointLight("lamp", WHITE, position=(0.3, 0.2, 6.0)),
+        DirectionalLight("sun", WHITE, direction=(0.2, 0.1, -0.97)),
+        CollimatedLight("beam", WHITE, position=(0.1, 0.0, 6.0), direction=(0.0, 0.0, -1.0), radius=0.4),
+        CollimatedLight(
             "slit",
-            "collimated",
             WHITE,
             position=(0.1, 0.0, 6.0),
             direction=(0.0, 0.0, -1.0),
+            tangent=(1, 0, 0),
             shape="rectangle",
             width=0.1,
             height=3.0,
-            tangent=(1, 0, 0),
         ),
-        Light(
-            "spot",
+        SpotLight(
             "spot",
             WHITE,
             position=(0.0, 0.0, 6.0),
@@ -152,7 +151,7 @@ GLASS = Dielectric(glass.from_abbe(1.6, 30.0, "flint"))
             inner_half_angle_deg=5.0,
             outer_half_angle_deg=6.0,
         ),
-        Light("panel", "area", WHITE, position=(0.0, 0.0, 6.0), direction=(0.0, 0.0, -1.0), radius=0.3),
+        AreaLight("panel", WHITE, position=(0.0, 0.0, 6.0), direction=(0.0, 0.0, -1.0), radius=0.3),
     ],
     ids=lambda light: light.name,
 )
@@ -180,14 +179,10 @@ def test_every_kind_of_light_sends_its_rays_onto_the_object(gl, light: Light) ->
 
 
 def test_a_beam_that_passes_by_gives_nothing_and_the_brighter_light_is_taken(gl) -> None:
-    aside = Light(
-        "aside", "collimated", WHITE.scaled(100.0), position=(5.0, 0.0, 6.0), direction=(0, 0, -1), radius=0.5
-    )
-    behind = Light(
-        "behind", "collimated", WHITE.scaled(100.0), position=(0.0, 0.0, -1.5), direction=(0, 0, -1), radius=0.5
-    )
+    aside = CollimatedLight("aside", WHITE.scaled(100.0), position=(5.0, 0.0, 6.0), direction=(0, 0, -1), radius=0.5)
+    behind = CollimatedLight("behind", WHITE.scaled(100.0), position=(0.0, 0.0, -1.5), direction=(0, 0, -1), radius=0.5)
     dim, bright = (
-        Light(n, "directional", WHITE.scaled(s), direction=(0, 0, -1)) for n, s in (("dim", 1.0), ("bright", 3.0))
+        DirectionalLight(n, WHITE.scaled(s), direction=(0, 0, -1)) for n, s in (("dim", 1.0), ("bright", 3.0))
     )
     scene = Scene("test", CAMERA, (aside, behind, dim, bright), (ball(1.0, GLASS), quad(9.0, -2.0, Diffuse())))
     with tracing(gl, scene) as paths:

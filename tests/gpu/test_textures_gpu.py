@@ -19,12 +19,12 @@ from spectrasplat.gpu.texture_store import PICTURE, TextureStore, place_defines
 from spectrasplat.model.features import Features
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.mesh import Mesh, make_mesh
+from spectrasplat.model.lights import PointLight
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import (
     Camera,
     Dielectric,
     Diffuse,
-    Light,
     Scene,
     SceneObject,
 )
@@ -68,7 +68,7 @@ def quad(uv_scale: float = 1.0) -> Mesh:
 def scene_of(*pictures: Texture | None, environment: np.ndarray | None = None, mesh: Mesh | None = None) -> Scene:
     """A quad for each picture; None is one without."""
     objects = tuple(SceneObject(f"object {i}", mesh or quad(), Diffuse(texture=t)) for i, t in enumerate(pictures))
-    light = Light("lamp", "point", illuminant("D65"), position=(0.0, 0.0, 3.0))
+    light = PointLight("lamp", illuminant("D65"), position=(0.0, 0.0, 3.0))
     sky = None if environment is None else Environment(environment)
     return Scene("test", Camera((0.0, 0.0, 5.0), (0.0, 0.0, 0.0)), (light,), objects, environment=sky)
 

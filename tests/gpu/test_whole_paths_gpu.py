@@ -17,6 +17,7 @@ from reference.path_check import ReferenceScene
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.geometry.primitives_round import sphere
+from spectrasplat.model.lights import PointLight
 from spectrasplat.model.optics import glass as dispersion
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM
 from spectrasplat.model.optics.spectrum import constant
@@ -24,7 +25,6 @@ from spectrasplat.model.scene import (
     Absorption,
     Dielectric,
     Diffuse,
-    Light,
     Mirror,
     SceneObject,
 )
@@ -78,7 +78,7 @@ def touching() -> tuple[SceneObject, ...]:
     )
 
 
-LIGHT = Light("light", "point", constant(1.0), position=(-3.0, 0.4, 0.3))
+LIGHT = PointLight("light", constant(1.0), position=(-3.0, 0.4, 0.3))
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,10 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.lights import SpotLight
 from spectrasplat.model.optics.colorimetry import K_M, cmf_xyz
 from spectrasplat.model.optics.spectrum import illuminant
-from spectrasplat.model.scene import Camera, Diffuse, Light, Scene, SceneObject
+from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.map_layout import plane_frame
 from spectrasplat.reference import optics
@@ -52,9 +53,8 @@ def wedge() -> np.ndarray:
 
 def scene() -> Scene:
     direction = optics.unit(AIM - LAMP)
-    light = Light(
+    light = SpotLight(
         "lamp",
-        "spot",
         SPECTRUM,
         position=tuple(LAMP),
         direction=tuple(direction),

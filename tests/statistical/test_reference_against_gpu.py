@@ -19,6 +19,7 @@ from spectrasplat.base.paths import assets_dir
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.primitives_round import sphere
 from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.lights import AreaLight, DirectionalLight, PointLight, SpotLight
 from spectrasplat.model.optics.colorimetry import rgb709_to_xyz
 from spectrasplat.model.optics.glass import sellmeier
 from spectrasplat.model.optics.spectrum import blackbody, illuminant
@@ -27,7 +28,6 @@ from spectrasplat.model.scene import (
     Camera,
     Dielectric,
     Diffuse,
-    Light,
     Mirror,
     Scene,
     SceneObject,
@@ -53,7 +53,7 @@ VIEW = Camera((0.0, -4.0, 4.0), (0.4, 0.0, 0.0), vertical_fov_deg=34.0)
 WINDOW = place(
     primitives.box((1.2, 1.2, 0.3)), Dielectric(FLINT, Absorption(np.linspace(0.2, 3.0, 401))), (-0.9, 0.0, 1.4)
 )
-LAMP = Light("lamp", "point", illuminant("A").scaled_to_luminous(1000.0), (-2.4, -0.3, 3.6))
+LAMP = PointLight("lamp", illuminant("A").scaled_to_luminous(1000.0), (-2.4, -0.3, 3.6))
 
 
 def tinted() -> Scene:
@@ -63,8 +63,7 @@ def tinted() -> Scene:
 
 def mirrored() -> Scene:
     """A sphere of copper in the light of a soft spot; the receiver has a spectral reflectance."""
-    spot = Light(
-        "spot",
+    spot = SpotLight(
         "spot",
         blackbody(3200.0).scaled_to_luminous(900.0),
         (-1.0, 0.5, 3.0),
@@ -86,9 +85,8 @@ def mirrored() -> Scene:
 
 def area_lit() -> Scene:
     """A ball of flint under a panel, seen by an orthographic camera."""
-    panel = Light(
+    panel = AreaLight(
         "panel",
-        "area",
         illuminant("D65").scaled_to_luminous(500.0),
         (-1.5, 0.0, 3.5),
         (0.35, 0.0, -0.94),
@@ -103,12 +101,8 @@ def area_lit() -> Scene:
 def nested() -> Scene:
     """Water in a glass ball, the water reaching into the wall, an air bubble in the water, in the light of a broad
     sun."""
-    sun = Light(
-        "sun",
-        "directional",
-        illuminant("D65").scaled_to_luminous(100.0),
-        direction=(0.5, 0.1, -0.8),
-        angular_diameter_deg=4.0,
+    sun = DirectionalLight(
+        "sun", illuminant("D65").scaled_to_luminous(100.0), direction=(0.5, 0.1, -0.8), angular_diameter_deg=4.0
     )
     water = sellmeier((0.75831,), (0.01007,))
     shells = (

@@ -13,8 +13,9 @@ import pytest
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.lights import CollimatedLight
 from spectrasplat.model.optics.spectrum import constant
-from spectrasplat.model.scene import Camera, Diffuse, Light, Scene, SceneObject
+from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.emission_domain import emission_domain
 from spectrasplat.passes.trace import Band, LatticeSlice, TracePass
@@ -38,8 +39,8 @@ def landed(gl) -> tuple[np.ndarray, float]:
     flat = box(1.0)
     slab = make_mesh("slab", flat.vertices * [8.0, 8.0, 0.5], flat.triangles)
     direction = np.array([np.sin(ANGLE), 0.0, -np.cos(ANGLE)])
-    light = Light(
-        "beam", "collimated", constant(1.0), position=tuple(-4.0 * direction), direction=tuple(direction), radius=0.2
+    light = CollimatedLight(
+        "beam", constant(1.0), position=tuple(-4.0 * direction), direction=tuple(direction), radius=0.2
     )
     objects = (
         SceneObject("slab", slab, glass("N-BK7")),

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
 from spectrasplat.model.optics.spectrum import constant
-from spectrasplat.model.scene import Light
 from spectrasplat.reference.optics import unit
 
 from tests.statistical.chi_square import ALPHA, chi_square, smallest_tilt, thinned
@@ -57,7 +57,7 @@ def refuse(counts: np.ndarray, expected: np.ndarray) -> None:
 
 @pytest.fixture(scope="module")
 def sphere(gl) -> Emitted:
-    return emit(gl, Light("l", "point", WHITE, position=INSIDE), box(1.0), passes=8)
+    return emit(gl, PointLight("l", WHITE, position=INSIDE), box(1.0), passes=8)
 
 
 def test_a_point_shines_evenly_over_the_sphere(sphere: Emitted) -> None:
@@ -101,8 +101,8 @@ def ring_integrals(intensity: np.ndarray, angle: np.ndarray, rings: int) -> np.n
 
 def test_a_spot_has_its_penumbra(gl) -> None:
     inner, outer = np.radians([20.0, 50.0])
-    light = Light(
-        "l", "spot", WHITE, position=INSIDE, direction=tuple(AXIS), inner_half_angle_deg=20.0, outer_half_angle_deg=50.0
+    light = SpotLight(
+        "l", WHITE, position=INSIDE, direction=tuple(AXIS), inner_half_angle_deg=20.0, outer_half_angle_deg=50.0
     )
     rays = emit(gl, light, box(1.0), passes=8)
     angle = np.linspace(0.0, outer, 100_001)
@@ -117,8 +117,8 @@ def test_a_spot_has_its_penumbra(gl) -> None:
 
 
 def test_a_hard_spot_fills_its_cone(gl) -> None:
-    light = Light(
-        "l", "spot", WHITE, position=INSIDE, direction=tuple(AXIS), inner_half_angle_deg=35.0, outer_half_angle_deg=35.0
+    light = SpotLight(
+        "l", WHITE, position=INSIDE, direction=tuple(AXIS), inner_half_angle_deg=35.0, outer_half_angle_deg=35.0
     )
     rays = emit(gl, light, box(1.0), passes=4)
     assert rays.weight.sum() == pytest.approx(2.0 * np.pi * (1.0 - np.cos(np.radians(35.0))), rel=MEASURE_ERROR)
@@ -133,17 +133,16 @@ def test_a_hard_spot_fills_its_cone(gl) -> None:
 @pytest.mark.parametrize("shape", ["disc", "rectangle"])
 def test_an_area_light_is_lambertian_and_even(gl, shape: str) -> None:
     radius, width, height = 0.2, 0.3, 0.2
-    light = Light(
+    light = AreaLight(
         "l",
-        "area",
         WHITE,
         position=INSIDE,
         direction=tuple(AXIS),
+        tangent=(1.0, 0.0, 0.0),
         shape=shape,
         radius=radius,
         width=width,
         height=height,
-        tangent=(1.0, 0.0, 0.0),
     )
     rays = emit(gl, light, box(1.0), passes=12, light_points=8192)
     area = np.pi * radius**2 if shape == "disc" else width * height
@@ -172,7 +171,7 @@ def test_an_area_light_is_lambertian_and_even(gl, shape: str) -> None:
 
 
 def test_the_sun_is_even_over_its_disc_and_over_the_ground(gl) -> None:
-    light = Light("l", "directional", WHITE, direction=(0.0, 0.0, -1.0), angular_diameter_deg=2.0)
+    light = DirectionalLight("l", WHITE, direction=(0.0, 0.0, -1.0), angular_diameter_deg=2.0)
     rays = emit(gl, light, box(1.0), passes=12, light_points=8192)
     tilt = rays.direction[:, :2] / -rays.direction[:, 2:] / np.tan(np.radians(1.0))
     ground = rays.position - rays.direction * (rays.position[:, 2:] / rays.direction[:, 2:])
@@ -194,17 +193,16 @@ def test_the_sun_is_even_over_its_disc_and_over_the_ground(gl) -> None:
 @pytest.mark.parametrize("shape", ["disc", "rectangle"])
 def test_a_beam_fills_its_aperture(gl, shape: str) -> None:
     radius, width, height = 0.5, 0.9, 0.4
-    light = Light(
+    light = CollimatedLight(
         "l",
-        "collimated",
         WHITE,
         position=(0.1, -0.1, 3.0),
         direction=(0.0, 0.0, -1.0),
+        tangent=(1.0, 0.0, 0.0),
         shape=shape,
         radius=radius,
         width=width,
         height=height,
-        tangent=(1.0, 0.0, 0.0),
     )
     rays = emit(gl, light, box(1.0), passes=8)
     np.testing.assert_allclose(rays.direction, [[0.0, 0.0, -1.0]] * len(rays.weight), atol=1e-7)

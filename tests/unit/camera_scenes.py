@@ -7,6 +7,7 @@ import math
 import numpy as np
 from reference import camera_answers
 from spectrasplat.model.geometry import primitives
+from spectrasplat.model.lights import DirectionalLight
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM, rgb709_to_xyz
 from spectrasplat.model.optics.glass import Dispersion, from_abbe
 from spectrasplat.model.optics.spectrum import illuminant
@@ -50,11 +51,8 @@ GRAZING = math.radians(5.0)
 
 def slab_scene(glass: Dispersion) -> Scene:
     """White for x > 0, black elsewhere; seen at 45° through a slab, which shades neither."""
-    light = Light(
-        "low",
-        "directional",
-        D65.scaled(1.0 / math.sin(GRAZING)),
-        direction=(0.0, math.cos(GRAZING), -math.sin(GRAZING)),
+    light = DirectionalLight(
+        "low", D65.scaled(1.0 / math.sin(GRAZING)), direction=(0.0, math.cos(GRAZING), -math.sin(GRAZING))
     )
     white = place(primitives.plane(4.0, 8.0), Diffuse((1.0, 1.0, 1.0)), (2.0, 0.0, 0.0))
     black = place(primitives.plane(4.0, 8.0), Black(), (-2.0, 0.0, 0.0))

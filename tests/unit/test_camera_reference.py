@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.primitives_round import sphere
+from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
 from spectrasplat.model.optics.colorimetry import (
     K_M,
     VISIBLE_NM,
@@ -40,7 +41,11 @@ from spectrasplat.model.scene import (
     SceneObject,
 )
 from spectrasplat.model.texture import Environment, Texture
-from spectrasplat.reference.camera_reference import cached_camera_reference, camera_scene_key, render_camera_reference
+from spectrasplat.reference.camera_reference import (
+    cached_camera_reference,
+    camera_reference_key,
+    render_camera_reference,
+)
 from spectrasplat.reference.camera_run import CameraPicture, CameraRun
 from spectrasplat.reference.spectral_caustic import CausticPlan
 
@@ -66,7 +71,7 @@ def z_squared(picture: CameraPicture, expected: np.ndarray) -> float:
 
 
 def test_a_plate_under_a_point_light_is_lamberts_law() -> None:
-    light = Light("l", "point", D65.scaled(5.0), (0.3, -0.2, 1.5))
+    light = PointLight("l", D65.scaled(5.0), (0.3, -0.2, 1.5))
     picture = render_camera_reference(scene_of(light, plate(Diffuse((0.8, 0.4, 0.1)))), 33, 33, samples=256)
     middle = (np.arange(33) + 0.5) / 33 - 0.5
     x, y = np.meshgrid(middle, -middle)
@@ -77,7 +82,7 @@ def test_a_plate_under_a_point_light_is_lamberts_law() -> None:
 
 def test_a_spectral_reflectance_meets_the_lights_spectrum() -> None:
     curve = np.where(np.abs(VISIBLE_NM - 600.0) < 30.0, 0.9, 0.1)
-    light = Light("l", "directional", D65 + laser(532.0, 0.01), direction=(0.0, 0.0, -1.0))
+    light = DirectionalLight("l", D65 + laser(532.0, 0.01), direction=(0.0, 0.0, -1.0))
     picture = render_camera_reference(scene_of(light, plate(Diffuse(reflectance=curve))), 3, 3, samples=8)
     expected = K_M * ((D65.density * curve) @ cmf_xyz() + 0.01 * 0.1 * cmf_at(532.0)) / math.pi
     np.testing.assert_allclose(picture.xyz, np.broadcast_to(expected, (3, 3, 3)), rtol=1e-9)
@@ -86,14 +91,13 @@ def test_a_spectral_reflectance_meets_the_lights_spectrum() -> None:
 @pytest.mark.parametrize(
     ("light", "expected"),
     [
-        (Light("sun", "directional", D65, direction=(0.6, 0.0, -0.8), angular_diameter_deg=4.0), 0.8),
-        (Light("beam", "collimated", D65, (0.0, 0.0, 2.0), radius=0.9), 1.0),
-        (Light("away", "collimated", D65, (3.0, 0.0, 2.0), radius=0.9), 0.0),
-        (Light("spot", "spot", D65, (0.0, 0.0, 2.0), inner_half_angle_deg=40.0, outer_half_angle_deg=50.0), 0.25),
+        (DirectionalLight("sun", D65, direction=(0.6, 0.0, -0.8), angular_diameter_deg=4.0), 0.8),
+        (CollimatedLight("beam", D65, (0.0, 0.0, 2.0), radius=0.9), 1.0),
+        (CollimatedLight("away", D65, (3.0, 0.0, 2.0), radius=0.9), 0.0),
+        (SpotLight("spot", D65, (0.0, 0.0, 2.0), inner_half_angle_deg=40.0, outer_half_angle_deg=50.0), 0.25),
         (
-            Light(
+            SpotLight(
                 "soft",
-                "spot",
                 D65,
                 (0.0, 0.0, 2.0),
                 (math.sin(0.3), 0.0, -math.cos(0.3)),
@@ -102,8 +106,8 @@ def test_a_spectral_reflectance_meets_the_lights_spectrum() -> None:
             ),
             0.125,
         ),
-        (Light("disc", "area", D65, (0.0, 0.0, 2.0), radius=1.0), math.pi * 0.2),
-        (Light("turned", "area", D65, (0.0, 0.0, 2.0), (0.0, 0.0, 1.0), radius=1.0), 0.0),
+        (AreaLight("disc", D65, (0.0, 0.0, 2.0), radius=1.0), math.pi * 0.2),
+        (AreaLight("turned", D65, (0.0, 0.0, 2.0), (0.0, 0.0, 1.0), radius=1.0), 0.0),
     ],
     ids=lambda value: value.name if isinstance(value, Light) else "",
 )
@@ -118,11 +122,11 @@ def test_every_kind_of_light_gives_its_irradiance(light: Light, expected: float)
 
 
 def test_lights_are_seen_from_the_front_through_each_other_and_hide_nothing() -> None:
-    front = Light("a", "area", D65, (0.0, 0.0, 3.0), (0.0, 0.0, 1.0), radius=0.2)
-    through = Light(
-        "b", "area", D65.scaled(2.0), (0.0, 0.0, 2.0), (0.0, 0.0, 1.0), shape="rectangle", width=0.2, height=0.8
+    front = AreaLight("a", D65, (0.0, 0.0, 3.0), (0.0, 0.0, 1.0), radius=0.2)
+    through = AreaLight(
+        "b", D65.scaled(2.0), (0.0, 0.0, 2.0), (0.0, 0.0, 1.0), shape="rectangle", width=0.2, height=0.8
     )
-    from_behind = Light("c", "area", D65.scaled(4.0), (0.0, 0.0, 4.0), radius=3.0)
+    from_behind = AreaLight("c", D65.scaled(4.0), (0.0, 0.0, 4.0), radius=3.0)
     below = replace(front, position=(0.0, 0.0, -1.0))
     picture = render_camera_reference(scene_of(front, through, from_behind, below, plate(Black())), 21, 21, samples=8)
     y = picture.xyz[..., 1]
@@ -135,7 +139,7 @@ def test_lights_are_seen_from_the_front_through_each_other_and_hide_nothing() ->
 
 
 def test_the_suns_disc_is_seen_where_nothing_hides_it() -> None:
-    sun = Light("sun", "directional", D65, direction=(0.0, 0.0, -1.0), angular_diameter_deg=8.0)
+    sun = DirectionalLight("sun", D65, direction=(0.0, 0.0, -1.0), angular_diameter_deg=8.0)
     up = Camera((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), up=(0.0, 1.0, 0.0), vertical_fov_deg=8.0)
     half = place(primitives.plane(1.0, 1.0), Black(), (0.5, 0.0, 0.5))
     picture = render_camera_reference(scene_of(sun, half, camera=up), 40, 40, samples=64)
@@ -148,7 +152,7 @@ def test_the_suns_disc_is_seen_where_nothing_hides_it() -> None:
 
 
 def test_shadow_rays_stop_at_glass() -> None:
-    light = Light("l", "directional", D65, direction=(0.0, 0.0, -1.0))
+    light = DirectionalLight("l", D65, direction=(0.0, 0.0, -1.0))
     pane = place(primitives.box((0.5, 0.5, 0.1)), Dielectric(constant_index(1.0)), (0.25, 0.0, 4.0))
     camera = replace(ABOVE, position=(0.0, 0.0, 3.0))
     y = render_camera_reference(scene_of(light, plate(), pane, camera=camera), 20, 20, samples=8).xyz[..., 1]
@@ -160,7 +164,7 @@ def test_shadow_rays_stop_at_glass() -> None:
 
 def test_a_texture_lies_upright_and_is_interpolated() -> None:
     rgb = np.random.default_rng(3).random((4, 6, 3)).astype(np.float32)
-    light = Light("l", "directional", D65, direction=(0.0, 0.0, -1.0))
+    light = DirectionalLight("l", D65, direction=(0.0, 0.0, -1.0))
     camera = replace(ABOVE, vertical_extent=1.0)
     for wrap in ("clamp", "repeat"):
         page = place(primitives.plane(1.5, 1.0), Diffuse((1.0, 0.5, 1.0), texture=Texture(rgb, wrap)))
@@ -314,25 +318,27 @@ def test_limits() -> None:
 
 def test_the_key_knows_textures_and_what_lies_beyond() -> None:
     rgb = np.ones((2, 2, 3), np.float32)
-    scene = scene_of(Light("l", "point", D65, (0, 0, 1)), plate(Diffuse(texture=Texture(rgb))))
+    scene = scene_of(PointLight("l", D65, (0, 0, 1)), plate(Diffuse(texture=Texture(rgb))))
     other_texture = replace(scene, objects=(plate(Diffuse(texture=Texture(0.5 * rgb))),))
     room = Environment(rgb)
     keys = [
-        camera_scene_key(scene, 8, 8, 64, None),
-        camera_scene_key(scene, 8, 8, 64, CausticPlan()),
-        camera_scene_key(scene, 8, 8, 64, CausticPlan(photons=5)),
-        camera_scene_key(other_texture, 8, 8, 64, None),
-        camera_scene_key(replace(scene, objects=(plate(Diffuse(texture=Texture(rgb, "clamp"))),)), 8, 8, 64, None),
-        camera_scene_key(replace(scene, background_rgb=(0.1, 0.1, 0.1)), 8, 8, 64, None),
-        camera_scene_key(replace(scene, environment=room), 8, 8, 64, None),
-        camera_scene_key(
+        camera_reference_key(scene, 8, 8, 64, None),
+        camera_reference_key(scene, 8, 8, 64, CausticPlan()),
+        camera_reference_key(scene, 8, 8, 64, CausticPlan(photons=5)),
+        camera_reference_key(other_texture, 8, 8, 64, None),
+        camera_reference_key(replace(scene, objects=(plate(Diffuse(texture=Texture(rgb, "clamp"))),)), 8, 8, 64, None),
+        camera_reference_key(replace(scene, background_rgb=(0.1, 0.1, 0.1)), 8, 8, 64, None),
+        camera_reference_key(replace(scene, environment=room), 8, 8, 64, None),
+        camera_reference_key(
             replace(scene, environment=replace(room, world_to_local=np.diag([-1.0, -1.0, 1.0]))), 8, 8, 64, None
         ),
-        camera_scene_key(replace(scene, environment=replace(room, rgb=2.0 * rgb)), 8, 8, 64, None),
+        camera_reference_key(replace(scene, environment=replace(room, rgb=2.0 * rgb)), 8, 8, 64, None),
     ]
     assert len(set(keys)) == len(keys)
     assert (
-        camera_scene_key(replace(scene, name="other", environment=replace(room, source="elsewhere")), 8, 8, 64, None)
+        camera_reference_key(
+            replace(scene, name="other", environment=replace(room, source="elsewhere")), 8, 8, 64, None
+        )
         == keys[6]
     )
     np.testing.assert_allclose(K_M * (rgb_basis() @ np.ones(3) * daylight_per_lumen()) @ cmf_xyz(), WHITE, rtol=1e-9)

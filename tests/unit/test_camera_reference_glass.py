@@ -15,6 +15,7 @@ from reference import camera_answers
 from spectrasplat.base.errors import UserError
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.primitives_round import sphere
+from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
 from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz
 from spectrasplat.model.optics.glass import Dispersion
 from spectrasplat.model.optics.glass import constant as constant_index
@@ -25,7 +26,6 @@ from spectrasplat.model.scene import (
     Camera,
     Dielectric,
     Diffuse,
-    Light,
     Mirror,
     Scene,
     SceneObject,
@@ -108,9 +108,9 @@ def test_a_pane_of_air_changes_nothing() -> None:
     rgb = np.random.default_rng(5).random((5, 5, 3)).astype(np.float32)
     curve = np.linspace(0.1, 0.9, 401)
     lights = (
-        Light("lamp", "area", D65, (0.5, 0.2, 1.0), radius=0.3),
-        Light("line", "point", laser(560.0, 0.004), (-0.4, 0.3, 0.8)),
-        Light("lines", "point", Spectrum(np.zeros(401), ((450.0, 0.003), (640.0, 0.002))), (0.0, -0.4, 0.8)),
+        AreaLight("lamp", D65, (0.5, 0.2, 1.0), radius=0.3),
+        PointLight("line", laser(560.0, 0.004), (-0.4, 0.3, 0.8)),
+        PointLight("lines", Spectrum(np.zeros(401), ((450.0, 0.003), (640.0, 0.002))), (0.0, -0.4, 0.8)),
     )
     things = (
         place(primitives.plane(1.0, 1.0), Diffuse((0.9, 0.8, 1.0), texture=Texture(rgb)), (-0.5, 0.0, 0.0)),
@@ -154,7 +154,7 @@ def test_an_edge_behind_a_prism_stands_where_the_exact_trace_puts_it() -> None:
     black = place(primitives.plane(2.0, 4.0), Black(), (9.0, 0.0, -1.0), turn)
     camera = Camera((0.0, 0.0, 0.0), (math.cos(middle), 0.0, math.sin(middle)), vertical_fov_deg=3.0)
     # Even light from between prism and screen.
-    lit = [Light("l", "directional", laser(nm, 1.0), direction=(math.sin(0.35), 0.0, -math.cos(0.35))) for nm in lines]
+    lit = [DirectionalLight("l", laser(nm, 1.0), direction=(math.sin(0.35), 0.0, -math.cos(0.35))) for nm in lines]
     edges = []
     for light in lit:
         glass = place(mesh, Dielectric(FLINT))
@@ -210,15 +210,8 @@ def test_closed_forms_agree_with_each_other() -> None:
 
 def caustic_scene(*more: SceneObject) -> Scene:
     """A beam through a prism on to a plate that the camera sees from above."""
-    light = Light(
-        "beam",
-        "collimated",
-        D65.scaled(3.0),
-        (-0.2, 0.0, 3.0),
-        (0.0, 0.0, -1.0),
-        shape="rectangle",
-        width=0.3,
-        height=0.6,
+    light = CollimatedLight(
+        "beam", D65.scaled(3.0), (-0.2, 0.0, 3.0), (0.0, 0.0, -1.0), shape="rectangle", width=0.3, height=0.6
     )
     prism = place(primitives.prism(50.0, 1.0, 1.0), Dielectric(FLINT), (0.0, 0.0, 1.6))
     camera = Camera((0.9, -3.0, 4.0), (1.2, 0.0, 0.0), vertical_fov_deg=38.0)
@@ -257,8 +250,8 @@ def busy_scene() -> Scene:
     spectral reflectance."""
     tint = Absorption(np.linspace(0.3, 0.0, 401))
     lights = (
-        Light("sun", "directional", D65, direction=(0.3, 0.2, -1.0), angular_diameter_deg=3.0),
-        Light("spot", "spot", laser(600.0, 0.02), (0.5, -1.0, 4.0), outer_half_angle_deg=30.0),
+        DirectionalLight("sun", D65, direction=(0.3, 0.2, -1.0), angular_diameter_deg=3.0),
+        SpotLight("spot", laser(600.0, 0.02), (0.5, -1.0, 4.0), outer_half_angle_deg=30.0),
     )
     return scene_of(
         *lights,

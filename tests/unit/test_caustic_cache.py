@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.model.geometry import primitives
-from spectrasplat.model.scene import Camera, Dielectric, Light, Scene
+from spectrasplat.model.lights import CollimatedLight
+from spectrasplat.model.scene import Camera, Dielectric, Scene
 from spectrasplat.reference import caustic_cache, photon_run, spectral_caustic
 from spectrasplat.reference.camera_reference import cached_camera_reference, render_camera_reference
 from spectrasplat.reference.camera_run import summed_camera
@@ -28,21 +29,14 @@ def short_pilots(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(photon_run, "_PILOT_PHOTONS", 1 << 12)
     monkeypatch.setattr(spectral_caustic, "_PILOT", 1 << 14)
     monkeypatch.setattr(spectral_caustic, "_MAX_UNITS", 2)  # several rounds
-    monkeypatch.setattr(caustic_cache, "_FIRST_LOOK", 1 << 15)
+    monkeypatch.setattr(caustic_cache, "_FIRST_STEP", 1 << 15)
 
 
 @pytest.fixture
 def scene() -> Scene:
     """A beam through a prism on to a plate that the camera sees from above."""
-    light = Light(
-        "beam",
-        "collimated",
-        D65.scaled(3.0),
-        (-0.2, 0.0, 3.0),
-        (0.0, 0.0, -1.0),
-        shape="rectangle",
-        width=0.3,
-        height=0.6,
+    light = CollimatedLight(
+        "beam", D65.scaled(3.0), (-0.2, 0.0, 3.0), (0.0, 0.0, -1.0), shape="rectangle", width=0.3, height=0.6
     )
     prism = place(primitives.prism(50.0, 1.0, 1.0), Dielectric(FLINT), (0.0, 0.0, 1.6))
     return scene_of(
@@ -160,7 +154,7 @@ def test_what_halves_of_the_caustic_have_apart_is_in_the_variance() -> None:
     error = np.array([0.3, -0.3])
     sums = np.stack([np.full((1, 1, 3), 4.0 * (1.0 + error[part % 2])) for part in range(PARTS)])
     units, tallies = np.full(PARTS, 4), np.zeros((PARTS, TALLY_SIZE))
-    picture = summed_camera(sums, units, tallies, 1.0, measured_passes=True)
+    picture = summed_camera(sums, units, tallies, 1.0, halves=True)
     assert picture.samples == 4 * PARTS
     np.testing.assert_allclose(picture.xyz, 1.0)
     np.testing.assert_allclose(picture.variance, 0.3**2)  # of a mean of two that are 0.6 apart

@@ -263,8 +263,8 @@ def test_distinct_gains_are_distinct_glasses_to_the_renderer() -> None:
     from spectrasplat.model.optics.spectral_tables import SpectralAxis
     from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
     from spectrasplat.model.scene_defaults import default_light
+    from spectrasplat.model.scene_key import scene_key
     from spectrasplat.model.settings import RenderSettings
-    from spectrasplat.reference.photon_reference import scene_key
 
     def scene(*gains: float) -> Scene:
         plain = catalogue.find("N-SF11")

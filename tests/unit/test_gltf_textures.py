@@ -20,8 +20,9 @@ from spectrasplat.model.io.gltf_write import save_gltf
 from spectrasplat.model.io.picture_files import read_picture
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
+from spectrasplat.model.lights import PointLight
 from spectrasplat.model.optics.spectrum import illuminant
-from spectrasplat.model.scene import Camera, Diffuse, Light, Scene, SceneObject
+from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.texture import Texture
 
 LEVELS = np.random.default_rng(3).integers(0, 256, (4, 6, 3)).astype(np.uint8)
@@ -177,7 +178,7 @@ def textured_scene(tmp_path: Path, exact: bool = True) -> Scene:
         SceneObject("three", box, Diffuse((1.0, 1.0, 1.0), texture=replace(on_disk, wrap="clamp"))),
         SceneObject("ball", ball, Diffuse((1.0, 1.0, 1.0), texture=Texture(memory))),
     )
-    light = Light("lamp", "point", illuminant("D65"), position=(0.0, 9.0, 0.0))
+    light = PointLight("lamp", illuminant("D65"), position=(0.0, 9.0, 0.0))
     return Scene("walls", Camera((0.0, 0.0, 9.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)), (light,), objects)
 
 

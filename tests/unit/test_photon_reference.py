@@ -17,6 +17,8 @@ from spectrasplat.base.paths import assets_dir
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.primitives_round import sphere
 from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
+from spectrasplat.model.lights.spot import spot_solid_angle_sr
 from spectrasplat.model.optics.colorimetry import K_M, xyz_to_rgb709
 from spectrasplat.model.optics.glass import constant as constant_index
 from spectrasplat.model.optics.spectrum import cmf_at, constant, laser
@@ -32,9 +34,8 @@ from spectrasplat.model.scene import (
     Scene,
     SceneObject,
 )
-from spectrasplat.model.scene_lights import spot_solid_angle_sr
-from spectrasplat.reference import photon_emission, photon_emit, photon_kernel, photon_run
-from spectrasplat.reference.photon_reference import cached_reference, render_reference, scene_key
+from spectrasplat.reference import photon_emission, photon_emit, photon_run, sampling
+from spectrasplat.reference.photon_reference import cached_reference, reference_key, render_reference
 
 N_SLAB = 1.5168
 SINK = Mirror((0.0, 0.0, 0.0))
@@ -74,9 +75,8 @@ def slab_scene(absorption: Absorption | None = None) -> tuple[Scene, float, floa
 
     Returns the scene, the pixel area and the length of the way through the glass.
     """
-    light = Light(
+    light = CollimatedLight(
         "pencil",
-        "collimated",
         laser(550.0, 1.0 / (math.pi * 1e-12)),
         (-6.0, 0.0, 8.0),
         (math.sqrt(0.5), 0.0, -math.sqrt(0.5)),
@@ -141,21 +141,21 @@ def square_factor(side: float, distance: float) -> float:
 @pytest.mark.parametrize(
     ("light", "expected"),
     [
-        (Light("point", "point", ONE, (0.0, 0.0, 1.5)), 4.0 * math.atan(1.0 / (1.5 * math.sqrt(1.5**2 + 2.0)))),
+        (PointLight("point", ONE, (0.0, 0.0, 1.5)), 4.0 * math.atan(1.0 / (1.5 * math.sqrt(1.5**2 + 2.0)))),
         (
-            Light("spot", "spot", ONE, **DOWN, inner_half_angle_deg=10.0, outer_half_angle_deg=30.0),
+            SpotLight("spot", ONE, **DOWN, inner_half_angle_deg=10.0, outer_half_angle_deg=30.0),
             spot_solid_angle_sr(10.0, 30.0),
         ),
         (
-            Light("hard", "spot", ONE, **DOWN, inner_half_angle_deg=25.0, outer_half_angle_deg=25.0),
+            SpotLight("hard", ONE, **DOWN, inner_half_angle_deg=25.0, outer_half_angle_deg=25.0),
             spot_solid_angle_sr(25.0, 25.0),
         ),
-        (Light("slanted", "directional", ONE, direction=(0.6, 0.0, -0.8)), 4.0 * 0.8),
-        (Light("sun", "directional", ONE, direction=(0.0, 0.0, -1.0), angular_diameter_deg=8.0), 4.0),
-        (Light("beam", "collimated", ONE, **DOWN, radius=0.7), math.pi * 0.49),
-        (Light("sheet", "collimated", ONE, **DOWN, shape="rectangle", width=0.3, height=3.0), 0.6),
+        (DirectionalLight("slanted", ONE, direction=(0.6, 0.0, -0.8)), 4.0 * 0.8),
+        (DirectionalLight("sun", ONE, direction=(0.0, 0.0, -1.0), angular_diameter_deg=8.0), 4.0),
+        (CollimatedLight("beam", ONE, **DOWN, radius=0.7), math.pi * 0.49),
+        (CollimatedLight("sheet", ONE, **DOWN, shape="rectangle", width=0.3, height=3.0), 0.6),
         (
-            Light("panel", "area", ONE, **DOWN, shape="rectangle", width=2.0, height=2.0),
+            AreaLight("panel", ONE, **DOWN, shape="rectangle", width=2.0, height=2.0),
             math.pi * 4.0 * square_factor(2.0, 1.5),
         ),
     ],
@@ -168,11 +168,11 @@ def test_every_light_has_its_power(light: Light, expected: float) -> None:
 def test_a_point_among_mirrors_shines_all_round() -> None:
     """The cube of planes: inside a closed box every photon is swallowed."""
     box = place(primitives.box((3.0, 2.0, 4.0)), SINK, (0.3, 0.1, -0.4))
-    assert flux_on_sink(Light("lamp", "point", ONE, (0.2, 0.3, 0.1)), box) == pytest.approx(4.0 * math.pi, rel=2e-3)
+    assert flux_on_sink(PointLight("lamp", ONE, (0.2, 0.3, 0.1)), box) == pytest.approx(4.0 * math.pi, rel=2e-3)
 
 
 def test_light_that_nothing_specular_can_meet_is_none() -> None:
-    scene = scene_of(Light("away", "collimated", ONE, (0.0, 0.0, 5.0), (1.0, 0.0, 0.0), radius=0.5), PLATE)
+    scene = scene_of(CollimatedLight("away", ONE, (0.0, 0.0, 5.0), (1.0, 0.0, 0.0), radius=0.5), PLATE)
     picture = render_reference(scene, 4, 4, photons=1000)
     assert picture.photons == 0 and not picture.rgb.any() and picture.relmse == 0.0
 
@@ -184,7 +184,7 @@ def test_light_that_nothing_specular_can_meet_is_none() -> None:
 def test_an_evenly_lit_floor_is_even_in_a_slanted_picture(kind: str) -> None:
     """Sunlight that a large tilted mirror throws straight down: radiance E ρ/π in every pixel, wherever the camera
     stands."""
-    light = Light("sun", "directional", ONE.scaled_to_luminous(100.0), direction=(1.0, 0.0, 0.0))
+    light = DirectionalLight("sun", ONE.scaled_to_luminous(100.0), direction=(1.0, 0.0, 0.0))
     mirror = place(primitives.plane(30.0, 30.0), Mirror(), (0.0, 0.0, 14.0), turned(1, 45.0))
     floor = place(primitives.plane(100.0, 100.0), Diffuse((0.5, 0.25, 0.75)))
     camera = Camera((1.0, -6.0, 2.0), (0.0, 0.0, 0.0), kind=kind, vertical_fov_deg=50.0, vertical_extent=3.0)  # type: ignore[arg-type]
@@ -200,7 +200,7 @@ def test_an_evenly_lit_floor_is_even_in_a_slanted_picture(kind: str) -> None:
 
 
 def test_light_on_the_far_side_of_a_sheet_is_not_seen() -> None:
-    light = Light("up", "collimated", ONE, (0.0, 0.0, -3.0), (0.0, 0.0, 1.0), radius=0.3)
+    light = CollimatedLight("up", ONE, (0.0, 0.0, -3.0), (0.0, 0.0, 1.0), radius=0.3)
     pane = place(primitives.box((1.0, 1.0, 0.2)), Dielectric(constant_index(1.5)), (0.0, 0.0, -1.0))
     sheet = place(primitives.plane(4.0, 4.0), Diffuse())
     above = render_reference(scene_of(light, pane, sheet), 8, 8, photons=20_000)
@@ -211,7 +211,7 @@ def test_light_on_the_far_side_of_a_sheet_is_not_seen() -> None:
 
 
 def test_glass_hides_what_lies_behind_it() -> None:
-    light = Light("down", "collimated", ONE, (0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=0.3)
+    light = CollimatedLight("down", ONE, (0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=0.3)
     pane = place(primitives.box((1.0, 1.0, 0.2)), Dielectric(constant_index(1.5)), (0.0, 0.0, 1.0))
     floor = place(primitives.plane(4.0, 4.0), Diffuse())
     assert not render_reference(scene_of(light, pane, floor), 8, 8, photons=20_000).rgb.any()
@@ -224,9 +224,9 @@ def test_glass_hides_what_lies_behind_it() -> None:
 def busy() -> Scene:
     """Nested, touching, absorbing, mirrored, smooth: everything at once."""
     tint = Absorption(np.full(401, 0.3))
-    light = Light("lamp", "point", constant(1.0), (0.4, -1.0, 4.0))
+    light = PointLight("lamp", constant(1.0), (0.4, -1.0, 4.0))
     return scene_of(
-        (light, Light("sun", "directional", laser(600.0), direction=(0.3, 0.2, -0.9), angular_diameter_deg=3.0)),
+        (light, DirectionalLight("sun", laser(600.0), direction=(0.3, 0.2, -0.9), angular_diameter_deg=3.0)),
         place(sphere(0.8, 1280), Dielectric(constant_index(1.5), None, 1), (0.0, 0.0, 1.0)),
         place(sphere(0.4, 1280), Dielectric(constant_index(1.33), tint, 2), (0.1, 0.0, 1.0)),
         place(primitives.box((0.6, 0.6, 0.6)), Dielectric(constant_index(1.7), tint, 0), (1.2, 0.0, 1.0)),
@@ -248,7 +248,7 @@ def test_flux_closes_and_none_slips_through_cracks(busy: Scene) -> None:
 
 def test_depth_counts_as_the_program_counts_it(busy: Scene) -> None:
     """A pane takes two events: with one allowed, all that enters is lost."""
-    light = Light("beam", "collimated", ONE, (0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=0.3)
+    light = CollimatedLight("beam", ONE, (0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=0.3)
     pane = place(primitives.box((1.0, 1.0, 0.2)), Dielectric(constant_index(1.5)), (0.0, 0.0, 1.0))
     scene = scene_of(light, pane, place(primitives.plane(4.0, 4.0), Diffuse()))
     one, two = (render_reference(scene, 4, 4, photons=20_000, max_depth=depth).balance for depth in (1, 2))
@@ -258,7 +258,7 @@ def test_depth_counts_as_the_program_counts_it(busy: Scene) -> None:
 
 def test_touching_blocks_of_one_glass_are_one_block() -> None:
     """No film of air between coincident faces: a beam along the axis of two passes loses only two surfaces."""
-    light = Light("beam", "collimated", ONE, (0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=0.3)
+    light = CollimatedLight("beam", ONE, (0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=0.3)
     glass = Dielectric(constant_index(1.5))
     measured_passes = [place(primitives.box((1.0, 1.0, 0.5)), glass, (0.0, 0.0, z)) for z in (1.0, 1.5)]
     balance = render_reference(
@@ -281,10 +281,10 @@ def test_its_own_error_is_true(busy: Scene) -> None:
 
 
 def test_the_sequence_is_a_net_in_its_first_two_dimensions_and_stratified_in_all() -> None:
-    sequence = photon_kernel.scrambled(5, 0, 0)
+    sequence = sampling.scrambled(5, 0, 0)
     bits = (np.arange(256)[:, None] >> np.arange(32)) & 1
-    words = np.zeros((photon_kernel.DIMENSIONS, 256), np.uint32)
-    for d in range(photon_kernel.DIMENSIONS):
+    words = np.zeros((sampling.DIMENSIONS, 256), np.uint32)
+    for d in range(sampling.DIMENSIONS):
         words[d] = (
             np.bitwise_xor.reduce(np.where(bits == 1, sequence.directions[d], np.uint32(0)), axis=1) ^ sequence.shift[d]
         )
@@ -296,7 +296,7 @@ def test_the_sequence_is_a_net_in_its_first_two_dimensions_and_stratified_in_all
 def _lamp_domain() -> photon_emission.Domain:
     triangles = np.array([[[-1, -1, 0], [1, -1, 0], [1, 1, 0]], [[-1, -1, 0], [1, 1, 0], [-1, 1, 0]]], float)
     return photon_emission.domains(
-        Light("spot", "spot", ONE, **DOWN, inner_half_angle_deg=10.0, outer_half_angle_deg=30.0),
+        SpotLight("spot", ONE, **DOWN, inner_half_angle_deg=10.0, outer_half_angle_deg=30.0),
         triangles,
         np.zeros(3),
         2.0,
@@ -367,7 +367,7 @@ def test_an_interrupt_keeps_what_is_done(small: Scene, tmp_path: Path) -> None:
 
 def test_limits() -> None:
     with pytest.raises(ValueError, match="limit"):
-        render_reference(scene_of(Light("l", "point", ONE, (0, 0, 1)), PLATE), 4, 4)
+        render_reference(scene_of(PointLight("l", ONE, (0, 0, 1)), PLATE), 4, 4)
     scene = load_scene(assets_dir() / "scenes" / "prism.toml")
     rough = render_reference(scene, 24, 16, target_relmse=0.05)
     assert 0.0 < rough.relmse <= 0.05
@@ -375,18 +375,20 @@ def test_limits() -> None:
 
 
 def test_the_key_tells_pictures_apart_and_nothing_else(small: Scene) -> None:
-    key = scene_key(small, 16, 12, 64)
+    key = reference_key(small, 16, 12, 64)
     light, glass = small.lights[0], small.objects[0]
-    assert scene_key(replace(small, name="other", notes=("note",), background_rgb=(1.0, 0.0, 0.0)), 16, 12, 64) == key
+    assert (
+        reference_key(replace(small, name="other", notes=("note",), background_rgb=(1.0, 0.0, 0.0)), 16, 12, 64) == key
+    )
     others = [
-        scene_key(small, 16, 13, 64),
-        scene_key(small, 16, 12, 63),
-        scene_key(replace(small, camera=replace(small.camera, vertical_fov_deg=35.1)), 16, 12, 64),
-        scene_key(
+        reference_key(small, 16, 13, 64),
+        reference_key(small, 16, 12, 63),
+        reference_key(replace(small, camera=replace(small.camera, vertical_fov_deg=35.1)), 16, 12, 64),
+        reference_key(
             replace(small, lights=(replace(light, spectral_power=light.spectral_power.scaled(2.0)),)), 16, 12, 64
         ),
-        scene_key(replace(small, lights=(replace(light, position=(0.4, -1.0, 4.1)),)), 16, 12, 64),
-        scene_key(
+        reference_key(replace(small, lights=(replace(light, position=(0.4, -1.0, 4.1)),)), 16, 12, 64),
+        reference_key(
             replace(
                 small, objects=(replace(glass, material=Dielectric(constant_index(1.51), None, 1)), small.objects[1])
             ),
@@ -394,7 +396,7 @@ def test_the_key_tells_pictures_apart_and_nothing_else(small: Scene) -> None:
             12,
             64,
         ),
-        scene_key(
+        reference_key(
             replace(small, objects=(replace(glass, object_to_world=np.diag([1.0, 1.0, 1.01, 1.0])), small.objects[1])),
             16,
             12,

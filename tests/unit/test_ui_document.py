@@ -76,10 +76,10 @@ def test_a_save_that_breaks_halfway_keeps_the_old_file(file: Path, monkeypatch: 
     document = Document.open(file)
     edited(document)
 
-    def full(scene: Scene, path: Path) -> str:
+    def full(values: object, before: str) -> str:
         raise UserError("the disk is full")
 
-    monkeypatch.setattr(scene_save, "scene_text", full)
+    monkeypatch.setattr(scene_save, "toml_text", full)
     with pytest.raises(UserError, match="full"):
         document.save()
     assert file.read_text(encoding="utf-8") == SCENE and document.unsaved

@@ -11,7 +11,7 @@ from ...gpu.mip_chain import level_count
 from ...gpu.records import photon_record, ray_record
 from ...gpu.scene_buffers import SAMPLES, TRIANGLE
 from ...model.features import Features, is_convex_solid, overlapping_solids
-from ...model.scene import Dielectric, Diffuse, Mirror, Scene
+from ...model.scene import Scene
 from ...model.texture import Environment, Texture
 from ...passes.footprint import SPLAT
 
@@ -56,21 +56,17 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
     sizes = RecordSizes.of(features)
     unspectral = RecordSizes.of(replace(features, spectral_groups=0))
     unspatial = RecordSizes.of(replace(features, footprints=False))
-    specular = [o for o in scene.objects if isinstance(o.material, Dielectric | Mirror)]
+    specular = [o for o in scene.objects if o.material.is_specular]
     loose = [o for o in scene.objects if not is_convex_solid(o)]
     triangles = sum(len(o.mesh.triangles) for o in loose)
     smooth = sum(len(o.mesh.triangles) for o in specular if o.mesh.corner_normals is not None)
     planes = sum(len(o.mesh.convex_planes) for o in scene.objects if is_convex_solid(o))
     row = SAMPLES * 8
-    glasses = {o.material.dispersion for o in scene.objects if isinstance(o.material, Dielectric)}
-    absorbing = sum(isinstance(o.material, Dielectric) and o.material.absorption is not None for o in scene.objects)
-    mirrors = sum(isinstance(o.material, Mirror) for o in scene.objects)
-    curved = [o for o in scene.objects if isinstance(o.material, Diffuse)]
-    worn = {
-        id(o.material.texture.rgb): o.material.texture
-        for o in scene.objects
-        if isinstance(o.material, Diffuse) and o.material.texture is not None
-    }
+    glasses = {o.material.dispersion for o in scene.objects if o.material.transmits}
+    absorbing = sum(o.material.absorption is not None for o in scene.objects)
+    mirrors = sum(o.material.is_mirror for o in scene.objects)
+    curved = [o for o in scene.objects if o.material.receives]
+    worn = {id(o.material.texture.rgb): o.material.texture for o in scene.objects if o.material.texture is not None}
     beyond = scene.environment
     told = {
         "spectral columns": (

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...model.features import Features, explain, is_convex_solid
 from ...model.geometry.mesh import Mesh
-from ...model.scene import Absorption, Dielectric, Mirror, Scene, SceneObject
+from ...model.scene import Absorption, Scene, SceneObject
 
 FORCED_BINS = 16
 """Spectral bins that a scene without any is made to pay for."""
@@ -83,7 +83,7 @@ def _dispersion(scene: Scene, base: Features) -> Trial:
         spectral_groups=0,
         merged_groups=False,
         band_cuts=False,
-        spectral_weights=base.spectral_weights and not included or base.absorption,
+        spectral_weights=(base.spectral_weights and not included) or base.absorption,
     )
     forced = base if included else replace(base, spectral_groups=1, band_cuts=True, spectral_weights=True)
     if base.point_spectrum:
@@ -238,18 +238,14 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
 
 
 def _specular(scene: Scene) -> list[SceneObject]:
-    return [o for o in scene.objects if isinstance(o.material, Dielectric | Mirror)]
+    return [o for o in scene.objects if o.material.is_specular]
 
 
 def _with_normals(scene: Scene) -> Scene:
     """Every specular facet with its own normal at all three corners: smooth in name, flat in reference."""
 
     def smoothed(item: SceneObject) -> SceneObject:
-        if (
-            not isinstance(item.material, Dielectric | Mirror)
-            or item.mesh.corner_normals is not None
-            or is_convex_solid(item)
-        ):
+        if not item.material.is_specular or item.mesh.corner_normals is not None or is_convex_solid(item):
             return item
         normals = np.repeat(item.mesh.face_normals()[:, None, :], 3, axis=1)
         return replace(item, mesh=replace(item.mesh, corner_normals=normals))
@@ -261,7 +257,7 @@ def _with_absorption(scene: Scene) -> Scene:
     """Every glass with an absorption of zero."""
 
     def filled(item: SceneObject) -> SceneObject:
-        if not isinstance(item.material, Dielectric):
+        if not item.material.transmits:
             return item
         return replace(item, material=replace(item.material, absorption=Absorption(np.zeros(401))))
 

@@ -18,17 +18,19 @@ import numpy as np
 from ...base.errors import UserError
 from ..geometry.mesh import Mesh, make_mesh
 from ..geometry.mesh_health import examine, repair
+from ..lights import LIGHT_KINDS, DirectionalLight, PointLight, SpotLight
+from ..lights.light import made
+from ..lights.light_file import read_light
+from ..placement import Surroundings
 from ..scene import (
     Camera,
     Dielectric,
-    Diffuse,
     Light,
     Material,
     Scene,
     SceneObject,
 )
 from ..scene_defaults import default_camera, default_light, default_table, environment_of
-from ..scene_lights import Surroundings, read_light
 from .gltf_document import GltfDocument, open_document
 from .gltf_extras import read_node_dabs, read_scene_extras
 from .gltf_materials import (
@@ -47,6 +49,7 @@ UNDERSTOOD = frozenset({LIGHTS, TRANSMISSION, VOLUME, IOR, DISPERSION, "KHR_mesh
 _CAN_BE_LEFT_OUT = ("KHR_texture_", "KHR_materials_", "EXT_texture_", "KHR_xmp", "MSFT_", "EXT_lights_image_based")
 Y_UP_TO_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
 _DEFAULT_DISTANCE = 1.0
+_PUNCTUAL = tuple(cls.kind for cls in (PointLight, SpotLight, DirectionalLight))
 
 
 @dataclass
@@ -105,7 +108,7 @@ class _Reader:
         upright = [replace(o, object_to_world=Y_UP_TO_Z_UP @ o.object_to_world) for o in self.objects]
         around = environment_of(upright)
         background, environment, render = read_scene_extras(self.document, self.notes)
-        receives = any(isinstance(o.material, Diffuse) for o in self.objects)
+        receives = any(o.material.receives for o in self.objects)
         # An environment shows glass and mirrors without a light and without anything it falls on.
         if environment is None and not receives:
             table = default_table(upright)
@@ -226,7 +229,7 @@ class _Reader:
 
     def _wearable(self, material: Material, mesh: Mesh, label: str) -> Material:
         """`material`, without its texture where the mesh cannot say where it goes."""
-        if not isinstance(material, Diffuse) or material.texture is None or mesh.uv is not None:
+        if material.texture is None or mesh.uv is not None:
             return material
         self.notes.append(
             f"node '{label}' has no texture coordinates; its texture is not shown (it is kept when saving)."
@@ -321,13 +324,15 @@ class _Reader:
         extras = entry.get("extras") if isinstance(entry.get("extras"), dict) else {}
         own = extras.get(EXTRAS, {}).get("light")
         if own is not None:
-            placed: dict[str, Any] = {} if own.get("kind") == "directional" else {"position": list(position)}
-            placed |= {} if own.get("kind", "point") == "point" else {"direction": list(direction)}
-            placed |= {"tangent": list(_vec3(_unit(world[:3, 0])))} if "size" in own else {}
+            cls = LIGHT_KINDS.get(own.get("kind", "point"), Light)
+            placed: dict[str, Any] = {"position": list(position)} if cls.has_place else {}
+            placed |= {"direction": list(direction)} if cls.has_direction else {}
+            has_tangent = "size" in own or cls.has_roll is True
+            placed |= {"tangent": list(_vec3(_unit(world[:3, 0])))} if has_tangent else {}
             table = SceneTable(own | placed, self.document.path, f"{LIGHTS}.extras.{EXTRAS}.light")
             return read_light(table, 0, around)
         kind = entry.get("type")
-        if kind not in ("point", "spot", "directional"):
+        if kind not in _PUNCTUAL:
             raise self.document.fail(f"light '{label}' has the unknown type '{kind}'; use point, spot or directional")
         rgb = np.array(entry.get("color", (1.0, 1.0, 1.0)), dtype=np.float64)
         intensity = float(entry.get("intensity", 1.0))
@@ -337,16 +342,15 @@ class _Reader:
         if luminance == 0.0:
             return None
         tinted = Spectrum(illuminant_table()["D65"] * (rgb_partition() @ rgb)).scaled_to_luminous(luminance)
-        light = Light(label, kind, tinted, position=position, direction=direction)
-        if kind == "spot":
+        placed = {"name": label, "spectral_power": tinted, "position": position, "direction": direction}
+        if kind == SpotLight.kind:
             cone = entry.get("spot", {})
             inner, outer = float(cone.get("innerConeAngle", 0.0)), float(cone.get("outerConeAngle", math.pi / 4.0))
             if not (0.0 <= inner <= outer and 0.0 < outer <= 0.5 * math.pi + 1e-6):
                 raise self.document.fail(f"light '{label}' needs cone angles with 0 <= inner <= outer <= 90 degrees")
-            light = replace(
-                light, inner_half_angle_deg=math.degrees(inner), outer_half_angle_deg=min(90.0, math.degrees(outer))
-            )
-        return light
+            placed |= {"inner_half_angle_deg": math.degrees(inner)}
+            placed |= {"outer_half_angle_deg": min(90.0, math.degrees(outer))}
+        return made(LIGHT_KINDS[kind], placed)
 
 
 def _triangles(order: np.ndarray, mode: int, where: str) -> np.ndarray:

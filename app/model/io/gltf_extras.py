@@ -14,11 +14,10 @@ from ..scene import Dab, Material, RenderDefaults, Scene, Vec3
 from ..scene_dabs import KEY, describe_dabs, read_dabs
 from ..scene_environment import KEY as ENVIRONMENT
 from ..scene_environment import environment_values, read_environment
-from ..scene_render import read_render
+from ..scene_render import read_render, render_values
 from ..texture import Environment
 from .gltf_document import GltfDocument
 from .gltf_materials import EXTRAS
-from .scene_save import render_values
 from .scene_table import SceneTable
 
 _SCENE = "scene"

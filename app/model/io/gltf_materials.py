@@ -11,18 +11,16 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from ..materials.material_file import read_material
 from ..optics import catalogue, glass
 from ..optics.colorimetry import attenuation_from_colour
 from ..scene import (
     Absorption,
-    Black,
     Dielectric,
     Diffuse,
     Material,
     Mirror,
 )
-from ..scene_describe import describe_material
-from ..scene_materials import read_material
 from .gltf_document import GltfDocument
 from .gltf_textures import GltfTextures
 from .scene_table import SceneTable
@@ -68,7 +66,7 @@ def read_gltf_material(document: GltfDocument, index: int | None, textures: Gltf
 
 def _with_textures_told(material: Material, values: dict[str, Any], label: str, notes: list[str]) -> Material:
     """`material`, after a note on the textures it does not show."""
-    shown = {_BASE_COLOUR} if isinstance(material, Diffuse) else set()
+    shown = {_BASE_COLOUR} if material.receives else set()
     if any("Texture" in key for key in _all_keys(values) if key not in shown):
         others = "other " if getattr(material, "texture", None) is not None else ""
         notes.append(f"{label}: its {others}textures are not shown, only its factors (they are kept when saving).")
@@ -119,18 +117,18 @@ def write_gltf_material(values: dict[str, Any], material: Material, thickness: f
     extras.pop("glass", None)
     rgb = (1.0, 1.0, 1.0)
     metallic, roughness = 0.0, 0.0
-    if isinstance(material, Dielectric):
+    if material.transmits:
         extensions |= _glass_extensions(material, thickness)
-    elif isinstance(material, Mirror):
+    elif material.is_mirror:
         rgb, metallic = material.reflectance_rgb, 1.0
     else:
-        rgb, roughness = (0.0, 0.0, 0.0) if isinstance(material, Black) else material.reflectance_rgb, 1.0
+        rgb, roughness = (0.0, 0.0, 0.0) if material.is_black else material.reflectance_rgb, 1.0
     pbr |= {"baseColorFactor": [*map(float, rgb), 1.0], "metallicFactor": metallic, "roughnessFactor": roughness}
-    if isinstance(material, Diffuse):
+    if material.receives:
         _wear(pbr, texture)
     exact = not isinstance(material, (Mirror, Diffuse)) or getattr(material, "reflectance", None) is not None
     if exact:
-        own["material"] = describe_material(material)
+        own["material"] = material.values()
     if own:
         extras[EXTRAS] = own
     for key, content in (("extensions", extensions), ("extras", extras)):
@@ -150,7 +148,7 @@ def _wear(pbr: dict[str, Any], texture: int | None) -> None:
 def _glass_extensions(material: Dielectric, thickness: float) -> dict[str, Any]:
     dispersion = material.dispersion
     volume: dict[str, Any] = {"thicknessFactor": float(thickness)}
-    described = describe_material(material).get("absorption", {})
+    described = material.values().get("absorption", {})
     if "colour" in described:
         volume |= {"attenuationColor": described["colour"], "attenuationDistance": described["distance"]}
     extensions: dict[str, Any] = {

@@ -18,21 +18,20 @@ import numpy as np
 from ...base.errors import UserError
 from ..geometry.mesh import Mesh
 from ..geometry.mesh_health import weld_map
+from ..lights import DirectionalLight, PointLight, SpotLight
+from ..lights.light_file import light_values
 from ..scene import (
     Camera,
-    Diffuse,
     Light,
     Material,
     Scene,
     SceneObject,
 )
-from ..scene_describe import describe_material
 from .gltf import LIGHTS, Origins, open_document, read_scene
 from .gltf_document import GltfDocument, save_document
 from .gltf_extras import write_node_dabs, write_scene_extras
 from .gltf_materials import EXTRAS, write_gltf_material
 from .gltf_textures import TextureWriter, turned_over
-from .scene_save import light_values
 
 _SUFFIXES = (".glb", ".gltf")
 
@@ -216,7 +215,7 @@ class _Writer:
 
     def _write_material(self, values: dict[str, Any], item: SceneObject) -> None:
         low, high = item.mesh.bounds()
-        texture = item.material.texture if isinstance(item.material, Diffuse) else None
+        texture = item.material.texture
         number = None if texture is None else self._textures.number(texture)
         self._used |= write_gltf_material(values, item.material, float((high - low).min()) or 1e-3, number)
 
@@ -251,18 +250,19 @@ class _Writer:
         xyz = light.spectral_power.xyz()
         rgb = np.maximum(xyz_to_rgb709(xyz), 0.0)
         brightest = float(rgb.max())
-        kind = light.kind if light.kind in ("point", "spot", "directional") else "directional"
+        # A beam is nearest to a sun; a glowing surface to a spot that shines as widely.
+        kind = DirectionalLight.kind if light.is_parallel else PointLight.kind
         entry |= {"name": light.name, "type": kind, "intensity": brightest}
         entry["color"] = (rgb / brightest if brightest > 0.0 else np.ones(3)).tolist()
-        if light.kind == "area":
-            entry |= {"type": "spot", "spot": {"innerConeAngle": 0.0, "outerConeAngle": 0.5 * math.pi}}
-            area = light.width * light.height if light.shape == "rectangle" else math.pi * light.radius**2
-            entry["intensity"] = brightest * area
-        if light.kind == "spot":
-            inner, outer = math.radians(light.inner_half_angle_deg), math.radians(light.outer_half_angle_deg)
+        inner, outer = light.cone
+        if not light.is_parallel and not light.is_intensity:
+            inner, outer = 0.0, 0.5 * math.pi
+            entry["intensity"] = brightest * light.area
+        if not light.is_parallel and outer < math.pi:
             # glTF wants inner < outer: a hard edge keeps its exact angles in the extras.
-            entry["spot"] = {"innerConeAngle": min(inner, outer - 1e-6), "outerConeAngle": outer}
-        own = {k: v for k, v in light_values(light).items() if k not in ("position", "direction", "tangent")}
+            cone = {"innerConeAngle": min(inner, outer - 1e-6), "outerConeAngle": outer}
+            entry |= {"type": SpotLight.kind, "spot": cone}
+        own = {k: v for k, v in light_values(light, self.path).items() if k not in ("position", "direction", "tangent")}
         extras = entry.get("extras") if isinstance(entry.get("extras"), dict) else {}
         entry["extras"] = extras | {EXTRAS: {"light": own}}
         self._used.add(LIGHTS)
@@ -366,7 +366,7 @@ class _Writer:
 
 
 def _key(material: Material) -> str:
-    return json.dumps(describe_material(material), sort_keys=True)
+    return json.dumps(material.values(), sort_keys=True)
 
 
 def _same_mesh(a: Mesh, b: Mesh) -> bool:
@@ -394,7 +394,7 @@ def _look_world(position: Any, forward: Any, up: Any) -> np.ndarray:
 def _world_of_light(light: Light) -> np.ndarray:
     """World matrix of a light's node: it shines along -z, and a rectangle's width runs along x."""
     helper = np.eye(3)[int(np.argmin(np.abs(light.direction)))]
-    if light.tangent is not None:
-        helper = np.cross(-np.array(light.direction), light.tangent)
-    world = _look_world((0.0, 0.0, 0.0) if light.kind == "directional" else light.position, light.direction, helper)
+    if light.has_roll:
+        helper = np.cross(-np.array(light.direction), light.axes()[:, 0])
+    world = _look_world((0.0, 0.0, 0.0) if not light.has_place else light.position, light.direction, helper)
     return world

@@ -14,10 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from ...base.errors import UserError
+from ..lights.light_file import read_light
+from ..materials.dielectric import DEFAULT_GLASS
+from ..materials.material_file import read_materials
+from ..placement import Surroundings
 from ..scene import (
     Camera,
     Dielectric,
-    Diffuse,
     Light,
     Scene,
     SceneObject,
@@ -26,8 +29,6 @@ from ..scene_camera import read_camera
 from ..scene_checks import check_scene
 from ..scene_defaults import default_camera, default_light, default_table, environment_of
 from ..scene_environment import read_environment
-from ..scene_lights import Surroundings, read_light
-from ..scene_materials import DEFAULT_GLASS, read_materials
 from ..scene_objects import MESH_SUFFIXES, ObjectReader, load_checked_mesh
 from ..scene_render import read_render
 from ..scene_textures import TextureReader
@@ -132,7 +133,7 @@ def _add_table(objects: list[SceneObject], notes: list[str]) -> None:
 
 
 def _has_diffuse(objects: list[SceneObject]) -> bool:
-    return any(isinstance(o.material, Diffuse) for o in objects)
+    return any(o.material.receives for o in objects)
 
 
 def _scene_around_mesh(path: Path) -> Scene:

@@ -2,131 +2,158 @@
 
 Everything is told from the scene's values alone: a spectrum that is D65 is written "D65", an
 absorption that a colour explains is written as that colour, a mesh that came from a shape or
-a file is written as that. Only meshes nobody can name are stored as triangles. Comments and
-defaults of a file that was read are not kept.
+a file is written as that. Only meshes nobody can name are stored as triangles. Saved over the file it came from,
+a scene keeps there what a person wrote and nobody changed.
 """
 
 from __future__ import annotations
 
-import json
-import math
 import os
+import tomllib
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...base.atomic import atomic_output, check_writable
 from ...base.errors import UserError
 from ..geometry.mesh import Mesh
 from ..geometry.mesh_recipes import recipe_of
-from ..scene import (
-    Camera,
-    Diffuse,
-    Light,
-    RenderDefaults,
-    Scene,
-    SceneObject,
-)
+from ..lights.light_file import light_values
+from ..scene import Scene, SceneObject
+from ..scene_camera import camera_values
 from ..scene_dabs import KEY as DABS
 from ..scene_dabs import describe_dabs
-from ..scene_describe import describe_material, describe_spectrum
 from ..scene_environment import KEY as ENVIRONMENT
 from ..scene_environment import environment_values
 from ..scene_objects import INLINE
-from .scene_pictures import picture_file, relative_name
+from ..scene_render import render_values
+from ..texture import Environment
+from .scene_pictures import relative_name
+from .toml_text import toml_text
 
 INLINE_TRIANGLES = 64
 """Flat meshes of no more triangles than this go into the scene file itself."""
 
-_POWER_KEY = {
-    "point": "intensity_w_sr",
-    "spot": "intensity_w_sr",
-    "directional": "irradiance_w_m2",
-    "collimated": "irradiance_w_m2",
-    "area": "radiance_w_sr_m2",
-}
 
-
-def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
+def save_scene(scene: Scene, path: str | os.PathLike[str], over: bool = False) -> None:
     """Write `scene` to the TOML file `path`, whole or not at all.
 
     Meshes without a description go to PLY files in the folder `<stem>_meshes` beside it, pictures
-    without a file to `<stem>_pictures`.
+    without a file to `<stem>_pictures`. `over`: where `path` holds a scene already, what did not change keeps the
+    words, order and comments it has there.
     Raises UserError when something cannot be written.
     """
-    from ...base.atomic import atomic_output, check_writable
-
     path = Path(path)
     check_writable(path)
-    text = scene_text(scene, path)
+    values, before = scene_values(scene, path), ""
+    if over and path.is_file():
+        with suppress(UserError, OSError, ValueError):
+            before = path.read_text(encoding="utf-8-sig")
+            values = _kept(scene, path, tomllib.loads(before))
+    text = toml_text(values, before)
     with atomic_output(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
-def scene_text(scene: Scene, path: Path) -> str:
-    """The TOML text of `scene` as it would stand in `path`; writes PLY and picture files where it must."""
-    behind = {"background": list(scene.background_rgb)} if scene.environment is None else {}
-    parts = [toml_block("", {"name": scene.name} | behind | ({} if scene.lights else {"lights": []}))]
-    parts.append(toml_block("[camera]", camera_values(scene.camera)))
-    parts.append(toml_block("[render]", render_values(scene.render)))
+def scene_values(scene: Scene, path: Path) -> dict[str, Any]:
+    """The tables of `scene` as they would stand in `path`; writes PLY and picture files where it must."""
+    values: dict[str, Any] = {"name": scene.name}
+    if scene.environment is None:
+        values["background"] = list(scene.background_rgb)
+    if not scene.lights:
+        values["lights"] = []
+    values["camera"] = camera_values(scene.camera)
+    values["render"] = render_values(scene.render)
     if scene.environment is not None:
-        parts.append(toml_block(f"[{ENVIRONMENT}]", environment_values(scene.environment, path)))
-    parts += [toml_block("[[lights]]", light_values(light)) for light in scene.lights]
+        values[ENVIRONMENT] = environment_values(scene.environment, path)
+    if scene.lights:
+        values["lights"] = [light_values(light, path) for light in scene.lights]
     materials: dict[str, dict[str, Any]] = {}
-    objects = [toml_block("[[objects]]", _objects(group, materials, path)) for group in _groups(scene.objects)]
-    parts += [toml_block(f"[materials.{toml_key(name)}]", values) for name, values in materials.items()]
-    return "\n".join(parts + objects)
+    objects = [_objects(group, materials, path) for group in _groups(scene.objects)]
+    return values | ({"materials": materials} if materials else {}) | {"objects": objects}
 
 
-# -- parts of a scene ---------------------------------------------------------------------
+# -- over what a person wrote -------------------------------------------------------------
 
 
-def camera_values(camera: Camera) -> dict[str, Any]:
-    """The [camera] table of a scene file."""
-    values: dict[str, Any] = {
-        "kind": camera.kind,
-        "position": list(camera.position),
-        "target": list(camera.target),
-        "up": list(camera.up),
-    }
-    if camera.kind == "pinhole":
-        return values | {"vertical_fov_deg": camera.vertical_fov_deg}
-    return values | {"vertical_extent": camera.vertical_extent}
+def _kept(scene: Scene, path: Path, raw: dict[str, Any]) -> dict[str, Any]:
+    """`raw`, the tables that stand in `path`, with what differs in `scene` replaced."""
+    from .scene_file import load_scene
 
-
-def render_values(render: RenderDefaults) -> dict[str, Any]:
-    """The [render] table of a scene file."""
-    return {
-        "size": [render.width, render.height],
-        "photons": render.photons,
-        "exposure_ev": render.exposure_ev,
-        "max_depth": render.max_depth,
-    }
-
-
-def light_values(light: Light) -> dict[str, Any]:
-    """One of the [[lights]] of a scene file."""
-    values: dict[str, Any] = {"name": light.name, "kind": light.kind}
-    if light.kind != "directional":
-        values["position"] = list(light.position)
-    if light.kind != "point":
-        values["direction"] = list(light.direction)
-    if light.kind == "spot":
-        values["half_angle_deg"] = light.outer_half_angle_deg
-        values["inner_half_angle_deg"] = light.inner_half_angle_deg
-    if light.kind == "directional":
-        values["angular_diameter_deg"] = light.angular_diameter_deg
-    if light.kind in ("collimated", "area"):
-        values["shape"] = light.shape
-        if light.shape == "disc":
-            values["radius"] = light.radius
+    before = load_scene(path)
+    values = dict(raw)
+    if scene.name != before.name:
+        values["name"] = scene.name
+    if scene.camera != before.camera:
+        values["camera"] = camera_values(scene.camera)
+    if scene.render != before.render:
+        values["render"] = render_values(scene.render)
+    if scene.background_rgb != before.background_rgb or not _same_environment(scene.environment, before.environment):
+        for key in ("background", ENVIRONMENT):
+            values.pop(key, None)
+        if scene.environment is None:
+            values["background"] = list(scene.background_rgb)
         else:
-            values["size"] = [light.width, light.height]
-            if light.tangent is not None:
-                values["tangent"] = list(light.tangent)
-    values["spectrum"] = describe_spectrum(light.spectral_power)
-    values[_POWER_KEY[light.kind]] = light.spectral_power.power_w()
+            values[ENVIRONMENT] = environment_values(scene.environment, path)
+    if scene.lights != before.lights:
+        written = dict(zip(before.lights, raw.get("lights", []), strict=False))
+        values["lights"] = [written.get(light) or light_values(light, path) for light in scene.lights]
+    materials = dict(raw.get("materials", {}))
+    values["objects"] = _kept_objects(scene, before, raw["objects"], materials, path)
+    if materials:
+        values["materials"] = materials
     return values
+
+
+def _kept_objects(
+    scene: Scene, before: Scene, raw: list[dict[str, Any]], materials: dict[str, dict[str, Any]], path: Path
+) -> list[dict[str, Any]]:
+    """The [[objects]]: an entry whose objects are all as they were stays as it is written."""
+    entries: dict[str, tuple[dict[str, Any], tuple[SceneObject, ...]]] = {}
+    first = 0
+    for entry in raw:
+        of_entry = before.objects[first : first + len(entry.get("instances", (None,)))]
+        entries[of_entry[0].name] = entry, of_entry
+        first += len(of_entry)
+    told: list[dict[str, Any]] = []
+    changed: list[SceneObject] = []
+    at = 0
+    while at < len(scene.objects):
+        entry, old = entries.get(scene.objects[at].name, ({}, ()))
+        new = scene.objects[at : at + len(old)]
+        if old and len(new) == len(old) and all(map(_same_object, new, old)):
+            told += [_objects(group, materials, path) for group in _groups(tuple(changed))]
+            told.append(entry)
+            changed = []
+            at += len(old)
+        else:
+            changed.append(scene.objects[at])
+            at += 1
+    return told + [_objects(group, materials, path) for group in _groups(tuple(changed))]
+
+
+def _same_object(a: SceneObject, b: SceneObject) -> bool:
+    recipe = recipe_of(a.mesh)
+    return (
+        a.name == b.name
+        and np.array_equal(a.object_to_world, b.object_to_world)
+        and a.local_dispersion == b.local_dispersion
+        and recipe == recipe_of(b.mesh)
+        and (recipe is not None or np.array_equal(a.mesh.vertices, b.mesh.vertices))
+        and a.material.values() == b.material.values()
+    )
+
+
+def _same_environment(a: Environment | None, b: Environment | None) -> bool:
+    if a is None or b is None:
+        return a is b
+    told = [(e.kind, dict(e.parameters), e.source) for e in (a, b)]
+    return told[0] == told[1] and np.array_equal(a.world_to_local, b.world_to_local) and np.array_equal(a.rgb, b.rgb)
+
+
+# -- objects ------------------------------------------------------------------------------
 
 
 def _groups(objects: tuple[SceneObject, ...]) -> list[list[SceneObject]]:
@@ -162,10 +189,7 @@ def _matrix(item: SceneObject) -> list[float]:
 
 def _material(item: SceneObject, materials: dict[str, dict[str, Any]], path: Path) -> dict[str, Any]:
     """`glass = …` where that says it all, else `material = …` naming an entry of `materials`."""
-    values = describe_material(item.material)
-    texture = item.material.texture if isinstance(item.material, Diffuse) else None
-    if texture is not None:
-        values["texture"] = {"file": picture_file(texture.rgb, texture.source, path), "wrap": texture.wrap}
+    values = item.material.values(path)
     if set(values) == {"glass"}:
         return values
     for name, known in materials.items():
@@ -215,33 +239,3 @@ def _file_stem(mesh: Mesh) -> str:
             digest.update(more.tobytes())
     plain = "".join(c if c.isalnum() else "_" for c in mesh.name)[:40]
     return f"{plain}_{digest.hexdigest()[:12]}"
-
-
-# -- TOML ---------------------------------------------------------------------------------
-
-
-def toml_block(header: str, values: dict[str, Any]) -> str:
-    """A table with its header ("" for the top level), as TOML text."""
-    lines = [header] if header else []
-    return "\n".join(lines + [f"{toml_key(key)} = {_value(value)}" for key, value in values.items()]) + "\n"
-
-
-def toml_key(key: str) -> str:
-    """A key, in quotes where it needs them."""
-    bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
-    return key if bare else _value(key)
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        # JSON's escapes are TOML's, but for DEL.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, float):
-        return repr(float(value)) if math.isfinite(value) else ("inf" if value > 0 else "-inf")
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{toml_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
-    return "[" + ", ".join(_value(entry) for entry in value) + "]"

@@ -18,7 +18,7 @@ Vec3 = tuple[float, float, float]
 MAX_MAGNITUDE = 1e30
 """Largest number in a scene: the renderer's float32 ends at 3e38, and sums need room."""
 
-_REQUIRED: Any = object()
+REQUIRED: Any = object()
 """Default of a key that has none."""
 
 
@@ -81,11 +81,11 @@ class SceneTable:
             self.fail(found[1], f"cannot stand beside '{found[0]}': give {what} once")
         return found[0] if found else None
 
-    def raw(self, key: str, default: Any = _REQUIRED) -> Any:
+    def raw(self, key: str, default: Any = REQUIRED) -> Any:
         """The value as TOML gave it; a missing required key is an error."""
         if self.has(key):
             return self._values[key]
-        if default is _REQUIRED:
+        if default is REQUIRED:
             # A misspelt key is the likelier mistake, and the more helpful sentence.
             for unknown in self._values:
                 if unknown not in self._asked and nearest_names(unknown, [key]):
@@ -98,7 +98,7 @@ class SceneTable:
     def number(
         self,
         key: str,
-        default: Any = _REQUIRED,
+        default: Any = REQUIRED,
         *,
         above: float | None = None,
         at_least: float | None = None,
@@ -121,28 +121,28 @@ class SceneTable:
                 self.fail(key, f"is {number:g} but must be {words} {bound:g}")
         return number
 
-    def integer(self, key: str, default: Any = _REQUIRED, *, at_least: int, at_most: int) -> int:
+    def integer(self, key: str, default: Any = REQUIRED, *, at_least: int, at_most: int) -> int:
         """A whole number in [at_least, at_most]; 1e6 is accepted as one."""
         number = self.number(key, default, at_least=at_least, at_most=at_most)
         if number != int(number):
             self.fail(key, f"is {number:g} but must be a whole number")
         return int(number)
 
-    def boolean(self, key: str, default: Any = _REQUIRED) -> bool:
+    def boolean(self, key: str, default: Any = REQUIRED) -> bool:
         """true or false."""
         value = self.raw(key, default)
         if not isinstance(value, bool):
             self.fail(key, f"must be true or false, not {_show(value)}")
         return value
 
-    def string(self, key: str, default: Any = _REQUIRED) -> str:
+    def string(self, key: str, default: Any = REQUIRED) -> str:
         """A non-empty string."""
         value = self.raw(key, default)
         if not isinstance(value, str) or (not value and value is not default):
             self.fail(key, f"must be a text in quotes, not {_show(value)}")
         return value
 
-    def choice(self, key: str, options: Sequence[str], default: Any = _REQUIRED) -> str:
+    def choice(self, key: str, options: Sequence[str], default: Any = REQUIRED) -> str:
         """One of a few words."""
         value = self.raw(key, default)
         if value not in options:
@@ -154,7 +154,7 @@ class SceneTable:
     # -- vectors --------------------------------------------------------------------------
 
     def numbers(
-        self, key: str, default: Any = _REQUIRED, *, count: int | None = None, at_least: int = 1
+        self, key: str, default: Any = REQUIRED, *, count: int | None = None, at_least: int = 1
     ) -> tuple[float, ...]:
         """A list of finite numbers, of exactly `count` or no fewer than `at_least`."""
         value = self.raw(key, default)
@@ -167,14 +167,14 @@ class SceneTable:
             self.fail(key, f"has {len(value)} entries but needs {wanted}")
         return tuple(self._as_number(f"{key}[{i}]", v, False) for i, v in enumerate(value))
 
-    def vector(self, key: str, default: Any = _REQUIRED, *, nonzero: bool = False) -> Vec3:
+    def vector(self, key: str, default: Any = REQUIRED, *, nonzero: bool = False) -> Vec3:
         """Three finite numbers; where `nonzero`, a length that can be normalised."""
         vector = self.numbers(key, default, count=3)
         if nonzero and vector is not default and math.hypot(*vector) < 1e-150:
             self.fail(key, "is the zero vector and has no direction")
         return vector
 
-    def unit_vector(self, key: str, default: Any = _REQUIRED) -> Vec3:
+    def unit_vector(self, key: str, default: Any = REQUIRED) -> Vec3:
         """A direction, normalised."""
         vector = self.vector(key, default, nonzero=True)
         if vector is default:
@@ -194,7 +194,7 @@ class SceneTable:
             rows.append(tuple(self._as_number(f"{key}[{i}][{j}]", v, False) for j, v in enumerate(row)))
         return rows
 
-    def colour(self, key: str, default: Any = _REQUIRED) -> Vec3:
+    def colour(self, key: str, default: Any = REQUIRED) -> Vec3:
         """Linear Rec.709 in [0, 1]: three numbers, one number for a grey, or an sRGB "#rrggbb"."""
         value = self.raw(key, default)
         if value is default and not self.has(key):

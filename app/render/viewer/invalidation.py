@@ -15,8 +15,6 @@ import numpy as np
 from ...edit.live_inputs import LiveInputs
 from ...model.optics.glass import Dispersion
 from ...model.scene import (
-    Dielectric,
-    Diffuse,
     Light,
     Material,
     Scene,
@@ -47,9 +45,9 @@ def _inputs(old: LiveInputs, new: LiveInputs) -> DirtyLevel:
 
 
 _INPUTS = {
-    "camera": DirtyLevel.LOOK,
-    "width": DirtyLevel.LOOK,
-    "height": DirtyLevel.LOOK,
+    "camera": DirtyLevel.CAMERA,
+    "width": DirtyLevel.CAMERA,
+    "height": DirtyLevel.CAMERA,
     "smoothing": DirtyLevel.SPLAT,
     "solo_nm": DirtyLevel.SPLAT,
     "local_gain": DirtyLevel.SPLAT,
@@ -72,7 +70,7 @@ def _scene(old: Scene, new: Scene) -> DirtyLevel:
             cost = max(cost, _lights(a, b))
         elif item.name in ("background_rgb", "environment"):
             # They light nothing. Environments are compared by identity: a new one is another one.
-            cost = max(cost, DirtyLevel.LOOK if a != b else DirtyLevel.NOTHING)
+            cost = max(cost, DirtyLevel.CAMERA if a != b else DirtyLevel.NOTHING)
         elif item.name == "render":
             cost = max(cost, DirtyLevel.BUILD if a.max_depth != b.max_depth else DirtyLevel.NOTHING)
         else:
@@ -102,13 +100,13 @@ def _object(old: SceneObject, new: SceneObject) -> DirtyLevel:
         return cost
     if type(a) is not type(b):
         return DirtyLevel.BUILD
-    if isinstance(a, Diffuse) and isinstance(b, Diffuse):
+    if a.receives and b.receives:
         if a.reflectance is None and b.reflectance is None and (a.texture is None) == (b.texture is None):
             # Another picture is only looked at; whether there is one, the objects' records on the device know.
             same = a.reflectance_rgb == b.reflectance_rgb and a.texture is b.texture
-            return max(cost, DirtyLevel.NOTHING if same else DirtyLevel.LOOK)
+            return max(cost, DirtyLevel.NOTHING if same else DirtyLevel.CAMERA)
         return DirtyLevel.BUILD
-    if isinstance(a, Dielectric) and isinstance(b, Dielectric):
+    if a.transmits and b.transmits:
         same_absorption = a.absorption is b.absorption or (
             a.absorption is not None
             and b.absorption is not None
@@ -124,7 +122,7 @@ def _glasses(old: Scene, new: Scene) -> DirtyLevel:
     pairs = [
         (a.material.dispersion, b.material.dispersion)
         for a, b in zip(old.objects, new.objects, strict=True)
-        if isinstance(a.material, Dielectric) and isinstance(b.material, Dielectric)
+        if a.material.transmits and b.material.transmits
     ]
     if all(a == b for a, b in pairs):
         return DirtyLevel.NOTHING
@@ -152,7 +150,7 @@ def shown_glasses(traced: Scene, shown: Scene) -> Mapping[Dispersion, Dispersion
     """
     found: dict[Dispersion, Dispersion] = {}
     for a, b in zip(traced.objects, shown.objects, strict=True):
-        if not (isinstance(a.material, Dielectric) and isinstance(b.material, Dielectric)):
+        if not (a.material.transmits and b.material.transmits):
             continue
         before, after = a.material.dispersion, b.material.dispersion
         if found.setdefault(before, after) != after:
@@ -171,8 +169,8 @@ def _lights(old: tuple[Light, ...], new: tuple[Light, ...]) -> DirtyLevel:
 def _light(old: Light, new: Light) -> DirtyLevel:
     if old is new or old == new:
         return DirtyLevel.NOTHING
-    if replace(old, name="", spectral_power=new.spectral_power) != replace(new, name=""):
-        return DirtyLevel.TRACE if old.kind == new.kind and old.shape == new.shape else DirtyLevel.BUILD
+    if replace(old, name=new.name, spectral_power=new.spectral_power) != new:
+        return DirtyLevel.TRACE if old.variant == new.variant else DirtyLevel.BUILD
     if old.spectral_power == new.spectral_power:
         return DirtyLevel.NOTHING
     # Photons carry weights, not watts; bands reach as far as the light they were planned for.
@@ -194,7 +192,7 @@ def looks_other(old: LiveInputs, new: LiveInputs) -> bool:
 def _material_looks_other(old: Material, new: Material) -> bool:
     if old is new:
         return False
-    if isinstance(old, Dielectric) and isinstance(new, Dielectric):
+    if old.transmits and new.transmits:
         # The rest of a glass is traced anew before it is looked at.
         return old.dispersion != new.dispersion
     return True

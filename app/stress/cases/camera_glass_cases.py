@@ -13,10 +13,11 @@ import numpy as np
 from ...gpu.context import Context
 from ...model.geometry.primitives import plane, prism
 from ...model.geometry.primitives_round import sphere
+from ...model.lights import DirectionalLight
 from ...model.optics.glass import Dispersion, constant, from_abbe, table
 from ...model.optics.spectrum import illuminant
 from ...model.placement import rotation_about
-from ...model.scene import Camera, Diffuse, Light, Scene, SceneObject
+from ...model.scene import Camera, Diffuse, Scene, SceneObject
 from ...model.texture import Texture
 from ...reference.camera_reference import render_camera_reference
 from ..case import Case, Measurement
@@ -90,9 +91,7 @@ def measure_focus(context: Context) -> Iterator[Measurement]:
     wall_material = Diffuse((1.0, 1.0, 1.0), texture=Texture(np.repeat(checks[..., None], 3, axis=-1)))
     upright = np.array([[0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
     # From above and behind: the ball's shadow falls beside what is seen.
-    lamp = Light(
-        "lamp", "directional", illuminant("D65").scaled_to_luminous(3.0), direction=(0.25881905, 0.0, -0.96592583)
-    )
+    lamp = DirectionalLight("lamp", illuminant("D65").scaled_to_luminous(3.0), direction=(0.25881905, 0.0, -0.96592583))
     ball = solid("ball", sphere(1.0, 5120), constant(BALL_N))
     for defocus in DEFOCUS:
         place = upright.copy()

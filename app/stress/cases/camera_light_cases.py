@@ -13,6 +13,7 @@ from ...model.camera_rays import camera_rays
 from ...model.geometry.primitives import box, plane
 from ...model.geometry.primitives_gem import brilliant
 from ...model.geometry.primitives_round import sphere
+from ...model.lights import AreaLight, DirectionalLight
 from ...model.optics.colorimetry import VISIBLE_NM
 from ...model.optics.glass import constant
 from ...model.optics.spectrum import illuminant
@@ -21,7 +22,6 @@ from ...model.scene import (
     Camera,
     Dielectric,
     Diffuse,
-    Light,
     Scene,
     SceneObject,
 )
@@ -115,7 +115,7 @@ def measure_lamps(context: Context) -> Iterator[Measurement]:
     first = None
     for radius in LAMPS:
         power = illuminant("D65").scaled_to_luminous(1.0 / (np.pi * radius**2))
-        lamp = Light("lamp", "area", power, position=tuple(3.0 * toward), direction=tuple(-toward), radius=radius)
+        lamp = AreaLight("lamp", power, position=tuple(3.0 * toward), direction=tuple(-toward), radius=radius)
         sight = look(context, Scene("lamp", STONE_SEEN_FROM, (lamp,), (stone,)), settings, 4)
         total = sight.picture.sum()
         first = first or total
@@ -193,7 +193,7 @@ def _checked(camera: Camera, *objects: SceneObject) -> Scene:
     mesh = replace(uv_side, uv=uv_side.uv * side)
     elevation = np.radians(1.0)
     power = illuminant("D65").scaled_to_luminous(2.0 * np.pi * GREY / np.sin(elevation))
-    lamp = Light("lamp", "directional", power, direction=(np.cos(elevation), 0.0, -np.sin(elevation)))
+    lamp = DirectionalLight("lamp", power, direction=(np.cos(elevation), 0.0, -np.sin(elevation)))
     wall = SceneObject(
         "wall", mesh, Diffuse((1.0, 1.0, 1.0), texture=Texture(np.repeat(checks[..., None], 3, axis=-1)))
     )

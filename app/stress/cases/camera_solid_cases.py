@@ -11,7 +11,7 @@ import numpy as np
 from ...gpu.context import Context
 from ...model.geometry.primitives_gem import brilliant
 from ...model.optics.glass import constant
-from ...model.scene import Camera, Dielectric, Scene
+from ...model.scene import Camera, Scene
 from ..case import Case, Measurement
 from ..rigs.camera_probe import (
     LOOK,
@@ -112,7 +112,7 @@ def measure_pairs(context: Context) -> Iterator[Measurement]:
 
 def _seen_through(scene: Scene) -> Scene:
     """Its glass alone, without dispersion, under a sky: what is asked is which medium comes next."""
-    glass = tuple(item for item in scene.objects if isinstance(item.material, Dielectric))
+    glass = tuple(item for item in scene.objects if item.material.transmits)
     scene = replace(scene, camera=SEEN_FROM, objects=glass, lights=(), environment=slope_sky())
     return with_glass(scene, lambda dispersion: constant(dispersion.n_d, dispersion.name))
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from ...base.errors import UserError
 from ...gpu.context import Context
 from ...model.geometry.primitives import box, plane, prism
+from ...model.lights import AreaLight, PointLight
 from ...model.optics.glass import constant
 from ...model.optics.spectrum import Spectrum, illuminant
 from ...model.scene import Camera, Diffuse, Light, Scene, SceneObject
@@ -111,7 +112,7 @@ def measure_distances(context: Context) -> Iterator[Measurement]:
     noise = picture_error(probe(context, _prism_under(SUN), replace(CAUSTIC, seed=2)).picture, base.picture)
     for distance in DISTANCES:
         x, y, z = (-distance * d for d in SUN.direction)
-        lamp = Light("lamp", "point", brighter(SUN.spectral_power, distance**2), (x, y, z + 0.9))
+        lamp = PointLight("lamp", brighter(SUN.spectral_power, distance**2), (x, y, z + 0.9))
         found = probe(context, _prism_under(lamp), CAUSTIC)
         moved, rounded = 4.0 / distance, distance * 2.0**-23
         held = Held(
@@ -144,11 +145,11 @@ def _beam(
 
 
 def _point(position: tuple[float, float, float]) -> Light:
-    return Light("lamp", "point", SPECTRUM, position)
+    return PointLight("lamp", SPECTRUM, position)
 
 
 def _area(position: tuple[float, float, float], radius: float = 0.3) -> Light:
-    return Light("panel", "area", SPECTRUM, position, (0.0, 0.0, -1.0), radius=radius)
+    return AreaLight("panel", SPECTRUM, position, (0.0, 0.0, -1.0), radius=radius)
 
 
 def _tiny_table() -> Scene:

@@ -17,6 +17,7 @@ from ...gpu.context import Context
 from ...gpu.scene_buffers import Groups, SceneBuffers
 from ...model.features import Features
 from ...model.geometry.mesh import Mesh, make_mesh
+from ...model.lights import CollimatedLight
 from ...model.optics.glass import sellmeier
 from ...model.optics.spectral_tables import SpectralAxis
 from ...model.optics.spectrum import constant
@@ -189,7 +190,7 @@ def trace_light(
     )
     try:
         space = buffers.space
-        specular = [o.mesh.corners() for o in objects if not isinstance(o.material, Diffuse)]
+        specular = [o.mesh.corners() for o in objects if not o.material.receives]
         domain = emission_domain(light, scene, space, space.to_gpu(np.concatenate(specular)))
         assert domain is not None
         ends = [buffers.axis.x_of_nm(np.array(band)) for band in bands_nm]
@@ -230,13 +231,8 @@ def trace_light(
 
 def beam_light(start: np.ndarray, direction: np.ndarray, radius: float) -> Light:
     """Collimated white light from a disc."""
-    return Light(
-        "beam",
-        "collimated",
-        constant(1.0),
-        position=tuple(start),
-        direction=tuple(unit(np.asarray(direction, float))),
-        radius=radius,
+    return CollimatedLight(
+        "beam", constant(1.0), position=tuple(start), direction=tuple(unit(np.asarray(direction, float))), radius=radius
     )
 
 

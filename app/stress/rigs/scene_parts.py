@@ -9,6 +9,8 @@ import numpy as np
 
 from ...model.geometry.mesh import Mesh
 from ...model.geometry.primitives import plane
+from ...model.lights import CollimatedLight, DirectionalLight
+from ...model.lights.light import made
 from ...model.optics.glass import Dispersion, from_abbe
 from ...model.optics.spectrum import Spectrum, illuminant
 from ...model.placement import rotation_about
@@ -25,11 +27,11 @@ TABLE = SceneObject("table", plane(8.0, 8.0), Diffuse())
 """Receiver in z = 0."""
 FROM_BELOW = Camera((0.0, 0.0, -5.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=4.5)
 """Sees the table's caustic without any glass before it, on the same pixels whatever stands on the table."""
-BEAM = Light(
-    "beam", "collimated", illuminant("D65").scaled_to_luminous(10.0), (0.3, 0.0, 6.0), (0.0, 0.0, -1.0), radius=0.45
+BEAM = CollimatedLight(
+    "beam", illuminant("D65").scaled_to_luminous(10.0), (0.3, 0.0, 6.0), (0.0, 0.0, -1.0), radius=0.45
 )
 """A beam straight down."""
-SUN = Light("sun", "directional", illuminant("D65").scaled_to_luminous(10.0), direction=(0.36, 0.0, -0.9329523))
+SUN = DirectionalLight("sun", illuminant("D65").scaled_to_luminous(10.0), direction=(0.36, 0.0, -0.9329523))
 """Slanting light over everything."""
 FLINT = from_abbe(1.7, 30.0, "flint")
 CROWN = from_abbe(1.5, 60.0, "crown")
@@ -88,21 +90,17 @@ def moved(
         up=direction(scene.camera.up),
         vertical_extent=scale * scene.camera.vertical_extent,
     )
-    lights = tuple(
-        replace(
-            light,
-            position=point(light.position),
-            direction=direction(light.direction),
-            tangent=None if light.tangent is None else direction(light.tangent),
-            radius=scale * light.radius,
-            width=scale * light.width,
-            height=scale * light.height,
-            spectral_power=brighter(light.spectral_power, scale**2)
-            if light.kind in ("point", "spot")
-            else light.spectral_power,
-        )
-        for light in scene.lights
-    )
+
+    def moved(light: Light) -> Light:
+        given = light.given()
+        given |= {name: scale * given[name] for name in ("radius", "width", "height") if name in given}
+        given |= {"position": point(light.position), "direction": direction(light.direction)}
+        given["tangent"] = None if light.tangent is None else direction(light.tangent)
+        if light.is_intensity:
+            given["spectral_power"] = brighter(light.spectral_power, scale**2)
+        return made(type(light), given)
+
+    lights = tuple(moved(light) for light in scene.lights)
     objects = tuple(
         replace(_thinner(item, scale), object_to_world=matrix @ item.object_to_world) for item in scene.objects
     )
@@ -124,7 +122,7 @@ def with_glass(scene: Scene, change: Callable[[Dispersion], Dispersion]) -> Scen
     """The scene with every glass replaced by `change(glass)`."""
 
     def changed(item: SceneObject) -> SceneObject:
-        if not isinstance(item.material, Dielectric):
+        if not item.material.transmits:
             return item
         return replace(item, material=replace(item.material, dispersion=change(item.material.dispersion)))
 
@@ -135,7 +133,7 @@ def extent(scene: Scene) -> float:
     """Diagonal of what is not a receiver (else of everything), scene units."""
     from ...model.scene_defaults import bounds_of
 
-    items = [o for o in scene.objects if not isinstance(o.material, Diffuse)] or list(scene.objects)
+    items = [o for o in scene.objects if not o.material.receives] or list(scene.objects)
     low, high = bounds_of(items)
     return float(np.linalg.norm(np.asarray(high) - np.asarray(low)))
 
@@ -143,7 +141,7 @@ def extent(scene: Scene) -> float:
 def _thinner(item: SceneObject, scale: float) -> SceneObject:
     """Absorption is per length."""
     material = item.material
-    if not isinstance(material, Dielectric) or material.absorption is None:
+    if material.absorption is None:
         return item
     absorption = replace(material.absorption, coefficient=material.absorption.coefficient / scale)
     return replace(item, material=replace(material, absorption=absorption))

@@ -10,7 +10,7 @@ import numpy as np
 from ...edit import edits
 from ...edit.state import State
 from ...model.optics.colorimetry import rgb_partition
-from ...model.scene import Absorption, Dielectric, Vec3
+from ...model.scene import Absorption, Vec3
 from . import widgets
 
 _FIRST_COLOUR, _FIRST_DISTANCE = (0.55, 0.85, 0.75), 1.0
@@ -33,7 +33,7 @@ def draw_absorption(state: State, index: int) -> State:
     """Rows for the absorption of object `index`, which is of glass."""
     item = state.scene.objects[index]
     material = item.material
-    if not isinstance(material, Dielectric):
+    if not material.transmits:
         return state
     tip = "Let the glass absorb light on the way through it (Beer–Lambert). Off: perfectly clear."
     changed, tinted = widgets.toggle("Tinted", material.absorption is not None, tip=tip)
@@ -96,6 +96,6 @@ def _tinted(state: State, index: int, rgb: Vec3 | None, distance: float) -> Stat
     after = edits.attempt(state, label, edits.set_absorption, index, (r, g, b), distance)
     material = after.scene.objects[index].material
     is_done = after.scene is not state.scene
-    if is_done and isinstance(material, Dielectric) and material.absorption is not None:
+    if is_done and material.absorption is not None:
         _memory.coefficient, _memory.rgb, _memory.distance = material.absorption.coefficient, (r, g, b), distance
     return after

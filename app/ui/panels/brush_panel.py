@@ -12,7 +12,7 @@ from imgui_bundle import ImVec2, imgui
 from ...edit import edits
 from ...edit.state import Brush, State, Tool
 from ...model.local_dispersion import dab_weight
-from ...model.scene import Dab, Diffuse
+from ...model.scene import Dab
 from .. import theme
 from ..view_model import ViewModel
 from . import widgets
@@ -115,7 +115,7 @@ def _draw_painted(state: State) -> State:
     painted = [(i, o) for i, o in enumerate(state.scene.objects) if o.local_dispersion]
     if not painted:
         widgets.hint("Nothing is painted: this is the physical picture.")
-        if not any(isinstance(o.material, Diffuse) for o in state.scene.objects):
+        if not any(o.material.receives for o in state.scene.objects):
             widgets.hint("No object receives light; make one diffuse to paint on it.")
         return state
     if state.physical:

@@ -11,10 +11,10 @@ from imgui_bundle import ImVec2, imgui
 from ...base.errors import UserError
 from ...edit import edits, presets
 from ...edit.state import State
+from ...model.materials.dielectric import MAX_PRIORITY
 from ...model.optics import glass
 from ...model.optics.glass import Dispersion
-from ...model.scene import Dielectric, SceneObject
-from ...model.scene_materials import MAX_PRIORITY
+from ...model.scene import SceneObject
 from .. import theme
 from ..view_model import ViewModel
 from . import widgets
@@ -130,11 +130,11 @@ def _draw_clipboard(state: State, index: int) -> State:
         state = replace(state, clipboard=item.material)
     widgets.beside("Paste material")
     held = state.clipboard
-    if isinstance(held, Dielectric):
+    if held is not None and held.transmits:
         tip = f"Give {item.name} the copied material: {shown_name(held.dispersion)}."
     else:
         tip = "Copy the material of an object of glass first."
-    if widgets.button("Paste material", tip=tip, enabled=isinstance(held, Dielectric)) and held is not None:
+    if widgets.button("Paste material", tip=tip, enabled=held is not None and held.transmits) and held:
         state = edits.attempt(state, f"Paste material on {item.name}", edits.set_material, index, held)
     widgets.beside("Presets…")
     ready = {p.name: p for p in presets.material_presets()}
@@ -151,7 +151,7 @@ def _draw_clipboard(state: State, index: int) -> State:
 
 def _draw_numbers(state: State, view_model: ViewModel, index: int) -> State:
     item = state.scene.objects[index]
-    dispersion = item.material.dispersion  # type: ignore[union-attr]
+    dispersion = item.material.dispersion
     sold = as_sold(dispersion)
     tip = (
         "How many times stronger than in nature colours spread. 1 is the glass itself, 0 does not disperse; n_d stays."
@@ -183,7 +183,7 @@ def _draw_numbers(state: State, view_model: ViewModel, index: int) -> State:
         state = _attempt(state, index, f"Abbe number of {item.name}", lambda: with_abbe(dispersion, n_d, new_v_d))
     if _memory.refused:
         widgets.error(_memory.refused)
-    _draw_lines(state.scene.objects[index].material.dispersion)  # type: ignore[union-attr]
+    _draw_lines(state.scene.objects[index].material.dispersion)
     if view_model.stats.first_order:
         widgets.hint("The caustic follows this edit to first order until it is traced again.")
     return state
@@ -232,7 +232,7 @@ def _draw_lines(dispersion: Dispersion) -> None:
 def _draw_priority(state: State, index: int) -> State:
     item = state.scene.objects[index]
     material = item.material
-    if not isinstance(material, Dielectric):
+    if not material.transmits:
         return state
     tip = (
         "Where solids overlap, the one of higher priority fills the place (a liquid in its vessel: lower than the "

@@ -10,7 +10,6 @@ from imgui_bundle import imgui
 
 from ...edit.requests import Animate, Bake, CancelJob, Screenshot
 from ...edit.state import State
-from ...model.scene import Diffuse
 from ..view_model import ViewModel
 from . import file_browser, keys_editor, rows, widgets
 
@@ -102,7 +101,7 @@ def _screenshot(view_model: ViewModel, idle: bool) -> None:
 
 
 def _bake(state: State, view_model: ViewModel, idle: bool) -> None:
-    names = list(dict.fromkeys(item.name for item in state.scene.objects if isinstance(item.material, Diffuse)))
+    names = list(dict.fromkeys(item.name for item in state.scene.objects if item.material.receives))
     if not names:
         widgets.hint("Nothing in this scene is diffuse, so nothing carries a caustic.")
         return

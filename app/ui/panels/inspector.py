@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 from imgui_bundle import imgui
 
 from ...edit import edits, environments
 from ...edit.state import State
+from ...model.materials import MATERIAL_KINDS
 from ...model.optics import catalogue
 from ...model.scene import (
-    Black,
     Dielectric,
     Diffuse,
     Material,
@@ -24,7 +25,7 @@ from ..view_model import ViewModel
 from . import outliner, picture_choice, widgets
 from .environment_rows import draw_environment
 
-_KINDS: dict[str, type] = {"Glass": Dielectric, "Diffuse": Diffuse, "Mirror": Mirror, "Black": Black}
+_KINDS = {cls.title: cls for cls in MATERIAL_KINDS.values()}
 _NEW_GLASS = "N-BK7"
 _UNITS = "units"
 _WRAPS = {"repeat": "Repeats", "clamp": "Its border goes on"}
@@ -116,30 +117,27 @@ def _in_proportion(before: Vec3, after: Vec3) -> Vec3:
 def _material(state: State, view_model: ViewModel, index: int) -> State:
     thing = state.scene.objects[index]
     material = thing.material
-    kind = next(name for name, made in _KINDS.items() if isinstance(material, made))
     changed, wanted = widgets.combo(
         "Kind",
         tuple(_KINDS),
-        kind,
+        material.title,
         tip="Glass refracts, diffuse surfaces receive caustics, mirrors reflect, black absorbs.",
     )
     if changed:
         return edits.attempt(state, f"Make {thing.name} {wanted.lower()}", edits.set_material, index, _fresh(wanted))
-    if isinstance(material, Dielectric):
-        return _glass(state, material)
-    if isinstance(material, Diffuse):
-        state = _texture(state, view_model, index, material)
-        return _colour(state, index, material)
-    if isinstance(material, Mirror):
-        return _colour(state, index, material)
-    widgets.hint("Absorbs all light that meets it.")
-    return state
+    if material.transmits:
+        return _glass(state, cast(Dielectric, material))
+    if material.is_black:
+        widgets.hint("Absorbs all light that meets it.")
+        return state
+    if material.receives:
+        state = _texture(state, view_model, index, cast(Diffuse, material))
+    return _colour(state, index, cast(Mirror, material))
 
 
 def _fresh(kind: str) -> Material:
-    if kind == "Glass":
-        return Dielectric(catalogue.find(_NEW_GLASS))
-    return Diffuse() if kind == "Diffuse" else Mirror() if kind == "Mirror" else Black()
+    cls: Any = _KINDS[kind]
+    return cls(catalogue.find(_NEW_GLASS)) if cls.transmits else cls()
 
 
 def _glass(state: State, material: Dielectric) -> State:
@@ -188,10 +186,10 @@ def _texture(state: State, view_model: ViewModel, index: int, material: Diffuse)
 def _colour(state: State, index: int, material: Diffuse | Mirror) -> State:
     thing = state.scene.objects[index]
     tip = "Share of light reflected, linear Rec.709, 0 to 1."
-    if isinstance(material, Diffuse) and material.texture is not None:
+    if material.texture is not None:
         tip += " The picture is multiplied by it."
     changed, rgb, active = widgets.colour("Reflectance", material.reflectance_rgb, tip=tip)
-    if isinstance(material, Diffuse) and material.reflectance is not None:
+    if material.reflectance is not None:
         widgets.hint("A measured spectral reflectance is in use; choosing a colour replaces it.")
     if changed:
         clipped = (min(max(rgb[0], 0.0), 1.0), min(max(rgb[1], 0.0), 1.0), min(max(rgb[2], 0.0), 1.0))

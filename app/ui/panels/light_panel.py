@@ -3,46 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ...edit import edits
 from ...edit.state import State
+from ...model.fields import Number
+from ...model.lights import LIGHT_KINDS
 from ...model.scene import Light, Vec3
 from ...model.scene_defaults import environment_of
-from ...model.scene_lights import POWER_KEYS
 from ..view_model import ViewModel
 from . import widgets
 from .light_spectrum import draw_spectrum_choice
 
-_KINDS = {
-    "directional": "Sun (directional)",
-    "collimated": "Collimated beam",
-    "point": "Point",
-    "spot": "Spot",
-    "area": "Area",
-}
 _SHAPES = {"disc": "Disc", "rectangle": "Rectangle"}
-
-_POWER_NAMES = {
-    "intensity_cd": "Luminous intensity (cd)",
-    "intensity_w_sr": "Radiant intensity (W/sr)",
-    "flux_lm": "Luminous flux (lm)",
-    "flux_w": "Radiant flux (W)",
-    "illuminance_lx": "Illuminance (lm/unit²)",
-    "irradiance_w_m2": "Irradiance (W/unit²)",
-    "luminance_nt": "Luminance (cd/unit²)",
-    "radiance_w_sr_m2": "Radiance (W/(sr unit²))",
-}
-_POWER_TIPS = {
-    "intensity": "Power into each direction; for a spot, on its axis.",
-    "flux": "All the light that leaves it.",
-    "illuminance": "Light on a plane across the beam; lux where a scene unit is a metre.",
-    "irradiance": "Power on a plane across the beam.",
-    "luminance": "How bright its surface looks; nits where a scene unit is a metre.",
-    "radiance": "How bright its surface is, as power.",
-}
 
 _power_key: dict[str, str] = {}
 """Kind of light -> the quantity in which its power is shown. A way of display, not part of the document."""
@@ -71,7 +46,7 @@ def _draw_name(state: State, index: int) -> State:
     if changed:
         state = edits.attempt(state, f"Rename {light.name}", edits.rename_light, index, name)
     tip = "How the light leaves it. Another kind aims at the same place and lights it as brightly."
-    changed, kind = widgets.combo("Kind", _KINDS, light.kind, tip=tip)
+    changed, kind = widgets.combo("Kind", {k: cls.title for k, cls in LIGHT_KINDS.items()}, light.kind, tip=tip)
     if changed:
         state = edits.attempt(state, f"Kind of {light.name}", edits.set_light_kind, index, kind)
     return state
@@ -86,14 +61,14 @@ def _edit(state: State, index: int, light: Light, what: str) -> State:
 
 def _draw_place(state: State, index: int) -> State:
     light = state.scene.lights[index]
-    if light.kind != "directional":
+    if light.has_place:
         speed = 0.005 * environment_of(state.scene.objects).radius
         tip = "Where the light stands: x, y, z in scene units."
         changed, position, active = widgets.vec3("Position", light.position, unit="units", tip=tip, speed=speed)
         state = widgets.holding(state, active)
         if changed:
-            state = _edit(state, index, replace(light, position=position), "Move")
-    return state if light.kind == "point" else _draw_direction(state, index)
+            state = _edit(state, index, light.changed(position=position), "Move")
+    return _draw_direction(state, index) if light.has_direction else state
 
 
 def _draw_direction(state: State, index: int) -> State:
@@ -105,15 +80,15 @@ def _draw_direction(state: State, index: int) -> State:
     tilted, elevation, held_e = widgets.slider("Elevation", elevation, -90.0, 90.0, unit="°", tip=tip, format="%.1f")
     state = widgets.holding(state, held_a or held_e)
     if turned or tilted:
-        aimed = replace(light, direction=direction_of(azimuth, elevation))
+        aimed = light.changed(direction=direction_of(azimuth, elevation))
         return _edit(state, index, aimed, "Turn")
-    if light.kind == "directional":
+    if not light.has_place:
         return state
     tip = "Turn the light towards the middle of the objects that are not receivers."
     if widgets.button("Aim at the objects", tip=tip):
         toward = environment_of(state.scene.objects).centre - np.array(light.position)
         x, y, z = (float(v) for v in toward)
-        return _edit(state, index, replace(light, direction=(x, y, z)), "Aim")
+        return _edit(state, index, light.changed(direction=(x, y, z)), "Aim")
     return state
 
 
@@ -137,58 +112,36 @@ def direction_of(azimuth_deg: float, elevation_deg: float) -> Vec3:
 
 
 def _draw_size(state: State, index: int) -> State:
+    """Rows for the shape, as the kind of light declares them."""
     light = state.scene.lights[index]
-    if light.kind == "point":
+    if not light.numbers:
         widgets.hint("A point has no size: shadows and caustics are sharp.")
         return state
-    rows = {"spot": _draw_cone, "directional": _draw_sun}
-    changed, active = rows.get(light.kind, _draw_outline)(light)
+    changed, active = light, False
+    if light.has_outline:
+        _, shape = widgets.combo("Shape", _SHAPES, light.shape, tip="Outline of the beam or of the glowing surface.")
+        changed = changed.changed(shape=shape)
+    for number in changed.shown_numbers():
+        changed, held = _draw_number(changed, number)
+        active = active or held
     state = widgets.holding(state, active)
-    return state if changed == light else _edit(state, index, changed, "Size of")
+    return state if changed == light else _edit(state, index, changed.fitted(), "Size of")
 
 
-def _draw_sun(light: Light) -> tuple[Light, bool]:
-    tip = (
-        "How large the source looks from the scene. The sun has 0.53°; 0 is perfectly parallel and gives the "
-        "sharpest colours."
-    )
-    _, angle, active = widgets.slider(
-        "Angular diameter", light.angular_diameter_deg, 0.0, 20.0, unit="°", tip=tip, reset=0.53, format="%.2f"
-    )
-    return replace(light, angular_diameter_deg=min(max(angle, 0.0), 90.0)), active
-
-
-def _draw_cone(light: Light) -> tuple[Light, bool]:
-    tip = "Half the opening angle of the cone; beyond it there is no light."
-    _, outer, outer_held = widgets.slider(
-        "Half angle", light.outer_half_angle_deg, 0.1, 90.0, unit="°", tip=tip, reset=30.0, format="%.1f"
-    )
-    tip = "Half angle up to which the cone is at full strength; between the two it fades. Equal: a hard edge."
-    _, inner, inner_held = widgets.slider(
-        "Full within", min(light.inner_half_angle_deg, outer), 0.0, outer, unit="°", tip=tip, reset=outer, format="%.1f"
-    )
-    shaped = replace(light, outer_half_angle_deg=outer, inner_half_angle_deg=min(inner, outer))
-    return shaped, outer_held or inner_held
-
-
-def _draw_outline(light: Light) -> tuple[Light, bool]:
-    tip = "Outline of the beam or of the glowing surface."
-    _, shape = widgets.combo("Shape", _SHAPES, light.shape, tip=tip)
-    sized = replace(light, shape=shape)  # type: ignore[arg-type]
-    if shape == "disc":
-        tip = "Radius of the disc."
-        _, radius, active = widgets.drag(
-            "Radius", light.radius, 1e-6, 1e6, unit="units", tip=tip, format="%.4g", logarithmic=True
-        )
-        return replace(sized, radius=radius), active
-    tip = "Side of the rectangle."
-    _, width, width_held = widgets.drag(
-        "Width", light.width, 1e-6, 1e6, unit="units", tip=tip, format="%.4g", logarithmic=True
-    )
-    _, height, height_held = widgets.drag(
-        "Height", light.height, 1e-6, 1e6, unit="units", tip=tip, format="%.4g", logarithmic=True
-    )
-    return replace(sized, width=width, height=height), width_held or height_held
+def _draw_number(light: Light, number: Number) -> tuple[Light, bool]:
+    row, value = number.row, getattr(light, number.attribute)
+    assert row is not None
+    high = getattr(light, row.bounded_by) if row.bounded_by else row.high
+    shown: Any = {"unit": number.unit, "tip": row.tip, "format": row.format}
+    if row.is_slider:
+        if row.bounded_by:
+            value, reset = min(value, high), high
+        else:
+            reset = row.reset
+        _, value, active = widgets.slider(row.label, value, row.low, high, reset=reset, **shown)
+    else:
+        _, value, active = widgets.drag(row.label, value, row.low, row.high, logarithmic=True, **shown)
+    return light.changed(**{number.attribute: value}), active
 
 
 # ---- power --------------------------------------------------------------------------------
@@ -196,10 +149,10 @@ def _draw_outline(light: Light) -> tuple[Light, bool]:
 
 def _draw_power(state: State, index: int) -> State:
     light = state.scene.lights[index]
-    keys = POWER_KEYS[light.kind]
+    keys = {key.key: key for key in light.power_keys}
     key = _power_key.get(light.kind, edits.photometric_key(light))
     tip = "In which quantity the power is shown and typed. Photometric ones weight each colour as the eye does."
-    _, key = widgets.combo("Quantity", {k: _POWER_NAMES[k] for k in keys}, key, tip=tip)
+    _, key = widgets.combo("Quantity", {k: each.label for k, each in keys.items()}, key, tip=tip)
     _power_key[light.kind] = key
     power = edits.light_power(light, key)
     changed, power, active = widgets.drag(
@@ -207,8 +160,8 @@ def _draw_power(state: State, index: int) -> State:
         power,
         0.0,
         1e12,
-        unit=edits.POWER_UNITS[key],
-        tip=_POWER_TIPS[key.split("_")[0]],
+        unit=keys[key].unit,
+        tip=keys[key].tip,
         format="%.6g",
         logarithmic=True,
     )

@@ -11,16 +11,13 @@ from imgui_bundle import imgui
 from ...edit import edits
 from ...edit.requests import CopyMaterial, FrameSelection
 from ...edit.state import Selection, State
+from ...model.lights import LIGHT_KINDS
 from ...model.scene import (
-    Black,
-    Dielectric,
-    Diffuse,
     Light,
     Material,
     Scene,
     SceneObject,
 )
-from ...model.scene_lights import KINDS
 from .. import item_rects, theme
 from ..view_model import ViewModel
 from . import widgets
@@ -48,10 +45,10 @@ def draw_outliner(state: State, _view_model: ViewModel) -> State:
 def draw_add_items(state: State) -> State:
     """Menu items that add lights and objects to the scene and select what was added."""
     if imgui.begin_menu(f"{icons.ICON_FA_LIGHTBULB}  Light"):
-        for kind in KINDS:
+        for kind, cls in LIGHT_KINDS.items():
             pressed, _ = imgui.menu_item(f"{kind.capitalize()}##light", "", False)
             item_rects.note(f"Add {kind} light")
-            widgets.tooltip(_LIGHT_TIPS.get(kind, ""))
+            widgets.tooltip(cls.remark)
             if pressed:
                 state = _added(
                     state, Selection("light", len(state.scene.lights)), f"Add {kind} light", edits.add_light, kind
@@ -76,15 +73,6 @@ def draw_add_items(state: State) -> State:
             imgui.end_menu()
         item_rects.note(f"Add {title.lower()}")
     return state
-
-
-_LIGHT_TIPS = {
-    "point": "Shines alike in all directions (cd).",
-    "spot": "A point that shines into a cone (cd).",
-    "directional": "Sunlight: parallel, everywhere (lx).",
-    "collimated": "A beam with an edge (lx).",
-    "area": "A shining disc or rectangle (cd/unit²).",
-}
 
 
 def duplicate(state: State, selection: Selection) -> State:
@@ -113,16 +101,16 @@ def paste_material(state: State, selection: Selection) -> State:
 def icon_of(thing: SceneObject | Light) -> str:
     """What stands before a name: by material, or a lamp."""
     if isinstance(thing, Light):
-        return icons.ICON_FA_SUN if thing.kind == "directional" else icons.ICON_FA_LIGHTBULB
+        return icons.ICON_FA_SUN if not thing.has_place else icons.ICON_FA_LIGHTBULB
     return _material_icon(thing.material)
 
 
 def _material_icon(material: Material) -> str:
-    if isinstance(material, Dielectric):
+    if material.transmits:
         return icons.ICON_FA_GEM
-    if isinstance(material, Diffuse):
+    if material.receives:
         return icons.ICON_FA_SQUARE
-    return icons.ICON_FA_CIRCLE if isinstance(material, Black) else icons.ICON_FA_CIRCLE_HALF_STROKE
+    return icons.ICON_FA_CIRCLE if material.is_black else icons.ICON_FA_CIRCLE_HALF_STROKE
 
 
 def _added(state: State, selection: Selection, label: str, edit: Callable[..., Scene], *args: object) -> State:
@@ -193,9 +181,7 @@ def _aside(thing: SceneObject | Light, low: imgui.ImVec2, high: imgui.ImVec2) ->
 
 
 def _material_words(material: Material) -> str:
-    if isinstance(material, Dielectric):
-        return material.dispersion.name or "glass"
-    return type(material).__name__.lower()
+    return (material.dispersion.name if material.dispersion is not None else "") or material.kind
 
 
 def _about(thing: SceneObject | Light) -> str:

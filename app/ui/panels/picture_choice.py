@@ -8,7 +8,7 @@ from pathlib import Path
 from ...edit import edits, environments
 from ...edit.requests import Notice
 from ...edit.state import State
-from ...model.scene import Diffuse, Scene
+from ...model.scene import Scene
 from ..view_model import ViewModel
 from . import file_browser
 
@@ -33,7 +33,7 @@ def ask_environment(state: State, view_model: ViewModel) -> None:
 def ask_texture(state: State, view_model: ViewModel, index: int) -> None:
     """Ask for a picture that object `index` is to wear."""
     item = state.scene.objects[index]
-    worn = item.material.texture if isinstance(item.material, Diffuse) else None
+    worn = item.material.texture
     _memory["worn by"] = item.name
     start = _folder(view_model, None if worn is None else worn.source)
     file_browser.ask(file_browser.Question(_TEXTURE, f"Picture for {item.name}", environments.TEXTURE_SUFFIXES, start))
@@ -64,7 +64,7 @@ def dropped(state: State, path: Path) -> State:
     if (
         selection.kind == "object"
         and selection.index < len(state.scene.objects)
-        and isinstance(state.scene.objects[selection.index].material, Diffuse)
+        and state.scene.objects[selection.index].material.receives
     ):
         return _as_texture(state, path, selection.index)
     return state.asking(

@@ -1,0 +1,198 @@
+"""Keys of a scene file, each declared once: how it is read and checked, written, shown in a panel and animated.
+
+A class of the scene lists its fields; `read_fields` makes attributes of a table and `write_fields` a table of a value.
+What is more than one key for one attribute (a cone's soft edge, an outline) is a `Part` of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .io.scene_table import REQUIRED, SceneTable
+
+
+class Part:
+    """Some keys of a table that become some attributes of a value, and the way back."""
+
+    def read(self, table: SceneTable) -> dict[str, Any]:
+        """Attributes by name. Raises UserError, one sentence with the key, for what cannot be."""
+        raise NotImplementedError
+
+    def write(self, value: Any, path: Path | None) -> dict[str, Any]:
+        """Keys that `read` makes into the same attributes.
+
+        Files are named as the scene file `path` would name them, absolutely where it is None."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Animated:
+    """What an animation may do with a number."""
+
+    meaning: str
+    low: float
+    high: float
+    name: str = ""
+    """Its name in an animation, where that is not the attribute's."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """How a panel shows a field."""
+
+    label: str
+    tip: str
+    low: float = 1e-6
+    high: float = 1e6
+    reset: float | None = None
+    format: str = "%.4g"
+    bounded_by: str = ""
+    """Attribute that `high` and `reset` are, where they are not fixed."""
+    is_slider: bool = False
+    """A slider between `low` and `high`; else a logarithmic drag."""
+
+
+@dataclass(frozen=True)
+class Field(Part):
+    """One key that is one attribute."""
+
+    attribute: str
+    default: Any = REQUIRED
+    key: str = ""
+    """Where it is not the attribute's name."""
+    unit: str = ""
+    row: Row | None = None
+    animated: Animated | None = None
+    optional: bool = False
+    """Left out when saved at its default."""
+
+    def read(self, table: SceneTable) -> dict[str, Any]:
+        """The attribute by name."""
+        return {self.attribute: self.value(table, self.key or self.attribute)}
+
+    def value(self, table: SceneTable, key: str) -> Any:
+        """What stands under `key`, checked."""
+        raise NotImplementedError
+
+    def write(self, value: Any, path: Path | None) -> dict[str, Any]:
+        """The key with its value, in the types of TOML."""
+        found = getattr(value, self.attribute)
+        if found is None or (self.optional and found == self.default):
+            return {}
+        return {self.key or self.attribute: list(found) if isinstance(found, tuple) else found}
+
+
+@dataclass(frozen=True)
+class Number(Field):
+    """A finite number within bounds."""
+
+    above: float | None = None
+    at_least: float | None = None
+    below: float | None = None
+    at_most: float | None = None
+
+    def value(self, table: SceneTable, key: str) -> float:
+        """The number."""
+        limits = {"above": self.above, "at_least": self.at_least, "below": self.below, "at_most": self.at_most}
+        return table.number(key, self.default, **limits)  # type: ignore[arg-type]
+
+    def holds(self, number: float) -> bool:
+        """Whether `number` lies within the bounds."""
+        return (
+            (self.above is None or number > self.above)
+            and (self.at_least is None or number >= self.at_least)
+            and (self.below is None or number < self.below)
+            and (self.at_most is None or number <= self.at_most)
+        )
+
+
+@dataclass(frozen=True)
+class Integer(Field):
+    """A whole number within bounds."""
+
+    at_least: int = 0
+    at_most: int = 0
+
+    def value(self, table: SceneTable, key: str) -> int:
+        """The number."""
+        return table.integer(key, self.default, at_least=self.at_least, at_most=self.at_most)
+
+
+@dataclass(frozen=True)
+class Vector(Field):
+    """Three finite numbers."""
+
+    nonzero: bool = False
+
+    def value(self, table: SceneTable, key: str) -> tuple[float, float, float]:
+        """The three."""
+        return table.vector(key, self.default, nonzero=self.nonzero)
+
+
+@dataclass(frozen=True)
+class Direction(Field):
+    """Three numbers, normalised."""
+
+    def value(self, table: SceneTable, key: str) -> tuple[float, float, float]:
+        """The unit vector."""
+        return table.unit_vector(key, self.default)
+
+
+@dataclass(frozen=True)
+class Colour(Field):
+    """Linear Rec.709 from 0 to 1."""
+
+    def value(self, table: SceneTable, key: str) -> tuple[float, float, float]:
+        """The three channels."""
+        return table.colour(key, self.default)
+
+
+@dataclass(frozen=True)
+class Choice(Field):
+    """One of a few words."""
+
+    options: Sequence[str] = ()
+
+    def value(self, table: SceneTable, key: str) -> str:
+        """The word."""
+        return table.choice(key, self.options, self.default)
+
+
+@dataclass(frozen=True)
+class FileName(Field):
+    """A file of the value's own: `attribute` is what `load` makes of it, and has its path as `source`."""
+
+    load: Callable[[Path], Any] | None = None
+    suffix: str = ""
+    """Which files a panel offers."""
+
+    def value(self, table: SceneTable, key: str) -> Any:
+        """What is in the file."""
+        assert self.load is not None
+        return self.load(table.existing_file(key))
+
+    def write(self, value: Any, path: Path | None) -> dict[str, Any]:
+        """The file's name."""
+        from .io.scene_pictures import relative_name
+
+        source = getattr(value, self.attribute).source
+        return {self.key or self.attribute: source if path is None else relative_name(source, path.parent)}
+
+
+def read_fields(parts: Iterable[Part], table: SceneTable) -> dict[str, Any]:
+    """Attributes that `parts` find in `table`."""
+    found: dict[str, Any] = {}
+    for part in parts:
+        found |= part.read(table)
+    return found
+
+
+def write_fields(parts: Iterable[Part], value: Any, path: Path | None = None) -> dict[str, Any]:
+    """The keys of `value`, in the order of `parts`."""
+    told: dict[str, Any] = {}
+    for part in parts:
+        told |= part.write(value, path)
+    return told

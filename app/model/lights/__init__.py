@@ -1,0 +1,27 @@
+"""Kinds of light, one class each: this is the list of them."""
+
+from __future__ import annotations
+
+from .area import AreaLight
+from .collimated import CollimatedLight
+from .directional import DirectionalLight
+from .ies import IesLight
+from .light import Light
+from .point import PointLight
+from .spot import SpotLight
+
+LIGHT_KINDS: dict[str, type[Light]] = {
+    cls.kind: cls for cls in (PointLight, SpotLight, DirectionalLight, CollimatedLight, AreaLight, IesLight)
+}
+"""By their word in a scene file."""
+
+__all__ = [
+    "LIGHT_KINDS",
+    "AreaLight",
+    "CollimatedLight",
+    "DirectionalLight",
+    "IesLight",
+    "Light",
+    "PointLight",
+    "SpotLight",
+]

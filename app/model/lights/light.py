@@ -1,0 +1,315 @@
+"""What every light is asked: where it stands, how it shines, what its power is called, what a panel shows of it.
+
+A kind of light is one class in a file of its own beside this one; it overrides what differs. Whoever needs to know
+something about a light asks it, and never which kind it is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+
+from ...base.errors import UserError
+from ..fields import Animated, Choice, Number, Part, Row
+from ..io.scene_table import MAX_MAGNITUDE, SceneTable, Vec3
+from ..optics.spectrum import Spectrum
+
+DEFAULT_ILLUMINANCE = 3.0
+"""Lumen per square unit on a plane across the light where a file states no power: with
+exposure 0 a white table then shows mid-grey and leaves room for the caustic above it."""
+_FAR = 1e9
+
+
+@dataclass(frozen=True)
+class PowerKey:
+    """One physical quantity that a light's power may be given in; areas count in scene units."""
+
+    key: str
+    unit: str
+    label: str
+    tip: str
+    is_photometric: bool
+    is_flux: bool = False
+    """All the light that leaves it, rather than the kind's own quantity."""
+
+
+_INTENSITY = "Power into each direction; for a spot, on its axis."
+_FLUX = "All the light that leaves it."
+FLUX_KEYS = (
+    PowerKey("flux_lm", "lm", "Luminous flux (lm)", _FLUX, True, True),
+    PowerKey("flux_w", "W", "Radiant flux (W)", _FLUX, False, True),
+)
+INTENSITY_KEYS = (
+    PowerKey("intensity_cd", "cd", "Luminous intensity (cd)", _INTENSITY, True),
+    PowerKey("intensity_w_sr", "W/sr", "Radiant intensity (W/sr)", _INTENSITY, False),
+)
+IRRADIANCE_KEYS = (
+    PowerKey(
+        "illuminance_lx",
+        "lm/unit²",
+        "Illuminance (lm/unit²)",
+        "Light on a plane across the beam; lux where a scene unit is a metre.",
+        True,
+    ),
+    PowerKey("irradiance_w_m2", "W/unit²", "Irradiance (W/unit²)", "Power on a plane across the beam.", False),
+)
+RADIANCE_KEYS = (
+    PowerKey(
+        "luminance_nt",
+        "cd/unit²",
+        "Luminance (cd/unit²)",
+        "How bright its surface looks; nits where a scene unit is a metre.",
+        True,
+    ),
+    PowerKey(
+        "radiance_w_sr_m2", "W/(sr unit²)", "Radiance (W/(sr unit²))", "How bright its surface is, as power.", False
+    ),
+)
+
+
+_NONE: Any = None
+"""Nothing, of whatever type the kinds give it."""
+
+
+@dataclass(frozen=True)
+class Light:
+    """One emitter.
+
+    `spectral_power` holds the spectral density per nanometre of the quantity that belongs to the kind
+    (`own_keys` names it), already scaled to absolute units. A photometric scene file (cd, lm, lux, nits) is converted
+    with K_m = 683.002 lm/W, so the renderer's Y is always in lm/(sr unit²).
+    """
+
+    name: str
+    spectral_power: Spectrum
+
+    kind: ClassVar[str]
+    """Its word in a scene file."""
+    title: ClassVar[str]
+    remark: ClassVar[str]
+    """Name and one line for menus."""
+    emission: ClassVar[Literal["point", "plane", "area", "profile"]]
+    """Variant of emit.comp, and whether its domain is of directions or of positions."""
+    gpu_code: ClassVar[int]
+    """LIGHT_KIND_… of shaders/lib/lights.glsl."""
+    own_keys: ClassVar[tuple[PowerKey, ...]]
+    """Its own quantity, photometric and radiometric."""
+    power_keys: ClassVar[tuple[PowerKey, ...]]
+    """All that its power may be given in; the first is shown first."""
+    parts: ClassVar[tuple[Part, ...]] = ()
+    """What the scene file says of its shape."""
+    numbers: ClassVar[tuple[Number, ...]] = ()
+    """Numbers of its shape: their bounds, rows of a panel, ways to animate them."""
+    has_place: ClassVar[bool] = True
+    has_direction: ClassVar[bool] = True
+    has_roll: ClassVar[bool] = False
+    """Whether turning it about its own axis changes it."""
+    has_outline: ClassVar[bool] = False
+    """Whether it is a disc or a rectangle that can be scaled."""
+    is_parallel: ClassVar[bool] = False
+    is_intensity: ClassVar[bool] = False
+    """Whether its quantity is an intensity, which falls off with distance²."""
+    # What a kind may have as attributes, without annotations: an annotated one would order the kinds' own fields.
+    profile = _NONE
+    """Table of its intensity over directions, where it has one."""
+    across = (np.zeros(3), np.zeros(3))
+    """Directions in which the profile's horizontal angle is 0 and 90°."""
+    position = (0.0, 0.0, 0.0)
+    direction = (0.0, 0.0, -1.0)
+    """Unit propagation direction of the axis."""
+    tangent = _NONE
+    """Direction of a rectangle's width; None picks one."""
+    shape = "disc"
+    """Outline of what has one: disc or rectangle."""
+    is_disc = False
+    half_extent = (0.0, 0.0)
+    """Half of its width and height, scene units."""
+    area = 0.0
+    """Scene units²."""
+    angular_radius = 0.0
+    """Of what is infinitely far away, rad."""
+    cone = (4.0, 4.0)
+    """Inner and outer half angle of its cone, rad; beyond π for none."""
+
+    def changed(self, **values: Any) -> Self:
+        """A copy with other values of its kind's own fields, which only the kind knows."""
+        return replace(self, **values)
+
+    @property
+    def has_extent(self) -> bool:
+        """Whether it is more than a point or a strictly parallel beam, so that a camera ray can run into it."""
+        return False
+
+    @property
+    def variant(self) -> tuple[Any, ...]:
+        """What programs and buffers are built for: lights of equal variant can stand in for each other."""
+        return type(self), self.is_disc, self.profile
+
+    @property
+    def flux_factor(self) -> float:
+        """Total flux divided by the quantity of `spectral_power`; infinite for a directional light."""
+        raise NotImplementedError
+
+    def reach(self, distance: float) -> float:
+        """Its quantity over the irradiance it gives at `distance`, on a plane across it."""
+        return distance**2
+
+    def axes(self) -> np.ndarray:
+        """Columns tangent, bitangent and axis (propagation), unit and right-handed, float64 (3, 3)."""
+        axis = np.asarray(self.direction, float) / np.linalg.norm(self.direction)
+        guide = np.eye(3)[np.argmin(np.abs(axis))] if self.tangent is None else np.asarray(self.tangent, float)
+        first = guide - axis * (guide @ axis)
+        first = first / np.linalg.norm(first)
+        return np.column_stack([first, np.cross(axis, first), axis])
+
+    def emits_toward(self, directions: np.ndarray) -> np.ndarray:
+        """Which of the unit directions (..., 3) it emits into, bool (...)."""
+        return np.ones(np.shape(directions)[:-1], bool)
+
+    def default_power(self, distance: float) -> float:
+        """The photometric quantity where a scene file states none: DEFAULT_ILLUMINANCE at `distance`."""
+        return DEFAULT_ILLUMINANCE * self.reach(distance)
+
+    def words(self) -> str:
+        """Kind and shape in a few words."""
+        return self.kind
+
+    def fitted(self) -> Light:
+        """The same with numbers that bound each other brought in line."""
+        return self
+
+    def shown_numbers(self) -> tuple[Number, ...]:
+        """Those of `numbers` that count for it as it is."""
+        return self.numbers
+
+    def check(self) -> None:
+        """Raise UserError for a place, size or angle that no scene file could hold."""
+        sizes = [getattr(self, number.attribute) for number in self.numbers]
+        if not all(math.isfinite(v) and abs(v) <= MAX_MAGNITUDE for v in (*self.position, *sizes)):
+            raise UserError(f"light '{self.name}': its place or size is not finite or too large; choose another")
+
+    def power(self, key: PowerKey) -> float:
+        """Its power as `key` states it."""
+        spectrum = self.spectral_power
+        value = spectrum.luminous() if key.is_photometric else spectrum.power_w()
+        return value * self.flux_factor if key.is_flux else value
+
+    def with_power(self, key: PowerKey, value: float) -> Light:
+        """The same light of power `value` in the unit of `key`. Raises UserError where its spectrum cannot have it."""
+        own = value / self.flux_factor if key.is_flux else value
+        spectrum = self.spectral_power
+        return replace(
+            self,
+            spectral_power=spectrum.scaled_to_luminous(own) if key.is_photometric else spectrum.scaled_to_power(own),
+        )
+
+    def given(self) -> dict[str, Any]:
+        """Its attributes by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+def made(kind: type[Light], attributes: dict[str, Any]) -> Light:
+    """A light of class `kind` with those of `attributes` that it has."""
+    known = {field.name for field in fields(kind)}
+    return kind(**{name: value for name, value in attributes.items() if name in known})
+
+
+class _OutlineFile(Part):
+    """`shape` with `radius`, or with `size` and `tangent`."""
+
+    def read(self, table: SceneTable) -> dict[str, Any]:
+        """The shape, and what belongs to it."""
+        shape = table.choice("shape", SHAPES, "rectangle" if table.has("size") else "disc")
+        if shape == "disc":
+            return {"shape": shape} | RADIUS.read(table)
+        width, height = table.numbers("size", (1.0, 1.0), count=2)
+        if min(width, height) <= 0.0:
+            table.fail("size", "must be a width and a height above 0")
+        tangent = table.unit_vector("tangent") if table.has("tangent") else None
+        return {"shape": shape, "width": width, "height": height, "tangent": tangent}
+
+    def write(self, value: Any, path: object) -> dict[str, Any]:
+        """The keys of its shape."""
+        if value.is_disc:
+            return {"shape": value.shape, "radius": value.radius}
+        told = {"shape": value.shape, "size": [value.width, value.height]}
+        return told if value.tangent is None else told | {"tangent": list(value.tangent)}
+
+
+SHAPES = ("disc", "rectangle")
+RADIUS = Number(
+    "radius",
+    1.0,
+    unit="units",
+    above=0.0,
+    row=Row("Radius", "Radius of the disc."),
+    animated=Animated("Radius", 1e-9, _FAR),
+)
+_WIDTH, _HEIGHT = (
+    Number(
+        name.lower(),
+        1.0,
+        unit="units",
+        above=0.0,
+        row=Row(name, "Side of the rectangle."),
+        animated=Animated(name, 1e-9, _FAR),
+    )
+    for name in ("Width", "Height")
+)
+SHAPE = Choice("shape", "disc", options=SHAPES, row=Row("Shape", "Outline of the beam or of the glowing surface."))
+
+
+@dataclass(frozen=True)
+class OutlinedLight(Light):
+    """A light that leaves a disc or a rectangle."""
+
+    position: Vec3 = (0.0, 0.0, 0.0)
+    direction: Vec3 = (0.0, 0.0, -1.0)
+    tangent: Vec3 | None = None
+    shape: Literal["disc", "rectangle"] = "disc"
+    radius: float = 1.0
+    width: float = 1.0
+    height: float = 1.0
+
+    parts: ClassVar = (_OutlineFile(),)
+    numbers: ClassVar = (RADIUS, _WIDTH, _HEIGHT)
+    has_outline: ClassVar = True
+
+    @property
+    def is_disc(self) -> bool:
+        """Disc or rectangle."""
+        return self.shape == "disc"
+
+    @property
+    def half_extent(self) -> tuple[float, float]:
+        """Half of its width and height, scene units."""
+        return (self.radius, self.radius) if self.is_disc else (0.5 * self.width, 0.5 * self.height)
+
+    @property
+    def has_roll(self) -> bool:  # type: ignore[override]
+        """A rectangle's."""
+        return not self.is_disc
+
+    @property
+    def area(self) -> float:
+        """Scene units²."""
+        return math.pi * self.radius**2 if self.is_disc else self.width * self.height
+
+    def shown_numbers(self) -> tuple[Number, ...]:
+        """Its radius, or its sides."""
+        return (RADIUS,) if self.is_disc else (_WIDTH, _HEIGHT)
+
+    def check(self) -> None:
+        """Also of its size."""
+        super().check()
+        if min(self.radius, self.width, self.height) <= 0.0:
+            raise UserError(f"light '{self.name}': its size must be above 0")
+
+    def words(self) -> str:
+        """Kind and size."""
+        if self.is_disc:
+            return f"{self.kind} disc, radius {self.radius:.4g}"
+        return f"{self.kind} rectangle, {self.width:.4g} × {self.height:.4g}"

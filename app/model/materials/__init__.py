@@ -1,0 +1,15 @@
+"""Kinds of material, one class each: this is the list of them."""
+
+from __future__ import annotations
+
+from .absorption import Absorption
+from .black import Black
+from .dielectric import Dielectric
+from .diffuse import Diffuse
+from .material import Material
+from .mirror import Mirror
+
+MATERIAL_KINDS: dict[str, type[Material]] = {cls.kind: cls for cls in (Dielectric, Mirror, Diffuse, Black)}
+"""By their word in a scene file."""
+
+__all__ = ["MATERIAL_KINDS", "Absorption", "Black", "Dielectric", "Diffuse", "Material", "Mirror"]

@@ -1,0 +1,102 @@
+"""What glass absorbs, with its words in a scene file, and curves over wavelength in general."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..fields import Part
+from ..io.scene_table import SceneTable
+from ..optics.colorimetry import VISIBLE_NM, attenuation_from_colour, rgb_partition
+from ..optics.spectrum import read_csv
+from ..spectrum_file import SAME, same_curve
+
+MAX_ATTENUATION = 1e15
+"""Per scene unit; float32 holds it in any unit the renderer may choose."""
+_SPECTRUM_SOURCES = ("csv", "nm")
+
+
+@dataclass(frozen=True)
+class Absorption:
+    """Absorption coefficient alpha(wavelength), per scene unit, on the visible grid of `spectrum`."""
+
+    coefficient: np.ndarray
+    """float64 (401,), 1/unit, at 380, 381, … 780 nm."""
+
+
+class AbsorptionPart(Part):
+    """`absorption`: a colour, or a spectrum of transmittance, reached at a distance; or the coefficient itself."""
+
+    def read(self, table: SceneTable) -> dict[str, Any]:
+        """The absorption, None without one."""
+        return {"absorption": _read_absorption(table)}
+
+    def write(self, value: Any, path: Path | None) -> dict[str, Any]:
+        """A colour at a distance where one explains it, else the coefficient."""
+        return {} if value.absorption is None else {"absorption": _describe_absorption(value.absorption)}
+
+
+def _read_absorption(table: SceneTable) -> Absorption | None:
+    if not table.has("absorption"):
+        return None
+    inner = table.table("absorption")
+    if inner is None:
+        table.fail("absorption", "must be a table such as {colour = [0.4, 0.9, 0.7], distance = 2.0}")
+    if inner.has("coefficient"):
+        wavelengths = inner.numbers("nm", at_least=2)
+        values = np.array(inner.numbers("coefficient", count=len(wavelengths)))
+        alpha = _on_visible_grid(inner, "coefficient", np.array(wavelengths), values)
+    else:
+        distance = inner.number("distance", above=0.0)
+        if inner.one_of(("colour", *_SPECTRUM_SOURCES), "the colour") == "colour":
+            alpha = attenuation_from_colour(inner.colour("colour"), distance, inner.where("colour"))
+        else:
+            source, transmittance = read_curve(inner, "transmittance")
+            if transmittance.min() <= 0.0 or transmittance.max() > 1.0:
+                inner.fail(source, "must hold transmittances above 0 and at most 1")
+            alpha = -np.log(transmittance) / distance
+    if alpha.min() < 0.0:
+        inner.fail("coefficient", "is negative somewhere; glass cannot amplify light")
+    if alpha.max() > MAX_ATTENUATION:
+        inner.fail(
+            "distance",
+            f'makes the glass opaque within {1.0 / MAX_ATTENUATION:g} units; use material = "black" for that',
+        )
+    inner.finish("absorption")
+    return Absorption(alpha)
+
+
+def read_curve(table: SceneTable, value_key: str) -> tuple[str, np.ndarray]:
+    """A curve over wavelength from `csv`, or from `nm` with `value_key`: (key to blame, (401,))."""
+    source = table.one_of(_SPECTRUM_SOURCES, "the curve")
+    if source is None:
+        table.fail("", f"holds no curve: give 'csv', or 'nm' with '{value_key}'")
+    if source == "csv":
+        return source, _on_visible_grid(table, source, *read_csv(table.existing_file("csv")))
+    wavelengths = table.numbers("nm", at_least=2)
+    values = table.numbers(value_key, count=len(wavelengths))
+    return value_key, _on_visible_grid(table, "nm", np.array(wavelengths), np.array(values))
+
+
+def _on_visible_grid(table: SceneTable, key: str, wavelength_nm: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Linear between the rows, held at the ends, float64 (401,)."""
+    if np.any(np.diff(wavelength_nm) <= 0.0):
+        table.fail(key, "must list its wavelengths in ascending order")
+    curve = np.interp(VISIBLE_NM, wavelength_nm, values)
+    curve.setflags(write=False)
+    return curve
+
+
+def _describe_absorption(absorption: Absorption) -> dict[str, Any]:
+    alpha = absorption.coefficient
+    strength, *_ = np.linalg.lstsq(rgb_partition(), alpha, rcond=None)
+    strongest = float(strength.max())
+    if strongest > 0.0 and strength.min() > -SAME * strongest and same_curve(rgb_partition() @ strength, alpha):
+        # The distance at which the strongest channel has fallen to one half.
+        distance = math.log(2.0) / strongest
+        return {"colour": np.exp(-np.maximum(strength, 0.0) * distance).tolist(), "distance": distance}
+    return {"nm": VISIBLE_NM.tolist(), "coefficient": alpha.tolist()}

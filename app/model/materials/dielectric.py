@@ -1,0 +1,54 @@
+"""Glass, water, gems: a transparent solid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+from ..fields import Integer
+from ..optics.colorimetry import VISIBLE_NM
+from ..optics.glass import Dispersion
+from .absorption import Absorption, AbsorptionPart
+from .dispersion_file import DispersionPart
+from .material import Material
+
+DEFAULT_GLASS = "N-BK7"
+MAX_PRIORITY = 1_000_000
+PRIORITY = Integer("priority", 0, optional=True, at_least=-MAX_PRIORITY, at_most=MAX_PRIORITY)
+
+
+@dataclass(frozen=True)
+class Dielectric(Material):
+    """A transparent solid."""
+
+    dispersion: Dispersion
+    absorption: Absorption | None = None
+    priority: int = 0
+    """Where solids overlap, the higher priority decides; equal ones: the later object."""
+
+    kind: ClassVar = "glass"
+    title: ClassVar = "Glass"
+    gpu_code: ClassVar = 3
+    parts: ClassVar = (DispersionPart(), AbsorptionPart(), PRIORITY)
+    is_specular: ClassVar = True
+    transmits: ClassVar = True
+
+    def values(self, path: Path | None = None) -> dict[str, Any]:
+        """Glass is what a material is unless it says otherwise."""
+        values = super().values(path)
+        del values["kind"]
+        return values
+
+    def content(self) -> tuple[object, ...]:
+        """Its index on the visible grid, its priority and what it absorbs."""
+        absorbed = None if self.absorption is None else self.absorption.coefficient
+        return self.dispersion.index(VISIBLE_NM), self.priority, absorbed
+
+    def words(self) -> str:
+        """Its glass, and what sets it apart from it."""
+        glass = self.dispersion
+        words = glass.name or f"glass of n_d {glass.n_d:.4f}"
+        words += "" if glass.gain == 1.0 else f", {glass.gain:g} times as dispersive"
+        words += ", absorbing" if self.absorption is not None else ""
+        return words + (f", priority {self.priority}" if self.priority else "")

@@ -1,0 +1,113 @@
+"""A refractive index in the words of a scene file, read and told again."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ...base.errors import UserError
+from ..fields import Part
+from ..io.scene_table import SceneTable
+from ..optics import catalogue, glass
+from ..optics.glass import Dispersion
+from ..optics.spectrum import read_csv
+
+GAIN = "dispersion_gain"
+_INDEX_KEYS = ("glass", "n_d", "sellmeier", "cauchy", "formula", "table", "csv")
+_FITS_WITH_RANGE = ("sellmeier", "cauchy", "formula")
+
+
+class DispersionPart(Part):
+    """The keys of a refractive index, and `dispersion_gain`, as `dispersion`."""
+
+    def read(self, table: SceneTable) -> dict[str, Any]:
+        """The dispersion."""
+        dispersion = _read_index(table)
+        return {"dispersion": with_gain(table, dispersion) if table.has(GAIN) else dispersion}
+
+    def write(self, value: Any, path: Path | None) -> dict[str, Any]:
+        """Its glass by name where it has one, else its data."""
+        return describe_dispersion(value.dispersion)
+
+
+def with_gain(table: SceneTable, dispersion: Dispersion) -> Dispersion:
+    """`dispersion` with the gain that `table` gives."""
+    return glass.with_gain(dispersion, table.number(GAIN, at_least=0.0), table.where(GAIN))
+
+
+def named_glass(table: SceneTable, key: str, name: str) -> Dispersion:
+    """The catalogue's glass of this name, which stands under `key`."""
+    return catalogue.find(name, table.where(key))
+
+
+def _read_index(table: SceneTable) -> Dispersion:
+    key = table.one_of(_INDEX_KEYS, "the refractive index")
+    if key is None:
+        if table.has("V_d"):
+            table.fail("V_d", "needs 'n_d' beside it")
+        table.fail("", f"has no refractive index: give one of {', '.join(_INDEX_KEYS)}, or another kind")
+    if key == "glass":
+        return named_glass(table, key, table.string(key))
+    name = table.string("name", "")
+    where = table.where(key)
+    limits = _read_range(table) if key in _FITS_WITH_RANGE else None
+    if key == "n_d":
+        v_d = table.number("V_d", math.inf, infinite=True)
+        return glass.from_abbe(table.number(key), v_d, name, where)
+    if key == "sellmeier":
+        inner = table.table(key)
+        if inner is None:
+            table.fail(key, "must be a table {B = […], C = […]} with C in µm²")
+        b, c = inner.numbers("B"), inner.numbers("C")
+        inner.finish("sellmeier")
+        return glass.sellmeier(b, c, name, limits, where)
+    if key == "cauchy":
+        return glass.cauchy(table.numbers(key), name, limits, where)
+    if key == "formula":
+        inner = table.table(key)
+        if inner is None:
+            table.fail(key, "must be a table {number = 1 … 6, coefficients = […]} as refractiveindex.info numbers them")
+        number = inner.integer("number", at_least=1, at_most=6)
+        coefficients = inner.numbers("coefficients")
+        inner.finish("formula")
+        return glass.from_formula(f"formula {number}", coefficients, name, limits, where)  # type: ignore[arg-type]
+    if key == "table":
+        wavelengths, n = zip(*table.rows(key, 2), strict=True)
+        return glass.table(wavelengths, n, name, where)
+    path = table.existing_file(key)
+    wavelengths_nm, indices = read_csv(path)
+    return glass.table(wavelengths_nm, indices, name or path.stem, where)
+
+
+def _read_range(table: SceneTable) -> tuple[float, float] | None:
+    if not table.has("range_nm"):
+        return None
+    low, high = table.numbers("range_nm", count=2)
+    return low, high
+
+
+def describe_dispersion(dispersion: Dispersion) -> dict[str, Any]:
+    """The keys that give this dispersion."""
+    if dispersion.gain != 1.0:
+        return describe_dispersion(replace(dispersion, gain=1.0)) | {"dispersion_gain": dispersion.gain}
+    try:
+        if catalogue.find(dispersion.name) == dispersion:
+            return {"glass": dispersion.name}
+    except UserError:
+        pass  # not of the catalogue: its data are written out
+    values: dict[str, Any] = {"name": dispersion.name} if dispersion.name else {}
+    kind, data = dispersion.kind, dispersion.coefficients
+    if kind == "constant":
+        return values | {"n_d": data[0]}
+    if kind == "abbe":
+        return values | {"n_d": data[0], "V_d": data[1]}
+    if kind == "table":
+        # Micrometres came from nanometres: rounding brings those back exactly.
+        pairs = zip(data[0::2], data[1::2], strict=True)
+        return values | {"table": [[round(um * 1e3, 9), n] for um, n in pairs]}
+    values["formula"] = {"number": int(kind.removeprefix("formula ")), "coefficients": list(data)}
+    if dispersion.range_nm != (0.0, math.inf):
+        values["range_nm"] = list(dispersion.range_nm)
+    return values

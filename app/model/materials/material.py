@@ -1,0 +1,93 @@
+"""What every material is asked: does light go on, end, or land on it, and what is it called.
+
+A kind of material is one class in a file of its own beside this one; it overrides what differs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+from ..fields import Part, read_fields, write_fields
+from ..io.scene_table import SceneTable, Vec3
+
+if TYPE_CHECKING:
+    from ..scene_textures import TextureReader
+
+
+_NONE: Any = None
+"""Nothing, of whatever type the kinds give it."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a surface, or the inside of a solid, does with light."""
+
+    kind: ClassVar[str]
+    """Its word in a scene file."""
+    title: ClassVar[str]
+    gpu_code: ClassVar[int]
+    """KIND_… of shaders/lib/scene.glsl."""
+    parts: ClassVar[tuple[Part, ...]] = ()
+    """What the scene file says of it."""
+    is_specular: ClassVar[bool] = False
+    """Paths go on from it along rays: glass and mirrors. What is not ends them."""
+    transmits: ClassVar[bool] = False
+    """Light enters it: a dielectric."""
+    is_mirror: ClassVar[bool] = False
+    receives: ClassVar[bool] = False
+    """Caustics are seen on it: it is diffuse."""
+    # What a kind may have as attributes, without annotations: an annotated one would order the kinds' own fields.
+    reflectance_rgb = (0.0, 0.0, 0.0)
+    """Linear Rec.709."""
+    reflectance = _NONE
+    """(401,) on the visible grid, instead of `reflectance_rgb`."""
+    texture = _NONE
+    absorption = _NONE
+    dispersion = _NONE
+    priority = 0
+    """Among solids that overlap the higher one wins."""
+
+    def changed(self, **values: Any) -> Self:
+        """A copy with other values of its kind's own fields, which only the kind knows."""
+        return replace(self, **values)
+
+    @property
+    def is_black(self) -> bool:
+        """It ends paths and sends nothing on."""
+        return not (self.is_specular or self.receives)
+
+    @property
+    def is_coloured(self) -> bool:
+        """Its plain reflectance is not grey."""
+        return len(set(self.reflectance_rgb)) > 1
+
+    @classmethod
+    def read(cls, table: SceneTable, textures: TextureReader) -> Self:
+        """One of this kind from its table; `textures` reads its pictures."""
+        return cls(**read_fields(cls.parts, table))
+
+    def values(self, path: Path | None = None) -> dict[str, Any]:
+        """The keys of its table in a scene file `path`.
+
+        Without one, files are named absolutely, and a picture without a file by its content.
+        """
+        return {"kind": self.kind} | write_fields(self.parts, self, path)
+
+    def words(self) -> str:
+        """What it is, in a few words."""
+        return self.kind
+
+    def content(self) -> tuple[object, ...]:
+        """What of it light depends on, as plain values and arrays: two that send light alike agree in it."""
+        return (*(float(v) for v in self.reflectance_rgb), self.reflectance)
+
+    def is_like(self, other: Material) -> bool:
+        """Whether programs and buffers made for the one serve the other, so that only values differ."""
+        return self == other
+
+
+def colour_words(rgb: Vec3) -> str:
+    """A colour in as few numbers as say it."""
+    return f"{rgb[0]:.3g}" if len(set(rgb)) == 1 else "(" + ", ".join(f"{c:.3g}" for c in rgb) + ")"

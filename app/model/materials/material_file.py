@@ -1,0 +1,60 @@
+"""Materials of a scene file: [materials.NAME] tables and those written inline on an object."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ...base.errors import suggestion
+from ..io.scene_table import SceneTable
+from ..scene_textures import TextureReader
+from . import MATERIAL_KINDS
+from .dielectric import DEFAULT_GLASS, PRIORITY, Dielectric
+from .dispersion_file import GAIN, named_glass, with_gain
+from .material import Material
+
+
+def read_materials(table: SceneTable, textures: TextureReader | None = None) -> dict[str, Material]:
+    """All of [materials.NAME] by name; `textures` reads their pictures, each once."""
+    textures = textures or TextureReader()
+    return {name: read_material(entry, textures) for name, entry in table.named_tables("materials").items()}
+
+
+def read_object_material(
+    table: SceneTable, named: dict[str, Material], textures: TextureReader | None = None
+) -> Material:
+    """The material of one object: `glass = "…"`, `material = "NAME"`, `material = {…}` or the default glass.
+
+    "mirror", "diffuse" and "black" are known without being defined. The object's `priority`
+    and `dispersion_gain` go above the material's own.
+    """
+    key = table.one_of(("glass", "material"), "the material")
+    if key == "material" and isinstance(table.raw(key), str):
+        name = table.string(key)
+        plain = {kind: cls() for kind, cls in MATERIAL_KINDS.items() if not cls.transmits}
+        known = plain | named
+        if name not in known:
+            table.fail(key, f"names '{name}', which is not defined under [materials]" + suggestion(name, known))
+        material = known[name]
+    elif key == "material":
+        inner = table.table(key)
+        assert inner is not None
+        material = read_material(inner, textures)
+    else:
+        material = Dielectric(named_glass(table, key or "", table.string("glass", DEFAULT_GLASS)))
+    if table.has(GAIN):
+        if not material.transmits:
+            table.fail(GAIN, "is for glass; this object has none")
+        material = replace(material, dispersion=with_gain(table, material.dispersion))
+    if table.has("priority"):
+        if not material.transmits:
+            table.fail("priority", "decides between overlapping solids of glass; this object has none")
+        material = replace(material, **PRIORITY.read(table))
+    return material
+
+
+def read_material(table: SceneTable, textures: TextureReader | None = None) -> Material:
+    """One material table of any kind ('glass' unless it says otherwise)."""
+    kind = table.choice("kind", tuple(MATERIAL_KINDS), Dielectric.kind)
+    material = MATERIAL_KINDS[kind].read(table, textures or TextureReader())
+    table.finish(f"a material of kind '{kind}'")
+    return material

@@ -1,0 +1,90 @@
+// What a surface of glass or a mirror does to a camera path: its ray, its columns, the rays at the ends of its band.
+#ifndef CAMERA_INTERFACE_GLSL
+#define CAMERA_INTERFACE_GLSL
+
+#ifdef SPECTRAL_SWEEP
+// The normal that the ray at an end of the band meets; `turned`: how the path's own was deflected.
+vec3 end_normal(CameraPath path, int end, ShadingFrame frame)
+{
+    return normal_beside(frame, path.narrowed ? path.end_position[end] - path.position : vec3(0.0));
+}
+#endif
+
+void reflect_path(inout CameraPath path, ShadingFrame frame)
+{
+    Deflection turned = reflect_at(frame, path.direction);
+    for (int c = 0; c < COLUMNS_HELD; ++c)
+        path.ddirection[c] = reflected_column(turned, path.direction, path.ddirection[c], normal_column(frame, path.dposition[c]));
+    path.direction = turned.direction;
+#ifdef SPECTRAL_SWEEP
+    for (int end = 0; end < 2; ++end) {
+        vec3 normal = turned.geometric ? turned.normal : end_normal(path, end, frame), direction = path.end_direction[end];
+        path.end_direction[end] = normalize(reflect_direction(direction, normal, dot(direction, normal)));
+    }
+#endif
+}
+
+#ifdef HAS_DIELECTRIC
+// `turned`: how the path's own ray is refracted.
+void refract_path(inout CameraPath path, Deflection turned, ShadingFrame frame, MediumInterface boundary, vec3 n_i, vec3 n_t)
+{
+    float eta_it = n_i.y / n_t.y;
+    for (int c = 0; c < COLUMNS_HELD; ++c) {
+        float deta_it = 0.0;
+#if SPECTRAL_GROUPS > 0
+        if (c >= SPATIAL) deta_it = index_ratio_derivative(boundary, uint(c - SPATIAL), path.band.y, n_i.y, n_t.y);
+#endif
+        path.ddirection[c] = refracted_column(turned, path.direction, path.ddirection[c], normal_column(frame, path.dposition[c]), eta_it, deta_it);
+    }
+    path.direction = turned.direction;
+#ifdef SPECTRAL_SWEEP
+    for (int end = 0; end < 2; ++end) {
+        vec3 normal = turned.geometric ? turned.normal : end_normal(path, end, frame), direction = path.end_direction[end];
+        float eta_end = (end == 0 ? n_i.x : n_i.z) / (end == 0 ? n_t.x : n_t.z), theta = dot(direction, normal);
+        float cosine2 = transmitted_cosine2(theta, eta_end);
+        vec3 position_l, direction_l;
+        linear_end(path, end, position_l, direction_l);
+        path.end_direction[end] = cosine2 > 0.0 && theta < 0.0 ? normalize(refract_direction(direction, normal, theta, eta_end, sqrt(cosine2))) : direction_l;
+    }
+#endif
+}
+
+// Cosine of incidence at three places of the band.
+vec3 incidence_over_band(CameraPath path, ShadingFrame frame)
+{
+    vec3 theta = vec3(dot(path.direction, frame.normal));
+#ifdef SPECTRAL_SWEEP
+    if (path.narrowed) {
+        theta.x = dot(path.end_direction[0], end_normal(path, 0, frame));
+        theta.z = dot(path.end_direction[1], end_normal(path, 1, frame));
+        theta.xz = clamp(theta.xz, -1.0, -1e-6);
+    }
+#endif
+    return theta;
+}
+
+#ifdef SPECTRAL_SWEEP
+// The wavelength within the path's band where total internal reflection sets in; `passes` says where it transmits.
+float onset_of(CameraPath path, ShadingFrame frame, vec3 theta, MediumInterface boundary, bvec3 passes)
+{
+    float dtheta[SPECTRAL_GROUPS];
+    vec2 bend = theta.xz - theta.y;
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+        dtheta[g] = dot(path.ddirection[SPATIAL + g], frame.normal) + dot(path.direction, normal_column(frame, path.dposition[SPATIAL + g]));
+        bend -= dtheta[g] * path.end_step[g];
+    }
+    return total_reflection_onset(path.band, theta.y, dtheta, bend, boundary, passes);
+}
+
+// Whether anchoring the parts [x, at] and [at, z] of the band leaves a path's start where it is known to be clear.
+bool cut_is_near(CameraPath whole, float at, float distance)
+{
+    vec3 low, high, unused;
+    ray_at(whole, anchor_of(whole, whole.band.x, at), low, unused);
+    ray_at(whole, anchor_of(whole, at, whole.band.z), high, unused);
+    return starts_stay_near(low - whole.position, high - whole.position, distance);
+}
+#endif
+#endif
+
+#endif
