@@ -21,11 +21,10 @@ from ..model.features import (
     world_bounds,
 )
 from ..model.geometry.bvh import build_bvh
-from ..model.lights import Light
 from ..model.optics.colorimetry import VISIBLE_NM, rgb_partition
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative, index_table
-from ..model.scene import Scene
+from ..model.scene import Light, Scene
 from . import bindings
 from .records import NONE
 from .scene_texels import SceneTexels, spectra_texture, tree_texels

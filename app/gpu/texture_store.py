@@ -18,6 +18,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..model.scene import Scene, SceneObject
 from ..model.texture import Environment, Texture
+from .device_traits import DeviceTraits
 from .mip_chain import kept_levels, level_count
 from .records import NONE
 from .schema import Field, Struct
@@ -104,7 +105,7 @@ class TextureStore:
         """
         self.ctx = ctx
         self._max_side = min(max_side or MAX_BYTES, int(ctx.info["GL_MAX_TEXTURE_SIZE"]))
-        self._as_image = "llvmpipe" in ctx.info["GL_RENDERER"] if as_image is None else as_image
+        self._as_image = DeviceTraits.of(ctx.info["GL_RENDERER"]).texels_as_images if as_image is None else as_image
         self._pictures = self._corners = None
         self._records: moderngl.Buffer | None = None
         self._sources = _sources(scene)
@@ -161,7 +162,10 @@ class TextureStore:
     def _packed(self) -> moderngl.Texture:
         largest = max(self._sources, key=lambda s: s.rgb.size)
         height, width = largest.rgb.shape[:2]
-        remedy = f"{largest.name}: its {width} x {height} pixels do not fit this device's textures with all pictures of the scene; make it smaller"
+        remedy = (
+            f"{largest.name}: its {width} x {height} pixels do not fit this device's textures with all pictures of "
+            "the scene; make it smaller"
+        )
         try:
             self._tiles, size = pack([s.cell for s in self._sources], self._max_side)
         except UserError as error:
@@ -242,7 +246,8 @@ def _corner_texels(item: SceneObject, turn: np.ndarray, *, repeats: bool) -> np.
     uv = item.mesh.transformed(item.object_to_world).uv
     if uv is None:
         raise UserError(
-            f"object '{item.name}': it wears a texture, but its mesh has no texture coordinates; add them or give it a plain colour"
+            f"object '{item.name}': it wears a texture, but its mesh has no texture coordinates; add them or give it "
+            "a plain colour"
         )
     if not np.isfinite(uv).all() or np.abs(uv).max(initial=0.0) > 1e9:
         raise UserError(
@@ -264,7 +269,8 @@ def _in_rows(corners: Sequence[np.ndarray], max_side: int, first: SceneObject) -
     rows = -(-count // ROW_TEXELS)
     if rows > max_side:
         raise UserError(
-            f"object '{first.name}': textured objects have more triangles than this device's textures hold; simplify their meshes"
+            f"object '{first.name}': textured objects have more triangles than this device's textures hold; simplify "
+            "their meshes"
         )
     image = np.zeros((rows * ROW_TEXELS, 4), np.float32)
     image[:count] = np.concatenate(corners)

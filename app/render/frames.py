@@ -1,5 +1,5 @@
-"""A frame, top to bottom: Scene → Features → buffers → light pass → camera pass → picture. Stills, animations, bakes and
-exports drive it; the scene comes from its file, or is what a window shows.
+"""A frame, top to bottom: Scene → Features → buffers → light pass → camera pass → picture. Stills, animations, bakes
+and exports drive it; the scene comes from its file, or is what a window shows.
 
 What one frame has in common with the next is kept. Where only the camera moves, photons are traced once: caustic maps
 do not depend on it. Where light changes, every frame is traced anew with the same counters, and maps are fitted once to

@@ -13,7 +13,7 @@ from . import false_colour, spectrum_strip, widgets
 from .methods import METHOD_NAMES, METHOD_TIPS
 
 SWEEP_NM = (400.0, 700.0)
-"""What the sweep runs through: where the camera sees something."""
+"""What the sweep runs through: where the eye sees something."""
 SWEEP_NM_PER_S = 45.0
 """Speed of the sweep through the spectrum."""
 _TONES: dict[ToneCurve, str] = {
