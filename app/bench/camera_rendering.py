@@ -94,7 +94,8 @@ class CameraRig:
         features = Features.of(scene, _settings(scene, method, width, height))
         if not features.camera_disperses:
             raise NothingToMeasure(
-                f"scene '{scene.name}': the camera sees nothing through glass that disperses, so the camera's methods do not differ and there is nothing to measure"
+                f"scene '{scene.name}': the camera sees nothing through glass that disperses, so the camera's "
+                "methods do not differ and there is nothing to measure"
             )
         started = time.perf_counter()
         self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))

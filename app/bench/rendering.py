@@ -107,7 +107,8 @@ class MethodRig:
         if not seen:
             self.release()
             raise NothingToMeasure(
-                f"scene '{scene.name}': no light that glass or mirrors throw falls on what the camera sees directly, so there is nothing to measure"
+                f"scene '{scene.name}': no light that glass or mirrors throw falls on what the camera sees directly, "
+                "so there is nothing to measure"
             )
         self.setup_seconds = {
             "buffers": buffered - started,
@@ -147,7 +148,7 @@ class MethodRig:
             smallest = max(smallest / _TRIAL_GROWTH, SMALLEST_BUDGET)
             took = self._photon_seconds(int(smallest))
         smallest = min(smallest, largest)
-        return sorted({int(round(n)) for n in np.geomspace(smallest, largest, count)})
+        return sorted({round(n) for n in np.geomspace(smallest, largest, count)})
 
     def fitting(self, budget: int) -> int:
         """Any number of photons has its lattice."""

@@ -45,11 +45,11 @@ def scene_lines(scene: SceneResult) -> list[str]:
             f"{measure} {ratio_text(ratios.get('srd'))}" for measure, ratios in scene.time_to_equal_other.items()
         )
         lines.append(f"  srd's time to the error that stochastic ends with, by other measures: {others}")
-    for claim in scene.claims:
-        lines.append(
-            f"  {'holds' if claim.holds else 'FALLS SHORT'}: {claim.name}: {claim.asked}: "
-            f"{claim.measured}{f' ({claim.why})' if claim.why else ''}"
-        )
+    lines += [
+        f"  {'holds' if claim.holds else 'FALLS SHORT'}: {claim.name}: {claim.asked}: "
+        f"{claim.measured}{f' ({claim.why})' if claim.why else ''}"
+        for claim in scene.claims
+    ]
     if scene.reference_too_coarse and scene.reference is not None:
         lines.append(
             f"  note: the reference's own relMSE, {scene.reference.relmse:.2g}, is above a tenth of the smallest "

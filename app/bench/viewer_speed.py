@@ -51,7 +51,8 @@ class Phase:
         """For the table."""
         median, worst = np.percentile(self.frame_ms, [50, 95])
         return (
-            f"{self.name:<24} {median:8.1f} ms {worst:8.1f} ms {1000 / median:8.1f} /s {self.photons_per_second / 1e6:8.3f} M/s "
+            f"{self.name:<24} {median:8.1f} ms {worst:8.1f} ms {1000 / median:8.1f} /s "
+            f"{self.photons_per_second / 1e6:8.3f} M/s "
             f"{self.rays_traced:>12,} {100 * self.scale:6.0f} %"
         )
 
@@ -70,7 +71,10 @@ def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) ->
             bench.interface.frame()
         with bench.holding_gain():
             yield bench.phase("dragging dispersion", seconds, bench.drag_gain).line
-        yield f"input to picture: camera {bench.latency(bench.nudge_camera):.0f} ms, dispersion {bench.latency(bench.nudge_gain):.0f} ms (median of {NUDGES})"
+        yield (
+            f"input to picture: camera {bench.latency(bench.nudge_camera):.0f} ms, dispersion "
+            f"{bench.latency(bench.nudge_gain):.0f} ms (median of {NUDGES})"
+        )
         yield f"device memory {bench.session.picture.stats.bytes / 2**20:.0f} MiB"
     finally:
         bench.release()

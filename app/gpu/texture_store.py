@@ -162,7 +162,10 @@ class TextureStore:
     def _packed(self) -> moderngl.Texture:
         largest = max(self._sources, key=lambda s: s.rgb.size)
         height, width = largest.rgb.shape[:2]
-        remedy = f"{largest.name}: its {width} x {height} pixels do not fit this device's textures with all pictures of the scene; make it smaller"
+        remedy = (
+            f"{largest.name}: its {width} x {height} pixels do not fit this device's textures with all pictures of "
+            "the scene; make it smaller"
+        )
         try:
             self._tiles, size = pack([s.cell for s in self._sources], self._max_side)
         except UserError as error:
@@ -243,7 +246,8 @@ def _corner_texels(item: SceneObject, turn: np.ndarray, *, repeats: bool) -> np.
     uv = item.mesh.transformed(item.object_to_world).uv
     if uv is None:
         raise UserError(
-            f"object '{item.name}': it wears a texture, but its mesh has no texture coordinates; add them or give it a plain colour"
+            f"object '{item.name}': it wears a texture, but its mesh has no texture coordinates; add them or give it "
+            "a plain colour"
         )
     if not np.isfinite(uv).all() or np.abs(uv).max(initial=0.0) > 1e9:
         raise UserError(
@@ -265,7 +269,8 @@ def _in_rows(corners: Sequence[np.ndarray], max_side: int, first: SceneObject) -
     rows = -(-count // ROW_TEXELS)
     if rows > max_side:
         raise UserError(
-            f"object '{first.name}': textured objects have more triangles than this device's textures hold; simplify their meshes"
+            f"object '{first.name}': textured objects have more triangles than this device's textures hold; simplify "
+            "their meshes"
         )
     image = np.zeros((rows * ROW_TEXELS, 4), np.float32)
     image[:count] = np.concatenate(corners)

@@ -232,10 +232,10 @@ def dispersive_materials(scene: Scene) -> list[int]:
     """Object indices that first show each distinct dispersive glass, in order."""
     seen, first = set(), []
     for index, item in enumerate(scene.objects):
-        if item.material.transmits and item.material.dispersion.is_dispersive:
-            if item.material.dispersion not in seen:
-                seen.add(item.material.dispersion)
-                first.append(index)
+        glass = item.material.dispersion if item.material.transmits else None
+        if glass is not None and glass.is_dispersive and glass not in seen:
+            seen.add(glass)
+            first.append(index)
     return first
 
 

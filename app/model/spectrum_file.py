@@ -70,7 +70,7 @@ def _spectrum_of(table: SceneTable, key: str | None) -> Spectrum:
         return spectra.from_table(np.array(wavelengths), np.array(values), table.where("values"))
     if table.has("lines"):
         return spectra.constant(0.0)
-    table.fail("", f"names no spectrum: give one of {', '.join(_SPECTRUM_KEYS)} or lines")
+    return table.fail("", f"names no spectrum: give one of {', '.join(_SPECTRUM_KEYS)} or lines")
 
 
 def _named(table: SceneTable, key: str, name: str) -> Spectrum:

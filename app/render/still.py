@@ -65,16 +65,24 @@ class RenderStats:
             *(f"  {name:<17} {flux / total:10.6f}" for name, flux in tally.ended.items()),
             f"  {'roulette':<17} {tally.roulette / total:10.6f}",
             f"  {'unaccounted':<17} {tally.imbalance:10.2e}   (emitted − all of the above)",
-            f"map holds           {self.map_flux_w / deposited:10.6f} of what was deposited; "
-            f"outside every map {light.outside_map_w / deposited:.6f}",
+            (
+                f"map holds           {self.map_flux_w / deposited:10.6f} of what was deposited; "
+                f"outside every map {light.outside_map_w / deposited:.6f}"
+            ),
             f"fall-backs          {_counted(tally.fallbacks)}, splat_footprint_dropped {dropped}",
             f"bands × points      {', '.join(bands)}",
-            f"camera              {camera.samples} samples a pixel, {camera.spectrum.words}; "
-            f"{_counted(camera.fallbacks)}",
-            f"maps                {self.atlas_size[0]}×{self.atlas_size[1]} texels, "
-            f"buffers {self.bytes / 2**20:.0f} MiB",
-            f"seconds             prepare {self.prepare_seconds:.2f}, emit and trace {light.trace_seconds:.2f}, "
-            f"splat {light.splat_seconds:.2f}, camera {self.camera_seconds:.2f}, all {self.seconds:.2f}",
+            (
+                f"camera              {camera.samples} samples a pixel, {camera.spectrum.words}; "
+                f"{_counted(camera.fallbacks)}"
+            ),
+            (
+                f"maps                {self.atlas_size[0]}×{self.atlas_size[1]} texels, "
+                f"buffers {self.bytes / 2**20:.0f} MiB"
+            ),
+            (
+                f"seconds             prepare {self.prepare_seconds:.2f}, emit and trace {light.trace_seconds:.2f}, "
+                f"splat {light.splat_seconds:.2f}, camera {self.camera_seconds:.2f}, all {self.seconds:.2f}"
+            ),
         ]
 
 

@@ -138,7 +138,7 @@ def _measured(case: Case, context: Context, found: CaseResult) -> Iterator[Measu
     try:
         yield from case.measure(context)
         context.check(f"stress case {case.name}")
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 - whatever a case dies of is its result
         found.failure = " ".join(f"{type(error).__name__}: {error}".split())
         found.trace = traceback.format_exc()
         _forget_gl_errors(context)

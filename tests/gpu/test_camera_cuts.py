@@ -63,7 +63,11 @@ def test_parted_colours_go_their_own_ways(gl, edge: Scene, drawn, monkeypatch, t
     gets."""
     cut = error(picture(gl, edge, 32), drawn)
     mutate(
-        monkeypatch, tmp_path, "camera/cuts.glsl", "return parts && path.planar_so_far", "return false && parts && path.planar_so_far"
+        monkeypatch,
+        tmp_path,
+        "camera/cuts.glsl",
+        "return parts && path.planar_so_far",
+        "return false && parts && path.planar_so_far",
     )
     whole = error(picture(gl, edge, 32), drawn)
     assert cut < 1.2e-3 and whole > 1.5 * cut, (cut, whole)

@@ -137,9 +137,7 @@ def prism_case() -> Scene:
     return replace(scene, camera=replace(scene.camera, target=(22.5, 0.0, 0.0), vertical_fov_deg=9.0))
 
 
-SCENES = {
-    scene.__name__: scene for scene in (tinted, mirrored, area_lit, lamp_lit, nested, wine_glass, prism_case)
-}
+SCENES = {scene.__name__: scene for scene in (tinted, mirrored, area_lit, lamp_lit, nested, wine_glass, prism_case)}
 
 
 def blocks(picture: np.ndarray, side: int = BLOCK) -> np.ndarray:

@@ -131,9 +131,7 @@ def write_gltf_material(values: dict[str, Any], material: Material, thickness: f
         own["material"] = material.values()
     if own:
         extras[EXTRAS] = own
-    for key, content in (("extensions", extensions), ("extras", extras)):
-        if content:
-            values[key] = content
+    values |= {key: content for key, content in (("extensions", extensions), ("extras", extras)) if content}
     return set(extensions)
 
 

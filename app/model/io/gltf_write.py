@@ -396,5 +396,4 @@ def _world_of_light(light: Light) -> np.ndarray:
     helper = np.eye(3)[int(np.argmin(np.abs(light.direction)))]
     if light.has_roll:
         helper = np.cross(-np.array(light.direction), light.axes()[:, 0])
-    world = _look_world((0.0, 0.0, 0.0) if not light.has_place else light.position, light.direction, helper)
-    return world
+    return _look_world((0.0, 0.0, 0.0) if not light.has_place else light.position, light.direction, helper)

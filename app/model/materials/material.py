@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, Self, cast
+from typing import Any, ClassVar, Self
 
 from ..fields import Part, read_fields, write_fields
 from ..io.scene_table import SceneTable
 from ..scene_textures import TextureReader
 from ..vectors import Vec3
+
+_NONE: Any = None
+"""Nothing, of whatever type the kinds give it."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +39,11 @@ class Material:
     # What a kind may have as fields of its own; without annotations, which would order those.
     reflectance_rgb = (0.0, 0.0, 0.0)
     """Linear Rec.709."""
-    reflectance = cast(Any, None)
+    reflectance = _NONE
     """(401,) on the visible grid, instead of `reflectance_rgb`."""
-    texture = cast(Any, None)
-    absorption = cast(Any, None)
-    dispersion = cast(Any, None)
+    texture = _NONE
+    absorption = _NONE
+    dispersion = _NONE
     priority = 0
 
     @property
