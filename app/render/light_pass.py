@@ -430,7 +430,7 @@ def spectral_axis(scene: Scene, features: Features) -> SpectralAxis:
     """The axis of a rendering: by the scene's glasses, or plain wavelength for methods linear in λ."""
     if not features.spectral_groups or features.merged_groups and features.spectral_groups == 1:
         return SpectralAxis.build([])
-    return SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.transmits])
+    return SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.dispersion is not None])
 
 
 def _largest_batch(context: Context, features: Features) -> int:

@@ -75,7 +75,10 @@ float onset_of(CameraPath path, ShadingFrame frame, vec3 theta, MediumInterface 
     }
     return total_reflection_onset(path.band, theta.y, dtheta, bend, boundary, passes);
 }
+#endif
+#endif
 
+#ifdef SPECTRAL_SWEEP
 // Whether anchoring the parts [x, at] and [at, z] of the band leaves a path's start where it is known to be clear.
 bool cut_is_near(CameraPath whole, float at, float distance)
 {
@@ -84,7 +87,6 @@ bool cut_is_near(CameraPath whole, float at, float distance)
     ray_at(whole, anchor_of(whole, at, whole.band.z), high, unused);
     return starts_stay_near(low - whole.position, high - whole.position, distance);
 }
-#endif
 #endif
 
 #endif

@@ -26,6 +26,9 @@ struct CameraPath {
     bool recut;                     // its band was cut before the surface ahead, and is not again
     bool sound;                     // its band's ends have kept to its own facets: it met flat ones only
     int cuts;                       // of its band, where ways parted
+#ifdef HAS_GRATING
+    uint order;                     // of the grating ahead, the next to be followed; see camera/grating.glsl
+#endif
 #ifdef SPECTRAL_SWEEP
     // The rays at both ends of the band, by way of the same facets: what columns, being first derivatives, leave out of the sweep.
     vec3 end_position[2];

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from ..fields import Part, read_fields, write_fields
+from ..fields import Number, Part, read_fields, write_fields
 from ..io.scene_table import SceneTable, Vec3
 
 if TYPE_CHECKING:
+    from ..scene import SceneObject
     from ..scene_textures import TextureReader
 
 
@@ -32,6 +33,7 @@ class Material:
     transmits: ClassVar[bool] = False
     """Light enters it: a dielectric."""
     is_mirror: ClassVar[bool] = False
+    is_grating: ClassVar[bool] = False
     receives: ClassVar[bool] = False
     """Caustics are seen on it: it is diffuse."""
     # What a kind may have as attributes, without annotations: an annotated one would order the kinds' own fields.
@@ -42,6 +44,7 @@ class Material:
     texture = None
     absorption = None
     dispersion = None
+    """What its deflection of light is a function of: a glass's index, a grating's wavelength."""
 
     @property
     def is_black(self) -> bool:
@@ -64,6 +67,14 @@ class Material:
         Without one, files are named absolutely, and a picture without a file by its content.
         """
         return {"kind": self.kind} | write_fields(self.parts, self, path)
+
+    def check_on(self, item: SceneObject, file_name: str) -> None:
+        """Raise UserError where the object's mesh cannot be of this material."""
+
+    @classmethod
+    def shown_numbers(cls) -> tuple[Number, ...]:
+        """Its plain numbers with a row in the panel."""
+        return tuple(part for part in cls.parts if isinstance(part, Number) and part.row is not None)
 
     def words(self) -> str:
         """What it is, in a few words."""
