@@ -105,14 +105,16 @@ class Frames:
         stored = self._stored()
         if stored is None and any(folder.glob("*.png")):
             raise UserError(
-                f"{folder} holds pictures of something else: choose another folder, or replace its frames with --overwrite"
+                f"{folder} holds pictures of something else: choose another folder, or replace its frames with "
+                "--overwrite"
             )
         self.base_ev: float | None = None
         if stored is not None:
             self.base_ev = stored.pop("base_ev", None)
             if stored != json.loads(json.dumps(self.description)):
                 raise UserError(
-                    f"{folder} holds frames of another animation: choose another folder, or replace them with --overwrite"
+                    f"{folder} holds frames of another animation: choose another folder, or replace them with "
+                    "--overwrite"
                 )
         self._save()
 

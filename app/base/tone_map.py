@@ -67,7 +67,7 @@ def to_display(rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
     are not finite come out as `NOT_FINITE_RGB`.
     """
     scene = np.asarray(rgb, np.float32)
-    finite = np.isfinite(scene).all(axis=-1)
+    finite = np.asarray(np.isfinite(scene).all(axis=-1))
     # Products of float32 must not overflow however bright a firefly is.
     limit = np.float32(1e30)
     exposed = np.where(finite[..., None], np.clip(scene, -limit, limit), np.float32(0))

@@ -22,7 +22,8 @@ from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass, CausticMaps
 from ..passes.spectrum_choice import Spectrum
-from ..render.light_pass import LightPass, spectral_axis
+from ..render.light_pass import LightPass, scene_buffers, spectral_axis
+from ..render.sampling import CameraSampling
 from .rendering import NothingToMeasure, Rendering, Rig
 
 LIGHT_PHOTONS = 1 << 22
@@ -57,9 +58,8 @@ class SharedLight:
             return
         started = time.perf_counter()
         settings = _settings(scene, "srd", width, height)
-        features = Features.of(scene, settings)
-        self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
-        self._light = light = LightPass(context, scene, settings, features, self._buffers)
+        self._buffers = scene_buffers(context, scene, settings)
+        self._light = light = LightPass(context, scene, settings, self._buffers.features, self._buffers)
         light.prepare()
         light.begin(photons, LIGHT_SEED)
 
@@ -70,7 +70,7 @@ class SharedLight:
         light.run_pass(0, photons, told)
         light.finish()
         self.channels, self.reflectances = light.map_channels, light.reflectances
-        self.maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
+        self.maps = light.caustic_maps()
         context.finish()
         context.check("the light pass of the bench")
         self.seconds = time.perf_counter() - started
@@ -103,7 +103,7 @@ class CameraRig:
         # Drivers put off part of the compiling until a program runs.
         self._camera_pass.run(scene.camera, width, height, 1, 0, light.maps)
         if self._camera_pass.chooses:
-            self._camera_pass.may_be_single, self._camera_pass.spectrum = True, Spectrum(single=True)
+            self._camera_pass.spectrum = Spectrum(single=True)
             self._camera_pass.run(scene.camera, width, height, 1, 0, light.maps)
         compiled = self._finished()
         self.setup_seconds = {
@@ -157,7 +157,9 @@ class CameraRig:
         return rendering.seconds["bands"], sum(rendering.seconds.values()), taken
 
     def _choose(self, samples: int) -> Spectrum:
-        return self._camera_pass.choose_spectrum(self._scene.camera, *self._size, samples, self._light.maps)
+        for _ in CameraSampling(samples).choosing(self._camera_pass, self._scene.camera, *self._size, self._light.maps):
+            pass
+        return self._camera_pass.spectrum
 
     def _finished(self) -> float:
         self._context.finish()

@@ -17,7 +17,10 @@ Progress = Callable[[float, str], None]
 TARGET_RELMSE = 1e-5
 """Good enough for any method's error; time usually ends sooner."""
 METHOD = "photon tracing in float64: random wavelength, one photon one pixel, no footprint, no splat or map code shared"
-CAMERA_METHOD = "camera paths in float64: one random wavelength each, Fresnel by chance, textures looked up at points, no column, no map and no shader code shared"
+CAMERA_METHOD = (
+    "camera paths in float64: one random wavelength each, Fresnel by chance, textures looked up at points, "
+    "no column, no map and no shader code shared"
+)
 CAUSTIC_RELMSE = 3e-5
 """What the caustic's noise may add to the picture's error …"""
 CAUSTIC_PHOTONS = 1 << 27
@@ -51,7 +54,7 @@ def reference_key(scene: Scene, width: int, height: int) -> str:
     """Hash of everything that the reference depends on."""
     from ..reference import photon_reference
 
-    return photon_reference.scene_key(scene, width, height, scene.render.max_depth)
+    return photon_reference.reference_key(scene, width, height, scene.render.max_depth)
 
 
 def make_camera_reference(
@@ -88,7 +91,7 @@ def camera_reference_key(scene: Scene, width: int, height: int) -> str:
     """Hash of everything that the camera's reference depends on."""
     from ..reference import camera_reference
 
-    return camera_reference.camera_scene_key(scene, width, height, camera_reference.MAX_DEPTH, caustic_plan(scene))
+    return camera_reference.camera_reference_key(scene, width, height, camera_reference.MAX_DEPTH, caustic_plan(scene))
 
 
 def caustic_plan(scene: Scene) -> CausticPlan | None:

@@ -18,14 +18,12 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..gpu.context import Context
-from ..gpu.scene_buffers import SceneBuffers
-from ..model.features import Features
 from ..model.optics.colorimetry import rgb709_to_xyz
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
-from ..passes.camera import CameraPass, CausticMaps
-from ..render.light_pass import LightPass, spectral_axis
-from ..render.still import DEFAULT_SAMPLES
+from ..passes.camera import CameraPass
+from ..render.light_pass import LightPass, scene_buffers
+from ..render.sampling import DEFAULT_SAMPLES
 
 WARM_UP_PHOTONS = 2048
 SMALLEST_BUDGET = 128
@@ -96,11 +94,10 @@ class MethodRig:
         self._settings = RenderSettings(
             width=width, height=height, method=method, layer="caustic", max_depth=scene.render.max_depth
         )
-        features = Features.of(scene, self._settings)
         started = time.perf_counter()
-        self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+        self._buffers = scene_buffers(context, scene, self._settings)
         buffered = self._finished()
-        self._light = LightPass(context, scene, self._settings, features, self._buffers)
+        self._light = LightPass(context, scene, self._settings, self._buffers.features, self._buffers)
         self._camera_pass = CameraPass(context, self._buffers, "caustic", self._light.reflectances)
         compiled = self._finished()
         self._light.prepare()
@@ -125,7 +122,7 @@ class MethodRig:
         seconds = self._light_seconds(photons, seed)
         started = time.perf_counter()
         light, settings = self._light, self._settings
-        maps = CausticMaps(self._textures, light.receivers, light.atlas.placements, light.map_scale)
+        maps = light.maps.caustic_maps(self._textures)
         self._camera_pass.run(self._scene.camera, settings.width, settings.height, DEFAULT_SAMPLES, 0, maps, seed)
         xyz = rgb709_to_xyz(self._camera_pass.read_rgb().astype(np.float64))
         seconds["camera"] = time.perf_counter() - started

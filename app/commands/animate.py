@@ -87,7 +87,8 @@ def animate_command(request: AnimateRequest) -> int:
         return INTERRUPTED
     again = f"; the same command goes on ({MANIFEST} knows it)" if stopped and place.is_dir() else ""
     print(
-        f"{place}: {written} of {count} frames{kept}, {settings.width}×{settings.height} at {fps:g} a second, in {time.perf_counter() - started:.1f} s{early}{again}"
+        f"{place}: {written} of {count} frames{kept}, {settings.width}×{settings.height} at {fps:g} a second, in "
+        f"{time.perf_counter() - started:.1f} s{early}{again}"
     )
     return INTERRUPTED if stopped else 0
 

@@ -57,6 +57,7 @@ def bake_command(request: BakeRequest) -> int:
                 return INTERRUPTED
     place = request.output.resolve()
     print(
-        f"{place}: caustic map of '{request.receiver}' in {time.perf_counter() - started:.1f} s; where it lies is in {bake.placement_path(place).name}"
+        f"{place}: caustic map of '{request.receiver}' in {time.perf_counter() - started:.1f} s; where it lies is in "
+        f"{bake.placement_path(place).name}"
     )
     return 0

@@ -28,7 +28,7 @@ CAMERA_SECONDS = 20.0
 """Time of the largest rendering where the camera is measured and nothing else was asked for: the talk's stochastic
 picture had as much."""
 CAMERA_SCENES = ("prism_edge", "lens_text", "brilliant_studio", "ball_caustic")
-"""Shipped scenes that are about what is seen through glass; `bench --eye` without names measures these."""
+"""Shipped scenes that are about what is seen through glass; `bench --camera` without names measures these."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
     """Run the bench; returns the exit code. Raises `UserError`."""
     if request.features is not None:
         if request.camera_pass:
-            raise UserError("--features and --eye exclude each other: give one of them")
+            raise UserError("--features and --camera exclude each other: give one of them")
         return _features(request)
     if request.output is None:
         raise UserError("bench needs a folder for what it finds: give one with -o DIR")
@@ -110,8 +110,9 @@ def parse_settings(request: BenchRequest) -> BenchSettings:
     if request.methods is not None:
         asked["methods"] = parse_methods(request.methods, CAMERA_METHODS if request.camera_pass else METHODS)
     if request.size is not None:
-        asked["size"] = options.parse_size(request.size)
-        check_picture_memory(*asked["size"], None)
+        width, height = options.parse_size(request.size)
+        check_picture_memory(width, height, None)
+        asked["size"] = (width, height)
     return BenchSettings(**asked)
 
 
@@ -151,7 +152,8 @@ def load_scenes(names: Sequence[str]) -> dict[str, Scene]:
     for name, file in zip(names, files, strict=True):
         if file.stem in scenes:
             raise UserError(
-                f"scene {name}: another scene of this run is called '{file.stem}' too; rename the file or run them apart"
+                f"scene {name}: another scene of this run is called '{file.stem}' too; rename the file or run them "
+                "apart"
             )
         scenes[file.stem] = load_scene(file)
     return scenes
@@ -169,7 +171,7 @@ def repeat_command(scenes: Sequence[str], request: BenchRequest) -> str:
     words = [
         "spectrasplat",
         "bench",
-        *(["--eye"] if request.camera_pass else []),
+        *(["--camera"] if request.camera_pass else []),
         *(request.scenes or scenes),
         "-o",
         request.output.name if request.output else "",
@@ -217,5 +219,6 @@ def _report(result: BenchResult, directory: Path, show: Callable[[object], None]
     if measured:
         write_report(result, directory)
         show(
-            f"{(directory / 'report.html').resolve()}: the report; {(directory / 'results.json').resolve()}: every number"
+            f"{(directory / 'report.html').resolve()}: the report; {(directory / 'results.json').resolve()}: every "
+            "number"
         )

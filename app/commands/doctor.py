@@ -27,13 +27,16 @@ _WINDOW_MODULES = ("imgui_bundle", "glfw")
 """Rendering to files does without them."""
 
 
+State = Literal["ok", "optional", "missing"]
+
+
 @dataclass(frozen=True)
 class Check:
     """One finding. `remedy` is empty when all is well."""
 
     name: str
     found: str
-    state: Literal["ok", "optional", "missing"]
+    state: State
     """"optional": something is absent that rendering can do without."""
     remedy: str = ""
 
@@ -119,7 +122,7 @@ def _modules() -> Iterator[Check]:
             reason = " ".join(str(error).split())
             library = re.search(r"lib[\w.+-]*\.so[.\d]*", reason)
             remedy = f"run '{gpu.APT_LINE}' as root" if library else f"{REINSTALL} --force-reinstall {name}"
-            state = "optional" if name in _WINDOW_MODULES else "missing"
+            state: State = "optional" if name in _WINDOW_MODULES else "missing"
             yield Check(f"module {name}", reason, state, remedy)
         else:
             loaded.append(name)

@@ -18,7 +18,8 @@ def glass_command(query: str | None, plot_file: Path | None, show: Callable[[obj
     hits = _hits(query or "")
     if plot_file is not None and len(hits) > MAX_PLOTTED:
         raise UserError(
-            f"--plot shows at most {MAX_PLOTTED} glasses and {len(hits)} match: give more of the name, for example N-BK7"
+            f"--plot shows at most {MAX_PLOTTED} glasses and {len(hits)} match: give more of the name, for example "
+            "N-BK7"
         )
     if plot_file is not None:
         plot(hits, plot_file)  # first, so that a refused file name is all that is said

@@ -35,15 +35,9 @@ def list_glasses(query: str = "", limit: int | None = None) -> Table:
     if not found:
         raise UserError(f"no glass resembles '{query}'; 'spectrasplat glass' without a name lists all")
     table = Table(title=f"{len(found)} of {len(entries())} glasses and materials", title_justify="left")
-    for heading, justify in (
-        ("name", "left"),
-        ("maker", "left"),
-        ("n_d", "right"),
-        ("V_d", "right"),
-        ("range nm", "right"),
-        ("also", "left"),
-    ):
-        table.add_column(heading, justify=justify, no_wrap=heading != "also")
+    for heading in ("name", "maker", "n_d", "V_d", "range nm", "also"):
+        is_number = heading in ("n_d", "V_d", "range nm")
+        table.add_column(heading, justify="right" if is_number else "left", no_wrap=heading != "also")
     for entry in found:
         glass = entry.dispersion
         table.add_row(
@@ -163,7 +157,7 @@ def _draw_abbe_diagram(axes: Axes, shown: Sequence[Entry], colours: Sequence[str
             ]
         )
         label = "optical glasses" if maker == "makers" else "other materials"
-        axes.scatter(*places.T, s=size, color=colour, lw=0, label=label)
+        axes.scatter(places[:, 0], places[:, 1], s=size, color=colour, lw=0, label=label)
     v_limits, n_limits = [10.0, 100.0], [1.28, 2.1]
     for entry, colour in zip(shown, colours, strict=True):
         glass = entry.dispersion

@@ -114,7 +114,7 @@ def parse_camera_method(text: str) -> str:
     """One of those that camera rays may follow."""
     if text not in CAMERA_METHODS:
         hint = suggestion(text, CAMERA_METHODS)
-        raise UserError(f"--eye-method '{text}' is unknown{hint or ','} known are {', '.join(CAMERA_METHODS)}")
+        raise UserError(f"--camera-method '{text}' is unknown{hint or ','} known are {', '.join(CAMERA_METHODS)}")
     return text
 
 
@@ -122,7 +122,7 @@ def check_layer(text: str, scene: Scene) -> str:
     """ "beauty", "caustic" or "map:RECEIVER" with a diffuse object of `scene`."""
     if text in ("beauty", "caustic"):
         return text
-    receivers = list(dict.fromkeys(o.name for o in scene.objects if o.material.receives))
+    receivers = receivers_of(scene)
     kind, _, name = text.partition(":")
     if kind != "map":
         hint = suggestion(text, ("beauty", "caustic", "map"))
@@ -131,6 +131,11 @@ def check_layer(text: str, scene: Scene) -> str:
         listed = ", ".join(f"'map:{receiver}'" for receiver in receivers) or "none, for nothing in it is diffuse"
         raise UserError(f"--layer '{text}' names no receiver of scene '{scene.name}'; it has {listed}")
     return text
+
+
+def receivers_of(scene: Scene) -> list[str]:
+    """Names of the diffuse objects, in the scene's order."""
+    return list(dict.fromkeys(item.name for item in scene.objects if item.material.receives))
 
 
 def find_scene(text: str) -> Path:

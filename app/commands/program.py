@@ -1,6 +1,6 @@
 """The command line: what the commands are called and which options they take.
 
-Options arrive as text and are checked in `cli_options`; the work is in the modules that each
+Options arrive as text and are checked in `options`; the work is in the modules that each
 command imports when it runs, so that `--help` and small commands start at once.
 """
 
@@ -16,7 +16,7 @@ from typer.core import TyperGroup
 from .. import __version__
 from ..base.errors import UserError
 from ..model.settings import CAMERA_METHODS, METHODS
-from . import options
+from . import completion, options
 
 
 class _Interrupted(Exception):
@@ -35,7 +35,6 @@ class _Program(TyperGroup):
 app = typer.Typer(
     name="spectrasplat",
     cls=_Program,
-    add_completion=False,
     pretty_exceptions_enable=False,
     no_args_is_help=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -43,7 +42,19 @@ app = typer.Typer(
 
 SceneArgument = Annotated[
     str,
-    typer.Argument(metavar="SCENE", help="A scene file (.toml, .glb, .gltf, a bare mesh), or a shipped scene's name."),
+    typer.Argument(
+        metavar="SCENE",
+        help="A scene file (.toml, .glb, .gltf, a bare mesh), or a shipped scene's name.",
+        autocompletion=completion.scenes,
+    ),
+]
+MethodOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help=f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.",
+        autocompletion=completion.methods,
+    ),
 ]
 Text = str | None
 PIPE_WIDTH = 200
@@ -101,18 +112,23 @@ def render(
     ] = None,
     seconds: Annotated[Text, typer.Option(metavar="S", help="Emit photons for this long instead.")] = None,
     seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
-    method: Annotated[
-        Text, typer.Option(metavar="NAME", help=f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.")
-    ] = None,
+    method: MethodOption = None,
     camera_method: Annotated[
         Text,
         typer.Option(
+            "--camera-method",
             "--eye-method",
             metavar="NAME",
             help=f"The same for the camera's rays: {', '.join(CAMERA_METHODS)}; default: as --method.",
+            autocompletion=completion.camera_methods,
         ),
     ] = None,
-    layer: Annotated[Text, typer.Option(metavar="LAYER", help="beauty (default), caustic, or map:RECEIVER.")] = None,
+    layer: Annotated[
+        Text,
+        typer.Option(
+            metavar="LAYER", help="beauty (default), caustic, or map:RECEIVER.", autocompletion=completion.layers
+        ),
+    ] = None,
     bins: Annotated[
         Text,
         typer.Option(
@@ -123,7 +139,7 @@ def render(
         Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than automatic; .png only.")
     ] = None,
     max_depth: Annotated[
-        Text, typer.Option("--max-depth", metavar="N", help="Most specular events on a light path; default: 64.")
+        Text, typer.Option("--max-depth", metavar="N", help="Specular events on a light path, at most; default: 64.")
     ] = None,
     spp: Annotated[Text, typer.Option(metavar="N", help="Camera samples a pixel.")] = None,
     batch: Annotated[
@@ -201,9 +217,7 @@ def animate(
     seed: Annotated[
         Text, typer.Option(metavar="K", help="Seed of the random numbers, the same for all frames; default: 1.")
     ] = None,
-    method: Annotated[
-        Text, typer.Option(metavar="NAME", help=f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.")
-    ] = None,
+    method: MethodOption = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the frames of another animation in the folder.")
     ] = False,
@@ -235,7 +249,9 @@ def view(
     scene: Annotated[
         Text,
         typer.Argument(
-            metavar="[SCENE]", help="A scene file, a bare mesh, or a shipped scene's name; default: the default scene."
+            metavar="[SCENE]",
+            help="A scene file, a bare mesh, or a shipped scene's name; default: the default scene.",
+            autocompletion=completion.scenes,
         ),
     ] = None,
     size: Annotated[Text, typer.Option(metavar="WxH", help="Of the window; default: as it was last.")] = None,
@@ -256,14 +272,20 @@ def view(
 @app.command()
 def bake(
     scene: SceneArgument,
-    receiver: Annotated[str, typer.Argument(metavar="RECEIVER", help="The diffuse object whose caustic is baked.")],
+    receiver: Annotated[
+        str,
+        typer.Argument(
+            metavar="RECEIVER", help="The diffuse object whose caustic is baked.", autocompletion=completion.receivers
+        ),
+    ],
     output: Annotated[
         Path,
         typer.Option(
             "-o",
             "--output",
             metavar="OUT",
-            help="The texture: .exr or .npy (linear irradiance), .png (to look at); where it lies is written to a .json beside it.",
+            help="The texture: .exr or .npy (linear irradiance), .png (to look at); where it lies is written to a "
+            ".json beside it.",
         ),
     ],
     size: Annotated[Text, typer.Option(metavar="WxH", help="Texels; default: 1024x1024.")] = None,
@@ -288,7 +310,10 @@ def inspect(scene: SceneArgument) -> None:
 @app.command()
 def glass(
     query: Annotated[
-        Text, typer.Argument(metavar="[QUERY]", help="Part of a name or maker; nothing lists all.")
+        Text,
+        typer.Argument(
+            metavar="[QUERY]", help="Part of a name or maker; nothing lists all.", autocompletion=completion.glasses
+        ),
     ] = None,
     plot: Annotated[
         Path | None,
@@ -303,7 +328,7 @@ def glass(
 
 @app.command()
 def doctor() -> None:
-    """Check OpenGL, its limits and the packages, and tell the remedy for what is missing."""
+    """Check OpenGL, its limits and the packages, with a remedy for what is missing."""
     from .doctor import examine, report
 
     checks = examine()
@@ -315,7 +340,11 @@ def doctor() -> None:
 def bench(
     scenes: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[SCENE]...", help="Scenes to measure; default: every shipped one that holds glass."),
+        typer.Argument(
+            metavar="[SCENE]...",
+            help="Scenes to measure; default: every shipped one that holds glass.",
+            autocompletion=completion.scenes,
+        ),
     ] = None,
     output: Annotated[
         Path | None,
@@ -324,11 +353,14 @@ def bench(
     seconds: Annotated[
         Text,
         typer.Option(
-            metavar="S", help="Photon time of each method's and seed's largest rendering; default: 3, with --eye 20."
+            metavar="S", help="Photon time of each method's and seed's largest rendering; default: 3, with --camera 20."
         ),
     ] = None,
     seeds: Annotated[Text, typer.Option(metavar="N", help="Independent repeats; default: 5.")] = None,
-    methods: Annotated[Text, typer.Option(metavar="A,B", help="Methods to compare; default: all.")] = None,
+    methods: Annotated[
+        Text,
+        typer.Option(metavar="A,B", help="Methods to compare; default: all.", autocompletion=completion.method_lists),
+    ] = None,
     size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: 480 wide, in the scene's aspect.")] = None,
     reference_seconds: Annotated[
         Text,
@@ -338,13 +370,19 @@ def bench(
     ] = None,
     features: Annotated[
         Text,
-        typer.Option(metavar="SCENE", help="Measure instead what each feature of the programs costs in this scene."),
+        typer.Option(
+            metavar="SCENE",
+            help="Measure instead what each feature of the programs costs in this scene.",
+            autocompletion=completion.scenes,
+        ),
     ] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Begin anew instead of going on from what DIR holds.")] = False,
     camera_pass: Annotated[
         bool,
         typer.Option(
-            "--eye", help="Measure the camera pass, by samples a pixel, instead of the light pass by photons."
+            "--camera",
+            "--eye",
+            help="Measure the camera pass, by samples a pixel, instead of the light pass by photons.",
         ),
     ] = False,
 ) -> None:
@@ -362,7 +400,9 @@ def stress(
     scenes: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[SCENE]...", help="Sweep these scenes; default: all stiff cases, and a sweep over shipped scenes."
+            metavar="[SCENE]...",
+            help="Sweep these scenes; default: all stiff cases, and a sweep over shipped scenes.",
+            autocompletion=completion.scenes,
         ),
     ] = None,
     output: Annotated[
@@ -392,7 +432,10 @@ def bench_speed() -> None:
 
 @app.command("bench-view")
 def bench_view(
-    scene: Annotated[Text, typer.Argument(metavar="[SCENE]", help="Default: the default scene.")] = None,
+    scene: Annotated[
+        Text,
+        typer.Argument(metavar="[SCENE]", help="Default: the default scene.", autocompletion=completion.scenes),
+    ] = None,
     size: Annotated[
         Text, typer.Option(metavar="WxH", help="Of the viewport; default: 960x540, on a GPU 1920x1080.")
     ] = None,

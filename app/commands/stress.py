@@ -89,7 +89,8 @@ def _cases(files: Sequence[Path]) -> tuple[Case, ...]:
     for file in files:
         if file.stem in scenes:
             raise UserError(
-                f"scene {file}: another scene of this run is called '{file.stem}' too; rename the file or run them apart"
+                f"scene {file}: another scene of this run is called '{file.stem}' too; rename the file or run them "
+                "apart"
             )
         scenes[file.stem] = load_scene(file)
     return sweeps(list(scenes.items()))

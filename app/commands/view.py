@@ -14,11 +14,12 @@ from . import options
 
 if TYPE_CHECKING:
     from ..edit.preferences import WindowPlace
+    from ..edit.state import Theme
     from ..ui.session import Session
     from ..ui.viewer import Viewer
     from ..ui.window import Window
 
-THEMES = ("dark", "light")
+THEMES: tuple[Theme, ...] = ("dark", "light")
 DEFAULT_AFTER_S = 10.0
 LONGEST_WAIT_S = 120.0
 """For the first picture."""
@@ -63,7 +64,7 @@ def view_command(request: ViewRequest) -> int:
     return 0
 
 
-def _run(window: Window, scene: Path | None, theme: str | None, screenshot: tuple[Path, float] | None) -> None:
+def _run(window: Window, scene: Path | None, theme: Theme | None, screenshot: tuple[Path, float] | None) -> None:
     from ..ui import layout_memory
     from ..ui.session import Session
     from ..ui.viewer import Viewer
@@ -125,7 +126,8 @@ def _rescued(session: Session, error: Exception) -> UserError:
     from ..edit.preferences import config_dir
 
     return UserError(
-        f"the window had to close ({type(error).__name__}: {what[:200]}).{kept} Details are in {config_dir() / 'crash.log'}"
+        f"the window had to close ({type(error).__name__}: {what[:200]}).{kept} Details are in "
+        f"{config_dir() / 'crash.log'}"
     )
 
 
@@ -135,11 +137,12 @@ def _place(window: Window, before: WindowPlace) -> WindowPlace:
     return replace(before, maximised=True) if place.maximised else place
 
 
-def _parse_theme(text: str) -> str:
-    if text not in THEMES:
-        hint = suggestion(text, THEMES)
-        raise UserError(f"--theme '{text}' is unknown{hint or ','} known are {' and '.join(THEMES)}")
-    return text
+def _parse_theme(text: str) -> Theme:
+    for theme in THEMES:
+        if text == theme:
+            return theme
+    hint = suggestion(text, THEMES)
+    raise UserError(f"--theme '{text}' is unknown{hint or ','} known are {' and '.join(THEMES)}")
 
 
 def _check_screenshot(path: Path) -> None:

@@ -15,7 +15,7 @@ import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from .parameters import Stage, apply_all, check_value, parameter
 from .state import Key
 
 Interpolation = Literal["smooth", "linear", "hold"]
+SMOOTH: Interpolation = "smooth"
 INTERPOLATIONS: tuple[Interpolation, ...] = ("smooth", "linear", "hold")
 ORBIT = "camera.orbit_deg"
 MAX_FRAMES = 1_000_000
@@ -148,7 +149,7 @@ def tracks_of(keys: Iterable[Key], interpolations: Sequence[Interpolation] = ())
     `interpolations`: one a key; without them all are smooth.
     """
     keys = tuple(keys)
-    kinds = tuple(interpolations) or ("smooth",) * len(keys)
+    kinds = tuple(interpolations) or (SMOOTH,) * len(keys)
     by_path: dict[str, dict[float, tuple[float, Interpolation]]] = {}
     for key, kind in zip(keys, kinds, strict=True):
         by_path.setdefault(key.path, {})[key.time_s] = (key.value, kind)
@@ -172,7 +173,8 @@ def read_keys(path: Path, stage: Stage) -> tuple[Track, ...]:
         raise UserError(f"{path.name}: unknown key '{next(iter(document))}'; a file of keys holds [[keys]] only")
     if not isinstance(rows, list) or not rows or not all(isinstance(row, dict) for row in rows):
         raise UserError(f"{path.name} holds no keys: write [[keys]] with time_s, parameter and value")
-    keys, kinds = [], []
+    keys: list[Key] = []
+    kinds: list[Interpolation] = []
     for index, row in enumerate(rows):
         table = SceneTable(row, path, f"keys[{index}]")
         where = table.where("parameter") + ": "
@@ -185,7 +187,7 @@ def read_keys(path: Path, stage: Stage) -> tuple[Track, ...]:
                 check_value(stage, name, table.number("value"), where),
             )
         )
-        kinds.append(table.choice("interpolation", INTERPOLATIONS, "smooth"))
+        kinds.append(cast(Interpolation, table.choice("interpolation", INTERPOLATIONS, "smooth")))
         table.finish("a key")
     return tracks_of(keys, kinds)
 
@@ -203,4 +205,4 @@ def parse_range(text: str, stage: Stage, duration_s: float) -> Track:
     for value in values:
         check_value(stage, path, value, "--set ")
     times = tuple(float(t) for t in np.linspace(0.0, duration_s, len(values)))
-    return Track(path, times, values, ("smooth",) * len(values))
+    return Track(path, times, values, (SMOOTH,) * len(values))

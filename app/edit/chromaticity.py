@@ -1,13 +1,28 @@
-"""What colour a spectrum has: chromaticity and dominant wavelength (CIE 15:2004, sections 7 and 8)."""
+"""What colour a spectrum has: chromaticity, dominant wavelength, purity, temperature (CIE 15:2004, sections 7 to 9).
+
+By colour-science, which takes about a second to import: `ready` does that beside the interface.
+"""
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, illuminant_table
+
+if TYPE_CHECKING:
+    from colour import MultiSpectralDistributions
+
+_GREY = 0.005
+"""Distance from white below which there is no hue."""
+_MAX_DUV = 0.05
+"""Distance from the Planckian locus in CIE 1960 uv above which CIE gives no colour temperature."""
+_KELVIN = (1000.0, 1e5)
 
 
 @dataclass(frozen=True)
@@ -19,11 +34,26 @@ class ColourInfo:
     x: float
     y: float
     dominant_nm: float | None
-    """Wavelength of the spectral colour on the line from D65 through (x, y); None for greys."""
+    """Wavelength of the spectral colour on the line from D65 through (x, y), to a nanometre; None for greys."""
     is_complementary: bool
     """A purple: `dominant_nm` then lies on the other side of white."""
     purity: float
     """Excitation purity: distance from white over that of the border."""
+    temperature_k: float | None
+    """Correlated colour temperature, K (Ohno 2014); None where the colour is too far from any black body's."""
+
+
+def ready() -> bool:
+    """Whether `colour_info` answers at once; the first call begins to see to that, in a thread."""
+    thread = _loading()
+    return not thread.is_alive()
+
+
+@cache
+def _loading() -> threading.Thread:
+    thread = threading.Thread(target=lambda: _described(0.31, 0.32), name="colour-science", daemon=True)
+    thread.start()
+    return thread
 
 
 def colour_info(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> ColourInfo | None:
@@ -37,56 +67,38 @@ def colour_info(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> ColourInfo 
     if not np.isfinite(total) or total <= 0.0 or xyz[1] <= 0.0:
         return None
     x, y = float(xyz[0] / total), float(xyz[1] / total)
-    dominant, is_complementary, purity = _dominant(x, y)
-    return ColourInfo(K_M * float(xyz[1]), x, y, dominant, is_complementary, purity)
+    return ColourInfo(K_M * float(xyz[1]), x, y, *_described(x, y))
+
+
+@lru_cache(maxsize=64)
+def _described(x: float, y: float) -> tuple[float | None, bool, float, float | None]:
+    """(dominant wavelength, whether it is the complementary one, purity, temperature) of a chromaticity."""
+    science, place = _colour_science(), np.array([x, y])
+    with science.utilities.suppress_warnings(colour_runtime_warnings=True):  # strong colours have no temperature
+        kelvin, duv = science.uv_to_CCT(science.xy_to_UCS_uv(place), method="Ohno 2013")
+    temperature = float(kelvin) if abs(duv) <= _MAX_DUV and _KELVIN[0] <= kelvin <= _KELVIN[1] else None
+    if np.linalg.norm(place - _white()) < _GREY:
+        return None, False, 0.0, temperature
+    observer = _observer()
+    wavelength = float(science.dominant_wavelength(place, _white(), observer)[0])
+    purity = float(science.excitation_purity(place, _white(), observer))
+    return abs(wavelength), wavelength < 0.0, min(purity, 1.0), temperature
+
+
+def _colour_science() -> ModuleType:
+    import colour
+
+    return colour
 
 
 @cache
-def _locus() -> np.ndarray:
-    """(x, y) of spectral colours at 1 nm from 400 to 700 nm, where it turns one way only."""
-    xyz = cmf_xyz()[20:321]
-    return xyz[:, :2] / xyz.sum(axis=1, keepdims=True)
+def _observer() -> MultiSpectralDistributions:
+    """The colour matching functions from 400 to 700 nm, where the spectral locus turns one way only."""
+    science = _colour_science()
+    return science.MultiSpectralDistributions(cmf_xyz()[20:321], VISIBLE_NM[20:321])
 
 
 @cache
 def _white() -> np.ndarray:
     xyz = illuminant_table()["D65"] @ cmf_xyz()
     return xyz[:2] / xyz.sum()
-
-
-def _dominant(x: float, y: float) -> tuple[float | None, bool, float]:
-    white, toward = _white(), np.array([x, y]) - _white()
-    length = float(np.hypot(*toward))
-    if length < 0.005:
-        return None, False, 0.0
-    for is_complementary in (False, True):
-        direction = -toward if is_complementary else toward
-        found = _crossing(white, direction / length)
-        if found is not None:
-            wavelength, reach = found
-            border = _purple_reach(white, toward / length) if is_complementary else reach
-            return wavelength, is_complementary, min(length / border, 1.0)
-    return None, False, 0.0
-
-
-def _crossing(white: np.ndarray, direction: np.ndarray) -> tuple[float, float] | None:
-    """(wavelength nm, distance from white) where the ray leaves the spectral locus; None where it leaves between its
-    ends."""
-    relative = _locus() - white
-    across = direction[0] * relative[:, 1] - direction[1] * relative[:, 0]
-    along = relative @ direction
-    changes = np.nonzero((across[:-1] * across[1:] <= 0.0) & (along[:-1] + along[1:] > 0.0))[0]
-    if changes.size == 0:
-        return None
-    i = int(changes[0])
-    step = across[i] - across[i + 1]
-    share = float(across[i] / step) if step != 0.0 else 0.0
-    return 400.0 + i + share, float(along[i] + share * (along[i + 1] - along[i]))
-
-
-def _purple_reach(white: np.ndarray, direction: np.ndarray) -> float:
-    """Distance from white to the line of purples."""
-    start, end = _locus()[0] - white, _locus()[-1] - white
-    edge = end - start
-    denominator = direction[0] * edge[1] - direction[1] * edge[0]
-    return abs(float((start[0] * edge[1] - start[1] * edge[0]) / denominator)) if denominator else 1.0

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -172,7 +172,8 @@ def _without_environment(scene: Scene) -> Scene:
         raise UserError("the environment is the scene's only light; add a light before taking it away")
     if not any(o.material.receives for o in scene.objects):
         raise UserError(
-            "nothing in the scene receives light, so the environment is all there is to see; add a diffuse object before taking it away"
+            "nothing in the scene receives light, so the environment is all there is to see; add a diffuse object "
+            "before taking it away"
         )
     return replace(scene, environment=None)
 
@@ -183,7 +184,7 @@ def _of_kind(scene: Scene, kind: str) -> Environment:
     return scene.environment
 
 
-def _vectors(parameters: dict[str, object]) -> dict[str, object]:
+def _vectors(parameters: dict[str, Any]) -> dict[str, Any]:
     """Lists as tuples."""
     return {key: tuple(value) if isinstance(value, list) else value for key, value in parameters.items()}
 
@@ -234,7 +235,7 @@ def _illuminance(light: Light, scene: Scene) -> float:
     return light.spectral_power.luminous() / light.reach(math.sqrt(distance2))
 
 
-def _sun_of(scene: Scene) -> dict[str, float]:
+def _sun_of(scene: Scene) -> dict[str, Any]:
     """Where the scene's first directional light comes from, for a sky that fits it."""
     sun = next((light for light in scene.lights if not light.has_place), None)
     if sun is None:

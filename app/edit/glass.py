@@ -93,7 +93,8 @@ def set_absorption(scene: Scene, index: int, colour: Vec3 | None, distance: floa
     alpha = attenuation_from_colour(colour, distance, _where(scene, index))
     if alpha.max() > MAX_ATTENUATION:
         raise UserError(
-            f"{_where(scene, index)}: the glass would be opaque within {1.0 / MAX_ATTENUATION:g} units; choose a longer distance"
+            f"{_where(scene, index)}: the glass would be opaque within {1.0 / MAX_ATTENUATION:g} units; choose a "
+            "longer distance"
         )
     alpha.setflags(write=False)
     return _with_glass(scene, index, replace(_glass(scene, index), absorption=Absorption(alpha)))

@@ -78,7 +78,8 @@ def delete(scene: Scene, index: int) -> Scene:
     without = replace(scene, objects=rest)
     if _shows_nothing(without):
         raise UserError(
-            f"'{name}' is the only surface that receives light; add another diffuse object or an environment before deleting it"
+            f"'{name}' is the only surface that receives light; add another diffuse object or an environment before "
+            "deleting it"
         )
     return without
 
@@ -90,7 +91,8 @@ def set_material(scene: Scene, index: int, material: Material) -> Scene:
     changed = _replaced(scene, index, replace(item, material=material, local_dispersion=dabs))
     if _shows_nothing(changed):
         raise UserError(
-            f"'{item.name}' is the only surface that receives light; make another object diffuse or add an environment before changing it"
+            f"'{item.name}' is the only surface that receives light; make another object diffuse or add an "
+            "environment before changing it"
         )
     check_scene(changed, scene.name)
     return changed
@@ -228,7 +230,8 @@ def _check_dabs(item: SceneObject, dabs: Sequence[Dab] | None = None) -> None:
             raise UserError(f"'{item.name}': a touch of the brush holds a number that is not finite")
         if not (0.0 < dab.radius <= MAX_LENGTH and abs(dab.log2_gain) <= MAX_DAB_LOG2):
             raise UserError(
-                f"'{item.name}': a touch of the brush needs a radius above 0 and a gain within ±{MAX_DAB_LOG2:g} doublings"
+                f"'{item.name}': a touch of the brush needs a radius above 0 and a gain within ±{MAX_DAB_LOG2:g} "
+                "doublings"
             )
         if not (0.0 <= dab.falloff <= 1.0 and 0.0 <= dab.erase <= 1.0):
             raise UserError(f"'{item.name}': falloff and eraser of the brush lie between 0 and 1")

@@ -104,7 +104,7 @@ def _read(table: SceneTable) -> OwnPresets:
 
 def _put(kept: tuple[Preset, ...], new: Preset) -> tuple[Preset, ...]:
     if all(p.name != new.name for p in kept):
-        return (*kept, new)
+        return kept + (new,)
     return tuple(new if p.name == new.name else p for p in kept)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -111,7 +111,8 @@ def parameter(stage: Stage, path: str, where: str = "") -> Parameter:
         near = [p for p in known if beginning and p.startswith(beginning + ".")]
         hint = suggestion(path, near or known) or suggestion(path, known)
         raise UserError(
-            f"{where}'{path}' is no parameter of scene '{stage.scene.name}'{hint or '; known are ' + ', '.join(near or sorted(_GLOBAL)) + ' and others'}"
+            f"{where}'{path}' is no parameter of scene "
+            f"'{stage.scene.name}'{hint or '; known are ' + ', '.join(near or sorted(_GLOBAL)) + ' and others'}"
         )
     return known[path]
 
@@ -121,7 +122,8 @@ def check_value(stage: Stage, path: str, value: float, where: str = "") -> float
     known = parameter(stage, path, where)
     if not (math.isfinite(value) and known.low <= value <= known.high):
         raise UserError(
-            f"{where}{path} = {value:g} is out of range: give between {known.low:g} and {known.high:g} {known.unit}".rstrip()
+            f"{where}{path} = {value:g} is out of range: give between {known.low:g} and {known.high:g} "
+            f"{known.unit}".rstrip()
         )
     return value
 
@@ -149,8 +151,8 @@ def apply(stage: Stage, path: str, value: float) -> Stage:
     if name:
         change: Callable = _with_object if head == "objects" else _with_light
         items = tuple(change(x, field, value) if x.name == name else x for x in getattr(stage.scene, head))
-        return replace(stage, scene=replace(stage.scene, **{head: items}))
-    return replace(stage, **{path: value})
+        return replace(stage, scene=_changed(stage.scene, head, items))
+    return _changed(stage, path, value)
 
 
 def apply_all(stage: Stage, values: Mapping[str, float]) -> Stage:
@@ -190,7 +192,7 @@ def _camera_value(camera: Camera, name: str) -> float:
 def _with_camera(camera: Camera, name: str, value: float) -> Camera:
     match name.split("."):
         case ["position" | "target" as field, axis]:
-            return replace(camera, **{field: _with_axis(getattr(camera, field), axis, value)})
+            return _changed(camera, field, _with_axis(getattr(camera, field), axis, value))
         case ["fov_deg"]:
             return replace(camera, vertical_fov_deg=value)
         case ["extent"]:
@@ -285,14 +287,19 @@ def _with_light(light: Light, name: str, value: float) -> Light:
     if field == "rotation":
         turn = rotation_about(_AXES[axis], math.radians(value))
         turned = replace(light, direction=_vec3(turn @ np.asarray(light.direction)))
-        if light.tangent is None:
+        if not light.has_roll:
             return turned
-        return replace(turned, tangent=_vec3(turn @ np.asarray(light.tangent)))
+        return replace(turned, tangent=_vec3(turn @ light.axes()[:, 0]))
     if field == "power":
         spectrum = light.spectral_power
         lines = tuple((nm, power * value) for nm, power in spectrum.lines)
         return replace(light, spectral_power=Spectrum(spectrum.density * value, lines))
     return replace(light, **{_turned_by(light)[field].attribute: value}).fitted()
+
+
+def _changed(thing: Any, name: str, value: object) -> Any:
+    """A copy of a frozen `thing` with one field set."""
+    return replace(thing, **{name: value})
 
 
 def _with_axis(vector: Vec3, axis: str, value: float) -> Vec3:

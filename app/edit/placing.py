@@ -48,7 +48,7 @@ def frame_of(scene: Scene, selection: Selection, is_local: bool) -> np.ndarray:
         light = scene.lights[selection.index]
         frame[:3, 3] = light_place(scene, light)
         if is_local:
-            frame[:3, :3] = light_axes(light)
+            frame[:3, :3] = light.axes()
         return frame
     item = scene.objects[selection.index]
     frame[:3, 3] = world_bounds(item).mean(axis=0)
@@ -65,14 +65,6 @@ def light_place(scene: Scene, light: Light) -> np.ndarray:
     bounds = np.stack([world_bounds(item) for item in chosen])
     low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
     return 0.5 * (low + high) - 0.9 * float(np.linalg.norm(high - low)) * _unit(np.asarray(light.direction, float))
-
-
-def light_axes(light: Light) -> np.ndarray:
-    """Columns: width, height and propagation direction of a light, right-handed (3, 3)."""
-    axis = _unit(np.asarray(light.direction, float))
-    guide = np.eye(3)[np.argmin(np.abs(axis))] if light.tangent is None else np.asarray(light.tangent, float)
-    first = _unit(guide - axis * (guide @ axis))
-    return np.column_stack([first, np.cross(axis, first), axis])
 
 
 def change(before: np.ndarray, after: np.ndarray, operation: Operation) -> np.ndarray:
@@ -103,13 +95,13 @@ def changed(scene: Scene, selection: Selection, delta: np.ndarray) -> Scene:
 def moved_light(light: Light, delta: np.ndarray) -> Light:
     """A light after a world matrix: its place, direction, and the size of what it opens with."""
     linear = delta[:3, :3]
-    axes = light_axes(light)
+    axes = light.axes()
     stretched = np.linalg.norm(linear @ axes, axis=0)
     position = (delta @ np.append(np.asarray(light.position, float), 1.0))[:3]
     moved = replace(light, position=_vec3(position)) if light.has_place else light
     if light.has_direction and not np.allclose(linear, np.eye(3), atol=1e-12):
         moved = replace(moved, direction=_vec3(_unit(linear @ axes[:, 2])))
-        if light.tangent is not None or (light.has_outline and not light.is_disc):
+        if light.tangent is not None or light.has_roll:
             moved = replace(moved, tangent=_vec3(_unit(linear @ axes[:, 0])))
     if not light.has_outline:
         return moved

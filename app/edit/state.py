@@ -15,6 +15,8 @@ from .live_inputs import LiveInputs
 from .requests import Pull, Request
 
 Tool = Literal["select", "move", "rotate", "scale", "brush", "pull"]
+CompareMode = Literal["off", "hold", "wipe", "error"]
+Theme = Literal["dark", "light"]
 ToneCurve = Literal["spectrasplat", "aces", "reinhard", "linear"]
 
 
@@ -60,7 +62,7 @@ class Brush:
 class Compare:
     """A/B with a reference or another method."""
 
-    mode: Literal["off", "hold", "wipe", "error"] = "off"
+    mode: CompareMode = "off"
     method: str = "reference"
     """"reference", or one of `METHODS`, run on its own in the time left over."""
     wipe: float = 0.5
@@ -95,7 +97,7 @@ class Panels:
 class Preferences:
     """Remembered between sessions."""
 
-    theme: Literal["dark", "light"] = "dark"
+    theme: Theme = "dark"
     ui_scale: float = 1.0
     target_photons: int = 32_000_000
     refine_when_still: bool = True

@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 from ..base.errors import UserError, suggestion
 from .limits import Limits
@@ -68,7 +68,7 @@ class Context:
         """Destroy the context; its buffers, textures and programs are gone with it."""
         self.ctx.release()
 
-    def __enter__(self) -> Context:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_exception: object) -> None:
@@ -119,14 +119,13 @@ def _create_egl() -> Context:
     if egl is None or gl is None:
         missing = "libEGL.so.1" if egl is None else "libGL.so.1"
         raise UserError(f"OpenGL is missing ({missing} is not installed): run '{APT_LINE}' as root")
+    libraries: Any = {"backend": "egl", "libegl": egl, "libgl": gl}
     problem = ""
     # The first device may be a card without rights or too old, and a software one follow it.
     for index in range(_MAX_EGL_DEVICES):
         try:
-            ctx = moderngl.create_standalone_context(
-                backend="egl", require=GL_VERSION_CODE, device_index=index, libegl=egl, libgl=gl
-            )
-        except Exception as error:  # glcontext raises bare Exception
+            ctx = moderngl.create_standalone_context(require=GL_VERSION_CODE, **libraries | {"device_index": index})
+        except Exception as error:  # noqa: BLE001 - glcontext raises bare Exception
             if index > 0 and "requested device index" in str(error):
                 break
             problem = problem or str(error)
@@ -143,7 +142,7 @@ def _create_osmesa() -> Context:
     from .osmesa import OSMesaLoader
 
     try:
-        loader = OSMesaLoader(*GL_VERSION)
+        loader: Any = OSMesaLoader(*GL_VERSION)
     except OSError as error:
         raise UserError(
             f"OpenGL through OSMesa failed ({error}): run '{APT_LINE_OSMESA}' as root, or use EGL"

@@ -8,6 +8,7 @@ The constants are those of Mesa's `GL/osmesa.h`. Mesa dropped OSMesa with versio
 from __future__ import annotations
 
 import ctypes
+from typing import Self
 
 _LIBRARIES = ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")
 _FORMAT, _RGBA = 0x22, 0x1908
@@ -58,7 +59,7 @@ class OSMesaLoader:
             self._library.OSMesaDestroyContext(self._handle)
             self._handle = None
 
-    def __enter__(self) -> OSMesaLoader:
+    def __enter__(self) -> Self:
         self._make_current()
         return self
 

@@ -208,7 +208,7 @@ EMIT_PARAMETERS = Struct(
         Field("is_disc", "uint", "shape of light or aperture"),
         Field("light_axis", "vec3", "spot axis, or area light's normal"),
         Field("seed", "uint"),
-        Field("light_u", "vec3", "area: half extent; aperture: 1 / half extent; GPU space"),
+        Field("light_u", "vec3", "area: half extent; aperture: 1 / half extent (0: none), GPU space; profile: its C0"),
         Field("light", "uint"),
         Field("light_v", "vec3", "likewise"),
         Field("lattice_count", "uint", "points of one sub-lattice"),
@@ -224,7 +224,7 @@ EMIT_PARAMETERS = Struct(
         Field("count", "uint", "rays of the batch: lattice points times sub-lattices"),
         Field("band_count", "uint"),
         Field("light_points", "uint", "points on the light (sun's disc, area light); each has a sub-lattice per band"),
-        Field("has_aperture", "uint", "plane: the beam ends at its aperture"),
+        Field("profile", "uint", "where the light's intensity table begins"),
         Field("spacing", "vec2", "of one sub-lattice along the domain's axes, domain coordinates"),
         Field("bands", "vec4", "x_lo, x_hi, x_anchor, W per unit weight", MAX_BANDS),
         Field(

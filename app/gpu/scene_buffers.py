@@ -185,6 +185,7 @@ class SceneBuffers:
         self.defines = bindings.SCENE_DEFINES | {"SPECTRAL_SAMPLES": SAMPLES}
         self._pack_geometry()
         self._pack_objects()
+        self._pack_profiles()
         self.texels = SceneTexels(ctx, self._sections)
         self._sections.clear()
         self.defines |= self.texels.defines
@@ -194,7 +195,7 @@ class SceneBuffers:
         self.texels.bind()
         self.texels.bind_spectra(self._spectra)
         for binding, buffer in self._buffers.items():
-            if self._in_storage:
+            if self._in_storage or binding == bindings.PROFILES:
                 buffer.bind_to_storage_buffer(binding)
             else:
                 buffer.bind_to_uniform_block(binding)
@@ -214,6 +215,19 @@ class SceneBuffers:
         return sum(buffer.size for buffer in self._buffers.values()) + sum(
             t.width * t.height * size for t, size in pixels
         )
+
+    def _pack_profiles(self) -> None:
+        """Intensity tables of lights that have one, each once."""
+        tables = list(dict.fromkeys(light.profile for light in self.scene.lights if light.profile is not None))
+        packed = [table.packed() for table in tables]
+        starts = np.cumsum([0] + [len(table) for table in packed])
+        self._profile_start = dict(zip(tables, starts.tolist(), strict=False))
+        if packed:
+            self._buffers[bindings.PROFILES] = self.ctx.buffer(np.concatenate(packed).astype("f4"))
+
+    def profile_start(self, light: Light) -> int:
+        """Where the light's intensity table begins among the profiles; 0 without one."""
+        return self._profile_start.get(light.profile, 0)
 
     def _pack_geometry(self) -> None:
         corners, owner, source, normals = [], [], [], []

@@ -87,6 +87,8 @@ class Features:
     sweep."""
     map_tents: int = 0
     """Spectral channels of the caustic maps beside XYZ, for light whose dispersion the camera's adds to."""
+    light_profiles: bool = False
+    """Some light shines by a table of intensities over directions."""
     anchor_weights: bool = False
     """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
 
@@ -116,6 +118,7 @@ class Features:
             "CHARTS": self.charts,
             "NESTED_WINDOWS": self.nested_windows,
             "ANCHOR_WEIGHTS": self.anchor_weights,
+            "LIGHT_PROFILES": self.light_profiles,
         }
         return numbers | {name: 1 for name, on in switches.items() if on}
 
@@ -171,6 +174,7 @@ class Features:
             reindexed=_reindexed(scene, settings, groups, coloured=absorbing or coloured_mirror),
             local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
             anchor_weights=settings.anchor_weights,
+            light_profiles=any(light.profile is not None for light in scene.lights),
         )
 
 
@@ -406,6 +410,13 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             "environment map",
             scene.environment is not None,
             f"a {scene.environment.kind} lies beyond" if scene.environment is not None else "one colour lies beyond",
+        ),
+        (
+            "light profiles",
+            features.light_profiles,
+            f"measured lamps: {names([light.name for light in scene.lights if light.profile is not None])}"
+            if features.light_profiles
+            else "no light comes from a photometric file",
         ),
         ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
     ]

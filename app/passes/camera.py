@@ -334,6 +334,11 @@ class CameraPass:
         return self._pictures
 
     @property
+    def is_even(self) -> bool:
+        """All pixels of a row have as many samples: `samples` may be left here."""
+        return not self._within_rows
+
+    @property
     def samples_taken(self) -> int:
         """Samples that every pixel has."""
         return int(self._samples_of_row.min()) if len(self._samples_of_row) else 0

@@ -13,15 +13,16 @@ CAMERA_LIGHT = Struct(
     "CameraLight",
     (
         Field("position", "vec3", "GPU space"),
-        Field("kind", "uint", "0 point or spot, 1 directional, 2 collimated, 3 area"),
+        Field("kind", "uint", "0 point, spot or measured, 1 directional, 2 collimated, 3 area"),
         Field("axis", "vec3", "unit, propagation"),
         Field("is_disc", "uint"),
-        Field("half_u", "vec3", "centre to rim, GPU units; directional: tangent of the angular radius"),
+        Field("half_u", "vec3", "centre to rim, GPU units; directional: tangent of the angular radius; profile: C0"),
         Field("measure", "float", "area: GPU units²; directional: radiance per irradiance (0: no extent); else 0"),
         Field("half_v", "vec3", "as half_u, across it"),
-        Field("reserved", "float", ""),
+        Field("profile", "uint", "where its intensity table begins"),
         Field("cone", "vec2", "inner and outer half angle, rad"),
-        Field("reserved2", "vec2", ""),
+        Field("has_profile", "uint"),
+        Field("reserved", "uint", ""),
     ),
 )
 CAMERA_PARAMETERS = Struct(
@@ -80,8 +81,11 @@ def light_record(light: Light, scene: SceneBuffers) -> np.void:
     if light.angular_radius > 0.0:
         half = np.full(2, np.tan(light.angular_radius))
         record["measure"] = 1.0 / (np.pi * np.sin(light.angular_radius) ** 2)
-    elif light.area > 0.0:
+    elif light.has_extent:
         record["measure"] = light.area * scene.space.scale**2
     record["half_u"], record["half_v"] = tangent * half[0], bitangent * half[1]
+    if light.profile is not None:
+        record["has_profile"], record["profile"] = 1, scene.profile_start(light)
+        record["half_u"], record["half_v"] = light.across
     record["cone"] = light.cone
     return record

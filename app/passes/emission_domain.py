@@ -33,7 +33,7 @@ class EmissionDomain:
     """One light's domain; positions in GPU space."""
 
     kind: str
-    """"point", "plane" or "area": which variant of emit.comp runs."""
+    """"point", "profile", "plane" or "area": which variant of emit.comp runs."""
     origin: np.ndarray
     axis: np.ndarray
     tangent: np.ndarray
@@ -167,7 +167,7 @@ def _diverging_domain(
     relative = (triangles - position) @ frame.T
     lengths = np.linalg.norm(relative, axis=-1)
     flat = azimuthal_plane(relative / np.maximum(lengths, 1e-12)[..., None])
-    light_u = light_v = np.zeros(3)
+    light_u, light_v = light.across
     # Farthest from the axis, with what the extent of the light adds to it.
     farthest = np.arccos(np.clip((relative[..., 2] / np.maximum(lengths, 1e-12)).min(axis=1), -1.0, 1.0))
     shift = np.zeros(len(triangles))

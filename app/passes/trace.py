@@ -276,9 +276,9 @@ class TracePass:
         p["mean_spacing"] = np.sqrt(np.prod(spacing))
         p["back"] = domain.back
         p["light_axis"] = np.asarray(self.scene.scene.lights[piece.light].direction, float)
+        p["profile"] = self.scene.profile_start(self.scene.scene.lights[piece.light])
         p["light_u"], p["light_v"], p["aperture_centre"] = domain.light_u, domain.light_v, domain.aperture_centre
         p["is_disc"] = domain.is_disc
-        p["has_aperture"] = bool(np.any(domain.light_u)) and domain.kind == "plane"
         p["rect"] = domain.rect
         p["cone"] = domain.cone
         p["bands"][0, : len(piece.bands)] = [(b.x_lo, b.x_hi, b.x_anchor, b.power_w) for b in piece.bands]

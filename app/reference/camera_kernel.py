@@ -15,22 +15,14 @@ from typing import NamedTuple
 import numpy as np
 
 from .camera_lights import light_seen, sample_light
-from .camera_optics import (
-    AIR,
-    camera_ray,
-    choice,
-    inlined,
-    scatter,
-    sobol_next,
-    sobol_start,
-    stripped,
-    transmitted,
-)
+from .camera_rays import camera_ray
 from .camera_scene import beyond, picture_at
+from .compiling import compiled, inlined
 from .photon_emit import search
 from .photon_intersect import blocked, nearest
-from .photon_kernel import DIMENSIONS, _mixed, _unit
 from .photon_scene import BLACK, DIFFUSE
+from .sampling import DIMENSIONS, FIRST_CHOICE, choice, mixed, sobol_next, sobol_start, unit
+from .scattering import AIR, scatter, side_met, transmitted
 
 LOST_DEPTH, LOST_NUMERIC = range(2)
 """Places in a tally of paths that were given up: too many events, or nothing met inside a solid."""
@@ -201,7 +193,7 @@ def sample(
     last, last_object, within, mask, alone, events = -1, -1, False, start.mask, start.alone, 0
     atom, nm, found, weight = -1, 0.0, 0.0, 1.0
     if mask != np.uint64(0) or alone != AIR:  # in glass wavelengths part at once
-        atom, nm = _wavelength(spectra, _unit(state[2] ^ shift[2]))
+        atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
     while True:
         t, triangle, u, v = nearest(
             scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance
@@ -232,8 +224,7 @@ def sample(
         if kind == BLACK or weight <= 0.0:
             break
         if kind == DIFFUSE:
-            facing = dx * scene.normals[triangle, 0] + dy * scene.normals[triangle, 1] + dz * scene.normals[triangle, 2]
-            a, b = _unit(state[3] ^ shift[3]), _unit(state[4] ^ shift[4])
+            a, b = unit(state[3] ^ shift[3]), unit(state[4] ^ shift[4])
             found += weight * _diffuse(
                 scene,
                 lights,
@@ -247,7 +238,7 @@ def sample(
                 px,
                 py,
                 pz,
-                1 if facing > 0.0 else 0,
+                side_met(scene, triangle, dx, dy, dz),
                 a,
                 b,
                 stack,
@@ -258,20 +249,20 @@ def sample(
             tally[LOST_DEPTH] += 1.0
             break
         if atom < 0:
-            atom, nm = _wavelength(spectra, _unit(state[2] ^ shift[2]))
+            atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
         last, last_object = triangle, thing
-        dx, dy, dz, mask, alone, within, is_event, kept = scatter(
-            scene, triangle, u, v, dx, dy, dz, mask, alone, nm, choice(state, shift, events, noise)
+        draw = choice(state, shift, FIRST_CHOICE + events, noise, events)
+        dx, dy, dz, mask, alone, within, is_event, kept, _ = scatter(
+            scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw
         )
         weight *= kept
-        if is_event:
-            events += 1
+        events += is_event
     if found > 0.0:
         for c in range(3):
             xyz[c] += found * spectra.response[atom, c]
 
 
-@stripped
+@compiled
 def trace_camera(
     scene, camera, lights, spectra, pictures, tables, start, sequence, first, count, max_depth, sums, tally, scratch
 ):
@@ -281,18 +272,18 @@ def trace_camera(
     sobol_start(sequence, first, beginning)
     for row in range(camera.height):
         for column in range(camera.width):
-            key = _mixed(sequence.key ^ _mixed(np.uint64(row * camera.width + column)))
+            key = mixed(sequence.key ^ mixed(np.uint64(row * camera.width + column)))
             for d in range(DIMENSIONS):
                 key += np.uint64(0x9E3779B97F4A7C15)
-                shift[d] = np.uint32(_mixed(key) >> np.uint64(32))
+                shift[d] = np.uint32(mixed(key) >> np.uint64(32))
                 state[d] = beginning[d]
             for i in range(first, first + count):
                 if i > first:
                     sobol_next(sequence, i, state)
                 ox, oy, oz, dx, dy, dz = camera_ray(
-                    camera, column + _unit(state[0] ^ shift[0]), row + _unit(state[1] ^ shift[1])
+                    camera, column + unit(state[0] ^ shift[0]), row + unit(state[1] ^ shift[1])
                 )
-                noise = _mixed(key ^ _mixed(np.uint64(i)))
+                noise = mixed(key ^ mixed(np.uint64(i)))
                 sample(
                     scene,
                     lights,
@@ -320,7 +311,7 @@ def trace_camera(
                 xyz[c] = 0.0
 
 
-@stripped
+@compiled
 def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, points, which, scratch):
     """Where `count` camera paths spread over the picture end on sides of receivers, for fitting windows: the number
     found.
@@ -335,8 +326,8 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, poin
     for i in range(count):
         if i > 0:
             sobol_next(sequence, i, state)
-        px, py, pz, dx, dy, dz = camera_ray(camera, _unit(state[0]) * camera.width, _unit(state[1]) * camera.height)
-        noise = _mixed(sequence.key ^ _mixed(np.uint64(i)))
+        px, py, pz, dx, dy, dz = camera_ray(camera, unit(state[0]) * camera.width, unit(state[1]) * camera.height)
+        noise = mixed(sequence.key ^ mixed(np.uint64(i)))
         last, last_object, within, mask, alone, events, way = -1, -1, False, start.mask, start.alone, 0, 0.0
         while events <= max_depth:
             t, triangle, u, v = nearest(
@@ -348,10 +339,7 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, poin
             thing = scene.owner[triangle]
             kind = scene.kind[thing]
             if kind == DIFFUSE:
-                facing = (
-                    dx * scene.normals[triangle, 0] + dy * scene.normals[triangle, 1] + dz * scene.normals[triangle, 2]
-                )
-                at = side[thing, 1 if facing > 0.0 else 0]
+                at = side[thing, side_met(scene, triangle, dx, dy, dz)]
                 if at >= 0:
                     points[found, 0], points[found, 1], points[found, 2], points[found, 3] = px, py, pz, way
                     which[found, 0], which[found, 1] = at, events
@@ -360,9 +348,9 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, side, poin
             if kind == BLACK:
                 break
             last, last_object = triangle, thing
-            dx, dy, dz, mask, alone, within, is_event, _ = scatter(
-                scene, triangle, u, v, dx, dy, dz, mask, alone, nm, choice(state, shift, events, noise)
+            draw = choice(state, shift, FIRST_CHOICE + events, noise, events)
+            dx, dy, dz, mask, alone, within, is_event, _, _ = scatter(
+                scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw
             )
-            if is_event:
-                events += 1
+            events += is_event
     return found

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..model.scene import Light
-from .camera_optics import inlined
+from .compiling import inlined
 from .photon_emission import frame_of
-from .photon_emit import _disc, _falloff
+from .photon_emit import concentric_disc, spot_falloff, shone
 
 POINT, DIRECTIONAL, COLLIMATED, AREA = range(4)
 
@@ -38,11 +38,16 @@ class CameraLights(NamedTuple):
     """float64 (L,): area (area light); radiance per irradiance (a sun of some size, else 0)."""
     cone: np.ndarray
     """float64 (L, 2): a spot's half angles, rad; beyond π for none."""
+    profile: np.ndarray
+    """int64 (L,): where its table begins among `tables`, -1 for none."""
+    tables: np.ndarray
+    """float64: intensities over directions, one light's after the other's (`ies_file.Profile.packed`)."""
 
 
 def camera_lights(lights: Sequence[Light], centre: np.ndarray) -> CameraLights:
     """The arrays for `lights`, about the world position `centre` (3,)."""
     count = len(lights)
+    tables = [light.profile.packed() for light in lights if light.profile is not None]
     packed = CameraLights(
         np.zeros(count, np.int32),
         np.zeros((count, 3)),
@@ -52,7 +57,10 @@ def camera_lights(lights: Sequence[Light], centre: np.ndarray) -> CameraLights:
         np.zeros(count, np.bool_),
         np.zeros(count),
         np.full((count, 2), 4.0),
+        np.full(count, -1),
+        np.concatenate([np.zeros(1), *tables]),
     )
+    begin = 1
     for i, light in enumerate(lights):
         axis = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
         frame = frame_of(axis, light.tangent)
@@ -60,12 +68,15 @@ def camera_lights(lights: Sequence[Light], centre: np.ndarray) -> CameraLights:
         packed.kind[i] = light.gpu_code
         packed.is_disc[i] = light.is_disc
         packed.cone[i] = light.cone
-        packed.measure[i] = light.area
+        packed.measure[i] = light.area if light.has_extent else 0.0
         if light.angular_radius > 0.0:
             half[:] = math.tan(light.angular_radius)
             packed.measure[i] = 1.0 / (math.pi * math.sin(light.angular_radius) ** 2)
         packed.position[i], packed.axis[i] = np.asarray(light.position, float) - centre, axis
         packed.half_u[i], packed.half_v[i] = half[0] * frame[0], half[1] * frame[1]
+        if light.profile is not None:
+            packed.profile[i], begin = begin, begin + len(light.profile.packed())
+            packed.half_u[i], packed.half_v[i] = light.across
     return packed
 
 
@@ -90,7 +101,7 @@ def sample_light(lights, i, px, py, pz, a, b):
     vx, vy, vz = lights.half_v[i, 0], lights.half_v[i, 1], lights.half_v[i, 2]
     kind = lights.kind[i]
     if kind == DIRECTIONAL:
-        s, t = _disc(a, b)
+        s, t = concentric_disc(a, b)
         tx, ty, tz = ax + s * ux + t * vx, ay + s * uy + t * vy, az + s * uz + t * vz
         length = math.sqrt(tx * tx + ty * ty + tz * tz)
         return -tx / length, -ty / length, -tz / length, np.inf, 1.0
@@ -102,7 +113,7 @@ def sample_light(lights, i, px, py, pz, a, b):
     if kind == AREA:
         s, t = 2.0 * a - 1.0, 2.0 * b - 1.0
         if lights.is_disc[i]:
-            s, t = _disc(a, b)
+            s, t = concentric_disc(a, b)
         wx, wy, wz = wx + s * ux + t * vx, wy + s * uy + t * vy, wz + s * uz + t * vz
     distance = max(math.sqrt(wx * wx + wy * wy + wz * wz), 1e-300)
     tx, ty, tz = wx / distance, wy / distance, wz / distance
@@ -111,7 +122,12 @@ def sample_light(lights, i, px, py, pz, a, b):
         return tx, ty, tz, distance, lights.measure[i] * max(facing, 0.0) / (distance * distance)
     kx, ky, kz = ty * az - tz * ay, tz * ax - tx * az, tx * ay - ty * ax
     angle = math.atan2(math.sqrt(kx * kx + ky * ky + kz * kz), facing)
-    return tx, ty, tz, distance, _falloff(lights.cone[i], angle) / (distance * distance)
+    shining = spot_falloff(lights.cone[i], angle)
+    if lights.profile[i] >= 0:
+        shining *= shone(
+            lights.tables, lights.profile[i], lights.axis[i], lights.half_u[i], lights.half_v[i], -tx, -ty, -tz
+        )
+    return tx, ty, tz, distance, shining / (distance * distance)
 
 
 @inlined

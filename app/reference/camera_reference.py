@@ -12,45 +12,33 @@ Pictures are kept by the content of their scene beside those of `photon_referenc
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import astuple, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model.content_key import ContentKey
 from ..model.scene import Scene
+from ..model.scene_key import picture_key
 from .camera_run import MAX_DEPTH, CameraPicture, CameraRun, summed_camera
-from .kept import kept_path, load_kept, save_kept
-from .photon_reference import scene_key
+from .code_key import code_key
+from .kept import continue_kept, kept_path
 from .photon_run import TALLY_SIZE
-from .rounds import PARTS, Cancelled, Progress, continue_run
+from .rounds import PARTS, Cancelled, Limits, Progress, continue_run
 
 if TYPE_CHECKING:
     from .spectral_caustic import CausticPlan, SpectralCaustic
 
-CAMERA_REFERENCE_VERSION = 1
-"""Grows whenever the same scene would give another picture."""
-CAUSTIC_VERSION = 3
-"""Grows whenever the same plan would give another caustic."""
 _SEED = 1
 _CAUSTIC_SHARE = 0.5
 """Of the progress bar, where there is a caustic to be made."""
 
 
-def camera_scene_key(scene: Scene, width: int, height: int, max_depth: int, caustic: CausticPlan | None) -> str:
-    """SHA-256 over everything the picture depends on, textures and what lies beyond included; names and notes do not
-    count."""
-    key = ContentKey(scene_key(scene, width, height, max_depth))
-    key.add("camera", CAMERA_REFERENCE_VERSION, None if caustic is None else (CAUSTIC_VERSION, *astuple(caustic)))
-    if scene.environment is None:
-        key.add("background", *(float(v) for v in scene.background_rgb))
-    else:
-        key.add("environment", scene.environment.rgb, np.asarray(scene.environment.world_to_local, float))
-    for index, item in enumerate(scene.objects):
-        if item.material.texture is not None:
-            key.add("texture", index, item.material.texture.rgb, item.material.texture.wrap, item.mesh.uv)
-    return key.hexdigest()
+def camera_reference_key(scene: Scene, width: int, height: int, max_depth: int, caustic: CausticPlan | None) -> str:
+    """SHA-256 over everything the picture depends on, the code that makes it included."""
+    plan = None if caustic is None else astuple(caustic)
+    return picture_key(scene, code_key("camera_run"), width, height, max_depth, plan)
 
 
 def render_camera_reference(
@@ -75,9 +63,8 @@ def render_camera_reference(
     any limit, UserError without numba or where too many solids nest.
     """
     progress(0.0, "preparing")
-    return continue_run(
-        CameraRun(scene, width, height, max_depth, seed, caustic), samples, seconds, target_relmse, progress, cancelled
-    )
+    limits = Limits(samples, seconds, target_relmse)
+    return continue_run(CameraRun(scene, width, height, max_depth, seed, caustic), limits, progress, cancelled)
 
 
 def cached_camera_reference(
@@ -100,49 +87,35 @@ def cached_camera_reference(
     the caustic's not counted. That is given as a plan and loaded, or made, only when samples are needed. A damaged file
     is ignored; a folder that cannot be written costs only the saving; an interrupt stores what is done.
     """
-    path = kept_path(camera_scene_key(scene, width, height, max_depth, caustic), folder)
-    shapes = {"sums": (PARTS, height, width, 3), "units": (PARTS,), "tallies": (PARTS, TALLY_SIZE), "seconds": ()}
-    stored = load_kept(path, shapes if caustic is None else shapes | {"caustic_photons": (), "caustic_relmse": ()})
-    looked_up = (
-        None if stored is None or caustic is None else (int(stored["caustic_photons"]), float(stored["caustic_relmse"]))
+
+    def picture_of(stored: Mapping[str, np.ndarray]) -> CameraPicture:
+        values = stored["sums"], stored["units"], stored["tallies"], float(stored["seconds"])
+        noted = int(stored["caustic_photons"]), float(stored["caustic_relmse"])
+        return summed_camera(*values, caustic is not None, noted)
+
+    def begin(stored: Mapping[str, np.ndarray] | None) -> CameraRun:
+        progress(0.0, "preparing")
+        tables, noise = None, 0.0
+        if caustic is not None:
+            tables, noise = _caustic(scene, width, height, max_depth, caustic, folder, progress)
+        run = CameraRun(scene, width, height, max_depth, _SEED, tables, noise)
+        if stored is not None:
+            run.restore(stored)
+        return run
+
+    path = kept_path(camera_reference_key(scene, width, height, max_depth, caustic), folder)
+    shapes = {"sums": (PARTS, height, width, 3), "units": (PARTS,), "tallies": (PARTS, TALLY_SIZE)}
+    shapes |= {"seconds": (), "caustic_photons": (), "caustic_relmse": ()}
+    first = 0.0 if caustic is None else _CAUSTIC_SHARE
+    return continue_kept(
+        path,
+        shapes,
+        picture_of,
+        begin,
+        Limits(samples, seconds, target_relmse),
+        lambda done, text: progress(first + (1.0 - first) * done, text),
+        cancelled,
     )
-    if stored is not None:
-        picture = summed_camera(
-            stored["sums"], stored["units"], stored["tallies"], float(stored["seconds"]), caustic is not None
-        )
-        if (samples is not None and picture.samples >= samples) or (
-            target_relmse is not None and picture.is_within(target_relmse)
-        ):
-            return _with_caustic(picture, looked_up)
-    progress(0.0, "preparing")
-    tables = None
-    if caustic is not None:
-        tables, noise = _caustic(scene, width, height, max_depth, caustic, folder, progress)
-        looked_up = looked_up or (tables.photons, noise)
-    run = CameraRun(scene, width, height, max_depth, _SEED, tables)
-    if stored is not None:
-        run.sums[:], run.units[:], run.tallies[:] = stored["sums"], stored["units"], stored["tallies"]
-        run.seconds = float(stored["seconds"])
-    before = run.samples
-    begin = 0.0 if caustic is None else _CAUSTIC_SHARE
-    try:
-        picture = continue_run(
-            run,
-            samples,
-            seconds,
-            target_relmse,
-            lambda done, text: progress(begin + (1.0 - begin) * done, text),
-            cancelled,
-        )
-    finally:
-        if run.samples > before:
-            more = {} if looked_up is None else {"caustic_photons": looked_up[0], "caustic_relmse": looked_up[1]}
-            save_kept(path, sums=run.sums, units=run.units, tallies=run.tallies, seconds=run.seconds, **more)
-    return _with_caustic(picture, looked_up)
-
-
-def _with_caustic(picture: CameraPicture, looked_up: tuple[int, float] | None) -> CameraPicture:
-    return picture if looked_up is None else replace(picture, caustic_photons=looked_up[0], caustic_relmse=looked_up[1])
 
 
 def _caustic(
@@ -152,7 +125,7 @@ def _caustic(
     from .caustic_cache import CachedCaustic
 
     any_number = replace(plan, photons=0, target_relmse=0.0)
-    key = camera_scene_key(scene, width, height, max_depth, any_number)
+    key = camera_reference_key(scene, width, height, max_depth, any_number)
     return CachedCaustic(scene, width, height, max_depth, plan, key, folder).grown(
         lambda done, text: progress(_CAUSTIC_SHARE * done, text)
     )

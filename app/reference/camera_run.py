@@ -6,6 +6,7 @@ of its own: the picture converges faster than random and still knows its own err
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -15,8 +16,8 @@ import numpy as np
 from ..base.errors import UserError
 from ..model.optics.colorimetry import xyz_to_rgb709
 from ..model.scene import Scene
-from .photon_run import RELMSE_EPSILON, TALLY_SIZE
-from .rounds import PARTS, Pace, trace_parts
+from .photon_run import TALLY_SIZE, relative_variance
+from .rounds import PARTS, PartsRun
 
 if TYPE_CHECKING:
     from .spectral_caustic import SpectralCaustic
@@ -42,9 +43,15 @@ class CameraPicture:
     lost: dict[str, float]
     """Share of paths given up: "depth" (too many events) and "numeric" (nothing met inside a solid)."""
     caustic_photons: int = 0
-    """Of the caustic that was looked up, where `cached_camera_reference` made it."""
+    """Of the caustic that was looked up."""
     caustic_relmse: float = 0.0
-    """What its noise adds to the picture's own error, about: a part of `variance`."""
+    """What its noise adds to the picture's own error, about, where `cached_camera_reference` measured it: a part of
+    `variance`."""
+
+    @property
+    def amount(self) -> int:
+        """Samples a pixel."""
+        return self.samples
 
     def rgb(self) -> np.ndarray:
         """Linear Rec.709, float64 (H, W, 3)."""
@@ -53,15 +60,14 @@ class CameraPicture:
     @cached_property
     def relmse(self) -> float:
         """The picture's own error, mean[var/(R² + ε)] as `ReferencePicture.relmse` has it; 0 for a black picture."""
-        epsilon = RELMSE_EPSILON * self.xyz.mean() ** 2
-        return float(np.mean(self.variance / (self.xyz**2 + epsilon))) if epsilon > 0.0 else 0.0
+        return relative_variance(self.xyz, self.variance)
 
     def is_within(self, target_relmse: float) -> bool:
         """Whether the error is known to be no larger; blackness is believed after many samples only."""
         return self.relmse <= target_relmse and (bool(self.xyz.any()) or self.samples >= _BLACK_SAMPLES)
 
 
-class CameraRun:
+class CameraRun(PartsRun[CameraPicture]):
     """Samples of one picture, added round by round; `picture()` at any time."""
 
     def __init__(
@@ -72,27 +78,28 @@ class CameraRun:
         max_depth: int = MAX_DEPTH,
         seed: int = 1,
         caustic: SpectralCaustic | None = None,
+        caustic_relmse: float = 0.0,
     ) -> None:
-        """Even and odd parts look up one half each of the caustic's photons, so that the picture's variance holds the
-        caustic's too.
+        """`caustic_relmse`: what the caustic's noise adds to the picture's error, to be noted with it.
 
-        Raises UserError where numba is missing or solids nest beyond reach."""
+        Even and odd parts look up one half each of the caustic's photons, so that the picture's variance holds the
+        caustic's too. Raises UserError where numba is missing or solids nest beyond reach.
+        """
         try:
             from . import (
                 camera_kernel,
                 camera_lights,
-                camera_optics,
                 camera_scene,
                 camera_start,
-                photon_kernel,
                 photon_scene,
+                sampling,
                 spectral_caustic,
             )
         except ImportError as error:
             raise UserError(
                 f"the camera's reference renderer needs numba ({error}); install it with: pip install numba"
             ) from error
-        self._kernel, self._scratch = camera_kernel, camera_optics.scratch
+        self._kernel, self._scratch = camera_kernel, sampling.scratch
         photons, centre = photon_scene.photon_scene(scene)
         self._scene = camera_scene.with_upsampled_mirrors(photons, scene)
         self._camera = photon_scene.viewpoint(scene.camera, width, height, centre)
@@ -103,21 +110,15 @@ class CameraRun:
             [caustic.half(number).tables for number in range(2)] if caustic else [spectral_caustic.no_caustic(scene)]
         )
         self._spectra = camera_scene.spectra(scene, caustic.plan.bins if caustic else 1)
-        self._sequences = [photon_kernel.scrambled(seed, part) for part in range(PARTS)]
+        self._sequences = [sampling.scrambled(seed, part) for part in range(PARTS)]
         self._max_depth = max_depth
-        self.sums = np.zeros((PARTS, height, width, 3))
-        self.units = np.zeros(PARTS, np.int64)
-        """Samples of a pixel by each part."""
-        self.tallies = np.zeros((PARTS, TALLY_SIZE))
-        self.seconds = 0.0
-        self._pace = Pace()
+        self._caustic_noted = caustic.photons if caustic else 0, caustic_relmse
+        super().__init__((height, width, 3), TALLY_SIZE)
 
     @property
     def samples(self) -> int:
         """Samples of every pixel so far."""
-        return int(self.units.sum())
-
-    amount = samples
+        return self.amount
 
     @property
     def amount_words(self) -> str:
@@ -129,19 +130,20 @@ class CameraRun:
         """Whether the sequence has no fresh points left."""
         return int(self.units.max()) >= _LAST_SAMPLE
 
-    def advance(self, samples_left: int | None = None, seconds_left: float | None = None) -> None:
-        """One round of all parts, about half a second or what is left. An interrupt keeps the parts that were
-        finished."""
-        count = self._pace.units
-        if samples_left is not None:
-            count = min(count, max(1, -(-samples_left // PARTS)))
-        took = trace_parts(self._trace_part, count)
-        self.seconds += took
-        self._pace.learn(count, took, seconds_left)
-
     def picture(self) -> CameraPicture:
         """What has been gathered; black without variance before the first round."""
-        return summed_camera(self.sums, self.units, self.tallies, self.seconds, len(self._tables) > 1)
+        halves = len(self._tables) > 1
+        return summed_camera(self.sums, self.units, self.tallies, self.seconds, halves, self._caustic_noted)
+
+    def kept(self) -> dict[str, object]:
+        """With what is noted of the caustic."""
+        photons, relmse = self._caustic_noted
+        return super().kept() | {"caustic_photons": photons, "caustic_relmse": relmse}
+
+    def restore(self, stored: Mapping[str, np.ndarray]) -> None:
+        """With what was noted of the caustic then: it may have grown since."""
+        super().restore(stored)
+        self._caustic_noted = int(stored["caustic_photons"]), float(stored["caustic_relmse"])
 
     def _trace_part(self, part: int, count: int) -> None:
         self._kernel.trace_camera(
@@ -164,7 +166,12 @@ class CameraRun:
 
 
 def summed_camera(
-    sums: np.ndarray, units: np.ndarray, tallies: np.ndarray, seconds: float, measured_passes: bool = False
+    sums: np.ndarray,
+    units: np.ndarray,
+    tallies: np.ndarray,
+    seconds: float,
+    halves: bool = False,
+    caustic_noted: tuple[int, float] = (0, 0.0),
 ) -> CameraPicture:
     """The picture from the sums (PARTS, H, W, 3) and tallies (PARTS, TALLY_SIZE) of parts with `units` (PARTS,) samples
     a pixel.
@@ -174,7 +181,7 @@ def summed_camera(
     total = max(int(units.sum()), 1)
     mean = sums.sum(axis=0) / total
     variance = np.zeros_like(mean)
-    if measured_passes:
+    if halves:
         sums, units = (np.stack([values[half::2].sum(axis=0) for half in range(2)]) for values in (sums, units))
     used = np.flatnonzero(units)
     if len(used) > 1:
@@ -182,6 +189,5 @@ def summed_camera(
             variance += units[part] / total * (sums[part] / units[part] - mean) ** 2
         variance /= len(used) - 1
     lost = tallies.sum(axis=0)[:2] / (total * mean.shape[0] * mean.shape[1])
-    return CameraPicture(
-        mean, variance, total if used.size else 0, seconds, {"depth": float(lost[0]), "numeric": float(lost[1])}
-    )
+    fates = {"depth": float(lost[0]), "numeric": float(lost[1])}
+    return CameraPicture(mean, variance, total if used.size else 0, seconds, fates, *caustic_noted)

@@ -18,7 +18,7 @@ from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, daylight_per_lu
 from ..model.optics.spectrum import cmf_at
 from ..model.scene import Scene
 from ..model.texture import Texture
-from .camera_optics import inlined
+from .compiling import inlined
 from .photon_scene import TABLE_NM, PhotonScene, reflectance_classes
 
 _EVEN_SHARE = 0.2

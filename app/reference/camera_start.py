@@ -7,14 +7,14 @@ import numpy as np
 from ..model.scene import Scene
 from ..model.scene_checks import contains
 from .camera_kernel import Start
-from .photon_kernel import _AIR
 from .photon_scene import PhotonScene
+from .scattering import AIR
 
 
 def camera_start(scene: Scene, photons: PhotonScene) -> Start:
     """The medium at the camera's position (of an orthographic camera too: its rays all begin as the middle one
     does)."""
-    mask, alone = 0, _AIR
+    mask, alone = 0, AIR
     for index, item in enumerate(scene.objects):
         if item.material.transmits and contains(item, np.array(scene.camera.position)):
             if photons.bit[index] >= 0:

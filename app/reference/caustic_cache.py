@@ -15,11 +15,11 @@ from ..model.content_key import ContentKey
 from ..model.scene import Scene
 from .camera_run import CameraRun
 from .kept import kept_path, load_kept, save_kept
-from .photon_run import RELMSE_EPSILON
+from .photon_run import relative_variance
 from .rounds import PARTS, Progress
 from .spectral_caustic import CausticPlan, CausticRun, SpectralCaustic
 
-_FIRST_LOOK = 1 << 22
+_FIRST_STEP = 1 << 22
 """Photons after which the noise is measured first."""
 _NOISE_SAMPLES = 128
 """Of each pixel, by which it is measured."""
@@ -109,7 +109,7 @@ class CachedCaustic:
 def picture_noise(scene: Scene, width: int, height: int, max_depth: int, caustic: SpectralCaustic) -> float:
     """relMSE that the caustic's noise adds to a picture, mean[var/(R² + ε)].
 
-    Both passes are looked up by the same paths, and what the parts' differences have in common is no noise of the
+    Both halves are looked up by the same paths, and what the parts' differences have in common is no noise of the
     paths.
     """
     runs = [CameraRun(scene, width, height, max_depth, caustic=caustic.half(number)) for number in range(2)]
@@ -120,8 +120,7 @@ def picture_noise(scene: Scene, width: int, height: int, max_depth: int, caustic
     apart = even - odd
     variance = 0.25 * (apart.sum(axis=0) ** 2 - (apart**2).sum(axis=0)) / (PARTS * (PARTS - 1))
     mean = 0.5 * (even + odd).mean(axis=0)
-    epsilon = RELMSE_EPSILON * float(mean.mean()) ** 2
-    return max(float(np.mean(variance / (mean**2 + epsilon))), 0.0) if epsilon > 0.0 else 0.0
+    return max(relative_variance(mean, variance), 0.0)
 
 
 def _goal(plan: CausticPlan, measured: int, noise: float) -> int:
@@ -129,7 +128,7 @@ def _goal(plan: CausticPlan, measured: int, noise: float) -> int:
     if plan.target_relmse <= 0.0:
         return plan.photons
     if not measured:
-        return min(_FIRST_LOOK, plan.photons)
+        return min(_FIRST_STEP, plan.photons)
     if noise <= plan.target_relmse or measured >= plan.photons:
         return measured
     return int(min(max(_SPARE * noise / plan.target_relmse, _MIN_STEP) * measured, plan.photons))

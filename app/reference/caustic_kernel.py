@@ -10,22 +10,15 @@ from __future__ import annotations
 import numpy as np
 
 from .camera_kernel import on_plane, texel_of
-from .camera_optics import (
-    AIR,
-    choice,
-    scatter,
-    sobol_next,
-    sobol_start,
-    stripped,
-    transmitted,
-)
-from .photon_emit import emit, search
+from .compiling import compiled
+from .photon_emit import emit_coloured
 from .photon_intersect import nearest
-from .photon_kernel import _mixed, _unit
 from .photon_scene import BLACK, DIFFUSE
+from .sampling import FIRST_CHOICE, choice, mixed, sobol_next, sobol_start
+from .scattering import AIR, scatter, side_met, transmitted
 
 
-@stripped
+@compiled
 def land(scene, domain, colour, band_of, side, sequence, first, count, share, max_depth, points, watts, ends, scratch):
     """Trace photons [first, first + count) of a domain and note those that land after glass or a mirror: their number.
 
@@ -40,17 +33,8 @@ def land(scene, domain, colour, band_of, side, sequence, first, count, share, ma
     for i in range(first, first + count):
         if i > first:
             sobol_next(sequence, i, state)
-        c, e = (_unit(state[3]), _unit(state[4])) if domain.extended else (0.5, 0.5)
-        px, py, pz, dx, dy, dz, watt, row, column = emit(domain, _unit(state[0]), _unit(state[1]), c, e)
-        if watt <= 0.0:
-            continue
-        chance = _unit(state[2])
-        atom = search(colour.cdf, chance)
-        nm = colour.start_nm[atom] + colour.width_nm[atom] * (chance - colour.cdf[atom]) / (
-            colour.cdf[atom + 1] - colour.cdf[atom]
-        )
-        watt *= colour.watt[atom] * share
-        noise = _mixed(sequence.key ^ _mixed(np.uint64(i)))
+        px, py, pz, dx, dy, dz, watt, row, column, atom, nm = emit_coloured(domain, colour, share, state)
+        noise = mixed(sequence.key ^ mixed(np.uint64(i)))
         last, last_object, within, mask, alone, events = -1, -1, False, np.uint64(0), AIR, 0
         while watt > 0.0:
             t, triangle, u, v = nearest(
@@ -65,10 +49,7 @@ def land(scene, domain, colour, band_of, side, sequence, first, count, share, ma
             if kind == BLACK or (kind != DIFFUSE and events >= max_depth):
                 break
             if kind == DIFFUSE:
-                facing = (
-                    dx * scene.normals[triangle, 0] + dy * scene.normals[triangle, 1] + dz * scene.normals[triangle, 2]
-                )
-                at = side[thing, 1 if facing > 0.0 else 0]
+                at = side[thing, side_met(scene, triangle, dx, dy, dz)]
                 if events > 0 and at >= 0:  # straight from the light it is no caustic
                     points[landed, 0], points[landed, 1], points[landed, 2] = px, py, pz
                     watts[landed] = watt
@@ -76,16 +57,16 @@ def land(scene, domain, colour, band_of, side, sequence, first, count, share, ma
                     landed += 1
                 break
             last, last_object = triangle, thing
-            dx, dy, dz, mask, alone, within, is_event, kept = scatter(
-                scene, triangle, u, v, dx, dy, dz, mask, alone, nm, choice(state, shift, events, noise)
+            draw = choice(state, shift, FIRST_CHOICE + events, noise, events)
+            dx, dy, dz, mask, alone, within, is_event, kept, _ = scatter(
+                scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw
             )
             watt *= kept
-            if is_event:
-                events += 1
+            events += is_event
     return landed
 
 
-@stripped
+@compiled
 def gather(tables, points, watts, ends, count, sums):
     """Add landed photons to `sums` (as `CausticTables.irradiance`, but W a texel).
 

@@ -6,8 +6,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..model.scene import Scene
-from .photon_intersect import STACK_SIZE, compiled, nearest
+from .camera_rays import camera_ray
+from .compiling import compiled
+from .photon_intersect import nearest
 from .photon_scene import MIRROR, photon_scene, viewpoint
+from .sampling import scratch
 
 
 def seen_directly(scene: Scene, width: int, height: int) -> np.ndarray:
@@ -19,30 +22,17 @@ def seen_directly(scene: Scene, width: int, height: int) -> np.ndarray:
     camera = viewpoint(scene.camera, width, height, centre)
     corners = np.zeros((height + 1, width + 1), np.bool_)
     middles = np.zeros((height, width), np.bool_)
-    _specular(photons, camera, 0.0, corners)
-    _specular(photons, camera, 0.5, middles)
+    _specular(photons, camera, 0.0, corners, scratch())
+    _specular(photons, camera, 0.5, middles, scratch())
     touched = corners[:-1, :-1] | corners[1:, :-1] | corners[:-1, 1:] | corners[1:, 1:]
     return ~(touched | middles)
 
 
 @compiled
-def _specular(scene, camera, offset, hit):
+def _specular(scene, camera, offset, hit, scratch):
     """Set `hit` where the camera ray at (row + offset, column + offset) pixels meets glass or a mirror first."""
-    stack, stack_distance = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)
     for row in range(hit.shape[0]):
-        y = camera.half_height * (1.0 - 2.0 * (row + offset) / camera.height)
         for column in range(hit.shape[1]):
-            x = camera.half_width * (2.0 * (column + offset) / camera.width - 1.0)
-            ax = x * camera.right[0] + y * camera.up[0]
-            ay = x * camera.right[1] + y * camera.up[1]
-            az = x * camera.right[2] + y * camera.up[2]
-            ox, oy, oz = camera.position[0], camera.position[1], camera.position[2]
-            dx, dy, dz = camera.forward[0], camera.forward[1], camera.forward[2]
-            if camera.orthographic:
-                ox, oy, oz = ox + ax, oy + ay, oz + az
-            else:
-                dx, dy, dz = dx + ax, dy + ay, dz + az
-                length = np.sqrt(dx * dx + dy * dy + dz * dz)
-                dx, dy, dz = dx / length, dy / length, dz / length
-            found = nearest(scene, ox, oy, oz, dx, dy, dz, -1, -1, False, np.uint64(0), stack, stack_distance)
-            hit[row, column] = found[1] >= 0 and scene.kind[scene.owner[found[1]]] >= MIRROR
+            ray = camera_ray(camera, column + offset, row + offset)
+            _, triangle, _, _ = nearest(scene, *ray, -1, -1, False, np.uint64(0), scratch.stack, scratch.stack_distance)
+            hit[row, column] = triangle >= 0 and scene.kind[scene.owner[triangle]] >= MIRROR

@@ -73,6 +73,10 @@ class Emitter:
 
         radial = float(np.sqrt(np.prod(spacing)))
 
+        if light.profile is not None:
+            u, v = light.across
+            horizontal = np.arctan2(direction @ v, direction @ u)
+            share = share * light.profile.at(angle_between(direction, axis), horizontal)
         inner, outer = light.cone
         if outer < np.pi:
             return share * (

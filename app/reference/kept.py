@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -17,6 +17,7 @@ import numpy as np
 from ..base import paths
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
+from .rounds import Cancelled, EstimateT, Limits, PartsRun, Progress, continue_run
 
 _CACHE_BYTES = 2 << 30
 
@@ -55,6 +56,32 @@ def save_kept(path: Path | None, **arrays: object) -> None:
         with atomic_output(path) as temporary:
             np.savez(temporary, **arrays)  # type: ignore[arg-type]
         _forget_oldest(path.parent, path)
+
+
+def continue_kept(
+    path: Path | None,
+    shapes: Mapping[str, tuple[int, ...]],
+    picture_of: Callable[[Mapping[str, np.ndarray]], EstimateT],
+    begin: Callable[[Mapping[str, np.ndarray] | None], PartsRun[EstimateT]],
+    limits: Limits,
+    progress: Progress,
+    cancelled: Cancelled,
+) -> EstimateT:
+    """The picture of what `path` holds, where that is good enough, otherwise of that and more, stored again.
+
+    `picture_of` makes it from the arrays that `shapes` names; `begin` gives the run that goes on from them (None: from
+    nothing). An interrupt (KeyboardInterrupt) stores what is done and goes on upwards.
+    """
+    stored = load_kept(path, shapes)
+    if stored is not None and limits.are_met_by(picture := picture_of(stored)):
+        return picture
+    run = begin(stored)
+    before = run.amount
+    try:
+        return continue_run(run, limits, progress, cancelled)
+    finally:
+        if run.amount > before:
+            save_kept(path, **run.kept())
 
 
 def _forget_oldest(folder: Path, newest: Path) -> None:

@@ -49,6 +49,8 @@ class Domain(NamedTuple):
     """The light's own axis."""
     cone: np.ndarray
     """float64 (2,): a spot's half angles, rad; beyond π for none."""
+    profile: np.ndarray
+    """float64: a lamp's intensities over directions, as `ies_file.Profile.packed` has them; empty without."""
     back: float
     """How far before the plane rays start (PLANE)."""
     tilt: float
@@ -61,7 +63,7 @@ class Domain(NamedTuple):
     """Two more random numbers place a photon on the light."""
     half_u: np.ndarray
     half_v: np.ndarray
-    """An area light's middle to its rim."""
+    """An area light's middle to its rim; where a profile's horizontal angle is 0 and 90°."""
     target: np.ndarray
     """Middle of the sphere round all specular objects (AREA)."""
     radius: float
@@ -133,6 +135,7 @@ def _domain(
         measure,
         axis,
         np.array([4.0, 4.0]),
+        np.zeros(0),
         0.0,
         0.0,
         np.zeros(4),
@@ -206,6 +209,9 @@ def _directions(light: Light, triangles: np.ndarray, position: np.ndarray, direc
     for frame in charts:
         limit = np.array([[-np.inf] * 2, [np.inf] * 2]) if narrow else np.array([[-1.0] * 2, [1.0] * 2])
         domain = _chart(frame, relative @ frame.T, limit, position, direction, cone)
+        if domain is not None and light.profile is not None:
+            u, v = light.across
+            domain = domain._replace(profile=light.profile.packed(), half_u=u, half_v=v)
         if domain is not None:
             found.append(domain)
     return found

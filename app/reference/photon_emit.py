@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from .photon_intersect import compiled
+from .compiling import compiled, inlined
+from .sampling import unit
 
 GRID = 64
 """Cells a side of a domain's density."""
@@ -26,7 +27,7 @@ def search(cdf, value):
 
 
 @compiled
-def _disc(a, b):
+def concentric_disc(a, b):
     """Uniform point of the unit disc, neighbours kept together (Shirley and Chiu 1997)."""
     x, y = 2.0 * a - 1.0, 2.0 * b - 1.0
     if x == 0.0 and y == 0.0:
@@ -39,7 +40,7 @@ def _disc(a, b):
 
 
 @compiled
-def _falloff(cone, angle):
+def spot_falloff(cone, angle):
     """A spot's edge: 1 inside, 0 outside, a smoothstep of the angle between (a hard edge where there is none)."""
     if angle > cone[1]:
         return 0.0
@@ -47,6 +48,41 @@ def _falloff(cone, angle):
         return 1.0
     t = (cone[1] - angle) / (cone[1] - cone[0])
     return t * t * (3.0 - 2.0 * t)
+
+
+@compiled
+def _between(table, first, count, angle):
+    """Stretch of an ascending list of `count` angles at `first` that holds `angle`, and how far along it (0 to 1)."""
+    k = 0
+    while k < count - 2 and table[first + k + 1] <= angle:
+        k += 1
+    along = (angle - table[first + k]) / (table[first + k + 1] - table[first + k])
+    return k, min(max(along, 0.0), 1.0)
+
+
+@compiled
+def _shine(table, start, vertical, horizontal):
+    """Share of its peak that a lamp's table at `start` (`ies_file.Profile.packed`) has at these angles, rad (any turn).
+
+    Bilinear: the weighted sum of the four values round the angles."""
+    verticals, horizontals = int(table[start]), int(table[start + 1])
+    turn = horizontal - 2.0 * math.pi * math.floor(horizontal / (2.0 * math.pi))
+    j, t = _between(table, start + 2, verticals, vertical)
+    i, s = _between(table, start + 2 + verticals, horizontals, turn)
+    at = start + 2 + verticals + horizontals + i * verticals + j
+    below = (1.0 - s) * table[at] + s * table[at + verticals]
+    above = (1.0 - s) * table[at + 1] + s * table[at + verticals + 1]
+    return (1.0 - t) * below + t * above
+
+
+@compiled
+def shone(table, start, axis, u, v, dx, dy, dz):
+    """The same towards a unit direction; `u`, `v`: where the horizontal angle is 0 and 90°."""
+    ax, ay, az = axis[0], axis[1], axis[2]
+    kx, ky, kz = dy * az - dz * ay, dz * ax - dx * az, dx * ay - dy * ax
+    vertical = math.atan2(math.sqrt(kx * kx + ky * ky + kz * kz), dx * ax + dy * ay + dz * az)
+    across_u, across_v = dx * u[0] + dy * u[1] + dz * u[2], dx * v[0] + dy * v[1] + dz * v[2]
+    return _shine(table, start, vertical, math.atan2(across_v, across_u))
 
 
 @compiled
@@ -71,7 +107,7 @@ def emit(domain, a, b, c, d):
             u, v = (x - domain.aperture[0]) / domain.aperture[2], (y - domain.aperture[1]) / domain.aperture[3]
             if u * u + v * v > 1.0:
                 weight = 0.0
-        tx, ty = _disc(c, d)
+        tx, ty = concentric_disc(c, d)
         tx, ty = tx * domain.tilt, ty * domain.tilt
         scale = 1.0 / math.sqrt(1.0 + tx * tx + ty * ty)
         dx = (tx * f[0, 0] + ty * f[1, 0] + f[2, 0]) * scale
@@ -93,11 +129,13 @@ def emit(domain, a, b, c, d):
             ax, ay, az = domain.axis[0], domain.axis[1], domain.axis[2]
             kx, ky, kz = dy * az - dz * ay, dz * ax - dx * az, dx * ay - dy * ax
             angle = math.atan2(math.sqrt(kx * kx + ky * ky + kz * kz), dx * ax + dy * ay + dz * az)
-            weight *= _falloff(domain.cone, angle)
+            weight *= spot_falloff(domain.cone, angle)
+        if domain.profile.shape[0] > 0:
+            weight *= shone(domain.profile, 0, domain.axis, domain.half_u, domain.half_v, dx, dy, dz)
         return px, py, pz, dx, dy, dz, weight, row, column
     tx, ty = 2.0 * c - 1.0, 2.0 * d - 1.0
     if domain.is_disc:
-        tx, ty = _disc(c, d)
+        tx, ty = concentric_disc(c, d)
     px += tx * domain.half_u[0] + ty * domain.half_v[0]
     py += tx * domain.half_u[1] + ty * domain.half_v[1]
     pz += tx * domain.half_u[2] + ty * domain.half_v[2]
@@ -123,3 +161,16 @@ def emit(domain, a, b, c, d):
     facing = dx * domain.axis[0] + dy * domain.axis[1] + dz * domain.axis[2]
     weight *= 2.0 * math.pi * lack * max(facing, 0.0)
     return px, py, pz, dx, dy, dz, weight, row, column
+
+
+@inlined
+def emit_coloured(domain, colour, share, state):
+    """A photon of one wavelength from a point of the sequence: (as `emit`, weight in W times `share`, …, atom, nm)."""
+    c, d = (unit(state[3]), unit(state[4])) if domain.extended else (0.5, 0.5)
+    px, py, pz, dx, dy, dz, watt, row, column = emit(domain, unit(state[0]), unit(state[1]), c, d)
+    chance = unit(state[2])
+    atom = search(colour.cdf, chance)
+    nm = colour.start_nm[atom] + colour.width_nm[atom] * (chance - colour.cdf[atom]) / (
+        colour.cdf[atom + 1] - colour.cdf[atom]
+    )
+    return px, py, pz, dx, dy, dz, watt * (colour.watt[atom] * share), row, column, atom, nm

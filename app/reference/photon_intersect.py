@@ -7,23 +7,13 @@ record of what it is inside of tells which surface it has crossed already.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-from numba import njit
+
+from .compiling import compiled, inlined
 
 SLACK = 1e-10
 """Barycentric: facets that share an edge overlap by this much, so that no ray slips between them."""
 STACK_SIZE = 64
-
-
-def compiled(function: Callable) -> Callable:
-    """`function` as machine code, kept on disk where some folder can be written (else compiled anew each run)."""
-    options = {"nogil": True, "error_model": "numpy"}
-    try:
-        return njit(cache=True, **options)(function)
-    except RuntimeError:  # numba: no folder for the cache
-        return njit(**options)(function)
 
 
 @compiled
@@ -50,6 +40,28 @@ def _enter(bounds, node, ox, oy, oz, ix, iy, iz, far):
 @compiled
 def _inverse(component):
     return 1.0 / component if abs(component) > 1e-200 else 1e200
+
+
+@inlined
+def _meets(scene, i, ox, oy, oz, dx, dy, dz):
+    """(whether the ray's line meets facet i, distance, u, v, which way it crosses: > 0 inwards); Möller and Trumbore
+    1997."""
+    e1x, e1y, e1z = scene.corners[i, 3], scene.corners[i, 4], scene.corners[i, 5]
+    e2x, e2y, e2z = scene.corners[i, 6], scene.corners[i, 7], scene.corners[i, 8]
+    px, py, pz = dy * e2z - dz * e2y, dz * e2x - dx * e2z, dx * e2y - dy * e2x
+    determinant = e1x * px + e1y * py + e1z * pz
+    if determinant == 0.0:
+        return False, 0.0, 0.0, 0.0, 0.0
+    inverse = 1.0 / determinant
+    sx, sy, sz = ox - scene.corners[i, 0], oy - scene.corners[i, 1], oz - scene.corners[i, 2]
+    u = (sx * px + sy * py + sz * pz) * inverse
+    if not -SLACK <= u <= 1.0 + SLACK:
+        return False, 0.0, 0.0, 0.0, 0.0
+    qx, qy, qz = sy * e1z - sz * e1y, sz * e1x - sx * e1z, sx * e1y - sy * e1x
+    v = (dx * qx + dy * qy + dz * qz) * inverse
+    if not (v >= -SLACK and u + v <= 1.0 + SLACK):
+        return False, 0.0, 0.0, 0.0, 0.0
+    return True, (e2x * qx + e2y * qy + e2z * qz) * inverse, u, v, -determinant
 
 
 @compiled
@@ -79,24 +91,9 @@ def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stac
             for i in range(first, first + scene.node_count[node]):
                 if i == last:
                     continue
-                e1x, e1y, e1z = scene.corners[i, 3], scene.corners[i, 4], scene.corners[i, 5]
-                e2x, e2y, e2z = scene.corners[i, 6], scene.corners[i, 7], scene.corners[i, 8]
-                # Möller and Trumbore 1997.
-                px, py, pz = dy * e2z - dz * e2y, dz * e2x - dx * e2z, dx * e2y - dy * e2x
-                determinant = e1x * px + e1y * py + e1z * pz
-                if determinant == 0.0:
+                hit, t, u, v, facing = _meets(scene, i, ox, oy, oz, dx, dy, dz)
+                if not hit:
                     continue
-                inverse = 1.0 / determinant
-                sx, sy, sz = ox - scene.corners[i, 0], oy - scene.corners[i, 1], oz - scene.corners[i, 2]
-                u = (sx * px + sy * py + sz * pz) * inverse
-                if not -SLACK <= u <= 1.0 + SLACK:
-                    continue
-                qx, qy, qz = sy * e1z - sz * e1y, sz * e1x - sx * e1z, sx * e1y - sy * e1x
-                v = (dx * qx + dy * qy + dz * qz) * inverse
-                if not (v >= -SLACK and u + v <= 1.0 + SLACK):
-                    continue
-                t = (e2x * qx + e2y * qy + e2z * qz) * inverse
-                facing = -determinant
                 key = t + near if nested and facing > 0.0 else t
                 if key >= best_key or t <= -near:
                     continue
@@ -143,21 +140,9 @@ def blocked(scene, ox, oy, oz, dx, dy, dz, far, last, stack):
             for i in range(first, first + scene.node_count[node]):
                 if i == last:
                     continue
-                e1x, e1y, e1z = scene.corners[i, 3], scene.corners[i, 4], scene.corners[i, 5]
-                e2x, e2y, e2z = scene.corners[i, 6], scene.corners[i, 7], scene.corners[i, 8]
-                px, py, pz = dy * e2z - dz * e2y, dz * e2x - dx * e2z, dx * e2y - dy * e2x
-                determinant = e1x * px + e1y * py + e1z * pz
-                if determinant == 0.0:
-                    continue
-                inverse = 1.0 / determinant
-                sx, sy, sz = ox - scene.corners[i, 0], oy - scene.corners[i, 1], oz - scene.corners[i, 2]
-                u = (sx * px + sy * py + sz * pz) * inverse
-                qx, qy, qz = sy * e1z - sz * e1y, sz * e1x - sx * e1z, sx * e1y - sy * e1x
-                v = (dx * qx + dy * qy + dz * qz) * inverse
-                if u >= -SLACK and v >= -SLACK and u + v <= 1.0 + SLACK:
-                    t = (e2x * qx + e2y * qy + e2z * qz) * inverse
-                    if scene.near < t < far:
-                        return True
+                hit, t, _, _, _ = _meets(scene, i, ox, oy, oz, dx, dy, dz)
+                if hit and scene.near < t < far:
+                    return True
         else:
             left = scene.node_first[node]
             if _enter(scene.node_bounds, left, ox, oy, oz, ix, iy, iz, far) < np.inf:

@@ -12,50 +12,24 @@ independent parts and how far each went, so that a later call goes on with fresh
 
 from __future__ import annotations
 
-from dataclasses import astuple
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from ..model.content_key import ContentKey
-from ..model.optics.colorimetry import VISIBLE_NM
-from ..model.scene import Dielectric, Diffuse, Mirror, Scene
-from .kept import kept_path, load_kept, save_kept
+from ..model.scene import Scene
+from ..model.scene_key import scene_key
+from .code_key import code_key
+from .kept import continue_kept, kept_path
 from .photon_run import TALLY_SIZE, ReferencePicture, ReferenceRun, summed
-from .rounds import PARTS, Cancelled, Progress, continue_run
+from .rounds import PARTS, Cancelled, Limits, Progress, continue_run
 
-REFERENCE_VERSION = 1
-"""Grows whenever the same scene would give another picture."""
 _SEED = 1
 
 
-def scene_key(scene: Scene, width: int, height: int, max_depth: int) -> str:
-    """SHA-256 over everything the picture depends on: names, notes and the background do not count."""
-    key = ContentKey()
-    key.add("version", REFERENCE_VERSION, width, height, max_depth)
-    key.add("camera", *astuple(scene.camera))
-    for light in scene.lights:
-        spectrum = light.spectral_power
-        fields = {name: value for name, value in vars(light).items() if name not in ("name", "spectral_power")}
-        key.add("light", spectrum.density, spectrum.lines, *(_plain(fields[name]) for name in sorted(fields)))
-    for item in scene.objects:
-        mesh = item.mesh
-        key.add("mesh", mesh.vertices, mesh.triangles, np.asarray(item.object_to_world, float))
-        key.add("normals", mesh.corner_normals if mesh.corner_normals is not None else None)
-        key.add("material", type(item.material).__name__)
-        match item.material:
-            case Dielectric(dispersion=dispersion, absorption=absorption, priority=priority):
-                key.add(
-                    "glass",
-                    dispersion.index(VISIBLE_NM),
-                    priority,
-                    None if absorption is None else absorption.coefficient,
-                )
-            case Mirror(reflectance_rgb=rgb):
-                key.add("mirror", *(float(v) for v in rgb))
-            case Diffuse(reflectance_rgb=rgb, reflectance=reflectance):
-                key.add("diffuse", *(float(v) for v in rgb), reflectance)
-    return key.hexdigest()
+def reference_key(scene: Scene, width: int, height: int, max_depth: int) -> str:
+    """SHA-256 over everything the picture depends on, the code that makes it included."""
+    return scene_key(scene, code_key("photon_run"), width, height, max_depth)
 
 
 def render_reference(
@@ -77,9 +51,8 @@ def render_reference(
     without numba or where too many solids nest.
     """
     progress(0.0, "preparing")
-    return continue_run(
-        ReferenceRun(scene, width, height, max_depth, seed), photons, seconds, target_relmse, progress, cancelled
-    )
+    limits = Limits(photons, seconds, target_relmse)
+    return continue_run(ReferenceRun(scene, width, height, max_depth, seed), limits, progress, cancelled)
 
 
 def cached_reference(
@@ -101,43 +74,20 @@ def cached_reference(
     now: with `seconds` alone every call adds. A damaged file is ignored; a folder that cannot be written
     costs only the saving. An interrupt (KeyboardInterrupt) stores what is done and goes on upwards.
     """
-    path = kept_path(scene_key(scene, width, height, max_depth), folder)
-    stored = load_kept(
-        path,
-        {
-            "sums": (PARTS, height, width, 3),
-            "units": (PARTS,),
-            "tallies": (PARTS, TALLY_SIZE),
-            "seconds": (),
-            "unit": (),
-        },
-    )
-    if stored is not None:
-        picture = summed(
-            stored["sums"], stored["units"], stored["tallies"], int(stored["unit"]), float(stored["seconds"])
-        )
-        if _suffices(picture, photons, target_relmse):
-            return picture
-    progress(0.0, "preparing")
-    run = ReferenceRun(scene, width, height, max_depth, _SEED)
-    if stored is not None and int(stored["unit"]) == run.unit:
-        run.sums[:], run.units[:], run.tallies[:] = stored["sums"], stored["units"], stored["tallies"]
-        run.seconds = float(stored["seconds"])
-    before = run.photons
-    try:
-        return continue_run(run, photons, seconds, target_relmse, progress, cancelled)
-    finally:
-        if run.photons > before:
-            save_kept(path, sums=run.sums, units=run.units, tallies=run.tallies, seconds=run.seconds, unit=run.unit)
 
+    def picture_of(stored: Mapping[str, np.ndarray]) -> ReferencePicture:
+        values = stored["sums"], stored["units"], stored["tallies"]
+        return summed(*values, int(stored["unit"]), float(stored["seconds"]))
 
-def _suffices(picture: ReferencePicture, photons: int | None, target_relmse: float | None) -> bool:
-    enough = photons is not None and picture.photons >= photons
-    return enough or (target_relmse is not None and picture.is_within(target_relmse))
+    def begin(stored: Mapping[str, np.ndarray] | None) -> ReferenceRun:
+        progress(0.0, "preparing")
+        run = ReferenceRun(scene, width, height, max_depth, _SEED)
+        if stored is not None and int(stored["unit"]) == run.unit:
+            run.restore(stored)
+        return run
 
-
-def _plain(value: object) -> object:
-    """A light's field so that equal values print alike (1 and 1.0, tuples of numpy numbers)."""
-    if isinstance(value, str | bool) or value is None:
-        return value
-    return tuple(float(v) for v in np.ravel(value))
+    path = kept_path(reference_key(scene, width, height, max_depth), folder)
+    shapes = {"sums": (PARTS, height, width, 3), "units": (PARTS,), "tallies": (PARTS, TALLY_SIZE)}
+    shapes |= {"seconds": (), "unit": ()}
+    limits = Limits(photons, seconds, target_relmse)
+    return continue_kept(path, shapes, picture_of, begin, limits, progress, cancelled)

@@ -15,7 +15,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..model.optics.colorimetry import rgb709_to_xyz, rgb709_to_xyz_matrix
 from ..model.scene import Scene
-from .rounds import PARTS, Pace, trace_parts
+from .rounds import PARTS, Pace, PartsRun
 
 if TYPE_CHECKING:
     from .photon_emission import Domain
@@ -37,6 +37,12 @@ _LAST_POINT = 2**31
 _BLACK_PHOTONS = 1 << 20
 
 
+def relative_variance(values: np.ndarray, variance: np.ndarray) -> float:
+    """mean[variance / (values² + ε)], as relMSE weighs errors; 0 where all is black."""
+    epsilon = RELMSE_EPSILON * float(values.mean()) ** 2 if values.size else 0.0
+    return float(np.mean(variance / (values**2 + epsilon))) if epsilon > 0.0 else 0.0
+
+
 @dataclass(frozen=True)
 class ReferencePicture:
     """A converged picture and what is known of its error; row 0 on top."""
@@ -51,6 +57,11 @@ class ReferencePicture:
     """Time spent tracing."""
     balance: dict[str, float]
     """Flux by fate, W: emitted = deposited + direct + absorbed + escaped + lost_depth + lost_numeric."""
+
+    @property
+    def amount(self) -> int:
+        """Photons."""
+        return self.photons
 
     @property
     def variance(self) -> np.ndarray:
@@ -69,16 +80,14 @@ class ReferencePicture:
     @cached_property
     def relmse(self) -> float:
         """The picture's own error: mean[var/(R² + ε)] on XYZ; 0 for a black picture without photons in it."""
-        xyz = self.xyz()
-        epsilon = RELMSE_EPSILON * xyz.mean() ** 2
-        return float(np.mean(self.xyz_variance() / (xyz**2 + epsilon))) if epsilon > 0.0 else 0.0
+        return relative_variance(self.xyz(), self.xyz_variance())
 
     def is_within(self, target_relmse: float) -> bool:
         """Whether the error is known to be no larger; blackness is believed after many photons only."""
         return self.relmse <= target_relmse and (bool(self.rgb.any()) or self.photons >= _BLACK_PHOTONS)
 
 
-class ReferenceRun:
+class ReferenceRun(PartsRun[ReferencePicture]):
     """Photons of one picture, added round by round; `picture()` at any time."""
 
     def __init__(self, scene: Scene, width: int, height: int, max_depth: int = 64, seed: int = 1) -> None:
@@ -87,12 +96,12 @@ class ReferenceRun:
         Raises UserError where numba is missing or solids nest beyond reach.
         """
         try:
-            from . import photon_emission, photon_kernel, photon_scene
+            from . import photon_emission, photon_kernel, photon_scene, sampling
         except ImportError as error:
             raise UserError(
                 f"the reference renderer needs numba ({error}); install it with: pip install numba"
             ) from error
-        self._kernel = photon_kernel
+        self._kernel, self._sampling = photon_kernel, sampling
         self._scene, centre = photon_scene.photon_scene(scene)
         self._camera_pass = photon_scene.viewpoint(scene.camera, width, height, centre)
         self._max_depth, self._seed = max_depth, seed
@@ -111,15 +120,9 @@ class ReferenceRun:
             found = photon_emission.domains(light, corners, centre, reach)
             domains += found
             self._colours += [photon_scene.colours(light.spectral_power, classes)] * len(found)
-        self.sums = np.zeros((PARTS, height, width, 3))
-        self.units = np.zeros(PARTS, np.int64)
-        """Units traced by each part."""
-        self.tallies = np.zeros((PARTS, TALLY_SIZE))
-        self.seconds = 0.0
+        super().__init__((height, width, 3), TALLY_SIZE)
         self._domains, self._points = self._aimed(domains)
-        self._sequences = [
-            [photon_kernel.scrambled(seed, part, d) for d in range(len(domains))] for part in range(PARTS)
-        ]
+        self._sequences = [[sampling.scrambled(seed, part, d) for d in range(len(domains))] for part in range(PARTS)]
         self._pace = Pace(max(1, 1024 // max(self.unit, 1)))
 
     @property
@@ -130,30 +133,24 @@ class ReferenceRun:
     @property
     def photons(self) -> int:
         """Photons so far."""
-        return int(self.units.sum()) * self.unit
-
-    amount = photons
+        return self.amount
 
     @property
     def amount_words(self) -> str:
         """Photons for people."""
-        return f"{self.photons / 1e6:.1f} M photons"
+        return f"{self.amount / 1e6:.1f} M photons"
 
     @property
     def exhausted(self) -> bool:
         """Whether the sequence has no fresh points left, or there is nothing to trace."""
         return not self._points or int(self.units.max()) * max(self._points) >= _LAST_POINT
 
-    def advance(self, photons_left: int | None = None, seconds_left: float | None = None) -> None:
-        """One round of all parts, about half a second or what is left. An interrupt keeps the parts that were
-        finished."""
-        units = self._pace.units
-        if photons_left is not None:
-            units = min(units, max(1, -(-photons_left // (self.unit * PARTS))))
-        units = min(units, _LAST_POINT // max(self._points))
-        took = trace_parts(self._trace_part, units)
-        self.seconds += took
-        self._pace.learn(units, took, seconds_left)
+    def _most_units(self) -> int:
+        return _LAST_POINT // max(self._points)
+
+    def kept(self) -> dict[str, object]:
+        """With the size of a unit, which a pilot has found."""
+        return super().kept() | {"unit": self.unit}
 
     def picture(self) -> ReferencePicture:
         """What has been gathered; black without variance before the first round."""
@@ -178,6 +175,7 @@ class ReferenceRun:
                 self.tallies[part],
                 none,
                 none,
+                self._sampling.scratch(),
             )
         self.units[part] += units
 
@@ -208,7 +206,7 @@ class ReferenceRun:
 
         picture, importance = np.zeros(self.sums.shape[1:]), [np.zeros((GRID, GRID)) for _ in domains]
         for d, (domain, colour) in enumerate(zip(domains, self._colours, strict=True)):
-            sequence = self._kernel.scrambled(self._seed, PARTS + number, d)
+            sequence = self._sampling.scrambled(self._seed, PARTS + number, d)
             self._kernel.trace(
                 self._scene,
                 self._camera_pass,
@@ -223,6 +221,7 @@ class ReferenceRun:
                 np.zeros(TALLY_SIZE),
                 weight,
                 importance[d],
+                self._sampling.scratch(),
             )
         return picture, importance
 

@@ -295,7 +295,8 @@ def _ranks(scene: Scene, meshes: list[Mesh]) -> dict[int, int]:
     ]
     if len(meeting) > _MAX_STACK:
         raise UserError(
-            f"scene '{scene.name}': {len(meeting)} transparent solids nest or touch and at most {_MAX_STACK} may; move some apart"
+            f"scene '{scene.name}': {len(meeting)} transparent solids nest or touch and at most {_MAX_STACK} may; "
+            "move some apart"
         )
     ranked = sorted(meeting, key=lambda i: (scene.objects[i].material.priority, i))  # type: ignore[union-attr]
     return {index: rank for rank, index in enumerate(ranked)}

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -25,6 +26,10 @@ class Estimate(Protocol):
     """A picture that knows its own error."""
 
     @property
+    def amount(self) -> int:
+        """Photons, or samples a pixel, in it."""
+
+    @property
     def relmse(self) -> float:
         """Its error."""
 
@@ -33,29 +38,22 @@ class Estimate(Protocol):
 
 
 EstimateT = TypeVar("EstimateT", bound=Estimate)
-EstimateT_co = TypeVar("EstimateT_co", bound=Estimate, covariant=True)
 
 
-class Run(Protocol[EstimateT_co]):
-    """Something that grows by rounds."""
+@dataclass(frozen=True)
+class Limits:
+    """Where a reference may stop: at the first that is reached."""
 
-    @property
-    def amount(self) -> int:
-        """Photons, or samples a pixel, so far."""
+    amount: int | None = None
+    """Photons, or samples a pixel, of all the run's."""
+    seconds: float | None = None
+    """From now on."""
+    target_relmse: float | None = None
 
-    @property
-    def amount_words(self) -> str:
-        """The same for people."""
-
-    @property
-    def exhausted(self) -> bool:
-        """Whether nothing can be added."""
-
-    def advance(self, amount_left: int | None, seconds_left: float | None) -> None:
-        """One round, or what is left."""
-
-    def picture(self) -> EstimateT_co:
-        """What has been gathered."""
+    def are_met_by(self, picture: Estimate) -> bool:
+        """Whether a picture needs no more, whatever the time."""
+        enough = self.amount is not None and picture.amount >= self.amount
+        return enough or (self.target_relmse is not None and picture.is_within(self.target_relmse))
 
 
 @dataclass
@@ -89,18 +87,71 @@ def trace_parts(trace_part: Callable[[int, int], None], units: int) -> float:
     return time.perf_counter() - started
 
 
-def continue_run(
-    run: Run[EstimateT],
-    amount: int | None,
-    seconds: float | None,
-    target_relmse: float | None,
-    progress: Progress,
-    cancelled: Cancelled,
-) -> EstimateT:
-    """Add rounds to `run` up to the first limit; `amount` counts all of the run's, `seconds` from now on.
+class PartsRun(ABC, Generic[EstimateT]):
+    """A picture's sums by PARTS independent parts, that grow by rounds of about half a second."""
+
+    def __init__(self, shape: tuple[int, ...], tally_size: int) -> None:
+        self.sums = np.zeros((PARTS, *shape))
+        self.units = np.zeros(PARTS, np.int64)
+        """Units that each part has done."""
+        self.tallies = np.zeros((PARTS, tally_size))
+        self.seconds = 0.0
+        self._pace = Pace()
+
+    unit = 1
+    """What counts as one unit: so many photons, or a sample of every pixel."""
+
+    @property
+    def amount(self) -> int:
+        """Photons, or samples a pixel, so far."""
+        return int(self.units.sum()) * self.unit
+
+    @property
+    @abstractmethod
+    def amount_words(self) -> str:
+        """The same for people."""
+
+    @property
+    @abstractmethod
+    def exhausted(self) -> bool:
+        """Whether nothing can be added."""
+
+    @abstractmethod
+    def picture(self) -> EstimateT:
+        """What has been gathered; black without variance before the first round."""
+
+    @abstractmethod
+    def _trace_part(self, part: int, units: int) -> None: ...
+
+    def _most_units(self) -> int:
+        """A part may do in a round."""
+        return 2**31
+
+    def advance(self, amount_left: int | None = None, seconds_left: float | None = None) -> None:
+        """One round of all parts, or what is left. An interrupt keeps the parts that were finished."""
+        units = min(self._pace.units, self._most_units())
+        if amount_left is not None:
+            units = min(units, max(1, -(-amount_left // (self.unit * PARTS))))
+        took = trace_parts(self._trace_part, units)
+        self.seconds += took
+        self._pace.learn(units, took, seconds_left)
+
+    def kept(self) -> dict[str, object]:
+        """What a file holds of the run."""
+        return {"sums": self.sums, "units": self.units, "tallies": self.tallies, "seconds": self.seconds}
+
+    def restore(self, stored: Mapping[str, np.ndarray]) -> None:
+        """Go on from what `kept` gave."""
+        self.sums[:], self.units[:], self.tallies[:] = stored["sums"], stored["units"], stored["tallies"]
+        self.seconds = float(stored["seconds"])
+
+
+def continue_run(run: PartsRun[EstimateT], limits: Limits, progress: Progress, cancelled: Cancelled) -> EstimateT:
+    """Add rounds to `run` up to the first limit.
 
     What was done when `cancelled()` turned true is kept. Raises ValueError without any limit.
     """
+    amount, seconds, target_relmse = limits.amount, limits.seconds, limits.target_relmse
     if amount is None and seconds is None and target_relmse is None:
         raise ValueError("a reference needs a limit: an amount, seconds or target_relmse")
     started = time.perf_counter()

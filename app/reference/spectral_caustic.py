@@ -19,7 +19,6 @@ from ..base.errors import UserError
 from ..model.scene import Scene
 from . import camera_kernel, caustic_kernel, photon_emission, photon_scene
 from .camera_kernel import CausticTables
-from .camera_optics import scratch
 from .camera_scene import line_wavelengths
 from .camera_start import camera_start
 from .caustic_windows import (
@@ -34,10 +33,10 @@ from .caustic_windows import (
 )
 from .photon_emission import Domain
 from .photon_emit import GRID
-from .photon_kernel import Sequence, scrambled
 from .photon_run import RELMSE_EPSILON
 from .photon_scene import Colours
 from .rounds import PARTS, Progress, trace_parts
+from .sampling import Sequence, scrambled, scratch
 
 __all__ = ["CausticPlan", "CausticRun", "SpectralCaustic", "build_caustic", "no_caustic"]
 
@@ -77,7 +76,7 @@ class SpectralCaustic:
 
     plan: CausticPlan
     tables: CausticTables
-    measured_passes: np.ndarray
+    halves: np.ndarray
     """float32 (2, texels × bins): `tables.irradiance` as either half of the photons has it."""
     photons: int
     landed_w: float
@@ -92,11 +91,11 @@ class SpectralCaustic:
 
     def half(self, number: int) -> SpectralCaustic:
         """The caustic by the photons of one half alone."""
-        alone = self.measured_passes[number]
+        alone = self.halves[number]
         return SpectralCaustic(
             self.plan,
             self.tables._replace(irradiance=alone),
-            np.broadcast_to(alone, self.measured_passes.shape),
+            np.broadcast_to(alone, self.halves.shape),
             self.photons // _HALVES,
             self.landed_w,
             self.outside_w,
@@ -109,7 +108,7 @@ class SpectralCaustic:
         for side in range(len(self.tables.first)):
             mean, apart = (
                 _blocks(_window(self.tables, values, side, 1))
-                for values in (self.tables.irradiance, self.measured_passes[0] - self.measured_passes[1])
+                for values in (self.tables.irradiance, self.halves[0] - self.halves[1])
             )
             epsilon = RELMSE_EPSILON * float(mean.mean()) ** 2 if mean.size else 0.0
             if epsilon > 0.0:
@@ -182,17 +181,17 @@ class CausticRun:
     def caustic(self) -> SpectralCaustic:
         """What has been gathered."""
         by_half = np.array([self.units[half::_HALVES].sum() for half in range(_HALVES)])
-        measured_passes = self.sums / np.maximum(by_half, 1).astype(np.float32)[:, None]
+        halves = self.sums / np.maximum(by_half, 1).astype(np.float32)[:, None]
         for side in np.flatnonzero(self.wanted):
             for window in range(2):
                 area = free_areas(self.tables, side, window).reshape(self.tables.size[side, window, ::-1])[..., None]
-                for values in measured_passes:
+                for values in halves:
                     irradiance = _window(self.tables, values, side, window)
                     np.divide(irradiance, area, out=irradiance, where=area > 0.0, casting="same_kind")
         total = max(int(self.units.sum()), 1)
-        tables = self.tables._replace(irradiance=np.tensordot((by_half / total).astype(np.float32), measured_passes, 1))
+        tables = self.tables._replace(irradiance=np.tensordot((by_half / total).astype(np.float32), halves, 1))
         landed, outside = self.flux.sum(axis=0) / total
-        return SpectralCaustic(self.plan, tables, measured_passes, self.photons, float(landed), float(outside))
+        return SpectralCaustic(self.plan, tables, halves, self.photons, float(landed), float(outside))
 
     def _trace_part(self, part: int, units: int) -> None:
         found = [
@@ -280,8 +279,8 @@ class CausticRun:
             if not self.planes.is_flat[side]:
                 name = self.scene.objects[self.planes.owner[side]].name
                 raise UserError(
-                    f"scene '{self.scene.name}': glass throws light on '{name}', which is not flat, and the camera's reference "
-                    "looks caustics up on flat receivers only; make it flat, or black"
+                    f"scene '{self.scene.name}': glass throws light on '{name}', which is not flat, and the camera's "
+                    "reference looks caustics up on flat receivers only; make it flat, or black"
                 )
 
     def _texel(self, distance: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import astuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..base.tone_map import auto_exposure, tone_map_8bit
 from ..edit.animation import Animation
 from ..gpu.context import Context
 from ..model.scene import Scene
+from ..model.scene_key import scene_key
 from ..model.settings import RenderSettings
 from .frames import FrameRenderer
 
@@ -27,7 +28,7 @@ def render_animation(
     sink: Sink,
     base_ev: float | None = None,
     develop: Develop = tone_map_8bit,
-) -> Iterator[float]:
+) -> Generator[float]:
     """Render all frames that `sink` lacks, pausing with the share done; the sink is closed however it ends.
 
     All frames share one exposure: `base_ev` plus the stage's own; `base_ev` None takes the automatic one of the first
@@ -43,7 +44,7 @@ def render_animation(
             if not sink.has(index):
                 for share in renderer.steps(stage):
                     yield (index + 0.99 * share) / len(stages)  # the rest is developing and writing
-                rgb = renderer.rgb()
+                rgb = renderer.picture.rgb
                 if base_ev is None:
                     base_ev = auto_exposure(rgb)
                     if isinstance(sink, Frames):
@@ -57,8 +58,6 @@ def render_animation(
 
 def description(animation: Animation, settings: RenderSettings, fps: float, photons: int) -> Mapping[str, object]:
     """All that decides how the frames look, as plain values: what a resumed folder must agree on."""
-    from ..reference.photon_reference import scene_key
-
     start = animation.start
     return {
         "scene": start.scene.name,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +21,9 @@ from ..base.tone_map import auto_exposure
 from ..edit.parameters import Stage
 from ..gpu.context import Context
 from ..model.geometry.charts import ChartAtlas
-from ..model.optics.colorimetry import xyz_to_rgb709
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
+from ..passes.map_layout import plane_frame
 from .frames import FrameRenderer
 from .light_pass import LightPass
 
@@ -63,57 +64,34 @@ def bake(context: Context, stage: Stage, settings: RenderSettings, receiver: str
     """
     check_receiver(stage.scene, receiver)
     check_output(path)
-    own = RenderSettings(**{**vars(settings), "layer": f"map:{receiver}"})
-    renderer = FrameRenderer(context, own, [stage])
+    renderer = FrameRenderer(context, replace(settings, layer=f"map:{receiver}"), [stage])
     try:
         for share in renderer.steps(stage):
             yield 0.98 * share
-        assert renderer.light is not None
-        rgb, placement = baked(renderer.light)
+        rgb, where = renderer.picture.rgb, placement(renderer.light)
     finally:
         renderer.release()
-    placement |= {"receiver": receiver, "scene": stage.scene.name, "file": path.name, "units": UNITS}
+    told = {**where, "receiver": receiver, "scene": stage.scene.name, "file": path.name, "units": UNITS}
     if path.suffix.lower() == ".png":
-        placement["exposure_ev"] = auto_exposure(rgb)
+        told["exposure_ev"] = auto_exposure(rgb)
     write_image(path, rgb)
     with atomic_output(placement_path(path)) as temporary:
-        temporary.write_text(json.dumps(placement, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        temporary.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     yield 1.0
 
 
-def baked(light: LightPass) -> tuple[np.ndarray, dict[str, object]]:
-    """Irradiance float32 (H, W, 3), row 0 on top, and where it lies; of a light pass whose settings ask for a map
-    layer."""
+def placement(light: LightPass) -> Mapping[str, object]:
+    """Where the map lies that the settings' layer names."""
     receiver = light.map_receiver
     assert receiver is not None
+    x0, y0, x1, y1 = light.layout.tiles[receiver][0].rect
+    width, height = x1 - x0, y1 - y0
     charts = light.layout.charts.get(receiver)
-    energy = light.resolved_map(receiver)[..., :3].astype(float) * light.map_scale
-    if charts is None:
-        area = float(light.layout.placements["texel_area"][light.layout.receivers[receiver]["placement"]])
-        irradiance = energy / area
-    else:
-        # Gutters hold what lies across their seam, measured in texels of their own chart's edge.
-        areas = charts.texel_area[np.maximum(_nearest_owner(charts), 0)]
-        irradiance = energy / areas[..., None]
-    rgb = xyz_to_rgb709(irradiance)[::-1].astype(np.float32)
-    height, width = rgb.shape[:2]
-    placement = _rectangle(light, receiver, width, height) if charts is None else _charts(light, receiver, charts)
-    return np.ascontiguousarray(rgb), {"width": width, "height": height, **placement}
-
-
-def _nearest_owner(charts: ChartAtlas) -> np.ndarray:
-    """Triangle of each texel; in gutters that of the place across the seam, else -1 (nothing landed there)."""
-    owner = charts.owner.copy()
-    x, y = charts.gutter_texel_xy.T
-    to_x, to_y = charts.destination_xy.T
-    kept = to_x >= 0
-    owner[y[kept], x[kept]] = charts.owner[to_y[kept], to_x[kept]]
-    return owner
+    where = _rectangle(light, receiver, width, height) if charts is None else _charts(light, receiver, charts)
+    return {"width": width, "height": height, **where}
 
 
 def _rectangle(light: LightPass, receiver: int, width: int, height: int) -> Mapping[str, object]:
-    from ..passes.map_layout import plane_frame
-
     space = light.buffers.space
     points = space.to_gpu(light.buffers.world_meshes[light.buffers.receivers[receiver]].vertices)
     frame = plane_frame(points)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import moderngl
@@ -12,6 +12,7 @@ from ..gpu.records import RECEIVER
 from ..gpu.shader import Releasable
 from ..model.features import Features
 from ..passes.accumulate import LevelsFold, SeamFold, copy_texture
+from ..passes.camera import CausticMaps
 from ..passes.map_atlas import MapAtlas
 from ..passes.map_layout import MapLayout
 from ..passes.splat import Splatter
@@ -71,6 +72,10 @@ class LightMaps:
                 copy_texture(ctx, source, target)
         self._levels_fold.run(self._resolved)
         return self._resolved
+
+    def caustic_maps(self, textures: Sequence[moderngl.Texture] | None = None) -> CausticMaps:
+        """As the camera reads them; `textures` where they are not `resolved_textures`."""
+        return CausticMaps(textures or self.resolved_textures(), self.receivers, self.atlas.placements, self.scale)
 
     def _read_resolved(self) -> np.ndarray:
         """All maps put together, float32 (height, width, channels)."""

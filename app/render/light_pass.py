@@ -3,38 +3,42 @@
 The pilot is a few thousand photons per light, traced at several wavelengths. It says where light
 lands (so the maps are fitted before anything is deposited) and how far the spectral columns are
 from the reference (so the spectrum is cut into as few bands as that error allows).
+
+What varies from one kind of rendering to another is handed in: what maps are fitted to (`MapFit`), how finely
+lattices are divided (`Division`), where photons are kept (`PhotonRecords`), how work is cut (`Pace`).
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import moderngl
 import numpy as np
 
 from ..gpu import records
 from ..gpu.context import Context
-from ..gpu.gain_buffers import GainBuffers
-from ..gpu.map_channels import MapChannels, tents
-from ..gpu.reindex import ReindexBuffer, Reindexing, Spans
+from ..gpu.map_channels import MapChannels
+from ..gpu.reindex import Spans
 from ..gpu.scene_buffers import SceneBuffers
-from ..gpu.splat_tables import SplatTables
 from ..model.features import Features
 from ..model.optics.spectral_tables import SpectralAxis
-from ..model.optics.spectrum import Spectrum
-from ..model.scene import Camera, Scene
+from ..model.scene import Scene
 from ..model.settings import RenderSettings
+from ..passes.camera import CausticMaps
 from ..passes.emission_domain import EmissionDomain, emission_domain
-from ..passes.footprint import SpectralVariables
 from ..passes.map_atlas import MapAtlas
-from ..passes.map_layout import COARSE_TILE_MAX, FINE_TILE_MAX, MapLayout, check_map_receiver, layout_maps
+from ..passes.map_layout import MapLayout, check_map_receiver, layout_maps
 from ..passes.pilot import Pilot, landings_of, pilot_steps
 from ..passes.splat import Splatter
-from ..passes.trace import Batch, FluxTally, LatticeSlice, TracePass
+from ..passes.trace import RAY_ROOM, Batch, FluxTally, LatticeSlice, TracePass
 from .light_maps import LightMaps
-from .light_plan import SMALLEST_BATCH, Planner
+from .light_plan import Division, Planner
+from .map_fit import MapFit
+from .shown_spectra import PassTables, ShownSpectra, ShownTables
+from .splatting import Pace, Splatting
 
 DEFAULT_BATCH = 1 << 16
 
@@ -54,20 +58,6 @@ class LightStats:
     footprints_dropped: int = 0
     dropped_w: float = 0.0
     """Flux of those photons, splatted as one texel each."""
-
-
-@dataclass(frozen=True)
-class ShownTables:
-    """The spectra as splats see them, and which wavelengths belong to which paths."""
-
-    tables: SplatTables
-    reindex: ReindexBuffer | None
-
-    def release(self) -> None:
-        """Free both."""
-        self.tables.release()
-        if self.reindex is not None:
-            self.reindex.release()
 
 
 @dataclass(frozen=True)
@@ -92,47 +82,90 @@ class RoundOf:
     is_last_light: bool
 
 
+class PhotonRecords(Protocol):
+    """Where traced photons go besides the maps, with the spectral tables that belong to them."""
+
+    @property
+    def tables(self) -> PassTables:
+        """Of the passes that run; `begin` comes first."""
+
+    def begin(self, shown: ShownSpectra, spans: Spans, photons: int) -> None:
+        """Passes of `photons` in bands of `spans` follow."""
+
+    def keep(self, photons: moderngl.Buffer, batch: Batch, stride: int, of: RoundOf) -> None:
+        """A batch was traced; `photons` holds its records of `stride` bytes until the next."""
+
+    def release(self) -> None:
+        """Free everything."""
+
+
+class NoRecords:
+    """`PhotonRecords` for photons that are splatted and forgotten."""
+
+    def __init__(self) -> None:
+        self._tables: PassTables | None = None
+
+    @property
+    def tables(self) -> PassTables:
+        """Kept as long as the bands stay."""
+        assert self._tables is not None, "begin() comes first"
+        return self._tables
+
+    def begin(self, shown: ShownSpectra, spans: Spans, photons: int) -> None:
+        """See `PhotonRecords`."""
+        if self._tables is None or spans != self._tables.spans:
+            self.release()
+            self._tables = PassTables(shown, spans)
+
+    def keep(self, photons: moderngl.Buffer, batch: Batch, stride: int, of: RoundOf) -> None:
+        """Nothing is kept."""
+
+    def release(self) -> None:
+        """Free the tables."""
+        if self._tables is not None:
+            self._tables.forget()
+        self._tables = None
+
+
 class LightPass:
     """Owns the light pass's passes and the caustic maps of one scene."""
 
-    tile_max = (FINE_TILE_MAX, COARSE_TILE_MAX)
-    """Longest sides of the maps' fine and coarse windows, texels."""
-    min_batch = SMALLEST_BATCH
-    """With fewer rays in flight the plan would depend on the batch."""
-
     def __init__(
-        self, context: Context, scene: Scene, settings: RenderSettings, features: Features, buffers: SceneBuffers
+        self,
+        context: Context,
+        scene: Scene,
+        settings: RenderSettings,
+        features: Features,
+        buffers: SceneBuffers,
+        *,
+        fit: MapFit | None = None,
+        division: Division = Division(),
+        photon_records: PhotonRecords | None = None,
+        pace: Pace | None = None,
     ) -> None:
+        """`fit` None fits maps to the scene's camera and the picture of `settings`. `photon_records` becomes the light
+        pass's own."""
         self.context = context
         self.scene = scene
         self.settings = settings
         self.features = features
         self.buffers = buffers
+        self.fit = fit or MapFit(scene.camera, settings.width, settings.height)
+        """What `maps` are fitted to."""
         self.stats = LightStats()
+        self._division = division
+        self._records = photon_records or NoRecords()
+        self._pace = pace or Pace.of(context)
         batch = settings.batch or DEFAULT_BATCH * (1 if context.is_software else 4)
-        batch = max(min(batch, _largest_batch(context, features)), self.min_batch)
+        batch = max(min(batch, _largest_batch(context, features)), self._pace.min_batch)
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
-        self.variables = SpectralVariables.build(context.ctx, buffers.variables)
-        self.gains = (
-            GainBuffers(context.ctx, scene, buffers.receivers, buffers.space, buffers.axis)
-            if features.local_gain
-            else None
-        )
-        self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
-        edges = None if settings.bins is None else tuple(np.linspace(380.0, 780.0, settings.bins + 1).tolist())
-        self.map_channels = tents(buffers.axis, features.map_tents) if features.map_tents else MapChannels(edges)
-        """What the maps' channels stand for."""
+        self.shown = ShownSpectra(context.ctx, scene, buffers, settings.bins)
+        self._splatting = Splatting(context, self.shown, self._pace)
+        self.smoothing = settings.smoothing
+        """Standard deviation of a footprint in lattice spacings."""
         self.maps: LightMaps | None = None
-        self.waits = context.is_software
-        """Wait for the device at every pause: times are then what the work took, and a budget is kept."""
-        self.splat_part = 1 << 30
-        """Photons splatted without a pause."""
-        self._shown_spectra: Sequence[Spectrum] = [light.spectral_power for light in scene.lights]
-        self._reindexing = (
-            Reindexing.of(buffers.axis.glasses[0], buffers.axis.glasses[0]) if features.reindexed else None
-        )
-        self._tables: ShownTables | None = None
-        self._spans: Spans = []
+
+    # ---- once for a scene --------------------------------------------------------------------
 
     def prepare(self) -> None:
         """Pilots and maps, once for a scene. Afterwards `layout` and `atlas` exist, and `features` are those of the
@@ -162,26 +195,55 @@ class LightPass:
         yield
         shows_map = self.settings.layer.startswith("map:")
         self.map_receiver = check_map_receiver(self.scene, self.buffers, self.settings.layer[4:]) if shows_map else None
-        self.lay_out(self.scene.camera)
+        self.lay_out(self.fit)
 
-    def lay_out(self, camera: Camera) -> None:
-        """Maps fitted to where light lands and to what `camera` sees of it; empty."""
+    def lay_out(self, fit: MapFit) -> None:
+        """Maps fitted to where light lands and to `fit`; empty."""
         if self.maps is not None:
             self.maps.release()
-        self.maps = self.maps_for(camera, self.settings.width, self.settings.height, self.tile_max)
+        self.maps, self.fit = None, fit
+        self.maps = LightMaps(self.context.ctx, self.layout_for(fit), self.features)
         self.features = self.maps.features
 
-    def maps_for(
-        self, camera: Camera, width: int, height: int, tile_max: tuple[int, int] = (FINE_TILE_MAX, COARSE_TILE_MAX)
-    ) -> LightMaps:
-        """Maps fitted to what `camera` sees in a picture of `width` × `height`; the caller's to release. `tile_max`:
-        see `layout_maps`."""
-        seen = replace(self.scene, camera=camera)
-        landings = landings_of(self.pilots.values())
+    def layout_for(self, fit: MapFit) -> MapLayout:
+        """Where maps fitted to `fit` lie."""
         layout = layout_maps(
-            seen, self.buffers, landings, (width, height), self.reflectance_class, self.map_receiver, tile_max=tile_max
+            replace(self.scene, camera=fit.view),
+            self.buffers,
+            landings_of(fit.landings(list(self.pilots.values()), self.buffers.space)),
+            (fit.width, fit.height),
+            self.reflectance_class,
+            self.map_receiver,
+            tile_max=fit.tile_max,
         )
-        return LightMaps(self.context.ctx, layout, self.features)
+        if not fit.avoids_powers_of_two:
+            return layout
+        return replace(layout, size=tuple(side + (side & (side - 1) == 0) for side in layout.size))
+
+    @property
+    def _needs_spectral_pilot(self) -> bool:
+        return bool(self.features.spectral_groups) or self.features.point_spectrum
+
+    def _full_power(self, light: int) -> float:
+        """Radiant power of a light's whole spectrum per unit weight, W."""
+        return float(self.buffers.light_power[light].band(0.0, 1.0)[3])
+
+    # ---- what there is -----------------------------------------------------------------------
+
+    @property
+    def map_channels(self) -> MapChannels:
+        """What the maps' channels stand for."""
+        return self.shown.channels
+
+    @property
+    def reflectances(self) -> list[np.ndarray | None]:
+        """Spectral reflectances that are folded into the tables; None: none."""
+        return self.shown.reflectances
+
+    @property
+    def reflectance_class(self) -> dict[int, int]:
+        """Each receiver's of `reflectances`."""
+        return self.shown.reflectance_class
 
     @property
     def bin_edges_nm(self) -> np.ndarray | None:
@@ -218,6 +280,10 @@ class LightPass:
         """Factor from what the maps have summed to energy per texel."""
         return self._maps.scale
 
+    def caustic_maps(self) -> CausticMaps:
+        """The summed maps as the camera reads them."""
+        return self._maps.caustic_maps()
+
     def resolved_textures(self) -> list[moderngl.Texture]:
         """The summed maps for lookups: wide texels added to fine ones, charts' seams folded home."""
         return self._maps.resolved_textures()
@@ -230,6 +296,13 @@ class LightPass:
         """What the maps hold where they are read: the sum of XYZ maps' last channel (W), or of all bins."""
         return self._maps.flux(self.bin_edges_nm is None)
 
+    @property
+    def tables(self) -> ShownTables:
+        """The spectral tables of the plan that was begun."""
+        return self._records.tables.full
+
+    # ---- work --------------------------------------------------------------------------------
+
     def begin(self, photons: int, seed: int) -> None:
         """Empty maps and a plan for passes of about `photons`; what was summed and counted before is forgotten.
 
@@ -238,7 +311,14 @@ class LightPass:
         self.stats = LightStats()
         self._maps.clear()
         planner = Planner(
-            self.scene, self.settings, self.features, self.buffers, self.domains, self.pilots, self.trace.batch
+            self.scene,
+            self.settings,
+            self.features,
+            self.buffers,
+            self.domains,
+            self.pilots,
+            self.trace.batch,
+            self._division,
         )
         self.plans = planner.plans(photons, self._texel_size())
         for plan in self.plans:
@@ -246,55 +326,36 @@ class LightPass:
             self.stats.bands[name], self.stats.light_points[name] = len(plan.bands), plan.light_points
         limits = {plan.index: [(b.x_lo, b.x_hi) for b in plan.bands] for plan in self.plans}
         spans = [limits.get(i, [(0.0, 1.0)]) for i in range(len(self.scene.lights))]
-        if spans != self._spans:
-            if self._tables is not None:
-                self._tables.release()
-            self._spans, self._tables = spans, self._tables_of(spans)
-
-    def _tables_of(self, spans: Spans, width: int | None = None) -> ShownTables:
-        channels = self.map_channels
-        ctx, spectra, reindexing = self.context.ctx, self._shown_spectra, self._reindexing
-        if reindexing is None:
-            return ShownTables(
-                SplatTables.build(ctx, self.buffers.axis, spectra, self.reflectances, spans, channels, width), None
-            )
-        shown = reindexing.spans(spans, self.buffers.axis, spectra)
-        tables = SplatTables.build(ctx, reindexing.axis, spectra, self.reflectances, shown, channels, width)
-        return ShownTables(tables, ReindexBuffer(ctx, reindexing, spans, shown, spectra, tables.classes))
-
-    @property
-    def tables(self) -> ShownTables:
-        """The spectral tables of the plan that was begun."""
-        assert self._tables is not None
-        return self._tables
-
-    @property
-    def _needs_spectral_pilot(self) -> bool:
-        return bool(self.features.spectral_groups) or self.features.point_spectrum
-
-    def _full_power(self, light: int) -> float:
-        """Radiant power of a light's whole spectrum per unit weight, W."""
-        return float(self.buffers.light_power[light].band(0.0, 1.0)[3])
+        self._records.begin(self.shown, spans, photons)
 
     def run_pass(self, number: int, photons: int, proceed: Callable[[float], bool]) -> bool:
-        """One shifted set of lattices with about `photons` points over all lights.
+        """One shifted set of lattices with about `photons` points over all lights. `proceed(fraction)` is asked after
+        every slice; returns False when it said stop, see `steps_until`."""
+        goes_on, done = True, 0.0
+        steps = self.steps_until(number, photons, lambda: not goes_on)
+        while True:
+            try:
+                fraction = next(steps)
+            except StopIteration as finished:
+                return finished.value
+            if fraction > done:
+                done = fraction
+                goes_on = proceed(done)
 
-        It is traced in rounds, each an even sub-lattice of the whole, so that a pass that is stopped
-        between rounds is complete everywhere, only coarser. `proceed(fraction)` is asked after
-        every slice; returns False when it said stop.
-        """
-        go_on, done = True, 0.0
+    def steps_until(self, number: int, photons: int, stop: Callable[[], bool]) -> Generator[float, None, bool]:
+        """A pass, pausing with the share done; returns False when `stop` left part of it undone.
+
+        It is traced in rounds, each an even sub-lattice of the whole, so that a pass that is stopped between rounds is
+        complete everywhere, only coarser."""
         for step in self.pass_steps(number, photons):
-            if step.fraction > done:
-                done = step.fraction
-                go_on = proceed(done)
-            if step.round_done and not go_on and done < 1.0:
+            yield step.fraction
+            if step.round_done and step.fraction < 1.0 and stop():
                 return False
         return True
 
-    def pass_steps(self, number: int, photons: int, first_round: int = 0) -> Generator[PassStep, None, None]:
-        """`run_pass`, pausing after every event of the rays and after every splatting: whoever draws meanwhile may bind
-        what it likes.
+    def pass_steps(self, number: int, photons: int, first_round: int = 0) -> Iterator[PassStep]:
+        """A whole pass, pausing after every event of the rays and after every splatting: whoever draws meanwhile may
+        bind what it likes.
 
         `first_round`: where a pass goes on that was left before."""
         if not self.plans:
@@ -307,17 +368,17 @@ class LightPass:
                 done = j * len(self.plans) + i
                 points = len(range(j, lattice, rounds))
                 if points:
-                    piece = plan.piece(self.seed, number, lattice, j, rounds, points, float(photons))
-                    for _ in self._slice(piece, plan.domain, RoundOf(number, j, rounds, i + 1 == len(self.plans))):
+                    part = plan.slice(self.seed, number, lattice, j, rounds, points, float(photons))
+                    for _ in self._slice_steps(part, plan.domain, RoundOf(number, j, rounds, i + 1 == len(self.plans))):
                         yield PassStep(done / slices, False)
                 if i + 1 < len(self.plans):
                     yield PassStep((done + 1) / slices, False)
             self._maps.photon_weight += photons / rounds
             yield PassStep((j + 1) / rounds, True)
 
-    def _slice(self, piece: LatticeSlice, domain: EmissionDomain, of: RoundOf) -> Iterator[None]:
+    def _slice_steps(self, part: LatticeSlice, domain: EmissionDomain, of: RoundOf) -> Iterator[None]:
         started = time.perf_counter()
-        steps = self.trace.steps(piece, domain)
+        steps = self.trace.steps(part, domain)
         while True:
             try:
                 next(steps)
@@ -325,20 +386,19 @@ class LightPass:
                 batch: Batch = finished.value
                 break
             if (
-                self.waits and not self.context.is_software
+                self._pace.waits and not self.context.is_software
             ):  # there the queue's length is read at every step, which waits
                 self.context.finish()
             self.stats.trace_seconds += time.perf_counter() - started
             yield
             started = time.perf_counter()
         self.stats.trace_seconds += time.perf_counter() - started
-        self.keep(batch, of)
+        self._records.keep(self.trace.photons, batch, self.trace.photon.stride, of)
         yield
         yield from self.splat_steps(self.trace.photons, batch.photons)
-        self._account(batch)
-
-    def keep(self, batch: Batch, of: RoundOf) -> None:
-        """Called with every batch while `trace.photons` holds it; a live rendering stores the records."""
+        self.stats.photons += batch.emitted_photons
+        self.stats.splats += batch.photons
+        self.stats.tally.merge(batch.tally)
 
     def splat_steps(
         self,
@@ -349,39 +409,23 @@ class LightPass:
         maps: LightMaps | None = None,
         stride: int = 1,
     ) -> Iterator[None]:
-        """Add every `stride`-th photon record to the maps, with footprints `coarsening` times as wide, pausing after
-        every `splat_part` of them.
+        """Add every `stride`-th photon record to the maps, with footprints `coarsening` times as wide, see
+        `Splatting.steps`. `tables` of another plan than the one
+        begun, `maps` of another layout than the light pass's own."""
+        before, stats = self._splatting.seconds, self.stats
+        for _ in self._splatting.steps(
+            photons, count, maps or self._maps, tables or self.tables, self.smoothing * coarsening, stride
+        ):
+            stats.splat_seconds += self._splatting.seconds - before
+            yield
+            before = self._splatting.seconds
+        stats.splat_seconds += self._splatting.seconds - before
 
-        `count`: of those that are added. `tables` of another plan than the one begun, `maps` of another layout than the
-        light pass's own."""
-        maps, tables = maps or self._maps, tables or self.tables
-        smoothing = self.settings.smoothing * coarsening
-        for start in range(0, count, self.splat_part):
-            started = time.perf_counter()
-            part = min(self.splat_part, count - start)
-            maps.splatter.run(
-                photons,
-                part,
-                self.variables,
-                tables.tables,
-                maps.atlas,
-                maps.receivers,
-                smoothing,
-                self.gains,
-                start * stride,
-                stride,
-                tables.reindex,
-            )
-            if self.waits:
-                self.context.finish()
-            self.stats.splat_seconds += time.perf_counter() - started
-            if start + part < count:
-                yield
-
-    def _account(self, batch: Batch) -> None:
-        self.stats.photons += batch.emitted_photons
-        self.stats.splats += batch.photons
-        self.stats.tally.merge(batch.tally)
+    def settling(self) -> Iterator[None]:
+        """Sum up what is pending, so that the maps can be shown at once."""
+        before, stats = self._splatting.seconds, self.stats
+        yield from self._splatting.summing(self.atlas)
+        stats.splat_seconds += self._splatting.seconds - before
 
     def _texel_size(self) -> np.ndarray:
         """Texel side of each receiver's finest window, GPU units."""
@@ -390,6 +434,13 @@ class LightPass:
             area = self.layout.placements["texel_area"][record["placement"]]
             sides.append(np.sqrt(area) * self.buffers.space.scale)
         return np.array(sides)
+
+    def show_gains(self, scene: Scene | None) -> None:
+        """Splat from now on with the brush's dabs of `scene`; None without."""
+        if (scene is not None) != self.features.local_gain:
+            self.features = replace(self.features, local_gain=scene is not None)
+            self._maps.take(self.features)
+        self.shown.show_gains(scene)
 
     def finish(self) -> None:
         """Sum what is pending and fetch the counters."""
@@ -401,42 +452,26 @@ class LightPass:
 
     def release(self) -> None:
         """Free everything."""
-        self.trace.release()
-        self.variables.release()
-        for owned in (self.maps, self.gains, self._tables):
+        for owned in (self.trace, self._records, self._splatting, self.shown, self.maps):
             if owned is not None:
                 owned.release()
 
 
-def reflectance_classes(scene: Scene, buffers: SceneBuffers) -> tuple[list[np.ndarray | None], dict[int, int]]:
-    """Distinct spectral reflectances to fold into the tables (None: none), and each receiver's class."""
-    classes: list[np.ndarray | None] = [None]
-    chosen: dict[int, int] = {}
-    for receiver, index in enumerate(buffers.receivers):
-        material = scene.objects[index].material
-        if material.reflectance is None:
-            chosen[receiver] = 0
-            continue
-        chosen[receiver] = next(
-            (i for i, known in enumerate(classes) if known is not None and np.array_equal(known, material.reflectance)),
-            len(classes),
-        )
-        if chosen[receiver] == len(classes):
-            classes.append(material.reflectance)
-    return classes, chosen
-
-
 def spectral_axis(scene: Scene, features: Features) -> SpectralAxis:
     """The axis of a rendering: by the scene's glasses, or plain wavelength for methods linear in λ."""
-    if not features.spectral_groups or features.merged_groups and features.spectral_groups == 1:
+    if not features.spectral_groups or (features.merged_groups and features.spectral_groups == 1):
         return SpectralAxis.build([])
     return SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.dispersion is not None])
 
 
+def scene_buffers(context: Context, scene: Scene, settings: RenderSettings) -> SceneBuffers:
+    """`scene` on the device, with the features that it and `settings` decide; the caller's."""
+    features = Features.of(scene, settings)
+    return SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+
+
 def _largest_batch(context: Context, features: Features) -> int:
     """Lattice points whose queue fits the device's largest storage buffer."""
-    from ..passes.trace import RAY_ROOM
-
     ray = records.ray_record(features.defines()["COLUMNS"]).stride
     limit = context.limits.storage_block_bytes
     return max(64, int(limit // (2 * RAY_ROOM * ray)) // 64 * 64)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from ..base.random_words import PASS_GENERATORS, Dimension, random_word, shift
 from ..gpu.records import MAX_BANDS
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import Features
+from ..model.optics.spectral_tables import CumulativeSpectrum
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.emission_domain import EmissionDomain
@@ -42,7 +45,7 @@ class LightPlan:
         """Points of each sub-lattice over the whole rectangle, so that about the light's share of `photons` starts."""
         return max(1, round(photons * self.share / self.lattices / self.domain.active_share))
 
-    def piece(
+    def slice(
         self, seed: int, number: int, lattice: int, first: int, stride: int, points: int, weight: float
     ) -> LatticeSlice:
         """Points first, first + stride, … of pass `number`'s lattices of `lattice` points each."""
@@ -65,6 +68,35 @@ class LightPlan:
 
 
 @dataclass(frozen=True)
+class Division:
+    """How finely sub-lattices are divided at least, whatever a plan asks for by itself: for frames whose lattices shall
+    be the same."""
+
+    counts: Mapping[int, tuple[int, int]] = field(default_factory=dict)
+    """Spectral bands and points of each light."""
+
+    @staticmethod
+    def finest(needs: Iterable[Mapping[int, tuple[int, int]]]) -> Division:
+        """The finest that any of several frames asks for."""
+        counts: dict[int, tuple[int, int]] = {}
+        for need in needs:
+            for light, (bands, points) in need.items():
+                before = counts.get(light, (1, 1))
+                counts[light] = max(before[0], bands), max(before[1], points)
+        return Division(counts)
+
+    def of(self, plan: LightPlan, power: CumulativeSpectrum | None) -> LightPlan:
+        """`plan` divided so; `power` of the light, None where bands stay as they are."""
+        least_bands, least_points = self.counts.get(plan.index, (1, 1))
+        points = max(plan.light_points, least_points)
+        bands = plan.bands
+        if power is not None and least_bands > len(bands):
+            edges = np.linspace(bands[0].x_lo, bands[-1].x_hi, least_bands + 1).tolist()
+            bands = tuple(Band(lo, hi, 0.5 * (lo + hi), float(power.band(lo, hi)[3])) for lo, hi in pairwise(edges))
+        return replace(plan, bands=bands, light_points=points)
+
+
+@dataclass(frozen=True)
 class Planner:
     """What a plan is made from."""
 
@@ -76,6 +108,7 @@ class Planner:
     pilots: dict[int, Pilot]
     batch: int = SMALLEST_BATCH
     """Rays in flight at once: a sub-lattice of each kind must have a point in them."""
+    division: Division = Division()
 
     def plans(self, photons: int, texel: np.ndarray) -> list[LightPlan]:
         """Photons, bands and points of each light that reaches a receiver; `texel`: side of each receiver's finest
@@ -99,7 +132,9 @@ class Planner:
                 else self._scattered_points(i, len(bands), budget)
             )
             points = max(1, min(points, self.batch // len(bands)))
-            plans.append(LightPlan(i, self.domains[i], bands, points, share))
+            plan = LightPlan(i, self.domains[i], bands, points, share)
+            power_of = self.buffers.light_power[i] if self.features.spectral_groups else None
+            plans.append(self.division.of(plan, power_of))
         return plans
 
     def _scattered_points(self, light: int, bands: int, budget: int) -> int:

@@ -94,6 +94,10 @@ def _is_selected(state: State, view_model: ViewModel) -> bool:
     return lights or _is_object(state, view_model)
 
 
+def _is_stored(number: int, state: State, _view_model: ViewModel) -> bool:
+    return state.views[number] is not None
+
+
 def _can_paste(state: State, view_model: ViewModel) -> bool:
     return state.clipboard is not None and _is_object(state, view_model)
 
@@ -339,7 +343,7 @@ VIEWS: tuple[Command, ...] = tuple(
             "Views",
             "Go to this stored view.",
             partial(view_commands.go_to_view, number),
-            enabled=lambda state, _view_model, number=number: state.views[number] is not None,
+            enabled=partial(_is_stored, number),
         ),
         Command(
             f"Store view {number + 1}",

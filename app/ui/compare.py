@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..edit.live_inputs import LiveInputs
-from ..gpu.scene_buffers import SceneBuffers
-from ..model.features import Features
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
-from ..passes.spectrum_choice import Spectrum
-from ..render.light_pass import reflectance_classes, spectral_axis
+from ..render.light_pass import scene_buffers
+from ..render.sampling import CameraSampling
+from ..render.shown_spectra import reflectance_classes
+from ..render.solo import scene_seen
 from ..render.viewer.dirty_level import DirtyLevel
 from ..render.viewer.invalidation import dirty_level
 from .error_curves import ErrorCurves
@@ -34,13 +34,13 @@ if TYPE_CHECKING:
 
     from ..edit.state import Compare, State
     from ..gpu.context import Context
-    from ..model.scene import Scene
+    from ..model.scene import Camera, Scene
     from ..render.viewer.engine import LiveEngine
 
 REFERENCE = "reference"
 STAND_IN = "stochastic-even"
 """Takes the reference's place where that cannot be computed."""
-DIRECT_SAMPLES = 32
+DIRECT = CameraSampling(32, whole_spectrum=True)
 DISPATCH_SECONDS = 0.012
 SHOWN_FROM = 1.0
 """Photons a pixel from which on a reference is shown."""
@@ -110,10 +110,19 @@ class Comparison:
             return "Reference: the first photons are on their way."
         if not self._has(snapshot, SHOWN_FROM):
             least = SHOWN_FROM * self._begun.width * self._begun.height
-            return f"Reference: {snapshot.photons / 1e6:.2f} million photons so far. It is shown from {least / 1e6:.2f} million on."
-        told = f"Reference: light tracing in float64 without shared code, {snapshot.photons / 1e6:.1f} million photons, own relMSE {snapshot.relmse:.1e}."
+            return (
+                f"Reference: {snapshot.photons / 1e6:.2f} million photons so far. It is shown from {least / 1e6:.2f} "
+                "million on."
+            )
+        told = (
+            f"Reference: light tracing in float64 without shared code, {snapshot.photons / 1e6:.1f} million photons, "
+            f"own relMSE {snapshot.relmse:.1e}."
+        )
         if self._compare.plot and not self._has(snapshot, MEASURED_FROM):
-            told += f" Errors are measured from {MEASURED_FROM * self._begun.width * self._begun.height / 1e6:.1f} million on."
+            told += (
+                f" Errors are measured from {MEASURED_FROM * self._begun.width * self._begun.height / 1e6:.1f} "
+                "million on."
+            )
         if not snapshot.directly.all():
             told += " What is seen behind glass or in mirrors is not compared."
         if self._begun.local_gain and any(item.local_dispersion for item in self._begun.scene.objects):
@@ -195,7 +204,7 @@ class Comparison:
         return not self._shows_reference
 
     def _start_reference(self, begun: LiveInputs) -> None:
-        scene = _lit(begun)
+        scene = scene_seen(begun.scene, begun.camera, begun.solo_nm)
         self._thread = ReferenceThread(scene, begun.width, begun.height)
         self._direct = _DirectPicture(self._context, scene, begun)
 
@@ -262,8 +271,9 @@ class Comparison:
             engines[self._method] = self._engine
         for method, engine in engines.items():
             stats, picture = engine.stats, engine.picture
-            whole = picture is not None and picture.size == (state.viewport_size[0], state.viewport_size[1])
-            if whole and stats.resolution_scale == 1.0 and self._curves.wants(method, stats.photons):
+            if picture is None or picture.size != (state.viewport_size[0], state.viewport_size[1]):
+                continue
+            if stats.resolution_scale == 1.0 and self._curves.wants(method, stats.photons):
                 self._curves.add(method, self._seconds[method][0], stats.photons, _read(picture))
 
     def _count_seconds(self, engine: LiveEngine | None, method: str) -> None:
@@ -287,17 +297,18 @@ class _DirectPicture:
 
     def __init__(self, context: Context, scene: Scene, inputs: LiveInputs) -> None:
         settings = RenderSettings(width=inputs.width, height=inputs.height, method=inputs.method)
-        features = Features.of(scene, settings)
-        self._buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+        self._buffers = scene_buffers(context, scene, settings)
         reflectances, _ = reflectance_classes(scene, self._buffers)
-        # Without maps, and for what is seen directly alone: there one band of the spectrum is exact.
         self._camera_pass = CameraPass(context, self._buffers, "beauty", reflectances)
-        self._camera_pass.spectrum = Spectrum()
         self._camera_pass.dispatch_seconds = DISPATCH_SECONDS
-        self._steps: Iterator[float] | None = self._camera_pass.samples(
-            scene.camera, inputs.width, inputs.height, DIRECT_SAMPLES, 0, None, inputs.seed
-        )
+        self._steps: Iterator[float] | None = self._sampled(scene.camera, inputs)
         self._rgb: np.ndarray | None = None
+
+    def _sampled(self, camera: Camera, inputs: LiveInputs) -> Iterator[float]:
+        """Without maps."""
+        view = camera, inputs.width, inputs.height
+        yield from DIRECT.choosing(self._camera_pass, *view, None)
+        yield from self._camera_pass.samples(*view, DIRECT.samples(self._camera_pass), 0, None, inputs.seed)
 
     def advance(self) -> bool:
         """One dispatch of work; True once it is done."""
@@ -316,13 +327,6 @@ class _DirectPicture:
         """Free everything."""
         self._camera_pass.release()
         self._buffers.release()
-
-
-def _lit(inputs: LiveInputs) -> Scene:
-    """The scene as its camera sees it, with the light of one wavelength only where `solo_nm` says so."""
-    from ..render.viewer.live_camera import solo_scene
-
-    return replace(solo_scene(inputs.scene, inputs.solo_nm), camera=inputs.camera)
 
 
 def _read(picture: moderngl.Texture) -> np.ndarray:

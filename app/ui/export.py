@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ..base.image_io import check_suffix, write_image
 from ..base.memory import MAX_SIDE_PX, check_picture_memory
 from ..edit import requests
 from ..edit.parameters import Stage
-from ..edit.state import Display as PilotRender
+from ..edit.state import Display as DisplaySettings
 from ..edit.state import State
 from ..model.settings import RenderSettings
 from ..passes.display import Display
@@ -160,7 +160,7 @@ class _Job:
         frame = (
             f"Frame {min(int(self._fraction * self._frames) + 1, self._frames)} of {self._frames}"
             if self._frames
-            else "Tracing and looking"
+            else "Tracing photons and taking camera samples"
         )
         if self._fraction < 0.02:
             return frame
@@ -201,7 +201,7 @@ def _texels(texture: moderngl.Texture) -> np.ndarray:
     return np.ascontiguousarray(texels[..., :3])
 
 
-def _settings(state: State, size: tuple[int, int], photons: int, **changes: object) -> RenderSettings:
+def _settings(state: State, size: tuple[int, int], photons: int, **changes: Any) -> RenderSettings:
     """What is shown, in another size and with so many photons."""
     width, height = size
     if not (1 <= width <= MAX_SIDE_PX and 1 <= height <= MAX_SIDE_PX):
@@ -234,8 +234,8 @@ def _spectral(context: Context, path: Path, stage: Stage, state: State, photons:
         try:
             for share in renderer.steps(stage):
                 yield 0.98 * share
-            spectral, edges = renderer.spectral()
-            write_image(path, renderer.rgb(), spectral=spectral, bin_edges_nm=edges)
+            picture = renderer.picture
+            write_image(path, picture.rgb, spectral=picture.spectral, bin_edges_nm=picture.bin_edges_nm)
         finally:
             renderer.release()
 
@@ -287,8 +287,8 @@ def _animate(context: Context, request: requests.Animate, stage: Stage, state: S
 class _Developer:
     """Linear pictures to codes as the window shows them: tone curve or false colour."""
 
-    def __init__(self, context: Context, look: PilotRender) -> None:
-        self._context, self._look = context, look
+    def __init__(self, context: Context, settings: DisplaySettings) -> None:
+        self._context, self._settings = context, settings
         self._display: Display | None = None
 
     def __call__(self, rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
@@ -299,7 +299,7 @@ class _Developer:
             (width, height), 4, np.ascontiguousarray(texels, np.float32).tobytes(), dtype="f4"
         )
         try:
-            return texture_codes(self._display.run(texture, self._look, exposure_ev, (width, height)))
+            return texture_codes(self._display.run(texture, self._settings, exposure_ev, (width, height)))
         finally:
             texture.release()
 

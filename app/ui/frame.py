@@ -62,7 +62,7 @@ def _carry_out(session: Session, request: requests.Request) -> None:
         session_requests.carry_out(session, request)
     except UserError as error:
         session.messages.tell(sentence(str(error)), is_error=True)
-    except Exception as error:  # a bug: the work and the window outlive it
+    except Exception as error:  # noqa: BLE001 - a bug: the work and the window outlive it
         session.save_from_crash(f"{type(request).__name__}", error)
         session.messages.tell(
             f"{words(request)} failed by a fault of the program ({brief(error)}); your work is kept.", is_error=True
@@ -94,7 +94,7 @@ def _work(session: Session, budget_s: float) -> None:
         session.companions.look(session.state, session.picture, now)
     except UserError as error:
         session.messages.tell(sentence(str(error)), is_error=True)
-    except Exception as error:  # a bug, or the device is lost
+    except Exception as error:  # noqa: BLE001 - a bug, or the device is lost
         session.picture.give_up()
         session.renderer_stopped(error)
 
@@ -103,7 +103,7 @@ def _work_beside(session: Session, budget_s: float) -> float:
     """Exports and comparison; returns the time that is left."""
     try:
         return session.companions.work(session.state, session.picture, budget_s)
-    except Exception as error:  # a bug in a side line must not stop the picture
+    except Exception as error:  # noqa: BLE001 - a bug in a side line must not stop the picture
         session.companions.exports.cancel()
         session.save_from_crash("exporting or comparing", error)
         session.messages.tell(

@@ -166,7 +166,8 @@ def _render(scene: Path, output: Path) -> subprocess.Popen[bytes]:
     command += ["--size", size, "--photons", PHOTONS, "--spp", "4"]
     # One thread: the others belong to the window.
     environment = os.environ | {"LP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
-    nice = {"preexec_fn": lambda: os.nice(19)} if os.name == "posix" else {}
+    silent = subprocess.DEVNULL
+    lowest_priority = (lambda: os.nice(19)) if os.name == "posix" else None
     return subprocess.Popen(
-        command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **nice
+        command, env=environment, stdin=silent, stdout=silent, stderr=silent, preexec_fn=lowest_priority
     )

@@ -20,6 +20,8 @@ from ..model.scene import Scene
 from . import item_rects
 
 _IM = imguizmo.im_guizmo
+_OPERATION_OF: dict[str, Operation] = {"move": "move", "rotate": "rotate", "scale": "scale"}
+"""By tool; the others have no handles."""
 _OPERATIONS = {"move": _IM.OPERATION.translate, "rotate": _IM.OPERATION.rotate, "scale": _IM.OPERATION.scale}
 _LABELS = {"move": "Move", "rotate": "Turn", "scale": "Scale"}
 ROTATION_SNAP_DEG = 15.0
@@ -67,7 +69,8 @@ class Gizmo:
 
     def draw(self, state: State, view: View, rect: tuple[float, float, float, float]) -> State:
         """Draw it over the picture in `rect` (left, top, width, height in pixels) and answer its handles."""
-        if state.tool not in _OPERATIONS or not placing.can_do(state.scene, state.selection, state.tool):
+        operation = _OPERATION_OF.get(state.tool)
+        if operation is None or not placing.can_do(state.scene, state.selection, operation):
             self._drag = None
             return state
         if self._drag is not None and not self._drag.goes_on(state):
@@ -80,13 +83,13 @@ class Gizmo:
         _IM.get_style().hatched_axis_line_thickness = 0.0
         frame = placing.frame_of(state.scene, state.selection, self.is_local) if self._drag is None else self._drag.now
         origin = frame[:3, 3] if self._drag is None else self._drag.before[:3, 3]
-        after = self._manipulate(state.tool, view, frame, origin)
+        after = self._manipulate(operation, view, frame, origin)
         self._note(view, frame, rect)
         if not _IM.is_using():
             self._drag = None
             return state
         if self._drag is None:
-            self._drag = _Drag(state.scene, state.scene, state.selection, state.tool, frame, frame)
+            self._drag = _Drag(state.scene, state.scene, state.selection, operation, frame, frame)
         self._drag.now = after
         return self._edited(state)
 

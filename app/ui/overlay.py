@@ -66,7 +66,7 @@ class Canvas:
 def _cut_near(pairs: np.ndarray, depth: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
     """Segments (n, 2, 3) without what lies nearer than `near`, and which are left."""
     ahead = depth > near
-    kept = ahead.any(axis=1)
+    kept = np.asarray(ahead.any(axis=1))
     pairs, depth, ahead = pairs[kept], depth[kept], ahead[kept]
     crossing = ahead[:, 0] != ahead[:, 1]
     share = np.where(crossing, (near - depth[:, 0]) / np.where(crossing, depth[:, 1] - depth[:, 0], 1.0), 0.0)[:, None]

@@ -51,17 +51,13 @@ class RayOverlay:
         self._fan = self._buffers = self._scene = None
 
     def _fan_of(self, scene: Scene) -> RayFan:
-        from ..gpu.scene_buffers import SceneBuffers
-        from ..model.features import Features
         from ..model.settings import RenderSettings
         from ..passes.ray_fan import RayFan
-        from ..render.light_pass import spectral_axis
+        from ..render.light_pass import scene_buffers
 
         if self._fan is None or scene is not self._scene:
             self.release()
-            features = Features.of(scene, RenderSettings())
-            self._scene = scene
-            self._buffers = SceneBuffers(self._context.ctx, scene, features, spectral_axis(scene, features))
+            self._scene, self._buffers = scene, scene_buffers(self._context, scene, RenderSettings())
             self._fan = RayFan(self._context, self._buffers)
         return self._fan
 

@@ -6,6 +6,7 @@ work after the round it is in.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import threading
@@ -84,11 +85,9 @@ class ReferenceThread:
             self._thread.join()
 
     def _run(self) -> None:
-        try:
+        with contextlib.suppress(OSError, AttributeError):  # then it only takes more of the processor
             # Linux: of this thread and of those it starts, not of the program.
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
-        except (OSError, AttributeError):
-            pass  # then it only takes more of the processor
         try:
             self._compute()
         except UserError as error:

@@ -1,4 +1,4 @@
-"""What the interface holds between frames: one document, one engine's picture, messages, settings, and what runs beside.
+"""What the interface holds between frames: one document, one engine's picture, messages, settings, and side jobs.
 
 `frame` goes round between the panels and this; `session_requests` carries out what they ask for.
 """

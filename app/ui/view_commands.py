@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from typing import Any
 
 from ..edit.requests import FrameSelection, Notice
 from ..edit.state import Panels, Selection, State
@@ -74,7 +75,8 @@ def toggle_auto(state: State, view_model: ViewModel) -> State:
 
 def toggle_display(name: str, state: State, _view_model: ViewModel) -> State:
     """Turn the switch `Display.<name>`."""
-    return replace(state, display=replace(state.display, **{name: not getattr(state.display, name)}))
+    changed: Any = {name: not getattr(state.display, name)}
+    return replace(state, display=replace(state.display, **changed))
 
 
 def toggle_solo(state: State, _view_model: ViewModel) -> State:

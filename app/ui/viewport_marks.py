@@ -143,7 +143,7 @@ def _draw_light(
     opacity = 1.0 if chosen or hovered else 0.5
     if (chosen or hovered) and light.has_direction:
         length = canvas.view.height_at(max(float(canvas.view.depth(place)), 1e-9)) * theme.em(_ARROW_EM) / canvas.height
-        tip = place + length * placing.light_axes(light)[:, 2]
+        tip = place + length * light.axes()[:, 2]
         draw_outlined(canvas, np.stack([place, tip]), (*colour[:3], 0.9), 1.6, closed=False)
     canvas.drawing.add_circle_filled(
         ImVec2(x, y), theme.em(0.78), theme.packed((0.0, 0.0, 0.0, 1.0), 0.5 * opacity), 24

@@ -54,7 +54,10 @@ def draw_toolbar(state: State, gizmo: Gizmo, left: float, top: float) -> State:
     if has_axes:
         _ground(x, y, size, 1)
         name, icon = ("Object's axes", icons.ICON_FA_CUBE) if gizmo.is_local else ("World's axes", icons.ICON_FA_GLOBE)
-        tip = f"The gizmo shows the {name[:1].lower()}{name[1:]}; click for the {'world' if gizmo.is_local else 'object'}'s."
+        tip = (
+            f"The gizmo shows the {name[:1].lower()}{name[1:]}; click for the "
+            f"{'world' if gizmo.is_local else 'object'}'s."
+        )
         if _button("Gizmo axes", icon, x, y, gizmo.is_local, tip, ()):
             gizmo.is_local = not gizmo.is_local
         y += size + gap
@@ -119,7 +122,8 @@ def badges(state: State, view_model: ViewModel) -> list[Badge]:
         told.append(
             Badge(
                 "First order",
-                "Photons were traced through a glass of another dispersion; the picture follows the edit to first order until they are traced again (Ctrl+R).",
+                "Photons were traced through a glass of another dispersion; the picture follows the edit to first "
+                "order until they are traced again (Ctrl+R).",
             )
         )
     if state.solo_nm is not None:

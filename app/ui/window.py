@@ -11,7 +11,7 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol, Self
+from typing import Any, Protocol, Self, cast
 
 import moderngl
 import numpy as np
@@ -74,7 +74,8 @@ class GlfwLoader:
 
     def load(self, name: str) -> int:
         """Address of the OpenGL function `name`, 0 when unknown."""
-        return glfw.get_proc_address(name) or 0
+        address: Any = glfw.get_proc_address(name)
+        return address or 0
 
     def release(self) -> None:
         """The window owns the context."""
@@ -96,7 +97,8 @@ class Window:
         place = place or WindowPlace()
         self._handle = _create(place, visible)
         glfw.make_context_current(self._handle)
-        self.context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=GlfwLoader()), "window")
+        loader: Any = GlfwLoader()
+        self.context = Context(moderngl.create_context(require=GL_VERSION_CODE, context=loader), "window")
         # A GPU waits for the screen; on the processor waiting would be time taken from the photons.
         glfw.swap_interval(0 if self.context.is_software else 1)
         self._screen = self.context.ctx.detect_framebuffer(0)
@@ -105,7 +107,7 @@ class Window:
         self._close_pressed = False
         self._listen()
         self._host = ImguiHost()
-        imgui.backends.glfw_init_for_opengl(ctypes.cast(self._handle, ctypes.c_void_p).value, True)
+        imgui.backends.glfw_init_for_opengl(ctypes.cast(self._handle, ctypes.c_void_p).value or 0, True)
         self._title = ""
 
     def __enter__(self) -> Self:
@@ -244,11 +246,11 @@ class Window:
             self._close_pressed = True
             self.wake()
 
-        glfw.set_drop_callback(self._handle, dropped)
+        glfw.set_drop_callback(self._handle, cast(Any, dropped))  # glfw hands a list over, whatever its types say
         glfw.set_window_close_callback(self._handle, closing)
 
 
-def _create(place: WindowPlace, visible: bool) -> object:
+def _create(place: WindowPlace, visible: bool) -> Any:
     """A glfw window with an OpenGL 4.3 core context, or a `UserError`."""
     problems: list[str] = []
     glfw.set_error_callback(

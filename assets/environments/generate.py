@@ -10,11 +10,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-HERE = Path(__file__).resolve().parent
-
 from spectrasplat.model.environment import direction_of
 from spectrasplat.model.texture import Environment
+
+HERE = Path(__file__).resolve().parent
 
 WIDTH, HEIGHT = 1024, 512
 SAMPLES = 4

@@ -8,9 +8,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-HERE = Path(__file__).resolve().parent
-
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.mesh import Mesh, make_mesh, normalised
 from spectrasplat.model.io.gltf_write import save_gltf
@@ -27,6 +24,8 @@ from spectrasplat.model.scene import (
     Scene,
     SceneObject,
 )
+
+HERE = Path(__file__).resolve().parent
 
 
 def trefoil_knot(radius: float = 0.5, tube: float = 0.13, along: int = 168, around: int = 20) -> Mesh:

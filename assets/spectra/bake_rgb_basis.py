@@ -16,10 +16,9 @@ from pathlib import Path
 import numpy as np
 from scipy.sparse import block_diag, bmat, csc_matrix, diags, hstack, viewpoint
 from scipy.sparse.linalg import splu
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM, cmf_xyz, illuminant_table, xyz_to_rgb709_matrix
 
 HERE = Path(__file__).resolve().parent
-
-from spectrasplat.model.optics.colorimetry import VISIBLE_NM, cmf_xyz, illuminant_table, xyz_to_rgb709_matrix
 
 COUNT = len(VISIBLE_NM)
 ROUNDS = 200
@@ -69,7 +68,8 @@ def main() -> None:
     basis = smoothest_basis()
     assert basis.min() >= -1e-12 and np.abs(basis.sum(axis=1) - 1.0).max() < 1e-12
     header = (
-        "Smoothest reflectances >= 0 that sum to 1 and show the Rec.709 primaries under D65; computed by bake_rgb_basis.py\n"
+        "Smoothest reflectances >= 0 that sum to 1 and show the Rec.709 primaries under D65; computed by "
+        "bake_rgb_basis.py\n"
         "wavelength_nm,red,green,blue"
     )
     rows = np.column_stack([VISIBLE_NM, np.clip(basis, 0.0, 1.0)])

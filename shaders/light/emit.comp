@@ -1,9 +1,12 @@
 // Emission: one thread a lattice point. Compiled once per kind of light (LIGHT_POINT covers spots,
-// LIGHT_PLANE directional and collimated light, LIGHT_AREA area lights).
+// LIGHT_PROFILE lamps from photometric files, LIGHT_PLANE directional and collimated light, LIGHT_AREA area lights).
 layout(local_size_x = 64) in;
 
 #include "lib/emission.glsl"
 #include "lib/spot.glsl"
+#ifdef LIGHT_PROFILE
+#include "lib/profile.glsl"
+#endif
 
 layout(std430, binding = BIND_PARAMETERS) readonly restrict buffer Parameters { EmitParameters p; };
 layout(std430, binding = BIND_RAYS_OUT) writeonly restrict buffer RaysOut { uvec4 rays[]; };
@@ -48,16 +51,19 @@ void main()
 
     vec3 position, direction, dposition_ds = vec3(0.0), dposition_dt = vec3(0.0), ddirection_ds = vec3(0.0), ddirection_dt = vec3(0.0);
     float weight = p.weight;
-#if defined(LIGHT_POINT) || defined(LIGHT_AREA)
+#ifndef LIGHT_PLANE
     alive = alive && dot(q, q) < 4.0;
     vec3 dx, dy;
     direction = to_world(azimuthal_direction(q, dx, dy));
     ddirection_ds = p.spacing.x * to_world(dx);
     ddirection_dt = p.spacing.y * to_world(dy);
     position = p.origin;
-#ifdef LIGHT_POINT
+#ifndef LIGHT_AREA
     weight *= p.cone.y - p.cone.x > 1e-7 ? spot_falloff(direction, p.light_axis, p.cone)
                                          : coverage(p.cone.y - angle_between(direction, p.light_axis), p.mean_spacing);
+#ifdef LIGHT_PROFILE
+    weight *= profile_intensity(p.profile, direction, p.light_axis, p.light_u, p.light_v);
+#endif
 #else
     vec2 on_light = p.is_disc != 0u ? concentric_disc(on_disc) : 2.0 * on_disc - 1.0;
     position += on_light.x * p.light_u + on_light.y * p.light_v;
@@ -74,7 +80,7 @@ void main()
     vec2 at = vec2(dot(on_plane - p.aperture_centre, p.light_u), dot(on_plane - p.aperture_centre, p.light_v));
     vec2 half_size = 1.0 / max(vec2(length(p.light_u), length(p.light_v)), vec2(1e-20));
     vec2 inside = half_size * (1.0 - abs(at));
-    weight *= p.has_aperture == 0u ? 1.0 : p.is_disc != 0u ? coverage(half_size.x * (1.0 - length(at)), p.mean_spacing)
+    weight *= p.light_u == vec3(0.0) ? 1.0 : p.is_disc != 0u ? coverage(half_size.x * (1.0 - length(at)), p.mean_spacing)
                                                         : coverage(inside.x, p.spacing.x) * coverage(inside.y, p.spacing.y);
 #endif
     alive = alive && weight > 0.0;

@@ -36,7 +36,10 @@ glass = "N-BK7"
 position = [0.4, -0.2, 1.2]
 {receiver}
 """
-FLOOR = '[[objects]]\nname = "floor"\nshape = "plane"\nwidth = 6.0\nheight = 6.0\nmaterial = {{ kind = "diffuse", colour = {} }}\n'
+FLOOR = (
+    '[[objects]]\nname = "floor"\nshape = "plane"\nwidth = 6.0\nheight = 6.0\n'
+    'material = {{ kind = "diffuse", colour = {} }}\n'
+)
 BOWL = '[[objects]]\nname = "bowl"\nshape = "sphere"\nradius = 2.0\nposition = [0.0, 0.0, -1.9]\nmaterial = "diffuse"\n'
 
 

@@ -6,6 +6,7 @@ The command line runs in this process and borrows the session's OpenGL context.
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 import time
 from collections.abc import Callable
@@ -46,7 +47,10 @@ material = {{ kind = "diffuse", colour = 0.8 }}
 """
 LIGHT_ALONE = "--layer map:floor"
 """Where only the light's balance is asked for: no camera's picture, and so none of its programs."""
-SLAB = '[[objects]]\nshape = "slab"\nwidth = 1.0\nheight = 1.0\nthickness = 1.0\nposition = [0.0, 0.0, 2.5]\nmaterial = {{ n_d = 1.5{} }}\n'
+SLAB = (
+    '[[objects]]\nshape = "slab"\nwidth = 1.0\nheight = 1.0\nthickness = 1.0\nposition = [0.0, 0.0, 2.5]\n'
+    "material = {{ n_d = 1.5{} }}\n"
+)
 PRISM = '[[objects]]\nname = "prism"\nshape = "prism"\nglass = "N-SF11"\nrests_at_z = 0.01\n'
 
 
@@ -97,7 +101,7 @@ def share(render: Render, name: str) -> float:
 def stack_transmittance(*indices: float) -> float:
     """Incoherent transmittance of parallel interfaces at normal incidence, with all reflections between them."""
     transmitted, reflected_back = 1.0, 0.0  # of the layers so far, and seen from below
-    for above, below in zip(indices, indices[1:], strict=False):
+    for above, below in itertools.pairwise(indices):
         r = ((above - below) / (above + below)) ** 2
         echo = 1.0 / (1.0 - reflected_back * r)
         reflected_back = r + (1.0 - r) ** 2 * reflected_back * echo
@@ -232,18 +236,33 @@ def test_absorption_gives_its_colour_at_its_distance(render: Render) -> None:
 
 def test_water_in_a_glass(render: Render) -> None:
     """Nested solids: the water reaches into the wall, where the glass has priority."""
-    outer = '[[objects]]\nname = "glass"\nshape = "slab"\nthickness = 1.0\nposition = [0, 0, 1]\nmaterial = { n_d = 1.6, priority = 2 }\n'
+    outer = (
+        '[[objects]]\nname = "glass"\nshape = "slab"\nthickness = 1.0\nposition = [0, 0, 1]\n'
+        "material = { n_d = 1.6, priority = 2 }\n"
+    )
     # A glass tank whose hollow is a second shell, facing inward; the water overlaps 0.05 of all walls.
-    hollow = '[[objects]]\nname = "air"\nshape = "box"\nsize = [0.8, 0.8, 0.6]\nposition = [0, 0, 1]\nmaterial = { n_d = 1.0, priority = 3 }\n'
-    water = '[[objects]]\nname = "water"\nshape = "box"\nsize = [0.8, 0.8, 0.6]\nposition = [0, 0, 1]\nmaterial = { n_d = 1.333, priority = 3 }\n'
+    hollow = (
+        '[[objects]]\nname = "air"\nshape = "box"\nsize = [0.8, 0.8, 0.6]\nposition = [0, 0, 1]\n'
+        "material = { n_d = 1.0, priority = 3 }\n"
+    )
+    water = (
+        '[[objects]]\nname = "water"\nshape = "box"\nsize = [0.8, 0.8, 0.6]\nposition = [0, 0, 1]\n'
+        "material = { n_d = 1.333, priority = 3 }\n"
+    )
     for inner, index in ((hollow, 1.0), (water, 1.333)):
         render(beam(outer + inner), f"{LIGHT_ALONE} --stats")
         assert share(render, "deposited") == pytest.approx(stack_transmittance(1.0, 1.6, index, 1.6, 1.0), abs=0.005)
 
 
 def test_overlap_belongs_to_the_higher_priority(render: Render) -> None:
-    lower = '[[objects]]\nname = "a"\nshape = "slab"\nthickness = 0.6\nposition = [0, 0, 0.8]\nmaterial = {{ n_d = 1.5, priority = {} }}\n'
-    upper = '[[objects]]\nname = "b"\nshape = "slab"\nthickness = 0.6\nposition = [0, 0, 1.2]\nmaterial = {{ n_d = 2.4, priority = {} }}\n'
+    lower = (
+        '[[objects]]\nname = "a"\nshape = "slab"\nthickness = 0.6\nposition = [0, 0, 0.8]\n'
+        "material = {{ n_d = 1.5, priority = {} }}\n"
+    )
+    upper = (
+        '[[objects]]\nname = "b"\nshape = "slab"\nthickness = 0.6\nposition = [0, 0, 1.2]\n'
+        "material = {{ n_d = 2.4, priority = {} }}\n"
+    )
     for first, second in ((1, 2), (2, 1), (0, 0)):  # one interface between the two, wherever it lies
         render(beam(lower.format(first) + upper.format(second)), f"{LIGHT_ALONE} --stats")
         assert share(render, "deposited") == pytest.approx(stack_transmittance(1.0, 2.4, 1.5, 1.0), abs=0.005)
@@ -251,7 +270,8 @@ def test_overlap_belongs_to_the_higher_priority(render: Render) -> None:
 
 def test_a_cemented_doublet_has_three_surfaces(render: Render) -> None:
     part = (
-        '[[objects]]\nshape = "doublet"\npart = "{}"\nradius1 = 3.0\nradius2 = -3.0\nradius3 = -30.0\nthickness1 = 0.2\n'
+        '[[objects]]\nshape = "doublet"\npart = "{}"\nradius1 = 3.0\nradius2 = -3.0\nradius3 = -30.0\n'
+        "thickness1 = 0.2\n"
         'thickness2 = 0.1\ndiameter = 0.9\ntriangles = 8000\nglass = "{}"\nposition = [0, 0, 1]\n'
     )
     render(beam(part.format("front", "N-BK7") + part.format("back", "F2")), f"{LIGHT_ALONE} --stats")

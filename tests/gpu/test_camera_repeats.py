@@ -42,7 +42,8 @@ from spectrasplat.render.still import render
 context, scene = create_context(), load_scene(Path(sys.argv[1]))
 for run in range(int(sys.argv[2])):
     camera._TARGET_SECONDS = (0.15, 0.02, 1.0, 0.003, 0.4)[run % 5]
-    result = render(scene, RenderSettings(width=96, height=54, photons=20_000, spp=4, seed=7, tally=True), context=context)
+    settings = RenderSettings(width=96, height=54, photons=20_000, spp=4, seed=7, tally=True)
+    result = render(scene, settings, context=context)
     assert result.stats.camera.fallbacks["loops_ended"] == 0, result.stats.camera.fallbacks
     print(hashlib.sha256(np.ascontiguousarray(result.rgb).tobytes()).hexdigest())
 """

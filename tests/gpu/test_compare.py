@@ -68,7 +68,10 @@ def test_the_reference_agrees_with_the_picture_and_stops_when_the_scene_changes(
     gl, state: State, running: LiveEngine, comparison: Comparison
 ) -> None:
     compared = replace(state, compare=Compare(mode="wipe", plot=True))
-    thread = lambda: comparison._thread
+
+    def thread():
+        return comparison._thread
+
     until(
         lambda: comparison.picture is not None and thread().snapshot.relmse < 0.05,
         lambda: (comparison.advance(compared, running, 0.02), time.sleep(0.02)),

@@ -24,7 +24,10 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.light_pass import LightPass, spectral_axis
 
 LAMP = '[[lights]]\nname = "lamp"\nkind = "point"\nposition = [0.4, 0.2, 6]\nspectrum = "D65"\nintensity_cd = 100\n'
-FLOOR = '[[objects]]\nname = "floor"\nshape = "plane"\nwidth = 20\nheight = 20\nposition = [0, 0, -2]\nmaterial = { kind = "diffuse", colour = 0.5 }\n'
+FLOOR = (
+    '[[objects]]\nname = "floor"\nshape = "plane"\nwidth = 20\nheight = 20\nposition = [0, 0, -2]\n'
+    'material = { kind = "diffuse", colour = 0.5 }\n'
+)
 BALL = '[[objects]]\nname = "ball"\nshape = "sphere"\ntriangles = 1280\n'
 GEM = '[[objects]]\nname = "gem"\nshape = "box"\nsize = [1, 1, 1]\nrotation_deg = [20, 30, 0]\n'
 NEST = '[[objects]]\nname = "core"\nshape = "sphere"\ntriangles = 320\nradius = 0.5\n'
@@ -36,7 +39,10 @@ SCENES = {
     "nested": BALL
     + 'glass = "N-BK7"\n'
     + NEST
-    + "material = { n_d = 1.33, V_d = 55.0, absorption = { colour = [0.5, 0.9, 0.9], distance = 1.0 }, priority = 4 }\n",
+    + (
+        "material = { n_d = 1.33, V_d = 55.0, absorption = { colour = [0.5, 0.9, 0.9], distance = 1.0 }, priority = "
+        "4 }\n"
+    ),
     "mirror": BALL + 'material = { kind = "mirror", reflectance = 0.9 }\n',
 }
 

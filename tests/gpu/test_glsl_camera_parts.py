@@ -44,7 +44,10 @@ struct RayOrigin { uint primitive; uint object; bool inside; uint inside_mask; }
 struct RayRecord { uint inside_mask; uint inside_object; };
 struct CameraParameters { uint sample_index; uint draw_index; uint dithered; uint bands; };
 CameraParameters p = CameraParameters(3u, 3u, 0u, 4u);
-vec3 transfer_column(vec3 dp, vec3 dd, vec3 d, vec3 n, float t) { vec3 q = dp + t * dd; return q - dot(q, n) / dot(d, n) * d; }
+vec3 transfer_column(vec3 dp, vec3 dd, vec3 d, vec3 n, float t) {
+    vec3 q = dp + t * dd;
+    return q - dot(q, n) / dot(d, n) * d;
+}
 uint hash_combine(uint a, uint b) { return a ^ b; }
 #include "camera/path.glsl"
 """

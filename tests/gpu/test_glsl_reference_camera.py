@@ -199,7 +199,10 @@ def test_the_finest_window_that_holds_a_place_is_found(gl) -> None:
     receiver = rng.integers(0, 3, COUNT, dtype=np.uint32)
     source = np.where(receiver == 1, rng.integers(100, 103, COUNT), 0).astype(np.uint32)
     position = as_f32(rng.uniform(-1.5, 1.5, (COUNT, 3)) * rng.uniform(0.05, 1, (COUNT, 1)))
-    body = "uint place; vec2 at; found = find_texel(receiver, source, position, place, at) ? 1u : 0u; placement = place; texel = at;"
+    body = (
+        "uint place; vec2 at; found = find_texel(receiver, source, position, place, at) ? 1u : 0u; placement = "
+        "place; texel = at;"
+    )
     outputs = {"found": "uint", "placement": "uint", "texel": "vec2"}
     inputs = {"receiver": receiver, "source": source, "position": position}
     got = evaluate(

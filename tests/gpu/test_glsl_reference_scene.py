@@ -126,7 +126,8 @@ def test_media_on_both_sides_of_a_surface(scene: Scene, stack: bool) -> None:
         RAY
         + """
     Crossing c = cross_boundary(ray, hit, enters != 0u);
-    before = c.before; after = c.after; mask_after = c.mask_after; object_after = c.object_after; changes = c.changes ? 1u : 0u;
+    before = c.before; after = c.after; mask_after = c.mask_after; object_after = c.object_after;
+    changes = c.changes ? 1u : 0u;
     inside = ray_is_inside(ray) ? 1u : 0u; now = ray_medium(ray); weight = medium_weight_row(ray);
     """
     )
@@ -256,7 +257,10 @@ def test_gaussians(gl) -> None:
     rng = np.random.default_rng(4)
     x = as_f32(np.concatenate([rng.normal(0, 2.5, COUNT - 4), [0.0, 1e-20, 30.0, -30.0]]))
     width = as_f32(rng.uniform(0.01, 3.0, COUNT))
-    body = "e = erf_approx(x); box = gaussian_box(x, w); fast = gaussian_box_fast(x, w); excess = normal_excess(x); s = sinc_pi(x);"
+    body = (
+        "e = erf_approx(x); box = gaussian_box(x, w); fast = gaussian_box_fast(x, w); excess = normal_excess(x); s = "
+        "sinc_pi(x);"
+    )
     got = evaluate(
         gl.ctx,
         ["lib/gaussian.glsl"],

@@ -124,7 +124,8 @@ def test_t6_up_to_89_degrees_on_the_exact_sphere(gl) -> None:
         got = evaluate(
             gl.ctx,
             ["lib/optics.glsl"],
-            "float theta = dot(d, n); out_d = refract_direction(d, n, theta, eta, sqrt(transmitted_cosine2(theta, eta)));",
+            "float theta = dot(d, n); out_d = refract_direction(d, n, theta, eta, sqrt(transmitted_cosine2(theta, "
+            "eta)));",
             {"d": direction, "n": -point, "eta": np.full(len(angle), n)},
             {"out_d": "vec3"},
         )["out_d"]
@@ -170,7 +171,10 @@ def test_t9_mirror_nephroid(gl) -> None:
     frame = [photons.emitter.domain.tangent[1], photons.emitter.domain.bitangent[1]]
     dposition = frame[0] * photons.dposition_ds + frame[1] * photons.dposition_dt
     ddirection = frame[0] * rays.ddirection_ds + frame[1] * rays.ddirection_dt
-    cross = lambda a, b: a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+    def cross(a, b):
+        return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
     caustic = (
         photons.position
         - (cross(dposition, rays.direction) / cross(ddirection, rays.direction))[:, None] * rays.direction

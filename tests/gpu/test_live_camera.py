@@ -18,10 +18,11 @@ from spectrasplat.model.optics.glass import with_gain
 from spectrasplat.model.scene import Camera, Dielectric, Scene
 from spectrasplat.model.texture import Environment
 from spectrasplat.passes.spectrum_choice import Spectrum
+from spectrasplat.render.solo import solo_scene
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
-from spectrasplat.render.viewer.engine import LOOK_S, Budget, LiveEngine
+from spectrasplat.render.viewer.engine import PREVIEW_S, Budget, LiveEngine
 from spectrasplat.render.viewer.invalidation import dirty_level, looks_other
-from spectrasplat.render.viewer.live_camera import SCALES, _side, solo_scene
+from spectrasplat.render.viewer.live_camera import SCALES, _side
 from spectrasplat.render.viewer.spectrum_guess import guess_weights
 
 SIZE = (120, 68)
@@ -169,12 +170,12 @@ def test_better_maps_wait_for_a_cycle_and_the_last_are_shown(engine: LiveEngine,
     )
     maps = engine._maps
     engine._shown.accumulation.number += 1
-    engine._publish_maps()
-    assert engine._maps is maps and engine._maps_wait and not engine.is_idle
+    engine._maps_ready()
+    assert engine._maps is maps and engine.schedule.maps_wait and not engine.is_idle
     engine._shown.accumulation.number -= 1
     until(lambda: engine.is_idle, engine)
-    assert engine._maps is not maps and not engine._maps_wait
-    assert engine.stats.photons == pytest.approx(engine._shown.light.maps.photon_weight, abs=1)
+    assert engine._maps is not maps and not engine.schedule.maps_wait
+    assert engine.stats.photons == pytest.approx(engine._shown.light.light_pass.maps.photon_weight, abs=1)
 
 
 def test_an_edited_dispersion_changes_what_is_seen_in_glass_and_traces_nothing(
@@ -208,7 +209,7 @@ def test_environments_are_only_looked_at_and_a_turned_one_is_not_sent_again(engi
     )
     graded = replace(stage, environment=gradient((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
     for scene in (striped, turned, graded):
-        assert dirty_level(engine._inputs, engine._inputs, inputs(scene)) == DirtyLevel.LOOK
+        assert dirty_level(engine._inputs, engine._inputs, inputs(scene)) == DirtyLevel.CAMERA
     corner = settle(engine, inputs(striped))[:4, :, 0]
     assert np.ptp(corner) > 0.9 * WHITE
     store = engine._camera_pass._pictures
@@ -245,7 +246,7 @@ def test_a_picture_in_motion_is_as_small_as_its_time_asks_for(engine: LiveEngine
     viewpoint = engine._camera_pass
     pixels = viewpoint.picture.width * viewpoint.picture.height
     assert viewpoint.shown_samples == 1 and (
-        pixels <= 2.0 * viewpoint._rates[True] * LOOK_S or viewpoint.scale == SCALES[-1]
+        pixels <= 2.0 * viewpoint._rates[True] * PREVIEW_S or viewpoint.scale == SCALES[-1]
     )
     # Ten times the aim leaves room for a machine that does other things besides.
     assert np.median(seconds[4:]) < 10 * 0.05
@@ -262,7 +263,7 @@ def test_sides_in_motion_are_no_powers_of_two() -> None:
 def test_the_spectrum_guessed_for_a_colour_has_that_colour(gl: Context, engine: LiveEngine, stage: Scene) -> None:
     engine.set(inputs(stage))
     until(lambda: engine._shown is not None, engine)
-    channels = engine._shown.light.map_channels
+    channels = engine._shown.light.light_pass.map_channels
     weights, luminance = guess_weights(channels, stage.lights)
     xyz = np.array([spectrum.xyz() for spectrum in channels.spectra(stage.lights)])
     np.testing.assert_allclose(weights.T @ xyz, np.eye(3), atol=1e-9)

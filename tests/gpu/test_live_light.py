@@ -12,14 +12,12 @@ import pytest
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.gpu.context import Context
-from spectrasplat.gpu.scene_buffers import SceneBuffers
-from spectrasplat.model.features import Features
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.glass import with_gain
 from spectrasplat.model.scene import Dab, Dielectric, Diffuse, Scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.render.light_pass import spectral_axis
 from spectrasplat.render.light_plan import LightPlan
+from spectrasplat.render.shown_spectra import PassTables
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.render.viewer.invalidation import dirty_level
 from spectrasplat.render.viewer.live_light import LiveLight
@@ -59,35 +57,29 @@ def inputs(scene: Scene, **changes) -> LiveInputs:
 
 
 @contextmanager
-def live(context: Context, scene: Scene, photons: int = PHOTONS) -> Iterator[LiveLight]:
-    features = Features.of(scene, SETTINGS)
-    light = LiveLight(
-        context,
-        scene,
-        SETTINGS,
-        features,
-        SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features)),
-        64 << 20,
-    )
+def live(
+    context: Context, scene: Scene, photons: int = PHOTONS, capacity_bytes: int = 64 << 20
+) -> Iterator[LiveLight]:
+    light = LiveLight(context, scene, SETTINGS, capacity_bytes)
     try:
-        light.prepare()
-        light.begin(photons, 1)
+        light.light_pass.prepare()
+        light.light_pass.begin(photons, 1)
         yield light
     finally:
         light.release()
 
 
 def trace(light: LiveLight, photons: int = PHOTONS) -> None:
-    for _ in light.pass_steps(0, photons):
+    for _ in light.light_pass.pass_steps(0, photons):
         pass
 
 
 def maps(light: LiveLight) -> np.ndarray:
     """XYZ and W of every texel, scaled to energy."""
-    texture, *_ = light.resolved_textures()  # what follows are spectral channels of the same light
+    texture, *_ = light.light_pass.resolved_textures()  # what follows are spectral channels of the same light
     return (
         np.frombuffer(texture.read(), np.float32).reshape(texture.height, texture.width, 4).astype(float)
-        * light.map_scale
+        * light.light_pass.map_scale
     )
 
 
@@ -105,13 +97,15 @@ def difference(a: np.ndarray, b: np.ndarray) -> float:
 def anchored_alike(fresh: LiveLight, light: LiveLight) -> list[LightPlan]:
     """Plans of `fresh` with the intervals of the index, and the anchors in them, that `light`'s photons were traced
     for."""
-    reindexing = light._reindexing
-    assert reindexing is not None and light._running is not None
+    reindexing = light.light_pass.shown.reindexing
+    assert reindexing is not None and light.stored.running is not None
     spans = reindexing.spans(
-        light._running.spans, light.buffers.axis, [lamp.spectral_power for lamp in fresh.scene.lights]
+        light.stored.running.tables.spans,
+        light.buffers.axis,
+        [lamp.spectral_power for lamp in fresh.light_pass.scene.lights],
     )
     plans = []
-    for plan, old in zip(fresh.plans, light.plans, strict=True):
+    for plan, old in zip(fresh.light_pass.plans, light.light_pass.plans, strict=True):
         # From y, affine in the index, to the fresh photons' own coordinate.
         nm = np.linspace(380.0, 780.0, 400_001)
         y, x = reindexing.axis.x_of_nm(nm), fresh.buffers.axis.x_of_nm(nm)
@@ -134,12 +128,13 @@ def anchored_alike(fresh: LiveLight, light: LiveLight) -> list[LightPlan]:
 
 def into(light: LiveLight, fresh: LiveLight) -> np.ndarray:
     """Another light pass's photons in the maps of `light`; `fresh` splats them with its own tables and variables."""
-    assert fresh._running is not None and light.maps is not None
-    light.maps.clear()
-    for slab in fresh._running.store.slabs:
-        for _ in fresh.splat_steps(slab.buffer, slab.count, maps=light.maps):
+    running, into_maps = fresh.stored.running, light.light_pass.maps
+    assert running is not None and into_maps is not None
+    into_maps.clear()
+    for slab in running.store.slabs:
+        for _ in fresh.light_pass.splat_steps(slab.buffer, slab.count, maps=into_maps):
             pass
-    light.maps.photon_weight = float(fresh._running.pass_photons)
+    into_maps.photon_weight = float(running.pass_photons)
     return maps(light)
 
 
@@ -157,16 +152,16 @@ def test_edited_dispersion_equals_a_fresh_trace_at_the_same_indices(gl: Context,
     changed = edited(scene, gain)
     with live(gl, scene) as light, live(gl, changed) as fresh:
         trace(light)
-        before, rays = maps(light), light.trace.rays_traced
+        before, rays = maps(light), light.light_pass.trace.rays_traced
         followed = splat_again(light, inputs(changed))
-        assert light.trace.rays_traced == rays and light.first_order
+        assert light.light_pass.trace.rays_traced == rays and light.first_order
         assert difference(followed, before) > 0.05
 
-        fresh.plans = anchored_alike(fresh, light)
-        fresh._running.spans = [[(band.x_lo, band.x_hi) for band in plan.bands] for plan in fresh.plans]
-        fresh._running.forget_tables()
+        fresh.light_pass.plans = anchored_alike(fresh, light)
+        spans = [[(band.x_lo, band.x_hi) for band in plan.bands] for plan in fresh.light_pass.plans]
+        fresh.stored.running.tables = PassTables(fresh.light_pass.shown, spans)
         trace(fresh)
-        assert fresh.stats.tally.fallbacks["band_cut"] == 0
+        assert fresh.light_pass.stats.tally.fallbacks["band_cut"] == 0
         # Single photons at the rims decide: twelve seeds gave 2e-7 to 2.5e-5.
         assert nrmse(into(light, fresh), followed) < 4e-5
 
@@ -266,26 +261,23 @@ def test_solo_shows_one_colour(gl: Context) -> None:
 def test_first_rounds_are_the_same_picture_only_coarser(gl: Context) -> None:
     with live(gl, shipped("prism"), photons=100_000) as light:
         trace(light, 100_000)
-        whole = splat_again(light, inputs(light.scene))
-        quick = light.splat_quickly(8_000)
+        whole = splat_again(light, inputs(light.light_pass.scene))
+        quick = light.splat_preview(8_000)
         assert quick is not None
         texture, *_ = quick.resolved_textures()
         coarse = np.frombuffer(texture.read(), np.float32).astype(float).reshape(-1, 4) * quick.scale
-        assert quick.flux(True) * quick.scale == pytest.approx(light.map_flux() * light.map_scale, rel=0.02)
+        assert quick.flux(True) * quick.scale == pytest.approx(light.light_pass.map_flux() * light.light_pass.map_scale, rel=0.02)
         assert np.isfinite(coarse).all() and whole.max() > 0.0
 
 
 def test_records_beyond_the_store_leave_whole_rounds(gl: Context) -> None:
-    with live(gl, shipped("prism"), photons=100_000) as light:
-        light.capacity_bytes = 1
-        light.begin(100_000, 1)
-        assert light._running is not None
-        light._running.store.capacity_bytes = 4 << 20
+    with live(gl, shipped("prism"), photons=100_000, capacity_bytes=4 << 20) as light:
         trace(light, 100_000)
-        store = light._running.store
+        assert light.stored.running is not None
+        store = light.stored.running.store
         assert 0 < store.rounds < store.rounds_of_pass and store.bytes <= 4 << 20
         assert {slab.round for slab in store.slabs} == set(range(store.rounds))
-        stored = splat_again(light, inputs(light.scene))
+        stored = splat_again(light, inputs(light.light_pass.scene))
         assert stored[..., 3].sum() > 0.0
 
 
@@ -294,7 +286,7 @@ def test_records_beyond_the_store_leave_whole_rounds(gl: Context) -> None:
     [
         (lambda s: s, DirtyLevel.NOTHING),
         (lambda s: replace(s, name="other"), DirtyLevel.NOTHING),
-        (lambda s: replace(s, background_rgb=(0.1, 0.0, 0.0)), DirtyLevel.LOOK),
+        (lambda s: replace(s, background_rgb=(0.1, 0.0, 0.0)), DirtyLevel.CAMERA),
         (lambda s: edited(s, 2.0), DirtyLevel.SPLAT),
         (lambda s: painted(s, 1.0), DirtyLevel.SPLAT),
         (
@@ -327,8 +319,8 @@ def test_other_inputs_cost() -> None:
     before = inputs(shipped("prism"))
     moved = replace(before.camera, position=(0.0, 1.0, 2.0))
     costs = {
-        "camera": (moved, DirtyLevel.LOOK),
-        "width": (80, DirtyLevel.LOOK),
+        "camera": (moved, DirtyLevel.CAMERA),
+        "width": (80, DirtyLevel.CAMERA),
         "smoothing": (0.6, DirtyLevel.SPLAT),
         "solo_nm": (500.0, DirtyLevel.SPLAT),
         "local_gain": (False, DirtyLevel.SPLAT),

@@ -40,7 +40,7 @@ material = "diffuse"
 def picture(backend: str, folder: Path) -> np.ndarray:
     """The scene through `backend`, float32 (36, 64, 3)."""
     output = folder / f"{backend}.npy"
-    options = "--size 64x36 --photons 10k --spp 1 --seed 3".split()
+    options = ["--size", "64x36", "--photons", "10k", "--spp", "1", "--seed", "3"]
     done = subprocess.run(
         [sys.executable, "-m", "spectrasplat", "render", str(folder / "scene.toml"), "-o", str(output), *options],
         cwd=ROOT,

@@ -93,7 +93,10 @@ def run(
     rows: int = ROWS,
 ) -> dict[int, bytes]:
     """A kernel of one thread a row; returns what the storage buffers hold afterwards."""
-    text = f"layout(local_size_x = {GROUP}) in;\n{declarations}\nvoid main() {{\n    uint row = gl_GlobalInvocationID.x;\n    if (row >= {rows}u) return;\n{body}\n}}\n"
+    text = (
+        f"layout(local_size_x = {GROUP}) in;\n{declarations}\nvoid main() {{\n"
+        f"    uint row = gl_GlobalInvocationID.x;\n    if (row >= {rows}u) return;\n{body}\n}}\n"
+    )
     held = {binding: gl.ctx.buffer(content) for binding, content in storage.items()}
     block = gl.ctx.buffer(uniform) if uniform is not None else None
     with tempfile.TemporaryDirectory() as folder:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from reference.splat_reference import splat_image
@@ -108,7 +110,7 @@ def test_cut_bands_add_up_to_the_whole(cut_rig: Rig) -> None:
     whole = cut_rig.draw(photons(CUTS, centre, *axes, chord))
     parts = np.zeros_like(whole)
     edges = [0.0, 0.3, 0.301, 0.7, 1.0]
-    for lo, hi in zip(edges[:-1], edges[1:], strict=True):
+    for lo, hi in itertools.pairwise(edges):
         middle = 0.5 * (lo + hi)
         part = cut_rig.draw(photons(CUTS, centre + (middle - 0.5) * chord, *axes, chord, lo, hi))
         nm = 380.0 + 400.0 * np.array([lo, hi])

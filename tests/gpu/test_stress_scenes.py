@@ -14,7 +14,7 @@ from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.lights import PointLight
 from spectrasplat.stress.cases import contact_cases, sweep_cases
 from spectrasplat.stress.rigs import probe
-from spectrasplat.stress.rigs.probe import WatchedLight, with_photons
+from spectrasplat.stress.rigs.probe import WatchedRecords, with_photons
 from spectrasplat.stress.rigs.scene_parts import (
     BEAM,
     FLINT,
@@ -83,19 +83,16 @@ def test_a_picture_that_knows_its_scale_is_found(gl, monkeypatch) -> None:
 
 def test_every_nan_is_found_and_every_dropped_footprint_must_be_counted(gl, monkeypatch) -> None:
     """Mutant: after tracing, three photons lose their position and two more their footprint without being counted."""
-    account = WatchedLight._account
+    watch = WatchedRecords._watch
 
-    def spoil(self: WatchedLight, batch) -> None:
-        photons = np.frombuffer(
-            self.trace.photons.read(batch.photons * self.trace.photon.stride), self.trace.photon.dtype
-        ).copy()
+    def spoil(self: WatchedRecords, photons: np.ndarray) -> None:
+        photons = photons.copy()
         photons["position"][:3, 1] = np.nan
         photons["flags"][3:5] |= records.FLAG_FOOTPRINT_DROPPED
         photons["dposition_ds"][3:5] = np.inf
-        self.trace.photons.write(photons.tobytes())
-        account(self, batch)
+        watch(self, photons)
 
-    monkeypatch.setattr(WatchedLight, "_account", spoil)
+    monkeypatch.setattr(WatchedRecords, "_watch", spoil)
     found = probe.measurement(1.0, "", probe.probe(gl, block(), FEW))
     assert found.nonfinite == 3 and found.dropped == 2
     assert len([s for s in found.broken() if "finite" in s or "uncounted" in s]) == 2

@@ -55,7 +55,10 @@ def test_a_patch_shows_its_mean(gl, make, limit: float, ratio: float) -> None:
     def value(at: np.ndarray) -> np.ndarray:
         return cpu_reference.bilinear(rgb, np.column_stack([at[:, 0], 1.0 - at[:, 1]]), (True, True))
 
-    body = "rgb = texture_filtered(pictures[0], uv, s, t); other = texture_filtered(pictures[0], uv, vec2(-s.x, s.y), vec2(-t.x, t.y));"
+    body = (
+        "rgb = texture_filtered(pictures[0], uv, s, t); other = texture_filtered(pictures[0], uv, vec2(-s.x, s.y), "
+        "vec2(-t.x, t.y));"
+    )
     for width in (1.5, 2.0, 3.0, 5.0):
         s, t = patches(ratio, width, rng)
         got = run(gl, store, body, {"uv": uv, "s": s, "t": t}, {"rgb": "vec3", "other": "vec3"})

@@ -100,7 +100,10 @@ def test_every_texel_of_every_level_is_found(gl, as_image: bool) -> None:
             at.append(np.column_stack([np.full(rows.size, index), np.full(rows.size, k), columns, rows]))
             wanted.append(level.reshape(-1, 3))
     which, level, column, row = np.concatenate(at).astype(np.uint32).T
-    body = "rgb = picture_texel(level_origin(pictures[which], int(level)) + ivec2(column, line)); levels = pictures[which].levels;"
+    body = (
+        "rgb = picture_texel(level_origin(pictures[which], int(level)) + ivec2(column, line)); levels = "
+        "pictures[which].levels;"
+    )
     got = run(
         gl,
         store,
@@ -146,7 +149,8 @@ def test_repeated_pictures_go_on_and_clamped_ones_end(gl) -> None:
     beyond = as_f32(uv + rng.integers(-3, 4, (COUNT, 2)))
     far = np.column_stack([rng.choice([-2.0, 3.0], COUNT), uv[:, 1]])
     body = """
-    here = texture_filtered(pictures[0], uv, side, side.yx); there = texture_filtered(pictures[0], beyond, side, side.yx);
+    here = texture_filtered(pictures[0], uv, side, side.yx);
+    there = texture_filtered(pictures[0], beyond, side, side.yx);
     border = texture_filtered(pictures[1], far, vec2(0.0), vec2(0.0));
     """
     got = run(
@@ -220,7 +224,10 @@ def test_filters_agree_with_their_twins(gl) -> None:
     direction = as_f32(direction / np.linalg.norm(direction, axis=1, keepdims=True))
     ds, dt = (np.cross(direction, side) for side in random_patches(rng, direction))
     ds, dt = as_f32(ds), as_f32(dt)
-    body = "rgb = texture_filtered(pictures[0], uv, s, t); sky = environment_radiance(d, ds, dt); place = environment_place(3.0 * d);"
+    body = (
+        "rgb = texture_filtered(pictures[0], uv, s, t); sky = environment_radiance(d, ds, dt); place = "
+        "environment_place(3.0 * d);"
+    )
     inputs = {"uv": uv, "s": s, "t": t, "d": direction, "ds": ds, "dt": dt}
     got = run(gl, store, body, inputs, {"rgb": "vec3", "sky": "vec3", "place": "vec2"})
     place = cpu_reference.environment_place(direction)

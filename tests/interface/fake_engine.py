@@ -37,7 +37,7 @@ class FakeEngine:
 
     def set(self, inputs: LiveInputs) -> DirtyLevel:
         self.inputs = inputs
-        return DirtyLevel.LOOK
+        return DirtyLevel.CAMERA
 
     def advance(self, budget_s: float, interacting: bool = False) -> None:
         assert self.inputs is not None

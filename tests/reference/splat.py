@@ -6,6 +6,8 @@ bin [a, b] receives its integral over λ.
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 
@@ -32,7 +34,7 @@ def swept_gaussian(
     x, weight = np.polynomial.legendre.leggauss(nodes // pieces)
     edges = np.linspace(*band, pieces + 1)
     total = np.zeros(np.shape(points)[:-1])
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         for node, part in zip(0.5 * (low + high) + 0.5 * (high - low) * x, 0.5 * (high - low) * weight, strict=True):
             total += part * gaussian(points, p0 + (node - anchor) * velocity, covariance)
     return total

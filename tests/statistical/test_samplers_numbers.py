@@ -196,7 +196,8 @@ def play(
 ) -> dict[str, np.ndarray]:
     body = """
     RayRecord ray;
-    ray.flux_w = survival; ray.throughput = vec3(survival); ray.survival = survival; ray.photon_id = photon; ray.depth = depth; ray.branch_key = key;
+    ray.flux_w = survival; ray.throughput = vec3(survival); ray.survival = survival;
+    ray.photon_id = photon; ray.depth = depth; ray.branch_key = key;
     ray.footprint_scale = 1.0;
     float roulette = 0.0;
     ray.flux_w *= share; ray.throughput *= share;

@@ -173,7 +173,8 @@ def test_frames_of_keys(stage: Stage) -> None:
 def test_key_files(stage: Stage, tmp_path: Path) -> None:
     file = tmp_path / "keys.toml"
     file.write_text(
-        f'[[keys]]\ntime_s = 0\nparameter = "{GAIN}"\nvalue = 0\ninterpolation = "linear"\n[[keys]]\ntime_s = 2\nparameter = "{GAIN}"\nvalue = 3\n'
+        f'[[keys]]\ntime_s = 0\nparameter = "{GAIN}"\nvalue = 0\ninterpolation = "linear"\n[[keys]]\ntime_s = 2\n'
+        f'parameter = "{GAIN}"\nvalue = 3\n'
     )
     (track,) = read_keys(file, stage)
     assert track == Track(GAIN, (0.0, 2.0), (0.0, 3.0), ("linear", "smooth"))

@@ -93,7 +93,7 @@ class Case(NamedTuple):
     scene: str | bytes | None
     told: tuple[str, ...]
     options: tuple[str, ...] = ()
-    files: dict[str, bytes] = {}  # noqa: RUF012 – never written to
+    files: dict[str, bytes] = {}
     name: str = "scene.toml"
     output: str = "out.png"
 
@@ -351,7 +351,10 @@ WARNINGS = {
     "wound inconsistently": (
         ply(CORNERS + "3 0 1 2\n3 0 1 3\n3 1 2 3\n3 0 3 2\n"),
         [
-            "inconsistently wound mesh 'm': 3 edges where neighbours face opposite ways; the side is decided by the face normals"
+            (
+                "inconsistently wound mesh 'm': 3 edges where neighbours face opposite ways; the side is decided by "
+                "the face normals"
+            )
         ],
     ),
     "degenerate triangles": (

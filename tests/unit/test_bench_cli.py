@@ -7,7 +7,7 @@ import os
 import shlex
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import Any
+from typing import Any, Self
 
 import pytest
 from spectrasplat.__main__ import main
@@ -21,14 +21,14 @@ from spectrasplat.model.settings import CAMERA_METHODS
 class FakeContext:
     renderer, vendor, version = "llvmpipe", "Mesa", "4.5"
 
-    def __enter__(self) -> FakeContext:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         pass
 
 
-class SurfaceInteraction:
+class Seen:
     """What the runner and the report were given."""
 
     def __init__(self) -> None:
@@ -40,9 +40,9 @@ class SurfaceInteraction:
 
 
 @pytest.fixture
-def seen(monkeypatch: pytest.MonkeyPatch) -> SurfaceInteraction:
+def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
     """The command without OpenGL: the runner is made up."""
-    found = SurfaceInteraction()
+    found = Seen()
 
     def run(_context: object, scenes: dict[str, Any], store: Any, _progress: object, _skipped: object) -> None:
         found.scenes, found.settings, found.command = [*scenes], store.result.settings, store.result.command
@@ -96,10 +96,10 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> SurfaceInteraction:
         (["prism", "-o", "out", "--size", "64"], "--size '64' is not WIDTHxHEIGHT"),
         (["prism", "-o", "out", "--size", "16384x16384", "--seeds", "1"], ""),
         (
-            ["prism", "-o", "out", "--eye", "--methods", "stochastic-point"],
+            ["prism", "-o", "out", "--camera", "--methods", "stochastic-point"],
             "--methods 'stochastic-point' is a method of the light pass alone",
         ),
-        (["--eye", "--features", "prism"], "--features and --eye exclude each other"),
+        (["--camera", "--features", "prism"], "--features and --camera exclude each other"),
         (["--features", "prism", "ball"], "'bench --features prism' without further scenes"),
         (["--features", "nowhere"], "neither a file nor shipped"),
     ],
@@ -107,7 +107,7 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> SurfaceInteraction:
 def test_mistakes_are_one_sentence(
     arguments: list[str],
     told: str,
-    seen: SurfaceInteraction,
+    seen: Seen,
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -122,9 +122,7 @@ def test_mistakes_are_one_sentence(
     assert seen.scenes == [] and list(tmp_path.iterdir()) == []
 
 
-def test_folders_that_cannot_be_used(
-    seen: SurfaceInteraction, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_folders_that_cannot_be_used(seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "file"
     file.write_text("")
     assert main(["bench", "prism", "-o", str(file)]) == 2
@@ -138,13 +136,13 @@ def test_folders_that_cannot_be_used(
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_write_protected_folder(seen: SurfaceInteraction, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_write_protected_folder(seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     tmp_path.chmod(0o500)
     assert main(["bench", "prism", "-o", str(tmp_path / "out")]) == 2
     assert "cannot make the folder" in capsys.readouterr().err
 
 
-def test_options_reach_the_runner(seen: SurfaceInteraction, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_options_reach_the_runner(seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     options = [
         "--seconds",
@@ -190,27 +188,29 @@ def test_options_reach_the_runner(seen: SurfaceInteraction, tmp_path: Path, caps
     )
 
 
-def test_defaults_are_all_scenes_with_glass_and_all_methods(seen: SurfaceInteraction, tmp_path: Path) -> None:
+def test_defaults_are_all_scenes_with_glass_and_all_methods(seen: Seen, tmp_path: Path) -> None:
     assert main(["bench", "-o", str(tmp_path)]) == 0
     assert seen.settings == BenchSettings() and len(BenchSettings().methods) == 7
     assert {"prism", "brilliant", "ball_plain", "wine_glass"} <= set(seen.scenes) and len(seen.scenes) >= 6
     assert shlex.split(seen.command)[2 : 2 + len(seen.scenes)] == seen.scenes
 
 
-def test_the_camera_has_its_own_defaults(seen: SurfaceInteraction, tmp_path: Path) -> None:
-    assert main(["bench", "--eye", "-o", str(tmp_path)]) == 0
+def test_the_camera_has_its_own_defaults(seen: Seen, tmp_path: Path) -> None:
+    assert main(["bench", "--camera", "-o", str(tmp_path)]) == 0
     methods = ("stochastic", "stochastic-even", "regular-7", "regular-16", "srd-lambda", "srd")
     assert seen.settings == BenchSettings(20.0, methods=methods, measured_pass="camera") and set(methods) == set(
         CAMERA_METHODS
     )
     assert seen.scenes == ["prism_edge", "lens_text", "brilliant_studio", "ball_caustic"]
-    assert shlex.split(seen.command)[:4] == ["spectrasplat", "bench", "--eye", "prism_edge"]
-    assert main(["bench", "--eye", "prism", "-o", str(tmp_path / "other"), "--seconds", "2", "--methods", "srd"]) == 0
+    assert shlex.split(seen.command)[:4] == ["spectrasplat", "bench", "--camera", "prism_edge"]
+    assert (
+        main(["bench", "--camera", "prism", "-o", str(tmp_path / "other"), "--seconds", "2", "--methods", "srd"]) == 0
+    )
     assert seen.settings == BenchSettings(2.0, methods=("srd",), measured_pass="camera") and seen.scenes == ["prism"]
 
 
 def test_ctrl_c_says_what_is_kept_and_reports_it(
-    seen: SurfaceInteraction, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    seen: Seen, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     seen.interrupt = True
     assert main(["bench", "prism", "-o", str(tmp_path)]) == 130

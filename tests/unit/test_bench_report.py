@@ -12,6 +12,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from jinja2 import UndefinedError
+from markupsafe import Markup
 from spectrasplat.base.errors import UserError
 from spectrasplat.bench.report import (
     curve_plots as plots,
@@ -31,8 +33,8 @@ from spectrasplat.bench.report import (
 from spectrasplat.bench.report import (
     text as report_text,
 )
-from spectrasplat.bench.report.html import Html, element
 from spectrasplat.bench.report.overview import overview
+from spectrasplat.bench.report.page import Table, render
 from spectrasplat.bench.report.prose import PROSE
 from spectrasplat.bench.results import BenchResult, Claim, Curve, Point, SceneResult
 from spectrasplat.reference.metrics import EPSILON_SHARE
@@ -202,7 +204,7 @@ def test_empty_run_and_refused_folder(tmp_path: Path) -> None:
 
 def test_failure_keeps_the_earlier_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "report.html").write_text("earlier")
-    monkeypatch.setattr(report, "page", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(report, "document", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         report.write_report(synthetic_result([]), tmp_path)
     assert (tmp_path / "report.html").read_text() == "earlier"
@@ -381,9 +383,12 @@ def test_broken_pictures_are_left_out(tmp_path: Path) -> None:
 
 
 def test_escaping_and_words() -> None:
-    assert (
-        element("p", "<&>", Html("<b>"), None, ["a", 1], title='"<') == '<p title="&quot;&lt;">&lt;&amp;&gt;<b>a1</p>'
-    )
+    rows = [("<&>", Markup("<b>"), 1)]
+    page = render("features.html", scene='"<', heading="", tables=[Table(("a", "b", "c"), rows, title="c")], reading="")
+    assert "<title>What each feature costs in '&#34;&lt;'</title>" in page and "&lt;&amp;&gt;" in page
+    assert '<td class="n"><b></td>' in page
+    with pytest.raises(UndefinedError, match="reading"):
+        render("features.html", scene="", heading="", tables=[])
     assert report.file_names(["a/b c", "a_b_c", "", "overview", "桜"]) == [
         "a_b_c",
         "a_b_c_2",

@@ -41,7 +41,11 @@ from spectrasplat.model.scene import (
     SceneObject,
 )
 from spectrasplat.model.texture import Environment, Texture
-from spectrasplat.reference.camera_reference import cached_camera_reference, camera_scene_key, render_camera_reference
+from spectrasplat.reference.camera_reference import (
+    cached_camera_reference,
+    camera_reference_key,
+    render_camera_reference,
+)
 from spectrasplat.reference.camera_run import CameraPicture, CameraRun
 from spectrasplat.reference.spectral_caustic import CausticPlan
 
@@ -242,10 +246,8 @@ def test_glass_in_a_white_room_is_white_path_by_path(scene: Scene) -> None:
     picture = run.picture()
     lost = picture.lost["depth"] + picture.lost["numeric"]
     assert lost < 1e-5
-    assert (
-        np.abs(picture.xyz - 1.0).max() < 1e-12
-        or lost > 0.0
-        and np.mean(np.abs(picture.xyz - 1.0) > 1e-12) <= lost * picture.samples * 3
+    assert np.abs(picture.xyz - 1.0).max() < 1e-12 or (
+        lost > 0.0 and np.mean(np.abs(picture.xyz - 1.0) > 1e-12) <= lost * picture.samples * 3
     )
 
 
@@ -320,21 +322,23 @@ def test_the_key_knows_textures_and_what_lies_beyond() -> None:
     other_texture = replace(scene, objects=(plate(Diffuse(texture=Texture(0.5 * rgb))),))
     room = Environment(rgb)
     keys = [
-        camera_scene_key(scene, 8, 8, 64, None),
-        camera_scene_key(scene, 8, 8, 64, CausticPlan()),
-        camera_scene_key(scene, 8, 8, 64, CausticPlan(photons=5)),
-        camera_scene_key(other_texture, 8, 8, 64, None),
-        camera_scene_key(replace(scene, objects=(plate(Diffuse(texture=Texture(rgb, "clamp"))),)), 8, 8, 64, None),
-        camera_scene_key(replace(scene, background_rgb=(0.1, 0.1, 0.1)), 8, 8, 64, None),
-        camera_scene_key(replace(scene, environment=room), 8, 8, 64, None),
-        camera_scene_key(
+        camera_reference_key(scene, 8, 8, 64, None),
+        camera_reference_key(scene, 8, 8, 64, CausticPlan()),
+        camera_reference_key(scene, 8, 8, 64, CausticPlan(photons=5)),
+        camera_reference_key(other_texture, 8, 8, 64, None),
+        camera_reference_key(replace(scene, objects=(plate(Diffuse(texture=Texture(rgb, "clamp"))),)), 8, 8, 64, None),
+        camera_reference_key(replace(scene, background_rgb=(0.1, 0.1, 0.1)), 8, 8, 64, None),
+        camera_reference_key(replace(scene, environment=room), 8, 8, 64, None),
+        camera_reference_key(
             replace(scene, environment=replace(room, world_to_local=np.diag([-1.0, -1.0, 1.0]))), 8, 8, 64, None
         ),
-        camera_scene_key(replace(scene, environment=replace(room, rgb=2.0 * rgb)), 8, 8, 64, None),
+        camera_reference_key(replace(scene, environment=replace(room, rgb=2.0 * rgb)), 8, 8, 64, None),
     ]
     assert len(set(keys)) == len(keys)
     assert (
-        camera_scene_key(replace(scene, name="other", environment=replace(room, source="elsewhere")), 8, 8, 64, None)
+        camera_reference_key(
+            replace(scene, name="other", environment=replace(room, source="elsewhere")), 8, 8, 64, None
+        )
         == keys[6]
     )
     np.testing.assert_allclose(K_M * (rgb_basis() @ np.ones(3) * daylight_per_lumen()) @ cmf_xyz(), WHITE, rtol=1e-9)

@@ -29,7 +29,7 @@ def short_pilots(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(photon_run, "_PILOT_PHOTONS", 1 << 12)
     monkeypatch.setattr(spectral_caustic, "_PILOT", 1 << 14)
     monkeypatch.setattr(spectral_caustic, "_MAX_UNITS", 2)  # several rounds
-    monkeypatch.setattr(caustic_cache, "_FIRST_LOOK", 1 << 15)
+    monkeypatch.setattr(caustic_cache, "_FIRST_STEP", 1 << 15)
 
 
 @pytest.fixture
@@ -154,7 +154,7 @@ def test_what_halves_of_the_caustic_have_apart_is_in_the_variance() -> None:
     error = np.array([0.3, -0.3])
     sums = np.stack([np.full((1, 1, 3), 4.0 * (1.0 + error[part % 2])) for part in range(PARTS)])
     units, tallies = np.full(PARTS, 4), np.zeros((PARTS, TALLY_SIZE))
-    picture = summed_camera(sums, units, tallies, 1.0, measured_passes=True)
+    picture = summed_camera(sums, units, tallies, 1.0, halves=True)
     assert picture.samples == 4 * PARTS
     np.testing.assert_allclose(picture.xyz, 1.0)
     np.testing.assert_allclose(picture.variance, 0.3**2)  # of a mean of two that are 0.6 apart

@@ -50,7 +50,10 @@ def test_conditions(condition: str, reference: bool) -> None:
     ["UNSEEN > 0", "__VERSION__ >= 430", "defined(GL_ARB_gpu_shader5)", "LOOP == 1", "1 / 0", "1 +", "2 $ 3"],
 )
 def test_what_only_the_driver_can_tell_stays_whole(condition: str) -> None:
-    text = f"#define LOOP LOOP\n#if {condition}\n#define MAYBE 1\nvoid unused() {{}}\n#elif 1\n#endif\n#ifdef MAYBE\nint i;\n#endif"
+    text = (
+        f"#define LOOP LOOP\n#if {condition}\n#define MAYBE 1\nvoid unused() {{}}\n#elif 1\n#endif\n#ifdef MAYBE\n"
+        "int i;\n#endif"
+    )
     assert stripped_source(text) == text.splitlines()
 
 

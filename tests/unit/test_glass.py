@@ -98,7 +98,7 @@ def test_search_ranks_exact_then_prefix() -> None:
     assert found[0].qualified_name == "Schott N-SF6"
     assert found[1].name.startswith("N-SF6")
     assert all("sf6" in catalogue.search_key(e.maker + e.name) for e in found)
-    assert [e.name for e in catalogue.search("diamnod")][0] == "diamond"
+    assert next(e.name for e in catalogue.search("diamnod")) == "diamond"
     assert {e.maker for e in catalogue.search("hoya fcd")} == {"Hoya"}
     assert len(catalogue.search()) == len(catalogue.entries())
 
@@ -205,7 +205,7 @@ def test_notes_say_index_below_one() -> None:
         (lambda w: glass.from_formula("formula 9", [2.0], where=w), "unknown dispersion formula"),  # type: ignore[arg-type]
     ],
 )
-def test_impossible_data_are_refused_by_key(make, message: str) -> None:  # noqa: ANN001
+def test_impossible_data_are_refused_by_key(make, message: str) -> None:
     with pytest.raises(UserError) as caught:
         make("s.toml: materials.prism")
     assert str(caught.value).startswith("s.toml: materials.prism: ") and message in str(caught.value)
@@ -222,7 +222,7 @@ def test_description_holds_the_facts() -> None:
         glass_report.list_glasses("§§§")
 
 
-def test_plot_is_a_picture_and_refuses_other_names(tmp_path) -> None:  # noqa: ANN001
+def test_plot_is_a_picture_and_refuses_other_names(tmp_path) -> None:
     from PIL import Image
 
     target = tmp_path / "plot.png"
@@ -263,8 +263,8 @@ def test_distinct_gains_are_distinct_glasses_to_the_renderer() -> None:
     from spectrasplat.model.optics.spectral_tables import SpectralAxis
     from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
     from spectrasplat.model.scene_defaults import default_light
+    from spectrasplat.model.scene_key import scene_key
     from spectrasplat.model.settings import RenderSettings
-    from spectrasplat.reference.photon_reference import scene_key
 
     def scene(*gains: float) -> Scene:
         plain = catalogue.find("N-SF11")

@@ -41,7 +41,10 @@ material = {{ kind = "diffuse", colour = 0.18 }}
 [[lights]]
 {light}
 """
-LAMP = 'name = "lamp"\nkind = "spot"\nposition = [0, 0, 9]\nhalf_angle_deg = 60\nspectrum = {blackbody = 3200}\nflux_lm = 900'
+LAMP = (
+    'name = "lamp"\nkind = "spot"\nposition = [0, 0, 9]\nhalf_angle_deg = 60\nspectrum = {blackbody = 3200}\n'
+    "flux_lm = 900"
+)
 
 
 def scene(tmp_path: Path, light: str = LAMP) -> Scene:

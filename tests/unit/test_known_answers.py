@@ -56,7 +56,10 @@ def axis_crossing(ray: Ray) -> float:
 
 def envelope(ray: Ray) -> np.ndarray:
     """Caustic point of a plane one-parameter family: where its column becomes parallel to the ray."""
-    cross = lambda a, b: a[0] * b[1] - a[1] * b[0]
+
+    def cross(a, b):
+        return a[0] * b[1] - a[1] * b[0]
+
     return ray.at(-cross(ray.dposition[0], ray.direction) / cross(ray.ddirection[0], ray.direction))
 
 

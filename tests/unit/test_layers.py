@@ -1,4 +1,4 @@
-"""The rooms of app/ stand in layers: a file imports from its own room or from lower ones, and no files import in a circle.
+"""The rooms of app/ stand in layers: a file imports from its own or from lower ones, and no files import in a circle.
 
     base < model < gpu, edit < passes < render < ui, reference < bench < stress < commands
 

@@ -34,8 +34,8 @@ from spectrasplat.model.scene import (
     Scene,
     SceneObject,
 )
-from spectrasplat.reference import photon_emission, photon_emit, photon_kernel, photon_run
-from spectrasplat.reference.photon_reference import cached_reference, render_reference, scene_key
+from spectrasplat.reference import photon_emission, photon_emit, photon_run, sampling
+from spectrasplat.reference.photon_reference import cached_reference, reference_key, render_reference
 
 N_SLAB = 1.5168
 SINK = Mirror((0.0, 0.0, 0.0))
@@ -281,10 +281,10 @@ def test_its_own_error_is_true(busy: Scene) -> None:
 
 
 def test_the_sequence_is_a_net_in_its_first_two_dimensions_and_stratified_in_all() -> None:
-    sequence = photon_kernel.scrambled(5, 0, 0)
+    sequence = sampling.scrambled(5, 0, 0)
     bits = (np.arange(256)[:, None] >> np.arange(32)) & 1
-    words = np.zeros((photon_kernel.DIMENSIONS, 256), np.uint32)
-    for d in range(photon_kernel.DIMENSIONS):
+    words = np.zeros((sampling.DIMENSIONS, 256), np.uint32)
+    for d in range(sampling.DIMENSIONS):
         words[d] = (
             np.bitwise_xor.reduce(np.where(bits == 1, sequence.directions[d], np.uint32(0)), axis=1) ^ sequence.shift[d]
         )
@@ -375,18 +375,20 @@ def test_limits() -> None:
 
 
 def test_the_key_tells_pictures_apart_and_nothing_else(small: Scene) -> None:
-    key = scene_key(small, 16, 12, 64)
+    key = reference_key(small, 16, 12, 64)
     light, glass = small.lights[0], small.objects[0]
-    assert scene_key(replace(small, name="other", notes=("note",), background_rgb=(1.0, 0.0, 0.0)), 16, 12, 64) == key
+    assert (
+        reference_key(replace(small, name="other", notes=("note",), background_rgb=(1.0, 0.0, 0.0)), 16, 12, 64) == key
+    )
     others = [
-        scene_key(small, 16, 13, 64),
-        scene_key(small, 16, 12, 63),
-        scene_key(replace(small, camera=replace(small.camera, vertical_fov_deg=35.1)), 16, 12, 64),
-        scene_key(
+        reference_key(small, 16, 13, 64),
+        reference_key(small, 16, 12, 63),
+        reference_key(replace(small, camera=replace(small.camera, vertical_fov_deg=35.1)), 16, 12, 64),
+        reference_key(
             replace(small, lights=(replace(light, spectral_power=light.spectral_power.scaled(2.0)),)), 16, 12, 64
         ),
-        scene_key(replace(small, lights=(replace(light, position=(0.4, -1.0, 4.1)),)), 16, 12, 64),
-        scene_key(
+        reference_key(replace(small, lights=(replace(light, position=(0.4, -1.0, 4.1)),)), 16, 12, 64),
+        reference_key(
             replace(
                 small, objects=(replace(glass, material=Dielectric(constant_index(1.51), None, 1)), small.objects[1])
             ),
@@ -394,7 +396,7 @@ def test_the_key_tells_pictures_apart_and_nothing_else(small: Scene) -> None:
             12,
             64,
         ),
-        scene_key(
+        reference_key(
             replace(small, objects=(replace(glass, object_to_world=np.diag([1.0, 1.0, 1.01, 1.0])), small.objects[1])),
             16,
             12,

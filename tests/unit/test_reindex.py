@@ -3,6 +3,8 @@ light is lost."""
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from spectrasplat.gpu.reindex import Reindexing
@@ -37,7 +39,7 @@ def test_bands_meet_and_hold_the_whole_spectrum(gain: float) -> None:
     _, spans = shown(FLINT, with_gain(FLINT, gain))
     lit = [(lo, hi) for lo, hi in spans if lo < 1.0 and hi > 0.0 and hi > lo]
     assert lit[0][0] == pytest.approx(0.0, abs=1e-9) and lit[-1][1] == pytest.approx(1.0, abs=1e-9)
-    for (_, hi), (lo, _) in zip(lit[:-1], lit[1:], strict=True):
+    for (_, hi), (lo, _) in itertools.pairwise(lit):
         assert hi == pytest.approx(lo, abs=1e-9)
 
 

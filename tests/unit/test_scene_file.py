@@ -451,13 +451,19 @@ name = "wall"
 shape = "plane"
 material = "diffuse"
 position = [0, 0, -3]
-local_dispersion = [{position = [0.25, 0.1, 0.0], radius = 0.5, log2_gain = 1.5}, {position = [0, 0, 0], radius = 1, falloff = 0.2, erase = 0.75}]
+local_dispersion = [
+    {position = [0.25, 0.1, 0.0], radius = 0.5, log2_gain = 1.5},
+    {position = [0, 0, 0], radius = 1, falloff = 0.2, erase = 0.75},
+]
 [[objects]]
 name = "tile"
 shape = "plane"
 material = "diffuse"
 local_dispersion = [{position = [0, 0, 0], radius = 1, log2_gain = -1}]
-instances = [{position = [0, 0, -4]}, {position = [0, 0, -5], local_dispersion = [{position = [0, 1, 0], radius = 2, log2_gain = 1}]}]
+instances = [
+    {position = [0, 0, -4]},
+    {position = [0, 0, -5], local_dispersion = [{position = [0, 1, 0], radius = 2, log2_gain = 1}]},
+]
 """
 
 

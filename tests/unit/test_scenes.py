@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import tomllib
 from pathlib import Path
@@ -187,7 +188,7 @@ def test_the_amici_prism_lets_yellow_through_straight() -> None:
     assert abs(deviation["F"]) == pytest.approx(2.21096, abs=1e-4)
     assert abs(deviation["C"]) == pytest.approx(0.82305, abs=1e-4)
     # Neighbours share the vertices of their common face.
-    for left, right in zip(parts, parts[1:], strict=False):
+    for left, right in itertools.pairwise(parts):
         assert len(set(map(tuple, left.mesh.vertices)) & set(map(tuple, right.mesh.vertices))) == 4
 
 

@@ -121,7 +121,7 @@ def test_a_spectrum_is_a_value() -> None:
         (lambda: sp.from_table([400.0, 500.0], [1.0, -2.0]), "negative \\(-2\\) at 500 nm"),
     ],
 )
-def test_bad_spectra(make, message: str) -> None:  # noqa: ANN001
+def test_bad_spectra(make, message: str) -> None:
     with pytest.raises(UserError, match=message):
         make()
 

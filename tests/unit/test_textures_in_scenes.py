@@ -264,7 +264,10 @@ def test_a_texture_without_a_file_gets_one(folder: Path, exact: bool) -> None:
     [
         'kind = "map"\nfile = "room.exr"\nintensity = 0.5\nrotation_deg = -70\nup = [0.1, 0.2, 1]',
         'kind = "gradient"\nzenith = [1, 2, 30]\nhorizon = 4\nnadir = [0, 0, 1]\nintensity = 2\nup = [0, 1, 0]',
-        'kind = "sky"\ntype = 13\nsun_elevation_deg = 12.5\nsun_azimuth_deg = 200\nluminance = 3000\nground = [0.1, 0.2, 0.3]',
+        (
+            'kind = "sky"\ntype = 13\nsun_elevation_deg = 12.5\nsun_azimuth_deg = 200\nluminance = 3000\n'
+            "ground = [0.1, 0.2, 0.3]"
+        ),
     ],
 )
 def test_environments_survive_saving(folder: Path, lines: str) -> None:
@@ -357,7 +360,10 @@ def test_pictures_on_primitives_leave_their_charts_alone(mesh) -> None:
     np.testing.assert_array_equal(atlas.rows, bare.rows)
 
 
-INLINE = '[[objects]]\nname = "quad"\nshape = "inline"\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\ntriangles = [[0, 1, 2]]\n'
+INLINE = (
+    '[[objects]]\nname = "quad"\nshape = "inline"\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\n'
+    "triangles = [[0, 1, 2]]\n"
+)
 
 
 def test_inline_triangles_may_have_texture_coordinates(folder: Path) -> None:

@@ -82,7 +82,7 @@ def test_dabs_lie_in_the_receivers_own_coordinates() -> None:
     assert stroke.dabs[0].radius == pytest.approx(BRUSH.radius / 4.0)
     bowl = replace(
         receiver(np.diag([2.0, 2.0, 2.0, 1.0])),
-        mesh=make_mesh("bent", CORNERS + [[0, 0, 0.5], [0, 0, 0], [0, 0, 0], [0, 0, 0]], QUAD.triangles),
+        mesh=make_mesh("bent", [*CORNERS, [0, 0, 0.5], [0, 0, 0], [0, 0, 0], [0, 0, 0]], QUAD.triangles),
     )
     assert brushes.object_radius(bowl, 0.2) == pytest.approx(0.1)
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from spectrasplat.edit import chromaticity
 from spectrasplat.edit.chromaticity import colour_info
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM, illuminant_table
+from spectrasplat.model.optics.spectrum import blackbody
 
 
 @pytest.mark.parametrize("wavelength", [450.0, 486.0, 520.0, 589.0, 640.0])
@@ -38,3 +40,38 @@ def test_illuminance_of_green_laser_light() -> None:
 
 def test_darkness_has_no_colour() -> None:
     assert colour_info(VISIBLE_NM, np.zeros(401)) is None
+
+
+@pytest.mark.parametrize(("kelvin", "tolerance"), [(2000.0, 2.0), (2856.0, 2.0), (6500.0, 5.0), (20000.0, 100.0)])
+def test_a_black_body_has_its_own_temperature(kelvin: float, tolerance: float) -> None:
+    found = colour_info(VISIBLE_NM, blackbody(kelvin).density)
+    assert found is not None and found.temperature_k == pytest.approx(kelvin, abs=tolerance)
+
+
+def test_strong_colours_have_no_temperature() -> None:
+    for wavelength in (450.0, 520.0, 650.0):
+        found = colour_info(VISIBLE_NM, np.where(VISIBLE_NM == wavelength, 1.0, 0.0))
+        assert found is not None and found.temperature_k is None
+
+
+def test_preparing_ends() -> None:
+    chromaticity.ready()
+    chromaticity._loading().join(60.0)
+    assert chromaticity.ready()
+
+
+def test_the_baked_observer_and_illuminants_are_colour_sciences() -> None:
+    """Light and camera use tables that are baked, so that starting need not import colour-science: they are its own."""
+    import colour
+    from spectrasplat.model.optics.colorimetry import cmf_xyz
+
+    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
+    held = np.isin(observer.wavelengths, VISIBLE_NM)
+    np.testing.assert_array_equal(observer.values[held], cmf_xyz())
+    for name, values in illuminant_table().items():
+        if name in ("A", "E"):
+            continue
+        table = colour.SDS_ILLUMINANTS[name]
+        own = np.interp(table.wavelengths, VISIBLE_NM, values)
+        inside = (table.wavelengths >= 380) & (table.wavelengths <= 780)
+        np.testing.assert_allclose(own[inside], table.values[inside], rtol=1e-9, atol=1e-9)

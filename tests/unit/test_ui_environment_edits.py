@@ -112,7 +112,7 @@ def test_turning_a_map_keeps_its_picture_and_is_only_looked_at(with_map: Scene) 
     assert turned.environment.rgb is with_map.environment.rgb
     middle = direction_of(turned.environment, np.array(0.5), np.array(0.5))
     np.testing.assert_allclose(middle, (0.0, 1.0, 0.0), atol=1e-12)
-    assert cost(with_map, turned) == DirtyLevel.LOOK
+    assert cost(with_map, turned) == DirtyLevel.CAMERA
     with pytest.raises(UserError, match="finite"):
         environment.set_map_rotation(with_map, float("nan"))
 
@@ -165,10 +165,10 @@ def test_a_picture_is_worn_tinted_shared_and_taken_off(scene: Scene, picture: Pa
     double = replace(worn, objects=(*worn.objects, replace(scene.objects[table], name="CPU reference")))
     cpu_reference = environment.set_texture(double, len(double.objects) - 1, picture)
     assert cpu_reference.objects[-1].material.texture is worn.objects[table].material.texture
-    assert cost(scene, worn) == DirtyLevel.BUILD and cost(worn, tinted) == DirtyLevel.LOOK
+    assert cost(scene, worn) == DirtyLevel.BUILD and cost(worn, tinted) == DirtyLevel.CAMERA
     clamped = environment.set_texture_wrap(worn, table, "clamp")
     assert (
-        cost(worn, clamped) == DirtyLevel.LOOK
+        cost(worn, clamped) == DirtyLevel.CAMERA
         and clamped.objects[table].material.texture.rgb is worn.objects[table].material.texture.rgb
     )
     plain = environment.clear_texture(worn, table)

@@ -12,7 +12,6 @@ from math import comb
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import msgspec
 import numpy as np
 
 from ... import __version__
@@ -20,6 +19,8 @@ from ...base.errors import UserError
 from ...model.features import Features, explain
 from ...model.settings import RenderSettings
 from ...render.light_pass import LightPass, spectral_axis
+from . import report as report_page
+from .results import Absence, FeatureCost, FeatureReport, Percent, ProgramSize
 from .rig import Rig, Work, map_difference
 from .static_costs import RecordSizes, static_costs
 from .symbol_proof import compiled_sources, program_texts, prove
@@ -39,71 +40,6 @@ _TARGET_SECONDS = 0.4
 _PHOTONS = (2048, 1 << 16)
 
 
-class Percent(msgspec.Struct, frozen=True):
-    """A cost, % of the time without the feature, and the interval of the median."""
-
-    median: float
-    low: float
-    high: float
-
-
-class FeatureCost(msgspec.Struct, frozen=True):
-    """One feature in one scene."""
-
-    feature: str
-    included: bool
-    reason: str
-    bytes: str
-    """What it adds to records and tables; empty where it is out."""
-    trace: Percent | None
-    splat: Percent | None
-    """None where there is nothing to compare."""
-    map_difference: float | None
-    """Σ|a − b| / Σ|a| of the maps with and without, where they must agree."""
-    note: str
-
-
-class ProgramSize(msgspec.Struct, frozen=True):
-    """One compiled text."""
-
-    name: str
-    lines: int
-    flattened_lines: int
-    features: list[str]
-    """Whose symbols occur in it."""
-
-
-class Absence(msgspec.Struct, frozen=True):
-    """The proof for one feature."""
-
-    feature: str
-    included: bool
-    symbols: tuple[str, ...]
-    programs: tuple[str, ...]
-    """Where any of the symbols occurs."""
-    holds: bool
-
-
-class FeatureReport(msgspec.Struct):
-    """One run."""
-
-    version: str
-    date: str
-    scene: str
-    renderer: str
-    clock: str
-    photons: int
-    repeats: int
-    trace_seconds: float
-    splat_seconds: float
-    """Of the scene as it is."""
-    records: str
-    costs: list[FeatureCost]
-    programs: list[ProgramSize]
-    proof: list[Absence]
-    complete: bool = True
-
-
 def command(scene: Scene, output: Path | None) -> int:
     """Measure, print and (with `output`, a folder) write features.json and features.html; returns the exit code.
 
@@ -112,10 +48,9 @@ def command(scene: Scene, output: Path | None) -> int:
     """
     from ...base.progress import ProgressReporter
     from ...gpu.context import create_context
-    from . import report as features_report
 
     if output is not None:
-        features_report.check(output)
+        report_page.check(output)
     report = None
     try:
         with create_context() as context, ProgressReporter("features") as progress:
@@ -124,9 +59,9 @@ def command(scene: Scene, output: Path | None) -> int:
     finally:
         # Also after Ctrl-C: what is measured is told.
         if report is not None:
-            features_report.show(report)
+            report_page.show(report)
             if output is not None:
-                features_report.write(report, output)
+                report_page.write(report, output)
     assert report is not None
     return 0 if all(p.holds for p in report.proof) and all(agrees(c) for c in report.costs) else 1
 
@@ -166,7 +101,8 @@ def measure(
         _prove(report, context, scene, settings, features)
         if not light.plans:
             raise UserError(
-                f"scene '{scene.name}': no light meets glass or a mirror, so no feature costs anything; name a scene with a caustic"
+                f"scene '{scene.name}': no light meets glass or a mirror, so no feature costs anything; name a scene "
+                "with a caustic"
             )
         work = _calibrated(report, light, seconds, context)
         told = static_costs(scene, features)

@@ -2,39 +2,20 @@
 
 from __future__ import annotations
 
-import html
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 
 from ...base.atomic import atomic_output, check_writable
 from ...base.errors import UserError
-
-if TYPE_CHECKING:
-    from .cost import FeatureReport, Percent
+from ..report.page import Table, render
+from .results import FeatureReport, Percent
 
 _COST_HEADINGS = ("feature", "", "why", "trace", "splat", "adds", "note")
 _PROOF_HEADINGS = ("feature", "", "symbols looked for", "found in", "")
 _PROGRAM_HEADINGS = ("program", "lines", "of", "holds code of")
 _NUMBERS = ("trace", "splat", "lines", "of")
 _PAGE_ALONE = ("adds", "symbols looked for")
-
-_PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>
-<style>
-:root {{ color-scheme: light dark; --ink: #1c1e21; --muted: #5b6068; --line: #e2e4e7; --paper: #fefefe; }}
-@media (prefers-color-scheme: dark) {{ :root {{ --ink: #e9eaec; --muted: #a4aab3; --line: #33373d; --paper: #15171a; }} }}
-body {{ font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 75rem; margin: 2rem auto; padding: 0 1rem; }}
-table {{ border-collapse: collapse; margin: 0.5rem 0 2rem; }}
-th, td {{ text-align: left; padding: 0.25rem 0.8rem 0.25rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }}
-th, .muted {{ color: var(--muted); font-weight: normal; }} .number {{ text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }}
-.wide {{ overflow-x: auto; }} code {{ font-size: 0.9em; }}
-</style></head><body>
-<h1>{title}</h1>
-{body}
-</body></html>
-"""
 
 
 def check(directory: Path) -> None:
@@ -57,50 +38,38 @@ def write(report: FeatureReport, directory: Path) -> None:
 
 def show(report: FeatureReport) -> None:
     """Three tables on stdout; what would make them too wide is on the page."""
+    import rich.table
     from rich.console import Console
-    from rich.table import Table
 
     console = Console()
     console.print(_heading(report))
-    for title, headings, rows in _tables(report):
-        table = Table(title=title, title_justify="left")
-        narrow = [index for index, heading in enumerate(headings) if heading not in _PAGE_ALONE]
+    for made in _tables(report):
+        shown = rich.table.Table(title=made.title, title_justify="left")
+        narrow = [index for index, heading in enumerate(made.headings) if heading not in _PAGE_ALONE]
         for index in narrow:
-            table.add_column(
-                headings[index], justify="right" if headings[index] in _NUMBERS else "left", overflow="fold"
-            )
-        for row in rows:
-            table.add_row(*(row[index] for index in narrow))
-        console.print(table)
-    console.print(_reading(report))
+            heading = made.headings[index]
+            shown.add_column(heading, justify="right" if heading in _NUMBERS else "left", overflow="fold")
+        for row in made.rows:
+            shown.add_row(*(str(row[index]) for index in narrow))
+        console.print(shown)
+    console.print(_reading())
 
 
 def page(report: FeatureReport) -> str:
     """One self-contained page."""
-    parts = [f"<p>{html.escape(_heading(report))}</p>"]
-    for title, headings, rows in _tables(report):
-        head = "".join(f"<th>{html.escape(h)}</th>" for h in headings)
-        lines = []
-        for row in rows:
-            cells = zip(headings, row, strict=True)
-            lines.append(
-                "<tr>" + "".join(f"<td{_class(heading)}>{html.escape(cell)}</td>" for heading, cell in cells) + "</tr>"
-            )
-        parts.append(
-            f'<h2>{html.escape(title)}</h2><div class="wide"><table><tr>{head}</tr>{"".join(lines)}</table></div>'
-        )
-    parts.append(f'<p class="muted">{html.escape(_reading(report))}</p>')
-    return _PAGE.format(title=html.escape(f"What each feature costs in '{report.scene}'"), body="\n".join(parts))
+    return render(
+        "features.html",
+        scene=report.scene,
+        heading=_heading(report),
+        tables=_tables(report),
+        reading=_reading(),
+    )
 
 
 # -- private ------------------------------------------------------------------------------
 
 
-def _class(heading: str) -> str:
-    return ' class="number"' if heading in _NUMBERS else ""
-
-
-def _tables(report: FeatureReport) -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
+def _tables(report: FeatureReport) -> list[Table]:
     costs = [
         (
             c.feature,
@@ -125,9 +94,12 @@ def _tables(report: FeatureReport) -> list[tuple[str, tuple[str, ...], list[tupl
     ]
     programs = [(p.name, str(p.lines), str(p.flattened_lines), ", ".join(p.features)) for p in report.programs]
     return [
-        ("Cost of each feature (in: what it costs; out: what leaving it out saves)", _COST_HEADINGS, costs),
-        ("Is what the scene does not need absent from every program?", _PROOF_HEADINGS, proof),
-        ("Compiled texts: lines that can run, of lines written", _PROGRAM_HEADINGS, programs),
+        Table(headings, rows, title=title, numbers=_NUMBERS)
+        for title, headings, rows in (
+            ("Cost of each feature (in: what it costs; out: what leaving it out saves)", _COST_HEADINGS, costs),
+            ("Is what the scene does not need absent from every program?", _PROOF_HEADINGS, proof),
+            ("Compiled texts: lines that can run, of lines written", _PROGRAM_HEADINGS, programs),
+        )
     ]
 
 
@@ -135,13 +107,15 @@ def _heading(report: FeatureReport) -> str:
     rest = "" if report.complete else " Stopped early: the features that follow were not measured."
     return (
         f"Scene '{report.scene}' on {report.renderer}, by {report.clock}: about {report.photons:,} photons a run, "
-        f"trace {1e3 * report.trace_seconds:.0f} ms, splat {1e3 * report.splat_seconds:.0f} ms; {report.repeats} turns. {report.records}{rest}"
+        f"trace {1e3 * report.trace_seconds:.0f} ms, splat {1e3 * report.splat_seconds:.0f} ms; {report.repeats} "
+        f"turns. {report.records}{rest}"
     )
 
 
-def _reading(report: FeatureReport) -> str:
+def _reading() -> str:
     return (
-        "Percentages are of the time without the feature: the median over turns with and without, then the interval that holds "
+        "Percentages are of the time without the feature: the median over turns with and without, then the interval "
+        "that holds "
         "the true median with 95 %. An interval on both sides of 0 means that no cost was found."
     )
 

@@ -83,7 +83,7 @@ def _dispersion(scene: Scene, base: Features) -> Trial:
         spectral_groups=0,
         merged_groups=False,
         band_cuts=False,
-        spectral_weights=base.spectral_weights and not included or base.absorption,
+        spectral_weights=(base.spectral_weights and not included) or base.absorption,
     )
     forced = base if included else replace(base, spectral_groups=1, band_cuts=True, spectral_weights=True)
     if base.point_spectrum:

@@ -86,7 +86,7 @@ def error_against(scene: SceneResult, abscissa: str) -> Figure:
 
 
 def set_limits(
-    axes: Axes, groups: Sequence[Sequence[Series]], own_errors: Sequence[float], abscissa: str, measured_pass: str = "light"
+    axes: Axes, groups: Sequence[Sequence[Series]], own_errors: Sequence[float], abscissa: str, measured: str = "light"
 ) -> None:
     """Logarithmic axes around all that is positive, with ticks that read as plain numbers."""
     everything = [one for group in groups for one in group]
@@ -105,7 +105,7 @@ def set_limits(
     axes.set_yscale("log")
     axes.set_xlim(float(x.min()) / 1.25, float(x.max()) * 1.12)
     axes.set_ylim(float(least) / 1.8, float(largest) * 1.6)
-    axes.set_xlabel(axis_name(measured_pass, abscissa))
+    axes.set_xlabel(axis_name(measured, abscissa))
     _ticks(axes, abscissa)
     axes.grid(True, which="major", color=style.GRID, lw=0.7)
     axes.set_axisbelow(True)

@@ -192,7 +192,8 @@ def small_multiples(result: BenchResult) -> Figure:
         set_limits(axes, [group for _, group in panels], [], "seconds", scene.measured_pass)
         lowest, leftmost = index + columns >= len(panels), index % columns == 0
         last = index % columns == columns - 1 or index == len(panels) - 1
-        axes.set(xlabel=axis_name(scene.measured_pass, "seconds") if lowest else "", ylabel="relMSE" if leftmost else "")
+        name = axis_name(scene.measured_pass, "seconds")
+        axes.set(xlabel=name if lowest else "", ylabel="relMSE" if leftmost else "")
         axes.tick_params(labelbottom=lowest)
         _draw_panel(axes, scene, drawn, named=last)
     return figure

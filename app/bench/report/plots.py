@@ -46,7 +46,8 @@ def bias_and_variance(scene: SceneResult) -> Figure | None:
         axes.set_visible(False)
     for index, (axes, name) in enumerate(zip(grid.flat, names, strict=False)):
         set_limits(axes, [everything], [], "seconds", scene.measured_pass)
-        axes.set(xlabel=axis_name(scene.measured_pass, "seconds"), ylabel="share of relMSE" if index % columns == 0 else "")
+        share = "share of relMSE" if index % columns == 0 else ""
+        axes.set(xlabel=axis_name(scene.measured_pass, "seconds"), ylabel=share)
         axes.set_title(
             name,
             loc="left",
@@ -202,7 +203,8 @@ def _stage_key(axes: Axes, scene: SceneResult) -> None:
     measured = MEASURED_PASSES[scene.measured_pass]
     style.title(axes, f"{scene.scene}: where the {measured.time} goes", " ")
     handles = [
-        Patch(color=style.STAGE_COLOURS[stage], label=measured.stage_names.get(stage, stage)) for stage in measured.stages
+        Patch(color=style.STAGE_COLOURS[stage], label=measured.stage_names.get(stage, stage))
+        for stage in measured.stages
     ]
     axes.legend(
         handles=handles,

@@ -12,17 +12,19 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from markupsafe import Markup
+
 from ...base.atomic import atomic_output
 from ...base.errors import UserError
 from ...base.progress import ProgressReporter
 from ..measured_passes import MEASURED_PASSES
 from ..results import BenchResult, SceneResult
 from . import scene as report_scene
-from . import sections as report_sections
 from . import style as report_style
 from .curve_plots import error_against
-from .html import Html, page
 from .overview import overview, small_multiples
+from .page import inlined
+from .sections import document
 
 
 def write_report(result: BenchResult, directory: Path) -> None:
@@ -36,27 +38,20 @@ def write_report(result: BenchResult, directory: Path) -> None:
     except OSError as error:
         raise UserError(f"cannot make the folder {plots}: {error.strerror or error}; choose another place") from error
     names = file_names([scene.scene for scene in result.scenes])
-    sections = []
+    scenes = []
     with report_style.plot_style(), ProgressReporter("report") as progress:
         for index, (scene, name) in enumerate(zip(result.scenes, names, strict=True)):
             progress(index / (len(names) + 1), scene.scene)
-            sections.append(report_scene.section(scene, f"scene-{name}", _curve_plots(scene, name, plots), directory))
-        document = report_style.save(overview(result), plots / "overview")
-        glance = report_scene.inlined(
-            document, "overview", "time to equal error of each method in each scene, as a ratio to stochastic"
+            scenes.append(report_scene.view(scene, f"scene-{name}", _curve_plots(scene, name, plots), directory))
+        glance = inlined(
+            report_style.save(overview(result), plots / "overview"),
+            "overview",
+            "time to equal error of each method in each scene, as a ratio to stochastic",
         )
         readme_plot(result, plots / "scenes")
         progress(1.0, "page")
-    body = [
-        report_sections.header(result),
-        report_sections.contents(result, [f"scene-{name}" for name in names]),
-        report_sections.claims(result, glance),
-        report_sections.definitions(result),
-        sections,
-        report_sections.limits(result),
-    ]
     with atomic_output(directory / "report.html") as temporary:
-        temporary.write_text(page(f"Error against run time, SpectraSplat {result.version}", body), encoding="utf-8")
+        temporary.write_text(document(result, scenes, glance), encoding="utf-8")
 
 
 def readme_plot(result: BenchResult, stem: Path) -> None:
@@ -66,14 +61,13 @@ def readme_plot(result: BenchResult, stem: Path) -> None:
         report_style.save(small_multiples(result), stem)
 
 
-def _curve_plots(scene: SceneResult, name: str, plots: Path) -> dict[str, Html]:
+def _curve_plots(scene: SceneResult, name: str, plots: Path) -> list[Markup]:
     """Error over time and over photons or samples: saved, and as SVG for the page."""
-    drawn, measured = {}, MEASURED_PASSES[scene.measured_pass]
+    drawn, measured = [], MEASURED_PASSES[scene.measured_pass]
     for abscissa, ending, words in (("seconds", "time", measured.time), ("photons", measured.units, measured.unit)):
-        document = report_style.save(error_against(scene, abscissa), plots / f"{name}_error_{ending}")
-        drawn[abscissa] = report_scene.inlined(
-            document, f"{name}-{ending}", f"{scene.scene}: relMSE of each method against {words}, logarithmic axes"
-        )
+        saved = report_style.save(error_against(scene, abscissa), plots / f"{name}_error_{ending}")
+        label = f"{scene.scene}: relMSE of each method against {words}, logarithmic axes"
+        drawn.append(inlined(saved, f"{name}-{ending}", label))
     return drawn
 
 

@@ -207,11 +207,3 @@ def inline_svg(document: str, prefix: str, label: str) -> str:
     for name, (on_paper, _) in PALETTE.items():
         text = text.replace(on_paper, f"var(--{name})")
     return text.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
-
-
-def css_variables() -> str:
-    """The palette as CSS: for paper, and for a dark screen where the reader prefers one (never in print)."""
-    light, dark = ("".join(f"--{name}:{pair[i]};" for name, pair in PALETTE.items()) for i in (0, 1))
-    return (
-        f":root{{color-scheme:light dark;{light}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n"
-    )

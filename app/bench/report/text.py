@@ -80,21 +80,25 @@ def warnings_of(scene: SceneResult) -> list[str]:
     elif least > 0 and scene.reference.relmse > REFERENCE_SHARE * least:
         share = scene.reference.relmse / least
         told.append(
-            f"The reference's own error ({number(scene.reference.relmse)}) is {share:.2g} times the smallest error reported "
-            f"({number(least)}), above the tenth that the protocol asks for. Its variance has been taken off, yet errors near it are less "
+            f"The reference's own error ({number(scene.reference.relmse)}) is {share:.2g} times the smallest error "
+            "reported "
+            f"({number(least)}), above the tenth that the protocol asks for. Its variance has been taken off, yet "
+            "errors near it are less "
             "certain than the band between seeds shows, and a ratio read there is less certain too."
         )
     elif scene.reference_too_coarse:
         told.append("The reference's own error is above a tenth of the smallest error reported.")
     if any(p.relmse <= 0 for c in scene.curves for p in c.points):
         told.append(
-            "Where a debiased error is zero or below, the picture cannot be told from the reference; the plots show a hollow triangle on the floor."
+            "Where a debiased error is zero or below, the picture cannot be told from the reference; the plots show a "
+            "hollow triangle on the floor."
         )
     busy = [curve.method for curve in scene.curves if _times_fall(curve)]
     if busy:
         measured = MEASURED_PASSES[scene.measured_pass]
         told.append(
-            f"{sentence(measured.time)} does not rise with the number of {measured.unit} for {', '.join(busy)}: the machine was busy with other work, so times and time ratios "
+            f"{sentence(measured.time)} does not rise with the number of {measured.unit} for {', '.join(busy)}: the "
+            "machine was busy with other work, so times and time ratios "
             f"here are rough. Errors against {measured.units} are not touched by that."
         )
     unfinished = [curve.method for curve in scene.curves if not curve.points]
@@ -104,7 +108,8 @@ def warnings_of(scene: SceneResult) -> list[str]:
         told.append("The run was stopped before this scene was complete; the same command goes on where it stopped.")
     if scene.seeds < 5:
         told.append(
-            f"Only {seeds_text(scene.seeds)}: the band over seeds and the parting of bias and variance are weak; the protocol asks for five."
+            f"Only {seeds_text(scene.seeds)}: the band over seeds and the parting of bias and variance are weak; the "
+            "protocol asks for five."
         )
     return told
 
@@ -127,14 +132,15 @@ def headline(result: BenchResult) -> list[str]:
         asked = MEASURED_PASSES[result.settings.measured_pass].asked_ratio
         enough = sum(ratio >= asked for ratio in ratios)
         told.append(
-            f"srd reached the error that stochastic ends with in at most 1/{asked:.0f} of its time in {enough} of {len(compared)} "
+            f"srd reached the error that stochastic ends with in at most 1/{asked:.0f} of its time in {enough} of "
+            f"{len(compared)} "
             f"scene{'' if len(compared) == 1 else 's'}{_range_of(ratios)}."
         )
         if len(ratios) < len(compared):
             told.append(f"In {len(compared) - len(ratios)} of them it never got there.")
     if claims:
         told.append(
-            f"{sum(claim.holds for claim in claims)} of {len(claims)} claims hold; what does not is told under Limits."
+            f"{sum(claim.holds for claim in claims)} of {len(claims)} claims hold; what does not is listed under Limits."
         )
     if not told:
         told.append("Nothing has been compared yet: the run was stopped early or had one method only.")
@@ -147,7 +153,8 @@ def _range_of(ratios: list[float]) -> str:
         return ""
     if len(ratios) < 3:
         return f"; it took {' and '.join(ratio_text(ratio) for ratio in ratios)} less time"
-    return f"; times less: {ratio_text(ratios[0])} at least, {ratio_text(statistics.median(ratios))} in the median, {ratio_text(ratios[-1])} at most"
+    least, median, most = (ratio_text(ratio) for ratio in (ratios[0], statistics.median(ratios), ratios[-1]))
+    return f"; times less: {least} at least, {median} in the median, {most} at most"
 
 
 def limits(result: BenchResult) -> list[tuple[str, Claim]]:

@@ -327,7 +327,8 @@ class _Reader:
             cls = LIGHT_KINDS.get(own.get("kind", "point"), Light)
             placed: dict[str, Any] = {"position": list(position)} if cls.has_place else {}
             placed |= {"direction": list(direction)} if cls.has_direction else {}
-            placed |= {"tangent": list(_vec3(_unit(world[:3, 0])))} if "size" in own else {}
+            has_tangent = "size" in own or cls.has_roll is True
+            placed |= {"tangent": list(_vec3(_unit(world[:3, 0])))} if has_tangent else {}
             table = SceneTable(own | placed, self.document.path, f"{LIGHTS}.extras.{EXTRAS}.light")
             return read_light(table, 0, around)
         kind = entry.get("type")

@@ -394,7 +394,7 @@ def _look_world(position: Any, forward: Any, up: Any) -> np.ndarray:
 def _world_of_light(light: Light) -> np.ndarray:
     """World matrix of a light's node: it shines along -z, and a rectangle's width runs along x."""
     helper = np.eye(3)[int(np.argmin(np.abs(light.direction)))]
-    if light.tangent is not None:
-        helper = np.cross(-np.array(light.direction), light.tangent)
+    if light.has_roll:
+        helper = np.cross(-np.array(light.direction), light.axes()[:, 0])
     world = _look_world((0.0, 0.0, 0.0) if not light.has_place else light.position, light.direction, helper)
     return world

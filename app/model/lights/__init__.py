@@ -5,12 +5,13 @@ from __future__ import annotations
 from .area import AreaLight
 from .collimated import CollimatedLight
 from .directional import DirectionalLight
+from .ies import IesLight
 from .light import Light
 from .point import PointLight
 from .spot import SpotLight
 
 LIGHT_KINDS: dict[str, type[Light]] = {
-    cls.kind: cls for cls in (PointLight, SpotLight, DirectionalLight, CollimatedLight, AreaLight)
+    cls.kind: cls for cls in (PointLight, SpotLight, DirectionalLight, CollimatedLight, AreaLight, IesLight)
 }
 """By their word in a scene file."""
 
@@ -19,6 +20,7 @@ __all__ = [
     "AreaLight",
     "CollimatedLight",
     "DirectionalLight",
+    "IesLight",
     "Light",
     "PointLight",
     "SpotLight",

@@ -101,6 +101,8 @@ class Light:
     """Numbers of its shape: their bounds, rows of a panel, ways to animate them."""
     has_place: ClassVar[bool] = True
     has_direction: ClassVar[bool] = True
+    has_roll: ClassVar[bool] = False
+    """Whether turning it about its own axis changes it."""
     has_outline: ClassVar[bool] = False
     """Whether it is a disc or a rectangle that can be scaled."""
     is_parallel: ClassVar[bool] = False
@@ -109,6 +111,8 @@ class Light:
     # What a kind may have as attributes, without annotations: an annotated one would order the kinds' own fields.
     profile = None
     """Table of its intensity over directions, where it has one."""
+    across = (np.zeros(3), np.zeros(3))
+    """Directions in which the profile's horizontal angle is 0 and 90°."""
     position = (0.0, 0.0, 0.0)
     direction = (0.0, 0.0, -1.0)
     """Unit propagation direction of the axis."""
@@ -132,7 +136,7 @@ class Light:
     @property
     def variant(self) -> tuple[Any, ...]:
         """What programs and buffers are built for: lights of equal variant can stand in for each other."""
-        return type(self), self.is_disc, self.profile is None
+        return type(self), self.is_disc, self.profile
 
     @property
     def flux_factor(self) -> float:
@@ -142,6 +146,14 @@ class Light:
     def reach(self, distance: float) -> float:
         """Its quantity over the irradiance it gives at `distance`, on a plane across it."""
         return distance**2
+
+    def axes(self) -> np.ndarray:
+        """Columns tangent, bitangent and axis (propagation), unit and right-handed, float64 (3, 3)."""
+        axis = np.asarray(self.direction, float) / np.linalg.norm(self.direction)
+        guide = np.eye(3)[np.argmin(np.abs(axis))] if self.tangent is None else np.asarray(self.tangent, float)
+        first = guide - axis * (guide @ axis)
+        first = first / np.linalg.norm(first)
+        return np.column_stack([first, np.cross(axis, first), axis])
 
     def emits_toward(self, directions: np.ndarray) -> np.ndarray:
         """Which of the unit directions (..., 3) it emits into, bool (...)."""
@@ -265,6 +277,11 @@ class OutlinedLight(Light):
     def half_extent(self) -> tuple[float, float]:
         """Half of its width and height, scene units."""
         return (self.radius, self.radius) if self.is_disc else (0.5 * self.width, 0.5 * self.height)
+
+    @property
+    def has_roll(self) -> bool:  # type: ignore[override]
+        """A rectangle's."""
+        return not self.is_disc
 
     @property
     def area(self) -> float:

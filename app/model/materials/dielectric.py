@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from ..fields import Integer
+from ..optics.colorimetry import VISIBLE_NM
 from ..optics.glass import Dispersion
 from .absorption import Absorption, AbsorptionPart
 from .dispersion_file import DispersionPart
@@ -38,6 +39,11 @@ class Dielectric(Material):
         values = super().values(path)
         del values["kind"]
         return values
+
+    def content(self) -> tuple[object, ...]:
+        """Its index on the visible grid, its priority and what it absorbs."""
+        absorbed = None if self.absorption is None else self.absorption.coefficient
+        return self.dispersion.index(VISIBLE_NM), self.priority, absorbed
 
     def words(self) -> str:
         """Its glass, and what sets it apart from it."""

@@ -80,6 +80,10 @@ class Material:
         """What it is, in a few words."""
         return self.kind
 
+    def content(self) -> tuple[object, ...]:
+        """What of it light depends on, as plain values and arrays: two that send light alike agree in it."""
+        return (*(float(v) for v in self.reflectance_rgb), self.reflectance)
+
     def is_like(self, other: Material) -> bool:
         """Whether programs and buffers made for the one serve the other, so that only values differ."""
         return self == other

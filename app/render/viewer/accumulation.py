@@ -37,7 +37,10 @@ class Accumulation:
     def is_done(self) -> bool:
         """The target is reached."""
         return (
-            self.begun and self.number > 0 and self.photons >= self.largest and self.light.stats.photons >= self.target
+            self.begun
+            and self.number > 0
+            and self.photons >= self.largest
+            and self.light.light_pass.stats.photons >= self.target
         )
 
     def aim_at(self, target: int, largest: int) -> None:
@@ -48,16 +51,16 @@ class Accumulation:
         """Everything from here to the target, pausing often."""
         while not self.is_done:
             if not self.begun:
-                self.light.begin(self.photons, self.seed)
+                self.light.light_pass.begin(self.photons, self.seed)
                 self.begun = True
                 yield
             yield from self._pass(0 if self.number else self.light.rounds_running)
-            if not self.light.plans:
+            if not self.light.light_pass.plans:
                 self.number, self.photons = 1, self.largest
                 self.publish()
                 return
             self.number += 1
-            yield from self.light.settling()
+            yield from self.light.light_pass.settling()
             self.publish()
             yield
             if self.photons < self.largest:
@@ -65,7 +68,7 @@ class Accumulation:
                 self.number, self.begun = 0, False
 
     def _pass(self, first_round: int) -> Iterator[None]:
-        for _ in self.light.pass_steps(self.number, self.photons, first_round):
+        for _ in self.light.light_pass.pass_steps(self.number, self.photons, first_round):
             yield
 
     def resumed(self) -> Iterator[None]:
@@ -73,7 +76,7 @@ class Accumulation:
         if self.number > 0:
             # Of the finished passes only the first is stored: the others are due again.
             self.number = 1
-            self.light.stats.photons = min(self.light.stats.photons, self.photons)
+            self.light.light_pass.stats.photons = min(self.light.light_pass.stats.photons, self.photons)
         elif self.begun:
             yield from self.light.splat_stored(of_running=True)
         yield from self.steps()
@@ -82,5 +85,5 @@ class Accumulation:
         """Splat the stored photons and publish them."""
         if self.light.photons_stored:
             yield from self.light.splat_stored()
-            yield from self.light.settling()
+            yield from self.light.light_pass.settling()
             self.publish()

@@ -7,12 +7,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from ...gpu.scene_buffers import SceneBuffers
-from ...model.features import Features
 from ...model.settings import RenderSettings
-from ..light_pass import spectral_axis
+from ..map_fit import preview_size
 from .accumulation import Accumulation
-from .live_light import LiveLight, quick_size
+from .live_light import LiveLight
 
 if TYPE_CHECKING:
     from ...edit.live_inputs import LiveInputs
@@ -55,7 +53,7 @@ def build(
     `largest`: photons of the finest pass, `target`: after which nothing more is traced. `publish` is called for every
     later picture. What was made is freed when the generator is closed before its end.
     """
-    width, height = quick_size(wanted.width, wanted.height)
+    width, height = preview_size(wanted.width, wanted.height)
     settings = RenderSettings(
         width=width,
         height=height,
@@ -69,12 +67,10 @@ def build(
         any_view=True,
     )
     scene = replace(wanted.scene, camera=wanted.camera)
-    features = Features.of(scene, settings)
-    buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
-    light = LiveLight(context, scene, settings, features, buffers, budget.store_bytes)
+    light = LiveLight(context, scene, settings, budget.store_bytes)
     try:
         yield None
-        for _ in light.preparing():
+        for _ in light.light_pass.preparing():
             yield None
         light.show(wanted)
         published: list[bool] = []

@@ -13,7 +13,7 @@ class DirtyLevel(IntEnum):
     """What must be done again, cheapest first; each includes those before it."""
 
     NOTHING = 0
-    LOOK = 1
+    CAMERA = 1
     """Camera samples only: photons and maps stay."""
     SPLAT = 2
     """Stored photons are splatted again; nothing is traced."""

@@ -45,9 +45,9 @@ def _inputs(old: LiveInputs, new: LiveInputs) -> DirtyLevel:
 
 
 _INPUTS = {
-    "camera": DirtyLevel.LOOK,
-    "width": DirtyLevel.LOOK,
-    "height": DirtyLevel.LOOK,
+    "camera": DirtyLevel.CAMERA,
+    "width": DirtyLevel.CAMERA,
+    "height": DirtyLevel.CAMERA,
     "smoothing": DirtyLevel.SPLAT,
     "solo_nm": DirtyLevel.SPLAT,
     "local_gain": DirtyLevel.SPLAT,
@@ -70,7 +70,7 @@ def _scene(old: Scene, new: Scene) -> DirtyLevel:
             cost = max(cost, _lights(a, b))
         elif item.name in ("background_rgb", "environment"):
             # They light nothing. Environments are compared by identity: a new one is another one.
-            cost = max(cost, DirtyLevel.LOOK if a != b else DirtyLevel.NOTHING)
+            cost = max(cost, DirtyLevel.CAMERA if a != b else DirtyLevel.NOTHING)
         elif item.name == "render":
             cost = max(cost, DirtyLevel.BUILD if a.max_depth != b.max_depth else DirtyLevel.NOTHING)
         else:
@@ -104,7 +104,7 @@ def _object(old: SceneObject, new: SceneObject) -> DirtyLevel:
         if a.reflectance is None and b.reflectance is None and (a.texture is None) == (b.texture is None):
             # Another picture is only looked at; whether there is one, the objects' records on the device know.
             same = a.reflectance_rgb == b.reflectance_rgb and a.texture is b.texture
-            return max(cost, DirtyLevel.NOTHING if same else DirtyLevel.LOOK)
+            return max(cost, DirtyLevel.NOTHING if same else DirtyLevel.CAMERA)
         return DirtyLevel.BUILD
     if a.transmits and b.transmits:
         same_absorption = a.absorption is b.absorption or (

@@ -13,7 +13,6 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +22,8 @@ from ...gpu.map_channels import MapChannels
 from ...gpu.texture_store import TextureStore
 from ...passes.camera import MAX_TAPS, CameraPass, CausticMaps
 from ...passes.spectrum_choice import Spectrum
+from ..sampling import CameraSampling, whole_cycles
+from .schedule import CameraState
 
 if TYPE_CHECKING:
     import moderngl
@@ -37,10 +38,7 @@ DISPATCH_SECONDS = 0.008
 SETTLED = 8
 """Samples at most that a better map waits for before its picture replaces the one shown."""
 MOVING_TAPS = 8
-"""Looks along one spectral sweep at most, in a picture that must be there at once."""
-BANDED_SAMPLES = 16
-"""Samples whose error the number of bands is fitted to: a still picture shall be whole within seconds, so not to all
-that it gets in the end."""
+"""Lookups along one spectral sweep at most, in a picture that must be there at once."""
 SMOOTH_SHARE = 1 / 4
 """Samples of the whole spectrum that come before bands, over the number of these: edges are smooth while the bands are
 awaited."""
@@ -63,8 +61,8 @@ class LiveCamera:
         self._maps: CausticMaps | None = None
         self._camera: Camera | None = None
         self._size = (0, 0)
-        self._is_quick = False
-        """The picture that runs is an answer to a movement."""
+        self._is_preview = False
+        """The picture that runs is a preview: it answers a movement."""
         self._is_smooth = False
         """Its samples are of the whole spectrum: the picture until there are bands."""
         self._bands: int | None = None
@@ -75,11 +73,11 @@ class LiveCamera:
         """Samples from which on this picture replaces the one shown, and those that it has."""
         self._owes = False
         self._shows_other = False
-        """What is shown is of another scene than the one that is looked at."""
+        """What is shown is of another scene than the one that was taken last."""
         self._shows_whole = False
-        """What is shown is no answer to a movement and no mere first sample."""
+        """What is shown is no preview and no mere first sample."""
         self._rates: dict[bool, float] = {}
-        """Pixels per second, of quick pictures and of others."""
+        """Pixels per second, of previews and of others."""
         self.picture: moderngl.Texture | None = None
         """RGBA32F, linear Rec.709, top row first; None before the first sample."""
         self.shown_samples = 0
@@ -92,7 +90,7 @@ class LiveCamera:
         self.scale = 1.0
         self._wanted_scale = 1.0
 
-    def look_at(
+    def take_scene(
         self, buffers: SceneBuffers, scene: Scene, reflectances: list[np.ndarray | None], maps: MapChannels
     ) -> None:
         """Take the scene as it is shown: `buffers` hold its geometry, `scene` its colours, glass, lights and pictures;
@@ -150,13 +148,13 @@ class LiveCamera:
         self._camera, self._maps = camera, maps
         self._size = (width, height) if scale == 1.0 else (_side(width * scale), _side(height * scale))
         keeps = same_view and self.scale == scale == 1.0 and not self._shows_other
-        self._wanted_scale, self._is_quick = scale, seconds is not None
+        self._wanted_scale, self._is_preview = scale, seconds is not None
         view = camera, width, height
         if finer_maps or view != self._bands_view:
             self._bands = None
         self._bands_view = view
         self._owes = True
-        smooth = not self._is_quick and self._needed_bands != 1 and not (keeps and self._shows_whole)
+        smooth = not self._is_preview and self._needed_bands != 1 and not (keeps and self._shows_whole)
         self._settled = 1
         if keeps and not (smooth and self._needed_bands is None):
             self._settled = max(1, min(self.shown_samples, self._smooth_samples if smooth else SETTLED))
@@ -167,9 +165,20 @@ class LiveCamera:
         self._maps = self._steps = self._choosing = None
 
     @property
+    def state(self) -> CameraState:
+        """How far the picture is."""
+        return CameraState(
+            self.is_coarse, self.owes_picture, self.is_within_cycle, self.is_done, is_full_size=self.scale == 1.0
+        )
+
+    @property
+    def _sampling(self) -> CameraSampling:
+        return CameraSampling.live(self.target_samples)
+
+    @property
     def is_coarse(self) -> bool:
         """The picture asked for last is less than what is wanted."""
-        return self._wanted_scale < 1.0 or (self._is_quick and self._needed_bands != 1)
+        return self._wanted_scale < 1.0 or (self._is_preview and self._needed_bands != 1)
 
     @property
     def owes_picture(self) -> bool:
@@ -180,7 +189,7 @@ class LiveCamera:
     def is_within_cycle(self) -> bool:
         """Part of the bands of the first whole picture since `restart` are there: with other maps they would be
         lost."""
-        begun = self._maps is not None and not (self._is_quick or self._is_smooth) and self._cycle > 1
+        begun = self._maps is not None and not (self._is_preview or self._is_smooth) and self._cycle > 1
         return begun and self._taken < self._publish_from
 
     @property
@@ -210,21 +219,19 @@ class LiveCamera:
     def _needed_bands(self) -> int | None:
         """Of a fine picture; None while nobody knows."""
         assert self._pass is not None
-        if not self._pass.disperses or self._pass.scene.features.random_wavelength:
-            return 1
-        return self._pass.fixed_bands or self._bands
+        return self._sampling.fixed_bands(self._pass) or self._bands
 
     @property
     def _cycle(self) -> int:
         """Samples after which the picture that runs is whole."""
-        return 1 if self._is_quick or self._is_smooth else self._needed_bands or 1
+        return 1 if self._is_preview or self._is_smooth else self._needed_bands or 1
 
     @property
     def _target(self) -> int:
         """Samples after which the picture that runs is finished."""
         if self._is_smooth:
             return 1 if self._needed_bands is None else self._smooth_samples
-        return self.target_samples + -self.target_samples % self._cycle
+        return whole_cycles(self.target_samples, self._cycle)
 
     @property
     def _smooth_samples(self) -> int:
@@ -236,10 +243,10 @@ class LiveCamera:
         self._is_smooth = smooth
         self._taken = 0
         self._steps = self._choosing = None
-        self._publish_from = self._settled + -self._settled % self._cycle
-        if not (smooth or self._is_quick) and self._needed_bands is None:
+        self._publish_from = whole_cycles(self._settled, self._cycle)
+        if not (smooth or self._is_preview) and self._needed_bands is None:
             self._pass.max_taps = MAX_TAPS
-            self._choosing = self._pass.choosing_spectrum(self._camera, *self._size, BANDED_SAMPLES, self._maps)
+            self._choosing = self._sampling.choosing(self._pass, self._camera, *self._size, self._maps)
 
     # ---- samples -----------------------------------------------------------------------------
 
@@ -272,7 +279,7 @@ class LiveCamera:
         width, height = self._size
         if self._steps is None:
             self._pass.spectrum = Spectrum(self._cycle)
-            self._pass.max_taps = MOVING_TAPS if self._is_quick or self._is_smooth else MAX_TAPS
+            self._pass.max_taps = MOVING_TAPS if self._is_preview or self._is_smooth else MAX_TAPS
             self._steps = self._pass.samples(self._camera, width, height, 1, self._taken, self._maps)
             self._spent_s = 0.0
         started = time.perf_counter()
@@ -281,8 +288,8 @@ class LiveCamera:
         if not goes_on and self._spent_s > 1e-4:
             # Of whole pictures: rows without glass go ten times as fast.
             measured = width * height / self._spent_s
-            rate = self._rates.setdefault(self._is_quick, measured)
-            self._rates[self._is_quick] = rate + _RATE_BLEND * (measured - rate)
+            rate = self._rates.setdefault(self._is_preview, measured)
+            self._rates[self._is_preview] = rate + _RATE_BLEND * (measured - rate)
         return goes_on
 
     def _publish(self) -> None:
@@ -298,7 +305,7 @@ class LiveCamera:
         self._average.run(-(-sums.width // 8), -(-sums.height // 8))
         self._context.ctx.memory_barrier()
         self.shown_samples, self.shown_bands, self.scale = self._taken, self._cycle, self._wanted_scale
-        self._shows_whole, self._shows_other = not (self._is_quick or self._is_smooth), False
+        self._shows_whole, self._shows_other = not (self._is_preview or self._is_smooth), False
         self._owes = False
         self.fallbacks = self._pass.fallbacks
         self.version += 1
@@ -317,14 +324,3 @@ def _side(pixels: float) -> int:
     side is a power of two."""
     side = max(9, round(pixels))
     return side + 1 if side & (side - 1) == 0 else side
-
-
-def solo_scene(scene: Scene, wavelength_nm: float | None) -> Scene:
-    """`scene` as seen in the light of one wavelength: lights narrowed, what lies behind everything dark; itself for
-    None."""
-    if wavelength_nm is None:
-        return scene
-    from .live_light import solo
-
-    lights = tuple(replace(light, spectral_power=solo(light.spectral_power, wavelength_nm)) for light in scene.lights)
-    return replace(scene, lights=lights, background_rgb=(0.0, 0.0, 0.0), environment=None)

@@ -66,7 +66,7 @@ def world_photons(light: LiveLight, inputs: LiveInputs, limit: int) -> StoredPho
     records = light.stored_records(limit)
     buffers = light.buffers
     space, axis, groups = buffers.space, buffers.axis, buffers.groups
-    glasses = shown_glasses(light.scene, inputs.scene) or {}
+    glasses = shown_glasses(light.light_pass.scene, inputs.scene) or {}
     samples = np.linspace(0.0, 1.0, buffers.variable_table.shape[1]) if groups.count else np.zeros(0)
     # Where glasses share a group its variable is no index, and the glass that is shown is the one that was traced.
     alone = [
@@ -88,7 +88,7 @@ def world_photons(light: LiveLight, inputs: LiveInputs, limit: int) -> StoredPho
     source = (records["light_and_source"] >> 16).astype(int)
     owner = {
         i: groups.group[groups.glasses.index(item.material.dispersion)]
-        for i, item in enumerate(light.scene.objects)
+        for i, item in enumerate(light.light_pass.scene.objects)
         if item.material.transmits and groups.count and item.material.dispersion in groups.glasses
     }
     return StoredPhotons(
@@ -152,5 +152,7 @@ def caustic_spectrum(
 def reach_of(light: LiveLight, receiver: int) -> float:
     """Radius that still gathers a few footprints on object `receiver`: some texels of its finest map, world units."""
     index = light.buffers.receivers.index(receiver)
-    area = float(light.layout.placements["texel_area"][light.layout.receivers[index]["placement"]])
-    return (4.0 if is_flat(light.scene.objects[receiver]) else 6.0) * area**0.5
+    area = float(
+        light.light_pass.layout.placements["texel_area"][light.light_pass.layout.receivers[index]["placement"]]
+    )
+    return (4.0 if is_flat(light.light_pass.scene.objects[receiver]) else 6.0) * area**0.5

@@ -7,13 +7,11 @@ window at light that only the coarse one holds.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...passes.map_layout import MapLayout, layout_maps
-from ...passes.pilot import landings_of
+from ...passes.map_layout import MapLayout
 
 if TYPE_CHECKING:
     from ...edit.live_inputs import LiveInputs
@@ -23,14 +21,6 @@ PAYS = 1.5
 """Texels must get so many times smaller."""
 BESIDE = 0.25
 """Share of the window that would be fitted now that may lie outside the present one."""
-
-
-def layout_for(light: LiveLight, inputs: LiveInputs) -> MapLayout:
-    """Maps as they would be laid out for the camera and picture of `inputs`."""
-    seen = replace(light.scene, camera=inputs.camera)
-    return layout_maps(
-        seen, light.buffers, landings_of(light.pilots.values()), (inputs.width, inputs.height), light.reflectance_class
-    )
 
 
 def is_judged(light: LiveLight, inputs: LiveInputs) -> bool:
@@ -43,9 +33,10 @@ def wants_new_maps(light: LiveLight, inputs: LiveInputs) -> bool:
     if is_judged(light, inputs):
         return False
     light.judged_view = (inputs.camera, inputs.width, inputs.height)
-    if (inputs.width, inputs.height) != (light.settings.width, light.settings.height):
+    light_pass = light.light_pass
+    if (inputs.width, inputs.height) != (light_pass.fit.width, light_pass.fit.height):
         return True
-    now, then = light.layout, layout_for(light, inputs)
+    now, then = light_pass.layout, light_pass.layout_for(light.fit_of(inputs))
     return any(_pays(now, then, receiver) for receiver in range(len(now.receivers)))
 
 

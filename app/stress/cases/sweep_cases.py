@@ -273,7 +273,7 @@ def _bins(context: Context, whole: Base) -> Iterator[Measurement]:
 def _passes(context: Context, scene: Scene) -> Iterator[Measurement]:
     """Maps after k equal passes against k times the maps after one: every texel, relative to the brightest."""
     photons = 4096
-    with light_pass(context, scene, with_photons(photons)) as light:
+    with light_pass(context, scene, with_photons(photons)) as (light, photon_records):
         light.begin(photons, SMALL.seed)
         light.run_pass(0, photons, lambda _: True)
         one, done = read_maps(light).astype(float), 1
@@ -287,8 +287,8 @@ def _passes(context: Context, scene: Scene) -> Iterator[Measurement]:
             found = Probe(
                 np.zeros((1, 1, 3)),
                 light.stats,
-                nonfinite(sums) + light.nonfinite_photons,
-                light.dropped,
+                nonfinite(sums) + photon_records.nonfinite_photons,
+                photon_records.dropped,
                 light.map_flux(),
             )
             yield measurement(passes, f"{passes} passes", found, Held({"sum": error}, {"sum": SAME_TO_ROUNDING}))

@@ -14,16 +14,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...gpu import records
-from ...model.features import Features
 from ...model.settings import RenderSettings
-from ...passes.camera import CameraPass, CausticMaps
-from ...render.light_pass import LightPass, LightStats, spectral_axis
+from ...passes.camera import CameraPass
+from ...render.light_pass import LightPass, LightStats, NoRecords, scene_buffers
 from ..case import Measurement
 
 if TYPE_CHECKING:
+    import moderngl
+
     from ...gpu.context import Context
+    from ...gpu.reindex import Spans
     from ...model.scene import Scene
     from ...passes.trace import Batch
+    from ...render.light_pass import RoundOf
+    from ...render.shown_spectra import PassTables, ShownSpectra
 
 SMALL = RenderSettings(width=160, height=90, photons=32_768, spp=16)
 """What a sweep renders unless the case is about just that. Fewer than 16 samples a pixel would miss texels of a sharp
@@ -32,22 +36,35 @@ LOST_TO_NUMERICS = 1e-3
 """Largest share of the flux that may end for numerical reasons (cracks, overflows): a tenth of what a picture shows."""
 
 
-class WatchedLight(LightPass):
-    """A light pass whose photon records are read after every batch."""
+class WatchedRecords:
+    """`PhotonRecords` that are read after every batch."""
 
-    def __init__(self, *arguments) -> None:
-        super().__init__(*arguments)
+    def __init__(self, groups: int) -> None:
+        self._dtype = records.photon_record(groups).dtype
+        self._forgotten = NoRecords()
         self.nonfinite_photons = 0
         self.dropped = 0
         self.watched = 0
 
-    def _account(self, batch: Batch) -> None:
-        super()._account(batch)
-        if not batch.photons:
-            return
-        photons = np.frombuffer(
-            self.trace.photons.read(batch.photons * self.trace.photon.stride), self.trace.photon.dtype
-        )
+    @property
+    def tables(self) -> PassTables:
+        """See `PhotonRecords`."""
+        return self._forgotten.tables
+
+    def begin(self, shown: ShownSpectra, spans: Spans, photons: int) -> None:
+        """See `PhotonRecords`."""
+        self._forgotten.begin(shown, spans, photons)
+
+    def release(self) -> None:
+        """Free the tables."""
+        self._forgotten.release()
+
+    def keep(self, photons: moderngl.Buffer, batch: Batch, stride: int, of: RoundOf) -> None:
+        """Look at the batch."""
+        if batch.photons:
+            self._watch(np.frombuffer(photons.read(batch.photons * stride), self._dtype))
+
+    def _watch(self, photons: np.ndarray) -> None:
         self.watched += len(photons)
         dropped = (photons["flags"] & records.FLAG_FOOTPRINT_DROPPED) != 0
         self.dropped += int(dropped.sum())
@@ -93,16 +110,14 @@ class Probe:
 
 
 @contextmanager
-def light_pass(context: Context, scene: Scene, settings: RenderSettings) -> Iterator[WatchedLight]:
-    """The prepared light pass of `scene`; everything is freed afterwards."""
-    from ...gpu.scene_buffers import SceneBuffers
-
-    features = Features.of(scene, settings)
-    buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
-    light = WatchedLight(context, scene, settings, features, buffers)
+def light_pass(context: Context, scene: Scene, settings: RenderSettings) -> Iterator[tuple[LightPass, WatchedRecords]]:
+    """The prepared light pass of `scene` and its photons; everything is freed afterwards."""
+    buffers = scene_buffers(context, scene, settings)
+    watched = WatchedRecords(buffers.features.spectral_groups)
+    light = LightPass(context, scene, settings, buffers.features, buffers, photon_records=watched)
     try:
         light.prepare()
-        yield light
+        yield light, watched
     finally:
         light.release()
         buffers.release()
@@ -111,23 +126,23 @@ def light_pass(context: Context, scene: Scene, settings: RenderSettings) -> Iter
 def probe(context: Context, scene: Scene, settings: RenderSettings = SMALL) -> Probe:
     """Render `scene` in one pass and look at everything."""
     photons = settings.photons or scene.render.photons
-    with light_pass(context, scene, settings) as light:
+    with light_pass(context, scene, settings) as (light, photon_records):
         light.begin(photons, settings.seed)
         light.run_pass(0, photons, lambda _: True)
         light.finish()
-        if light.watched != light.stats.splats:
-            raise RuntimeError(f"{light.watched} of {light.stats.splats} photon records were seen")
+        if photon_records.watched != light.stats.splats:
+            raise RuntimeError(f"{photon_records.watched} of {light.stats.splats} photon records were seen")
         camera_pass = CameraPass(context, light.buffers, settings.layer, light.reflectances, light.map_channels)
         try:
-            maps = CausticMaps(light.resolved_textures(), light.receivers, light.atlas.placements, light.map_scale)
-            camera_pass.run(scene.camera, settings.width, settings.height, settings.spp or 1, 0, maps, settings.seed)
+            view = scene.camera, settings.width, settings.height
+            camera_pass.run(*view, settings.spp or 1, 0, light.caustic_maps(), settings.seed)
             picture = camera_pass.read_rgb()
             spectral = camera_pass.read_spectral() if settings.bins else None
         finally:
             camera_pass.release()
-        bad = light.nonfinite_photons + nonfinite(picture) + nonfinite(read_maps(light))
+        bad = photon_records.nonfinite_photons + nonfinite(picture) + nonfinite(read_maps(light))
         bad += 0 if spectral is None else nonfinite(spectral)
-        return Probe(picture.astype(float), light.stats, bad, light.dropped, light.map_flux(), spectral)
+        return Probe(picture.astype(float), light.stats, bad, photon_records.dropped, light.map_flux(), spectral)
 
 
 def read_maps(light: LightPass) -> np.ndarray:

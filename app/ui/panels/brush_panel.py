@@ -4,12 +4,13 @@ with."""
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from ...edit import edits
-from ...edit.state import Brush, State
+from ...edit.state import Brush, State, Tool
 from ...model.local_dispersion import dab_weight
 from ...model.scene import Dab
 from .. import theme
@@ -38,10 +39,11 @@ def draw_brush(state: State, view_model: ViewModel) -> State:
 
 def _draw_tools(state: State) -> State:
     width = 0.5 * (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x)
-    for tool, label, tip in (
+    tools: tuple[tuple[Tool, str, str], ...] = (
         ("brush", "Brush", "Paint on a receiver where its colours spread more or less than in nature. B"),
         ("pull", "Pull a colour", "Take a colour of the caustic and drag it; the glass's dispersion follows. P"),
-    ):
+    )
+    for tool, label, tip in tools:
         is_on = state.tool == tool
         if is_on:
             imgui.push_style_color(imgui.Col_.button, imgui.get_style_color_vec4(imgui.Col_.button_active))
@@ -102,7 +104,7 @@ def _draw_profile(falloff: float) -> None:
     across = np.linspace(-1.0, 1.0, 81)
     weight = dab_weight(Dab((0.0, 0.0, 0.0), 1.0, 1.0, falloff), np.abs(across))
     base, height = corner.y + size.y - 3.0, size.y - 6.0
-    points = [
+    points: list[Any] = [
         ImVec2(corner.x + size.x * (0.5 + 0.48 * float(x)), base - height * float(w))
         for x, w in zip(across, weight, strict=True)
     ]
@@ -137,7 +139,8 @@ def _draw_painted(state: State) -> State:
 def _draw_pull_words(state: State) -> None:
     if state.pull is None:
         widgets.hint(
-            "Choose the tool (P), press on a colour of the caustic and drag it along the spectrum. The dispersion of the "
+            "Choose the tool (P), press on a colour of the caustic and drag it along the spectrum. The dispersion of "
+            "the "
             "glass that made it is solved so that the colour stays under the cursor; white light stays where it is. "
             "With Shift only the place is changed: a local gain, which is not physical."
         )

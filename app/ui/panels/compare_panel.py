@@ -9,14 +9,19 @@ from imgui_bundle import imgui, implot
 
 from ...base.colour_maps import ERROR, sample
 from ...edit.requests import ComputeReference
-from ...edit.state import Compare, State
+from ...edit.state import Compare, CompareMode, State
 from ...model.settings import METHODS
 from .. import theme
 from ..view_model import ErrorCurve, ViewModel
 from . import rows, widgets
 from .methods import METHOD_NAMES, METHOD_TIPS
 
-MODES = {"off": "Picture alone", "hold": "Hold C to see it", "wipe": "Wipe", "error": "Error map"}
+MODES: dict[CompareMode, str] = {
+    "off": "Picture alone",
+    "hold": "Hold C to see it",
+    "wipe": "Wipe",
+    "error": "Error map",
+}
 MODE_TIPS = {
     "off": "Show the picture alone. Hold C at any time to see what it is compared with.",
     "hold": "Compute the other picture and show it as long as C is held.",
@@ -114,10 +119,12 @@ def _legend() -> None:
     share = min(max((imgui.get_mouse_pos().x - start.x) / max(width, 1.0), 0.0), 1.0)
     rows.explain(
         "Scale",
-        f"{100 * ERROR_RANGE * (2 * share - 1):+.0f} % of the reference. What is nearly black on the screen counts less; magenta is no number.",
+        f"{100 * ERROR_RANGE * (2 * share - 1):+.0f} % of the reference. What is nearly black on the screen counts "
+        "less; magenta is no number.",
     )
     drawing = imgui.get_window_draw_list()
-    colours = [theme.packed((*map(float, rgb), 1.0)) for rgb in sample(ERROR, np.linspace(0.0, 1.0, _LEGEND_STEPS + 1))]
+    scale = sample(ERROR, np.linspace(0.0, 1.0, _LEGEND_STEPS + 1)).astype(float)
+    colours = [theme.packed((r, g, b, 1.0)) for r, g, b in scale.tolist()]
     for i in range(_LEGEND_STEPS):
         low, high = start.x + width * i / _LEGEND_STEPS, start.x + width * (i + 1) / _LEGEND_STEPS
         corners = imgui.ImVec2(low, start.y), imgui.ImVec2(high, start.y + height)

@@ -172,7 +172,8 @@ def _draw_numbers(state: State, view_model: ViewModel, index: int) -> State:
         state = _attempt(state, index, f"n_d of {item.name}", lambda: with_abbe(dispersion, new_n_d, v_d))
     tip = (
         "Abbe number (n_d − 1)/(n_F − n_C) of the glass before its gain: small is dispersive, 20 to 90 for glass. "
-        "The slider is even in 1/V_d, so equal ways spread colours by equal amounts. Negative numbers (anomalous dispersion) can be typed."
+        "The slider is even in 1/V_d, so equal ways spread colours by equal amounts. Negative numbers (anomalous "
+        "dispersion) can be typed."
     )
     changed, new_v_d, active = widgets.reciprocal_slider(
         "Abbe number V_d", v_d, 8.0, unit="", tip=tip, reset=sold.V_d if sold else None
@@ -233,7 +234,10 @@ def _draw_priority(state: State, index: int) -> State:
     material = item.material
     if not material.transmits:
         return state
-    tip = "Where solids overlap, the one of higher priority fills the place (a liquid in its vessel: lower than the glass)."
+    tip = (
+        "Where solids overlap, the one of higher priority fills the place (a liquid in its vessel: lower than the "
+        "glass)."
+    )
     changed, priority, active = widgets.drag(
         "Priority",
         float(material.priority),

@@ -83,7 +83,10 @@ def _gradient(state: State, environment: Environment) -> State:
 def _sky(state: State, environment: Environment) -> State:
     told: Any = environment.parameters
     skies = {str(number): f"{number}  {words}" for number, words in _SKIES.items()}
-    tip = "The CIE's fifteen types of sky: how bright it is towards the horizon and about the sun. Its disc is not drawn: a light shows it."
+    tip = (
+        "The CIE's fifteen types of sky: how bright it is towards the horizon and about the sun. Its disc is not "
+        "drawn: a light shows it."
+    )
     changed, number = widgets.combo("Sky", skies, str(told["type"]), tip=tip)
     if changed:
         return edits.attempt(state, "Type of sky", environments.set_sky, type=int(number))
@@ -121,7 +124,10 @@ def _sky(state: State, environment: Environment) -> State:
 def _map(state: State, view_model: ViewModel, environment: Environment) -> State:
     height, width = environment.rgb.shape[:2]
     name = Path(environment.source).name if environment.source is not None else "From the scene's file"
-    tip = "A picture of all directions, twice as wide as high (.hdr, .exr). Click to choose another; one may also be dropped on the window."
+    tip = (
+        "A picture of all directions, twice as wide as high (.hdr, .exr). Click to choose another; one may also be "
+        "dropped on the window."
+    )
     if widgets.file_field("Picture", name, tip=tip):
         picture_choice.ask_environment(state, view_model)
     widgets.read_out("Size", f"{width} × {height}", tip="Pixels across and down.")

@@ -119,7 +119,10 @@ def _bake(state: State, view_model: ViewModel, idle: bool) -> None:
     _, _choices.map_photons = widgets.combo(
         "Photons##map", PHOTONS, _choices.map_photons, tip="Photons emitted for the map."
     )
-    tip = "Irradiance of the caustic, lm/unit², as EXR or NPY (linear) or PNG (to look at). A .json beside it says where the texture lies in the world."
+    tip = (
+        "Irradiance of the caustic, lm/unit², as EXR or NPY (linear) or PNG (to look at). A .json beside it says "
+        "where the texture lies in the world."
+    )
     if widgets.button("Bake map…", tip=tip, enabled=idle, width=-1):
         _ask(
             "bake", "Bake caustic map", (".exr", ".png", ".npy"), view_model, f"{view_model.title}_{_choices.receiver}"

@@ -54,4 +54,4 @@ def _packed() -> tuple[int, ...]:
     table = np.asarray(FALSE_COLOUR, float)
     at = np.linspace(0.0, len(table) - 1.0, _STEPS + 1)
     columns = [np.interp(at, np.arange(len(table)), table[:, channel]) for channel in range(3)]
-    return tuple(theme.packed((*map(float, rgb), 1.0)) for rgb in zip(*columns, strict=True))
+    return tuple(theme.packed((float(rgb[0]), float(rgb[1]), float(rgb[2]), 1.0)) for rgb in zip(*columns, strict=True))

@@ -151,7 +151,7 @@ def _table(question: Question) -> None:
         imgui.table_next_column()
         _row(entry, question)
         imgui.table_next_column()
-        imgui.text_disabled(f"{datetime.fromtimestamp(entry.modified):%Y-%m-%d  %H:%M}")
+        imgui.text_disabled(f"{datetime.fromtimestamp(entry.modified).astimezone():%Y-%m-%d  %H:%M}")
         imgui.table_next_column()
         imgui.text_disabled("" if entry.is_folder else _size_text(entry.size))
     imgui.end_table()
@@ -253,14 +253,14 @@ def _enter(folder: Path) -> None:
     """Show another folder; one that cannot be read leaves the present one and says why."""
     question = _browser.question
     if question is None:
-        return
+        return None
     folder = folder.absolute()
     try:
         found = [_entry(item) for item in os.scandir(folder) if not item.name.startswith(".")]
     except OSError as error:
         _browser.error = f"{folder} cannot be read: {error.strerror}."
         if folder.exists() or folder == folder.parent:
-            return
+            return None
         return _enter(folder.parent)
     _browser.folder, _browser.error = folder, ""
     if not question.saving:
@@ -288,7 +288,7 @@ def _sorted(entries: Sequence[_Entry], specs: imgui.TableSortSpecs | None) -> li
     return sorted(ordered, key=lambda e: not e.is_folder)
 
 
-def _size_text(size: int) -> str:
+def _size_text(size: float) -> str:
     for unit in ("B", "kB", "MB"):
         if size < 1000:
             return f"{size:.0f} {unit}" if unit == "B" else f"{size:.1f} {unit}"

@@ -45,7 +45,8 @@ def _matching(wanted: str) -> dict[str, list[tuple[str, str]]]:
 
 def _balanced(groups: dict[str, list[tuple[str, str]]], columns: int) -> list[list[str]]:
     """Titles by column, each group where least stands so far."""
-    heights, result = [0] * columns, [[] for _ in range(columns)]
+    heights = [0] * columns
+    result: list[list[str]] = [[] for _ in range(columns)]
     for title, lines in groups.items():
         column = heights.index(min(heights))
         result[column].append(title)

@@ -68,7 +68,10 @@ def draw_index_curve(state: State, view_model: ViewModel) -> State:
     area = _draw_plot(dispersion)
     if area is not None:
         state = _draw_points(state, index, dispersion, area)
-    tip = "Hold the point of the d line, so that only the colours move: light that is stored is splatted again and nothing is traced."
+    tip = (
+        "Hold the point of the d line, so that only the colours move: light that is stored is splatted again and "
+        "nothing is traced."
+    )
     _, _look.keep_n_d = widgets.toggle("Keep n_d", _look.keep_n_d, tip=tip)
     tip = "Draw the slope dn/dλ, 1/µm, on the right-hand axis: the steeper, the wider colours spread."
     _, _look.slope = widgets.toggle("Show dn/dλ", _look.slope, tip=tip)

@@ -27,7 +27,7 @@ _KINDS = {
 }
 
 LAMPS: dict[str, tuple[tuple[float, float], ...]] = {
-    **{preset.name: preset.value for preset in presets.light_presets() if preset.kind == "lines"},  # type: ignore[dict-item]
+    **{preset.name: preset.value for preset in presets.light_presets() if isinstance(preset.value, tuple)},
     "Hydrogen lamp": ((410.174, 0.05), (434.047, 0.09), (486.135, 0.36), (656.279, 1.0)),
     "Helium lamp": (
         (447.148, 0.4),

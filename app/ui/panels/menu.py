@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from ...edit.state import Panels, State
+from ...edit.state import Panels, State, Theme
 from .. import commands, item_rects, layout, theme
 from ..commands import Command
 from ..view_model import ViewModel
@@ -101,7 +101,8 @@ def _view(state: State, view_model: ViewModel) -> State:
 
 def _appearance(state: State) -> State:
     preferences = state.preferences
-    for name, theme_name in (("Dark theme", "dark"), ("Light theme", "light")):
+    themes: tuple[tuple[str, Theme], ...] = (("Dark theme", "dark"), ("Light theme", "light"))
+    for name, theme_name in themes:
         if imgui.menu_item(name, "", preferences.theme == theme_name)[0]:
             preferences = replace(preferences, theme=theme_name)
         item_rects.note(name)

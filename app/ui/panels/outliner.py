@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from imgui_bundle import icons_fontawesome_6 as icons
@@ -14,6 +15,7 @@ from ...model.lights import LIGHT_KINDS
 from ...model.scene import (
     Light,
     Material,
+    Scene,
     SceneObject,
 )
 from .. import item_rects, theme
@@ -111,7 +113,7 @@ def _material_icon(material: Material) -> str:
     return icons.ICON_FA_CIRCLE if material.is_black else icons.ICON_FA_CIRCLE_HALF_STROKE
 
 
-def _added(state: State, selection: Selection, label: str, edit: object, *args: object) -> State:
+def _added(state: State, selection: Selection, label: str, edit: Callable[..., Scene], *args: object) -> State:
     after = edits.attempt(state, label, edit, *args)
     return after if after.scene is state.scene else replace(after, selection=selection)
 
@@ -138,9 +140,7 @@ def _toolbar(state: State) -> State:
     return state
 
 
-def _group(
-    state: State, title: str, kind: str, things: tuple[Light, ...] | tuple[SceneObject, ...], wanted: str
-) -> State:
+def _group(state: State, title: str, kind: str, things: Sequence[Light | SceneObject], wanted: str) -> State:
     imgui.separator_text(f"{title}  {len(things)}")
     for index, thing in enumerate(things):
         if wanted in thing.name.lower():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import imgui, implot
 
-from ...edit.chromaticity import ColourInfo, colour_info
+from ...edit.chromaticity import ColourInfo, colour_info, ready
 from ...edit.state import State
 from .. import theme
 from ..view_model import CursorInfo, ViewModel
@@ -18,13 +18,13 @@ def draw_spectrum(state: State, view_model: ViewModel) -> State:
     if cursor is None:
         widgets.hint("Point at a receiver in the picture to see the spectrum of the light that falls there.")
         return state
-    colour = None
-    if cursor.spectrum is not None and cursor.spectrum_nm is not None:
+    colour, is_ready = None, ready()
+    if is_ready and cursor.spectrum is not None and cursor.spectrum_nm is not None:
         colour = colour_info(cursor.spectrum_nm, cursor.spectrum)
     _told(state, cursor, colour)
     if cursor.spectrum is None or cursor.spectrum_nm is None:
         widgets.hint("The surface under the cursor is no receiver: caustics are recorded on diffuse objects only.")
-    elif colour is None:
+    elif colour is None and (is_ready or not cursor.spectrum.any()):
         widgets.hint("No caustic light falls here.")
     else:
         _plot(cursor.spectrum_nm, cursor.spectrum)
@@ -49,6 +49,11 @@ def _told(state: State, cursor: CursorInfo, colour: ColourInfo | None) -> None:
                 "Wavelength of the spectral colour of the same hue, from D65; c: of the opposite hue.",
             ),
             ("Purity", numbers.percent(colour.purity), "Excitation purity: 100 % is a spectral colour, 0 % is white."),
+            (
+                "Temperature",
+                "–" if colour.temperature_k is None else f"{colour.temperature_k:.3g} K",
+                "Correlated colour temperature: of the black body that looks most alike; none for strong colours.",
+            ),
         ]
     if cursor.object_index is not None and cursor.object_index < len(state.scene.objects):
         parts.insert(0, ("On", state.scene.objects[cursor.object_index].name, "The first surface under the cursor."))

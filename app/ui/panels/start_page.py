@@ -137,7 +137,11 @@ def _card(entry: SceneEntry, width: float) -> bool:
     drawing.add_rect(start, end, theme.packed(chosen.accent if hovered else chosen.border), rounding)
     left, top = start.x + padding, start.y + picture_height + padding
     drawing.add_text(
-        theme.bold(), imgui.get_font_size(), imgui.ImVec2(left, top), theme.packed(chosen.text), entry.title
+        theme.bold() or imgui.get_font(),
+        imgui.get_font_size(),
+        imgui.ImVec2(left, top),
+        theme.packed(chosen.text),
+        entry.title,
     )
     words = _first_lines(entry.description, width - 2 * padding, 2)
     for number, text in enumerate(words):

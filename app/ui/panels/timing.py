@@ -194,7 +194,10 @@ def _numbers(state: State, stats: LiveStats) -> None:
         (
             "Samples",
             _samples(stats),
-            "Camera samples of the shown picture; where glass disperses, bands of the spectrum that they are divided over.",
+            (
+                "Camera samples of the shown picture; where glass disperses, bands of the spectrum that they are "
+                "divided over."
+            ),
         ),
         (
             "Resolution",

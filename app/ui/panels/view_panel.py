@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from ...edit.state import Display, Preferences, State
+from ...edit.state import Display, Preferences, State, ToneCurve
 from ...model.scene import Camera
 from .. import view_commands
 from ..view_model import ViewModel
@@ -16,7 +16,12 @@ SWEEP_NM = (400.0, 700.0)
 """What the sweep runs through: where the camera sees something."""
 SWEEP_NM_PER_S = 45.0
 """Speed of the sweep through the spectrum."""
-_TONES = {"spectrasplat": "SpectraSplat", "aces": "ACES", "reinhard": "Reinhard", "linear": "Linear, clipped"}
+_TONES: dict[ToneCurve, str] = {
+    "spectrasplat": "SpectraSplat",
+    "aces": "ACES",
+    "reinhard": "Reinhard",
+    "linear": "Linear, clipped",
+}
 _TARGETS = {str(n * 1_000_000): f"{n} million" for n in (1, 4, 16, 32, 64, 128, 256, 512, 1024)}
 _KINDS = {"pinhole": "Perspective", "orthographic": "Orthographic"}
 
@@ -64,7 +69,8 @@ def _exposure(state: State, view_model: ViewModel) -> State:
         "Tone curve",
         _TONES,
         display.tone,
-        tip="How light beyond display white is shown. SpectraSplat keeps hues of spectral colours; Linear clips each channel.",
+        tip="How light beyond display white is shown. SpectraSplat keeps hues of spectral colours; Linear clips each "
+        "channel.",
     )
     _, is_false = widgets.toggle(
         "False colour", display.false_colour, tip="Show luminance on a logarithmic colour scale instead of colours (X)."

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -58,6 +59,8 @@ __all__ = [
 
 FloatResult = tuple[bool, float, bool]
 """Whether it changed, the value, whether it is being dragged or typed in."""
+
+Choice = TypeVar("Choice", bound=str)
 
 _FLOAT_MAX = 3e38
 
@@ -161,9 +164,11 @@ def vec3(
     return changed, (x, y, z) if changed else value, imgui.is_item_active()
 
 
-def combo(label: str, options: Sequence[str] | Mapping[str, str], current: str, *, tip: str) -> tuple[bool, str]:
+def combo(
+    label: str, options: Sequence[Choice] | Mapping[Choice, str], current: Choice, *, tip: str
+) -> tuple[bool, Choice]:
     """A choice. A mapping shows its values and returns its keys; `current` need not be among the options."""
-    shown = options if isinstance(options, Mapping) else {option: option for option in options}
+    shown: Mapping[Choice, str] = options if isinstance(options, Mapping) else {option: option for option in options}
     begin_row(label)
     chosen = current
     opened = imgui.begin_combo(f"##{label}", shown.get(current, current))

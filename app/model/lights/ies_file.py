@@ -1,0 +1,236 @@
+"""Photometric files of lamps, ANSI/IES LM-63 (1986, 1991, 1995, 2002, 2019): candela over directions.
+
+Angles of type C: the vertical one is 0 straight along the lamp's axis and 180° behind it, the horizontal one turns
+about that axis from the C0 plane. Between the listed directions the candela are bilinear in both angles.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+
+import numpy as np
+
+from ...base.errors import UserError
+from ...base.paths import assets_dir
+
+MAX_BYTES = 1 << 20
+MAX_ANGLES = 4096
+"""Of either kind: one every 0.09°."""
+_WHERE = "export the file again from the lamp's maker or a photometric editor"
+_UNLIT_DEG = 1e-3
+"""A lamp whose angles begin at 90° goes dark within this of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A lamp's intensity over directions; equal by content."""
+
+    vertical_deg: np.ndarray
+    """float64 (V,), ascending from 0; beyond the last one there is no light."""
+    horizontal_deg: np.ndarray
+    """float64 (H,), ascending from 0 to 360."""
+    intensity: np.ndarray
+    """float64 (H, V), as a share of the peak; first and last row are the same."""
+    peak_cd: float
+    """The file's own candela where `intensity` is 1."""
+    source: str
+    """Path of the file."""
+
+    @cached_property
+    def _content(self) -> tuple[object, ...]:
+        arrays = (self.vertical_deg, self.horizontal_deg, self.intensity)
+        return (self.source, self.peak_cd, *(array.tobytes() for array in arrays))
+
+    def __eq__(self, other: object) -> bool:
+        return self._content == other._content if isinstance(other, Profile) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._content)
+
+    def __repr__(self) -> str:
+        return f"Profile({self.source!r}, {hash(self)})"
+
+    @cached_property
+    def integral_sr(self) -> float:
+        """∫ intensity dω: the flux of a peak of 1.
+
+        Exact for the bilinear table: a stretch of the vertical angle holds ∫ (a + bθ) sin θ dθ in closed form."""
+        theta, phi = np.radians(self.vertical_deg), np.radians(self.horizontal_deg)
+        slope = np.diff(self.intensity, axis=1) / np.diff(theta)
+        # ∫ (g₀ + s (θ − θ₀)) sin θ = −g₁ cos θ₁ + g₀ cos θ₀ + s (sin θ₁ − sin θ₀)
+        ends = self.intensity * np.cos(theta)
+        rings = (ends[:, :-1] - ends[:, 1:] + slope * np.diff(np.sin(theta))).sum(axis=1)
+        return float(np.trapezoid(rings, phi))
+
+    @cached_property
+    def cone_rad(self) -> float:
+        """Half angle beyond which there is no light, rad; beyond π for none."""
+        lit = np.flatnonzero(self.intensity.max(axis=0) > 0.0)
+        last = min(int(lit[-1]) + 1, len(self.vertical_deg) - 1)
+        return 4.0 if self.vertical_deg[last] >= 180.0 else math.radians(self.vertical_deg[last])
+
+    def at(self, theta_rad: np.ndarray, phi_rad: np.ndarray) -> np.ndarray:
+        """Intensity as a share of the peak towards these angles from the axis and about it (any φ)."""
+        theta, phi = np.degrees(theta_rad), np.mod(np.degrees(phi_rad), 360.0)
+        (i, s), (j, t) = _cell(self.horizontal_deg, phi), _cell(self.vertical_deg, theta)
+        g = self.intensity
+        low, high = g[i, j] * (1.0 - t) + g[i, j + 1] * t, g[i + 1, j] * (1.0 - t) + g[i + 1, j + 1] * t
+        return np.where(theta_rad <= self.cone_rad, low * (1.0 - s) + high * s, 0.0)
+
+    def packed(self) -> np.ndarray:
+        """float64: V, H, the vertical angles, the horizontal ones (rad), then row by row the intensities."""
+        angles = np.radians(self.vertical_deg), np.radians(self.horizontal_deg)
+        return np.concatenate([self.intensity.shape[::-1], *angles, self.intensity.ravel()])
+
+
+def _cell(listed: np.ndarray, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    index = np.clip(np.searchsorted(listed, angle, "right") - 1, 0, len(listed) - 2)
+    return index, np.clip((angle - listed[index]) / (listed[index + 1] - listed[index]), 0.0, 1.0)
+
+
+@cache
+def default_profile() -> Profile:
+    """A lamp to begin with."""
+    return read_ies(assets_dir() / "lights" / "downlight.ies")
+
+
+def read_ies(path: str | os.PathLike[str]) -> Profile:
+    """The profile in `path`. Raises UserError, one sentence with the file and a remedy, for what cannot be used."""
+    path = Path(path)
+    try:
+        if not path.is_file():
+            raise UserError(f"{path} is not a file; choose a .ies file")
+        if path.stat().st_size > MAX_BYTES:
+            raise UserError(f"{path} is longer than {MAX_BYTES >> 20} MiB, as no lamp's file is; choose a .ies file")
+        # Makers write their names in any code page; numbers are ASCII in all of them.
+        text = path.read_bytes().decode("latin-1")
+    except OSError as error:
+        raise UserError(f"{path} cannot be read: {error.strerror}; choose another file") from error
+    return _Numbers(path, text).profile()
+
+
+class _Numbers:
+    """The numbers behind a file's TILT line, taken one after the other."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        self._path = path
+        lines = text.splitlines()
+        at = next((i for i, line in enumerate(lines) if line.strip().upper().startswith("TILT=")), None)
+        if at is None:
+            told = "has no line TILT=, so it is no LM-63 file or is cut off" if text.strip() else "is empty"
+            raise self._error(told)
+        self._tilt = lines[at].partition("=")[2].strip().upper()
+        self._words = " ".join(lines[at + 1 :]).replace(",", " ").split()
+        self._next = 0
+
+    def profile(self) -> Profile:
+        """All of the file."""
+        if self._tilt == "INCLUDE":
+            # What a lamp loses when it is tilted; it hangs as it was measured.
+            self._take(1, "the lamp's place in the luminaire")
+            self._take(2 * self._count("tilt angles"), "the factors for a tilted lamp")
+        elif self._tilt != "NONE":
+            raise self._error(f"keeps its tilt factors in {self._tilt}, which is not read", "write TILT=NONE into it")
+        _, _, multiplier = self._take(3, "lamps, lumens and multiplier")
+        verticals, horizontals = self._count("vertical angles"), self._count("horizontal angles")
+        kind = int(self._take(1, "the photometric type")[0])
+        if kind != 1:
+            name = {2: "B", 3: "A"}.get(kind, str(kind))
+            raise self._error(f"is of photometric type {name} and only type C is read", "export it as type C")
+        self._take(4, "the luminaire's size")
+        ballast, ballast_lamp, _ = self._take(3, "ballast factors and watts")
+        vertical = self._angles(verticals, "vertical")
+        horizontal = self._angles(horizontals, "horizontal")
+        candela = np.array(self._take(verticals * horizontals, "candela")).reshape(horizontals, verticals)
+        if self._next < len(self._words):
+            raise self._error(f"goes on after its {verticals * horizontals} candela, so its counts of angles are wrong")
+        candela *= multiplier * ballast * ballast_lamp
+        if candela.min() < 0.0 or not np.isfinite(candela).all():
+            raise self._error("has candela, or a factor on them, that are negative or too large")
+        if candela.max() <= 0.0:
+            raise self._error("gives no light in any direction", "choose another file")
+        return self._whole(vertical, horizontal, candela)
+
+    def _whole(self, vertical: np.ndarray, horizontal: np.ndarray, candela: np.ndarray) -> Profile:
+        """With the symmetries written out: all the way round, and dark before the first vertical angle."""
+        if vertical[0] not in (0.0, 90.0) or vertical[-1] not in (90.0, 180.0):
+            raise self._error("has vertical angles that do not run from 0 or 90 to 90 or 180")
+        first, last = horizontal[0], horizontal[-1]
+        if len(horizontal) == 1:
+            horizontal, candela = np.array([0.0, 360.0]), np.repeat(candela, 2, axis=0)
+        elif first == 90.0 and last == 270.0:
+            # Symmetric about the plane across C0: the other half is its mirror picture, 90 to −90.
+            horizontal = np.concatenate([180.0 - horizontal[::-1], horizontal[1:]])
+            candela = np.concatenate([candela[::-1], candela[1:]])
+            horizontal, candela = _from_zero(horizontal, candela)
+        elif first == 0.0 and last in (90.0, 180.0):
+            while horizontal[-1] < 360.0:
+                horizontal = np.concatenate([horizontal, 2.0 * horizontal[-1] - horizontal[-2::-1]])
+                candela = np.concatenate([candela, candela[-2::-1]])
+        elif not (first == 0.0 and last == 360.0):
+            raise self._error("has horizontal angles that run neither to 0, 90, 180 or 360 from 0, nor from 90 to 270")
+        candela[[0, -1]] = 0.5 * (candela[0] + candela[-1])
+        if vertical[0] == 90.0:
+            dark = np.zeros((len(candela), 2))
+            vertical = np.concatenate([[0.0, 90.0 - _UNLIT_DEG], vertical])
+            candela = np.hstack([dark, candela])
+        peak = float(candela.max())
+        intensity = candela / peak
+        for array in (vertical, horizontal, intensity):
+            array.setflags(write=False)
+        return Profile(vertical, horizontal, intensity, peak, str(self._path.resolve()))
+
+    def _angles(self, count: int, which: str) -> np.ndarray:
+        angles = np.array(self._take(count, f"{which} angles"))
+        if np.any(np.diff(angles) <= 0.0):
+            raise self._error(f"has {which} angles that do not ascend")
+        if which == "vertical" and count < 2:
+            raise self._error("has a single vertical angle, which says nothing about the others")
+        return angles
+
+    def _count(self, what: str) -> int:
+        number = self._take(1, f"the number of {what}")[0]
+        if number != int(number) or not 1 <= number <= MAX_ANGLES:
+            raise self._error(f"says it has {number:g} {what}")
+        return int(number)
+
+    def _take(self, count: int, what: str) -> list[float]:
+        words = self._words[self._next : self._next + count]
+        if len(words) < count:
+            raise self._error(f"ends within {what}, after {len(self._words)} numbers")
+        self._next += count
+        try:
+            numbers = [float(word) for word in words]
+        except ValueError:
+            wrong = next(word for word in words if not _is_number(word))
+            raise self._error(f"has '{wrong[:20]}' among {what}, which is no number") from None
+        if not all(map(math.isfinite, numbers)):
+            raise self._error(f"has a number that is not finite among {what}")
+        return numbers
+
+    def _error(self, told: str, remedy: str = _WHERE) -> UserError:
+        return UserError(f"{self._path} {told}; {remedy}")
+
+
+def _from_zero(horizontal: np.ndarray, candela: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows from −90 to 270, made to run from 0 to 360."""
+    if not np.any(horizontal == 0.0):
+        low = int(np.searchsorted(horizontal, 0.0)) - 1
+        share = -horizontal[low] / (horizontal[low + 1] - horizontal[low])
+        between = candela[low] * (1.0 - share) + candela[low + 1] * share
+        horizontal, candela = np.insert(horizontal, low + 1, 0.0), np.insert(candela, low + 1, between, axis=0)
+    at = int(np.flatnonzero(horizontal == 0.0)[0])
+    turned = np.concatenate([horizontal[at:], horizontal[1 : at + 1] + 360.0])
+    return turned, np.concatenate([candela[at:], candela[1 : at + 1]])
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

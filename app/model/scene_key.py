@@ -1,0 +1,50 @@
+"""Keys of scenes by content: equal scenes give equal keys, whatever objects hold them."""
+
+from __future__ import annotations
+
+from dataclasses import astuple
+
+import numpy as np
+
+from .content_key import ContentKey
+from .scene import Scene
+
+
+def scene_key(scene: Scene, *more: object) -> str:
+    """SHA-256 over everything that light and the caustic layer depend on, and over `more` (plain values).
+
+    Names, notes, textures and the background do not count.
+    """
+    key = ContentKey()
+    key.add("scene", *more)
+    key.add("camera", *astuple(scene.camera))
+    for light in scene.lights:
+        spectrum = light.spectral_power
+        fields = {name: value for name, value in vars(light).items() if name not in ("name", "spectral_power")}
+        key.add("light", spectrum.density, spectrum.lines, *(_plain(fields[name]) for name in sorted(fields)))
+    for item in scene.objects:
+        mesh = item.mesh
+        key.add("mesh", mesh.vertices, mesh.triangles, np.asarray(item.object_to_world, float))
+        key.add("normals", mesh.corner_normals if mesh.corner_normals is not None else None)
+        key.add("material", type(item.material).__name__, *item.material.content())
+    return key.hexdigest()
+
+
+def picture_key(scene: Scene, *more: object) -> str:
+    """The same over everything that a camera sees: textures and what lies beyond count as well."""
+    key = ContentKey(scene_key(scene, *more))
+    if scene.environment is None:
+        key.add("background", *(float(v) for v in scene.background_rgb))
+    else:
+        key.add("environment", scene.environment.rgb, np.asarray(scene.environment.world_to_local, float))
+    for index, item in enumerate(scene.objects):
+        if item.material.texture is not None:
+            key.add("texture", index, item.material.texture.rgb, item.material.texture.wrap, item.mesh.uv)
+    return key.hexdigest()
+
+
+def _plain(value: object) -> object:
+    """A light's field so that equal values print alike (1 and 1.0, tuples of numpy numbers)."""
+    if isinstance(value, str | bool) or value is None:
+        return value
+    return tuple(float(v) for v in np.ravel(value))

@@ -1,0 +1,146 @@
+"""What happens to a path at a surface and between surfaces, compiled: the one set of rules of all references.
+
+The light tracer (`photon_kernel`), the camera tracer (`camera_kernel`) and the caustic's (`caustic_kernel`) call these
+functions: Fresnel's exact reflectance decides by chance, nested solids follow their rank, an interpolated normal that
+would send a ray through its own facet gives way to the facet's, Beer's law thins what passes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .compiling import compiled, inlined
+from .photon_scene import MIRROR
+
+AIR = -1
+_TABLE_SCALE = 20.0
+_TABLE_LAST = 8000
+
+
+@compiled
+def table(rows, row, nm):
+    """A row on `TABLE_NM` at a wavelength, linear between its values."""
+    at = (nm - 380.0) * _TABLE_SCALE
+    cell = min(int(at), _TABLE_LAST - 1)
+    share = at - cell
+    return rows[row, cell] + share * (rows[row, cell + 1] - rows[row, cell])
+
+
+@compiled
+def medium(scene, mask, alone):
+    """The object whose substance fills a place: the highest rank in the mask, or the solid that stands alone."""
+    for rank in range(scene.stack.shape[0] - 1, -1, -1):
+        if (mask >> np.uint64(rank)) & np.uint64(1):
+            return scene.stack[rank]
+    return alone
+
+
+@compiled
+def _refractive_index(scene, thing, nm):
+    return 1.0 if thing == AIR else table(scene.index, scene.medium[thing], nm)
+
+
+@compiled
+def fresnel(cosine_i, eta):
+    """(unpolarised reflectance, cosine of the transmitted angle) with eta = n_i/n_t; (1, 0) is total reflection."""
+    cosine2 = (1.0 - eta) * (1.0 + eta) + eta * eta * cosine_i * cosine_i
+    if cosine2 <= 0.0:
+        return 1.0, 0.0
+    cosine_t = math.sqrt(cosine2)
+    s = (eta * cosine_i - cosine_t) / (eta * cosine_i + cosine_t)
+    p = (cosine_i - eta * cosine_t) / (cosine_i + eta * cosine_t)
+    return 0.5 * (s * s + p * p), cosine_t
+
+
+@inlined
+def transmitted(scene, mask, alone, nm, distance):
+    """What Beer's law leaves after `distance` in the medium a ray is in."""
+    filling = medium(scene, mask, alone)
+    if filling == AIR or scene.weight[filling] < 0:
+        return 1.0
+    return math.exp(-table(scene.weights, scene.weight[filling], nm) * distance)
+
+
+@inlined
+def side_met(scene, triangle, dx, dy, dz):
+    """0 where a ray comes to a facet's front (against its normal), else 1."""
+    n = scene.normals[triangle]
+    return 1 if dx * n[0] + dy * n[1] + dz * n[2] > 0.0 else 0
+
+
+@inlined
+def _shading_normal(scene, triangle, u, v, dx, dy, dz, gx, gy, gz, entering):
+    """Unit normal against the ray: interpolated where that faces the ray, else the facet's (gx, gy, gz)."""
+    row = scene.smooth[triangle]
+    if row < 0:
+        return gx, gy, gz
+    m = scene.corner_normals[row]
+    w = 1.0 - u - v
+    nx = w * m[0] + u * m[3] + v * m[6]
+    ny = w * m[1] + u * m[4] + v * m[7]
+    nz = w * m[2] + u * m[5] + v * m[8]
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if length == 0.0:
+        return gx, gy, gz
+    length = length if entering else -length
+    nx, ny, nz = nx / length, ny / length, nz / length
+    if not -(dx * nx + dy * ny + dz * nz) > 1e-6:
+        return gx, gy, gz
+    return nx, ny, nz
+
+
+@inlined
+def scatter(scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw):
+    """One event at glass or a mirror: (direction (3), mask, alone, on the object's inner side, is an event, share
+    kept, whether `draw` mattered).
+
+    `draw` in [0, 1) decides by Fresnel's reflectance, unless all is reflected. "Is an event" is false where the same
+    substance lies on both sides; a mirror keeps its reflectance, glass everything.
+    """
+    gx, gy, gz = scene.normals[triangle, 0], scene.normals[triangle, 1], scene.normals[triangle, 2]
+    cosine_g = -(dx * gx + dy * gy + dz * gz)
+    entering = cosine_g > 0.0
+    thing = scene.owner[triangle]
+    mirror = scene.kind[thing] == MIRROR
+    before, after, mask_after, alone_after = AIR, AIR, mask, alone
+    if not mirror:
+        bit = scene.bit[thing]
+        if bit >= 0:
+            own = np.uint64(1) << np.uint64(bit)
+            mask_before = mask & ~own if entering else mask | own
+            mask_after = mask | own if entering else mask & ~own
+            before, after = medium(scene, mask_before, AIR), medium(scene, mask_after, AIR)
+            if before == after:
+                return dx, dy, dz, mask_after, alone, entering, False, 1.0, False
+        else:
+            before = AIR if entering else thing
+            after = thing if entering else AIR
+            alone_after = after
+    if not entering:
+        gx, gy, gz, cosine_g = -gx, -gy, -gz, -cosine_g
+    nx, ny, nz = _shading_normal(scene, triangle, u, v, dx, dy, dz, gx, gy, gz, entering)
+    cosine = -(dx * nx + dy * ny + dz * nz)
+    kept, reflects, drawn, cosine_t, eta_it = 1.0, True, False, 0.0, 1.0
+    if mirror:
+        kept = table(scene.weights, scene.weight[thing], nm)
+    else:
+        eta_it = _refractive_index(scene, before, nm) / _refractive_index(scene, after, nm)
+        reflectance, cosine_t = fresnel(cosine, eta_it)
+        reflects, drawn = draw < reflectance, reflectance < 1.0
+    if reflects:
+        rx, ry, rz = dx + 2.0 * cosine * nx, dy + 2.0 * cosine * ny, dz + 2.0 * cosine * nz
+        if rx * gx + ry * gy + rz * gz <= 0.0:  # into the facet
+            rx, ry, rz = dx + 2.0 * cosine_g * gx, dy + 2.0 * cosine_g * gy, dz + 2.0 * cosine_g * gz
+        mask_after, alone_after, inner = mask, alone, not entering
+    else:
+        k = eta_it * cosine - cosine_t
+        rx, ry, rz = eta_it * dx + k * nx, eta_it * dy + k * ny, eta_it * dz + k * nz
+        if rx * gx + ry * gy + rz * gz >= 0.0:  # back out of the facet
+            cosine2 = (1.0 - eta_it) * (1.0 + eta_it) + eta_it * eta_it * cosine_g * cosine_g
+            k = eta_it * cosine_g - math.sqrt(max(cosine2, 1e-12))
+            rx, ry, rz = eta_it * dx + k * gx, eta_it * dy + k * gy, eta_it * dz + k * gz
+        inner = entering
+    length = math.sqrt(rx * rx + ry * ry + rz * rz)
+    return rx / length, ry / length, rz / length, mask_after, alone_after, inner, True, kept, drawn

@@ -1,0 +1,72 @@
+"""What caustic maps are fitted to: a view, a picture's size, and where light lands in this and in other frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..gpu.scene_buffers import GpuSpace
+from ..model.scene import Camera
+from ..passes.map_layout import COARSE_TILE_MAX, FINE_TILE_MAX
+from ..passes.pilot import Pilot
+
+PREVIEW = 8
+"""Pixels to a texel's side in the maps of a preview."""
+PREVIEW_TILE_MAX = (288, 144)
+"""Longest sides of their windows, texels."""
+
+
+@dataclass(frozen=True)
+class MapFit:
+    """One way to lay the maps of a scene out."""
+
+    view: Camera
+    width: int
+    height: int
+    """Pixels of the picture that `view` is seen in."""
+    tile_max: tuple[int, int] = (FINE_TILE_MAX, COARSE_TILE_MAX)
+    """Longest sides of fine and coarse windows, texels."""
+    others: tuple[tuple[GpuSpace, Pilot], ...] = ()
+    """Where light lands in other frames that the maps must serve as well, each in its own GPU space."""
+    avoids_powers_of_two: bool = False
+    """Mesa's software renderer compiles what reads a texture once more, for seconds, where a side becomes a power of
+    two: for maps that are made while somebody waits."""
+
+    @property
+    def preview(self) -> MapFit:
+        """Small maps of the same, for an answer at once."""
+        width, height = preview_size(self.width, self.height)
+        return replace(self, width=width, height=height, tile_max=PREVIEW_TILE_MAX)
+
+    def landings(self, own: Sequence[Pilot], space: GpuSpace) -> Sequence[Pilot]:
+        """The pilots to fit to: `own` alone, or with the others' landings in `space`."""
+        if not self.others:
+            return own
+        return [_landings(pilot, at, space) for at, pilot in (*((space, pilot) for pilot in own), *self.others)]
+
+
+def preview_size(width: int, height: int) -> tuple[int, int]:
+    """Picture size for which the maps of a preview are laid out."""
+    return max(16, round(width / PREVIEW)), max(16, round(height / PREVIEW))
+
+
+_LANDING = np.dtype([("position", "f4", 3), ("flux_w", "f4"), ("receiver", "u4")])
+"""What maps are fitted to; the records of two frames may differ in their columns."""
+
+
+def _landings(pilot: Pilot, old: GpuSpace, new: GpuSpace) -> Pilot:
+    """Only the landings of `pilot`, in another frame's GPU space."""
+
+    def moved(records: np.ndarray) -> np.ndarray:
+        found = np.zeros(len(records), _LANDING)
+        found["position"] = (
+            records["position"] if old is new else new.to_gpu(old.to_world(records["position"].astype(float)))
+        )
+        found["flux_w"], found["receiver"] = records["flux_w"], records["receiver"]
+        return found
+
+    return replace(
+        pilot, whole=moved(pilot.whole), spectral=[moved(r) for r in pilot.spectral], rim=[moved(r) for r in pilot.rim]
+    )

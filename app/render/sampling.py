@@ -1,0 +1,115 @@
+"""What a rendering samples, and how finely: chosen here for stills, frames, bakes, comparisons and the viewer alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from ..model.features import Features
+from ..model.scene import Camera, Scene
+from ..model.settings import RenderSettings
+from ..passes.camera import CameraPass, CausticMaps
+from ..passes.spectrum_choice import MAX_BANDS, MIN_SAMPLES, SAMPLES_A_BAND, Spectrum
+
+DEFAULT_SAMPLES = 16
+"""Camera samples a pixel."""
+LIVE_BANDS_FOR = 16
+"""Samples whose error the viewer's number of bands is fitted to: a still picture shall be whole within seconds, so not
+to all that it gets in the end."""
+
+
+@dataclass(frozen=True)
+class LightSampling:
+    """What the light pass traces."""
+
+    photons: int
+    seconds: float | None
+    """As many photons as this time allows, where it is given."""
+    seed: int
+
+    @staticmethod
+    def of(scene: Scene, settings: RenderSettings) -> LightSampling:
+        """The scene's own number where `settings` say nothing."""
+        return LightSampling(settings.photons or scene.render.photons, settings.seconds, settings.seed)
+
+
+@dataclass(frozen=True)
+class CameraSampling:
+    """How camera rays sample pixels and the spectrum."""
+
+    budget: int = DEFAULT_SAMPLES
+    """Samples a pixel, each of one band of the spectrum."""
+    may_be_single: bool = True
+    """Where bands serve a scene badly, wavelengths may be taken one by one, by a program of their own."""
+    bands_for: int | None = None
+    """Samples whose error the number of bands is fitted to; None: all."""
+    whole_spectrum: bool = False
+    """Every sample sees all of the spectrum, whatever the method: for what is seen directly alone one band is exact."""
+
+    @staticmethod
+    def of(settings: RenderSettings) -> CameraSampling:
+        """For pictures that are waited for."""
+        return CameraSampling(settings.spp or DEFAULT_SAMPLES)
+
+    @staticmethod
+    def live(samples: int) -> CameraSampling:
+        """For a picture that is looked at while it is made: no second program is compiled for it."""
+        return CameraSampling(samples, may_be_single=False, bands_for=LIVE_BANDS_FOR)
+
+    def fixed_bands(self, camera_pass: CameraPass) -> int | None:
+        """Bands of the spectrum that nothing has to be found out for; None where the picture decides."""
+        if self.whole_spectrum or not camera_pass.disperses or camera_pass.scene.features.random_wavelength:
+            return 1
+        return camera_pass.fixed_bands
+
+    def choosing(
+        self, camera_pass: CameraPass, camera: Camera, width: int, height: int, maps: CausticMaps | None
+    ) -> Iterator[float]:
+        """Set `camera_pass.spectrum` to what leaves the least error in this picture, pausing after every dispatch. For
+        every picture anew: what it becomes must not depend on what was rendered before it."""
+        if self.whole_spectrum:
+            camera_pass.spectrum = Spectrum()
+            return
+        camera_pass.may_be_single = self.may_be_single
+        yield from camera_pass.choosing_spectrum(camera, width, height, self.bands_for or self.budget, maps)
+
+    def samples(self, camera_pass: CameraPass) -> int:
+        """Samples a pixel in the way chosen: whole cycles, so that every band has its turn equally often, of as many
+        bands as could have been chosen. Frames that choose differently have as many samples then, and what stands still
+        in them stays."""
+        spectrum = camera_pass.spectrum
+        if spectrum.single:
+            return spectrum.samples(self.budget)
+        bands = spectrum.bands
+        if camera_pass.chooses and not self.whole_spectrum:
+            bands = most_bands(self.bands_for or self.budget)
+        return whole_cycles(self.budget, bands)
+
+
+def most_bands(samples: int) -> int:
+    """The largest number of bands that `choosing_spectrum` may choose for so many samples."""
+    if samples < MIN_SAMPLES:
+        return 1
+    return min(1 << ((samples // SAMPLES_A_BAND).bit_length() - 1), MAX_BANDS)
+
+
+def whole_cycles(samples: int, bands: int) -> int:
+    """`samples`, or a few more, in which each of `bands` has its turn equally often."""
+    return samples + -samples % bands
+
+
+def camera_settings(settings: RenderSettings) -> RenderSettings:
+    """`settings` with the camera's own method, where it has one."""
+    method = settings.camera_method or settings.method
+    return replace(settings, method="stochastic" if method == "stochastic-point" else method)
+
+
+def has_own_method(settings: RenderSettings) -> bool:
+    """Whether the camera's rays follow another method than the light's, and so need programs and tables of their
+    own."""
+    return (settings.camera_method or settings.method) != settings.method
+
+
+def camera_features(scene: Scene, settings: RenderSettings) -> Features:
+    """What the camera's rays need: those of its own method, where it has one."""
+    return Features.of(scene, camera_settings(settings))

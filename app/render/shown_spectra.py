@@ -1,0 +1,178 @@
+"""The glass, the spectra and the brush's gains that photons are splatted by: those they were traced through, until
+another is shown in their stead.
+
+Photons carry weights and derivatives, not watts and colours, so none of this needs tracing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import moderngl
+import numpy as np
+
+from ..gpu.gain_buffers import GainBuffers
+from ..gpu.map_channels import MapChannels, tents
+from ..gpu.reindex import ReindexBuffer, Reindexing, Spans
+from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.splat_tables import SplatTables
+from ..model.optics.glass import Dispersion
+from ..model.optics.spectrum import Spectrum
+from ..model.scene import Scene
+from ..passes.footprint import SpectralVariables
+
+PREVIEW_WIDTH = 64
+"""Samples of the spectral tables of a preview."""
+
+
+@dataclass(frozen=True)
+class ShownTables:
+    """The spectra as splats see them, and which wavelengths belong to which paths."""
+
+    tables: SplatTables
+    reindex: ReindexBuffer | None
+
+    def release(self) -> None:
+        """Free both."""
+        self.tables.release()
+        if self.reindex is not None:
+            self.reindex.release()
+
+
+class ShownSpectra:
+    """Owns each spectral group's variable and the brush's gains; makes tables."""
+
+    def __init__(self, ctx: moderngl.Context, scene: Scene, buffers: SceneBuffers, bins: int | None) -> None:
+        self._ctx = ctx
+        self._buffers = buffers
+        features = buffers.features
+        self.reflectances, self.reflectance_class = reflectance_classes(scene, buffers)
+        edges = None if bins is None else tuple(np.linspace(380.0, 780.0, bins + 1).tolist())
+        self.channels = tents(buffers.axis, features.map_tents) if features.map_tents else MapChannels(edges)
+        """What the maps' channels stand for."""
+        self.spectra: Sequence[Spectrum] = [light.spectral_power for light in scene.lights]
+        self.variables = SpectralVariables.build(ctx, buffers.variables)
+        self.gains: GainBuffers | None = None
+        self.changed: Mapping[Dispersion, Dispersion] = {}
+        """Glasses that are shown otherwise than they were traced."""
+        self._reindexes = features.reindexed
+        self._reindexing = self._unchanged() if features.reindexed else None
+        if features.local_gain:
+            self.show_gains(scene)
+
+    @property
+    def reindexing(self) -> Reindexing | None:
+        """Which index belongs to which wavelength, where photons are told apart by the index."""
+        return self._reindexing
+
+    def show_spectra(self, spectra: Sequence[Spectrum]) -> bool:
+        """Light the scene with `spectra`; True where tables follow."""
+        stale = spectra != self.spectra
+        self.spectra = spectra
+        return stale
+
+    def show_glass(self, changed: Mapping[Dispersion, Dispersion]) -> bool:
+        """Follow an edit of n(λ), glass by glass; True where tables follow."""
+        if changed == self.changed:
+            return False
+        self.changed = changed
+        table, axis = self._buffers.variables, self._buffers.axis
+        self.variables.release()
+        if self._reindexes:
+            (traced,) = axis.glasses
+            reindexing = Reindexing.of(traced, changed.get(traced, traced))
+            if reindexing is not None:
+                self._reindexing = reindexing
+                self.variables = SpectralVariables.build(self._ctx, table)
+                return True
+            self._reindexing = self._unchanged()
+        groups = self._buffers.groups
+        shown = replace(groups, glasses=tuple(changed.get(glass, glass) for glass in groups.glasses)).variables(axis)
+        self.variables = SpectralVariables.build(self._ctx, shown, table if changed else None)
+        return self._reindexes
+
+    def show_gains(self, scene: Scene | None) -> None:
+        """The brush's dabs of `scene`; None for none."""
+        if scene is None:
+            if self.gains is not None:
+                self.gains.release()
+            self.gains = None
+        elif self.gains is None:
+            b = self._buffers
+            self.gains = GainBuffers(self._ctx, scene, b.receivers, b.space, b.axis)
+        else:
+            self.gains.update(scene)
+
+    def tables(self, spans: Spans, channels: MapChannels | None = None, width: int | None = None) -> ShownTables:
+        """Tables for bands of `spans`, the caller's; `channels` of maps that are not the light pass's own."""
+        ctx, spectra, channels = self._ctx, self.spectra, channels or self.channels
+        if self._reindexing is None:
+            return ShownTables(
+                SplatTables.build(ctx, self._buffers.axis, spectra, self.reflectances, spans, channels, width), None
+            )
+        shown = self._reindexing.spans(spans, self._buffers.axis, spectra)
+        tables = SplatTables.build(ctx, self._reindexing.axis, spectra, self.reflectances, shown, channels, width)
+        return ShownTables(tables, ReindexBuffer(ctx, self._reindexing, spans, shown, spectra, tables.classes))
+
+    def _unchanged(self) -> Reindexing | None:
+        (traced, *_) = self._buffers.axis.glasses
+        return Reindexing.of(traced, traced)
+
+    def release(self) -> None:
+        """Free what it owns."""
+        self.variables.release()
+        self.show_gains(None)
+
+
+class PassTables:
+    """The spectral tables of one pass's bands, made when they are needed: an edit that is followed by the next one
+    needs only those of the preview."""
+
+    def __init__(self, shown: ShownSpectra, spans: Spans) -> None:
+        self._shown = shown
+        self.spans = spans
+        self._full: ShownTables | None = None
+        self._preview: ShownTables | None = None
+
+    @property
+    def full(self) -> ShownTables:
+        """For the light pass's own maps."""
+        if self._full is None:
+            self._full = self._shown.tables(self.spans)
+        return self._full
+
+    @property
+    def preview(self) -> ShownTables:
+        """For maps in colour only."""
+        channels = self._shown.channels
+        if self._full is not None and not channels.tents_nm:
+            return self._full
+        if self._preview is None:
+            self._preview = self._shown.tables(self.spans, MapChannels(channels.edges_nm), PREVIEW_WIDTH)
+        return self._preview
+
+    def forget(self) -> None:
+        """They show another glass or light than what is wanted now."""
+        for tables in (self._full, self._preview):
+            if tables is not None:
+                tables.release()
+        self._full = self._preview = None
+
+
+def reflectance_classes(scene: Scene, buffers: SceneBuffers) -> tuple[list[np.ndarray | None], dict[int, int]]:
+    """Distinct spectral reflectances to fold into the tables (None: none), and each receiver's class."""
+    classes: list[np.ndarray | None] = [None]
+    chosen: dict[int, int] = {}
+    for receiver, index in enumerate(buffers.receivers):
+        material = scene.objects[index].material
+        if material.reflectance is None:
+            chosen[receiver] = 0
+            continue
+        chosen[receiver] = next(
+            (i for i, known in enumerate(classes) if known is not None and np.array_equal(known, material.reflectance)),
+            len(classes),
+        )
+        if chosen[receiver] == len(classes):
+            classes.append(material.reflectance)
+    return classes, chosen

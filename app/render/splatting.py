@@ -1,0 +1,129 @@
+"""Photon records into caustic maps, in parts so small that whoever draws meanwhile keeps its frames."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..gpu.dispatch_budget import DispatchBudget
+from ..passes.accumulate import ROWS, Accumulate
+from ..passes.splat import CHUNK, FLUSH_SHARE
+from .light_plan import SMALLEST_BATCH
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from ..gpu.context import Context
+    from ..passes.map_atlas import MapAtlas
+    from .light_maps import LightMaps
+    from .shown_spectra import ShownSpectra, ShownTables
+
+FLUSH_AHEAD = 0.9
+"""Of the photons after which a splat pass sums its maps up by itself."""
+FIRST_SUMMED = 256
+"""Rows of a map that are summed up at first, before it is known how long they take."""
+SUMMING_SECONDS = 0.01
+"""What one part of it may take."""
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How a light pass cuts its work."""
+
+    waits: bool
+    """Wait for the device at every pause: times are then what the work took, and a budget is kept."""
+    splat_part: int = 1 << 30
+    """Photons splatted without a pause."""
+    sums_in_parts: bool = False
+    """Maps of several textures are summed up one by one before it has to be, as all together take longer than a
+    frame."""
+    min_batch: int = SMALLEST_BATCH
+    """Rays in flight, at least. With fewer than `SMALLEST_BATCH` the plan depends on the batch."""
+
+    @staticmethod
+    def of(context: Context) -> Pace:
+        """For a rendering that nobody looks at meanwhile."""
+        return Pace(context.is_software)
+
+    @staticmethod
+    def within_frames(context: Context) -> Pace:
+        """For one that takes little of every frame; extended lights make do with as many points."""
+        return Pace(True, 1 << 12 if context.is_software else 1 << 18, True, 1024)
+
+
+class Splatting:
+    """Adds photons to maps as `shown` has them; `seconds` counts what it took."""
+
+    def __init__(self, context: Context, shown: ShownSpectra, pace: Pace) -> None:
+        self._context = context
+        self._shown = shown
+        self._pace = pace
+        self._accumulate = Accumulate(context.ctx) if pace.sums_in_parts else None
+        self.seconds = 0.0
+
+    def steps(
+        self,
+        photons: moderngl.Buffer,
+        count: int,
+        maps: LightMaps,
+        tables: ShownTables,
+        smoothing: float,
+        stride: int = 1,
+    ) -> Iterator[None]:
+        """Add every `stride`-th photon record to `maps`, pausing after every part of them. `count`: of those that are
+        added; `smoothing`: standard deviation of a footprint in lattice spacings."""
+        atlas, part_max = maps.atlas, self._pace.splat_part
+        if atlas.targets > 1 and atlas.pending + count >= FLUSH_AHEAD * min(
+            CHUNK, atlas.size[0] * atlas.size[1] / FLUSH_SHARE
+        ):
+            yield from self.summing(atlas)
+        for start in range(0, count, part_max):
+            started = time.perf_counter()
+            part = min(part_max, count - start)
+            maps.splatter.run(
+                photons,
+                part,
+                self._shown.variables,
+                tables.tables,
+                atlas,
+                maps.receivers,
+                smoothing,
+                self._shown.gains,
+                start * stride,
+                stride,
+                tables.reindex,
+            )
+            if self._pace.waits:
+                self._context.finish()
+            self.seconds += time.perf_counter() - started
+            if start + part < count:
+                yield
+
+    def summing(self, atlas: MapAtlas) -> Iterator[None]:
+        """Sum up what is pending with pauses, so that the maps can be shown at once; nothing where the pace knows no
+        parts."""
+        if self._accumulate is None or not atlas.pending:
+            return
+        height = atlas.size[1]
+        dispatch_budget = DispatchBudget(FIRST_SUMMED, ROWS, -(-height // ROWS) * ROWS)
+        for scratch, total in zip(atlas.scratch_textures, atlas.total_textures, strict=True):
+            row = 0
+            while row < height:
+                started = time.perf_counter()
+                rows = min(dispatch_budget.units, height - row)
+                self._accumulate.run_rows(scratch, total, row, rows)
+                if self._pace.waits:
+                    self._context.finish()
+                took = time.perf_counter() - started
+                dispatch_budget.learn(rows, took, SUMMING_SECONDS)
+                self.seconds += took
+                row += rows
+                yield
+        atlas.pending = 0
+
+    def release(self) -> None:
+        """Free the program."""
+        if self._accumulate is not None:
+            self._accumulate.release()

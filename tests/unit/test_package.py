@@ -1,0 +1,111 @@
+"""What is installed: the package `spectrasplat` with its shaders and assets, and nothing called `app`."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+STAYS_HOME = ("gallery/viewer", "gallery/error_time")
+"""Pictures of the documentation, which the program does not show."""
+
+
+def folders_with_python() -> list[str]:
+    """The packages that app/ holds, by the names they are imported by."""
+    folders = {file.parent.relative_to(ROOT / "app") for file in (ROOT / "app").rglob("*.py")}
+    return sorted(".".join(("spectrasplat", *folder.parts)) for folder in folders)
+
+
+def data_files(folder: str) -> list[str]:
+    """What of assets/ or shaders/ must be installed, relative to the folder."""
+    files = (file.relative_to(ROOT / folder).as_posix() for file in (ROOT / folder).rglob("*") if file.is_file())
+    return sorted(f for f in files if not f.endswith((".py", ".pyc")) and not f.startswith(STAYS_HOME))
+
+
+def test_every_folder_is_listed_and_nothing_else() -> None:
+    listed = PROJECT["tool"]["setuptools"]["packages"]
+    assert sorted(set(listed) - {"spectrasplat.assets", "spectrasplat.shaders"}) == folders_with_python()
+    assert len(set(listed)) == len(listed)
+
+
+def test_every_folder_is_a_package() -> None:
+    """A folder without __init__.py would be imported from a checkout and missing in other tools' eyes."""
+    folders = {file.parent for file in (ROOT / "app").rglob("*.py")}
+    assert [folder for folder in folders if not (folder / "__init__.py").is_file()] == []
+
+
+def test_only_python_lies_in_the_packages() -> None:
+    """Data has its own folders; a stray file in app/ would not be installed."""
+    files = (file for file in (ROOT / "app").rglob("*") if file.is_file() and "__pycache__" not in file.parts)
+    assert [file for file in files if file.suffix != ".py"] == []
+
+
+def test_the_program_finds_its_files_in_the_checkout() -> None:
+    from spectrasplat.base import paths
+
+    assert paths.assets_dir() == ROOT / "assets" and paths.shaders_dir() == ROOT / "shaders"
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Built from a copy: setuptools writes beside what it builds."""
+    folder = tmp_path_factory.mktemp("wheel")
+    for name in ("app", "assets", "shaders"):
+        shutil.copytree(ROOT / name, folder / "tree" / name)
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, folder / "tree" / name)
+    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", str(folder), str(folder / "tree")]
+    try:
+        if int(importlib.metadata.version("setuptools").split(".")[0]) >= 77:
+            command.append("--no-build-isolation")
+    except importlib.metadata.PackageNotFoundError:
+        pass  # pip fetches one
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if "No matching distribution found for setuptools" in done.stderr:
+        pytest.skip("setuptools 77 is neither installed nor to be had from a package index")
+    assert done.returncode == 0, done.stderr
+    return next(folder.glob("*.whl"))
+
+
+@pytest.mark.slow
+def test_the_wheel_holds_the_package_its_data_and_nothing_else(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        names = [name for name in archive.namelist() if not name.endswith("/")]
+    assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"spectrasplat"}
+    python = (file.relative_to(ROOT / "app").as_posix() for file in (ROOT / "app").rglob("*.py"))
+    wanted = {f"spectrasplat/{name}" for name in python}
+    wanted |= {f"spectrasplat/{folder}/{name}" for folder in ("assets", "shaders") for name in data_files(folder)}
+    assert {name for name in names if ".dist-info" not in name} == wanted
+
+
+@pytest.mark.slow
+def test_the_unpacked_wheel_runs_and_finds_its_files(wheel: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path / "site")
+    check = (
+        "import spectrasplat\n"
+        "from spectrasplat.base import paths\n"
+        "from spectrasplat.commands.options import shipped_scenes\n"
+        "from spectrasplat.model.io.scene_file import load_scene\n"
+        "load_scene(shipped_scenes()['brilliant_studio'])\n"
+        "assert (paths.shaders_dir() / 'light' / 'trace.comp').is_file()\n"
+        "print(spectrasplat.__file__)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", check],
+        env={"PYTHONPATH": str(tmp_path / "site"), "PATH": "", "HOME": str(tmp_path)},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert Path(done.stdout.strip()).is_relative_to(tmp_path / "site")
