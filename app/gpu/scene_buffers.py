@@ -24,7 +24,7 @@ from ..model.geometry.bvh import build_bvh
 from ..model.optics.colorimetry import VISIBLE_NM, rgb_partition
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative, index_table
-from ..model.scene import Scene, SceneObject
+from ..model.scene import Light, Scene, SceneObject
 from . import bindings
 from .records import NONE
 from .scene_texels import SceneTexels, spectra_texture, tree_texels
@@ -56,7 +56,9 @@ OBJECT = Struct(
     (
         Field("kind", "uint", "0 black, 1 diffuse, 2 mirror, 3 dielectric, 4 grating"),
         Field("medium", "uint", "row of the index table (dielectric, grating: its wavelength)"),
-        Field("weight_row", "uint", "row of absorption (1/GPU unit) or reflectance over x, texel of a grating, or NONE"),
+        Field(
+            "weight_row", "uint", "row of absorption (1/GPU unit) or reflectance over x, texel of a grating, or NONE"
+        ),
         Field(
             "stack_bit", "uint", "bit of this solid in a ray's inside mask, by priority; NONE where it overlaps nothing"
         ),

@@ -42,10 +42,10 @@ float order_step_derivative(GratingOrder order, uint grating, uint medium, uint 
 }
 #endif
 
-// Unit vector in the surface across the lines.
+// Unit vector in the surface across the lines: positive orders lean towards lines × outward normal.
 vec3 across_lines(vec3 normal, vec3 lines, float side)
 {
-    return side * normalize(cross(normal, lines));
+    return side * normalize(cross(lines, normal));
 }
 
 // Squared cosine of the angle that an order leaves at; <= 0: it is evanescent. `shift` lies in the surface.
@@ -86,7 +86,7 @@ vec3 diffract_column(vec3 direction, vec3 ddirection, vec3 normal, vec3 dnormal,
 {
     vec3 across = across_lines(normal, lines, side);
     vec3 shift = step * across;
-    vec3 dshift = dstep * across + step * side * normalised_derivative(cross(normal, lines), cross(dnormal, lines));
+    vec3 dshift = dstep * across + step * side * normalised_derivative(cross(lines, normal), cross(lines, dnormal));
     float dtheta = dot(ddirection, normal) + dot(direction, dnormal);
     float domega = (theta * dtheta - dot(dshift, direction + shift) - dot(shift, ddirection)) / omega;
     float sense = reflects ? 1.0 : -1.0;

@@ -47,6 +47,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
         "INDEX_ROW",
     ),
     "mirrors": (r"\(kind == KIND_MIRROR\) ",),
+    "gratings": ("grating_at", "diffract_direction", "GRATINGS_AT"),
     "interpolated normals": (
         "corner_normal",
         "smooth_facet",

@@ -123,6 +123,10 @@ class Grating(Material):
         """Its lines, and where light goes."""
         return f"{'reflection' if self.reflects else 'transmission'} grating, {self.lines_per_mm:g} lines/mm"
 
+    def content(self) -> tuple[object, ...]:
+        """All its numbers."""
+        return (self.lines_per_mm, *self.orders, *self.efficiency, self.reflects, *self.direction)
+
     def is_like(self, other: Material) -> bool:
         """Numbers may differ, not how many there are."""
         return isinstance(other, Grating) and len(self.orders) == len(other.orders)

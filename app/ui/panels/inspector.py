@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +10,13 @@ from imgui_bundle import imgui
 
 from ...edit import edits, environments
 from ...edit.state import State
+from ...model.fields import Flag
 from ...model.materials import MATERIAL_KINDS
 from ...model.optics import catalogue
 from ...model.scene import (
     Dielectric,
     Diffuse,
+    Grating,
     Material,
     Mirror,
     SceneObject,
@@ -129,6 +132,8 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
     if material.is_black:
         widgets.hint("Absorbs all light that meets it.")
         return state
+    if material.is_grating:
+        return _grating(state, index, material)
     if material.receives:
         state = _texture(state, view_model, index, material)
     return _colour(state, index, material)
@@ -154,6 +159,38 @@ def _glass(state: State, material: Dielectric) -> State:
         "Edit dispersion", tip="Open the Dispersion panel.", width=-1
     ):
         state = state.with_panels(dispersion=True)
+    return state
+
+
+def _grating(state: State, index: int, material: Grating) -> State:
+    name = state.scene.objects[index].name
+    wanted: dict[str, object] = {}
+    for part in material.shown_numbers():
+        row = part.row
+        changed, value, active = widgets.drag(
+            row.label,
+            getattr(material, part.attribute),
+            row.low,
+            row.high,
+            unit=part.unit,
+            tip=row.tip,
+            format=row.format,
+            reset=row.reset,
+            logarithmic=True,
+        )
+        state = widgets.holding(state, active)
+        if changed:
+            wanted[part.attribute] = value
+    for part in material.parts:
+        if isinstance(part, Flag):
+            changed, on = widgets.toggle(part.row.label, getattr(material, part.attribute), tip=part.row.tip)
+            if changed:
+                wanted[part.attribute] = on
+    told = ", ".join(f"{m:+d}: {e:.0%}" for m, e in zip(material.orders, material.efficiency, strict=True))
+    widgets.read_out("Orders", told, tip="Orders that light is sent on in, and the share of it that each gets.")
+    if wanted:
+        changed_material = replace(material, **wanted)
+        state = edits.attempt(state, f"Grating of {name}", edits.set_material, index, changed_material)
     return state
 
 
