@@ -43,7 +43,10 @@ def ratios_of(curves: Sequence[Curve], measure: str = "relmse") -> dict[str, flo
 
 def _speed_up_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> Claim:
     end, one_pass = stochastic.points[-1], MEASURED_PASSES[scene.measured_pass]
-    asked = f"at most 1/{one_pass.asked_ratio:.0f} of the time of stochastic to its error at the end ({end.relmse:.3g} after {end.seconds:.2f} s)"
+    asked = (
+        f"at most 1/{one_pass.asked_ratio:.0f} of the time of stochastic to its error at the end ({end.relmse:.3g} "
+        f"after {end.seconds:.2f} s)"
+    )
     reached = speed_up(srd.points, stochastic.points)
     if reached is None:
         last = srd.points[-1]
@@ -59,7 +62,10 @@ def _speed_up_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> Claim:
     why = ""
     if not holds and reached.at_once:
         first = srd.points[0]
-        why = f"srd's smallest rendering ({one_pass.amount(first.photons)}, {first.seconds:.3f} s) is already as good: {_stage_shares(scene, srd, first)}; longer runs would tell more"
+        why = (
+            f"srd's smallest rendering ({one_pass.amount(first.photons)}, {first.seconds:.3f} s) is already as good: "
+            f"{_stage_shares(scene, srd, first)}; longer runs would tell more"
+        )
     elif not holds:
         why = f"short by a factor of {one_pass.asked_ratio / reached.seconds:.2g}; {reason(scene, srd)}"
     return Claim("time to equal error", asked, measured, holds, why)
@@ -69,11 +75,17 @@ def _first_picture_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> C
     late = error_at_time(stochastic.points, LATE_SECONDS)
     end = stochastic.points[-1]
     late = end.relmse if late is None else late
-    asked = f"the picture after {EARLY_SECONDS} s of photon time is better than stochastic's after {LATE_SECONDS:.0f} s (relMSE {late:.3g})"
+    asked = (
+        f"the picture after {EARLY_SECONDS} s of photon time is better than stochastic's after {LATE_SECONDS:.0f} s "
+        f"(relMSE {late:.3g})"
+    )
     early = error_at_time(srd.points, EARLY_SECONDS)
     if early is None:
         first = srd.points[0]
-        why = f"even {MEASURED_PASSES[scene.measured_pass].amount(first.photons)} take {first.seconds:.2f} s: {_stage_shares(scene, srd, first)}"
+        why = (
+            f"even {MEASURED_PASSES[scene.measured_pass].amount(first.photons)} take {first.seconds:.2f} s: "
+            f"{_stage_shares(scene, srd, first)}"
+        )
         return Claim(
             "first picture",
             asked,
@@ -92,7 +104,10 @@ def _index_claim(scene: SceneResult, srd: Curve, linear: Curve) -> Claim:
     times = sorted({t for t in MEASURED_PASSES[scene.measured_pass].compared_seconds if t < common} | {common})
     pairs = [(t, error_at_time(srd.points, t), error_at_time(linear.points, t)) for t in times]
     compared = [(t, a, b) for t, a, b in pairs if a is not None and b is not None]
-    asked = f"smaller error than srd-lambda at equal time, the strongest glass being {scene.strongest_glass} (V_d {scene.strongest_abbe:.1f})"
+    asked = (
+        f"smaller error than srd-lambda at equal time, the strongest glass being {scene.strongest_glass} (V_d "
+        f"{scene.strongest_abbe:.1f})"
+    )
     if not compared:
         return Claim(
             "index against wavelength",
@@ -113,7 +128,8 @@ def reason(scene: SceneResult, curve: Curve, seconds: float | None = None) -> st
     parts = []
     if scene.reference is not None and scene.reference.relmse > 0.5 * point.relmse:
         parts.append(
-            f"the reference's own relMSE of {scene.reference.relmse:.2g} leaves the true error of {point.relmse:.2g} uncertain"
+            f"the reference's own relMSE of {scene.reference.relmse:.2g} leaves the true error of {point.relmse:.2g} "
+            "uncertain"
         )
     total = point.bias2 + point.variance
     if total > 0.0 and len({s.seed for s in curve.samples}) > 1:
@@ -121,7 +137,8 @@ def reason(scene: SceneResult, curve: Curve, seconds: float | None = None) -> st
         one_pass = MEASURED_PASSES[scene.measured_pass]
         cause = one_pass.bias_cause if share > 0.5 else one_pass.noise_cause
         parts.append(
-            f"{100 * share:.0f} % of {curve.method}'s error at {point.seconds:.2g} s is bias² and {100 * (1 - share):.0f} % variance, so mostly {cause}"
+            f"{100 * share:.0f} % of {curve.method}'s error at {point.seconds:.2g} s is bias² and "
+            f"{100 * (1 - share):.0f} % variance, so mostly {cause}"
         )
         parts += _common_share(scene, point) if share > 0.5 else []
     parts.append(_stage_shares(scene, curve, point))
@@ -131,7 +148,9 @@ def reason(scene: SceneResult, curve: Curve, seconds: float | None = None) -> st
 def _common_share(scene: SceneResult, point: Point) -> list[str]:
     """How much of a bias² all methods have, as far as the pass's bare method tells."""
     one_pass = MEASURED_PASSES[scene.measured_pass]
-    bare = next((curve.points[-1] for curve in scene.curves if curve.method == one_pass.bare_method and curve.points), None)
+    bare = next(
+        (curve.points[-1] for curve in scene.curves if curve.method == one_pass.bare_method and curve.points), None
+    )
     if bare is None or bare.bias2 < 0.1 * point.bias2:
         return []
     share = min(100.0 * bare.bias2 / point.bias2, 100.0)
@@ -140,6 +159,8 @@ def _common_share(scene: SceneResult, point: Point) -> list[str]:
 
 def _stage_shares(scene: SceneResult, curve: Curve, point: Point) -> str:
     samples = [s for s in curve.samples if s.photons == point.photons]
-    spent = {stage: sum(s.seconds.get(stage, 0.0) for s in samples) for stage in MEASURED_PASSES[scene.measured_pass].counted}
+    spent = {
+        stage: sum(s.seconds.get(stage, 0.0) for s in samples) for stage in MEASURED_PASSES[scene.measured_pass].counted
+    }
     total = sum(spent.values()) or 1.0
     return "its time is " + ", ".join(f"{100 * seconds / total:.0f} % {stage}" for stage, seconds in spent.items())

@@ -22,16 +22,16 @@ CONFIDENCE = 0.95
 
 def make_point(samples: Sequence[Sample], mean_difference: np.ndarray, reference_image: ReferencePicture) -> Point:
     """All seeds of one photon budget; `mean_difference`: mean over them of I − R̂, XYZ (H, W, 3)."""
-    told_apart = bias_variance(mean_difference, [s.metrics["relmse_raw"] for s in samples], reference_image)
+    split = bias_variance(mean_difference, [s.metrics["relmse_raw"] for s in samples], reference_image)
     single = [s.metrics["relmse"] for s in samples]
     return Point(
         samples[0].photons,
         float(np.median([s.photon_seconds for s in samples])),
-        told_apart.relmse,
+        split.relmse,
         min(single),
         max(single),
-        told_apart.bias2,
-        told_apart.variance,
+        split.bias2,
+        split.variance,
     )
 
 

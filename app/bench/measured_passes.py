@@ -33,13 +33,13 @@ class MeasuredPass:
     setup: tuple[str, ...]
     """What is made once and not counted, as `Curve.setup_seconds` names it."""
     uncounted: tuple[str, ...]
-    """Stages of every rendering that are not counted and not among `stages`, but told in the table of costs."""
+    """Stages of every rendering that are not counted and not among `stages`, but listed in the table of costs."""
     tick: tuple[float, str]
-    """Factor from seconds to the unit in which the time of one photon or sample is told, and that unit."""
+    """Factor from seconds to the unit in which the time of one photon or sample is given, and that unit."""
     asked_ratio: float
     """`srd` is to reach the error that `stochastic` ends with in at most one over this of its time."""
     compared_seconds: tuple[float, ...]
-    """Times at which errors are told and compared, as far as a run reaches."""
+    """Times at which errors are read and compared, as far as a run reaches."""
     pictures: tuple[tuple[str, float], ...]
     """Endings of the names of the equal-time pictures, with the share of the time given that each is made after; the
     last picture first."""
@@ -92,10 +92,16 @@ CAMERA = MeasuredPass(
     asked_ratio=20.0,  # 1 second against 20 in the talk
     compared_seconds=(0.5, 1.0, 5.0),
     pictures=(("", 1.0), (" early", 0.05), (" first", 0.025)),
-    bias_cause="straight columns within wide bands, few places within a pixel and the caustic maps, of which more samples cure the first two alone",
+    bias_cause=(
+        "straight columns within wide bands, few places within a pixel and the caustic maps, of which more samples "
+        "cure the first two alone"
+    ),
     noise_cause="noise, which more samples reduce",
     bare_method="stochastic",
-    bare_text="which has neither columns nor bands: places within a pixel, caustic maps and the noise of the reference's caustic, common to all methods",
+    bare_text=(
+        "which has neither columns nor bands: places within a pixel, caustic maps and the noise of the reference's "
+        "caustic, common to all methods"
+    ),
 )
 
 MEASURED_PASSES = {measured.key: measured for measured in (LIGHT, CAMERA)}

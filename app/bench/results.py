@@ -9,7 +9,7 @@ from .measured_passes import COUNTED_STAGES
 DEFAULT_METHODS = ("stochastic", "stochastic-even", "stochastic-point", "regular-7", "regular-16", "srd-lambda", "srd")
 
 OTHER_MEASURES = ("relmse_whole", "relmse_trimmed", "nrmse", "smape", "chroma")
-"""Measures beside relMSE by which times to equal error are told, so that no conclusion hangs on one."""
+"""Measures beside relMSE by which times to equal error are given, so that no conclusion hangs on one."""
 
 
 class BenchSettings(msgspec.Struct, frozen=True):
@@ -24,8 +24,8 @@ class BenchSettings(msgspec.Struct, frozen=True):
     reference_seconds: float = 60.0
     """Most time that one run spends on a scene's reference; what earlier runs made is used as well."""
     measured_pass: str = "light"
-    """Which pass of the renderer is measured, a key of `measured_passes.MEASURED_PASSES`. Below, what is said of photons and photon time
-    holds for camera samples a pixel and camera time where it is the camera's."""
+    """Which pass of the renderer is measured, a key of `measured_passes.MEASURED_PASSES`. Below, what is said of
+    photons and photon time holds for camera samples a pixel and camera time where it is the camera's."""
 
 
 class Sample(msgspec.Struct, frozen=True):
@@ -37,8 +37,8 @@ class Sample(msgspec.Struct, frozen=True):
     emitted: int
     splats: int
     seconds: dict[str, float]
-    """By stage: `Half.stages`; and, not counted, the light pass's "plan" (bands and spectral tables, once before a
-    rendering) and "camera" (display, the same for every method)."""
+    """By stage: `MeasuredPass.stages`; and, not counted, the light pass's "plan" (bands and spectral tables, once
+    before a rendering) and "camera" (display, the same for every method)."""
     metrics: dict[str, float]
     """relmse, relmse_raw (the reference's own variance left in), relmse_trimmed, relmse_whole (ε from the whole
     picture's mean), smape, chroma, nrmse, energy_ratio (Σ picture / Σ reference); "flip" for the equal-time pictures
@@ -71,7 +71,7 @@ class Curve(msgspec.Struct):
     method: str
     setup_seconds: dict[str, float]
     """Once per scene and not in photon time: "buffers" (tree and uploads), "compile", "pilot", "warm-up" (a small
-    rendering, in which drivers finish compiling); "light pass" (the caustic maps that all eyes look up)."""
+    rendering, in which drivers finish compiling); "light pass" (the caustic maps that all methods look up)."""
     samples: list[Sample]
     budgets: list[int] = []
     """Photons of each point, from the rate that a first trial had; the same for every seed."""
@@ -132,7 +132,7 @@ class SceneResult(msgspec.Struct):
     """Lowest V_d in the scene; 0 when nothing disperses."""
     pictures: dict[str, str] = {}
     """Files beside results.json, .npy of XYZ float32 (H, W, 3): "reference", "METHOD" (after
-    `equal_time` of photon time) and "METHOD early" and the like (after a share of it, see `Half.pictures`)."""
+    `equal_time` of photon time) and "METHOD early" and the like (after a share of it, see `MeasuredPass.pictures`)."""
     equal_time: float = 0.0
     """Photon seconds for which the pictures named by a method alone were made."""
     picture_samples: dict[str, Sample] = {}

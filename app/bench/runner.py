@@ -157,7 +157,8 @@ class _SceneBench:
         )
         if earlier is None:
             raise UserError(
-                f"{store.directory}/partial has lost what going on with '{result.scene}' needs: give --fresh to begin anew"
+                f"{store.directory}/partial has lost what going on with '{result.scene}' needs: give --fresh to begin "
+                "anew"
             )
         sums, samples = earlier, []
         for i, budget in enumerate(curve.budgets):
@@ -181,7 +182,8 @@ class _SceneBench:
     def _sample(self, rendering: Rendering, method: str, budget: int, seed: int) -> Sample:
         if not np.isfinite(rendering.xyz).all():
             raise RuntimeError(
-                f"{method} gave a picture with numbers that are not finite ({self._result.scene}, {budget} {MEASURED_PASSES[self._result.measured_pass].units}, seed {seed})"
+                f"{method} gave a picture with numbers that are not finite ({self._result.scene}, {budget} "
+                f"{MEASURED_PASSES[self._result.measured_pass].units}, seed {seed})"
             )
         return Sample(
             budget,
@@ -215,9 +217,9 @@ class _SceneBench:
             if budget not in made:
                 rendering = rig.render(budget, 1)
                 made[budget] = rendering, self._sample(rendering, method, budget, 1)
-                look = metrics.flip(rendering.xyz, self._reference_image)
-                if look is not None:
-                    made[budget][1].metrics["flip"] = look
+                flip = metrics.flip(rendering.xyz, self._reference_image)
+                if flip is not None:
+                    made[budget][1].metrics["flip"] = flip
             rendering, sample = made[budget]
             result.pictures[name] = self._store.save_picture(result.scene, name, rendering.xyz)
             result.picture_samples[name] = sample

@@ -41,17 +41,19 @@ def scene_lines(scene: SceneResult) -> list[str]:
     """Times to equal error by the other measures, one line a claim, and notes."""
     lines = []
     if scene.time_to_equal_other and any(curve.method == "srd" for curve in scene.curves):
-        told = ", ".join(
+        others = ", ".join(
             f"{measure} {ratio_text(ratios.get('srd'))}" for measure, ratios in scene.time_to_equal_other.items()
         )
-        lines.append(f"  srd's time to the error that stochastic ends with, by other measures: {told}")
+        lines.append(f"  srd's time to the error that stochastic ends with, by other measures: {others}")
     for claim in scene.claims:
         lines.append(
-            f"  {'holds' if claim.holds else 'FALLS SHORT'}: {claim.name}: {claim.asked}: {claim.measured}{f' ({claim.why})' if claim.why else ''}"
+            f"  {'holds' if claim.holds else 'FALLS SHORT'}: {claim.name}: {claim.asked}: "
+            f"{claim.measured}{f' ({claim.why})' if claim.why else ''}"
         )
     if scene.reference_too_coarse and scene.reference is not None:
         lines.append(
-            f"  note: the reference's own relMSE, {scene.reference.relmse:.2g}, is above a tenth of the smallest error; --reference-seconds lowers it"
+            f"  note: the reference's own relMSE, {scene.reference.relmse:.2g}, is above a tenth of the smallest "
+            "error; --reference-seconds lowers it"
         )
     if scene.picture_samples and all("flip" not in sample.metrics for sample in scene.picture_samples.values()):
         lines.append(

@@ -50,16 +50,27 @@ def run() -> Iterator[str]:
     with create_context() as context:
         yield f"machine               {context.renderer}, OpenGL {context.version}"
         dispersive, plain = _trace_rates(context)
-        yield f"trace, 3 columns      {dispersive / 1e6:.3f} M photons/s through {TRIANGLES} triangles   (promised 0.40 on a 2-core llvmpipe)"
-        yield f"spectral column       adds {100 * (plain / dispersive - 1):.1f} % to the trace   (promised at most 15 %)"
+        yield (
+            f"trace, 3 columns      {dispersive / 1e6:.3f} M photons/s through {TRIANGLES} triangles   (promised 0.40 "
+            "on a 2-core llvmpipe)"
+        )
+        yield (
+            f"spectral column       adds {100 * (plain / dispersive - 1):.1f} % to the trace   (promised at most 15 %)"
+        )
         figures = splat_speed.measure(context.ctx, pixels=64, count=1 << 16)
-        yield f"splats at 64 texels   {figures['splat_m_per_s']:.2f} M/s swept XYZ, {figures['ratio']:.2f} of plain Gaussians"
+        yield (
+            f"splats at 64 texels   {figures['splat_m_per_s']:.2f} M/s swept XYZ, {figures['ratio']:.2f} of plain "
+            "Gaussians"
+        )
         yield f"                      {figures['draw_ratio']:.2f} of them once footprints are known   (promised 0.70)"
     yield f"tree                  {_tree_seconds():.3f} s for {TRIANGLES} triangles   (promised 0.5)"
     seconds = _warm_start_seconds()
     yield f"first picture         {seconds:.2f} s after process start, default scene   (promised 3)"
     resident, picture_seconds = _resident_bytes()
-    yield f"resident memory       {resident / 2**20:.0f} MiB at 1280×720 with 1 M photons in {picture_seconds:.1f} s   (promised below 1024)"
+    yield (
+        f"resident memory       {resident / 2**20:.0f} MiB at 1280×720 with 1 M photons in {picture_seconds:.1f} s   "
+        "(promised below 1024)"
+    )
 
 
 def _ball(dispersive: bool) -> Scene:

@@ -142,7 +142,8 @@ class Store:
                     "another version of the program" if key == "program" else f"another {key} ('{before}', not '{now}')"
                 )
                 raise UserError(
-                    f"{self.path} was made with {what}, which cannot be mixed: give --fresh to begin anew, or another -o"
+                    f"{self.path} was made with {what}, which cannot be mixed: give --fresh to begin anew, or another "
+                    "-o"
                 )
 
     def _forget(self) -> None:

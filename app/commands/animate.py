@@ -36,6 +36,7 @@ class AnimateRequest:
     exposure: str | None = None
     seed: str | None = None
     method: str | None = None
+    camera_method: str | None = None
     overwrite: bool = False
 
 
@@ -56,8 +57,8 @@ def animate_command(request: AnimateRequest) -> int:
     photons = settings.photons or scene.render.photons
     for note in scene.notes:
         print(f"note: {note}", file=sys.stderr)
-    told = description(animation, settings, fps, photons)
-    sink = open_sink(request.output, (settings.width, settings.height), fps, told, request.overwrite)
+    manifest = description(animation, settings, fps, photons)
+    sink = open_sink(request.output, (settings.width, settings.height), fps, manifest, request.overwrite)
 
     from ..gpu.context import create_context
     from ..gpu.shader import keep_programs
@@ -116,6 +117,8 @@ def _settings(request: AnimateRequest, scene: Scene) -> RenderSettings:
         settings = replace(settings, seed=options.parse_integer("--seed", request.seed, 0, options.MAX_SEED))
     if request.method is not None:
         settings = replace(settings, method=options.parse_method(request.method))
+    if request.camera_method is not None:
+        settings = replace(settings, camera_method=options.parse_camera_method(request.camera_method))
     check_picture_memory(settings.width, settings.height, None)
     return settings
 

@@ -77,7 +77,7 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
         stopped = False
         try:
             with ProgressReporter("bench") as progress:
-                # Who names scenes wants them measured; of all that there are, those that cannot be are told.
+                # Who names scenes wants them measured; of all that there are, those that cannot be are noted.
                 run_bench(
                     context,
                     scenes,

@@ -79,7 +79,7 @@ def _python() -> Check:
 
 
 def requirements() -> list[tuple[str, str]]:
-    """(package, least version) of the run-time dependencies, as installed or as in the checkout."""
+    """(package, oldest version) of the run-time dependencies, as installed or as in the checkout."""
     try:
         listed = importlib.metadata.requires(PACKAGE) or []
     except importlib.metadata.PackageNotFoundError:
@@ -98,15 +98,15 @@ def requirements() -> list[tuple[str, str]]:
 def _packages() -> Iterator[Check]:
     """One line for all packages that fit, one for each that does not."""
     fitting = []
-    for name, least in requirements():
-        wanted = f"'{name}>={least}'"
+    for name, oldest in requirements():
+        wanted = f"'{name}>={oldest}'"
         try:
             version = installed_version(name)
         except importlib.metadata.PackageNotFoundError:
             yield Check(f"package {name}", "not installed", "missing", f"{REINSTALL} {wanted}")
             continue
-        if _version_key(version) < _version_key(least):
-            yield Check(f"package {name}", f"{version}, needed {least}", "missing", f"{REINSTALL} {wanted}")
+        if _version_key(version) < _version_key(oldest):
+            yield Check(f"package {name}", f"{version}, needed {oldest}", "missing", f"{REINSTALL} {wanted}")
         else:
             fitting.append(f"{name} {version}")
     yield Check("packages", ", ".join(fitting), "ok")

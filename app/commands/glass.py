@@ -10,7 +10,7 @@ from ..model.optics.catalogue import Entry, search, search_key
 from .glass_report import describe, list_glasses, plot
 
 MAX_PLOTTED = 6
-"""Curves that can be told apart in one plot."""
+"""Curves that can be distinguished in one plot."""
 
 
 def glass_command(query: str | None, plot_file: Path | None, show: Callable[[object], None]) -> None:

@@ -14,7 +14,7 @@ from ..model.scene import Scene
 from ..model.texture import Environment, Texture
 from ..render.light_pass import spectral_axis
 
-_FILTER = "interpolated, the level by the footprint, more looks along a long one"
+_FILTER = "interpolated, the level by the footprint, more lookups along a long one"
 
 
 class Lookup(NamedTuple):
@@ -24,7 +24,7 @@ class Lookup(NamedTuple):
     content: str
     how: str
     memory: str
-    """On the device; "" for nothing worth telling."""
+    """On the device; "" for nothing worth a line."""
 
 
 def lookups(scene: Scene, features: Features) -> list[Lookup]:
@@ -73,14 +73,14 @@ def _maps(scene: Scene, features: Features) -> Lookup:
     return Lookup(
         "caustic maps",
         content,
-        "each wavelength looks elsewhere behind dispersive glass; straight views take XYZ",
+        "each wavelength meets another place behind dispersive glass; straight views take XYZ",
         f"{16 * features.targets} B a texel",
     )
 
 
 def _spectrum(features: Features) -> Lookup:
     if not features.camera_disperses:
-        return Lookup("spectrum", "one stretch", "no dispersive glass is in view: one look a place", "")
+        return Lookup("spectrum", "one interval", "no dispersive glass is in view: one lookup a place", "")
     if features.random_wavelength:
         return Lookup(
             "spectrum", "one wavelength a sample behind glass", f"drawn anew for each ({features.method})", ""

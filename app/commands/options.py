@@ -1,6 +1,6 @@
 """Command line values checked by hand, so that each mistake gets one sentence with a way out.
 
-The options arrive as strings: click's own conversions would tell less and differ between
+The options arrive as strings: click's own conversions would say less and differ between
 versions. Every function raises `UserError`.
 """
 
@@ -52,9 +52,9 @@ def parse_photons(text: str) -> int:
 def parse_batch(text: str) -> int:
     """Photons in flight at once; their records must fit into memory."""
     count = _count("--batch", text)
-    most = memory_bytes() // _BYTES_PER_PHOTON
-    if count > most:
-        raise UserError(f"--batch {text} is beyond this machine's memory: give at most {most}")
+    limit = memory_bytes() // _BYTES_PER_PHOTON
+    if count > limit:
+        raise UserError(f"--batch {text} is beyond this machine's memory: give at most {limit}")
     return count
 
 

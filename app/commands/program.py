@@ -56,6 +56,16 @@ MethodOption = Annotated[
         autocompletion=completion.methods,
     ),
 ]
+CameraMethodOption = Annotated[
+    str | None,
+    typer.Option(
+        "--camera-method",
+        "--eye-method",
+        metavar="NAME",
+        help=f"The same for the camera's rays: {', '.join(CAMERA_METHODS)}; default: as --method.",
+        autocompletion=completion.camera_methods,
+    ),
+]
 Text = str | None
 PIPE_WIDTH = 200
 """Columns where no terminal sets a limit: tables are then not cut."""
@@ -113,16 +123,7 @@ def render(
     seconds: Annotated[Text, typer.Option(metavar="S", help="Emit photons for this long instead.")] = None,
     seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
     method: MethodOption = None,
-    camera_method: Annotated[
-        Text,
-        typer.Option(
-            "--camera-method",
-            "--eye-method",
-            metavar="NAME",
-            help=f"The same for the camera's rays: {', '.join(CAMERA_METHODS)}; default: as --method.",
-            autocompletion=completion.camera_methods,
-        ),
-    ] = None,
+    camera_method: CameraMethodOption = None,
     layer: Annotated[
         Text,
         typer.Option(
@@ -218,6 +219,7 @@ def animate(
         Text, typer.Option(metavar="K", help="Seed of the random numbers, the same for all frames; default: 1.")
     ] = None,
     method: MethodOption = None,
+    camera_method: CameraMethodOption = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the frames of another animation in the folder.")
     ] = False,
@@ -239,6 +241,7 @@ def animate(
         exposure,
         seed,
         method,
+        camera_method,
         overwrite,
     )
     raise typer.Exit(animate_command(request))

@@ -150,7 +150,7 @@ def _integer(option: str, low: int, high: int) -> Callable[[str], int]:
 
 @contextmanager
 def interrupt_flag() -> Iterator[Callable[[], bool]]:
-    """Within the block the first Ctrl-C only sets a flag, which the yielded function tells.
+    """Within the block the first Ctrl-C only sets a flag, which the yielded function returns.
 
     The renderer then stops after its batch and what it has is written. A second Ctrl-C
     interrupts as usual.

@@ -53,7 +53,7 @@ def view_command(request: ViewRequest) -> int:
         _check_screenshot(request.screenshot)
     scene = None if request.scene is None else options.find_scene(request.scene)
 
-    # What needs a display comes last, so that a wrong option is told on any machine.
+    # What needs a display comes last, so that a wrong option is reported on any machine.
     from ..edit.preferences import load_settings
     from ..ui.window import Window
 

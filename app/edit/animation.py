@@ -136,7 +136,7 @@ def keyed(stage: Stage, tracks: Sequence[Track], frames: int | None, fps: float)
     times = np.linspace(first, last, count) if count > 1 else np.array([first])
     made = Animation(stage, tuple(tracks), tuple(float(t) for t in times))
     for index, time_s in enumerate(made.times_s):
-        try:  # what cannot be drawn is told before minutes of work
+        try:  # what cannot be drawn is refused before minutes of work
             made.frame(index)
         except UserError as error:
             raise UserError(f"the animation fails at {time_s:g} s: {error}") from error

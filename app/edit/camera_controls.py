@@ -2,7 +2,7 @@
 
 Drags are given in picture heights (a drag over the whole height is 1; x to the right, y down), so that
 the feel does not depend on the window's size. The camera's `up` stays what it is, so the horizon never
-tilts, and the view stops short of looking straight along it, so nothing flips.
+tilts, and the view stops short of going straight along it, so nothing flips.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ ORBIT_PER_HEIGHT = np.pi
 """Radians that a drag over the picture's height turns."""
 LOOK_PER_HEIGHT = 0.6 * np.pi
 STEEPEST = np.radians(89.5)
-"""Most elevation of the view."""
+"""Largest elevation of the view."""
 ZOOM_STEP = 0.88
 """Distance that is left after one notch of the wheel, as a share."""
 FAST, SLOW = 4.0, 0.25

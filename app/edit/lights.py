@@ -11,7 +11,8 @@ from typing import Any, Literal
 import numpy as np
 
 from ..base.errors import UserError
-from ..model.lights import LIGHT_KINDS
+from ..model.lights import LIGHT_KINDS, IesLight
+from ..model.lights.ies_file import read_ies
 from ..model.lights.light import DEFAULT_ILLUMINANCE, PowerKey, made
 from ..model.optics import spectrum as spectra
 from ..model.optics.spectrum import Spectrum
@@ -26,6 +27,8 @@ from .objects import MAX_LENGTH
 
 SpectrumKind = Literal["illuminant", "blackbody", "laser", "lines", "csv", "table"]
 
+LIGHT_SUFFIXES = (".ies",)
+"""Photometric files."""
 _DARK = 1e-9
 """Least power, in any unit: at none at all a light would forget its colour."""
 
@@ -110,6 +113,21 @@ def set_light_kind(scene: Scene, index: int, kind: str) -> Scene:
             direction = _unit(light, "direction", _vec3(toward))
     changed = made(cls, _usual(scene, np.array(direction)) | {"direction": direction} | light.given())
     return set_light(scene, index, _lighting(scene, changed, _illuminance(scene, light)))
+
+
+def set_light_file(scene: Scene, index: int | None, path: Path) -> Scene:
+    """Let light `index`, or a new one (None), shine as the photometric file `path` has it, as bright as that says.
+
+    A light of another kind becomes one that keeps its place and aim. Raises UserError for a file that cannot be used.
+    """
+    profile = read_ies(path)
+    if index is None:
+        scene, index = add_light(scene, IesLight.kind), len(scene.lights)
+    elif scene.lights[index].profile is None:
+        scene = set_light_kind(scene, index, IesLight.kind)
+    light = replace(scene.lights[index], profile=profile)
+    power = light.spectral_power.scaled_to_luminous(profile.peak_cd)
+    return set_light(scene, index, replace(light, spectral_power=power))
 
 
 # -- power ----------------------------------------------------------------------------------

@@ -39,7 +39,7 @@ def decompose(matrix: np.ndarray) -> Placement:
     """Position, rotation and scale of an object-to-world matrix: the inverse of `compose`.
 
     Angles lie in (-180, 180], that about y in [-90, 90]; at ±90 the angle about x is given as 0. A mirrored
-    matrix gets a negative scale on the axis that leaves the least rotation. What shears cannot be told
+    matrix gets a negative scale on the axis that leaves the smallest rotation. What shears cannot be expressed
     in these terms: the rotation is then that of the nearest rotation matrix.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]

@@ -1,6 +1,6 @@
 """A user's own presets, kept in the config folder as TOML in the words of scene files.
 
-A file that cannot be understood is set aside under another name and told, like the settings.
+A file that cannot be understood is set aside under another name and reported, like the settings.
 """
 
 from __future__ import annotations

@@ -122,10 +122,8 @@ def check_value(stage: Stage, path: str, value: float, where: str = "") -> float
     """`value` where `path` can take it; raises `UserError` otherwise."""
     known = parameter(stage, path, where)
     if not (math.isfinite(value) and known.low <= value <= known.high):
-        raise UserError(
-            f"{where}{path} = {value:g} is out of range: give between {known.low:g} and {known.high:g} "
-            f"{known.unit}".rstrip()
-        )
+        bounds = f"{known.low:g} and {known.high:g} {known.unit}".rstrip()
+        raise UserError(f"{where}{path} = {value:g} is out of range: give between {bounds}")
     return value
 
 
@@ -299,9 +297,10 @@ def _with_light(light: Light, name: str, value: float) -> Light:
     if field == "rotation":
         turn = rotation_about(_AXES[axis], math.radians(value))
         turned = replace(light, direction=_vec3(turn @ np.asarray(light.direction)))
-        if not light.has_roll:
+        if light.tangent is None and not light.has_roll:
             return turned
-        return replace(turned, tangent=_vec3(turn @ light.axes()[:, 0]))
+        tangent = light.axes()[:, 0] if light.tangent is None else np.asarray(light.tangent)
+        return replace(turned, tangent=_vec3(turn @ tangent))
     if field == "power":
         spectrum = light.spectral_power
         lines = tuple((nm, power * value) for nm, power in spectrum.lines)

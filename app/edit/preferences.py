@@ -1,7 +1,7 @@
 """What is remembered between sessions, in one JSON file of the user's config folder.
 
 The folder is the platform's own, or the one that SPECTRASPLAT_CONFIG names (tests do).
-A file that cannot be read is set aside under another name and told, never fatal and never
+A file that cannot be read is set aside under another name and reported, never fatal and never
 silently lost; a folder that cannot be written costs only the remembering.
 """
 

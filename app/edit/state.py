@@ -1,6 +1,6 @@
 """Everything the interface shows and edits, as one frozen value.
 
-Panels are functions `draw(state, facts) -> state`. They return a changed copy and know neither
+Panels are functions `draw(state, view_model) -> state`. They return a changed copy and know neither
 OpenGL nor the renderer. The difference of two states decides what is redone: `live_inputs` names the
 part that the picture depends on, `scene` is what undo and saving cover.
 """

@@ -12,6 +12,7 @@ import sys
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 from ..base.errors import UserError, suggestion
+from .device_traits import DeviceTraits
 from .limits import Limits
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ GL_VERSION_CODE = 100 * GL_VERSION[0] + 10 * GL_VERSION[1]
 
 APT_LINE = "apt-get install libegl1 libgl1 libgl1-mesa-dri"
 APT_LINE_OSMESA = "apt-get install libosmesa6"
-_SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader")
 _MAX_EGL_DEVICES = 16
 
 
@@ -44,12 +44,13 @@ class Context:
         self.vendor: str = info["GL_VENDOR"]
         self.version: str = info["GL_VERSION"]
         self.limits = Limits.read(info)
+        self.traits = DeviceTraits.of(self.renderer)
         self.check("reading the OpenGL limits")
 
     @property
     def is_software(self) -> bool:
         """Whether the processor draws, not a GPU (timer queries are then meaningless)."""
-        return any(name in self.renderer.casefold() for name in _SOFTWARE_RENDERERS)
+        return self.traits.is_software
 
     def finish(self) -> None:
         """Wait until everything sent so far is done."""

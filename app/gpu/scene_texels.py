@@ -16,6 +16,7 @@ import numpy as np
 
 from ..base.errors import UserError
 from . import bindings
+from .device_traits import DeviceTraits
 
 ROW_TEXELS = 4096
 """Texels a row of the scene's texture (shaders/lib/scene.glsl knows it as shift and mask)."""
@@ -38,7 +39,7 @@ class SceneTexels:
         words = {name: _words(sections.get(name)) for name in SECTIONS}
         starts = np.cumsum([0] + [len(part) for part in words.values()]).tolist()
         self.defines = {f"{name}_AT": start for name, start in zip(words, starts[:-1], strict=True)}
-        self._as_image = "llvmpipe" in ctx.info["GL_RENDERER"] if as_image is None else as_image
+        self._as_image = DeviceTraits.of(ctx.info["GL_RENDERER"]).texels_as_images if as_image is None else as_image
         if self._as_image:
             self.defines["SCENE_IMAGE"] = 1
         rows = max(1, -(-starts[-1] // ROW_TEXELS))

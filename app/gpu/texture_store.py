@@ -18,6 +18,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..model.scene import Scene, SceneObject
 from ..model.texture import Environment, Texture
+from .device_traits import DeviceTraits
 from .mip_chain import kept_levels, level_count
 from .records import NONE
 from .schema import Field, Struct
@@ -104,7 +105,7 @@ class TextureStore:
         """
         self.ctx = ctx
         self._max_side = min(max_side or MAX_BYTES, int(ctx.info["GL_MAX_TEXTURE_SIZE"]))
-        self._as_image = "llvmpipe" in ctx.info["GL_RENDERER"] if as_image is None else as_image
+        self._as_image = DeviceTraits.of(ctx.info["GL_RENDERER"]).texels_as_images if as_image is None else as_image
         self._pictures = self._corners = None
         self._records: moderngl.Buffer | None = None
         self._sources = _sources(scene)

@@ -51,7 +51,8 @@ def from_map(
     told = list(said)
     if width != 2 * height:
         told.append(
-            f"{path.name} is {width} × {height}; a latitude-longitude picture is twice as wide as high, so it is stretched."
+            f"{path.name} is {width} × {height}; a latitude-longitude picture is twice as wide as high, so it is "
+            "stretched."
         )
     if width > MAX_WIDTH or height > MAX_HEIGHT:
         rgb = _averaged(_averaged(rgb, min(height, MAX_HEIGHT)).swapaxes(0, 1), min(width, MAX_WIDTH)).swapaxes(0, 1)

@@ -1,6 +1,6 @@
 """What a scene needs, as one frozen value from which every program is built.
 
-Nothing else chooses a shader variant: (Scene, RenderSettings) → Features → defines. What is
+(Scene, RenderSettings) → Features → defines (`passes/variants.py`): nothing else chooses a shader variant. What is
 False or 0 here is absent from the program that runs, not skipped by it.
 """
 

@@ -6,11 +6,12 @@ What is more than one key for one attribute (a cone's soft edge, an outline) is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..base.errors import UserError
 from .io.scene_table import REQUIRED, SceneTable
 
 
@@ -160,28 +161,19 @@ class Colour(Field):
 
 
 @dataclass(frozen=True)
-class Choice(Field):
-    """One of a few words."""
-
-    options: Sequence[str] = ()
-
-    def value(self, table: SceneTable, key: str) -> str:
-        """The word."""
-        return table.choice(key, self.options, self.default)
-
-
-@dataclass(frozen=True)
 class FileName(Field):
     """A file of the value's own: `attribute` is what `load` makes of it, and has its path as `source`."""
 
     load: Callable[[Path], Any] | None = None
-    suffix: str = ""
-    """Which files a panel offers."""
 
     def value(self, table: SceneTable, key: str) -> Any:
         """What is in the file."""
         assert self.load is not None
-        return self.load(table.existing_file(key))
+        path = table.existing_file(key)
+        try:
+            return self.load(path)
+        except UserError as error:
+            table.fail(key, f"cannot be used: {error}")
 
     def write(self, value: Any, path: Path | None) -> dict[str, Any]:
         """The file's name."""

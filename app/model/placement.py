@@ -104,10 +104,7 @@ def _read_matrix(table: SceneTable) -> np.ndarray:
 def _read_scale(table: SceneTable) -> np.ndarray:
     """Scale per axis, float64 (3,); negative mirrors, zero is refused."""
     value = table.raw("scale", 1.0)
-    if isinstance(value, list):
-        scale = table.numbers("scale", count=3)
-    else:
-        scale = (table.number("scale", 1.0),) * 3
+    scale = table.numbers("scale", count=3) if isinstance(value, list) else (table.number("scale", 1.0),) * 3
     if 0.0 in scale:
         table.fail("scale", "is zero on an axis, which would flatten the object")
     return np.array(scale)

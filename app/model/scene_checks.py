@@ -132,7 +132,8 @@ def check_outside(light: Light, glasses: Sequence[SceneObject], file_name: str) 
     for item in glasses:
         if contains(item, np.array(light.position)):
             raise UserError(
-                f"{file_name}: light '{light.name}' stands inside the glass of '{item.name}'; move its position out of it"
+                f"{file_name}: light '{light.name}' stands inside the glass of '{item.name}'; move its position "
+                "out of it"
             )
 
 

@@ -59,7 +59,8 @@ def as_reflectance(rgb: np.ndarray, where: str) -> np.ndarray:
     count = int((rgb > 1.0 + _ABOVE_ONE).sum())
     if count:
         raise UserError(
-            f"{where}: {count} values lie above 1 (up to {rgb.max():.3g}), which no surface reflects; scale the picture down"
+            f"{where}: {count} values lie above 1 (up to {rgb.max():.3g}), which no surface reflects; scale the "
+            "picture down"
         )
     rgb = np.minimum(rgb, np.float32(1.0))
     rgb.setflags(write=False)

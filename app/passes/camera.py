@@ -26,7 +26,11 @@ from ..model.camera_rays import camera_frame
 from ..model.optics.colorimetry import xyz_to_rgb709_matrix
 from ..model.scene import Camera
 from ..model.scene_checks import contains
-from .camera_programs import (
+from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
+from .camera_tables import CameraTables
+from .present import Channels
+from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
+from .variants import (
     BIND_CELL_CDF,
     BIND_COUNTERS,
     BIND_HALTED,
@@ -44,10 +48,6 @@ from .camera_programs import (
     halting_defines,
     single_defines,
 )
-from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
-from .camera_tables import CameraTables
-from .present import Channels
-from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
 
 SPLIT_THRESHOLD = 0.004
 """Share of a sample's power above which both parts of a split path are followed."""
@@ -169,7 +169,7 @@ class CameraPass:
         self._halted: moderngl.Buffer | None = None
         self._beyond: moderngl.ComputeShader | None = None
         self._single: moderngl.ComputeShader | None = None
-        if "CAMERA_SPECULAR" in shown and context.is_software:
+        if "CAMERA_SPECULAR" in shown and context.traits.loops_may_end:
             self._halted = self._ctx.buffer(reserve=_PLACES * halted_bytes(shown))
             shown = halting_defines(shown)
         self._source = (shown, structs)

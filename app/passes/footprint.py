@@ -8,20 +8,19 @@ vertex and the fragment shaders need is worked out here once a splat, not once a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..gpu import shader
 from ..gpu.records import (
-    FLAG_FOOTPRINT_DROPPED,
     GAIN_BOX,
-    NONE,
     PLACEMENT,
     RECEIVER,
     photon_record,
 )
 from ..gpu.schema import Field, Struct
+from .variants import SplatFeatures, footprint_defines
 
 if TYPE_CHECKING:
     import moderngl
@@ -112,50 +111,6 @@ class SpectralVariables:
         self.buffer.release()
 
 
-class SplatFeatures(Protocol):
-    """What decides the programs' variant (a part of `spectrasplat.model.features.Features`)."""
-
-    @property
-    def spectral_groups(self) -> int: ...
-    @property
-    def band_cuts(self) -> bool: ...
-    @property
-    def nested_windows(self) -> bool: ...
-    @property
-    def targets(self) -> int: ...
-    @property
-    def point_spectrum(self) -> bool: ...
-    @property
-    def charts(self) -> bool: ...
-    @property
-    def local_gain(self) -> bool: ...
-    @property
-    def reindexed(self) -> bool: ...
-
-
-def splat_defines(features: SplatFeatures) -> dict[str, int]:
-    """Defines common to every program of the splat half."""
-    switches = {
-        "BAND_CUTS": features.band_cuts,
-        "POINT_SPECTRUM": features.point_spectrum,
-        # A splat that no wavelength moves is a Gaussian of one colour.
-        "ONE_COLOUR": features.point_spectrum or features.spectral_groups == 0,
-        "CHARTS": features.charts,
-    }
-    counts = {"TARGETS": features.targets, "SLOTS": 2 if features.nested_windows else 1}
-    return counts | {name: 1 for name, on in switches.items() if on}
-
-
-def footprint_defines(features: SplatFeatures) -> dict[str, int]:
-    """Defines of footprint.comp."""
-    switches = {"LOCAL_GAIN": features.local_gain, "REINDEXED": features.reindexed}
-    return (
-        splat_defines(features)
-        | {"GROUPS": features.spectral_groups}
-        | {name: 1 for name, on in switches.items() if on}
-    )
-
-
 class Footprints:
     """Owns the splat record buffer and the counts of what could not be drawn as asked."""
 
@@ -163,11 +118,7 @@ class Footprints:
         """`group`: the most photons one dispatch covers."""
         self._ctx = ctx
         groups = features.spectral_groups
-        defines = footprint_defines(features) | {
-            "WORKGROUP": WORKGROUP,
-            "NONE": f"{NONE}u",
-            "FLAG_FOOTPRINT_DROPPED": f"{FLAG_FOOTPRINT_DROPPED}u",
-        }
+        defines = footprint_defines(features) | {"WORKGROUP": WORKGROUP}
         structs = (photon_record(groups), PLACEMENT, RECEIVER, SPLAT, GAIN_BOX)
         self._program = shader.compute(ctx, "light/footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)

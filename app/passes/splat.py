@@ -18,9 +18,8 @@ from .footprint import (
     VERTICES,
     Footprints,
     SpectralVariables,
-    SplatFeatures,
-    splat_defines,
 )
+from .variants import SplatFeatures, draw_variants, splat_defines
 
 if TYPE_CHECKING:
     import moderngl
@@ -65,15 +64,8 @@ class Splatter:
         slots = GROUP * self._footprints.slots_per_photon
         corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(slots, dtype=np.uint32)[:, None]
         self._indices = ctx.buffer(corners)
-        classes = {
-            1: ("light/splat_small.frag", {"SMALL": 1}),
-            2: ("light/splat_swept.frag", {"SWEPT": 1}),
-            4: ("light/splat_swept.frag", {"SWEPT": 1, "EDGE": 1, "CLIPPED": 1}),
-        }
-        if features.band_cuts and not features.point_spectrum:
-            classes[3] = ("light/splat_cut.frag", {"CUT": 1, "CLIPPED": 1})
         self._draws: dict[int, moderngl.VertexArray] = {}
-        for kind, (fragment, chosen) in sorted(classes.items()):
+        for kind, (fragment, chosen) in draw_variants(features).items():
             program = shader.program(
                 ctx,
                 "light/splat.vert",

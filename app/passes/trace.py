@@ -19,6 +19,7 @@ from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
 from ..model.features import Features
 from .emission_domain import EmissionDomain
 from .lattice_order import morton_order
+from .variants import emit_defines, light_defines
 
 RAY_ROOM = 3
 """Rays in flight per lattice point of a batch: splitting rarely passes 1.5."""
@@ -128,25 +129,7 @@ class TracePass:
         self.photon = records.photon_record(features.spectral_groups)
         ctx = context.ctx
         structs = (*SCENE_STRUCTS, self._ray, self.photon, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE)
-        copies = " ".join(
-            f"photon.dposition_dvar{g} = ray.dposition[SPATIAL + {g}];" for g in range(features.spectral_groups)
-        )
-        defines = (
-            features.defines()
-            | bindings.LIGHT_HALF_DEFINES
-            | scene.defines
-            | {
-                "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",
-                "FLAG_BAND_FINAL": f"{records.FLAG_BAND_FINAL}u",
-                "FLAG_INSIDE": f"{records.FLAG_INSIDE}u",
-                "MASK_SIZE": records.MASK_SIZE,
-                "CATEGORY_COUNT": f"{len(records.CATEGORIES)}u",
-                "FALLBACK_COUNT": f"{len(records.FALLBACKS)}u",
-                "SPECTRAL_COPY": copies,
-            }
-        )
-        if features.tree and context.is_software:
-            defines["LOOPS_MAY_END"] = 1
+        defines = light_defines(features, context.traits) | scene.defines
         self._features = features
         self._defines = defines
         self._structs = structs
@@ -249,7 +232,7 @@ class TracePass:
             self._list_children(first=False)
             step += 1
             # Reading the count waits for the device: rarely on a GPU, where empty steps cost less.
-            if self.context.is_software or step % 8 == 0:
+            if step % self.context.traits.queue_read_steps == 0:
                 alive = int(self._read_state()["alive"])
             yield
         self.context.check("tracing photons")
@@ -346,11 +329,7 @@ class TracePass:
 
     def _emit_program(self, kind: str) -> moderngl.ComputeShader:
         if kind not in self._emit:
-            defines = self._defines | {f"LIGHT_{kind.upper()}": 1}
-            if self._features.point_spectrum and self._features.random_wavelength:
-                defines["RANDOM_WAVELENGTH"] = 1
-                if self._features.even_wavelengths:
-                    defines["EVEN_WAVELENGTHS"] = 1
+            defines = self._defines | emit_defines(self._features, kind)
             self._emit[kind] = shader.compute(
                 self.context.ctx, "light/emit.comp", defines, (*self._structs, records.EMIT_PARAMETERS)
             )

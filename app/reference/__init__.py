@@ -1,8 +1,15 @@
-"""The float64 reference: slow, readable CPU references of what the shaders compute, and the rigs that hold shaders
-against them.
+"""The float64 references: independent tracers that pictures are measured against, and the papers' formulas in numpy.
 
-`optics`, `surfaces`, `tracer`, `splat`, `glasses` are plain numpy and share no code with the
-shaders or with the rest of the program. `glsl_function`, `gpu_paths`, `far_field` and
-`splat_rig` run the real shaders on inputs made for one question; `path_check` holds both against each other.
-Tests and `spectrasplat stress` use all of them.
+`photon_reference` (light tracer) and `camera_reference` (camera tracer, with the `spectral_caustic`) are compiled with
+numba and share `scattering`, `sampling` and `photon_intersect`, but nothing with the shaders. `optics`, `emission`,
+`glasses` and `random_numbers` are plain numpy; `metrics` says how far a picture is from its reference. The slow,
+readable tracer that judges the shaders step by step stands in tests/reference and shares nothing with either.
+"""
+
+"""The float64 references: independent tracers that pictures are measured against, and the papers' formulas in numpy.
+
+`photon_reference` (light tracer) and `camera_reference` (camera tracer, with the `spectral_caustic`) are compiled with
+numba and share `scattering`, `sampling` and `photon_intersect`, but nothing with the shaders. `optics`, `emission`,
+`glasses` and `random_numbers` are plain numpy; `metrics` says how far a picture is from its reference. The slow,
+readable tracer that judges the shaders step by step stands in tests/reference and shares nothing with either.
 """

@@ -126,15 +126,17 @@ def _added(table, i, row, red, green, blue, factor, xyz):
 
 
 @inlined
-def _diffuse(scene, lights, spectra, pictures, tables, atom, triangle, u, v, px, py, pz, side, a, b, stack, xyz):
+def _diffuse(scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, a, b, scratch):
     """Radiance in an atom that a diffuse surface sends back from a side; without atom (−1) all wavelengths go to
-    `xyz`."""
+    `scratch.xyz`."""
+    px, py, pz = place
+    xyz = scratch.xyz
     row, red, green, blue = _surface(scene, pictures, triangle, u, v)
     white = atom < 0
     total = 0.0
     for i in range(lights.kind.shape[0]):
         if white or spectra.lights[i, atom] > 0.0:
-            gain = _gain(scene, lights, i, triangle, side, px, py, pz, a, b, stack)
+            gain = _gain(scene, lights, i, triangle, side, px, py, pz, a, b, scratch.stack)
             if white and gain > 0.0:
                 _added(spectra.light_xyz, i, row, red, green, blue, gain / math.pi, xyz)
             elif gain > 0.0:
@@ -163,40 +165,21 @@ def _wavelength(spectra, chance):
 
 
 @inlined
-def sample(
-    scene,
-    lights,
-    spectra,
-    pictures,
-    tables,
-    start,
-    px,
-    py,
-    pz,
-    dx,
-    dy,
-    dz,
-    state,
-    shift,
-    noise,
-    max_depth,
-    tally,
-    stack,
-    stack_distance,
-    xyz,
-):
-    """Add what a camera ray sees to `xyz` (3,).
+def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_depth, tally, scratch):
+    """Add what a camera ray sees to `scratch.xyz`.
 
     Up to the first event at glass or a mirror nothing depends on a wavelength, and all are added at once;
     then one is drawn and stands for all by its probability.
     """
+    px, py, pz, dx, dy, dz = ray
+    state, shift, xyz = scratch.state, scratch.shift, scratch.xyz
     last, last_object, within, mask, alone, events = -1, -1, False, start.mask, start.alone, 0
     atom, nm, found, weight = -1, 0.0, 0.0, 1.0
     if mask != np.uint64(0) or alone != AIR:  # in glass wavelengths part at once
         atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
     while True:
         t, triangle, u, v = nearest(
-            scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance
+            scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, scratch.stack, scratch.stack_distance
         )
         far = t if triangle >= 0 else np.inf
         for i in range(lights.kind.shape[0]):
@@ -225,24 +208,10 @@ def sample(
             break
         if kind == DIFFUSE:
             a, b = unit(state[3] ^ shift[3]), unit(state[4] ^ shift[4])
+            side = side_met(scene, triangle, dx, dy, dz)
+            place = px, py, pz
             found += weight * _diffuse(
-                scene,
-                lights,
-                spectra,
-                pictures,
-                tables,
-                atom,
-                triangle,
-                u,
-                v,
-                px,
-                py,
-                pz,
-                side_met(scene, triangle, dx, dy, dz),
-                a,
-                b,
-                stack,
-                xyz,
+                scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, a, b, scratch
             )
             break
         if events >= max_depth:
@@ -267,8 +236,7 @@ def trace_camera(
     scene, camera, lights, spectra, pictures, tables, start, sequence, first, count, max_depth, sums, tally, scratch
 ):
     """Add samples [first, first + count) of every pixel to `sums` (H, W, 3), XYZ of each: divide by their number."""
-    stack, stack_distance, xyz = scratch.stack, scratch.stack_distance, scratch.xyz
-    beginning, state, shift = scratch.beginning, scratch.state, scratch.shift
+    beginning, state, shift, xyz = scratch.beginning, scratch.state, scratch.shift, scratch.xyz
     sobol_start(sequence, first, beginning)
     for row in range(camera.height):
         for column in range(camera.width):
@@ -280,32 +248,9 @@ def trace_camera(
             for i in range(first, first + count):
                 if i > first:
                     sobol_next(sequence, i, state)
-                ox, oy, oz, dx, dy, dz = camera_ray(
-                    camera, column + unit(state[0] ^ shift[0]), row + unit(state[1] ^ shift[1])
-                )
+                ray = camera_ray(camera, column + unit(state[0] ^ shift[0]), row + unit(state[1] ^ shift[1]))
                 noise = mixed(key ^ mixed(np.uint64(i)))
-                sample(
-                    scene,
-                    lights,
-                    spectra,
-                    pictures,
-                    tables,
-                    start,
-                    ox,
-                    oy,
-                    oz,
-                    dx,
-                    dy,
-                    dz,
-                    state,
-                    shift,
-                    noise,
-                    max_depth,
-                    tally,
-                    stack,
-                    stack_distance,
-                    xyz,
-                )
+                sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_depth, tally, scratch)
             for c in range(3):
                 sums[row, column, c] += xyz[c]
                 xyz[c] = 0.0

@@ -16,7 +16,7 @@ import numpy as np
 from ..model.scene import Light
 from .compiling import inlined
 from .photon_emission import frame_of
-from .photon_emit import concentric_disc, spot_falloff, shone
+from .photon_emit import concentric_disc, shone, spot_falloff
 
 POINT, DIRECTIONAL, COLLIMATED, AREA = range(4)
 

@@ -22,7 +22,7 @@ from .compiling import inlined
 from .photon_scene import TABLE_NM, PhotonScene, reflectance_classes
 
 _EVEN_SHARE = 0.2
-"""Of the wavelengths: drawn by power, the rest by what the camera sees."""
+"""Of the wavelengths: drawn by power, the rest by what the eye sees."""
 
 
 class Spectra(NamedTuple):

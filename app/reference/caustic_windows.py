@@ -1,7 +1,7 @@
 """Where the spectral caustic is counted: the planes of flat receivers, and windows of texels on them.
 
 Each side of a receiver that is both lit by glass or mirrors and seen gets two windows: a coarse one over all that the
-camera sees of it, and a fine one over nearly all the light where it looks most. Where they overlap only the fine one
+camera sees of it, and a fine one over nearly all the light where it views most. Where they overlap only the fine one
 counts.
 """
 
@@ -24,8 +24,8 @@ photons more thinly."""
 _FLAT = 1e-6
 """Share of a receiver's size that its corners may leave a plane."""
 _SPREAD = 0.005
-"""Of the looks, and of the power where these end, beyond each side of a fine window: a lens shows some of a floor as
-far as it goes."""
+"""Of the places seen, and of the power where these end, beyond each side of a fine window: a lens shows some of a floor
+as far as it goes."""
 _MARGIN_SEEN, _MARGIN_LIT = 0.1, 0.05
 """Shares of their sizes by which windows are larger than what the pilots found."""
 _COARSE = 0.05
@@ -137,10 +137,10 @@ def fit_windows(
     """Tables of zeros over what both pilots found, and which sides have any, bool (S,) (at least one).
 
     `texel_at`: size of a fine texel at a distance along the camera's way; where all fine windows together had more than
-    `max_texels`, each has the share that it has of the looks.
+    `max_texels`, each has the share that it has of the places seen.
     """
     count = len(planes.owner)
-    low, high, texel, looks = np.zeros((count, 2, 2)), np.ones((count, 2, 2)), np.ones(count), np.zeros(count)
+    low, high, texel, views = np.zeros((count, 2, 2)), np.ones((count, 2, 2)), np.ones(count), np.zeros(count)
     wanted = np.zeros(count, bool)
     for side in range(count):
         from_camera = seen.side == side
@@ -163,10 +163,10 @@ def fit_windows(
         near = np.all((places >= low[side, 1]) & (places <= high[side, 1]), axis=1)
         distance = seen.distance[from_camera]
         texel[side] = texel_at(float(np.median(distance[near] if near.any() else distance)))
-        looks[side] = max(int(near.sum()), 1)
+        views[side] = max(int(near.sum()), 1)
     span = np.maximum(high - low, 1e-300)
     asked = np.where(wanted, np.prod(span[:, 1], axis=1) / texel**2, 0.0)
-    texel *= np.sqrt(np.divide(asked, _shared(asked, looks, max_texels), out=np.ones(count), where=wanted))
+    texel *= np.sqrt(np.divide(asked, _shared(asked, views, max_texels), out=np.ones(count), where=wanted))
     size = np.zeros((count, 2, 2), np.int64)
     for side in np.flatnonzero(wanted):
         size[side, 1] = np.maximum(np.ceil(span[side, 1] / texel[side] - 1e-9), 1)

@@ -1,4 +1,4 @@
-"""How far a picture is from the reference: one number each for energy, noise, colour and look.
+"""How far a picture is from the reference: one number each for energy, noise, colour and perceived difference.
 
 All but FLIP are taken on linear XYZ before tone mapping, pooled over pixels and channels. The reference is a
 Monte Carlo picture itself, so what its own variance adds to a squared error is subtracted:
@@ -155,7 +155,7 @@ def flip(xyz: np.ndarray, reference_image: ReferencePicture) -> float | None:
 
 @dataclass(frozen=True)
 class BiasVariance:
-    """relMSE of one photon budget told apart, over seeds."""
+    """relMSE of one photon budget split into bias² and variance, over seeds."""
 
     relmse: float
     bias2: float

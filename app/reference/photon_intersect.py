@@ -2,7 +2,7 @@
 
 The side of a surface a photon is on decides near the place it left, not an offset: on the object
 just left only the opposite crossing can be true, and of two touching solids the photon's own
-record of what it is inside of tells which surface it has crossed already.
+record of what it is inside of says which surface it has crossed already.
 """
 
 from __future__ import annotations

@@ -26,9 +26,10 @@ COUNTED = 7
 
 
 @compiled
-def _deposit(scene, camera, colour, atom, triangle, px, py, pz, from_front, watt, picture, stack):
+def _deposit(scene, camera, colour, atom, triangle, place, from_front, watt, picture, stack):
     """Add a landed photon to its pixel; returns (row, column, luminance added), row −1 where the camera does not see
     it."""
+    px, py, pz = place
     row, column, factor, tx, ty, tz, distance = project(camera, px, py, pz)
     if row < 0:
         return -1, -1, 0.0
@@ -108,20 +109,9 @@ def trace(
                     tally[DIRECT] += watt
                     break
                 tally[DEPOSITED] += watt
-                y, x, added = _deposit(
-                    scene,
-                    camera,
-                    colour,
-                    atom,
-                    triangle,
-                    px,
-                    py,
-                    pz,
-                    side_met(scene, triangle, dx, dy, dz) == 0,
-                    watt,
-                    picture,
-                    stack,
-                )
+                is_front = side_met(scene, triangle, dx, dy, dz) == 0
+                place = px, py, pz
+                y, x, added = _deposit(scene, camera, colour, atom, triangle, place, is_front, watt, picture, stack)
                 if y >= 0:
                     tally[COUNTED + 1] += 1.0
                     if pilot:

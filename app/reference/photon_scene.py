@@ -209,7 +209,7 @@ def viewpoint(camera: Camera, width: int, height: int, centre: np.ndarray) -> Vi
 
 
 def colours(spectrum: Spectrum, classes: list[np.ndarray | None]) -> Colours:
-    """Atoms of a spectrum: most of the probability goes where the camera sees most, some where power is.
+    """Atoms of a spectrum: most of the probability goes where the eye sees most, some where power is.
 
     A cell has the colour of its nanometre, as everywhere in the program; a line that of its own wavelength.
     """

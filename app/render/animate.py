@@ -72,6 +72,7 @@ def description(animation: Animation, settings: RenderSettings, fps: float, phot
         "photons": photons,
         "samples": settings.spp,
         "method": settings.method,
+        "camera_method": settings.camera_method,
         "seed": settings.seed,
         "fps": fps,
         "frames": len(animation.times_s),

@@ -156,7 +156,7 @@ class LightPass:
         self._division = division
         self._records = photon_records or NoRecords()
         self._pace = pace or Pace.of(context)
-        batch = settings.batch or DEFAULT_BATCH * (1 if context.is_software else 4)
+        batch = settings.batch or DEFAULT_BATCH * context.traits.batch_scale
         batch = max(min(batch, _largest_batch(context, features)), self._pace.min_batch)
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
         self.shown = ShownSpectra(context.ctx, scene, buffers, settings.bins)
@@ -385,9 +385,7 @@ class LightPass:
             except StopIteration as finished:
                 batch: Batch = finished.value
                 break
-            if (
-                self._pace.waits and not self.context.is_software
-            ):  # there the queue's length is read at every step, which waits
+            if self._pace.waits and self.context.traits.work_is_queued:
                 self.context.finish()
             self.stats.trace_seconds += time.perf_counter() - started
             yield

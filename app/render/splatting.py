@@ -45,12 +45,12 @@ class Pace:
     @staticmethod
     def of(context: Context) -> Pace:
         """For a rendering that nobody looks at meanwhile."""
-        return Pace(context.is_software)
+        return Pace(not context.traits.work_is_queued)
 
     @staticmethod
     def within_frames(context: Context) -> Pace:
         """For one that takes little of every frame; extended lights make do with as many points."""
-        return Pace(True, 1 << 12 if context.is_software else 1 << 18, True, 1024)
+        return Pace(True, context.traits.viewer_splat_photons, True, 1024)
 
 
 class Splatting:

@@ -1,6 +1,6 @@
 """Runs stress cases one after the other and keeps what each measured, also when it is stopped or a case fails.
 
-A case that raises is a broken promise of its own: it is told with its reason and the others go on. Ctrl-C
+A case that raises is a broken promise of its own: it is reported with its reason and the others go on. Ctrl-C
 ends the run; what was measured by then is the result.
 """
 
@@ -138,7 +138,7 @@ def _measured(case: Case, context: Context, found: CaseResult) -> Iterator[Measu
     try:
         yield from case.measure(context)
         context.check(f"stress case {case.name}")
-    except Exception as error:  # noqa: BLE001  (whatever a case dies of is its result, and the others go on)
+    except Exception as error:
         found.failure = " ".join(f"{type(error).__name__}: {error}".split())
         found.trace = traceback.format_exc()
         _forget_gl_errors(context)

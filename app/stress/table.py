@@ -19,7 +19,10 @@ def summary(result: StressResult) -> str:
     verdict = "every promise holds" if not broken else f"{len(broken)} promise{'s' if len(broken) > 1 else ''} broken"
     if result.partial and not broken:
         verdict = "every promise measured so far holds"
-    return f"{state}{len(result.cases)} of {result.asked} cases, {result.measured} severities in {result.seconds:.0f} s: {verdict}"
+    return (
+        f"{state}{len(result.cases)} of {result.asked} cases, {result.measured} severities in {result.seconds:.0f} s: "
+        f"{verdict}"
+    )
 
 
 def table(result: StressResult) -> Table:

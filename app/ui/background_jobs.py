@@ -29,7 +29,7 @@ COMPARE_SHARE = 0.4
 
 
 class BackgroundJobs:
-    """Owns them. `told` collects sentences about what was finished, for the host to show."""
+    """Owns them. `notes` collects sentences about what was finished, for the host to show."""
 
     def __init__(self, context: Context, config: Path) -> None:
         self.comparison = Comparison(context)
@@ -37,7 +37,7 @@ class BackgroundJobs:
         self.overlay = RayOverlay(context)
         self.cursor = Cursor()
         self.gallery = Gallery(context, config, shipped_scenes())
-        self.told: list[tuple[str, bool]] = []
+        self.notes: list[tuple[str, bool]] = []
         """Sentence, whether it is an error."""
 
     @property
@@ -51,18 +51,18 @@ class BackgroundJobs:
         left = budget_s
         if self.exports.job is not None:
             try:
-                told = self.exports.step(JOB_SHARE * budget_s)
+                note = self.exports.step(JOB_SHARE * budget_s)
             except UserError as error:
-                self.told.append((str(error), True))
+                self.notes.append((str(error), True))
             else:
-                if told is not None:
-                    self.told.append((told, False))
+                if note is not None:
+                    self.notes.append((note, False))
             left = budget_s - (time.perf_counter() - started)
         share = COMPARE_SHARE if picture.engine is not None and not picture.stats.converged else 1.0
         self.comparison.advance(state, picture.engine, share * max(left, 0.0))
         return max(budget_s - (time.perf_counter() - started), 0.2 * budget_s)
 
-    def look(self, state: State, picture: LivePicture, now_s: float) -> None:
+    def follow(self, state: State, picture: LivePicture, now_s: float) -> None:
         """After the picture is made: what lies under the cursor, where rays go. Raises `UserError`."""
         self.cursor.update(state, picture, now_s)
         self.overlay.update(state)
@@ -73,17 +73,17 @@ class BackgroundJobs:
         """Begin what `request` asks for. Raises `UserError`."""
         if picture.shown is None or picture.radiance is None:
             raise UserError("there is no picture yet; wait a moment")
-        told = self.exports.begin(
+        note = self.exports.begin(
             request, state, Shown(picture.shown, picture.radiance, picture.exposure_ev, picture.stats.photons)
         )
-        if told is not None:
-            self.told.append((told, False))
+        if note is not None:
+            self.notes.append((note, False))
 
     def cancel_export(self) -> None:
         """Stop the running export; what is finished stays."""
-        told = self.exports.cancel()
-        if told is not None:
-            self.told.append((told, False))
+        note = self.exports.cancel()
+        if note is not None:
+            self.notes.append((note, False))
 
     def release(self) -> None:
         """End and free everything; before the engine is released."""

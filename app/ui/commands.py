@@ -1,6 +1,6 @@
 """What can be done by name: one table that the menu, the shortcuts and their list are drawn from.
 
-A command is a function of state and facts, like a panel. Those that need a file open the file
+A command is a function of state and view model, like a panel. Those that need a file open the file
 dialogue (`panels.dialogs`), those that would lose unsaved work ask first.
 """
 
@@ -69,7 +69,7 @@ def _set_tool(tool: Tool, state: State, _view_model: ViewModel) -> State:
 
 
 def _take_brush(state: State, _view_model: ViewModel) -> State:
-    """With its panel, which tells radius and strength and how to compare with the physical picture."""
+    """With its panel, which shows radius and strength and how to compare with the physical picture."""
     return replace(state, tool="brush").with_panels(brush=True)
 
 

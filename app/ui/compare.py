@@ -1,6 +1,6 @@
 """What the picture is compared with: the reference, or another method, computed in the time that is left over.
 
-It belongs to the scene and view it was begun for. When those change it is kept and told to be stale; asking for
+It belongs to the scene and view it was begun for. When those change it is kept and marked as stale; asking for
 it again begins anew. The reference is the caustic layer by independent light tracing (`reference_thread`), put on the
 picture without caustics; what is seen behind glass is not compared.
 """
@@ -101,33 +101,33 @@ class Comparison:
             return ""
         if not self._shows_reference:
             photons = 0 if self._engine is None else self._engine.stats.photons
-            told = f"{METHOD_NAMES.get(self._method, self._method)}: {photons / 1e6:.2f} million photons."
+            note = f"{METHOD_NAMES.get(self._method, self._method)}: {photons / 1e6:.2f} million photons."
             return (
-                told if self._compare.method != REFERENCE else f"There is no reference: {self._thread_problem}. {told}"
+                note if self._compare.method != REFERENCE else f"There is no reference: {self._thread_problem}. {note}"
             )
         snapshot = self._thread.snapshot if self._thread is not None else None
         if snapshot is None:
             return "Reference: the first photons are on their way."
         if not self._has(snapshot, SHOWN_FROM):
-            least = SHOWN_FROM * self._begun.width * self._begun.height
+            needed = SHOWN_FROM * self._begun.width * self._begun.height
             return (
-                f"Reference: {snapshot.photons / 1e6:.2f} million photons so far. It is shown from {least / 1e6:.2f} "
+                f"Reference: {snapshot.photons / 1e6:.2f} million photons so far. It is shown from {needed / 1e6:.2f} "
                 "million on."
             )
-        told = (
+        note = (
             f"Reference: light tracing in float64 without shared code, {snapshot.photons / 1e6:.1f} million photons, "
             f"own relMSE {snapshot.relmse:.1e}."
         )
         if self._compare.plot and not self._has(snapshot, MEASURED_FROM):
-            told += (
+            note += (
                 f" Errors are measured from {MEASURED_FROM * self._begun.width * self._begun.height / 1e6:.1f} "
                 "million on."
             )
         if not snapshot.directly.all():
-            told += " What is seen behind glass or in mirrors is not compared."
+            note += " What is seen behind glass or in mirrors is not compared."
         if self._begun.local_gain and any(item.local_dispersion for item in self._begun.scene.objects):
-            told += " The brush's local gain is not in it: it is not physical."
-        return told
+            note += " The brush's local gain is not in it: it is not physical."
+        return note
 
     @property
     def is_busy(self) -> bool:

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from ..passes.pick import PickHit
 
 SPECTRUM_S = 0.1
-"""Least time between two spectra: each reads stored photons."""
+"""Shortest time between two spectra: each reads stored photons."""
 
 
 class Cursor:
-    """The facts of the last cursor position."""
+    """What was found at the last cursor position."""
 
     def __init__(self) -> None:
         self.view_model: CursorInfo | None = None
@@ -29,7 +29,7 @@ class Cursor:
         self._spectrum_key: tuple[object, ...] = ()
 
     def update(self, state: State, picture: LivePicture, now_s: float) -> None:
-        """Look again under `state.hover`."""
+        """Query again under `state.hover`."""
         if state.hover is None or picture.engine is None or picture.radiance is None:
             self.view_model = None
             self._key = ()
@@ -40,11 +40,11 @@ class Cursor:
             self._hit = picture.pick(state.hover)
             self._key = key
         before = self.view_model
-        self.view_model = self._look(state, picture)
+        self.view_model = self._query(state, picture)
         if state.preferences.panels.spectrum and self._hit is not None and self._hit.is_receiver:
             self._take_spectrum(state, picture, before, now_s)
 
-    def _look(self, state: State, picture: LivePicture) -> CursorInfo:
+    def _query(self, state: State, picture: LivePicture) -> CursorInfo:
         assert state.hover is not None
         radiance, hit = picture.radiance, self._hit
         assert radiance is not None

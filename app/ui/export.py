@@ -75,13 +75,13 @@ class Exports:
         if self._job is None:
             return None
         try:
-            told = self._job.step(budget_s)
+            note = self._job.step(budget_s)
         except BaseException:
             self._job = None
             raise
-        if told is not None:
+        if note is not None:
             self._job = None
-        return told
+        return note
 
     def cancel(self) -> str | None:
         """End the job; what is finished stays."""
@@ -127,7 +127,7 @@ class Exports:
 
 
 class _Job:
-    """A generator of shares, with what is told about it."""
+    """A generator of shares, with a note about it."""
 
     def __init__(self, title: str, work: Iterator[float], finished: str, cancelled: str, frames: int = 0) -> None:
         self._title, self._work = title, work
@@ -264,11 +264,11 @@ def _animate(context: Context, request: requests.Animate, stage: Stage, state: S
     size = request.size or state.viewport_size
     settings = _settings(state, size, request.photons, spp=request.samples)
     check_picture_memory(*size, None)
-    told = dict(description(made, settings, request.fps, request.photons)) | {
-        "look": repr(state.display),
+    description_ = dict(description(made, settings, request.fps, request.photons)) | {
+        "display": repr(state.display),
         "smoothing": state.smoothing,
     }
-    sink = open_sink(request.path, size, request.fps, told)
+    sink = open_sink(request.path, size, request.fps, description_)
     develop = _Developer(context, state.display)
 
     def work() -> Iterator[float]:

@@ -1,6 +1,6 @@
 """One frame of the interface: panels, edits, requests, then the engine's work.
 
-`run_frame` tells the panels what there is (`ViewModel`), takes the state they return, records what they
+`run_frame` shows the panels what there is (`ViewModel`), takes the state they return, records what they
 edited, carries their requests out and lets the engine work on it, so that the picture drawn in a
 frame already shows the input of that frame. No window is needed; `window` and `headless` show it.
 """
@@ -26,7 +26,7 @@ DEFAULT_BUDGET_S = 0.03
 
 
 def run_frame(session: Session, draw: Draw, budget_s: float = DEFAULT_BUDGET_S) -> None:
-    """Draw the interface with `draw`, within imgui's frame, and answer it; the engine works for about
+    """Draw the interface with `draw`, within imgui's frame, and carry out what it asks; the engine works for about
     `budget_s`."""
     view_model = view_model_of(session)
     before = replace(session.state, interacting=False, hover=None, requests=())
@@ -90,8 +90,8 @@ def _work(session: Session, budget_s: float) -> None:
     session.problem_said = problem
     now = session.clock()
     try:
-        session.picture.show(session.state, now, session.delta_s, session.companions.comparison)
-        session.companions.look(session.state, session.picture, now)
+        session.picture.show(session.state, now, session.delta_s, session.jobs.comparison)
+        session.jobs.follow(session.state, session.picture, now)
     except UserError as error:
         session.messages.tell(sentence(str(error)), is_error=True)
     except Exception as error:  # noqa: BLE001 - a bug, or the device is lost
@@ -102,9 +102,9 @@ def _work(session: Session, budget_s: float) -> None:
 def _work_beside(session: Session, budget_s: float) -> float:
     """Exports and comparison; returns the time that is left."""
     try:
-        return session.companions.work(session.state, session.picture, budget_s)
+        return session.jobs.work(session.state, session.picture, budget_s)
     except Exception as error:  # noqa: BLE001 - a bug in a side line must not stop the picture
-        session.companions.exports.cancel()
+        session.jobs.exports.cancel()
         session.save_from_crash("exporting or comparing", error)
         session.messages.tell(
             f"Comparing or exporting failed by a fault of the program ({brief(error)}).", is_error=True
@@ -112,9 +112,9 @@ def _work_beside(session: Session, budget_s: float) -> float:
         session.state = replace(session.state, compare=replace(session.state.compare, mode="off", plot=False))
         return budget_s
     finally:
-        for text, is_error in session.companions.told:
+        for text, is_error in session.jobs.notes:
             session.messages.tell(sentence(text), is_error)
-        session.companions.told.clear()
+        session.jobs.notes.clear()
 
 
 def _with_dropped(session: Session, state: State, view_model: ViewModel) -> State:

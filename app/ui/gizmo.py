@@ -68,7 +68,7 @@ class Gizmo:
         return self.is_held or bool(_IM.is_over())
 
     def draw(self, state: State, view: View, rect: tuple[float, float, float, float]) -> State:
-        """Draw it over the picture in `rect` (left, top, width, height in pixels) and answer its handles."""
+        """Draw it over the picture in `rect` (left, top, width, height in pixels) and follow its handles."""
         operation = _OPERATION_OF.get(state.tool)
         if operation is None or not placing.can_do(state.scene, state.selection, operation):
             self._drag = None

@@ -1,6 +1,6 @@
 """The whole interface without a window: an own framebuffer, a synthetic mouse and keyboard, pictures of the result.
 
-Tests, screenshots and `bench-view` drive the interface through this, as a hand would: by places
+Tests, screenshots and `bench-view` drive the interface through this, as a user would: by places
 on the screen, or by the labels that widgets note in `item_rects`.
 """
 
@@ -36,7 +36,7 @@ class HeadlessInterface:
     """An interface of `size` pixels whose frame is `draw()`.
 
     `prepare()` runs before each frame, `rendered()` and `finished()` after it, outside of imgui's; `preferences()`
-    tells the theme. A context manager; `release()` frees it. `items` tells where controls are.
+    holds the theme. A context manager; `release()` frees it. `items` says where controls are.
     """
 
     def __init__(
@@ -180,7 +180,7 @@ class HeadlessInterface:
         self.drag(item.at(start), item.at(end), steps)
 
     def wheel(self, where: str | Point, amount: float, keys: Sequence[imgui.Key] = ()) -> None:
-        """Turn the wheel over a control or a place; positive is away from the hand."""
+        """Turn the wheel over a control or a place; positive is away from the user."""
         with self.held(keys):
             self.move(where)
             imgui.get_io().add_mouse_wheel_event(0.0, amount)

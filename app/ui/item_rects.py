@@ -1,7 +1,7 @@
 """Where each labelled control was drawn last, so that tests and screenshots can aim a mouse at it by name.
 
 Widgets call `note(label)` straight after an item. It costs one comparison unless a recorder is
-installed, and it is the only place where the interface tells anything about itself outward.
+installed, and it is the only place where the interface reports anything about itself outward.
 """
 
 from __future__ import annotations

@@ -108,7 +108,7 @@ class LivePicture:
         self.engine = self._make_engine(self._context)
 
     def reload_shaders(self) -> None:
-        """Compile from disk again, while the last good programs go on (`shader_error` tells what fails). Raises
+        """Compile from disk again, while the last good programs go on (`shader_error` says what fails). Raises
         `EngineError`."""
         if self.engine is None:
             self.restart()

@@ -1,10 +1,10 @@
-"""How long the engine may work in a frame so that input is answered in time, whatever else a frame costs."""
+"""How long the engine may work in a frame so that input has its effect in time, whatever else a frame costs."""
 
 from __future__ import annotations
 
 SOFTWARE_FRAME_S = 0.04
-"""A frame on the software renderer: with the piece of work that runs over its end, within the 50 ms in which input must
-be answered."""
+"""A frame on the software renderer: with the batch that runs over its end, within the 50 ms in which input must
+have its effect."""
 GPU_SHARE = 0.75
 """Of the time between two pictures of the screen; the rest is the driver's and the window system's."""
 MIN_SHARE = 0.25

@@ -111,14 +111,14 @@ class ReferenceThread:
         width, height = self._size
         directly = seen_directly(self._scene, width, height)
         run = ReferenceRun(self._scene, width, height, self._scene.render.max_depth)
-        told = 0
+        reported = 0
         while not self._stopped.is_set():
             self._going.wait()
             if not run.exhausted:
                 run.advance()
             over = run.exhausted or run.seconds > MAX_SECONDS
-            if run.photons >= _GROWTH * told or over:
-                told = run.photons
+            if run.photons >= _GROWTH * reported or over:
+                reported = run.photons
                 picture = run.picture()
                 self._publish(picture, directly)
                 if over or picture.is_within(TARGET_RELMSE):

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 FRAMES_REMEMBERED = 120
 IDLE_S = 0.5
-"""How long the window may sleep when nothing moves: shaders on disk are looked at then."""
+"""How long the window may sleep when nothing moves: shaders on disk are checked then."""
 LAYOUT_FRAMES = 3
 """Frames until docked windows have their sizes: maps fitted to another view would have to be made anew."""
 THUMBNAIL_S = 0.1
@@ -59,7 +59,7 @@ class Session:
         self.autosave = Autosave(config_dir())
         self.recovery: Recovery | None = next(iter(recoveries(config_dir())), None)
         self.picture = LivePicture(context, make_engine)
-        self.companions = BackgroundJobs(context, config_dir())
+        self.jobs = BackgroundJobs(context, config_dir())
         self.window_picture: Path | None = None
         """Where a picture of the whole window is to be written once this frame is drawn."""
         self.interface_scale = self.framebuffer_scale = 1.0
@@ -97,11 +97,11 @@ class Session:
         now = self.clock()
         self.delta_s = min(max(now - self._last_start, 1e-4), 0.25)
         self._frame_started = self._last_start = now
-        self.picture.resize(self.state, self.companions.comparison)
+        self.picture.resize(self.state, self.jobs.comparison)
         if self._watch.changed():
             self.reload_shaders()
         if self.may_make_thumbnails():
-            self.companions.gallery.step()
+            self.jobs.gallery.step()
 
     def wait_for_layout(self) -> None:
         """The window's size has changed before anything was made for it: leave the engine alone for some frames
@@ -115,11 +115,11 @@ class Session:
     def wait_s(self) -> float:
         """Seconds the window may sleep when no event comes; 0 while anything moves."""
         state = self.state
-        if self.companions.gallery.is_busy and self.may_make_thumbnails():
+        if self.jobs.gallery.is_busy and self.may_make_thumbnails():
             return THUMBNAIL_S
         moves = (
             state.interacting
-            or self.companions.is_busy
+            or self.jobs.is_busy
             or self.messages.is_fading
             or (state.display.auto_exposure and self.picture.is_settling)
             or (state.playing and self.picture.engine is not None and not self.picture.stats.converged)
@@ -127,7 +127,7 @@ class Session:
         return 0.0 if moves else IDLE_S
 
     def may_make_thumbnails(self) -> bool:
-        """While they are looked for, or when there is nothing else to do."""
+        """While files are searched, or when there is nothing else to do."""
         return self.state.preferences.panels.start_page or self.picture.stats.converged
 
     def renderer_stopped(self, error: Exception) -> None:
@@ -221,7 +221,7 @@ class Session:
 
     def release(self) -> None:
         """Free what the device holds."""
-        self.companions.release()
+        self.jobs.release()
         self.picture.release()
 
 

@@ -22,10 +22,10 @@ PICK_PHOTONS = 400_000
 
 
 def carry_out(session: Session, request: requests.Request) -> None:
-    """Do what `request` says. Raises `UserError`, and NotImplementedError for one that nobody answers."""
+    """Do what `request` says. Raises `UserError`, and NotImplementedError for one that is unknown."""
     handler = _HANDLERS.get(type(request))
     if handler is None:
-        raise NotImplementedError(f"no answer to {type(request).__name__}")
+        raise NotImplementedError(f"unknown request {type(request).__name__}")
     handler(session, request)
 
 
@@ -154,15 +154,15 @@ def _export(session: Session, request: requests.Screenshot | requests.Bake | req
         check_writable(request.path)
         session.window_picture = request.path
         return
-    session.companions.export(request, session.state, session.picture)
+    session.jobs.export(request, session.state, session.picture)
 
 
 def _cancel_job(session: Session, _request: requests.CancelJob) -> None:
-    session.companions.cancel_export()
+    session.jobs.cancel_export()
 
 
 def _compute_reference(session: Session, _request: requests.ComputeReference) -> None:
-    session.companions.comparison.restart()
+    session.jobs.comparison.restart()
 
 
 def _copy_material(session: Session, request: requests.CopyMaterial) -> None:

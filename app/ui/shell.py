@@ -1,4 +1,4 @@
-"""The whole interface of one frame: `draw_interface(state, facts) -> state`, the one function a host calls.
+"""The whole interface of one frame: `draw_interface(state, view_model) -> state`, the one function a host calls.
 
 Every panel draws its own contents; the windows around them, with their close buttons, are opened here.
 """

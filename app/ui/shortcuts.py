@@ -86,7 +86,7 @@ def handle(state: State, view_model: ViewModel) -> State:
 
 
 def _close_menus() -> None:
-    """Esc closes menus and pickers; dialogues answer it themselves. (imgui does so only with its keyboard navigation
+    """Esc closes menus and pickers; dialogues handle it themselves. (imgui does so only with its keyboard navigation
     on.)"""
     is_menu = imgui.is_popup_open("", imgui.PopupFlags_.any_popup) and imgui.internal.get_top_most_popup_modal() is None
     if is_menu and imgui.is_key_pressed(imgui.Key.escape):

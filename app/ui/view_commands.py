@@ -1,4 +1,4 @@
-"""Commands about what is seen: camera, numbered views, panels, display. Functions of state and facts, see
+"""Commands about what is seen: camera, numbered views, panels, display. Functions of state and view model, see
 `commands`."""
 
 from __future__ import annotations

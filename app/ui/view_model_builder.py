@@ -7,17 +7,17 @@ from .view_model import ViewModel
 
 
 def view_model_of(session: Session) -> ViewModel:
-    """The facts of the frame that begins."""
+    """The view model of the frame that begins."""
     picture, document = session.picture, session.document
     shown = picture.shown
-    stats, comparison = picture.stats, session.companions.comparison
+    stats, comparison = picture.stats, session.jobs.comparison
     return ViewModel(
         stats=stats,
         picture=None if shown is None else shown.glo,
         picture_size=(0, 0) if shown is None else shown.size,
         frame_ms=tuple(session.frame_ms),
         pass_ms=_pass_ms(session),
-        cursor=session.companions.cursor.view_model,
+        cursor=session.jobs.cursor.view_model,
         title=document.title,
         path=document.path,
         unsaved=document.unsaved,
@@ -25,7 +25,7 @@ def view_model_of(session: Session) -> ViewModel:
         redo=document.history.redo_label,
         history=document.history.entries,
         recent=session.settings.existing_recent(),
-        scenes=session.companions.gallery.entries,
+        scenes=session.jobs.gallery.entries,
         messages=session.messages.messages(),
         shader_error=picture.shader_error,
         recovery=None if session.recovery is None else session.recovery.path,
@@ -35,8 +35,8 @@ def view_model_of(session: Session) -> ViewModel:
         compare_text=comparison.text,
         compare_ready=comparison.picture is not None,
         compare_stale=comparison.is_stale,
-        rays=session.companions.overlay.rays,
-        job=session.companions.exports.job,
+        rays=session.jobs.overlay.rays,
+        job=session.jobs.exports.job,
         exposure_ev=picture.exposure_ev,
         delta_s=session.delta_s,
         framebuffer_scale=session.framebuffer_scale,

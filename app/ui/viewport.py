@@ -31,19 +31,19 @@ _FLAGS = (
     | imgui.WindowFlags_.no_nav
 )
 
-hand = ViewportInput()
+viewport_input = ViewportInput()
 """What the mouse holds."""
 gizmo = Gizmo()
 
 
 def reset() -> None:
     """Let go of everything: another interface begins."""
-    global hand, gizmo
-    hand, gizmo = ViewportInput(), Gizmo()
+    global viewport_input, gizmo
+    viewport_input, gizmo = ViewportInput(), Gizmo()
 
 
 def draw_viewport(state: State, view_model: ViewModel) -> State:
-    """Draw the picture into the present window and answer what is done in it."""
+    """Draw the picture into the present window and carry out what is done in it."""
     room = imgui.get_content_region_avail()
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
     imgui.begin_child("picture", ImVec2(max(room.x, 1.0), max(room.y, 1.0)), 0, _FLAGS)
@@ -69,7 +69,7 @@ def _draw_inside(state: State, view_model: ViewModel) -> State:
     drawing.push_clip_rect(corner, ImVec2(corner.x + width, corner.y + height), True)
     if state.display.ray_overlay:
         overlay.draw_rays(canvas, view_model.rays)
-    draw_marks(canvas, state, view_model, hand.grip == "brush")
+    draw_marks(canvas, state, view_model, viewport_input.grip == "brush")
     state = draw_lights(canvas, state)
     state = gizmo.draw(state, canvas.view, (corner.x, corner.y, width, height))
     draw_wipe(canvas, state, view_model)
@@ -79,7 +79,7 @@ def _draw_inside(state: State, view_model: ViewModel) -> State:
         state = draw_axes(state, canvas.view, corner.x + width - inset, corner.y + inset)
     draw_badges(badges(state, view_model), corner.x, corner.y + height)
     mouse = _mouse(canvas)
-    state = hand.act(state, view_model, canvas, mouse)
+    state = viewport_input.act(state, view_model, canvas, mouse)
     state = _with_hover(state, mouse)
     if state.display.magnifier and mouse.is_over:
         draw_magnifier(canvas, view_model)
@@ -125,9 +125,9 @@ def _mouse(canvas: Canvas) -> Mouse:
 
 def _with_hover(state: State, mouse: Mouse) -> State:
     """The host looks at what lies there; while the camera is dragged nobody needs to know."""
-    dragging = hand.grip in ("brush", "pull", "click", "wipe")
+    dragging = viewport_input.grip in ("brush", "pull", "click", "wipe")
     inside = 0.0 <= mouse.x < 1.0 and 0.0 <= mouse.y < 1.0
-    hovers = (mouse.is_over and hand.is_free) or (dragging and inside)
+    hovers = (mouse.is_over and viewport_input.is_free) or (dragging and inside)
     return replace(
         state, hover=(float(np.clip(mouse.x, 0.0, 1.0)), float(np.clip(mouse.y, 0.0, 1.0))) if hovers else None
     )

@@ -1,7 +1,7 @@
 """What the mouse and the keys do in the viewport: walk the camera, select, paint, pull, shift the wipe.
 
-`Hand` remembers what a drag that is under way holds; that is memory of the interface, like a scroll position, and no
-part of the state. The gizmo has its own.
+`ViewportInput` remembers what a drag that is under way holds; that is memory of the interface, like a scroll position,
+and no part of the state. The gizmo has its own.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class ViewportInput:
         return self.grip is None
 
     def act(self, state: State, view_model: ViewModel, canvas: Canvas, mouse: Mouse) -> State:
-        """Answer this frame's mouse and keys."""
+        """Carry out this frame's mouse and keys."""
         if self.grip is not None and not imgui.is_mouse_down(self._button):
             state = self._let_go(state, mouse)
         if state.pull is not None and self.grip != "pull":

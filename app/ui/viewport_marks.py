@@ -1,4 +1,4 @@
-"""Marks over the picture that answer the cursor: the brush's ring, the held colour, lights, selection, wipe,
+"""Marks over the picture that follow the cursor: the brush's ring, the held colour, lights, selection, wipe,
 magnifier."""
 
 from __future__ import annotations

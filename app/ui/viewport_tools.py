@@ -101,17 +101,17 @@ def _button(name: str, icon: str, x: float, y: float, is_on: bool, tip: str, key
 
 def badges(state: State, view_model: ViewModel) -> list[Badge]:
     """What must be said of the present picture."""
-    told = []
+    badges = []
     painted = any(item.local_dispersion for item in state.scene.objects)
     if painted and not state.physical:
-        told.append(
+        badges.append(
             Badge(
                 NOT_PHYSICAL,
                 "The dispersion brush has changed how far colours spread on a receiver. V shows the physical picture.",
             )
         )
     elif painted:
-        told.append(
+        badges.append(
             Badge(
                 "Physical: local gain left out",
                 "What the dispersion brush painted is kept but not shown. V brings it back.",
@@ -119,7 +119,7 @@ def badges(state: State, view_model: ViewModel) -> list[Badge]:
             )
         )
     if view_model.stats.first_order:
-        told.append(
+        badges.append(
             Badge(
                 "First order",
                 "Photons were traced through a glass of another dispersion; the picture follows the edit to first "
@@ -127,7 +127,7 @@ def badges(state: State, view_model: ViewModel) -> list[Badge]:
             )
         )
     if state.solo_nm is not None:
-        told.append(
+        badges.append(
             Badge(
                 f"Only {state.solo_nm:.0f} nm",
                 "The light of a single wavelength is shown. L goes back to all of it.",
@@ -135,17 +135,17 @@ def badges(state: State, view_model: ViewModel) -> list[Badge]:
             )
         )
     if (state.compare.mode in ("wipe", "error") or state.compare.holding) and not view_model.compare_ready:
-        told.append(
+        badges.append(
             Badge(
                 "Nothing to compare with yet",
                 "The other picture is being computed; the compare panel shows how far it is.",
             )
         )
     elif state.compare.holding:
-        told.append(Badge("Reference", "Shown while C is held down.", False))
+        badges.append(Badge("Reference", "Shown while C is held down.", False))
     if not state.playing:
-        told.append(Badge("Paused", "No photons are added. Space goes on.", False))
-    return told
+        badges.append(Badge("Paused", "No photons are added. Space goes on.", False))
+    return badges
 
 
 def draw_badges(shown: list[Badge], left: float, bottom: float) -> None:

@@ -1,6 +1,6 @@
 """The interface in a glfw window: events in, frames out, and nothing at all while nothing changes.
 
-The window knows a `Guest` (the session) that draws one frame within imgui and tells how long
+The window knows a `Guest` (the session) that draws one frame within imgui and says how long
 it can wait for the next; everything else here is glfw.
 """
 
@@ -159,7 +159,7 @@ class Window:
         while not guest.wants_to_close and not until():
             self._take_events(guest)
             if glfw.get_window_attrib(self._handle, glfw.ICONIFIED):
-                # Nothing to be seen: the picture waits, files and jobs are looked after.
+                # Nothing to be seen: the picture waits, files and jobs go on.
                 time.sleep(0.05)
             self.frame(guest)
 
@@ -275,7 +275,7 @@ def _create(place: WindowPlace, visible: bool) -> Any:
             f"no window with OpenGL {wanted} could be opened ({_first(problems)}): update the graphics driver, "
             "or set LIBGL_ALWAYS_SOFTWARE=1 for the software renderer"
         )
-    if glfw.get_platform() != glfw.PLATFORM_NULL:  # which takes the least side for the height
+    if glfw.get_platform() != glfw.PLATFORM_NULL:  # which takes the smallest side for the height
         glfw.set_window_size_limits(handle, MIN_SIDE, MIN_SIDE, glfw.DONT_CARE, glfw.DONT_CARE)
     if place.position is not None and _is_on_a_screen(place.position, place.size[0]):
         glfw.set_window_pos(handle, *place.position)

@@ -201,7 +201,7 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
         path.origin = origin_beyond;
         return;
     }
-    ShadingFrame frame = shading_frame(hit, facet, path.direction);
+    PathFrame frame = path_frame(path, hit, facet);
     CameraPath mirrored = path;
     vec3 n_i, n_t, theta3, cosine2, reflectance, mirror_weight;
     bool begins = false;
@@ -241,7 +241,7 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
     if (cut) return;
 #endif
     path.recut = mirrored.recut = false;
-    Deflection refracted = refract_at(frame, path.direction, n_i.y / n_t.y);
+    Deflection refracted = refract_at(frame.shading, path.direction, n_i.y / n_t.y);
     bool total = !refracted.exists, reflects = total;
     float likely = total ? 1.0 : dot(reflectance, vec3(0.25, 0.5, 0.25));
     bool strong = !total && (begins || path.depth <= 1 || min(path.share * likely, path.share * (1.0 - likely)) > p.split_threshold);
@@ -296,7 +296,7 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
     path.depth += 1;
 #ifdef HAS_MIRROR
     WHEN(kind == KIND_MIRROR) {
-        reflect_path(path, shading_frame(hit, facet, path.direction));
+        reflect_path(path, path_frame(path, hit, facet));
         path.origin = RayOrigin(hit.primitive, hit.object, dot(path.direction, hit.normal_g) < 0.0, path.origin.inside_mask);
         path.recut = false;
         vec3 colour = object_colours[hit.object].rgb;

@@ -2,23 +2,46 @@
 #ifndef CAMERA_INTERFACE_GLSL
 #define CAMERA_INTERFACE_GLSL
 
+// The normals that a path meets, worked out once: whatever turns it asks for them again.
+struct PathFrame {
+    ShadingFrame shading;
 #ifdef SPECTRAL_SWEEP
-// The normal that the ray at an end of the band meets; `turned`: how the path's own was deflected.
-vec3 end_normal(CameraPath path, int end, ShadingFrame frame)
+    vec3 end_normal[2];           // where the rays at the ends of its band arrive
+#endif
+#ifdef NORMAL_DERIVATIVES
+    vec3 columns[COLUMNS_HELD];   // derivatives of the shading normal
+#endif
+};
+
+PathFrame path_frame(CameraPath path, Hit hit, Triangle facet)
 {
-    return normal_beside(frame, path.narrowed ? path.end_position[end] - path.position : vec3(0.0));
+    PathFrame frame;
+    frame.shading = shading_frame(hit, facet, path.direction);
+#ifdef SPECTRAL_SWEEP
+    for (int end = 0; end < 2; ++end)
+        frame.end_normal[end] = normal_beside(frame.shading, path.narrowed ? path.end_position[end] - path.position : vec3(0.0));
+#endif
+#ifdef NORMAL_DERIVATIVES
+    for (int c = 0; c < COLUMNS_HELD; ++c) frame.columns[c] = normal_column(frame.shading, path.dposition[c]);
+#endif
+    return frame;
 }
+
+#ifdef NORMAL_DERIVATIVES
+#define NORMAL_COLUMN(frame, c) frame.columns[c]
+#else
+#define NORMAL_COLUMN(frame, c) vec3(0.0)
 #endif
 
-void reflect_path(inout CameraPath path, ShadingFrame frame)
+void reflect_path(inout CameraPath path, PathFrame frame)
 {
-    Deflection turned = reflect_at(frame, path.direction);
+    Deflection turned = reflect_at(frame.shading, path.direction);
     for (int c = 0; c < COLUMNS_HELD; ++c)
-        path.ddirection[c] = reflected_column(turned, path.direction, path.ddirection[c], normal_column(frame, path.dposition[c]));
+        path.ddirection[c] = reflected_column(turned, path.direction, path.ddirection[c], NORMAL_COLUMN(frame, c));
     path.direction = turned.direction;
 #ifdef SPECTRAL_SWEEP
     for (int end = 0; end < 2; ++end) {
-        vec3 normal = turned.geometric ? turned.normal : end_normal(path, end, frame), direction = path.end_direction[end];
+        vec3 normal = turned.geometric ? turned.normal : frame.end_normal[end], direction = path.end_direction[end];
         path.end_direction[end] = normalize(reflect_direction(direction, normal, dot(direction, normal)));
     }
 #endif
@@ -26,7 +49,7 @@ void reflect_path(inout CameraPath path, ShadingFrame frame)
 
 #ifdef HAS_DIELECTRIC
 // `turned`: how the path's own ray is refracted.
-void refract_path(inout CameraPath path, Deflection turned, ShadingFrame frame, MediumInterface boundary, vec3 n_i, vec3 n_t)
+void refract_path(inout CameraPath path, Deflection turned, PathFrame frame, MediumInterface boundary, vec3 n_i, vec3 n_t)
 {
     float eta_it = n_i.y / n_t.y;
     for (int c = 0; c < COLUMNS_HELD; ++c) {
@@ -34,12 +57,12 @@ void refract_path(inout CameraPath path, Deflection turned, ShadingFrame frame, 
 #if SPECTRAL_GROUPS > 0
         if (c >= SPATIAL) deta_it = index_ratio_derivative(boundary, uint(c - SPATIAL), path.band.y, n_i.y, n_t.y);
 #endif
-        path.ddirection[c] = refracted_column(turned, path.direction, path.ddirection[c], normal_column(frame, path.dposition[c]), eta_it, deta_it);
+        path.ddirection[c] = refracted_column(turned, path.direction, path.ddirection[c], NORMAL_COLUMN(frame, c), eta_it, deta_it);
     }
     path.direction = turned.direction;
 #ifdef SPECTRAL_SWEEP
     for (int end = 0; end < 2; ++end) {
-        vec3 normal = turned.geometric ? turned.normal : end_normal(path, end, frame), direction = path.end_direction[end];
+        vec3 normal = turned.geometric ? turned.normal : frame.end_normal[end], direction = path.end_direction[end];
         float eta_end = (end == 0 ? n_i.x : n_i.z) / (end == 0 ? n_t.x : n_t.z), theta = dot(direction, normal);
         float cosine2 = transmitted_cosine2(theta, eta_end);
         vec3 position_l, direction_l;
@@ -50,13 +73,13 @@ void refract_path(inout CameraPath path, Deflection turned, ShadingFrame frame, 
 }
 
 // Cosine of incidence at three places of the band.
-vec3 incidence_over_band(CameraPath path, ShadingFrame frame)
+vec3 incidence_over_band(CameraPath path, PathFrame frame)
 {
-    vec3 theta = vec3(dot(path.direction, frame.normal));
+    vec3 theta = vec3(dot(path.direction, frame.shading.normal));
 #ifdef SPECTRAL_SWEEP
     if (path.narrowed) {
-        theta.x = dot(path.end_direction[0], end_normal(path, 0, frame));
-        theta.z = dot(path.end_direction[1], end_normal(path, 1, frame));
+        theta.x = dot(path.end_direction[0], frame.end_normal[0]);
+        theta.z = dot(path.end_direction[1], frame.end_normal[1]);
         theta.xz = clamp(theta.xz, -1.0, -1e-6);
     }
 #endif
@@ -65,12 +88,12 @@ vec3 incidence_over_band(CameraPath path, ShadingFrame frame)
 
 #ifdef SPECTRAL_SWEEP
 // The wavelength within the path's band where total internal reflection sets in; `passes` says where it transmits.
-float onset_of(CameraPath path, ShadingFrame frame, vec3 theta, MediumInterface boundary, bvec3 passes)
+float onset_of(CameraPath path, PathFrame frame, vec3 theta, MediumInterface boundary, bvec3 passes)
 {
     float dtheta[SPECTRAL_GROUPS];
     vec2 bend = theta.xz - theta.y;
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-        dtheta[g] = dot(path.ddirection[SPATIAL + g], frame.normal) + dot(path.direction, normal_column(frame, path.dposition[SPATIAL + g]));
+        dtheta[g] = dot(path.ddirection[SPATIAL + g], frame.shading.normal) + dot(path.direction, NORMAL_COLUMN(frame, SPATIAL + g));
         bend -= dtheta[g] * path.end_step[g];
     }
     return total_reflection_onset(path.band, theta.y, dtheta, bend, boundary, passes);

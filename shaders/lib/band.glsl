@@ -44,10 +44,12 @@ float total_reflection_onset(vec3 band, float theta, float dtheta[SPECTRAL_GROUP
     float a = low_side ? band.x : band.y, b = low_side ? band.y : band.z;
     bool passes_a = low_side ? passes.x : passes.y;
     float per_reach = 1.0 / max(b - a, 1e-9), bend_end = low_side ? bend.x : bend.y;
+    float anchors[SPECTRAL_GROUPS];
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) anchors[g] = spectral_row(uint(VARIABLE_ROW) + uint(g), band.y);
     for (int i = 0; i < ONSET_HALVINGS; ++i) {
         float x = 0.5 * (a + b), reach = (x - band.y) * per_reach;
         float theta_x = theta + reach * reach * bend_end;
-        for (int g = 0; g < SPECTRAL_GROUPS; ++g) theta_x += dtheta[g] * variable_step(uint(g), x, band.y);
+        for (int g = 0; g < SPECTRAL_GROUPS; ++g) theta_x += dtheta[g] * (spectral_row(uint(VARIABLE_ROW) + uint(g), x) - anchors[g]);
         float eta_x = medium_index(boundary.before, x) / medium_index(boundary.after, x);
         bool passes_x = transmitted_cosine2(clamp(theta_x, -1.0, -1e-6), eta_x) > 0.0;
         a = passes_x == passes_a ? x : a;

@@ -156,7 +156,7 @@ def test_the_fringe_notices_a_wrong_sign(gl, monkeypatch, tmp_path) -> None:
     mutate(
         monkeypatch,
         tmp_path,
-        "camera/crossing.glsl",
+        "camera/interface.glsl",
         "deta_it = index_ratio_derivative(",
         "deta_it = abs(1.0) * -index_ratio_derivative(",
     )

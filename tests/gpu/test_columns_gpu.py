@@ -229,7 +229,7 @@ MUTANTS = {
         "derivative -= medium_slope",
         "point",
     ),
-    "another glass's slope": ("lib/medium.glsl", "object_at(crossing.before).group == g", "true", "doublet"),
+    "another glass's slope": ("lib/medium.glsl", "object_at(boundary.before).group == g", "true", "doublet"),
     "no slope of the medium": (
         "lib/medium.glsl",
         "return spectral_row(uint(SLOPE_ROW) + object_at(object).medium, x);",
@@ -237,15 +237,15 @@ MUTANTS = {
         "by wavelength",
     ),
     "flat normals": (
-        "light/trace.comp",
-        "sign_n * normalised_derivative(summed, dsummed)",
-        "vec3(0.0)",
+        "lib/interface.glsl",
+        "return frame.interpolated ? dnormal : vec3(0.0);",
+        "return vec3(0.0);",
         "inner reflections",
     ),
     "normal not turned inside": (
-        "light/trace.comp",
-        "float sign_n = entering ? 1.0 : -1.0",
-        "float sign_n = 1.0",
+        "lib/interface.glsl",
+        "return frame.interpolated ? dnormal",
+        "return frame.interpolated ? sign(dot(frame.summed, vec3(1.0))) * dnormal",
         "beam",
     ),
     "mirror forgets the normal": (
@@ -257,7 +257,7 @@ MUTANTS = {
     "position follows the shading normal": (
         "light/trace.comp",
         "ray.direction, hit.normal_g, hit.distance)",
-        "ray.direction, normal, hit.distance)",
+        "ray.direction, shading_frame(hit, facet, ray.direction).normal, hit.distance)",
         "sun",
     ),
     "axes swapped": (

@@ -12,7 +12,7 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.base.image_io import read_image
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit.requests import Animate, Bake, Screenshot
-from spectrasplat.edit.state import Display as PilotRender
+from spectrasplat.edit.state import Display as DisplaySettings
 from spectrasplat.edit.state import Key, State
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.passes.display import Display
@@ -40,7 +40,7 @@ def shown(gl):
     rgb = np.linspace(0.0, 2.0, SIZE[0] * SIZE[1] * 4, dtype=np.float32).reshape(SIZE[1], SIZE[0], 4)
     radiance = gl.ctx.texture(SIZE, 4, rgb.tobytes(), dtype="f4")
     display = Display(gl)
-    yield Shown(display.run(radiance, PilotRender(), 0.5, SIZE), radiance, 0.5)
+    yield Shown(display.run(radiance, DisplaySettings(), 0.5, SIZE), radiance, 0.5)
     display.release()
     radiance.release()
 
@@ -102,7 +102,7 @@ def test_an_animation_looks_as_the_window_and_can_be_cancelled(
 
     false = replace(
         state,
-        display=PilotRender(false_colour=True),
+        display=DisplaySettings(false_colour=True),
         animation=(Key(0.0, "camera.fov_deg", 30.0), Key(1.0, "camera.fov_deg", 40.0)),
     )
     request = Animate(tmp_path / "frames", "keys", 2, 2.0, SIZE, 10_000, 1)

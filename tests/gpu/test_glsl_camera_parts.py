@@ -1,5 +1,4 @@
-"""Parts of the camera's program that stand alone: the box that a look is averaged over, weights over a band, and when
-columns are dropped."""
+"""Parts of the camera's program that stand alone: the box that a look is averaged over, and when columns are dropped."""
 
 from __future__ import annotations
 
@@ -41,7 +40,8 @@ def test_the_box_of_three_sides_has_their_covariance(gl) -> None:
 PATH = {"SPECTRAL_GROUPS": 0, "NONE": "0xffffffffu"}
 STANDALONE = """
 struct RayOrigin { uint primitive; uint object; bool inside; uint inside_mask; };
-struct RayRecord { uint inside_mask; uint inside_object; };
+struct MediumStack { uint mask; uint object; };
+#define COLUMN_LIMIT 1e6
 struct CameraParameters { uint sample_index; uint draw_index; uint dithered; uint bands; };
 CameraParameters p = CameraParameters(3u, 3u, 0u, 4u);
 vec3 transfer_column(vec3 dp, vec3 dd, vec3 d, vec3 n, float t) {
@@ -53,27 +53,9 @@ uint hash_combine(uint a, uint b) { return a ^ b; }
 """
 
 
-def test_weights_over_a_band_are_straight_between_its_ends_and_its_anchor(gl) -> None:
-    rng = np.random.default_rng(4)
-    band = np.sort(rng.random((COUNT, 3)), axis=1)
-    band[:200] = band[:200, :1]  # a band without width
-    band, weight = as_f32(band), as_f32(rng.random((COUNT, 3)))
-    x = as_f32(rng.uniform(-0.2, 1.2, (COUNT, 3)))
-    x[200:400] = band[200:400]
-    body = "EyePath path; path.band = band; path.weight = weight; at = weights_at(path, x);"
-    got = evaluate(
-        gl.ctx, [], body, {"band": band, "weight": weight, "x": x}, {"at": "vec3"}, PATH, declarations=STANDALONE
-    )["at"]
-    wide = np.diff(band, axis=1).min(axis=1) > 1e-3
-    want = np.array([np.interp(row, b, w) for row, b, w in zip(x[wide], band[wide], weight[wide], strict=True)])
-    assert np.abs(got[wide] - want).max() < 1e-6 / 1e-3
-    assert np.abs(got[200:400][wide[200:400]] - weight[200:400][wide[200:400]]).max() < 1e-6
-    assert np.isfinite(got).all() and (got >= 0.0).all() and (got <= 1.0).all()
-
-
 def test_columns_that_are_no_numbers_or_without_bound_are_dropped(gl) -> None:
     rng = np.random.default_rng(5)
-    dp = rng.normal(size=(COUNT, 3)) * 10.0 ** rng.uniform(-6, 6, (COUNT, 1))
+    dp = rng.normal(size=(COUNT, 3)) * 10.0 ** rng.uniform(-4, 8, (COUNT, 1))
     dp = dp.astype(np.float32)
     dp[:50, 1], dp[50:100, 2], dp[100:150, 0] = np.nan, np.inf, -np.inf
     body = """
@@ -86,8 +68,8 @@ def test_columns_that_are_no_numbers_or_without_bound_are_dropped(gl) -> None:
     got = evaluate(gl.ctx, [], body, {"column": dp}, {"held": "uint", "left": "vec3"}, PATH, declarations=STANDALONE)
     with np.errstate(invalid="ignore", over="ignore"):
         length = np.linalg.norm(dp.astype(np.float64), axis=1)
-        good = length < 1e4
-    clear = ~(np.abs(length - 1e4) < 1.0)
+        good = length < 1e6
+    clear = ~(np.abs(length - 1e6) < 100.0)
     assert (got["held"].astype(bool) == good)[clear].all()
     assert 0.3 < good.mean() < 0.95 and not got["held"][:150].any()
     assert (got["left"][~good & clear] == 0.0).all() and np.array_equal(

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from spectrasplat.gpu import bindings
-from spectrasplat.gpu.records import NONE, ray_record
+from spectrasplat.gpu.records import NONE
 from spectrasplat.gpu.scene_buffers import OBJECT, SCENE_STRUCTS
 from spectrasplat.gpu.scene_texels import SceneTexels, spectra_texture
 from spectrasplat.reference import optics
@@ -207,18 +207,14 @@ def test_the_highest_solid_around_a_ray_is_its_medium(gl) -> None:
     objects["stack_bit"] = NONE
     objects["stack_bit"][order] = range(3)
     body = """
-    RayRecord ray;
-    ray.inside_mask = mask;
-    ray.inside_object = NONE;
-    Crossing c = cross_boundary(ray, object, enter != 0u);
-    before = c.before; after = c.after; mask_after = c.mask_after; changes = c.changes ? 1u : 0u;
+    MediumInterface c = cross_boundary(MediumStack(mask, NONE), object, enter != 0u);
+    before = c.before; after = c.after; mask_after = c.behind.mask; changes = c.changes ? 1u : 0u;
     """
     outputs = dict.fromkeys(("before", "after", "mask_after", "changes"), "uint")
     inputs = {"mask": mask, "object": np.array(order, np.uint32)[bit], "enter": enter}
     texels = SceneTexels(gl.ctx, {"OBJECTS": objects})
     defines = {**bindings.SCENE_DEFINES, **texels.defines, "SPECTRAL_SAMPLES": 2, **NESTED}
-    structs = (*SCENE_STRUCTS, ray_record(0))
-    got = evaluate(gl.ctx, ["lib/medium.glsl"], body, inputs, outputs, defines, structs, binders=[texels.bind])
+    got = evaluate(gl.ctx, ["lib/medium.glsl"], body, inputs, outputs, defines, SCENE_STRUCTS, binders=[texels.bind])
     texels.release()
 
     def medium(held: int) -> int:

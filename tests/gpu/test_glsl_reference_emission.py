@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from reference.lamps import cosine, isotropic, lamp, lopsided
+from spectrasplat.model.optics.spectrum import constant
 from spectrasplat.reference import emission_maps, random_numbers
 from spectrasplat.reference.optics import unit
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
@@ -12,6 +14,7 @@ COVERS = {
     "random.glsl": ("hash_pcg", "hash_combine", "unit_float", "kronecker"),
     "emission.glsl": ("lattice_point", "azimuthal_direction", "concentric_disc"),
     "spot.glsl": ("angle_between", "spot_falloff"),
+    "profile.glsl": ("profile_stretch", "profile_intensity"),
 }
 COUNT = 4096
 WORD = 2**32
@@ -119,3 +122,29 @@ def test_spot_falloff(gl, inner: float, outer: float) -> None:
     assert clear.mean() > 0.99
     assert np.abs(got - want)[clear].max() < 5e-5
     assert 0.0 < want.mean() <= 1.0
+
+
+@pytest.mark.parametrize("text", [isotropic(), cosine(), lopsided()], ids=["isotropic", "cosine", "lopsided"])
+def test_profiles_are_looked_up(gl, tmp_path, text: str) -> None:
+    rng = np.random.default_rng(11)
+    light = lamp(tmp_path, constant(1.0), text, direction=(0.6, 0.0, -0.8), rotation_deg=20.0)
+    axis, (u, v) = np.asarray(light.direction), light.across
+    direction = as_f32(np.concatenate([unit(rng.normal(size=(COUNT - 2, 3))), [axis, -axis]]))
+    table = light.profile.packed()
+    axes = {name: as_f32(np.tile(value, (COUNT, 1))) for name, value in (("axis", axis), ("u", u), ("v", v))}
+    got = evaluate(
+        gl.ctx,
+        ["lib/profile.glsl"],
+        "f = profile_intensity(1u, d, axis, u, v); cell = profile_stretch(3u, uint(profiles[1]), angle, along);",
+        {"d": direction, **axes, "angle": as_f32(rng.uniform(0.0, np.pi, COUNT))},
+        {"f": "float", "cell": "uint", "along": "float"},
+        {"BIND_PROFILES": 8},
+        buffers={8: np.concatenate([[0.0], table]).astype("f4")},
+    )
+    theta = emission_maps.angle_between(unit(direction), np.tile(axis, (COUNT, 1)))
+    want = light.profile.at(theta, np.arctan2(direction @ v, direction @ u))
+    # Beyond the last angle the cone ends the light, not the table; on the axis the turn about it is of no account.
+    clear = (theta < light.profile.cone_rad - 1e-4) & (theta > 1e-5) & (theta < np.pi - 1e-5)
+    # llvmpipe's atan is good to 2e-5.
+    assert np.abs(got["f"] - want)[clear].max() < 1e-4
+    assert (got["along"] >= 0.0).all() and (got["along"] <= 1.0).all()

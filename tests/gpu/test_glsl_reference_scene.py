@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from reference import gaussians, medium
 from spectrasplat.gpu import bindings
-from spectrasplat.gpu.records import NONE, ray_record
+from spectrasplat.gpu.records import NONE
 from spectrasplat.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, TRIANGLE
 from spectrasplat.gpu.scene_texels import SceneTexels, spectra_texture
 from spectrasplat.gpu.schema import Struct
@@ -18,12 +18,12 @@ from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 COVERS = {
     "medium.glsl": (
         "medium_of",
-        "ray_is_inside",
-        "ray_medium",
+        "is_inside",
+        "current_medium",
         "medium_weight_row",
         "cross_boundary",
         "medium_index",
-        "crossing_indices",
+        "interface_indices",
         "medium_slope",
         "index_ratio_derivative",
     ),
@@ -86,7 +86,7 @@ class Scene:
         )
         spectra = spectra_texture(self.ctx, self.table)
         defines = {**bindings.SCENE_DEFINES, **texels.defines, **COMMON, **(STACK if stack else {})}
-        structs: tuple[Struct, ...] = (*SCENE_STRUCTS, ray_record(0))
+        structs: tuple[Struct, ...] = SCENE_STRUCTS
         try:
             return evaluate(
                 self.ctx,
@@ -108,9 +108,6 @@ def scene(gl) -> Scene:
     return Scene(gl)
 
 
-RAY = "RayRecord ray; ray.inside_mask = mask; ray.inside_object = alone;"
-
-
 @pytest.mark.parametrize("stack", [False, True], ids=["alone", "stack"])
 def test_media_on_both_sides_of_a_surface(scene: Scene, stack: bool) -> None:
     masks = range(8) if stack else (0,)
@@ -122,15 +119,13 @@ def test_media_on_both_sides_of_a_surface(scene: Scene, stack: bool) -> None:
         for enters in (0, 1)
     ]
     mask, alone, hit, enters = np.array(cases, np.uint32).T
-    body = (
-        RAY
-        + """
-    Crossing c = cross_boundary(ray, hit, enters != 0u);
-    before = c.before; after = c.after; mask_after = c.mask_after; object_after = c.object_after;
+    body = """
+    MediumStack stack = MediumStack(mask, alone);
+    MediumInterface c = cross_boundary(stack, hit, enters != 0u);
+    before = c.before; after = c.after; mask_after = c.behind.mask; object_after = c.behind.object;
     changes = c.changes ? 1u : 0u;
-    inside = ray_is_inside(ray) ? 1u : 0u; now = ray_medium(ray); weight = medium_weight_row(ray);
+    inside = is_inside(stack) ? 1u : 0u; now = current_medium(stack); weight = medium_weight_row(stack);
     """
-    )
     names = ("before", "after", "mask_after", "object_after", "changes", "inside", "now", "weight")
     got = scene.evaluate(
         body, {"mask": mask, "alone": alone, "hit": hit, "enters": enters}, dict.fromkeys(names, "uint"), stack
@@ -173,8 +168,8 @@ def test_indices_and_their_slopes_at_a_surface(scene: Scene, stack: bool) -> Non
         )
     x = as_f32(rng.uniform(-0.05, 1.05, (COUNT, 3)))
     body = """
-    Crossing c = Crossing(before, after, 0u, NONE, true);
-    crossing_indices(c, x, n_i, n_t);
+    MediumInterface c = MediumInterface(before, after, MediumStack(0u, NONE), true);
+    interface_indices(c, x, n_i, n_t);
     single = medium_index(before, x.x);
     row2 = spectral_row(2u, x.z);
     slope = medium_slope(after == NONE ? 0u : after, x.y);

@@ -57,9 +57,7 @@ def inputs(scene: Scene, **changes) -> LiveInputs:
 
 
 @contextmanager
-def live(
-    context: Context, scene: Scene, photons: int = PHOTONS, capacity_bytes: int = 64 << 20
-) -> Iterator[LiveLight]:
+def live(context: Context, scene: Scene, photons: int = PHOTONS, capacity_bytes: int = 64 << 20) -> Iterator[LiveLight]:
     light = LiveLight(context, scene, SETTINGS, capacity_bytes)
     try:
         light.light_pass.prepare()
@@ -266,7 +264,8 @@ def test_first_rounds_are_the_same_picture_only_coarser(gl: Context) -> None:
         assert quick is not None
         texture, *_ = quick.resolved_textures()
         coarse = np.frombuffer(texture.read(), np.float32).astype(float).reshape(-1, 4) * quick.scale
-        assert quick.flux(True) * quick.scale == pytest.approx(light.light_pass.map_flux() * light.light_pass.map_scale, rel=0.02)
+        light_pass = light.light_pass
+        assert quick.flux(True) * quick.scale == pytest.approx(light_pass.map_flux() * light_pass.map_scale, rel=0.02)
         assert np.isfinite(coarse).all() and whole.max() > 0.0
 
 

@@ -10,10 +10,7 @@ import numpy as np
 import pytest
 from reference import tracer
 from reference.tracer import Body, Index, TriangleList
-from spectrasplat.gpu import bindings
-from spectrasplat.gpu.records import NONE
-from spectrasplat.gpu.scene_buffers import OBJECT, SCENE_STRUCTS, TRIANGLE, SceneBuffers
-from spectrasplat.gpu.scene_texels import SceneTexels
+from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.model.features import Features
 from spectrasplat.model.geometry import primitives_round
 from spectrasplat.model.geometry.mesh import make_mesh
@@ -35,11 +32,7 @@ from spectrasplat.passes.ray_fan import RayFan
 from spectrasplat.passes.ray_paths import RayPaths
 from spectrasplat.reference import optics
 from spectrasplat.render.light_pass import spectral_axis
-from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
-COVERS = {
-    "surface.glsl": ("facing_geometric", "facing_normal", "reflected_direction", "refracted_direction", "surface_point")
-}
 SCENES = Path(__file__).parents[2] / "assets" / "scenes"
 LINES_NM = (440.0, 546.0, 640.0)
 WHITE = spectrum.illuminant("D65").scaled_to_luminous(1000.0)
@@ -228,87 +221,3 @@ def _box(half: float) -> tuple[np.ndarray, np.ndarray]:
     corners = half * np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     return corners, np.array([t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))])
-
-
-def test_surface_functions_against_their_twins(gl) -> None:
-    """Flat and smooth facets, met from both sides, some at grazing incidence where shading normals mislead."""
-    rng = np.random.default_rng(8)
-    count = 2000
-    records = TRIANGLE.zeros(count)
-    for name in ("vertex", "edge1", "edge2"):
-        records[name] = rng.normal(size=(count, 3))
-    smooth = np.arange(count) % 3 > 0
-    records["normals"] = np.where(smooth, 3 * np.arange(count), NONE)
-    normal_g = optics.unit(np.cross(records["edge1"].astype(float), records["edge2"].astype(float)))
-    corner = optics.unit(normal_g[:, None] + 0.4 * rng.normal(size=(count, 3, 3)))
-    normals = np.zeros((3 * count, 4), np.float32)
-    normals[:, :3] = corner.reshape(-1, 3)
-    texels = SceneTexels(gl.ctx, {"TRIANGLES": records, "NORMALS": normals, "OBJECTS": OBJECT.zeros(1)})
-    inputs = {
-        "d": as_f32(optics.unit(rng.normal(size=(count, 3)))),
-        "n_g": as_f32(normal_g),
-        "bary": as_f32(rng.uniform(0.05, 0.45, (count, 2))),
-        "eta": as_f32(rng.choice([1 / 1.6, 1.6, 1.0], count)),
-        "slot": np.arange(count, dtype=np.uint32),
-    }
-    body = """
-    Hit hit = Hit(1.0, slot, 0u, n_g, bary);
-    vec3 n = facing_normal(hit, d);
-    bool is_total;
-    facing = facing_geometric(hit, d);
-    shading = n;
-    mirrored = reflected_direction(hit, d, n);
-    bent = refracted_direction(hit, d, n, eta, is_total);
-    total = is_total ? 1u : 0u;
-    place = surface_point(hit, vec3(0.0), d);
-    """
-    outputs = {
-        "facing": "vec3",
-        "shading": "vec3",
-        "mirrored": "vec3",
-        "bent": "vec3",
-        "total": "uint",
-        "place": "vec3",
-    }
-    defines = {
-        **bindings.SCENE_DEFINES,
-        **texels.defines,
-        "TRIANGLE_COUNT": count,
-        "SPECTRAL_SAMPLES": 2,
-        "LOOSE_TRIANGLES": 1,
-        "SMOOTH_NORMALS": 1,
-    }
-    got = evaluate(gl.ctx, ["lib/surface.glsl"], body, inputs, outputs, defines, SCENE_STRUCTS, binders=[texels.bind])
-    texels.release()
-
-    d, g, eta = inputs["d"], inputs["n_g"], inputs["eta"]
-    facing = np.where((optics.dot(d, g) < 0)[:, None], g, -g)
-    weights = np.column_stack([1 - inputs["bary"].sum(axis=1), inputs["bary"]])
-    shading = optics.unit(np.einsum("nc,ncj->nj", weights, normals.reshape(count, 3, 4)[..., :3].astype(float)))
-    shading = np.where((optics.dot(shading, facing) < 0)[:, None], -shading, shading)
-    shading = np.where((smooth & (optics.dot(d, shading) < -1e-4))[:, None], shading, facing)
-    cosine2 = optics.transmitted_cosine2(d, shading, eta)
-    clear = (np.abs(cosine2) > 1e-3) & (np.abs(optics.dot(d, facing)) > 1e-3) & (np.abs(optics.dot(d, shading)) > 1e-3)
-    mirrored = optics.reflect(d, shading)
-    by_geometry = optics.dot(mirrored, facing) <= 0
-    mirrored = np.where(by_geometry[:, None], optics.reflect(d, facing), mirrored)
-    bent = np.array([_bent(*row) for row in zip(d, shading, facing, eta, mirrored, strict=True)])
-    assert got["facing"] == pytest.approx(facing, abs=1e-6)
-    assert got["shading"][clear] == pytest.approx(shading[clear], abs=1e-5)
-    assert got["mirrored"][clear] == pytest.approx(mirrored[clear], abs=1e-4)
-    assert np.all(got["total"][clear & (cosine2 <= 0)] == 1)
-    close = np.linalg.norm(got["bent"] - bent, axis=1) < 2e-4
-    assert close[clear].mean() > 0.998  # at the seam between the two normals either may win
-    assert by_geometry[clear].sum() > 20 and (cosine2[clear] <= 0).sum() > 100
-    at = records["vertex"] + inputs["bary"][:, :1] * records["edge1"] + inputs["bary"][:, 1:] * records["edge2"]
-    assert got["place"] == pytest.approx(at, abs=1e-5)
-
-
-def _bent(d: np.ndarray, shading: np.ndarray, facing: np.ndarray, eta: float, mirrored: np.ndarray) -> np.ndarray:
-    if optics.transmitted_cosine2(d, shading, eta) <= 0:
-        return mirrored
-    bent = optics.refract(d, shading, eta)
-    if bent @ facing >= 0:
-        inside = optics.transmitted_cosine2(d, facing, eta) > 0
-        bent = optics.refract(d, facing, eta) if inside else optics.reflect(d, facing)
-    return bent

@@ -183,7 +183,8 @@ HAND_WRITTEN = {
 def uniform_blocks() -> list[tuple[str, str, str]]:
     """(file, block, text between its braces) of every std140 block of the shaders."""
     files = sorted(paths.shaders_dir().rglob("*.*"))
-    return [(file.name, *found) for file in files if file.suffix != ".md" for found in _BLOCK.findall(file.read_text())]
+    shown = [(file.relative_to(paths.shaders_dir()).as_posix(), file) for file in files if file.suffix != ".md"]
+    return [(name, *found) for name, file in shown for found in _BLOCK.findall(file.read_text())]
 
 
 @pytest.mark.parametrize(("file", "name", "text"), uniform_blocks(), ids=lambda value: value if len(value) < 20 else "")

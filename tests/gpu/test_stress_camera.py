@@ -81,15 +81,15 @@ MUTANTS = {
     "total reflection before its time": (
         "eye-tir-margin",
         "camera/camera.comp",
-        "bool total = cosine2.y <= 0.0",
+        "bool total = !refracted.exists",
         "bool total = cosine2.y <= 0.01",
         "inside the edge",
     ),
     "a reflection that turns a little": (
         "eye-corner",
-        "camera/crossing.glsl",
-        "path.direction = normalize(reflect_direction(path.direction, facing.normal, theta));",
-        "path.direction = normalize(reflect_direction(path.direction, facing.normal, theta) + vec3(5e-3, 0.0, 0.0));",
+        "camera/interface.glsl",
+        "path.direction = turned.direction;",
+        "path.direction = normalize(turned.direction + vec3(5e-3, 0.0, 0.0));",
         "returned",
     ),
     "paths given up too early": (

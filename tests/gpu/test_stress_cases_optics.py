@@ -62,8 +62,8 @@ MUTANTS = {
     "wrong sign of dispersion when leaving": (
         "gem-bands",
         "lib/medium.glsl",
-        "derivative += medium_slope(crossing.before, x)",
-        "derivative -= medium_slope(crossing.before, x)",
+        "derivative += medium_slope(boundary.before, x)",
+        "derivative -= medium_slope(boundary.before, x)",
         "band ends",
     ),
     "overflow not seen": ("overflow", "light/footprint.comp", "bool accident = !(", "bool accident = false && !(", ""),

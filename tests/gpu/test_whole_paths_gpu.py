@@ -186,8 +186,8 @@ def test_position_and_throughput_at_three_wavelengths(gl, name: str) -> None:
 MUTANTS = {
     "one coefficient for the band": (
         "light/trace.comp",
-        "exp(-alpha * hit.distance)",
-        "vec3(exp(-alpha.y * hit.distance))",
+        "exp(-alpha * distance)",
+        "vec3(exp(-alpha.y * distance))",
         "absorption",
     ),
     "flux not absorbed": (
@@ -202,11 +202,16 @@ MUTANTS = {
         "stack_objects[findLSB(mask)]",
         "nested, the outer decides",
     ),
-    "grey mirror": ("light/trace.comp", "child.throughput *= kept;", "child.throughput *= kept.y;", "coloured mirror"),
+    "grey mirror": (
+        "light/trace.comp",
+        "send_on(child, reflected, kept, outcome)",
+        "send_on(child, reflected, kept.yyy, outcome)",
+        "coloured mirror",
+    ),
     "one polarisation": ("lib/optics.glsl", "0.5 * (rs * rs + rp * rp)", "rs * rs", "steep Fresnel"),
     "covered surface is an event": (
         "lib/medium.glsl",
-        "crossing.before != crossing.after",
+        "boundary.before != boundary.after",
         "true",
         "nested, the outer decides",
     ),

@@ -57,7 +57,7 @@ class Flow:
     def begin(self) -> None:
         context = Context(moderngl.create_context(require=430, context=GlfwLoader()), "window")
         session = Session(context, self._scene, make_engine=small_engine(PHOTONS))
-        session.companions.gallery.release()
+        session.jobs.gallery.release()
         preferences = replace(session.state.preferences, target_photons=target(PHOTONS), refine_when_still=False)
         session.state = replace(session.state, preferences=preferences)
         self.viewer = Viewer(session)

@@ -119,7 +119,7 @@ def viewer(
 ) -> Iterator[Hands]:
     """A viewer of `scene`; `photons` is the target."""
     session = Session(context, scene, make_engine=small_engine(photons))
-    session.companions.gallery.release()
+    session.jobs.gallery.release()
     preferences = replace(session.state.preferences, target_photons=target(photons), refine_when_still=refine)
     session.state = replace(session.state, preferences=preferences, selection=Selection())
     guest = Viewer(session, draw)

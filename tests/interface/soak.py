@@ -129,8 +129,8 @@ class ViewportInput:
         session = self._hands.session
         if session.wants_to_close:
             session.wants_to_close = session.asks_to_quit = False
-        if session.companions.exports.job is not None:
-            session.companions.cancel_export()
+        if session.jobs.exports.job is not None:
+            session.jobs.cancel_export()
 
     def _item(self) -> str:
         labels = sorted(k for k, item in self._hands.interface.items.items.items() if "/" in k and item.is_visible)

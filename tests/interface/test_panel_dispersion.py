@@ -29,7 +29,7 @@ N_SF11 = "Schott N-SF11"
 def fresh_looks(monkeypatch: pytest.MonkeyPatch) -> None:
     """What a panel remembers of how it is looked at is not carried from test to test."""
     for module in (abbe, dispersion, glass_picker, index_curve):
-        monkeypatch.setattr(module, "_look", module._Look())
+        monkeypatch.setattr(module, "_memory", module._Memory())
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def test_gain_stays_when_n_d_is_edited(panel: PanelRig) -> None:
 def test_an_impossible_index_is_refused_and_said(panel: PanelRig) -> None:
     panel.type_into("Index n_d", "-2")
     assert own_numbers(panel.glass)[0] > 0.0
-    assert "index" in dispersion._look.refused
+    assert "index" in dispersion._memory.refused
 
 
 def test_as_sold_undoes_every_edit(panel: PanelRig) -> None:
@@ -159,7 +159,7 @@ def test_picker_filters_and_sorts() -> None:
 
 def _pixel(rig: PanelRig, n_d: float, v_d: float) -> tuple[float, float]:
     """Where a glass lies in the diagram: by the plot's own rectangle, found from two axes' ranges."""
-    low, high = abbe._look.corners
+    low, high = abbe._memory.corners
     x = low[0] + (high[0] - low[0]) * (V_D_RANGE[1] - v_d) / (V_D_RANGE[1] - V_D_RANGE[0])
     y = low[1] + (high[1] - low[1]) * (N_D_RANGE[1] - n_d) / (N_D_RANGE[1] - N_D_RANGE[0])
     return x, y

@@ -137,7 +137,7 @@ def test_dropped_pictures(nothing_selected: State, picture: Path) -> None:
     worn = dialogs.open_path(replace(nothing_selected, selection=Selection("object", table)), view_model, picture)
     assert worn.scene.objects[table].material.texture is not None
     assert dialogs.open_path(nothing_selected, ViewModel(), Path("other.toml")).requests == (Open(Path("other.toml")),)
-    assert picture_choice.is_picture(Path("X.EXR")) and not picture_choice.is_picture(Path("x.glb"))
+    assert picture_choice.is_part(Path("X.EXR")) and not picture_choice.is_part(Path("x.glb"))
 
 
 def test_a_name_too_long_for_its_field_is_cut(gl: Context, nothing_selected: State) -> None:

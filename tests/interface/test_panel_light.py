@@ -9,10 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from panel_rig import PanelRig, receiver_of, scene_state
+from reference.lamps import isotropic
 from spectrasplat.edit import edits
+from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
+from spectrasplat.model.lights import IesLight
 from spectrasplat.model.scene import Dab
-from spectrasplat.ui.panels import light_panel, light_spectrum
+from spectrasplat.ui.panels import file_browser, light_panel, light_spectrum, picture_choice
 from spectrasplat.ui.panels.brush_panel import draw_brush
 from spectrasplat.ui.panels.light_panel import angles_of, direction_of, draw_light
 from spectrasplat.ui.panels.light_spectrum import LAMPS
@@ -21,7 +24,7 @@ from spectrasplat.ui.panels.light_spectrum import LAMPS
 @pytest.fixture(autouse=True)
 def fresh_looks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(light_panel, "_power_key", {})
-    monkeypatch.setattr(light_spectrum, "_look", light_spectrum._Look())
+    monkeypatch.setattr(light_spectrum, "_memory", light_spectrum._Memory())
 
 
 @pytest.fixture
@@ -131,6 +134,47 @@ def test_name_is_taken_when_the_field_is_left(panel: PanelRig) -> None:
     panel.type("sunbeam")
     panel.click("Light spectrum")
     assert panel.light.name == "sunbeam"
+
+
+# ---- lamps from files ---------------------------------------------------------------------
+
+
+def test_a_lamp_is_made_turned_and_given_lumens(panel: PanelRig) -> None:
+    choose(panel, "Kind", "Photometric (IES)")
+    assert isinstance(panel.light, IesLight)
+    assert "File" in panel.items.items and "Width" not in panel.items.items
+    panel.type_into("Rotation", "45")
+    assert panel.light.rotation_deg == 45.0
+    panel.type_into("Power", "800")
+    assert edits.light_power(panel.light, "lumens") == pytest.approx(800.0)
+
+
+def test_a_lamp_is_chosen_from_a_file(panel: PanelRig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    choose(panel, "Kind", "Photometric (IES)")
+    asked = []
+    monkeypatch.setattr(file_browser, "ask", asked.append)
+    panel.click("File")
+    assert [question.suffixes for question in asked] == [(".ies",)]
+    chosen = tmp_path / "mine.ies"
+    chosen.write_text(isotropic(), encoding="ascii")
+    monkeypatch.setattr(file_browser, "take", lambda name: chosen if name == "lamp" else None)
+    panel.state = picture_choice.answers(panel.state)
+    assert Path(panel.light.profile.source) == chosen
+    assert panel.light.spectral_power.luminous() == pytest.approx(100.0)
+
+
+def test_a_dropped_lamp_file(panel: PanelRig, tmp_path: Path) -> None:
+    path = tmp_path / "MINE.IES"
+    path.write_text(isotropic(), encoding="ascii")
+    assert picture_choice.is_part(path)
+    count = len(panel.state.scene.lights)
+    selected = picture_choice.dropped(panel.state, path)
+    assert isinstance(selected.scene.lights[0], IesLight) and len(selected.scene.lights) == count
+    unselected = picture_choice.dropped(replace(panel.state, selection=Selection()), path)
+    assert isinstance(unselected.scene.lights[-1], IesLight) and len(unselected.scene.lights) == count + 1
+    path.write_text("nothing", encoding="ascii")
+    refused = picture_choice.dropped(panel.state, path)
+    assert refused.scene is panel.state.scene and "TILT=" in refused.requests[0].text
 
 
 # ---- brush --------------------------------------------------------------------------------

@@ -313,7 +313,7 @@ def test_settings_reach_the_engine_and_the_next_session(gl: Context, config: Pat
 
 
 def test_idle_costs_nothing_once_converged(rig: Rig) -> None:
-    rig.session.companions.gallery.release()  # no thumbnails are waited for
+    rig.session.jobs.gallery.release()  # no thumbnails are waited for
     assert rig.session.wait_s() == 0.0
     for _ in range(10):
         rig.frame()

@@ -19,7 +19,7 @@ from spectrasplat.base.paths import assets_dir
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.primitives_round import sphere
 from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.model.lights import AreaLight, DirectionalLight, PointLight, SpotLight
+from spectrasplat.model.lights import AreaLight, DirectionalLight, IesLight, PointLight, SpotLight
 from spectrasplat.model.optics.colorimetry import rgb709_to_xyz
 from spectrasplat.model.optics.glass import sellmeier
 from spectrasplat.model.optics.spectrum import blackbody, illuminant
@@ -98,6 +98,18 @@ def area_lit() -> Scene:
     return Scene("panel", view, (panel,), (place(sphere(0.4, 1280), Dielectric(FLINT), (-0.3, 0.0, 1.2)), FLOOR))
 
 
+def lamp_lit() -> Scene:
+    """A ball under the shipped photometric lamp, which hangs aslant and is turned about its axis."""
+    lamp = IesLight(
+        "lamp",
+        illuminant("A").scaled_to_luminous(900.0),
+        position=(-1.6, 0.4, 3.2),
+        direction=(0.37, -0.1, -0.92),
+        rotation_deg=30.0,
+    )
+    return Scene("lamp", VIEW, (lamp,), (place(sphere(0.4, 1280), Dielectric(FLINT), (-0.5, 0.1, 1.0)), FLOOR))
+
+
 def nested() -> Scene:
     """Water in a glass ball, the water reaching into the wall, an air bubble in the water, in the light of a broad
     sun."""
@@ -125,7 +137,9 @@ def prism_case() -> Scene:
     return replace(scene, camera=replace(scene.camera, target=(22.5, 0.0, 0.0), vertical_fov_deg=9.0))
 
 
-SCENES = {scene.__name__: scene for scene in (tinted, mirrored, area_lit, nested, wine_glass, prism_case)}
+SCENES = {
+    scene.__name__: scene for scene in (tinted, mirrored, area_lit, lamp_lit, nested, wine_glass, prism_case)
+}
 
 
 def blocks(picture: np.ndarray, side: int = BLOCK) -> np.ndarray:

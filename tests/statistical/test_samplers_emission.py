@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from reference.lamps import cosine, isotropic, lamp, lopsided
 from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
 from spectrasplat.model.optics.spectrum import constant
 from spectrasplat.reference.optics import unit
@@ -114,6 +115,34 @@ def test_a_spot_has_its_penumbra(gl) -> None:
     accept(counts, np.repeat(rings[:, None], 4, axis=1))
     linear = ring_integrals(np.clip((outer - angle) / (outer - inner), 0.0, 1.0), angle, 16)
     refuse(counts, np.repeat(linear[:, None], 4, axis=1))
+
+
+@pytest.mark.parametrize(
+    ("text", "band_sr"),
+    [(isotropic(), 4.0 * np.pi), (cosine(), np.pi), (lopsided(), None)],
+    ids=["isotropic", "cosine", "lopsided"],
+)
+def test_a_lamp_emits_what_its_file_integrates_to(gl, tmp_path, text: str, band_sr: float | None) -> None:
+    light = lamp(tmp_path, WHITE, text, position=INSIDE, direction=tuple(AXIS), rotation_deg=33.0)
+    rays = emit(gl, light, box(1.0), passes=8)
+    assert rays.weight.sum() == pytest.approx(light.profile.integral_sr, rel=MEASURE_ERROR)
+    if band_sr is not None:
+        assert rays.weight.sum() == pytest.approx(band_sr, rel=1e-4 + MEASURE_ERROR)
+    # Over the sphere about the lamp's own axes, against the table's own values.
+    cosine_of, _ = polar(rays.direction, AXIS)
+    u, v = light.across
+    turn = np.arctan2(rays.direction @ v, rays.direction @ u) / (2.0 * np.pi) % 1.0
+    kept = thinned(rays.weight, rays.weight.max(), seed=4)
+    fine = 64
+    z, phi = (np.arange(16 * fine) + 0.5) / (8 * fine) - 1.0, 2.0 * np.pi * (np.arange(8 * fine) + 0.5) / (8 * fine)
+    dense = light.profile.at(np.arccos(z)[:, None], phi[None, :])
+    expected = dense.reshape(16, fine, 8, fine).sum(axis=(1, 3))
+    lit = expected.sum(axis=1) > 0.0
+    counts = cells(0.5 * (cosine_of[kept] + 1.0), turn[kept], bins=(16, 8))
+    assert counts[~lit].sum() == 0
+    accept(counts[lit], expected[lit])
+    if band_sr is None:  # a table that was turned the other way
+        refuse(counts, expected[:, ::-1])
 
 
 def test_a_hard_spot_fills_its_cone(gl) -> None:

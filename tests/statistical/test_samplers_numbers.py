@@ -150,11 +150,10 @@ def test_places_in_a_pixel_are_even_in_one_launch_and_over_many() -> None:
 def test_single_wavelengths_are_even_over_the_places_in_a_pixel() -> None:
     """Of camera samples: with the places' own ratio every height in the pixel had a colour of its own, and more samples
     did not help."""
-    shader = (paths.shaders_dir() / "camera" / "path.glsl").read_text()
-    (generator,) = re.findall(r"#define WAVELENGTH_GENERATOR (\d+)u", shader)
+    generator = generators()[0]
     for samples in (64, 204, 1024):
         places = _pixel_lattice(samples, 0)
-        for of_wavelength, even in ((int(generator), True), (GOLDEN, False)):
+        for of_wavelength, even in ((generator, True), (GOLDEN, False)):
             colour = kronecker(np.arange(samples), of_wavelength, 0)
             worst = max(box_discrepancy(np.column_stack([colour, places[:, axis]])) for axis in range(2))
             assert (worst < 2.5 * samples**-0.75) is even, (samples, of_wavelength, worst)
@@ -174,10 +173,8 @@ def survives_source() -> str:
 
 def generators() -> list[int]:
     """Roulette's irrationals, one a depth up to 63: a table for the first, hashed ones below."""
-    table = [
-        int(g)
-        for g in re.search(r"generators\[\d+\] = uint\[\]\(([^)]*)\)", survives_source())[1].replace("u", "").split(",")
-    ]
+    text = (paths.shaders_dir() / "lib/random.glsl").read_text()
+    table = [int(g) for g in re.search(r"generators\[\d+\] = uint\[\]\(([^)]*)\)", text)[1].replace("u", "").split(",")]
     return table + [int(hash_pcg(depth)) | 1 for depth in range(len(table), 64)]
 
 

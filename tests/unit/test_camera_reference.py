@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference.lamps import cosine, isotropic, lamp, lopsided
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.primitives_round import sphere
 from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
@@ -119,6 +120,22 @@ def test_every_kind_of_light_gives_its_irradiance(light: Light, expected: float)
         scene_of(light, plate(Diffuse((1.0, 1.0, 1.0))), camera=camera), 3, 3, samples=2048
     )
     assert picture.xyz[1, 1, 1] * math.pi == pytest.approx(expected, rel=1e-3, abs=1e-12)
+
+
+def test_lamps_give_their_candela(tmp_path: Path) -> None:
+    """Below a lamp, and aside from it where the file says something else."""
+    camera = Camera((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), kind="orthographic", vertical_extent=1e-3)
+    floor = plate(Diffuse((1.0, 1.0, 1.0)))
+    for text in (isotropic(), cosine(), lopsided()):
+        light = lamp(tmp_path, D65, text, position=(0.9, 0.4, 2.0), direction=(0.0, 0.6, -0.8), rotation_deg=15.0)
+        picture = render_camera_reference(scene_of(light, floor, camera=camera), 3, 3, samples=16)
+        way = -np.asarray(light.position)
+        distance = np.linalg.norm(way)
+        u, v = light.across
+        theta = math.acos(way @ np.asarray(light.direction) / distance)
+        share = light.profile.at(np.array(theta), np.array(math.atan2(way @ v, way @ u)))
+        expected = float(share) * (2.0 / distance) / distance**2
+        assert picture.xyz[1, 1, 1] * math.pi == pytest.approx(expected, rel=1e-3)
 
 
 def test_lights_are_seen_from_the_front_through_each_other_and_hide_nothing() -> None:

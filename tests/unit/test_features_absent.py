@@ -19,9 +19,9 @@ from spectrasplat.gpu.texture_store import PICTURE
 from spectrasplat.model.features import Features, explain
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes.camera_programs import direct_defines
 from spectrasplat.passes.camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS
-from spectrasplat.passes.footprint import SPLAT, footprint_defines, splat_defines
+from spectrasplat.passes.footprint import SPLAT
+from spectrasplat.passes.variants import direct_defines, footprint_defines, splat_defines
 
 EVERYTHING = Features(
     method="srd",
@@ -46,6 +46,7 @@ EVERYTHING = Features(
     nested_windows=True,
     targets=3,
     local_gain=True,
+    light_profiles=True,
     reindexed=True,
     camera_specular=True,
     camera_disperses=True,
@@ -54,6 +55,7 @@ EVERYTHING = Features(
 PLAIN_CAMERA = {"camera_disperses": False, "map_tents": 0}
 """What the camera sees disperses nothing: the camera carries the spectrum in the same way as the light pass."""
 WITHOUT = {
+    "light profiles": {"light_profiles": False},
     "spectral columns": {
         "spectral_groups": 0,
         "merged_groups": False,

@@ -189,7 +189,7 @@ def test_what_the_maps_hold_comes_with_the_reason(tmp_path: Path) -> None:
     assert looked_up(away)["caustic maps"] == Lookup(
         "caustic maps", "XYZ and W", "no spectra: caustics are seen directly", "16 B a texel"
     )
-    assert looked_up(away)["spectrum"].content == "one stretch"
+    assert looked_up(away)["spectrum"].content == "one interval"
     bare = replace(value, objects=tuple(o for o in value.objects if not isinstance(o.material, Diffuse)))
     assert looked_up(bare)["caustic maps"].how == "nothing diffuse receives light"
 
@@ -208,4 +208,4 @@ def test_every_method_samples_the_spectrum_its_own_way(tmp_path: Path, method: s
     value = scene(tmp_path)
     assert looked_up(value, method=method)["spectrum"].content == words
     plain = replace(value, objects=tuple(o for o in value.objects if not isinstance(o.material, Dielectric)))
-    assert looked_up(plain, method=method)["spectrum"].content == "one stretch"
+    assert looked_up(plain, method=method)["spectrum"].content == "one interval"

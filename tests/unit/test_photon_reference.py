@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference.lamps import cosine, isotropic, lamp, lopsided
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.primitives_round import sphere
@@ -136,6 +137,18 @@ def square_factor(side: float, distance: float) -> float:
         / (math.pi * x * x)
         * (math.log(q * q / math.sqrt(1.0 + 2.0 * x * x)) + 2.0 * x * q * math.atan(x / q) - 2.0 * x * math.atan(x))
     )
+
+
+def test_lamps_have_their_files_power(tmp_path: Path) -> None:
+    box = place(primitives.box((3.0, 2.0, 4.0)), SINK, (0.3, 0.1, -0.4))
+    for text in (isotropic(), cosine(), lopsided()):
+        light = lamp(tmp_path, ONE, text, position=(0.2, 0.3, 0.1), direction=(0.6, 0.0, -0.8), rotation_deg=50.0)
+        assert flux_on_sink(light, box) == pytest.approx(light.profile.integral_sr, rel=4e-3)
+    # A Lambertian point over a square: π times the form factor of four quarters (Howell, configuration B-4).
+    side = 1.0 / 1.5
+    root = math.sqrt(1.0 + side * side)
+    seen = 4.0 * (side / root) * math.atan(side / root) / math.pi
+    assert flux_on_sink(lamp(tmp_path, ONE, cosine(), **DOWN), PLATE) == pytest.approx(math.pi * seen, rel=4e-3)
 
 
 @pytest.mark.parametrize(

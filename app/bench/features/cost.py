@@ -57,7 +57,7 @@ def command(scene: Scene, output: Path | None) -> int:
             for report, share in measure(context, scene):
                 progress(share, f"{len(report.costs)} features")
     finally:
-        # Also after Ctrl-C: what is measured is told.
+        # Also after Ctrl-C: what is measured is shown.
         if report is not None:
             report_page.show(report)
             if output is not None:
@@ -105,9 +105,9 @@ def measure(
                 "with a caustic"
             )
         work = _calibrated(report, light, seconds, context)
-        told = static_costs(scene, features)
+        sizes = static_costs(scene, features)
         for index, trial in enumerate(asked):
-            report.costs.append(cost_of(trial, told.get(trial.feature, ""), context, work, repeats))
+            report.costs.append(cost_of(trial, sizes.get(trial.feature, ""), context, work, repeats))
             report.complete = index + 1 == len(asked)
             yield report, (index + 1) / len(asked)
     finally:
@@ -148,10 +148,10 @@ def _calibrated(report: FeatureReport, light: LightPass, seconds: float, context
     return work
 
 
-def cost_of(trial: Trial, bytes_told: str, context: Context, work: Work, repeats: int) -> FeatureCost:
+def cost_of(trial: Trial, size: str, context: Context, work: Work, repeats: int) -> FeatureCost:
     """Time and measure one trial: its two programs in turns, `repeats` times."""
     if trial.carried is None or trial.absent is None:
-        return FeatureCost(trial.feature, trial.included, trial.reason, bytes_told, None, None, None, trial.note)
+        return FeatureCost(trial.feature, trial.included, trial.reason, size, None, None, None, trial.note)
     rigs = [Rig(context, variant, work) for variant in (trial.carried, trial.absent)]
     try:
         for rig in rigs:
@@ -171,7 +171,7 @@ def cost_of(trial: Trial, bytes_told: str, context: Context, work: Work, repeats
         trial.feature,
         trial.included,
         trial.reason,
-        bytes_told,
+        size,
         trace,
         splat if trial.same_splats else None,
         difference,

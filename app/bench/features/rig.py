@@ -6,8 +6,6 @@ scene as it is, so that two rigs do the same work but for what their programs ho
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -85,8 +83,7 @@ class Rig:
         light = work.light
         self._context = context
         self._work = work
-        # Other work on the machine disturbs processor time less.
-        self._clock: Callable[[], float] = time.process_time if context.is_software else time.perf_counter
+        self._clock = context.traits.clock
         ctx, scene = context.ctx, light.scene
         self._buffers = SceneBuffers(ctx, variant.scene, variant.features, light.buffers.axis)
         self._trace = TracePass(context, variant.features, self._buffers, work.batch, light.settings.max_depth)

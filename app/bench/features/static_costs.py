@@ -68,7 +68,7 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
     curved = [o for o in scene.objects if o.material.receives]
     worn = {id(o.material.texture.rgb): o.material.texture for o in scene.objects if o.material.texture is not None}
     beyond = scene.environment
-    told = {
+    costs = {
         "spectral columns": (
             features.spectral_groups > 0,
             f"{sizes.ray - unspectral.ray} B a ray, {sizes.photon - unspectral.photon} B a photon",
@@ -108,7 +108,7 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         ),
         "spectral bins": (features.targets > 1, f"{sizes.texel} B a texel instead of {_TEXEL}"),
     }
-    return {name: words for name, (included, words) in told.items() if included}
+    return {name: words for name, (included, words) in costs.items() if included}
 
 
 def picture_bytes(picture: Texture | Environment) -> int:

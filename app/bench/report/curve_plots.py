@@ -145,36 +145,44 @@ def _ticks(axes: Axes, abscissa: str) -> None:
 
 def draw_series(axes: Axes, one: Series, markers: bool = True) -> None:
     """A curve with its band over seeds; what is not positive goes to the floor of the axes."""
-    look = style.method_style(one.method)
+    appearance = style.method_style(one.method)
     floor = axes.get_ylim()[0]
     shown = one.mean > 0
     mean = np.where(shown, one.mean, np.nan)
-    order = 3 + look.rank
+    order = 3 + appearance.rank
     # A seed's error of zero or less reaches the floor; one point alone has a bar instead of a band.
     low, high = np.maximum(one.low, floor), np.maximum(one.high, floor)
     if one.x.size > 1:
         axes.fill_between(
-            one.x, low, high, color=look.colour, alpha=0.16 if one.method == "srd" else 0.10, lw=0, zorder=order
+            one.x, low, high, color=appearance.colour, alpha=0.16 if one.method == "srd" else 0.10, lw=0, zorder=order
         )
     else:
-        axes.vlines(one.x, low, high, color=look.colour, lw=4, alpha=0.2, zorder=order)
+        axes.vlines(one.x, low, high, color=appearance.colour, lw=4, alpha=0.2, zorder=order)
     size = (4.6 if one.method == "srd" else 3.4) if markers else 0.0
     axes.plot(
         one.x,
         mean,
-        color=look.colour,
-        lw=look.width_pt,
-        ls=look.dash,
-        marker=look.marker,
+        color=appearance.colour,
+        lw=appearance.width_pt,
+        ls=appearance.dash,
+        marker=appearance.marker,
         ms=size,
-        mec=style.PAPER if look.marker not in "x+" else look.colour,
-        mew=0.6 if look.marker not in "x+" else 1.1,
+        mec=style.PAPER if appearance.marker not in "x+" else appearance.colour,
+        mew=0.6 if appearance.marker not in "x+" else 1.1,
         zorder=order + 0.5,
     )
     if not shown.all():
         x = one.x[~shown]
         axes.plot(
-            x, np.full(x.size, floor), "v", ms=6, mfc=style.PAPER, mec=look.colour, mew=1.2, clip_on=False, zorder=12
+            x,
+            np.full(x.size, floor),
+            "v",
+            ms=6,
+            mfc=style.PAPER,
+            mec=appearance.colour,
+            mew=1.2,
+            clip_on=False,
+            zorder=12,
         )
 
 
@@ -263,7 +271,7 @@ def label_ends(axes: Axes, drawn: Sequence[Series], gap_pt: float = 11.5) -> Non
     ends = sorted((max(float(one.mean[-1]), low), one.method, float(one.x[-1])) for one in drawn)
     wanted = [height_pt * math.log(error / low) / math.log(high / low) for error, _, _ in ends]
     for place, (error, name, x) in zip(spread(wanted, gap_pt, height_pt), ends, strict=True):
-        look = style.method_style(name)
+        appearance = style.method_style(name)
         axes.annotate(
             name,
             (x, error),
@@ -272,12 +280,12 @@ def label_ends(axes: Axes, drawn: Sequence[Series], gap_pt: float = 11.5) -> Non
             va="center",
             ha="left",
             fontsize=9,
-            color=look.colour,
+            color=appearance.colour,
             fontweight="bold" if name == "srd" else "normal",
             annotation_clip=False,
             arrowprops={
                 "arrowstyle": "-",
-                "color": look.colour,
+                "color": appearance.colour,
                 "lw": 0.6,
                 "shrinkA": 1,
                 "shrinkB": 3,

@@ -83,7 +83,7 @@ def _draw_ratios(axes: Axes, row: int, scene: SceneResult, left: float) -> None:
     for curve in scene.curves:
         if curve.method == BASELINE:
             continue
-        look = style.method_style(curve.method)
+        appearance = style.method_style(curve.method)
         strong = curve.method == "srd"
         ratio = _ratio(scene, curve.method)
         reached = ratio is not None
@@ -91,13 +91,13 @@ def _draw_ratios(axes: Axes, row: int, scene: SceneResult, left: float) -> None:
         axes.plot(
             x,
             row,
-            look.marker,
+            appearance.marker,
             ms=8.5 if strong else 5.0,
-            zorder=5 + look.rank,
+            zorder=5 + appearance.rank,
             clip_on=False,
             alpha=1.0 if reached else 0.75,
-            mfc=look.colour if reached else style.PAPER,
-            mec=look.colour if not strong or not reached else style.PAPER,
+            mfc=appearance.colour if reached else style.PAPER,
+            mec=appearance.colour if not strong or not reached else style.PAPER,
             mew=1.0,
         )
         if strong and ratio is not None:
@@ -107,7 +107,7 @@ def _draw_ratios(axes: Axes, row: int, scene: SceneResult, left: float) -> None:
                 xytext=(0, 5),
                 textcoords="offset points",
                 ha="center",
-                color=look.colour,
+                color=appearance.colour,
                 fontweight="bold",
                 fontsize=9,
                 zorder=14,
@@ -153,10 +153,10 @@ def _method_key(axes: Axes, scenes: Sequence[SceneResult], height_in: float) -> 
             [],
             [],
             ls="",
-            marker=(look := style.method_style(name)).marker,
+            marker=(appearance := style.method_style(name)).marker,
             ms=8 if name == "srd" else 5.5,
-            mfc=look.colour,
-            mec=look.colour,
+            mfc=appearance.colour,
+            mec=appearance.colour,
             label=name,
         )
         for name in names

@@ -70,8 +70,8 @@ def _parts(curve: Curve) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _draw_parts(axes: Axes, name: str, seconds: np.ndarray, bias2: np.ndarray, variance: np.ndarray) -> None:
-    look = style.method_style(name)
-    axes.plot(seconds, np.where(variance > 0, variance, np.nan), color=look.colour, lw=2.0)
+    appearance = style.method_style(name)
+    axes.plot(seconds, np.where(variance > 0, variance, np.nan), color=appearance.colour, lw=2.0)
     axes.plot(seconds, np.where(bias2 > 0, bias2, np.nan), color=style.INK, lw=1.0, marker="o", ms=3.2)
     hidden = seconds[bias2 <= 0]
     axes.plot(

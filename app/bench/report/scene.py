@@ -203,7 +203,7 @@ def _error_table(scene: SceneResult) -> Table:
             for key in ("relmse_trimmed", "smape", "chroma", "nrmse", "energy_ratio")
         }
         last = ends[1] if ends else None
-        told_apart = last is not None and scene.seeds > 1
+        is_split = last is not None and scene.seeds > 1
         slope = (
             f"{text.signed(curve.slope)} ± {curve.slope_half_width:.2f}"
             if curve.slope and math.isfinite(curve.slope)
@@ -212,9 +212,9 @@ def _error_table(scene: SceneResult) -> Table:
         rows.append(
             [
                 curve.method,
-                text.number(last.bias2) if told_apart else "–",
-                text.number(last.variance) if told_apart else "–",
-                "–" if share is None or not told_apart else f"{100 * share:.0f} %",
+                text.number(last.bias2) if is_split else "–",
+                text.number(last.variance) if is_split else "–",
+                "–" if share is None or not is_split else f"{100 * share:.0f} %",
                 slope,
                 text.number(metrics["relmse_trimmed"]),
                 text.number(metrics["smape"]),

@@ -71,15 +71,15 @@ def smallest_error(scene: SceneResult) -> float:
 
 def warnings_of(scene: SceneResult) -> list[str]:
     """What a reader must know before trusting a scene's numbers."""
-    told = []
+    said = []
     least = smallest_error(scene)
     if scene.reference is None:
-        told.append("There is no reference yet, so there are no errors.")
+        said.append("There is no reference yet, so there are no errors.")
     elif not math.isfinite(scene.reference.relmse):
-        told.append("The reference's own error is not known.")
+        said.append("The reference's own error is not known.")
     elif least > 0 and scene.reference.relmse > REFERENCE_SHARE * least:
         share = scene.reference.relmse / least
-        told.append(
+        said.append(
             f"The reference's own error ({number(scene.reference.relmse)}) is {share:.2g} times the smallest error "
             "reported "
             f"({number(least)}), above the tenth that the protocol asks for. Its variance has been taken off, yet "
@@ -87,31 +87,31 @@ def warnings_of(scene: SceneResult) -> list[str]:
             "certain than the band between seeds shows, and a ratio read there is less certain too."
         )
     elif scene.reference_too_coarse:
-        told.append("The reference's own error is above a tenth of the smallest error reported.")
+        said.append("The reference's own error is above a tenth of the smallest error reported.")
     if any(p.relmse <= 0 for c in scene.curves for p in c.points):
-        told.append(
+        said.append(
             "Where a debiased error is zero or below, the picture cannot be told from the reference; the plots show a "
             "hollow triangle on the floor."
         )
     busy = [curve.method for curve in scene.curves if _times_fall(curve)]
     if busy:
         measured = MEASURED_PASSES[scene.measured_pass]
-        told.append(
+        said.append(
             f"{sentence(measured.time)} does not rise with the number of {measured.unit} for {', '.join(busy)}: the "
             "machine was busy with other work, so times and time ratios "
             f"here are rough. Errors against {measured.units} are not touched by that."
         )
     unfinished = [curve.method for curve in scene.curves if not curve.points]
     if unfinished:
-        told.append(f"No finished point yet: {', '.join(unfinished)}.")
+        said.append(f"No finished point yet: {', '.join(unfinished)}.")
     if not scene.complete:
-        told.append("The run was stopped before this scene was complete; the same command goes on where it stopped.")
+        said.append("The run was stopped before this scene was complete; the same command goes on where it stopped.")
     if scene.seeds < 5:
-        told.append(
+        said.append(
             f"Only {seeds_text(scene.seeds)}: the band over seeds and the parting of bias and variance are weak; the "
             "protocol asks for five."
         )
-    return told
+    return said
 
 
 def _times_fall(curve: Curve) -> bool:
@@ -127,24 +127,25 @@ def headline(result: BenchResult) -> list[str]:
         s for s in result.scenes if {"srd", "stochastic"} <= {curve.method for curve in s.curves if curve.points}
     ]
     ratios = sorted(r for s in compared if (r := s.time_to_equal_error.get("srd", 0.0)) > 0 and math.isfinite(r))
-    told = []
+    said = []
     if compared:
         asked = MEASURED_PASSES[result.settings.measured_pass].asked_ratio
         enough = sum(ratio >= asked for ratio in ratios)
-        told.append(
+        said.append(
             f"srd reached the error that stochastic ends with in at most 1/{asked:.0f} of its time in {enough} of "
             f"{len(compared)} "
             f"scene{'' if len(compared) == 1 else 's'}{_range_of(ratios)}."
         )
         if len(ratios) < len(compared):
-            told.append(f"In {len(compared) - len(ratios)} of them it never got there.")
+            said.append(f"In {len(compared) - len(ratios)} of them it never got there.")
     if claims:
-        told.append(
-            f"{sum(claim.holds for claim in claims)} of {len(claims)} claims hold; what does not is listed under Limits."
+        said.append(
+            f"{sum(claim.holds for claim in claims)} of {len(claims)} claims hold; what does not is listed under "
+            "Limits."
         )
-    if not told:
-        told.append("Nothing has been compared yet: the run was stopped early or had one method only.")
-    return told
+    if not said:
+        said.append("Nothing has been compared yet: the run was stopped early or had one method only.")
+    return said
 
 
 def _range_of(ratios: list[float]) -> str:
@@ -169,7 +170,7 @@ def limit_sentence(claim: Claim) -> str:
 
 
 def bias_share(curve: Curve) -> float | None:
-    """Share of bias² in bias² + variance at the largest budget, 0 to 1; None where it cannot be told."""
+    """Share of bias² in bias² + variance at the largest budget, 0 to 1; None where it cannot be known."""
     if not curve.points:
         return None
     last = max(curve.points, key=lambda point: point.photons)

@@ -150,10 +150,7 @@ def _at_resolution(
     rects = np.hstack([places, places + _rectangle(layout.extents * scale, gutter)]).astype(np.int32)
     owner, doubled = rasterise(corners, size)
     overlapping = np.unique(layout.chart_of[doubled])
-    if len(overlapping):
-        seams = Seams.none()
-    else:
-        seams = find_seams(mesh, corners, layout.chart_of, rects, owner, rows)
+    seams = Seams.none() if len(overlapping) else find_seams(mesh, corners, layout.chart_of, rects, owner, rows)
     ratio = np.ones(len(seams.gutter_texel_xy))
     known = seams.destination_xy[:, 0] >= 0
     dx, dy = seams.destination_xy[known].T

@@ -71,7 +71,7 @@ class MeshHealth:
 
 def count_of(number: int, thing: str) -> str:
     """ "1 edge", "2 edges"."""
-    plural = thing if number == 1 or thing.endswith("s") or thing.endswith("ices") else thing + "s"
+    plural = thing if number == 1 or thing.endswith(("s", "ices")) else thing + "s"
     return f"{number} {plural}"
 
 

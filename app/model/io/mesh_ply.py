@@ -237,7 +237,7 @@ class _AsciiBody:
         if len(element.properties) == 1 and element.count and len(rest):
             size = int(rest[0])
             rows = rest[: element.count * (size + 1)]
-            if 0 <= size and len(rows) == element.count * (size + 1):
+            if size >= 0 and len(rows) == element.count * (size + 1):
                 rows = rows.reshape(element.count, size + 1)
                 if (rows[:, 0] == size).all():
                     self._at += rows.size

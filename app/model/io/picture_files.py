@@ -67,7 +67,8 @@ def decode_8bit(data: bytes, where: str) -> tuple[np.ndarray, tuple[str, ...]]:
             image = Image.open(io.BytesIO(data), formats=("PNG", "JPEG"))
         if image.width * image.height > MAX_PIXELS:
             raise UserError(
-                f"{where}: {image.width} × {image.height} pixels are more than {MAX_PIXELS >> 20} million; make it smaller"
+                f"{where}: {image.width} × {image.height} pixels are more than {MAX_PIXELS >> 20} million; make "
+                "it smaller"
             )
         if image.mode.startswith(("I", "F")):
             raise UserError(
@@ -121,7 +122,8 @@ def _checked(rgb: np.ndarray, where: str) -> tuple[np.ndarray, tuple[str, ...]]:
     count, lowest, highest = int(negative.sum()), float(rgb.min()), float(rgb.max())
     if lowest <= -_NOISE * highest:
         raise UserError(
-            f"{where}: {count} values are negative (down to {lowest:.3g}), which light cannot be; export it without them"
+            f"{where}: {count} values are negative (down to {lowest:.3g}), which light cannot be; export it "
+            "without them"
         )
     return np.maximum(rgb, np.float32(0.0)), (
         f"{where}: {count} slightly negative values (down to {lowest:.3g}) were set to 0.",

@@ -74,7 +74,8 @@ def _resolution(data: bytes, start: int, where: str) -> tuple[int, int, int]:
         raise UserError(f"{where}: the line that gives its size is missing; copy or export it again")
     if (words[0], words[2]) != ("-Y", "+X"):
         raise UserError(
-            f"{where}: its pixels run '{words[0]} {words[2]}', not from the top left ('-Y +X'); turn and export it again"
+            f"{where}: its pixels run '{words[0]} {words[2]}', not from the top left ('-Y +X'); turn and export "
+            "it again"
         )
     height, width = int(words[1]), int(words[3])
     if not (0 < height <= _MAX_SIDE and 0 < width <= _MAX_SIDE):

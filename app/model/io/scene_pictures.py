@@ -26,7 +26,8 @@ def picture_file(rgb: np.ndarray, source: str | None, scene_path: Path) -> str:
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise UserError(
-            f"cannot write the pictures of {scene_path}: {folder} cannot be made ({error.strerror}); choose another name"
+            f"cannot write the pictures of {scene_path}: {folder} cannot be made ({error.strerror}); choose "
+            "another name"
         ) from error
     levels = eight_bit_levels(rgb)
     target = folder / f"{picture_name(rgb)}{'.exr' if levels is None else '.png'}"

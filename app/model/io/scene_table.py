@@ -57,10 +57,7 @@ class SceneTable:
         near = nearest_names(key, [known for known in self._asked if known.casefold().startswith(initial)], count=1)
         if not near and len(key) > 2:  # "fov" for "vertical_fov_deg"
             near = [known for known in sorted(self._asked) if key.casefold() in known.casefold()]
-        if near:
-            remedy = f"did you mean '{near[0]}'?"
-        else:
-            remedy = f"{noun} knows {', '.join(sorted(self._asked))}"
+        remedy = f"did you mean '{near[0]}'?" if near else f"{noun} knows {', '.join(sorted(self._asked))}"
         raise UserError(f"{self.file.name}: unknown key '{self.key_path(key)}', {remedy}")
 
     # -- raw access -----------------------------------------------------------------------

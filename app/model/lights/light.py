@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ...base.errors import UserError
-from ..fields import Animated, Choice, Number, Part, Row
+from ..fields import Animated, Number, Part, Row
 from ..io.scene_table import MAX_MAGNITUDE, SceneTable, Vec3
 from ..optics.spectrum import Spectrum
 
@@ -249,7 +249,6 @@ _WIDTH, _HEIGHT = (
     )
     for name in ("Width", "Height")
 )
-SHAPE = Choice("shape", "disc", options=SHAPES, row=Row("Shape", "Outline of the beam or of the glowing surface."))
 
 
 @dataclass(frozen=True)

@@ -84,10 +84,6 @@ class Material:
         """What of it light depends on, as plain values and arrays: two that send light alike agree in it."""
         return (*(float(v) for v in self.reflectance_rgb), self.reflectance)
 
-    def is_like(self, other: Material) -> bool:
-        """Whether programs and buffers made for the one serve the other, so that only values differ."""
-        return self == other
-
 
 def colour_words(rgb: Vec3) -> str:
     """A colour in as few numbers as say it."""

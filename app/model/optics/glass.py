@@ -96,7 +96,8 @@ class Dispersion:
         n = self.index(_CHECK_NM)
         if self.gain != 1.0:
             told.append(
-                f"{label}: its dispersion is {self.gain:g} times that of the material (dispersion_gain), which nature does not offer."
+                f"{label}: its dispersion is {self.gain:g} times that of the material (dispersion_gain), which "
+                "nature does not offer."
             )
         if n.min() < 1.0:
             at = _CHECK_NM[int(n.argmin())]
@@ -140,7 +141,8 @@ def from_abbe(n_d: float, v_d: float = math.inf, name: str = "", where: str = ""
     """
     if v_d == 0.0 or math.isnan(v_d):
         raise UserError(
-            f"{_prefix(where)}V_d is {v_d:g}; give a number other than 0 (20 to 90 for glass), or leave it out for no dispersion"
+            f"{_prefix(where)}V_d is {v_d:g}; give a number other than 0 (20 to 90 for glass), or leave it out "
+            "for no dispersion"
         )
     if math.isinf(v_d):
         return constant(n_d, name, where)
@@ -193,7 +195,8 @@ def from_formula(
     lengths_fit = len(values) >= 9 if kind == "formula 4" else len(values) >= 1
     if not lengths_fit or len(values) % 2 == 0:
         raise UserError(
-            f"{_prefix(where)}{kind} does not take {len(values)} coefficients; see 'Dispersion formulas' of refractiveindex.info"
+            f"{_prefix(where)}{kind} does not take {len(values)} coefficients; see 'Dispersion formulas' of "
+            "refractiveindex.info"
         )
     return _checked(Dispersion(name, kind, values, range_nm or _ALL_WAVELENGTHS), where)
 
@@ -205,7 +208,8 @@ def table(wavelength_nm: Sequence[float], n: Sequence[float], name: str = "", wh
     """
     if len(wavelength_nm) != len(n) or len(n) < 2:
         raise UserError(
-            f"{_prefix(where)}a table of n needs two or more wavelengths and as many indices (got {len(wavelength_nm)} and {len(n)})"
+            f"{_prefix(where)}a table of n needs two or more wavelengths and as many indices (got "
+            f"{len(wavelength_nm)} and {len(n)})"
         )
     lam = np.asarray(wavelength_nm, dtype=np.float64)
     if not np.all(np.isfinite(lam)) or lam[0] <= 0.0:
@@ -215,7 +219,8 @@ def table(wavelength_nm: Sequence[float], n: Sequence[float], name: str = "", wh
     if np.any(np.diff(lam) <= 0.0):
         at = int(np.argmax(np.diff(lam) <= 0.0))
         raise UserError(
-            f"{_prefix(where)}the wavelengths of the table must ascend, but {lam[at + 1]:g} follows {lam[at]:g}; sort the rows"
+            f"{_prefix(where)}the wavelengths of the table must ascend, but {lam[at + 1]:g} follows {lam[at]:g}; "
+            "sort the rows"
         )
     values = [float(x) for x in n]
     for wavelength, value in zip(lam, values, strict=True):
@@ -267,12 +272,14 @@ def _checked(dispersion: Dispersion, where: str) -> Dispersion:
     first, last = max(lo, VISIBLE_RANGE_NM[0]), min(hi, VISIBLE_RANGE_NM[1])
     if first >= last:
         raise UserError(
-            f"{who}the data hold from {lo:g} to {hi:g} nm, outside the visible range 380 to 780 nm; choose another material or other data"
+            f"{who}the data hold from {lo:g} to {hi:g} nm, outside the visible range 380 to 780 nm; choose "
+            "another material or other data"
         )
     for b, c in formulas.sellmeier_poles(dispersion.kind, dispersion.coefficients):
         if b != 0.0 and (first * 1e-3) ** 2 <= c <= (last * 1e-3) ** 2:
             raise UserError(
-                f"{who}the Sellmeier term with C = {c:g} µm² has its pole at {1e3 * math.sqrt(c):.4g} nm, inside the visible range; check B and C (C is in µm²)"
+                f"{who}the Sellmeier term with C = {c:g} µm² has its pole at {1e3 * math.sqrt(c):.4g} nm, inside "
+                "the visible range; check B and C (C is in µm²)"
             )
     n = dispersion.index(_CHECK_NM)
     bad = ~(np.isfinite(n) & (n > 0.0))
@@ -280,6 +287,7 @@ def _checked(dispersion: Dispersion, where: str) -> Dispersion:
         at = int(np.argmax(bad))
         state = "imaginary or infinite" if not np.isfinite(n[at]) else f"{n[at]:.6g}"
         raise UserError(
-            f"{who}the refractive index is {state} at {_CHECK_NM[at]:g} nm; it must be a positive number from 380 to 780 nm"
+            f"{who}the refractive index is {state} at {_CHECK_NM[at]:g} nm; it must be a positive number from 380 "
+            "to 780 nm"
         )
     return dispersion

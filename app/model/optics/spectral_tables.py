@@ -9,6 +9,7 @@ x grows with λ. With no dispersive glass it is linear in λ.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -135,7 +136,7 @@ def _turning_points(glass: Dispersion) -> np.ndarray:
 def _variation(glass: Dispersion, turning_nm: np.ndarray, wavelength_nm: np.ndarray) -> np.ndarray:
     """Total variation of n between 380 nm and each wavelength: exact, no quadrature."""
     total = np.zeros_like(wavelength_nm)
-    for start, end in zip(turning_nm[:-1], turning_nm[1:], strict=True):
+    for start, end in itertools.pairwise(turning_nm):
         total = total + np.abs(glass.index(np.clip(wavelength_nm, start, end)) - glass.index(start))
     return total
 

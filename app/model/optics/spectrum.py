@@ -124,7 +124,7 @@ class Spectrum:
 
     def scaled_to_luminous(self, value: float) -> Spectrum:
         """The same colour with K_m Σ S ȳ = `value` (lm, cd, lx … as the density's unit has it)."""
-        return self._scaled_to(value, self.luminous(), "no light that the camera sees")
+        return self._scaled_to(value, self.luminous(), "no light that the eye sees")
 
     def scaled_to_power(self, value_w: float) -> Spectrum:
         """The same shape with Σ S = `value_w`."""

@@ -29,9 +29,10 @@ class Budget:
     @staticmethod
     def of(context: Context) -> Budget:
         """A software renderer answers in small steps; a GPU takes millions at a time."""
-        if context.is_software:
-            return Budget(1 << 14, 1 << 14, 1 << 22, 256 << 20)
-        return Budget(1 << 18, 1 << 20, 1 << 25, 1 << 30)
+        traits = context.traits
+        return Budget(
+            traits.viewer_batch, traits.viewer_first_photons, traits.viewer_largest_photons, traits.viewer_store_bytes
+        )
 
 
 @dataclass

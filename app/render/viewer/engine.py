@@ -321,7 +321,7 @@ class LiveEngine:
         assert self._building is not None
         while time.perf_counter() < deadline:
             built = next(self._building, None)
-            if not self.context.is_software:
+            if self.context.traits.work_is_queued:
                 # What is only queued keeps no deadline.
                 self.context.finish()
             if built is not None:

@@ -18,19 +18,19 @@ from ...model.geometry.primitives_round import ellipsoid, sphere
 from ...model.optics.colorimetry import rgb_basis
 from ...model.optics.glass import constant, from_abbe
 from ...model.scene import Camera, Mirror, SceneObject
-from ...passes.camera_programs import MAX_DEPTH
+from ...passes.variants import MAX_DEPTH
 from ..case import Case, Measurement
 from ..rigs.camera_probe import (
-    LOOK,
+    PROBE,
     UNCHECKED,
     Judged,
     daylight_mean,
     fresnel,
     furnace_errors,
     half_sky,
-    look,
+    measurement_of,
+    render_probe,
     resized,
-    seen,
     sharing_programs,
     slope,
     slope_sky,
@@ -40,7 +40,7 @@ from ..rigs.camera_probe import (
 from ..rigs.flat_glass import extruded, rectangle, ways
 from ..rigs.scene_parts import solid
 
-FEW = resized(LOOK, 12, 8, 64)
+FEW = resized(PROBE, 12, 8, 64)
 GUIDE_N = 1.6
 BOUNCES = (10, 20, 30, 40, 60)
 """Total reflections on the way through a light guide; from MAX_DEPTH on the way ends inside."""
@@ -66,7 +66,7 @@ def measure_guide(context: Context) -> Iterator[Measurement]:
         start = foot - 2.0 * direction
         camera = Camera((*start, 0.0), (*foot, 0.0), (0.0, 0.0, 1.0), "orthographic", vertical_extent=0.01)
         guide = solid("guide", extruded(outline, 0.2, "guide"), glass)
-        sight = look(context, with_sky(guide, camera=camera, environment=half_sky((1.0, 0.0, 0.0))), FEW)
+        sight = render_probe(context, with_sky(guide, camera=camera, environment=half_sky((1.0, 0.0, 0.0))), FEW)
         out = ways(outline, GUIDE_N, tuple(start), tuple(direction))
         expected = sum(way.weight for way in out if way.direction[0] > 0.0)
         # A path given up shines as if it left there, in the direction it has, without the 5 % that the end would have
@@ -76,7 +76,7 @@ def measure_guide(context: Context) -> Iterator[Measurement]:
         deep = any(way.events > MAX_DEPTH and way.weight > 0.5 for way in out)
         judged.hold("not counted", float(deep and sight.share("depth_reached") < 1.0), 0.0)
         note = f"{given_up:.1%} of the light has more than {MAX_DEPTH} events before it"
-        yield seen(bounces, f"{bounces} reflections", sight, judged, {"depth_reached": UNCHECKED}, note)
+        yield measurement_of(bounces, f"{bounces} reflections", sight, judged, {"depth_reached": UNCHECKED}, note)
 
 
 @sharing_programs
@@ -97,7 +97,7 @@ def measure_corner(context: Context) -> Iterator[Measurement]:
             "orthographic",
             vertical_extent=0.02,
         )
-        sight = look(
+        sight = render_probe(
             context, with_sky(solid("corner", corner, constant(CORNER_N)), camera=camera, environment=slope_sky()), FEW
         )
         r = float(fresnel(np.cos(tilt), CORNER_N))
@@ -107,7 +107,7 @@ def measure_corner(context: Context) -> Iterator[Measurement]:
         judged = Judged().hold(
             "returned", np.abs(sight.mean / expected - 1.0).max(), 1e-3 if tilt_deg <= 10.0 else r * r
         )
-        yield seen(tilt_deg, f"tilted by {tilt_deg:g}°", sight, judged)
+        yield measurement_of(tilt_deg, f"tilted by {tilt_deg:g}°", sight, judged)
 
 
 @sharing_programs
@@ -122,9 +122,9 @@ def measure_gems(context: Context) -> Iterator[Measurement]:
     )
     for number, (label, mesh, glass, mean) in enumerate(stones, 1):
         camera = Camera((0.4, -4.0, 2.2), (0.0, 0.0, 0.0), vertical_fov_deg=26.0)
-        sight = look(context, white_furnace(solid("stone", mesh, glass), camera=camera))
+        sight = render_probe(context, white_furnace(solid("stone", mesh, glass), camera=camera))
         judged = furnace_errors(Judged(), sight.picture, mean, 0.2)
-        yield seen(
+        yield measurement_of(
             number,
             label,
             sight,
@@ -140,11 +140,11 @@ def measure_room(context: Context) -> Iterator[Measurement]:
     camera = Camera((0.1, 0.2, 0.05), (1.0, 0.4, 0.3), vertical_fov_deg=60.0)
     for reflectance in REFLECTANCES:
         room = SceneObject("room", box((2.0, 2.0, 2.0)), Mirror((reflectance, reflectance, reflectance)))
-        sight = look(context, white_furnace(room, camera=camera), FEW)
+        sight = render_probe(context, white_furnace(room, camera=camera), FEW)
         expected = reflectance**MAX_DEPTH
         judged = Judged().hold("radiance", np.abs(sight.mean / expected - 1.0).max(), 1e-4)
         judged.hold("paths not counted", abs(sight.share("depth_reached") - 1.0), 0.0)
-        yield seen(reflectance, f"reflectance {reflectance:g}", sight, judged, {"depth_reached": 1.0})
+        yield measurement_of(reflectance, f"reflectance {reflectance:g}", sight, judged, {"depth_reached": 1.0})
 
 
 @sharing_programs
@@ -153,11 +153,11 @@ def measure_mirrors(context: Context) -> Iterator[Measurement]:
     colour."""
     colours = (0.95, 0.85, 0.6), (0.98, 0.9, 0.97)
     for hops in HOPS:
-        sight = look(context, white_furnace(*_corridor(colours, hops), camera=_into_corridor(hops)), FEW)
+        sight = render_probe(context, white_furnace(*_corridor(colours, hops), camera=_into_corridor(hops)), FEW)
         first, second = (rgb_basis() @ np.array(c) for c in colours)
         expected = daylight_mean(first ** ((hops + 1) // 2) * second ** (hops // 2))
         judged = Judged().hold("colour", np.abs(sight.mean - expected).max() / expected.max(), 1e-2)
-        yield seen(hops, f"{hops} reflections", sight, judged)
+        yield measurement_of(hops, f"{hops} reflections", sight, judged)
 
 
 def _corridor(colours: tuple, hops: int) -> list[SceneObject]:
@@ -190,10 +190,10 @@ def measure_shells(context: Context) -> Iterator[Measurement]:
         for k in range(2 * shells, 0, -1):
             glass = constant(3.0, "dense") if k % 2 == 0 else constant(1.0, "air")
             items.append(solid(f"shell {k}", sphere(0.9 * k / (2 * shells), 320), glass, priority=2 * shells - k))
-        sight = look(context, white_furnace(*items, camera=camera), resized(LOOK, 24, 16))
+        sight = render_probe(context, white_furnace(*items, camera=camera), resized(PROBE, 24, 16))
         judged = furnace_errors(Judged(), sight.picture, 2e-3, 0.1)
         judged.hold("full stack not counted", float(shells > 1 and not sight.fallbacks["stack_full"]), 0.0)
-        yield seen(
+        yield measurement_of(
             shells,
             f"{shells} shells",
             sight,
@@ -206,7 +206,8 @@ CASES: tuple[Case, ...] = (
     Case(
         "eye-guide",
         "A light guide of ten to sixty total reflections, against the sum over all ways",
-        f"A camera path ends after {MAX_DEPTH} surfaces. What is given up is counted, and shines as if it left the glass there.",
+        f"A camera path ends after {MAX_DEPTH} surfaces. What is given up is counted, and shines as if it left the "
+        "glass there.",
         "reflections",
         measure_guide,
         len(BOUNCES),
@@ -224,7 +225,8 @@ CASES: tuple[Case, ...] = (
     Case(
         "eye-gems",
         "Gems before white: nothing of them may be seen",
-        "Chains of dozens of reflections split at every facet, columns grow exponentially, total reflection cuts bands; the "
+        "Chains of dozens of reflections split at every facet, columns grow exponentially, total reflection cuts "
+        "bands; the "
         "weights of all parts must add up to one.",
         "gem",
         measure_gems,

@@ -21,7 +21,7 @@ from ...model.scene import Black, Camera, Scene, SceneObject
 from ...reference.glasses import sellmeier_terms
 from ..case import Case, Measurement
 from ..rigs.camera_probe import (
-    LOOK,
+    PROBE,
     UNCHECKED,
     WHITE,
     Judged,
@@ -30,11 +30,11 @@ from ..rigs.camera_probe import (
     daylight_mean,
     difference,
     half_sky,
-    look,
     look_with,
+    measurement_of,
     opened_camera_pass,
+    render_probe,
     resized,
-    seen,
     sharing_programs,
     sky,
     slope,
@@ -44,7 +44,7 @@ from ..rigs.camera_probe import (
 from ..rigs.flat_glass import extruded, radiance_seen, rectangle, trapezium
 from ..rigs.scene_parts import solid
 
-FEW = resized(LOOK, 12, 8, 64)
+FEW = resized(PROBE, 12, 8, 64)
 """Flat glass looks the same in every pixel."""
 BK7 = sellmeier(*sellmeier_terms("N-BK7"), name="N-BK7")
 FLINT = from_abbe(1.7, 30.0, "flint")
@@ -81,7 +81,7 @@ def measure_margin(context: Context) -> Iterator[Measurement]:
                 camera=along_x(0.02),
                 environment=slope_sky(),
             )
-            sight = look(context, scene, FEW)
+            sight = render_probe(context, scene, FEW)
             expected = radiance_seen(outline, INDEX, (-3.0, 0.0), (1.0, 0.0), slope)
             # Fresnel's reflectance falls from 1 as the root of the margin, which rounding moves by about 2e-7.
             slack = 4.0 * (np.sqrt(margin + 4e-7) - np.sqrt(margin)) + 2e-3
@@ -89,7 +89,7 @@ def measure_margin(context: Context) -> Iterator[Measurement]:
                 "inside the edge" if side < 0 else "beyond the edge", np.abs(sight.mean / expected - 1.0).max(), slack
             )
             total = sight if total is None else replace(total, nonfinite=total.nonfinite + sight.nonfinite)
-        yield seen(margin, f"{margin:g} rad", total, judged)
+        yield measurement_of(margin, f"{margin:g} rad", total, judged)
 
 
 @sharing_programs
@@ -127,7 +127,7 @@ def measure_cut(context: Context) -> Iterator[Measurement]:
             judged.hold("spectrum", np.abs(got - want).max(), 0.4 / bands + 2e-3)
             dark = edges[1:] < CUT_NM
             judged.hold("light before the cut", (got - want)[dark].max(), 0.05 / bands + 3e-3)
-            yield seen(bands, f"{bands} band{'s' if bands > 1 else ''}", _both(sight, spectral), judged)
+            yield measurement_of(bands, f"{bands} band{'s' if bands > 1 else ''}", _both(sight, spectral), judged)
 
 
 def _ahead(d: np.ndarray) -> np.ndarray:
@@ -148,11 +148,11 @@ def measure_grazing(context: Context) -> Iterator[Measurement]:
         camera = Camera(
             (*start, 0.0), (*foot, 0.0), (0.0, 0.0, 1.0), "orthographic", vertical_extent=0.05 * np.cos(angle)
         )
-        sight = look(context, Scene("slab", camera, (), (glass, *walls), background_rgb=WHITE), FEW)
+        sight = render_probe(context, Scene("slab", camera, (), (glass, *walls), background_rgb=WHITE), FEW)
         values = [radiance_seen(SLAB, float(n), tuple(start), tuple(direction), _upper) for n in FLINT.index(coarse)]
         expected = daylight_mean(np.interp(VISIBLE_NM, coarse, values))
         judged = Judged().hold("reflectance", np.abs(sight.mean - expected).max(), 4e-3)
-        yield seen(
+        yield measurement_of(
             90.0 - angle_deg,
             f"{angle_deg:g}°",
             sight,
@@ -175,7 +175,7 @@ def measure_index_matched(context: Context) -> Iterator[Measurement]:
     environment = sky(lambda d: 1.0 + 0.5 * np.sin(9.0 * d[..., 0]) * np.cos(7.0 * d[..., 1]))
     camera = Camera((0.3, -4.0, 0.5), (0.0, 0.0, 0.0), vertical_fov_deg=24.0)
     behind_camera = solid("far", sphere(1e-3, 80), constant(1.5), (0.0, -9.0, 0.0))
-    empty = look(context, with_sky(behind_camera, camera=camera, environment=environment))
+    empty = render_probe(context, with_sky(behind_camera, camera=camera, environment=environment))
     for disperses in (False, True):
         for delta in DIFFERENCES:
             glass = (
@@ -184,19 +184,19 @@ def measure_index_matched(context: Context) -> Iterator[Measurement]:
                 else constant(1.0 + delta, "hardly glass")
             )
             scene = with_sky(solid("ball", sphere(0.7, 1280), glass), camera=camera, environment=environment)
-            sight = look(context, scene, LOOK, 1)
+            sight = render_probe(context, scene, PROBE, 1)
             bound = 10.0 * abs(delta) + 0.5 * np.sqrt(2.0 * abs(delta)) + 1e-5
             judged = Judged().hold("picture", difference(sight.picture, empty.picture), bound)
             if disperses:
                 # Of the samples of a pixel on the ball's rim some have a band and some the whole spectrum: that leaves
                 # grain.
-                in_bands = look(context, scene)
+                in_bands = render_probe(context, scene)
                 judged.hold("picture in bands", difference(in_bands.picture, empty.picture), bound + RIM_GRAIN)
                 sight = _both(sight, in_bands)
             label = f"1 {'+' if delta > 0 else '−'} {abs(delta):.0e}" + (", dispersive" if disperses else "")
             # At the very limb columns grow without end: now and then one path's are dropped, and counted.
             shares = {"columns_dropped": 1e-4, "depth_reached": 1e-2, "stack_full": 1e-3, "band_uncut": 0.1}
-            yield seen(delta * (1.01 if disperses else 1.0), label, sight, judged, shares)
+            yield measurement_of(delta * (1.01 if disperses else 1.0), label, sight, judged, shares)
 
 
 def _both(sight: Sight, other: Sight) -> Sight:
@@ -211,7 +211,8 @@ CASES: tuple[Case, ...] = (
     Case(
         "eye-tir-margin",
         "The camera looks at the edge of total reflection, from both sides",
-        "Fresnel's reflectance falls from 1 like a root, and float32 knows cos² to seven digits of 1: a picture may lose or "
+        "Fresnel's reflectance falls from 1 like a root, and float32 knows cos² to seven digits of 1: a picture may "
+        "lose or "
         "gain no more than that.",
         "margin to the critical angle (rad)",
         measure_margin,
@@ -220,7 +221,8 @@ CASES: tuple[Case, ...] = (
     Case(
         "eye-cut",
         "A band of a camera path that total reflection cuts in two, against the sum over all ways at 401 wavelengths",
-        "Half of a band leaves the glass (N-BK7 at 41.10°, from 503 nm on), half stays. The band is cut there, in colour and in "
+        "Half of a band leaves the glass (N-BK7 at 41.10°, from 503 nm on), half stays. The band is cut there, in "
+        "colour and in "
         "32 spectral bins.",
         "bands",
         measure_cut,

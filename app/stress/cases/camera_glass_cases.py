@@ -23,13 +23,13 @@ from ...reference.camera_reference import render_camera_reference
 from ..case import Case, Measurement
 from ..rigs.camera_probe import (
     CHANCE,
-    LOOK,
+    PROBE,
     UNCHECKED,
     Judged,
     Sight,
-    look,
+    measurement_of,
+    render_probe,
     resized,
-    seen,
     sharing_programs,
     sky,
     with_sky,
@@ -39,9 +39,9 @@ from ..rigs.scene_parts import solid
 
 BLOCK = 3
 """Side of the blocks of pixels that are compared."""
-LOOK_LONG = resized(LOOK, 30, 21, 128)
+PROBE_LONG = resized(PROBE, 30, 21, 128)
 """Fine stripes need many samples before a picture's own chance is below what its dispersion does."""
-LOOK_FOCUS = resized(LOOK, 36, 24, 32)
+PROBE_FOCUS = resized(PROBE, 36, 24, 32)
 REFERENCE_SAMPLES = 512
 DEFOCUS = (0.5, 0.1, 0.01, 0.0)
 """Distance of a wall from a ball's focus, radii."""
@@ -72,8 +72,8 @@ def measure_glasses(context: Context) -> Iterator[Measurement]:
         ball = solid("ball", sphere(0.7, 1280), glass, (-0.85, 0.0, 0.0))
         wedge = solid("prism", prism(side=1.2), glass, (0.9, 0.0, 0.0), turned=turned)
         scene = with_sky(ball, wedge, camera=camera, environment=stripes)
-        sight = look(context, scene, LOOK_LONG)
-        yield seen(
+        sight = render_probe(context, scene, PROBE_LONG)
+        yield measurement_of(
             number,
             label,
             sight,
@@ -102,25 +102,29 @@ def measure_focus(context: Context) -> Iterator[Measurement]:
             (lamp,),
             (ball, SceneObject("wall", plane(4.0, 4.0), wall_material, place)),
         )
-        sight = look(context, scene, LOOK_FOCUS)
-        yield seen(1.0 + defocus, f"wall {defocus:g} off the focus", sight, against_reference(scene, sight, 0.003), ANY)
+        sight = render_probe(context, scene, PROBE_FOCUS)
+        yield measurement_of(
+            1.0 + defocus, f"wall {defocus:g} off the focus", sight, against_reference(scene, sight, 0.003), ANY
+        )
     stripes = sky(lambda d: 1.0 + 0.9 * np.sin(40.0 * d[..., 2]) * np.sin(31.0 * d[..., 1]))
     for defocus in (0.01, 0.0):
         camera = Camera((-focus - defocus, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), vertical_fov_deg=60.0)
         scene = with_sky(ball, camera=camera, environment=stripes)
-        sight = look(context, scene, LOOK_FOCUS)
-        yield seen(-defocus, f"camera {defocus:g} off the focus", sight, against_reference(scene, sight, 0.003), ANY)
+        sight = render_probe(context, scene, PROBE_FOCUS)
+        yield measurement_of(
+            -defocus, f"camera {defocus:g} off the focus", sight, against_reference(scene, sight, 0.003), ANY
+        )
 
 
 def against_reference(scene: Scene, sight: Sight, bias: float) -> Judged:
     """The picture in blocks, its colours (red less blue) and its sum against two passes of a reference; what these
     differ by is chance."""
     height, width = sight.picture.shape[:2]
-    measured_passes = [
+    halves = [
         blocks(render_camera_reference(scene, width, height, samples=REFERENCE_SAMPLES, seed=seed).rgb(), BLOCK)
         for seed in (1, 2)
     ]
-    want, apart = 0.5 * (measured_passes[0] + measured_passes[1]), 0.5 * (measured_passes[0] - measured_passes[1])
+    want, apart = 0.5 * (halves[0] + halves[1]), 0.5 * (halves[0] - halves[1])
     error, size = blocks(sight.picture, BLOCK) - want, want.mean()
     judged = Judged().hold("picture", _root_mean_square(error) / size, bias + 2.0 * _root_mean_square(apart) / size)
     judged.hold(
@@ -147,7 +151,8 @@ CASES: tuple[Case, ...] = (
     Case(
         "eye-glasses",
         "A ball and a prism of glass with any dispersion, before a sky of stripes, against the float64 reference",
-        "A path's columns are straight lines in n; where the spectrum is spread far or jumps, it must be cut into bands enough.",
+        "A path's columns are straight lines in n; where the spectrum is spread far or jumps, it must be cut into "
+        "bands enough.",
         "glass",
         measure_glasses,
         len(glasses()),

@@ -26,12 +26,12 @@ from ...model.scene import (
     SceneObject,
 )
 from ...model.texture import Environment, Texture
-from ...passes.camera_programs import TINT_STEPS
+from ...passes.variants import TINT_STEPS
 from ...reference.camera_reference import render_camera_reference
 from ..case import Case, Measurement
 from ..rigs.camera_probe import (
     CHANCE,
-    LOOK,
+    PROBE,
     UNCHECKED,
     WHITE,
     Judged,
@@ -39,16 +39,16 @@ from ..rigs.camera_probe import (
     daylight_mean,
     difference,
     fresnel,
-    look,
+    measurement_of,
+    render_probe,
     resized,
-    seen,
     sharing_programs,
     sky,
     with_sky,
 )
 from ..rigs.scene_parts import FLINT, solid
 
-FEW = resized(LOOK, 12, 8, 16)
+FEW = resized(PROBE, 12, 8, 16)
 SUNS = (1e2, 1e4, 1e5, 1e6, 1e8)
 """Of one texel of a panorama, the rest of which is about 1."""
 LAMPS = (0.2, 0.1, 0.03, 0.01, 0.003)
@@ -76,13 +76,13 @@ def measure_sun(context: Context) -> Iterator[Measurement]:
     def scene(sun: float) -> Scene:
         return with_sky(stone, camera=STONE_SEEN_FROM, environment=_panorama(sun))
 
-    without, hundred = (look(context, scene(sun), LOOK, 4) for sun in (0.0, SUNS[0]))
+    without, hundred = (render_probe(context, scene(sun), PROBE, 4) for sun in (0.0, SUNS[0]))
     added = (hundred.picture - without.picture) / SUNS[0]
-    reference_image = render_camera_reference(scene(SUNS[0]), LOOK.width, LOOK.height, samples=256)
+    reference_image = render_camera_reference(scene(SUNS[0]), PROBE.width, PROBE.height, samples=256)
     want = reference_image.rgb().sum() - without.picture.sum()
     chance = CHANCE * np.sqrt(reference_image.variance.sum()) / want
     for sun in SUNS:
-        sight = look(context, scene(sun), LOOK, 4)
+        sight = render_probe(context, scene(sun), PROBE, 4)
         judged = Judged().hold(
             "brighter than the sun", max(0.0, sight.picture.max() / (1.02 * sun + without.picture.max()) - 1.0), 0.0
         )
@@ -93,7 +93,7 @@ def measure_sun(context: Context) -> Iterator[Measurement]:
             0.02 + chance,
         )
         judged.tell("brightest over mean", sight.picture.max() / sight.picture.mean())
-        yield seen(sun, f"{sun:.0e}", sight, judged, ANY)
+        yield measurement_of(sun, f"{sun:.0e}", sight, judged, ANY)
 
 
 def _panorama(sun: float) -> Environment:
@@ -111,12 +111,12 @@ def measure_lamps(context: Context) -> Iterator[Measurement]:
     than the lamp itself."""
     stone = solid("stone", brilliant(1.6), FLINT)
     toward = np.array([-0.3, 3.6, 2.4]) / np.linalg.norm([-0.3, 3.6, 2.4])
-    settings = replace(LOOK, spp=32)
+    settings = replace(PROBE, spp=32)
     first = None
     for radius in LAMPS:
         power = illuminant("D65").scaled_to_luminous(1.0 / (np.pi * radius**2))
         lamp = AreaLight("lamp", power, position=tuple(3.0 * toward), direction=tuple(-toward), radius=radius)
-        sight = look(context, Scene("lamp", STONE_SEEN_FROM, (lamp,), (stone,)), settings, 4)
+        sight = render_probe(context, Scene("lamp", STONE_SEEN_FROM, (lamp,), (stone,)), settings, 4)
         total = sight.picture.sum()
         first = first or total
         judged = Judged().hold(
@@ -124,7 +124,7 @@ def measure_lamps(context: Context) -> Iterator[Measurement]:
         )
         judged.hold("light in all", abs(total / first - 1.0), 0.2)
         judged.tell("brightest over mean", sight.picture.max() / sight.picture.mean())
-        yield seen(radius, f"radius {radius:g}", sight, judged, ANY)
+        yield measurement_of(radius, f"radius {radius:g}", sight, judged, ANY)
 
 
 @sharing_programs
@@ -135,17 +135,17 @@ def measure_poles(context: Context) -> Iterator[Measurement]:
         elevation = np.radians(elevation_deg)
         forward = np.array([np.cos(elevation) * 0.8, np.cos(elevation) * 0.6, np.sin(elevation)])
         camera = Camera((0.0, 0.0, 0.0), tuple(forward), (0.6, -0.8, 0.0), vertical_fov_deg=30.0)
-        settings = resized(LOOK, 32, 32, 16)
+        settings = resized(PROBE, 32, 32, 16)
         scene = with_sky(
             SceneObject("far", box((0.1, 0.1, 0.1)), Diffuse(), at(-9.0, 0.0, 0.0)),
             camera=camera,
             environment=sky(_smooth),
         )
-        sight = look(context, scene, settings)
+        sight = render_probe(context, scene, settings)
         _, directions = camera_rays(camera, (32, 32), 32 * 16 + 1)
         middles = directions[8::16, 8::16][::-1]
         judged = Judged().hold("radiance", np.abs(sight.picture - _smooth(middles)[..., None]).max(), 5e-3)
-        yield seen(90.0 - elevation_deg, f"{elevation_deg:g}° up", sight, judged)
+        yield measurement_of(90.0 - elevation_deg, f"{elevation_deg:g}° up", sight, judged)
 
 
 def _smooth(d: np.ndarray) -> np.ndarray:
@@ -157,15 +157,17 @@ def measure_texels(context: Context) -> Iterator[Measurement]:
     """A wall of checks far finer than a pixel, seen directly and through a ball of flint, before a sky as grey as their
     mean: all is grey."""
     for texels in TEXELS:
-        extent = LOOK.height * texels / 1024.0
+        extent = PROBE.height * texels / 1024.0
         camera = Camera((0.05, 0.03, 9.0), (0.05, 0.03, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=extent)
-        bare = look(context, replace(_checked(camera), background_rgb=(0.0, 0.0, 0.0)), resized(LOOK, 24, 16, 4))
+        bare = render_probe(
+            context, replace(_checked(camera), background_rgb=(0.0, 0.0, 0.0)), resized(PROBE, 24, 16, 4)
+        )
         ball = solid("ball", sphere(0.3 * extent, 1280), FLINT, (0.05, 0.03, 0.45 * extent))
-        sight = look(context, _checked(camera, ball), resized(LOOK, 24, 16), 4)
+        sight = render_probe(context, _checked(camera, ball), resized(PROBE, 24, 16), 4)
         judged = Judged().hold("directly", np.abs(bare.picture / GREY - 1.0).max(), 0.02)
         judged.hold("through glass", np.abs(sight.mean / GREY - 1.0).max(), 0.02)
         judged.tell("a pixel through glass", np.abs(sight.picture / GREY - 1.0).max())
-        yield seen(texels, f"{texels:g} texels a pixel", sight, judged, ANY)
+        yield measurement_of(texels, f"{texels:g} texels a pixel", sight, judged, ANY)
 
 
 @sharing_programs
@@ -177,11 +179,13 @@ def measure_slanting(context: Context) -> Iterator[Measurement]:
         camera = Camera(
             position, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), "orthographic", vertical_extent=10.0 * np.cos(angle)
         )
-        sight = look(context, replace(_checked(camera), background_rgb=(0.0, 0.0, 0.0)), resized(LOOK, 8, 24, 16))
+        sight = render_probe(
+            context, replace(_checked(camera), background_rgb=(0.0, 0.0, 0.0)), resized(PROBE, 8, 24, 16)
+        )
         columns = sight.picture[4:-4]
         judged = Judged().hold("mean", np.abs(columns.mean(axis=(0, 1)) / GREY - 1.0).max(), 0.02)
         judged.hold("of a pixel", np.abs(columns / GREY - 1.0).max(), 0.1)
-        yield seen(90.0 - angle_deg, f"{angle_deg:g}°", sight, judged)
+        yield measurement_of(90.0 - angle_deg, f"{angle_deg:g}°", sight, judged)
 
 
 def _checked(camera: Camera, *objects: SceneObject) -> Scene:
@@ -211,14 +215,14 @@ def measure_absorption(context: Context) -> Iterator[Measurement]:
     cases.append(("1e6 per unit, below 550 nm", np.where(step, 1e6, 0.0)))
     for number, (label, coefficient) in enumerate(cases):
         slab = SceneObject("slab", box((2.0, 2.0, thickness)), Dielectric(constant(n), Absorption(coefficient)))
-        sight = look(context, Scene("slab", camera, (), (slab,), background_rgb=WHITE), FEW)
+        sight = render_probe(context, Scene("slab", camera, (), (slab,), background_rgb=WHITE), FEW)
         r, kept = float(fresnel(1.0, n)), np.exp(-np.minimum(coefficient * thickness, 700.0))
         values = r + (1.0 - r) ** 2 * kept * (1.0 + r * kept) / (1.0 - (r * kept) ** 2)
         # Over 1/TINT_STEPS of the spectrum a path lets through what it does in the middle: an edge may lie off by half
         # of that, and near 550 nm a nanometre holds some 1.2 % of a channel.
         sharp = 0.012 * 0.5 * 400.0 / TINT_STEPS if "below" in label else 2e-4
         judged = Judged().hold("radiance", np.abs(sight.mean - daylight_mean(values)).max(), sharp)
-        yield seen(number, label, sight, judged)
+        yield measurement_of(number, label, sight, judged)
 
 
 CASES: tuple[Case, ...] = (

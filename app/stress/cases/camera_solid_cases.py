@@ -14,14 +14,14 @@ from ...model.optics.glass import constant
 from ...model.scene import Camera, Scene
 from ..case import Case, Measurement
 from ..rigs.camera_probe import (
-    LOOK,
+    PROBE,
     UNCHECKED,
     Judged,
     Sight,
     difference,
-    look,
+    measurement_of,
+    render_probe,
     resized,
-    seen,
     sharing_programs,
     slope,
     slope_sky,
@@ -40,7 +40,7 @@ from ..rigs.scene_parts import (
 from .contact_cases import PAIRS, tilted
 from .mesh_file_cases import FAULTS, Fault, sound_solid, through_file
 
-FEW = resized(LOOK, 12, 8, 64)
+FEW = resized(PROBE, 12, 8, 64)
 SEEN_FROM = Camera((2.6, -2.2, 2.6), (0.0, 0.0, 1.1), vertical_fov_deg=30.0)
 FROM_FACE = (0.3, 1e-2, 1e-3, 1e-5, 1e-7, 0.0, -1e-7, -1e-5, -1e-3, -1e-2, -0.3)
 SURE = 1e-3
@@ -77,7 +77,7 @@ def measure_inside(context: Context) -> Iterator[Measurement]:
             direction = np.array([sign * np.cos(angle), np.sin(angle)])
             start = np.array([0.5 - distance, 0.07])
             camera = Camera((*start, 0.0), (*(start + direction), 0.0), (0.0, 0.0, 1.0), vertical_fov_deg=0.1)
-            sight = look(context, with_sky(glass, camera=camera, environment=slope_sky()), FEW)
+            sight = render_probe(context, with_sky(glass, camera=camera, environment=slope_sky()), FEW)
             sights.append(sight)
             places = [distance > 0.0] if abs(distance) >= SURE else [True, False]
             true = [
@@ -86,7 +86,9 @@ def measure_inside(context: Context) -> Iterator[Measurement]:
             ]
             judged.hold(name, min(np.abs(sight.mean / value - 1.0).max() for value in true), 5e-4)
         where = "inside" if distance > 0.0 else "outside"
-        yield seen(number, f"{abs(distance):.0e} {where}" if distance else "on the face", _together(sights), judged)
+        yield measurement_of(
+            number, f"{abs(distance):.0e} {where}" if distance else "on the face", _together(sights), judged
+        )
 
 
 def _clearly(start: np.ndarray, distance: float, inside: bool) -> tuple[float, float]:
@@ -99,15 +101,15 @@ def measure_pairs(context: Context) -> Iterator[Measurement]:
     """Solids that nest or touch, seen through, against a simpler description of the same."""
     for number, pair in enumerate((p for p in PAIRS if p.label in CHOSEN_PAIRS), 1):
         joined, plain = _seen_through(pair.joined()), _seen_through(pair.plain())
-        base, other = (look(context, plain, replace(LOOK, seed=seed), 1) for seed in (1, 2))
-        sight = look(context, joined, LOOK, 1)
+        base, other = (render_probe(context, plain, replace(PROBE, seed=seed), 1) for seed in (1, 2))
+        sight = render_probe(context, joined, PROBE, 1)
         judged = Judged().hold(
             "picture",
             difference(sight.picture, base.picture),
             NOISE * difference(other.picture, base.picture) + SAME_PICTURE,
         )
         judged.hold("energy", abs(sight.picture.mean() / base.picture.mean() - 1.0), SAME_ENERGY)
-        yield seen(number, pair.label, sight, judged, ANY)
+        yield measurement_of(number, pair.label, sight, judged, ANY)
 
 
 def _seen_through(scene: Scene) -> Scene:
@@ -125,14 +127,14 @@ def measure_scale(context: Context) -> Iterator[Measurement]:
         camera=SEEN_FROM,
         background_rgb=(0.3, 0.4, 0.6),
     )
-    base = look(context, scene, LOOK, 4)
+    base = render_probe(context, scene, PROBE, 4)
     size = extent(scene)
     for number, (label, scale, offset) in enumerate(CHANGES, 1):
         place = offset * size * scale
-        sight = look(context, moved(scene, scale=scale, offset=(place, -place, place)), LOOK, 4)
+        sight = render_probe(context, moved(scene, scale=scale, offset=(place, -place, place)), PROBE, 4)
         judged = Judged().hold("picture", difference(sight.picture, base.picture), SAME_PICTURE)
         judged.hold("energy", abs(sight.picture.mean() / base.picture.mean() - 1.0), SAME_ENERGY)
-        yield seen(number, label, sight, judged, ANY)
+        yield measurement_of(number, label, sight, judged, ANY)
 
 
 @sharing_programs
@@ -142,20 +144,20 @@ def measure_faults(context: Context) -> Iterator[Measurement]:
     clean: dict[bool, tuple[Sight, float]] = {}
     for smooth in (False, True):
         base, other = (
-            look(context, _solid_scene(Fault("", lambda mesh: mesh, smooth)), replace(LOOK, seed=seed), 1)
+            render_probe(context, _solid_scene(Fault("", lambda mesh: mesh, smooth)), replace(PROBE, seed=seed), 1)
             for seed in (1, 2)
         )
         clean[smooth] = base, difference(other.picture, base.picture)
     for number, fault in enumerate(CHOSEN_FAULTS, 1):
         base, noise = clean[fault.smooth]
-        sight = look(context, _solid_scene(fault), LOOK, 1)
+        sight = render_probe(context, _solid_scene(fault), PROBE, 1)
         error = difference(sight.picture, base.picture)
         judged = Judged()
         if fault.mendable:
             judged.hold("picture", error, NOISE * noise + SAME_PICTURE)
         else:
             judged.tell("picture", error)
-        yield seen(number, fault.label, sight, judged, ANY)
+        yield measurement_of(number, fault.label, sight, judged, ANY)
 
 
 def _solid_scene(fault: Fault) -> Scene:
@@ -179,7 +181,8 @@ CASES: tuple[Case, ...] = (
     Case(
         "eye-inside",
         "The camera inside glass, on its face and before it, against the sum over all ways",
-        "Which medium a path begins in decides all that follows, and on a face rounding decides that; either is right, anything "
+        "Which medium a path begins in decides all that follows, and on a face rounding decides that; either is "
+        "right, anything "
         "else is not.",
         "place",
         measure_inside,

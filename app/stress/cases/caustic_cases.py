@@ -15,8 +15,8 @@ from ...model.geometry.primitives_round import sphere as sphere_mesh
 from ...model.scene import Mirror
 from ...reference.glasses import D_NM, index
 from ..case import Case, Measurement
-from ..judging import EPSILON, judged, length, not_finite, not_finite_in
-from ..rigs.gpu_paths import REFRACTED, Photons, glass, screen, trace_beam
+from ..judging import EPSILON, judged, length
+from ..rigs.gpu_paths import REFRACTED, Photons, glass, screen, trace_beam, traced
 from ..rigs.splat_rig import Rig, SplatFeatures, photons
 from .splat_cases import EDGE, FAST_ERF, SAMPLED
 
@@ -70,14 +70,13 @@ def measure_focus(context: Context) -> Iterator[Measurement]:
                 "peak": (np.array([abs(image[32, 32] / share.sum() - 1.0)]), 0.02),
             }
         )
-        yield Measurement(
+        yield traced(
             float(triangles),
             f"{triangles:,} triangles",
-            not_finite_in(landed.records) + not_finite([image]),
+            landed,
             errors,
             bounds,
-            landed.tally.imbalance,
-            dict(landed.tally.fallbacks),
+            images=[image],
             note=f"{share.mean():.0%} of the light in one texel",
         )
 
@@ -269,22 +268,15 @@ def caustic_energy(
             crossing + beam.lattice_in_disc**-0.75 + (FAST_ERF + EDGE / size) * wanted,
         )
     errors, bounds = judged(rows)
-    return Measurement(
-        float(size),
-        f"{size}² texels",
-        not_finite_in(beam.records) + not_finite([image]),
-        errors,
-        bounds,
-        beam.tally.imbalance,
-        dict(beam.tally.fallbacks),
-    )
+    return traced(float(size), f"{size}² texels", beam, errors, bounds, images=[image])
 
 
 CASES = (
     Case(
         "perfect-focus",
         "An ellipsoid of eccentricity 1/n, tessellated finer and finer: a perfect focus",
-        "Footprints shrink to nothing and irradiance grows without bound. The columns must vanish with the facets, and what a texel holds must be the light that falls into it, all of it.",
+        "Footprints shrink to nothing and irradiance grows without bound. The columns must vanish with the facets, "
+        "and what a texel holds must be the light that falls into it, all of it.",
         "triangles",
         measure_focus,
         steps=4,
@@ -292,7 +284,8 @@ CASES = (
     Case(
         "fold",
         "The fold caustic of a ball, at finer and finer maps",
-        "Irradiance is r^(-1/2) at a fold, where a photon's footprint collapses and turns over. Energy in rings at the fold against the exact ball.",
+        "Irradiance is r^(-1/2) at a fold, where a photon's footprint collapses and turns over. Energy in rings at "
+        "the fold against the exact ball.",
         "texels across the map",
         measure_fold,
         steps=4,

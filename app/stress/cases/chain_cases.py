@@ -245,7 +245,10 @@ def outgrown(photons: Photons, severity: float, label: str) -> Measurement:
         }
     )
     bad, finite = not_finite_in(records[~flagged]), longest[np.isfinite(longest)]
-    note = f"{np.count_nonzero(flagged)} of {len(records)} footprints dropped, longest column {finite.max():.1e} glass sizes"
+    note = (
+        f"{np.count_nonzero(flagged)} of {len(records)} footprints dropped, longest column {finite.max():.1e} glass "
+        "sizes"
+    )
     return Measurement(
         severity,
         label,
@@ -263,7 +266,8 @@ CASES = (
     Case(
         "long-chain",
         "Five to sixty events inside a diamond",
-        "Every reflection adds a few roundings to a direction, and the path that is left carries them on. Against float64 over the same facets, "
+        "Every reflection adds a few roundings to a direction, and the path that is left carries them on. Against "
+        "float64 over the same facets, "
         "the error must stay below events × rounding × what float64's own columns say becomes of it.",
         "events",
         measure_chain,
@@ -272,7 +276,8 @@ CASES = (
     Case(
         "smooth-chain",
         "The same inside a smooth gem, where columns grow exponentially",
-        "Curved facets make neighbouring rays part for good. A column beyond a million glass sizes, or not finite, costs the photon its footprint, never its light, and is counted.",
+        "Curved facets make neighbouring rays part for good. A column beyond a million glass sizes, or not finite, "
+        "costs the photon its footprint, never its light, and is counted.",
         "events",
         measure_smooth_chain,
         steps=5,

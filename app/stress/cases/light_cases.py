@@ -7,13 +7,16 @@ scene has the same light, also to that.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ...base.errors import UserError
 from ...gpu.context import Context
 from ...model.geometry.primitives import box, plane, prism
-from ...model.lights import AreaLight, PointLight
+from ...model.lights import AreaLight, IesLight, PointLight, SpotLight
+from ...model.lights.ies_file import Profile
 from ...model.optics.glass import constant
 from ...model.optics.spectrum import Spectrum, illuminant
 from ...model.scene import Camera, Diffuse, Light, Scene, SceneObject
@@ -127,6 +130,47 @@ def measure_distances(context: Context) -> Iterator[Measurement]:
         yield measurement(distance, f"{distance:.0e} units", found, held)
 
 
+def measure_lamps(context: Context) -> Iterator[Measurement]:
+    """Tables of intensities that are hard on a lookup, against a spot or a point of the same light."""
+    for number, lamp in enumerate(LAMPS, 1):
+        found = probe(context, _block(lamp.light))
+        held = Held()
+        if lamp.like is not None:
+            base = probe(context, _block(lamp.like))
+            held = Held(
+                {
+                    "picture": picture_error(found.picture, base.picture),
+                    "energy": energy_error(found.picture, base.picture),
+                },
+                {"picture": lamp.bound, "energy": lamp.bound},
+            )
+        yield measurement(number, lamp.label, found, held)
+
+
+@dataclass(frozen=True)
+class Lamp:
+    """A photometric lamp, and what shines as it does."""
+
+    label: str
+    light: Light
+    like: Light | None = None
+    bound: float = 0.0
+
+
+def _lamp(vertical_deg: Sequence[float], share: Sequence[float], **placed: object) -> Light:
+    """A lamp that is the same all the way round."""
+    intensity = np.array([share, share], float)
+    profile = Profile(np.array(vertical_deg, float), np.array([0.0, 360.0]), intensity, 1.0, "")
+    return IesLight("lamp", SPECTRUM, profile, **({"position": (0.1, 0.1, 3.0)} | placed))
+
+
+def _comb(teeth: int) -> Light:
+    """Every other direction dark, all the way round too."""
+    vertical, horizontal = np.linspace(0.0, 180.0, 2 * teeth + 1), np.linspace(0.0, 360.0, 2 * teeth + 1)
+    intensity = np.where((np.arange(2 * teeth + 1)[:, None] + np.arange(2 * teeth + 1)) % 2, 0.0, 1.0)
+    return IesLight("comb", SPECTRUM, Profile(vertical, horizontal, intensity, 1.0, ""), (0.1, 0.1, 3.0))
+
+
 def _prism_under(light: Light) -> Scene:
     return stage(solid("prism", prism(), FLINT, (0.0, 0.0, 0.9)), lights=[light])
 
@@ -193,6 +237,24 @@ PLACES = (
     ),
 )
 
+LAMPS = (
+    Lamp("the same all round, as a point", _lamp([0, 90, 180], [1, 1, 1]), _point((0.1, 0.1, 3.0)), 1e-6),
+    Lamp(
+        "cut off at 10° within a millionth of a degree, as a hard spot",
+        _lamp([0, 10, 10.000001, 180], [1, 1, 0, 0]),
+        SpotLight("spot", SPECTRUM, (0.1, 0.1, 3.0), inner_half_angle_deg=10.0, outer_half_angle_deg=10.0),
+        0.05,
+    ),
+    Lamp("a peak of a hundredth of a degree", _lamp([0, 0.01, 180], [1, 0, 0])),
+    Lamp("a peak a thousand times as bright as the rest", _lamp([0, 0.5, 180], [1, 1e-3, 1e-3])),
+    Lamp("a ring of light, dark inside and outside", _lamp([0, 4, 5, 6, 180], [0, 0, 1, 0, 0])),
+    Lamp("a comb of 180 dark and bright directions each way", _comb(180)),
+    Lamp("shining up only, away from the block", _lamp([0, 89.999, 90, 180], [0, 0, 1, 1])),
+    Lamp(
+        "the pole of the angles in the middle of the block", _lamp([0, 90, 180], [1, 0.5, 0], direction=(0.0, 0.0, 1.0))
+    ),
+)
+
 REFUSED: tuple[tuple[str, Callable[[], Scene]], ...] = (
     ("a point light in the glass", lambda: _block(_point((0.1, 0.0, 0.7)))),
     ("a beam's aperture in the glass", lambda: _block(_beam((0.0, 0.0, 0.7)))),
@@ -217,6 +279,15 @@ CASES: tuple[Case, ...] = (
         "scene",
         measure_refusals,
         len(REFUSED),
+        logarithmic=False,
+    ),
+    Case(
+        "lamps",
+        "Photometric files with peaks, zeros and edges",
+        "A table is looked up between its angles; photons are spread over directions, not over the light.",
+        "lamp",
+        measure_lamps,
+        len(LAMPS),
         logarithmic=False,
     ),
     Case(

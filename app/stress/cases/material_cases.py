@@ -26,6 +26,7 @@ from ..rigs.gpu_paths import (
     screen,
     trace_beam,
     trace_light,
+    traced,
 )
 
 # ---- a slab of anything -------------------------------------------------------------------------
@@ -100,16 +101,7 @@ def measure_extremes(context: Context) -> Iterator[Measurement]:
                 "impossible indices accepted": (np.array([float(accepted())]), 0.0),
             }
         )
-        yield Measurement(
-            severity,
-            label,
-            not_finite_in(photons.records),
-            errors,
-            bounds,
-            photons.tally.imbalance,
-            dict(photons.tally.fallbacks),
-            note=f"{len(x)} photons",
-        )
+        yield traced(severity, label, photons, errors, bounds, note=f"{len(x)} photons")
 
 
 def table_error(photons: Photons, dispersion: Dispersion) -> float:
@@ -191,15 +183,8 @@ def measure_gem_bands(context: Context) -> Iterator[Measurement]:
                 ),
             }
         )
-        yield Measurement(
-            width,
-            f"{width:g} nm",
-            not_finite_in(photons.records),
-            errors,
-            bounds,
-            photons.tally.imbalance,
-            dict(photons.tally.fallbacks),
-            note=f"n {n[0, 0]:.3f} to {n[0, 2]:.3f} in one band",
+        yield traced(
+            width, f"{width:g} nm", photons, errors, bounds, note=f"n {n[0, 0]:.3f} to {n[0, 2]:.3f} in one band"
         )
 
 
@@ -252,7 +237,8 @@ CASES = (
     Case(
         "extreme-index",
         "Indices from a gas to germanium, dispersion from none to all there is, and the wrong way round",
-        "V_d towards 0 sends n to a thousand or below 1, and a table of n may have anything in it. What cannot be is refused, what is odd is said aloud, and what can be is traced as it is.",
+        "V_d towards 0 sends n to a thousand or below 1, and a table of n may have anything in it. What cannot be is "
+        "refused, what is odd is said aloud, and what can be is traced as it is.",
         "index (1.5…: V_d varies)",
         measure_extremes,
         steps=len(EXTREMES),
@@ -261,7 +247,8 @@ CASES = (
     Case(
         "gem-bands",
         "A gem with n from 2.2 (violet) to 1.2 (red), in bands of 200 nm to 1 nm",
-        "The path over a band is linear in n, exactly; nothing better is claimed, and nothing worse may happen: the band's ends land within Taylor's remainder of the reference.",
+        "The path over a band is linear in n, exactly; nothing better is claimed, and nothing worse may happen: the "
+        "band's ends land within Taylor's remainder of the reference.",
         "width of the band (nm)",
         measure_gem_bands,
         steps=6,
@@ -269,7 +256,8 @@ CASES = (
     Case(
         "gem-cut",
         "The same gem where total reflection sets in inside a band",
-        "Half of a band leaves the glass, the other half stays. The band is cut at the wavelength that float32 can know, both parts go on, and flux closes.",
+        "Half of a band leaves the glass, the other half stays. The band is cut at the wavelength that float32 can "
+        "know, both parts go on, and flux closes.",
         "width of the band (nm)",
         measure_gem_cut,
         steps=4,

@@ -15,7 +15,7 @@ from ...model.geometry.primitives_round import sphere as sphere_mesh
 from ...model.scene import Diffuse, Mirror
 from ...reference.glasses import D_NM
 from ..case import Case, Measurement
-from ..judging import EPSILON, judged, length, not_finite_in
+from ..judging import EPSILON, judged, length
 from ..rigs.gpu_paths import (
     MIRRORED,
     REFRACTED,
@@ -26,6 +26,7 @@ from ..rigs.gpu_paths import (
     screen,
     trace_beam,
     trace_light,
+    traced,
 )
 from .caustic_cases import BEAM_RADIUS, SLOPE, hollow_mirror, mirrored_landing
 
@@ -113,21 +114,19 @@ def measure_slivers(context: Context) -> Iterator[Measurement]:
                 ),
             }
         )
-        yield Measurement(
+        yield traced(
             min(aspect, 1e8),
             f"{aspect:g} : 1" if np.isfinite(aspect) else "no area",
-            not_finite_in(photons.records),
+            photons,
             errors,
             bounds,
-            photons.tally.imbalance,
-            dict(photons.tally.fallbacks),
-            dropped(photons),
-            examine(mended).summary(),
+            dropped=dropped(photons),
+            note=examine(mended).summary(),
         )
 
 
 def _said(mesh: Mesh, notes: tuple[str, ...]) -> bool:
-    """Whether triangles without area are told of: dropped with a note, or kept as a closed mesh's stitches and told by
+    """Whether triangles without area are noted: dropped with a note, or kept as a closed mesh's stitches and named by
     `inspect`."""
     return any("degenerate" in note for note in notes) or "degenerate" in examine(mesh).summary()
 
@@ -173,16 +172,8 @@ def measure_needles(context: Context) -> Iterator[Measurement]:
         # Boxes of slanting needles all overlap, and llvmpipe stops a ray's walk after 65,535 rounds: lost, and said so.
         given_up = photons.tally.ended["lost_numeric"] / photons.tally.emitted
         note = f"{given_up:.0%} of the light given up by the software renderer" if given_up else ""
-        yield Measurement(
-            2.3 / width,
-            f"{2.3 / width:.0f} : 1",
-            not_finite_in(photons.records),
-            errors,
-            bounds,
-            photons.tally.imbalance,
-            dict(photons.tally.fallbacks),
-            dropped(photons),
-            note,
+        yield traced(
+            2.3 / width, f"{2.3 / width:.0f} : 1", photons, errors, bounds, dropped=dropped(photons), note=note
         )
 
 
@@ -211,24 +202,15 @@ def measure_normals(context: Context) -> Iterator[Measurement]:
         silent = label in ("a tenth zero", "all zero", "all backwards") and not notes
         rows["faults not said"] = (np.array([float(silent)]), 0.0)
         errors, bounds = judged(rows)
-        yield Measurement(
-            float(number),
-            label,
-            not_finite_in(photons.records),
-            errors,
-            bounds,
-            photons.tally.imbalance,
-            dict(photons.tally.fallbacks),
-            dropped(photons),
-            "; ".join(notes),
-        )
+        yield traced(float(number), label, photons, errors, bounds, dropped=dropped(photons), note="; ".join(notes))
 
 
 CASES = (
     Case(
         "slivers",
         "A ball whose every face holds a sliver, from 100:1 to no area at all",
-        "A thin triangle's normal is mostly rounding, and the edge tests of its neighbours must overlap or light leaks into the glass for good. Light through a sliver may go astray; "
+        "A thin triangle's normal is mostly rounding, and the edge tests of its neighbours must overlap or light "
+        "leaks into the glass for good. Light through a sliver may go astray; "
         "how much light that is shrinks as fast.",
         "aspect of the slivers",
         measure_slivers,
@@ -237,7 +219,8 @@ CASES = (
     Case(
         "needles",
         "A mirror made of needles in no direction in particular",
-        "The cross product of a needle's two long edges loses as many digits as the needle is thin. Every triangle is turned to begin at its best corner, so a needle shows its short edge.",
+        "The cross product of a needle's two long edges loses as many digits as the needle is thin. Every triangle is "
+        "turned to begin at its best corner, so a needle shows its short edge.",
         "aspect of the needles",
         measure_needles,
         steps=5,
@@ -245,7 +228,8 @@ CASES = (
     Case(
         "bad-normals",
         "Shading normals that are zero, unnormalised, backwards or random",
-        "What can be repaired is, with a note; whatever is left, the geometric normal judges, no ray leaks and nothing is NaN.",
+        "What can be repaired is, with a note; whatever is left, the geometric normal judges, no ray leaks and "
+        "nothing is NaN.",
         "kind of fault",
         measure_normals,
         steps=6,

@@ -49,7 +49,7 @@ class Fault:
 
 def measure_faults(context: Context) -> Iterator[Measurement]:
     """Each fault, through an OBJ file. A hole lets rays in and out that no medium can follow: what is lost there only
-    has to be told."""
+    has to be said."""
     clean = {}
     for smooth in (False, True):
         scene = stage(*tilted(solid("solid", sound_solid(smooth), FLINT)), lights=[SUN])

@@ -256,8 +256,10 @@ CASES = (
     Case(
         "tir-margin",
         "The edge of total internal reflection, from both sides",
-        "Columns grow as 1/cos² of the refracted ray, and float32 knows cos² to about 10 roundings only. The stable forms lose no more than that; "
-        "where cos² lies within its own rounding the ray may go either way, but stays finite and of unit length, and hardly any light passes there.",
+        "Columns grow as 1/cos² of the refracted ray, and float32 knows cos² to about 10 roundings only. The stable "
+        "forms lose no more than that; "
+        "where cos² lies within its own rounding the ray may go either way, but stays finite and of unit length, and "
+        "hardly any light passes there.",
         "margin to the critical angle (rad)",
         measure_tir_margin,
         steps=5,
@@ -265,7 +267,8 @@ CASES = (
     Case(
         "grazing",
         "Grazing incidence, and receivers seen edge-on",
-        "A column lands as 1/cos of the angle on a receiver, and float32 knows that cosine to 1.5 roundings of 1: the error grows as 1/cos². "
+        "A column lands as 1/cos of the angle on a receiver, and float32 knows that cosine to 1.5 roundings of 1: the "
+        "error grows as 1/cos². "
         "Refraction itself is well conditioned when entering.",
         "degrees from grazing",
         measure_grazing,
@@ -274,7 +277,8 @@ CASES = (
     Case(
         "index-matched",
         "Two media that hardly differ",
-        "The textbook's mu = eta (d·n) + cos θt cancels to nothing when eta is near 1; (1−eta)(1+eta)/(cos θt − eta (d·n)) keeps all digits, "
+        "The textbook's mu = eta (d·n) + cos θt cancels to nothing when eta is near 1; (1−eta)(1+eta)/(cos θt − eta "
+        "(d·n)) keeps all digits, "
         "and equal media change nothing, to the last bit.",
         "|eta − 1|",
         measure_index_matched,

@@ -23,7 +23,7 @@ from .sweep_cases import against_single_wavelengths, scene_sweep
 
 LEFT_IN_MAPS = {"lens_text": 0.05, "water": 0.05, "wine_glass": 0.03}
 """Where light falls over a receiver's whole width, or on curved ones, footprints reach over edges: that share is lost
-and told."""
+and noted."""
 MAP = 0.01
 """What a map may lack or have too much elsewhere: splats are cut off at four standard deviations and at windows'
 borders."""

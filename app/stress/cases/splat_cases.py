@@ -173,7 +173,8 @@ CASES = (
     Case(
         "stretched",
         "Footprints a thousand times longer than wide, at every angle",
-        "Near a fold one axis of the footprint collapses while the other crosses the map. Across, the texel's own box is integrated; "
+        "Near a fold one axis of the footprint collapses while the other crosses the map. Across, the texel's own box "
+        "is integrated; "
         "along, a Gaussian no narrower than the grid can see is sampled. No energy may be lost or made.",
         "ratio of the axes",
         measure_stretched,
@@ -182,8 +183,10 @@ CASES = (
     Case(
         "sweeps",
         "Spectral sweeps from nothing to a thousand texels, over sheared footprints",
-        "A strong prism throws one photon's spectrum across the whole map. The splat's table is chosen by blur over sweep, from 2^-8 to 2^5, "
-        "and beyond either end something has to give: the blur along a long sweep is widened, never the energy changed.",
+        "A strong prism throws one photon's spectrum across the whole map. The splat's table is chosen by blur over "
+        "sweep, from 2^-8 to 2^5, "
+        "and beyond either end something has to give: the blur along a long sweep is widened, never the energy "
+        "changed.",
         "length of the sweep (texels)",
         measure_sweeps,
         steps=6,
@@ -191,7 +194,8 @@ CASES = (
     Case(
         "collapse",
         "A footprint that shrinks to a line and to a point",
-        "At a perfect focus det A is 0 and irradiance infinite; a texel holds its average, which is finite, and all of the energy. The peak is never capped.",
+        "At a perfect focus det A is 0 and irradiance infinite; a texel holds its average, which is finite, and all "
+        "of the energy. The peak is never capped.",
         "size of the footprint (texels)",
         measure_collapse,
         steps=8,

@@ -165,8 +165,10 @@ CASES = (
     Case(
         "one-texel",
         "Every photon on one texel, up to a hundred million",
-        "A float32 sum stops growing at 2^24 equal parts. Photons go to a scratch texture that is added to the total after a chunk, "
-        "and what that addition rounds off stays in the scratch (Kahan): the total is right to its last place however long a rendering runs.",
+        "A float32 sum stops growing at 2^24 equal parts. Photons go to a scratch texture that is added to the total "
+        "after a chunk, "
+        "and what that addition rounds off stays in the scratch (Kahan): the total is right to its last place however "
+        "long a rendering runs.",
         "photons",
         measure_one_texel,
         steps=7,
@@ -174,7 +176,8 @@ CASES = (
     Case(
         "one-chunk",
         "A chunk of photons on one texel of a large map",
-        "Between two flushes a plain float32 sum runs on: a sixteenth of the map's texels in photons, since a flush costs as much as the map is large. "
+        "Between two flushes a plain float32 sum runs on: a sixteenth of the map's texels in photons, since a flush "
+        "costs as much as the map is large. "
         "Equal photons on one texel all round alike and may lose n · 2^-24; photons that differ lose its root.",
         "photons between two flushes",
         measure_one_chunk,

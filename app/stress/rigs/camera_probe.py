@@ -30,7 +30,7 @@ from ...render.light_pass import spectral_axis
 from ..case import Measurement
 from .probe import nonfinite
 
-LOOK = RenderSettings(width=48, height=32, spp=16)
+PROBE = RenderSettings(width=48, height=32, spp=16)
 """What a case looks at unless it is about just that."""
 WHITE = (1.0, 1.0, 1.0)
 UNCHECKED = np.inf
@@ -78,7 +78,7 @@ def sharing_programs(measure: Callable[[Context], Iterator[Measurement]]) -> Cal
 
 
 @contextmanager
-def opened_camera_pass(context: Context, scene: Scene, settings: RenderSettings = LOOK) -> Iterator[CameraPass]:
+def opened_camera_pass(context: Context, scene: Scene, settings: RenderSettings = PROBE) -> Iterator[CameraPass]:
     """The camera pass of `scene`, without caustics; freed afterwards."""
     features = Features.of(scene, settings)
     buffers = SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
@@ -93,7 +93,7 @@ def opened_camera_pass(context: Context, scene: Scene, settings: RenderSettings 
         buffers.release()
 
 
-def look(context: Context, scene: Scene, settings: RenderSettings = LOOK, bands: int | None = None) -> Sight:
+def render_probe(context: Context, scene: Scene, settings: RenderSettings = PROBE, bands: int | None = None) -> Sight:
     """A picture of `scene` in so many bands (None: as many as a rendering would choose), `settings.spp` samples a pixel
     or a whole cycle more."""
     with opened_camera_pass(context, scene, settings) as camera_pass:
@@ -101,7 +101,7 @@ def look(context: Context, scene: Scene, settings: RenderSettings = LOOK, bands:
 
 
 def look_with(
-    camera_pass: CameraPass, camera: Camera, settings: RenderSettings = LOOK, bands: int | None = None
+    camera_pass: CameraPass, camera: Camera, settings: RenderSettings = PROBE, bands: int | None = None
 ) -> Sight:
     """The same with a pass that is there already."""
     samples = settings.spp or 1
@@ -138,7 +138,7 @@ class Judged:
         return self
 
 
-def seen(
+def measurement_of(
     severity: float, label: str, sight: Sight, judged: Judged, shares: dict[str, float] | None = None, note: str = ""
 ) -> Measurement:
     """A sight's measurement: finite, and no fall-back taken more often than `shares` says, as a share of the samples
@@ -148,9 +148,9 @@ def seen(
         if np.isfinite(most):
             judged.hold(name.replace("_", " "), sight.share(name), most)
     bands = f"{sight.bands} band{'s' if sight.bands > 1 else ''}"
-    told = f"{note}; {bands}" if note else bands
+    noted = f"{note}; {bands}" if note else bands
     return Measurement(
-        severity, label, sight.nonfinite, judged.errors, judged.bounds, fallbacks=dict(sight.fallbacks), note=told
+        severity, label, sight.nonfinite, judged.errors, judged.bounds, fallbacks=dict(sight.fallbacks), note=noted
     )
 
 

@@ -38,6 +38,8 @@ from ...reference.glasses import sellmeier_terms
 from ...reference.optics import unit
 from ...reference.random_numbers import hash_combine
 from ...render.light_pass import spectral_axis
+from ..case import Measurement
+from ..judging import not_finite, not_finite_in
 
 SHIFT = (123456789, 987654321)
 SEED = 1
@@ -271,3 +273,20 @@ def trace_beam(
     lattice = np.concatenate([everything.emitter.start(everything.emitter.lattice(count, SHIFT, k))[0] for k in own])
     chosen = everything.where(inside(everything.start))
     return replace(chosen, lattice_in_disc=int(np.count_nonzero(inside(lattice))))
+
+
+def traced(
+    severity: float,
+    label: str,
+    photons: Photons,
+    errors: dict[str, float],
+    bounds: dict[str, float],
+    images: Sequence[np.ndarray] = (),
+    dropped: int = 0,
+    note: str = "",
+) -> Measurement:
+    """The measurement of one beam: its values, and those of `images`, are finite; its tally closes."""
+    tally, nonfinite = photons.tally, not_finite_in(photons.records) + not_finite(images)
+    return Measurement(
+        severity, label, nonfinite, errors, bounds, tally.imbalance, dict(tally.fallbacks), dropped, note
+    )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import moderngl
 import numpy as np
 
+from ...bench.splat_speed import SplatFeatures
 from ...gpu.map_channels import MapChannels
 from ...gpu.records import NONE, RECEIVER, photon_record
 from ...gpu.splat_tables import SplatTables
@@ -23,18 +24,6 @@ IDENTITY_ROWS = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
 WHOLE_BAND = ((0.0, 1.0),)
 
 
-@dataclass(frozen=True)
-class SplatFeatures:
-    spectral_groups: int = 1
-    band_cuts: bool = False
-    nested_windows: bool = False
-    charts: bool = False
-    targets: int = 1
-    point_spectrum: bool = False
-    local_gain: bool = False
-    reindexed: bool = False
-
-
 @dataclass
 class Rig:
     """One flat receiver of `size` texels, and what is drawn into it."""
@@ -44,7 +33,7 @@ class Rig:
     size: tuple[int, int] = (64, 64)
     light: spectrum.Spectrum = field(default_factory=lambda: spectrum.illuminant("D65"))
     bands: Sequence[tuple[float, float]] = WHOLE_BAND
-    channels: MapChannels = MapChannels()
+    channels: MapChannels = field(default_factory=MapChannels)
     axis: SpectralAxis = field(default_factory=lambda: SpectralAxis.build([]))
     coarse: tuple[tuple[int, int], np.ndarray, float] | None = None
     """Size, rows (2, 4) and texel area of a coarser window."""

@@ -1,1 +1,1 @@
-"""Panels: each is `draw(state, facts) -> state`; none knows OpenGL, files or the renderer."""
+"""Panels: each is `draw(state, view_model) -> state`; none knows OpenGL, files or the renderer."""

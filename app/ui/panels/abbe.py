@@ -42,7 +42,7 @@ _COLOURS = (
     (0.74, 0.70, 0.24),
     (0.45, 0.75, 0.75),
 )
-"""One for each maker, told apart by the colour-blind too (after Okabe and Ito)."""
+"""One for each maker, distinguishable to the colour-blind too (after Okabe and Ito)."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class _Points:
 
 
 @dataclass
-class _Look:
+class _Memory:
     """What the diagram shows; not part of the document."""
 
     hidden: set[str] = field(default_factory=set)
@@ -69,7 +69,7 @@ class _Look:
     """Where the plot was drawn last, pixels: top left, bottom right."""
 
 
-_look = _Look()
+_memory = _Memory()
 
 
 def draw_abbe(state: State, view_model: ViewModel) -> State:
@@ -80,8 +80,8 @@ def draw_abbe(state: State, view_model: ViewModel) -> State:
         widgets.hint("Select an object of glass, then click a glass here.")
     else:
         widgets.hint(f"Click: {selected[1].name} gets that glass.  Ctrl+drag: any n_d and V_d.  Wheel: zoom.")
-    if _look.refused:
-        widgets.error(_look.refused)
+    if _memory.refused:
+        widgets.error(_memory.refused)
     flags = implot.Flags_.no_legend.value | implot.Flags_.no_menus.value | implot.Flags_.no_box_select.value
     flags |= implot.Flags_.no_title.value | implot.Flags_.no_mouse_text.value
     if not implot.begin_plot("##abbe", ImVec2(-1.0, max(imgui.get_content_region_avail().y, theme.em(14.0))), flags):
@@ -93,7 +93,7 @@ def draw_abbe(state: State, view_model: ViewModel) -> State:
     _draw_objects(state)
     state = _answer_mouse(state, shown)
     corner, size = implot.get_plot_pos(), implot.get_plot_size()
-    _look.corners = (corner.x, corner.y), (corner.x + size.x, corner.y + size.y)
+    _memory.corners = (corner.x, corner.y), (corner.x + size.x, corner.y + size.y)
     implot.end_plot()
     item_rects.note("Abbe plot")
     return state
@@ -113,7 +113,7 @@ def _points() -> _Points:
 
 def _shown() -> np.ndarray:
     """Which points are shown, bool."""
-    hidden = [i for i, maker in enumerate(MAKER_ORDER) if maker in _look.hidden]
+    hidden = [i for i, maker in enumerate(MAKER_ORDER) if maker in _memory.hidden]
     return ~np.isin(_points().maker, hidden)
 
 
@@ -135,12 +135,12 @@ def _draw_makers() -> None:
         else:
             used = width
         imgui.push_style_color(imgui.Col_.check_mark, ImVec4(*_maker_colour(index)))
-        changed, is_shown = imgui.checkbox(maker, maker not in _look.hidden)
+        changed, is_shown = imgui.checkbox(maker, maker not in _memory.hidden)
         imgui.pop_style_color()
         item_rects.note(maker)
         widgets.tooltip(f"Show the glasses of {maker}." if index else "Show water, plastics, crystals and gems.")
         if changed:
-            (_look.hidden.discard if is_shown else _look.hidden.add)(maker)
+            (_memory.hidden.discard if is_shown else _memory.hidden.add)(maker)
 
 
 # ---- drawing ------------------------------------------------------------------------------
@@ -223,10 +223,10 @@ def _draw_name(drawing: imgui.ImDrawList, at: ImVec2, name: str, tint: int) -> N
 def _answer_mouse(state: State, shown: np.ndarray) -> State:
     is_hovered, io = implot.is_plot_hovered(), imgui.get_io()
     if is_hovered and io.key_ctrl and imgui.is_mouse_clicked(0) and selected_glass(state) is not None:
-        _look.is_setting, _look.refused = True, ""
-    if _look.is_setting and not imgui.is_mouse_down(0):
-        _look.is_setting = False
-    if _look.is_setting:
+        _memory.is_setting, _memory.refused = True, ""
+    if _memory.is_setting and not imgui.is_mouse_down(0):
+        _memory.is_setting = False
+    if _memory.is_setting:
         return _set_freely(widgets.holding(state, True))
     near = nearest_entry(shown) if is_hovered else None
     if near is None:
@@ -236,7 +236,7 @@ def _answer_mouse(state: State, shown: np.ndarray) -> State:
     is_click = imgui.is_mouse_released(0) and abs(moved.x) + abs(moved.y) < 4.0
     if not (is_click and selected_glass(state) is not None):
         return state
-    _look.refused = ""
+    _memory.refused = ""
     return apply_glass(state, near)
 
 
@@ -254,7 +254,7 @@ def _set_freely(state: State) -> State:
     try:
         scene = edits.set_dispersion(state.scene, index, with_abbe(material.dispersion, n_d, v_d))
     except UserError as refusal:
-        _look.refused = str(refusal)
+        _memory.refused = str(refusal)
         return state
     return state.edited(scene, f"n_d and V_d of {item.name}")
 

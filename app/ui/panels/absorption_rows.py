@@ -18,15 +18,15 @@ _FIRST_COLOUR, _FIRST_DISTANCE = (0.55, 0.85, 0.75), 1.0
 
 
 @dataclass
-class _Look:
-    """Colour and distance as they were set: a coefficient alone does not tell them apart."""
+class _Memory:
+    """Colour and distance as they were set: a coefficient alone does not distinguish them."""
 
     coefficient: np.ndarray | None = None
     rgb: Vec3 = _FIRST_COLOUR
     distance: float = _FIRST_DISTANCE
 
 
-_look = _Look()
+_memory = _Memory()
 
 
 def draw_absorption(state: State, index: int) -> State:
@@ -38,7 +38,7 @@ def draw_absorption(state: State, index: int) -> State:
     tip = "Let the glass absorb light on the way through it (Beer–Lambert). Off: perfectly clear."
     changed, tinted = widgets.toggle("Tinted", material.absorption is not None, tip=tip)
     if changed:
-        return _tinted(state, index, _look.rgb if tinted else None, _look.distance)
+        return _tinted(state, index, _memory.rgb if tinted else None, _memory.distance)
     if material.absorption is None:
         return state
     return _draw_colour(state, index, material.absorption)
@@ -73,8 +73,8 @@ def colour_of(absorption: Absorption) -> tuple[Vec3, float] | None:
 
     Where it was not set here, the distance at which the strongest channel has fallen to one half.
     """
-    if _look.coefficient is not None and np.array_equal(_look.coefficient, absorption.coefficient):
-        return _look.rgb, _look.distance
+    if _memory.coefficient is not None and np.array_equal(_memory.coefficient, absorption.coefficient):
+        return _memory.rgb, _memory.distance
     strength, *_ = np.linalg.lstsq(rgb_partition(), absorption.coefficient, rcond=None)
     strongest = float(strength.max())
     if strongest <= 0.0:
@@ -97,5 +97,5 @@ def _tinted(state: State, index: int, rgb: Vec3 | None, distance: float) -> Stat
     material = after.scene.objects[index].material
     is_done = after.scene is not state.scene
     if is_done and material.absorption is not None:
-        _look.coefficient, _look.rgb, _look.distance = material.absorption.coefficient, (r, g, b), distance
+        _memory.coefficient, _memory.rgb, _memory.distance = material.absorption.coefficient, (r, g, b), distance
     return after

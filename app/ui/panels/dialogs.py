@@ -48,8 +48,8 @@ def open_file(state: State, view_model: ViewModel) -> State:
 
 
 def open_path(state: State, view_model: ViewModel, path: Path) -> State:
-    """Open `path`; asks first when work would be lost. A picture becomes part of the scene instead."""
-    if picture_choice.is_picture(path):
+    """Open `path`; asks first when work would be lost. A picture or a lamp becomes part of the scene instead."""
+    if picture_choice.is_part(path):
         return picture_choice.dropped(state, path)
     return _unless_unsaved(state, view_model, requests.Open(path))
 

@@ -39,14 +39,14 @@ MAX_GAIN = 10.0
 
 
 @dataclass
-class _Look:
+class _Memory:
     """The last edit that was refused, until one succeeds or something else is selected."""
 
     refused: str = ""
     of: str = ""
 
 
-_look = _Look()
+_memory = _Memory()
 
 
 def draw_dispersion(state: State, view_model: ViewModel) -> State:
@@ -56,8 +56,8 @@ def draw_dispersion(state: State, view_model: ViewModel) -> State:
         widgets.hint(_why_empty(state))
         return state
     index, item, material = selected
-    if _look.of != item.name:
-        _look.of, _look.refused = item.name, ""
+    if _memory.of != item.name:
+        _memory.of, _memory.refused = item.name, ""
     _draw_header(item, material.dispersion)
     state = _draw_buttons(state, view_model, index)
     if widgets.section("Dispersion"):
@@ -181,8 +181,8 @@ def _draw_numbers(state: State, view_model: ViewModel, index: int) -> State:
     state = widgets.holding(state, active)
     if changed:
         state = _attempt(state, index, f"Abbe number of {item.name}", lambda: with_abbe(dispersion, n_d, new_v_d))
-    if _look.refused:
-        widgets.error(_look.refused)
+    if _memory.refused:
+        widgets.error(_memory.refused)
     _draw_lines(state.scene.objects[index].material.dispersion)  # type: ignore[union-attr]
     if view_model.stats.first_order:
         widgets.hint("The caustic follows this edit to first order until it is traced again.")
@@ -194,9 +194,9 @@ def _attempt(state: State, index: int, label: str, make: Callable[[], Dispersion
     try:
         scene = edits.set_dispersion(state.scene, index, make())
     except UserError as refusal:
-        _look.refused = str(refusal)
+        _memory.refused = str(refusal)
         return state
-    _look.refused = ""
+    _memory.refused = ""
     return state.edited(scene, label)
 
 
@@ -225,8 +225,8 @@ def _draw_lines(dispersion: Dispersion) -> None:
             imgui.text_unformatted(value)
             widgets.tooltip(tip)
         imgui.end_table()
-    for told in notes_of(dispersion):
-        widgets.note(told[:1].upper() + told[1:])
+    for note in notes_of(dispersion):
+        widgets.note(note[:1].upper() + note[1:])
 
 
 def _draw_priority(state: State, index: int) -> State:

@@ -63,31 +63,31 @@ def _constant(state: State) -> State:
 
 
 def _gradient(state: State, environment: Environment) -> State:
-    told: Any = environment.parameters
+    parameters: Any = environment.parameters
     for key, label, where in (
         ("zenith", "Above", "straight up"),
         ("horizon", "Horizon", "all round"),
         ("nadir", "Below", "straight down"),
     ):
         changed, rgb, active = widgets.colour(
-            label, _vector(told[key]), tip=f"Colour seen {where}; the intensity below makes it a radiance."
+            label, _vector(parameters[key]), tip=f"Colour seen {where}; the intensity below makes it a radiance."
         )
         if changed:
             state = edits.attempt(
                 state, f"{label} of the gradient", environments.set_gradient, **{key: tuple(max(c, 0.0) for c in rgb)}
             )
         state = widgets.holding(state, active)
-    return _intensity(state, float(told.get("intensity", 1.0)), environments.set_gradient)
+    return _intensity(state, float(parameters.get("intensity", 1.0)), environments.set_gradient)
 
 
 def _sky(state: State, environment: Environment) -> State:
-    told: Any = environment.parameters
+    parameters: Any = environment.parameters
     skies = {str(number): f"{number}  {words}" for number, words in _SKIES.items()}
     tip = (
         "The CIE's fifteen types of sky: how bright it is towards the horizon and about the sun. Its disc is not "
         "drawn: a light shows it."
     )
-    changed, number = widgets.combo("Sky", skies, str(told["type"]), tip=tip)
+    changed, number = widgets.combo("Sky", skies, str(parameters["type"]), tip=tip)
     if changed:
         return edits.attempt(state, "Type of sky", environments.set_sky, type=int(number))
     rows = (
@@ -101,19 +101,23 @@ def _sky(state: State, environment: Environment) -> State:
         ),
     )
     for key, label, low, high, tip in rows:
-        changed, value, active = widgets.slider(label, float(told[key]), low, high, unit="°", tip=tip, format="%.1f")
+        changed, value, active = widgets.slider(
+            label, float(parameters[key]), low, high, unit="°", tip=tip, format="%.1f"
+        )
         if changed:
             state = edits.attempt(state, label, environments.set_sky, **{key: value})
         state = widgets.holding(state, active)
     tip = "Luminance straight above."
     changed, value, active = widgets.drag(
-        "Luminance", float(told["luminance"]), 0.0, 1e9, unit=_RADIANCE, tip=tip, format="%.4g", logarithmic=True
+        "Luminance", float(parameters["luminance"]), 0.0, 1e9, unit=_RADIANCE, tip=tip, format="%.4g", logarithmic=True
     )
     if changed:
         state = edits.attempt(state, "Luminance of the sky", environments.set_sky, luminance=value)
     state = widgets.holding(state, active)
     changed, rgb, active = widgets.colour(
-        "Ground", _vector(told["ground"]), tip="Reflectance of the ground below the horizon, which the sky lights."
+        "Ground",
+        _vector(parameters["ground"]),
+        tip="Reflectance of the ground below the horizon, which the sky lights.",
     )
     if changed:
         clipped = tuple(min(max(c, 0.0), 1.0) for c in rgb)

@@ -29,7 +29,7 @@ _COLUMNS = ("Name", "Maker", "n_d", "V_d", "Remark")
 
 
 @dataclass
-class _Look:
+class _Memory:
     """What the list shows; not part of the document."""
 
     query: str = ""
@@ -40,7 +40,7 @@ class _Look:
     """Column and whether it descends; None keeps the best match first."""
 
 
-_look = _Look()
+_memory = _Memory()
 
 
 def draw_glass_picker(state: State, view_model: ViewModel) -> State:
@@ -49,11 +49,11 @@ def draw_glass_picker(state: State, view_model: ViewModel) -> State:
         widgets.hint("Select an object of glass to choose its material.")
         return state
     by_enter = _draw_search()
-    found = matching(_look.query, _look.maker, _look.order)
+    found = matching(_memory.query, _memory.maker, _memory.order)
     _move_by_keys(len(found))
     widgets.hint(f"{len(found)} of {len(catalogue.entries())}    ↑ ↓ move, Enter takes, Esc closes")
     clicked = _draw_table(found)
-    chosen = clicked if clicked is not None else found[_look.row] if by_enter and found else None
+    chosen = clicked if clicked is not None else found[_memory.row] if by_enter and found else None
     if chosen is None:
         return state
     imgui.close_current_popup()
@@ -99,11 +99,11 @@ def _draw_search() -> bool:
     """The field (focused when the popup opens) and the makers; True when Enter is pressed in it."""
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()
-        _look.row = 0
+        _memory.row = 0
     imgui.set_next_item_width(theme.em(18.0))
     flags = imgui.InputTextFlags_.enter_returns_true.value | imgui.InputTextFlags_.escape_clears_all.value
-    before = _look.query
-    by_enter, _look.query = imgui.input_text_with_hint(
+    before = _memory.query
+    by_enter, _memory.query = imgui.input_text_with_hint(
         "##search", "Search: N-BK7, flint, schott sf, diamond …", before, flags
     )
     item_rects.note("Search glasses")
@@ -112,16 +112,16 @@ def _draw_search() -> bool:
     )
     imgui.same_line()
     imgui.set_next_item_width(-1.0)
-    maker_before = _look.maker
-    if imgui.begin_combo("##maker", _look.maker):
+    maker_before = _memory.maker
+    if imgui.begin_combo("##maker", _memory.maker):
         for maker in (_ALL_MAKERS, *catalogue.MAKER_ORDER):
-            if imgui.selectable(maker, maker == _look.maker)[0]:
-                _look.maker = maker
+            if imgui.selectable(maker, maker == _memory.maker)[0]:
+                _memory.maker = maker
         imgui.end_combo()
     item_rects.note("Maker")
     widgets.tooltip("Show the glasses of one maker. “Materials” are water, plastics, crystals and gems.")
-    if before != _look.query or maker_before != _look.maker:
-        _look.row = 0
+    if before != _memory.query or maker_before != _memory.maker:
+        _memory.row = 0
     return by_enter
 
 
@@ -134,8 +134,8 @@ def _move_by_keys(count: int) -> None:
         (imgui.Key.page_up, -page),
     ):
         if imgui.is_key_pressed(key):
-            _look.row += step
-    _look.row = max(0, min(_look.row, count - 1))
+            _memory.row += step
+    _memory.row = max(0, min(_memory.row, count - 1))
 
 
 def _draw_table(found: tuple[Entry, ...]) -> Entry | None:
@@ -155,7 +155,7 @@ def _draw_table(found: tuple[Entry, ...]) -> Entry | None:
     clipper = imgui.ListClipper()
     clipper.begin(len(found))
     if imgui.is_key_pressed(imgui.Key.down_arrow) or imgui.is_key_pressed(imgui.Key.up_arrow):
-        clipper.include_item_by_index(_look.row)
+        clipper.include_item_by_index(_memory.row)
     while clipper.step():
         for row in range(clipper.display_start, clipper.display_end):
             clicked = found[row] if _draw_row(found[row], row) else clicked
@@ -167,10 +167,10 @@ def _take_order() -> None:
     specs = imgui.table_get_sort_specs()
     if specs is None or not specs.specs_dirty:
         return
-    _look.order = None
+    _memory.order = None
     if specs.specs_count:
         first = specs.get_specs(0)
-        _look.order = (first.column_index, first.get_sort_direction() == imgui.SortDirection.descending)
+        _memory.order = (first.column_index, first.get_sort_direction() == imgui.SortDirection.descending)
     specs.specs_dirty = False
 
 
@@ -178,10 +178,10 @@ def _draw_row(entry: Entry, row: int) -> bool:
     imgui.table_next_row()
     imgui.table_next_column()
     span = imgui.SelectableFlags_.span_all_columns.value
-    pressed = imgui.selectable(f"{entry.name}##{row}", row == _look.row, span)[0]
+    pressed = imgui.selectable(f"{entry.name}##{row}", row == _memory.row, span)[0]
     item_rects.note(entry.qualified_name)
     widgets.tooltip(f"{entry.qualified_name}\n{remark(entry)}".strip(), *entry.dispersion.notes())
-    if row == _look.row and (imgui.is_key_pressed(imgui.Key.down_arrow) or imgui.is_key_pressed(imgui.Key.up_arrow)):
+    if row == _memory.row and (imgui.is_key_pressed(imgui.Key.down_arrow) or imgui.is_key_pressed(imgui.Key.up_arrow)):
         imgui.set_scroll_here_y(0.5)
     cells = (entry.maker, f"{entry.dispersion.n_d:.5f}", abbe_text(entry.dispersion.V_d), remark(entry))
     for text in cells:

@@ -91,7 +91,7 @@ def base_name(dispersion: Dispersion) -> str:
 
 
 def as_sold(dispersion: Dispersion) -> Dispersion | None:
-    """The catalogue's glass that this one was made from, with its natural dispersion; None where no name tells."""
+    """The catalogue's glass that this one was made from, with its natural dispersion; None where no name says so."""
     return _in_catalogue(base_name(dispersion))
 
 

@@ -44,7 +44,7 @@ def _matching(wanted: str) -> dict[str, list[tuple[str, str]]]:
 
 
 def _balanced(groups: dict[str, list[tuple[str, str]]], columns: int) -> list[list[str]]:
-    """Titles by column, each group where least stands so far."""
+    """Titles by column, each group where it is shortest so far."""
     heights = [0] * columns
     result: list[list[str]] = [[] for _ in range(columns)]
     for title, lines in groups.items():

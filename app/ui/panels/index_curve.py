@@ -23,12 +23,12 @@ from .spectral_colour import colour_of_nm, draw_strip
 _CURVE_NM = np.linspace(380.0, 780.0, 161)
 _LINES = {LINE_F_NM: "F", LINE_D_NM: "d", LINE_C_NM: "C"}
 _MIN_SPAN = 0.004
-"""Least height of the plot in n: a constant index is shown as a level line, not as noise."""
+"""Smallest height of the plot in n: a constant index is shown as a level line, not as noise."""
 
 
 @dataclass
-class _Look:
-    """How the curve is looked at; not part of the document."""
+class _Memory:
+    """How the curve is shown; not part of the document."""
 
     keep_n_d: bool = True
     slope: bool = False
@@ -48,7 +48,7 @@ class _Area:
     n_per_pixel: float
 
 
-_look = _Look()
+_memory = _Memory()
 
 
 @lru_cache(maxsize=16)
@@ -72,11 +72,11 @@ def draw_index_curve(state: State, view_model: ViewModel) -> State:
         "Hold the point of the d line, so that only the colours move: light that is stored is splatted again and "
         "nothing is traced."
     )
-    _, _look.keep_n_d = widgets.toggle("Keep n_d", _look.keep_n_d, tip=tip)
+    _, _memory.keep_n_d = widgets.toggle("Keep n_d", _memory.keep_n_d, tip=tip)
     tip = "Draw the slope dn/dλ, 1/µm, on the right-hand axis: the steeper, the wider colours spread."
-    _, _look.slope = widgets.toggle("Show dn/dλ", _look.slope, tip=tip)
-    if _look.refused:
-        widgets.error(_look.refused)
+    _, _memory.slope = widgets.toggle("Show dn/dλ", _memory.slope, tip=tip)
+    if _memory.refused:
+        widgets.error(_memory.refused)
     return _draw_reset(state, index, dispersion)
 
 
@@ -90,7 +90,7 @@ def _draw_reset(state: State, index: int, dispersion: Dispersion) -> State:
     )
     begin_row("")
     if widgets.button("Reset curve", tip=tip, enabled=can_reset) and sold is not None:
-        _look.refused = ""
+        _memory.refused = ""
         name = state.scene.objects[index].name
         natural_curve = glass.with_gain(sold, dispersion.gain)
         return edits.attempt(state, f"Reset n(λ) of {name}", edits.set_dispersion, index, natural_curve)
@@ -99,13 +99,13 @@ def _draw_reset(state: State, index: int, dispersion: Dispersion) -> State:
 
 def _fit(dispersion: Dispersion) -> None:
     """Ends of the axis about the curve (and the catalogue's, where it is another)."""
-    if _look.held or dispersion == _look.of:
+    if _memory.held or dispersion == _memory.of:
         return
     sold = as_sold(dispersion)
     values = [_curves(each)[0] for each in (dispersion, sold) if each is not None]
     low, high = float(np.min(values)), float(np.max(values))
     middle, span = (low + high) / 2, max(high - low, _MIN_SPAN)
-    _look.of, _look.limits = dispersion, (middle - 0.72 * span, middle + 0.62 * span)
+    _memory.of, _memory.limits = dispersion, (middle - 0.72 * span, middle + 0.62 * span)
 
 
 def _draw_plot(dispersion: Dispersion) -> _Area | None:
@@ -118,9 +118,9 @@ def _draw_plot(dispersion: Dispersion) -> _Area | None:
     implot.setup_axis(implot.ImAxis_.y1.value, "n", plain)
     implot.setup_axis_format(implot.ImAxis_.y1.value, "%.4g")
     implot.setup_axis_limits(implot.ImAxis_.x1.value, 380.0, 780.0, implot.Cond_.always.value)
-    implot.setup_axis_limits(implot.ImAxis_.y1.value, *_look.limits, implot.Cond_.always.value)
+    implot.setup_axis_limits(implot.ImAxis_.y1.value, *_memory.limits, implot.Cond_.always.value)
     n, slope = _curves(dispersion)
-    if _look.slope:
+    if _memory.slope:
         _setup_slope_axis(plain, slope)
     implot.setup_finish()
     _draw_ground()
@@ -129,13 +129,13 @@ def _draw_plot(dispersion: Dispersion) -> _Area | None:
     if sold is not None and sold != dispersion:
         _line("catalogue", _curves(sold)[0], (*colours.muted[:3], 0.8), 1.5)
     _line("n", n, colours.text, 2.0)
-    if _look.slope:
+    if _memory.slope:
         implot.set_axes(implot.ImAxis_.x1.value, implot.ImAxis_.y2.value)
         _line("slope", slope, colours.accent, 1.5)
         implot.set_axes(implot.ImAxis_.x1.value, implot.ImAxis_.y1.value)
     values = dispersion.index(np.array(CONTROL_NM))
     points = tuple(implot.plot_to_pixels(nm, float(n)) for nm, n in zip(CONTROL_NM, values, strict=True))
-    per_pixel = (_look.limits[1] - _look.limits[0]) / max(implot.get_plot_size().y, 1.0)
+    per_pixel = (_memory.limits[1] - _memory.limits[0]) / max(implot.get_plot_size().y, 1.0)
     implot.end_plot()
     item_rects.note("Index plot")
     return _Area(points, per_pixel)
@@ -172,9 +172,9 @@ def _draw_ground() -> None:
 def _draw_points(state: State, index: int, dispersion: Dispersion, area: _Area) -> State:
     """Handles over the plot; the one that is dragged bends the curve."""
     after, radius = imgui.get_cursor_screen_pos(), theme.em(0.32)
-    _look.held = False
+    _memory.held = False
     for at, (nm, pixel) in enumerate(zip(CONTROL_NM, area.points, strict=True)):
-        is_fixed = _look.keep_n_d and nm == LINE_D_NM
+        is_fixed = _memory.keep_n_d and nm == LINE_D_NM
         imgui.set_cursor_screen_pos(ImVec2(pixel.x - 1.6 * radius, pixel.y - 1.6 * radius))
         imgui.invisible_button(f"point {at}", ImVec2(3.2 * radius, 3.2 * radius))
         is_held, is_hovered = imgui.is_item_active(), imgui.is_item_hovered()
@@ -183,7 +183,7 @@ def _draw_points(state: State, index: int, dispersion: Dispersion, area: _Area) 
         if is_held or is_hovered:
             _tell(nm, float(dispersion.index(nm)), is_fixed)
         if is_held and not is_fixed:
-            _look.held = True
+            _memory.held = True
             state = _moved(widgets.holding(state, True), index, dispersion, at, area)
     imgui.set_cursor_screen_pos(after)
     imgui.dummy(ImVec2(0.0, 0.0))
@@ -198,12 +198,12 @@ def _moved(state: State, index: int, dispersion: Dispersion, at: int, area: _Are
         return state
     try:
         n = float(dispersion.index(CONTROL_NM[at])) + step
-        shaped = with_point(dispersion, at, n, _look.keep_n_d)
+        shaped = with_point(dispersion, at, n, _memory.keep_n_d)
         scene = edits.set_dispersion(state.scene, index, shaped)
     except UserError as refusal:
-        _look.refused = str(refusal)
+        _memory.refused = str(refusal)
         return state
-    _look.refused = ""
+    _memory.refused = ""
     return state.edited(scene, f"Shape n(λ) of {state.scene.objects[index].name}")
 
 

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from ...edit import edits
 from ...edit.state import State
-from ...model.fields import Number
+from ...model.fields import FileName, Number
 from ...model.lights import LIGHT_KINDS
 from ...model.scene import Light, Vec3
 from ...model.scene_defaults import environment_of
 from ..view_model import ViewModel
-from . import widgets
+from . import picture_choice, widgets
 from .light_spectrum import draw_spectrum_choice
 
 _SHAPES = {"disc": "Disc", "rectangle": "Rectangle"}
 
 _power_key: dict[str, str] = {}
-"""Kind of light -> the quantity in which its power is shown. A way of looking, not part of the document."""
+"""Kind of light -> the quantity in which its power is shown. A way of display, not part of the document."""
 
 
 def draw_light(state: State, view_model: ViewModel) -> State:
@@ -33,6 +34,7 @@ def draw_light(state: State, view_model: ViewModel) -> State:
     if widgets.section("Placement##light"):
         state = _draw_place(state, index)
     if widgets.section("Size##light"):
+        state = _draw_file(state, view_model, index)
         state = _draw_size(state, index)
     if widgets.section("Power and spectrum##light"):
         state = _draw_power(state, index)
@@ -111,6 +113,17 @@ def direction_of(azimuth_deg: float, elevation_deg: float) -> Vec3:
 # ---- size ---------------------------------------------------------------------------------
 
 
+def _draw_file(state: State, view_model: ViewModel, index: int) -> State:
+    """The file that a light shines by, where its kind has one."""
+    light = state.scene.lights[index]
+    for part in light.parts:
+        if isinstance(part, FileName) and part.row is not None:
+            name = Path(getattr(light, part.attribute).source).name
+            if widgets.file_field(part.row.label, name, tip=part.row.tip, enabled=True, clear_tip=""):
+                picture_choice.ask_lamp(state, view_model, index)
+    return state
+
+
 def _draw_size(state: State, index: int) -> State:
     """Rows for the shape, as the kind of light declares them."""
     light = state.scene.lights[index]
@@ -151,7 +164,7 @@ def _draw_power(state: State, index: int) -> State:
     light = state.scene.lights[index]
     keys = {key.key: key for key in light.power_keys}
     key = _power_key.get(light.kind, edits.photometric_key(light))
-    tip = "In which quantity the power is shown and typed. Photometric ones weigh each colour as the camera does."
+    tip = "In which quantity the power is shown and typed. Photometric ones weigh each colour as the eye does."
     _, key = widgets.combo("Quantity", {k: each.label for k, each in keys.items()}, key, tip=tip)
     _power_key[light.kind] = key
     power = edits.light_power(light, key)

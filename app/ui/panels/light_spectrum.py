@@ -61,7 +61,7 @@ _ABOUT = {
 
 
 @dataclass
-class _Look:
+class _Memory:
     """The file that is being typed in."""
 
     path: str = ""
@@ -69,21 +69,21 @@ class _Look:
     """Lights for which a file is to be chosen."""
 
 
-_look = _Look()
+_memory = _Memory()
 
 
 def draw_spectrum_choice(state: State, index: int) -> State:
     """Rows that choose the spectrum of light `index`, and its plot. Its photometric power stays."""
     light = state.scene.lights[index]
     kind, value = edits.spectrum_words(light.spectral_power)
-    shown = "csv" if light.name in _look.wants_file else kind
+    shown = "csv" if light.name in _memory.wants_file else kind
     kinds = _KINDS if kind != "table" else {**_KINDS, "table": "Measured"}
     tip = "Where the light's colours come from. Its power in the unit above stays the same."
     changed, chosen = widgets.combo("Spectrum", kinds, shown, tip=tip)
     if changed:
-        _look.wants_file.discard(light.name)
+        _memory.wants_file.discard(light.name)
         if chosen == "csv":
-            _look.wants_file.add(light.name)
+            _memory.wants_file.add(light.name)
             return state
         first: dict[str, object] = {
             "illuminant": "D65",
@@ -113,7 +113,7 @@ def _draw_presets(state: State, index: int) -> State:
     if chosen is None:
         return state
     name = state.scene.lights[index].name
-    _look.wants_file.discard(name)
+    _memory.wants_file.discard(name)
     return edits.attempt(state, f"{chosen} for {name}", presets.apply_light, index, ready[chosen])
 
 
@@ -166,16 +166,16 @@ def _draw_file(state: State, index: int) -> State:
     begin_row("File")
     hint = "wavelength_nm, power in a .csv"
     flags = imgui.InputTextFlags_.enter_returns_true.value
-    entered, _look.path = imgui.input_text_with_hint("##spectrum file", hint, _look.path, flags)
+    entered, _memory.path = imgui.input_text_with_hint("##spectrum file", hint, _memory.path, flags)
     item_rects.note("Spectrum file")
     widgets.tooltip("A text file with two columns, wavelength in nm and power; Enter reads it.")
     begin_row("")
-    pressed = widgets.button("Read file", tip="Take the spectrum from this file.", enabled=bool(_look.path.strip()))
+    pressed = widgets.button("Read file", tip="Take the spectrum from this file.", enabled=bool(_memory.path.strip()))
     if not (entered or pressed):
         return state
-    after = _set(state, index, "csv", Path(_look.path.strip()).expanduser())
+    after = _set(state, index, "csv", Path(_memory.path.strip()).expanduser())
     if after.scene is not state.scene:
-        _look.wants_file.discard(state.scene.lights[index].name)
+        _memory.wants_file.discard(state.scene.lights[index].name)
     return after
 
 

@@ -16,8 +16,8 @@ METHOD_NAMES = {
 METHOD_TIPS = {
     "srd": "The default: each photon is swept along its own spectrum in closed form; as many spectral bands as needed.",
     "srd-lambda": "One derivative by wavelength and one anchor a photon: the published method.",
-    "stochastic": "One random wavelength a photon with a footprint: the usual answer.",
-    "stochastic-even": "The same with wavelengths from a low-discrepancy sequence: the usual answer at its best.",
+    "stochastic": "One random wavelength a photon with a footprint: the usual way.",
+    "stochastic-even": "The same with wavelengths from a low-discrepancy sequence: the usual way at its best.",
     "stochastic-point": "One random wavelength and one texel a photon: unbiased light tracing.",
     "regular-7": "Seven fixed wavelengths, a splat each: shows banding.",
     "regular-16": "Sixteen fixed wavelengths, a splat each: shows banding.",

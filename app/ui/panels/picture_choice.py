@@ -1,11 +1,12 @@
-"""Choosing picture files for the environment and for surfaces: the questions, their answers, and pictures dropped on
-the window."""
+"""Choosing files that become part of the scene (pictures of the environment and of surfaces, lamps): the questions,
+their answers, and what is dropped on the window."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from ...edit import edits, environments
+from ...edit.lights import LIGHT_SUFFIXES
 from ...edit.requests import Notice
 from ...edit.state import State
 from ...model.scene import Scene
@@ -14,11 +15,12 @@ from . import file_browser
 
 _ENVIRONMENT = "environment"
 _TEXTURE = "texture"
+_LAMP = "lamp"
 _PANORAMAS = (".hdr", ".exr", ".pic")
 """Dropped files of these kinds are environments: no surface reflects more than 1."""
 
-_memory = {"worn by": ""}
-"""Name of the object that is to wear the picture asked for."""
+_memory = {"worn by": "", "shines": ""}
+"""Name of the object that is to wear the picture asked for, and of the light that is to shine as the file has it."""
 
 
 def ask_environment(state: State, view_model: ViewModel) -> None:
@@ -39,6 +41,14 @@ def ask_texture(state: State, view_model: ViewModel, index: int) -> None:
     file_browser.ask(file_browser.Question(_TEXTURE, f"Picture for {item.name}", environments.TEXTURE_SUFFIXES, start))
 
 
+def ask_lamp(state: State, view_model: ViewModel, index: int) -> None:
+    """Ask for a photometric file for light `index`."""
+    light = state.scene.lights[index]
+    _memory["shines"] = light.name
+    start = _folder(view_model, light.profile.source if light.profile is not None else None)
+    file_browser.ask(file_browser.Question(_LAMP, f"Lamp for {light.name}", LIGHT_SUFFIXES, start))
+
+
 def answers(state: State) -> State:
     """Files chosen since the last frame."""
     path = file_browser.take(_ENVIRONMENT)
@@ -48,16 +58,24 @@ def answers(state: State) -> State:
     index = _index(state.scene, _memory["worn by"])
     if path is not None and index is not None:
         state = _as_texture(state, path, index)
+    path = file_browser.take(_LAMP)
+    lamp = next((i for i, light in enumerate(state.scene.lights) if light.name == _memory["shines"]), None)
+    if path is not None and lamp is not None:
+        state = _as_lamp(state, path, lamp)
     return state
 
 
-def is_picture(path: Path) -> bool:
+def is_part(path: Path) -> bool:
     """Whether a dropped file is one for `dropped`."""
-    return path.suffix.lower() in {*environments.ENVIRONMENT_SUFFIXES, *environments.TEXTURE_SUFFIXES}
+    return path.suffix.lower() in {*LIGHT_SUFFIXES, *environments.ENVIRONMENT_SUFFIXES, *environments.TEXTURE_SUFFIXES}
 
 
 def dropped(state: State, path: Path) -> State:
-    """A panorama becomes the environment; another picture is worn by the selected object."""
+    """A panorama becomes the environment, a photometric file the selected light or a new one; another picture is worn
+    by the selected object."""
+    if path.suffix.lower() in LIGHT_SUFFIXES:
+        chosen = state.selection.index if state.selection.kind == "light" else None
+        return _as_lamp(state, path, chosen)
     if path.suffix.lower() in _PANORAMAS:
         return _as_environment(state, path)
     selection = state.selection
@@ -74,6 +92,10 @@ def dropped(state: State, path: Path) -> State:
 
 def _as_environment(state: State, path: Path) -> State:
     return edits.attempt(state, f"Environment {path.name}", environments.set_environment_map, path)
+
+
+def _as_lamp(state: State, path: Path, index: int | None) -> State:
+    return edits.attempt(state, f"Lamp {path.name}", edits.set_light_file, index, path)
 
 
 def _as_texture(state: State, path: Path, index: int) -> State:

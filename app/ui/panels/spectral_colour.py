@@ -10,7 +10,7 @@ from imgui_bundle import ImVec2, imgui
 from ...model.optics.colorimetry import VISIBLE_NM, cmf_xyz, xyz_to_rgb709
 
 _DIMMEST = 0.25
-"""Share of the brightness left at 380 and 780 nm, where the camera sees next to nothing."""
+"""Share of the brightness left at 380 and 780 nm, where the eye sees next to nothing."""
 
 
 @cache

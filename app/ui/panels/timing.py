@@ -50,7 +50,7 @@ _COUNTERS = {
     ),
     "band_uncut": (
         "Spectrum not split",
-        "Part of a camera ray's band is totally reflected, but too near its end or too far to tell where.",
+        "Part of a camera ray's band is totally reflected, but too near its end or too far for its place to be found.",
     ),
     "loops_ended": ("Path cut short", "The driver ended the loops of camera rays; anything but zero here is a fault."),
     "queue_overflow": ("Queue full", "Photons that found no room among those in flight."),
@@ -209,18 +209,18 @@ def _numbers(state: State, stats: LiveStats) -> None:
     _table("##numbers", lines)
     dropped = [(_named(k), numbers.count(v), _tip(k)) for k, v in stats.fallbacks.items() if v]
     lost = [(_named(k), numbers.percent(v), _tip(k)) for k, v in stats.lost.items() if v]
-    looked = [(_named(k), numbers.count(v), _tip(k)) for k, v in stats.camera_fallbacks.items() if v]
+    camera_rows = [(_named(k), numbers.count(v), _tip(k)) for k, v in stats.camera_fallbacks.items() if v]
     bands = [(name, f"{n} bands", "Spectral bands of this light.") for name, n in sorted(stats.bands.items())]
-    for title, tip, told in (
+    for title, tip, rows_ in (
         ("Fall-backs", "Photons that took a simpler way.", dropped),
-        ("Camera rays' fall-backs", "Camera rays that took a simpler way, since the scene was last made.", looked),
+        ("Camera rays' fall-backs", "Camera rays that took a simpler way, since the scene was last made.", camera_rows),
         ("Where light ended", "Shares of the emitted flux.", lost),
         ("Spectral bands", "How finely each light's spectrum is divided.", bands),
     ):
-        if told:
+        if rows_:
             imgui.separator_text(title)
             widgets.tooltip(tip)
-            _table(f"##{title}", told)
+            _table(f"##{title}", rows_)
     if stats.renderer:
         widgets.hint(stats.renderer + (" (software)" if stats.is_software else ""))
         widgets.tooltip("What draws: the graphics driver's name.")

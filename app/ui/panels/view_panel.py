@@ -13,7 +13,7 @@ from . import false_colour, spectrum_strip, widgets
 from .methods import METHOD_NAMES, METHOD_TIPS
 
 SWEEP_NM = (400.0, 700.0)
-"""What the sweep runs through: where the camera sees something."""
+"""What the sweep runs through: where the eye sees something."""
 SWEEP_NM_PER_S = 45.0
 """Speed of the sweep through the spectrum."""
 _TONES: dict[ToneCurve, str] = {
@@ -167,7 +167,7 @@ def _sweep(state: State, view_model: ViewModel) -> State:
 def _overlays(state: State) -> State:
     display = state.display
     _, magnifier = widgets.toggle(
-        "Magnifier", display.magnifier, tip="Enlarge the pixels under the cursor and tell their values (M)."
+        "Magnifier", display.magnifier, tip="Enlarge the pixels under the cursor and show their values (M)."
     )
     _, rays = widgets.toggle(
         "Ray overlay",
@@ -261,7 +261,7 @@ def _camera(state: State) -> State:
     _, target, aiming = widgets.vec3(
         "Target", camera.target, unit="units", tip="The point in the middle of the picture: x, y, z.", speed=0.02
     )
-    if position != target:  # a camera looks at something else than itself
+    if position != target:  # a camera's target is not its own position
         camera = replace(camera, position=position, target=target)
     if widgets.button("Scene's own view", tip="Back to the camera that the scene was saved with (0).", width=-1):
         camera = state.scene.camera

@@ -3,7 +3,7 @@
 A row is a label in a column of fixed width and a field that fills the rest. Everywhere: hover
 explains (with the unit), Ctrl+click types a value, a double click on field or label goes back
 to the default where there is one. Values come back as Python floats with seven digits, because
-Dear ImGui itself works in float32. Each item is told to `item_rects` by its label.
+Dear ImGui itself works in float32. Each item is noted in `item_rects` by its label.
 
 Values that are dragged return `active`: pass it to `holding` so that the state knows that
 something is being dragged. The host lowers that flag before every frame.
@@ -296,7 +296,7 @@ def error(text: str) -> None:
 
 
 def holding(state: State, active: bool) -> State:
-    """The state, told that something is being dragged when `active`; never lowers the flag."""
+    """The state, marked as being dragged when `active`; never lowers the flag."""
     return replace(state, interacting=True) if active and not state.interacting else state
 
 

@@ -1,17 +1,19 @@
-"""The programs of the camera's pass: what each is compiled with, and how far a sample is followed.
+"""Which variant of each program a scene gets: Features → defines. Nothing else chooses one.
 
-A scene that shows glass or mirrors has two: one for what is seen directly, which lists the pixels that meet something
-specular first, and one for those, which holds all that is dear. A third is for samples of single wavelengths.
+The scene's buffers and tables add the numbers that only their data give (rows, counts, bindings).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Protocol
 
-from ..gpu import bindings
+from ..gpu import bindings, records
+from ..gpu.device_traits import DeviceTraits
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.texture_store import place_defines
+from ..model.features import Features
 from .camera_tables import EMISSION_CELLS
 from .present import Channels
 
@@ -58,6 +60,105 @@ _BEYOND_ONLY = (
     "NORMAL_DERIVATIVES",
 )
 """What only rays beyond glass and mirrors need."""
+
+
+# -- light pass ---------------------------------------------------------------------------
+
+
+def light_defines(features: Features, traits: DeviceTraits) -> Defines:
+    """Defines common to the programs that emit, trace and queue rays."""
+    copies = " ".join(
+        f"photon.dposition_dvar{g} = ray.dposition[SPATIAL + {g}];" for g in range(features.spectral_groups)
+    )
+    defines: Defines = {
+        "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",
+        "FLAG_BAND_FINAL": f"{records.FLAG_BAND_FINAL}u",
+        "FLAG_INSIDE": f"{records.FLAG_INSIDE}u",
+        "MASK_SIZE": records.MASK_SIZE,
+        "CATEGORY_COUNT": f"{len(records.CATEGORIES)}u",
+        "FALLBACK_COUNT": f"{len(records.FALLBACKS)}u",
+        "SPECTRAL_COPY": copies,
+    }
+    if features.tree and traits.loops_may_end:
+        defines["LOOPS_MAY_END"] = 1
+    return features.defines() | bindings.LIGHT_HALF_DEFINES | defines
+
+
+def emit_defines(features: Features, kind: str) -> Defines:
+    """What emit.comp has besides: the kind of its light's emission domain, and how it draws wavelengths."""
+    random = features.point_spectrum and features.random_wavelength
+    switches = {
+        f"LIGHT_{kind.upper()}": True,
+        "RANDOM_WAVELENGTH": random,
+        "EVEN_WAVELENGTHS": random and features.even_wavelengths,
+    }
+    return {name: 1 for name, on in switches.items() if on}
+
+
+class SplatFeatures(Protocol):
+    """What decides the programs' variant (a part of `spectrasplat.model.features.Features`)."""
+
+    @property
+    def spectral_groups(self) -> int: ...
+    @property
+    def band_cuts(self) -> bool: ...
+    @property
+    def nested_windows(self) -> bool: ...
+    @property
+    def targets(self) -> int: ...
+    @property
+    def point_spectrum(self) -> bool: ...
+    @property
+    def charts(self) -> bool: ...
+    @property
+    def local_gain(self) -> bool: ...
+    @property
+    def reindexed(self) -> bool: ...
+
+
+def splat_defines(features: SplatFeatures) -> Defines:
+    """Defines common to every program of the splat half."""
+    switches = {
+        "BAND_CUTS": features.band_cuts,
+        "POINT_SPECTRUM": features.point_spectrum,
+        # A splat that no wavelength moves is a Gaussian of one colour.
+        "ONE_COLOUR": features.point_spectrum or features.spectral_groups == 0,
+        "CHARTS": features.charts,
+    }
+    counts: Defines = {"TARGETS": features.targets, "SLOTS": 2 if features.nested_windows else 1}
+    return counts | {name: 1 for name, on in switches.items() if on}
+
+
+def footprint_defines(features: SplatFeatures) -> Defines:
+    """Defines of footprint.comp."""
+    switches = {"LOCAL_GAIN": features.local_gain, "REINDEXED": features.reindexed}
+    return (
+        splat_defines(features)
+        | {
+            "GROUPS": features.spectral_groups,
+            "NONE": f"{records.NONE}u",
+            "FLAG_FOOTPRINT_DROPPED": f"{records.FLAG_FOOTPRINT_DROPPED}u",
+        }
+        | {name: 1 for name, on in switches.items() if on}
+    )
+
+
+def draw_variants(features: SplatFeatures) -> dict[int, tuple[str, Defines]]:
+    """Kind of splat → its fragment shader and what sets its programs apart."""
+    variants: dict[int, tuple[str, Defines]] = {
+        1: ("light/splat_small.frag", {"SMALL": 1}),
+        2: ("light/splat_swept.frag", {"SWEPT": 1}),
+    }
+    if features.band_cuts and not features.point_spectrum:
+        variants[3] = ("light/splat_cut.frag", {"CUT": 1, "CLIPPED": 1})
+    variants[4] = ("light/splat_swept.frag", {"SWEPT": 1, "EDGE": 1, "CLIPPED": 1})
+    return variants
+
+
+# -- camera pass --------------------------------------------------------------------------
+# A scene that shows glass or mirrors has two programs: one for what is seen directly, which lists the pixels that meet
+# something specular first, and one for those, which holds all that is expensive. A third is for samples of single
+# wavelengths.
 
 
 def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: MapChannels) -> Defines:

@@ -1,0 +1,166 @@
+"""A still is one frame: what an animation shows first is what `render` makes, whatever scene, method and layer; and
+what chooses the sampling is the same for all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit.animation import Track, keyed
+from spectrasplat.edit.parameters import Stage
+from spectrasplat.gpu import shader
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import CAMERA_METHODS, METHODS, RenderSettings
+from spectrasplat.render.animate import render_animation
+from spectrasplat.render.frames import FrameRenderer
+from spectrasplat.render.sampling import CameraSampling, most_bands, whole_cycles
+from spectrasplat.render.still import render
+
+SCENES = sorted(path.stem for path in (assets_dir() / "scenes").glob("*.toml"))
+QUICK = {
+    ("prism", "srd", None),
+    ("prism", "regular-7", None),
+    ("prism", "stochastic", "srd"),
+    ("prism", "srd", "srd-lambda"),
+    ("brilliant", "srd", None),
+}
+SHAKY = 1e-6
+EYES = [(method, None) for method in METHODS] + [("srd", method) for method in CAMERA_METHODS if method != "srd"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def programs_kept(gl: Context):
+    """As the commands do it."""
+    shader.keep_programs(gl.ctx)
+    yield
+    shader.forget_programs(gl.ctx)
+
+
+class First:
+    """A sink that keeps the linear picture of the first frame."""
+
+    def __init__(self) -> None:
+        self.rgb: np.ndarray | None = None
+
+    def has(self, index: int) -> bool:
+        return False
+
+    def develop(self, rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
+        self.rgb = rgb if self.rgb is None else self.rgb
+        return np.zeros(rgb.shape, np.uint8)
+
+    def write(self, index: int, codes: np.ndarray) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("name", "method", "camera_method"),
+    [
+        pytest.param(
+            name,
+            *methods,
+            marks=() if (name, *methods) in QUICK else pytest.mark.slow,
+            id="-".join(map(str, (name, *methods))),
+        )
+        for name in SCENES
+        for methods in EYES
+    ],
+)
+def test_the_first_frame_is_the_picture(gl: Context, name: str, method: str, camera_method: str | None) -> None:
+    scene = load_scene(assets_dir() / "scenes" / f"{name}.toml")
+    settings = RenderSettings(
+        width=48,
+        height=27,
+        photons=10_000,
+        method=method,
+        camera_method=camera_method,
+        max_depth=scene.render.max_depth,
+    )
+    picture = render(scene, settings, context=gl).rgb
+    made = keyed(
+        Stage(scene, scene.camera), [Track("exposure_ev", (0.0, 1.0), (0.0, 1.0), ("linear", "linear"))], 2, 2.0
+    )
+    first = First()
+    for _ in render_animation(gl, made, settings, first, 0.0, first.develop):
+        pass
+    assert first.rgb is not None and picture.shape == first.rgb.shape
+    assert np.abs(first.rgb - picture).max() <= SHAKY * np.abs(picture).max()
+
+
+def test_a_gem_of_an_animation_may_be_sampled_by_single_wavelengths(gl: Context) -> None:
+    """Only stills were once."""
+    scene = load_scene(assets_dir() / "scenes" / "brilliant_studio.toml")
+    stage = Stage(scene, scene.camera)
+    renderer = FrameRenderer(gl, RenderSettings(width=96, height=54, photons=1_000), [stage])
+    try:
+        renderer.run(stage)
+        camera_pass = renderer.camera_pass
+        assert camera_pass is not None and camera_pass.spectrum.single
+        assert camera_pass.samples_taken == camera_pass.spectrum.samples(16)
+    finally:
+        renderer.release()
+
+
+def test_a_stop_while_tracing_still_gives_a_picture(gl: Context) -> None:
+    scene = load_scene(assets_dir() / "scenes" / "prism.toml")
+    settings = RenderSettings(width=48, height=27, photons=400_000, batch=1 << 13)
+    told: list[tuple[float, str]] = []
+    result = render(
+        scene,
+        settings,
+        progress=lambda share, text: told.append((share, text)),
+        cancelled=lambda: (told[-1][1] == "tracing photons" and told[-1][0] > 0.2) or told[-1][0] >= 0.8,
+        context=gl,
+    )
+    assert 50_000 < result.stats.photons < 200_000
+    assert result.stats.camera_pass.samples == 1 and result.rgb.max() > 0.0
+    assert [share for share, _ in told] == sorted(share for share, _ in told)
+
+
+def test_seconds_bound_the_light_pass(gl: Context) -> None:
+    scene = load_scene(assets_dir() / "scenes" / "prism.toml")
+    told: list[float] = []
+    result = render(
+        scene,
+        RenderSettings(width=48, height=27, seconds=1.0, spp=1),
+        progress=lambda share, text: told.append(share),
+        context=gl,
+    )
+    spent = result.stats.light.trace_seconds + result.stats.light.splat_seconds
+    assert 0.0 < spent < 3.0 and result.stats.photons > 0
+    assert told == sorted(told)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 7, 8, 15, 16, 17, 31, 32, 100, 256, 4096])
+def test_all_frames_have_as_many_samples_however_many_bands_they_choose(samples: int) -> None:
+    most = most_bands(samples)
+    assert most & (most - 1) == 0
+    whole = whole_cycles(samples, most)
+    assert samples <= whole < samples + most
+    for bands in (2**k for k in range(most.bit_length())):
+        assert whole % bands == 0
+
+
+def test_what_is_shown_while_it_is_made_compiles_no_second_program() -> None:
+    assert CameraSampling.of(RenderSettings()).may_be_single
+    assert not CameraSampling.live(256).may_be_single
+    assert CameraSampling.live(256).bands_for == CameraSampling.live(16).bands_for
+
+
+def test_no_driver_chooses_by_itself() -> None:
+    """`may_be_single` and `choosing_spectrum` stand in the camera pass and in sampling.py alone."""
+    import spectrasplat
+
+    root = Path(spectrasplat.__path__[0])
+    users = {
+        path.relative_to(root).as_posix()
+        for path in root.rglob("*.py")
+        if any(word in path.read_text(encoding="utf-8") for word in ("may_be_single", ".choosing_spectrum("))
+    }
+    assert users == {"passes/camera.py", "passes/spectrum_choice.py", "render/sampling.py"}
