@@ -9,13 +9,13 @@
 // On `CameraPath.order`: only that order is left.
 #define ONLY_ORDER 0x80000000u
 
-void diffract_path(inout CameraPath path, ShadingFrame frame, Grating grating, GratingOrder order, uint object, float side, vec3 steps)
+void diffract_path(inout CameraPath path, PathFrame frame, Grating grating, GratingOrder order, uint object, float side, vec3 steps)
 {
     bool reflects = order.reflects != 0u;
-    Deflection turned = diffract_at(frame, path.direction, grating.lines, side, steps.y, reflects);
+    Deflection turned = diffract_at(frame.shading, path.direction, grating.lines, side, steps.y, reflects);
 #ifdef SPECTRAL_SWEEP
     for (int end = 0; end < 2; ++end) {
-        vec3 normal = turned.geometric ? turned.normal : end_normal(path, end, frame), direction = path.end_direction[end];
+        vec3 normal = turned.geometric ? turned.normal : frame.end_normal[end], direction = path.end_direction[end];
         vec3 shift = (end == 0 ? steps.x : steps.z) * across_lines(normal, grating.lines, side);
         float theta = dot(direction, normal), cosine2 = diffracted_cosine2(direction, theta, shift);
         vec3 turned_end = diffract_direction(direction, normal, theta, shift, sqrt(max(cosine2, 1e-12)), reflects);
@@ -27,7 +27,7 @@ void diffract_path(inout CameraPath path, ShadingFrame frame, Grating grating, G
 #if SPECTRAL_GROUPS > 0
         if (c >= SPATIAL) dstep = order_step_derivative(order, object, current_medium(path.medium), uint(c - SPATIAL), path.band.y);
 #endif
-        path.ddirection[c] = diffracted_column(turned, path.direction, path.ddirection[c], normal_column(frame, path.dposition[c]), grating.lines, side, steps.y, dstep, reflects);
+        path.ddirection[c] = diffracted_column(turned, path.direction, path.ddirection[c], NORMAL_COLUMN(frame, c), grating.lines, side, steps.y, dstep, reflects);
     }
     path.direction = turned.direction;
 }
@@ -52,7 +52,8 @@ void meet_grating(inout CameraPath path, CameraPath whole, Hit hit, Triangle fac
 {
     uint row = object_at(hit.object).weight_row, medium = current_medium(path.medium);
     Grating grating = grating_at(row);
-    ShadingFrame frame = shading_frame(hit, facet, path.direction);
+    PathFrame frame = path_frame(path, hit, facet);
+    vec3 normal = frame.shading.normal;
     float side = dot(path.direction, hit.normal_g) < 0.0 ? 1.0 : -1.0;
     bool alone = (path.order & ONLY_ORDER) != 0u;
     uint number = path.order & ~ONLY_ORDER;
@@ -77,11 +78,11 @@ void meet_grating(inout CameraPath path, CameraPath whole, Hit hit, Triangle fac
     for (; number < end; ++number) {
         order = order_at(row, number);
         steps = order_steps(order, hit.object, medium, banded.band);
-        vec3 across = across_lines(frame.normal, grating.lines, side);
-        passes = bvec3(diffracted_cosine2(banded.direction, dot(banded.direction, frame.normal), steps.y * across) > 0.0);
+        vec3 across = across_lines(normal, grating.lines, side);
+        passes = bvec3(diffracted_cosine2(banded.direction, dot(banded.direction, normal), steps.y * across) > 0.0);
 #ifdef SPECTRAL_SWEEP
-        passes.x = diffracted_cosine2(banded.end_direction[0], dot(banded.end_direction[0], frame.normal), steps.x * across) > 0.0;
-        passes.z = diffracted_cosine2(banded.end_direction[1], dot(banded.end_direction[1], frame.normal), steps.z * across) > 0.0;
+        passes.x = diffracted_cosine2(banded.end_direction[0], dot(banded.end_direction[0], normal), steps.x * across) > 0.0;
+        passes.z = diffracted_cosine2(banded.end_direction[1], dot(banded.end_direction[1], normal), steps.z * across) > 0.0;
 #endif
         if (any(passes) && order.efficiency > 0.0) break;
     }
@@ -99,7 +100,7 @@ void meet_grating(inout CameraPath path, CameraPath whole, Hit hit, Triangle fac
             bends[e] = banded.end_direction[e] - bends[e];
         }
         for (int g = 0; g < SPECTRAL_GROUPS; ++g) columns[g] = banded.ddirection[SPATIAL + g];
-        float at = cell_border(evanescence_onset(banded.band, banded.direction, columns, bends, frame.normal, grating.lines, side, order, hit.object, medium, passes));
+        float at = cell_border(evanescence_onset(banded.band, banded.direction, columns, bends, normal, grating.lines, side, order, hit.object, medium, passes));
         CameraPath start = whole;
         WHEN(!start.narrowed) narrow(start, pixel_key);
         cut = may_cut_at(start, at);
