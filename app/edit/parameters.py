@@ -22,6 +22,7 @@ from ..model.placement import rotation_about
 from ..model.scene import (
     Camera,
     Light,
+    Material,
     Scene,
     SceneObject,
     Vec3,
@@ -94,7 +95,7 @@ def paths(scene: Scene, camera: Camera) -> dict[str, Parameter]:
     own = {**_PLACE, **_TARGET, **_ORBIT}
     found |= {f"camera.{name}": parameter for name, parameter in own.items() if name != skipped}
     for item in scene.objects:
-        parts = {**_PLACE, **_TURN} | (_GLASS if item.material.transmits else {})
+        parts = {**_PLACE, **_TURN} | (_GLASS if item.material.transmits else {}) | _of_numbers(item.material)
         found |= {f"objects.{item.name}.{name}": parameter for name, parameter in parts.items()}
     for light in scene.lights:
         found |= {f"lights.{light.name}.{name}": parameter for name, parameter in _of_light(light).items()}
@@ -231,6 +232,9 @@ def _object_value(item: SceneObject, name: str) -> float:
         return float(item.object_to_world["xyz".index(axis), 3])
     if field == "rotation":
         return 0.0
+    numbers = _turned_by(item.material)
+    if field in numbers:
+        return getattr(item.material, numbers[field].attribute)
     dispersion = item.material.dispersion
     # The gain is a parameter of its own: V_d is the glass's without it.
     return {"dispersion_gain": dispersion.gain, "n_d": dispersion.n_d, "V_d": replace(dispersion, gain=1.0).V_d}[name]
@@ -245,6 +249,9 @@ def _with_object(item: SceneObject, name: str, value: float) -> SceneObject:
         else:
             matrix[:3, :3] = rotation_about(_AXES[axis], math.radians(value)) @ matrix[:3, :3]
         return replace(item, object_to_world=matrix)
+    numbers = _turned_by(item.material)
+    if field in numbers:
+        return replace(item, material=replace(item.material, **{numbers[field].attribute: value}))
     dispersion = _with_glass(item.material.dispersion, name, value)
     return replace(item, material=item.material.changed(dispersion=dispersion))
 
@@ -258,17 +265,22 @@ def _with_glass(dispersion: Dispersion, name: str, value: float) -> Dispersion:
 
 
 def _of_light(light: Light) -> dict[str, Parameter]:
-    found = {"power": _POWER}
-    for name, number in _turned_by(light).items():
-        told = number.animated
-        assert told is not None
-        found[name] = Parameter(told.meaning, number.unit, told.low, told.high)
+    found = {"power": _POWER} | _of_numbers(light)
     return found | (_PLACE if light.has_place else {}) | (_TURN if light.has_direction else {})
 
 
-def _turned_by(light: Light) -> dict[str, Number]:
-    """The numbers of its shape by their names in an animation."""
-    return {n.animated.name or n.attribute: n for n in light.shown_numbers() if n.animated is not None}
+def _of_numbers(thing: Light | Material) -> dict[str, Parameter]:
+    found = {}
+    for name, number in _turned_by(thing).items():
+        told = number.animated
+        assert told is not None
+        found[name] = Parameter(told.meaning, number.unit, told.low, told.high)
+    return found
+
+
+def _turned_by(thing: Light | Material) -> dict[str, Number]:
+    """The numbers of a light's shape, or of a material, by their names in an animation."""
+    return {n.animated.name or n.attribute: n for n in thing.shown_numbers() if n.animated is not None}
 
 
 def _light_value(light: Light, name: str) -> float:

@@ -24,7 +24,7 @@ from ..model.geometry.bvh import build_bvh
 from ..model.optics.colorimetry import VISIBLE_NM, rgb_partition
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative, index_table
-from ..model.scene import Light, Scene
+from ..model.scene import Light, Scene, SceneObject
 from . import bindings
 from .records import NONE
 from .scene_texels import SceneTexels, spectra_texture, tree_texels
@@ -54,9 +54,11 @@ SOLID = Struct(
 OBJECT = Struct(
     "Object",
     (
-        Field("kind", "uint", "0 black, 1 diffuse, 2 mirror, 3 dielectric"),
-        Field("medium", "uint", "row of the index table (dielectric)"),
-        Field("weight_row", "uint", "row of absorption (1/GPU unit) or reflectance over x, or NONE"),
+        Field("kind", "uint", "0 black, 1 diffuse, 2 mirror, 3 dielectric, 4 grating"),
+        Field("medium", "uint", "row of the index table (dielectric, grating: its wavelength)"),
+        Field(
+            "weight_row", "uint", "row of absorption (1/GPU unit) or reflectance over x, texel of a grating, or NONE"
+        ),
         Field(
             "stack_bit", "uint", "bit of this solid in a ray's inside mask, by priority; NONE where it overlaps nothing"
         ),
@@ -68,7 +70,25 @@ OBJECT = Struct(
     ),
     texels=True,
 )
-SCENE_STRUCTS = (TRIANGLE, SOLID, OBJECT)
+GRATING = Struct(
+    "Grating",
+    (
+        Field("lines", "vec3", "unit, along the lines"),
+        Field("orders", "uint", "how many follow it in the same section, one GratingOrder each"),
+    ),
+    texels=True,
+)
+GRATING_ORDER = Struct(
+    "GratingOrder",
+    (
+        Field("shift_per_um", "float", "added to a direction's tangential part, per micrometre of wavelength: m / Λ"),
+        Field("efficiency", "float", "share of the light"),
+        Field("left", "float", "share that the orders before have left"),
+        Field("reflects", "uint"),
+    ),
+    texels=True,
+)
+SCENE_STRUCTS = (TRIANGLE, SOLID, OBJECT, GRATING, GRATING_ORDER)
 
 
 @dataclass(frozen=True)
@@ -280,6 +300,7 @@ class SceneBuffers:
     def _pack_objects(self) -> None:
         media: list[Dispersion] = []
         weights: list[np.ndarray] = []
+        gratings: list[np.ndarray] = []
         x = np.linspace(0.0, 1.0, SAMPLES)
         nm = self.axis.nm_of_samples(SAMPLES)
         stack_bits = _stack_bits(self.scene) if self.features.medium_stack else {}
@@ -298,7 +319,10 @@ class SceneBuffers:
             if material.is_mirror:
                 record["weight_row"] = len(weights)
                 weights.append(mirror_reflectance(material.reflectance_rgb, nm))
-            if material.transmits:
+            if material.is_grating:
+                record["weight_row"] = sum(len(texels) for texels in gratings)
+                gratings.append(_grating_texels(item))
+            if material.dispersion is not None:
                 if material.dispersion not in media:
                     media.append(material.dispersion)
                 record["medium"] = media.index(material.dispersion)
@@ -312,6 +336,10 @@ class SceneBuffers:
                 coefficient = np.interp(nm, VISIBLE_NM, material.absorption.coefficient)
                 weights.append(coefficient / self.space.scale)
         self._sections["OBJECTS"] = records
+        if gratings:
+            self._sections["GRATINGS"] = np.concatenate(gratings)
+        self.most_orders = max((len(texels) - 1 for texels in gratings), default=0)
+        """Orders of the grating that has most."""
         # bit -> (medium, weight row) for the medium stack.
         by_bit = {bit: index for index, bit in stack_bits.items()}
         self.stack_objects = [by_bit[bit] for bit in range(len(by_bit))]
@@ -349,6 +377,18 @@ class SceneBuffers:
             "STACK_SIZE": max(1, len(self.stack_objects)),
             "STACK_OBJECTS": "uint[](" + ", ".join(f"{o}u" for o in (self.stack_objects or [0])) + ")",
         }
+
+
+def _grating_texels(item: SceneObject) -> np.ndarray:
+    """A GRATING and one GRATING_ORDER an order: uint32 (1 + orders, 4)."""
+    grating = item.material
+    head = GRATING.zeros(1)
+    head["lines"] = grating.lines_in_world(item.object_to_world)
+    head["orders"] = len(grating.orders)
+    orders = GRATING_ORDER.zeros(len(grating.orders))
+    orders["shift_per_um"], orders["efficiency"] = grating.shift_per_um, grating.efficiency
+    orders["left"], orders["reflects"] = grating.left, grating.reflects
+    return np.concatenate([record.view("<u4").reshape(-1, 4) for record in (head, orders)])
 
 
 def index_slope(groups: Groups, glass: int | None, axis: SpectralAxis, variables: np.ndarray) -> np.ndarray:

@@ -55,6 +55,7 @@ class Features:
     """Total internal reflection may cut a band."""
     dielectrics: bool
     mirrors: bool
+    gratings: bool
     smooth_normals: bool
     """Some specular surface has interpolated normals."""
     normal_derivatives: bool
@@ -106,6 +107,7 @@ class Features:
             "BAND_CUTS": self.band_cuts,
             "HAS_DIELECTRIC": self.dielectrics,
             "HAS_MIRROR": self.mirrors,
+            "HAS_GRATING": self.gratings,
             "SMOOTH_NORMALS": self.smooth_normals,
             "NORMAL_DERIVATIVES": self.normal_derivatives,
             "ABSORPTION": self.absorption,
@@ -155,6 +157,7 @@ class Features:
             band_cuts=groups > 0,
             dielectrics=bool(dielectrics),
             mirrors=any(o.material.is_mirror for o in scene.objects),
+            gratings=any(o.material.is_grating for o in scene.objects),
             smooth_normals=smooth,
             normal_derivatives=smooth and (footprints or groups > 0),
             absorption=absorbing,
@@ -183,6 +186,8 @@ def _reindexed(scene: Scene, settings: RenderSettings, groups: int, *, coloured:
     edited = settings.anchor_weights or (settings.local_gain and any(o.local_dispersion for o in scene.objects))
     if not edited or groups != 1 or coloured or settings.method != "srd":
         return False
+    if any(o.material.is_grating for o in scene.objects):
+        return False
     (turning,) = SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.transmits]).turning_nm
     return len(turning) == 2
 
@@ -192,12 +197,12 @@ def camera_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:
     if settings.layer != "beauty":
         return False, False
     mirrors = any(o.material.is_mirror for o in scene.objects)
-    glass = [o for o in scene.objects if o.material.transmits]
+    glass = [o for o in scene.objects if o.material.transmits or o.material.is_grating]
     if not (settings.any_view or mirrors):
         # What is refracted or reflected first must be seen first; all else follows from it.
         seen = [o for o in glass if in_view(o, scene.camera, settings.width / settings.height)]
         glass = glass if seen else []
-    return bool(glass) or mirrors, any(o.material.transmits and o.material.dispersion.is_dispersive for o in glass)
+    return bool(glass) or mirrors, any(o.material.dispersion.is_dispersive for o in glass)
 
 
 def in_view(item: SceneObject, camera: Camera, aspect: float) -> bool:
@@ -229,10 +234,10 @@ def _has_receivers(scene: Scene) -> bool:
 
 
 def dispersive_materials(scene: Scene) -> list[int]:
-    """Object indices that first show each distinct dispersive glass, in order."""
+    """Object indices that first show each distinct dispersive glass, or a grating, in order."""
     seen, first = set(), []
     for index, item in enumerate(scene.objects):
-        glass = item.material.dispersion if item.material.transmits else None
+        glass = item.material.dispersion
         if glass is not None and glass.is_dispersive and glass not in seen:
             seen.add(glass)
             first.append(index)
@@ -321,6 +326,11 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
         ),
         ("refraction", features.dielectrics, "there is glass" if features.dielectrics else "there is no glass"),
         ("mirrors", features.mirrors, "there are mirrors" if features.mirrors else "there are no mirrors"),
+        (
+            "gratings",
+            features.gratings,
+            "there are gratings" if features.gratings else "there is no grating",
+        ),
         (
             "interpolated normals",
             features.smooth_normals,

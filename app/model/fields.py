@@ -124,6 +124,15 @@ class Integer(Field):
 
 
 @dataclass(frozen=True)
+class Flag(Field):
+    """true or false."""
+
+    def value(self, table: SceneTable, key: str) -> bool:
+        """Which."""
+        return table.boolean(key, self.default)
+
+
+@dataclass(frozen=True)
 class Vector(Field):
     """Three finite numbers."""
 

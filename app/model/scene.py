@@ -14,7 +14,7 @@ import numpy as np
 
 from .geometry.mesh import Mesh
 from .lights import Light
-from .materials import Absorption, Black, Dielectric, Diffuse, Material, Mirror
+from .materials import Absorption, Black, Dielectric, Diffuse, Grating, Material, Mirror
 from .texture import Environment
 from .vectors import Vec3
 
@@ -25,6 +25,7 @@ __all__ = [
     "Dab",
     "Dielectric",
     "Diffuse",
+    "Grating",
     "Light",
     "Material",
     "Mirror",

@@ -218,8 +218,9 @@ class TracePass:
         emitted = int(self._read_state()["alive"])
         self.rays_traced += emitted
 
-        # Walking through covered surfaces and cutting bands take steps without being events.
-        limit = 2 * max_depth + 32
+        # Walking through covered surfaces, cutting bands and all but one of a grating's orders take steps without
+        # being events.
+        limit = (2 + self.scene.most_orders) * max_depth + 32
         step, alive = 0, emitted
         while alive and step < limit:
             if step == limit - 1:

@@ -236,7 +236,7 @@ def halting_defines(beyond: Mapping[str, int | float | str]) -> Defines:
 
 def halted_bytes(beyond: Mapping[str, int | float | str]) -> int:
     """Room that surely holds one halted sample: its paths, and what it knows besides."""
-    path = 304 + 40 * int(beyond["SPECTRAL_GROUPS"]) + 4 * int(beyond.get("ABSORBERS", 0))
+    path = 312 + 40 * int(beyond["SPECTRAL_GROUPS"]) + 4 * int(beyond.get("ABSORBERS", 0))
     return (STACK + 1) * path + 16 * int(beyond["TARGETS"]) + 64
 
 

@@ -22,7 +22,7 @@ from ..model.scene import (
     Scene,
 )
 
-BLACK, DIFFUSE, MIRROR, DIELECTRIC = range(4)
+BLACK, DIFFUSE, MIRROR, DIELECTRIC, GRATING = range(5)
 OUTSIDE = -1
 """In place of an object: air."""
 
@@ -71,6 +71,12 @@ class PhotonScene(NamedTuple):
     """float64 (M, 8001): n on `TABLE_NM`."""
     weights: np.ndarray
     """float64 (W, 8001)."""
+    lines: np.ndarray
+    """float64 (O, 3): along a grating's lines."""
+    first_order: np.ndarray
+    """int32 (O + 1,): where the orders of each object's grating begin, and the last's end."""
+    orders: np.ndarray
+    """float64 (R, 3): order / line spacing in 1/µm, efficiency, whether it is reflected."""
     near: float
     """Distances below this are the same place."""
 
@@ -157,8 +163,24 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         reflectance_class,
         media.array(),
         weights.array(),
+        *_gratings(scene),
         _NEAR * size,
     ), centre
+
+
+def _gratings(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`lines`, `first_order` and `orders` of a `PhotonScene`."""
+    lines = np.zeros((len(scene.objects), 3))
+    counts, orders = [0], [np.zeros((0, 3))]
+    for index, item in enumerate(scene.objects):
+        material = item.material
+        counts.append(0)
+        if material.is_grating:
+            lines[index] = material.lines_in_world(item.object_to_world)
+            reflects = np.full(len(material.orders), float(material.reflects))
+            orders.append(np.column_stack([material.shift_per_um, material.efficiency, reflects]))
+            counts[-1] = len(material.orders)
+    return lines, np.cumsum(counts).astype(np.int32), np.concatenate([*orders, np.zeros((1, 3))])
 
 
 def viewpoint(camera: Camera, width: int, height: int, centre: np.ndarray) -> Viewpoint:

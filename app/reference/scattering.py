@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from .compiling import compiled, inlined
-from .photon_scene import MIRROR
+from .photon_scene import GRATING, MIRROR
 
 AIR = -1
 _TABLE_SCALE = 20.0
@@ -92,6 +92,51 @@ def _shading_normal(scene, triangle, u, v, dx, dy, dz, gx, gy, gz, entering):
 
 
 @inlined
+def _diffracted(dx, dy, dz, nx, ny, nz, lines, step, reflects):
+    """(direction, whether it is real) of an order: `step` = m λ / (Λ n) across `lines`, along lines × n, is added to the
+    direction's part in the surface; (nx, ny, nz) is the outward normal."""
+    ax, ay, az = lines[1] * nz - lines[2] * ny, lines[2] * nx - lines[0] * nz, lines[0] * ny - lines[1] * nx
+    length = math.sqrt(ax * ax + ay * ay + az * az)
+    theta = dx * nx + dy * ny + dz * nz
+    tx = dx - theta * nx + step * ax / length
+    ty = dy - theta * ny + step * ay / length
+    tz = dz - theta * nz + step * az / length
+    cosine2 = 1.0 - (tx * tx + ty * ty + tz * tz)
+    cosine = math.sqrt(max(cosine2, 0.0))
+    if (theta < 0.0) != reflects:
+        cosine = -cosine
+    return tx + cosine * nx, ty + cosine * ny, tz + cosine * nz, cosine2 > 0.0
+
+
+@compiled
+def _diffract(scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw):
+    """`scatter` at a grating: `draw` chooses an order as they are strong; what they leave, and an order that is
+    evanescent, is absorbed."""
+    thing = scene.owner[triangle]
+    gx, gy, gz = scene.normals[triangle, 0], scene.normals[triangle, 1], scene.normals[triangle, 2]
+    entering = dx * gx + dy * gy + dz * gz < 0.0
+    side = 1.0 if entering else -1.0
+    nx, ny, nz = _shading_normal(scene, triangle, u, v, dx, dy, dz, side * gx, side * gy, side * gz, entering)
+    first, end = scene.first_order[thing], scene.first_order[thing + 1]
+    efficiency = 0.0
+    for row in range(first, end):
+        efficiency += scene.orders[row, 1]
+    chosen, below = first, 0.0
+    for row in range(first, end):
+        if below <= draw * efficiency:
+            chosen = row
+        below += scene.orders[row, 1]
+    reflects = scene.orders[chosen, 2] > 0.0
+    step = scene.orders[chosen, 0] * nm * 1e-3 / _refractive_index(scene, medium(scene, mask, alone), nm)
+    rx, ry, rz, real = _diffracted(dx, dy, dz, side * nx, side * ny, side * nz, scene.lines[thing], step, reflects)
+    wrong = ((rx * gx + ry * gy + rz * gz) * side > 0.0) != reflects
+    if wrong:
+        rx, ry, rz, real = _diffracted(dx, dy, dz, gx, gy, gz, scene.lines[thing], step, reflects)
+    inner = entering != reflects
+    return rx, ry, rz, mask, alone, inner, True, efficiency if real else 0.0, True
+
+
+@inlined
 def scatter(scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw):
     """One event at glass or a mirror: (direction (3), mask, alone, on the object's inner side, is an event, share
     kept, whether `draw` mattered).
@@ -99,6 +144,8 @@ def scatter(scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw):
     `draw` in [0, 1) decides by Fresnel's reflectance, unless all is reflected. "Is an event" is false where the same
     substance lies on both sides; a mirror keeps its reflectance, glass everything.
     """
+    if scene.kind[scene.owner[triangle]] == GRATING:
+        return _diffract(scene, triangle, u, v, dx, dy, dz, mask, alone, nm, draw)
     gx, gy, gz = scene.normals[triangle, 0], scene.normals[triangle, 1], scene.normals[triangle, 2]
     cosine_g = -(dx * gx + dy * gy + dz * gz)
     entering = cosine_g > 0.0

@@ -459,7 +459,7 @@ def spectral_axis(scene: Scene, features: Features) -> SpectralAxis:
     """The axis of a rendering: by the scene's glasses, or plain wavelength for methods linear in λ."""
     if not features.spectral_groups or (features.merged_groups and features.spectral_groups == 1):
         return SpectralAxis.build([])
-    return SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.transmits])
+    return SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.dispersion is not None])
 
 
 def scene_buffers(context: Context, scene: Scene, settings: RenderSettings) -> SceneBuffers:

@@ -158,6 +158,9 @@ CameraPath camera_path(uvec2 pixel, uint primary_sample, float gain)
     path.recut = false;
     path.planar_so_far = true;
     path.cuts = 0;
+#ifdef HAS_GRATING
+    path.order = 0u;
+#endif
 #ifdef SPECTRAL_SWEEP
     for (int end = 0; end < 2; ++end) {
         path.end_position[end] = path.position;
@@ -172,13 +175,20 @@ CameraPath camera_path(uvec2 pixel, uint primary_sample, float gain)
 }
 
 #ifdef CAMERA_SPECULAR
-#ifdef HAS_DIELECTRIC
+#if defined(HAS_DIELECTRIC) || defined(HAS_GRATING)
 // A number for a choice at this depth: a Kronecker sequence over a pixel's samples (the first generator is the wavelength's).
 float choice(CameraPath path, uint pixel_key)
 {
     return kronecker(p.draw_index, depth_generator(uint(path.depth)), hash_combine(pixel_key, path.key + uint(path.depth) * 2654435769u));
 }
 
+#endif
+
+#ifdef HAS_GRATING
+#include "camera/grating.glsl"
+#endif
+
+#ifdef HAS_DIELECTRIC
 // One glass surface: `path` goes on, the other part is put on the stack or, if weak, one of them is chosen.
 void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle facet, uint pixel_key)
 {
@@ -305,6 +315,9 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
 #ifdef HAS_DIELECTRIC
     WHEN(kind == KIND_DIELECTRIC) cross_glass(path, whole, hit, facet, pixel_key);
 #endif
+#ifdef HAS_GRATING
+    WHEN(kind == KIND_GRATING) meet_grating(path, whole, hit, facet, pixel_key);
+#endif
 }
 #endif
 
@@ -362,7 +375,7 @@ void main()
         Hit hit;
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
         uint kind = met ? object_at(hit.object).kind : NONE;
-        if (kind == KIND_MIRROR || kind == KIND_DIELECTRIC) {
+        if (is_specular(kind)) {
             specular_samples += 1u;
             // Each of them as likely: the newest of c with 1 / c.
             draw = hash_pcg(draw);
@@ -403,7 +416,12 @@ void main()
 #endif
             WHEN(!parts) {
 #if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
-                WHEN(!path.recut) add_lights(path, met ? hit.distance : FAR_DISTANCE);
+#ifdef HAS_GRATING
+                bool met_before = path.recut || path.order != 0u;
+#else
+                bool met_before = path.recut;
+#endif
+                WHEN(!met_before) add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
                 // Light that would still be caught inside is as if it left here.
                 bool specular = !ends && kind != KIND_BLACK, leaves = specular && (event_limit_reached || path.depth >= MAX_DEPTH);
@@ -411,6 +429,9 @@ void main()
                 WHEN(ends || leaves) ended[found++] = PathEnd(path, hit, met && ends, same_hit || leaves);
                 goes_on = specular && !leaves;
                 WHEN(goes_on) meet_surface(path, hit, kind, pixel_key);
+#ifdef HAS_GRATING
+                goes_on = goes_on && path.inverse_pdf > 0.0;
+#endif
             }
 #ifdef SPECTRAL_SWEEP
             WHEN(cut_at >= 0.0) cut_band(path, cut_at, pixel_key);

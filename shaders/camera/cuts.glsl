@@ -74,7 +74,7 @@ bool follows_same_path(CameraPath path, float x, bool met, bool ends, Hit hit, i
     }
     same_hit = same_hit && same;
     uint kind = meets ? object_at(found.object).kind : NONE;
-    return same || (ends && kind != KIND_MIRROR && kind != KIND_DIELECTRIC);
+    return same || (ends && !is_specular(kind));
 }
 
 // By how much a ray meets the plane of one hit sooner than that of another.

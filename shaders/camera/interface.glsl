@@ -95,7 +95,10 @@ float onset_of(CameraPath path, vec3 theta, MediumInterface boundary, bvec3 pass
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) dtheta[g] = 0.0;
     return total_reflection_onset(path.band, theta.y, dtheta, theta.xz - theta.y, boundary, passes);
 }
+#endif
+#endif
 
+#ifdef SPECTRAL_SWEEP
 // Whether anchoring the parts [x, at] and [at, z] of the band leaves a path's start where it is known to be clear.
 bool cut_is_near(CameraPath whole, float at, float distance)
 {
@@ -104,7 +107,6 @@ bool cut_is_near(CameraPath whole, float at, float distance)
     ray_at(whole, anchor_of(whole, at, whole.band.z), high, unused);
     return starts_stay_near(low - whole.position, high - whole.position, distance);
 }
-#endif
 #endif
 
 #endif

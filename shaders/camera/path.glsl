@@ -18,14 +18,17 @@ struct CameraPath {
     vec3 ddirection[COLUMNS_HELD];
     vec3 band;                      // its lowest wavelength, the one it is traced at, its highest: as x
     vec3 weight;                    // throughput at these
-    float inverse_pdf;                     // one over the probability of all choices made
-    float branch_weight;                    // throughput as far as branches are worth following
+    float inverse_pdf;  // one over the probability of all choices made
+    float branch_weight;  // throughput as far as branches are worth following
     uint key;                       // says which branch this is
     int depth;                      // surfaces met
-    bool restricted;                  // stands for one band
-    bool recut;                     // its band was cut before the surface ahead, and is not again
-    bool planar_so_far;                     // its band's ends have kept to its own facets: it met flat ones only
+    bool restricted;  // stands for one band
+    bool recut;  // its band was cut before the surface ahead, and is not again
+    bool planar_so_far;  // its band's ends have kept to its own facets: it met flat ones only
     int cuts;                       // of its band, where paths diverged
+#ifdef HAS_GRATING
+    uint order;                     // of the grating ahead, the next to be followed; see camera/grating.glsl
+#endif
 #ifdef SPECTRAL_SWEEP
     // The rays at both ends of the band, by way of the same facets: what columns, being first derivatives, leave out of the sweep.
     vec3 end_position[2];

@@ -5,6 +5,9 @@ layout(local_size_x = 32) in;
 
 #include "lib/medium.glsl"
 #include "lib/interface.glsl"
+#ifdef HAS_GRATING
+#include "lib/grating.glsl"
+#endif
 
 layout(std430, binding = BIND_PARAMETERS) readonly restrict buffer Parameters { PathParameters p; };
 layout(std430, binding = BIND_STARTS) readonly restrict buffer Starts { PathStart starts[]; };
@@ -65,6 +68,25 @@ void main()
             if (!total) medium = boundary.behind;
             origin = RayOrigin(hit.primitive, hit.object, total ? !entering : entering, medium.mask);
             goes_on = true;
+        }
+#endif
+#ifdef HAS_GRATING
+        if (kind == KIND_GRATING) {
+            // The strongest order that leaves.
+            uint row = object_at(hit.object).weight_row;
+            Grating grating = grating_at(row);
+            float strongest = 0.0;
+            vec3 incident = direction;
+            for (uint number = 0u; number < grating.orders; ++number) {
+                GratingOrder order = order_at(row, number);
+                float step = order_steps(order, hit.object, current_medium(medium), vec3(starts[id].x)).x;
+                Deflection sent = diffract_at(frame, incident, grating.lines, entering ? 1.0 : -1.0, step, order.reflects != 0u);
+                if (!sent.exists || order.efficiency <= strongest) continue;
+                strongest = order.efficiency;
+                direction = sent.direction;
+                origin = RayOrigin(hit.primitive, hit.object, dot(direction, hit.normal_g) < 0.0, origin.inside_mask);
+                goes_on = true;
+            }
         }
 #endif
         if (!goes_on) break;

@@ -228,7 +228,7 @@ void add_end(CameraPath path, bool met, Hit hit, bool same_hit, uint pixel_key)
                 Hit found;
                 ends = intersect_closest(position, direction, FAR_DISTANCE, path.origin, found);
                 uint kind = ends ? object_at(found.object).kind : NONE;
-                if (kind == KIND_MIRROR || kind == KIND_DIELECTRIC) {
+                if (is_specular(kind)) {
                     // This colour goes on where the middle one ended: it is given what that one sees.
                     ends = met;
                     found = hit;

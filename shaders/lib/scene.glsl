@@ -10,6 +10,13 @@
 #define KIND_DIFFUSE 1u
 #define KIND_MIRROR 2u
 #define KIND_DIELECTRIC 3u
+#define KIND_GRATING 4u
+
+// Paths go on from it.
+bool is_specular(uint kind)
+{
+    return kind == KIND_MIRROR || kind == KIND_DIELECTRIC || kind == KIND_GRATING;
+}
 
 // Tree, triangles, corner normals and objects, one after the other, in rows of 4096 texels.
 #ifdef SCENE_IMAGE

@@ -9,11 +9,18 @@ layout(local_size_x = 64) in;
 #include "lib/band.glsl"
 #include "lib/interface.glsl"
 #include "light/trace_records.glsl"
+#ifdef HAS_GRATING
+#include "lib/grating.glsl"
+#endif
 
 // Survivors of roulette are only nearly a lattice: wider footprints keep their unevenness unseen.
 #define SURVIVOR_SOFTNESS 1.5
 // Narrower bands are not cut at total internal reflection.
 #define MIN_CUT_BAND 1e-4
+// A grating of up to so many orders sends each on as a whole lattice where it is met first.
+#define MAX_WHOLE_ORDERS 3u
+// Bits of `flags` from which on the order of a grating stands that is to be sent on next.
+#define ORDER_BIT 8
 
 #ifdef NORMAL_DERIVATIVES
 // Derivatives of the shading normal by the ray's columns.
@@ -26,13 +33,12 @@ vec3 normal_columns[COLUMNS];
 // Share of a ray's power that must remain for a child to be followed for certain; weaker ones play
 // roulette. Roulette's numbers are a Kronecker sequence in the photon's number, so survivors are
 // again close to a lattice.
-bool survives(inout RayRecord ray, inout float roulette_w, float share, uint branch)
+bool survives(inout RayRecord ray, inout float roulette_w, float share, uint branch, bool keeps_lattice)
 {
     ray.survival *= share;
     ray.branch_key = hash_combine(ray.branch_key, branch);
     float chance = ray.survival / p.split_threshold;
-    // What a first surface throws back is seen all round the glass: it keeps its whole lattice.
-    if (chance >= 1.0 || ray.depth == 1u) return true;
+    if (chance >= 1.0 || keeps_lattice) return true;
     // The count is that of the sub-lattice's own points: a multiple of an irrational may be a poor one.
     float draw = kronecker(ray.photon_id / p.lattices, depth_generator(ray.depth), ray.branch_key + (ray.photon_id % p.lattices) * 2654435769u);
     if (draw >= chance) {
@@ -46,6 +52,12 @@ bool survives(inout RayRecord ray, inout float roulette_w, float share, uint bra
     ray.footprint_scale *= SURVIVOR_SOFTNESS * sqrt(boost);
     ray.survival = p.split_threshold;
     return true;
+}
+
+// What a first surface throws back is seen all round the glass: it keeps its whole lattice.
+bool survives(inout RayRecord ray, inout float roulette_w, float share, uint branch)
+{
+    return survives(ray, roulette_w, share, branch, ray.depth == 1u);
 }
 
 #ifdef ABSORPTION
@@ -107,6 +119,45 @@ void land(inout RayRecord ray, uint receiver, uint triangle, float cosine, uint 
     outcome.what |= LEFT_PHOTON;
 }
 
+#ifdef BAND_CUTS
+// `at`, where the parts [lo, at] and [at, hi] of a ray's band may set out again from where its flight started; else a negative number.
+float clear_cut(RayRecord ray, RayRecord start, float at, float distance)
+{
+    vec3 low = vec3(0.0), high = vec3(0.0);
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+        low += variable_step(uint(g), 0.5 * (ray.x_lo + at), ray.x_anchor) * start.dposition[SPATIAL + g].xyz;
+        high += variable_step(uint(g), 0.5 * (at + ray.x_hi), ray.x_anchor) * start.dposition[SPATIAL + g].xyz;
+    }
+    // A sliver of a band is not worth a path of its own.
+    bool sliver = min(at - ray.x_lo, ray.x_hi - at) <= 0.01 * MIN_CUT_BAND;
+    return !sliver && starts_stay_near(low, high, distance) ? at : -1.0;
+}
+
+// The part [lo, hi] of a ray's band, with this share of its power, traced at its own middle: position and direction follow the spectral
+// columns, weights are interpolated.
+RayRecord part_of_band(RayRecord ray, float lo, float hi, float share, uint branch)
+{
+    float x = 0.5 * (lo + hi);
+    ray.throughput = band_weights(band_of(ray), ray.throughput, vec3(lo, x, hi));
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+        float change = variable_step(uint(g), x, ray.x_anchor);
+        ray.position += change * ray.dposition[SPATIAL + g].xyz;
+        ray.direction += change * ray.ddirection[SPATIAL + g].xyz;
+    }
+    ray.direction = normalize(ray.direction);
+    ray.x_lo = lo;
+    ray.x_hi = hi;
+    ray.x_anchor = x;
+    ray.flux_w *= share;
+    // Roulette counts by power, also where a band was only divided: or cuts would breed.
+    ray.survival *= share;
+    ray.branch_key = hash_combine(ray.branch_key, branch);
+    // It meets the surface again, and is not cut there a second time.
+    ray.flags |= FLAG_BAND_FINAL;
+    return ray;
+}
+#endif
+
 #ifdef HAS_DIELECTRIC
 #ifdef SPECTRAL_WEIGHTS
 #if SPECTRAL_GROUPS > 0
@@ -143,39 +194,7 @@ float cut_of_band(RayRecord ray, RayRecord start, ShadingFrame frame, float dist
     if (!cut) return -1.0;
     float dtheta[SPECTRAL_GROUPS];
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) dtheta[g] = incidence_column(ray, frame, g);
-    float at = total_reflection_onset(band_of(ray), dot(ray.direction, frame.normal), dtheta, vec2(0.0), boundary, passes);
-    vec3 low = vec3(0.0), high = vec3(0.0);
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-        low += variable_step(uint(g), 0.5 * (ray.x_lo + at), ray.x_anchor) * start.dposition[SPATIAL + g].xyz;
-        high += variable_step(uint(g), 0.5 * (at + ray.x_hi), ray.x_anchor) * start.dposition[SPATIAL + g].xyz;
-    }
-    // A sliver of a band is not worth a path of its own.
-    bool sliver = min(at - ray.x_lo, ray.x_hi - at) <= 0.01 * MIN_CUT_BAND;
-    return !sliver && starts_stay_near(low, high, distance) ? at : -1.0;
-}
-
-// The part [lo, hi] of a ray's band, with this share of its power, traced at its own middle: position and direction follow the spectral
-// columns, weights are interpolated.
-RayRecord part_of_band(RayRecord ray, float lo, float hi, float share, uint branch)
-{
-    float x = 0.5 * (lo + hi);
-    ray.throughput = band_weights(band_of(ray), ray.throughput, vec3(lo, x, hi));
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-        float change = variable_step(uint(g), x, ray.x_anchor);
-        ray.position += change * ray.dposition[SPATIAL + g].xyz;
-        ray.direction += change * ray.ddirection[SPATIAL + g].xyz;
-    }
-    ray.direction = normalize(ray.direction);
-    ray.x_lo = lo;
-    ray.x_hi = hi;
-    ray.x_anchor = x;
-    ray.flux_w *= share;
-    // Roulette counts by power, also where a band was only divided: or cuts would breed.
-    ray.survival *= share;
-    ray.branch_key = hash_combine(ray.branch_key, branch);
-    // It meets the surface again, and is not cut there a second time.
-    ray.flags |= FLAG_BAND_FINAL;
-    return ray;
+    return clear_cut(ray, start, total_reflection_onset(band_of(ray), dot(ray.direction, frame.normal), dtheta, vec2(0.0), boundary, passes), distance);
 }
 #endif
 #endif
@@ -198,6 +217,87 @@ void send_on(inout RayRecord child, Deflection turned, vec3 share, inout Outcome
     child.throughput *= share;
     outcome.what |= turned.geometric ? FELL_NORMAL : 0u;
 }
+
+#ifdef HAS_GRATING
+// A grating's orders leave one after the other. The first one that carries light goes on as `child`; for the others the ray meets the surface
+// again (`rest`, the ray before its flight). `rest` is also the other part of a band that is cut because this order becomes evanescent inside
+// it. Whether `child` lives.
+bool diffract(RayRecord ray, Hit hit, ShadingFrame frame, uint row, inout RayRecord child, inout RayRecord rest, out bool rest_lives, inout Outcome outcome)
+{
+    Grating grating = grating_at(row);
+    uint medium = current_medium(medium_stack(ray)), first = min(ray.flags >> ORDER_BIT, grating.orders - 1u), number = first;
+    float side = dot(ray.direction, hit.normal_g) < 0.0 ? 1.0 : -1.0;
+    vec3 across = across_lines(frame.normal, grating.lines, side);
+    vec3 low = ray.direction, high = ray.direction, steps;
+#if SPECTRAL_GROUPS > 0
+    vec3 columns[SPECTRAL_GROUPS];
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
+        columns[g] = ray.ddirection[SPATIAL + g].xyz;
+        low += variable_step(uint(g), ray.x_lo, ray.x_anchor) * columns[g];
+        high += variable_step(uint(g), ray.x_hi, ray.x_anchor) * columns[g];
+    }
+    low = normalize(low);
+    high = normalize(high);
+#endif
+    GratingOrder order;
+    bvec3 passes = bvec3(false);
+    float at = -1.0;
+    rest_lives = false;
+    for (; number < grating.orders; ++number) {
+        order = order_at(row, number);
+        steps = order_steps(order, hit.object, medium, band_of(ray));
+        vec3 cosine2 = vec3(diffracted_cosine2(low, dot(low, frame.normal), steps.x * across),
+            diffracted_cosine2(ray.direction, dot(ray.direction, frame.normal), steps.y * across),
+            diffracted_cosine2(high, dot(high, frame.normal), steps.z * across));
+        passes = greaterThan(cosine2, vec3(0.0));
+#ifdef BAND_CUTS
+        bool is_final = (ray.flags & FLAG_BAND_FINAL) != 0u && number == first;
+        if (any(passes) && !all(passes) && !is_final && ray.x_hi - ray.x_lo > MIN_CUT_BAND) {
+            vec3 bends[2] = vec3[](vec3(0.0), vec3(0.0));
+            at = clear_cut(ray, rest, evanescence_onset(band_of(ray), ray.direction, columns, bends, frame.normal, grating.lines, side, order, hit.object, medium, passes), hit.distance);
+        }
+#endif
+        if (passes.y || at >= 0.0) break;
+    }
+    // Of the light that is here, what the orders from `first` on have left when this one, and the next one, has its turn.
+    float per_left = 1.0 / max(order_at(row, first).left, 1e-9);
+    bool found = number < grating.orders, more = found && number + 1u < grating.orders;
+    float kept = found ? order.left * per_left : 0.0, share = found ? order.efficiency * per_left : 0.0;
+    float left = at >= 0.0 ? kept : (more ? kept - share : 0.0);
+    outcome.what |= ABSORBED;
+    outcome.flux_w = ray.flux_w * max(1.0 - left - (at >= 0.0 ? 0.0 : share), 0.0);
+    outcome.absorbed_w *= 1.0 - left;
+    rest.flux_w *= left;
+    rest.throughput *= left;
+    rest.survival *= left;
+    rest.flags = (rest.flags & ((1u << ORDER_BIT) - 1u) & ~FLAG_BAND_FINAL) | ((at >= 0.0 ? number : number + 1u) << ORDER_BIT);
+    rest_lives = left > 0.0;
+#ifdef BAND_CUTS
+    if (at >= 0.0) {
+        outcome.what |= FELL_BAND;
+        vec3 power = spectral_row(uint(p.power_row), vec3(rest.x_lo, at, rest.x_hi));
+        float below = clamp((power.y - power.x) / max(power.z - power.x, 1e-30), 0.0, 1.0);
+        child = part_of_band(rest, rest.x_lo, at, below, 5u);
+        rest = part_of_band(rest, at, rest.x_hi, 1.0 - below, 6u);
+        return rest_lives;
+    }
+#endif
+    if (share <= 0.0) return false;
+    Deflection turned = diffract_at(frame, ray.direction, grating.lines, side, steps.y, order.reflects != 0u);
+    if (order.reflects == 0u) child.flags ^= FLAG_INSIDE;
+    send_on(child, turned, vec3(share), outcome);
+#if COLUMNS > 0
+    for (int c = 0; c < COLUMNS; ++c) {
+        float dstep = 0.0;
+#if SPECTRAL_GROUPS > 0
+        if (c >= SPATIAL) dstep = order_step_derivative(order, hit.object, medium, uint(c - SPATIAL), ray.x_anchor);
+#endif
+        child.ddirection[c].xyz = diffracted_column(turned, ray.direction, ray.ddirection[c].xyz, NORMAL_COLUMN(c), grating.lines, side, steps.y, dstep, order.reflects != 0u);
+    }
+#endif
+    return survives(child, outcome.roulette_w, share, 16u + number, child.depth == 1u && grating.orders <= MAX_WHOLE_ORDERS);
+}
+#endif
 
 // Each child is stored in one place, whichever event made it: where every branch is executed, every
 // store costs even when no ray takes it.
@@ -226,6 +326,11 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
         send_on(child, reflected, kept, outcome);
         lives = survives(child, outcome.roulette_w, kept.y, 3u);
     }
+#endif
+#ifdef HAS_GRATING
+    RayRecord rest = start;
+    bool rest_lives = false;
+    if (kind == KIND_GRATING) lives = diffract(ray, hit, frame, weight_row, child, rest, rest_lives, outcome);
 #endif
 #ifdef HAS_DIELECTRIC
     MediumInterface boundary = cross_boundary(medium_stack(ray), hit.object, entering);
@@ -276,9 +381,16 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
         outcome.what |= LEFT_FIRST;
     }
 
-#ifdef HAS_DIELECTRIC
+#if defined(HAS_DIELECTRIC) || defined(HAS_GRATING)
     child = child_of(ray, hit, entering);
     lives = false;
+#ifdef HAS_GRATING
+    if (rest_lives) {
+        child = rest;
+        lives = true;
+    }
+#endif
+#ifdef HAS_DIELECTRIC
 #ifdef BAND_CUTS
     if (at >= 0.0) {
         child = part_of_band(start, at, start.x_hi, 1.0 - below, 6u);
@@ -300,6 +412,7 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 #endif
         lives = survives(child, outcome.roulette_w, 1.0 - reflectance.y, 2u);
     }
+#endif
     if (lives) {
         store_ray(2u * slot + 1u, child);
         outcome.what |= LEFT_SECOND;

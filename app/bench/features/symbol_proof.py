@@ -55,6 +55,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
         "INDEX_ROW",
     ),
     "mirrors": (r"\(kind == KIND_MIRROR\) ",),
+    "gratings": ("grating_at", "diffract_direction", "GRATINGS_AT"),
     "interpolated normals": (
         "corner_normal",
         "has_normals",

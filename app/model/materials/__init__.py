@@ -12,10 +12,11 @@ from .absorption import Absorption
 from .black import Black
 from .dielectric import Dielectric
 from .diffuse import Diffuse
+from .grating import Grating
 from .material import Material
 from .mirror import Mirror
 
-MATERIAL_KINDS: dict[str, type[Material]] = {cls.kind: cls for cls in (Dielectric, Mirror, Diffuse, Black)}
+MATERIAL_KINDS: dict[str, type[Material]] = {cls.kind: cls for cls in (Dielectric, Mirror, Diffuse, Black, Grating)}
 """By their word in a scene file."""
 
-__all__ = ["MATERIAL_KINDS", "Absorption", "Black", "Dielectric", "Diffuse", "Material", "Mirror"]
+__all__ = ["MATERIAL_KINDS", "Absorption", "Black", "Dielectric", "Diffuse", "Grating", "Material", "Mirror"]

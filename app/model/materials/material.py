@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from ..fields import Part, read_fields, write_fields
+from ..fields import Number, Part, read_fields, write_fields
 from ..io.scene_table import SceneTable
 from ..scene_textures import TextureReader
 from ..vectors import Vec3
+
+if TYPE_CHECKING:
+    from ..scene import SceneObject
 
 _NONE: Any = None
 """Nothing, of whatever type the kinds give it."""
@@ -34,6 +37,7 @@ class Material:
     transmits: ClassVar[bool] = False
     """Light enters it: a dielectric."""
     is_mirror: ClassVar[bool] = False
+    is_grating: ClassVar[bool] = False
     receives: ClassVar[bool] = False
     """Caustics are seen on it: it is diffuse."""
     # What a kind may have as fields of its own; without annotations, which would order those.
@@ -44,6 +48,7 @@ class Material:
     texture = _NONE
     absorption = _NONE
     dispersion = _NONE
+    """What its deflection of light is a function of: a glass's index, a grating's wavelength."""
     priority = 0
 
     @property
@@ -76,6 +81,14 @@ class Material:
     def changed(self, **values: Any) -> Self:
         """The same with other values of its kind's fields."""
         return replace(self, **values)
+
+    def check_on(self, item: SceneObject, file_name: str) -> None:
+        """Raise UserError where the object's mesh cannot be of this material."""
+
+    @classmethod
+    def shown_numbers(cls) -> tuple[Number, ...]:
+        """Its plain numbers with a row in the panel."""
+        return tuple(part for part in cls.parts if isinstance(part, Number) and part.row is not None)
 
     def words(self) -> str:
         """What it is, in a few words."""

@@ -115,7 +115,9 @@ def _object(old: SceneObject, new: SceneObject) -> DirtyLevel:
         if not same_absorption:
             return DirtyLevel.BUILD if (a.absorption is None) != (b.absorption is None) else max(cost, DirtyLevel.TRACE)
         return max(cost, DirtyLevel.TRACE) if a.priority != b.priority else cost
-    return max(cost, DirtyLevel.NOTHING if a == b else DirtyLevel.BUILD)
+    if a == b:
+        return cost
+    return max(cost, DirtyLevel.TRACE if a.is_like(b) else DirtyLevel.BUILD)
 
 
 def _glasses(old: Scene, new: Scene) -> DirtyLevel:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from imgui_bundle import imgui
 
 from ...edit import edits, environments
 from ...edit.state import State
+from ...model.fields import Flag
 from ...model.materials import MATERIAL_KINDS
 from ...model.scene import (
+    Grating,
     Material,
     SceneObject,
     Vec3,
@@ -124,6 +127,8 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
     if material.is_black:
         widgets.hint("Absorbs all light that meets it.")
         return state
+    if material.is_grating:
+        return _grating(state, index, material)
     if material.receives:
         state = _texture(state, view_model, index, material)
     return _colour(state, index, material)
@@ -148,6 +153,39 @@ def _glass(state: State, material: Material) -> State:
         "Edit dispersion", tip="Open the Dispersion panel.", width=-1
     ):
         state = state.with_panels(dispersion=True)
+    return state
+
+
+def _grating(state: State, index: int, material: Grating) -> State:
+    name = state.scene.objects[index].name
+    wanted: dict[str, Any] = {}
+    for number in material.shown_numbers():
+        row = number.row
+        assert row is not None
+        changed, value, active = widgets.drag(
+            row.label,
+            getattr(material, number.attribute),
+            row.low,
+            row.high,
+            unit=number.unit,
+            tip=row.tip,
+            format=row.format,
+            reset=row.reset,
+            logarithmic=True,
+        )
+        state = widgets.holding(state, active)
+        if changed:
+            wanted[number.attribute] = value
+    for part in material.parts:
+        if isinstance(part, Flag) and part.row is not None:
+            changed, on = widgets.toggle(part.row.label, getattr(material, part.attribute), tip=part.row.tip)
+            if changed:
+                wanted[part.attribute] = on
+    told = ", ".join(f"{m:+d}: {e:.0%}" for m, e in zip(material.orders, material.efficiency, strict=True))
+    widgets.read_out("Orders", told, tip="Orders that light is sent on in, and the share of it that each gets.")
+    if wanted:
+        changed_material = material.changed(**wanted)
+        state = edits.attempt(state, f"Grating of {name}", edits.set_material, index, changed_material)
     return state
 
 
