@@ -1,4 +1,4 @@
-"""Parts of the camera's program that stand alone: the box that a look is averaged over, and when columns are dropped."""
+"""Parts of the camera's program that stand alone: the box a lookup is averaged over, and when columns are dropped."""
 
 from __future__ import annotations
 

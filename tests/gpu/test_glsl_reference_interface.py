@@ -1,4 +1,4 @@
-"""lib/interface.glsl and lib/band.glsl, which light pass, camera pass and ray queries share, against their CPU references."""
+"""lib/interface.glsl and lib/band.glsl, which every pass that follows rays shares, against their CPU references."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def test_columns_of_a_turned_ray(gl, facets: Facets) -> None:
             side = 1.0 if row["d"] @ row["n_g"] < 0 else -1.0
             point = corners[0] + row["bary"] @ (corners[1:] - corners[0])
             normals = side * facets.corners[i]
-            summed, dnormal = optics.shading_normal_column(corners, normals, point, row["dp"])
+            _, dnormal = optics.shading_normal_column(corners, normals, point, row["dp"])
             beside, _ = optics.shading_normal_column(corners, normals, point + 0.1 * row["dp"], row["dp"])
             scale = 1.0 + np.linalg.norm(dnormal)
             flat = np.linalg.norm(np.cross(triangle["edge1"], triangle["edge2"])) < 0.3
@@ -164,7 +164,7 @@ def test_columns_of_a_turned_ray(gl, facets: Facets) -> None:
             assert (got["dnormal"][i] == 0).all() and (got["moved"][i] == got["moved"][i]).all()
         # Given the normal's derivative that the shader found: its error is judged above.
         dnormal = got["dnormal"][i]
-        turned, normal = interface.reflected(frame, row["d"])
+        _, normal = interface.reflected(frame, row["d"])
         judged = normal is frame.normal_g and frame.interpolated
         if frame.interpolated and judged != bool(got["by_facet"][i] & 1):
             continue
@@ -258,7 +258,7 @@ def test_where_total_reflection_sets_in(gl) -> None:
     float dtheta[SPECTRAL_GROUPS];
     dtheta[0] = slope;
     MediumInterface boundary = MediumInterface(0u, NONE, MediumStack(0u, NONE), true);
-    at = total_reflection_onset(band, theta, dtheta, straight, boundary, bvec3(passes.x > 0.5, passes.y > 0.5, passes.z > 0.5));
+    at = total_reflection_onset(band, theta, dtheta, straight, boundary, greaterThan(passes, vec3(0.5)));
     step_ = variable_step(0u, band.x, band.z);
     """
     inputs = {"band": band, "theta": theta, "slope": slope, "straight": straight, "passes": passes.astype(float)}
