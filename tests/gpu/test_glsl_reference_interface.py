@@ -258,7 +258,7 @@ def test_where_total_reflection_sets_in(gl) -> None:
     float dtheta[SPECTRAL_GROUPS];
     dtheta[0] = slope;
     MediumInterface boundary = MediumInterface(0u, NONE, MediumStack(0u, NONE), true);
-    at = total_reflection_onset(band, theta, dtheta, straight, boundary, bvec3(passes.x > 0.5, passes.y > 0.5, passes.z > 0.5));
+    at = total_reflection_onset(band, theta, dtheta, straight, boundary, greaterThan(passes, vec3(0.5)));
     step_ = variable_step(0u, band.x, band.z);
     """
     inputs = {"band": band, "theta": theta, "slope": slope, "straight": straight, "passes": passes.astype(float)}

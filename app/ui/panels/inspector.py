@@ -127,7 +127,7 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
     if material.is_black:
         widgets.hint("Absorbs all light that meets it.")
         return state
-    if material.is_grating:
+    if isinstance(material, Grating):
         return _grating(state, index, material)
     if material.receives:
         state = _texture(state, view_model, index, material)
