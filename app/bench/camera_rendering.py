@@ -1,4 +1,4 @@
-"""One method of the camera pass in one scene, ready to look again and again: what `bench --eye` times, and nothing
+"""One method of the camera pass in one scene, ready to run again and again: what `bench --eye` times, and nothing
 else.
 
 All methods look up the same caustic maps, which are made once and cost nothing here: they differ in how camera rays
@@ -36,8 +36,8 @@ _TRIAL_SHARE = 0.25
 
 
 class SharedLight:
-    """The caustic maps that all eyes of a scene look up; none where the scene has no light or nothing that light could
-    fall on."""
+    """The caustic maps that all camera passes of a scene look up; none where the scene has no light or
+    nothing that light could fall on."""
 
     def __init__(
         self,
@@ -121,9 +121,9 @@ class CameraRig:
         samples = self._choose(budget).samples(budget)
         chosen = self._finished()
         self._camera_pass.run(self._scene.camera, *self._size, samples, 0, self._light.maps, seed)
-        looked = self._finished()
+        sampled = self._finished()
         xyz = rgb709_to_xyz(self._camera_pass.read_rgb().astype(np.float64))
-        return Rendering(xyz, {"bands": chosen - started, "looks": looked - chosen}, samples, 0)
+        return Rendering(xyz, {"bands": chosen - started, "looks": sampled - chosen}, samples, 0)
 
     def fitting(self, budget: int) -> int:
         """The largest multiple of the bands that `budget` samples are given; the smallest where that is none."""

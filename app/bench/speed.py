@@ -99,14 +99,14 @@ def _trace_rates(context: Context) -> tuple[float, float]:
             scene.lights[0], scene, buffers.space, buffers.space.to_gpu(buffers.world_meshes[0].corners())
         )
         assert domain is not None
-        piece = LatticeSlice(0, (Band(0.0, 1.0, 0.5, 1.0),), LATTICE, 0, 1, LATTICE, (0, 0), (0, 0), 0, 1)
-        runs.append((trace, piece, domain))
+        lattice_slice = LatticeSlice(0, (Band(0.0, 1.0, 0.5, 1.0),), LATTICE, 0, 1, LATTICE, (0, 0), (0, 0), 0, 1)
+        runs.append((trace, lattice_slice, domain))
     best = [0.0, 0.0]
     for repeat in range(REPEATS + 1):
-        for i, (trace, piece, domain) in enumerate(runs):
+        for i, (trace, lattice_slice, domain) in enumerate(runs):
             context.finish()
             started = time.perf_counter()
-            batch = trace.run(piece, domain)
+            batch = trace.run(lattice_slice, domain)
             context.finish()
             if repeat:  # the first run compiles
                 best[i] = max(best[i], batch.emitted_photons / (time.perf_counter() - started))

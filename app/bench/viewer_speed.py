@@ -86,7 +86,7 @@ class _Bench:
     def __init__(self, context: Context, scene: Path, size: tuple[int, int]) -> None:
         self._context = context
         self.session = Session(context, scene)
-        self.session.companions.gallery.release()
+        self.session.jobs.gallery.release()
         self.viewer = Viewer(self.session)
         objects = self.session.state.scene.objects
         glass = next((i for i, o in enumerate(objects) if o.material.transmits), None)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..model.camera_rays import camera_frame
 from ..model.scene import Camera, Vec3
+from ..model.vectors import vec3
 from .projection import View
 
 ORBIT_PER_HEIGHT = np.pi
@@ -27,11 +28,6 @@ FAST, SLOW = 4.0, 0.25
 FRAME_MARGIN = 1.12
 _MIN_DISTANCE = 1e-4
 """Share of the pivot's distance that a zoom may come near in one step."""
-
-
-def _vec3(values: np.ndarray) -> Vec3:
-    x, y, z = (float(v) for v in values)
-    return (x, y, z)
 
 
 def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
@@ -55,7 +51,7 @@ def _rotated(camera: Camera, pivot: np.ndarray, yaw: float, pitch: float) -> Cam
     # The distance is restored, so that thousands of small turns do not drift.
     direction = turn @ forward
     return replace(
-        camera, position=_vec3(new_position), target=_vec3(new_position + np.linalg.norm(target - position) * direction)
+        camera, position=vec3(new_position), target=vec3(new_position + np.linalg.norm(target - position) * direction)
     )
 
 
@@ -79,7 +75,7 @@ def pan(camera: Camera, dx: float, dy: float, depth: float | None = None) -> Cam
 
 def _moved(camera: Camera, step: np.ndarray) -> Camera:
     return replace(
-        camera, position=_vec3(np.asarray(camera.position) + step), target=_vec3(np.asarray(camera.target) + step)
+        camera, position=vec3(np.asarray(camera.position) + step), target=vec3(np.asarray(camera.target) + step)
     )
 
 
@@ -106,7 +102,7 @@ def zoom_to(
     focus = np.asarray(camera.target if hit is None else hit, float)
     position = focus + factor * (view.position - focus)
     distance = max(view.target_distance * factor, _MIN_DISTANCE * view.target_distance)
-    return replace(camera, position=_vec3(position), target=_vec3(position + distance * view.forward))
+    return replace(camera, position=vec3(position), target=vec3(position + distance * view.forward))
 
 
 def dolly(camera: Camera, dy: float) -> Camera:
@@ -145,15 +141,15 @@ def frame(camera: Camera, low: Vec3 | np.ndarray, high: Vec3 | np.ndarray, aspec
     across, upward, ahead = np.abs(corners @ view.right) / aspect, np.abs(corners @ view.up), corners @ view.forward
     radius = float(np.linalg.norm(corners, axis=1).max())
     if radius == 0.0:
-        return replace(camera, position=_vec3(centre - view.target_distance * view.forward), target=_vec3(centre))
+        return replace(camera, position=vec3(centre - view.target_distance * view.forward), target=vec3(centre))
     if view.is_orthographic:
         extent = 2.0 * FRAME_MARGIN * max(float(across.max()), float(upward.max()), 0.05 * radius)
         distance = max(view.target_distance, 2.0 * radius)
         return replace(
-            camera, position=_vec3(centre - distance * view.forward), target=_vec3(centre), vertical_extent=extent
+            camera, position=vec3(centre - distance * view.forward), target=vec3(centre), vertical_extent=extent
         )
     distance = float((np.maximum(across, upward) * FRAME_MARGIN / view.half_height - ahead).max())
-    return replace(camera, position=_vec3(centre - distance * view.forward), target=_vec3(centre))
+    return replace(camera, position=vec3(centre - distance * view.forward), target=vec3(centre))
 
 
 def look_along(camera: Camera, direction: Vec3 | np.ndarray) -> Camera:
@@ -168,4 +164,4 @@ def look_along(camera: Camera, direction: Vec3 | np.ndarray) -> Camera:
         wanted = np.sign(wanted @ axis) * np.sin(STEEPEST) * axis + np.cos(STEEPEST) * level / np.linalg.norm(level)
     target = np.asarray(camera.target, float)
     distance = float(np.linalg.norm(target - np.asarray(camera.position, float)))
-    return replace(camera, position=_vec3(target - distance * wanted))
+    return replace(camera, position=vec3(target - distance * wanted))

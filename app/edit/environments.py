@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 
@@ -129,7 +129,7 @@ def set_map_intensity(scene: Scene, intensity: float) -> Scene:
 
 def map_intensity(environment: Environment) -> float:
     """Factor that the map's values carry already."""
-    return float(environment.parameters.get("intensity", 1.0))  # type: ignore[arg-type]
+    return float(environment.parameters.get("intensity", 1.0))
 
 
 # -- pictures on surfaces -------------------------------------------------------------------
@@ -191,9 +191,9 @@ def _vectors(parameters: dict[str, Any]) -> dict[str, Any]:
 
 def _diffuse(scene: Scene, index: int) -> Diffuse:
     material = scene.objects[index].material
-    if not material.receives:
+    if not isinstance(material, Diffuse):
         raise UserError(f"'{scene.objects[index].name}' is not diffuse and wears no picture; make it diffuse first")
-    return cast(Diffuse, material)
+    return material
 
 
 def _with_material(scene: Scene, index: int, material: Diffuse) -> Scene:

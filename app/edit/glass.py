@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 
@@ -112,9 +111,9 @@ def set_priority(scene: Scene, index: int, priority: int) -> Scene:
 
 def _glass(scene: Scene, index: int) -> Dielectric:
     material = scene.objects[index].material
-    if not material.transmits:
+    if not isinstance(material, Dielectric):
         raise UserError(f"'{scene.objects[index].name}' is not made of glass; give it a glass first")
-    return cast(Dielectric, material)
+    return material
 
 
 def _with_glass(scene: Scene, index: int, material: Dielectric) -> Scene:

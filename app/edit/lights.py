@@ -21,6 +21,7 @@ from ..model.scene import Light, Scene, Vec3
 from ..model.scene_checks import check_lines, check_outside
 from ..model.scene_defaults import environment_of
 from ..model.spectrum_file import describe_spectrum
+from ..model.vectors import vec3
 from .adding import up_frame
 from .names import checked_name, free_name
 from .objects import MAX_LENGTH
@@ -54,7 +55,7 @@ def add_light(scene: Scene, kind: str = "directional") -> Scene:
     """With a white light at the end, aimed at the objects and as bright there as a scene file's default."""
     cls = _class_of(kind)
     name = free_name(f"{kind} light", [light.name for light in scene.lights])
-    direction = _vec3(up_frame(scene) @ default_direction())
+    direction = vec3(up_frame(scene) @ default_direction())
     given = {"name": name, "spectral_power": spectra.illuminant("D65"), "direction": direction}
     light = made(cls, _usual(scene, np.array(direction)) | given)
     return set_light(scene, len(scene.lights), _lighting(scene, light, DEFAULT_ILLUMINANCE))
@@ -69,7 +70,7 @@ def _class_of(kind: str) -> type[Light]:
 def _usual(scene: Scene, direction: np.ndarray) -> dict[str, Any]:
     """Place and size that suit the scene's objects, for a light that shines along `direction`."""
     around = environment_of(scene.objects)
-    position = _vec3(around.centre - 6.0 * around.radius * direction)
+    position = vec3(around.centre - 6.0 * around.radius * direction)
     return {"position": position, "radius": 0.5 * around.radius, "width": around.radius, "height": around.radius}
 
 
@@ -81,9 +82,9 @@ def duplicate_light(scene: Scene, index: int) -> Scene:
     if not light.has_place:
         turn = math.radians(15.0)
         about_up = np.array([(math.cos(turn), -math.sin(turn), 0), (math.sin(turn), math.cos(turn), 0), (0, 0, 1)])
-        copy = copy.changed(direction=_vec3(frame @ about_up @ frame.T @ light.direction))
+        copy = copy.changed(direction=vec3(frame @ about_up @ frame.T @ light.direction))
     else:
-        copy = copy.changed(position=_vec3(light.position + 0.5 * environment_of(scene.objects).radius * frame[:, 0]))
+        copy = copy.changed(position=vec3(light.position + 0.5 * environment_of(scene.objects).radius * frame[:, 0]))
     return set_light(scene, len(scene.lights), copy)
 
 
@@ -110,7 +111,7 @@ def set_light_kind(scene: Scene, index: int, kind: str) -> Scene:
     if not light.has_direction:
         toward = around.centre - light.position
         if np.linalg.norm(toward) > 1e-9 * around.radius:
-            direction = _unit(light, "direction", _vec3(toward))
+            direction = _unit(light, "direction", vec3(toward))
     changed = made(cls, _usual(scene, np.array(direction)) | {"direction": direction} | light.given())
     return set_light(scene, index, _lighting(scene, changed, _illuminance(scene, light)))
 
@@ -254,9 +255,4 @@ def _unit(light: Light, what: str, vector: Vec3) -> Vec3:
     length = math.hypot(*vector)
     if not (math.isfinite(length) and length > 1e-150):
         raise UserError(f"light '{light.name}': its {what} is zero or not finite; give a direction")
-    return _vec3(np.array(vector) / length)
-
-
-def _vec3(vector: np.ndarray) -> Vec3:
-    x, y, z = (float(v) + 0.0 for v in vector)
-    return x, y, z
+    return vec3(np.array(vector) / length)

@@ -14,6 +14,7 @@ import numpy as np
 import pyrr
 
 from ..model.scene import Vec3
+from ..model.vectors import vec3
 
 Placement = tuple[Vec3, Vec3, Vec3]
 """Position (scene units), rotation (degrees about x, y, z), scale along the object's own axes."""
@@ -49,7 +50,7 @@ def decompose(matrix: np.ndarray) -> Placement:
         mirrored = int(np.argmin(np.diagonal(axes)))
         axes[:, mirrored] *= -1.0
         scale[mirrored] *= -1.0
-    return _vec3(matrix[:3, 3]), _angles_deg(axes), _vec3(scale)
+    return vec3(matrix[:3, 3]), _angles_deg(axes), vec3(scale)
 
 
 def with_position(matrix: np.ndarray, position: Vec3) -> np.ndarray:
@@ -90,9 +91,4 @@ def _angles_deg(rotation: np.ndarray) -> Vec3:
         x, z = 0.0, math.atan2(-rotation[0, 1], rotation[1, 1])
     else:
         x, z = math.atan2(rotation[2, 1], rotation[2, 2]), math.atan2(rotation[1, 0], rotation[0, 0])
-    return _vec3(np.degrees([x, y, z]))
-
-
-def _vec3(vector: np.ndarray) -> Vec3:
-    x, y, z = (float(v) + 0.0 for v in vector)
-    return x, y, z
+    return vec3(np.degrees([x, y, z]))

@@ -26,6 +26,7 @@ from ..model.scene import (
     SceneObject,
     Vec3,
 )
+from ..model.vectors import vec3
 
 if TYPE_CHECKING:
     from ..model.optics.glass import Dispersion
@@ -200,10 +201,10 @@ def _with_camera(camera: Camera, name: str, value: float) -> Camera:
     if name == "distance":
         arm = arm * (value / max(float(np.linalg.norm(arm)), 1e-12))
     elif name == "orbit_deg":
-        arm = rotation_about(_vec3(up), math.radians(value)) @ arm
+        arm = rotation_about(vec3(up), math.radians(value)) @ arm
     else:
         arm = _raised(arm, up, value)
-    return replace(camera, position=_vec3(target + arm))
+    return replace(camera, position=vec3(target + arm))
 
 
 def _raised(arm: np.ndarray, up: np.ndarray, degrees: float) -> np.ndarray:
@@ -284,11 +285,11 @@ def _with_light(light: Light, name: str, value: float) -> Light:
         return light.changed(position=_with_axis(light.position, axis, value))
     if field == "rotation":
         turn = rotation_about(_AXES[axis], math.radians(value))
-        turned = light.changed(direction=_vec3(turn @ np.asarray(light.direction)))
+        turned = light.changed(direction=vec3(turn @ np.asarray(light.direction)))
         if light.tangent is None and not light.has_roll:
             return turned
         tangent = light.axes()[:, 0] if light.tangent is None else np.asarray(light.tangent)
-        return turned.changed(tangent=_vec3(turn @ tangent))
+        return turned.changed(tangent=vec3(turn @ tangent))
     if field == "power":
         spectrum = light.spectral_power
         lines = tuple((nm, power * value) for nm, power in spectrum.lines)
@@ -304,8 +305,3 @@ def _changed(thing: Any, name: str, value: object) -> Any:
 def _with_axis(vector: Vec3, axis: str, value: float) -> Vec3:
     index = "xyz".index(axis)
     return (*vector[:index], float(value), *vector[index + 1 :])  # type: ignore[return-value]
-
-
-def _vec3(vector: np.ndarray) -> Vec3:
-    x, y, z = (float(v) for v in vector)
-    return x, y, z

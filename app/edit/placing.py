@@ -6,7 +6,7 @@ change is worked out in float64 from where the drag began, so nothing drifts and
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -16,8 +16,8 @@ from ..model.scene import (
     Light,
     Scene,
     SceneObject,
-    Vec3,
 )
+from ..model.vectors import vec3
 from . import edits
 from .state import Selection
 
@@ -97,21 +97,14 @@ def moved_light(light: Light, delta: np.ndarray) -> Light:
     axes = light.axes()
     stretched = np.linalg.norm(linear @ axes, axis=0)
     position = (delta @ np.append(np.asarray(light.position, float), 1.0))[:3]
-    moved = light.changed(position=_vec3(position)) if light.has_place else light
+    moved = light.changed(position=vec3(position)) if light.has_place else light
     if light.has_direction and not np.allclose(linear, np.eye(3), atol=1e-12):
-        moved = moved.changed(direction=_vec3(_unit(linear @ axes[:, 2])))
+        moved = moved.changed(direction=vec3(_unit(linear @ axes[:, 2])))
         if light.tangent is not None or light.has_roll:
-            moved = moved.changed(tangent=_vec3(_unit(linear @ axes[:, 0])))
-    if not light.has_outline:
-        return moved
+            moved = moved.changed(tangent=vec3(_unit(linear @ axes[:, 0])))
     # A disc stays round: whichever of its two directions was pulled counts.
     across = stretched[:2][np.argmax(np.abs(np.log(stretched[:2])))]
-    outline: Any = light
-    return moved.changed(
-        radius=outline.radius * float(across),
-        width=outline.width * float(stretched[0]),
-        height=outline.height * float(stretched[1]),
-    )
+    return moved.resized(float(across), float(stretched[0]), float(stretched[1]))
 
 
 def name_of(scene: Scene, selection: Selection) -> str:
@@ -130,8 +123,3 @@ def _nearest_rotation(linear: np.ndarray) -> np.ndarray:
 
 def _unit(vector: np.ndarray) -> np.ndarray:
     return vector / np.linalg.norm(vector)
-
-
-def _vec3(values: np.ndarray) -> Vec3:
-    x, y, z = (float(v) for v in values)
-    return (x, y, z)

@@ -25,6 +25,7 @@ from ..model.scene import (
     Vec3,
 )
 from ..model.scene_defaults import environment_of
+from ..model.vectors import vec3
 from .adding import up_frame
 from .lights import SpectrumKind, light_power, set_light, set_light_power, set_light_spectrum
 from .objects import set_material
@@ -192,16 +193,11 @@ def view_camera(scene: Scene, camera: Camera, preset: ViewPreset) -> Camera:
         distance = 6.0 * around.radius
     away = frame @ np.array(preset.toward_camera)
     away = away / np.linalg.norm(away)
-    target = _vec3(around.centre)
+    target = vec3(around.centre)
     return replace(
         camera,
-        position=_vec3(around.centre + distance * away),
+        position=vec3(around.centre + distance * away),
         target=target,
-        up=_vec3(frame @ preset.up),
+        up=vec3(frame @ preset.up),
         vertical_extent=2.0 * reach,
     )
-
-
-def _vec3(vector: np.ndarray) -> Vec3:
-    x, y, z = (float(v) + 0.0 for v in vector)
-    return x, y, z

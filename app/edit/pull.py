@@ -18,6 +18,7 @@ from ..model.local_dispersion import MAX_LOG2_GAIN, MIN_LOG2_GAIN, gain_at
 from ..model.optics.colorimetry import VISIBLE_NM, cmf_xyz, illuminant_table
 from ..model.optics.glass import LINE_D_NM
 from ..model.scene import Dab, Scene, SceneObject, Vec3
+from ..model.vectors import vec3
 from .requests import Pull
 
 MAX_GAIN = 10.0
@@ -135,9 +136,9 @@ def begin_pull(
     pull = Pull(
         source,
         receiver_index,
-        _vec3(point),
-        _vec3(reference),
-        _vec3(moved / length),
+        vec3(point),
+        vec3(reference),
+        vec3(moved / length),
         wavelength_nm,
         material.dispersion.gain,
         material.dispersion.V_d,
@@ -269,7 +270,7 @@ def local_dabs(receiver: SceneObject, pull: Pull, gain: float, radius: float, fa
         rest = rest[:-1]
     before = float(np.log2(gain_at(rest, place[None])[0]))
     wanted = float(np.clip(np.log2(max(gain, 1e-9)), MIN_LOG2_GAIN, MAX_LOG2_GAIN))
-    return (*rest, Dab(_vec3(place), object_radius(receiver, radius), wanted - before, falloff))
+    return (*rest, Dab(vec3(place), object_radius(receiver, radius), wanted - before, falloff))
 
 
 def local_gain(receiver: SceneObject, pull: Pull) -> float:
@@ -279,8 +280,3 @@ def local_gain(receiver: SceneObject, pull: Pull) -> float:
 
 def _to_object(item: SceneObject, point: np.ndarray) -> np.ndarray:
     return np.linalg.solve(item.object_to_world, np.append(point, 1.0))[:3]
-
-
-def _vec3(values: np.ndarray) -> Vec3:
-    x, y, z = (float(v) for v in values)
-    return (x, y, z)

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .io.scene_table import SceneTable, Vec3
+from .io.scene_table import SceneTable
+from .vectors import Vec3
 
 
 @dataclass(frozen=True)

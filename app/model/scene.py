@@ -13,10 +13,10 @@ from typing import Literal
 import numpy as np
 
 from .geometry.mesh import Mesh
-from .io.scene_table import Vec3
 from .lights import Light
 from .materials import Absorption, Black, Dielectric, Diffuse, Material, Mirror
 from .texture import Environment
+from .vectors import Vec3
 
 __all__ = [
     "Absorption",

@@ -17,6 +17,7 @@ from .lights.light import DEFAULT_ILLUMINANCE
 from .optics.spectrum import illuminant
 from .placement import Surroundings, default_direction
 from .scene import Camera, Diffuse, Light, SceneObject
+from .vectors import vec3
 
 
 def bounds_of(objects: Sequence[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
@@ -38,7 +39,7 @@ def default_camera(around: Surroundings) -> Camera:
     target = around.centre + around.radius * np.array([0.75 * x, 0.75 * y, -0.35])
     away = np.array([0.18, -0.80, 0.57])
     position = target + 7.5 * around.radius * away / np.linalg.norm(away)
-    return Camera(_vec3(position), _vec3(target), vertical_fov_deg=32.0)
+    return Camera(vec3(position), vec3(target), vertical_fov_deg=32.0)
 
 
 def default_light() -> Light:
@@ -59,8 +60,3 @@ def default_table(objects: Sequence[SceneObject]) -> SceneObject:
     mesh = plane(size, size, name="table")
     note_recipe(mesh, {"shape": "plane", "width": size, "height": size})
     return SceneObject("table", mesh, Diffuse((0.8, 0.8, 0.8)), matrix)
-
-
-def _vec3(vector: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in vector)
-    return x, y, z

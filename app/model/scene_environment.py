@@ -17,9 +17,10 @@ from .environment import (
     up_and_rotation,
 )
 from .io.scene_pictures import picture_file
-from .io.scene_table import SceneTable, Vec3
+from .io.scene_table import SceneTable
 from .scene_render import read_background
 from .texture import Environment
+from .vectors import Vec3
 
 KEY = "environment"
 KINDS = ("map", "gradient", "sky", "constant")

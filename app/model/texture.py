@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -38,7 +38,7 @@ class Environment:
     world_to_local: np.ndarray = field(default_factory=lambda: np.eye(3))
     """float64 (3, 3), a rotation."""
     kind: Literal["map", "gradient", "sky"] = "map"
-    parameters: Mapping[str, object] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
     """What the scene file said under [environment], so that it can be saved again."""
     source: str | None = None
     """Path of the file it came from, for a map."""

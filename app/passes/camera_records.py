@@ -7,7 +7,6 @@ import numpy as np
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.schema import Field, Struct
 from ..model.scene import Light
-from .emission_domain import orthonormal_frame
 
 CAMERA_LIGHT = Struct(
     "CameraLight",
@@ -71,8 +70,7 @@ CAMERA_PARAMETERS = Struct(
 def light_record(light: Light, scene: SceneBuffers) -> np.void:
     """The light in GPU space."""
     record = CAMERA_LIGHT.zeros(1)[0]
-    axis = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
-    tangent, bitangent = orthonormal_frame(axis, None if light.tangent is None else np.asarray(light.tangent))
+    tangent, bitangent, axis = light.axes().T
     record["position"] = scene.space.to_gpu(np.array(light.position))
     record["kind"] = light.gpu_code
     record["axis"] = axis

@@ -90,7 +90,7 @@ def emission_domain(
     if len(specular_triangles) == 0:
         return None
     position = space.to_gpu(np.array(light.position))
-    direction = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
+    direction = light.axes()[:, 2]
     corners = specular_triangles.reshape(-1, 3)
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     if light.is_parallel:
@@ -107,7 +107,7 @@ def _plane_domain(
     direction: np.ndarray,
     middle: np.ndarray,
 ) -> EmissionDomain | None:
-    tangent, bitangent = orthonormal_frame(direction, light.tangent)
+    tangent, bitangent, _ = light.axes().T
     frame = np.stack([tangent, bitangent])
     relative = triangles - middle
     flat = relative @ frame.T
@@ -174,7 +174,7 @@ def _diverging_domain(
     area = 1.0
     if light.has_outline:
         half = np.array(light.half_extent)
-        edge_u, edge_v = orthonormal_frame(direction, None if light.tangent is None else np.asarray(light.tangent))
+        edge_u, edge_v, _ = light.axes().T
         light_u, light_v = edge_u * half[0] * space.scale, edge_v * half[1] * space.scale
         area = light.area
         reach = (half[0] if light.is_disc else np.linalg.norm(half)) * space.scale

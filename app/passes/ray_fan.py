@@ -110,7 +110,7 @@ class RayFan:
             if not light.has_place:
                 # From outside of everything, so that whatever stands in the way is met.
                 return _Beam(centre - axis * float(np.linalg.norm(self._high - self._low)), axis, True, None)
-            first, second = orthonormal_frame(axis, None if light.tangent is None else np.asarray(light.tangent, float))
+            first, second, _ = light.axes().T
             half = light.half_extent
             return _Beam(position, axis, True, np.stack([first * half[0], second * half[1]]), light.is_disc)
         way = centre - position

@@ -139,7 +139,7 @@ class LightPass:
         buffers: SceneBuffers,
         *,
         fit: MapFit | None = None,
-        division: Division = Division(),
+        division: Division | None = None,
         photon_records: PhotonRecords | None = None,
         pace: Pace | None = None,
     ) -> None:
@@ -153,7 +153,7 @@ class LightPass:
         self.fit = fit or MapFit(scene.camera, settings.width, settings.height)
         """What `maps` are fitted to."""
         self.stats = LightStats()
-        self._division = division
+        self._division = division or Division()
         self._records = photon_records or NoRecords()
         self._pace = pace or Pace.of(context)
         batch = settings.batch or DEFAULT_BATCH * context.traits.batch_scale

@@ -36,7 +36,7 @@ class MapFit:
 
     @property
     def preview(self) -> MapFit:
-        """Small maps of the same, for an answer at once."""
+        """Small maps of the same, to be filled at once."""
         width, height = preview_size(self.width, self.height)
         return replace(self, width=width, height=height, tile_max=PREVIEW_TILE_MAX)
 

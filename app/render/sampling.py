@@ -53,7 +53,7 @@ class CameraSampling:
 
     @staticmethod
     def live(samples: int) -> CameraSampling:
-        """For a picture that is looked at while it is made: no second program is compiled for it."""
+        """For a picture that is shown while it is made: no second program is compiled for it."""
         return CameraSampling(samples, may_be_single=False, bands_for=LIVE_BANDS_FOR)
 
     def fixed_bands(self, camera_pass: CameraPass) -> int | None:

@@ -24,7 +24,7 @@ class CameraStats:
 
     samples: int = 0
     """A pixel."""
-    spectrum: Spectrum = Spectrum()
+    spectrum: Spectrum = field(default_factory=Spectrum)
     """How samples saw it."""
     fallbacks: Mapping[str, int] = field(default_factory=dict)
 
@@ -56,38 +56,38 @@ class RenderStats:
 
     def lines(self) -> list[str]:
         """The energy balance and the times, one line each."""
-        tally = self.light.tally
+        light, tally, camera = self.light, self.light.tally, self.camera_pass
         total, deposited = tally.emitted or 1.0, max(tally.ended["deposited"], 1e-300)
-        text = [f"emitted             {tally.emitted:.6e} W of scene flux per pass weight"]
-        text += [f"  {name:<17} {flux / total:10.6f}" for name, flux in tally.ended.items()]
-        text += [
+        bands = (f"{name} {count} × {light.light_points[name]}" for name, count in light.bands.items())
+        dropped = f"{light.footprints_dropped} ({light.dropped_w / deposited:.1e} of what was deposited)"
+        return [
+            f"emitted             {tally.emitted:.6e} W of scene flux per pass weight",
+            *(f"  {name:<17} {flux / total:10.6f}" for name, flux in tally.ended.items()),
             f"  {'roulette':<17} {tally.roulette / total:10.6f}",
             f"  {'unaccounted':<17} {tally.imbalance:10.2e}   (emitted − all of the above)",
             (
                 f"map holds           {self.map_flux_w / deposited:10.6f} of what was deposited; "
-                f"outside every map {self.light.outside_map_w / deposited:.6f}"
+                f"outside every map {light.outside_map_w / deposited:.6f}"
             ),
-            "fall-backs          "
-            + ", ".join(f"{name} {count}" for name, count in tally.fallbacks.items())
-            + f", splat_footprint_dropped {self.light.footprints_dropped} "
-            + f"({self.light.dropped_w / deposited:.1e} of what was deposited)",
-            "bands × points      "
-            + ", ".join(
-                f"{name} {count} × {self.light.light_points[name]}" for name, count in self.light.bands.items()
+            f"fall-backs          {_counted(tally.fallbacks)}, splat_footprint_dropped {dropped}",
+            f"bands × points      {', '.join(bands)}",
+            (
+                f"camera              {camera.samples} samples a pixel, {camera.spectrum.words}; "
+                f"{_counted(camera.fallbacks)}"
             ),
-            f"camera              {self.camera_pass.samples} samples a pixel, {self.camera_pass.spectrum.words}; "
-            + ", ".join(f"{name} {count}" for name, count in self.camera_pass.fallbacks.items()),
             (
                 f"maps                {self.atlas_size[0]}×{self.atlas_size[1]} texels, "
                 f"buffers {self.bytes / 2**20:.0f} MiB"
             ),
             (
-                f"seconds             prepare {self.prepare_seconds:.2f}, "
-                f"emit and trace {self.light.trace_seconds:.2f}, "
-                f"splat {self.light.splat_seconds:.2f}, camera {self.camera_seconds:.2f}, all {self.seconds:.2f}"
+                f"seconds             prepare {self.prepare_seconds:.2f}, emit and trace {light.trace_seconds:.2f}, "
+                f"splat {light.splat_seconds:.2f}, camera {self.camera_seconds:.2f}, all {self.seconds:.2f}"
             ),
         ]
-        return text
+
+
+def _counted(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in counts.items())
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.render.solo import solo_scene
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.render.viewer.engine import PREVIEW_S, Budget, LiveEngine
-from spectrasplat.render.viewer.invalidation import dirty_level, looks_other
+from spectrasplat.render.viewer.invalidation import appearance_differs, dirty_level
 from spectrasplat.render.viewer.live_camera import SCALES, _side
 from spectrasplat.render.viewer.spectrum_guess import guess_weights
 
@@ -186,7 +186,7 @@ def test_an_edited_dispersion_changes_what_is_seen_in_glass_and_traces_nothing(
     rays, mask = engine.stats.rays_traced, in_glass(engine, before.shape)
     edited = with_dispersion(scene, 4.0)
     assert (
-        looks_other(inputs(scene), inputs(edited))
+        appearance_differs(inputs(scene), inputs(edited))
         and dirty_level(inputs(scene), inputs(scene), inputs(edited)) == DirtyLevel.SPLAT
     )
     after = settle(engine, inputs(edited))

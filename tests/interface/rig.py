@@ -15,8 +15,9 @@ from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.scene import Dielectric, Diffuse
 from spectrasplat.render.viewer.engine import Budget, LiveEngine
+from spectrasplat.ui.frame import Draw
 from spectrasplat.ui.headless import HeadlessInterface
-from spectrasplat.ui.session import Draw, Session
+from spectrasplat.ui.session import Session
 from spectrasplat.ui.shell import draw_interface
 from spectrasplat.ui.viewer import Viewer, headless_viewer
 

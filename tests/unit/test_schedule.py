@@ -15,9 +15,9 @@ from spectrasplat.render.viewer.schedule import (
     CameraState,
     CameraWorked,
     Event,
+    Examined,
     Failed,
     FrameBegan,
-    Looked,
     MapsReady,
     PreviewShown,
     RetraceAsked,
@@ -47,12 +47,12 @@ def run(schedule: Schedule, *events: Event, now: float = 0.0) -> tuple[Schedule,
     return schedule, done
 
 
-def asked(level: DirtyLevel, camera: CameraState = DONE, moves_view: bool = False) -> Looked:
-    return Looked(camera, level, moves_view)
+def asked(level: DirtyLevel, camera: CameraState = DONE, moves_view: bool = False) -> Examined:
+    return Examined(camera, level, moves_view)
 
 
 def test_the_first_wish_is_built_once() -> None:
-    schedule, done = run(Schedule(), Wished(), Looked(level=DirtyLevel.BUILD), Looked(level=DirtyLevel.BUILD))
+    schedule, done = run(Schedule(), Wished(), Examined(level=DirtyLevel.BUILD), Examined(level=DirtyLevel.BUILD))
     assert done == [Action.BUILD] and schedule.building and not schedule.wish_is_due
     schedule, done = run(schedule, Built(), MapsReady(1, DONE))
     assert done == [ShowMaps(same_view=True, finer_maps=True)]
@@ -120,30 +120,30 @@ def test_the_end_of_a_drag_is_a_wish() -> None:
 def test_what_followed_to_first_order_is_traced_once_still() -> None:
     schedule, _ = run(SHOWN, Wished(), asked(DirtyLevel.SPLAT), SplattingBegan(first_order=True), SplattingEnded())
     schedule, _ = run(schedule, TracingEnded())
-    early, done = run(schedule, Looked(), now=0.9 * STILL_S)
+    early, done = run(schedule, Examined(), now=0.9 * STILL_S)
     assert done == [] and not early.is_idle(DONE)
-    assert run(replace(schedule, interacting=True), Looked(), now=2 * STILL_S)[1] == []
-    late, done = run(schedule, Looked(), now=1.1 * STILL_S)
+    assert run(replace(schedule, interacting=True), Examined(), now=2 * STILL_S)[1] == []
+    late, done = run(schedule, Examined(), now=1.1 * STILL_S)
     assert done == [Action.BUILD]
     assert not run(late, Built())[0].first_order
 
 
 def test_who_does_not_want_that_asks_for_it() -> None:
     schedule = replace(SHOWN, first_order=True, refines_when_still=False)
-    assert run(schedule, Looked(), now=9.0)[1] == [Action.JUDGE_MAPS] and schedule.is_idle(DONE)
-    assert run(schedule, RetraceAsked(), Looked())[1] == [Action.BUILD]
-    assert run(SHOWN, RetraceAsked(), Looked())[1] == []  # nothing to gain
+    assert run(schedule, Examined(), now=9.0)[1] == [Action.JUDGE_MAPS] and schedule.is_idle(DONE)
+    assert run(schedule, RetraceAsked(), Examined())[1] == [Action.BUILD]
+    assert run(SHOWN, RetraceAsked(), Examined())[1] == []  # nothing to gain
 
 
 def test_coarse_maps_are_refitted_when_nothing_is_dragged_and_others_judged_when_still() -> None:
     coarse = replace(SHOWN, maps_are_coarse=True)
-    assert run(coarse, Looked())[1] == [Action.REFIT_MAPS]
-    assert run(replace(coarse, interacting=True), Looked())[1] == []
-    assert run(replace(coarse, building=True), Looked())[1] == []
+    assert run(coarse, Examined())[1] == [Action.REFIT_MAPS]
+    assert run(replace(coarse, interacting=True), Examined())[1] == []
+    assert run(replace(coarse, building=True), Examined())[1] == []
     refitted, _ = run(coarse, SplattingBegan(first_order=False, refitted=True))
     assert not refitted.maps_are_coarse and refitted.splatting and refitted.tracing
-    assert run(refitted, Looked())[1] == []
-    assert run(refitted, Looked(), now=1.1 * STILL_S)[1] == [Action.JUDGE_MAPS]
+    assert run(refitted, Examined())[1] == []
+    assert run(refitted, Examined(), now=1.1 * STILL_S)[1] == [Action.JUDGE_MAPS]
 
 
 def test_splatting_again_leaves_coarse_maps_coarse() -> None:
@@ -196,13 +196,13 @@ def test_pausing_stops_tracing_but_not_what_an_edit_asks_for() -> None:
 
 
 def test_what_failed_is_not_tried_again_by_itself() -> None:
-    schedule, _ = run(Schedule(), Wished(), Looked(level=DirtyLevel.BUILD), Failed())
-    assert run(schedule, Looked(level=DirtyLevel.BUILD))[1] == [] and schedule.is_idle(DONE)
-    again, done = run(schedule, Wished(), Looked(level=DirtyLevel.BUILD))
+    schedule, _ = run(Schedule(), Wished(), Examined(level=DirtyLevel.BUILD), Failed())
+    assert run(schedule, Examined(level=DirtyLevel.BUILD))[1] == [] and schedule.is_idle(DONE)
+    again, done = run(schedule, Wished(), Examined(level=DirtyLevel.BUILD))
     assert done == [Action.BUILD] and not again.failed
     # Neither is a refinement, which would fail in every frame.
     refining = replace(SHOWN, first_order=True, failed=True)
-    assert run(refining, Looked(), now=9.0)[1] == [Action.JUDGE_MAPS] and refining.is_idle(DONE)
+    assert run(refining, Examined(), now=9.0)[1] == [Action.JUDGE_MAPS] and refining.is_idle(DONE)
 
 
 def test_idle_is_when_nothing_is_left() -> None:

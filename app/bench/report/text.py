@@ -1,6 +1,6 @@
 """What the bench report says in words: numbers as people read them, warnings, findings and limits.
 
-Plain text only; `report_html` escapes it.
+Plain text only; the page escapes it.
 """
 
 from __future__ import annotations

@@ -31,6 +31,7 @@ from ..scene import (
     SceneObject,
 )
 from ..scene_defaults import default_camera, default_light, default_table, environment_of
+from ..vectors import vec3
 from .gltf_document import GltfDocument, open_document
 from .gltf_extras import read_node_dabs, read_scene_extras
 from .gltf_materials import (
@@ -292,7 +293,7 @@ class _Reader:
         extras = node.get("extras") if isinstance(node.get("extras"), dict) else {}
         distance = float(extras.get(EXTRAS, {}).get("target_distance", _DEFAULT_DISTANCE))
         position, forward, up = world[:3, 3], -_unit(world[:3, 2]), _unit(world[:3, 1])
-        common = {"position": _vec3(position), "target": _vec3(position + distance * forward), "up": _vec3(up)}
+        common = {"position": vec3(position), "target": vec3(position + distance * forward), "up": vec3(up)}
         if entry.get("type") == "orthographic":
             extent = 2.0 * float(entry["orthographic"]["ymag"])
             if not extent > 0.0:
@@ -320,7 +321,7 @@ class _Reader:
         from ..optics.colorimetry import illuminant_table, rgb709_to_xyz_matrix, rgb_partition
         from ..optics.spectrum import Spectrum
 
-        position, direction = _vec3(world[:3, 3]), _vec3(-_unit(world[:3, 2]))
+        position, direction = vec3(world[:3, 3]), vec3(-_unit(world[:3, 2]))
         extras = entry.get("extras") if isinstance(entry.get("extras"), dict) else {}
         own = extras.get(EXTRAS, {}).get("light")
         if own is not None:
@@ -328,7 +329,7 @@ class _Reader:
             placed: dict[str, Any] = {"position": list(position)} if cls.has_place else {}
             placed |= {"direction": list(direction)} if cls.has_direction else {}
             has_tangent = "size" in own or cls.has_roll is True
-            placed |= {"tangent": list(_vec3(_unit(world[:3, 0])))} if has_tangent else {}
+            placed |= {"tangent": list(vec3(_unit(world[:3, 0])))} if has_tangent else {}
             table = SceneTable(own | placed, self.document.path, f"{LIGHTS}.extras.{EXTRAS}.light")
             return read_light(table, 0, around)
         kind = entry.get("type")
@@ -390,9 +391,4 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 
 def _turned(vector: tuple[float, float, float]) -> tuple[float, float, float]:
     """A z-up vector in glTF's y-up axes."""
-    return _vec3(Y_UP_TO_Z_UP[:3, :3].T @ np.array(vector))
-
-
-def _vec3(vector: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = (float(v) + 0.0 for v in vector)
-    return x, y, z
+    return vec3(Y_UP_TO_Z_UP[:3, :3].T @ np.array(vector))

@@ -126,7 +126,7 @@ def write_gltf_material(values: dict[str, Any], material: Material, thickness: f
     pbr |= {"baseColorFactor": [*map(float, rgb), 1.0], "metallicFactor": metallic, "roughnessFactor": roughness}
     if material.receives:
         _wear(pbr, texture)
-    exact = not isinstance(material, (Mirror, Diffuse)) or getattr(material, "reflectance", None) is not None
+    exact = material.transmits or material.is_black or material.reflectance is not None
     if exact:
         own["material"] = material.values()
     if own:

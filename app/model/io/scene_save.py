@@ -30,6 +30,7 @@ from ..scene_environment import environment_values
 from ..scene_objects import INLINE
 from ..scene_render import render_values
 from ..texture import Environment
+from .scene_file import load_scene
 from .scene_pictures import relative_name
 from .toml_text import toml_text
 
@@ -80,8 +81,6 @@ def scene_values(scene: Scene, path: Path) -> dict[str, Any]:
 
 def _kept(scene: Scene, path: Path, raw: dict[str, Any]) -> dict[str, Any]:
     """`raw`, the tables that stand in `path`, with what differs in `scene` replaced."""
-    from .scene_file import load_scene
-
     before = load_scene(path)
     values = dict(raw)
     if scene.name != before.name:

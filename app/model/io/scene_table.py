@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ...base.errors import UserError, nearest_names
-
-Vec3 = tuple[float, float, float]
+from ..vectors import Vec3
 
 MAX_MAGNITUDE = 1e30
 """Largest number in a scene: the renderer's float32 ends at 3e38, and sums need room."""

@@ -39,4 +39,4 @@ class AreaLight(OutlinedLight):
 
     def emits_toward(self, directions: np.ndarray) -> np.ndarray:
         """Those to its front."""
-        return directions @ (np.asarray(self.direction, float) / np.linalg.norm(self.direction)) > 0.0
+        return directions @ self.axes()[:, 2] > 0.0

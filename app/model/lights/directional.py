@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from ...base.errors import UserError
 from ..fields import Animated, Number, Row
-from ..io.scene_table import Vec3
+from ..vectors import Vec3
 from .light import IRRADIANCE_KEYS, Light
 
 SUN_DIAMETER_DEG = 0.53

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base.errors import UserError
 from ..fields import Animated, Direction, FileName, Number, Row
-from ..io.scene_table import Vec3
+from ..vectors import Vec3
 from .ies_file import Profile, default_profile, read_ies
 from .light import FLUX_KEYS, INTENSITY_KEYS, Light, PowerKey
 

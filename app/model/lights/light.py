@@ -14,8 +14,9 @@ import numpy as np
 
 from ...base.errors import UserError
 from ..fields import Animated, Number, Part, Row
-from ..io.scene_table import MAX_MAGNITUDE, SceneTable, Vec3
+from ..io.scene_table import MAX_MAGNITUDE, SceneTable
 from ..optics.spectrum import Spectrum
+from ..vectors import Vec3
 
 DEFAULT_ILLUMINANCE = 3.0
 """Lumen per square unit on a plane across the light where a file states no power: with
@@ -70,10 +71,6 @@ RADIANCE_KEYS = (
 )
 
 
-_NONE: Any = None
-"""Nothing, of whatever type the kinds give it."""
-
-
 @dataclass(frozen=True)
 class Light:
     """One emitter.
@@ -113,17 +110,17 @@ class Light:
     is_intensity: ClassVar[bool] = False
     """Whether its quantity is an intensity, which falls off with distance²."""
     # What a kind may have as attributes, without annotations: an annotated one would order the kinds' own fields.
-    profile = _NONE
+    profile = None
     """Table of its intensity over directions, where it has one."""
     across = (np.zeros(3), np.zeros(3))
     """Directions in which the profile's horizontal angle is 0 and 90°."""
     position = (0.0, 0.0, 0.0)
     direction = (0.0, 0.0, -1.0)
     """Unit propagation direction of the axis."""
-    tangent = _NONE
+    tangent = None
     """Direction of a rectangle's width; None picks one."""
     shape = "disc"
-    """Outline of what has one: disc or rectangle."""
+    """Outline, where it has one."""
     is_disc = False
     half_extent = (0.0, 0.0)
     """Half of its width and height, scene units."""
@@ -133,10 +130,6 @@ class Light:
     """Of what is infinitely far away, rad."""
     cone = (4.0, 4.0)
     """Inner and outer half angle of its cone, rad; beyond π for none."""
-
-    def changed(self, **values: Any) -> Self:
-        """A copy with other values of its kind's own fields, which only the kind knows."""
-        return replace(self, **values)
 
     @property
     def has_extent(self) -> bool:
@@ -176,6 +169,14 @@ class Light:
     def words(self) -> str:
         """Kind and shape in a few words."""
         return self.kind
+
+    def resized(self, across: float, wide: float, high: float) -> Self:
+        """With an outline so many times as large; a disc knows one factor only."""
+        return self
+
+    def changed(self, **values: Any) -> Self:
+        """The same with other values of its kind's fields."""
+        return replace(self, **values)
 
     def fitted(self) -> Light:
         """The same with numbers that bound each other brought in line."""
@@ -276,6 +277,10 @@ class OutlinedLight(Light):
     parts: ClassVar = (_OutlineFile(),)
     numbers: ClassVar = (RADIUS, _WIDTH, _HEIGHT)
     has_outline: ClassVar = True
+
+    def resized(self, across: float, wide: float, high: float) -> Self:
+        """With another opening."""
+        return self.changed(radius=self.radius * across, width=self.width * wide, height=self.height * high)
 
     @property
     def is_disc(self) -> bool:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..io.scene_table import Vec3
+from ..vectors import Vec3
 from .light import FLUX_KEYS, INTENSITY_KEYS, Light
 
 

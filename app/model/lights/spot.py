@@ -11,7 +11,8 @@ import numpy as np
 
 from ...base.errors import UserError
 from ..fields import Animated, Number, Part, Row
-from ..io.scene_table import SceneTable, Vec3
+from ..io.scene_table import SceneTable
+from ..vectors import Vec3
 from .light import FLUX_KEYS, INTENSITY_KEYS, Light
 
 _HALF_ANGLE = Number(
@@ -101,8 +102,7 @@ class SpotLight(Light):
 
     def emits_toward(self, directions: np.ndarray) -> np.ndarray:
         """Those within the cone."""
-        axis = np.asarray(self.direction, float) / np.linalg.norm(self.direction)
-        return directions @ axis > math.cos(self.cone[1])
+        return directions @ self.axes()[:, 2] > math.cos(self.cone[1])
 
     def words(self) -> str:
         """Kind and cone."""

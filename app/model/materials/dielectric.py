@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from ..fields import Integer
+from ..optics import catalogue
 from ..optics.colorimetry import VISIBLE_NM
 from ..optics.glass import Dispersion
 from .absorption import Absorption, AbsorptionPart
@@ -33,6 +34,11 @@ class Dielectric(Material):
     parts: ClassVar = (DispersionPart(), AbsorptionPart(), PRIORITY)
     is_specular: ClassVar = True
     transmits: ClassVar = True
+
+    @classmethod
+    def usual(cls) -> Self:
+        """Of the default glass."""
+        return cls(catalogue.find(DEFAULT_GLASS))
 
     def values(self, path: Path | None = None) -> dict[str, Any]:
         """Glass is what a material is unless it says otherwise."""

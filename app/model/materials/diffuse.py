@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from ..io.scene_pictures import picture_file, picture_name
-from ..io.scene_table import SceneTable, Vec3
+from ..io.scene_table import SceneTable
 from ..optics.colorimetry import VISIBLE_NM
 from ..optics.spectrum import Spectrum, illuminant, xyz_to_rgb709
+from ..scene_textures import TextureReader
 from ..texture import Texture
+from ..vectors import Vec3
 from .absorption import read_curve
 from .material import Material, colour_words
-
-if TYPE_CHECKING:
-    from ..scene_textures import TextureReader
 
 
 @dataclass(frozen=True)

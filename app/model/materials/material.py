@@ -7,17 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self, cast
 
 from ..fields import Part, read_fields, write_fields
-from ..io.scene_table import SceneTable, Vec3
-
-if TYPE_CHECKING:
-    from ..scene_textures import TextureReader
-
-
-_NONE: Any = None
-"""Nothing, of whatever type the kinds give it."""
+from ..io.scene_table import SceneTable
+from ..scene_textures import TextureReader
+from ..vectors import Vec3
 
 
 @dataclass(frozen=True)
@@ -38,20 +33,15 @@ class Material:
     is_mirror: ClassVar[bool] = False
     receives: ClassVar[bool] = False
     """Caustics are seen on it: it is diffuse."""
-    # What a kind may have as attributes, without annotations: an annotated one would order the kinds' own fields.
+    # What a kind may have as fields of its own; without annotations, which would order those.
     reflectance_rgb = (0.0, 0.0, 0.0)
     """Linear Rec.709."""
-    reflectance = _NONE
+    reflectance = cast(Any, None)
     """(401,) on the visible grid, instead of `reflectance_rgb`."""
-    texture = _NONE
-    absorption = _NONE
-    dispersion = _NONE
+    texture = cast(Any, None)
+    absorption = cast(Any, None)
+    dispersion = cast(Any, None)
     priority = 0
-    """Among solids that overlap the higher one wins."""
-
-    def changed(self, **values: Any) -> Self:
-        """A copy with other values of its kind's own fields, which only the kind knows."""
-        return replace(self, **values)
 
     @property
     def is_black(self) -> bool:
@@ -64,6 +54,11 @@ class Material:
         return len(set(self.reflectance_rgb)) > 1
 
     @classmethod
+    def usual(cls) -> Self:
+        """What somebody gets who asks for one of this kind and nothing more."""
+        return cls()
+
+    @classmethod
     def read(cls, table: SceneTable, textures: TextureReader) -> Self:
         """One of this kind from its table; `textures` reads its pictures."""
         return cls(**read_fields(cls.parts, table))
@@ -74,6 +69,10 @@ class Material:
         Without one, files are named absolutely, and a picture without a file by its content.
         """
         return {"kind": self.kind} | write_fields(self.parts, self, path)
+
+    def changed(self, **values: Any) -> Self:
+        """The same with other values of its kind's fields."""
+        return replace(self, **values)
 
     def words(self) -> str:
         """What it is, in a few words."""

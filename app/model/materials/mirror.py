@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ..fields import Colour
-from ..io.scene_table import Vec3
+from ..vectors import Vec3
 from .material import Material, colour_words
 
 

@@ -1,7 +1,7 @@
 """What a change of a live rendering's inputs costs.
 
 The difference of two `LiveInputs` decides what is redone. A field that nobody thought about
-falls through to the dearest answer, so a forgotten field is slow, never wrong.
+falls through to the most expensive level, so a forgotten field is slow, never wrong.
 """
 
 from __future__ import annotations

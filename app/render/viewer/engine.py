@@ -2,7 +2,7 @@
 changes.
 
 `set` says what is wanted, `advance` works on it for a while. What is done when is `Schedule`'s to say: the engine tells
-it what happens, and carries out what it answers. Work is cut into parts of a few milliseconds, so that a frame's
+it what happens, and carries out what it says. Work is cut into parts of a few milliseconds, so that a frame's
 budget is kept on a software renderer too.
 """
 
@@ -25,7 +25,7 @@ from ..solo import scene_seen
 from . import schedule as events
 from .building import Budget, Shown, build
 from .dirty_level import DirtyLevel
-from .invalidation import dirty_level, looks_other
+from .invalidation import appearance_differs, dirty_level
 from .live_camera import LiveCamera
 from .live_light import LiveLight
 from .photon_queries import StoredPhotons, caustic_spectrum, reach_of, world_photons
@@ -182,7 +182,7 @@ class LiveEngine:
         due = self.schedule.wish_is_due
         level = self._level if due else DirtyLevel.NOTHING
         moves = due and self._inputs is not None and _moves_view(self._inputs, self._wanted)
-        self._tell(events.Looked(self._camera, level, moves), budget_s)
+        self._tell(events.Examined(self._camera, level, moves), budget_s)
 
     def _work(self, deadline: float, budget_s: float) -> None:
         sees, camera = self._maps is not None and self._inputs is not None, self._camera
@@ -250,7 +250,7 @@ class LiveEngine:
         assert shown is not None and before is not None
         shown.light.show(wanted)
         self._inputs = wanted
-        if looks_other(before, wanted):
+        if appearance_differs(before, wanted):
             self._take_scene(wanted, shown.light)
         self._show_preview(seconds)
         self._splat_again(shown)

@@ -102,7 +102,7 @@ def _object(old: SceneObject, new: SceneObject) -> DirtyLevel:
         return DirtyLevel.BUILD
     if a.receives and b.receives:
         if a.reflectance is None and b.reflectance is None and (a.texture is None) == (b.texture is None):
-            # Another picture is only looked at; whether there is one, the objects' records on the device know.
+            # Another picture is only seen; whether there is one, the objects' records on the device know.
             same = a.reflectance_rgb == b.reflectance_rgb and a.texture is b.texture
             return max(cost, DirtyLevel.NOTHING if same else DirtyLevel.CAMERA)
         return DirtyLevel.BUILD
@@ -178,7 +178,7 @@ def _light(old: Light, new: Light) -> DirtyLevel:
     return DirtyLevel.SPLAT if a0 <= b0 and b1 <= a1 and (a0 < a1) else DirtyLevel.TRACE
 
 
-def looks_other(old: LiveInputs, new: LiveInputs) -> bool:
+def appearance_differs(old: LiveInputs, new: LiveInputs) -> bool:
     """Whether what the camera sees without the maps differs: colours, lights, what lies behind everything, glass that
     bends its own rays otherwise."""
     a, b = old.scene, new.scene
@@ -186,10 +186,10 @@ def looks_other(old: LiveInputs, new: LiveInputs) -> bool:
         return True
     if a.lights is not b.lights and any(x is not y for x, y in zip(a.lights, b.lights, strict=True)):
         return True
-    return any(_material_looks_other(x.material, y.material) for x, y in zip(a.objects, b.objects, strict=True))
+    return any(_material_differs(x.material, y.material) for x, y in zip(a.objects, b.objects, strict=True))
 
 
-def _material_looks_other(old: Material, new: Material) -> bool:
+def _material_differs(old: Material, new: Material) -> bool:
     if old is new:
         return False
     if old.transmits and new.transmits:

@@ -62,7 +62,7 @@ class LiveCamera:
         self._camera: Camera | None = None
         self._size = (0, 0)
         self._is_preview = False
-        """The picture that runs is a preview: it answers a movement."""
+        """The picture that runs is a preview of a movement."""
         self._is_smooth = False
         """Its samples are of the whole spectrum: the picture until there are bands."""
         self._bands: int | None = None

@@ -73,8 +73,8 @@ class LiveLight:
     # ---- what is shown -----------------------------------------------------------------------
 
     def show(self, inputs: LiveInputs) -> None:
-        """Take over dispersion, spectra, solo, smoothing and local gain of `inputs`; maps keep what was deposited until
-        they are splatted again.
+        """Take over dispersion, spectra, solo, smoothing and local gain of `inputs`; maps keep what was
+        deposited until they are splatted again.
 
         `inputs.scene` must be one that these photons can follow (`invalidation.dirty_level` below TRACE).
         """

@@ -1,7 +1,7 @@
 """Photon records kept after they were splatted, so that an edit of what they show needs no tracing.
 
 Slabs are kept by round: the rounds of a pass are even sub-lattices of the whole, so the first few of them
-are the same picture, only coarser. That is what a dragged slider is answered with.
+are the same picture, only coarser. A preview shows those while a slider is dragged.
 """
 
 from __future__ import annotations

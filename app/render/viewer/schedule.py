@@ -86,7 +86,7 @@ class FrameBegan:
 
 
 @dataclass(frozen=True)
-class Looked:
+class Examined:
     """The engine asks what to do about what is wanted."""
 
     camera: CameraState = CameraState()
@@ -155,7 +155,7 @@ Event = (
     | RetraceAsked
     | BuildAsked
     | FrameBegan
-    | Looked
+    | Examined
     | Built
     | Failed
     | PreviewShown
@@ -180,7 +180,7 @@ class Schedule:
     """When something else was wanted last, or a drag ended."""
     interacting: bool = False
     wish_is_due: bool = False
-    """What is wanted has not been looked at."""
+    """What is wanted has not been examined."""
     retrace_is_due: bool = False
     shows_scene: bool = False
     """There are photons of some scene; not before the first build."""
@@ -251,8 +251,8 @@ def step(schedule: Schedule, event: Event, now: float) -> Next:
             if s.interacting and not interacting:
                 s = replace(s, changed_at=now, wish_is_due=True)
             return replace(s, interacting=interacting), ()
-        case Looked():
-            return _look(s, event, now)
+        case Examined():
+            return _examine(s, event, now)
         case Built():
             return _built(s), ()
         case Failed():
@@ -274,7 +274,7 @@ def step(schedule: Schedule, event: Event, now: float) -> Next:
             return s, _after_camera(s, camera, now)
 
 
-def _look(s: Schedule, event: Looked, now: float) -> Next:
+def _examine(s: Schedule, event: Examined, now: float) -> Next:
     if not s.shows_scene:
         starts = not s.building and (s.wish_is_due or not s.failed)
         s = replace(s, wish_is_due=False)
@@ -283,7 +283,7 @@ def _look(s: Schedule, event: Looked, now: float) -> Next:
         s = replace(s, retrace_is_due=False)
         return (s, ()) if s.building else _build(s)
     if s.wish_is_due:
-        return (s, ()) if s.finishes_preview(event.camera) else _answer(replace(s, wish_is_due=False), event)
+        return (s, ()) if s.finishes_preview(event.camera) else _fulfil(replace(s, wish_is_due=False), event)
     if s.building:
         return s, ()
     if s.maps_are_coarse and not s.interacting:
@@ -291,10 +291,10 @@ def _look(s: Schedule, event: Looked, now: float) -> Next:
     return s, (Action.JUDGE_MAPS,) if s.is_still(now) else ()
 
 
-def _answer(s: Schedule, event: Looked) -> Next:
+def _fulfil(s: Schedule, event: Examined) -> Next:
     """The least that shows what is wanted."""
     if event.level >= DirtyLevel.TRACE:
-        # A build that runs is finished first and shown; then the newest wish is looked at again.
+        # A build that runs is finished first and shown; then the newest wish is examined.
         s, actions = (replace(s, wish_is_due=s.wish_is_newer), ()) if s.building else _build(s)
         return s, (*actions, Action.MOVE_CAMERA) if event.moves_view else actions
     if event.level == DirtyLevel.SPLAT:
@@ -309,7 +309,7 @@ def _build(s: Schedule) -> Next:
 
 
 def _built(s: Schedule) -> Schedule:
-    # What was wished for meanwhile is looked at in the next frame.
+    # What was wished for meanwhile is examined in the next frame.
     return replace(
         s,
         shows_scene=True,

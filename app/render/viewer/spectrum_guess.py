@@ -1,5 +1,5 @@
-"""Spectral channels for maps that were splatted in colour only, so that a drag is answered as fast where the camera
-looks through dispersive glass.
+"""Spectral channels for maps that were splatted in colour only, so that a preview is as fast where the camera
+sees through dispersive glass.
 
 Such maps live for a moment. Each texel gets the smoothest spectrum that has its colour, in the channels that proper
 maps hold.

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import cast
 
 import numpy as np
 
@@ -65,12 +64,12 @@ def selected_glass(state: State) -> tuple[int, SceneObject, Dielectric] | None:
     if state.selection.kind != "object" or not 0 <= index < len(state.scene.objects):
         return None
     item = state.scene.objects[index]
-    return (index, item, cast(Dielectric, item.material)) if item.material.transmits else None
+    return (index, item, item.material) if isinstance(item.material, Dielectric) else None
 
 
 def glasses_of(scene: Scene) -> list[tuple[int, SceneObject, Dielectric]]:
     """Every object of glass with its index and material."""
-    return [(i, o, cast(Dielectric, o.material)) for i, o in enumerate(scene.objects) if o.material.transmits]
+    return [(i, o, o.material) for i, o in enumerate(scene.objects) if isinstance(o.material, Dielectric)]
 
 
 def own_numbers(dispersion: Dispersion) -> tuple[float, float]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, cast
 
 import numpy as np
 from imgui_bundle import imgui
@@ -11,12 +10,8 @@ from imgui_bundle import imgui
 from ...edit import edits, environments
 from ...edit.state import State
 from ...model.materials import MATERIAL_KINDS
-from ...model.optics import catalogue
 from ...model.scene import (
-    Dielectric,
-    Diffuse,
     Material,
-    Mirror,
     SceneObject,
     Vec3,
 )
@@ -26,7 +21,6 @@ from . import outliner, picture_choice, widgets
 from .environment_rows import draw_environment
 
 _KINDS = {cls.title: cls for cls in MATERIAL_KINDS.values()}
-_NEW_GLASS = "N-BK7"
 _UNITS = "units"
 _WRAPS = {"repeat": "Repeats", "clamp": "Its border goes on"}
 
@@ -126,21 +120,20 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
     if changed:
         return edits.attempt(state, f"Make {thing.name} {wanted.lower()}", edits.set_material, index, _fresh(wanted))
     if material.transmits:
-        return _glass(state, cast(Dielectric, material))
+        return _glass(state, material)
     if material.is_black:
         widgets.hint("Absorbs all light that meets it.")
         return state
     if material.receives:
-        state = _texture(state, view_model, index, cast(Diffuse, material))
-    return _colour(state, index, cast(Mirror, material))
+        state = _texture(state, view_model, index, material)
+    return _colour(state, index, material)
 
 
 def _fresh(kind: str) -> Material:
-    cls: Any = _KINDS[kind]
-    return cls(catalogue.find(_NEW_GLASS)) if cls.transmits else cls()
+    return _KINDS[kind].usual()
 
 
-def _glass(state: State, material: Dielectric) -> State:
+def _glass(state: State, material: Material) -> State:
     dispersion = material.dispersion
     widgets.read_out(
         "Glass",
@@ -158,7 +151,7 @@ def _glass(state: State, material: Dielectric) -> State:
     return state
 
 
-def _texture(state: State, view_model: ViewModel, index: int, material: Diffuse) -> State:
+def _texture(state: State, view_model: ViewModel, index: int, material: Material) -> State:
     """The picture that the surface wears."""
     thing = state.scene.objects[index]
     worn = material.texture
@@ -183,7 +176,7 @@ def _texture(state: State, view_model: ViewModel, index: int, material: Diffuse)
     return state
 
 
-def _colour(state: State, index: int, material: Diffuse | Mirror) -> State:
+def _colour(state: State, index: int, material: Material) -> State:
     thing = state.scene.objects[index]
     tip = "Share of light reflected, linear Rec.709, 0 to 1."
     if material.texture is not None:

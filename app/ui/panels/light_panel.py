@@ -145,7 +145,7 @@ def _draw_number(light: Light, number: Number) -> tuple[Light, bool]:
     row, value = number.row, getattr(light, number.attribute)
     assert row is not None
     high = getattr(light, row.bounded_by) if row.bounded_by else row.high
-    shown: Any = {"unit": number.unit, "tip": row.tip, "format": row.format}
+    shown: dict[str, Any] = {"unit": number.unit, "tip": row.tip, "format": row.format}
     if row.is_slider:
         if row.bounded_by:
             value, reset = min(value, high), high
