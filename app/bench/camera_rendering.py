@@ -36,8 +36,8 @@ _TRIAL_SHARE = 0.25
 
 
 class SharedLight:
-    """The caustic maps that all camera passes of a scene look up; none where the scene has no light or nothing that light could
-    fall on."""
+    """The caustic maps that all camera passes of a scene look up; none where the scene has no light or
+    nothing that light could fall on."""
 
     def __init__(
         self,

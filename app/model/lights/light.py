@@ -71,10 +71,6 @@ RADIANCE_KEYS = (
 )
 
 
-_NONE: Any = None
-"""Nothing, of whatever type the kinds give it."""
-
-
 @dataclass(frozen=True)
 class Light:
     """One emitter.
@@ -114,14 +110,14 @@ class Light:
     is_intensity: ClassVar[bool] = False
     """Whether its quantity is an intensity, which falls off with distance²."""
     # What a kind may have as attributes, without annotations: an annotated one would order the kinds' own fields.
-    profile = _NONE
+    profile = None
     """Table of its intensity over directions, where it has one."""
     across = (np.zeros(3), np.zeros(3))
     """Directions in which the profile's horizontal angle is 0 and 90°."""
     position = (0.0, 0.0, 0.0)
     direction = (0.0, 0.0, -1.0)
     """Unit propagation direction of the axis."""
-    tangent = _NONE
+    tangent = None
     """Direction of a rectangle's width; None picks one."""
     shape = "disc"
     """Outline, where it has one."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 from ..fields import Number, Part, read_fields, write_fields
 from ..io.scene_table import SceneTable
@@ -16,9 +16,6 @@ from ..vectors import Vec3
 
 if TYPE_CHECKING:
     from ..scene import SceneObject
-
-_NONE: Any = None
-"""Nothing, of whatever type the kinds give it."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +40,11 @@ class Material:
     # What a kind may have as fields of its own; without annotations, which would order those.
     reflectance_rgb = (0.0, 0.0, 0.0)
     """Linear Rec.709."""
-    reflectance = _NONE
+    reflectance = cast(Any, None)
     """(401,) on the visible grid, instead of `reflectance_rgb`."""
-    texture = _NONE
-    absorption = _NONE
-    dispersion = _NONE
+    texture = cast(Any, None)
+    absorption = cast(Any, None)
+    dispersion = cast(Any, None)
     """What its deflection of light is a function of: a glass's index, a grating's wavelength."""
     priority = 0
 
