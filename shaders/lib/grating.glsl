@@ -86,7 +86,10 @@ vec3 diffract_column(vec3 direction, vec3 ddirection, vec3 normal, vec3 dnormal,
 {
     vec3 across = across_lines(normal, lines, side);
     vec3 shift = step * across;
-    vec3 dshift = dstep * across + step * side * normalised_derivative(cross(lines, normal), cross(lines, dnormal));
+    vec3 dshift = dstep * across;
+#ifdef NORMAL_DERIVATIVES
+    dshift += step * side * normalised_derivative(cross(lines, normal), cross(lines, dnormal));
+#endif
     float dtheta = dot(ddirection, normal) + dot(direction, dnormal);
     float domega = (theta * dtheta - dot(dshift, direction + shift) - dot(shift, ddirection)) / omega;
     float sense = reflects ? 1.0 : -1.0;
