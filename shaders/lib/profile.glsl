@@ -19,7 +19,8 @@ uint profile_stretch(uint first, uint count, float angle, out float along)
         else high = middle;
     }
     float begin = profiles[first + low];
-    along = clamp((angle - begin) / (profiles[first + high] - begin), 0.0, 1.0);
+    // Angles that float32 cannot tell apart are an edge.
+    along = clamp((angle - begin) / max(profiles[first + high] - begin, 1e-12), 0.0, 1.0);
     return low;
 }
 

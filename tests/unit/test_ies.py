@@ -148,6 +148,7 @@ GOOD = ies_text(lambda v, h: 5.0 + 0.0 * v, [0.0, 45.0, 90.0], [0.0, 45.0, 90.0]
         (GOOD.replace("5 5 5\n", "5 inf 5\n", 1), "not finite among candela"),
         (GOOD.replace("5 5 5\n", "5 five 5\n", 1), "has 'five' among candela, which is no number"),
         (GOOD.replace("5 5 5\n", "5 -5 5\n", 1), "negative or too large"),
+        (GOOD.replace("5 5 5\n", "5 1e300 5\n").replace("1 1 0\n", "1e300 1 0\n"), "negative or too large"),
         (GOOD.replace("5 5 5\n", "0 0 0\n"), "gives no light in any direction"),
         (
             GOOD.replace("TILT=NONE", "TILT=lamp.tlt"),

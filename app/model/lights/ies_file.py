@@ -16,6 +16,7 @@ import numpy as np
 
 from ...base.errors import UserError
 from ...base.paths import assets_dir
+from ..io.scene_table import MAX_MAGNITUDE
 
 MAX_BYTES = 1 << 20
 MAX_ANGLES = 4096
@@ -148,8 +149,9 @@ class _Numbers:
         candela = np.array(self._take(verticals * horizontals, "candela")).reshape(horizontals, verticals)
         if self._next < len(self._words):
             raise self._error(f"goes on after its {verticals * horizontals} candela, so its counts of angles are wrong")
-        candela *= multiplier * ballast * ballast_lamp
-        if candela.min() < 0.0 or not np.isfinite(candela).all():
+        with np.errstate(over="ignore", invalid="ignore", under="ignore"):
+            candela = candela * multiplier * ballast * ballast_lamp
+        if not (candela.min() >= 0.0 and candela.max() <= MAX_MAGNITUDE):
             raise self._error("has candela, or a factor on them, that are negative or too large")
         if candela.max() <= 0.0:
             raise self._error("gives no light in any direction", "choose another file")
