@@ -33,7 +33,7 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
         )
     for item in scene.objects:
         check_texture(item, file_name)
-        item.material.check_on(item, file_name)
+        item.material.check_on(item.mesh, item.name, file_name)
     _check_sizes(scene, file_name)
     glasses = [o for o in scene.objects if o.material.transmits]
     for light in scene.lights:

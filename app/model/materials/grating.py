@@ -15,7 +15,7 @@ from ..optics.glass import Dispersion
 from .material import Material
 
 if TYPE_CHECKING:
-    from ..scene import SceneObject
+    from ..geometry.mesh import Mesh
 
 MAX_ORDER = 50
 MAX_ORDERS = 2 * MAX_ORDER + 1
@@ -131,12 +131,11 @@ class Grating(Material):
         """Numbers may differ, not how many there are."""
         return isinstance(other, Grating) and len(self.orders) == len(other.orders)
 
-    def check_on(self, item: SceneObject, file_name: str) -> None:
+    def check_on(self, mesh: Mesh, name: str, file_name: str) -> None:
         """Thin sheets only, whose lines lie in them."""
-        mesh = item.mesh
         if mesh.is_closed:
             raise UserError(
-                f"{file_name}: object '{item.name}' is a closed solid and a grating a thin sheet; "
+                f"{file_name}: object '{name}' is a closed solid and a grating a thin sheet; "
                 "give it an open shape such as 'plane' or 'disc', before the solid if need be"
             )
         normals = mesh.face_normals()
@@ -144,6 +143,6 @@ class Grating(Material):
         sines = np.linalg.norm(np.cross(normals, np.asarray(self.direction, float)), axis=1)
         if np.any(sines < _MIN_SINE):
             raise UserError(
-                f"{file_name}: the lines of grating '{item.name}' run along the normal of its surface; "
+                f"{file_name}: the lines of grating '{name}' run along the normal of its surface; "
                 "choose a 'direction' that lies in the surface"
             )

@@ -15,7 +15,7 @@ from ..scene_textures import TextureReader
 from ..vectors import Vec3
 
 if TYPE_CHECKING:
-    from ..scene import SceneObject
+    from ..geometry.mesh import Mesh
 
 
 @dataclass(frozen=True)
@@ -79,8 +79,8 @@ class Material:
         """The same with other values of its kind's fields."""
         return replace(self, **values)
 
-    def check_on(self, item: SceneObject, file_name: str) -> None:
-        """Raise UserError where the object's mesh cannot be of this material."""
+    def check_on(self, mesh: Mesh, name: str, file_name: str) -> None:
+        """Raise UserError where the object `name`, of this mesh, cannot be of this material."""
 
     @classmethod
     def shown_numbers(cls) -> tuple[Number, ...]:
