@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
-from spectrasplat.model.fields import Number
+from spectrasplat.edit import edits, parameters
+from spectrasplat.model.fields import Animated, Number, Row
+from spectrasplat.model.io.gltf import load_gltf
+from spectrasplat.model.io.gltf_write import save_gltf
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.io.scene_table import SceneTable
@@ -254,3 +258,43 @@ def test_the_default_sun_is_left_out_again(tmp_path: Path) -> None:
     save_scene(scene, path, over=True)
     # The table that was put below is an object now; the rest is as it was.
     assert "lights" not in path.read_text(encoding="utf-8")
+
+
+# -- the proof by use -----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Torch(PointLight):
+    """A kind of light that nothing else knows of: a point whose glow is counted in candles."""
+
+    candles: float = 1.0
+
+    kind: ClassVar = "torch"
+    title: ClassVar = "Torch"
+    parts: ClassVar = (Number("candles", 1.0, above=0.0),)
+    numbers: ClassVar = (
+        Number("candles", 1.0, above=0.0, row=Row("Candles", "How many."), animated=Animated("Candles", 1.0, 9.0)),
+    )
+
+
+def test_a_new_kind_of_light_needs_its_class_and_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(LIGHT_KINDS, "torch", Torch)
+    path = tmp_path / "mine.toml"
+    path.write_text(WRITTEN.replace('kind = "point"', 'kind = "torch"\ncandles = 3'), encoding="utf-8")
+    scene = load_scene(path)
+    light = scene.lights[0]
+    assert (
+        isinstance(light, Torch) and light.candles == 3.0 and edits.light_power(light, "flux_lm") == pytest.approx(100)
+    )
+    save_scene(scene, tmp_path / "again.toml")
+    assert load_scene(tmp_path / "again.toml").lights[0].given().keys() == light.given().keys()
+    save_gltf(scene, tmp_path / "again.glb")
+    again = load_gltf(tmp_path / "again.glb").lights[0]
+    assert isinstance(again, Torch) and again.candles == 3.0 and again.position == light.position
+    stage = parameters.Stage(scene, scene.camera)
+    assert parameters.apply(stage, "lights.left.candles", 5.0).scene.lights[0] == replace(light, candles=5.0)
+    made_so = edits.set_light_kind(scene, 1, "torch").lights[1]
+    assert isinstance(made_so, Torch) and edits.add_light(scene, "torch").lights[-1].kind == "torch"
+    with pytest.raises(UserError, match=r"lights\[0\].candles is -1 but must be above 0"):
+        path.write_text(path.read_text(encoding="utf-8").replace("candles = 3", "candles = -1"), encoding="utf-8")
+        load_scene(path)

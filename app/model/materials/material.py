@@ -80,7 +80,7 @@ class Material:
         return replace(self, **values)
 
     def check_on(self, mesh: Mesh, name: str, file_name: str) -> None:
-        """Raise UserError where the object `name`, of this mesh, cannot be of this material."""
+        """Raise UserError where the mesh of object `name` cannot be of this material."""
 
     @classmethod
     def shown_numbers(cls) -> tuple[Number, ...]:
