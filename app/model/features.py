@@ -149,7 +149,7 @@ class Features:
             method=settings.method,
             spectral_groups=groups,
             merged_groups=groups > 0 and (settings.method == "srd-lambda" or len(dispersive) > MAX_GROUPS),
-            spectral_weights=not single and (groups > 0 or absorbing or coloured_mirror),
+            spectral_weights=not single and ((groups > 0 and bool(dielectrics)) or absorbing or coloured_mirror),
             footprints=footprints,
             point_spectrum=single,
             random_wavelength=settings.method.startswith("stochastic"),

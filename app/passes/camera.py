@@ -28,14 +28,14 @@ from ..model.scene import Camera
 from ..model.scene_checks import contains
 from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
 from .camera_tables import CameraTables
+from .listed_pixels import GROUP, ListedPixels
+from .pixel_lattice import is_in_strips, pixel_lattice
 from .present import Channels
 from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
 from .variants import (
     BIND_CELL_CDF,
     BIND_COUNTERS,
-    BIND_HALTED,
     BIND_LIGHTS,
-    BIND_LISTED,
     BIND_OBJECT_COLOURS,
     BIND_PICTURES,
     BIND_PLACEMENTS,
@@ -63,12 +63,7 @@ PRIMARY_SAMPLES_UNTIL = 16
 _TARGET_SECONDS = 0.15
 """What one dispatch may take; rows are divided to fit."""
 _GROUP = 8
-_LISTED_GROUP = 64
-_FIRST_ROWS, _FIRST_LISTED = 16, 1024
-_PLACES = 8192
-"""Samples that may be under way, where they halt."""
-_LISTED_AT, _HALTED_AT = 0, 4
-_NOTHING_LISTED = bytes(8)
+_FIRST_ROWS = 16
 FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut", "loops_ended")
 """What the shader counts, in its order."""
 
@@ -128,7 +123,7 @@ class CameraPass:
         self._empty: CausticMaps | None = None
         self._pictures: list[moderngl.Texture] = []
         self._samples_of_row = np.zeros(0, int)
-        self._rows = self._pixels = self._resumed = DispatchBudget(1, 1, 1)
+        self._rows = DispatchBudget(1, 1, 1)
         self._within_rows = False
         """Some listed pixels of a band of rows have this sample, others are still to get it."""
         self._map_targets = maps.targets
@@ -165,13 +160,13 @@ class CameraPass:
             )
             if on
         }
-        self._listed: moderngl.Buffer | None = None
-        self._halted: moderngl.Buffer | None = None
+        self._listed: ListedPixels | None = None
         self._beyond: moderngl.ComputeShader | None = None
         self._single: moderngl.ComputeShader | None = None
-        if "CAMERA_SPECULAR" in shown and context.traits.loops_may_end:
-            self._halted = self._ctx.buffer(reserve=_PLACES * halted_bytes(shown))
-            shown = halting_defines(shown)
+        if "CAMERA_SPECULAR" in shown:
+            halts = context.traits.loops_may_end
+            self._listed = ListedPixels(self._ctx, halted_bytes(shown) if halts else None)
+            shown = halting_defines(shown) if halts else shown
         self._source = (shown, structs)
         if "CAMERA_SPECULAR" in shown:
             self._beyond = shader.compute(self._ctx, "camera/camera.comp", shown, structs)
@@ -220,7 +215,7 @@ class CameraPass:
         maps = maps or self._no_maps()
         parameters = self._parameters(camera, width, height, maps.scale, seed)
         parameters["sample_side"] = 1.0 / np.sqrt(samples + sample_offset)
-        if _is_in_strips(samples, sample_offset):
+        if is_in_strips(samples, sample_offset):
             parameters["pixel_width"], parameters["pixel_height"] = samples**-0.5, samples**0.5
         # Where samples are of one band each, fewer of them share a pixel in that band.
         parameters["band_side"] = min(1.0, np.sqrt(self.spectrum.bands / (samples + sample_offset)))
@@ -228,7 +223,7 @@ class CameraPass:
         parameters["primary_samples"] = (
             1 if self.spectrum.single or samples + sample_offset > PRIMARY_SAMPLES_UNTIL else self.primary_samples
         )
-        for index, place in enumerate(_pixel_lattice(samples, sample_offset)):
+        for index, place in enumerate(pixel_lattice(samples, sample_offset)):
             parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
             parameters["within_pixel"] = place
             for share in self._add_sample(parameters, width, height, maps):
@@ -313,9 +308,7 @@ class CameraPass:
             buffer.bind_to_storage_buffer(binding)
         self._counters.bind_to_storage_buffer(BIND_COUNTERS)
         if self._listed is not None:
-            self._listed.bind_to_storage_buffer(BIND_LISTED)
-        if self._halted is not None:
-            self._halted.bind_to_storage_buffer(BIND_HALTED)
+            self._listed.bind()
         self._parameters_buffer.bind_to_uniform_block(bindings.PARAMETERS)
         for unit, texture in enumerate(maps.textures):
             texture.use(location=unit)
@@ -357,9 +350,8 @@ class CameraPass:
         for program in (self._program, self._beyond, self._single):
             if program is not None:
                 shader.release(program)
-        for buffer in (self._listed, self._halted):
-            if buffer is not None:
-                buffer.release()
+        if self._listed is not None:
+            self._listed.release()
         if self._owns_pictures:
             self.pictures.release()
         if self._empty is not None:
@@ -419,15 +411,8 @@ class CameraPass:
                 picture.release()
             self._pictures = [self._ctx.texture((width, height), 4, dtype="f4") for _ in range(self.channels.targets)]
             self._rows = DispatchBudget(_FIRST_ROWS, _GROUP, -(-height // _GROUP) * _GROUP)
-            self._pixels = DispatchBudget(_FIRST_LISTED, _LISTED_GROUP, max(width * height, _LISTED_GROUP))
-            self._resumed = DispatchBudget(_FIRST_LISTED, _LISTED_GROUP, _PLACES)
             if self._listed is not None:
-                self._listed.release()
-            self._listed = (
-                self._ctx.buffer(reserve=8 + 4 * width * (-(-height // _GROUP) * _GROUP))
-                if self._beyond is not None
-                else None
-            )
+                self._listed.resize(width * height, width * (-(-height // _GROUP) * _GROUP))
         zeros = bytes(width * height * 16)
         for picture in self._pictures:
             picture.write(zeros)
@@ -443,7 +428,7 @@ class CameraPass:
             rows = min(self._rows.units, height - row)
             parameters["first_row"] = row
             if self._listed is not None:
-                self._listed.write(_NOTHING_LISTED)
+                self._listed.clear()
             self._rows.learn(
                 rows,
                 self._dispatch(self._program, parameters, maps, -(-width // _GROUP), -(-rows // _GROUP)),
@@ -458,54 +443,14 @@ class CameraPass:
             yield row / height
 
     def _follow_listed(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
-        """Follow what the listed pixels of a band of rows see, yielding the share done after each dispatch but the
-        last."""
+        """Follow what the listed pixels of a band of rows see, yielding the share done."""
         if self._listed is None:
             return
-        count, done, place = self._counted(_LISTED_AT), 0, 0
-        while done < count:
-            pixels = min(self._pixels.units, count - done)
-            if self._halted is not None:
-                pixels = min(pixels, _PLACES - place)
-            parameters["first_place"], parameters["queue"] = place, 0
-            self._follow(self._pixels, done, pixels, parameters, maps)
-            done, place = done + pixels, place + pixels
-            # Many portions' together, so that few are left without neighbours.
-            if self._halted is not None and (done == count or place == _PLACES):
-                for _ in self._take_up_halted(parameters, maps):
-                    yield done / count
-                place = 0
-            if done < count:
-                yield done / count
 
-    def _take_up_halted(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[None]:
-        """Take up the samples that have halted until none is left, pausing before every dispatch."""
-        assert self._listed is not None
-        parameters["first_place"] = NONE
-        while count := self._counted(_HALTED_AT):
-            self._listed.write(bytes(4), offset=_HALTED_AT)
-            parameters["queue"] = 1 - parameters["queue"]
-            done = 0
-            while done < count:
-                yield
-                samples = min(self._resumed.units, count - done)
-                self._follow(self._resumed, done, samples, parameters, maps)
-                done += samples
+        def dispatch(count: int) -> float:
+            return self._dispatch(self._program_beyond(), parameters, maps, -(-count // GROUP), 1)
 
-    def _follow(
-        self, dispatch_budget: DispatchBudget, first: int, count: int, parameters: np.ndarray, maps: CausticMaps
-    ) -> None:
-        """Dispatch a portion of the listed pixels, or of the halted samples."""
-        parameters["first_listed"], parameters["end_listed"] = first, first + count
-        dispatch_budget.learn(
-            count,
-            self._dispatch(self._program_beyond(), parameters, maps, -(-count // _LISTED_GROUP), 1),
-            self.dispatch_seconds,
-        )
-
-    def _counted(self, at: int) -> int:
-        assert self._listed is not None
-        return int(np.frombuffer(self._listed.read(4, offset=at), "u4")[0])
+        yield from self._listed.follow(parameters, dispatch, self.dispatch_seconds)
 
     def _dispatch(
         self, program: moderngl.ComputeShader, parameters: np.ndarray, maps: CausticMaps, groups_x: int, groups_y: int
@@ -550,24 +495,3 @@ class CameraPass:
                 textures, self._ctx.buffer(receivers.tobytes()), self._ctx.buffer(reserve=PLACEMENT.stride)
             )
         return self._empty
-
-
-def _is_in_strips(samples: int, offset: int) -> bool:
-    """Whether samples share the pixel in upright strips. Two or three squares of the same area do not fill it: what is
-    small and bright, and letters, would count twice or not at all. With more, outlines want different heights."""
-    return offset == 0 and samples in (2, 3)
-
-
-def _pixel_lattice(samples: int, offset: int) -> np.ndarray:
-    """(samples, 2) places in a pixel: ordered as in a golden-ratio lattice, shifted as a whole from launch to launch.
-
-    Every row and every column of the pixel cut into `samples` holds one sample, so that edges of any slant are filtered
-    well, and the first launch's lie about the pixel's middle, so that the picture does not move.
-    """
-    if _is_in_strips(samples, offset):
-        return np.column_stack([(np.arange(samples) + 0.5) / samples, np.full(samples, 0.5)])
-    golden = 0.6180339887498949
-    shift = offset * np.array([0.7548776662466927, 0.5698402909980532])
-    index = np.arange(samples)
-    rank = np.argsort(np.argsort((0.5 + index * golden) % 1.0))
-    return ((np.column_stack([index, rank]) + 0.5) / samples + shift) % 1.0

@@ -93,8 +93,8 @@ def _shading_normal(scene, triangle, u, v, dx, dy, dz, gx, gy, gz, entering):
 
 @inlined
 def _diffracted(dx, dy, dz, nx, ny, nz, lines, step, reflects):
-    """(direction, whether it is real) of an order: `step` = m λ / (Λ n) across `lines`, along lines × n, is added to the
-    direction's part in the surface; (nx, ny, nz) is the outward normal."""
+    """(direction, whether it is real) of an order: `step` = m λ / (Λ n) across `lines`, along lines × n, is added
+    to the direction's part in the surface; (nx, ny, nz) is the outward normal."""
     ax, ay, az = lines[1] * nz - lines[2] * ny, lines[2] * nx - lines[0] * nz, lines[0] * ny - lines[1] * nx
     length = math.sqrt(ax * ax + ay * ay + az * az)
     theta = dx * nx + dy * ny + dz * nz

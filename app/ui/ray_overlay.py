@@ -63,11 +63,11 @@ class RayOverlay:
 
     @staticmethod
     def _object(state: State) -> int | None:
-        """The selected glass; with a light or nothing selected, the first glass there is."""
+        """The selected glass or grating; with a light or nothing selected, the first there is."""
         selection, objects = state.selection, state.scene.objects
-        if selection.kind == "object" and objects[selection.index].material.transmits:
+        if selection.kind == "object" and objects[selection.index].material.dispersion is not None:
             return selection.index
-        return next((i for i, o in enumerate(objects) if o.material.transmits), None)
+        return next((i for i, o in enumerate(objects) if o.material.dispersion is not None), None)
 
 
 def wavelengths_of(state: State) -> list[float]:

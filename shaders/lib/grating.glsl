@@ -1,5 +1,5 @@
 // A diffraction grating: parallel lines on a thin sheet with one medium on both sides. Of a unit direction, the part that lies in the surface
-// changes by m λ / (Λ n) across the lines, order m, line spacing Λ; the rest follows from its length [Loewen and Popov 1997, ch. 2]. Where
+// changes by m λ / (Λ n) across the lines, order m, line spacing Λ; the rest follows from its length [Loewen, Popov 1997, ch. 2]. Where
 // nothing is left for it the order is evanescent. `side`: 1 where the frame's normal is the outward one, else -1, so that the orders have the
 // same sense seen from both sides.
 #ifndef GRATING_GLSL

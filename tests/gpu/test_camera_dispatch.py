@@ -28,7 +28,8 @@ def begun(camera_pass: CameraPass, rows: int, pixels: int) -> CameraPass:
     """With dispatches of so many rows, and of so many of their pixels that see glass."""
     camera_pass.run(CAMERA, *SIZE, 1)
     camera_pass.dispatch_seconds = 0.0  # they shall not grow
-    camera_pass._rows, camera_pass._pixels = DispatchBudget(rows, 8, 56), DispatchBudget(pixels, 64, 1 << 20)
+    camera_pass._rows = DispatchBudget(rows, 8, 56)
+    camera_pass._listed.budget = DispatchBudget(pixels, 64, 1 << 20)
     return camera_pass
 
 

@@ -20,7 +20,7 @@ from spectrasplat.model.features import Features
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes import camera_programs
+from spectrasplat.passes import variants
 from spectrasplat.passes.camera import CameraPass, CausticMaps
 from spectrasplat.render.light_pass import spectral_axis
 
@@ -44,7 +44,7 @@ for run in range(int(sys.argv[2])):
     camera._TARGET_SECONDS = (0.15, 0.02, 1.0, 0.003, 0.4)[run % 5]
     settings = RenderSettings(width=96, height=54, photons=20_000, spp=4, seed=7, tally=True)
     result = render(scene, settings, context=context)
-    assert result.stats.camera.fallbacks["loops_ended"] == 0, result.stats.camera.fallbacks
+    assert result.stats.camera_pass.fallbacks["loops_ended"] == 0, result.stats.camera_pass.fallbacks
     print(hashlib.sha256(np.ascontiguousarray(result.rgb).tobytes()).hexdigest())
 """
 
@@ -56,10 +56,11 @@ class Shuffled(CameraPass):
 
     def _follow_listed(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
         assert self._listed is not None
-        count = int(np.frombuffer(self._listed.read(4), "u4")[0])
+        pixels = self._listed._list
+        count = int(np.frombuffer(pixels.read(4), "u4")[0])
         if count:
-            listed = np.frombuffer(self._listed.read(4 * count, offset=8), "u4")
-            self._listed.write(np.random.default_rng(self.order).permutation(np.sort(listed)).tobytes(), offset=8)
+            listed = np.frombuffer(pixels.read(4 * count, offset=8), "u4")
+            pixels.write(np.random.default_rng(self.order).permutation(np.sort(listed)).tobytes(), offset=8)
         yield from super()._follow_listed(parameters, maps)
 
 
@@ -75,7 +76,7 @@ def pictures(camera_pass: Shuffled, scene: Scene, orders: int, samples: int) -> 
         camera_pass.run(scene.camera, *SIZE, 1)  # which learns how fast this device is
         camera_pass.dispatch_seconds = (0.15, 0.0, 0.02)[camera_pass.order % 3]
         if camera_pass.order % 3 == 1:
-            camera_pass._pixels, camera_pass._resumed = (
+            camera_pass._listed.budget, camera_pass._listed.resumed = (
                 DispatchBudget(64 * 7, 64, 1 << 20),
                 DispatchBudget(64 * 3, 64, 1 << 20),
             )
@@ -99,7 +100,7 @@ def picture_halting_after(
     gl: Context, scene: Scene, rounds: int, monkeypatch: pytest.MonkeyPatch
 ) -> tuple[np.ndarray, int]:
     """And how many samples the driver cut short."""
-    monkeypatch.setattr(camera_programs, "HALT_ROUNDS", rounds)
+    monkeypatch.setattr(variants, "HALT_ROUNDS", rounds)
     camera_pass = shuffled(gl, scene)
     [picture] = pictures(camera_pass, scene, 1, 2)
     cut_short = camera_pass.fallbacks["loops_ended"]
@@ -120,7 +121,7 @@ def test_without_halts_the_driver_cuts_samples_short(gl: Context, monkeypatch: p
     if not gl.is_software:
         pytest.skip("a GPU ends no loops")
     scene = load_scene(Path("assets/scenes/wine_glass.toml"))
-    monkeypatch.setattr(camera_programs, "HALT_ROUNDS", 1 << 30)
+    monkeypatch.setattr(variants, "HALT_ROUNDS", 1 << 30)
     camera_pass = shuffled(gl, scene)
     first, other = pictures(camera_pass, scene, 2, 2)
     assert camera_pass.fallbacks["loops_ended"] > 100

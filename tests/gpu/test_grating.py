@@ -2,18 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from reference.grating import diffract
+from spectrasplat.gpu import bindings
 from spectrasplat.gpu.context import Context
-from spectrasplat.gpu.scene_buffers import SCENE_STRUCTS
+from spectrasplat.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
+from spectrasplat.model.features import Features
+from spectrasplat.model.geometry.mesh import Mesh
 from spectrasplat.model.geometry.primitives import box
+from spectrasplat.model.optics import catalogue
 from spectrasplat.model.optics.glass import constant
-from spectrasplat.model.scene import Dielectric, Grating, SceneObject
+from spectrasplat.model.scene import Camera, Dielectric, Grating, Scene, SceneObject
+from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference.optics import dot, times, unit
+from spectrasplat.render.light_pass import spectral_axis
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 from spectrasplat.stress.rigs.gpu_paths import Photons, placed, screen, trace_beam
 
+COVERS = {
+    "grating.glsl": (
+        "across_lines",
+        "diffract_at",
+        "diffract_column",
+        "diffract_direction",
+        "diffracted_column",
+        "diffracted_cosine2",
+        "evanescence_onset",
+        "grating_at",
+        "order_at",
+        "order_step_derivative",
+        "order_steps",
+    ),
+    "scene.glsl": ("is_specular",),
+}
 MERCURY_NM = (404.66, 435.83, 546.07, 576.96, 579.07)
 COUNT = 4096
 DISTANCE = 1.0
@@ -25,7 +49,14 @@ def sheet(grating: Grating, size: float = 1.0, normal: tuple[float, float, float
 
 
 def shone(
-    gl: Context, grating: Grating, nm, direction=(0.0, 0.0, -1.0), around=(), normal=(0.0, 0.0, 1.0), wall=None, **more
+    gl: Context,
+    grating: Grating,
+    nm: float | tuple[float, float],
+    direction: Sequence[float] = (0.0, 0.0, -1.0),
+    around: Sequence[SceneObject] = (),
+    normal: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    wall: Mesh | None = None,
+    **more,
 ) -> Photons:
     """A thin beam through the grating at the origin, onto a wall one unit behind."""
     direction = unit(np.array(direction, float))
@@ -36,7 +67,7 @@ def shone(
 
 @pytest.mark.parametrize("method", ["srd", "srd-lambda", "regular-point"])
 def test_lines_of_mercury(gl: Context, method: str) -> None:
-    """600 lines/mm, a wall a metre behind: each line lies where the grating equation puts it, to two millionths of the way."""
+    """600 lines/mm, a wall a unit behind: each line lies where the grating equation puts it, to two millionths."""
     grating = Grating(orders=(-2, -1, 0, 1, 2), efficiency=(0.1,) * 5, direction=(0.0, 1.0, 0.0))
     for nm in MERCURY_NM:
         found = shone(gl, grating, nm, method=method)
@@ -95,6 +126,16 @@ def test_littrow(gl: Context) -> None:
     pytest.fail("neither order comes back")
 
 
+def slanted_landing(found: Photons, grating: Grating, direction: np.ndarray, nm: float, order: int) -> np.ndarray:
+    """Where the beam's rays arrive (N, 3), in float64."""
+    count = len(found.start)
+    step = np.full(count, order * nm * 1e-6 * grating.lines_per_mm)
+    lines = np.array(grating.direction)
+    going = diffract(np.broadcast_to(direction, (count, 3)), np.array([0.0, 0.0, 1.0]), lines, step, False)
+    at = found.start - (found.start[:, 2] / direction[2])[:, None] * direction
+    return at + (-DISTANCE / going[:, 2])[:, None] * going
+
+
 def test_columns_are_derivatives(gl: Context) -> None:
     """∂(landing)/∂λ of slanted beams, against the exact equation differentiated in float64."""
     rng = np.random.default_rng(3)
@@ -103,24 +144,13 @@ def test_columns_are_derivatives(gl: Context) -> None:
         direction = unit(np.array([*rng.uniform(-0.4, 0.4, 2), -1.0]))
         nm = float(rng.uniform(420.0, 620.0))
         found = shone(gl, grating, nm, direction)
-
-        def landing(wavelength: float, order: int) -> np.ndarray:
-            step = np.full(len(found.start), order * wavelength * 7e-4)
-            going = diffract(
-                np.broadcast_to(direction, found.start.shape),
-                np.array([0.0, 0.0, 1.0]),
-                np.array(grating.direction),
-                step,
-                False,
-            )
-            at = found.start - (found.start[:, 2] / direction[2])[:, None] * direction
-            return at + (-DISTANCE / going[:, 2])[:, None] * going
-
-        near = [np.linalg.norm(found.position - landing(nm, m), axis=1) for m in (-1, 1)]
+        low, middle, high = (
+            {m: slanted_landing(found, grating, direction, nm + h, m) for m in (-1, 1)} for h in (-0.5, 0.0, 0.5)
+        )
+        near = [np.linalg.norm(found.position - middle[m], axis=1) for m in (-1, 1)]
         assert np.minimum(*near).max() < 3e-6
-        order = np.where(near[0] < near[1], -1, 1)
-        slopes = {m: (landing(nm + 0.5, m) - landing(nm - 0.5, m)) * 1e3 for m in (-1, 1)}
-        want = np.where((order == -1)[:, None], slopes[-1], slopes[1])
+        slopes = {m: (high[m] - low[m]) * 1e3 for m in (-1, 1)}
+        want = np.where((near[0] < near[1])[:, None], slopes[-1], slopes[1])
         got = found.dposition_dvar[:, 0]
         assert np.linalg.norm(got - want, axis=1).max() < 2e-5 * np.linalg.norm(want, axis=1).max()
 
@@ -206,3 +236,83 @@ def test_functions_against_float64(gl: Context, reflects: bool) -> None:
     slope = (8 * (exact(h) - exact(-h)) - (exact(2 * h) - exact(-2 * h))) / (12 * h)
     error = np.linalg.norm(got["out_dd"] - slope, axis=1) / np.maximum(np.linalg.norm(slope, axis=1), 1.0)
     assert error[clear].max() < 3e-5
+
+
+def test_tables_and_the_edge_against_float64(gl: Context) -> None:
+    """Steps in a medium that disperses, their derivatives by both variables, and where a slanted order ends."""
+    glass = Dielectric(catalogue.find("N-SF11"))
+    grating = Grating(2600.0, (-1, 1), (0.25, 0.5), True, (0.6, 0.8, 0.0))
+    water = placed("glass", box((3.0, 3.0, 1.0)), glass)
+    scene = Scene("tables", Camera((0, 0, 9), (0, 0, 0)), (), (water, sheet(grating)))
+    features = Features.of(scene, RenderSettings())
+    buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
+    assert buffers.groups.count == 2
+    rng = np.random.default_rng(5)
+    x, d = rng.uniform(0.0, 1.0, COUNT), unit(rng.normal(size=(COUNT, 3)))
+    dd0, dd1 = 0.1 * rng.normal(size=(2, COUNT, 3))
+    inputs = {name: as_f32(v) for name, v in {"x": x, "d": d, "dd0": dd0, "dd1": dd1}.items()}
+    body = """
+    uint at_row = object_at(1u).weight_row;
+    Grating found = grating_at(at_row);
+    GratingOrder order = order_at(at_row, 1u);
+    head = vec4(found.lines, float(found.orders));
+    told = vec4(order.shift_per_um, order.efficiency, order.left, float(order.reflects));
+    kinds = vec4(is_specular(object_at(0u).kind), is_specular(object_at(1u).kind),
+        is_specular(KIND_DIFFUSE), is_specular(KIND_BLACK));
+    vec3 three = order_steps(order, 1u, 0u, vec3(x, 0.5, 1.0));
+    steps = vec4(three, order_steps(order, 1u, 0xffffffffu, vec3(x)).x);
+    slopes = vec2(order_step_derivative(order, 1u, 0u, 0u, x), order_step_derivative(order, 1u, 0u, 1u, x));
+    vec3 columns[SPECTRAL_GROUPS] = vec3[](dd0, dd1);
+    vec3 bends[2] = vec3[](vec3(0.0), vec3(0.0));
+    vec3 band = vec3(0.0, 0.5, 1.0), normal = vec3(0.0, 0.0, 1.0);
+    bvec3 passes;
+    for (int i = 0; i < 3; ++i) {
+        vec3 there = d;
+        for (int g = 0; g < SPECTRAL_GROUPS; ++g) there += columns[g] * variable_step(uint(g), band[i], 0.5);
+        there = normalize(there);
+        vec3 shift = order_steps(order, 1u, 0u, band)[i] * across_lines(normal, found.lines, 1.0);
+        passes[i] = diffracted_cosine2(there, dot(there, normal), shift) > 0.0;
+    }
+    parts = any(passes) && !all(passes) ? 1.0 : 0.0;
+    edge = evanescence_onset(band, d, columns, bends, normal, found.lines, 1.0, order, 1u, 0u, passes);
+    """
+    outputs = {"head": "vec4", "told": "vec4", "kinds": "vec4", "steps": "vec4", "slopes": "vec2", "parts": "float"}
+    try:
+        got = evaluate(
+            gl.ctx,
+            ["lib/grating.glsl"],
+            body,
+            inputs,
+            outputs | {"edge": "float"},
+            features.defines() | bindings.SCENE_DEFINES | buffers.defines,
+            SCENE_STRUCTS,
+            binders=[buffers.bind],
+        )
+        axis = buffers.axis
+    finally:
+        buffers.release()
+    assert np.allclose(got["head"], [0.6, 0.8, 0.0, 2.0]) and np.allclose(got["told"], [2.6, 0.5, 0.75, 1.0])
+    assert np.array_equal(got["kinds"][0], [1.0, 1.0, 0.0, 0.0])
+
+    def step(at: np.ndarray) -> np.ndarray:
+        nm = axis.nm_of_x(at)
+        return 2.6e-3 * nm / glass.dispersion.index(nm)
+
+    places = np.column_stack([inputs["x"], np.full(COUNT, 0.5), np.ones(COUNT)])
+    assert np.abs(got["steps"][:, :3] - step(places)).max() < 2e-6
+    nm = axis.nm_of_x(inputs["x"])
+    assert np.abs(got["steps"][:, 3] - 2.6e-3 * nm).max() < 2e-6
+    n = glass.dispersion.index(nm)
+    assert np.abs(got["slopes"] - np.column_stack([-2.6e-3 * nm / n**2, 2.6 / n])).max() < 5e-6
+
+    def cosine2(at: np.ndarray) -> np.ndarray:
+        wavelengths = axis.nm_of_x(np.array([0.5]))[0], axis.nm_of_x(at)
+        n_step = glass.dispersion.index(wavelengths[1]) - glass.dispersion.index(wavelengths[0])
+        um_step = (wavelengths[1] - wavelengths[0]) * 1e-3
+        there = unit(inputs["d"] + times(n_step, inputs["dd0"]) + times(um_step, inputs["dd1"]))
+        tangential = there[:, :2] + step(at)[:, None] * np.array([0.8, -0.6])
+        return 1.0 - np.sum(tangential**2, axis=1)
+
+    parts = got["parts"] > 0.0
+    assert parts.sum() > 50
+    assert np.abs(cosine2(got["edge"]))[parts].max() < 2e-5

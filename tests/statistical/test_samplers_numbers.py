@@ -14,7 +14,7 @@ import pytest
 from spectrasplat.base import paths
 from spectrasplat.base.random_words import PASS_GENERATORS
 from spectrasplat.gpu.records import TRACE_PARAMETERS, ray_record
-from spectrasplat.passes.camera import _pixel_lattice
+from spectrasplat.passes.pixel_lattice import pixel_lattice
 from spectrasplat.reference.emission_maps import GOLDEN, PLASTIC, lattice_point
 from spectrasplat.reference.random_numbers import hash_combine, hash_pcg, kronecker, unit_float
 from spectrasplat.stress.rigs.glsl_function import evaluate
@@ -133,17 +133,17 @@ def test_one_wavelength_a_photon_is_even_whatever_the_number_of_places(light_poi
 
 def test_places_in_a_pixel_are_even_in_one_launch_and_over_many() -> None:
     for samples in (1, 2, 4, 16, 64):
-        places = _pixel_lattice(samples, 0)
+        places = pixel_lattice(samples, 0)
         assert ((places >= 0.0) & (places < 1.0)).all()
         # Each column of the pixel cut into `samples` holds one.
         assert sorted((places[:, 0] * samples).astype(int)) == list(range(samples))
         assert star_discrepancy(places[:, 1]) <= 1.9 / samples
     # The viewer adds four samples at a time.
-    launches = np.concatenate([_pixel_lattice(4, 4 * k) for k in range(1024)])
+    launches = np.concatenate([pixel_lattice(4, 4 * k) for k in range(1024)])
     assert box_discrepancy(launches) < 0.01
-    single = np.concatenate([_pixel_lattice(1, k) for k in range(4096)])
+    single = np.concatenate([pixel_lattice(1, k) for k in range(4096)])
     assert box_discrepancy(single) < 0.01
-    still = np.concatenate([_pixel_lattice(4, 0) for _ in range(1024)])
+    still = np.concatenate([pixel_lattice(4, 0) for _ in range(1024)])
     assert box_discrepancy(still) > 0.05
 
 
@@ -152,7 +152,7 @@ def test_single_wavelengths_are_even_over_the_places_in_a_pixel() -> None:
     did not help."""
     generator = generators()[0]
     for samples in (64, 204, 1024):
-        places = _pixel_lattice(samples, 0)
+        places = pixel_lattice(samples, 0)
         for of_wavelength, even in ((generator, True), (GOLDEN, False)):
             colour = kronecker(np.arange(samples), of_wavelength, 0)
             worst = max(box_discrepancy(np.column_stack([colour, places[:, axis]])) for axis in range(2))
@@ -167,7 +167,7 @@ def survives_source() -> str:
     """The tracer's roulette as it stands in trace.comp, with the parameters it reads."""
     text = (paths.shaders_dir() / "light/trace.comp").read_text()
     softness = re.search(r"#define SURVIVOR_SOFTNESS .*", text)[0]
-    function = re.search(r"^bool survives\(.*?^}", text, re.MULTILINE | re.DOTALL)[0]
+    function = "\n".join(re.findall(r"^bool survives\(.*?^}", text, re.MULTILINE | re.DOTALL))
     return f"{softness}\nTraceParameters p = TraceParameters(64u, {THRESHOLD}, 0u, {LATTICES}u);\n{function}"
 
 

@@ -1,4 +1,4 @@
-"""The grating as a material: its keys and what is said of wrong ones, saving, animation, what it compiles, how it is redone."""
+"""The grating as a material: keys and what is said of wrong ones, saving, animation, what it compiles and costs."""
 
 from __future__ import annotations
 

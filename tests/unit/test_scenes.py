@@ -49,7 +49,8 @@ def test_a_scene_loads_and_can_be_rendered(path: Path) -> None:
     assert not {"lights", "camera"} - set(tomllib.loads(text)), "shipped scenes leave nothing to defaults"
     scene = load_scene(path)
     solids = [o for o in scene.objects if isinstance(o.material, Dielectric)]
-    assert solids and all(o.mesh.is_closed and o.mesh.volume() > 0.0 for o in solids)
+    assert all(o.mesh.is_closed and o.mesh.volume() > 0.0 for o in solids)
+    assert any(o.material.dispersion is not None for o in scene.objects)
     assert scene.environment is not None or any(isinstance(o.material, Diffuse) for o in scene.objects)
     # Every glass stands in the picture.
     forward = np.subtract(scene.camera.target, scene.camera.position)

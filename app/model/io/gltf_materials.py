@@ -129,12 +129,12 @@ def write_gltf_material(values: dict[str, Any], material: Material, thickness: f
         extensions |= _glass_extensions(material, thickness)
     elif material.is_mirror:
         rgb, metallic = material.reflectance_rgb, 1.0
-    else:
+    elif not material.is_specular:
         rgb, roughness = (0.0, 0.0, 0.0) if material.is_black else material.reflectance_rgb, 1.0
     pbr |= {"baseColorFactor": [*map(float, rgb), 1.0], "metallicFactor": metallic, "roughnessFactor": roughness}
     if material.receives:
         _wear(pbr, texture)
-    exact = material.transmits or material.is_black or material.reflectance is not None
+    exact = not (material.is_mirror or material.receives) or material.reflectance is not None
     if exact:
         own["material"] = material.values()
     if own:

@@ -1,0 +1,109 @@
+"""The pixels that see glass or mirrors first, and how a dispatch after the other follows them.
+
+The program for what is seen directly lists them; another follows the list, a portion at a time. Where a driver ends
+long loops, samples halt and are taken up again (shaders/camera/halts.glsl).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import moderngl
+import numpy as np
+
+from ..gpu.dispatch_budget import DispatchBudget
+from ..gpu.records import NONE
+from .variants import BIND_HALTED, BIND_LISTED
+
+GROUP = 64
+"""Pixels of a work group."""
+_FIRST = 1024
+_PLACES = 8192
+"""Samples that may be under way, where they halt."""
+_LISTED_AT, _HALTED_AT = 0, 4
+
+Dispatch = Callable[[int], float]
+"""Follows so many pixels, as `first_listed` and its neighbours in the parameters say; seconds it took."""
+
+
+class ListedPixels:
+    """Owns the list and, where samples may halt, the room that they wait in."""
+
+    def __init__(self, ctx: moderngl.Context, bytes_of_halted: int | None) -> None:
+        """`bytes_of_halted`: room of one halted sample; None where none halts."""
+        self._ctx = ctx
+        self._halted = None if bytes_of_halted is None else ctx.buffer(reserve=_PLACES * bytes_of_halted)
+        self._list: moderngl.Buffer | None = None
+        self.budget = self.resumed = DispatchBudget(1, 1, 1)
+        """How many pixels, and how many halted samples, a dispatch is given."""
+
+    def resize(self, pixels: int, room: int) -> None:
+        """For pictures of so many pixels, up to `room` of them on the list at a time."""
+        if self._list is not None:
+            self._list.release()
+        self._list = self._ctx.buffer(reserve=8 + 4 * room)
+        self.budget = DispatchBudget(_FIRST, GROUP, max(pixels, GROUP))
+        self.resumed = DispatchBudget(_FIRST, GROUP, _PLACES)
+
+    def clear(self) -> None:
+        """Nothing is listed and nothing has halted."""
+        assert self._list is not None
+        self._list.write(bytes(8))
+
+    def bind(self) -> None:
+        """To the places that the programs read."""
+        if self._list is not None:
+            self._list.bind_to_storage_buffer(BIND_LISTED)
+        if self._halted is not None:
+            self._halted.bind_to_storage_buffer(BIND_HALTED)
+
+    def follow(self, parameters: np.ndarray, dispatch: Dispatch, target_s: float) -> Iterator[float]:
+        """Follow all that is listed, yielding the share done after each dispatch but the last; one takes about
+        `target_s`."""
+        count, done, place = self._count(_LISTED_AT), 0, 0
+        while done < count:
+            pixels = min(self.budget.units, count - done)
+            if self._halted is not None:
+                pixels = min(pixels, _PLACES - place)
+            parameters["first_place"], parameters["queue"] = place, 0
+            _follow(self.budget, done, pixels, parameters, dispatch, target_s)
+            done, place = done + pixels, place + pixels
+            # Those of many dispatches together, so that few are left without neighbours.
+            if self._halted is not None and (done == count or place == _PLACES):
+                for _ in self._resume_halted(parameters, dispatch, target_s):
+                    yield done / count
+                place = 0
+            if done < count:
+                yield done / count
+
+    def _resume_halted(self, parameters: np.ndarray, dispatch: Dispatch, target_s: float) -> Iterator[None]:
+        """Take up the samples that have halted until none is left, pausing before every dispatch."""
+        assert self._list is not None
+        parameters["first_place"] = NONE
+        while count := self._count(_HALTED_AT):
+            self._list.write(bytes(4), offset=_HALTED_AT)
+            parameters["queue"] = 1 - parameters["queue"]
+            done = 0
+            while done < count:
+                yield
+                samples = min(self.resumed.units, count - done)
+                _follow(self.resumed, done, samples, parameters, dispatch, target_s)
+                done += samples
+
+    def _count(self, at: int) -> int:
+        assert self._list is not None
+        return int(np.frombuffer(self._list.read(4, offset=at), "u4")[0])
+
+    def release(self) -> None:
+        """Free both."""
+        for buffer in (self._list, self._halted):
+            if buffer is not None:
+                buffer.release()
+
+
+def _follow(
+    budget: DispatchBudget, first: int, count: int, parameters: np.ndarray, dispatch: Dispatch, target_s: float
+) -> None:
+    """Dispatch a portion of the listed pixels, or of the halted samples."""
+    parameters["first_listed"], parameters["end_listed"] = first, first + count
+    budget.learn(count, dispatch(count), target_s)

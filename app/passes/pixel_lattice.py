@@ -1,0 +1,26 @@
+"""Where in a pixel its camera samples lie."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def is_in_strips(samples: int, offset: int) -> bool:
+    """Whether samples share the pixel in upright strips. Two or three squares of the same area do not fill it: what is
+    small and bright, and letters, would count twice or not at all. With more, outlines want different heights."""
+    return offset == 0 and samples in (2, 3)
+
+
+def pixel_lattice(samples: int, offset: int) -> np.ndarray:
+    """(samples, 2) places in a pixel: ordered as in a golden-ratio lattice, shifted as a whole from launch to launch.
+
+    Every row and every column of the pixel cut into `samples` holds one sample, so that edges of any slant are filtered
+    well, and the first launch's lie about the pixel's middle, so that the picture does not move.
+    """
+    if is_in_strips(samples, offset):
+        return np.column_stack([(np.arange(samples) + 0.5) / samples, np.full(samples, 0.5)])
+    golden = 0.6180339887498949
+    shift = offset * np.array([0.7548776662466927, 0.5698402909980532])
+    index = np.arange(samples)
+    rank = np.argsort(np.argsort((0.5 + index * golden) % 1.0))
+    return ((np.column_stack([index, rank]) + 0.5) / samples + shift) % 1.0
