@@ -3,7 +3,7 @@
 #ifndef CAMERA_CUTS_GLSL
 #define CAMERA_CUTS_GLSL
 
-// Cuts of one path where its paths diverge.
+// Cuts of the band of one path.
 #define MAX_CUTS 4
 // Sweep, in sides of a sample's share of its pixel, below which nobody sees which colour went where.
 #define MIN_CUT_SWEEP 0.5

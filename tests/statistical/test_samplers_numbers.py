@@ -1,6 +1,6 @@
 """Random numbers, lattices and roulette's draws: uniform alone, in pairs and over passes.
 
-The numpy CPU references stand for the shaders here; tests/gpu holds them equal bit for bit. Independent draws are
+The numpy references stand for the shaders here; tests/gpu holds them equal bit for bit. Independent draws are
 judged by chi² (a tilt of `tilt` is seen with probability 0.99), low-discrepancy ones by their discrepancy too, against
 bounds a few times what golden-ratio lattices reach and a tenth of what random numbers of that count have.
 """

@@ -242,7 +242,7 @@ def _specular(scene: Scene) -> list[SceneObject]:
 
 
 def _with_normals(scene: Scene) -> Scene:
-    """Every specular facet with its own normal at all three corners: smooth in name, flat in reference."""
+    """Every specular facet with its own normal at all three corners: smooth in name, flat in truth."""
 
     def smoothed(item: SceneObject) -> SceneObject:
         if not item.material.is_specular or item.mesh.corner_normals is not None or is_convex_solid(item):
