@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from spectrasplat.model.geometry.mesh import Mesh, make_mesh
 from spectrasplat.model.lights import CollimatedLight, SpotLight
+from spectrasplat.model.lights.light import made
 from spectrasplat.model.optics.spectrum import Spectrum, illuminant
 from spectrasplat.model.scene import (
     Camera,
@@ -82,15 +83,12 @@ def moved(question: Scene, matrix: np.ndarray, lights: bool = True) -> Scene:
         return tuple((matrix[:3, :3] @ d / scale).tolist())
 
     def light(source: Light) -> Light:
-        factor = scale**2 if source.kind in ("point", "spot") else 1.0
-        spectrum = Spectrum(source.spectral_power.density * factor, source.spectral_power.lines)
-        return replace(
-            source,
-            position=point(source.position),
-            direction=direction(source.direction),
-            radius=source.radius * scale,
-            spectral_power=spectrum,
-        )
+        given = source.given()
+        factor = scale**2 if source.is_intensity else 1.0
+        given["spectral_power"] = Spectrum(source.spectral_power.density * factor, source.spectral_power.lines)
+        given |= {"position": point(source.position), "direction": direction(source.direction)}
+        given |= {name: given[name] * scale for name in ("radius",) if name in given}
+        return made(type(source), given)
 
     camera = replace(
         question.camera,

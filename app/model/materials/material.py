@@ -87,6 +87,10 @@ class Material:
         """Its plain numbers with a row in the panel."""
         return tuple(part for part in cls.parts if isinstance(part, Number) and part.row is not None)
 
+    def is_like(self, other: Material) -> bool:
+        """Whether programs and buffers made for the one serve the other, so that only values differ."""
+        return False
+
     def words(self) -> str:
         """What it is, in a few words."""
         return self.kind
