@@ -29,8 +29,8 @@ from ..model.scene_checks import contains
 from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
 from .camera_tables import CameraTables
 from .listed_pixels import GROUP, ListedPixels
+from .picture_channels import Channels
 from .pixel_lattice import is_in_strips, pixel_lattice
-from .present import Channels
 from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
 from .variants import (
     BIND_CELL_CDF,

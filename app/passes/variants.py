@@ -15,7 +15,7 @@ from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.texture_store import place_defines
 from ..model.features import Features
 from .camera_tables import EMISSION_CELLS
-from .present import Channels
+from .picture_channels import Channels
 
 Defines = dict[str, int | float | str]
 

@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from reference import tracer
 from reference.grating import diffract
 from spectrasplat.gpu import bindings
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
 from spectrasplat.model.features import Features
 from spectrasplat.model.geometry.mesh import Mesh
-from spectrasplat.model.geometry.primitives import box
+from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.optics import catalogue
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM
 from spectrasplat.model.optics.glass import constant
-from spectrasplat.model.scene import Camera, Dielectric, Grating, Scene, SceneObject
+from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Grating, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes.ray_paths import RayPaths
 from spectrasplat.reference.optics import dot, times, unit
-from spectrasplat.render.light_pass import spectral_axis
+from spectrasplat.render.light_pass import scene_buffers, spectral_axis
+from spectrasplat.render.still import render
+from spectrasplat.stress.rigs.camera_probe import white_furnace
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 from spectrasplat.stress.rigs.gpu_paths import Photons, placed, screen, trace_beam
+
+from tests.gpu.camera_rig import white_through
+from tests.gpu.test_live_light import difference, edited, inputs, into, live, maps, shipped, splat_again, trace
 
 COVERS = {
     "grating.glsl": (
@@ -316,3 +325,111 @@ def test_tables_and_the_edge_against_float64(gl: Context) -> None:
     parts = got["parts"] > 0.0
     assert parts.sum() > 50
     assert np.abs(cosine2(got["edge"]))[parts].max() < 2e-5
+
+
+def immersed(nm: float, grating: Grating, order: int, block: Mesh, tilt: np.ndarray, wall: Mesh):
+    """The slow tracer's scene of a grating inside a dispersive block, with columns by n and by λ (µm)."""
+    glass = catalogue.find("N-SF11")
+    corners = [mesh.corners() for mesh in (block, screen(np.zeros(3), tilt, 0.5), wall)]
+    material = np.repeat([0, -2, -1], [len(c) for c in corners])
+    per_um = order * grating.lines_per_mm * 1e-3
+    bodies = [
+        tracer.Body(tracer.Index(float(glass.index(nm)), np.array([1.0, 0.0]))),
+        tracer.Body(
+            kind="grating",
+            lines=np.array(grating.direction),
+            step=tracer.Index(per_um * nm * 1e-3, np.array([0.0, per_um])),
+        ),
+        tracer.Body(kind="receiver"),
+    ]
+    return tracer.TriangleList(np.concatenate(corners), material), bodies
+
+
+def test_inside_dispersive_glass_against_the_slow_tracer(gl: Context) -> None:
+    """Both columns, by the glass's index and by the wavelength, through a slanted grating immersed in N-SF11."""
+    nm, tilt = 560.0, unit(np.array([0.2, -0.3, 1.0]))
+    grating = Grating(900.0, (-1, 0, 1), (0.3, 0.3, 0.3), False, (0.3, 1.0, 0.1))
+    block, wall = box((2.0, 2.0, 1.4)), screen(np.array([0.0, 0.0, -2.0]), np.array([0.0, 0.0, 1.0]), 6.0)
+    direction = unit(np.array([0.15, 0.1, -1.0]))
+    objects = [sheet(grating, normal=tuple(tilt)), placed("block", block, Dielectric(catalogue.find("N-SF11")))]
+    found = trace_beam(gl, objects, None, wall, -1.2 * direction, direction, 0.02, nm, count=32).of_depth(3)
+    assert found.dposition_dvar.shape[1] == 2
+    matched = 0
+    for order in grating.orders:
+        scene, bodies = immersed(nm, grating, order, block, tilt, wall)
+        for k in range(len(found.records)):
+            ray = tracer.make_ray(found.start[k], direction, np.zeros((2, 3)))
+            path = tracer.follow(ray, scene, bodies)
+            if not path.landed or np.linalg.norm(path.ray.position - found.position[k]) > 1e-3:
+                continue
+            matched += 1
+            assert np.linalg.norm(path.ray.position - found.position[k]) < 1e-5
+            # Groups are in the order of the objects: the grating's wavelength first.
+            got = found.dposition_dvar[k][::-1]
+            assert np.abs(got - path.ray.dposition).max() < 3e-5 * max(np.abs(path.ray.dposition).max(), 1.0)
+    assert matched > 60
+
+
+@pytest.mark.parametrize("lines", [1500.0, 1700.0, 2000.0, 2400.0])
+def test_the_camera_sees_an_order_end_at_its_wavelength(gl: Context, lines: float) -> None:
+    """White all round, seen straight through order 1: all up to λ = Λ, nothing beyond."""
+    camera = Camera((0, 0, 2), (0, 0, 0), (0, 1, 0), "orthographic", vertical_extent=0.5)
+    scene = white_furnace(sheet(Grating(lines, (1,), (0.8,)), 4.0), camera=camera)
+    settings = RenderSettings(width=24, height=16, spp=64)
+    picture = render(scene, settings, context=gl).rgb.mean(axis=(0, 1))
+    # Half a nanometre on either side belongs to each value of the spectrum.
+    through = np.clip(1e6 / lines - VISIBLE_NM + 0.5, 0.0, 1.0)
+    assert np.abs(picture - 0.8 * white_through(through)).max() < 0.015
+
+
+def test_all_orders_of_white_are_white(gl: Context) -> None:
+    """Seen in a white furnace every order that leaves adds its efficiency, whatever its colours do."""
+    camera = Camera((0, 0, 2), (0.3, 0, 0), (0, 1, 0), vertical_fov_deg=30.0)
+    scene = white_furnace(sheet(Grating(250.0, (-2, -1, 0, 1, 2), (0.1, 0.2, 0.3, 0.2, 0.1)), 6.0), camera=camera)
+    picture = render(scene, RenderSettings(width=24, height=16, spp=64), context=gl).rgb
+    assert np.abs(picture.mean(axis=(0, 1)) - 0.9).max() < 2e-3
+    assert np.abs(picture - 0.9).max() < 1e-5
+
+
+def behind_a_prism() -> Scene:
+    """The shipped prism, and a grating in its fan of colours."""
+    scene = shipped("prism")
+    upright = np.array([[0.0, 0.0, 1.0, 1.3], [1.0, 0.0, 0.0, -0.3], [0.0, 1.0, 0.0, 0.62], [0.0, 0.0, 0.0, 1.0]])
+    grating = SceneObject("grating", plane(4.0, 1.2), Grating(300.0, (-1, 0, 1), (0.2, 0.4, 0.2)), upright)
+    return replace(scene, objects=(*scene.objects, grating))
+
+
+def test_an_edit_of_glass_before_a_grating_is_followed(gl: Context) -> None:
+    """Photons carry a column by n and one by λ; what the edit moves is where a fresh trace puts it."""
+    scene = behind_a_prism()
+    with live(gl, scene) as light:
+        trace(light)
+        before, other = maps(light), edited(scene, 1.05)
+        shown = splat_again(light, inputs(other))
+        with live(gl, other) as fresh:
+            trace(fresh)
+            want = into(light, fresh)
+
+    def blurred(texels: np.ndarray) -> np.ndarray:
+        height, width = (n // 8 * 8 for n in texels.shape[:2])
+        return texels[:height, :width].reshape(height // 8, 8, width // 8, 8, 4).mean(axis=(1, 3))
+
+    assert difference(blurred(shown), blurred(want)) < 0.3 * difference(blurred(before), blurred(want))
+
+
+def test_picking_follows_the_strongest_order(gl: Context) -> None:
+    """Each wavelength of a single ray goes where that order goes."""
+    grating = Grating(600.0, (-1, 0, 1), (0.2, 0.3, 0.4))
+    wall = placed("wall", screen(np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 1.0]), 3.0), Diffuse())
+    scene = Scene("pick", Camera((0, 0, 9), (0, 0, 0), up=(0, 1, 0)), (), (sheet(grating), wall))
+    buffers = scene_buffers(gl, scene, RenderSettings())
+    paths = RayPaths(gl, buffers)
+    try:
+        nm = np.array(MERCURY_NM)
+        start = np.tile([0.01, 0.02, 0.5], (len(nm), 1))
+        found = paths.trace(start, np.tile([0.0, 0.0, -1.0], (len(nm), 1)), nm, 1.0)
+    finally:
+        paths.release()
+        buffers.release()
+    ends = np.array([path.points[-1] for path in found])
+    assert np.abs(ends[:, 0] - 0.01 - np.tan(np.arcsin(nm * 6e-4))).max() < 2e-6

@@ -23,6 +23,27 @@ def diffract(
     return times(a, across) + times(b, along) + times(forward * c, normal_out)
 
 
+def diffract_columns(
+    direction: np.ndarray,
+    ddirection: np.ndarray,
+    normal_out: np.ndarray,
+    lines: np.ndarray,
+    step: float,
+    dstep: np.ndarray,
+    reflects: bool,
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """(direction (3,), columns (C, 3)) of an order of a flat grating; None where it is evanescent.
+
+    The part in the surface hands its change on; the normal part keeps the length 1.
+    """
+    turned = diffract(direction[None], normal_out, lines, np.array([step]), reflects)[0]
+    if not np.isfinite(turned).all():
+        return None
+    across = unit(cross(lines, normal_out))
+    moved = ddirection - (ddirection @ normal_out)[:, None] * normal_out + np.outer(dstep, across)
+    return turned, moved - np.outer((moved @ turned) / (turned @ normal_out), normal_out)
+
+
 def first_order_angle_deg(nm: float, lines_per_mm: float, order: int = 1, n: float = 1.0) -> float:
     """sin(angle) = m λ / (Λ n), at normal incidence."""
     return float(np.degrees(np.arcsin(order * nm * 1e-6 * lines_per_mm / n)))

@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from reference.grating import diffract_columns
 from reference.surfaces import Facet, Surface
 from spectrasplat.reference import optics
 
@@ -128,7 +129,12 @@ class Body:
     """Of a mirror."""
     priority: int = 0
     """Where glasses overlap, the highest decides; of equal ones the later."""
-    kind: Literal["glass", "mirror", "receiver"] = "glass"
+    kind: Literal["glass", "mirror", "receiver", "grating"] = "glass"
+    lines: np.ndarray | None = None
+    """(3,): along a grating's lines. `reflectance` is the efficiency of its one order."""
+    step: Index = Index(0.0)
+    """m λ / Λ of that order, and its derivative along each column."""
+    throws_back: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,6 +256,14 @@ def follow(
             factor *= body.reflectance
             reflections.append(True)
             continue
+        if body.kind == "grating":
+            sent = _diffracted(arrived, geometric, body, _medium(inside, bodies).index)
+            if sent is None:
+                return Path(arrived, tuple(triangles), tuple(reflections), False, factor, margin)
+            ray = sent
+            factor *= body.reflectance
+            reflections.append(body.throws_back)
+            continue
         before = inside - {material} if ray.direction @ geometric < 0.0 else inside | {material}
         after = before ^ {material}
         n_i, n_t = _medium(before, bodies), _medium(after, bodies)
@@ -265,6 +279,16 @@ def follow(
         reflections.append(beyond is None)
         ray, inside = (reflected(arrived, normal, dnormal), before) if beyond is None else (beyond, after)
     return Path(ray, tuple(triangles), tuple(reflections), False, factor, margin)
+
+
+def _diffracted(ray: Ray, normal_out: np.ndarray, body: Body, index: Index) -> Ray | None:
+    """The ray behind a flat grating in a medium of this index; None where its order is evanescent."""
+    assert body.lines is not None
+    dstep = (np.asarray(body.step.dn) * index.n - body.step.n * np.asarray(index.dn)) / index.n**2
+    columns = np.broadcast_to(dstep, len(ray.dposition))
+    step = body.step.n / index.n
+    sent = diffract_columns(ray.direction, ray.ddirection, normal_out, body.lines, step, columns, body.throws_back)
+    return None if sent is None else replace(ray, direction=sent[0], ddirection=sent[1])
 
 
 _OUTSIDE = Body()

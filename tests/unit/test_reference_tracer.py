@@ -9,10 +9,12 @@ from reference.surfaces import Plane, sphere
 from reference.tracer import (
     AIR,
     RECEIVER,
+    Body,
     Index,
     Path,
     TriangleList,
     central_difference,
+    follow,
     make_ray,
     onto,
     through,
@@ -227,3 +229,37 @@ def test_texel_average_of_a_gaussian_is_a_difference_of_erfs() -> None:
     average = texel_average(lambda p: gaussian(p, np.zeros(2), 0.04 * np.eye(2)), np.array([[0.3, 0.1]]), 1.0)
     part = [0.5 * (erf((c + 0.5) / 0.2 / 2**0.5) - erf((c - 0.5) / 0.2 / 2**0.5)) for c in (0.3, 0.1)]
     assert average[0] == pytest.approx(part[0] * part[1], rel=1e-8)
+
+
+@pytest.mark.parametrize("throws_back", [False, True])
+def test_columns_of_a_grating_behind_a_prism_are_derivatives(throws_back: bool) -> None:
+    """By the emission's two coordinates, by the glass's index and by the wavelength."""
+    corners, material = prism()
+    sheet = np.array([[[2.0, -9.0, -9.0], [2.2, 9.0, -9.0], [2.0, 0.0, 18.0]]])
+    room = np.array([[[x, -90.0, -90.0], [x, 90.0, -90.0], [x, 0.0, 180.0]] for x in (-6.0, 6.0)])
+    scene = TriangleList(np.concatenate([corners, sheet, room]), np.concatenate([material, [-2, -1, -1]]))
+
+    def path_of(place: np.ndarray) -> Path:
+        ray = make_ray(
+            [-3.0, 0.2 + place[0], 1.0 + place[1]],
+            [1.0, 0.05, 0.3],
+            [[0, 1, 0], [0, 0, 1], [0, 0, 0], [0, 0, 0]],
+        )
+        bodies = [
+            Body(Index(1.6 + place[2], np.array([0, 0, 1, 0]))),
+            Body(
+                kind="grating",
+                lines=np.array([0.1, 0.2, 1.0]),
+                step=Index(0.6 * (0.55 + place[3]), np.array([0, 0, 0, 0.6])),
+                throws_back=throws_back,
+            ),
+            Body(kind="receiver"),
+        ]
+        return follow(ray, scene, bodies)
+
+    path = path_of(np.zeros(4))
+    assert path.landed and path.reflections == (False, False, throws_back)
+    for column in range(4):
+        position, direction = central_difference(lambda x, c=column: path_of(x * np.eye(4)[c]), 1e-4)
+        np.testing.assert_allclose(path.ray.dposition[column], position, atol=1e-6)
+        np.testing.assert_allclose(path.ray.ddirection[column], direction, atol=1e-6)

@@ -82,6 +82,7 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "spatial columns": (features.footprints, f"{sizes.ray - unspatial.ray} B a ray"),
         "refraction": (features.dielectrics, f"{size_words(row * len(glasses))} of indices; two children a surface"),
         "mirrors": (features.mirrors, f"{size_words(row * mirrors)} of reflectances"),
+        "gratings": (features.gratings, f"{_TEXEL} B an order; a step of the queue for each"),
         "interpolated normals": (features.smooth_normals, f"{3 * _TEXEL} B a facet, {size_words(3 * _TEXEL * smooth)}"),
         "normal derivatives": (features.normal_derivatives, "one more vector a column and surface"),
         "absorption": (features.absorption, f"3 lookups a flight, {size_words(row * absorbing)}"),

@@ -152,7 +152,7 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             )
         case "nested windows":
             return asked, Variant(scene, replace(base, nested_windows=False)), "against the finest window alone"
-        case "refraction" | "mirrors":
+        case "refraction" | "mirrors" | "gratings":
             return None, None, "cannot be left out here: light would end there"
         case "interpolated normals" | "charts":
             return None, None, "cannot be left out here: light would land elsewhere"
@@ -191,6 +191,8 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
             return Variant(scene, replace(base, dielectrics=True)), asked, ""
         case "mirrors":
             return Variant(scene, replace(base, mirrors=True)), asked, ""
+        case "gratings":
+            return Variant(scene, replace(base, gratings=True)), asked, ""
         case "interpolated normals" | "normal derivatives":
             every = all(is_convex_solid(o) for o in _specular(scene))
             note = (
