@@ -14,12 +14,11 @@ if TYPE_CHECKING:
     from ..gpu.context import Context
 
 _MEASURING = (
-    "light_pass.py",
-    "renderer.py",
+    "model/**/*.py",
     "gpu/*.py",
-    "model/*.py",
     "passes/*.py",
-    "bench/metrics.py",
+    "render/*.py",
+    "reference/metrics.py",
     "bench/camera_rendering.py",
     "bench/rendering.py",
     "bench/runner.py",

@@ -123,7 +123,7 @@ class MethodRig:
         seconds = self._light_seconds(photons, seed)
         started = time.perf_counter()
         light, settings = self._light, self._settings
-        maps = light.maps.caustic_maps(self._textures)
+        maps = light.caustic_maps(self._textures)
         self._camera_pass.run(self._scene.camera, settings.width, settings.height, DEFAULT_SAMPLES, 0, maps, seed)
         xyz = rgb709_to_xyz(self._camera_pass.read_rgb().astype(np.float64))
         seconds["camera"] = time.perf_counter() - started

@@ -127,7 +127,7 @@ class _Plain:
         self._count = count
         structs = (photon_record(SplatFeatures.spectral_groups),)
         self._program = shader.program(ctx, "bench/plain_gaussian.vert", "bench/plain_gaussian.frag", {}, structs)
-        self._program["atlas_size"].value = size
+        self._program["atlas_size"] = size
         corners = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(count, dtype=np.uint32)[:, None]
         self._indices = ctx.buffer(corners)
         self._draw = ctx.vertex_array(self._program, [], index_buffer=self._indices)

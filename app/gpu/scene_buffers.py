@@ -16,7 +16,7 @@ from ..model.features import (
     MAX_GROUPS,
     Features,
     dispersive_materials,
-    is_convex_solid,
+    half_spaces,
     overlapping_solids,
     world_bounds,
 )
@@ -24,7 +24,7 @@ from ..model.geometry.bvh import build_bvh
 from ..model.optics.colorimetry import VISIBLE_NM, rgb_partition
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative, index_table
-from ..model.scene import Light, Scene, SceneObject
+from ..model.scene import Grating, Light, Scene
 from . import bindings
 from .records import NONE
 from .scene_texels import SceneTexels, spectra_texture, tree_texels
@@ -105,7 +105,7 @@ class GpuSpace:
         bounds = np.stack([world_bounds(o) for o in chosen])
         low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
         radius = 0.5 * float(np.linalg.norm(high - low))
-        return GpuSpace(0.5 * (low + high), 2.0 ** -np.round(np.log2(radius)) if radius > 0 else 1.0)
+        return GpuSpace(0.5 * (low + high), 2.0 ** -float(np.round(np.log2(radius))) if radius > 0 else 1.0)
 
     def to_gpu(self, points: np.ndarray) -> np.ndarray:
         """World positions (..., 3) → GPU space, float64."""
@@ -130,7 +130,7 @@ class Groups:
 
     @staticmethod
     def of(scene: Scene, features: Features) -> Groups:
-        glasses = tuple(scene.objects[i].material.dispersion for i in dispersive_materials(scene))  # type: ignore[union-attr]
+        glasses = tuple(scene.objects[i].material.dispersion for i in dispersive_materials(scene))
         count = features.spectral_groups
         group = tuple(min(i, count - 1) for i in range(len(glasses))) if count else ()
         return Groups(glasses, group, count, features.merged_groups and len(glasses) <= MAX_GROUPS)
@@ -184,7 +184,7 @@ class SceneBuffers:
         objects' triangles."""
         self._buffers: dict[int, moderngl.Buffer] = {}
         self._sections: dict[str, np.ndarray] = {}
-        self.defines = bindings.SCENE_DEFINES | {"SPECTRAL_SAMPLES": SAMPLES}
+        self.defines: dict[str, int | str] = {**bindings.SCENE_DEFINES, "SPECTRAL_SAMPLES": SAMPLES}
         self._pack_geometry()
         self._pack_objects()
         self._pack_profiles()
@@ -229,17 +229,20 @@ class SceneBuffers:
 
     def profile_start(self, light: Light) -> int:
         """Where the light's intensity table begins among the profiles; 0 without one."""
-        return self._profile_start.get(light.profile, 0)
+        return 0 if light.profile is None else self._profile_start[light.profile]
 
     def _pack_geometry(self) -> None:
-        corners, owner, source, normals = [], [], [], []
-        solids, planes = [], []
+        corners, owner, source = [], [], []
+        normals: list[np.ndarray] = []
+        solids: list[tuple[int, int, int, int]] = []
+        planes: list[np.ndarray] = []
         for index, item in enumerate(self.scene.objects):
             mesh = self.world_meshes[index]
-            if is_convex_solid(item):
+            untransformed = half_spaces(item)
+            if untransformed is not None:
                 own = mesh.convex_planes
                 if own is None:  # a transform may push a borderline solid over the tolerance
-                    own = _transformed_planes(item.mesh.convex_planes, item.object_to_world)
+                    own = _transformed_planes(untransformed, item.object_to_world)
                 solids.append((sum(len(p) for p in planes), len(own), index, 0))
                 offset = own[:, 3] - own[:, :3] @ self.space.centre
                 planes.append(np.column_stack([own[:, :3], offset * self.space.scale]))
@@ -247,9 +250,8 @@ class SceneBuffers:
             corners.append(self.space.to_gpu(mesh.corners()))
             owner.append(np.full(len(mesh.triangles), index))
             source.append(self.first_triangle[index] + np.arange(len(mesh.triangles)))
-            specular = item.material.is_specular
-            smooth = mesh.corner_normals is not None and specular
-            normals.append(mesh.corner_normals if smooth else np.full((len(mesh.triangles), 3, 3), np.nan))
+            known = mesh.corner_normals if item.material.is_specular else None
+            normals.append(np.full((len(mesh.triangles), 3, 3), np.nan) if known is None else known)
 
         solid_records = SOLID.zeros(len(solids))
         for record, values in zip(solid_records, solids, strict=True):
@@ -319,9 +321,9 @@ class SceneBuffers:
             if material.is_mirror:
                 record["weight_row"] = len(weights)
                 weights.append(mirror_reflectance(material.reflectance_rgb, nm))
-            if material.is_grating:
+            if isinstance(material, Grating):
                 record["weight_row"] = sum(len(texels) for texels in gratings)
-                gratings.append(_grating_texels(item))
+                gratings.append(_grating_texels(material, item.object_to_world))
             if material.dispersion is not None:
                 if material.dispersion not in media:
                     media.append(material.dispersion)
@@ -363,7 +365,7 @@ class SceneBuffers:
         ]
         rows.append(np.array([power.at(x)[:, 3] for power in self.light_power]).reshape(-1, SAMPLES))
         counts = np.cumsum([0] + [len(r) for r in rows])
-        self.layout = SpectraLayout(*counts[:5].tolist(), rows=int(counts[5]))
+        self.layout = SpectraLayout(*counts.tolist())
         self.variables = variables
         """Each spectral group's variable over x, float64 (groups, SAMPLES)."""
         self.variable_table = variables.astype("f4")
@@ -379,11 +381,10 @@ class SceneBuffers:
         }
 
 
-def _grating_texels(item: SceneObject) -> np.ndarray:
+def _grating_texels(grating: Grating, object_to_world: np.ndarray) -> np.ndarray:
     """A GRATING and one GRATING_ORDER an order: uint32 (1 + orders, 4)."""
-    grating = item.material
     head = GRATING.zeros(1)
-    head["lines"] = grating.lines_in_world(item.object_to_world)
+    head["lines"] = grating.lines_in_world(object_to_world)
     head["orders"] = len(grating.orders)
     orders = GRATING_ORDER.zeros(len(grating.orders))
     orders["shift_per_um"], orders["efficiency"] = grating.shift_per_um, grating.efficiency
@@ -440,5 +441,5 @@ def _stack_bits(scene: Scene) -> dict[int, int]:
             f"scene '{scene.name}': {len(overlapping)} transparent solids nest or touch and at most 32 may; "
             "move some apart or join their meshes"
         )
-    ranked = sorted(overlapping, key=lambda i: (scene.objects[i].material.priority, i))  # type: ignore[union-attr]
+    ranked = sorted(overlapping, key=lambda i: (scene.objects[i].material.priority, i))
     return {index: bit for bit, index in enumerate(ranked)}

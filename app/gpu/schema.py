@@ -79,6 +79,11 @@ class Struct:
         """Bytes of one record."""
         return self.dtype.itemsize
 
+    def offset(self, name: str) -> int:
+        """Byte at which a field begins in a record."""
+        assert self.dtype.fields is not None
+        return self.dtype.fields[name][1]
+
     def glsl(self) -> str:
         """GLSL declaration of the struct."""
         lines = [f"struct {self.name} {{"]

@@ -160,16 +160,17 @@ def drop_programs(ctx: moderngl.Context) -> None:
         _drop(programs.popitem(last=False)[1])
 
 
-def release(owned: Releasable) -> None:
-    """Give a program (or any other resource) back; a program is freed when its last owner does so and its context keeps
+def release(*resources: Releasable) -> None:
+    """Give programs (or any other resources) back; a program is freed when its last owner does so and its context keeps
     it no longer."""
-    owners = _owners.get(id(owned))
-    if owners is None:
-        owned.release()
-        return
-    _owners[id(owned)] = owners - 1
-    if owners <= 1 and not any(owned is held for programs in _kept.values() for held in programs.values()):
-        _drop(owned)
+    for owned in resources:
+        owners = _owners.get(id(owned))
+        if owners is None:
+            owned.release()
+            continue
+        _owners[id(owned)] = owners - 1
+        if owners <= 1 and not any(owned is held for programs in _kept.values() for held in programs.values()):
+            _drop(owned)
 
 
 def _drop(program: Releasable) -> None:

@@ -100,9 +100,17 @@ class SplatTables:
         texture = ctx.texture_array((width, len(SIGMAS), texels[..., 0, 0, 0].size), 4, texels, dtype="f4")
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         texture.repeat_x = texture.repeat_y = False
-        buffers = (ctx.buffer(np.ascontiguousarray(a)) for a in (spans, integrals, density, running))
         return cls(
-            texture, *buffers, classes=shape[1], bands=band_count, targets=targets, rows=len(SIGMAS), width=width
+            texture,
+            ctx.buffer(spans),
+            ctx.buffer(integrals),
+            ctx.buffer(density),
+            ctx.buffer(running),
+            classes=shape[1],
+            bands=band_count,
+            targets=targets,
+            rows=len(SIGMAS),
+            width=width,
         )
 
     def release(self) -> None:
@@ -123,7 +131,7 @@ def _by_target(values: np.ndarray, targets: int) -> np.ndarray:
 
 _KEPT_BYTES = 24 << 20
 """Of blurred spectra that are kept for the next plan with the same bands."""
-_blurred: dict[tuple[int | bytes, ...], tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+_blurred: dict[tuple[object, ...], tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,8 @@ class TextureStore:
         self.ctx = ctx
         self._max_side = min(max_side or MAX_BYTES, int(ctx.info["GL_MAX_TEXTURE_SIZE"]))
         self._as_image = DeviceTraits.of(ctx.info["GL_RENDERER"]).texels_as_images if as_image is None else as_image
-        self._pictures = self._corners = None
+        self._pictures: moderngl.Texture | None = None
+        self._corners: moderngl.Texture | None = None
         self._records: moderngl.Buffer | None = None
         self._sources = _sources(scene)
         self._tiles: list[Tile] = []
@@ -191,7 +192,7 @@ class TextureStore:
         corners: list[np.ndarray] = []
         for record, index in zip(records, textured, strict=False):
             item = scene.objects[index]
-            texture = item.material.texture  # type: ignore[union-attr]
+            texture = item.material.texture
             self._describe(record, texture)
             record["repeats"] = texture.wrap == "repeat"
             record["corners"] = (sum(map(len, corners)) - 2 * int(first_triangle[index])) % (1 << 32)
@@ -226,7 +227,7 @@ class TextureStore:
 
 def _sources(scene: Scene) -> list[_Source]:
     """Every picture once: of the textured objects in order, then of the environment."""
-    owners: list[Texture | Environment] = [scene.objects[i].material.texture for i in textured_objects(scene)]  # type: ignore[union-attr,misc]
+    owners: list[Texture | Environment] = [scene.objects[i].material.texture for i in textured_objects(scene)]
     owners += [scene.environment] if scene.environment is not None else []
     distinct: list[_Source] = []
     for owner in owners:

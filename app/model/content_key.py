@@ -20,7 +20,7 @@ class ContentKey:
         for value in values:
             if isinstance(value, np.ndarray):
                 self._digest.update(f"{value.dtype.str}{value.shape}".encode())
-                self._digest.update(np.ascontiguousarray(value))
+                self._digest.update(np.ascontiguousarray(value).data)
             else:
                 self._digest.update(f"{value!r};".encode())
 

@@ -244,12 +244,15 @@ def dispersive_materials(scene: Scene) -> list[int]:
     return first
 
 
+def half_spaces(item: SceneObject) -> np.ndarray | None:
+    """`Mesh.convex_planes` (P, 4) of an object that is intersected as an intersection of half-spaces, else None."""
+    planes = item.mesh.convex_planes if item.material.transmits else None
+    return planes if planes is not None and len(planes) <= MAX_SOLID_PLANES else None
+
+
 def is_convex_solid(item: SceneObject) -> bool:
     """Whether the object is intersected as an intersection of half-spaces."""
-    if not item.material.transmits:
-        return False
-    planes = item.mesh.convex_planes
-    return planes is not None and len(planes) <= MAX_SOLID_PLANES
+    return half_spaces(item) is not None
 
 
 def is_flat(item: SceneObject) -> bool:

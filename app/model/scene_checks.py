@@ -141,7 +141,7 @@ def check_lines(light: Light, glasses: Sequence[SceneObject], file_name: str) ->
     """Raise UserError for an emission line outside the data of one of `glasses`."""
     for wavelength_nm, power in light.spectral_power.lines:
         for item in glasses:
-            low, high = item.material.dispersion.range_nm  # type: ignore[union-attr]
+            low, high = item.material.dispersion.range_nm
             if power > 0.0 and not low <= wavelength_nm <= high:
                 raise UserError(
                     f"{file_name}: the line at {wavelength_nm:g} nm of light '{light.name}' lies outside the data of "
@@ -150,5 +150,5 @@ def check_lines(light: Light, glasses: Sequence[SceneObject], file_name: str) ->
 
 
 def _glass_notes(glasses: list[SceneObject]) -> list[str]:
-    dispersions = dict.fromkeys(o.material.dispersion for o in glasses)  # type: ignore[union-attr]
+    dispersions = dict.fromkeys(o.material.dispersion for o in glasses)
     return [note for dispersion in dispersions for note in dispersion.notes()]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import astuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .content_key import ContentKey
 from .scene import Scene
@@ -43,7 +44,7 @@ def picture_key(scene: Scene, *more: object) -> str:
     return key.hexdigest()
 
 
-def _plain(value: object) -> object:
+def _plain(value: ArrayLike | None) -> object:
     """A light's field so that equal values print alike (1 and 1.0, tuples of numpy numbers)."""
     if isinstance(value, str | bool) or value is None:
         return value

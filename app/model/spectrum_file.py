@@ -7,6 +7,7 @@ from: one proportional to D65 is "D65" however it was made.
 from __future__ import annotations
 
 import math
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -31,12 +32,8 @@ def read_spectrum(table: SceneTable) -> Spectrum:
         parts = table.tables("spectrum")
         if not parts:
             table.fail("spectrum", "is an empty list; name at least one spectrum")
-        total = None
-        for part in parts:
-            weight = part.number("weight", 1.0, above=0.0)
-            term = _read_table(part).scaled_to_power(weight)
-            total = term if total is None else total + term
-        return total
+        weighted = ((part.number("weight", 1.0, above=0.0), _read_table(part)) for part in parts)
+        return reduce(Spectrum.__add__, (term.scaled_to_power(weight) for weight, term in weighted))
     inner = table.table("spectrum")
     if inner is None:
         table.fail("spectrum", 'must be a name such as "D65" or a table such as {blackbody = 3200}')

@@ -92,15 +92,14 @@ class SeamFold:
         self._ctx.memory_barrier()
 
     def release(self) -> None:
-        for resource in (
+        shader.release(
             self._gather,
             self._fill,
             self._gather_buffer,
             self._fill_buffer,
             self._source_buffer,
             self._ratio_buffer,
-        ):
-            shader.release(resource)
+        )
 
 
 class LevelsFold:

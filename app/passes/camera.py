@@ -29,8 +29,8 @@ from ..model.scene_checks import contains
 from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
 from .camera_tables import CameraTables
 from .listed_pixels import GROUP, ListedPixels
+from .picture_channels import Channels
 from .pixel_lattice import is_in_strips, pixel_lattice
-from .present import Channels
 from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
 from .variants import (
     BIND_CELL_CDF,
@@ -256,7 +256,7 @@ class CameraPass:
         picture: np.ndarray | None = None
         while True:
             try:
-                look = looks.send(picture)
+                look = next(looks) if picture is None else looks.send(picture)
             except StopIteration as stop:
                 self.spectrum = stop.value
                 break
@@ -346,8 +346,7 @@ class CameraPass:
 
     def release(self) -> None:
         """Free every buffer, texture and program."""
-        for owned in (self._tables, self._lights, self._counters, *self._pictures, self._parameters_buffer):
-            owned.release()
+        shader.release(self._tables, self._lights, self._counters, *self._pictures, self._parameters_buffer)
         for program in (self._program, self._beyond, self._single):
             if program is not None:
                 shader.release(program)
@@ -356,8 +355,7 @@ class CameraPass:
         if self._owns_pictures:
             self.pictures.release()
         if self._empty is not None:
-            for owned in (*self._empty.textures, self._empty.receivers, self._empty.placements):
-                owned.release()
+            shader.release(*self._empty.textures, self._empty.receivers, self._empty.placements)
         self._pictures, self._empty = [], None
 
     # ---- private ---------------------------------------------------------------------------

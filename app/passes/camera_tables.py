@@ -28,7 +28,7 @@ from ..model.scene import (
     Mirror,
     Scene,
 )
-from .present import Channels
+from .picture_channels import Channels
 
 EMISSION_CELLS = SAMPLES - 1
 """Cells of x that a stretch of the spectrum begins and ends with; a wavelength is told to 1/1024 of the indices'

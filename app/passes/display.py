@@ -149,8 +149,7 @@ class Display:
 
     def release(self) -> None:
         """Free programs, buffers and textures."""
-        for owned in (*self._programs.values(), self._parameters, *self._samplers.values(), *self._outputs.values()):
-            shader.release(owned)
+        shader.release(*self._programs.values(), self._parameters, *self._samplers.values(), *self._outputs.values())
         self._programs.clear()
         self._outputs.clear()
 
@@ -213,4 +212,8 @@ def _tone(settings: Settings) -> str:
 def _shown(compare: Compare) -> Shows:
     if compare.holding:
         return "other"
-    return "picture" if compare.mode in ("off", "hold") else compare.mode
+    match compare.mode:
+        case "off" | "hold":
+            return "picture"
+        case mode:
+            return mode

@@ -125,7 +125,7 @@ class Footprints:
         self._unusual = ctx.buffer(np.zeros((group, 2), np.float32))
         self.commands = ctx.buffer(np.zeros(21, np.uint32))
         """Indirect draws of kinds 1 to 4, five words each; then the dropped footprints."""
-        self.slots_per_photon = defines["SLOTS"]
+        self.slots_per_photon = int(defines["SLOTS"])
         self.capacity = group * self.slots_per_photon
         """Splats of a kind that the lists have room for."""
         self.splats = ctx.buffer(reserve=self.capacity * SPLAT.stride)
@@ -213,7 +213,7 @@ class Footprints:
         self.commands.clear()
 
     def release(self) -> None:
-        for resource in (
+        shader.release(
             self._program,
             self._list,
             self.lists,
@@ -221,5 +221,4 @@ class Footprints:
             self._unusual,
             self.commands,
             self.splats,
-        ):
-            shader.release(resource)
+        )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..gpu import shader
 from ..gpu.records import NONE, PLACEMENT
 
 if TYPE_CHECKING:
@@ -114,10 +115,9 @@ class MapAtlas:
 
     def release(self) -> None:
         _park(self.ctx)
-        self.framebuffer.release()
-        self._accumulate.release()
-        for resource in (*self.scratch_textures, *self.total_textures, self.placements):
-            resource.release()
+        shader.release(
+            self.framebuffer, self._accumulate, *self.scratch_textures, *self.total_textures, self.placements
+        )
 
 
 def _park(ctx: moderngl.Context) -> None:

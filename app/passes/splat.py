@@ -151,7 +151,7 @@ class Splatter:
         tables.texture.use(0)
         atlas.framebuffer.use()
         ctx.enable_only(moderngl.BLEND)
-        ctx.blend_equation = moderngl.FUNC_ADD
+        ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
         ctx.blend_func = moderngl.ONE, moderngl.ONE
         # A kind that no splat of the group is of has no vertices.
         for kind, vertex_array in self._draws.items():

@@ -160,7 +160,7 @@ class TracePass:
 
     def release(self) -> None:
         """Free every buffer and program."""
-        for owned in (
+        shader.release(
             *self._rays,
             self._outcomes,
             self._slots,
@@ -178,8 +178,7 @@ class TracePass:
             self._advance,
             *self._emit.values(),
             *self._orders.values(),
-        ):
-            shader.release(owned)
+        )
 
     @property
     def bytes(self) -> int:
@@ -228,7 +227,7 @@ class TracePass:
             self.scene.bind()
             self._trace_parameters.bind_to_uniform_block(bindings.PARAMETERS)
             self._bind_queue(step + 1)
-            self._trace.run_indirect(self._state, records.QUEUE_STATE.dtype.fields["trace_groups"][1])
+            self._trace.run_indirect(self._state, records.QUEUE_STATE.offset("trace_groups"))
             self._list_children(first=False)
             step += 1
             # Reading the count waits for the device: rarely on a GPU, where empty steps cost less.
@@ -300,8 +299,7 @@ class TracePass:
     def _list_children(self, *, first: bool, chunks: int = 0) -> None:
         ctx = self.context.ctx
         offsets = {
-            name: records.QUEUE_STATE.dtype.fields[name][1]
-            for name in ("chunk_groups", "next_chunk_groups", "gather_groups")
+            name: records.QUEUE_STATE.offset(name) for name in ("chunk_groups", "next_chunk_groups", "gather_groups")
         }
         ctx.memory_barrier()
         if first:

@@ -15,7 +15,7 @@ from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.texture_store import place_defines
 from ..model.features import Features
 from .camera_tables import EMISSION_CELLS
-from .present import Channels
+from .picture_channels import Channels
 
 Defines = dict[str, int | float | str]
 
@@ -172,9 +172,12 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
     beauty = layer != "caustic"
     specular = beauty and features.camera_specular
     disperses = specular and features.camera_disperses
-    defines: Defines = dict(
-        features.defines() | bindings.SCENE_DEFINES | scene.defines | place_defines(BIND_PICTURES, UNIT_PICTURES)
-    )
+    defines: Defines = {
+        **features.defines(),
+        **bindings.SCENE_DEFINES,
+        **scene.defines,
+        **place_defines(BIND_PICTURES, UNIT_PICTURES),
+    }
     # A method that follows single wavelengths has no columns for them; nor has a scene where nothing disperses.
     groups = features.spectral_groups if disperses else 0
     defines |= {

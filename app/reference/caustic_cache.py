@@ -82,8 +82,12 @@ class CachedCaustic:
 
     def _restore(self, run: CausticRun) -> tuple[int, float]:
         """Photons at which the noise was measured last, and the noise; `run` gets what is stored, if that fits."""
-        pilots = {"counts": run.counts, "low": run.tables.low, "texels": run.tables.texels_per_unit}
-        own = {"sums": run.sums, "units": run.units, "flux": run.flux}
+        pilots: dict[str, np.ndarray] = {
+            "counts": run.counts,
+            "low": run.tables.low,
+            "texels": run.tables.texels_per_unit,
+        }
+        own: dict[str, np.ndarray] = {"sums": run.sums, "units": run.units, "flux": run.flux}
         shapes = {name: values.shape for name, values in (pilots | own).items()}
         stored = load_kept(self._path, shapes | {"noise": (), "measured": ()})
         if stored is None or any(not np.array_equal(stored[name], values) for name, values in pilots.items()):

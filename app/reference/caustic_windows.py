@@ -53,7 +53,7 @@ class Planes(NamedTuple):
         return (points - self.frame[side, 0]) @ self.frame[side, 1:].T
 
 
-class SurfaceInteraction(NamedTuple):
+class VisiblePoints(NamedTuple):
     """Where N camera paths ended on receivers."""
 
     points: np.ndarray
@@ -78,7 +78,8 @@ class Landed(NamedTuple):
 def receiver_planes(scene: Scene, photons: PhotonScene) -> Planes:
     """The sides of every diffuse object, flat or not."""
     side = np.full((len(scene.objects), 2), -1, np.int32)
-    owner, frames, extents, flat = [], [], [], []
+    owner: list[int] = []
+    frames, extents, flat = [], [], []
     for index, item in enumerate(scene.objects):
         if not item.material.receives:
             continue
@@ -128,7 +129,7 @@ def no_caustic(scene: Scene) -> CausticTables:
 
 def fit_windows(
     planes: Planes,
-    seen: SurfaceInteraction,
+    seen: VisiblePoints,
     lit: Landed,
     bins: int,
     texel_at: Callable[[float], float],
@@ -168,7 +169,7 @@ def fit_windows(
     asked = np.where(wanted, np.prod(span[:, 1], axis=1) / texel**2, 0.0)
     texel *= np.sqrt(np.divide(asked, _shared(asked, views, max_texels), out=np.ones(count), where=wanted))
     size = np.zeros((count, 2, 2), np.int64)
-    for side in np.flatnonzero(wanted):
+    for side in np.flatnonzero(wanted).tolist():
         size[side, 1] = np.maximum(np.ceil(span[side, 1] / texel[side] - 1e-9), 1)
         texels = max(_COARSE * float(np.prod(size[side, 1])), _MIN_COARSE)
         size[side, 0] = np.maximum(np.ceil(span[side, 0] * math.sqrt(texels / np.prod(span[side, 0]))), 1)
@@ -240,6 +241,5 @@ def _quantiles(values: np.ndarray, weights: np.ndarray) -> tuple[float, float]:
     order = np.argsort(values)
     share = np.cumsum(weights[order]) / weights.sum()
     last = len(order) - 1
-    return float(values[order[min(np.searchsorted(share, _SPREAD), last)]]), float(
-        values[order[min(np.searchsorted(share, 1.0 - _SPREAD), last)]]
-    )
+    low, high = np.minimum(np.searchsorted(share, (_SPREAD, 1.0 - _SPREAD)), last)
+    return float(values[order[low]]), float(values[order[high]])

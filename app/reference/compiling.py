@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from numba import njit
 
-_OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False}
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False}
 
 
 def _sources() -> str:
@@ -22,7 +23,7 @@ def _sources() -> str:
 _VERSION = _sources()
 
 
-def compiled(function: Callable, **more: bool) -> Callable:
+def compiled(function: Callable, **more: Any) -> Callable:
     """`function` as machine code, kept on disk where some folder can be written (else compiled anew each run).
 
     References are not counted: a scene is some sixty arrays, and counting them took 60 % of a path's time. So nothing

@@ -63,7 +63,8 @@ class Emitter:
 
         At a hard edge that is the covered share of a lattice cell.
         """
-        light, share = self.light, self.domain.measure / count
+        light = self.light
+        share: np.ndarray | float = self.domain.measure / count
         start, direction = self.start(q)
         axis = unit(np.asarray(light.direction, float))
         spacing = self.domain.spacing(count) * self.unit_length
@@ -89,13 +90,13 @@ class Emitter:
         if light.has_outline:
             offset = (start - np.array(light.position)) @ np.stack([self.domain.tangent, self.domain.bitangent]).T
             if light.is_disc:
-                return share * covered(light.radius - np.linalg.norm(offset, axis=-1), radial)
+                return share * covered(light.half_extent[0] - np.linalg.norm(offset, axis=-1), radial)
             inside = np.array(light.half_extent) - np.abs(offset)
             return share * covered(inside[..., 0], spacing[0]) * covered(inside[..., 1], spacing[1])
         return np.full(direction.shape[:-1], share)
 
     def lattice(self, count: int, shift: tuple[int, int], sub_lattice: int = 0) -> np.ndarray:
         """All points (count, 2) of a sub-lattice of the domain, in the coordinates of `start`."""
-        own = tuple((s + sub_lattice * g) % 2**32 for s, g in zip(shift, PLASTIC, strict=True))
-        square = lattice_point(np.arange(count), count, own)
+        first, second = ((s + sub_lattice * g) % 2**32 for s, g in zip(shift, PLASTIC, strict=True))
+        square = lattice_point(np.arange(count), count, (first, second))
         return self.unit_length * (self.domain.rect[:2] + square * self.domain.rect[2:])

@@ -16,7 +16,7 @@ GOLDEN = 2654435769
 PLASTIC = (3242174889, 2447445414)
 
 
-def lattice_point(i: Array, count: int, shift: tuple[Array, Array]) -> Array:
+def lattice_point(i: Array, count: int, shift: tuple[Array | int, Array | int]) -> Array:
     """Point i of the golden-ratio Kronecker lattice of `count` points in the unit square, shifted modulo 2³²."""
     along = (np.asarray(i, np.float64) + unit_float(shift[0])) / count
     return np.stack(np.broadcast_arrays(along, kronecker(i, GOLDEN, shift[1])), axis=-1)
@@ -46,7 +46,7 @@ def angle_between(a: Array, b: Array) -> Array:
     return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
 
 
-def spot_falloff(direction: Array, axis: Array, inner: Array, outer: Array) -> Array:
+def spot_falloff(direction: Array, axis: Array, inner: Array | float, outer: Array | float) -> Array:
     """1 within `inner`, 0 beyond `outer` (rad), a smoothstep of the angle between; hard where they are equal."""
     angle = angle_between(direction, axis)
     soft = outer - inner > 1e-7

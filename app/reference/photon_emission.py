@@ -18,6 +18,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..model.scene import Light
 from .photon_emit import AREA, DIRECTIONS, GRID, PLANE
@@ -106,7 +107,7 @@ def density(domain: Domain) -> np.ndarray:
     return np.diff(domain.rows)[:, None] * np.diff(domain.columns, axis=1)
 
 
-def frame_of(axis: np.ndarray, tangent: np.ndarray | None) -> np.ndarray:
+def frame_of(axis: np.ndarray, tangent: ArrayLike | None) -> np.ndarray:
     """Rows tangent, bitangent, axis, right-handed; without a tangent the world axis farthest from `axis` gives it."""
     guide = np.eye(3)[np.argmin(np.abs(axis))] if tangent is None else np.asarray(tangent, float)
     first = guide - (guide @ axis) * axis

@@ -19,6 +19,7 @@ from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, rgb_partition, 
 from ..model.optics.spectrum import Spectrum, cmf_at
 from ..model.scene import (
     Camera,
+    Grating,
     Scene,
 )
 
@@ -56,7 +57,7 @@ class PhotonScene(NamedTuple):
     kind: np.ndarray
     """int32 (O,)."""
     medium: np.ndarray
-    """int32 (O,): row of `index`, or −1."""
+    """int32 (O,): row of `refractive_index`, or −1."""
     weight: np.ndarray
     """int32 (O,): row of `weights` (absorption per unit, or a mirror's reflectance), or −1."""
     bit: np.ndarray
@@ -67,7 +68,7 @@ class PhotonScene(NamedTuple):
     """float64 (O, 3): linear Rec.709 factor of a receiver (1 where its reflectance is a spectrum)."""
     reflectance_class: np.ndarray
     """int32 (O,): row of the colour tables."""
-    index: np.ndarray
+    refractive_index: np.ndarray
     """float64 (M, 8001): n on `TABLE_NM`."""
     weights: np.ndarray
     """float64 (W, 8001)."""
@@ -175,7 +176,7 @@ def _gratings(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     for index, item in enumerate(scene.objects):
         material = item.material
         counts.append(0)
-        if material.is_grating:
+        if isinstance(material, Grating):
             lines[index] = material.lines_in_world(item.object_to_world)
             reflects = np.full(len(material.orders), float(material.reflects))
             orders.append(np.column_stack([material.shift_per_um, material.efficiency, reflects]))
@@ -288,10 +289,10 @@ def _middle(scene: Scene, meshes: list[Mesh]) -> tuple[np.ndarray, float]:
 
 def _corner_normals(scene: Scene, meshes: list[Mesh], order: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Row of each triangle's corner normals (−1: flat, or not specular), and the rows (S, 9)."""
-    rows = []
+    rows: list[np.ndarray] = []
     for mesh, item in zip(meshes, scene.objects, strict=True):
-        smooth = mesh.corner_normals is not None and item.material.is_specular
-        rows.append(mesh.corner_normals if smooth else np.zeros((len(mesh.triangles), 3, 3)))
+        own = mesh.corner_normals if item.material.is_specular else None
+        rows.append(np.zeros((len(mesh.triangles), 3, 3)) if own is None else own)
     normals = np.concatenate(rows)[order]
     known = (np.abs(normals).sum(axis=2) > 0.0).all(axis=1)
     index = np.full(len(order), -1, np.int32)
@@ -320,7 +321,7 @@ def _ranks(scene: Scene, meshes: list[Mesh]) -> dict[int, int]:
             f"scene '{scene.name}': {len(meeting)} transparent solids nest or touch and at most {_MAX_STACK} may; "
             "move some apart"
         )
-    ranked = sorted(meeting, key=lambda i: (scene.objects[i].material.priority, i))  # type: ignore[union-attr]
+    ranked = sorted(meeting, key=lambda i: (scene.objects[i].material.priority, i))
     return {index: rank for rank, index in enumerate(ranked)}
 
 

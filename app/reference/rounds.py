@@ -98,8 +98,10 @@ class PartsRun(ABC, Generic[EstimateT]):
         self.seconds = 0.0
         self._pace = Pace()
 
-    unit = 1
-    """What counts as one unit: so many photons, or a sample of every pixel."""
+    @property
+    def unit(self) -> int:
+        """What counts as one unit: so many photons, or a sample of every pixel."""
+        return 1
 
     @property
     def amount(self) -> int:

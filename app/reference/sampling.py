@@ -85,8 +85,8 @@ class Scratch(NamedTuple):
 
 def scratch() -> Scratch:
     """Fresh working memory."""
-    words = [np.zeros(DIMENSIONS, np.uint32) for _ in range(3)]
-    return Scratch(np.zeros(STACK_SIZE, np.int64), np.zeros(STACK_SIZE), *words, np.zeros(3))
+    beginning, state, shift = np.zeros((3, DIMENSIONS), np.uint32)
+    return Scratch(np.zeros(STACK_SIZE, np.int64), np.zeros(STACK_SIZE), beginning, state, shift, np.zeros(3))
 
 
 @compiled

@@ -39,7 +39,7 @@ def medium(scene, mask, alone):
 
 @compiled
 def _refractive_index(scene, thing, nm):
-    return 1.0 if thing == AIR else table(scene.index, scene.medium[thing], nm)
+    return 1.0 if thing == AIR else table(scene.refractive_index, scene.medium[thing], nm)
 
 
 @compiled

@@ -24,7 +24,7 @@ from .camera_start import camera_start
 from .caustic_windows import (
     TEXELS_A_PIXEL,
     Landed,
-    SurfaceInteraction,
+    VisiblePoints,
     fit_windows,
     free_areas,
     no_caustic,
@@ -182,7 +182,7 @@ class CausticRun:
         """What has been gathered."""
         by_half = np.array([self.units[half::_HALVES].sum() for half in range(_HALVES)])
         halves = self.sums / np.maximum(by_half, 1).astype(np.float32)[:, None]
-        for side in np.flatnonzero(self.wanted):
+        for side in np.flatnonzero(self.wanted).tolist():
             for window in range(2):
                 area = free_areas(self.tables, side, window).reshape(self.tables.size[side, window, ::-1])[..., None]
                 for values in halves:
@@ -239,7 +239,7 @@ class CausticRun:
                 colours += [photon_scene.colours(light.spectral_power, classes)] * len(found)
         return domains, colours
 
-    def _seen(self) -> SurfaceInteraction:
+    def _seen(self) -> VisiblePoints:
         points, which = np.empty((_PILOT, 4)), np.empty((_PILOT, 2), np.int32)
         found = camera_kernel.seen_points(
             self.photon_scene,
@@ -254,7 +254,7 @@ class CausticRun:
             which,
             scratch(),
         )
-        return SurfaceInteraction(points[:found, :3], points[:found, 3], which[:found, 0])
+        return VisiblePoints(points[:found, :3], points[:found, 3], which[:found, 0])
 
     def _land(self, d: int, sequence: Sequence, first: int, count: int, share: float) -> Landed:
         found = Landed(np.empty((count, 3)), np.empty(count), np.empty((count, 4), np.int32))
@@ -274,7 +274,7 @@ class CausticRun:
         )
         return Landed(*(values[:landed] for values in found))
 
-    def _refuse_curved(self, seen: SurfaceInteraction, lit: Landed) -> None:
+    def _refuse_curved(self, seen: VisiblePoints, lit: Landed) -> None:
         for side in np.intersect1d(seen.side, lit.ends[:, 0]):
             if not self.planes.is_flat[side]:
                 name = self.scene.objects[self.planes.owner[side]].name
@@ -295,7 +295,7 @@ class CausticRun:
         weight = []
         for d, found in enumerate(pilot):
             useful = np.zeros(len(found.watts), bool)
-            for side in np.flatnonzero(wanted):
+            for side in np.flatnonzero(wanted).tolist():
                 here = np.flatnonzero(found.ends[:, 0] == side)
                 useful[here[within(tables, side, self.planes.flat(side, found.points[here]))]] = True
             importance = np.zeros((GRID, GRID))

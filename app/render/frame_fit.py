@@ -75,8 +75,8 @@ class FrameFit:
             factor = math.tan(math.radians(0.5 * _WIDE_DEG)) / math.tan(math.radians(0.5 * nearest.vertical_fov_deg))
             view = replace(nearest, vertical_fov_deg=max(_WIDE_DEG, nearest.vertical_fov_deg))
             factor = max(factor, 1.0)
-        size = {"width": round(factor * settings.width), "height": round(factor * settings.height)}
-        return FrameFit(view, replace(settings, **size))
+        width, height = round(factor * settings.width), round(factor * settings.height)
+        return FrameFit(view, replace(settings, width=width, height=height))
 
     @property
     def glasses(self) -> list[Dispersion]:

@@ -11,7 +11,7 @@ lattices are divided (`Division`), where photons are kept (`PhotonRecords`), how
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -218,7 +218,8 @@ class LightPass:
         )
         if not fit.avoids_powers_of_two:
             return layout
-        return replace(layout, size=tuple(side + (side & (side - 1) == 0) for side in layout.size))
+        width, height = (side + (side & (side - 1) == 0) for side in layout.size)
+        return replace(layout, size=(width, height))
 
     @property
     def _needs_spectral_pilot(self) -> bool:
@@ -280,9 +281,9 @@ class LightPass:
         """Factor from what the maps have summed to energy per texel."""
         return self._maps.scale
 
-    def caustic_maps(self) -> CausticMaps:
-        """The summed maps as the camera reads them."""
-        return self._maps.caustic_maps()
+    def caustic_maps(self, textures: Sequence[moderngl.Texture] | None = None) -> CausticMaps:
+        """The summed maps as the camera reads them; `textures` where they are not `resolved_textures`."""
+        return self._maps.caustic_maps(textures)
 
     def resolved_textures(self) -> list[moderngl.Texture]:
         """The summed maps for lookups: wide texels added to fine ones, charts' seams folded home."""

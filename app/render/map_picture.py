@@ -6,7 +6,7 @@ import numpy as np
 
 from ..model.geometry.charts import ChartAtlas
 from ..model.optics.colorimetry import xyz_to_rgb709
-from ..passes.present import Channels
+from ..passes.picture_channels import Channels
 from .light_pass import LightPass
 
 

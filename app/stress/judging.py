@@ -3,7 +3,7 @@ finite."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -25,7 +25,7 @@ def worst(error: np.ndarray, bound: np.ndarray | float) -> tuple[float, float]:
     return float(error[at]), float(bound[at])
 
 
-def judged(rows: dict[str, tuple[np.ndarray, np.ndarray | float]]) -> tuple[dict[str, float], dict[str, float]]:
+def judged(rows: Mapping[str, tuple[np.ndarray, np.ndarray | float]]) -> tuple[dict[str, float], dict[str, float]]:
     """(errors, bounds) of a `Measurement` from {name: (error of each row, bound of each row)}; what has no row is left
     out."""
     pairs = {name: worst(error, bound) for name, (error, bound) in rows.items() if np.size(error)}

@@ -1,5 +1,5 @@
 // From a lattice point to a ray with its two spatial columns. Emission domains are rectangles that
-// just hold the specular objects as seen from the light (app/passes/emit.py fits them):
+// just hold the specular objects as seen from the light (app/passes/emission_domain.py fits them):
 // - point, spot, area: directions on Lambert's azimuthal equal-area plane round an axis, so that
 //   solid angle is area and a regular lattice stays regular up to the whole sphere;
 // - directional, collimated: positions on a plane across the direction.

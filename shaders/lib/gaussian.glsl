@@ -1,5 +1,5 @@
 // Gaussians, their integrals and their averages over a texel. Pure functions, no bindings.
-// CPU reference: app/reference/splat_reference.py.
+// CPU reference: tests/reference/splat_reference.py.
 
 const float SQRT_HALF = 0.70710678;
 const float TWO_PI = 6.2831853;

@@ -1,4 +1,4 @@
-// Linear Rec.709 to what a display shows. Pure functions; app/tone_map.py tells why the first curve is as it is.
+// Linear Rec.709 to what a display shows. Pure functions; app/base/tone_map.py tells why the first curve is as it is.
 #ifndef TONE_GLSL
 #define TONE_GLSL
 

@@ -100,7 +100,7 @@ def test_lights_as_a_point_and_as_a_ray_see_them(gl, kind: int) -> None:
     toward = s.toward; distance = s.distance; gain = s.gain;
     seen = light_seen(lights[row], position, direction, far, width);
     """
-    declared = "layout(std430, binding = 8) readonly buffer Lights { EyeLight lights[]; };"
+    declared = "layout(std430, binding = 8) readonly buffer Lights { CameraLight lights[]; };"
     inputs = {"position": position, "unit": uniform, "direction": direction, "far": far, "width": width}
     outputs = {"toward": "vec3", "distance": "float", "gain": "float", "seen": "float"}
     got = evaluate(
@@ -135,7 +135,7 @@ def test_lights_as_a_point_and_as_a_ray_see_them(gl, kind: int) -> None:
 def soft_amounts(gl, body: str, offset: np.ndarray, blur: float) -> np.ndarray:
     """What a soft look at the offsets sees, by the shader."""
     inputs = {"offset": offset, "blur": np.full(len(offset), blur)}
-    declared = "layout(std430, binding = 8) readonly buffer Lights { EyeLight lights[]; };"
+    declared = "layout(std430, binding = 8) readonly buffer Lights { CameraLight lights[]; };"
     got = evaluate(
         gl.ctx,
         ["lib/lights.glsl"],

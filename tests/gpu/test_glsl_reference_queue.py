@@ -30,7 +30,7 @@ class Queue:
         self.ctx = gl.ctx
         structs = (*SCENE_STRUCTS, PHOTON, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE)
         self.programs = {
-            name: shader.compute(self.ctx, f"queue_{name}.comp", DEFINES, structs)
+            name: shader.compute(self.ctx, f"light/queue_{name}.comp", DEFINES, structs)
             for name in ("count", "scan", "scatter", "gather", "advance")
         }
         state = records.QUEUE_STATE.zeros(1)

@@ -18,7 +18,7 @@ from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Light, Scene, 
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.emission_domain import emission_domain
 from spectrasplat.render.still import render
-from spectrasplat.render.viewer.inputs import DirtyLevel
+from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.render.viewer.invalidation import _light
 
 SETTINGS = RenderSettings(width=64, height=48, photons=20_000, spp=4)

@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 from spectrasplat.edit import edits, requests
 from spectrasplat.edit.state import Panels, Preferences, Selection
 from spectrasplat.gpu.context import Context
-from spectrasplat.model.scene import Diffuse
+from spectrasplat.model.scene import Diffuse, Grating
 from spectrasplat.render.viewer.stats import LiveStats
 from spectrasplat.ui.panels.view_panel import SWEEP_NM_PER_S
 from spectrasplat.ui.view_model import (
@@ -91,6 +91,19 @@ def test_inspector_moves_and_makes_diffuse(rig: ShellRig) -> None:
     rig.click("Kind")
     rig.click("Diffuse")
     assert isinstance(rig.state.scene.objects[0].material, Diffuse)
+
+
+def test_a_grating_shows_what_its_class_declares(gl: Context) -> None:
+    state = scene_state("spectrometer", Grating)
+    with ShellRig(gl, state, full_view_model()) as rig:
+        rig.show_tab("Inspector")
+        before = state.scene.objects[state.selection.index].material
+        rig.click("Reflects")
+        assert rig.state.scene.objects[state.selection.index].material == replace(before, reflects=True)
+        assert rig.state.edit_label == "Grating of grating"
+        place = rig.find("Lines").at(0.15)
+        rig.drag(place, (place[0] + 40, place[1]))
+        assert rig.state.scene.objects[state.selection.index].material.lines_per_mm > before.lines_per_mm
 
 
 def test_scale_keeps_proportions(rig: ShellRig) -> None:

@@ -14,8 +14,9 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from spectrasplat.base import paths
 from spectrasplat.base.errors import UserError
-from spectrasplat.bench import runner
+from spectrasplat.bench import machine, runner
 from spectrasplat.bench.rendering import NothingToMeasure, Rendering
 from spectrasplat.bench.results import BenchResult, BenchSettings, ReferenceInfo, SceneResult
 from spectrasplat.bench.store import Store
@@ -316,6 +317,11 @@ def test_a_black_scene_is_an_error_by_name_and_skipped_among_all(tmp_path: Path,
     reasons: list[str] = []
     bench.skipped = reasons.append
     assert bench.run().scenes == [] and reasons == ["nothing", "nothing"] and bench.references == 0
+
+
+def test_the_program_is_told_apart_by_files_that_exist() -> None:
+    app = paths.assets_dir().parent / "app"
+    assert [pattern for pattern in machine._MEASURING if not any(app.glob(pattern))] == []
 
 
 def test_default_size_follows_the_scene() -> None:

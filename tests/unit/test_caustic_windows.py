@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from spectrasplat.reference.caustic_windows import Landed, Planes, SurfaceInteraction, _shared, fit_windows
+from spectrasplat.reference.caustic_windows import Landed, Planes, VisiblePoints, _shared, fit_windows
 
 RNG = np.random.default_rng(4)
 PAGE, FLOOR = 0, 1
@@ -27,12 +27,10 @@ def points(count: int, half: float) -> np.ndarray:
     return flat
 
 
-def looks(stray: int) -> SurfaceInteraction:
+def looks(stray: int) -> VisiblePoints:
     """3000 at the page, 1000 at the floor's middle, `stray` anywhere on the floor."""
     where = np.concatenate([points(3000, 1.0), points(1000, 1.5), points(stray, 20.0)])
-    return SurfaceInteraction(
-        where, np.ones(len(where)), np.repeat(np.array([PAGE, FLOOR], np.int32), [3000, 1000 + stray])
-    )
+    return VisiblePoints(where, np.ones(len(where)), np.repeat(np.array([PAGE, FLOOR], np.int32), [3000, 1000 + stray]))
 
 
 def light() -> Landed:

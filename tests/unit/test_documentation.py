@@ -26,6 +26,7 @@ PAGES = sorted(
     ]
 )
 MAX_README_LINES = 150
+SOURCES = {".py", ".glsl", ".comp", ".vert", ".frag"}
 NOT_FILES = ("NAME", "…")
 """Marks of paths that stand for others."""
 ids = [str(page.relative_to(ROOT)) for page in PAGES]
@@ -109,6 +110,22 @@ def test_named_paths_exist(page: Path) -> None:
     spans = re.findall(r"`((?:app|assets|docs|shaders|tests|integrations)/[^`\s]*)`", page.read_text(encoding="utf-8"))
     named = [span for span in spans if not any(mark in span for mark in NOT_FILES)]
     assert [span for span in named if not any(ROOT.glob(span.rstrip("/")))] == []
+
+
+def test_paths_named_in_sources_exist() -> None:
+    """Comments and docstrings of the program that point to another file."""
+    files = [f for folder in ("app", "shaders") for f in (ROOT / folder).rglob("*") if f.suffix in SOURCES]
+    pattern = re.compile(r"(?<![\w/.])(?:app|assets|docs|shaders|tests)/[\w/]+\.(?:py|md|toml|glsl|comp|vert|frag)\b")
+    named = {(file.name, path) for file in files for path in pattern.findall(file.read_text(encoding="utf-8"))}
+    assert len(named) > 10
+    assert sorted(entry for entry in named if not (ROOT / entry[1]).exists()) == []
+
+
+def test_every_shader_is_in_their_list() -> None:
+    listed = re.findall(r"`([^`\s]+)`", (ROOT / "shaders" / "README.md").read_text(encoding="utf-8"))
+    shaders = [file for file in (ROOT / "shaders").rglob("*") if file.suffix in SOURCES - {".py"}]
+    assert shaders
+    assert sorted(file.name for file in shaders if not any(file.match(name) for name in listed)) == []
 
 
 def test_every_page_is_in_the_index() -> None:

@@ -301,4 +301,4 @@ def test_the_float64_references_follow_a_gain() -> None:
     for nm in (400.0, 587.56, 700.0):
         assert reference.bodies(nm)[0].index.n == pytest.approx(float(item.material.dispersion.index(nm)), rel=1e-6)
     packed, _ = photon_scene(Scene("s", Camera((0, -3, 1), (0, 0, 0)), (default_light(),), (item, floor)))
-    np.testing.assert_allclose(packed.index[0], item.material.dispersion.index(TABLE_NM))
+    np.testing.assert_allclose(packed.refractive_index[0], item.material.dispersion.index(TABLE_NM))

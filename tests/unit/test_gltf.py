@@ -395,7 +395,7 @@ def _rich_scene() -> Scene:
         ),
         (
             SceneObject("ball", ball, Dielectric(catalogue.find("N-SF11"), tint, 3)),
-            SceneObject("CPU reference", ball, Dielectric(catalogue.find("N-SF11"), tint, 3), moved),
+            SceneObject("twin", ball, Dielectric(catalogue.find("N-SF11"), tint, 3), moved),
             SceneObject(
                 "coefficients", primitives.box(), Dielectric(glass.sellmeier((1.1, 0.2), (0.01, 0.02))), mirrored
             ),

@@ -162,7 +162,7 @@ def test_a_picture_is_worn_tinted_shared_and_taken_off(scene: Scene, picture: Pa
     assert worn.objects[table].material.reflectance_rgb == (1.0, 1.0, 1.0)
     tinted = edits.set_diffuse_colour(worn, table, (1.0, 0.5, 0.5))
     assert tinted.objects[table].material.texture is worn.objects[table].material.texture
-    double = replace(worn, objects=(*worn.objects, replace(scene.objects[table], name="CPU reference")))
+    double = replace(worn, objects=(*worn.objects, replace(scene.objects[table], name="twin")))
     cpu_reference = environment.set_texture(double, len(double.objects) - 1, picture)
     assert cpu_reference.objects[-1].material.texture is worn.objects[table].material.texture
     assert cost(scene, worn) == DirtyLevel.BUILD and cost(worn, tinted) == DirtyLevel.CAMERA

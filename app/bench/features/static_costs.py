@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from ...gpu.mip_chain import level_count
 from ...gpu.records import photon_record, ray_record
 from ...gpu.scene_buffers import SAMPLES, TRIANGLE
-from ...model.features import Features, is_convex_solid, overlapping_solids
+from ...model.features import Features, half_spaces, is_convex_solid, overlapping_solids
 from ...model.scene import Scene
 from ...model.texture import Environment, Texture
 from ...passes.footprint import SPLAT
@@ -60,7 +60,7 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
     loose = [o for o in scene.objects if not is_convex_solid(o)]
     triangles = sum(len(o.mesh.triangles) for o in loose)
     smooth = sum(len(o.mesh.triangles) for o in specular if o.mesh.corner_normals is not None)
-    planes = sum(len(o.mesh.convex_planes) for o in scene.objects if is_convex_solid(o))
+    planes = sum(len(own) for o in scene.objects if (own := half_spaces(o)) is not None)
     row = SAMPLES * 8
     glasses = {o.material.dispersion for o in scene.objects if o.material.transmits}
     absorbing = sum(o.material.absorption is not None for o in scene.objects)

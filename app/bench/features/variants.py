@@ -261,7 +261,7 @@ def _with_absorption(scene: Scene) -> Scene:
     def filled(item: SceneObject) -> SceneObject:
         if not item.material.transmits:
             return item
-        return replace(item, material=replace(item.material, absorption=Absorption(np.zeros(401))))
+        return replace(item, material=item.material.changed(absorption=Absorption(np.zeros(401))))
 
     return replace(scene, objects=tuple(filled(o) for o in scene.objects))
 

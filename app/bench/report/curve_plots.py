@@ -266,8 +266,7 @@ def is_lower_bound(scene: SceneResult, method: str) -> bool:
 def label_ends(axes: Axes, drawn: Sequence[Series], gap_pt: float = 11.5) -> None:
     """Name each curve at its right end; names are pushed apart and tied to their curves by a thin line."""
     low, high = axes.get_ylim()
-    box = axes.get_position()
-    height_pt = box.height * axes.figure.get_figheight() * 72
+    height_pt = axes.bbox.height / axes.figure.dpi * 72
     ends = sorted((max(float(one.mean[-1]), low), one.method, float(one.x[-1])) for one in drawn)
     wanted = [height_pt * math.log(error / low) / math.log(high / low) for error, _, _ in ends]
     for place, (error, name, x) in zip(spread(wanted, gap_pt, height_pt), ends, strict=True):

@@ -137,9 +137,9 @@ def _speed_table(scene: SceneResult) -> Table:
     compared = any(curve.method == BASELINE and curve.points for curve in scene.curves)
     for curve in _curves(scene):
         ends, ratio = _ends(curve), scene.time_to_equal_error.get(curve.method)
-        reached = ratio is not None and math.isfinite(ratio) and ratio > 0
-        unreached = "never" if compared and ends is not None else "–"
-        ratio_cell = text.ratio_text(ratio, is_lower_bound(scene, curve.method)) if reached else unreached
+        ratio_cell = "never" if compared and ends is not None else "–"
+        if ratio is not None and math.isfinite(ratio) and ratio > 0:
+            ratio_cell = text.ratio_text(ratio, is_lower_bound(scene, curve.method))
         if ends is None:
             rows.append([curve.method, *["–"] * 6])
             continue
@@ -202,8 +202,7 @@ def _error_table(scene: SceneResult) -> Table:
             key: _mean([s.metrics[key] for s in samples if key in s.metrics])
             for key in ("relmse_trimmed", "smape", "chroma", "nrmse", "energy_ratio")
         }
-        last = ends[1] if ends else None
-        is_split = last is not None and scene.seeds > 1
+        split = ends[1] if ends and scene.seeds > 1 else None
         slope = (
             f"{text.signed(curve.slope)} ± {curve.slope_half_width:.2f}"
             if curve.slope and math.isfinite(curve.slope)
@@ -212,9 +211,9 @@ def _error_table(scene: SceneResult) -> Table:
         rows.append(
             [
                 curve.method,
-                text.number(last.bias2) if is_split else "–",
-                text.number(last.variance) if is_split else "–",
-                "–" if share is None or not is_split else f"{100 * share:.0f} %",
+                text.number(split.bias2) if split else "–",
+                text.number(split.variance) if split else "–",
+                "–" if share is None or split is None else f"{100 * share:.0f} %",
                 slope,
                 text.number(metrics["relmse_trimmed"]),
                 text.number(metrics["smape"]),

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ...base.atomic import atomic_output
 
@@ -55,6 +55,9 @@ PALETTE = {
 """Name: (on paper, on a dark screen). Every colour on paper occurs once: it is the key for the exchange."""
 
 
+Dash = str | tuple[float, tuple[float, ...]]
+
+
 @dataclass(frozen=True)
 class MethodStyle:
     """One method's drawing."""
@@ -62,13 +65,13 @@ class MethodStyle:
     name: str
     colour: str
     width_pt: float
-    dash: str | tuple[float, tuple[float, ...]]
+    dash: Dash
     marker: str
     rank: int
     """Order in lists and in depth: larger is drawn over smaller."""
 
 
-_STYLES = {
+_STYLES: dict[str, tuple[float, Dash, str, int]] = {
     "stochastic-point": (1.4, (0.0, (2.0, 1.6)), "x", 0),
     "regular-7": (1.4, (0.0, (5.0, 2.0)), "v", 1),
     "regular-16": (1.4, (0.0, (5.0, 1.5, 1.0, 1.5)), "^", 2),
@@ -100,7 +103,7 @@ def plot_style() -> Iterator[None]:
     mathematics."""
     import matplotlib
 
-    settings = {
+    settings: dict[Any, object] = {
         "font.family": "sans-serif",
         "font.sans-serif": ["DejaVu Sans"],
         "font.size": 9.0,

@@ -124,7 +124,7 @@ def _cache_path(triangles: np.ndarray) -> Path | None:
     except OSError:
         return None
     key = hashlib.blake2b(_CACHE_VERSION + bytes((MAX_DEPTH, MAX_LEAF)), digest_size=_DIGEST_BYTES)
-    key.update(triangles)
+    key.update(triangles.data)
     return folder / f"{key.hexdigest()}.bvh"
 
 

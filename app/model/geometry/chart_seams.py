@@ -128,7 +128,7 @@ def _sampled(corners: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.nd
 def _unfolded(
     mesh: Mesh, corners: np.ndarray, rows: np.ndarray, centre: np.ndarray, here: np.ndarray, there: np.ndarray
 ) -> np.ndarray:
-    """Texel positions (N, 2) of `centre` (N, 2) carried over the half-edges `here` to their CPU references `there`."""
+    """Texel positions (N, 2) of `centre` (N, 2) carried over the half-edges `here` to their twins `there`."""
     p = mesh.corners()
     t, i = here // 3, here % 3
     start, end = p[t, i], p[t, (i + 1) % 3]

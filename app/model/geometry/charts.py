@@ -108,9 +108,9 @@ def build_charts(
     areas by at most about a half (recorded in `texel_area`). Raises UserError for a size that is not positive or leads
     to more than MAX_TEXELS.
     """
-    if (total_texels is None) == (texel_size is None):
-        raise ValueError("give either total_texels or texel_size")
     chosen = total_texels if texel_size is None else texel_size
+    if chosen is None or None not in (total_texels, texel_size):
+        raise ValueError("give either total_texels or texel_size")
     if not (math.isfinite(chosen) and chosen > 0):
         raise UserError(
             f"mesh '{mesh.name}': the texel number or size of its map must be greater than 0, not {chosen:g}"
@@ -119,7 +119,7 @@ def build_charts(
         layout = lay_out(mesh, own_uv)
         # Charts by projection that still overlap are halved until none does.
         while layout is not None:
-            atlas, overlapping = _at_resolution(mesh, layout, total_texels, texel_size, gutter)
+            atlas, overlapping = _at_resolution(mesh, layout, total_texels, chosen, gutter)
             if not len(overlapping):
                 return atlas
             layout = None if own_uv else layout.split(mesh, overlapping)
@@ -127,11 +127,14 @@ def build_charts(
 
 
 def _at_resolution(
-    mesh: Mesh, layout: Layout, total_texels: int | None, texel_size: float | None, gutter: int
+    mesh: Mesh, layout: Layout, total_texels: int | None, texel_size: float, gutter: int
 ) -> tuple[ChartAtlas, np.ndarray]:
-    """The packed atlas, and the numbers of charts that overlap themselves (the atlas then is not to be used)."""
+    """The packed atlas, and the numbers of charts that overlap themselves (the atlas then is not to be used).
+
+    `texel_size` counts where `total_texels` is None.
+    """
     area = float(layout.extents.prod(axis=1).sum())
-    scale = 1.0 / texel_size if texel_size is not None else math.sqrt(0.8 * total_texels / area)
+    scale = 1.0 / texel_size if total_texels is None else math.sqrt(0.8 * total_texels / area)
     places, size = _pack(layout.extents * scale, gutter)
     if total_texels is not None:
         for _ in range(4):  # gutters do not scale, so the size is approached in a few steps

@@ -125,7 +125,7 @@ def examine(mesh: Mesh) -> MeshHealth:
         non_manifold_edges=crowded,
         inconsistent_edges=inconsistent,
         degenerate_triangles=int(degenerate.sum()),
-        zero_normals=0 if mesh.corner_normals is None else int(_zero_normals(mesh).sum()),
+        zero_normals=0 if mesh.corner_normals is None else int(_zero_normals(mesh.corner_normals).sum()),
         duplicate_vertices=size - len(weld_map(mesh.vertices)[0]),
         components=len(volumes),
         inward_components=int((volumes < 0.0).sum()) if closed else 0,
@@ -154,8 +154,9 @@ def repair(mesh: Mesh, health: MeshHealth | None = None, solid: bool = True) -> 
         if dropped:
             notes.append(f"{label}: {count_of(dropped, 'degenerate triangle')} dropped")
             health = examine(mesh)
-    if health.zero_normals:
-        normals = np.where(_zero_normals(mesh)[..., None], mesh.face_normals()[:, None], mesh.corner_normals)
+    if health.zero_normals and mesh.corner_normals is not None:
+        zero = _zero_normals(mesh.corner_normals)
+        normals = np.where(zero[..., None], mesh.face_normals()[:, None], mesh.corner_normals)
         mesh = replace(mesh, corner_normals=normals)
         notes.append(f"{label}: {count_of(health.zero_normals, 'zero normal')} replaced by the face normal")
     if health.inside_out:
@@ -205,9 +206,9 @@ def _degenerate(mesh: Mesh) -> np.ndarray:
     return 2.0 * mesh.areas() <= _DEGENERATE * longest
 
 
-def _zero_normals(mesh: Mesh) -> np.ndarray:
+def _zero_normals(corner_normals: np.ndarray) -> np.ndarray:
     """Which corner normals are zero, bool (T, 3)."""
-    return (mesh.corner_normals == 0.0).all(axis=2)
+    return (corner_normals == 0.0).all(axis=2)
 
 
 def _without_degenerate(mesh: Mesh, health: MeshHealth) -> tuple[Mesh, int]:

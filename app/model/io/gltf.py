@@ -40,6 +40,7 @@ from .gltf_materials import (
     IOR,
     TRANSMISSION,
     VOLUME,
+    own_extras,
     read_gltf_material,
 )
 from .gltf_textures import GltfTextures, turned_over
@@ -119,7 +120,7 @@ class _Reader:
         lights = self._read_lights(Surroundings(Y_UP_TO_Z_UP[:3, :3].T @ around.centre, around.radius))
         if not lights and (environment is None or receives):
             sun = default_light()
-            lights = (replace(sun, name=self._unique(sun.name), direction=_turned(sun.direction)),)
+            lights = (sun.changed(name=self._unique(sun.name), direction=_turned(sun.direction)),)
             self.notes.append("No light in the file: a white sun from behind on the left was added.")
         camera = self.camera
         if camera is None:
@@ -235,7 +236,7 @@ class _Reader:
         self.notes.append(
             f"node '{label}' has no texture coordinates; its texture is not shown (it is kept when saving)."
         )
-        return replace(material, texture=None)
+        return material.changed(texture=None)
 
     def _mesh(self, index: int, number: int, primitive: dict[str, Any], entry: dict[str, Any]) -> Mesh | None:
         """One primitive as a repaired mesh; None when it has no triangles.
@@ -290,19 +291,18 @@ class _Reader:
 
     def _camera(self, node: dict[str, Any], world: np.ndarray) -> Camera:
         entry = self.document.item("cameras", node["camera"])
-        extras = node.get("extras") if isinstance(node.get("extras"), dict) else {}
-        distance = float(extras.get(EXTRAS, {}).get("target_distance", _DEFAULT_DISTANCE))
+        distance = float(own_extras(node).get("target_distance", _DEFAULT_DISTANCE))
         position, forward, up = world[:3, 3], -_unit(world[:3, 2]), _unit(world[:3, 1])
-        common = {"position": vec3(position), "target": vec3(position + distance * forward), "up": vec3(up)}
+        camera = Camera(vec3(position), vec3(position + distance * forward), vec3(up))
         if entry.get("type") == "orthographic":
             extent = 2.0 * float(entry["orthographic"]["ymag"])
             if not extent > 0.0:
                 raise self.document.fail("an orthographic camera has no height (ymag); export the file again")
-            return Camera(kind="orthographic", vertical_extent=extent, **common)
+            return replace(camera, kind="orthographic", vertical_extent=extent)
         fov = math.degrees(float(entry["perspective"]["yfov"]))
         if not 0.0 < fov < 180.0:
             raise self.document.fail(f"a camera's yfov is {fov:g} degrees; it must lie between 0 and 180")
-        return Camera(kind="pinhole", vertical_fov_deg=fov, **common)
+        return replace(camera, vertical_fov_deg=fov)
 
     def _read_lights(self, around: Surroundings) -> tuple[Light, ...]:
         lights = []
@@ -322,8 +322,7 @@ class _Reader:
         from ..optics.spectrum import Spectrum
 
         position, direction = vec3(world[:3, 3]), vec3(-_unit(world[:3, 2]))
-        extras = entry.get("extras") if isinstance(entry.get("extras"), dict) else {}
-        own = extras.get(EXTRAS, {}).get("light")
+        own = own_extras(entry).get("light")
         if own is not None:
             cls = LIGHT_KINDS.get(own.get("kind", "point"), Light)
             placed: dict[str, Any] = {"position": list(position)} if cls.has_place else {}

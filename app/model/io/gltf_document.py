@@ -92,7 +92,7 @@ class GltfDocument:
     def _view(self, label: str, index: Any, offset: int, dtype: np.dtype, width: int, count: int) -> np.ndarray:
         view = self.item("bufferViews", index)
         data = self.buffer(view.get("buffer"))
-        start, length = view.get("byteOffset", 0), view.get("byteLength")
+        start, length = view.get("byteOffset", 0), view.get("byteLength", -1)
         stride = view.get("byteStride") or width * dtype.itemsize
         numbers = (start, length, stride, offset, count)
         if not all(isinstance(n, int) and n >= 0 for n in numbers) or stride < width * dtype.itemsize:

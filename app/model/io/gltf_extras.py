@@ -17,7 +17,7 @@ from ..scene_environment import environment_values, read_environment
 from ..scene_render import read_render, render_values
 from ..texture import Environment
 from .gltf_document import GltfDocument
-from .gltf_materials import EXTRAS
+from .gltf_materials import EXTRAS, own_extras
 from .scene_table import SceneTable
 
 _SCENE = "scene"
@@ -26,7 +26,7 @@ _SCENE = "scene"
 def read_node_dabs(document: GltfDocument, index: int, number: int, material: Material) -> tuple[Dab, ...]:
     """Dabs on primitive `number` of node `index`, in the mesh's own coordinates."""
     where = f"nodes[{index}].extras.{EXTRAS}"
-    kept = SceneTable(_own(document.item("nodes", index)), document.path, where)
+    kept = SceneTable(own_extras(document.item("nodes", index)), document.path, where)
     found: tuple[Dab, ...] = ()
     for entry in kept.tables(KEY):
         if entry.integer("primitive", 0, at_least=0, at_most=1 << 31) == number:
@@ -42,7 +42,7 @@ def write_node_dabs(node: dict[str, Any], dabs: Mapping[int, Sequence[Dab]]) -> 
 
 def read_scene_extras(document: GltfDocument, notes: list[str]) -> tuple[Vec3, Environment | None, RenderDefaults]:
     """Background, environment and render defaults; those of an empty scene file where there are none."""
-    values = _own(document.json).get(_SCENE, {})
+    values = own_extras(document.json).get(_SCENE, {})
     table = SceneTable(values if isinstance(values, dict) else {}, document.path, f"extras.{EXTRAS}.{_SCENE}")
     background, environment = read_environment(table, notes)
     return background, environment, read_render(table.table("render"))
@@ -62,15 +62,9 @@ def write_scene_extras(json: dict[str, Any], scene: Scene, path: Path) -> None:
     _keep(json, _SCENE, None if (scene.background_rgb, scene.environment, scene.render) == usual else told)
 
 
-def _own(entry: Mapping[str, Any]) -> dict[str, Any]:
-    extras = entry.get("extras")
-    own = extras.get(EXTRAS) if isinstance(extras, dict) else None
-    return own if isinstance(own, dict) else {}
-
-
 def _keep(entry: dict[str, Any], key: str, value: object) -> None:
     """Set or (None) remove `key` of our extras; nothing else is touched, and no empty dictionary stays behind."""
-    own = _own(entry)
+    own = own_extras(entry)
     if value is None and key not in own:
         return
     changed = {k: v for k, v in own.items() if k != key} | ({} if value is None else {key: value})

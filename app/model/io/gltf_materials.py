@@ -9,6 +9,7 @@ anything else a diffuse surface.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from ..materials.material_file import read_material
@@ -21,6 +22,7 @@ from ..scene import (
     Material,
     Mirror,
 )
+from ..vectors import vec3
 from .gltf_document import GltfDocument
 from .gltf_textures import GltfTextures
 from .scene_table import SceneTable
@@ -32,6 +34,13 @@ _MIRROR_ROUGHNESS = 0.2
 _BASE_COLOUR = "baseColorTexture"
 
 
+def own_extras(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """What an entry's extras hold of ours; empty where there is nothing."""
+    extras = entry.get("extras")
+    own = extras.get(EXTRAS) if isinstance(extras, dict) else None
+    return own if isinstance(own, dict) else {}
+
+
 def read_gltf_material(document: GltfDocument, index: int | None, textures: GltfTextures, notes: list[str]) -> Material:
     """Material `index` of the document, None being glTF's default; what was assumed goes to `notes`."""
     if index is None:
@@ -39,18 +48,17 @@ def read_gltf_material(document: GltfDocument, index: int | None, textures: Gltf
     values = document.item("materials", index)
     label = f"material '{values.get('name', index)}'"
     where = f"{document.path.name}: materials[{index}]"
-    extras = values.get("extras") if isinstance(values.get("extras"), dict) else {}
-    own = extras.get(EXTRAS) if isinstance(extras.get(EXTRAS), dict) else {}
+    own, extras = own_extras(values), values.get("extras")
     if "material" in own:
         table = SceneTable(own["material"], document.path, f"materials[{index}].extras.{EXTRAS}.material")
         return _with_textures_told(read_material(table), values, label, notes)
-    named = own.get("glass", extras.get("glass"))
+    named = own.get("glass", extras.get("glass") if isinstance(extras, dict) else None)
     extensions = values.get("extensions", {})
     if named is not None:
         dispersion = catalogue.find(str(named), f"{where}.extras.glass")
         return _with_textures_told(Dielectric(dispersion, _absorption(extensions, where)), values, label, notes)
     pbr = values.get("pbrMetallicRoughness", {})
-    rgb = tuple(min(1.0, max(0.0, float(c))) for c in (*pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)),)[:3])
+    rgb = vec3(min(1.0, max(0.0, float(c))) for c in (*pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)),)[:3])
     roughness = float(pbr.get("roughnessFactor", 1.0))
     transmission = float(extensions.get(TRANSMISSION, {}).get("transmissionFactor", 0.0))
     if transmission >= 0.5:
@@ -96,7 +104,7 @@ def _glass(document: GltfDocument, values: dict[str, Any], label: str, where: st
 def _absorption(extensions: dict[str, Any], where: str) -> Absorption | None:
     volume = extensions.get(VOLUME, {})
     distance = float(volume.get("attenuationDistance", math.inf))
-    colour = tuple(float(c) for c in volume.get("attenuationColor", (1.0, 1.0, 1.0)))
+    colour = vec3(float(c) for c in volume.get("attenuationColor", (1.0, 1.0, 1.0)))
     if math.isinf(distance) or colour == (1.0, 1.0, 1.0):
         return None
     return Absorption(attenuation_from_colour(colour, distance, f"{where}.extensions.{VOLUME}.attenuationDistance"))
@@ -117,7 +125,7 @@ def write_gltf_material(values: dict[str, Any], material: Material, thickness: f
     extras.pop("glass", None)
     rgb = (1.0, 1.0, 1.0)
     metallic, roughness = 0.0, 0.0
-    if material.transmits:
+    if isinstance(material, Dielectric):
         extensions |= _glass_extensions(material, thickness)
     elif material.is_mirror:
         rgb, metallic = material.reflectance_rgb, 1.0

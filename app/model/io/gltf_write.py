@@ -68,7 +68,7 @@ class _Writer:
         self._data = bytearray()
         self._textures = TextureWriter(self.json, self._view, origins.textures)
         self._materials: dict[str, int] = {}
-        self._meshes: dict[tuple[int, int], int] = {}
+        self._meshes: dict[tuple[int, int | None], int] = {}
         self._geometry: dict[int, dict[str, Any]] = {}
         self._keep: list[Mesh] = []
         self._used: set[str] = set()
@@ -222,9 +222,9 @@ class _Writer:
     # -- lights and camera ----------------------------------------------------------------
 
     def _lights(self, scene: Scene) -> None:
-        for name, node in self.origins.lights.items():
+        for name, index in self.origins.lights.items():
             if name not in {light.name for light in scene.lights}:
-                del self.json["nodes"][node]["extensions"][LIGHTS]
+                del self.json["nodes"][index]["extensions"][LIGHTS]
         for light in scene.lights:
             node = self.origins.lights.get(light.name)
             old = self.old_lights.get(light.name)
@@ -263,8 +263,8 @@ class _Writer:
             cone = {"innerConeAngle": min(inner, outer - 1e-6), "outerConeAngle": outer}
             entry |= {"type": SpotLight.kind, "spot": cone}
         own = {k: v for k, v in light_values(light, self.path).items() if k not in ("position", "direction", "tangent")}
-        extras = entry.get("extras") if isinstance(entry.get("extras"), dict) else {}
-        entry["extras"] = extras | {EXTRAS: {"light": own}}
+        extras = entry.get("extras")
+        entry["extras"] = (extras if isinstance(extras, dict) else {}) | {EXTRAS: {"light": own}}
         self._used.add(LIGHTS)
         lights = self.json.setdefault("extensions", {}).setdefault(LIGHTS, {}).setdefault("lights", [])
         lights.append(entry)
@@ -273,6 +273,7 @@ class _Writer:
     def _camera(self, camera: Camera) -> None:
         offset = np.subtract(camera.target, camera.position)
         aspect = {"aspectRatio": 16.0 / 9.0}
+        lens: dict[str, Any]
         if camera.kind == "orthographic":
             half = 0.5 * camera.vertical_extent
             lens = {"type": "orthographic", "orthographic": {"xmag": half * 16.0 / 9.0, "ymag": half}}
@@ -328,7 +329,7 @@ class _Writer:
     def _accessor(self, values: np.ndarray, kind: str, target: int, bounds: bool = False) -> int:
         view = self._view(np.ascontiguousarray(values).tobytes(), target=target)
         component = 5126 if values.dtype.kind == "f" else 5125
-        entry = {"bufferView": view, "componentType": component}
+        entry: dict[str, Any] = {"bufferView": view, "componentType": component}
         entry |= {"count": len(values), "type": kind}
         if bounds:
             entry |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}

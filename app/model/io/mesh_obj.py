@@ -88,6 +88,7 @@ def _uniform_faces(rows: list[str]) -> tuple[np.ndarray, np.ndarray] | None:
     text = " ".join(rows)
     if "-" in text or text.count("/") != len(rows) * size * (len(parts) - 1):
         return None
+    columns: tuple[int, ...] = tuple(range(len(parts)))
     if len(parts) == 3 and parts[1] == "":
         text, columns = text.replace("//", " "), (_POSITION, _NORMAL)
         if "/" in text:
@@ -95,7 +96,6 @@ def _uniform_faces(rows: list[str]) -> tuple[np.ndarray, np.ndarray] | None:
     elif "//" in text:
         return None
     else:
-        columns = tuple(range(len(parts)))
         text = text.replace("/", " ")
     try:
         values = np.array(text.split(), dtype=np.int64)

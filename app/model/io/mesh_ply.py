@@ -180,8 +180,10 @@ class _BinaryBody:
 
     def _walk(self, element: _Element) -> dict:
         """Row by row, for lists of differing lengths."""
-        lists = {p.name: ([], []) for p in element.properties if p.count_kind is not None}
-        scalars = {p.name: [] for p in element.properties if p.count_kind is None}
+        lists: dict[str, tuple[list[int], list[np.ndarray]]] = {
+            p.name: ([], []) for p in element.properties if p.count_kind is not None
+        }
+        scalars: dict[str, list[float]] = {p.name: [] for p in element.properties if p.count_kind is None}
         for row in range(element.count):
             for p in element.properties:
                 width = np.dtype(p.kind).itemsize
@@ -245,8 +247,10 @@ class _AsciiBody:
         return self._walk(element)
 
     def _walk(self, element: _Element) -> dict:
-        lists = {p.name: ([], []) for p in element.properties if p.count_kind is not None}
-        scalars = {p.name: [] for p in element.properties if p.count_kind is None}
+        lists: dict[str, tuple[list[int], list[np.ndarray]]] = {
+            p.name: ([], []) for p in element.properties if p.count_kind is not None
+        }
+        scalars: dict[str, list[float]] = {p.name: [] for p in element.properties if p.count_kind is None}
         values, at, end = self._values, self._at, len(self._values)
         for row in range(element.count):
             for p in element.properties:

@@ -36,10 +36,11 @@ def read_picture(path: str | os.PathLike[str]) -> tuple[np.ndarray, tuple[str, .
         raise UserError(
             f"cannot read {path}: '{suffix}' is not a picture format; use one of {', '.join(PICTURE_SUFFIXES)}"
         )
+    notes: tuple[str, ...] = ()
     if suffix in (".exr", ".npy"):
         from ...base.image_io import read_image
 
-        rgb, notes = read_image(path).rgb, ()
+        rgb = read_image(path).rgb
     else:
         data = _bytes_of(path)
         if suffix in (".hdr", ".pic"):
@@ -74,9 +75,9 @@ def decode_8bit(data: bytes, where: str) -> tuple[np.ndarray, tuple[str, ...]]:
             raise UserError(
                 f"{where}: more than 8 bits a channel in a grey PNG are not understood; save it as 8 bit or as .exr"
             )
-        image = ImageOps.exif_transpose(image)
-        notes = _transparency(image, where)
-        encoded = np.asarray(image.convert("RGB"))
+        upright = ImageOps.exif_transpose(image)
+        notes = _transparency(upright, where)
+        encoded = np.asarray(upright.convert("RGB"))
     except UnidentifiedImageError as error:
         raise UserError(
             f"{where}: this is neither a PNG nor a JPEG picture; check the suffix or export it again"

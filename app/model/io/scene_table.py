@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, cast
 
 from ...base.errors import UserError, nearest_names
 from ..vectors import Vec3
@@ -168,7 +168,7 @@ class SceneTable:
         vector = self.numbers(key, default, count=3)
         if nonzero and vector is not default and math.hypot(*vector) < 1e-150:
             self.fail(key, "is the zero vector and has no direction")
-        return vector
+        return cast(Vec3, vector)
 
     def unit_vector(self, key: str, default: Any = REQUIRED) -> Vec3:
         """A direction, normalised."""

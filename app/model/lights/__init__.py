@@ -1,9 +1,8 @@
 """Kinds of light, one class each: this is the list of them.
 
 A new kind is a file here and its name in `LIGHT_KINDS`; the scene file, saving, glTF, the panel, presets and
-animation follow from what the class declares. Where it shines as no kind does yet, it also wants its emission in
-`shaders/light/emit.comp` with its domain in `passes/emission_domain.py`, its direct light in `shaders/lib/lights.glsl`,
-and both again in the two references (`reference/photon_emit.py`, `reference/camera_lights.py`).
+animation follow from what the class declares. Where it shines as no kind does yet, CONTRIBUTING.md lists what it also
+wants in shaders and references.
 """
 
 from __future__ import annotations

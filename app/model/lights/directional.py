@@ -50,7 +50,11 @@ class DirectionalLight(Light):
     numbers: ClassVar = (_DIAMETER,)
     has_place: ClassVar = False
     is_parallel: ClassVar = True
-    is_disc: ClassVar = True
+
+    @property
+    def is_disc(self) -> bool:
+        """The sun's."""
+        return True
 
     @property
     def angular_radius(self) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, cast
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from ..fields import Animated, Number, Part, Row
 from ..io.scene_table import MAX_MAGNITUDE, SceneTable
 from ..optics.spectrum import Spectrum
 from ..vectors import Vec3
+
+if TYPE_CHECKING:
+    from .ies_file import Profile
 
 DEFAULT_ILLUMINANCE = 3.0
 """Lumen per square unit on a plane across the light where a file states no power: with
@@ -110,26 +113,45 @@ class Light:
     is_intensity: ClassVar[bool] = False
     """Whether its quantity is an intensity, which falls off with distance²."""
     # What a kind may have as attributes, without annotations: an annotated one would order the kinds' own fields.
-    profile = None
+    profile = cast("Profile | None", None)
     """Table of its intensity over directions, where it has one."""
-    across = (np.zeros(3), np.zeros(3))
-    """Directions in which the profile's horizontal angle is 0 and 90°."""
     position = (0.0, 0.0, 0.0)
     direction = (0.0, 0.0, -1.0)
     """Unit propagation direction of the axis."""
-    tangent = None
+    tangent = cast(Vec3 | None, None)
     """Direction of a rectangle's width; None picks one."""
     shape = "disc"
     """Outline, where it has one."""
-    is_disc = False
-    half_extent = (0.0, 0.0)
-    """Half of its width and height, scene units."""
-    area = 0.0
-    """Scene units²."""
-    angular_radius = 0.0
-    """Of what is infinitely far away, rad."""
-    cone = (4.0, 4.0)
-    """Inner and outer half angle of its cone, rad; beyond π for none."""
+
+    @property
+    def across(self) -> tuple[np.ndarray, np.ndarray]:
+        """Directions (3,) in which the profile's horizontal angle is 0 and 90°."""
+        return np.zeros(3), np.zeros(3)
+
+    @property
+    def is_disc(self) -> bool:
+        """Its outline is round."""
+        return False
+
+    @property
+    def half_extent(self) -> tuple[float, float]:
+        """Half of its width and height, scene units."""
+        return 0.0, 0.0
+
+    @property
+    def area(self) -> float:
+        """Scene units²."""
+        return 0.0
+
+    @property
+    def angular_radius(self) -> float:
+        """Of what is infinitely far away, rad."""
+        return 0.0
+
+    @property
+    def cone(self) -> tuple[float, float]:
+        """Inner and outer half angle of its cone, rad; beyond π for none."""
+        return 4.0, 4.0
 
     @property
     def has_extent(self) -> bool:

@@ -1,9 +1,8 @@
 """Kinds of material, one class each: this is the list of them.
 
-A new kind is a file here and its name in `MATERIAL_KINDS`; the scene file, saving, glTF's extras and reports follow
-from what the class declares. Where light meets it as no kind does yet, it also wants a KIND_ in
-`shaders/lib/scene.glsl`, what happens there in `shaders/light/trace.comp` and `shaders/camera/camera.comp`, and the
-same in the two references (`reference/photon_kernel.py`, `reference/camera_kernel.py`).
+A new kind is a file here and its name in `MATERIAL_KINDS`; the scene file, saving, glTF's extras, the inspector's rows
+and reports follow from what the class declares. Where light meets it as no kind does yet, CONTRIBUTING.md lists what
+it also wants in shaders and references.
 """
 
 from __future__ import annotations

@@ -101,7 +101,7 @@ class Grating(Material):
     parts: ClassVar = (_LINES, _Orders(), _REFLECTS, Direction("direction", (0.0, 1.0, 0.0)))
     is_specular: ClassVar = True
     is_grating: ClassVar = True
-    dispersion: ClassVar = WAVELENGTH
+    dispersion = WAVELENGTH
 
     @property
     def shift_per_um(self) -> np.ndarray:

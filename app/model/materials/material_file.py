@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from ...base.errors import suggestion
 from ..io.scene_table import SceneTable
 from ..scene_textures import TextureReader
@@ -44,11 +42,11 @@ def read_object_material(
     if table.has(GAIN):
         if not material.transmits:
             table.fail(GAIN, "is for glass; this object has none")
-        material = replace(material, dispersion=with_gain(table, material.dispersion))
+        material = material.changed(dispersion=with_gain(table, material.dispersion))
     if table.has("priority"):
         if not material.transmits:
             table.fail("priority", "decides between overlapping solids of glass; this object has none")
-        material = replace(material, **PRIORITY.read(table))
+        material = material.changed(**PRIORITY.read(table))
     return material
 
 

@@ -11,11 +11,13 @@ from __future__ import annotations
 import difflib
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import cast
 
 import msgspec
 
 from ...base.errors import UserError
 from ...base.paths import assets_dir
+from .dispersion_formulas import Kind
 from .glass import Dispersion
 
 MAKER_ORDER = ("Materials", "Schott", "Ohara", "Hoya", "CDGM", "Hikari", "Sumita", "LZOS", "Cargille")
@@ -48,7 +50,7 @@ class Entry:
     def dispersion(self) -> Dispersion:
         """n(λ) of this entry; its `name` is the qualified name."""
         kind = f"formula {self.kind}" if isinstance(self.kind, int) else self.kind
-        return Dispersion(self.qualified_name, kind, self.coefficients, self.range_nm)
+        return Dispersion(self.qualified_name, cast(Kind, kind), self.coefficients, self.range_nm)
 
 
 def search_key(text: str) -> str:

@@ -38,11 +38,11 @@ def relative_luminance(sky_type: int, toward_sky: np.ndarray, toward_sun: np.nda
     """
     a, b, c, d, e = SKY_TYPES[sky_type]
 
-    def gradation(cosine_of_zenith: np.ndarray) -> np.ndarray:
+    def gradation(cosine_of_zenith: np.ndarray | float) -> np.ndarray:
         # φ(90°) is 1: the exponential has gone long before the smallest cosine kept here.
         return 1.0 + a * np.exp(b / np.maximum(cosine_of_zenith, 2e-3))
 
-    def indicatrix(cosine_to_sun: np.ndarray) -> np.ndarray:
+    def indicatrix(cosine_to_sun: np.ndarray | float) -> np.ndarray:
         angle_rad = np.arccos(np.clip(cosine_to_sun, -1.0, 1.0))
         return 1.0 + c * (np.exp(d * angle_rad) - math.exp(0.5 * math.pi * d)) + e * np.square(cosine_to_sun)
 

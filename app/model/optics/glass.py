@@ -63,7 +63,7 @@ class Dispersion:
     def n_d(self) -> float:
         """Index at the helium line d, 587.56 nm."""
         d_um = min(max(LINE_D_NM, self.range_nm[0]), self.range_nm[1]) * 1e-3
-        return float(formulas.evaluate(self.kind, self.coefficients, np.float64(d_um))[0])
+        return float(formulas.evaluate(self.kind, self.coefficients, np.asarray(d_um))[0])
 
     @cached_property
     def V_d(self) -> float:
@@ -91,7 +91,8 @@ class Dispersion:
 
     def notes(self) -> list[str]:
         """What a user should know about these data, one sentence each (often none)."""
-        told = [self.clamps_visible()] if self.clamps_visible() else []
+        clamped = self.clamps_visible()
+        told = [clamped] if clamped else []
         label = self.name or "the index"
         n = self.index(_CHECK_NM)
         if self.gain != 1.0:
@@ -201,7 +202,9 @@ def from_formula(
     return _checked(Dispersion(name, kind, values, range_nm or _ALL_WAVELENGTHS), where)
 
 
-def table(wavelength_nm: Sequence[float], n: Sequence[float], name: str = "", where: str = "") -> Dispersion:
+def table(
+    wavelength_nm: Sequence[float] | np.ndarray, n: Sequence[float] | np.ndarray, name: str = "", where: str = ""
+) -> Dispersion:
     """Measured n at given wavelengths (nm), two or more and ascending.
 
     Interpolated by a monotone cubic (PCHIP) in λ⁻², clamped at both ends.

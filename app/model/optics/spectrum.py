@@ -246,15 +246,16 @@ def read_csv(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
         if not cells:
             continue
         parsed = [_number(cell) for cell in cells]
-        if header_allowed and all(value is None for value in parsed):
+        numbers = [value for value in parsed if value is not None]
+        if header_allowed and not numbers:
             header_allowed = False
             continue
         header_allowed = False
-        if len(parsed) != 2 or None in parsed:
+        if len(parsed) != 2 or len(numbers) != 2:
             raise UserError(
                 f"{shown}, line {number}: expected two numbers, wavelength_nm and power, but found '{raw.strip()}'"
             )
-        wavelength, value = parsed
+        wavelength, value = numbers
         if not (math.isfinite(wavelength) and math.isfinite(value)):
             raise UserError(f"{shown}, line {number}: '{raw.strip()}' holds no finite number; remove the row")
         rows.append((wavelength, value))

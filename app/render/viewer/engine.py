@@ -181,7 +181,7 @@ class LiveEngine:
         """Bring what is shown nearer to what is wanted."""
         due = self.schedule.wish_is_due
         level = self._level if due else DirtyLevel.NOTHING
-        moves = due and self._inputs is not None and _moves_view(self._inputs, self._wanted)
+        moves = due and _moves_view(self._inputs, self._wanted)
         self._tell(events.Examined(self._camera, level, moves), budget_s)
 
     def _work(self, deadline: float, budget_s: float) -> None:
@@ -482,5 +482,7 @@ class LiveEngine:
         self._shown = self._maps = self._picker = None
 
 
-def _moves_view(before: LiveInputs, after: LiveInputs) -> bool:
+def _moves_view(before: LiveInputs | None, after: LiveInputs | None) -> bool:
+    if before is None or after is None:
+        return False
     return (before.camera, before.width, before.height) != (after.camera, after.width, after.height)

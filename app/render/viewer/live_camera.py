@@ -55,7 +55,7 @@ class LiveCamera:
         self.target_samples = target_samples
         self._pass: CameraPass | None = None
         self._pictures: TextureStore | None = None
-        self._average = shader.compute(context.ctx, "light/average.comp")
+        self._average = shader.compute(context.ctx, "camera/average.comp")
         self._steps: Iterator[float] | None = None
         self._choosing: Iterator[float] | None = None
         self._maps: CausticMaps | None = None

@@ -78,5 +78,4 @@ class SpectrumGuess:
 
     def release(self) -> None:
         """Free everything."""
-        for owned in (self._program, self._weights, *self.textures):
-            shader.release(owned)
+        shader.release(self._program, self._weights, *self.textures)

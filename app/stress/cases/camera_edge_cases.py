@@ -73,7 +73,7 @@ def measure_margin(context: Context) -> Iterator[Measurement]:
     """Both sides of the edge: before it little leaves and most is reflected, beyond it all is."""
     critical = float(np.arcsin(1.0 / INDEX))
     for margin in MARGINS:
-        judged, total = Judged(), None
+        judged, sights = Judged(), []
         for side in (-1.0, 1.0):
             outline = trapezium(critical + side * margin)
             scene = with_sky(
@@ -88,7 +88,8 @@ def measure_margin(context: Context) -> Iterator[Measurement]:
             judged.hold(
                 "inside the edge" if side < 0 else "beyond the edge", np.abs(sight.mean / expected - 1.0).max(), slack
             )
-            total = sight if total is None else replace(total, nonfinite=total.nonfinite + sight.nonfinite)
+            sights.append(sight)
+        total = replace(sights[0], nonfinite=sum(sight.nonfinite for sight in sights))
         yield measurement_of(margin, f"{margin:g} rad", total, judged)
 
 
@@ -122,6 +123,7 @@ def measure_cut(context: Context) -> Iterator[Measurement]:
                 look_with(camera_pass, scene.camera, FEW, bands),
                 look_with(camera_in_bins, scene.camera, settings, bands),
             )
+            assert spectral.spectral is not None
             got = spectral.spectral.mean(axis=(0, 1)) / white
             judged = Judged().hold("colour", np.abs(sight.mean - daylight_mean(through)).max(), 0.12 / bands + 2e-3)
             judged.hold("spectrum", np.abs(got - want).max(), 0.4 / bands + 2e-3)

@@ -194,6 +194,7 @@ def _checked(camera: Camera, *objects: SceneObject) -> Scene:
     checks = (np.indices((1024, 1024)).sum(axis=0) % 2).astype(np.float32)
     side = 64.0
     uv_side = plane(side, side)
+    assert uv_side.uv is not None
     mesh = replace(uv_side, uv=uv_side.uv * side)
     elevation = np.radians(1.0)
     power = illuminant("D65").scaled_to_luminous(2.0 * np.pi * GREY / np.sin(elevation))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -157,7 +158,7 @@ class Lamp:
     bound: float = 0.0
 
 
-def _lamp(vertical_deg: Sequence[float], share: Sequence[float], **placed: object) -> Light:
+def _lamp(vertical_deg: Sequence[float], share: Sequence[float], **placed: Any) -> Light:
     """A lamp that is the same all the way round."""
     intensity = np.array([share, share], float)
     profile = Profile(np.array(vertical_deg, float), np.array([0.0, 360.0]), intensity, 1.0, "")

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -296,7 +297,7 @@ def _passes(context: Context, scene: Scene) -> Iterator[Measurement]:
 
 def _dispersions(context: Context, scene: Scene) -> Iterator[Measurement]:
     for v_d in ABBE_NUMBERS:
-        bent = with_glass(scene, lambda glass, v_d=v_d: _dispersive(glass, v_d))
+        bent = with_glass(scene, partial(_dispersive, v_d=v_d))
         yield against_single_wavelengths(context, bent, v_d, f"V_d {v_d:g}")
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...gpu.context import Context
 from ...gpu.scene_buffers import Groups, SceneBuffers
@@ -31,6 +32,7 @@ from ...model.scene import (
     SceneObject,
 )
 from ...model.settings import RenderSettings
+from ...model.vectors import vec3
 from ...passes.emission_domain import emission_domain, orthonormal_frame
 from ...passes.trace import Band, FluxTally, LatticeSlice, TracePass
 from ...reference.emission import Emitter
@@ -142,7 +144,7 @@ def glass(name: str) -> Dielectric:
     return Dielectric(sellmeier(*sellmeier_terms(name), name=name))
 
 
-def screen(centre: np.ndarray, normal: np.ndarray, half: float = 50.0) -> Mesh:
+def screen(centre: ArrayLike, normal: ArrayLike, half: float = 50.0) -> Mesh:
     """A square of side 2·half across `normal`."""
     side, up = orthonormal_frame(unit(np.asarray(normal, float)))
     corners = [np.asarray(centre) + half * (s * side + t * up) for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
@@ -231,10 +233,14 @@ def trace_light(
         buffers.release()
 
 
-def beam_light(start: np.ndarray, direction: np.ndarray, radius: float) -> Light:
+def beam_light(start: ArrayLike, direction: ArrayLike, radius: float) -> Light:
     """Collimated white light from a disc."""
     return CollimatedLight(
-        "beam", constant(1.0), position=tuple(start), direction=tuple(unit(np.asarray(direction, float))), radius=radius
+        "beam",
+        constant(1.0),
+        position=vec3(np.asarray(start)),
+        direction=tuple(unit(np.asarray(direction, float))),
+        radius=radius,
     )
 
 
@@ -243,8 +249,8 @@ def trace_beam(
     solid: Mesh | Sequence[SceneObject],
     material: Dielectric | Mirror | None,
     screen_mesh: Mesh,
-    start: np.ndarray,
-    direction: np.ndarray,
+    start: ArrayLike,
+    direction: ArrayLike,
     radius: float,
     nm: float | tuple[float, float] | Sequence[tuple[float, float]],
     count: int = 256,

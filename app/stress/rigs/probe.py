@@ -69,10 +69,9 @@ class WatchedRecords:
         dropped = (photons["flags"] & records.FLAG_FOOTPRINT_DROPPED) != 0
         self.dropped += int(dropped.sum())
         # A dropped footprint's columns are never read again, everything else always is.
-        columns = [name for name in photons.dtype.names if name.startswith("dposition")]
-        floats = [
-            name for name in photons.dtype.names if photons.dtype[name].base == np.float32 and name not in columns
-        ]
+        names = photons.dtype.names or ()
+        columns = [name for name in names if name.startswith("dposition")]
+        floats = [name for name in names if photons.dtype[name].base == np.float32 and name not in columns]
         bad = np.zeros(len(photons), bool)
         for name in floats:
             bad |= ~_finite_rows(photons[name])

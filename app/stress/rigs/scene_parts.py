@@ -124,7 +124,7 @@ def with_glass(scene: Scene, change: Callable[[Dispersion], Dispersion]) -> Scen
     def changed(item: SceneObject) -> SceneObject:
         if not item.material.transmits:
             return item
-        return replace(item, material=replace(item.material, dispersion=change(item.material.dispersion)))
+        return replace(item, material=item.material.changed(dispersion=change(item.material.dispersion)))
 
     return replace(scene, objects=tuple(changed(item) for item in scene.objects))
 
@@ -144,4 +144,4 @@ def _thinner(item: SceneObject, scale: float) -> SceneObject:
     if material.absorption is None:
         return item
     absorption = replace(material.absorption, coefficient=material.absorption.coefficient / scale)
-    return replace(item, material=replace(material, absorption=absorption))
+    return replace(item, material=material.changed(absorption=absorption))

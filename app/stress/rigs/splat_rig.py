@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import moderngl
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...bench.splat_speed import SplatFeatures
 from ...gpu.map_channels import MapChannels
@@ -70,9 +71,9 @@ class Rig:
 def photons(
     features: SplatFeatures,
     centre: np.ndarray,
-    axis_s: np.ndarray = (0.0, 0.0),
-    axis_t: np.ndarray = (0.0, 0.0),
-    chord: np.ndarray = (0.0, 0.0),
+    axis_s: ArrayLike = (0.0, 0.0),
+    axis_t: ArrayLike = (0.0, 0.0),
+    chord: ArrayLike = (0.0, 0.0),
     x_lo: float = 0.0,
     x_hi: float = 1.0,
     x_anchor: float | None = None,

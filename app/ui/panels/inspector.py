@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from imgui_bundle import imgui
 
 from ...edit import edits, environments
 from ...edit.state import State
-from ...model.fields import Flag
 from ...model.materials import MATERIAL_KINDS
 from ...model.scene import (
     Grating,
@@ -21,6 +19,7 @@ from ...model.scene import (
 from .. import theme
 from ..view_model import ViewModel
 from . import outliner, picture_choice, widgets
+from .declared_rows import draw_flags, draw_numbers
 from .environment_rows import draw_environment
 
 _KINDS = {cls.title: cls for cls in MATERIAL_KINDS.values()}
@@ -127,11 +126,12 @@ def _material(state: State, view_model: ViewModel, index: int) -> State:
     if material.is_black:
         widgets.hint("Absorbs all light that meets it.")
         return state
+    state = _declared(state, index, material)
     if isinstance(material, Grating):
-        return _grating(state, index, material)
+        _orders(material)
     if material.receives:
         state = _texture(state, view_model, index, material)
-    return _colour(state, index, material)
+    return _colour(state, index, material) if material.receives or material.is_mirror else state
 
 
 def _fresh(kind: str) -> Material:
@@ -156,37 +156,20 @@ def _glass(state: State, material: Material) -> State:
     return state
 
 
-def _grating(state: State, index: int, material: Grating) -> State:
-    name = state.scene.objects[index].name
-    wanted: dict[str, Any] = {}
-    for number in material.shown_numbers():
-        row = number.row
-        assert row is not None
-        changed, value, active = widgets.drag(
-            row.label,
-            getattr(material, number.attribute),
-            row.low,
-            row.high,
-            unit=number.unit,
-            tip=row.tip,
-            format=row.format,
-            reset=row.reset,
-            logarithmic=True,
-        )
-        state = widgets.holding(state, active)
-        if changed:
-            wanted[number.attribute] = value
-    for part in material.parts:
-        if isinstance(part, Flag) and part.row is not None:
-            changed, on = widgets.toggle(part.row.label, getattr(material, part.attribute), tip=part.row.tip)
-            if changed:
-                wanted[part.attribute] = on
+def _declared(state: State, index: int, material: Material) -> State:
+    """What the kind declares with a row."""
+    changed, active = draw_numbers(material, material.shown_numbers())
+    changed = draw_flags(changed, material.parts)
+    state = widgets.holding(state, active)
+    if changed is material:
+        return state
+    label = f"{material.title} of {state.scene.objects[index].name}"
+    return edits.attempt(state, label, edits.set_material, index, changed)
+
+
+def _orders(material: Grating) -> None:
     told = ", ".join(f"{m:+d}: {e:.0%}" for m, e in zip(material.orders, material.efficiency, strict=True))
     widgets.read_out("Orders", told, tip="Orders that light is sent on in, and the share of it that each gets.")
-    if wanted:
-        changed_material = material.changed(**wanted)
-        state = edits.attempt(state, f"Grating of {name}", edits.set_material, index, changed_material)
-    return state
 
 
 def _texture(state: State, view_model: ViewModel, index: int, material: Material) -> State:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ...edit import edits
 from ...edit.state import State
-from ...model.fields import FileName, Number
+from ...model.fields import FileName
 from ...model.lights import LIGHT_KINDS
 from ...model.scene import Light, Vec3
 from ...model.scene_defaults import environment_of
 from ..view_model import ViewModel
 from . import picture_choice, widgets
+from .declared_rows import draw_numbers
 from .light_spectrum import draw_spectrum_choice
 
 _SHAPES = {"disc": "Disc", "rectangle": "Rectangle"}
@@ -130,31 +130,13 @@ def _draw_size(state: State, index: int) -> State:
     if not light.numbers:
         widgets.hint("A point has no size: shadows and caustics are sharp.")
         return state
-    changed, active = light, False
+    changed = light
     if light.has_outline:
         _, shape = widgets.combo("Shape", _SHAPES, light.shape, tip="Outline of the beam or of the glowing surface.")
         changed = changed.changed(shape=shape)
-    for number in changed.shown_numbers():
-        changed, held = _draw_number(changed, number)
-        active = active or held
+    changed, active = draw_numbers(changed, changed.shown_numbers())
     state = widgets.holding(state, active)
     return state if changed == light else _edit(state, index, changed.fitted(), "Size of")
-
-
-def _draw_number(light: Light, number: Number) -> tuple[Light, bool]:
-    row, value = number.row, getattr(light, number.attribute)
-    assert row is not None
-    high = getattr(light, row.bounded_by) if row.bounded_by else row.high
-    shown: dict[str, Any] = {"unit": number.unit, "tip": row.tip, "format": row.format}
-    if row.is_slider:
-        if row.bounded_by:
-            value, reset = min(value, high), high
-        else:
-            reset = row.reset
-        _, value, active = widgets.slider(row.label, value, row.low, high, reset=reset, **shown)
-    else:
-        _, value, active = widgets.drag(row.label, value, row.low, row.high, logarithmic=True, **shown)
-    return light.changed(**{number.attribute: value}), active
 
 
 # ---- power --------------------------------------------------------------------------------

@@ -1,0 +1,45 @@
+"""Rows of a light or a material that follow from what its class declares: its numbers and its switches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeVar
+
+from ...model.fields import Flag, Number, Part
+from ...model.lights import Light
+from ...model.materials import Material
+from . import widgets
+
+T = TypeVar("T", Light, Material)
+
+
+def draw_numbers(thing: T, numbers: Sequence[Number]) -> tuple[T, bool]:
+    """A row for each number: `thing` as the user left it, and whether a control is held."""
+    held = False
+    for number in numbers:
+        thing, active = _number(thing, number)
+        held = held or active
+    return thing, held
+
+
+def draw_flags(thing: T, parts: Sequence[Part]) -> T:
+    """A switch for each part that is one."""
+    for part in parts:
+        if isinstance(part, Flag) and part.row is not None:
+            changed, on = widgets.toggle(part.row.label, getattr(thing, part.attribute), tip=part.row.tip)
+            thing = thing.changed(**{part.attribute: on}) if changed else thing
+    return thing
+
+
+def _number(thing: T, number: Number) -> tuple[T, bool]:
+    row, value = number.row, getattr(thing, number.attribute)
+    assert row is not None
+    high = getattr(thing, row.bounded_by) if row.bounded_by else row.high
+    shown: dict[str, Any] = {"unit": number.unit, "tip": row.tip, "format": row.format, "reset": row.reset}
+    if row.bounded_by:
+        value, shown["reset"] = min(value, high), high
+    if row.is_slider:
+        changed, new, active = widgets.slider(row.label, value, row.low, high, **shown)
+    else:
+        changed, new, active = widgets.drag(row.label, value, row.low, high, logarithmic=True, **shown)
+    return thing.changed(**{number.attribute: new}) if changed else thing, active
