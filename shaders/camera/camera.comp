@@ -426,6 +426,9 @@ void main()
                 // Light that would still be caught inside is as if it left here.
                 bool specular = !ends && kind != KIND_BLACK, leaves = specular && (event_limit_reached || path.depth >= MAX_DEPTH);
                 if (leaves) atomicAdd(fallbacks[FELL_DEPTH], 1u);
+#ifdef HAS_GRATING
+                WHEN(leaves && kind == KIND_GRATING) path.weight *= efficiency_left(path, hit.object);
+#endif
                 WHEN(ends || leaves) ended[found++] = PathEnd(path, hit, met && ends, same_hit || leaves);
                 goes_on = specular && !leaves;
                 WHEN(goes_on) meet_surface(path, hit, kind, pixel_key);

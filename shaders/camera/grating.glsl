@@ -8,6 +8,8 @@
 
 // On `CameraPath.order`: only that order is left.
 #define ONLY_ORDER 0x80000000u
+// Share of a sample's power below which orders are not all followed: many orders at several gratings would use up its events.
+#define MIN_ORDER_SHARE 0.02
 
 void diffract_path(inout CameraPath path, PathFrame frame, Grating grating, GratingOrder order, uint object, float side, vec3 steps)
 {
@@ -47,6 +49,16 @@ uint chosen_order(inout CameraPath path, uint row, uint first, uint count, uint 
     return chosen;
 }
 
+// What a path stands for that has not met the grating ahead yet, or not with all its orders.
+float efficiency_left(CameraPath path, uint object)
+{
+    uint row = object_at(object).weight_row, first = path.order & ~ONLY_ORDER;
+    uint end = (path.order & ONLY_ORDER) != 0u ? first + 1u : grating_at(row).orders;
+    float left = 0.0;
+    for (uint k = first; k < end; ++k) left += order_at(row, k).efficiency;
+    return left;
+}
+
 // `whole`: the path before its flight here. A path that ends has an inverse probability of 0.
 void meet_grating(inout CameraPath path, CameraPath whole, Hit hit, Triangle facet, uint pixel_key)
 {
@@ -58,7 +70,7 @@ void meet_grating(inout CameraPath path, CameraPath whole, Hit hit, Triangle fac
     bool alone = (path.order & ONLY_ORDER) != 0u;
     uint number = path.order & ~ONLY_ORDER;
     if (!alone && number + 1u < grating.orders) {
-        bool strong = path.depth <= 1 || path.branch_weight * order_at(row, number).efficiency > p.split_threshold;
+        bool strong = path.depth <= 1 || path.branch_weight * order_at(row, number).efficiency > max(p.split_threshold, MIN_ORDER_SHARE);
         if (strong && stack_size >= STACK) atomicAdd(fallbacks[FELL_STACK], 1u);
         if (!strong || stack_size >= STACK) {
             number = chosen_order(whole, row, number, grating.orders, pixel_key);

@@ -433,3 +433,14 @@ def test_picking_follows_the_strongest_order(gl: Context) -> None:
         buffers.release()
     ends = np.array([path.points[-1] for path in found])
     assert np.abs(ends[:, 0] - 0.01 - np.tan(np.arcsin(nm * 6e-4))).max() < 2e-6
+
+
+@pytest.mark.parametrize(("count", "lines"), [(3, 20.0), (11, 20.0), (51, 10.0)])
+def test_two_gratings_of_many_orders_keep_white(gl: Context, count: int, lines: float) -> None:
+    """What a sample cannot follow any more still stands for the light that is left, no more and no less."""
+    camera = Camera((0, 0, 2), (0.2, 0, 0), (0, 1, 0), vertical_fov_deg=30.0)
+    grating = Grating(lines, tuple(range(-(count // 2), count // 2 + 1)), (0.9 / count,) * count)
+    beyond = placed("second", screen(np.array([0.0, 0.0, -0.3]), np.array([0.0, 0.0, 1.0]), 8.0), grating)
+    scene = white_furnace(sheet(grating, 6.0), beyond, camera=camera)
+    picture = render(scene, RenderSettings(width=24, height=16, spp=32), context=gl).rgb
+    assert np.abs(picture - 0.81).max() < 1e-5
