@@ -14,7 +14,8 @@ from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.optics import spectrum
 from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz
 from spectrasplat.passes.accumulate import SeamFold
-from spectrasplat.passes.map_atlas import MapAtlas, pack, placement_rows
+from spectrasplat.gpu.tiles import pack
+from spectrasplat.passes.map_atlas import MapAtlas, placement_rows
 from spectrasplat.stress.rigs.splat_rig import Rig, SplatFeatures, photons
 
 PLAIN = SplatFeatures()
