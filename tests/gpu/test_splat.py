@@ -9,12 +9,12 @@ import pytest
 from reference.splat_reference import splat_image
 from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.gpu.records import FLAG_FOOTPRINT_DROPPED, RECEIVER
+from spectrasplat.gpu.tiles import pack
 from spectrasplat.model.geometry.charts import build_charts
 from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.optics import spectrum
 from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz
 from spectrasplat.passes.accumulate import SeamFold
-from spectrasplat.gpu.tiles import pack
 from spectrasplat.passes.map_atlas import MapAtlas, placement_rows
 from spectrasplat.stress.rigs.splat_rig import Rig, SplatFeatures, photons
 
