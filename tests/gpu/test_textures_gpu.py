@@ -31,7 +31,6 @@ from spectrasplat.model.scene import (
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.model.texture import Environment, Texture
 from spectrasplat.render.light_pass import spectral_axis
-from spectrasplat.render.still import 
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
 COVERS = {
