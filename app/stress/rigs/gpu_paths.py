@@ -27,6 +27,7 @@ from ...model.scene import (
     Dielectric,
     Diffuse,
     Light,
+    Material,
     Mirror,
     Scene,
     SceneObject,
@@ -166,7 +167,7 @@ def extruded(name: str, section: np.ndarray, half: float = 0.5) -> Mesh:
     return make_mesh(name, np.concatenate([low, high]), np.array(caps + sides))
 
 
-def placed(name: str, mesh: Mesh, material: Dielectric | Diffuse | Mirror) -> SceneObject:
+def placed(name: str, mesh: Mesh, material: Material) -> SceneObject:
     """An object where its mesh is."""
     return SceneObject(name, mesh, material)
 
