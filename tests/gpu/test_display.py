@@ -1,4 +1,4 @@
-"""The display pass: tone curves against float64 and against app/base/tone_map.py, false colour, wipe, error map, scaling."""
+"""The display pass: tone curves against float64 and app/base/tone_map.py, false colour, wipe, error map, scaling."""
 
 from __future__ import annotations
 
