@@ -179,7 +179,7 @@ def test_every_forced_feature_compiles_runs_and_keeps_the_map(gl: Context, tmp_p
 
 @pytest.mark.slow
 def test_a_scene_without_dispersion_traces_faster_than_with_columns_forced(gl: Context) -> None:
-    """The shipped twin of `ball` without dispersion: columns, weights and cuts forced in make its trace dearer than any noise.
+    """The shipped twin of `ball` without dispersion: columns and cuts forced in make its trace dearer than any noise.
 
     The smallest cost this can tell from none is the half-width of the interval of two equal programs,
     measured beside it (about 5 % on a busy machine).
