@@ -350,7 +350,8 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 #ifdef ANCHOR_WEIGHTS
     reflectance = vec3(reflectance.y);
 #endif
-    if (!refracted.exists) reflectance = vec3(1.0);
+    // Where only the facet's normal forbids it, nothing is transmitted at any wavelength; at total reflection each has its own share.
+    if (!refracted.exists && cosine2.y > 0.0) reflectance = vec3(1.0);
 #ifdef BAND_CUTS
     float at = splits ? cut_of_band(ray, start, frame, hit.distance, boundary, cosine2) : -1.0, below = 0.0;
     if (at >= 0.0) {
