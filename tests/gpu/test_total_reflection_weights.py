@@ -16,7 +16,7 @@ SEEDS = (1, 2, 3)
 
 
 def test_no_photon_stands_out_at_the_onset_of_total_reflection(gl: Context) -> None:
-    """With one share for the whole band, seeds 1 and 2 have pixels 187 and 76 from the median; the brightest has 301."""
+    """With one share for the whole band, seeds 1 and 2 have pixels 187 and 76 from the median (brightest: 301)."""
     scene = load_scene(shipped_scenes()["lens_text"])
     settings = [RenderSettings(160, 90, photons=100_000, spp=1, layer="caustic", seed=seed) for seed in SEEDS]
     pictures = np.array([render(scene, each, context=gl).rgb for each in settings], float)
