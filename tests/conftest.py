@@ -46,12 +46,13 @@ def strict_floating_point() -> Iterator[None]:
         yield
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def gl():
-    """The session's OpenGL 4.3 context (`spectrasplat.gpu.context.Context`); `gl.ctx` is moderngl's.
+    """A file's OpenGL 4.3 context (`spectrasplat.gpu.context.Context`); `gl.ctx` is moderngl's.
 
-    Tests share compiled programs, as a viewer's edits and a stress run's cases do: most of what they draw are variants
-    of a few scenes, and a software renderer compiles longer than it draws.
+    A file's tests share compiled programs, as a viewer's edits and a stress run's cases do: most of what they draw are
+    variants of a few scenes, and a software renderer compiles longer than it draws. Files share nothing: what one
+    leaves behind must not fail another.
     """
     from spectrasplat.gpu import shader
     from spectrasplat.gpu.context import create_context

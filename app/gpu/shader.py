@@ -168,6 +168,8 @@ def release(*resources: Releasable) -> None:
         if owners is None:
             owned.release()
             continue
+        if owners <= 0:  # given back already
+            continue
         _owners[id(owned)] = owners - 1
         if owners <= 1 and not any(owned is held for programs in _kept.values() for held in programs.values()):
             _drop(owned)
