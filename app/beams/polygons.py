@@ -1,0 +1,145 @@
+"""What beams leave behind: polygons on flat receivers, and pieces that photons have to carry on.
+
+A beam is all light of one lamp that meets the same facets in the same order. Its outline is an intersection of
+half-planes that move with the wavelength; on a flat receiver each is a line, given at both ends of a narrow band of the
+spectral coordinate x (`model.optics.spectral_tables`) and linear in x between them. So the light at a place is that of
+an interval of x, cut out by the lines, times a density: no wavelength has to be sampled.
+
+All arrays are float64 and lengths are in GPU space (`gpu.scene_buffers.GpuSpace`) unless they say otherwise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class BeamPolygons:
+    """Polygons that bands of beams throw on flat receivers; N polygons, E edges, H corners of hulls.
+
+    Place p on a receiver is (u, v) of its plane's frame (`PlaneFrame`, by receiver). At t in [0, 1], where
+    x = x_lo + t (x_hi - x_lo), p is lit where for every edge  a(t) . p + c(t) >= 0, with (a, c) linear in t.
+    """
+
+    light: np.ndarray
+    """int32 (N,), index of the scene's light."""
+    receiver: np.ndarray
+    """int32 (N,), index of the receiver."""
+    source: np.ndarray
+    """int32 (N,), object that the beam met first."""
+    depth: np.ndarray
+    """int32 (N,), specular events on the way."""
+    x_lo: np.ndarray
+    """(N,), start of the band."""
+    x_hi: np.ndarray
+    """(N,), its end; equal to `x_lo` for an emission line: then only the first of each pair of ends counts."""
+    density: np.ndarray
+    """(N, 3), at x_lo, in the middle and at x_hi (a parabola between): flux per scene unit² on the receiver, per unit of
+    the light's spectral power (`SceneBuffers.light_power`, what `emit.comp`'s `weight` multiplies)."""
+    slope: np.ndarray
+    """(N, 2), relative change of the density per GPU unit along u and v, about `centre`; 0 for parallel light."""
+    centre: np.ndarray
+    """(N, 2), where `density` is taken (middle of the band)."""
+    flux: np.ndarray
+    """(N,), what of the light's spectral power the polygon holds at the middle of its band: density integrated over the
+    polygon, per unit of spectral power."""
+    edge_start: np.ndarray
+    """int32 (N + 1,), polygon i has edges edge_start[i] … edge_start[i + 1]."""
+    edges: np.ndarray
+    """(E, 8): a_u, a_v, c, softness at x_lo, the same at x_hi. |a| = 1; a . p + c is the distance inside, GPU units;
+    softness: half width of the penumbra of an extended light there, GPU units, 0: sharp."""
+    hull_start: np.ndarray
+    """int32 (N + 1,), likewise into `hulls`."""
+    hulls: np.ndarray
+    """(H, 2), corners, counter-clockwise, of a convex polygon that holds the lit places of the whole band (penumbra
+    included)."""
+
+    def __len__(self) -> int:
+        return len(self.light)
+
+
+@dataclass(frozen=True)
+class BeamPieces:
+    """Pieces of beams that go on as photons, since what they meet is not flat; M pieces, E edges, H hull corners.
+
+    A piece is a polygon in its light's emission coordinates q = (q_u, q_v) (`EmissionDomain`: GPU units across a
+    parallel light, Lambert's azimuthal plane for one that diverges), on the surface its rays left last. At t in
+    {0, 1/2, 1} of the band a ray of q has origin  X + X_u (q_u - c_u) + X_v (q_v - c_v)  and direction likewise, c the
+    piece's `centre`; between the three a parabola in x. It exists where all edges are >= 0 (linear in t, as in
+    `BeamPolygons`).
+    """
+
+    light: np.ndarray
+    """int32 (M,)."""
+    source: np.ndarray
+    """int32 (M,), object first met."""
+    depth: np.ndarray
+    """int32 (M,), specular events so far, at least 1."""
+    x_lo: np.ndarray
+    x_hi: np.ndarray
+    centre: np.ndarray
+    """(M, 2), q."""
+    position: np.ndarray
+    """(M, 3, 3, 3): [at x_lo, middle, x_hi][X, X_u, X_v][xyz]."""
+    direction: np.ndarray
+    """(M, 3, 3, 3) likewise; the first is a unit vector."""
+    weight: np.ndarray
+    """(M, 3): flux per unit measure of q (scene unit² for parallel light, sr else), per unit of spectral power."""
+    last_triangle: np.ndarray
+    """int32 (M,), some triangle (of the scene's, in the object's order) of the facet that was left last."""
+    last_object: np.ndarray
+    """int32 (M,)."""
+    is_inside: np.ndarray
+    """bool (M,), whether the piece travels on the inner side of `last_object`'s facet."""
+    inside: np.ndarray
+    """uint64 (M,), bit per object of the solids that the piece is inside of."""
+    flux: np.ndarray
+    """(M,), per unit of spectral power, middle of the band."""
+    edge_start: np.ndarray
+    edges: np.ndarray
+    """(E, 6): a_u, a_v, c about q - centre at x_lo, the same at x_hi; |a| = 1."""
+    hull_start: np.ndarray
+    hulls: np.ndarray
+    """(H, 2), q - centre."""
+
+    def __len__(self) -> int:
+        return len(self.light)
+
+
+@dataclass(frozen=True)
+class BeamTally:
+    """Where the light that met flat facets first went, W per light (L,), at the wavelengths followed.
+
+    Sums to `entered` but for `roulette`, whose mean over seeds is 0."""
+
+    entered: np.ndarray
+    deposited: np.ndarray
+    """On flat receivers, as polygons."""
+    handed: np.ndarray
+    """To photons."""
+    absorbed: np.ndarray
+    """In glass, by mirrors and on black."""
+    escaped: np.ndarray
+    lost_depth: np.ndarray
+    lost_numeric: np.ndarray
+    roulette: np.ndarray
+    """What roulette took (> 0) or gave (< 0)."""
+    beams: np.ndarray
+    """int64 (L,), beams followed."""
+
+
+def joined(parts: list[BeamPolygons] | list[BeamPieces]):
+    """One value that holds all of `parts` in order."""
+    kind = type(parts[0])
+    values = {}
+    for field in fields(kind):
+        arrays = [getattr(part, field.name) for part in parts]
+        if field.name.endswith("_start"):
+            ends = np.cumsum([0, *(array[-1] for array in arrays)])
+            arrays = [array[:-1] + end for array, end in zip(arrays, ends, strict=False)] + [ends[-1:]]
+            values[field.name] = np.concatenate(arrays).astype(np.int32)
+        else:
+            values[field.name] = np.concatenate(arrays)
+    return kind(**values)
