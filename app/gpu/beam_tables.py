@@ -23,36 +23,35 @@ if TYPE_CHECKING:
 
 SAMPLES = 4097
 """Of a running integral, equally spaced over x in [0, 1]."""
+WIDTH = SAMPLES + 1
+"""Of the texture: a sample at the end of a curve has a neighbour."""
+PAIRS = SAMPLES // 2
+"""Emission lines in a row."""
 LINE_TOLERANCE = 1e-6
 """How far in x a polygon of no band width may lie from its emission line."""
 
 
 @dataclass(frozen=True)
 class CurveParts:
-    """Which part of which table belongs to each of n polygons."""
+    """Which part of which curve belongs to each of n polygons."""
 
-    first: np.ndarray
-    """uint32 (n,), first value of the table of target 0."""
-    stride: np.ndarray
-    """uint32 (n,), values from one target's table to the next."""
+    row: np.ndarray
+    """int64 (n,), the curve of target 0; those of the other targets follow."""
     place: np.ndarray
-    """float64 (n, 2), where the band begins and ends, in samples of the table."""
+    """float64 (n, 2), where the band begins and ends, in samples of the row."""
 
 
 @dataclass(frozen=True)
 class BeamTables:
     """GPU tables of every light under every reflectance class."""
 
-    buffer: moderngl.Buffer
-    """vec4: `SAMPLES` a (light, class, target), then two a (line, class, target) light by light."""
+    texture: moderngl.Texture
+    """RGBA32F, `WIDTH` samples a row: a row a (light, class, target), then those of the lines, `PAIRS` side by side."""
     targets: int
     classes: int
-    values: np.ndarray
-    """float64 (values, 4), what the buffer holds."""
+    lights: int
     line_x: tuple[np.ndarray, ...]
     """By light: x of its emission lines."""
-    line_first: np.ndarray
-    """int64 (lights,), first value of each light's lines."""
 
     @classmethod
     def build(
@@ -64,40 +63,39 @@ class BeamTables:
         channels: MapChannels = MapChannels(),
     ) -> BeamTables:
         """Tables for the lights' spectra under each reflectance (401,) or None."""
-        targets, x = channels.targets, np.linspace(0.0, 1.0, SAMPLES)
-        smooth, lines, line_x, line_counts = [], [], [], []
-        for light in lights:
-            of_light = [FoldedSpectrum.of(axis, light, reflectance, channels) for reflectance in reflectances]
-            for source in of_light:
-                smooth.append(source.smooth.at(x).reshape(SAMPLES, targets, 4).transpose(1, 0, 2).reshape(-1, 4))
-            energy = np.stack([source.line_energy for source in of_light], axis=1)  # (lines, classes, columns)
-            pairs = np.zeros((*energy.shape[:2], targets, 2, 4))
-            pairs[..., 1, :] = energy.reshape(*energy.shape[:2], targets, 4)
-            lines.append(pairs.reshape(-1, 4))
-            line_x.append(of_light[0].line_x)
-            line_counts.append(len(lines[-1]))
-        values = np.concatenate([*smooth, *lines])
-        first = sum(map(len, smooth)) + np.cumsum([0, *line_counts])[:-1]
-        buffer = ctx.buffer(np.ascontiguousarray(values, np.float32))
-        return cls(buffer, targets, len(reflectances), values, tuple(line_x), first)
+        import moderngl
 
-    def parts(self, light: np.ndarray, reflectance_class: np.ndarray, x_lo: np.ndarray, x_hi: np.ndarray) -> CurveParts:
+        targets, x = channels.targets, np.linspace(0.0, 1.0, SAMPLES)
+        folded = [[FoldedSpectrum.of(axis, light, each, channels) for each in reflectances] for light in lights]
+        curves = np.stack([source.smooth.at(x) for of_light in folded for source in of_light])
+        curves = np.pad(curves, ((0, 0), (0, WIDTH - SAMPLES), (0, 0)), mode="edge")
+        # (lines, classes, columns): line by line, light after light.
+        energy = np.concatenate([np.stack([source.line_energy for source in of_light], 1) for of_light in folded])
+        pairs = np.zeros((-(-energy.shape[0] * energy.shape[1] // PAIRS) * PAIRS, 2, channels.columns))
+        pairs[: energy.shape[0] * energy.shape[1], 1] = energy.reshape(-1, channels.columns)
+        pairs = np.pad(pairs.reshape(-1, 2 * PAIRS, channels.columns), ((0, 0), (0, WIDTH - 2 * PAIRS), (0, 0)))
+        rows = np.concatenate([curves, pairs]).reshape(-1, WIDTH, targets, 4).transpose(0, 2, 1, 3)
+        texels = np.ascontiguousarray(rows.reshape(-1, WIDTH, 4), np.float32)
+        texture = ctx.texture((WIDTH, len(texels)), 4, texels, dtype="f4")
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        return cls(texture, targets, len(reflectances), len(lights), tuple(f[0].line_x for f in folded))
+
+    def parts(self, light: np.ndarray, reflectance_class: int, x_lo: np.ndarray, x_hi: np.ndarray) -> CurveParts:
         """Of polygons (n,) each; raises ValueError where a band of no width is no line of its light."""
         is_line = x_hi <= x_lo
-        first = (light.astype(np.int64) * self.classes + reflectance_class) * self.targets * SAMPLES
+        row = light.astype(np.int64) * self.classes + reflectance_class
         place = np.stack([x_lo, x_hi], axis=1) * (SAMPLES - 1)
-        place[is_line] = 0.0, 1.0
         for index in np.unique(light[is_line]):
             chosen = np.flatnonzero(is_line & (light == index))
-            known = self.line_x[index]
-            apart = np.abs(x_lo[chosen, None] - known)
-            line = apart.argmin(axis=1) if len(known) else np.zeros(len(chosen), int)
-            if not len(known) or np.any(apart[np.arange(len(chosen)), line] > LINE_TOLERANCE):
+            apart = np.abs(x_lo[chosen, None] - self.line_x[index])
+            if not apart.size or apart.min(axis=1).max() > LINE_TOLERANCE:
                 raise ValueError(f"a beam of light {index} has no band width, and lies at none of its emission lines")
-            of_line = (line * self.classes + reflectance_class[chosen]) * self.targets * 2
-            first[chosen] = self.line_first[index] + of_line
-        return CurveParts(first.astype(np.uint32), np.where(is_line, 2, SAMPLES).astype(np.uint32), place)
+            line = apart.argmin(axis=1) + sum(map(len, self.line_x[:index]))
+            pair = line * self.classes + reflectance_class
+            row[chosen] = self.lights * self.classes + pair // PAIRS
+            place[chosen] = (2 * (pair % PAIRS))[:, None] + np.array([0.0, 1.0])
+        return CurveParts(row * self.targets, place)
 
     def release(self) -> None:
-        """Free the buffer."""
-        self.buffer.release()
+        """Free the texture."""
+        self.texture.release()

@@ -6,6 +6,7 @@ far end of a wide map.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,17 +20,14 @@ BEAM = Struct(
     "BeamRecord",
     (
         Field("anchor", "vec2", "a texel corner near the polygon, atlas texels"),
-        Field("slope", "vec2", "relative change of the density per texel"),
-        Field("density", "vec3", "energy per texel and per unit of the curve: 1, t, t²"),
+        Field("slope", "vec2", "change of the density per texel, relative to that at the anchor"),
+        Field("density", "vec3", "energy per texel and per unit of the curve: 1, t, t²; at the anchor"),
         Field("nodes", "float", "equal parts of the band in which the polygon stands still"),
         Field("place", "vec2", "where the band begins on its curve, and its length there; samples"),
-        Field("first_edge", "uint", ""),
-        Field("edge_count", "uint", ""),
-        Field("curve", "uint", "first value of the curve of target 0"),
-        Field("curve_stride", "uint", "values from one target's curve to the next"),
-        Field("level", "float", "the density at the anchor over that at the polygon's centre"),
-        Field("unused", "float", ""),
+        Field("curve_row", "float", "the curve of target 0; the other targets' follow"),
+        Field("edge_count", "float", ""),
     ),
+    texels=True,
 )
 
 EDGE = Struct(
@@ -41,7 +39,20 @@ EDGE = Struct(
 )
 """`reach`: half of what a texel spans across the edge, in the edge's own measure."""
 
+EDGES = 4, 6, 8
+"""Edges that programs of their own hold as flat inputs; polygons of more are read from the texture."""
+ROW_TEXELS = 4096
+"""At most in a row of the texture."""
 NODES_MAX = 4096
+NODES_MIN = 4
+NO_EDGE = 1.0, 0.0, 1e6, 0.5
+"""Start of an edge that everything lies inside of."""
+LEAST_LEVEL = 0.05
+"""Of the density at the anchor over that at the polygon's centre."""
+STILL = 0.02
+"""Texels an edge may move over the band where it is drawn as if it stood in the middle."""
+FINEST_STEP, WIDEST_STEP = 1.0 / 6.0, 0.5
+"""Texels an edge moves from node to node: half of the polygon's width, within these."""
 
 
 @dataclass(frozen=True)
@@ -68,10 +79,13 @@ class TexelMap:
 class PackedBeams:
     """What is uploaded for one draw."""
 
-    records: np.ndarray
-    edges: np.ndarray
+    edges: int
+    """One of `EDGES`, or 0: any number."""
+    is_still: bool
+    texels: np.ndarray
+    """uint32 (rows, `per_row` polygons, texels a polygon, 4): BEAM, then EDGE by EDGE."""
     vertices: np.ndarray
-    """VERTEX dtype."""
+    """`VERTEX` dtype."""
     indices: np.ndarray
     """uint32, triangles."""
 
@@ -97,39 +111,65 @@ def packed(
     chosen: np.ndarray,
     to_texels: TexelMap,
     energy_scale: float,
+    area_scale: float,
     curves: CurveParts,
-) -> PackedBeams:
-    """The `chosen` polygons (n,), all on one window. `curves` of these; `energy_scale`: from flux per scene unit² to
-    what a whole texel holds."""
+) -> Iterator[PackedBeams]:
+    """The `chosen` polygons (n,), all on one window, a draw for each kind of program that they need. `curves` of these;
+    `energy_scale`: from flux per scene unit² to what a whole texel holds; `area_scale`: texels a scene unit²."""
     hull_rows, hull_counts = ragged(polygons.hull_start, chosen)
     hulls = to_texels.texels(polygons.hulls[hull_rows])
     hull_first = np.cumsum(hull_counts) - hull_counts
     low, high = np.minimum.reduceat(hulls, hull_first), np.maximum.reduceat(hulls, hull_first)
     anchor = np.floor(0.5 * (low + high))
-    radius = 0.5 * np.linalg.norm(high - low, axis=1)
+    diagonal = np.linalg.norm(high - low, axis=1)
+
+    edge_rows, counts = ragged(polygons.edge_start, chosen)
+    first = np.cumsum(counts) - counts
+    owner = np.repeat(np.arange(len(chosen)), counts)
+    is_line = (polygons.x_hi <= polygons.x_lo)[chosen]
+    edges, moves = _edges(polygons.edges[edge_rows], to_texels, anchor[owner], is_line[owner], 0.5 * diagonal[owner])
+    motion = np.maximum.reduceat(moves, first)
 
     records = BEAM.zeros(len(chosen))
-    edge_rows, edge_counts = ragged(polygons.edge_start, chosen)
-    owner = np.repeat(np.arange(len(chosen)), edge_counts)
-    is_line = (polygons.x_hi <= polygons.x_lo)[chosen]
-    edges, speed = _edges(polygons.edges[edge_rows], to_texels, anchor[owner], is_line[owner], radius[owner])
-
     inverse = np.linalg.inv(to_texels.matrix)
     slope = polygons.slope[chosen] @ inverse
+    level = 1.0 + np.sum(slope * (anchor - to_texels.texels(polygons.centre[chosen])), axis=1)
+    level = np.maximum(level, LEAST_LEVEL)
     start, middle, end = polygons.density[chosen].T
     middle, end = np.where(is_line, start, middle), np.where(is_line, start, end)
-    level = 1.0 + np.sum(slope * (anchor - to_texels.texels(polygons.centre[chosen])), axis=1)
-    records["anchor"], records["slope"] = anchor, slope
     parabola = np.stack([start, -3.0 * start + 4.0 * middle - end, 2.0 * (start - 2.0 * middle + end)], axis=1)
-    records["density"] = parabola * energy_scale
-    records["nodes"] = np.clip(
-        np.ceil(2.0 * np.maximum.reduceat(speed, np.cumsum(edge_counts) - edge_counts)), 1, NODES_MAX
-    )
+    area = polygons.flux[chosen] / np.where(middle > 0.0, middle, 1.0) * area_scale
+    records["anchor"], records["slope"] = anchor, slope / level[:, None]
+    records["density"] = parabola * (energy_scale * level)[:, None]
+    width = area / np.maximum(diagonal - motion, np.sqrt(area) + 1e-9)
+    step = np.clip(0.5 * width, FINEST_STEP, WIDEST_STEP)
+    records["nodes"] = np.clip(np.ceil(motion / step), NODES_MIN, NODES_MAX)
     records["place"] = np.stack([curves.place[:, 0], curves.place[:, 1] - curves.place[:, 0]], axis=1)
-    records["first_edge"], records["edge_count"] = np.cumsum(edge_counts) - edge_counts, edge_counts
-    records["curve"], records["curve_stride"] = curves.first, curves.stride
-    records["level"] = level
-    return PackedBeams(records, edges, *_boxes(low, high))
+    records["curve_row"], records["edge_count"] = curves.row, counts
+
+    is_still = motion < STILL
+    held = np.append(EDGES, 0)[np.searchsorted(EDGES, counts)]
+    column = np.arange(len(owner)) - first[owner]
+    for kind in np.unique(2 * held + is_still):
+        of_kind = np.flatnonzero(2 * held + is_still == kind)
+        size = int(kind // 2) or int(counts[of_kind].max())
+        texels = BEAM.stride // 16 + 2 * size
+        per_row = ROW_TEXELS // texels
+        data = np.zeros((-(-len(of_kind) // per_row) * per_row, texels, 4), np.uint32)
+        data[: len(of_kind), : BEAM.stride // 16] = records[of_kind].view(np.uint32).reshape(len(of_kind), -1, 4)
+        lines = data[: len(of_kind), BEAM.stride // 16 :].view(np.float32)
+        lines[:, ::2] = NO_EDGE
+        place = np.full(len(chosen), -1)
+        place[of_kind] = np.arange(len(of_kind))
+        mine = np.flatnonzero(place[owner] >= 0)
+        for offset, name in enumerate(("start", "change")):
+            lines[place[owner[mine]], 2 * column[mine] + offset] = edges[name][mine]
+        yield PackedBeams(
+            int(kind // 2),
+            bool(kind % 2),
+            data.reshape(-1, per_row, texels, 4),
+            *_boxes(low[of_kind], high[of_kind]),
+        )
 
 
 def _edges(

@@ -15,7 +15,8 @@ from ..beams.polygons import BeamPolygons
 from ..gpu import shader
 from ..gpu.records import NONE
 from ..gpu.schema import Field, Struct
-from .beam_records import BEAM, EDGE, TexelMap, hull_boxes, packed
+from .beam_records import BEAM, PackedBeams, TexelMap, hull_boxes, packed
+from .variants import beam_defines
 
 if TYPE_CHECKING:
     import moderngl
@@ -29,7 +30,11 @@ GROUP = 1 << 14
 
 PARAMETERS = Struct(
     "BeamDrawParameters",
-    (Field("atlas_size", "vec2", "texels"), Field("reserved", "vec2", "")),
+    (
+        Field("atlas_size", "vec2", "texels"),
+        Field("texels", "uint", "of a polygon"),
+        Field("per_row", "uint", "polygons in a row of their texture"),
+    ),
 )
 
 
@@ -38,8 +43,8 @@ class BeamSplatter:
 
     def __init__(self, ctx: moderngl.Context, targets: int = 1) -> None:
         self._ctx = ctx
-        defines = {"TARGETS": targets}
-        self._program = shader.program(ctx, "light/beam.vert", "light/beam.frag", defines, (BEAM, EDGE))
+        self._targets = targets
+        self._programs: dict[tuple[int, bool], moderngl.Program] = {}
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
 
     def run(
@@ -60,53 +65,59 @@ class BeamSplatter:
         for placement, receiver, chosen in _windows(polygons, frames, layout):
             record = layout.placements[placement]
             to_texels = TexelMap.of(record, frames[receiver])
-            classes = np.full(len(chosen), int(layout.receivers[receiver]["reflectance_class"]))
+            reflectance_class = int(layout.receivers[receiver]["reflectance_class"])
+            texel_area = float(record["texel_area"])
             for start in range(0, len(chosen), GROUP):
                 part = chosen[start : start + GROUP]
-                curves = tables.parts(
-                    polygons.light[part], classes[: len(part)], polygons.x_lo[part], polygons.x_hi[part]
-                )
-                beams = packed(polygons, part, to_texels, float(record["texel_area"]) * weight, curves)
-                self._draw(beams, tables, atlas, record["rect"])
+                curves = tables.parts(polygons.light[part], reflectance_class, polygons.x_lo[part], polygons.x_hi[part])
+                for beams in packed(polygons, part, to_texels, texel_area * weight, 1.0 / texel_area, curves):
+                    self._draw(beams, tables, atlas, record["rect"])
                 atlas.pending += len(part)
                 atlas.flush()
         error = self._ctx.error
         if error != "GL_NO_ERROR":
             raise RuntimeError(f"{error} while drawing {len(polygons)} beam polygons")
 
-    def _draw(self, beams, tables: BeamTables, atlas: MapAtlas, rect: np.ndarray) -> None:
+    def _draw(self, beams: PackedBeams, tables: BeamTables, atlas: MapAtlas, rect: np.ndarray) -> None:
         import moderngl
 
         ctx = self._ctx
+        rows, per_row, texels, _ = beams.texels.shape
         values = PARAMETERS.zeros(1)
-        values[0] = (atlas.size, 0.0)
+        values[0] = (atlas.size, texels, per_row)
         self._parameters.write(values.tobytes())
         self._parameters.bind_to_uniform_block(0)
-        uploads = [
-            ctx.buffer(np.ascontiguousarray(a)) for a in (beams.records, beams.edges, beams.vertices, beams.indices)
-        ]
-        records, edges, vertices, indices = uploads
-        array = ctx.vertex_array(self._program, [(vertices, "2f4 1u4", "in_position", "in_polygon")], indices)
-        records.bind_to_storage_buffer(1)
-        edges.bind_to_storage_buffer(2)
-        tables.buffer.bind_to_storage_buffer(3)
-        ctx.memory_barrier()
+        texture = ctx.texture((per_row * texels, rows), 4, beams.texels, dtype="u4")
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        vertices, indices = ctx.buffer(beams.vertices), ctx.buffer(beams.indices)
+        array = ctx.vertex_array(
+            self._program(beams.edges, beams.is_still), [(vertices, "2f4 1u4", "in_position", "in_polygon")], indices
+        )
+        texture.use(0)
+        tables.texture.use(1)
         x0, y0, x1, y1 = (int(v) for v in rect)
         atlas.framebuffer.use()
-        atlas.framebuffer.scissor = x0, y0, x1 - x0, y1 - y0
+        ctx.scissor = x0, y0, x1 - x0, y1 - y0
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
         ctx.blend_func = moderngl.ONE, moderngl.ONE
         array.render(moderngl.TRIANGLES)
         ctx.enable_only(moderngl.NOTHING)
-        atlas.framebuffer.scissor = None
-        array.release()
-        for buffer in uploads:
-            buffer.release()
+        ctx.scissor = None
+        for resource in (array, vertices, indices, texture):
+            resource.release()
+
+    def _program(self, edges: int, is_still: bool) -> moderngl.Program:
+        """Compiled when it is first needed."""
+        kind = edges, is_still
+        if kind not in self._programs:
+            defines = beam_defines(self._targets, edges, is_still)
+            self._programs[kind] = shader.program(self._ctx, "light/beam.vert", "light/beam.frag", defines, (BEAM,))
+        return self._programs[kind]
 
     def release(self) -> None:
         """Free program and buffers."""
-        shader.release(self._program, self._parameters)
+        shader.release(*self._programs.values(), self._parameters)
 
 
 def _windows(
