@@ -31,51 +31,37 @@ vec2 positive(float start, float change) {
     return vec2(start > 0.0 ? 0.0 : end > 0.0 ? at : 2.0, end > 0.0 ? 1.0 : start > 0.0 ? at : -1.0);
 }
 
-// Light of the interval, all of the texel covered; the density's slope meets the spectrum's.
-void add_whole(vec2 interval, float tilt) {
+void add_curve(float t, float weight) {
+    for (int g = 0; g < TARGETS; ++g) deposited[g] += weight * curve_at(g, t);
+}
+
+// Light of an interval in which all of the texel is covered; nothing where it is empty. The density's slope meets the spectrum's.
+void add_whole(vec2 interval) {
     float middle = 0.5 * (interval.x + interval.y), reach = 0.5 * (interval.y - interval.x);
-    float density = tilt * (density_at(middle) + density_nodes.z * reach * reach * (1.0 / 3.0));
-    float rise = tilt * (density_nodes.y + 2.0 * middle * density_nodes.z) * reach;
+    float density = density_at(middle) + density_nodes.z * reach * reach * (1.0 / 3.0);
+    float rise = (2.0 / 3.0) * reach * (density_nodes.y + 2.0 * middle * density_nodes.z);
     bool is_even = abs(density_nodes.y) + abs(density_nodes.z) < 0.02 * density_nodes.x;
-    for (int g = 0; g < TARGETS; ++g) {
-        vec4 below = curve_at(g, interval.x), above = curve_at(g, interval.y);
-        deposited[g] += density * (above - below);
-        WHEN (!is_even) deposited[g] += rise * (4.0 / 3.0) * (0.5 * (below + above) - curve_at(g, middle));
+    int count = reach <= 0.0 ? 0 : is_even ? 2 : 3;
+    for (int i = 0; i < count; ++i) {
+        float t = i == 0 ? interval.x : i == 1 ? interval.y : middle;
+        add_curve(t, i == 0 ? rise - density : i == 1 ? rise + density : -2.0 * rise);
     }
 }
 
-void add_nodes(vec2 touched, vec2 whole, float tilt) {
-    float nodes = density_nodes.w, per_node = 1.0 / nodes;
-    // Parts whose middles lie in the intervals.
-    int first = max(int(ceil(touched.x * nodes - 0.5)), 0);
-    int last = min(int(floor(touched.y * nodes - 0.5)), int(nodes) - 1);
-    int whole_first = max(int(ceil(whole.x * nodes - 0.5)), 0);
-    int whole_last = whole.x <= whole.y ? min(int(floor(whole.y * nodes - 0.5)), int(nodes) - 1) : -1;
-    if (whole_last < whole_first) {
-        whole_first = last + 1;
-        whole_last = last;
-    } else {
-        add_whole(vec2(float(whole_first), float(whole_last + 1)) * per_node, tilt);
-    }
-    for (int side = 0; side < 2; ++side) {
-        int row_first = side == 0 ? first : whole_last + 1, row_end = side == 0 ? min(whole_first, last + 1) : last + 1;
+// Light of the parts k, first <= k <= last, but for those from rows.x to rows.y.
+void add_nodes(int first, int last, ivec2 rows) {
+    float per_node = 1.0 / density_nodes.w, before = 0.0;
+    for (int k = first; k <= last + 1;) {
+        int row_first = k < rows.x ? first : rows.y + 1, row_end = k < rows.x ? min(rows.x, last + 1) : last + 1;
         int row = row_end - row_first;
-        if (row <= 0) continue;
-        int step = row > LOOKED_AT ? (row - LOOKED_AT + LOOKED_AT - 2 * AT_ENDS - 1) / (LOOKED_AT - 2 * AT_ENDS) : 1;
-        vec4 below[TARGETS];
-        for (int g = 0; g < TARGETS; ++g) below[g] = curve_at(g, float(row_first) * per_node);
-        for (int k = row_first; k < row_end;) {
-            int end = k + 1;
-            if (k - row_first >= AT_ENDS && row_end - k > AT_ENDS) end = min(k + step, row_end - AT_ENDS);
-            float t = 0.5 * float(k + end) * per_node;
-            float share = covered_share(t) * tilt * density_at(t);
-            for (int g = 0; g < TARGETS; ++g) {
-                vec4 above = curve_at(g, float(end) * per_node);
-                deposited[g] += share * (above - below[g]);
-                below[g] = above;
-            }
-            k = end;
-        }
+        int middle = min(k + (row - 2 * AT_ENDS + LOOKED_AT - 2 * AT_ENDS - 1) / (LOOKED_AT - 2 * AT_ENDS), row_end - AT_ENDS);
+        int end = row > LOOKED_AT && k - row_first >= AT_ENDS && row_end - k > AT_ENDS ? middle : k + 1;
+        bool is_left_out = k > last || (k >= rows.x && k <= rows.y);
+        float t = 0.5 * float(k + end) * per_node;
+        float now = is_left_out ? 0.0 : covered_share(t) * density_at(t);
+        add_curve(float(k) * per_node, before - now);
+        before = now;
+        k = k == rows.x && rows.y >= k ? rows.y + 1 : end;
     }
 }
 #endif
@@ -97,17 +83,21 @@ void main() {
         second = vec2(max(second.x, min(whole.x, covers.x)), min(second.y, max(whole.y, covers.y)));
         whole = vec2(max(whole.x, covers.x), min(whole.y, covers.y));
     }
-    bool is_inside = whole.x <= 0.0 && whole.y >= 1.0;
-    for (int g = 0; g < TARGETS; ++g) deposited[g] = is_inside ? tilt * whole_energy[g] : vec4(0.0);
-    WHEN (!is_inside && touched.x < touched.y) {
-        bool comes = whole.x <= 0.0 || (touched.x > 0.0 && second.x <= touched.x && whole.x - touched.x < SHORT_RAMP);
-        bool leaves = whole.y >= 1.0 || (touched.y < 1.0 && second.y >= touched.y && touched.y - whole.y < SHORT_RAMP);
-        bool is_short = comes && leaves && whole.x <= whole.y;
-        WHEN (is_short) {
-            vec2 interval = vec2(whole.x <= 0.0 ? 0.0 : 0.5 * (touched.x + whole.x), whole.y >= 1.0 ? 1.0 : 0.5 * (touched.y + whole.y));
-            add_whole(interval, tilt);
-        }
-        WHEN (!is_short) add_nodes(touched, whole, tilt);
-    }
+    bool is_inside = whole.x <= 0.0 && whole.y >= 1.0, is_touched = touched.x < touched.y && !is_inside;
+    bool comes = whole.x <= 0.0 || (touched.x > 0.0 && second.x <= touched.x && whole.x - touched.x < SHORT_RAMP);
+    bool leaves = whole.y >= 1.0 || (touched.y < 1.0 && second.y >= touched.y && touched.y - whole.y < SHORT_RAMP);
+    bool is_short = comes && leaves && whole.x <= whole.y;
+
+    // Parts whose middles lie in the intervals.
+    float nodes = density_nodes.w;
+    int first = max(int(ceil(touched.x * nodes - 0.5)), 0), last = min(int(floor(touched.y * nodes - 0.5)), int(nodes) - 1);
+    ivec2 rows = ivec2(max(int(ceil(whole.x * nodes - 0.5)), 0), min(int(floor(whole.y * nodes - 0.5)), int(nodes) - 1));
+    rows = whole.x <= whole.y && rows.x <= rows.y ? rows : ivec2(last + 1, last);
+    vec2 ramps = vec2(whole.x <= 0.0 ? 0.0 : 0.5 * (touched.x + whole.x), whole.y >= 1.0 ? 1.0 : 0.5 * (touched.y + whole.y));
+
+    for (int g = 0; g < TARGETS; ++g) deposited[g] = is_inside ? whole_energy[g] : vec4(0.0);
+    add_whole(!is_touched ? vec2(0.0) : is_short ? ramps : vec2(rows.x, rows.y + 1) / nodes);
+    add_nodes(first, is_touched && !is_short ? last : first - 2, rows);
+    for (int g = 0; g < TARGETS; ++g) deposited[g] *= tilt;
 #endif
 }

@@ -20,22 +20,9 @@ flat in vec4 edge[2 * EDGES];
 #define EDGE_CHANGE(e) FETCHED(2 * (e) + 1)
 #endif
 
-// An `if` that a software renderer leaves out where no texel takes it: it runs both sides of an `if`, but ends a loop that none is in.
-#define WHEN(condition) for (bool wanted = (condition); wanted; wanted = false)
-
 vec2 at;  // the texel's centre, about the anchor
 
 vec3 normalized_line(vec3 line) { return line * inversesqrt(dot(line.xy, line.xy)); }
-
-// Covered part of a texel whose centre lies `h` inside a half-plane.
-float half_plane_share(vec2 normal, float h) {
-    vec2 n = abs(normal);
-    float sum = 0.5 * (n.x + n.y), difference = 0.5 * abs(n.x - n.y);
-    float a = abs(h);
-    float missing = max(sum - a, 0.0);
-    float share = a <= difference ? 0.5 + a / max(n.x, n.y) : 1.0 - missing * missing / max(2.0 * n.x * n.y, 1e-12);
-    return h >= 0.0 ? share : 1.0 - share;
-}
 
 // Part of the line `own` (a point of it is -h n + s perpendicular) within the half-plane `other`, as an interval of s. Of two lines that are the same one counts.
 vec2 cut(vec2 interval, vec3 own, vec3 other, bool own_first) {
@@ -70,75 +57,62 @@ void cut_sides(vec3 own, inout vec4 low, inout vec4 high) {
     high = mix(min(high, s), high, rises);
 }
 
-// Area within the texel of an intersection of half-planes: the lengths of what bounds it times their distance from the texel's centre.
-float area_of(vec3 lines[4], int count) {
-    float twice = 0.0;
-    vec4 low = vec4(-0.5), high = vec4(0.5);
-    for (int e = 0; e < 4; ++e) {
-        if (e >= count) break;
-        vec2 interval = in_texel(lines[e]);
-        for (int f = 0; f < 4; ++f) {
-            if (f != e && f < count) interval = cut(interval, lines[e], lines[f], e < f);
-        }
-        twice += lines[e].z * max(interval.y - interval.x, 0.0);
-        cut_sides(lines[e], low, high);
-    }
-    vec4 sides = max(high - low, vec4(0.0));
-    return clamp(0.5 * twice + 0.25 * (sides.x + sides.y + sides.z + sides.w), 0.0, 1.0);
-}
-
 vec3 line_at(int e, float t) {
-    vec4 line = FETCHED(2 * e) + t * FETCHED(2 * e + 1);
+    vec4 line = EDGE_START(e) + t * EDGE_CHANGE(e);
     return normalized_line(vec3(line.xy, dot(line.xy, at) + line.z));
 }
 
-// The same for any number of edges.
-float area_of_all(float t) {
+// Covered part of the texel at t: the lengths of what bounds it, times their distance from the texel's centre. Loops over the edges that cross the texel have
+// short bodies, since a software renderer runs a loop that no texel is in once.
+float covered_share(float t) {
+    bool outside = false;
     float twice = 0.0;
     vec4 low = vec4(-0.5), high = vec4(0.5);
-    int count = int(band.w);
-    for (int e = 0; e < count; ++e) {
-        vec3 own = line_at(e, t);
-        if (own.z >= 0.75) continue;
+#if EDGES > 0
+    // Which edges cross it, four bits each.
+    uint crossing = 0u;
+    int count = 0;
+    vec3 lines[EDGES];
+    for (int e = 0; e < EDGES; ++e) {
+        vec4 line = EDGE_START(e) + t * EDGE_CHANGE(e);
+        float h = dot(line.xy, at) + line.z;
+        outside = outside || h <= -line.w;
+        bool crosses = h < line.w;
+        crossing = crosses ? crossing << 4 | uint(e) : crossing;
+        count += crosses ? 1 : 0;
+        lines[e] = normalized_line(vec3(line.xy, h));
+    }
+    count = outside ? 0 : count;
+    uint own_left = crossing;
+    for (int i = 0; i < count; ++i) {
+        int e = int(own_left & 15u);
+        own_left >>= 4;
+        vec3 own = lines[e];
         vec2 interval = in_texel(own);
-        for (int f = 0; f < count; ++f) {
-            if (f != e) interval = cut(interval, own, line_at(f, t), e < f);
+        uint other_left = crossing;
+        for (int j = 0; j < count; ++j) {
+            int f = int(other_left & 15u);
+            other_left >>= 4;
+            if (f != e) interval = cut(interval, own, lines[f], e < f);
         }
         twice += own.z * max(interval.y - interval.x, 0.0);
         cut_sides(own, low, high);
     }
-    vec4 sides = max(high - low, vec4(0.0));
-    return clamp(0.5 * twice + 0.25 * (sides.x + sides.y + sides.z + sides.w), 0.0, 1.0);
-}
-
-// Covered part of the texel at t.
-float covered_share(float t) {
-    int count = 0;
-    bool outside = false;
-    vec3 lines[4] = vec3[4](vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
+#else
     for (int e = 0; e < EDGE_COUNT; ++e) {
-        vec4 line = EDGE_START(e) + t * EDGE_CHANGE(e);
-        float h = dot(line.xy, at) + line.z;
-        outside = outside || h <= -line.w;
-        if (h < line.w) {
-            lines[3] = lines[2];
-            lines[2] = lines[1];
-            lines[1] = lines[0];
-            lines[0] = vec3(line.xy, h);
-            ++count;
-        }
-    }
-    float share = outside ? 0.0 : 1.0;
-    WHEN (!outside && count > 0) {
-        lines[0] = normalized_line(lines[0]);
-        share = half_plane_share(lines[0].xy, lines[0].z);
-        WHEN (count > 1 && count <= 4) {
-            for (int i = 1; i < 4; ++i) {
-                if (i < count) lines[i] = normalized_line(lines[i]);
+        vec3 own = line_at(e, t);
+        float reach = 0.5 * (abs(own.x) + abs(own.y));
+        outside = outside || own.z <= -reach;
+        if (own.z < reach) {
+            vec2 interval = in_texel(own);
+            for (int f = 0; f < EDGE_COUNT; ++f) {
+                if (f != e) interval = cut(interval, own, line_at(f, t), e < f);
             }
-            share = area_of(lines, count);
+            twice += own.z * max(interval.y - interval.x, 0.0);
+            cut_sides(own, low, high);
         }
-        WHEN (count > 4) share = area_of_all(t);
     }
-    return share;
+#endif
+    vec4 sides = max(high - low, vec4(0.0));
+    return outside ? 0.0 : clamp(0.5 * twice + 0.25 * (sides.x + sides.y + sides.z + sides.w), 0.0, 1.0);
 }
