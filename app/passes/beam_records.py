@@ -22,7 +22,7 @@ BEAM = Struct(
         Field("anchor", "vec2", "a texel corner near the polygon, atlas texels"),
         Field("slope", "vec2", "change of the density per texel, relative to that at the anchor"),
         Field("density", "vec3", "energy per texel and per unit of the curve: 1, t, t²; at the anchor"),
-        Field("nodes", "float", "equal parts of the band in which the polygon stands still"),
+        Field("nodes", "float", "equal parts of the band in which a narrow polygon stands still; 0: a wide one"),
         Field("place", "vec2", "where the band begins on its curve, and its length there; samples"),
         Field("curve_row", "float", "the curve of target 0; the other targets' follow"),
         Field("edge_count", "float", ""),
@@ -51,8 +51,10 @@ LEAST_LEVEL = 0.05
 """Of the density at the anchor over that at the polygon's centre."""
 STILL = 0.02
 """Texels an edge may move over the band where it is drawn as if it stood in the middle."""
-FINEST_STEP, WIDEST_STEP = 1.0 / 6.0, 0.5
-"""Texels an edge moves from node to node: half of the polygon's width, within these."""
+FINEST_STEP, WIDEST_STEP = 0.125, 0.25
+"""Texels a narrow polygon moves from node to node: a quarter of its width, within these."""
+WIDE = 2.0
+"""Texels; a wider polygon has texels that are all inside."""
 
 
 @dataclass(frozen=True)
@@ -142,8 +144,8 @@ def packed(
     records["anchor"], records["slope"] = anchor, slope / level[:, None]
     records["density"] = parabola * (energy_scale * level)[:, None]
     width = area / np.maximum(diagonal - motion, np.sqrt(area) + 1e-9)
-    step = np.clip(0.5 * width, FINEST_STEP, WIDEST_STEP)
-    records["nodes"] = np.clip(np.ceil(motion / step), NODES_MIN, NODES_MAX)
+    nodes = np.ceil(motion / np.clip(0.25 * width, FINEST_STEP, WIDEST_STEP))
+    records["nodes"] = np.where(width > WIDE, 0, np.clip(nodes, NODES_MIN, NODES_MAX))
     records["place"] = np.stack([curves.place[:, 0], curves.place[:, 1] - curves.place[:, 0]], axis=1)
     records["curve_row"], records["edge_count"] = curves.row, counts
 

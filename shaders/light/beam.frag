@@ -10,11 +10,13 @@ layout(location = 0) out vec4 deposited[TARGETS];
 #ifndef STILL
 layout(binding = 1) uniform sampler2D curves;
 
-// Parts of the band in a row that are looked at one by one; of longer rows only those at either end are.
-const int LOOKED_AT = 10;
-const int AT_ENDS = 3;
+// Parts of a texel's time that are looked at one by one, at most.
+const int LOOKED_AT = 16;
+// More than so many are not of one length.
+const int LOOKED_AT_EVENLY = 4;
 // Share of the band over which an edge may pass a texel for the middle of that to be its time.
 const float SHORT_RAMP = 0.2;
+const float INVERSE_SQRT_3 = 0.57735027;
 
 vec4 curve_at(int g, float t) {
     float place = band.x + t * band.y;
@@ -35,33 +37,43 @@ void add_curve(float t, float weight) {
     for (int g = 0; g < TARGETS; ++g) deposited[g] += weight * curve_at(g, t);
 }
 
-// Light of an interval in which all of the texel is covered; nothing where it is empty. The density's slope meets the spectrum's.
-void add_whole(vec2 interval) {
+// Light of an interval in which all of the texel is covered, nothing where it is empty. An edge takes the times `ramps` (halves) to come and to leave: the running
+// spectrum is averaged over them (Gauss, two points). The density's slope meets the spectrum's.
+void add_whole(vec2 interval, vec2 ramps) {
     float middle = 0.5 * (interval.x + interval.y), reach = 0.5 * (interval.y - interval.x);
     float density = density_at(middle) + density_nodes.z * reach * reach * (1.0 / 3.0);
     float rise = (2.0 / 3.0) * reach * (density_nodes.y + 2.0 * middle * density_nodes.z);
     bool is_even = abs(density_nodes.y) + abs(density_nodes.z) < 0.02 * density_nodes.x;
-    int count = reach <= 0.0 ? 0 : is_even ? 2 : 3;
+    bool is_sudden = max(ramps.x, ramps.y) < 0.01;
+    int at_ends = is_sudden ? 2 : 4, count = reach <= 0.0 ? 0 : is_even ? at_ends : at_ends + 1;
+    float share = is_sudden ? 1.0 : 0.5;
     for (int i = 0; i < count; ++i) {
-        float t = i == 0 ? interval.x : i == 1 ? interval.y : middle;
-        add_curve(t, i == 0 ? rise - density : i == 1 ? rise + density : -2.0 * rise);
+        bool is_end = (i & 1) != 0;
+        float aside = is_sudden ? 0.0 : (i & 2) != 0 ? INVERSE_SQRT_3 : -INVERSE_SQRT_3;
+        float t = i == at_ends ? middle : is_end ? interval.y + aside * ramps.y : interval.x + aside * ramps.x;
+        add_curve(t, i == at_ends ? -2.0 * rise : share * (is_end ? rise + density : rise - density));
     }
 }
 
-// Light of the parts k, first <= k <= last, but for those from rows.x to rows.y.
-void add_nodes(int first, int last, ivec2 rows) {
-    float per_node = 1.0 / density_nodes.w, before = 0.0;
-    for (int k = first; k <= last + 1;) {
-        int row_first = k < rows.x ? first : rows.y + 1, row_end = k < rows.x ? min(rows.x, last + 1) : last + 1;
-        int row = row_end - row_first;
-        int middle = min(k + (row - 2 * AT_ENDS + LOOKED_AT - 2 * AT_ENDS - 1) / (LOOKED_AT - 2 * AT_ENDS), row_end - AT_ENDS);
-        int end = row > LOOKED_AT && k - row_first >= AT_ENDS && row_end - k > AT_ENDS ? middle : k + 1;
-        bool is_left_out = k > last || (k >= rows.x && k <= rows.y);
-        float t = 0.5 * float(k + end) * per_node;
-        float now = is_left_out ? 0.0 : covered_share(t) * density_at(t);
-        add_curve(float(k) * per_node, before - now);
+// From a to b, slowly at both ends: where a long time is looked at in few parts, edges come and go within the first and the last.
+float eased(float s, float a, float b) { return mix(a, b, s * s * (3.0 - 2.0 * s)); }
+
+// Light of two intervals, each looked at in parts.
+void add_parts(vec4 intervals, ivec2 parts) {
+    int first_end = parts.x > 0 ? parts.x + 1 : 0, end = first_end + (parts.y > 0 ? parts.y + 1 : 0);
+    float before = 0.0, from = intervals.x;
+    for (int i = 0; i < end; ++i) {
+        bool second = i >= first_end;
+        int k = second ? i - first_end : i, count = second ? parts.y : parts.x;
+        vec2 interval = second ? intervals.zw : intervals.xy;
+        from = k == 0 ? interval.x : from;
+        float s = float(k + 1) / float(count);
+        float to = density_nodes.w == 0.0 && count > LOOKED_AT_EVENLY ? eased(s, interval.x, interval.y) : mix(interval.x, interval.y, s);
+        float t = 0.5 * (from + to);
+        float now = k == count ? 0.0 : covered_share(t) * density_at(t);
+        add_curve(from, before - now);
         before = now;
-        k = k == rows.x && rows.y >= k ? rows.y + 1 : end;
+        from = to;
     }
 }
 #endif
@@ -88,16 +100,30 @@ void main() {
     bool leaves = whole.y >= 1.0 || (touched.y < 1.0 && second.y >= touched.y && touched.y - whole.y < SHORT_RAMP);
     bool is_short = comes && leaves && whole.x <= whole.y;
 
-    // Parts whose middles lie in the intervals.
-    float nodes = density_nodes.w;
-    int first = max(int(ceil(touched.x * nodes - 0.5)), 0), last = min(int(floor(touched.y * nodes - 0.5)), int(nodes) - 1);
-    ivec2 rows = ivec2(max(int(ceil(whole.x * nodes - 0.5)), 0), min(int(floor(whole.y * nodes - 0.5)), int(nodes) - 1));
-    rows = whole.x <= whole.y && rows.x <= rows.y ? rows : ivec2(last + 1, last);
-    vec2 ramps = vec2(whole.x <= 0.0 ? 0.0 : 0.5 * (touched.x + whole.x), whole.y >= 1.0 ? 1.0 : 0.5 * (touched.y + whole.y));
-
+    vec4 intervals;
+    ivec2 parts;
+    bool ever_whole = whole.x < whole.y;
+    if (density_nodes.w > 0.0) {
+        // Nodes whose middles lie in the intervals.
+        float nodes = density_nodes.w;
+        vec2 some = clamp(vec2(ceil(touched.x * nodes - 0.5), floor(touched.y * nodes + 0.5)), 0.0, nodes);
+        vec2 all = clamp(vec2(ceil(whole.x * nodes - 0.5), floor(whole.y * nodes + 0.5)), 0.0, nodes);
+        all = ever_whole && all.x < all.y ? all : some.yy;
+        parts = min(ivec2(all.x - some.x, some.y - all.y), ivec2(LOOKED_AT));
+        intervals = vec4(some.x, all.xy, some.y) / nodes;
+    } else {
+        vec2 all = ever_whole ? whole : touched.yy;
+        intervals = vec4(touched.x, all.xy, touched.y);
+        vec2 lengths = vec2(all.x - touched.x, touched.y - all.y);
+        parts = ever_whole ? 2 + min(ivec2(8.0 * lengths) + 1, ivec2(6)) : ivec2(4 + min(int(8.0 * lengths.x) + 1, 6), 0);
+        parts = ivec2(mix(vec2(0.0), vec2(parts), greaterThan(lengths, vec2(0.0))));
+    }
+    bool is_slow = is_touched && !is_short;
     for (int g = 0; g < TARGETS; ++g) deposited[g] = is_inside ? whole_energy[g] : vec4(0.0);
-    add_whole(!is_touched ? vec2(0.0) : is_short ? ramps : vec2(rows.x, rows.y + 1) / nodes);
-    add_nodes(first, is_touched && !is_short ? last : first - 2, rows);
+    vec2 ramps = vec2(whole.x <= 0.0 ? 0.0 : 0.5 * (touched.x + whole.x), whole.y >= 1.0 ? 1.0 : 0.5 * (touched.y + whole.y));
+    vec2 halves = is_short ? 0.5 * max(vec2(whole.x - touched.x, touched.y - whole.y), 0.0) : vec2(0.0);
+    add_whole(!is_touched ? vec2(0.0) : is_short ? ramps : intervals.yz, halves);
+    add_parts(intervals, is_slow ? parts : ivec2(0));
     for (int g = 0; g < TARGETS; ++g) deposited[g] *= tilt;
 #endif
 }
