@@ -22,7 +22,7 @@ BEAM = Struct(
         Field("anchor", "vec2", "a texel corner near the polygon, atlas texels"),
         Field("slope", "vec2", "change of the density per texel, relative to that at the anchor"),
         Field("density", "vec3", "energy per texel and per unit of the curve: 1, t, t²; at the anchor"),
-        Field("nodes", "float", "equal parts of the band in which a narrow polygon stands still; 0: a wide one"),
+        Field("nodes", "float", "narrow: equal parts of the band in each of which it stands still; wide: -most parts"),
         Field("place", "vec2", "where the band begins on its curve, and its length there; samples"),
         Field("curve_row", "float", "the curve of target 0; the other targets' follow"),
         Field("edge_count", "float", ""),
@@ -53,6 +53,8 @@ STILL = 0.02
 """Texels an edge may move over the band where it is drawn as if it stood in the middle."""
 FINEST_STEP, WIDEST_STEP = 0.125, 0.25
 """Texels a narrow polygon moves from node to node: a quarter of its width, within these."""
+PARTS = 3, 10
+"""In which a texel's time is looked at that a wide polygon's edges cross, at least and at most."""
 WIDE = 2.0
 """Texels; a wider polygon has texels that are all inside."""
 
@@ -145,7 +147,9 @@ def packed(
     records["density"] = parabola * (energy_scale * level)[:, None]
     width = area / np.maximum(diagonal - motion, np.sqrt(area) + 1e-9)
     nodes = np.ceil(motion / np.clip(0.25 * width, FINEST_STEP, WIDEST_STEP))
-    records["nodes"] = np.where(width > WIDE, 0, np.clip(nodes, NODES_MIN, NODES_MAX))
+    records["nodes"] = np.where(
+        width > WIDE, -np.clip(np.ceil(2.0 + 6.0 * motion), *PARTS), np.clip(nodes, NODES_MIN, NODES_MAX)
+    )
     records["place"] = np.stack([curves.place[:, 0], curves.place[:, 1] - curves.place[:, 0]], axis=1)
     records["curve_row"], records["edge_count"] = curves.row, counts
 

@@ -68,7 +68,7 @@ void add_parts(vec4 intervals, ivec2 parts) {
         vec2 interval = second ? intervals.zw : intervals.xy;
         from = k == 0 ? interval.x : from;
         float s = float(k + 1) / float(count);
-        float to = density_nodes.w == 0.0 && count > LOOKED_AT_EVENLY ? eased(s, interval.x, interval.y) : mix(interval.x, interval.y, s);
+        float to = density_nodes.w < 0.0 && count > LOOKED_AT_EVENLY ? eased(s, interval.x, interval.y) : mix(interval.x, interval.y, s);
         float t = 0.5 * (from + to);
         float now = k == count ? 0.0 : covered_share(t) * density_at(t);
         add_curve(from, before - now);
@@ -82,7 +82,15 @@ void main() {
     at = gl_FragCoord.xy - anchor_slope.xy;
     float tilt = max(1.0 + dot(anchor_slope.zw, at), 0.0);
 #ifdef STILL
-    float share = tilt * covered_share(0.5);
+    bool outside = false;
+    for (int e = 0; e < EDGE_COUNT; ++e) {
+        vec4 line = EDGE_START(e) + 0.5 * EDGE_CHANGE(e);
+        float h = dot(line.xy, at) + line.z;
+        outside = outside || h <= -line.w;
+        note_crossing(e, h < line.w);
+    }
+    crossings = outside ? 0 : crossings;
+    float share = outside ? 0.0 : tilt * covered_share(0.5);
     for (int g = 0; g < TARGETS; ++g) deposited[g] = share * whole_energy[g];
 #else
     // When some of the texel may be covered, when all of it is; when all is but for the one edge that bounds that.
@@ -91,6 +99,7 @@ void main() {
         vec4 start = EDGE_START(e), change = EDGE_CHANGE(e);
         float h = dot(start.xy, at) + start.z, dh = dot(change.xy, at) + change.z;
         vec2 touches = positive(h + start.w, dh + change.w), covers = positive(h - start.w, dh - change.w);
+        note_crossing(e, covers.x > 0.0 || covers.y < 1.0);
         touched = vec2(max(touched.x, touches.x), min(touched.y, touches.y));
         second = vec2(max(second.x, min(whole.x, covers.x)), min(second.y, max(whole.y, covers.y)));
         whole = vec2(max(whole.x, covers.x), min(whole.y, covers.y));
@@ -115,7 +124,8 @@ void main() {
         vec2 all = ever_whole ? whole : touched.yy;
         intervals = vec4(touched.x, all.xy, touched.y);
         vec2 lengths = vec2(all.x - touched.x, touched.y - all.y);
-        parts = ever_whole ? 2 + min(ivec2(8.0 * lengths) + 1, ivec2(6)) : ivec2(4 + min(int(8.0 * lengths.x) + 1, 6), 0);
+        int most = int(-density_nodes.w);
+        parts = ever_whole ? 2 + min(ivec2(8.0 * lengths) + 1, ivec2(most - 2)) : ivec2(min(int(8.0 * lengths.x) + 5, most), 0);
         parts = ivec2(mix(vec2(0.0), vec2(parts), greaterThan(lengths, vec2(0.0))));
     }
     bool is_slow = is_touched && !is_short;

@@ -14,10 +14,12 @@ flat in vec4 edge[2 * EDGES];
 #define EDGE_COUNT EDGES
 #define EDGE_START(e) edge[2 * (e)]
 #define EDGE_CHANGE(e) edge[2 * (e) + 1]
+#define EDGE_OF(list, i) int(list & 15u)
 #else
 #define EDGE_COUNT int(band.w)
 #define EDGE_START(e) FETCHED(2 * (e))
 #define EDGE_CHANGE(e) FETCHED(2 * (e) + 1)
+#define EDGE_OF(list, i) i
 #endif
 
 vec2 at;  // the texel's centre, about the anchor
@@ -62,57 +64,41 @@ vec3 line_at(int e, float t) {
     return normalized_line(vec3(line.xy, dot(line.xy, at) + line.z));
 }
 
-// Covered part of the texel at t: the lengths of what bounds it, times their distance from the texel's centre. Loops over the edges that cross the texel have
-// short bodies, since a software renderer runs a loop that no texel is in once.
+// The edges that cross the texel at some time, four bits each; all of them where they are too many.
+uint crossing = 0u;
+int crossings = 0;
+
+// Covered part of the texel at t: the lengths of what bounds it, times their distance from the texel's centre. Loops have short bodies, since a software renderer
+// runs a loop that no texel is in once.
 float covered_share(float t) {
     bool outside = false;
     float twice = 0.0;
     vec4 low = vec4(-0.5), high = vec4(0.5);
-#if EDGES > 0
-    // Which edges cross it, four bits each.
-    uint crossing = 0u;
-    int count = 0;
-    vec3 lines[EDGES];
-    for (int e = 0; e < EDGES; ++e) {
-        vec4 line = EDGE_START(e) + t * EDGE_CHANGE(e);
-        float h = dot(line.xy, at) + line.z;
-        outside = outside || h <= -line.w;
-        bool crosses = h < line.w;
-        crossing = crosses ? crossing << 4 | uint(e) : crossing;
-        count += crosses ? 1 : 0;
-        lines[e] = normalized_line(vec3(line.xy, h));
-    }
-    count = outside ? 0 : count;
     uint own_left = crossing;
-    for (int i = 0; i < count; ++i) {
-        int e = int(own_left & 15u);
-        own_left >>= 4;
-        vec3 own = lines[e];
+    for (int i = 0; i < crossings; ++i) {
+        int e = EDGE_OF(own_left, i);
+        vec3 own = line_at(e, t);
+        outside = outside || own.z <= -0.5 * (abs(own.x) + abs(own.y));
         vec2 interval = in_texel(own);
         uint other_left = crossing;
-        for (int j = 0; j < count; ++j) {
-            int f = int(other_left & 15u);
+        for (int j = 0; j < crossings; ++j) {
+            int f = EDGE_OF(other_left, j);
+            if (f != e) interval = cut(interval, own, line_at(f, t), e < f);
             other_left >>= 4;
-            if (f != e) interval = cut(interval, own, lines[f], e < f);
         }
         twice += own.z * max(interval.y - interval.x, 0.0);
         cut_sides(own, low, high);
+        own_left >>= 4;
     }
-#else
-    for (int e = 0; e < EDGE_COUNT; ++e) {
-        vec3 own = line_at(e, t);
-        float reach = 0.5 * (abs(own.x) + abs(own.y));
-        outside = outside || own.z <= -reach;
-        if (own.z < reach) {
-            vec2 interval = in_texel(own);
-            for (int f = 0; f < EDGE_COUNT; ++f) {
-                if (f != e) interval = cut(interval, own, line_at(f, t), e < f);
-            }
-            twice += own.z * max(interval.y - interval.x, 0.0);
-            cut_sides(own, low, high);
-        }
-    }
-#endif
     vec4 sides = max(high - low, vec4(0.0));
     return outside ? 0.0 : clamp(0.5 * twice + 0.25 * (sides.x + sides.y + sides.z + sides.w), 0.0, 1.0);
+}
+
+void note_crossing(int e, bool crosses) {
+#if EDGES > 0
+    crossing = crosses ? crossing << 4 | uint(e) : crossing;
+    crossings += crosses ? 1 : 0;
+#else
+    crossings = EDGE_COUNT;
+#endif
 }
