@@ -58,23 +58,24 @@ void add_whole(vec2 interval, vec2 ramps) {
 // From a to b, slowly at both ends: where a long time is looked at in few parts, edges come and go within the first and the last.
 float eased(float s, float a, float b) { return mix(a, b, s * s * (3.0 - 2.0 * s)); }
 
-// Light of two intervals, each looked at in parts.
-void add_parts(vec4 intervals, ivec2 parts) {
-    int first_end = parts.x > 0 ? parts.x + 1 : 0, end = first_end + (parts.y > 0 ? parts.y + 1 : 0);
-    float before = 0.0, from = intervals.x;
-    for (int i = 0; i < end; ++i) {
-        bool second = i >= first_end;
-        int k = second ? i - first_end : i, count = second ? parts.y : parts.x;
-        vec2 interval = second ? intervals.zw : intervals.xy;
-        from = k == 0 ? interval.x : from;
-        float s = float(k + 1) / float(count);
-        float to = density_nodes.w < 0.0 && count > LOOKED_AT_EVENLY ? eased(s, interval.x, interval.y) : mix(interval.x, interval.y, s);
-        float t = 0.5 * (from + to);
-        float now = k == count ? 0.0 : covered_share(t) * density_at(t);
-        add_curve(from, before - now);
-        before = now;
-        from = to;
-    }
+// Light of two intervals, each looked at in parts. `share` is the function that tells the covered part.
+#define ADD_PARTS(intervals, parts, share) { \
+    int first_end = parts.x > 0 ? parts.x + 1 : 0, end = first_end + (parts.y > 0 ? parts.y + 1 : 0); \
+    float before = 0.0, from = intervals.x; \
+    for (int i = 0; i < end; ++i) { \
+        bool is_second = i >= first_end; \
+        int k = is_second ? i - first_end : i, count = is_second ? parts.y : parts.x; \
+        vec2 interval = is_second ? intervals.zw : intervals.xy; \
+        from = k == 0 ? interval.x : from; \
+        float s = float(k + 1) / float(count); \
+        bool is_long = density_nodes.w < 0.0 && count > LOOKED_AT_EVENLY; \
+        float to = is_long ? eased(s, interval.x, interval.y) : mix(interval.x, interval.y, s); \
+        float t = 0.5 * (from + to); \
+        float now = k == count ? 0.0 : share(t) * density_at(t); \
+        add_curve(from, before - now); \
+        before = now; \
+        from = to; \
+    } \
 }
 #endif
 
@@ -87,10 +88,14 @@ void main() {
         vec4 line = EDGE_START(e) + 0.5 * EDGE_CHANGE(e);
         float h = dot(line.xy, at) + line.z;
         outside = outside || h <= -line.w;
-        note_crossing(e, h < line.w);
+        note_crossing(e, h < line.w, vec3(line.xy, h), vec3(0.0));
     }
     crossings = outside ? 0 : crossings;
-    float share = outside ? 0.0 : tilt * covered_share(0.5);
+    float share = half_plane_share(0.5);
+    bool is_single = crossings < 2;
+    crossings = is_single ? 0 : crossings;
+    share = is_single ? share : covered_share(0.5);
+    share = outside ? 0.0 : tilt * share;
     for (int g = 0; g < TARGETS; ++g) deposited[g] = share * whole_energy[g];
 #else
     // When some of the texel may be covered, when all of it is; when all is but for the one edge that bounds that.
@@ -99,7 +104,7 @@ void main() {
         vec4 start = EDGE_START(e), change = EDGE_CHANGE(e);
         float h = dot(start.xy, at) + start.z, dh = dot(change.xy, at) + change.z;
         vec2 touches = positive(h + start.w, dh + change.w), covers = positive(h - start.w, dh - change.w);
-        note_crossing(e, covers.x > 0.0 || covers.y < 1.0);
+        note_crossing(e, covers.x > 0.0 || covers.y < 1.0, vec3(start.xy, h), vec3(change.xy, dh));
         touched = vec2(max(touched.x, touches.x), min(touched.y, touches.y));
         second = vec2(max(second.x, min(whole.x, covers.x)), min(second.y, max(whole.y, covers.y)));
         whole = vec2(max(whole.x, covers.x), min(whole.y, covers.y));
@@ -133,7 +138,12 @@ void main() {
     vec2 ramps = vec2(whole.x <= 0.0 ? 0.0 : 0.5 * (touched.x + whole.x), whole.y >= 1.0 ? 1.0 : 0.5 * (touched.y + whole.y));
     vec2 halves = is_short ? 0.5 * max(vec2(whole.x - touched.x, touched.y - whole.y), 0.0) : vec2(0.0);
     add_whole(!is_touched ? vec2(0.0) : is_short ? ramps : intervals.yz, halves);
-    add_parts(intervals, is_slow ? parts : ivec2(0));
+    // Of one edge alone the share costs little; a loop that no texel needs costs little as well.
+    bool is_single = crossings < 2;
+    ivec2 single = is_slow && is_single ? parts : ivec2(0), several = is_slow && !is_single ? parts : ivec2(0);
+    crossings = is_single ? 0 : crossings;
+    ADD_PARTS(intervals, single, half_plane_share)
+    ADD_PARTS(intervals, several, covered_share)
     for (int g = 0; g < TARGETS; ++g) deposited[g] *= tilt;
 #endif
 }

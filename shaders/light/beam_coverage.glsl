@@ -15,11 +15,13 @@ flat in vec4 edge[2 * EDGES];
 #define EDGE_START(e) edge[2 * (e)]
 #define EDGE_CHANGE(e) edge[2 * (e) + 1]
 #define EDGE_OF(list, i) int(list & 15u)
+#define LISTED crossings
 #else
 #define EDGE_COUNT int(band.w)
 #define EDGE_START(e) FETCHED(2 * (e))
 #define EDGE_CHANGE(e) FETCHED(2 * (e) + 1)
 #define EDGE_OF(list, i) i
+#define LISTED (crossings > 0 ? EDGE_COUNT : 0)
 #endif
 
 vec2 at;  // the texel's centre, about the anchor
@@ -64,9 +66,11 @@ vec3 line_at(int e, float t) {
     return normalized_line(vec3(line.xy, dot(line.xy, at) + line.z));
 }
 
-// The edges that cross the texel at some time, four bits each; all of them where they are too many.
+// The edges that cross the texel at some time, four bits each; where a program takes any number of edges it looks at all again.
 uint crossing = 0u;
 int crossings = 0;
+// One of them: normal, distance inside; and their change over the band.
+vec3 only_start = vec3(1.0, 0.0, 1.0), only_change = vec3(0.0);
 
 // Covered part of the texel at t: the lengths of what bounds it, times their distance from the texel's centre. Loops have short bodies, since a software renderer
 // runs a loop that no texel is in once.
@@ -75,13 +79,13 @@ float covered_share(float t) {
     float twice = 0.0;
     vec4 low = vec4(-0.5), high = vec4(0.5);
     uint own_left = crossing;
-    for (int i = 0; i < crossings; ++i) {
+    for (int i = 0; i < LISTED; ++i) {
         int e = EDGE_OF(own_left, i);
         vec3 own = line_at(e, t);
         outside = outside || own.z <= -0.5 * (abs(own.x) + abs(own.y));
         vec2 interval = in_texel(own);
         uint other_left = crossing;
-        for (int j = 0; j < crossings; ++j) {
+        for (int j = 0; j < LISTED; ++j) {
             int f = EDGE_OF(other_left, j);
             if (f != e) interval = cut(interval, own, line_at(f, t), e < f);
             other_left >>= 4;
@@ -94,11 +98,21 @@ float covered_share(float t) {
     return outside ? 0.0 : clamp(0.5 * twice + 0.25 * (sides.x + sides.y + sides.z + sides.w), 0.0, 1.0);
 }
 
-void note_crossing(int e, bool crosses) {
+// Covered part of the texel at t where one edge alone crosses it.
+float half_plane_share(float t) {
+    vec3 line = normalized_line(only_start + t * only_change);
+    vec2 n = abs(line.xy);
+    float sum = 0.5 * (n.x + n.y), difference = 0.5 * abs(n.x - n.y), h = abs(line.z);
+    float missing = max(sum - h, 0.0);
+    float share = h <= difference ? 0.5 + h / max(n.x, n.y) : 1.0 - missing * missing / max(2.0 * n.x * n.y, 1e-12);
+    return line.z >= 0.0 ? share : 1.0 - share;
+}
+
+void note_crossing(int e, bool crosses, vec3 start, vec3 change) {
+    only_start = crosses ? start : only_start;
+    only_change = crosses ? change : only_change;
 #if EDGES > 0
     crossing = crosses ? crossing << 4 | uint(e) : crossing;
-    crossings += crosses ? 1 : 0;
-#else
-    crossings = EDGE_COUNT;
 #endif
+    crossings += crosses ? 1 : 0;
 }
