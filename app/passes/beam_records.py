@@ -55,6 +55,8 @@ FINEST_STEP, WIDEST_STEP = 0.125, 0.25
 """Texels a narrow polygon moves from node to node: a quarter of its width, within these."""
 PARTS = 3, 10
 """In which a texel's time is looked at that a wide polygon's edges cross, at least and at most."""
+BORDER = 2.0
+"""Texels that a triangle costs besides its own, per texel of its sides: they are filled in blocks of 4 x 4."""
 WIDE = 2.0
 """Texels; a wider polygon has texels that are all inside."""
 
@@ -102,6 +104,12 @@ def ragged(start: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarra
     counts = (start[1:] - start[:-1])[chosen].astype(np.int64)
     first = np.cumsum(counts) - counts
     return np.repeat(start[:-1][chosen] - first, counts) + np.arange(counts.sum()), counts
+
+
+def _rows_of(rows: np.ndarray, first: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of the `chosen` items, one after the other, and where each begins."""
+    picked, sizes = ragged(np.append(first, len(rows)), chosen)
+    return rows[picked], np.concatenate([[0], np.cumsum(sizes)])
 
 
 def hull_boxes(polygons: BeamPolygons, corners: np.ndarray) -> np.ndarray:
@@ -174,7 +182,7 @@ def packed(
             int(kind // 2),
             bool(kind % 2),
             data.reshape(-1, per_row, texels, 4),
-            *_boxes(low[of_kind], high[of_kind]),
+            *_filled(*_rows_of(hulls, hull_first, of_kind)),
         )
 
 
@@ -200,13 +208,81 @@ def _edges(
     return records, np.abs(change[:, 2]) + np.linalg.norm(change[:, :2], axis=1) * radius
 
 
-def _boxes(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two triangles for every box that holds all texels a polygon touches."""
-    low, high = np.floor(low), np.ceil(high)
-    vertices = np.zeros((len(low), 4), VERTEX)
-    vertices["position"] = np.stack(
-        [low, np.stack([high[:, 0], low[:, 1]], axis=1), np.stack([low[:, 0], high[:, 1]], axis=1), high], axis=1
+def _grown(hulls: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Convex polygons start[i] … start[i + 1] of `hulls` (H, 2), each grown to every texel it touches: the same for
+    their Minkowski sums with a texel about 0.
+
+    A corner becomes the texel's corners that are farthest out along the normals between its two sides."""
+    counts = np.diff(start)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    place = np.arange(len(hulls)) - start[owner]
+    following = start[owner] + (place + 1) % counts[owner]
+    before = start[owner] + (place - 1) % counts[owner]
+    along = hulls[following] - hulls
+    quarter = _quarter(along)
+    steps = (quarter - quarter[before]) % 4
+    rows = np.repeat(np.arange(len(hulls)), steps + 1)
+    nth = np.arange(len(rows)) - np.repeat(np.cumsum(steps + 1) - steps - 1, steps + 1)
+    corner = TEXEL_CORNERS[(quarter[before][rows] + nth) % 4]
+    sizes = np.add.reduceat(steps + 1, start[:-1])
+    return hulls[rows] + corner, np.concatenate([[0], np.cumsum(sizes)])
+
+
+TEXEL_CORNERS = (0.5 + 1e-3) * np.array([[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
+"""Farthest out for a side of a counter-clockwise polygon that goes up and right, up and left, …"""
+
+
+def _quarter(along: np.ndarray) -> np.ndarray:
+    """0-3: a direction from right (included) to up, from up to left, …"""
+    x, y = along.T
+    return np.where(
+        (x > 0.0) & (y >= 0.0), 0, np.where((x <= 0.0) & (y > 0.0), 1, np.where((x < 0.0) & (y <= 0.0), 2, 3))
     )
-    vertices["polygon"] = np.arange(len(low))[:, None]
-    indices = np.array([0, 1, 2, 2, 1, 3], np.uint32) + 4 * np.arange(len(low), dtype=np.uint32)[:, None]
-    return vertices.reshape(-1), indices.reshape(-1)
+
+
+def _filled(hulls: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles that hold each polygon start[i] … start[i + 1] of `hulls`, grown by a texel: `VERTEX` and indices.
+
+    A fan of its corners, a rectangle along its longest side, or half of one along the axes: what costs least."""
+    grown, grown_start = _grown(hulls, start)
+    first, counts = grown_start[:-1], np.diff(grown_start)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    following = np.arange(len(grown)) + 1
+    following[grown_start[1:] - 1] = first
+    along, about = grown[following] - grown, grown - grown[first][owner]
+    length, diagonal = np.linalg.norm(along, axis=1), np.linalg.norm(about, axis=1)
+    twice = about[:, 0] * along[:, 1] - about[:, 1] * along[:, 0]
+    fan_cost = 0.5 * np.add.reduceat(twice, first) + BORDER * np.add.reduceat(length + 2.0 * diagonal, first)
+    # Where corners coincide, the turns of the sides do not add up to one round.
+    fan_cost[counts != np.diff(start) + 4] = np.inf
+
+    longest = np.maximum.reduceat(length, first)
+    is_longest = np.flatnonzero(length == longest[owner])
+    chosen = is_longest[np.searchsorted(owner[is_longest], np.arange(len(counts)))]
+    axis = along[chosen] / np.maximum(longest, 1e-12)[:, None]
+    corners, costs = [], [fan_cost]
+    for direction in (axis, np.broadcast_to([1.0, 0.0], axis.shape)):
+        across = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
+        x, y = np.sum(grown * direction[owner], axis=1), np.sum(grown * across[owner], axis=1)
+        low = np.stack([np.minimum.reduceat(x, first), np.minimum.reduceat(y, first)], axis=1)
+        size = np.stack([np.maximum.reduceat(x, first), np.maximum.reduceat(y, first)], axis=1) - low
+        unit = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) if not corners else np.array([[0, 0], [2, 0], [0, 2]])
+        at = low[:, None] + unit * size[:, None]
+        corners.append(at[..., :1] * direction[:, None] + at[..., 1:] * across[:, None])
+        border = size.sum(axis=1) * 2.0 + 2.0 * np.hypot(*size.T)
+        costs.append(np.prod(size, axis=1) * len(corners) + BORDER * border)
+    kind = np.argmin(costs, axis=0)
+
+    sizes = np.choose(kind, [counts, 4, 3])
+    begin = np.cumsum(sizes) - sizes
+    vertices = np.zeros(sizes.sum(), VERTEX)
+    vertices["polygon"] = np.repeat(np.arange(len(sizes)), sizes)
+    is_fan = np.repeat(kind == 0, sizes)
+    vertices["position"][is_fan] = grown[(kind == 0)[owner]]
+    for which, points in enumerate(corners, start=1):
+        rows = begin[kind == which, None] + np.arange(points.shape[1])
+        vertices["position"][rows.ravel()] = points[kind == which].reshape(-1, 2)
+    triangles = sizes - 2
+    base = np.repeat(begin, triangles)
+    nth = np.arange(triangles.sum()) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    return vertices, np.stack([base, base + nth + 1, base + nth + 2], axis=1).astype(np.uint32).reshape(-1)
