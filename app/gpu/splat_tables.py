@@ -146,7 +146,9 @@ class FoldedSpectrum:
     """Columns that say where in a band its light is: Y, or all bins."""
 
     @classmethod
-    def of(cls, axis: SpectralAxis, light: Spectrum, reflectance: np.ndarray | None, channels: MapChannels) -> FoldedSpectrum:
+    def of(
+        cls, axis: SpectralAxis, light: Spectrum, reflectance: np.ndarray | None, channels: MapChannels
+    ) -> FoldedSpectrum:
         folded = np.ones(401) if reflectance is None else np.asarray(reflectance, np.float64)
         smooth = cumulative(axis, Spectrum(light.density * folded), channels.cell_weights())
         line_nm, power = np.array(light.lines, np.float64).reshape(-1, 2).T

@@ -33,11 +33,11 @@ BEAM = Struct(
 EDGE = Struct(
     "BeamEdge",
     (
-        Field("start", "vec4", "x, y, c, reach at the band's start: inside is x, y · texel + c >= 0"),
+        Field("start", "vec4", "x, y, c, window at the band's start: inside is x, y · texel + c >= 0"),
         Field("change", "vec4", "from there to its end"),
     ),
 )
-"""`reach`: half of what a texel spans across the edge, in the edge's own measure."""
+"""`window`: side of the square over which the covered part is taken there, texels."""
 
 EDGES = 4, 6, 8
 """Edges that programs of their own hold as flat inputs; polygons of more are read from the texture."""
@@ -45,7 +45,7 @@ ROW_TEXELS = 4096
 """At most in a row of the texture."""
 NODES_MAX = 4096
 NODES_MIN = 4
-NO_EDGE = 1.0, 0.0, 1e6, 0.5
+NO_EDGE = 1.0, 0.0, 1e6, 1.0
 """Start of an edge that everything lies inside of."""
 LEAST_LEVEL = 0.05
 """Of the density at the anchor over that at the polygon's centre."""
@@ -139,24 +139,27 @@ def packed(
     first = np.cumsum(counts) - counts
     owner = np.repeat(np.arange(len(chosen)), counts)
     is_line = (polygons.x_hi <= polygons.x_lo)[chosen]
-    edges, moves = _edges(polygons.edges[edge_rows], to_texels, anchor[owner], is_line[owner], 0.5 * diagonal[owner])
+    start, middle, end = polygons.density[chosen].T
+    middle, end = np.where(is_line, start, middle), np.where(is_line, start, end)
+    lines, moves = _lines(polygons.edges[edge_rows], to_texels, anchor[owner], is_line[owner], 0.5 * diagonal[owner])
     motion = np.maximum.reduceat(moves, first)
+    area = polygons.flux[chosen] / np.where(middle > 0.0, middle, 1.0) * area_scale
+    width = area / np.maximum(diagonal - motion, np.sqrt(area) + 1e-9)
+    windows, widest = _windows(lines[..., 3], first, owner, width)
+    is_wide = width > WIDE * widest
+    edges = _edges(lines[..., :3], windows)
 
     records = BEAM.zeros(len(chosen))
     inverse = np.linalg.inv(to_texels.matrix)
     slope = polygons.slope[chosen] @ inverse
     level = 1.0 + np.sum(slope * (anchor - to_texels.texels(polygons.centre[chosen])), axis=1)
     level = np.maximum(level, LEAST_LEVEL)
-    start, middle, end = polygons.density[chosen].T
-    middle, end = np.where(is_line, start, middle), np.where(is_line, start, end)
     parabola = np.stack([start, -3.0 * start + 4.0 * middle - end, 2.0 * (start - 2.0 * middle + end)], axis=1)
-    area = polygons.flux[chosen] / np.where(middle > 0.0, middle, 1.0) * area_scale
     records["anchor"], records["slope"] = anchor, slope / level[:, None]
     records["density"] = parabola * (energy_scale * level)[:, None]
-    width = area / np.maximum(diagonal - motion, np.sqrt(area) + 1e-9)
     nodes = np.ceil(motion / np.clip(0.25 * width, FINEST_STEP, WIDEST_STEP))
     records["nodes"] = np.where(
-        width > WIDE, -np.clip(np.ceil(2.0 + 6.0 * motion), *PARTS), np.clip(nodes, NODES_MIN, NODES_MAX)
+        is_wide, -np.clip(np.ceil(2.0 + 6.0 * motion), *PARTS), np.clip(nodes, NODES_MIN, NODES_MAX)
     )
     records["place"] = np.stack([curves.place[:, 0], curves.place[:, 1] - curves.place[:, 0]], axis=1)
     records["curve_row"], records["edge_count"] = curves.row, counts
@@ -182,35 +185,53 @@ def packed(
             int(kind // 2),
             bool(kind % 2),
             data.reshape(-1, per_row, texels, 4),
-            *_filled(*_rows_of(hulls, hull_first, of_kind)),
+            *_filled(*_rows_of(hulls, hull_first, of_kind), widest[of_kind]),
         )
 
 
-def _edges(
+def _lines(
     edges: np.ndarray, to_texels: TexelMap, anchor: np.ndarray, is_line: np.ndarray, radius: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """EDGE records in texels about `anchor`, and how far each edge moves over the band within `radius`, texels."""
+    """Edges about `anchor` (E, 2 ends, 4): x, y, c and softness in texels; and how far each moves over the band within
+    `radius`, texels."""
     inverse = np.linalg.inv(to_texels.matrix)
-    ends = []
-    for columns in (slice(0, 4), slice(4, 8)):
-        a, c = edges[:, columns][:, :2] @ inverse, edges[:, columns][:, 2]
-        c = c + np.sum(a * (anchor - to_texels.offset), axis=1)
-        ends.append(np.column_stack([a, c]))
+    a = edges.reshape(-1, 2, 4)[..., :2] @ inverse
+    c = edges.reshape(-1, 2, 4)[..., 2] + np.sum(a * (anchor - to_texels.offset)[:, None], axis=-1)
+    lines = np.concatenate([a, c[..., None], edges.reshape(-1, 2, 4)[..., 3:]], axis=-1)
     # One factor for both ends: the line in between is a mixture of the two as they are.
-    scale = 2.0 / (np.linalg.norm(ends[0][:, :2], axis=1) + np.linalg.norm(ends[1][:, :2], axis=1))
-    start, end = (end * scale[:, None] for end in ends)
-    end = np.where(is_line[:, None], start, end)
-    reach = [0.5 * np.abs(line[:, :2]).sum(axis=1) for line in (start, end)]
-    records = EDGE.zeros(len(edges))
-    records["start"] = np.column_stack([start, reach[0]])
-    records["change"] = np.column_stack([end - start, reach[1] - reach[0]])
-    change = end - start
-    return records, np.abs(change[:, 2]) + np.linalg.norm(change[:, :2], axis=1) * radius
+    lines *= (2.0 / np.linalg.norm(a, axis=-1).sum(axis=1))[:, None, None]
+    lines[is_line, 1] = lines[is_line, 0]
+    change = lines[:, 1] - lines[:, 0]
+    return lines, np.abs(change[:, 2]) + np.linalg.norm(change[:, :2], axis=1) * radius
 
 
-def _grown(hulls: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _windows(
+    softness: np.ndarray, first: np.ndarray, owner: np.ndarray, width: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Sides of the squares over which the covered part is taken at each edge (E, 2 ends), texels: a texel blurred by
+    the edge's penumbra (of the same variance); and the largest of each polygon.
+
+    At the edges of a narrow polygon they are all the same and whole texels, or it would lose or gain light."""
+    windows = np.sqrt(1.0 + 4.0 * softness**2)
+    counts = np.diff(np.append(first, len(owner)))
+    mean = np.add.reduceat(windows.mean(axis=1), first) / counts
+    widest = np.maximum.reduceat(windows.max(axis=1), first)
+    is_narrow = width <= WIDE * widest
+    widest = np.where(is_narrow, np.round(mean), widest)
+    return np.where(is_narrow[owner, None], widest[owner, None], windows), widest
+
+
+def _edges(lines: np.ndarray, windows: np.ndarray) -> np.ndarray:
+    """EDGE records of lines (E, 2 ends, 3)."""
+    ends = np.concatenate([lines, windows[..., None]], axis=-1)
+    records = EDGE.zeros(len(lines))
+    records["start"], records["change"] = ends[:, 0], ends[:, 1] - ends[:, 0]
+    return records
+
+
+def _grown(hulls: np.ndarray, start: np.ndarray, windows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Convex polygons start[i] … start[i + 1] of `hulls` (H, 2), each grown to every texel it touches: the same for
-    their Minkowski sums with a texel about 0.
+    their Minkowski sums with a square of side `windows`.
 
     A corner becomes the texel's corners that are farthest out along the normals between its two sides."""
     counts = np.diff(start)
@@ -225,7 +246,7 @@ def _grown(hulls: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray
     nth = np.arange(len(rows)) - np.repeat(np.cumsum(steps + 1) - steps - 1, steps + 1)
     corner = TEXEL_CORNERS[(quarter[before][rows] + nth) % 4]
     sizes = np.add.reduceat(steps + 1, start[:-1])
-    return hulls[rows] + corner, np.concatenate([[0], np.cumsum(sizes)])
+    return hulls[rows] + corner * windows[owner[rows], None], np.concatenate([[0], np.cumsum(sizes)])
 
 
 TEXEL_CORNERS = (0.5 + 1e-3) * np.array([[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
@@ -240,11 +261,12 @@ def _quarter(along: np.ndarray) -> np.ndarray:
     )
 
 
-def _filled(hulls: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles that hold each polygon start[i] … start[i + 1] of `hulls`, grown by a texel: `VERTEX` and indices.
+def _filled(hulls: np.ndarray, start: np.ndarray, windows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles that hold each polygon start[i] … start[i + 1] of `hulls`, grown by half of `windows`.
 
-    A fan of its corners, a rectangle along its longest side, or half of one along the axes: what costs least."""
-    grown, grown_start = _grown(hulls, start)
+    `VERTEX` and indices: a fan of its corners, a rectangle along its longest side, or a triangle round one along the
+    axes, what costs least."""
+    grown, grown_start = _grown(hulls, start, windows)
     first, counts = grown_start[:-1], np.diff(grown_start)
     owner = np.repeat(np.arange(len(counts)), counts)
     following = np.arange(len(grown)) + 1
@@ -260,7 +282,8 @@ def _filled(hulls: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarra
     is_longest = np.flatnonzero(length == longest[owner])
     chosen = is_longest[np.searchsorted(owner[is_longest], np.arange(len(counts)))]
     axis = along[chosen] / np.maximum(longest, 1e-12)[:, None]
-    corners, costs = [], [fan_cost]
+    corners: list[np.ndarray] = []
+    costs = [fan_cost]
     for direction in (axis, np.broadcast_to([1.0, 0.0], axis.shape)):
         across = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
         x, y = np.sum(grown * direction[owner], axis=1), np.sum(grown * across[owner], axis=1)

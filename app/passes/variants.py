@@ -158,7 +158,8 @@ def draw_variants(features: SplatFeatures) -> dict[int, tuple[str, Defines]]:
 def beam_defines(targets: int, edges: int, is_still: bool) -> Defines:
     """Defines of the programs that draw beam polygons of up to `edges` edges (0: any number), moving over their band or
     not."""
-    return {"TARGETS": targets, "EDGES": edges} | ({"STILL": 1} if is_still else {})
+    counts: Defines = {"TARGETS": targets, "EDGES": edges}
+    return counts | ({"STILL": 1} if is_still else {})
 
 
 # -- camera pass --------------------------------------------------------------------------

@@ -87,8 +87,9 @@ void main() {
     for (int e = 0; e < EDGE_COUNT; ++e) {
         vec4 line = EDGE_START(e) + 0.5 * EDGE_CHANGE(e);
         float h = dot(line.xy, at) + line.z;
-        outside = outside || h <= -line.w;
-        note_crossing(e, h < line.w, vec3(line.xy, h), vec3(0.0));
+        float reach = reach_of(line);
+        outside = outside || h <= -reach;
+        note_crossing(e, h < reach, vec4(line.xy, h, line.w), vec4(0.0));
     }
     crossings = outside ? 0 : crossings;
     float share = half_plane_share(0.5);
@@ -103,8 +104,9 @@ void main() {
     for (int e = 0; e < EDGE_COUNT; ++e) {
         vec4 start = EDGE_START(e), change = EDGE_CHANGE(e);
         float h = dot(start.xy, at) + start.z, dh = dot(change.xy, at) + change.z;
-        vec2 touches = positive(h + start.w, dh + change.w), covers = positive(h - start.w, dh - change.w);
-        note_crossing(e, covers.x > 0.0 || covers.y < 1.0, vec3(start.xy, h), vec3(change.xy, dh));
+        float reach = reach_of(start), widens = reach_of(start + change) - reach;
+        vec2 touches = positive(h + reach, dh + widens), covers = positive(h - reach, dh - widens);
+        note_crossing(e, covers.x > 0.0 || covers.y < 1.0, vec4(start.xy, h, start.w), vec4(change.xy, dh, change.w));
         touched = vec2(max(touched.x, touches.x), min(touched.y, touches.y));
         second = vec2(max(second.x, min(whole.x, covers.x)), min(second.y, max(whole.y, covers.y)));
         whole = vec2(max(whole.x, covers.x), min(whole.y, covers.y));

@@ -26,7 +26,11 @@ flat in vec4 edge[2 * EDGES];
 
 vec2 at;  // the texel's centre, about the anchor
 
-vec3 normalized_line(vec3 line) { return line * inversesqrt(dot(line.xy, line.xy)); }
+// A line's unit normal and distance inside, in units of its window: a texel, or a square as wide as the penumbra.
+vec3 normalized_line(vec3 line, float window) { return vec3(line.xy, line.z / window) * inversesqrt(dot(line.xy, line.xy)); }
+
+// Half of what the window spans across a line.
+float reach_of(vec4 line) { return 0.5 * (abs(line.x) + abs(line.y)) * line.w; }
 
 // Part of the line `own` (a point of it is -h n + s perpendicular) within the half-plane `other`, as an interval of s. Of two lines that are the same one counts.
 vec2 cut(vec2 interval, vec3 own, vec3 other, bool own_first) {
@@ -63,14 +67,14 @@ void cut_sides(vec3 own, inout vec4 low, inout vec4 high) {
 
 vec3 line_at(int e, float t) {
     vec4 line = EDGE_START(e) + t * EDGE_CHANGE(e);
-    return normalized_line(vec3(line.xy, dot(line.xy, at) + line.z));
+    return normalized_line(vec3(line.xy, dot(line.xy, at) + line.z), line.w);
 }
 
 // The edges that cross the texel at some time, four bits each; where a program takes any number of edges it looks at all again.
 uint crossing = 0u;
 int crossings = 0;
-// One of them: normal, distance inside; and their change over the band.
-vec3 only_start = vec3(1.0, 0.0, 1.0), only_change = vec3(0.0);
+// One of them: normal, distance inside, window; and their change over the band.
+vec4 only_start = vec4(1.0, 0.0, 1.0, 1.0), only_change = vec4(0.0);
 
 // Covered part of the texel at t: the lengths of what bounds it, times their distance from the texel's centre. Loops have short bodies, since a software renderer
 // runs a loop that no texel is in once.
@@ -100,7 +104,8 @@ float covered_share(float t) {
 
 // Covered part of the texel at t where one edge alone crosses it.
 float half_plane_share(float t) {
-    vec3 line = normalized_line(only_start + t * only_change);
+    vec4 only = only_start + t * only_change;
+    vec3 line = normalized_line(only.xyz, only.w);
     vec2 n = abs(line.xy);
     float sum = 0.5 * (n.x + n.y), difference = 0.5 * abs(n.x - n.y), h = abs(line.z);
     float missing = max(sum - h, 0.0);
@@ -108,7 +113,7 @@ float half_plane_share(float t) {
     return line.z >= 0.0 ? share : 1.0 - share;
 }
 
-void note_crossing(int e, bool crosses, vec3 start, vec3 change) {
+void note_crossing(int e, bool crosses, vec4 start, vec4 change) {
     only_start = crosses ? start : only_start;
     only_change = crosses ? change : only_change;
 #if EDGES > 0
