@@ -42,8 +42,8 @@ void add_curve(float t, float weight) {
 void add_whole(vec2 interval, vec2 ramps) {
     float middle = 0.5 * (interval.x + interval.y), reach = 0.5 * (interval.y - interval.x);
     float density = density_at(middle) + density_nodes.z * reach * reach * (1.0 / 3.0);
-    float rise = (2.0 / 3.0) * reach * (density_nodes.y + 2.0 * middle * density_nodes.z);
     bool is_even = abs(density_nodes.y) + abs(density_nodes.z) < 0.02 * density_nodes.x;
+    float rise = is_even ? 0.0 : (2.0 / 3.0) * reach * (density_nodes.y + 2.0 * middle * density_nodes.z);
     bool is_sudden = max(ramps.x, ramps.y) < 0.01;
     int at_ends = is_sudden ? 2 : 4, count = reach <= 0.0 ? 0 : is_even ? at_ends : at_ends + 1;
     float share = is_sudden ? 1.0 : 0.5;
