@@ -16,7 +16,7 @@ from .scene import (
     Scene,
     SceneObject,
 )
-from .settings import RenderSettings
+from .settings import RenderSettings, divides_spectrum
 
 MAX_GROUPS = 4
 """Spectral columns a photon may carry; further dispersive materials share the last one."""
@@ -184,7 +184,7 @@ def _reindexed(scene: Scene, settings: RenderSettings, groups: int, *, coloured:
     from .optics.spectral_tables import SpectralAxis
 
     edited = settings.anchor_weights or (settings.local_gain and any(o.local_dispersion for o in scene.objects))
-    if not edited or groups != 1 or coloured or settings.method != "srd":
+    if not edited or groups != 1 or coloured or not divides_spectrum(settings.method):
         return False
     if any(o.material.is_grating for o in scene.objects):
         return False
