@@ -35,6 +35,8 @@ class LightPlan:
     light_points: int
     share: float
     """Share of the photons."""
+    beam_objects: tuple[int, ...] = ()
+    """Objects whose light beams carry, not photons."""
 
     @property
     def lattices(self) -> int:
@@ -64,6 +66,7 @@ class LightPlan:
             key,
             self.light_points,
             weight=weight,
+            beam_objects=self.beam_objects,
         )
 
 
