@@ -8,7 +8,7 @@ part of the piece holds, so no light is lost at an edge, and its footprint is as
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -135,3 +135,19 @@ class PieceLattice:
             found[:, 27:30],
             found[:, 30],
         )
+
+
+def pieces_where(pieces: BeamPieces, chosen: np.ndarray) -> BeamPieces:
+    """The pieces where `chosen`, bool (M,), in order."""
+    values = {}
+    for field in fields(pieces):
+        values[field.name] = getattr(pieces, field.name)
+        if field.name in ("edges", "hulls"):
+            starts = pieces.edge_start if field.name == "edges" else pieces.hull_start
+            values[field.name] = values[field.name][np.repeat(chosen, np.diff(starts))]
+        elif field.name.endswith("_start"):
+            counts = np.diff(values[field.name])[chosen]
+            values[field.name] = np.cumsum([0, *counts]).astype(np.int32)
+        else:
+            values[field.name] = values[field.name][chosen]
+    return BeamPieces(**values)

@@ -427,9 +427,7 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
         (
             "beams",
             features.beams,
-            "what flat facets throw is followed as beams"
-            if features.beams
-            else "all light is followed by photons",
+            "what flat facets throw is followed as beams" if features.beams else "all light is followed by photons",
         ),
         ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
     ]
