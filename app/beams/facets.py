@@ -120,12 +120,9 @@ def beam_scene(
     frames: dict[int, tuple[np.ndarray, np.ndarray]],
     axis: SpectralAxis,
     unit: float,
-    *,
-    sees: bool = False,
 ) -> BeamScene:
     """The facets of `scene`. `meshes`: each object's in GPU space; `frames`: origin (3,) and axes (2, 3) of every flat
-    receiver's map by number; `unit`: GPU units a scene unit. `sees`: for beams from the camera, which end where
-    they leave glass and mirrors."""
+    receiver's map by number; `unit`: GPU units a scene unit."""
     why_not: dict[int, str] = {}
     outlines: dict[int, list[tuple[np.ndarray, int]]] = {}
     receivers = [i for i, o in enumerate(scene.objects) if o.material.receives]
@@ -141,8 +138,6 @@ def beam_scene(
             if reason is not None:
                 why_not[i] = reason
                 obstacles.append(i)
-        elif sees:
-            continue
         elif item.material.receives and not is_flat(item) or len(item.mesh.triangles) > MAX_FACETS:
             obstacles.append(i)
         else:

@@ -404,11 +404,11 @@ def at_facet(nodes, top, facets, solids, tables, sources, task, leaves, sums, li
     """The beam in hand meets its facet: halved where it has to be, ended, or sent on. Returns (top, leaves)."""
     facet = nodes[_HAND].facet
     kind = facets[facet].kind
-    if kind == 3:
+    if kind == 3 or (kind == 2 and task.sees):
         if nodes[_HAND].depth > 0:
             copy(nodes, _HAND, top)
             leaves = end(
-                nodes, top, LEAF_RECEIVER, facets, solids, tables, sources, task, leaves, sums, spare_corner, spare_side
+                nodes, top, LEAF_OPEN if task.sees else LEAF_RECEIVER, facets, solids, tables, sources, task, leaves, sums, spare_corner, spare_side
             )
         return top, leaves
     if nodes[_HAND].total == _LAY:

@@ -15,7 +15,8 @@ class Leaves(NamedTuple):
     count: np.ndarray
     """int64 (3,): leaves, edges, corners."""
     head: np.ndarray
-    """int64 (L, 8): kind, facet it ends on (-1: none), facet left last, object first met, depth, mask, edges, corners."""
+    """int64 (L, 9): kind, facet it ends on (-1: none), facet left last, object first met, depth, mask, edges, corners, hash of
+    its path."""
     x: np.ndarray
     """(L, 3)."""
     density: np.ndarray
@@ -40,7 +41,7 @@ def empty_leaves(leaves: int) -> Leaves:
     """Room for so many."""
     return Leaves(
         np.zeros(3, np.int64),
-        np.empty((leaves, 8), np.int64),
+        np.empty((leaves, 9), np.int64),
         np.empty((leaves, 3)),
         np.empty((leaves, 3)),
         np.empty((leaves, 2)),
@@ -67,7 +68,7 @@ def grown(leaves):
     """The same with twice the room."""
     a, e, h = leaves.count[0], leaves.count[1], leaves.count[2]
     n, m, k = 2 * leaves.head.shape[0], 2 * leaves.edge.shape[0] + 256, 2 * leaves.corner.shape[0] + 384
-    head, x, density = np.empty((n, 8), np.int64), np.empty((n, 3)), np.empty((n, 3))
+    head, x, density = np.empty((n, 9), np.int64), np.empty((n, 3)), np.empty((n, 3))
     centre, slope, flux = np.empty((n, 2)), np.zeros((n, 2)), np.empty(n)
     ray, edge, corner = np.empty((n, 2, 3, 3, 3)), np.empty((m, 3, 3)), np.empty((k, 2))
     soft = np.zeros(m)
@@ -155,6 +156,7 @@ def lay_leaf(nodes, i, facets, kind, density, leaves):
     head[2] = nodes[i].path[0, flight - 1] if flight > 0 else -1
     head[3] = facets[nodes[i].path[0, 0]].owner if flight > 0 else -1
     head[4], head[5] = nodes[i].depth, nodes[i].mask
+    head[8] = np.int64(nodes[i].key >> np.uint64(33))
     leaves.x[row] = nodes[i].x
     leaves.ray[row, 0] = nodes[i].position
     leaves.ray[row, 1] = nodes[i].direction
