@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.features import is_flat
+from ..model.features import is_flat, why_no_beams
 from ..model.geometry.mesh import Mesh
 from ..model.optics.colorimetry import VISIBLE_NM, rgb_partition
 from ..model.optics.spectral_tables import SpectralAxis
-from ..model.scene import Scene, SceneObject
+from ..model.scene import Scene
 
 DIELECTRIC, MIRROR, BLACK, RECEIVER = 0, 1, 2, 3
 MAX_SOLIDS = 62
@@ -93,27 +93,6 @@ class BeamScene:
     """Specular objects that beams do not carry, and why."""
 
 
-def is_faceted(item: SceneObject) -> bool:
-    """Whether all the object's specular facets are flat: no interpolated normals."""
-    mesh = item.mesh
-    if mesh.corner_normals is None:
-        return True
-    known = np.abs(mesh.corner_normals).sum(axis=2) > 0.0
-    cosine = np.einsum("tcj,tj->tc", mesh.corner_normals, mesh.face_normals())
-    return bool((~known | (cosine >= 1.0 - 1e-9)).all())
-
-
-def why_not_faceted(item: SceneObject) -> str | None:
-    """Why beams cannot carry what an object of glass or a mirror throws; None: they can."""
-    if item.material.is_grating:
-        return "a grating sends light into several orders"
-    if not is_faceted(item):
-        return "its normals are interpolated"
-    if len(item.mesh.triangles) > 8 * MAX_FACETS:
-        return f"it has {len(item.mesh.triangles)} triangles"
-    return None
-
-
 def beam_scene(
     scene: Scene,
     meshes: list[Mesh],
@@ -129,7 +108,7 @@ def beam_scene(
     obstacles: list[int] = []
     for i, item in enumerate(scene.objects):
         if item.material.is_specular:
-            reason = why_not_faceted(item)
+            reason = why_no_beams(item)
             if reason is None:
                 outlines[i] = facets_of(meshes[i])
                 if len(outlines[i]) > MAX_FACETS:

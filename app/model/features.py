@@ -177,6 +177,7 @@ class Features:
             reindexed=_reindexed(scene, settings, groups, coloured=absorbing or coloured_mirror),
             local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
             anchor_weights=settings.anchor_weights,
+            beams=_has_beams(scene, settings),
             light_profiles=any(light.profile is not None for light in scene.lights),
         )
 
@@ -193,6 +194,43 @@ def _reindexed(scene: Scene, settings: RenderSettings, groups: int, *, coloured:
         return False
     (turning,) = SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.transmits]).turning_nm
     return len(turning) == 2
+
+
+MAX_BEAM_TRIANGLES = 8192
+"""A mesh of more is never tried as facets of beams; whether fewer pay is measured (`render.beam_light`)."""
+
+
+def is_faceted(item: SceneObject) -> bool:
+    """Whether all the object's facets are flat: no interpolated normals."""
+    mesh = item.mesh
+    if mesh.corner_normals is None:
+        return True
+    known = np.abs(mesh.corner_normals).sum(axis=2) > 0.0
+    cosine = np.einsum("tcj,tj->tc", mesh.corner_normals, mesh.face_normals())
+    return bool((~known | (cosine >= 1.0 - 1e-9)).all())
+
+
+def why_no_beams(item: SceneObject) -> str | None:
+    """Why beams cannot carry what an object of glass or a mirror throws; None: they can."""
+    if item.material.is_grating:
+        return "a grating sends light into several orders"
+    if len(item.mesh.triangles) > MAX_BEAM_TRIANGLES:
+        return f"it has {len(item.mesh.triangles)} triangles"
+    if not is_faceted(item):
+        return "its normals are interpolated"
+    return None
+
+
+def beam_objects(scene: Scene) -> list[int]:
+    """Objects of flat-faceted glass or mirrors, whose light may go as beams."""
+    return [i for i, o in enumerate(scene.objects) if o.material.is_specular and why_no_beams(o) is None]
+
+
+def _has_beams(scene: Scene, settings: RenderSettings) -> bool:
+    painted = settings.local_gain and any(o.local_dispersion for o in scene.objects)
+    receives = any(o.material.receives and is_flat(o) for o in scene.objects)
+    shines = any(light.profile is None for light in scene.lights)
+    return settings.method == "srd" and receives and shines and not painted and bool(beam_objects(scene))
 
 
 def camera_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:
