@@ -465,10 +465,28 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
         (
             "beams",
             features.beams,
-            "what flat facets throw is followed as beams" if features.beams else "all light is followed by photons",
+            _beam_words(scene, features),
         ),
         ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
     ]
+
+
+def _beam_words(scene: Scene, features: Features) -> str:
+    specular = [o for o in scene.objects if o.material.is_specular]
+    if features.beams:
+        carried = [scene.objects[i].name for i in beam_objects(scene)]
+        others = [f"{o.name}: {why_no_beams(o)}" for o in specular if why_no_beams(o)]
+        return f"what {', '.join(carried)} throw(s) goes as polygons" + (f"; photons for {'; '.join(others)}" if others else "")
+    if features.method != "srd":
+        return f"method {features.method} follows photons"
+    reasons = [f"{o.name}: {why_no_beams(o)}" for o in specular if why_no_beams(o)]
+    if not specular or len(reasons) == len(specular):
+        return "; ".join(reasons) or "there is neither glass nor mirror"
+    if not any(o.material.receives and is_flat(o) for o in scene.objects):
+        return "no receiver is flat"
+    if any(o.local_dispersion for o in scene.objects):
+        return "the dispersion brush was used on a receiver"
+    return "no light can be followed as beams"
 
 
 def _target_words(features: Features) -> str:

@@ -28,6 +28,7 @@ from ..model.features import Features
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
+from ..passes.beam_emission import BeamEmission
 from ..passes.camera import CausticMaps
 from ..passes.emission_domain import EmissionDomain, emission_domain
 from ..passes.map_atlas import MapAtlas
@@ -35,7 +36,6 @@ from ..passes.map_layout import MapLayout, check_map_receiver, layout_maps
 from ..passes.pilot import Pilot, landings_of, pilot_steps
 from ..passes.splat import Splatter
 from ..passes.trace import RAY_ROOM, Batch, FluxTally, TracePass
-from ..passes.beam_emission import BeamEmission
 from .beam_light import BeamLight, BeamStats, carries_everything
 from .light_maps import LightMaps
 from .light_plan import Division, Planner
