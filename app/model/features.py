@@ -230,7 +230,7 @@ def _has_beams(scene: Scene, settings: RenderSettings) -> bool:
     painted = settings.local_gain and any(o.local_dispersion for o in scene.objects)
     receives = any(o.material.receives and is_flat(o) for o in scene.objects)
     shines = any(light.profile is None for light in scene.lights)
-    return settings.method == "srd" and receives and shines and not painted and bool(beam_objects(scene))
+    return settings.method == "srd" and not settings.anchor_weights and receives and shines and not painted and bool(beam_objects(scene))
 
 
 def camera_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:
