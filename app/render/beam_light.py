@@ -32,7 +32,7 @@ THRESHOLD = 4.0
 COARSEST, FINEST = 1e-2, 1e-8
 _SURVEY = 1e-3
 """Threshold of the search that tells which objects beams carry, and what they cost."""
-_DEAREST = 3.0
+_DEAREST = 90.0
 """Seconds of a survey after which photons are thought cheaper."""
 _SUMS = {
     "entered": SUM_ENTERED,
