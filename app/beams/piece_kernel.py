@@ -118,8 +118,11 @@ def _lit(edges, t, u, v, polygon, count, scratch):
 
 
 @_compiled
-def contents(x_lo, x_hi, weight, edge_start, edges, hull_start, hulls, light, curve_start, curve_x, curve_w, out):
-    """What each piece holds, `out` (M,): weight · power · area, W per unit of the measure's scale."""
+def contents(
+    x_lo, x_hi, weight, edge_start, edges, hull_start, hulls, light, curve_start, curve_x, curve_w, out, powers
+):
+    """What each piece holds, `out` (M,): weight · power · area, W per unit of the measure's scale; `powers` (M,) of the
+    bands, W."""
     moments = np.empty(6)
     for i in range(len(out)):
         own = edges[edge_start[i] : edge_start[i + 1]]
@@ -137,6 +140,7 @@ def contents(x_lo, x_hi, weight, edge_start, edges, hull_start, hulls, light, cu
             polygon[: len(hull)] = hull
             _moments(polygon, _lit(own, t, 0.0, 0.0, polygon, len(hull), scratch), moments)
             total += moments[0] * power * _weight_at(weight[i], t)
+            powers[i] += power
         out[i] = total
 
 

@@ -13,14 +13,15 @@ from spectrasplat.beams.polygons import joined
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.model.features import Features
 from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.model.optics.spectrum import laser
+from spectrasplat.model.lights import PointLight
+from spectrasplat.model.optics.spectrum import constant, laser
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.beam_emission import BeamEmission
 from spectrasplat.render.light_pass import LightPass, RoundOf, spectral_axis
 from spectrasplat.render.light_plan import Division
 
-from tests.reference.first_events import first_events
+from tests.reference.first_events import diverging_first_event, first_events
 
 PHOTONS = 60_000
 SCENE = """
@@ -168,6 +169,31 @@ def test_pieces_go_on_as_photons_would(gl, tmp_path: Path, two_events: bool, sha
     # A ball within throws light far over the map's edge.
     assert handed.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=0.02 if more == WITHIN else 3e-3)
     print(difference(handed, reference), difference(alone, reference))
+    assert np.all(difference(handed, reference) < 1.4 * difference(alone, reference))
+
+
+def test_pieces_of_light_that_diverges(gl, tmp_path: Path) -> None:
+    """Eight hundred pieces of a point light."""
+    scene = scene_of(tmp_path, BESIDE)
+    lamp = PointLight("lamp", constant(1.0), position=(-2.4, -0.3, 3.0))
+    scene = replace(scene, lights=(lamp,))
+    maps = []
+    for seed, photons in ((1, PHOTONS), (3, 8 * PHOTONS)):
+        with light_of(gl, scene, False, 2, photons, seed) as light:
+            run(light, photons)
+            maps.append(map_of(light))
+    with light_of(gl, scene, True, 2) as light:
+        run(light)
+        spans = [(band.x_lo, band.x_hi) for band in light.plans[0].bands]
+        edges = np.array([spans[0][0], *(hi for _, hi in spans)])
+        pieces = diverging_first_event(light.buffers, light.domains[0], 0, edges, 10)
+        emission = BeamEmission(light.buffers, light.trace.ray, pieces, [spans])
+        assert emission.flux_w(0) * PHOTONS == pytest.approx(light.stats.tally.ended["beams"], rel=5e-3)
+        hand_over(light, emission, PHOTONS)
+        handed = map_of(light)
+    alone, reference = maps
+    print(len(pieces), difference(handed, reference), difference(alone, reference))
+    assert handed.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=3e-3)
     assert np.all(difference(handed, reference) < 1.4 * difference(alone, reference))
 
 

@@ -140,6 +140,15 @@ def test_sub_lattices_are_even_and_make_the_whole() -> None:
     assert np.ptp(middle, axis=0).max() < 0.05
 
 
+def test_no_colour_is_coarser_than_another() -> None:
+    """A band of a hundredth of the power has as many points; two halves of a band have as many as the whole."""
+    faint = CumulativeSpectrum(np.array([0.0, 0.5, 1.0]), np.outer([0.0, 0.01, 1.0], np.ones(4)))
+    halves = joined([piece(band=(0.0, 0.5)), piece(band=(0.5, 0.75)), piece(band=(0.75, 1.0))])
+    rays = PieceLattice(halves, [faint], [1.0]).rays(0, 4000, (0, 0), KEY)
+    assert np.bincount(rays.piece) == pytest.approx(np.array([2000, 1000, 1000]), rel=0.12)
+    assert np.bincount(rays.piece, rays.flux_w) == pytest.approx([0.04, 1.98, 1.98], rel=1e-6)
+
+
 def test_many_small_pieces_are_stood_for_by_some() -> None:
     sizes = np.linspace(0.5, 1.5, 1000)
     pieces = joined([piece(size * SQUARE, weight=(3.0, 3.0, 3.0)) for size in sizes])
