@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.beams.polygons import joined
+from spectrasplat.gpu.records import FLAG_INSIDE, NONE
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.model.features import Features
 from spectrasplat.model.io.scene_file import load_scene
@@ -132,6 +133,37 @@ def test_what_meets_a_beams_object_first_is_left_to_it(gl, tmp_path: Path) -> No
     assert 0.3 < after["beams"] < 0.9
     assert sum(after.values()) == pytest.approx(1.0, abs=0.02)
     assert after["deposited"] < 0.7 * before["deposited"]
+
+
+def test_records_say_where_a_piece_is(gl, tmp_path: Path) -> None:
+    """Facet, side and medium: what keeps a ray from meeting the surface it starts on, and what it goes through."""
+    more = WITHIN + BALL.format(radius=0.3, position=[4.0, 0.0, 0.5]).replace('"ball"', '"apart"')
+    with light_of(gl, scene_of(tmp_path, more), True) as light:
+        buffers = light.buffers
+        for triangle, number in enumerate(buffers.primitives.tolist()):
+            item = int(np.searchsorted(buffers.first_triangle, triangle, side="right")) - 1
+            corners = buffers.space.to_gpu(buffers.world_meshes[item].corners())[
+                triangle - buffers.first_triangle[item]
+            ]
+            if item == 0:
+                normal, offset = np.split(buffers._planes[number & 0x7FFFFFFF].astype(float), [3])
+                assert number >> 31 and corners @ normal == pytest.approx(float(offset[0]), abs=1e-6)
+            else:
+                assert buffers._triangle_order[number] == triangle
+        emission = emission_of(light, False)
+        (rays,) = emission.batches(0, 500, 1.0, (0, 0), 5, 10_000)
+        planes = buffers._planes[rays["last_primitive"] & 0x7FFFFFFF]
+        off = np.einsum("ij,ij->i", rays["position"], planes[:, :3]) - planes[:, 3]
+        assert np.abs(off).max() < 1e-6 and np.all(rays["last_object"] == 0) and np.all(rays["depth"] == 1)
+        inward = np.einsum("ij,ij->i", rays["direction"], planes[:, :3]) < 0.0
+        assert np.all((rays["flags"] == FLAG_INSIDE) == inward) and set(rays["flags"].tolist()) == {0, FLAG_INSIDE}
+        prism_bit = 1 << buffers.stack_objects.index(0)
+        assert np.all(rays["inside_mask"] == np.where(inward, prism_bit, 0)) and np.all(rays["inside_object"] == NONE)
+        # A solid that stands alone is no bit of the mask.
+        alone = replace(emission.pieces, inside=np.full(len(emission.pieces), 1 << 3, np.uint64))
+        spans = [(band.x_lo, band.x_hi) for band in light.plans[0].bands]
+        (rays,) = BeamEmission(buffers, light.trace.ray, alone, [spans]).batches(0, 500, 1.0, (0, 0), 5, 10_000)
+        assert np.all(rays["inside_object"] == 3) and not rays["inside_mask"].any()
 
 
 def test_beams_need_their_programs(gl, tmp_path: Path) -> None:

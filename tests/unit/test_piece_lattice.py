@@ -127,6 +127,22 @@ def test_what_moves_is_lit_for_as_long_as_it_is_there(move: tuple[float, float],
         assert spread == pytest.approx(np.array([2.0, 1.0]) / np.sqrt(12.0), rel=0.03)
 
 
+def test_rays_follow_a_sliver_that_moves_over_their_cells() -> None:
+    """A sliver a hundredth as wide as it moves: at each x light is where the sliver is, not all over the cells."""
+    corners = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 0.04], [0.0, 0.04]])
+    rays = rays_of(piece(corners, (0.0, 4.0), band=(0.0, 1.0)), 300)
+    assert rays.flux_w.sum() == pytest.approx(2.0 * 0.08, rel=5e-3)
+    for end in (0, 1, 2):
+        place = rays.band[:, end]
+        v = rays.position[:, 1] + rays.dposition[:, 2, 1] * (place - rays.band[:, 1])
+        assert v - 0.02 == pytest.approx(4.0 * place, abs=0.025)
+    assert np.median(rays.dposition[:, 2, 1]) == pytest.approx(4.0, rel=0.1)
+    assert np.linalg.norm(rays.dposition[:, :2], axis=2).min(axis=1).max() < 0.06
+    # Together they are lit all the time, each at any place once.
+    covered = [np.sum(rays.flux_w[(rays.band[:, 0] <= x) & (x < rays.band[:, 2])]) for x in np.linspace(0.01, 0.99, 50)]
+    assert min(covered) > 0.0
+
+
 def test_sub_lattices_are_even_and_make_the_whole() -> None:
     pieces = joined([piece(), piece(triangle(4.0, 0.02)), piece(0.01 * SQUARE, move=(0.5, 0.1))])
     whole = rays_of(pieces, 3000)
