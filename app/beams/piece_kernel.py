@@ -22,6 +22,9 @@ CELL_STEPS = 2
 COLUMNS = 31
 """Of a ray: position, direction, their derivatives by the cell's two axes (dp dp dd dd) and by x (dp dd), x_lo,
 x_anchor, x_hi, throughput there, flux."""
+MOMENTS_OF_BAND, TANGENTS = 5, 16
+"""Times at which what is lit is measured for its lattice, and sides of what is laid about it."""
+GOLDEN = 0.6180339887498949
 _BODY = 11
 _LINE_X = 1e-9
 """An emission line is looked for so far on both sides of its x."""
@@ -115,8 +118,11 @@ def _lit(edges, t, u, v, polygon, count, scratch):
 
 
 @_compiled
-def contents(x_lo, x_hi, weight, edge_start, edges, hull_start, hulls, light, curve_start, curve_x, curve_w, out):
-    """What each piece holds, `out` (M,): weight · power · area, W per unit of the measure's scale."""
+def contents(
+    x_lo, x_hi, weight, edge_start, edges, hull_start, hulls, light, curve_start, curve_x, curve_w, out, powers
+):
+    """What each piece holds, `out` (M,): weight · power · area, W per unit of the measure's scale; `powers` (M,) of the
+    bands, W."""
     moments = np.empty(6)
     for i in range(len(out)):
         own = edges[edge_start[i] : edge_start[i + 1]]
@@ -134,29 +140,71 @@ def contents(x_lo, x_hi, weight, edge_start, edges, hull_start, hulls, light, cu
             polygon[: len(hull)] = hull
             _moments(polygon, _lit(own, t, 0.0, 0.0, polygon, len(hull), scratch), moments)
             total += moments[0] * power * _weight_at(weight[i], t)
+            powers[i] += power
         out[i] = total
 
 
 @_compiled
-def _frame(hull, out):
-    """Principal axis (cosine, sine) of a hull, low and high along it and across it, area."""
-    moments = np.empty(6)
-    _moments(hull, len(hull), moments)
-    area = moments[0]
-    angle = 0.0
-    if area > 0.0:
-        u, v = moments[1] / area, moments[2] / area
-        uu, uv, vv = moments[3] / area - u * u, moments[4] / area - u * v, moments[5] / area - v * v
-        angle = 0.5 * math.atan2(2.0 * uv, uu - vv)
-    out[0], out[1] = math.cos(angle), math.sin(angle)
-    out[2] = out[4] = np.inf
-    out[3] = out[5] = -np.inf
+def _frame(own, hull, moves, out):
+    """Principal axis (cosine, sine) of what is lit at some time; low and high of the hull, and of that, along it and
+    across it; area of the convex hull of that."""
+    times = MOMENTS_OF_BAND if moves else 1
+    room = len(own) + len(hull) + 4
+    polygons, counts = np.empty((times, room, 2)), np.empty(times, np.int64)
+    scratch, moments, total = np.empty((2 * room, 2)), np.empty(6), np.zeros(6)
+    for k in range(times):
+        polygons[k, : len(hull)] = hull
+        t = k / (times - 1) if times > 1 else 0.0
+        counts[k] = _lit(own, t, 0.0, 0.0, polygons[k], len(hull), scratch)
+        _moments(polygons[k], counts[k], moments)
+        total += moments
+    if not total[0] > 0.0:
+        return False
+    u, v = total[1] / total[0], total[2] / total[0]
+    uu, uv, vv = total[3] / total[0] - u * u, total[4] / total[0] - u * v, total[5] / total[0] - v * v
+    angle = 0.5 * math.atan2(2.0 * uv, uu - vv)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    out[0], out[1] = cosine, sine
+    for at in range(2, 10, 2):
+        out[at], out[at + 1] = np.inf, -np.inf
     for i in range(len(hull)):
-        along = out[0] * hull[i, 0] + out[1] * hull[i, 1]
-        across = -out[1] * hull[i, 0] + out[0] * hull[i, 1]
-        out[2], out[3] = min(out[2], along), max(out[3], along)
-        out[4], out[5] = min(out[4], across), max(out[5], across)
-    out[6] = area
+        _widen(out[2:4], cosine * hull[i, 0] + sine * hull[i, 1])
+        _widen(out[4:6], -sine * hull[i, 0] + cosine * hull[i, 1])
+    for k in range(times):
+        for i in range(counts[k]):
+            _widen(out[6:8], cosine * polygons[k, i, 0] + sine * polygons[k, i, 1])
+            _widen(out[8:10], -sine * polygons[k, i, 0] + cosine * polygons[k, i, 1])
+    length, width = out[7] - out[6], out[9] - out[8]
+    if not (length > 0.0 and width > 0.0):
+        return False
+    if not moves or not np.any(own[:, :3] != own[:, 3:]):
+        out[10] = total[0] / times
+        return True
+    # About the hull as many tangents, in proportion to its box.
+    round_it = np.empty((2 * TANGENTS + 8, 2))
+    for corner in range(4):
+        round_it[corner, 0] = 1.0 if corner in (1, 2) else -1.0
+        round_it[corner, 1] = 1.0 if corner >= 2 else -1.0
+    count, scratch = 4, np.empty((4 * TANGENTS + 16, 2))
+    for tangent in range(TANGENTS):
+        turn = 2.0 * math.pi * (tangent + 0.5) / TANGENTS
+        a_u, a_v, farthest = math.cos(turn), math.sin(turn), -np.inf
+        for k in range(times):
+            for i in range(counts[k]):
+                along = cosine * polygons[k, i, 0] + sine * polygons[k, i, 1]
+                across = -sine * polygons[k, i, 0] + cosine * polygons[k, i, 1]
+                along = 2.0 * (along - out[6]) / length - 1.0
+                across = 2.0 * (across - out[8]) / width - 1.0
+                farthest = max(farthest, a_u * along + a_v * across)
+        count = _clip(round_it, count, scratch, -a_u, -a_v, farthest)
+    _moments(round_it, count, moments)
+    out[10] = 0.25 * moments[0] * length * width
+    return out[10] > 0.0
+
+
+@_compiled
+def _widen(span, value):
+    span[0], span[1] = min(span[0], value), max(span[1], value)
 
 
 @_compiled
@@ -346,11 +394,11 @@ def _random(key, piece, dimension):
 
 @_compiled
 def _divide(frame, points):
-    """Cells of a lattice of about `points` over a hull, along and across it."""
-    length, width = frame[3] - frame[2], frame[5] - frame[4]
-    cells = points * length * width / frame[6]
+    """Cells of a lattice of about `points` over what is lit, along and across it."""
+    length, width = frame[7] - frame[6], frame[9] - frame[8]
+    cells = points * length * width / frame[10]
     across = max(1.0, np.rint(math.sqrt(cells * width / length)))
-    return int(max(1.0, np.rint(cells / across))), int(across)
+    return max(1.0, np.rint(cells / across)), across
 
 
 @_compiled
@@ -384,19 +432,19 @@ def rays(
     room = 1024
     found, owner, number = np.empty((room, COLUMNS)), np.empty(room, np.int64), np.empty(room, np.int64)
     count, base = 0, 0
-    frame, cell = np.empty(7), np.empty(6)
+    frame, cell = np.empty(11), np.empty(6)
     # Rows of cells are shifted against each other, so that every sub-lattice is spread over the whole.
-    row_step = max(1, int(np.rint(0.618034 * stride)))
+    row_step = max(1, int(np.rint(GOLDEN * stride)))
     while stride > 1 and math.gcd(row_step, stride) != 1:
         row_step += 1
     for k in range(len(chosen)):
         i = chosen[k]
         own = edges[edge_start[i] : edge_start[i + 1]]
-        _frame(hulls[hull_start[i] : hull_start[i + 1]], frame)
-        if not frame[6] > 0.0 or not content[i] > 0.0:
+        if not _frame(own, hulls[hull_start[i] : hull_start[i + 1]], x_hi[i] > x_lo[i], frame):
             continue
-        columns, rows = _divide(frame, points[k])
-        length, width = (frame[3] - frame[2]) / columns, (frame[5] - frame[4]) / rows
+        along_it, across_it = _divide(frame, points[k])
+        length, width = (frame[7] - frame[6]) / along_it, (frame[9] - frame[8]) / across_it
+        columns, rows = int(np.ceil((frame[3] - frame[2]) / length)) + 1, int(np.ceil((frame[5] - frame[4]) / width))
         u0 = frame[2] - length * ((_random(0, i, 0) + shift_u) % 1.0)
         v0 = frame[4] - width * ((_random(0, i, 1) + shift_v) % 1.0)
         cell[2], cell[3] = 0.5 * length * frame[0], 0.5 * length * frame[1]
@@ -409,16 +457,18 @@ def rays(
             t = (step + 0.5) / steps if steps > 1 else 0.0
             band_content += _power(curve_x, curve_w, lo, hi) * _weight_at(weight[i], t)
 
-        bodies = np.empty(((columns + 1) * (rows + 1) // stride + rows + 2, _BODY))
+        room = int(2.0 * (along_it + 1.0) * (across_it + 1.0) / stride) + 16
+        bodies = np.empty((room, _BODY))
         polygon, scratch = np.empty((len(own) + 8, 2)), np.empty((2 * len(own) + 16, 2))
         # Lit cells that hold less than `least` are chosen by chance, in order along the lattice.
-        least = content[i] / points[k] / min(rows, 4)
+        least = content[i] / points[k] / min(across_it, 4.0)
         lit, small = 0, 0.0
         offset = int(_random(key, i, 2) * stride)
         for row in range(rows + 1):
             column = (first + offset + row * row_step) % stride
             while column <= columns:
-                along, across = u0 + (column + 0.5) * length, v0 + (row + 0.5) * width
+                # Rows go on by the golden ratio: as even a lattice along every line as that of emission.
+                along, across = u0 + (column + 0.5 - (row * GOLDEN) % 1.0) * length, v0 + (row + 0.5) * width
                 cell[0], cell[1] = frame[0] * along - frame[1] * across, frame[1] * along + frame[0] * across
                 if _cell_body(
                     own,
@@ -437,6 +487,8 @@ def rays(
                     if bodies[lit, 0] < least:
                         small += bodies[lit, 0]
                     lit += 1
+                    if lit == len(bodies):
+                        bodies = np.concatenate((bodies, np.empty_like(bodies)))
                 column += stride
         base += (rows + 1) * (columns + 1)
 

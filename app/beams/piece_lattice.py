@@ -71,7 +71,7 @@ class PieceLattice:
         )
         self._bands = np.ascontiguousarray(pieces.x_lo, float), np.ascontiguousarray(pieces.x_hi, float)
         self._weight = np.ascontiguousarray(pieces.weight, float)
-        self._content = np.zeros(len(pieces))
+        self._content, self._power = np.zeros(len(pieces)), np.zeros(len(pieces))
         piece_kernel.contents(
             *self._bands,
             self._weight,
@@ -81,6 +81,7 @@ class PieceLattice:
             curve_x,
             curve_w,
             self._content,
+            self._power,
         )
 
     @property
@@ -93,12 +94,14 @@ class PieceLattice:
     ) -> PieceRays:
         """Sub-lattice `first` of `stride` of lattices with about `count` points over all pieces of `light`.
 
-        Points are shared out by flux; of pieces that would have less than one, some are drawn to stand for all. `shift`
-        of the lattices modulo 2³², and `key` of what is drawn: of one pass."""
+        Points are shared out by flux per unit of spectral power, and by the bands' widths: no colour is coarser than
+        another, as on the emission lattices. Of pieces that would have less than one, some are drawn to stand for all.
+        `shift` of the lattices modulo 2³², and `key` of what is drawn: of one pass."""
         pieces = self.pieces
         mine = np.flatnonzero((pieces.light == light) & (self._content > 0.0))
-        held = self._content[mine]
-        points = count * held / held.sum() if len(mine) else held
+        share = self._content[mine] / self._power[mine]
+        share *= np.where(pieces.x_hi[mine] > pieces.x_lo[mine], pieces.x_hi[mine] - pieces.x_lo[mine], 1.0)
+        points = count * share / share.sum() if len(mine) else share
         # Systematic sampling: as many of the small ones as they have points together.
         running = np.cumsum(np.where(points < 1.0, points, 0.0)) + (key & 0xFFFFFFFF) / _WORD
         drawn = np.floor(running) > np.floor(np.concatenate([[(key & 0xFFFFFFFF) / _WORD], running[:-1]]))

@@ -275,25 +275,25 @@ def _filled(hulls: np.ndarray, start: np.ndarray, windows: np.ndarray) -> tuple[
     length, diagonal = np.linalg.norm(along, axis=1), np.linalg.norm(about, axis=1)
     twice = about[:, 0] * along[:, 1] - about[:, 1] * along[:, 0]
     fan_cost = 0.5 * np.add.reduceat(twice, first) + BORDER * np.add.reduceat(length + 2.0 * diagonal, first)
-    # Where corners coincide, the turns of the sides do not add up to one round.
-    fan_cost[counts != np.diff(start) + 4] = np.inf
 
     longest = np.maximum.reduceat(length, first)
     is_longest = np.flatnonzero(length == longest[owner])
     chosen = is_longest[np.searchsorted(owner[is_longest], np.arange(len(counts)))]
     axis = along[chosen] / np.maximum(longest, 1e-12)[:, None]
-    corners: list[np.ndarray] = []
-    costs = [fan_cost]
-    for direction in (axis, np.broadcast_to([1.0, 0.0], axis.shape)):
-        across = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
-        x, y = np.sum(grown * direction[owner], axis=1), np.sum(grown * across[owner], axis=1)
-        low = np.stack([np.minimum.reduceat(x, first), np.minimum.reduceat(y, first)], axis=1)
-        size = np.stack([np.maximum.reduceat(x, first), np.maximum.reduceat(y, first)], axis=1) - low
-        unit = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) if not corners else np.array([[0, 0], [2, 0], [0, 2]])
-        at = low[:, None] + unit * size[:, None]
-        corners.append(at[..., :1] * direction[:, None] + at[..., 1:] * across[:, None])
-        border = size.sum(axis=1) * 2.0 + 2.0 * np.hypot(*size.T)
-        costs.append(np.prod(size, axis=1) * len(corners) + BORDER * border)
+    across = np.stack([-axis[:, 1], axis[:, 0]], axis=1)
+    x, y = np.sum(grown * axis[owner], axis=1), np.sum(grown * across[owner], axis=1)
+    low = np.stack([np.minimum.reduceat(x, first), np.minimum.reduceat(y, first)], axis=1)
+    size = np.stack([np.maximum.reduceat(x, first), np.maximum.reduceat(y, first)], axis=1) - low
+    at = low[:, None] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size[:, None]
+    rectangle = at[..., :1] * axis[:, None] + at[..., 1:] * across[:, None]
+    rectangle_cost = np.prod(size, axis=1) + 2.0 * BORDER * (size.sum(axis=1) + np.hypot(*size.T))
+    # Where corners coincide, the turns of the sides do not add up to one round.
+    is_round = counts == np.diff(start) + 4
+    low = np.minimum.reduceat(hulls, start[:-1]) - 0.5 * windows[:, None]
+    size = np.maximum.reduceat(hulls, start[:-1]) + 0.5 * windows[:, None] - low
+    triangle = low[:, None] + np.array([[0, 0], [2, 0], [0, 2]]) * size[:, None]
+    triangle_cost = 2.0 * np.prod(size, axis=1) + 2.0 * BORDER * (size.sum(axis=1) + np.hypot(*size.T))
+    costs = [np.where(is_round, fan_cost, np.inf), np.where(is_round, rectangle_cost, np.inf), triangle_cost]
     kind = np.argmin(costs, axis=0)
 
     sizes = np.choose(kind, [counts, 4, 3])
@@ -302,7 +302,7 @@ def _filled(hulls: np.ndarray, start: np.ndarray, windows: np.ndarray) -> tuple[
     vertices["polygon"] = np.repeat(np.arange(len(sizes)), sizes)
     is_fan = np.repeat(kind == 0, sizes)
     vertices["position"][is_fan] = grown[(kind == 0)[owner]]
-    for which, points in enumerate(corners, start=1):
+    for which, points in ((1, rectangle), (2, triangle)):
         rows = begin[kind == which, None] + np.arange(points.shape[1])
         vertices["position"][rows.ravel()] = points[kind == which].reshape(-1, 2)
     triangles = sizes - 2

@@ -66,6 +66,7 @@ class RenderStats:
             f"emitted             {tally.emitted:.6e} W of scene flux per pass weight",
             *(f"  {name:<17} {flux / total:10.6f}" for name, flux in tally.ended.items()),
             f"  {'roulette':<17} {tally.roulette / total:10.6f}",
+            *([f"  {'handed':<17} {-tally.handed / total:10.6f}   (beams left it to photons)"] if tally.handed else []),
             f"  {'unaccounted':<17} {tally.imbalance:10.2e}   (emitted − all of the above)",
             (
                 f"map holds           {self.map_flux_w / deposited:10.6f} of what was deposited; "

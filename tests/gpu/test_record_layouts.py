@@ -22,7 +22,7 @@ from spectrasplat.base import paths
 from spectrasplat.gpu import shader
 from spectrasplat.gpu.records import photon_record, ray_record
 from spectrasplat.gpu.schema import Struct
-from spectrasplat.passes import footprint, splat
+from spectrasplat.passes import beam_splat, footprint, splat
 
 ONE = 0x3F800000
 """Bits of 1.0: words just above are ordinary floats, so that no driver flushes them."""
@@ -176,6 +176,7 @@ HAND_WRITTEN = {
     "light/splat_swept.frag": splat.PARAMETERS,
     "light/splat_cut.frag": splat.PARAMETERS,
     "light/splat_small.frag": splat.PARAMETERS,
+    "light/beam.vert": beam_splat.PARAMETERS,
 }
 """Shaders whose parameter block lists its members itself: it must be this struct."""
 

@@ -6,12 +6,13 @@ transmitted and reflected at the second surface. All of the light is in them, no
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 from spectrasplat.beams.polygons import BeamPieces, joined
 from spectrasplat.gpu.scene_buffers import SceneBuffers
-from spectrasplat.passes.emission_domain import EmissionDomain
+from spectrasplat.passes.emission_domain import EmissionDomain, azimuthal_plane
 from spectrasplat.reference.optics import fresnel_reflectance, reflect, refract
 
 
@@ -86,9 +87,73 @@ def first_events(
     return joined(found)
 
 
+def diverging_first_event(
+    buffers: SceneBuffers, domain: EmissionDomain, item: int, edges_x: np.ndarray, parts: int
+) -> BeamPieces:
+    """What a point light's first event at the convex solid `item` leaves, its facets divided into `parts`² each: there
+    rays are nearly affine in the light's azimuthal plane."""
+    scene, space = buffers.scene, buffers.space
+    corners = space.to_gpu(buffers.world_meshes[item].corners())
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    glass = scene.objects[item].material.dispersion
+    frame = np.stack([domain.tangent, domain.bitangent, domain.axis])
+    found: list[BeamPieces] = []
+
+    def way_of(q: np.ndarray) -> np.ndarray:
+        r2 = q @ q
+        return np.append(q * np.sqrt(1.0 - 0.25 * r2), 1.0 - 0.5 * r2) @ frame
+
+    def derived(function: Callable[[np.ndarray], np.ndarray], q: np.ndarray) -> np.ndarray:
+        """Value and central differences by both coordinates (3, 3)."""
+        steps = 1e-5 * np.eye(2)
+        return np.stack([function(q), *((function(q + s) - function(q - s)) / 2e-5 for s in steps)])
+
+    for lo, hi in pairwise(edges_x.tolist()):
+        n = glass.index(buffers.axis.nm_of_x(np.array([lo, 0.5 * (lo + hi), hi])))
+        for t in np.flatnonzero(np.einsum("ij,ij->i", normals, corners[:, 0] - domain.origin) < 0.0):
+            normal, (a, b, c) = normals[t], corners[t]
+            for part in _subdivided(parts):
+                outline = azimuthal_plane(_unit((a + part @ np.stack([b - a, c - a]) - domain.origin) @ frame.T))
+                centre = outline.mean(axis=0)
+                hull = counter_clockwise(outline - centre)
+                edges = half_planes(hull)
+
+                def met(q: np.ndarray, normal=normal, a=a) -> np.ndarray:
+                    way = way_of(q)
+                    return domain.origin + way * ((a - domain.origin) @ normal / (way @ normal))
+
+                start, axis = derived(met, centre), way_of(centre)
+                reflectance = np.array([fresnel_reflectance(axis, normal, 1.0 / index) for index in n])
+                inside = [derived(lambda q, i=index, n=normal: refract(way_of(q), n, 1.0 / i), centre) for index in n]
+                outside = derived(lambda q, n=normal: reflect(way_of(q), n), centre)
+                rest = np.column_stack([edges, edges]), t, item, 1
+                common = lo, hi, centre, hull, [start] * 3
+                found.append(_piece(*common, [outside] * 3, reflectance, *rest, False))
+                found.append(_piece(*common, inside, 1.0 - reflectance, *rest, True))
+    return joined(found)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def _subdivided(parts: int) -> list[np.ndarray]:
+    """Triangles (3, 2) of weights that divide one into parts²."""
+    found = []
+    for i in range(parts):
+        for j in range(parts - i):
+            low = np.array([[i, j], [i + 1, j], [i, j + 1]]) / parts
+            found.append(low)
+            if i + j + 1 < parts:
+                found.append(np.array([[i + 1, j], [i + 1, j + 1], [i, j + 1]]) / parts)
+    return found
+
+
 def _piece(lo, hi, centre, hull, positions, directions, weight, edges, triangle, item, depth, inside) -> BeamPieces:
+    """`directions`: one at each place of the band (3, 3), or with its columns (3, 3, 3)."""
     direction = np.zeros((1, 3, 3, 3))
-    direction[0, :, 0] = directions
+    direction[0, :, : 1 if np.ndim(directions) == 2 else 3] = np.reshape(directions, (3, -1, 3))
     one = np.ones(1, np.int32)
     return BeamPieces(
         light=0 * one,

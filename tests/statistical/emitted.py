@@ -73,7 +73,7 @@ def emit(
     try:
         domain = emission_domain(light, scene, buffers.space, buffers.space.to_gpu(solid.corners()))
         assert domain is not None
-        ray, rows = trace._ray, []
+        ray, rows = trace.ray, []
         for number in range(passes):
             shifts = [int(s) for s in rng.integers(0, 2**32, 5)]
             points = BATCH // light_points

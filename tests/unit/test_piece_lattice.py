@@ -127,6 +127,22 @@ def test_what_moves_is_lit_for_as_long_as_it_is_there(move: tuple[float, float],
         assert spread == pytest.approx(np.array([2.0, 1.0]) / np.sqrt(12.0), rel=0.03)
 
 
+def test_rays_follow_a_sliver_that_moves_over_their_cells() -> None:
+    """A sliver a hundredth as wide as it moves: at each x light is where the sliver is, not all over the cells."""
+    corners = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 0.04], [0.0, 0.04]])
+    rays = rays_of(piece(corners, (0.0, 4.0), band=(0.0, 1.0)), 300)
+    assert rays.flux_w.sum() == pytest.approx(2.0 * 0.08, rel=5e-3)
+    for end in (0, 1, 2):
+        place = rays.band[:, end]
+        v = rays.position[:, 1] + rays.dposition[:, 2, 1] * (place - rays.band[:, 1])
+        assert v - 0.02 == pytest.approx(4.0 * place, abs=0.025)
+    assert np.median(rays.dposition[:, 2, 1]) == pytest.approx(4.0, rel=0.1)
+    assert np.linalg.norm(rays.dposition[:, :2], axis=2).min(axis=1).max() < 0.06
+    # Together they are lit all the time, each at any place once.
+    covered = [np.sum(rays.flux_w[(rays.band[:, 0] <= x) & (x < rays.band[:, 2])]) for x in np.linspace(0.01, 0.99, 50)]
+    assert min(covered) > 0.0
+
+
 def test_sub_lattices_are_even_and_make_the_whole() -> None:
     pieces = joined([piece(), piece(triangle(4.0, 0.02)), piece(0.01 * SQUARE, move=(0.5, 0.1))])
     whole = rays_of(pieces, 3000)
@@ -138,6 +154,15 @@ def test_sub_lattices_are_even_and_make_the_whole() -> None:
     assert len(np.unique(numbers)) == len(numbers)
     middle = np.array([part.flux_w @ part.position[:, :2] / part.flux_w.sum() for part in parts])
     assert np.ptp(middle, axis=0).max() < 0.05
+
+
+def test_no_colour_is_coarser_than_another() -> None:
+    """A band of a hundredth of the power has as many points; two halves of a band have as many as the whole."""
+    faint = CumulativeSpectrum(np.array([0.0, 0.5, 1.0]), np.outer([0.0, 0.01, 1.0], np.ones(4)))
+    halves = joined([piece(band=(0.0, 0.5)), piece(band=(0.5, 0.75)), piece(band=(0.75, 1.0))])
+    rays = PieceLattice(halves, [faint], [1.0]).rays(0, 4000, (0, 0), KEY)
+    assert np.bincount(rays.piece) == pytest.approx(np.array([2000, 1000, 1000]), rel=0.12)
+    assert np.bincount(rays.piece, rays.flux_w) == pytest.approx([0.04, 1.98, 1.98], rel=1e-6)
 
 
 def test_many_small_pieces_are_stood_for_by_some() -> None:
