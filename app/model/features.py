@@ -16,7 +16,7 @@ from .scene import (
     Scene,
     SceneObject,
 )
-from .settings import RenderSettings
+from .settings import RANDOM_METHODS, RenderSettings
 
 MAX_GROUPS = 4
 """Spectral columns a photon may carry; further dispersive materials share the last one."""
@@ -91,6 +91,8 @@ class Features:
     """Some light shines by a table of intensities over directions."""
     anchor_weights: bool = False
     """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
+    draws_by_power: bool = False
+    """Random wavelengths are drawn by radiant power instead of brightness: for maps of spectral bins."""
 
     def defines(self) -> dict[str, int]:
         """Preprocessor symbols; a feature that is out is not defined at all (use #ifdef) — counts are numbers."""
@@ -127,7 +129,8 @@ class Features:
         """The features that `scene` needs under `settings`."""
         dielectrics = [o for o in scene.objects if o.material.transmits]
         dispersive = dispersive_materials(scene)
-        single = settings.method.startswith(("stochastic", "regular"))
+        random = settings.method in RANDOM_METHODS
+        single = random or settings.method.startswith("regular")
         groups = 0 if single else min(len(dispersive), 1 if settings.method == "srd-lambda" else MAX_GROUPS)
         loose = [o for o in scene.objects if not is_convex_solid(o)]
         loose_triangles = sum(len(o.mesh.triangles) for o in loose)
@@ -152,7 +155,7 @@ class Features:
             spectral_weights=not single and ((groups > 0 and bool(dielectrics)) or absorbing or coloured_mirror),
             footprints=footprints,
             point_spectrum=single,
-            random_wavelength=settings.method.startswith("stochastic"),
+            random_wavelength=random,
             even_wavelengths=settings.method == "stochastic-even",
             band_cuts=groups > 0,
             dielectrics=bool(dielectrics),
@@ -175,6 +178,7 @@ class Features:
             local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
             anchor_weights=settings.anchor_weights,
             light_profiles=any(light.profile is not None for light in scene.lights),
+            draws_by_power=random and settings.bins is not None,
         )
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 METHODS = ("srd", "srd-lambda", "stochastic", "stochastic-even", "stochastic-point", "regular-7", "regular-16")
 """Sampling methods that every comparison holds (README, "Methods")."""
+RANDOM_METHODS = ("stochastic", "stochastic-even", "stochastic-point")
+"""Of those, the ones whose photons have wavelengths drawn at random."""
 CAMERA_METHODS = tuple(name for name in METHODS if name != "stochastic-point")
 """Of those, the ones that camera rays may follow too."""
 
