@@ -117,7 +117,7 @@ def drawn_wavelengths(
     """(x, one over the density of x) of random wavelengths within `band` of x, by `place` (...,) in [0, 1): the
     reference of lib/wavelength.glsl.
 
-    Of the draws 0.8 go by X + Y + Z, 0.18 by radiant power and 0.02 evenly over the light's support; `by_power`: 0.98
+    Of the draws 0.6 go by X + Y + Z, 0.2 by radiant power and 0.2 evenly over the light's support; `by_power`: 0.8
     by power. The density is constant in each of `cells` equal cells of x."""
     borders = np.linspace(0.0, 1.0, cells + 1)
     nm = np.concatenate([[380.0], VISIBLE_NM[:-1] + 0.5, [780.0]])
@@ -135,7 +135,7 @@ def drawn_wavelengths(
     line_nm = np.array([wavelength for wavelength, _ in spectrum.lines])
     watt = in_cells(spectrum.density, np.ones(len(line_nm)))
     seen = in_cells(spectrum.density * cmf_xyz().sum(axis=1), cmf_at(line_nm).reshape(-1, 3).sum(axis=1))
-    share = (0.98 * watt if by_power else 0.8 * seen + 0.18 * watt) + 0.02 * even / even.sum()
+    share = (0.8 * watt if by_power else 0.6 * seen + 0.2 * watt) + 0.2 * even / even.sum()
     running = np.concatenate([[0.0], np.cumsum(share)])
     below, above = np.interp(band, borders, running)
     wanted = below + np.asarray(place, np.float64) * (above - below)
