@@ -18,7 +18,7 @@ from typing import Protocol
 import moderngl
 import numpy as np
 
-from ..gpu import records
+from ..gpu import records, splat_tables
 from ..gpu.context import Context
 from ..gpu.map_channels import MapChannels
 from ..gpu.reindex import Spans
@@ -301,6 +301,11 @@ class LightPass:
     def tables(self) -> ShownTables:
         """The spectral tables of the plan that was begun."""
         return self._records.tables.full
+
+    def forget_tables(self) -> None:
+        """Make spectral tables anew when they are next asked for, as a process that renders once does."""
+        self._records.release()
+        splat_tables.forget_blurred()
 
     # ---- work --------------------------------------------------------------------------------
 
