@@ -86,6 +86,9 @@ def light_rigs(
     """The light pass's rigs by method, freed at the end. Raises `NothingToMeasure`."""
     rigs: dict[str, Rig] = {}
     with ExitStack() as stack:
+        # What the first of a process pays for all, late imports and drivers that start up, falls on none.
+        progress(f"preparing {methods[0]}")
+        MethodRig(context, scene, methods[0], width, height).release()
         for method in methods:
             progress(f"preparing {method}")
             rigs[method] = rig = MethodRig(context, scene, method, width, height)

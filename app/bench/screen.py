@@ -82,10 +82,14 @@ def _speed_up_lines(scene: SceneResult) -> list[str]:
 
 
 def speed_up_text(one: SpeedUp) -> str:
-    """ "12×", "≥ 30×" where it is a bound, "not reached" where srd does not get there."""
+    """ "12×", "≥ 30×" where it is a bound, "not reached" where srd does not get there, "both at once" where it cannot
+    be known."""
     if one.ratio is None:
         return "not reached"
-    return f"{one.bound}{' ' * bool(one.bound)}{one.ratio:.3g}×"
+    if one.bound == "~":
+        return "both at once"
+    digits = f"{one.ratio:.0f}" if one.ratio >= 10 else f"{one.ratio:.2g}"
+    return f"{one.bound}{' ' * bool(one.bound)}{digits}×"
 
 
 def _ending(scene: SceneResult, curve: Curve) -> list[str]:
