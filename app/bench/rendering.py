@@ -24,6 +24,7 @@ from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
 from ..render.light_pass import LightPass, scene_buffers
 from ..render.sampling import DEFAULT_SAMPLES
+from ..render.shrinking import passes
 from .results import OWN_METHODS
 
 KERNELS = tuple(float(width) for width in np.geomspace(0.45, 32.0, 13))
@@ -184,10 +185,12 @@ class MethodRig:
         light = self._light
         light.forget_tables()
         started = self._finished()
+        count, photons = passes(light.features.method, photons)
         light.begin(photons, seed)
         _ = light.tables  # made when they are first asked for
         planned = self._finished()
-        light.run_pass(0, photons, self._wait)
+        for number in range(count):
+            light.run_pass(number, photons, self._wait)
         filled = self._finished()
         self._textures = light.resolved_textures()
         resolved = self._finished()

@@ -6,7 +6,16 @@ import msgspec
 
 from .measured_passes import COUNTED_STAGES
 
-DEFAULT_METHODS = ("stochastic", "stochastic-even", "stochastic-point", "regular-7", "regular-16", "srd-lambda", "srd")
+DEFAULT_METHODS = (
+    "stochastic",
+    "stochastic-even",
+    "stochastic-point",
+    "progressive-stochastic",
+    "regular-7",
+    "regular-16",
+    "srd-lambda",
+    "srd",
+)
 
 OWN_METHODS = ("srd", "srd-photons", "progressive")
 """The program's own, measured as they ship; all others are baselines, each at its best (`tuning`)."""

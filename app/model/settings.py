@@ -4,11 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-METHODS = ("srd", "srd-lambda", "stochastic", "stochastic-even", "stochastic-point", "regular-7", "regular-16")
+METHODS = (
+    "srd",
+    "srd-lambda",
+    "stochastic",
+    "stochastic-even",
+    "stochastic-point",
+    "progressive-stochastic",
+    "regular-7",
+    "regular-16",
+)
 """Sampling methods that every comparison holds (README, "Methods")."""
-RANDOM_METHODS = ("stochastic", "stochastic-even", "stochastic-point")
+RANDOM_METHODS = ("stochastic", "stochastic-even", "stochastic-point", "progressive-stochastic")
 """Of those, the ones whose photons have wavelengths drawn at random."""
-CAMERA_METHODS = tuple(name for name in METHODS if name != "stochastic-point")
+LIGHT_METHODS = ("stochastic-point", "progressive-stochastic")
+"""The ones that only photons may follow; camera rays then follow `stochastic`."""
+CAMERA_METHODS = tuple(name for name in METHODS if name not in LIGHT_METHODS)
 """Of those, the ones that camera rays may follow too."""
 
 

@@ -34,6 +34,7 @@ from ..passes.map_layout import MapLayout, check_map_receiver, layout_maps
 from ..passes.pilot import Pilot, landings_of, pilot_steps
 from ..passes.splat import Splatter
 from ..passes.trace import RAY_ROOM, Batch, FluxTally, LatticeSlice, TracePass
+from . import shrinking
 from .light_maps import LightMaps
 from .light_plan import Division, Planner
 from .map_fit import MapFit
@@ -161,8 +162,9 @@ class LightPass:
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
         self.shown = ShownSpectra(context.ctx, scene, buffers, settings.bins)
         self._splatting = Splatting(context, self.shown, self._pace)
-        self.smoothing = settings.smoothing
-        """Standard deviation of a footprint in lattice spacings."""
+        self._shrinks = features.method == shrinking.METHOD
+        self.smoothing = settings.smoothing * (shrinking.FIRST_KERNEL if self._shrinks else 1.0)
+        """Standard deviation of a footprint in lattice spacings; where passes shrink it, of the first one's."""
         self.maps: LightMaps | None = None
 
     # ---- once for a scene --------------------------------------------------------------------
@@ -399,7 +401,9 @@ class LightPass:
         self.stats.trace_seconds += time.perf_counter() - started
         self._records.keep(self.trace.photons, batch, self.trace.photon.stride, of)
         yield
-        yield from self.splat_steps(self.trace.photons, batch.photons)
+        yield from self.splat_steps(
+            self.trace.photons, batch.photons, shrinking.kernel_scale(of.number) if self._shrinks else 1.0
+        )
         self.stats.photons += batch.emitted_photons
         self.stats.splats += batch.photons
         self.stats.tally.merge(batch.tally)

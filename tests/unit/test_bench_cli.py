@@ -15,7 +15,7 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.bench import runner, screen
 from spectrasplat.bench.results import BenchSettings, Curve, Point, Sample, SceneResult
 from spectrasplat.commands import bench as cli_bench
-from spectrasplat.model.settings import CAMERA_METHODS
+from spectrasplat.model.settings import CAMERA_METHODS, METHODS
 
 
 class FakeContext:
@@ -202,7 +202,7 @@ def test_options_reach_the_runner(seen: Seen, tmp_path: Path, capsys: pytest.Cap
 
 def test_defaults_are_all_scenes_with_glass_and_all_methods(seen: Seen, tmp_path: Path) -> None:
     assert main(["bench", "-o", str(tmp_path)]) == 0
-    assert seen.settings == BenchSettings() and len(BenchSettings().methods) == 7
+    assert seen.settings == BenchSettings() and set(BenchSettings().methods) == set(METHODS)
     assert {"prism", "brilliant", "ball_plain", "wine_glass"} <= set(seen.scenes) and len(seen.scenes) >= 6
     assert shlex.split(seen.command)[2 : 2 + len(seen.scenes)] == seen.scenes
 
@@ -228,7 +228,8 @@ def test_ctrl_c_says_what_is_kept_and_reports_it(
     assert main(["bench", "prism", "-o", str(tmp_path)]) == 130
     told = capsys.readouterr()
     assert (
-        "stopped; 0 scenes done, 1 of 14 method seeds of 'prism' kept; the same command goes on from there" in told.err
+        f"stopped; 0 scenes done, 1 of {2 * len(METHODS)} method seeds of 'prism' kept; the same command goes on from "
+        "there" in told.err
     )
     assert seen.reported == tmp_path and "1/40" in told.out
 

@@ -8,6 +8,7 @@ METHOD_NAMES = {
     "stochastic": "Random wavelengths",
     "stochastic-even": "Even random wavelengths",
     "stochastic-point": "Light tracing, one texel",
+    "progressive-stochastic": "Random wavelengths, shrinking kernel",
     "regular-7": "7 fixed wavelengths",
     "regular-16": "16 fixed wavelengths",
 }
@@ -19,6 +20,7 @@ METHOD_TIPS = {
     "stochastic": "One random wavelength a photon with a footprint: the usual way.",
     "stochastic-even": "The same with wavelengths from a low-discrepancy sequence: the usual way at its best.",
     "stochastic-point": "One random wavelength and one texel a photon: unbiased light tracing.",
+    "progressive-stochastic": "Passes of random wavelengths whose kernel shrinks: progressive photon mapping.",
     "regular-7": "Seven fixed wavelengths, a splat each: shows banding.",
     "regular-16": "Sixteen fixed wavelengths, a splat each: shows banding.",
 }
