@@ -85,7 +85,7 @@ class SharedLight:
 class CameraRig:
     """Owns the camera's buffers and programs for one scene, method and picture size; the maps are `light`'s."""
 
-    tuned = False
+    goes_on = False
     kernels: tuple[float, ...] = ()
 
     def __init__(

@@ -61,8 +61,8 @@ class Rig(Protocol):
 
     setup_seconds: dict[str, float]
     buffers_mib: float
-    tuned: bool
-    """A baseline that is to be measured at its best."""
+    goes_on: bool
+    """Followed beyond the time given, to the horizon, until its error is what is sought."""
     kernels: tuple[float, ...]
     """Widths of its kernel to be tried, lattice spacings; empty where it has none or none is to be chosen."""
 
@@ -100,10 +100,11 @@ def light_rigs(
 class MethodRig:
     """Owns everything on the device for one scene, method and picture size."""
 
+    goes_on = True
+
     def __init__(self, context: Context, scene: Scene, method: str, width: int, height: int) -> None:
         self._context = context
         self._scene = scene
-        self.tuned = method not in OWN_METHODS
         self._settings = RenderSettings(
             width=width, height=height, method=method, layer="caustic", max_depth=scene.render.max_depth
         )
@@ -115,7 +116,8 @@ class MethodRig:
         compiled = self._finished()
         self._light.prepare()
         piloted = self._finished()
-        self.kernels = KERNELS if self.tuned and self._light.features.footprints else ()
+        tuned = method not in OWN_METHODS and self._light.features.footprints
+        self.kernels: tuple[float, ...] = KERNELS if tuned else ()
         # Drivers put off part of the compiling until a program runs.
         seen = self.render(WARM_UP_PHOTONS, 1).xyz.any()
         warm = self._finished()

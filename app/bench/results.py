@@ -22,7 +22,7 @@ OWN_METHODS = ("srd", "srd-photons", "progressive")
 TARGETS = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)
 """relMSE at which methods are compared."""
 ERROR_SOUGHT = 0.01
-"""A baseline that is worse than this after `BenchSettings.seconds` goes on to the horizon."""
+"""A method that is worse than this after `BenchSettings.seconds` goes on to the horizon."""
 
 OTHER_MEASURES = ("relmse_whole", "relmse_trimmed", "nrmse", "smape", "chroma")
 """Measures beside relMSE by which times to equal error are given, so that no conclusion hangs on one."""
@@ -43,7 +43,7 @@ class BenchSettings(msgspec.Struct, frozen=True):
     """Which pass of the renderer is measured, a key of `measured_passes.MEASURED_PASSES`. Below, what is said of
     photons and photon time holds for camera samples a pixel and camera time where it is the camera's."""
     horizon: float | None = None
-    """Most photon time of a baseline's largest rendering; None: ten times `seconds`. The light pass's alone."""
+    """Most photon time of a method's largest rendering; None: ten times `seconds`. The light pass's alone."""
 
     @property
     def horizon_seconds(self) -> float:

@@ -155,7 +155,7 @@ class _SceneBench:
                     [],
                     buffers_mib=rig.buffers_mib,
                 )
-                if rig.tuned:
+                if rig.goes_on:
                     self._tune(curve, rig)
                 else:
                     curve.budgets = rig.budgets(self._settings.seconds, POINTS)
@@ -163,7 +163,7 @@ class _SceneBench:
                 self._store.save()
 
     def _tune(self, curve: Curve, rig: Rig) -> None:
-        """Budgets and kernels with which a baseline is at its best."""
+        """Budgets as far as the horizon asks for, and kernels with which a baseline is at its best."""
 
         def judge(rendering: Rendering) -> tuple[float, float]:
             sample = self._sample(rendering, curve.method, 0, 0, None)

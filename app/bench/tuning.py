@@ -21,6 +21,8 @@ SWEEP_SEED = 0
 _SWEPT_BUDGETS = 5
 _GROWTH = 3.0
 """From one budget beyond the first horizon to the next."""
+_ALIKE = 2.5
+"""Kernels that differ by at most this factor belong to one minimum."""
 _SLOPES = (0.3, 1.0)
 """Between which the exponent of error against time is believed."""
 
@@ -45,58 +47,79 @@ def tune(
     """Try kernels over a few budgets, then spread `count` budgets from the smallest to the one that takes `seconds`, or
     up to `horizon` where the error is above `ERROR_SOUGHT` until then.
 
-    `judge`: (photon seconds, relMSE) of a rendering. Every kernel is tried at the smallest budget; from there on the
-    best one is followed downhill on both sides, since it moves slowly."""
-    first, last = (budgets := rig.budgets(seconds, count))[0], budgets[-1]
-    sweep: list[Trial] = []
-    best = 0
-
-    def tried(budget: int, index: int) -> float:
-        kernel = rig.kernels[index] if rig.kernels else None
-        known = next((t for t in sweep if t.photons == budget and t.smoothing == (kernel or 0.0)), None)
-        if known is None:
-            progress(f"{budget} photons" + (f", kernel of {kernel:.2g} spacings" if kernel else ""))
-            took, error = judge(rig.render(budget, SWEEP_SEED, kernel))
-            sweep.append(known := Trial(budget, kernel or 0.0, took, error))
-        return known.relmse
-
-    def follow(budget: int, start: int) -> int:
-        """Index of the kernel with the least error, downhill from `start`."""
-        at = start
-        while True:
-            near = [i for i in (at - 1, at, at + 1) if 0 <= i < max(len(rig.kernels), 1)]
-            least = min(near, key=lambda i: tried(budget, i))
-            if least == at:
-                return at
-            at = least
-
-    ladder = sorted({round(n) for n in np.geomspace(first, last, _SWEPT_BUDGETS)})
-    for budget in ladder:
-        if budget == ladder[0]:
-            best = min(range(max(len(rig.kernels), 1)), key=lambda i: tried(budget, i))
-        best = follow(budget, best)
+    `judge`: (photon seconds, relMSE) of a rendering."""
+    sweep = _Sweep(rig, judge, progress)
+    budgets = rig.budgets(seconds, count)
+    for budget in sorted({round(n) for n in np.geomspace(budgets[0], budgets[-1], _SWEPT_BUDGETS)}):
+        sweep.try_out(budget)
     end = seconds
     while True:
-        now = _best_trials(sweep)[-1]
+        now = best_trials(sweep.trials)[-1]
         if now.relmse <= ERROR_SOUGHT or now.seconds > 0.7 * horizon:
             break
-        budget = int(now.photons * min(_GROWTH, horizon / max(now.seconds, 1e-9)))
-        best = follow(budget, best)
-        end = min(max(_best_trials(sweep)[-1].seconds, seconds), horizon)
-    chosen = _best_trials(sweep)
-    log_n, log_t = np.log([float(t.photons) for t in chosen]), np.log([max(t.seconds, 1e-9) for t in chosen])
-    # Seconds that do not rise with photons are a busy machine's; the envelope does.
-    reach = float(np.exp(np.interp(np.log(end), np.maximum.accumulate(log_t), log_n)))
+        sweep.try_out(int(now.photons * min(_GROWTH, horizon / max(now.seconds, 1e-9))))
+        end = min(max(best_trials(sweep.trials)[-1].seconds, seconds), horizon)
+    chosen = best_trials(sweep.trials)
     if end > chosen[-1].seconds:
         reach = chosen[-1].photons * end / chosen[-1].seconds
-    budgets = sorted({round(n) for n in np.geomspace(min(first, reach), reach, count)})
-    if not rig.kernels:
-        return Tuning(budgets, [], sweep)
-    log_k = np.log([t.smoothing for t in chosen])
-    return Tuning(budgets, [float(k) for k in np.exp(np.interp(np.log(budgets), log_n, log_k))], sweep)
+    else:
+        # Seconds that do not rise with photons are a busy machine's; the envelope does.
+        log_n, log_t = np.log([float(t.photons) for t in chosen]), np.log([max(t.seconds, 1e-9) for t in chosen])
+        reach = float(np.exp(np.interp(np.log(end), np.maximum.accumulate(log_t), log_n)))
+    budgets = sorted({round(n) for n in np.geomspace(min(budgets[0], reach), reach, count)})
+    return Tuning(budgets, [sweep.between(chosen, budget) for budget in budgets] if rig.kernels else [], sweep.trials)
 
 
-def _best_trials(sweep: Sequence[Trial]) -> list[Trial]:
+class _Sweep:
+    """Trials of kernels, each once. Every kernel is tried at the first budget; from there on each of its least errors
+    is followed downhill on both sides, since they move slowly, and the narrowest is looked at: a caustic of points has
+    two minima, one of noise and one of blur, which change places."""
+
+    def __init__(
+        self, rig: Rig, judge: Callable[[Rendering], tuple[float, float]], progress: Callable[[str], None]
+    ) -> None:
+        self._rig, self._judge, self._progress = rig, judge, progress
+        self._starts: set[int] = set(range(max(len(rig.kernels), 1)))
+        self.trials: list[Trial] = []
+
+    def tried(self, budget: int, kernel: float | None) -> Trial:
+        """The trial of a kernel at a budget, now if not before."""
+        known = next((t for t in self.trials if t.photons == budget and t.smoothing == (kernel or 0.0)), None)
+        if known is None:
+            self._progress(f"{budget} photons" + (f", kernel of {kernel:.2g} spacings" if kernel else ""))
+            known = Trial(budget, kernel or 0.0, *self._judge(self._rig.render(budget, SWEEP_SEED, kernel)))
+            self.trials.append(known)
+        return known
+
+    def try_out(self, budget: int) -> None:
+        """All kernels that may be the best at `budget`."""
+        count = max(len(self._rig.kernels), 1)
+
+        def error(index: int) -> float:
+            return self.tried(budget, self._rig.kernels[index] if self._rig.kernels else None).relmse
+
+        minima = {0} if count == 1 or error(0) <= error(1) else set()
+        for at in sorted(self._starts):
+            while True:
+                least = min((i for i in (at - 1, at, at + 1) if 0 <= i < count), key=error)
+                if least == at:
+                    break
+                at = least
+            minima.add(at)
+        self._starts = minima
+
+    def between(self, chosen: Sequence[Trial], budget: int) -> float:
+        """The best kernel for a budget between those of `chosen`: in between theirs where they are alike, else the
+        better of the two."""
+        log_n = np.log([float(t.photons) for t in chosen])
+        above = min(int(np.searchsorted(log_n, np.log(budget))), len(chosen) - 1)
+        left, right = chosen[max(above - 1, 0)], chosen[above]
+        if max(left.smoothing, right.smoothing) <= _ALIKE * min(left.smoothing, right.smoothing):
+            return float(np.exp(np.interp(np.log(budget), log_n, np.log([t.smoothing for t in chosen]))))
+        return min((left.smoothing, right.smoothing), key=lambda kernel: self.tried(budget, kernel).relmse)
+
+
+def best_trials(sweep: Sequence[Trial]) -> list[Trial]:
     """For each budget, in rising order, the trial that is best at equal time: a wider kernel takes longer, which is
     weighed by the slope of the least errors against time."""
     by_budget = {n: [t for t in sweep if t.photons == n] for n in sorted({t.photons for t in sweep})}
@@ -111,7 +134,7 @@ def _best_trials(sweep: Sequence[Trial]) -> list[Trial]:
 
 
 def kernel_at(curve: Curve, budget: int) -> float | None:
-    """The kernel for any budget of a curve, between those of its own; None where the method has none."""
+    """The kernel for any budget of a curve: that of the nearest of its own; None where the method has none."""
     if not curve.kernels:
         return None
-    return float(np.exp(np.interp(np.log(budget), np.log(curve.budgets), np.log(curve.kernels))))
+    return curve.kernels[int(np.argmin(np.abs(np.log(np.array(curve.budgets) / budget))))]

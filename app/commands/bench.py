@@ -115,7 +115,7 @@ def parse_settings(request: BenchRequest) -> BenchSettings:
         asked["seconds"] = _seconds("--seconds", request.seconds)
     if request.horizon is not None:
         if request.camera_pass:
-            raise UserError("--horizon is for baselines of the light pass: leave it out with --camera")
+            raise UserError("--horizon is for methods of the light pass: leave it out with --camera")
         asked["horizon"] = _seconds("--horizon", request.horizon)
         if asked["horizon"] < asked.get("seconds", BenchSettings().seconds):
             raise UserError(

@@ -375,7 +375,7 @@ def bench(
         Text,
         typer.Option(
             metavar="S",
-            help="Photon time up to which a baseline is followed that has not come to a relMSE of 1 % by --seconds; "
+            help="Photon time up to which a method is followed that has not come to a relMSE of 1 % by --seconds; "
             "default: ten times --seconds.",
         ),
     ] = None,

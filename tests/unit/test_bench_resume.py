@@ -44,7 +44,7 @@ class Rig:
 
     setup_seconds = {"buffers": 0.1}
     buffers_mib = 1.0
-    tuned = False
+    goes_on = False
     kernels = ()
 
     def __init__(self, rigs: Rigs, method: str) -> None:
