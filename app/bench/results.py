@@ -11,6 +11,7 @@ DEFAULT_METHODS = (
     "stochastic-even",
     "stochastic-point",
     "progressive-stochastic",
+    "hero",
     "regular-7",
     "regular-16",
     "srd-lambda",

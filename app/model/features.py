@@ -93,6 +93,8 @@ class Features:
     """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
     draws_by_power: bool = False
     """Random wavelengths are drawn by radiant power instead of brightness: for maps of spectral bins."""
+    hero: bool = False
+    """Three more wavelengths share the path of the one that is followed, as long as it is theirs too."""
 
     def defines(self) -> dict[str, int]:
         """Preprocessor symbols; a feature that is out is not defined at all (use #ifdef) — counts are numbers."""
@@ -121,6 +123,7 @@ class Features:
             "NESTED_WINDOWS": self.nested_windows,
             "ANCHOR_WEIGHTS": self.anchor_weights,
             "LIGHT_PROFILES": self.light_profiles,
+            "HERO": self.hero,
         }
         return numbers | {name: 1 for name, on in switches.items() if on}
 
@@ -179,6 +182,7 @@ class Features:
             anchor_weights=settings.anchor_weights,
             light_profiles=any(light.profile is not None for light in scene.lights),
             draws_by_power=random and settings.bins is not None,
+            hero=settings.method == "hero",
         )
 
 

@@ -480,6 +480,6 @@ def scene_buffers(context: Context, scene: Scene, settings: RenderSettings) -> S
 
 def _largest_batch(context: Context, features: Features) -> int:
     """Lattice points whose queue fits the device's largest storage buffer."""
-    ray = records.ray_record(features.defines()["COLUMNS"]).stride
+    ray = records.ray_record(features.defines()["COLUMNS"], features.hero).stride
     limit = context.limits.storage_block_bytes
     return max(64, int(limit // (2 * RAY_ROOM * ray)) // 64 * 64)

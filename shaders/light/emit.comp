@@ -109,6 +109,21 @@ void main()
         ray.x_lo = ray.x_anchor;
         ray.x_hi = ray.x_anchor;
         ray.throughput *= per_density;
+#ifdef HERO
+        // The hero's path is shared by three wavelengths a quarter of all draws on each [Wilkie et al. 2014]. Any of the four would have led to
+        // it, so each has a quarter of its weight (balance heuristic; all that roulette asks is the same for all four).
+        ray.companion_x = vec4(0.0);
+        ray.companion_throughput = vec4(0.0);
+        if (band.y > band.x) {
+            for (int i = 0; i < 3; ++i) {
+                float x = drawn_wavelength(uint(BRIGHTNESS_ROW) + p.light, band.xy, fract(place_in_band + 0.25 * float(i + 1)), per_density);
+                ray.companion_x[i] = x;
+                ray.companion_throughput[i] = 0.25 * weight * per_density;
+            }
+            ray.companion_x.w = 1.0;
+            ray.throughput *= 0.25;
+        }
+#endif
 #endif
         ray.survival = 1.0;
         ray.photon_id = id;
