@@ -85,6 +85,9 @@ class SharedLight:
 class CameraRig:
     """Owns the camera's buffers and programs for one scene, method and picture size; the maps are `light`'s."""
 
+    goes_on = False
+    kernels: tuple[float, ...] = ()
+
     def __init__(
         self, context: Context, scene: Scene, method: str, width: int, height: int, light: SharedLight
     ) -> None:
@@ -114,7 +117,7 @@ class CameraRig:
         }
         self.buffers_mib = self._buffers.bytes / 2**20
 
-    def render(self, budget: int, seed: int) -> Rendering:
+    def render(self, budget: int, seed: int, kernel: float | None = None) -> Rendering:
         """One picture from nothing: the way to sample the spectrum chosen for `budget` samples a pixel, then those, or
         what they buy in that way."""
         started = self._finished()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .curves import error_at_time, points_by, speed_up
+from .curves import best_baseline, error_at_time, points_by, speed_up
 from .measured_passes import MEASURED_PASSES
 from .results import Claim, Curve, Point, SceneResult
 
@@ -21,11 +21,11 @@ def claims_of(scene: SceneResult) -> list[Claim]:
     if srd is None:
         return []
     claims = []
-    stochastic = curves.get("stochastic")
-    if stochastic is not None:
-        claims.append(_speed_up_claim(scene, srd, stochastic))
+    best = best_baseline(scene.curves)
+    if best is not None:
+        claims.append(_speed_up_claim(scene, srd, best))
         if scene.measured_pass == "light" and scene.seconds >= LATE_SECONDS:
-            claims.append(_first_picture_claim(scene, srd, stochastic))
+            claims.append(_first_picture_claim(scene, srd, best))
     linear = curves.get("srd-lambda")
     if linear is not None and 0.0 < scene.strongest_abbe < STRONG_ABBE:
         claims.append(_index_claim(scene, srd, linear))
@@ -41,13 +41,13 @@ def ratios_of(curves: Sequence[Curve], measure: str = "relmse") -> dict[str, flo
     return {name: reached.seconds for name, reached in found.items() if reached is not None}
 
 
-def _speed_up_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> Claim:
-    end, one_pass = stochastic.points[-1], MEASURED_PASSES[scene.measured_pass]
+def _speed_up_claim(scene: SceneResult, srd: Curve, baseline: Curve) -> Claim:
+    end, one_pass = baseline.points[-1], MEASURED_PASSES[scene.measured_pass]
     asked = (
-        f"at most 1/{one_pass.asked_ratio:.0f} of the time of stochastic to its error at the end ({end.relmse:.3g} "
-        f"after {end.seconds:.2f} s)"
+        f"at most 1/{one_pass.asked_ratio:.0f} of the time of the best baseline, {baseline.method}, to its error at "
+        f"the end ({end.relmse:.3g} after {end.seconds:.2f} s)"
     )
-    reached = speed_up(srd.points, stochastic.points)
+    reached = speed_up(srd.points, baseline.points)
     if reached is None:
         last = srd.points[-1]
         times = last.relmse / max(end.relmse, 1e-30)
@@ -71,13 +71,13 @@ def _speed_up_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> Claim:
     return Claim("time to equal error", asked, measured, holds, why)
 
 
-def _first_picture_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> Claim:
-    late = error_at_time(stochastic.points, LATE_SECONDS)
-    end = stochastic.points[-1]
+def _first_picture_claim(scene: SceneResult, srd: Curve, baseline: Curve) -> Claim:
+    late = error_at_time(baseline.points, LATE_SECONDS)
+    end = baseline.points[-1]
     late = end.relmse if late is None else late
     asked = (
-        f"the picture after {EARLY_SECONDS} s of photon time is better than stochastic's after {LATE_SECONDS:.0f} s "
-        f"(relMSE {late:.3g})"
+        f"the picture after {EARLY_SECONDS} s of photon time is better than that of the best baseline, "
+        f"{baseline.method}, after {LATE_SECONDS:.0f} s (relMSE {late:.3g})"
     )
     early = error_at_time(srd.points, EARLY_SECONDS)
     if early is None:
@@ -94,7 +94,11 @@ def _first_picture_claim(scene: SceneResult, srd: Curve, stochastic: Curve) -> C
             why,
         )
     holds = early < late
-    why = "" if holds else f"{early / max(late, 1e-30):.2g} times stochastic's; {reason(scene, srd, EARLY_SECONDS)}"
+    why = (
+        ""
+        if holds
+        else f"{early / max(late, 1e-30):.2g} times {baseline.method}'s; {reason(scene, srd, EARLY_SECONDS)}"
+    )
     return Claim("first picture", asked, f"relMSE {early:.3g}", holds, why)
 
 

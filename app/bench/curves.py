@@ -13,15 +13,18 @@ import msgspec
 import numpy as np
 
 from ..reference.metrics import ReferencePicture, bias_variance
-from .results import Curve, Point, Sample
+from .results import OWN_METHODS, TARGETS, Curve, Point, Sample, SpeedUp
 
 SMALLEST_ERROR = 1e-12
 """Stands for 0 in logarithms."""
 CONFIDENCE = 0.95
 
 
-def make_point(samples: Sequence[Sample], mean_difference: np.ndarray, reference_image: ReferencePicture) -> Point:
-    """All seeds of one photon budget; `mean_difference`: mean over them of I − R̂, XYZ (H, W, 3)."""
+def make_point(
+    samples: Sequence[Sample], mean_difference: np.ndarray, reference_image: ReferencePicture, setup: float = 0.0
+) -> Point:
+    """All seeds of one photon budget; `mean_difference`: mean over them of I − R̂, XYZ (H, W, 3); `setup`: seconds that
+    come before any rendering."""
     split = bias_variance(mean_difference, [s.metrics["relmse_raw"] for s in samples], reference_image)
     single = [s.metrics["relmse"] for s in samples]
     return Point(
@@ -32,6 +35,7 @@ def make_point(samples: Sequence[Sample], mean_difference: np.ndarray, reference
         max(single),
         split.bias2,
         split.variance,
+        setup + float(np.median([s.all_seconds for s in samples])),
     )
 
 
@@ -63,8 +67,9 @@ def complete_curve(curve: Curve, mean_differences: Mapping[int, np.ndarray], ref
     by_budget: dict[int, list[Sample]] = {}
     for sample in curve.samples:
         by_budget.setdefault(sample.photons, []).append(sample)
+    setup = sum(curve.setup_seconds.values())
     curve.points = [
-        make_point(by_budget[n], mean_differences[n], reference_image)
+        make_point(by_budget[n], mean_differences[n], reference_image, setup)
         for n in sorted(by_budget)
         if n in mean_differences
     ]
@@ -131,6 +136,50 @@ def speed_up(points: Sequence[Point], baseline: Sequence[Point]) -> Reached | No
     if own is None or reached is None:
         return None
     return Reached(own.seconds / reached.seconds, reached.at_once)
+
+
+def whole_process(points: Sequence[Point]) -> list[Point]:
+    """The points with the time of a whole process in the place of photon time."""
+    return [msgspec.structs.replace(p, seconds=p.whole_seconds) for p in points]
+
+
+def best_baseline(curves: Sequence[Curve]) -> Curve | None:
+    """The one whose error is least where all that have points are still followed; None without one."""
+    baselines = [c for c in curves if c.points and c.method not in OWN_METHODS]
+    if not baselines:
+        return None
+    common = min(max(p.seconds for p in c.points) for c in baselines)
+    return min(baselines, key=lambda c: error_at_time(c.points, common) or np.inf)
+
+
+def speed_ups(curves: Sequence[Curve], own: str = "srd") -> list[SpeedUp]:
+    """`own` against the best baseline at every target that either reaches, by photon time and by whole-process time."""
+    found = []
+    for clock in ("photon", "whole"):
+        points = {c.method: c.points if clock == "photon" else whole_process(c.points) for c in curves if c.points}
+        baselines = {name: p for name, p in points.items() if name not in OWN_METHODS}
+        if own not in points or not baselines:
+            return []
+        # Who was followed for less time might have got there before the others' ends.
+        end = min(max(point.seconds for point in p) for p in baselines.values())
+        for target in TARGETS:
+            mine = time_to_error(points[own], target)
+            theirs = {name: reached for name, p in baselines.items() if (reached := time_to_error(p, target))}
+            best = min(theirs, key=lambda name: theirs[name].seconds, default="")
+            if mine is None and not best:
+                continue
+            found.append(
+                SpeedUp(
+                    target,
+                    clock,
+                    None if mine is None else mine.seconds,
+                    mine is not None and mine.at_once,
+                    best,
+                    theirs[best].seconds if best else end,
+                    bool(best) and theirs[best].at_once,
+                )
+            )
+    return found
 
 
 def _log(error: float) -> float:

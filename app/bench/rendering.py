@@ -24,7 +24,11 @@ from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
 from ..render.light_pass import LightPass, scene_buffers
 from ..render.sampling import DEFAULT_SAMPLES
+from ..render.shrinking import passes
+from .results import OWN_METHODS
 
+KERNELS = tuple(float(width) for width in np.geomspace(0.45, 32.0, 13))
+"""Widths of a kernel that are tried: standard deviations in lattice spacings."""
 WARM_UP_PHOTONS = 2048
 SMALLEST_BUDGET = 128
 FIRST_SECONDS = 0.02
@@ -57,9 +61,14 @@ class Rig(Protocol):
 
     setup_seconds: dict[str, float]
     buffers_mib: float
+    goes_on: bool
+    """Followed beyond the time given, to the horizon, until its error is what is sought."""
+    kernels: tuple[float, ...]
+    """Widths of its kernel to be tried, lattice spacings; empty where it has none or none is to be chosen."""
 
-    def render(self, budget: int, seed: int) -> Rendering:
-        """One rendering from nothing of about `budget` photons, or camera samples a pixel."""
+    def render(self, budget: int, seed: int, kernel: float | None = None) -> Rendering:
+        """One rendering from nothing of about `budget` photons, or camera samples a pixel; `kernel` None: as the method
+        has it."""
 
     def budgets(self, seconds: float, count: int) -> list[int]:
         """Ascending, `count` at most: evenly spaced in the logarithm, the largest takes about `seconds`."""
@@ -78,6 +87,9 @@ def light_rigs(
     """The light pass's rigs by method, freed at the end. Raises `NothingToMeasure`."""
     rigs: dict[str, Rig] = {}
     with ExitStack() as stack:
+        # What the first of a process pays for all, late imports and drivers that start up, falls on none.
+        progress(f"preparing {methods[0]}")
+        MethodRig(context, scene, methods[0], width, height).release()
         for method in methods:
             progress(f"preparing {method}")
             rigs[method] = rig = MethodRig(context, scene, method, width, height)
@@ -87,6 +99,8 @@ def light_rigs(
 
 class MethodRig:
     """Owns everything on the device for one scene, method and picture size."""
+
+    goes_on = True
 
     def __init__(self, context: Context, scene: Scene, method: str, width: int, height: int) -> None:
         self._context = context
@@ -102,24 +116,29 @@ class MethodRig:
         compiled = self._finished()
         self._light.prepare()
         piloted = self._finished()
+        tuned = method not in OWN_METHODS and self._light.features.footprints
+        self.kernels: tuple[float, ...] = KERNELS if tuned else ()
         # Drivers put off part of the compiling until a program runs.
         seen = self.render(WARM_UP_PHOTONS, 1).xyz.any()
+        warm = self._finished()
         if not seen:
             self.release()
             raise NothingToMeasure(
                 f"scene '{scene.name}': no light that glass or mirrors throw falls on what the camera sees directly, "
                 "so there is nothing to measure"
             )
+        self.render(WARM_UP_PHOTONS, 1)
         self.setup_seconds = {
             "buffers": buffered - started,
             "compile": compiled - buffered,
             "pilot": piloted - compiled,
-            "warm-up": self._finished() - piloted,
+            "first run": max((warm - piloted) - (self._finished() - warm), 0.0),
         }
         self.buffers_mib = (self._buffers.bytes + self._light.trace.bytes) / 2**20
 
-    def render(self, photons: int, seed: int) -> Rendering:
-        """One rendering from nothing with one lattice of about `photons`, seen by the camera."""
+    def render(self, photons: int, seed: int, kernel: float | None = None) -> Rendering:
+        """One rendering from nothing of about `photons`, seen by the camera."""
+        self._light.smoothing = self._settings.smoothing if kernel is None else kernel
         seconds = self._light_seconds(photons, seed)
         started = time.perf_counter()
         light, settings = self._light, self._settings
@@ -166,10 +185,14 @@ class MethodRig:
     def _light_seconds(self, photons: int, seed: int) -> dict[str, float]:
         """Fill the maps; seconds by stage. All that a pass does beside tracing counts as splatting."""
         light = self._light
+        light.forget_tables()
         started = self._finished()
+        count, photons = passes(light.features.method, photons)
         light.begin(photons, seed)
+        _ = light.tables  # made when they are first asked for
         planned = self._finished()
-        light.run_pass(0, photons, self._wait)
+        for number in range(count):
+            light.run_pass(number, photons, self._wait)
         filled = self._finished()
         self._textures = light.resolved_textures()
         resolved = self._finished()

@@ -6,7 +6,24 @@ import msgspec
 
 from .measured_passes import COUNTED_STAGES
 
-DEFAULT_METHODS = ("stochastic", "stochastic-even", "stochastic-point", "regular-7", "regular-16", "srd-lambda", "srd")
+DEFAULT_METHODS = (
+    "stochastic",
+    "stochastic-even",
+    "stochastic-point",
+    "progressive-stochastic",
+    "hero",
+    "regular-7",
+    "regular-16",
+    "srd-lambda",
+    "srd",
+)
+
+OWN_METHODS = ("srd", "srd-photons", "progressive")
+"""The program's own, measured as they ship; all others are baselines, each at its best (`tuning`)."""
+TARGETS = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)
+"""relMSE at which methods are compared."""
+ERROR_SOUGHT = 0.01
+"""A method that is worse than this after `BenchSettings.seconds` goes on to the horizon."""
 
 OTHER_MEASURES = ("relmse_whole", "relmse_trimmed", "nrmse", "smape", "chroma")
 """Measures beside relMSE by which times to equal error are given, so that no conclusion hangs on one."""
@@ -26,6 +43,12 @@ class BenchSettings(msgspec.Struct, frozen=True):
     measured_pass: str = "light"
     """Which pass of the renderer is measured, a key of `measured_passes.MEASURED_PASSES`. Below, what is said of
     photons and photon time holds for camera samples a pixel and camera time where it is the camera's."""
+    horizon: float | None = None
+    """Most photon time of a method's largest rendering; None: ten times `seconds`. The light pass's alone."""
+
+    @property
+    def horizon_seconds(self) -> float:
+        return 10.0 * self.seconds if self.horizon is None else self.horizon
 
 
 class Sample(msgspec.Struct, frozen=True):
@@ -44,9 +67,17 @@ class Sample(msgspec.Struct, frozen=True):
     picture's mean), smape, chroma, nrmse, energy_ratio (Σ picture / Σ reference); "flip" for the equal-time pictures
     alone. See `metrics`."""
 
+    kernel: float = 0.0
+    """Standard deviation of the footprints in lattice spacings; 0: as the method has it."""
+
     @property
     def photon_seconds(self) -> float:
         return sum(seconds for stage, seconds in self.seconds.items() if stage in COUNTED_STAGES)
+
+    @property
+    def all_seconds(self) -> float:
+        """Of every stage; the set-up, once a process, is the curve's."""
+        return sum(self.seconds.values())
 
 
 class Point(msgspec.Struct, frozen=True):
@@ -63,6 +94,49 @@ class Point(msgspec.Struct, frozen=True):
     variance: float
     """relMSE told apart: bias² of the mean picture (less what its own variance leaves) and mean variance. With one
     seed they cannot be told apart: both are 0."""
+    whole_seconds: float = 0.0
+    """Median time of a whole process that makes this one picture: `Curve.setup_seconds` and every stage."""
+
+
+class Trial(msgspec.Struct, frozen=True):
+    """One rendering of the sweep that a baseline's kernel was chosen from."""
+
+    photons: int
+    smoothing: float
+    """Standard deviation of the footprints in lattice spacings; 0: the method has none."""
+    seconds: float
+    """Photon time."""
+    relmse: float
+
+
+class SpeedUp(msgspec.Struct, frozen=True):
+    """How much sooner `srd` reaches an error than the best of the baselines, by one clock."""
+
+    target: float
+    """relMSE."""
+    clock: str
+    """"photon" or "whole"."""
+    seconds: float | None
+    """When `srd` gets there; None: it does not."""
+    at_once: bool
+    """Its smallest rendering is already as good: at most `seconds`."""
+    baseline: str
+    """The one that gets there first; "" where none does."""
+    baseline_seconds: float
+    """When it gets there; where none does, the time up to which all were followed."""
+    baseline_at_once: bool
+
+    @property
+    def ratio(self) -> float | None:
+        """Baseline's time over `srd`'s; None where `srd` does not get there."""
+        return None if self.seconds is None else self.baseline_seconds / self.seconds
+
+    @property
+    def bound(self) -> str:
+        """ "≥" or "≤" where the ratio is a bound only, "~" where both are there at once, "" where it is known."""
+        above = not self.baseline or self.at_once
+        below = bool(self.baseline) and self.baseline_at_once
+        return "~" if above and below else "≥" if above else "≤" if below else ""
 
 
 class Curve(msgspec.Struct):
@@ -70,8 +144,9 @@ class Curve(msgspec.Struct):
 
     method: str
     setup_seconds: dict[str, float]
-    """Once per scene and not in photon time: "buffers" (tree and uploads), "compile", "pilot", "warm-up" (a small
-    rendering, in which drivers finish compiling); "light pass" (the caustic maps that all methods look up)."""
+    """Once per process and not in photon time: "start" (interpreter, imports, OpenGL context), "buffers" (tree and
+    uploads), "compile", "pilot", "first run" (what the first rendering takes longer than the second one, as drivers
+    finish compiling in it); "light pass" (the caustic maps that all methods look up)."""
     samples: list[Sample]
     budgets: list[int] = []
     """Photons of each point, from the rate that a first trial had; the same for every seed."""
@@ -80,6 +155,10 @@ class Curve(msgspec.Struct):
     """Exponent of relMSE against photons over the curve's second half, and its 95 % confidence half-width."""
     slope_half_width: float = 0.0
     buffers_mib: float = 0.0
+    kernels: list[float] = []
+    """Of each budget, standard deviation in lattice spacings; empty: as the method has it."""
+    sweep: list[Trial] = []
+    """What `kernels`, and the horizon, were chosen from."""
 
 
 class ReferenceInfo(msgspec.Struct):
@@ -127,6 +206,8 @@ class SceneResult(msgspec.Struct):
     below 1 the method is slower, absent when it never gets there."""
     time_to_equal_other: dict[str, dict[str, float]] = {}
     """The same by other measures: `OTHER_MEASURES` → method → ratio."""
+    speed_ups: list[SpeedUp] = []
+    """`srd` against the best baseline at each of `TARGETS`, by both clocks."""
     strongest_glass: str = ""
     strongest_abbe: float = 0.0
     """Lowest V_d in the scene; 0 when nothing disperses."""

@@ -16,12 +16,13 @@ from ..model.scene import Scene
 from ..reference import metrics
 from ..reference.metrics import ReferencePicture
 from .claims import claims_of, ratios_of
-from .curves import budget_at_time, complete_curve
+from .curves import budget_at_time, complete_curve, speed_ups
 from .measured_passes import MEASURED_PASSES
 from .rendering import NothingToMeasure, Rendering, Rig
 from .results import OTHER_MEASURES, BenchSettings, Curve, Sample, SceneResult
 from .store import Store
 from .subjects import SUBJECTS, Progress, Subject
+from .tuning import kernel_at, tune
 
 POINTS = 10
 """Budgets a curve."""
@@ -39,9 +40,11 @@ def run_bench(
     progress: Progress,
     skipped: Callable[[str], None] | None = None,
     subject: Subject | None = None,
+    start_seconds: float = 0.0,
 ) -> None:
     """Measure every scene by name that `store` does not hold yet; a KeyboardInterrupt loses one method's seed at most.
-    `subject`: what is measured; None: the pass that the store's settings name.
+    `subject`: what is measured; None: the pass that the store's settings name. `start_seconds`: what a process takes
+    before it begins with its scene.
 
     Raises `UserError` when a scene has changed since `store` was begun, and where there is nothing to measure, unless
     `skipped` takes the reason."""
@@ -51,9 +54,8 @@ def run_bench(
             progress((done + fraction) / len(scenes), f"{name}: {text}")
 
         try:
-            _SceneBench(
-                context, name, scene, store, share, subject or SUBJECTS[store.result.settings.measured_pass]
-            ).run()
+            one_pass = subject or SUBJECTS[store.result.settings.measured_pass]
+            _SceneBench(context, name, scene, store, share, one_pass, start_seconds).run()
         except NothingToMeasure as reason:
             if skipped is None:
                 raise
@@ -71,8 +73,16 @@ class _SceneBench:
     """One scene's measurements."""
 
     def __init__(
-        self, context: Context, name: str, scene: Scene, store: Store, progress: Progress, subject: Subject
+        self,
+        context: Context,
+        name: str,
+        scene: Scene,
+        store: Store,
+        progress: Progress,
+        subject: Subject,
+        start_seconds: float,
     ) -> None:
+        self._start_seconds = start_seconds
         self._context, self._scene, self._store, self._progress, self._subject = (
             context,
             scene,
@@ -139,8 +149,35 @@ class _SceneBench:
         for method, rig in rigs.items():
             if all(curve.method != method for curve in self._result.curves):
                 self._progress(_REFERENCE_SHARE, f"trying {method}")
-                budgets = rig.budgets(self._settings.seconds, POINTS)
-                self._result.curves.append(Curve(method, rig.setup_seconds, [], budgets, buffers_mib=rig.buffers_mib))
+                curve = Curve(
+                    method,
+                    {"start": self._start_seconds} | rig.setup_seconds,
+                    [],
+                    buffers_mib=rig.buffers_mib,
+                )
+                if rig.goes_on:
+                    self._tune(curve, rig)
+                else:
+                    curve.budgets = rig.budgets(self._settings.seconds, POINTS)
+                self._result.curves.append(curve)
+                self._store.save()
+
+    def _tune(self, curve: Curve, rig: Rig) -> None:
+        """Budgets as far as the horizon asks for, and kernels with which a baseline is at its best."""
+
+        def judge(rendering: Rendering) -> tuple[float, float]:
+            sample = self._sample(rendering, curve.method, 0, 0, None)
+            return sample.photon_seconds, sample.metrics["relmse"]
+
+        tuning = tune(
+            rig,
+            self._settings.seconds,
+            max(self._settings.horizon_seconds, self._settings.seconds),
+            POINTS,
+            judge,
+            lambda text: self._progress(_REFERENCE_SHARE, f"trying {curve.method}: {text}"),
+        )
+        curve.budgets, curve.kernels, curve.sweep = tuning.budgets, tuning.kernels, tuning.sweep
 
     def _curve(self, method: str) -> Curve:
         return next(curve for curve in self._result.curves if curve.method == method)
@@ -167,8 +204,9 @@ class _SceneBench:
                 _REFERENCE_SHARE + (1.0 - _REFERENCE_SHARE) * done + step * i / len(curve.budgets),
                 f"{curve.method}, seed {seed} of {self._settings.seeds}",
             )
-            rendering = rig.render(budget, seed)
-            samples.append(self._sample(rendering, curve.method, budget, seed))
+            kernel = kernel_at(curve, budget)
+            rendering = rig.render(budget, seed, kernel)
+            samples.append(self._sample(rendering, curve.method, budget, seed, kernel))
             sums[i] += rendering.xyz - reference_image.xyz
         store.save_sums(result.scene, curve.method, seed, sums)
         curve.samples.extend(samples)
@@ -179,7 +217,7 @@ class _SceneBench:
         store.save()
         store.drop_sums(result.scene, curve.method, seed - 1)
 
-    def _sample(self, rendering: Rendering, method: str, budget: int, seed: int) -> Sample:
+    def _sample(self, rendering: Rendering, method: str, budget: int, seed: int, kernel: float | None) -> Sample:
         if not np.isfinite(rendering.xyz).all():
             raise RuntimeError(
                 f"{method} gave a picture with numbers that are not finite ({self._result.scene}, {budget} "
@@ -192,6 +230,7 @@ class _SceneBench:
             rendering.splats,
             rendering.seconds,
             metrics.measure(rendering.xyz, self._reference_image),
+            kernel or 0.0,
         )
 
     def _judge(self) -> None:
@@ -199,6 +238,7 @@ class _SceneBench:
         result = self._result
         result.time_to_equal_error = ratios_of(result.curves)
         result.time_to_equal_other = {measure: ratios_of(result.curves, measure) for measure in OTHER_MEASURES}
+        result.speed_ups = speed_ups(result.curves)
         result.claims = claims_of(result)
         errors = [point.relmse for curve in result.curves for point in curve.points]
         assert result.reference is not None
@@ -207,16 +247,17 @@ class _SceneBench:
     def _make_pictures(self, method: str, rig: Rig) -> None:
         """Pictures at equal time, with FLIP."""
         result = self._result
-        points = self._curve(method).points
+        curve = self._curve(method)
         made: dict[
             int, tuple[Rendering, Sample]
         ] = {}  # a method whose shortest rendering takes longer than the early pictures has one for all
         for ending, share in MEASURED_PASSES[result.measured_pass].pictures:
             name = f"{method}{ending}"
-            budget = rig.fitting(budget_at_time(points, share * self._settings.seconds))
+            budget = rig.fitting(budget_at_time(curve.points, share * self._settings.seconds))
             if budget not in made:
-                rendering = rig.render(budget, 1)
-                made[budget] = rendering, self._sample(rendering, method, budget, 1)
+                kernel = kernel_at(curve, budget)
+                rendering = rig.render(budget, 1, kernel)
+                made[budget] = rendering, self._sample(rendering, method, budget, 1, kernel)
                 flip = metrics.flip(rendering.xyz, self._reference_image)
                 if flip is not None:
                     made[budget][1].metrics["flip"] = flip

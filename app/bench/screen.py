@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from .curves import error_at_time
 from .measured_passes import MEASURED_PASSES
-from .results import Curve, SceneResult
+from .results import Curve, SceneResult, SpeedUp
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -39,7 +39,7 @@ def scene_table(scene: SceneResult) -> Table:
 
 def scene_lines(scene: SceneResult) -> list[str]:
     """Times to equal error by the other measures, one line a claim, and notes."""
-    lines = []
+    lines = _speed_up_lines(scene)
     if scene.time_to_equal_other and any(curve.method == "srd" for curve in scene.curves):
         others = ", ".join(
             f"{measure} {ratio_text(ratios.get('srd'))}" for measure, ratios in scene.time_to_equal_other.items()
@@ -60,6 +60,36 @@ def scene_lines(scene: SceneResult) -> list[str]:
             "  note: FLIP is not available; 'pip install flip-evaluator' brings it, on Pythons that it has wheels for"
         )
     return lines
+
+
+def _speed_up_lines(scene: SceneResult) -> list[str]:
+    """The headline: a line for each clock, and one for the kernels that baselines were given."""
+    lines = []
+    for clock in dict.fromkeys(one.clock for one in scene.speed_ups):
+        found = ", ".join(
+            f"{one.target:g} {speed_up_text(one)} ({one.baseline or 'none of them'})"
+            for one in scene.speed_ups
+            if one.clock == clock
+        )
+        time = MEASURED_PASSES[scene.measured_pass].time if clock == "photon" else "time of a whole process"
+        lines.append(f"  srd's speed-up over the best baseline at relMSE, by {time}: {found}")
+    kernels = [
+        f"{curve.method} {curve.kernels[0]:.2g} to {curve.kernels[-1]:.2g}" for curve in scene.curves if curve.kernels
+    ]
+    if kernels:
+        lines.append(f"  kernels at their best, lattice spacings, first budget to last: {', '.join(kernels)}")
+    return lines
+
+
+def speed_up_text(one: SpeedUp) -> str:
+    """ "12×", "≥ 30×" where it is a bound, "not reached" where srd does not get there, "both at once" where it cannot
+    be known."""
+    if one.ratio is None:
+        return "not reached"
+    if one.bound == "~":
+        return "both at once"
+    digits = f"{one.ratio:.0f}" if one.ratio >= 10 else f"{one.ratio:.2g}"
+    return f"{one.bound}{' ' * bool(one.bound)}{digits}×"
 
 
 def _ending(scene: SceneResult, curve: Curve) -> list[str]:

@@ -44,6 +44,7 @@ class SplatFeatures:
     point_spectrum: bool = False
     local_gain: bool = False
     reindexed: bool = False
+    hero: bool = False
 
 
 def measure(ctx: moderngl.Context, pixels: float, count: int = 1 << 17) -> dict[str, float]:

@@ -161,6 +161,7 @@ def _settings_difference(earlier: BenchSettings, wanted: BenchSettings) -> str:
         return f"the {earlier.measured_pass} pass measured instead of the {wanted.measured_pass} pass"
     pairs = {
         "--seconds": (f"{earlier.seconds:g}", f"{wanted.seconds:g}"),
+        "--horizon": (f"{earlier.horizon_seconds:g}", f"{wanted.horizon_seconds:g}"),
         "--seeds": (f"{earlier.seeds}", f"{wanted.seeds}"),
         "--methods": (",".join(earlier.methods), ",".join(wanted.methods)),
         "--size": (size(earlier), size(wanted)),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -38,6 +39,7 @@ class BenchRequest:
     scenes: tuple[str, ...] = ()
     output: Path | None = None
     seconds: str | None = None
+    horizon: str | None = None
     seeds: str | None = None
     methods: str | None = None
     size: str | None = None
@@ -56,7 +58,12 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
     if request.output is None:
         raise UserError("bench needs a folder for what it finds: give one with -o DIR")
     settings = parse_settings(request)
+    # What any process of this program spends before it has its scene: interpreter and imports, as processor time, then
+    # a scene's file and the OpenGL context.
+    start_s, started = time.process_time(), time.perf_counter()
     scenes = load_scenes(request.scenes or (CAMERA_SCENES if request.camera_pass else ()))
+
+    start_s += (time.perf_counter() - started) / len(scenes)
 
     from ..base.progress import ProgressReporter
     from ..bench.machine import machine
@@ -64,7 +71,9 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
     from ..bench.store import Store
     from ..gpu.context import create_context
 
+    started = time.perf_counter()
     with create_context() as context:
+        start_s += time.perf_counter() - started
         empty = BenchResult(
             __version__,
             datetime.now(UTC).isoformat(timespec="seconds"),
@@ -84,6 +93,7 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
                     store,
                     progress,
                     None if request.scenes else lambda reason: print(f"note: {reason}", file=sys.stderr),
+                    start_seconds=start_s,
                 )
         except KeyboardInterrupt:
             stopped = True
@@ -103,6 +113,15 @@ def parse_settings(request: BenchRequest) -> BenchSettings:
         }
     if request.seconds is not None:
         asked["seconds"] = _seconds("--seconds", request.seconds)
+    if request.horizon is not None:
+        if request.camera_pass:
+            raise UserError("--horizon is for methods of the light pass: leave it out with --camera")
+        asked["horizon"] = _seconds("--horizon", request.horizon)
+        if asked["horizon"] < asked.get("seconds", BenchSettings().seconds):
+            raise UserError(
+                f"--horizon {request.horizon} is less than the photon time that every method is given: give at least "
+                f"{asked.get('seconds', BenchSettings().seconds):g}"
+            )
     if request.reference_seconds is not None:
         asked["reference_seconds"] = _seconds("--reference-seconds", request.reference_seconds)
     if request.seeds is not None:
@@ -163,6 +182,7 @@ def repeat_command(scenes: Sequence[str], request: BenchRequest) -> str:
     """The one command that repeats this run."""
     given = {
         "--seconds": request.seconds,
+        "--horizon": request.horizon,
         "--seeds": request.seeds,
         "--methods": request.methods,
         "--size": request.size,

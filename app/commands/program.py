@@ -371,6 +371,14 @@ def bench(
             "--reference-seconds", metavar="S", help="Time added to each scene's cached reference; default: 60."
         ),
     ] = None,
+    horizon: Annotated[
+        Text,
+        typer.Option(
+            metavar="S",
+            help="Photon time up to which a method is followed that has not come to a relMSE of 1 % by --seconds; "
+            "default: ten times --seconds.",
+        ),
+    ] = None,
     features: Annotated[
         Text,
         typer.Option(
@@ -393,7 +401,17 @@ def bench(
     from .bench import BenchRequest, bench_command
 
     request = BenchRequest(
-        tuple(scenes or ()), output, seconds, seeds, methods, size, reference_seconds, features, fresh, camera_pass
+        tuple(scenes or ()),
+        output,
+        seconds,
+        horizon,
+        seeds,
+        methods,
+        size,
+        reference_seconds,
+        features,
+        fresh,
+        camera_pass,
     )
     raise typer.Exit(bench_command(request, _print))
 

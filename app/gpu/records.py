@@ -22,8 +22,17 @@ FLAG_INSIDE = 4
 """The ray travels on the inner side of `last_object`."""
 
 
-def photon_record(groups: int) -> Struct:
-    """One landing on a receiver. `groups`: number of spectral groups (0 where nothing disperses).
+_COMPANIONS = (
+    Field(
+        "companion_x", "vec4", "xyz: spectral coordinates of the wavelengths that share the path, w: 1 while they do"
+    ),
+    Field("companion_throughput", "vec4", "xyz: their weights of the light's spectral power"),
+)
+
+
+def photon_record(groups: int, hero: bool = False) -> Struct:
+    """One landing on a receiver. `groups`: number of spectral groups (0 where nothing disperses); `hero`: with the
+    wavelengths that share its path.
 
     The photon covers the spectral band [x_lo, x_hi]; its path was traced at x_anchor. At spectral
     coordinate x it lies at position + sum_g dposition_dvar[g] (var_g(x) - var_g(x_anchor)).
@@ -51,6 +60,7 @@ def photon_record(groups: int) -> Struct:
             Field("depth", "uint", "specular events on the path"),
             Field("cosine", "float", "|cos| of incidence on the receiver"),
             *spectral,
+            *(_COMPANIONS if hero else ()),
         ),
         texels=True,
     )
@@ -103,8 +113,8 @@ GAIN_BOX = Struct(
 """Where one receiver's local gains of dispersion lie (`model.local_dispersion.GainGrid`)."""
 
 
-def ray_record(columns: int) -> Struct:
-    """State of one ray between two surfaces; `columns` derivative columns, spatial ones first."""
+def ray_record(columns: int, hero: bool = False) -> Struct:
+    """State of one ray between two surfaces; `columns` derivative columns, spatial ones first; `hero` as above."""
     fields = [
         Field("position", "vec3", "GPU space"),
         Field("flux_w", "float", "accounted radiant flux of the band, W"),
@@ -132,7 +142,7 @@ def ray_record(columns: int) -> Struct:
             ),
             Field("ddirection", "vec4", "xyz: per the same", columns),
         ]
-    return Struct("RayRecord", tuple(fields), texels=True)
+    return Struct("RayRecord", (*fields, *(_COMPANIONS if hero else ())), texels=True)
 
 
 OUTCOME = Struct(

@@ -24,7 +24,13 @@ from ..model.features import (
 from ..model.geometry.bvh import build_bvh
 from ..model.optics.colorimetry import VISIBLE_NM, rgb_partition
 from ..model.optics.glass import Dispersion
-from ..model.optics.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative, index_table
+from ..model.optics.spectral_tables import (
+    CumulativeSpectrum,
+    SpectralAxis,
+    cumulative,
+    index_table,
+    wavelength_cdf,
+)
 from ..model.scene import Grating, Light, Scene
 from . import bindings
 from .records import NONE
@@ -164,6 +170,8 @@ class SpectraLayout:
     weight_row: int
     power_row: int
     """First of one row per light: cumulative radiant power over x, W per unit weight."""
+    brightness_row: int
+    """Likewise, where wavelengths are drawn at random: share of the draws below x (`wavelength_cdf`)."""
     rows: int
 
 
@@ -382,21 +390,34 @@ class SceneBuffers:
             cumulative(self.axis, light.spectral_power) for light in self.scene.lights
         ]
         rows.append(np.array([power.at(x)[:, 3] for power in self.light_power]).reshape(-1, SAMPLES))
+        rows.append(self._draws())
         counts = np.cumsum([0] + [len(r) for r in rows])
         self.layout = SpectraLayout(*counts.tolist())
         self.variables = variables
         """Each spectral group's variable over x, float64 (groups, SAMPLES)."""
         self.variable_table = variables.astype("f4")
         self.media = media
-        self._spectra = spectra_texture(self.ctx, np.concatenate(rows) if counts[5] else np.ones((1, SAMPLES)))
+        self._spectra = spectra_texture(self.ctx, np.concatenate(rows) if counts[-1] else np.ones((1, SAMPLES)))
         self.defines |= {
             "INDEX_ROW": self.layout.index_row,
             "SLOPE_ROW": self.layout.slope_row,
             "VARIABLE_ROW": self.layout.variable_row,
             "WEIGHT_ROW": self.layout.weight_row,
+            "BRIGHTNESS_ROW": self.layout.brightness_row,
             "STACK_SIZE": max(1, len(self.stack_objects)),
             "STACK_OBJECTS": "uint[](" + ", ".join(f"{o}u" for o in (self.stack_objects or [0])) + ")",
         }
+
+    def _draws(self) -> np.ndarray:
+        """Each light's density of random wavelengths as a running integral, (lights, SAMPLES); none where none are
+        drawn."""
+        rows = []
+        for light, power in zip(self.scene.lights, self.light_power, strict=True):
+            # The range that a plan's single band has (`Planner`).
+            lo_nm, hi_nm = light.spectral_power.support_nm()
+            support = float(self.axis.x_of_nm(lo_nm - 0.5)), float(self.axis.x_of_nm(hi_nm + 0.5))
+            rows.append(wavelength_cdf(power, SAMPLES, support, self.features.draws_by_power))
+        return np.array(rows if self.features.random_wavelength else []).reshape(-1, SAMPLES)
 
 
 def _grating_texels(grating: Grating, object_to_world: np.ndarray) -> np.ndarray:

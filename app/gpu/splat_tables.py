@@ -134,6 +134,12 @@ _KEPT_BYTES = 24 << 20
 _blurred: dict[tuple[object, ...], tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
 
+def forget_blurred() -> None:
+    """Blur every spectrum anew, as a new process does."""
+    _blurred.clear()
+    _kernels.cache_clear()
+
+
 @dataclass(frozen=True)
 class FoldedSpectrum:
     """One light under one reflectance: a running integral without its lines, and the lines."""

@@ -16,7 +16,7 @@ from .scene import (
     Scene,
     SceneObject,
 )
-from .settings import RenderSettings, divides_spectrum
+from .settings import RANDOM_METHODS, RenderSettings, divides_spectrum
 
 MAX_GROUPS = 4
 """Spectral columns a photon may carry; further dispersive materials share the last one."""
@@ -93,6 +93,10 @@ class Features:
     """What meets certain flat-faceted objects first is left to beams (`spectrasplat.beams`): photons end there."""
     anchor_weights: bool = False
     """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
+    draws_by_power: bool = False
+    """Random wavelengths are drawn by radiant power instead of brightness: for maps of spectral bins."""
+    hero: bool = False
+    """Three more wavelengths share the path of the one that is followed, as long as it is theirs too."""
 
     def defines(self) -> dict[str, int]:
         """Preprocessor symbols; a feature that is out is not defined at all (use #ifdef) — counts are numbers."""
@@ -122,6 +126,7 @@ class Features:
             "ANCHOR_WEIGHTS": self.anchor_weights,
             "LIGHT_PROFILES": self.light_profiles,
             "BEAMS": self.beams,
+            "HERO": self.hero,
         }
         return numbers | {name: 1 for name, on in switches.items() if on}
 
@@ -130,7 +135,8 @@ class Features:
         """The features that `scene` needs under `settings`."""
         dielectrics = [o for o in scene.objects if o.material.transmits]
         dispersive = dispersive_materials(scene)
-        single = settings.method.startswith(("stochastic", "regular"))
+        random = settings.method in RANDOM_METHODS
+        single = random or settings.method.startswith("regular")
         groups = 0 if single else min(len(dispersive), 1 if settings.method == "srd-lambda" else MAX_GROUPS)
         loose = [o for o in scene.objects if not is_convex_solid(o)]
         loose_triangles = sum(len(o.mesh.triangles) for o in loose)
@@ -155,7 +161,7 @@ class Features:
             spectral_weights=not single and ((groups > 0 and bool(dielectrics)) or absorbing or coloured_mirror),
             footprints=footprints,
             point_spectrum=single,
-            random_wavelength=settings.method.startswith("stochastic"),
+            random_wavelength=random,
             even_wavelengths=settings.method == "stochastic-even",
             band_cuts=groups > 0,
             dielectrics=bool(dielectrics),
@@ -179,6 +185,8 @@ class Features:
             anchor_weights=settings.anchor_weights,
             beams=_has_beams(scene, settings),
             light_profiles=any(light.profile is not None for light in scene.lights),
+            draws_by_power=random and settings.bins is not None,
+            hero=settings.method == "hero",
         )
 
 

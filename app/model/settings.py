@@ -11,11 +11,17 @@ METHODS = (
     "stochastic",
     "stochastic-even",
     "stochastic-point",
+    "progressive-stochastic",
+    "hero",
     "regular-7",
     "regular-16",
 )
 """Sampling methods that every comparison holds (README, "Methods")."""
-CAMERA_METHODS = tuple(name for name in METHODS if name != "stochastic-point")
+RANDOM_METHODS = ("stochastic", "stochastic-even", "stochastic-point", "progressive-stochastic", "hero")
+"""Of those, the ones whose photons have wavelengths drawn at random."""
+LIGHT_METHODS = ("stochastic-point", "progressive-stochastic", "hero")
+"""The ones that only photons may follow; camera rays then follow `stochastic`."""
+CAMERA_METHODS = tuple(name for name in METHODS if name not in LIGHT_METHODS)
 """Of those, the ones that camera rays may follow too."""
 
 

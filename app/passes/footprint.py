@@ -119,7 +119,7 @@ class Footprints:
         self._ctx = ctx
         groups = features.spectral_groups
         defines = footprint_defines(features) | {"WORKGROUP": WORKGROUP}
-        structs = (photon_record(groups), PLACEMENT, RECEIVER, SPLAT, GAIN_BOX)
+        structs = (photon_record(groups, features.hero), PLACEMENT, RECEIVER, SPLAT, GAIN_BOX)
         self._program = shader.compute(ctx, "light/footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
         self._unusual = ctx.buffer(np.zeros((group, 2), np.float32))

@@ -129,8 +129,8 @@ class TracePass:
         self.rays_traced = 0
         """Rays emitted since this pass was made, pilots and all."""
         self.split_threshold = split_threshold
-        self.ray = records.ray_record(features.defines()["COLUMNS"])
-        self.photon = records.photon_record(features.spectral_groups)
+        self.ray = records.ray_record(features.defines()["COLUMNS"], features.hero)
+        self.photon = records.photon_record(features.spectral_groups, features.hero)
         ctx = context.ctx
         structs = (*SCENE_STRUCTS, self.ray, self.photon, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE)
         defines = light_defines(features, context.traits) | scene.defines

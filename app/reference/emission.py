@@ -1,6 +1,7 @@
 """Where rays leave a light, in float64 and world units: the CPU reference of emit.comp.
 
-Without derivatives: difference quotients over `Emitter.start` judge the shader's columns.
+Without derivatives: difference quotients over `Emitter.start` judge the shader's columns. Wavelengths, which no ray's
+start depends on, are drawn by `drawn_wavelengths`.
 """
 
 from __future__ import annotations
@@ -10,6 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..gpu.scene_buffers import GpuSpace
+from ..model.optics.colorimetry import VISIBLE_NM, cmf_xyz
+from ..model.optics.spectral_tables import SpectralAxis
+from ..model.optics.spectrum import Spectrum, cmf_at
 from ..model.scene import Light
 from ..passes.emission_domain import EmissionDomain
 from .emission_maps import (
@@ -100,3 +104,41 @@ class Emitter:
         first, second = ((s + sub_lattice * g) % 2**32 for s, g in zip(shift, PLASTIC, strict=True))
         square = lattice_point(np.arange(count), count, (first, second))
         return self.unit_length * (self.domain.rect[:2] + square * self.domain.rect[2:])
+
+
+def drawn_wavelengths(
+    spectrum: Spectrum,
+    axis: SpectralAxis,
+    band: tuple[float, float],
+    place: np.ndarray,
+    cells: int = 1024,
+    by_power: bool = False,
+) -> tuple[np.ndarray, np.ndarray]:
+    """(x, one over the density of x) of random wavelengths within `band` of x, by `place` (...,) in [0, 1): the
+    reference of lib/wavelength.glsl.
+
+    Of the draws 0.6 go by X + Y + Z, 0.2 by radiant power and 0.2 evenly over the light's support; `by_power`: 0.8
+    by power. The density is constant in each of `cells` equal cells of x."""
+    borders = np.linspace(0.0, 1.0, cells + 1)
+    nm = np.concatenate([[380.0], VISIBLE_NM[:-1] + 0.5, [780.0]])
+    lo_nm, hi_nm = spectrum.support_nm()
+    start, end = axis.x_of_nm(np.array([lo_nm - 0.5, hi_nm + 0.5]))
+    even = np.maximum(np.minimum(borders[1:], end) - np.maximum(borders[:-1], start), 0.0)
+
+    def in_cells(per_nm: np.ndarray, of_lines: np.ndarray) -> np.ndarray:
+        mass = np.diff(np.interp(borders, axis.x_of_nm(nm), np.concatenate([[0.0], np.cumsum(per_nm)])))
+        for (line_nm, power), weight in zip(spectrum.lines, of_lines, strict=True):
+            at = np.clip(np.ceil(float(axis.x_of_nm(line_nm)) * cells) - 1, 0, cells - 1)
+            mass[int(at)] += power * weight
+        return mass / mass.sum() if mass.sum() > 0.0 else even / even.sum()
+
+    line_nm = np.array([wavelength for wavelength, _ in spectrum.lines])
+    watt = in_cells(spectrum.density, np.ones(len(line_nm)))
+    seen = in_cells(spectrum.density * cmf_xyz().sum(axis=1), cmf_at(line_nm).reshape(-1, 3).sum(axis=1))
+    share = (0.8 * watt if by_power else 0.6 * seen + 0.2 * watt) + 0.2 * even / even.sum()
+    running = np.concatenate([[0.0], np.cumsum(share)])
+    below, above = np.interp(band, borders, running)
+    wanted = below + np.asarray(place, np.float64) * (above - below)
+    cell = np.clip(np.searchsorted(running, wanted, side="right") - 1, 0, cells - 1)
+    x = borders[cell] + (wanted - running[cell]) / (share[cell] * cells)
+    return x, (above - below) / (share[cell] * cells)

@@ -8,6 +8,7 @@ all frames (`FrameFit`), so that what stands still in the scene stands still in 
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -27,6 +28,7 @@ from .frame_fit import FrameFit, Survey, inputs_of, share_light, stages_to_surve
 from .light_pass import LightPass, scene_buffers, spectral_axis
 from .map_picture import map_picture
 from .sampling import CameraSampling, LightSampling, camera_settings, has_own_method
+from .shrinking import METHOD, PASS_PHOTONS, passes
 from .solo import scene_seen
 
 FIRST_PASS_PHOTONS = 1 << 17
@@ -234,8 +236,13 @@ def traced_light(light: LightPass, sampling: LightSampling, stop: Stop) -> Itera
     if sampling.seconds is not None:
         yield from _traced_for(light, sampling.seconds, sampling.seed, stop)
         return
-    light.begin(sampling.photons, sampling.seed)
-    yield from light.steps_until(0, sampling.photons, stop)
+    count, photons = passes(light.features.method, sampling.photons)
+    light.begin(photons, sampling.seed)
+    for number in range(count):
+        for share in light.steps_until(number, photons, stop):
+            yield (number + share) / count
+        if number + 1 < count and stop():
+            return
 
 
 def _traced_for(light: LightPass, seconds: float, seed: int, stop: Stop) -> Iterator[float]:
@@ -256,6 +263,12 @@ def _traced_for(light: LightPass, seconds: float, seed: int, stop: Stop) -> Iter
         for _ in light.steps_until(number, photons, ends):
             yield spent()
 
+    if light.features.method == METHOD:
+        light.begin(PASS_PHOTONS, seed)
+        for number in itertools.count():
+            yield from one_pass(number, PASS_PHOTONS)
+            if ends() or not light.plans:
+                return
     photons = FIRST_PASS_PHOTONS
     light.begin(photons, seed)
     yield from one_pass(0, photons)

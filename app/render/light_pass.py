@@ -19,7 +19,7 @@ import moderngl
 import numpy as np
 
 from ..base.random_words import Dimension, random_word, shift
-from ..gpu import records
+from ..gpu import records, splat_tables
 from ..gpu.context import Context
 from ..gpu.map_channels import MapChannels
 from ..gpu.reindex import Spans
@@ -37,6 +37,7 @@ from ..passes.pilot import Pilot, landings_of, pilot_steps
 from ..passes.splat import Splatter
 from ..passes.trace import RAY_ROOM, Batch, FluxTally, TracePass
 from .beam_light import BeamLight, BeamStats, carries_everything
+from . import shrinking
 from .light_maps import LightMaps
 from .light_plan import Division, Planner
 from .map_fit import MapFit
@@ -164,8 +165,9 @@ class LightPass:
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
         self.shown = ShownSpectra(context.ctx, scene, buffers, settings.bins)
         self._splatting = Splatting(context, self.shown, self._pace)
-        self.smoothing = settings.smoothing
-        """Standard deviation of a footprint in lattice spacings."""
+        self._shrinks = features.method == shrinking.METHOD
+        self.smoothing = settings.smoothing * (shrinking.FIRST_KERNEL if self._shrinks else 1.0)
+        """Standard deviation of a footprint in lattice spacings; where passes shrink it, of the first one's."""
         self.maps: LightMaps | None = None
         self._beams: BeamLight | None = None
 
@@ -313,6 +315,11 @@ class LightPass:
         """The spectral tables of the plan that was begun."""
         return self._records.tables.full
 
+    def forget_tables(self) -> None:
+        """Make spectral tables anew when they are next asked for, as a process that renders once does."""
+        self._records.release()
+        splat_tables.forget_blurred()
+
     # ---- work --------------------------------------------------------------------------------
 
     def begin(self, photons: int, seed: int) -> None:
@@ -457,7 +464,9 @@ class LightPass:
         self.stats.trace_seconds += time.perf_counter() - started
         self._records.keep(self.trace.photons, batch, self.trace.photon.stride, of)
         yield
-        yield from self.splat_steps(self.trace.photons, batch.photons)
+        yield from self.splat_steps(
+            self.trace.photons, batch.photons, shrinking.kernel_scale(of.number) if self._shrinks else 1.0
+        )
         self.stats.photons += batch.emitted_photons
         self.stats.splats += batch.photons
         self.stats.tally.merge(batch.tally)
@@ -534,6 +543,6 @@ def scene_buffers(context: Context, scene: Scene, settings: RenderSettings) -> S
 
 def _largest_batch(context: Context, features: Features) -> int:
     """Lattice points whose queue fits the device's largest storage buffer."""
-    ray = records.ray_record(features.defines()["COLUMNS"]).stride
+    ray = records.ray_record(features.defines()["COLUMNS"], features.hero).stride
     limit = context.limits.storage_block_bytes
     return max(64, int(limit // (2 * RAY_ROOM * ray)) // 64 * 64)

@@ -177,5 +177,7 @@ class Planner:
 
     @property
     def _tinted(self) -> bool:
-        """Something on the way changes a spectrum's shape."""
-        return self.features.absorption or (self.features.mirrors and self.features.spectral_weights)
+        """Something on the way changes a spectrum's shape, and photons stand for more than one wavelength of it."""
+        return (not self.features.random_wavelength and self.features.absorption) or (
+            self.features.mirrors and self.features.spectral_weights
+        )

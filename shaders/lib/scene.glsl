@@ -73,16 +73,22 @@ vec3 corner_normal(uint corner)
     return uintBitsToFloat(scene_texel(uint(NORMALS_AT) + corner).xyz);
 }
 
+// Samples `cell` and cell + 1 of a spectral table's row.
+vec2 spectral_pair(uint row, int cell)
+{
+#ifdef SCENE_IMAGE
+    return imageLoad(spectra, ivec2(cell, int(row))).xy;
+#else
+    return texelFetch(spectra, ivec2(cell, int(row)), 0).xy;
+#endif
+}
+
 // A spectral table's row at the spectral coordinate x, linear between samples.
 float spectral_row(uint row, float x)
 {
     float at = clamp(x, 0.0, 1.0) * float(SPECTRAL_SAMPLES - 1);
     int cell = min(int(at), SPECTRAL_SAMPLES - 2);
-#ifdef SCENE_IMAGE
-    vec2 ends = imageLoad(spectra, ivec2(cell, int(row))).xy;
-#else
-    vec2 ends = texelFetch(spectra, ivec2(cell, int(row)), 0).xy;
-#endif
+    vec2 ends = spectral_pair(row, cell);
     return mix(ends.x, ends.y, at - float(cell));
 }
 

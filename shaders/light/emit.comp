@@ -4,6 +4,9 @@ layout(local_size_x = 64) in;
 
 #include "lib/emission.glsl"
 #include "lib/spot.glsl"
+#ifdef RANDOM_WAVELENGTH
+#include "lib/wavelength.glsl"
+#endif
 #ifdef LIGHT_PROFILE
 #include "lib/profile.glsl"
 #endif
@@ -95,17 +98,32 @@ void main()
         ray.x_hi = band.y;
         ray.x_anchor = band.z;
 #ifdef RANDOM_WAVELENGTH
-        // Uniform over the band; a laser's band has no width, and its photons all have its wavelength.
+        // By brightness within the band; a laser's band has no width, and its photons all have its wavelength.
 #ifdef EVEN_WAVELENGTHS
         float place_in_band = kronecker(id, 3774877043u, p.shift_spectral);
 #else
         float place_in_band = unit_float(hash_combine(hash_combine(p.shift_spectral, p.light), id));
 #endif
-        ray.x_anchor = mix(band.x, band.y, place_in_band);
+        float per_density = 1.0;
+        if (band.y > band.x) ray.x_anchor = drawn_wavelength(uint(BRIGHTNESS_ROW) + p.light, band.xy, place_in_band, per_density);
         ray.x_lo = ray.x_anchor;
         ray.x_hi = ray.x_anchor;
-        float width = band.y - band.x;
-        ray.throughput *= width > 0.0 ? width : 1.0;
+        ray.throughput *= per_density;
+#ifdef HERO
+        // The hero's path is shared by three wavelengths a quarter of all draws on each [Wilkie et al. 2014]. Any of the four would have led to
+        // it, so each has a quarter of its weight (balance heuristic; all that roulette asks is the same for all four).
+        ray.companion_x = vec4(0.0);
+        ray.companion_throughput = vec4(0.0);
+        if (band.y > band.x) {
+            for (int i = 0; i < 3; ++i) {
+                float x = drawn_wavelength(uint(BRIGHTNESS_ROW) + p.light, band.xy, fract(place_in_band + 0.25 * float(i + 1)), per_density);
+                ray.companion_x[i] = x;
+                ray.companion_throughput[i] = 0.25 * weight * per_density;
+            }
+            ray.companion_x.w = 1.0;
+            ray.throughput *= 0.25;
+        }
+#endif
 #endif
         ray.survival = 1.0;
         ray.photon_id = id;

@@ -122,7 +122,10 @@ float grid_sum(vec2 centre, vec2 e, vec2 m, float shear, float box, float s2, fl
 
 // Throughput averaged over the band (piecewise linear through low end, anchor, high end).
 float mean_throughput(PhotonRecord photon) {
-#ifdef POINT_SPECTRUM
+#if defined(HERO)
+    // Each of the four wavelengths has its own (`carry_companions`).
+    return 1.0;
+#elif defined(POINT_SPECTRUM)
     return photon.throughput.y;
 #else
     float width = photon.x_hi - photon.x_lo;
@@ -139,6 +142,16 @@ float mean_throughput(PhotonRecord photon) {
 bool is_cut(PhotonRecord photon, vec4 band) {
     return photon.x_hi > photon.x_lo && any(greaterThan(abs(vec2(photon.x_lo, photon.x_hi) - band.xy), vec2(1e-5)));
 }
+
+#ifdef HERO
+// Weights of the hero and its companions, and where in the tables they look up their energies: two cells a number, exact below 2^24.
+void carry_companions(inout SplatRecord splat, PhotonRecord photon) {
+    splat.throughput = vec4(photon.throughput.y, photon.companion_throughput.xyz);
+    vec4 x = vec4(photon.x_anchor, photon.companion_x.xyz);
+    vec4 cell = min(floor(x * float(DENSITY_CELLS)), float(DENSITY_CELLS - 1u));
+    splat.x_range = cell.xz * float(DENSITY_CELLS) + cell.yw;
+}
+#endif
 
 SplatRecord small_splat(PhotonRecord photon, Footprint f, vec4 band) {
     SplatRecord splat;
@@ -311,6 +324,9 @@ SplatRecord splat_of(PhotonRecord photon, Footprint f, uint layer, vec4 band) {
         splat = swept_splat(photon, f, band);
     }
     splat.layer = layer;
+#ifdef HERO
+    carry_companions(splat, photon);
+#endif
     return splat;
 }
 

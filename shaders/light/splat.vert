@@ -40,6 +40,16 @@ vec4 energy(SplatRecord splat, uint g) {
 #ifdef POINT_SPECTRUM
     // One wavelength: its density over x, unless the photon stands for a band (or a line).
     vec4 span = table_bands[splat.layer / uint(TARGETS)];
+#ifdef HERO
+    // Four wavelengths, their cells two a number.
+    if (span.y > span.x) {
+        uvec2 cells = uvec2(splat.x_range);
+        uint base = row * density_cells;
+        return splat.throughput.x * curve[base + cells.x / DENSITY_CELLS] + splat.throughput.y * curve[base + cells.x % DENSITY_CELLS]
+             + splat.throughput.z * curve[base + cells.y / DENSITY_CELLS] + splat.throughput.w * curve[base + cells.y % DENSITY_CELLS];
+    }
+    return splat.throughput.x * band_integral[splat.layer + g];
+#endif
     bool single = splat.x_range.y <= splat.x_range.x && span.y > span.x;
     if (single) {
         uint cell = min(uint(splat.throughput.x * float(density_cells)), density_cells - 1u);
@@ -98,7 +108,11 @@ void main() {
     shape = vec3(splat.y_box, splat.table_row, float(splat.layer));
 #ifdef ONE_COLOUR
     for (int g = 0; g < TARGETS; ++g) {
+#ifdef HERO
+        splat_colour[g] = splat.amplitude * energy(splat, uint(g));
+#else
         splat_colour[g] = splat.throughput.y * splat.amplitude * energy(splat, uint(g));
+#endif
     }
 #else
     throughput = vec4(splat.throughput.x, splat.amplitude * splat.throughput.yzw);

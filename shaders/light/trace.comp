@@ -49,6 +49,9 @@ bool survives(inout RayRecord ray, inout float roulette_w, float share, uint bra
     roulette_w -= ray.flux_w * (boost - 1.0);
     ray.flux_w *= boost;
     ray.throughput *= boost;
+#ifdef HERO
+    ray.companion_throughput *= boost;
+#endif
     ray.footprint_scale *= SURVIVOR_SOFTNESS * sqrt(boost);
     ray.survival = p.split_threshold;
     return true;
@@ -59,6 +62,22 @@ bool survives(inout RayRecord ray, inout float roulette_w, float share, uint bra
 {
     return survives(ray, roulette_w, share, branch, ray.depth == 1u);
 }
+
+#ifdef HERO
+// From here on the hero's path is not that of its companions: none of them would have led to it, and it has all of its weight.
+void leave_companions(inout RayRecord ray)
+{
+    ray.throughput *= ray.companion_x.w > 0.0 ? 4.0 : 1.0;
+    ray.companion_x.w = 0.0;
+    ray.companion_throughput = vec4(0.0);
+}
+
+// The share of the hero and its companions together, by which roulette asks: whoever of them leads, the odds are the same.
+float common_share(RayRecord ray, float own, vec3 companions)
+{
+    return ray.companion_x.w > 0.0 ? 0.25 * (own + dot(companions, vec3(1.0))) : own;
+}
+#endif
 
 #ifdef ABSORPTION
 // What the medium on the way takes.
@@ -71,7 +90,13 @@ void absorb(inout RayRecord ray, float distance, inout float absorbed_w)
     absorbed_w += ray.flux_w * (1.0 - kept.y);
     ray.flux_w *= kept.y;
     ray.throughput *= kept;
+#ifdef HERO
+    vec3 companions = exp(-spectral_row(uint(WEIGHT_ROW) + row, ray.companion_x.xyz) * distance);
+    ray.companion_throughput.xyz *= companions;
+    ray.survival *= common_share(ray, kept.y, companions);
+#else
     ray.survival *= kept.y;
+#endif
 }
 #endif
 
@@ -93,6 +118,10 @@ void land(inout RayRecord ray, uint receiver, uint triangle, float cosine, uint 
     photon.x_lo = ray.x_lo;
     photon.x_hi = ray.x_hi;
     photon.throughput = ray.throughput;
+#ifdef HERO
+    photon.companion_x = ray.companion_x;
+    photon.companion_throughput = ray.companion_throughput;
+#endif
     photon.x_anchor = ray.x_anchor;
     photon.triangle = triangle;
     photon.receiver = receiver;
@@ -269,6 +298,9 @@ bool diffract(RayRecord ray, Hit hit, ShadingFrame frame, uint row, inout RayRec
     outcome.absorbed_w *= 1.0 - left;
     rest.flux_w *= left;
     rest.throughput *= left;
+#ifdef HERO
+    rest.companion_throughput *= left;
+#endif
     rest.survival *= left;
     rest.flags = (rest.flags & ((1u << ORDER_BIT) - 1u) & ~FLAG_BAND_FINAL) | ((at >= 0.0 ? number : number + 1u) << ORDER_BIT);
     rest_lives = left > 0.0;
@@ -286,6 +318,10 @@ bool diffract(RayRecord ray, Hit hit, ShadingFrame frame, uint row, inout RayRec
     Deflection turned = diffract_at(frame, ray.direction, grating.lines, side, steps.y, order.reflects != 0u);
     if (order.reflects == 0u) child.flags ^= FLAG_INSIDE;
     send_on(child, turned, vec3(share), outcome);
+#ifdef HERO
+    child.companion_throughput *= share;
+    if (steps.y != 0.0) leave_companions(child);
+#endif
 #if COLUMNS > 0
     for (int c = 0; c < COLUMNS; ++c) {
         float dstep = 0.0;
@@ -324,7 +360,13 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
         outcome.what |= ABSORBED;
         outcome.flux_w = ray.flux_w * (1.0 - kept.y);
         send_on(child, reflected, kept, outcome);
-        lives = survives(child, outcome.roulette_w, kept.y, 3u);
+        float share = kept.y;
+#ifdef HERO
+        vec3 companions = spectral_row(uint(WEIGHT_ROW) + weight_row, ray.companion_x.xyz);
+        child.companion_throughput.xyz *= companions;
+        share = common_share(ray, kept.y, companions);
+#endif
+        lives = survives(child, outcome.roulette_w, share, 3u);
     }
 #endif
 #ifdef HAS_GRATING
@@ -352,6 +394,18 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 #endif
     // Where only the facet's normal forbids it, nothing is transmitted at any wavelength; at total reflection each has its own share.
     if (!refracted.exists && cosine2.y > 0.0) reflectance = vec3(1.0);
+    float reflected_share = reflectance.y, refracted_share = 1.0 - reflectance.y;
+#ifdef HERO
+    vec3 companion_n_i, companion_n_t;
+    interface_indices(boundary, ray.companion_x.xyz, companion_n_i, companion_n_t);
+    vec3 companion_eta = companion_n_i / companion_n_t;
+    vec3 companion_reflectance = fresnel_reflectance(theta, companion_eta, transmitted_cosine2(theta, companion_eta));
+    if (!refracted.exists && cosine2.y > 0.0) companion_reflectance = vec3(1.0);
+    reflected_share = common_share(ray, reflectance.y, companion_reflectance);
+    // Refracted they stay together only where nothing disperses.
+    bool stay = all(lessThan(abs(companion_eta - n_i.y / n_t.y), vec3(1e-7)));
+    refracted_share = stay ? common_share(ray, 1.0 - reflectance.y, 1.0 - companion_reflectance) : 1.0 - reflectance.y;
+#endif
 #ifdef BAND_CUTS
     float at = splits ? cut_of_band(ray, start, frame, hit.distance, boundary, cosine2) : -1.0, below = 0.0;
     if (at >= 0.0) {
@@ -367,7 +421,10 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 #endif
     if (splits) {
         send_on(child, reflected, reflectance, outcome);
-        lives = child.flux_w > 0.0 && survives(child, outcome.roulette_w, reflectance.y, 1u);
+#ifdef HERO
+        child.companion_throughput.xyz *= companion_reflectance;
+#endif
+        lives = reflected_share > 0.0 && survives(child, outcome.roulette_w, reflected_share, 1u);
     }
     if (kind == KIND_DIELECTRIC && !boundary.changes) {
         // Another solid decides here: walk through, only remember where we are.
@@ -400,6 +457,10 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 #endif
     if (splits && refracted.exists) {
         send_on(child, refracted, 1.0 - reflectance, outcome);
+#ifdef HERO
+        child.companion_throughput.xyz *= 1.0 - companion_reflectance;
+        if (!stay) leave_companions(child);
+#endif
         child.inside_mask = boundary.behind.mask;
         child.inside_object = boundary.behind.object;
 #if COLUMNS > 0
@@ -411,7 +472,7 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
             child.ddirection[c].xyz = refracted_column(refracted, ray.direction, ray.ddirection[c].xyz, NORMAL_COLUMN(c), n_i.y / n_t.y, deta_it);
         }
 #endif
-        lives = survives(child, outcome.roulette_w, 1.0 - reflectance.y, 2u);
+        lives = survives(child, outcome.roulette_w, refracted_share, 2u);
     }
 #endif
     if (lives) {

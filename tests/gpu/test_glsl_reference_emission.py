@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from reference.lamps import cosine, isotropic, lamp, lopsided
-from spectrasplat.model.optics.spectrum import constant
+from spectrasplat.gpu import bindings
+from spectrasplat.gpu.scene_buffers import SAMPLES, SCENE_STRUCTS
+from spectrasplat.gpu.scene_texels import spectra_texture
+from spectrasplat.model.optics.catalogue import find
+from spectrasplat.model.optics.spectral_tables import SpectralAxis, cumulative, wavelength_cdf
+from spectrasplat.model.optics.spectrum import Spectrum, constant, illuminant
 from spectrasplat.reference import emission_maps, random_numbers
+from spectrasplat.reference.emission import drawn_wavelengths
 from spectrasplat.reference.optics import unit
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 
@@ -15,6 +21,7 @@ COVERS = {
     "emission.glsl": ("lattice_point", "azimuthal_direction", "concentric_disc"),
     "spot.glsl": ("angle_between", "spot_falloff"),
     "profile.glsl": ("profile_stretch", "profile_intensity"),
+    "wavelength.glsl": ("drawn_wavelength",),
 }
 COUNT = 4096
 WORD = 2**32
@@ -148,3 +155,42 @@ def test_profiles_are_looked_up(gl, tmp_path, text: str) -> None:
     # llvmpipe's atan is good to 2e-5.
     assert np.abs(got["f"] - want)[clear].max() < 1e-4
     assert (got["along"] >= 0.0).all() and (got["along"] <= 1.0).all()
+
+
+SODIUM = Spectrum(np.where(np.arange(380, 781) > 500, 0.01, 0.0), ((589.0, 1.0), (589.6, 0.5)))
+SPECTRA = {"flat": constant(1.0), "D65": illuminant("D65"), "sodium": SODIUM}
+
+
+@pytest.mark.parametrize("by_power", [False, True], ids=["brightness", "power"])
+@pytest.mark.parametrize("glass", [None, "N-SF11"])
+@pytest.mark.parametrize("spectrum", SPECTRA.values(), ids=SPECTRA)
+def test_wavelengths_are_drawn_by_brightness(gl, spectrum: Spectrum, glass: str | None, by_power: bool) -> None:
+    axis = SpectralAxis.build([find(glass)] if glass else [])
+    lo_nm, hi_nm = spectrum.support_nm()
+    support = tuple(axis.x_of_nm(np.array([lo_nm - 0.5, hi_nm + 0.5])).tolist())
+    row = wavelength_cdf(cumulative(axis, spectrum), SAMPLES, support, by_power)
+    texture = spectra_texture(gl.ctx, row[None])
+    place = random_numbers.unit_float(words(7))
+    for band in (support, (support[0] + 0.2 * (support[1] - support[0]), support[0] + 0.7 * (support[1] - support[0]))):
+        got = evaluate(
+            gl.ctx,
+            ["lib/wavelength.glsl"],
+            "float per = 0.0; x = drawn_wavelength(0u, band, place, per); d = per;",
+            {"place": as_f32(place), "band": as_f32(np.tile(band, (COUNT, 1)))},
+            {"x": "float", "d": "float"},
+            {
+                **bindings.SCENE_DEFINES,
+                **dict.fromkeys(("TRIANGLES_AT", "NORMALS_AT", "OBJECTS_AT"), 0),
+                "SPECTRAL_SAMPLES": SAMPLES,
+            },
+            SCENE_STRUCTS,
+            binders=[lambda: texture.use(bindings.UNIT_SPECTRA)],
+        )
+        x, per_density = drawn_wavelengths(spectrum, axis, band, place, by_power=by_power)
+        # Where hardly anything is drawn, 2e-5 of all in a cell, the row's own rounding moves x most: 6e-8 / 2e-5 cells.
+        assert np.abs(got["x"] - x).max() < 2e-2 / (SAMPLES - 1)
+        same = np.floor(got["x"] * (SAMPLES - 1)) == np.floor(x * (SAMPLES - 1))
+        assert same.mean() > 0.99
+        np.testing.assert_allclose(got["d"][same], per_density[same], rtol=1e-2)
+        assert np.abs(got["d"][same] / per_density[same] - 1.0).mean() < 1e-3
+    texture.release()

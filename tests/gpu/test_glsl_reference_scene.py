@@ -27,7 +27,7 @@ COVERS = {
         "medium_slope",
         "index_ratio_derivative",
     ),
-    "scene.glsl": ("scene_texel", "triangle_at", "object_at", "corner_normal", "spectral_row"),
+    "scene.glsl": ("scene_texel", "triangle_at", "object_at", "corner_normal", "spectral_pair", "spectral_row"),
     "gaussian.glsl": ("erf_approx", "gaussian_box", "gaussian_box_fast", "normal_excess", "sinc_pi"),
     "intersect.glsl": ("accept_hit", "crossing_key", "box_entry"),
 }

@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 from reference.lamps import cosine, isotropic, lamp, lopsided
 from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
+from spectrasplat.model.optics.spectral_tables import SpectralAxis
 from spectrasplat.model.optics.spectrum import constant
+from spectrasplat.reference.emission import drawn_wavelengths
 from spectrasplat.reference.optics import unit
 
 from tests.statistical.chi_square import ALPHA, chi_square, smallest_tilt, thinned
@@ -24,6 +26,8 @@ MEASURE_ERROR = 2e-4
 """Of sums of weights: the rim of a domain cuts a lattice."""
 WHITE = constant(1.0)
 AXIS = unit(np.array([0.3, -0.5, 0.8]))
+BAND = (0.2, 0.7)
+"""Of x, that rays are emitted in."""
 INSIDE = (0.3, 0.2, -0.1)
 """Within the unit box: glass all round."""
 
@@ -73,17 +77,34 @@ def test_a_point_shines_evenly_over_the_sphere(sphere: Emitted) -> None:
     refuse(cells(stretched, bins=(64,)), uniform_expected((64,)))
 
 
-def test_wavelengths_are_even_over_the_band_and_weighted_by_its_width(sphere: Emitted) -> None:
-    lo, hi = 0.2, 0.7
-    share = (sphere.x - lo) / (hi - lo)
-    assert share.min() >= 0.0 and share.max() <= 1.0
-    np.testing.assert_allclose(sphere.throughput / (8 * sphere.weight), hi - lo, rtol=1e-5)
-    accept(cells(share, bins=(64,)), uniform_expected((64,)))
+def test_wavelengths_are_drawn_by_brightness_within_the_band(sphere: Emitted) -> None:
+    lo, hi = BAND
+    assert sphere.x.min() >= lo and sphere.x.max() <= hi
+    # Here x is plain wavelength and the light even over it: what is bright is the observer's choice.
+    axis = SpectralAxis.build([])
+    places = (np.arange(64 * 4096) + 0.5) / (64 * 4096)
+    x, per_density = drawn_wavelengths(WHITE, axis, BAND, places)
+    expected = cells((x - lo) / (hi - lo), bins=(64,))
+    counts = cells((sphere.x - lo) / (hi - lo), bins=(64,))
+    accept(counts, expected)
+    # A photon's weight is one over the density it was drawn with: weighted, every wavelength has its share again.
+    weight = sphere.throughput / (8 * sphere.weight)
+    np.testing.assert_allclose(weight.mean(), hi - lo, rtol=5e-3)
+    weighted, _ = np.histogram(sphere.x, bins=16, range=BAND, weights=weight)
+    np.testing.assert_allclose(weighted / len(weight), (hi - lo) / 16, rtol=2e-2)
+    order = np.argsort(x)
+    np.testing.assert_allclose(
+        weight, np.interp(sphere.x, x[order], per_density[order]), rtol=0.05, atol=0.02 * weight.max()
+    )
     # Whatever the direction: no colour goes another way than the others.
+    share = np.interp(sphere.x, x[order], places)
     cosine, turn = polar(sphere.direction, AXIS)
     for other in (0.5 * (1.0 + cosine), turn):
         accept(cells(share, other, bins=(8, 8)), uniform_expected((8, 8)))
-    refuse(cells(share**1.05, bins=(64,)), uniform_expected((64,)))
+    # Mutants: drawn evenly, and drawn by brightness over the whole spectrum and squeezed into the band.
+    refuse(counts, uniform_expected((64,)))
+    everywhere, _ = drawn_wavelengths(WHITE, axis, (0.0, 1.0), places)
+    refuse(counts, cells(everywhere, bins=(64,)))
 
 
 def smoothstep(angle: np.ndarray, inner: float, outer: float) -> np.ndarray:
@@ -191,7 +212,8 @@ def test_an_area_light_is_lambertian_and_even(gl, shape: str) -> None:
     accept(counts, uniform_expected((8, 8)))
     accept(cells(*place, bins=(4, 4)), uniform_expected((4, 4)))
     accept(cells(cosine**2, place[0], place[1], bins=(4, 4, 4)), uniform_expected((4, 4, 4)))
-    colour = (rays.x[kept] - 0.2) / 0.5
+    drawn, _ = drawn_wavelengths(WHITE, SpectralAxis.build([]), BAND, np.linspace(0.0, 1.0, 4097))
+    colour = np.interp(rays.x[kept], drawn, np.linspace(0.0, 1.0, 4097))
     accept(cells(colour, place[0], bins=(8, 8)), uniform_expected((8, 8)))
     even = thinned(np.ones(len(rays.weight)), 1.0, seed=3) & (rays.weight > 0)
     refuse(cells(polar(rays.direction[even], AXIS)[0].clip(0.0, 1.0) ** 2, bins=(64,)), uniform_expected((64,)))

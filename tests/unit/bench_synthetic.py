@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from spectrasplat.bench.curves import speed_ups
 from spectrasplat.bench.results import (
     BenchResult,
     Claim,
@@ -18,6 +19,7 @@ from spectrasplat.bench.results import (
     ReferenceInfo,
     Sample,
     SceneResult,
+    Trial,
 )
 
 # Seconds per photon, variance at 1000 photons, its exponent, bias².
@@ -70,17 +72,27 @@ def synthetic_curve(method: str, difficulty: float, seeds: int, longest_s: float
                 float(errors.max()),
                 bias2 * difficulty,
                 float(spread.mean()),
+                float(seconds) + 1.4,
             )
         )
+    kernels = [] if method in ("srd", "stochastic-point") else np.geomspace(0.6, 6.0, len(points)).tolist()
     return Curve(
         method,
-        {"buffers": 0.05, "compile": 1.2, "pilot": 0.08},
+        {"start": 0.5, "buffers": 0.05, "compile": 1.2, "pilot": 0.08, "first run": 0.1},
         samples,
         points=points,
         slope=exponent,
         slope_half_width=0.06,
         buffers_mib=42.0,
         budgets=[p.photons for p in points],
+        kernels=kernels,
+        sweep=[
+            Trial(p.photons, width, p.seconds, p.relmse * (1.0 + 4.0 * np.log(width / best) ** 2))
+            for p, best in zip(points[::3], kernels[::3], strict=True)
+            for width in (0.5 * best, best, 2.0 * best)
+        ]
+        if kernels
+        else [],
     )
 
 
@@ -148,6 +160,7 @@ def synthetic_scene(
             "srd-lambda": 3.0,
             "regular-16": 1.7,
         }
+        scene.speed_ups = speed_ups(curves)
         holds = gain >= 30
         scene.time_to_equal_other = {"nrmse": {"srd": 61.0, "stochastic": 1.0}, "relmse_whole": {"srd": 17.0}}
         scene.claims = [

@@ -51,7 +51,7 @@ class WholeRig(Rig):
     def fitting(self, budget: int) -> int:
         return max(budget // 4, 1) * 4
 
-    def render(self, photons: int, seed: int) -> Rendering:
+    def render(self, photons: int, seed: int, kernel: float | None = None) -> Rendering:
         assert photons % 4 == 0
         return replace(super().render(photons, seed), seconds={"bands": 0.02, "looks": 0.1 * photons}, splats=0)
 

@@ -15,7 +15,7 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.bench import runner, screen
 from spectrasplat.bench.results import BenchSettings, Curve, Point, Sample, SceneResult
 from spectrasplat.commands import bench as cli_bench
-from spectrasplat.model.settings import CAMERA_METHODS
+from spectrasplat.model.settings import CAMERA_METHODS, METHODS
 
 
 class FakeContext:
@@ -44,7 +44,10 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
     """The command without OpenGL: the runner is made up."""
     found = Seen()
 
-    def run(_context: object, scenes: dict[str, Any], store: Any, _progress: object, _skipped: object) -> None:
+    def run(
+        _context: object, scenes: dict[str, Any], store: Any, _progress: object, *_skipped: object, start_seconds: float
+    ) -> None:
+        assert 0.0 < start_seconds
         found.scenes, found.settings, found.command = [*scenes], store.result.settings, store.result.command
         points = [Point(n, n / 1000, 1 / n, 1 / n, 1 / n, 0.2 / n, 0.8 / n) for n in (100, 1000)]
         samples = [Sample(n, 1, n, n, {"trace": n / 1000}, {"relmse": 1 / n}) for n in (100, 1000)]
@@ -92,6 +95,11 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
         (["prism", "-o", "out", "--seconds", "-1"], "--seconds -1 is out of range"),
         (["prism", "-o", "out", "--seconds", "nan"], "--seconds nan is out of range"),
         (["prism", "-o", "out", "--seconds", "soon"], "--seconds 'soon' is not a number"),
+        (
+            ["prism", "-o", "out", "--horizon", "2"],
+            "--horizon 2 is less than the photon time that every method is given",
+        ),
+        (["prism", "-o", "out", "--camera", "--horizon", "30"], "leave it out with --camera"),
         (["prism", "-o", "out", "--reference-seconds", "0"], "--reference-seconds 0 is out of range"),
         (["prism", "-o", "out", "--size", "64"], "--size '64' is not WIDTHxHEIGHT"),
         (["prism", "-o", "out", "--size", "16384x16384", "--seeds", "1"], ""),
@@ -147,6 +155,8 @@ def test_options_reach_the_runner(seen: Seen, tmp_path: Path, capsys: pytest.Cap
     options = [
         "--seconds",
         "0.5",
+        "--horizon",
+        "8",
         "--seeds",
         "2",
         "--methods",
@@ -158,7 +168,7 @@ def test_options_reach_the_runner(seen: Seen, tmp_path: Path, capsys: pytest.Cap
     ]
     assert main(["bench", "prism", "ball", "-o", str(out), *options]) == 0
     assert seen.scenes == ["prism", "ball"] and seen.reported == out
-    assert seen.settings == BenchSettings(0.5, 2, ("srd", "regular-7", "regular-16"), (64, 36), 4.0)
+    assert seen.settings == BenchSettings(0.5, 2, ("srd", "regular-7", "regular-16"), (64, 36), 4.0, horizon=8.0)
     words = shlex.split(seen.command)
     assert words == [
         "spectrasplat",
@@ -169,6 +179,8 @@ def test_options_reach_the_runner(seen: Seen, tmp_path: Path, capsys: pytest.Cap
         "out",
         "--seconds",
         "0.5",
+        "--horizon",
+        "8",
         "--seeds",
         "2",
         "--methods",
@@ -190,7 +202,7 @@ def test_options_reach_the_runner(seen: Seen, tmp_path: Path, capsys: pytest.Cap
 
 def test_defaults_are_all_scenes_with_glass_and_all_methods(seen: Seen, tmp_path: Path) -> None:
     assert main(["bench", "-o", str(tmp_path)]) == 0
-    assert seen.settings == BenchSettings() and len(BenchSettings().methods) == 7
+    assert seen.settings == BenchSettings() and set(BenchSettings().methods) == set(METHODS)
     assert {"prism", "brilliant", "ball_plain", "wine_glass"} <= set(seen.scenes) and len(seen.scenes) >= 6
     assert shlex.split(seen.command)[2 : 2 + len(seen.scenes)] == seen.scenes
 
@@ -215,7 +227,8 @@ def test_ctrl_c_says_what_is_kept_and_reports_it(
     assert main(["bench", "prism", "-o", str(tmp_path)]) == 130
     told = capsys.readouterr()
     assert (
-        "stopped; 0 scenes done, 1 of 14 method seeds of 'prism' kept; the same command goes on from there" in told.err
+        f"stopped; 0 scenes done, 1 of {2 * len(METHODS)} method seeds of 'prism' kept; the same command goes on from "
+        "there" in told.err
     )
     assert seen.reported == tmp_path and "1/40" in told.out
 
@@ -242,6 +255,7 @@ def test_notes_under_the_table() -> None:
     sample = Sample(1, 1, 1, 1, {}, {"relmse": 0.1})
     scene: Any = SimpleNamespace(
         claims=[],
+        speed_ups=[],
         time_to_equal_other={"nrmse": {"srd": 33.0}, "chroma": {}},
         curves=[Curve("srd", {}, [])],
         reference_too_coarse=True,

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 from spectrasplat.bench.claims import claims_of, ratios_of
 from spectrasplat.bench.curves import (
+    best_baseline,
     budget_at_time,
     complete_curve,
     error_at_time,
     points_by,
     speed_up,
+    speed_ups,
     tail_slope,
     time_to_error,
 )
@@ -184,7 +187,9 @@ def test_claims_that_hold() -> None:
     )
     assert set(claims) == {"time to equal error", "first picture", "index against wavelength"}
     assert all(claim.holds and not claim.why for claim in claims.values())
-    assert "at least 200 times sooner" in claims["time to equal error"].measured
+    # Against the best of them, which is not `stochastic`.
+    assert "50 times sooner" in claims["time to equal error"].measured
+    assert "srd-lambda" in claims["time to equal error"].asked
     assert "50×" in claims["index against wavelength"].measured
 
 
@@ -193,14 +198,57 @@ def test_claims_that_fall_short_say_by_how_much_and_why() -> None:
         claims_of(scene(curve("stochastic", law(1.0)), curve("srd-lambda", law(0.05)), curve("srd", law(0.1))))
     )
     short = claims["time to equal error"]
-    assert (
-        not short.holds
-        and "10 times sooner" in short.measured
-        and "short by a factor of 3" in short.why
-        and "variance" in short.why
-    )
-    assert not claims["first picture"].holds and "3 times" in claims["first picture"].why
+    assert not short.holds and "not reached" in short.measured and "variance" in short.why
+    assert not claims["first picture"].holds and "60 times srd-lambda's" in claims["first picture"].why
     assert not claims["index against wavelength"].holds and "0.1 s" in claims["index against wavelength"].why
+
+
+def test_a_ratio_that_is_too_small_is_told() -> None:
+    claims = by_name(claims_of(scene(curve("stochastic", law(1.0)), curve("srd", law(0.1)))))
+    short = claims["time to equal error"]
+    assert not short.holds and "10 times sooner" in short.measured and "short by a factor of 3" in short.why
+
+
+def whole(points: list[Point], overhead: float) -> list[Point]:
+    return [msgspec.structs.replace(p, whole_seconds=p.seconds + overhead) for p in points]
+
+
+def test_speed_up_over_target_error_is_against_whoever_gets_there_first() -> None:
+    """`noisy` is first at large errors, `biased` stops at 0.02, and nobody but srd reaches the smallest."""
+    noisy = curve("stochastic", whole(law(0.1), 1.0))
+    biased = curve("regular-7", whole(law(0.02, floor=0.02), 1.0))
+    own = curve("srd", whole(law(0.002), 2.0))
+    found = {(one.clock, one.target): one for one in speed_ups([noisy, biased, own])}
+    # Both are there with their first pictures, of 1/60 s.
+    first = found["photon", 0.3]
+    assert first.baseline == "stochastic" or first.baseline == "regular-7"
+    assert found["photon", 0.1].baseline == "regular-7"
+    at_0_1 = found["photon", 0.1]
+    assert at_0_1.baseline_seconds == pytest.approx(0.02 / 0.08, rel=0.05) and at_0_1.seconds == pytest.approx(0.02)
+    assert at_0_1.ratio == pytest.approx(12.5, rel=0.05) and at_0_1.bound == ""
+    assert found["photon", 0.1].ratio == at_0_1.baseline_seconds / at_0_1.seconds
+    # regular-7 never comes to 0.01; stochastic's end is 0.03: the longest that both were followed is a bound.
+    missed = found["photon", 0.01]
+    end = law(1.0)[-1].seconds
+    assert missed.baseline == "" and missed.baseline_seconds == pytest.approx(end) and missed.bound == "≥"
+    assert missed.ratio == pytest.approx(end / 0.2)
+    # A second and two of set-up swallow most of the gain.
+    assert found["whole", 0.1].ratio == pytest.approx((0.25 + 1.0) / (0.02 + 2.0), rel=0.02)
+    assert ("photon", 0.001) in found and found["photon", 0.001].seconds == pytest.approx(2.0)
+    assert speed_ups([own]) == [] and speed_ups([noisy]) == []
+
+
+def test_a_target_that_only_baselines_reach() -> None:
+    found = speed_ups([curve("stochastic", whole(law(0.01), 1.0)), curve("srd", whole(law(1e-4, floor=0.05), 1.0))])
+    missed = [one for one in found if one.target == 0.01 and one.clock == "photon"]
+    assert [one.ratio for one in missed] == [None] and missed[0].baseline == "stochastic"
+
+
+def test_the_best_baseline_is_the_best_where_all_are_followed() -> None:
+    long_run = curve("stochastic", [Point(10, 30.0, 0.001, 0.001, 0.001, 0.0, 0.001), *law(1.0)][::-1])
+    short = curve("stochastic-even", law(0.5))
+    assert best_baseline([long_run, short, curve("srd", law(1e-6))]).method == "stochastic-even"  # type: ignore[union-attr]
+    assert best_baseline([curve("srd", law(1.0)), curve("srd-photons", law(1.0))]) is None
 
 
 def test_a_bias_floor_is_named() -> None:

@@ -19,13 +19,14 @@ from spectrasplat.bench.report import (
     curve_plots as plots,
 )
 from spectrasplat.bench.report import (
+    fair_field,
+    report,
+)
+from spectrasplat.bench.report import (
     pictures as report_pictures,
 )
 from spectrasplat.bench.report import (
     plots as report_plots,
-)
-from spectrasplat.bench.report import (
-    report,
 )
 from spectrasplat.bench.report import (
     style as report_style,
@@ -36,7 +37,7 @@ from spectrasplat.bench.report import (
 from spectrasplat.bench.report.overview import overview
 from spectrasplat.bench.report.page import Table, render
 from spectrasplat.bench.report.prose import PROSE
-from spectrasplat.bench.results import BenchResult, Claim, Curve, Point, SceneResult
+from spectrasplat.bench.results import BenchResult, Claim, Curve, Point, SceneResult, SpeedUp
 from spectrasplat.reference.metrics import EPSILON_SHARE
 
 from tests.unit.bench_synthetic import METHODS, synthetic_result, synthetic_scene
@@ -136,7 +137,14 @@ def test_page_stands_alone_and_holds_everything(written: tuple[BenchResult, Path
     assert "61×" in page.text and "17×" in page.text
     # Per scene: seven columns in two rows of parts and one of whole pictures, six error maps and their scale.
     assert page.tags["img"] == 2 * (3 * 7 + 6 + 1)
-    assert page.tags["svg"] == 1 + 2 * 4
+    assert page.tags["svg"] == 2 + 2 * 5
+    # The headline by both clocks, the kernels that were tried, and every ratio with the baseline that it is against.
+    for scene in result.scenes:
+        assert {one.clock for one in scene.speed_ups} == {"photon", "whole"}
+        for one in scene.speed_ups:
+            assert f"{fair_field.cell(one)} {one.baseline}".strip() in page.text
+    assert page.text.count("best kernel") >= 2 and "whole process" in page.text
+    assert "To a relMSE of 1 % srd is, by photon time, faster than the best of all baselines" in page.text
 
 
 def test_files_are_whole_and_nothing_else_is_left(written: tuple[BenchResult, Path]) -> None:
@@ -144,6 +152,7 @@ def test_files_are_whole_and_nothing_else_is_left(written: tuple[BenchResult, Pa
     stems = [f"{scene}_error_{over}" for scene in ("ball", "wine_glass") for over in ("time", "photons")] + [
         "overview",
         "scenes",
+        "speed_up",
     ]
     assert sorted(p.name for p in (directory / "plots").iterdir()) == sorted(
         stem + suffix for stem in stems for suffix in (".png", ".svg")
@@ -151,6 +160,38 @@ def test_files_are_whole_and_nothing_else_is_left(written: tuple[BenchResult, Pa
     assert not [p for p in directory.rglob("*") if ".part" in p.name]
     for path in (directory / "plots").glob("*.svg"):
         assert_numbers_are_finite(path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "at_once", "baseline", "baseline_at_once", "told"),
+    [
+        (0.5, False, "stochastic", False, "20×"),
+        (0.5, True, "stochastic", False, "≥ 20×"),
+        (0.5, False, "", False, "≥ 20×"),
+        (0.5, False, "stochastic", True, "≤ 20×"),
+        (0.5, True, "stochastic", True, "both at once"),
+        (None, False, "stochastic", False, "not reached"),
+    ],
+)
+def test_a_speed_up_says_what_is_known_of_it(
+    seconds: float | None, at_once: bool, baseline: str, baseline_at_once: bool, told: str
+) -> None:
+    one = SpeedUp(0.01, "photon", seconds, at_once, baseline, 10.0, baseline_at_once)
+    assert fair_field.cell(one) == told and fair_field.cell(None) == "–"
+
+
+def test_the_kernels_that_were_tried_are_drawn(tmp_path: Path) -> None:
+    scene = synthetic_scene(tmp_path, "ball")
+    with report_style.plot_style():
+        figure = fair_field.sweep_plot(scene)
+        assert figure is not None and sum(axes.get_visible() for axes in figure.axes) == 4
+        svg_of(figure)
+        bare = synthetic_scene(tmp_path, "ball", methods=("srd",))
+        assert fair_field.sweep_plot(bare) is None
+    assert fair_field.kernel_table(bare) is None and fair_field.scene_table(bare) is None
+    assert fair_field.summary_table(synthetic_result([bare])) is None
+    table = fair_field.kernel_table(scene)
+    assert table is not None and len(list(table.rows)) == 4 * 4
 
 
 def test_limits_tell_each_claim_that_fails(written: tuple[BenchResult, Path]) -> None:

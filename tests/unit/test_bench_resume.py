@@ -44,6 +44,8 @@ class Rig:
 
     setup_seconds = {"buffers": 0.1}
     buffers_mib = 1.0
+    goes_on = False
+    kernels = ()
 
     def __init__(self, rigs: Rigs, method: str) -> None:
         self._rigs, self._method = rigs, method
@@ -51,7 +53,7 @@ class Rig:
     def budgets(self, _seconds: float, count: int) -> list[int]:
         return [1000 * 2**i for i in range(count)]
 
-    def render(self, photons: int, seed: int) -> Rendering:
+    def render(self, photons: int, seed: int, kernel: float | None = None) -> Rendering:
         if len(self._rigs.rendered) == self._rigs.stop_at:
             self._rigs.stop_at = -1
             raise KeyboardInterrupt

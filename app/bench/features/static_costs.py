@@ -36,8 +36,8 @@ class RecordSizes:
         columns = features.defines()["COLUMNS"]
         slots = (2 if features.nested_windows else 1) * SPLAT.stride
         return RecordSizes(
-            ray_record(columns).stride,
-            photon_record(features.spectral_groups).stride,
+            ray_record(columns, features.hero).stride,
+            photon_record(features.spectral_groups, features.hero).stride,
             slots,
             features.targets * _TEXEL,
             columns,

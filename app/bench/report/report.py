@@ -2,7 +2,7 @@
 
     DIR/plots/SCENE_error_time.png .svg    DIR/plots/SCENE_error_photons.png .svg (the camera pass: _samples)
     DIR/plots/overview.png .svg            DIR/plots/scenes.png .svg (the README's figure)
-    DIR/report.html
+    DIR/plots/speed_up.png .svg            DIR/report.html
 
 A run that was stopped can be reported as well: what is missing is named where it would stand.
 """
@@ -19,6 +19,7 @@ from ...base.errors import UserError
 from ...base.progress import ProgressReporter
 from ..measured_passes import MEASURED_PASSES
 from ..results import BenchResult, SceneResult
+from . import fair_field
 from . import scene as report_scene
 from . import style as report_style
 from .curve_plots import error_against
@@ -48,10 +49,15 @@ def write_report(result: BenchResult, directory: Path) -> None:
             "overview",
             "time to equal error of each method in each scene, as a ratio to stochastic",
         )
+        headline = fair_field.speed_up_over_error(result)
+        curve = None
+        if headline is not None:
+            label = "speed-up of srd over the best baseline against target error, by scene"
+            curve = inlined(report_style.save(headline, plots / "speed_up"), "speed-up", label)
         readme_plot(result, plots / "scenes")
         progress(1.0, "page")
     with atomic_output(directory / "report.html") as temporary:
-        temporary.write_text(document(result, scenes, glance), encoding="utf-8")
+        temporary.write_text(document(result, scenes, glance, curve), encoding="utf-8")
 
 
 def readme_plot(result: BenchResult, stem: Path) -> None:

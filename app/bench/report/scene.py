@@ -14,7 +14,7 @@ from markupsafe import Markup
 from ...reference.metrics import EPSILON_SHARE, lit_mean
 from ..measured_passes import MEASURED_PASSES
 from ..results import OTHER_MEASURES, Curve, Point, SceneResult
-from . import pictures, text
+from . import fair_field, pictures, text
 from . import plots as report_plots
 from . import style as report_style
 from .curve_plots import BASELINE, is_lower_bound
@@ -57,7 +57,10 @@ class SceneView:
     setting: str
     warnings: Sequence[str]
     curves: Sequence[Markup]
+    speed_ups: Table | None
     speed: Table
+    sweep: Markup | None
+    kernels: Table | None
     other_measures: Table | None
     bias: Markup | None
     errors: Table
@@ -77,7 +80,12 @@ def view(scene: SceneResult, anchor: str, curves: Sequence[Markup], directory: P
         _setting(scene),
         text.warnings_of(scene),
         curves,
+        fair_field.scene_table(scene),
         _speed_table(scene),
+        _drawn(
+            fair_field.sweep_plot(scene), f"{anchor}-sweep", f"{scene.scene}: error of each baseline against its kernel"
+        ),
+        fair_field.kernel_table(scene),
         _other_measures_table(scene),
         _drawn(report_plots.bias_and_variance(scene), f"{anchor}-bias", f"{scene.scene}: {bias}"),
         _error_table(scene),

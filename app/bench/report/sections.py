@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from ..measured_passes import MEASURED_PASSES
 from ..results import BenchResult
-from . import text
+from . import fair_field, text
 from .page import render
 from .prose import PROSE
 from .scene import SceneView
@@ -17,8 +17,8 @@ from .style import by_rank
 _KNOWN_AS = {"opengl": "OpenGL"}
 
 
-def document(result: BenchResult, scenes: Sequence[SceneView], glance: Markup) -> str:
-    """The whole page; `glance`: the ratios of all scenes, drawn."""
+def document(result: BenchResult, scenes: Sequence[SceneView], glance: Markup, speed_up: Markup | None) -> str:
+    """The whole page; `glance`: the ratios of all scenes to `stochastic`, `speed_up`: to the best baseline, drawn."""
     prose = PROSE[result.settings.measured_pass]
     used = by_rank(sorted({curve.method for scene in result.scenes for curve in scene.curves}))
     return render(
@@ -36,6 +36,8 @@ def document(result: BenchResult, scenes: Sequence[SceneView], glance: Markup) -
         scenes=scenes,
         is_judged=any(scene.claims for scene in result.scenes),
         glance=glance,
+        speed_up=speed_up,
+        speed_ups=fair_field.summary_table(result),
         glance_caption=text.sentence(prose.metrics["time to equal error"]),
         methods={name: prose.methods.get(name, "Not described.") for name in used},
         failed=[(f"{scene}, {claim.name}", text.limit_sentence(claim)) for scene, claim in text.limits(result)],

@@ -201,3 +201,32 @@ def cumulative(axis: SpectralAxis, spectrum: Spectrum, weights: np.ndarray | Non
     x = np.concatenate([edges_x, np.repeat(line_x, 2)])
     order = np.argsort(x, kind="stable")
     return CumulativeSpectrum(x[order], np.concatenate([running, before_after])[order])
+
+
+BRIGHT_SHARE, POWER_SHARE = 0.6, 0.2
+"""Of random wavelengths, what is drawn by X + Y + Z and by radiant power. The rest is even over the light's support in
+x: no wavelength is impossible (a light whose spectrum is edited may be bright where it was dark), and where a prism
+has spread the spectrum its dim ends have pixels of their own. Variance of `stochastic` relative to drawing evenly in
+`brilliant` and in `prism`: 0.79 and 0.97 with these shares, 0.75 and 1.17 with 0.8 and 0.18, 0.82 and 0.92 with 0.5
+and 0.1."""
+
+
+def wavelength_cdf(
+    power: CumulativeSpectrum, samples: int, support: tuple[float, float], by_power: bool = False
+) -> np.ndarray:
+    """Share of a light's random wavelengths below each of `samples` equally spaced x: float64 (samples,), from 0 to 1.
+
+    `power`: running X, Y, Z and W; `support`: the light's, in x; `by_power`: all but the even rest by radiant power,
+    for maps of spectral bins. What is bright is mixed with what is possible (defensive importance sampling,
+    Hesterberg 1995)."""
+    x = np.linspace(0.0, 1.0, samples)
+    running = power.at(x) - power.at(0.0)
+    running[0] = 0.0
+    lo, hi = support
+    even = np.clip((x - lo) / max(hi - lo, 1e-12), 0.0, 1.0)
+    bright, watt = running[:, :3].sum(axis=1), running[:, 3]
+    watt = watt / watt[-1] if watt[-1] > 0.0 else even
+    bright = bright / bright[-1] if bright[-1] > 0.0 and not by_power else watt
+    cdf = BRIGHT_SHARE * bright + POWER_SHARE * watt + (1.0 - BRIGHT_SHARE - POWER_SHARE) * even
+    cdf[-1] = 1.0
+    return cdf

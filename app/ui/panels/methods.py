@@ -9,6 +9,8 @@ METHOD_NAMES = {
     "stochastic": "Random wavelengths",
     "stochastic-even": "Even random wavelengths",
     "stochastic-point": "Light tracing, one texel",
+    "progressive-stochastic": "Random wavelengths, shrinking kernel",
+    "hero": "Hero wavelength",
     "regular-7": "7 fixed wavelengths",
     "regular-16": "16 fixed wavelengths",
 }
@@ -21,6 +23,8 @@ METHOD_TIPS = {
     "stochastic": "One random wavelength a photon with a footprint: the usual way.",
     "stochastic-even": "The same with wavelengths from a low-discrepancy sequence: the usual way at its best.",
     "stochastic-point": "One random wavelength and one texel a photon: unbiased light tracing.",
+    "progressive-stochastic": "Passes of random wavelengths whose kernel shrinks: progressive photon mapping.",
+    "hero": "Four stratified wavelengths share a photon's path until glass parts them.",
     "regular-7": "Seven fixed wavelengths, a splat each: shows banding.",
     "regular-16": "Sixteen fixed wavelengths, a splat each: shows banding.",
 }
