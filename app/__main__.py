@@ -10,7 +10,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from .base.errors import UserError
+from .base.errors import UserError, plain
 
 USER_ERROR = 2
 INTERRUPTED = 130
@@ -46,7 +46,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _tell(message: str) -> int:
-    print("spectrasplat: " + " ".join(message.split()), file=sys.stderr)
+    print(f"spectrasplat: {plain(message)}", file=sys.stderr)
     return USER_ERROR
 
 

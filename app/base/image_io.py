@@ -11,17 +11,21 @@ Files appear whole or not at all (`atomic`).
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from . import files
 from .atomic import atomic_output
 from .errors import UserError
 from .tone_map import auto_exposure, srgb_eotf, tone_map_8bit
 
 SUFFIXES = (".png", ".exr", ".npy")
+MAX_PIXELS = 1 << 26
+"""Of a picture that is read; 805 MB as float32: a mistake rather than a wish."""
 
 
 @dataclass(frozen=True)
@@ -90,13 +94,15 @@ def read_image(path: Path | str) -> Picture:
     reader = {".png": _read_png, ".exr": _read_exr, ".npy": _read_npy}.get(suffix)
     if reader is None:
         raise UserError(f"cannot read {path}: '{suffix}' is not a picture format; use one of {', '.join(SUFFIXES)}")
-    if not path.is_file():
+    if not os.path.exists(path):
         raise UserError(f"cannot read {path}: there is no such file; check the name")
     try:
+        files.check_regular(path, files.DATA_BYTES)
         return reader(path)
-    except (OSError, EOFError, ValueError, RuntimeError, KeyError) as error:
+    except (OSError, EOFError, ValueError, RuntimeError, KeyError, TypeError, SyntaxError, MemoryError) as error:
         raise UserError(
-            f"cannot read {path}: it is not a whole {suffix[1:].upper()} picture ({error}); write it again"
+            f"cannot read {path}: it is not a whole {suffix[1:].upper()} picture ({files.reason_of(error)}); write it "
+            "again"
         ) from error
 
 
@@ -123,9 +129,8 @@ def _write_png(path: Path, rgb: np.ndarray, exposure_ev: float, metadata: dict[s
 def _read_png(path: Path) -> Picture:
     from PIL import Image
 
-    with Image.open(path) as image:
-        if image.format != "PNG":
-            raise ValueError(f"its content is {image.format}")
+    with Image.open(path, formats=("PNG",)) as image:
+        _check_pixels(image.width, image.height)
         texts = {str(key): str(value) for key, value in getattr(image, "text", {}).items()}
         encoded = np.asarray(image.convert("RGB"), np.float32) / np.float32(255)
     return Picture(srgb_eotf(encoded).astype(np.float32), None, None, texts)
@@ -174,6 +179,9 @@ def _write_exr(
 def _read_exr(path: Path) -> Picture:
     import OpenEXR
 
+    with OpenEXR.File(str(path), header_only=True) as file:
+        (left, top), (right, bottom) = (corner.astype(np.int64) for corner in file.header()["dataWindow"])
+    _check_pixels(int(right - left + 1), int(bottom - top + 1))
     with OpenEXR.File(str(path), separate_channels=True) as file:
         # Copies: what the file hands out dies with it.
         header, channels = dict(file.header()), file.channels()
@@ -189,7 +197,15 @@ def _read_exr(path: Path) -> Picture:
 
 
 def _read_npy(path: Path) -> Picture:
-    rgb = np.load(path, allow_pickle=False)
+    rgb = files.read_npy(path)
     if rgb.ndim != 3 or rgb.shape[2] != 3:
         raise ValueError(f"its shape is {rgb.shape}, not (H, W, 3)")
-    return Picture(rgb.astype(np.float32, copy=False), None, None, {})
+    _check_pixels(rgb.shape[1], rgb.shape[0])
+    with np.errstate(over="ignore"):  # what float32 does not hold becomes infinite
+        return Picture(rgb.astype(np.float32), None, None, {})
+
+
+def _check_pixels(width: int, height: int) -> None:
+    """Before memory is taken for them."""
+    if width * height > MAX_PIXELS:
+        raise ValueError(f"{width} × {height} pixels are more than {MAX_PIXELS >> 20} million")

@@ -7,7 +7,7 @@ import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..base.errors import UserError
+from ..base.errors import UserError, plain
 from ..base.memory import check_picture_memory
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
@@ -56,7 +56,7 @@ def animate_command(request: AnimateRequest) -> int:
     animation = _animation(request, Stage(scene, scene.camera, exposure), frames, fps)
     photons = settings.photons or scene.render.photons
     for note in scene.notes:
-        print(f"note: {note}", file=sys.stderr)
+        print(f"note: {plain(note)}", file=sys.stderr)
     manifest = description(animation, settings, fps, photons)
     sink = open_sink(request.output, (settings.width, settings.height), fps, manifest, request.overwrite)
 

@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..base.errors import plain
 from ..base.memory import check_picture_memory
 from ..model.settings import RenderSettings
 from . import options
@@ -43,7 +44,7 @@ def bake_command(request: BakeRequest) -> int:
     scene = load_scene(options.find_scene(request.scene))
     bake.check_receiver(scene, request.receiver)
     for note in scene.notes:
-        print(f"note: {note}", file=sys.stderr)
+        print(f"note: {plain(note)}", file=sys.stderr)
     settings = RenderSettings(width=width, height=height, photons=photons, seed=seed, max_depth=scene.render.max_depth)
 
     from ..gpu.context import create_context

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import io
 import json
+import warnings
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -11,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base import files
 from ..base.errors import UserError
 from .geometry.mesh import Mesh
 from .geometry.mesh_recipes import note_recipe
@@ -263,8 +266,18 @@ def _load_heights(heights: Any) -> np.ndarray:
         return np.array(heights, dtype=np.float64)
     try:
         if heights.endswith(".npy"):
-            loaded = np.load(heights, allow_pickle=False)
-            return np.asarray(loaded, dtype=np.float64)
-        return np.loadtxt(heights, delimiter=",", ndmin=2)
-    except (OSError, ValueError, EOFError) as error:
-        raise UserError(f"the heights in {heights} cannot be read ({error}); give a plain array of numbers") from error
+            return np.asarray(files.read_npy(heights), dtype=np.float64)
+        return _csv_numbers(files.read_text(heights, files.TABLE_BYTES))
+    except (OSError, ValueError) as error:
+        reason = files.reason_of(error)
+        raise UserError(f"the heights in {heights} cannot be read ({reason}); give a plain array of numbers") from error
+
+
+def _csv_numbers(text: str) -> np.ndarray:
+    """Rows of numbers with commas between, float64 (R, C). Raises ValueError that quotes nothing of them."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", UserWarning)  # no data at all
+            return np.loadtxt(io.StringIO(text), delimiter=",", ndmin=2)
+    except (ValueError, UserWarning) as error:
+        raise ValueError("it is no table of numbers with commas between") from error

@@ -115,7 +115,7 @@ def _header(data: bytes, path: str) -> tuple[str, list[_Element], int]:
                 case _:
                     raise ValueError
         except (KeyError, ValueError, IndexError):
-            raise UserError(f"{path}: line {number} of the PLY header is not valid: '{line[:60]}'") from None
+            raise UserError(f"{path}: line {number} of the PLY header is not valid; export the mesh again") from None
     if order is None:
         raise UserError(f"{path}: the PLY header names no format; export the mesh again")
     return order, elements, line_end + 1
@@ -223,8 +223,8 @@ class _AsciiBody:
         self._path, self._at = path, 0
         try:
             self._values = np.array(body.split(), dtype=np.float64)
-        except ValueError as error:
-            raise UserError(f"{path}: the PLY body holds something that is no number ({error})") from None
+        except ValueError:
+            raise UserError(f"{path}: the PLY body holds something that is no number; export the mesh again") from None
 
     def element(self, element: _Element) -> dict:
         """As `_BinaryBody.element`."""

@@ -44,8 +44,8 @@ def _ascii_corners(data: bytes, path: str) -> np.ndarray:
         )
     try:
         values = np.array(b" ".join(rows).replace(b"vertex", b"").split(), dtype=np.float64)
-    except ValueError as error:
-        raise UserError(f"{path}: a vertex of the STL file is not three numbers ({error})") from None
+    except ValueError:
+        raise UserError(f"{path}: a vertex of the STL file is not three numbers; export the mesh again") from None
     if values.size != 9 * facets:
         raise UserError(f"{path}: a vertex of the STL file is not three numbers; export the mesh again")
     return values.reshape(-1, 3, 3)

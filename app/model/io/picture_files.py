@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ...base import files
 from ...base.errors import UserError
+from ...base.image_io import MAX_PIXELS
 from ...base.tone_map import srgb_eotf
 
 PICTURE_SUFFIXES = (".hdr", ".pic", ".exr", ".npy", ".png", ".jpg", ".jpeg")
-MAX_PIXELS = 1 << 26
-"""805 MB as float32; a mistake rather than a wish."""
 _NOISE = 1e-3
 """Negatives this far below 0, as a share of the brightest value, come from compression and become 0."""
 
@@ -89,11 +89,11 @@ def decode_8bit(data: bytes, where: str) -> tuple[np.ndarray, tuple[str, ...]]:
 
 def _bytes_of(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return files.read_bytes(path, files.DATA_BYTES)
     except FileNotFoundError:
         raise UserError(f"cannot read {path}: there is no such file; check the name") from None
     except OSError as error:
-        raise UserError(f"cannot read {path}: {error.strerror}; check its permissions") from None
+        raise UserError(f"cannot read {path}: {error.strerror}; check the file and its permissions") from None
 
 
 def _transparency(image, where: str) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ...base import files
 from ...base.errors import UserError
 from ..lights.light_file import read_light
 from ..materials.dielectric import DEFAULT_GLASS
@@ -44,8 +45,10 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
     rendered as it stands.
     """
     path = Path(path)
-    if not path.is_file():
-        problem = "is a folder, not a scene file" if path.is_dir() else "does not exist"
+    if not files.is_file(path):
+        problem = "is a folder, not a scene file" if os.path.isdir(path) else "does not exist"
+        if os.path.exists(path) and not os.path.isdir(path):
+            problem = "is a device or a pipe, not a scene file"
         raise UserError(f"{path} {problem}; give a .toml, .glb or .gltf scene or a .ply, .obj or .stl mesh")
     suffix = path.suffix.lower()
     if suffix == ".toml":
@@ -66,7 +69,7 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        return tomllib.loads(files.read_text(path, files.SCENE_BYTES))
     except tomllib.TOMLDecodeError as error:
         raise UserError(f"{path.name} is not valid TOML: {error}; texts need quotes and keys one line each") from error
     except RecursionError as error:
@@ -76,7 +79,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise UserError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8") from error
     except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror}") from error
+        raise UserError(f"{path} cannot be read: {error.strerror}; give another scene file") from error
 
 
 def _scene_from_table(table: SceneTable) -> Scene:
