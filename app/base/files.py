@@ -80,8 +80,11 @@ def read_bytes(path: str | os.PathLike[str], limit: int) -> bytes:
     """Content of the regular file `path`; raises OSError, whose `strerror` is plain, for anything else and for more
     than `limit` bytes."""
     with _opened(path, limit) as file:
-        data = file.read(limit + 1)
-    if len(data) > limit:  # it grew meanwhile
+        # Not file.read(limit + 1), which takes memory for all that it might be.
+        data = file.read(os.fstat(file.fileno()).st_size + 1)
+        while len(data) <= limit and (more := file.read(1 << 20)):  # it grows, or does not say its length
+            data += more
+    if len(data) > limit:
         raise _too_long(path, limit)
     return data
 

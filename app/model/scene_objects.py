@@ -23,6 +23,7 @@ from .placement import read_placement
 from .scene import Material, SceneObject
 from .scene_dabs import read_dabs
 from .scene_textures import TextureReader
+from .unique_names import Names
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl")
 INLINE = "inline"
@@ -36,7 +37,7 @@ class ObjectReader:
         self._materials = materials
         self._textures = textures
         self._meshes: dict[str, Mesh] = {}
-        self._names: set[str] = set()
+        self._names = Names()
         self.notes: list[str] = []
 
     def read(self, table: SceneTable) -> list[SceneObject]:
@@ -70,10 +71,7 @@ class ObjectReader:
             if name in self._names:
                 table.fail("name", f"is '{name}', which another object has already; give each its own")
         else:
-            name, number = fallback, 1
-            while name in self._names:
-                number += 1
-                name = f"{fallback} {number}"
+            return self._names.unique(fallback)
         self._names.add(name)
         return name
 

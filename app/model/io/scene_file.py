@@ -63,7 +63,8 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
         raise UserError(
             f"{path}: '{path.suffix}' is not a kind of scene; use .toml, {', '.join(GLTF_SUFFIXES + MESH_SUFFIXES)}"
         )
-    notes = [note for note in check_scene(scene, path.name) if note not in scene.notes]
+    told = set(scene.notes)
+    notes = [note for note in check_scene(scene, path.name) if note not in told]
     return replace(scene, notes=scene.notes + tuple(notes))
 
 
@@ -114,9 +115,11 @@ def _read_lights(table: SceneTable, around: Surroundings, notes: list[str], dark
         notes.append("No lights given: a white sun from behind on the left was added.")
         return (default_light(),)
     lights = tuple(read_light(entry, i, around) for i, entry in enumerate(table.tables("lights")))
+    seen: set[str] = set()
     for i, light in enumerate(lights):
-        if light.name in [other.name for other in lights[:i]]:
+        if light.name in seen:
             table.fail(f"lights[{i}].name", f"is '{light.name}', which another light has already; give each its own")
+        seen.add(light.name)
     return lights
 
 
