@@ -13,6 +13,7 @@ import io
 import os
 import stat
 import tokenize
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -109,10 +110,12 @@ def read_npy(path: str | os.PathLike[str], limit: int = DATA_BYTES) -> np.ndarra
     try:
         version = np.lib.format.read_magic(stream)
         read_header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-        shape, is_fortran, dtype = read_header[version](stream)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # a file of Python 2
+            shape, is_fortran, dtype = read_header[version](stream)
     except (ValueError, KeyError, TypeError, AttributeError, SyntaxError, tokenize.TokenError, RecursionError) as error:
         raise ValueError("its header is not that of a .npy file") from error
-    if dtype.kind not in "biuf" or not all(type(side) is int and side >= 0 for side in shape):
+    if dtype.kind not in "biuf" or dtype.itemsize > 8 or not all(type(side) is int and side >= 0 for side in shape):
         raise ValueError("it holds something else than numbers")
     count = 1
     for side in shape:

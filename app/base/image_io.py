@@ -11,8 +11,10 @@ Files appear whole or not at all (`atomic`).
 
 from __future__ import annotations
 
+import io
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -179,10 +181,10 @@ def _write_exr(
 def _read_exr(path: Path) -> Picture:
     import OpenEXR
 
-    with OpenEXR.File(str(path), header_only=True) as file:
+    with _silent(), OpenEXR.File(str(path), header_only=True) as file:
         (left, top), (right, bottom) = (corner.astype(np.int64) for corner in file.header()["dataWindow"])
     _check_pixels(int(right - left + 1), int(bottom - top + 1))
-    with OpenEXR.File(str(path), separate_channels=True) as file:
+    with _silent(), OpenEXR.File(str(path), separate_channels=True) as file:
         # Copies: what the file hands out dies with it.
         header, channels = dict(file.header()), file.channels()
         pixels = {name: np.array(channel.pixels, np.float32) for name, channel in channels.items()}
@@ -196,12 +198,26 @@ def _read_exr(path: Path) -> Picture:
     return Picture(rgb, spectral, wavelengths if waves else None, texts)
 
 
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Within the block nothing is printed: OpenEXR writes to stderr, past Python, and to stdout, before it raises."""
+    before, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    os.close(nowhere)
+    try:
+        with redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        os.dup2(before, 2)
+        os.close(before)
+
+
 def _read_npy(path: Path) -> Picture:
     rgb = files.read_npy(path)
     if rgb.ndim != 3 or rgb.shape[2] != 3:
         raise ValueError(f"its shape is {rgb.shape}, not (H, W, 3)")
     _check_pixels(rgb.shape[1], rgb.shape[0])
-    with np.errstate(over="ignore"):  # what float32 does not hold becomes infinite
+    with np.errstate(over="ignore", invalid="ignore"):  # what float32 does not hold becomes infinite
         return Picture(rgb.astype(np.float32), None, None, {})
 
 

@@ -167,8 +167,8 @@ def read_keys(path: Path, stage: Stage) -> tuple[Track, ...]:
         document = tomllib.loads(files.read_text(path, files.SETTINGS_BYTES))
     except OSError as error:
         raise UserError(f"--keys {path} cannot be read: {error.strerror}; check the path") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        reason = "it is not UTF-8 text" if isinstance(error, UnicodeDecodeError) else error
+    except (ValueError, RecursionError) as error:
+        reason = "it is not UTF-8 text" if isinstance(error, UnicodeDecodeError) else str(error).partition(":")[0]
         raise UserError(f"{path.name} is not TOML: {reason}; see docs/command-line.md for an example") from error
     rows = document.pop("keys", None)
     if document:

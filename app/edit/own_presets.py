@@ -75,7 +75,7 @@ def load_own_presets() -> tuple[OwnPresets, str | None]:
     try:
         with files.own_files():
             return _read(SceneTable(tomllib.loads(text), path)), None
-    except (tomllib.TOMLDecodeError, UserError, RecursionError) as error:
+    except (ValueError, UserError, RecursionError) as error:
         return OwnPresets(), _set_aside(path, error)
 
 

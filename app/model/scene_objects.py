@@ -17,6 +17,7 @@ from ..base import files
 from ..base.errors import UserError
 from .geometry.mesh import Mesh
 from .geometry.mesh_recipes import note_recipe
+from .io.mesh_raw import as_float64
 from .io.scene_table import SceneTable
 from .materials.material_file import read_object_material
 from .placement import read_placement
@@ -264,7 +265,7 @@ def _load_heights(heights: Any) -> np.ndarray:
         return np.array(heights, dtype=np.float64)
     try:
         if heights.endswith(".npy"):
-            return np.asarray(files.read_npy(heights), dtype=np.float64)
+            return as_float64(files.read_npy(heights))
         return _csv_numbers(files.read_text(heights, files.TABLE_BYTES))
     except (OSError, ValueError) as error:
         reason = files.reason_of(error)

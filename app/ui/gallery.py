@@ -151,7 +151,7 @@ def _entry(name: str, path: Path) -> SceneEntry:
     try:
         text = files.read_text(path, files.SCENE_BYTES)
         title = str(tomllib.loads(text).get("name", name))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError):
+    except (OSError, ValueError, RecursionError):
         return SceneEntry(path, name, "", None)
     lines = []
     for line in text.splitlines():

@@ -45,6 +45,7 @@ from .gltf_materials import (
     read_gltf_material,
 )
 from .gltf_textures import GltfTextures, turned_over
+from .mesh_raw import as_float64
 from .scene_table import MAX_MAGNITUDE, SceneTable
 
 LIGHTS = "KHR_lights_punctual"
@@ -176,9 +177,10 @@ class _Reader:
             matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T  # stored column by column
         else:
             matrix = np.eye(4)
-            matrix[:3, :3] = _rotation(node.get("rotation", (0, 0, 0, 1))) * np.array(
-                node.get("scale", (1, 1, 1)), float
-            )
+            with np.errstate(invalid="ignore", over="ignore"):  # refused below
+                matrix[:3, :3] = _rotation(node.get("rotation", (0, 0, 0, 1))) * np.array(
+                    node.get("scale", (1, 1, 1)), float
+                )
             matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
         if not (np.abs(matrix) <= MAX_MAGNITUDE).all():
             raise self.document.fail(
@@ -189,6 +191,11 @@ class _Reader:
     def _node(self, index: int, world: np.ndarray) -> None:
         node = self.document.item("nodes", index)
         self.origins.world[index] = world
+        if abs(np.linalg.det(world[:3, :3])) <= 1e-30 * np.linalg.norm(world[:3, :3]) ** 3:
+            if node.keys() & {"mesh", "camera"} or LIGHTS in node.get("extensions", {}):
+                label = node.get("name") or f"node {index}"
+                self.notes.append(f"node '{label}' is flattened by a scale of 0 and is left out.")
+            return
         if "mesh" in node:
             self._place(index, node, world)
         if "camera" in node and self.camera is None:
@@ -208,9 +215,6 @@ class _Reader:
     def _place(self, index: int, node: dict[str, Any], world: np.ndarray) -> None:
         entry = self.document.item("meshes", node["mesh"])
         label = str(node.get("name") or entry.get("name") or f"node {index}")
-        if abs(np.linalg.det(world[:3, :3])) <= 1e-30 * np.linalg.norm(world[:3, :3]) ** 3:
-            self.notes.append(f"node '{label}' is flattened by a scale of 0 and is left out.")
-            return
         for number, primitive in enumerate(entry["primitives"]):
             mesh = self._mesh(node["mesh"], number, primitive, entry)
             if mesh is None:
@@ -256,7 +260,7 @@ class _Reader:
             return None
         if primitive.get("targets"):
             self.notes.append(f"meshes[{index}].primitives[{number}]: its morph targets are not applied.")
-        positions = self.document.accessor(attributes["POSITION"]).astype(np.float64)
+        positions = as_float64(self.document.accessor(attributes["POSITION"]))
         indices = primitive.get("indices")
         order = np.arange(len(positions)) if indices is None else self.document.accessor(indices).astype(np.int64)
         if positions.ndim != 2 or positions.shape[1] != 3 or order.ndim != 1:
@@ -281,7 +285,7 @@ class _Reader:
     def _attribute(self, attributes: dict[str, Any], name: str, count: int) -> np.ndarray | None:
         if name not in attributes:
             return None
-        values = self.document.accessor(attributes[name]).astype(np.float64)
+        values = as_float64(self.document.accessor(attributes[name]))
         if len(values) != count:
             raise self.document.fail(f"{name} has {len(values)} elements for {count} positions; export the file again")
         return values
@@ -370,9 +374,9 @@ def _triangles(order: np.ndarray, mode: int, where: str) -> np.ndarray:
 def _rotation(quaternion: Any) -> np.ndarray:
     """Rotation matrix (3, 3) of a quaternion x, y, z, w."""
     q = np.array(quaternion, dtype=np.float64)
-    length = np.linalg.norm(q)
-    if not length > 0.0:
-        raise ValueError("a rotation quaternion is zero")
+    length = math.hypot(*q)
+    if not 0.0 < length < math.inf:
+        raise ValueError("a rotation quaternion is zero or not finite")
     x, y, z, w = q / length
     return np.array(
         [

@@ -64,8 +64,11 @@ def decode_8bit(data: bytes, where: str) -> tuple[np.ndarray, tuple[str, ...]]:
 
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit below says it better
+            # The limit below says it better; and damaged Exif turns nothing.
+            warnings.simplefilter("ignore", UserWarning)
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             image = Image.open(io.BytesIO(data), formats=("PNG", "JPEG"))
+            upright = ImageOps.exif_transpose(image) if image.width * image.height <= MAX_PIXELS else image
         if image.width * image.height > MAX_PIXELS:
             raise UserError(
                 f"{where}: {image.width} × {image.height} pixels are more than {MAX_PIXELS >> 20} million; make "
@@ -75,7 +78,6 @@ def decode_8bit(data: bytes, where: str) -> tuple[np.ndarray, tuple[str, ...]]:
             raise UserError(
                 f"{where}: more than 8 bits a channel in a grey PNG are not understood; save it as 8 bit or as .exr"
             )
-        upright = ImageOps.exif_transpose(image)
         notes = _transparency(upright, where)
         encoded = np.asarray(upright.convert("RGB"))
     except UnidentifiedImageError as error:

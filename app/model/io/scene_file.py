@@ -79,6 +79,8 @@ def _read_toml(path: Path) -> dict[str, Any]:
         ) from error
     except UnicodeDecodeError as error:
         raise UserError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8") from error
+    except ValueError as error:  # Python's own, about an integer of thousands of digits
+        raise UserError(f"{path.name} holds a whole number that is too long; write it as 1e30, say") from error
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror}; give another scene file") from error
 
