@@ -72,21 +72,34 @@ def write_image(
     `S0.<centre>nm` of an .exr; bin_edges_nm: (B + 1,) rising. metadata: short texts kept in .png
     and .exr. Raises `UserError` for an unknown suffix or a place that cannot be written.
     """
-    suffix = check_suffix(path)
+    check_suffix(path)
+    with atomic_output(path) as temporary:
+        write_into(temporary, rgb, exposure_ev, spectral, bin_edges_nm, metadata)
+
+
+def write_into(
+    part: Path,
+    rgb: np.ndarray,
+    exposure_ev: float | None = None,
+    spectral: np.ndarray | None = None,
+    bin_edges_nm: np.ndarray | None = None,
+    metadata: Mapping[str, str] | None = None,
+) -> None:
+    """As `write_image`, into a file that the caller got from `atomic_outputs`, together with others."""
+    suffix = part.suffix.lower()
     rgb = np.ascontiguousarray(rgb, np.float32)
     if rgb.ndim != 3 or rgb.shape[2] != 3 or 0 in rgb.shape:
         raise ValueError(f"a picture is (H, W, 3) and not empty, got {rgb.shape}")
     metadata = dict(metadata or {})
-    with atomic_output(path) as temporary:
-        if suffix == ".png":
-            _write_png(temporary, rgb, exposure_ev or 0.0, metadata)
-        elif suffix == ".exr":
-            _write_exr(temporary, rgb, _spectral_channels(rgb, spectral, bin_edges_nm), bin_edges_nm, metadata)
-        else:
-            with temporary.open("wb") as file:
-                # Not np.save: the error of its tofile does not say that the disk is full.
-                np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(rgb))
-                file.write(rgb.data)
+    if suffix == ".png":
+        _write_png(part, rgb, exposure_ev or 0.0, metadata)
+    elif suffix == ".exr":
+        _write_exr(part, rgb, _spectral_channels(rgb, spectral, bin_edges_nm), bin_edges_nm, metadata)
+    else:
+        with part.open("wb") as file:
+            # Not np.save: the error of its tofile does not say that the disk is full.
+            np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(rgb))
+            file.write(rgb.data)
 
 
 def read_image(path: Path | str) -> Picture:

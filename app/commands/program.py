@@ -89,7 +89,7 @@ def run(arguments: Sequence[str]) -> int:
     try:
         code = app(args=list(arguments) or ["--help"], prog_name="spectrasplat", standalone_mode=False)
     except _Interrupted as interrupted:
-        raise KeyboardInterrupt from interrupted
+        raise (interrupted.__cause__ or KeyboardInterrupt()) from None
     except Exception as error:
         # click's usage errors; typer has moved click inside itself, so there is no one class to name.
         if not hasattr(error, "format_message"):

@@ -72,7 +72,7 @@ def save_kept(path: Path | None, **arrays: object) -> None:
     if path is None:
         return
     with suppress(OSError, UserError):
-        with atomic_output(path) as temporary:
+        with atomic_output(path, lasting=False) as temporary:
             np.savez(temporary, **arrays)  # type: ignore[arg-type]
         _forget_oldest(path.parent, path)
 

@@ -150,7 +150,7 @@ def _save(path: Path, tree: Bvh) -> None:
     if len(payload) > _CACHE_BYTES:
         return
     with suppress(OSError, UserError):  # an unwritable or full cache only costs time
-        with atomic_output(path) as temporary:
+        with atomic_output(path, lasting=False) as temporary:
             temporary.write_bytes(_CACHE_VERSION + _digest(payload) + payload)
         _forget_oldest(path.parent)
 
