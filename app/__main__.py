@@ -1,42 +1,66 @@
 """Start of the program, and the one place where mistakes become a sentence and an exit code.
 
-0: done; 2: the user can mend it (one line on stderr); 130: interrupted by Ctrl-C; 1: a closed
-pipe, or a bug with its traceback.
+0: done; 2: the user can mend it (one line on stderr); 130, 143, 129: ended by Ctrl-C, SIGTERM, SIGHUP; 1: what was to
+be printed could not be (a closed pipe, a full disk), or a bug with its traceback.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import redirect_stderr, suppress
+from typing import Any, TextIO
 
-from .base.errors import UserError
+from .base.errors import UserError, plain
+from .base.interrupts import exit_code_of, terminations_raise
 
 USER_ERROR = 2
-INTERRUPTED = 130
-CLOSED_PIPE = 1  # as typer has it
+NOT_PRINTED = 1  # as typer has it for a closed pipe
+_OF_PRINTING = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line `arguments` (None: those of the process); returns the exit code."""
+    _open_standard_streams()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a terminal without × or ° shows "?" instead of failing
             stream.reconfigure(errors="replace")
-    try:
-        code = _run(arguments)
-        sys.stdout.flush()  # a closed pipe shows here, not in the interpreter's last breath
-        return code
-    except UserError as error:
-        return _tell(str(error))
-    except MemoryError:
-        return _tell("out of memory: use fewer photons, a smaller picture or a simpler mesh")
-    except KeyboardInterrupt:
-        print("spectrasplat: interrupted", file=sys.stderr)
-        return INTERRUPTED
-    except BrokenPipeError:
-        # The reader (head, less) has seen enough; the interpreter's own flush must not complain.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return CLOSED_PIPE
+    with terminations_raise(), redirect_stderr(_Patient(sys.stderr)):
+        try:
+            return _printed(_run(arguments))
+        except UserError as error:
+            return _tell(str(error))
+        except MemoryError:
+            return _tell("out of memory: use fewer photons, a smaller picture or a simpler mesh")
+        except KeyboardInterrupt as interrupt:
+            return _tell("interrupted", exit_code_of(interrupt))
+        except OSError as error:
+            if error.filename is not None or error.errno not in _OF_PRINTING:
+                raise
+            return _lost(error)
+
+
+class _Patient:
+    """A stream for notes and progress: where it cannot be written to (a log on a full disk), the work goes on."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """As of the stream."""
+        with suppress(OSError):
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """As of the stream."""
+        with suppress(OSError):
+            self._stream.flush()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
 
 def _run(arguments: Sequence[str] | None) -> int:
@@ -45,9 +69,43 @@ def _run(arguments: Sequence[str] | None) -> int:
     return run(sys.argv[1:] if arguments is None else list(arguments))
 
 
-def _tell(message: str) -> int:
-    print("spectrasplat: " + " ".join(message.split()), file=sys.stderr)
-    return USER_ERROR
+def _open_standard_streams() -> None:
+    """Where one was closed (`>&-`), what is printed there goes nowhere.
+
+    Otherwise the next file that is opened would take its number, and be printed into.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            with suppress(OSError):
+                os.open(os.devnull, os.O_RDWR)  # takes the lowest free number, which is this one
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), "r" if number == 0 else "w"))
+
+
+def _printed(code: int) -> int:
+    """`code` where everything printed has arrived: a closed pipe or a full disk shows here, not in the interpreter's
+    last breath."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        return _lost(error)
+    return code
+
+
+def _lost(error: OSError) -> int:
+    """Nothing can be printed any more, the interpreter's own flush included."""
+    if error.errno != errno.EPIPE:  # else the reader (head, less) has seen enough
+        _tell(f"what was to be printed is lost: {error.strerror}")
+    with suppress(OSError, ValueError):  # ValueError: a test's stream, without a number
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return NOT_PRINTED
+
+
+def _tell(message: str, code: int = USER_ERROR) -> int:
+    print(f"spectrasplat: {plain(message)}", file=sys.stderr)
+    return code
 
 
 if __name__ == "__main__":

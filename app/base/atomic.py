@@ -1,19 +1,26 @@
-"""Output files appear whole or not at all, and an existing one survives a failure.
+"""Output files appear whole or not at all, an existing one survives a failure, and what is done survives a power cut.
 
-Every writer of the project (pictures, scenes, meshes, plots, baked tables) writes to a
-temporary neighbour of the target and renames it when it is complete.
+Every writer of the project (pictures, scenes, meshes, plots, baked tables) writes to a temporary neighbour of the
+target and renames it when it is complete. A process that is killed leaves its neighbour behind: the next one that
+writes into the folder removes it. A lock tells it from one that is being written.
 """
 
 from __future__ import annotations
 
 import errno
 import os
+import re
 import secrets
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from .errors import UserError
+
+_PART = re.compile(r"\..*\.[0-9a-f]{8}\.part(\.[^.]*)?", re.DOTALL)
+_swept: set[str] = set()
+"""Folders that this process has looked through for what others left behind."""
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
@@ -22,70 +29,166 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     Meant to be called before a long job, so that minutes of work do not end in a refusal.
     """
     target = Path(path)
-    probe = _reserve(target)
-    probe.unlink(missing_ok=True)
+    with _reserved(target, _part_of(target)):
+        pass
 
 
 @contextmanager
-def atomic_output(path: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_output(path: str | os.PathLike[str], lasting: bool = True) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` when the block succeeds.
 
     The temporary name keeps the suffix, because libraries choose a format by it. It exists
     as an empty file when the block starts. If the block fails or is interrupted, it is
     removed and whatever was at `path` stays as it was. A symbolic link is followed, not replaced.
+    `lasting`: on the disk before this returns; caches, which can be made again, need not be.
 
     Raises `UserError` naming the path where the folder is missing or not writable, the
     path is a folder, or the disk is full; other errors of the block pass unchanged.
     """
-    target = Path(path)
-    temporary = _reserve(target)
-    try:
+    with atomic_outputs(path, lasting=lasting) as (temporary,):
         yield temporary
-        os.replace(temporary, _real(target))
-    except OSError as error:
-        if _concerns_output(error, temporary, target):
-            raise _refusal(target, error) from error
+
+
+@contextmanager
+def atomic_outputs(*paths: str | os.PathLike[str], lasting: bool = True) -> Iterator[tuple[Path, ...]]:
+    """As `atomic_output` for files that belong together: all of them appear, or all stay as they were."""
+    targets = [Path(path) for path in paths]
+    parts = [_part_of(target) for target in targets]
+    with ExitStack() as stack:
+        descriptors = [stack.enter_context(_reserved(*pair)) for pair in zip(targets, parts, strict=True)]
+        try:
+            yield tuple(parts)
+            for descriptor in descriptors if lasting else ():
+                os.fsync(descriptor)
+            _put_in_place(parts, [_real(target) for target in targets])
+        except OSError as error:
+            for part, target in zip(parts, targets, strict=True):
+                if error.filename is not None and os.fspath(error.filename) in (os.fspath(part), os.fspath(target)):
+                    raise _refusal(target, error) from error
+            if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+                raise _refusal(targets[0], error) from error
+            raise
+    if lasting:
+        for folder in {_real(target).parent for target in targets}:
+            _settle(folder)
+
+
+def _put_in_place(parts: list[Path], targets: list[Path]) -> None:
+    """Rename all `parts`, or none; of several targets the old ones are set aside until then."""
+    if len(parts) == 1:
+        os.replace(parts[0], targets[0])
+        return
+    aside: list[tuple[Path, Path]] = []
+    placed: list[Path] = []
+    try:
+        for target in targets:
+            if os.path.lexists(target):
+                # Not a name that is swept: until the end it is the only copy.
+                old = _part_of(target).with_suffix(f".old{target.suffix}")
+                os.replace(target, old)
+                aside.append((old, target))
+        for part, target in zip(parts, targets, strict=True):
+            os.replace(part, target)
+            placed.append(target)
+    except BaseException:
+        for target in placed:
+            target.unlink(missing_ok=True)
+        for old, target in aside:
+            os.replace(old, target)
         raise
-    finally:
-        temporary.unlink(missing_ok=True)
+    for old, _ in aside:
+        old.unlink(missing_ok=True)
 
 
-def _reserve(target: Path) -> Path:
-    """Create an empty temporary file beside `target`, with the permissions umask gives."""
+def _part_of(target: Path) -> Path:
+    """A name beside `target` for the file while it is being written."""
+    # Bounded, so that a target name near the file system's 255 bytes still has a neighbour.
+    stem = target.stem.encode(errors="surrogateescape")[:100].decode(errors="ignore")
+    try:
+        return _real(target).with_name(f".{stem}.{secrets.token_hex(4)}.part{target.suffix}")
+    except ValueError as error:  # a null byte, or no name at all
+        raise UserError(f"cannot write {target}: no file can have this name; choose another") from error
+
+
+@contextmanager
+def _reserved(target: Path, part: Path) -> Iterator[int]:
+    """Within the block `part` exists, empty at first, with the permissions umask gives, and locked; its descriptor."""
     if os.path.isdir(target):  # unlike Path.is_dir, silent about a name that is too long
         raise _refusal(target, IsADirectoryError(errno.EISDIR, "Is a directory"))
     if os.path.exists(target) and not os.path.isfile(target):
         # A rename would put a file where a device or a pipe was.
         raise UserError(f"cannot write {target}: it is a device or a pipe; give the name of an ordinary file")
-    # Bounded, so that a target name near the file system's 255 bytes still has a neighbour.
-    stem = target.stem.encode()[:100].decode(errors="ignore")
-    temporary = _real(target).with_name(f".{stem}.{secrets.token_hex(4)}.part{target.suffix}")
+    descriptor = -1
     try:
-        with suppress(FileNotFoundError):
-            os.stat(target)  # a name that is too long is told now, not after the work
-        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-    except OSError as error:
-        raise _refusal(target, error) from error
-    if os.path.exists(target) and not os.access(target, os.W_OK):
-        # A rename would replace a write-protected file; the user protected it on purpose.
-        temporary.unlink(missing_ok=True)
-        raise _refusal(target, PermissionError(errno.EACCES, "Permission denied"))
-    return temporary
+        try:
+            with suppress(FileNotFoundError):
+                os.stat(target)  # a name that is too long is told now, not after the work
+            _sweep(part.parent)
+            while descriptor < 0:
+                descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_CLOEXEC", 0), 0o666)
+                if not _lock(descriptor, wait=True) or os.path.exists(part):
+                    break
+                os.close(descriptor)  # swept before it was locked
+                descriptor = -1
+        except OSError as error:
+            raise _refusal(target, error) from error
+        if os.path.exists(target) and not os.access(target, os.W_OK):
+            # A rename would replace a write-protected file; the user protected it on purpose.
+            raise _refusal(target, PermissionError(errno.EACCES, "Permission denied"))
+        yield descriptor
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        if descriptor >= 0:
+            os.close(descriptor)
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what killed processes left in `folder`; once a process."""
+    name = os.fspath(folder)
+    if name in _swept or sys.platform == "win32":
+        return
+    _swept.add(name)
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if _PART.fullmatch(entry.name) and entry.is_file(follow_symlinks=False):
+                with suppress(OSError):
+                    descriptor = os.open(entry.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+                    try:
+                        if os.fstat(descriptor).st_uid == os.geteuid() and _lock(descriptor):
+                            os.unlink(entry.path)
+                    finally:
+                        os.close(descriptor)
+
+
+def _lock(descriptor: int, wait: bool = False) -> bool:
+    """Lock a file that is being written, until it is closed; whether it could be (on Windows an open file is held)."""
+    if sys.platform == "win32":
+        return False
+    import fcntl
+
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except OSError:  # somebody else's; or a file system without locks, where nothing is ever swept
+        return False
+    return True
+
+
+def _settle(folder: Path) -> None:
+    """Have the names in `folder` on the disk, where the system can."""
+    if sys.platform == "win32":
+        return
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def _real(target: Path) -> Path:
     """Where the file itself lies, symbolic links followed."""
     return Path(os.path.realpath(target))
-
-
-def _concerns_output(error: OSError, temporary: Path, target: Path) -> bool:
-    """Whether an error of the block is about the output and not, say, about an input file."""
-    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-        return True
-    return error.filename is not None and os.fspath(error.filename) in (
-        os.fspath(temporary),
-        os.fspath(target),
-    )
 
 
 def _refusal(target: Path, error: OSError) -> UserError:

@@ -8,11 +8,34 @@ traceback and exits with code 2.
 from __future__ import annotations
 
 import difflib
+import unicodedata
 from collections.abc import Iterable
 
 
 class UserError(Exception):
     """A mistake in what the user gave us, told in one sentence with a way out."""
+
+
+def visible(text: str) -> str:
+    """`text` with what could command a terminal (control and direction characters) written out, but for white space.
+
+    For everything that is printed and may hold a name out of a file.
+    """
+    if text.isascii() and text.isprintable():
+        return text
+    return "".join(c if c in "\n\t" or c.isprintable() else _escaped(c) for c in text)
+
+
+def plain(text: str) -> str:
+    """`visible` on one line."""
+    return visible(" ".join(text.split()))
+
+
+def _escaped(character: str) -> str:
+    if unicodedata.category(character) not in ("Cc", "Cf", "Cs", "Zl", "Zp"):
+        return character
+    code = ord(character)
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
 
 
 def nearest_names(name: str, known: Iterable[str], count: int = 3) -> list[str]:

@@ -11,17 +11,23 @@ Files appear whole or not at all (`atomic`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import io
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from . import files
 from .atomic import atomic_output
 from .errors import UserError
 from .tone_map import auto_exposure, srgb_eotf, tone_map_8bit
 
 SUFFIXES = (".png", ".exr", ".npy")
+MAX_PIXELS = 1 << 26
+"""Of a picture that is read; 805 MB as float32: a mistake rather than a wish."""
 
 
 @dataclass(frozen=True)
@@ -66,21 +72,34 @@ def write_image(
     `S0.<centre>nm` of an .exr; bin_edges_nm: (B + 1,) rising. metadata: short texts kept in .png
     and .exr. Raises `UserError` for an unknown suffix or a place that cannot be written.
     """
-    suffix = check_suffix(path)
+    check_suffix(path)
+    with atomic_output(path) as temporary:
+        write_into(temporary, rgb, exposure_ev, spectral, bin_edges_nm, metadata)
+
+
+def write_into(
+    part: Path,
+    rgb: np.ndarray,
+    exposure_ev: float | None = None,
+    spectral: np.ndarray | None = None,
+    bin_edges_nm: np.ndarray | None = None,
+    metadata: Mapping[str, str] | None = None,
+) -> None:
+    """As `write_image`, into a file that the caller got from `atomic_outputs`, together with others."""
+    suffix = part.suffix.lower()
     rgb = np.ascontiguousarray(rgb, np.float32)
     if rgb.ndim != 3 or rgb.shape[2] != 3 or 0 in rgb.shape:
         raise ValueError(f"a picture is (H, W, 3) and not empty, got {rgb.shape}")
     metadata = dict(metadata or {})
-    with atomic_output(path) as temporary:
-        if suffix == ".png":
-            _write_png(temporary, rgb, exposure_ev or 0.0, metadata)
-        elif suffix == ".exr":
-            _write_exr(temporary, rgb, _spectral_channels(rgb, spectral, bin_edges_nm), bin_edges_nm, metadata)
-        else:
-            with temporary.open("wb") as file:
-                # Not np.save: the error of its tofile does not say that the disk is full.
-                np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(rgb))
-                file.write(rgb.data)
+    if suffix == ".png":
+        _write_png(part, rgb, exposure_ev or 0.0, metadata)
+    elif suffix == ".exr":
+        _write_exr(part, rgb, _spectral_channels(rgb, spectral, bin_edges_nm), bin_edges_nm, metadata)
+    else:
+        with part.open("wb") as file:
+            # Not np.save: the error of its tofile does not say that the disk is full.
+            np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(rgb))
+            file.write(rgb.data)
 
 
 def read_image(path: Path | str) -> Picture:
@@ -90,13 +109,15 @@ def read_image(path: Path | str) -> Picture:
     reader = {".png": _read_png, ".exr": _read_exr, ".npy": _read_npy}.get(suffix)
     if reader is None:
         raise UserError(f"cannot read {path}: '{suffix}' is not a picture format; use one of {', '.join(SUFFIXES)}")
-    if not path.is_file():
+    if not os.path.exists(path):
         raise UserError(f"cannot read {path}: there is no such file; check the name")
     try:
+        files.check_regular(path, files.DATA_BYTES)
         return reader(path)
-    except (OSError, EOFError, ValueError, RuntimeError, KeyError) as error:
+    except (OSError, EOFError, ValueError, RuntimeError, KeyError, TypeError, SyntaxError, MemoryError) as error:
         raise UserError(
-            f"cannot read {path}: it is not a whole {suffix[1:].upper()} picture ({error}); write it again"
+            f"cannot read {path}: it is not a whole {suffix[1:].upper()} picture ({files.reason_of(error)}); write it "
+            "again"
         ) from error
 
 
@@ -123,9 +144,8 @@ def _write_png(path: Path, rgb: np.ndarray, exposure_ev: float, metadata: dict[s
 def _read_png(path: Path) -> Picture:
     from PIL import Image
 
-    with Image.open(path) as image:
-        if image.format != "PNG":
-            raise ValueError(f"its content is {image.format}")
+    with Image.open(path, formats=("PNG",)) as image:
+        _check_pixels(image.width, image.height)
         texts = {str(key): str(value) for key, value in getattr(image, "text", {}).items()}
         encoded = np.asarray(image.convert("RGB"), np.float32) / np.float32(255)
     return Picture(srgb_eotf(encoded).astype(np.float32), None, None, texts)
@@ -174,7 +194,10 @@ def _write_exr(
 def _read_exr(path: Path) -> Picture:
     import OpenEXR
 
-    with OpenEXR.File(str(path), separate_channels=True) as file:
+    with _silent(), OpenEXR.File(str(path), header_only=True) as file:
+        (left, top), (right, bottom) = (corner.astype(np.int64) for corner in file.header()["dataWindow"])
+    _check_pixels(int(right - left + 1), int(bottom - top + 1))
+    with _silent(), OpenEXR.File(str(path), separate_channels=True) as file:
         # Copies: what the file hands out dies with it.
         header, channels = dict(file.header()), file.channels()
         pixels = {name: np.array(channel.pixels, np.float32) for name, channel in channels.items()}
@@ -188,8 +211,30 @@ def _read_exr(path: Path) -> Picture:
     return Picture(rgb, spectral, wavelengths if waves else None, texts)
 
 
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Within the block nothing is printed: OpenEXR writes to stderr, past Python, and to stdout, before it raises."""
+    before, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    os.close(nowhere)
+    try:
+        with redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        os.dup2(before, 2)
+        os.close(before)
+
+
 def _read_npy(path: Path) -> Picture:
-    rgb = np.load(path, allow_pickle=False)
+    rgb = files.read_npy(path)
     if rgb.ndim != 3 or rgb.shape[2] != 3:
         raise ValueError(f"its shape is {rgb.shape}, not (H, W, 3)")
-    return Picture(rgb.astype(np.float32, copy=False), None, None, {})
+    _check_pixels(rgb.shape[1], rgb.shape[0])
+    with np.errstate(over="ignore", invalid="ignore"):  # what float32 does not hold becomes infinite
+        return Picture(rgb.astype(np.float32), None, None, {})
+
+
+def _check_pixels(width: int, height: int) -> None:
+    """Before memory is taken for them."""
+    if width * height > MAX_PIXELS:
+        raise ValueError(f"{width} × {height} pixels are more than {MAX_PIXELS >> 20} million")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 from collections.abc import Mapping
@@ -11,11 +12,13 @@ from typing import Protocol
 
 import numpy as np
 
+from . import files
 from .atomic import atomic_output, check_writable
 from .errors import UserError
 
 MANIFEST = "animation.json"
 _DIGITS = 4
+_PNG_BEGIN, _PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
 
 
 class Sink(Protocol):
@@ -110,7 +113,7 @@ class Frames:
             )
         self.base_ev: float | None = None
         if stored is not None:
-            self.base_ev = stored.pop("base_ev", None)
+            self.base_ev = _exposure(stored.pop("base_ev", None))
             if stored != json.loads(json.dumps(self.description)):
                 raise UserError(
                     f"{folder} holds frames of another animation: choose another folder, or replace them with "
@@ -125,7 +128,7 @@ class Frames:
 
     def has(self, index: int) -> bool:
         """Whether the frame is there."""
-        return self.base_ev is not None and self.path(index).is_file()
+        return self.base_ev is not None and _is_whole_png(self.path(index))
 
     def path(self, index: int) -> Path:
         """Of a frame."""
@@ -143,8 +146,8 @@ class Frames:
 
     def _stored(self) -> dict | None:
         try:
-            stored = json.loads(self._manifest.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            stored = json.loads(files.read_text(self._manifest, files.SETTINGS_BYTES))
+        except (OSError, ValueError, RecursionError):
             return None
         return stored if isinstance(stored, dict) else None
 
@@ -161,6 +164,24 @@ class Frames:
                 if frame.stem.isdigit():
                     frame.unlink()
         self._manifest.unlink(missing_ok=True)
+
+
+def _exposure(value: object) -> float | None:
+    """A manifest's exposure; None, which draws all frames again, for what is none."""
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return float(value) if is_number and math.isfinite(value) else None  # type: ignore[arg-type]
+
+
+def _is_whole_png(path: Path) -> bool:
+    """Whether the file begins and ends as a PNG does: a power cut may leave one that is empty or cut."""
+    try:
+        files.check_regular(path, files.DATA_BYTES)
+        with path.open("rb") as file:
+            begins = file.read(len(_PNG_BEGIN)) == _PNG_BEGIN
+            file.seek(-len(_PNG_END), os.SEEK_END)
+            return begins and file.read() == _PNG_END
+    except OSError:
+        return False
 
 
 def _arguments(size: tuple[int, int], fps: float) -> list[str]:

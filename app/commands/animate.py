@@ -7,12 +7,12 @@ import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..base.errors import UserError
+from ..base.errors import UserError, plain
+from ..base.interrupts import interrupt_flag
 from ..base.memory import check_picture_memory
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from . import options
-from .render import INTERRUPTED, interrupt_flag
 
 DEFAULT_FRAMES = 120
 DEFAULT_FPS = 24.0
@@ -56,7 +56,7 @@ def animate_command(request: AnimateRequest) -> int:
     animation = _animation(request, Stage(scene, scene.camera, exposure), frames, fps)
     photons = settings.photons or scene.render.photons
     for note in scene.notes:
-        print(f"note: {note}", file=sys.stderr)
+        print(f"note: {plain(note)}", file=sys.stderr)
     manifest = description(animation, settings, fps, photons)
     sink = open_sink(request.output, (settings.width, settings.height), fps, manifest, request.overwrite)
 
@@ -85,13 +85,13 @@ def animate_command(request: AnimateRequest) -> int:
     place = request.output.resolve()
     if stopped and written == 0:
         print(f"{place}: no frame was finished")
-        return INTERRUPTED
+        return interrupted.exit_code
     again = f"; the same command goes on ({MANIFEST} knows it)" if stopped and place.is_dir() else ""
     print(
         f"{place}: {written} of {count} frames{kept}, {settings.width}×{settings.height} at {fps:g} a second, in "
         f"{time.perf_counter() - started:.1f} s{early}{again}"
     )
-    return INTERRUPTED if stopped else 0
+    return interrupted.exit_code if stopped else 0
 
 
 def _parse_fps(text: str) -> float:

@@ -7,10 +7,11 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..base.errors import plain
+from ..base.interrupts import interrupt_flag
 from ..base.memory import check_picture_memory
 from ..model.settings import RenderSettings
 from . import options
-from .render import INTERRUPTED, interrupt_flag
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ def bake_command(request: BakeRequest) -> int:
     scene = load_scene(options.find_scene(request.scene))
     bake.check_receiver(scene, request.receiver)
     for note in scene.notes:
-        print(f"note: {note}", file=sys.stderr)
+        print(f"note: {plain(note)}", file=sys.stderr)
     settings = RenderSettings(width=width, height=height, photons=photons, seed=seed, max_depth=scene.render.max_depth)
 
     from ..gpu.context import create_context
@@ -54,7 +55,7 @@ def bake_command(request: BakeRequest) -> int:
             progress(share, "baking")
             if interrupted() and share < 1.0:
                 print("spectrasplat: nothing was written: a map is whole or not at all", file=sys.stderr)
-                return INTERRUPTED
+                return interrupted.exit_code
     place = request.output.resolve()
     print(
         f"{place}: caustic map of '{request.receiver}' in {time.perf_counter() - started:.1f} s; where it lies is in "

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..base.errors import UserError, suggestion
+from ..base.interrupts import exit_code_of
 from ..base.memory import check_picture_memory
 from ..base.paths import shipped_scenes
 from ..bench.results import DEFAULT_METHODS, BenchResult, BenchSettings
@@ -22,7 +23,6 @@ from . import options
 if TYPE_CHECKING:
     from ..model.scene import Scene
 
-INTERRUPTED = 130
 MAX_SEEDS = 1000
 MAX_SECONDS = 3600.0
 CAMERA_SECONDS = 20.0
@@ -83,7 +83,7 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
             settings,
         )
         store = Store(request.output, empty, request.fresh)
-        stopped = False
+        stopped = 0
         try:
             with ProgressReporter("bench") as progress:
                 # Who names scenes wants them measured; of all that there are, those that cannot be are noted.
@@ -95,11 +95,11 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
                     None if request.scenes else lambda reason: print(f"note: {reason}", file=sys.stderr),
                     start_seconds=start_s,
                 )
-        except KeyboardInterrupt:
-            stopped = True
+        except KeyboardInterrupt as interrupt:
+            stopped = exit_code_of(interrupt)
             print(f"spectrasplat: stopped; {kept_text(store.result)}", file=sys.stderr)
     _report(store.result, request.output, show)
-    return INTERRUPTED if stopped else 0
+    return stopped
 
 
 def parse_settings(request: BenchRequest) -> BenchSettings:

@@ -10,6 +10,7 @@ import math
 import os
 from pathlib import Path
 
+from ..base import files
 from ..base.errors import UserError, nearest_names, suggestion
 from ..base.memory import MAX_SIDE_PX, memory_bytes
 from ..base.paths import SCENE_SUFFIXES, shipped_scenes
@@ -141,13 +142,15 @@ def receivers_of(scene: Scene) -> list[str]:
 def find_scene(text: str) -> Path:
     """The file of a scene given by path, or by the bare name of a shipped one."""
     path = Path(text)
-    if path.is_file():
+    if files.is_file(path):
         return path
-    if path.is_dir():
+    if os.path.isdir(path):
         raise UserError(f"scene {text} is a folder: give a scene file in it")
     shipped = shipped_scenes()
     if text in shipped:
         return shipped[text]
+    if os.path.exists(path):
+        raise UserError(f"scene {text} is a device or a pipe: give an ordinary file")
     if os.sep in text or path.suffix:
         near = nearest_names(path.name, _files_beside(path))
         hint = f", did you mean '{path.with_name(near[0])}'?" if near else ""

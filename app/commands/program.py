@@ -8,15 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
 from .. import __version__
-from ..base.errors import UserError
+from ..base.errors import UserError, visible
+from ..base.files import allow_outside
 from ..model.settings import CAMERA_METHODS, METHODS
 from . import completion, options
+
+if TYPE_CHECKING:
+    from rich.text import Text as RichText
 
 
 class _Interrupted(Exception):
@@ -66,6 +70,15 @@ CameraMethodOption = Annotated[
         autocompletion=completion.camera_methods,
     ),
 ]
+AllowOutside = Annotated[
+    bool,
+    typer.Option(
+        "--allow-outside",
+        help="Let the scene read files outside its own folder, anywhere this user can; only for scenes you trust.",
+        callback=allow_outside,
+        expose_value=False,
+    ),
+]
 Text = str | None
 PIPE_WIDTH = 200
 """Columns where no terminal sets a limit: tables are then not cut."""
@@ -76,7 +89,7 @@ def run(arguments: Sequence[str]) -> int:
     try:
         code = app(args=list(arguments) or ["--help"], prog_name="spectrasplat", standalone_mode=False)
     except _Interrupted as interrupted:
-        raise KeyboardInterrupt from interrupted
+        raise (interrupted.__cause__ or KeyboardInterrupt()) from None
     except Exception as error:
         # click's usage errors; typer has moved click inside itself, so there is no one class to name.
         if not hasattr(error, "format_message"):
@@ -149,6 +162,7 @@ def render(
     stats: Annotated[
         bool, typer.Option("--stats", help="Print the energy balance and the times of all stages.")
     ] = False,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Render a scene to a picture file."""
     from .render import RenderRequest, render_command
@@ -223,6 +237,7 @@ def animate(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the frames of another animation in the folder.")
     ] = False,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Render an animation: a turntable, or any parameters over time."""
     from .animate import AnimateRequest, animate_command
@@ -265,6 +280,7 @@ def view(
     after: Annotated[
         Text, typer.Option(metavar="S", help="Seconds from the first picture until --screenshot; default: 10.")
     ] = None,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Open the viewer: edit dispersion and caustics on the screen."""
     from .view import ViewRequest, view_command
@@ -294,6 +310,7 @@ def bake(
     size: Annotated[Text, typer.Option(metavar="WxH", help="Texels; default: 1024x1024.")] = None,
     photons: Annotated[Text, typer.Option(metavar="N", help="Photons to emit; default: the scene's.")] = None,
     seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Bake the caustic on an object to a texture, with its placement."""
     from .bake import BakeRequest, bake_command
@@ -302,7 +319,7 @@ def bake(
 
 
 @app.command()
-def inspect(scene: SceneArgument) -> None:
+def inspect(scene: SceneArgument, allow_outside: AllowOutside = False) -> None:
     """Show what a scene holds, its glasses and mesh health, and which features its programs need."""
     from ..model.io.scene_file import load_scene
     from .inspect_report import inspect_text
@@ -396,6 +413,7 @@ def bench(
             help="Measure the camera pass, by samples a pixel, instead of the light pass by photons.",
         ),
     ] = False,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Measure every method's error against its run time, and write a report."""
     from .bench import BenchRequest, bench_command
@@ -435,6 +453,7 @@ def stress(
     list_cases: Annotated[
         bool, typer.Option("--list", help="List the cases with their number of severities, and measure nothing.")
     ] = False,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Measure stiff and extreme cases against their promises; exits with 1 where one is broken."""
     from .stress import StressRequest, stress_command
@@ -461,6 +480,7 @@ def bench_view(
         Text, typer.Option(metavar="WxH", help="Of the viewport; default: 960x540, on a GPU 1920x1080.")
     ] = None,
     seconds: Annotated[Text, typer.Option(metavar="S", help="For each phase; default: 6.")] = None,
+    allow_outside: AllowOutside = False,
 ) -> None:
     """Measure the viewer's frame times: accumulating, orbiting, dragging the dispersion."""
     from .bench_view import BenchViewRequest, bench_view_command
@@ -471,11 +491,17 @@ def bench_view(
 def _print(content: object) -> None:
     """Print text as it is, and rich's tables in colour where the terminal has it."""
     if isinstance(content, str):
-        print(content)
+        print(visible(content))
         return
     from rich.console import Console
 
-    console = Console(highlight=False)
+    class PlainConsole(Console):
+        """Names out of a file are shown as they are: they neither choose colours nor command the terminal."""
+
+        def render_str(self, text: str, **more: Any) -> RichText:
+            return super().render_str(visible(text), **more)
+
+    console = PlainConsole(highlight=False, markup=False, emoji=False)
     if not console.is_terminal:
         console.width = PIPE_WIDTH
     console.print(content)

@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import numpy as np
 
-from ..base.errors import UserError
+from ..base.errors import UserError, plain
+from ..base.interrupts import interrupt_flag
 from ..base.memory import check_picture_memory
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from . import options
-
-INTERRUPTED = 130
-"""Exit code after Ctrl-C, as shells have it (128 + SIGINT)."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +61,7 @@ def render_command(request: RenderRequest) -> int:
     settings = _complete(asked, scene, request.stats)
     # Before the work: who waits for minutes should know what was assumed, and also if it fails.
     for note in (*scene.notes, *_unused_options(request)):
-        print(f"note: {note}", file=sys.stderr)
+        print(f"note: {plain(note)}", file=sys.stderr)
 
     from ..render.still import render
 
@@ -88,7 +83,7 @@ def render_command(request: RenderRequest) -> int:
     print(_summary(request, settings, result.stats, stopped))
     if request.stats:
         print("\n".join(result.stats.lines()))
-    return INTERRUPTED if stopped else 0
+    return interrupted.exit_code if stopped else 0
 
 
 def _parse(request: RenderRequest) -> dict[str, Any]:
@@ -146,29 +141,6 @@ def _unused_options(request: RenderRequest) -> list[str]:
 
 def _integer(option: str, low: int, high: int) -> Callable[[str], int]:
     return lambda text: options.parse_integer(option, text, low, high)
-
-
-@contextmanager
-def interrupt_flag() -> Iterator[Callable[[], bool]]:
-    """Within the block the first Ctrl-C only sets a flag, which the yielded function returns.
-
-    The renderer then stops after its batch and what it has is written. A second Ctrl-C
-    interrupts as usual.
-    """
-    interrupted = False
-
-    def remember(_signal: int, _frame: FrameType | None) -> None:
-        nonlocal interrupted
-        if interrupted:
-            raise KeyboardInterrupt
-        interrupted = True
-        print("spectrasplat: stopping; what is done will be written", file=sys.stderr)
-
-    previous = signal.signal(signal.SIGINT, remember)
-    try:
-        yield lambda: interrupted
-    finally:
-        signal.signal(signal.SIGINT, previous)
 
 
 def _summary(request: RenderRequest, settings: RenderSettings, stats: Any, stopped: bool) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..base.errors import UserError, suggestion
+from ..base.interrupts import Interruption, interrupt_flag
 from . import options
 
 if TYPE_CHECKING:
@@ -59,12 +60,18 @@ def view_command(request: ViewRequest) -> int:
 
     settings, _ = load_settings()
     place = settings.window if size is None else replace(settings.window, size=size, maximised=False)
-    with Window(place) as window:
-        _run(window, scene, theme, None if request.screenshot is None else (request.screenshot, after))
-    return 0
+    with Window(place) as window, interrupt_flag() as interrupted:
+        _run(window, scene, theme, None if request.screenshot is None else (request.screenshot, after), interrupted)
+    return interrupted.exit_code
 
 
-def _run(window: Window, scene: Path | None, theme: Theme | None, screenshot: tuple[Path, float] | None) -> None:
+def _run(
+    window: Window,
+    scene: Path | None,
+    theme: Theme | None,
+    screenshot: tuple[Path, float] | None,
+    interrupted: Interruption,
+) -> None:
     from ..ui import layout_memory
     from ..ui.session import Session
     from ..ui.viewer import Viewer
@@ -77,11 +84,17 @@ def _run(window: Window, scene: Path | None, theme: Theme | None, screenshot: tu
     layout_memory.load()
     try:
         if screenshot is None:
-            window.run(viewer)
+            window.run(viewer, until=interrupted)
         else:
-            _take_screenshot(window, viewer, session, *screenshot)
+            _take_screenshot(window, viewer, session, *screenshot, interrupted)
     except Exception as error:
         raise _rescued(session, error) from error
+    if interrupted():
+        # Nobody can be asked: what is unsaved stays and is offered at the next start.
+        if session.document.unsaved:
+            session.autosave.write_now(session.document.scene, session.document.title, session.document.source)
+        session.release()
+        return
     if screenshot is None:
         layout_memory.save()
         session.settings = replace(session.settings, window=_place(window, session.settings.window))
@@ -91,7 +104,9 @@ def _run(window: Window, scene: Path | None, theme: Theme | None, screenshot: tu
         session.release()
 
 
-def _take_screenshot(window: Window, viewer: Viewer, session: Session, path: Path, after_s: float) -> None:
+def _take_screenshot(
+    window: Window, viewer: Viewer, session: Session, path: Path, after_s: float, interrupted: Interruption
+) -> None:
     """Let the picture gather light for `after_s` seconds, then write the window to `path`.
 
     They count from the first picture on: a driver may compile for longer than that. What has none is written as it is
@@ -110,9 +125,11 @@ def _take_screenshot(window: Window, viewer: Viewer, session: Session, path: Pat
         waits_until = begun + (LONGEST_WAIT_S if engine is not None else _ENGINE_WAIT_S)
         if not first and ((engine is not None and engine.picture is not None) or now > waits_until):
             first.append(now)
-        return bool(first) and now >= first[0] + after_s
+        return interrupted() or (bool(first) and now >= first[0] + after_s)
 
     window.run(viewer, until=is_due)
+    if interrupted():
+        return
     with atomic_output(path) as temporary:
         Image.fromarray(window.screenshot()).save(temporary)
     print(path.resolve())

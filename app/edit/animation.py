@@ -19,6 +19,7 @@ from typing import Literal, cast
 
 import numpy as np
 
+from ..base import files
 from ..base.errors import UserError
 from ..model.io.scene_table import SceneTable
 from .parameters import Stage, apply_all, check_value, parameter
@@ -163,11 +164,12 @@ def tracks_of(keys: Iterable[Key], interpolations: Sequence[Interpolation] = ())
 def read_keys(path: Path, stage: Stage) -> tuple[Track, ...]:
     """Tracks of a TOML file of `[[keys]]`; raises `UserError` naming file and key."""
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        document = tomllib.loads(files.read_text(path, files.SETTINGS_BYTES))
     except OSError as error:
         raise UserError(f"--keys {path} cannot be read: {error.strerror}; check the path") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UserError(f"{path.name} is not TOML: {error}") from error
+    except (ValueError, RecursionError) as error:
+        reason = "it is not UTF-8 text" if isinstance(error, UnicodeDecodeError) else str(error).partition(":")[0]
+        raise UserError(f"{path.name} is not TOML: {reason}; see docs/command-line.md for an example") from error
     rows = document.pop("keys", None)
     if document:
         raise UserError(f"{path.name}: unknown key '{next(iter(document))}'; a file of keys holds [[keys]] only")

@@ -20,6 +20,7 @@ from typing import IO
 
 import msgspec
 
+from ..base import files
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
 from ..model.geometry.mesh import Mesh
@@ -59,7 +60,8 @@ class Recovery:
 
     def load(self) -> Scene:
         """The scene, which needs none of the autosave's files any more. Raises UserError when it cannot be read."""
-        scene = load_scene(self.path)
+        with files.own_files():
+            scene = load_scene(self.path)
         here = self.path.parent.resolve()
         own: dict[Mesh, Mesh] = {}
         for mesh in {item.mesh for item in scene.objects}:
@@ -139,7 +141,8 @@ class Autosave:
     def _write(self, scene: Scene, note: Note) -> None:
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            save_scene(scene, self._path)
+            with files.own_files():  # it names what the scene uses where that lies, instead of copying it
+                save_scene(scene, self._path)
             if self._lock is None:
                 self._lock = _locked(self._path.with_suffix(".lock"))
             with atomic_output(self._path.with_suffix(".json")) as temporary:
@@ -164,7 +167,7 @@ def recoveries(folder: Path) -> tuple[Recovery, ...]:
     for entry in sorted((folder / _FOLDER).glob("*.json")):
         scene = entry.with_suffix(".toml")
         try:
-            note = msgspec.json.decode(entry.read_bytes(), type=Note)
+            note = msgspec.json.decode(files.read_bytes(entry, files.SETTINGS_BYTES), type=Note)
         except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
             continue
         if scene.is_file() and not _is_held(entry.with_suffix(".lock")):
@@ -173,11 +176,12 @@ def recoveries(folder: Path) -> tuple[Recovery, ...]:
 
 
 def _remove(path: Path) -> None:
-    """The autosave at `path` with its note, lock and meshes."""
+    """The autosave at `path` with its note, lock, meshes and pictures."""
     for each in (path.with_suffix(".json"), path, path.with_suffix(".lock")):
         with suppress(OSError):
             each.unlink()
-    shutil.rmtree(path.parent / f"{path.stem}_meshes", ignore_errors=True)
+    for what in ("meshes", "pictures"):
+        shutil.rmtree(path.parent / f"{path.stem}_{what}", ignore_errors=True)
 
 
 def _locked(path: Path) -> IO[str]:

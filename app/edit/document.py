@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from ..base import files
 from ..base.errors import UserError
 from ..base.paths import assets_dir
 from ..model.io.gltf_write import save_gltf
@@ -99,7 +100,7 @@ class Document:
 
     def _readable_original(self) -> Path | None:
         """The glTF file whose textures and extras are kept, while it is there to be read."""
-        if self._original is None or not self._original.is_file():
+        if self._original is None or not files.is_file(self._original):
             return None
         return self._original
 

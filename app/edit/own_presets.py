@@ -14,6 +14,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from ..base import files
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
 from ..model.io.scene_table import SceneTable
@@ -64,7 +65,7 @@ def load_own_presets() -> tuple[OwnPresets, str | None]:
     """What the user kept, and a sentence to show when it could not be read."""
     try:
         path = config_dir() / _FILE
-        text = path.read_text(encoding="utf-8")
+        text = files.read_text(path, files.SETTINGS_BYTES)
     except FileNotFoundError:
         return OwnPresets(), None
     except (OSError, UserError) as error:
@@ -72,8 +73,9 @@ def load_own_presets() -> tuple[OwnPresets, str | None]:
     except UnicodeDecodeError as error:
         return OwnPresets(), _set_aside(path, error)
     try:
-        return _read(SceneTable(tomllib.loads(text), path)), None
-    except (tomllib.TOMLDecodeError, UserError, RecursionError) as error:
+        with files.own_files():
+            return _read(SceneTable(tomllib.loads(text), path)), None
+    except (ValueError, UserError, RecursionError) as error:
         return OwnPresets(), _set_aside(path, error)
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import msgspec
 import platformdirs
 
+from ..base import files
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
 from .state import Preferences
@@ -52,7 +53,7 @@ class Settings:
 
     def existing_recent(self) -> tuple[Path, ...]:
         """Recent files that are still there."""
-        return tuple(p for p in self.recent if _is_file(p))
+        return tuple(p for p in self.recent if files.is_file(p))
 
 
 def config_dir() -> Path:
@@ -79,7 +80,7 @@ def load_settings() -> tuple[Settings, str | None]:
     except UserError as error:
         return Settings(), f"Settings are not remembered: {error}."
     try:
-        data = path.read_bytes()
+        data = files.read_bytes(path, files.SETTINGS_BYTES)
     except FileNotFoundError:
         return Settings(), None
     except OSError as error:
@@ -96,7 +97,9 @@ def load_settings() -> tuple[Settings, str | None]:
 
 def save_settings(settings: Settings) -> None:
     """Remember `settings`, whole or not at all. Raises UserError when the folder is not writable."""
-    content = msgspec.json.format(msgspec.json.encode(settings, enc_hook=os.fspath))
+    # A file's name need not be text; such a one is not remembered.
+    recent = tuple(path for path in settings.recent if _is_text(path))
+    content = msgspec.json.format(msgspec.json.encode(replace(settings, recent=recent), enc_hook=os.fspath))
     with atomic_output(config_dir() / _FILE) as temporary:
         temporary.write_bytes(content)
 
@@ -104,7 +107,7 @@ def save_settings(settings: Settings) -> None:
 def _decode_path(kind: type, value: object) -> Path:
     if kind is Path and isinstance(value, str):
         return Path(value)
-    raise NotImplementedError(f"{kind} in the settings")
+    raise ValueError(f"{kind.__name__} expected")
 
 
 def _sound(settings: Settings) -> Settings:
@@ -127,8 +130,9 @@ def _set_aside(path: Path, error: Exception) -> str:
     return f"The settings in {path} are damaged ({reason}); those of a new installation are used."
 
 
-def _is_file(path: Path) -> bool:
+def _is_text(path: Path) -> bool:
     try:
-        return path.is_file()
-    except OSError:
+        os.fspath(path).encode()
+    except UnicodeEncodeError:
         return False
+    return True

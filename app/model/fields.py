@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import UserError
-from .io.scene_pictures import relative_name
+from .io.scene_pictures import kept_name
 from .io.scene_table import REQUIRED, SceneTable
 
 
@@ -179,7 +179,7 @@ class FileName(Field):
     def write(self, value: Any, path: Path | None) -> dict[str, Any]:
         """The file's name."""
         source = getattr(value, self.attribute).source
-        return {self.key or self.attribute: source if path is None else relative_name(source, path.parent)}
+        return {self.key or self.attribute: source if path is None else kept_name(source, path)}
 
 
 def read_fields(parts: Iterable[Part], table: SceneTable) -> dict[str, Any]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import io
 import json
+import warnings
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -11,15 +13,18 @@ from typing import Any
 
 import numpy as np
 
+from ..base import files
 from ..base.errors import UserError
 from .geometry.mesh import Mesh
 from .geometry.mesh_recipes import note_recipe
+from .io.mesh_raw import as_float64
 from .io.scene_table import SceneTable
 from .materials.material_file import read_object_material
 from .placement import read_placement
 from .scene import Material, SceneObject
 from .scene_dabs import read_dabs
 from .scene_textures import TextureReader
+from .unique_names import Names
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl")
 INLINE = "inline"
@@ -33,7 +38,7 @@ class ObjectReader:
         self._materials = materials
         self._textures = textures
         self._meshes: dict[str, Mesh] = {}
-        self._names: set[str] = set()
+        self._names = Names()
         self.notes: list[str] = []
 
     def read(self, table: SceneTable) -> list[SceneObject]:
@@ -67,10 +72,7 @@ class ObjectReader:
             if name in self._names:
                 table.fail("name", f"is '{name}', which another object has already; give each its own")
         else:
-            name, number = fallback, 1
-            while name in self._names:
-                number += 1
-                name = f"{fallback} {number}"
+            return self._names.unique(fallback)
         self._names.add(name)
         return name
 
@@ -264,8 +266,18 @@ def _load_heights(heights: Any) -> np.ndarray:
         return np.array(heights, dtype=np.float64)
     try:
         if heights.endswith(".npy"):
-            loaded = np.load(heights, allow_pickle=False)
-            return np.asarray(loaded, dtype=np.float64)
-        return np.loadtxt(heights, delimiter=",", ndmin=2)
-    except (OSError, ValueError, EOFError) as error:
-        raise UserError(f"the heights in {heights} cannot be read ({error}); give a plain array of numbers") from error
+            return as_float64(files.read_npy(heights))
+        return _csv_numbers(files.read_text(heights, files.TABLE_BYTES))
+    except (OSError, ValueError) as error:
+        reason = files.reason_of(error)
+        raise UserError(f"the heights in {heights} cannot be read ({reason}); give a plain array of numbers") from error
+
+
+def _csv_numbers(text: str) -> np.ndarray:
+    """Rows of numbers with commas between, float64 (R, C). Raises ValueError that quotes nothing of them."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", UserWarning)  # no data at all
+            return np.loadtxt(io.StringIO(text), delimiter=",", ndmin=2)
+    except (ValueError, UserWarning) as error:
+        raise ValueError("it is no table of numbers with commas between") from error

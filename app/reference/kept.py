@@ -7,19 +7,38 @@ alone.
 from __future__ import annotations
 
 import os
+import struct
+import tokenize
 import zipfile
+import zlib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
-from ..base import paths
+from ..base import files, paths
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
 from .rounds import Cancelled, EstimateT, Limits, PartsRun, Progress, continue_run
 
 _CACHE_BYTES = 2 << 30
+_DAMAGED = (
+    OSError,
+    ValueError,
+    TypeError,
+    AttributeError,
+    KeyError,
+    EOFError,
+    MemoryError,
+    RuntimeError,  # "encrypted", and compression that is not known
+    SyntaxError,
+    tokenize.TokenError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What numpy and zipfile raise over damage."""
 
 
 def kept_path(key: str, folder: Path | None) -> Path | None:
@@ -34,12 +53,12 @@ def kept_path(key: str, folder: Path | None) -> Path | None:
 
 def load_kept(path: Path | None, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, np.ndarray] | None:
     """The arrays that `shapes` names; None when the file is missing, damaged or holds other shapes."""
-    if path is None or not path.is_file():
+    if path is None or not files.is_file(path):
         return None
     try:
         with path.open("rb") as file, np.load(file) as stored:
             values = {name: stored[name] for name in shapes}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+    except _DAMAGED:
         return None
     if any(values[name].shape != shape for name, shape in shapes.items()):
         return None
@@ -53,7 +72,7 @@ def save_kept(path: Path | None, **arrays: object) -> None:
     if path is None:
         return
     with suppress(OSError, UserError):
-        with atomic_output(path) as temporary:
+        with atomic_output(path, lasting=False) as temporary:
             np.savez(temporary, **arrays)  # type: ignore[arg-type]
         _forget_oldest(path.parent, path)
 

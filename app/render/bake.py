@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.atomic import atomic_output
+from ..base.atomic import atomic_outputs
 from ..base.errors import UserError, suggestion
-from ..base.image_io import check_suffix, write_image
+from ..base.image_io import check_suffix, write_into
 from ..base.tone_map import auto_exposure
 from ..edit.parameters import Stage
 from ..gpu.context import Context
@@ -74,9 +74,9 @@ def bake(context: Context, stage: Stage, settings: RenderSettings, receiver: str
     told = {**where, "receiver": receiver, "scene": stage.scene.name, "file": path.name, "units": UNITS}
     if path.suffix.lower() == ".png":
         told["exposure_ev"] = auto_exposure(rgb)
-    write_image(path, rgb)
-    with atomic_output(placement_path(path)) as temporary:
-        temporary.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    with atomic_outputs(path, placement_path(path)) as (picture, note):
+        write_into(picture, rgb)
+        note.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     yield 1.0
 
 

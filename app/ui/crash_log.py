@@ -12,6 +12,7 @@ import traceback
 from pathlib import Path
 
 from .. import __version__
+from ..base import files
 
 FILE_NAME = "crash.log"
 MAX_BYTES = 256 * 1024
@@ -28,7 +29,7 @@ def write_crash(folder: Path, doing: str, error: BaseException, device: str) -> 
     entry = "\n".join([head, f"while: {doing}", "".join(traceback.format_exception(error))])
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        before = path.read_bytes()[-MAX_BYTES:] if path.exists() else b""
+        before = files.read_bytes(path, files.SETTINGS_BYTES)[-MAX_BYTES:] if path.exists() else b""
         path.write_bytes(before + entry.encode("utf-8", "replace"))
     except OSError:
         return None

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .. import __version__
+from ..base import files
 from ..base.paths import assets_dir
 from .view_model import SceneEntry
 
@@ -109,6 +110,7 @@ class Gallery:
         from PIL import Image
 
         try:
+            files.check_regular(path, files.SETTINGS_BYTES)
             with Image.open(path) as image:
                 image.thumbnail((2 * SIZE[0], 2 * SIZE[1]))
                 rgba = image.convert("RGBA")
@@ -122,7 +124,7 @@ class Gallery:
 
     def _thumbnail(self, scene: Path) -> Path:
         try:
-            content = scene.read_bytes()
+            content = files.read_bytes(scene, files.SCENE_BYTES)
         except OSError:
             content = b""
         key = hashlib.sha256(f"{__version__} {SIZE} {PHOTONS}".encode() + content).hexdigest()[:16]
@@ -147,9 +149,9 @@ def _shipped_picture(scene: Path) -> Path:
 def _entry(name: str, path: Path) -> SceneEntry:
     """Title from the file's `name`, description from the comment it opens with."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = files.read_text(path, files.SCENE_BYTES)
         title = str(tomllib.loads(text).get("name", name))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+    except (OSError, ValueError, RecursionError):
         return SceneEntry(path, name, "", None)
     lines = []
     for line in text.splitlines():

@@ -6,6 +6,7 @@ from contextlib import suppress
 
 from imgui_bundle import imgui
 
+from ..base import files
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
 from ..edit.preferences import layout_file
@@ -14,7 +15,7 @@ from ..edit.preferences import layout_file
 def load() -> None:
     """Give imgui the remembered layout, before the first frame; nothing remembered leaves the default."""
     with suppress(OSError, UserError, UnicodeDecodeError):
-        imgui.load_ini_settings_from_memory(layout_file().read_text(encoding="utf-8"))
+        imgui.load_ini_settings_from_memory(files.read_text(layout_file(), files.SETTINGS_BYTES))
 
 
 def save() -> None:

@@ -123,9 +123,12 @@ def test_a_folder_is_resumed_and_ends_as_if_never_stopped(gl, stage: Stage, tmp_
     assert len(whole) == 4 and len(set(whole)) == 4
     draw(gl, made, Frames(tmp_path / "parts", told), stop_after=0.5)
     assert frames_of(tmp_path / "parts") == whole[:2]
-    (tmp_path / "parts" / "0000.png").write_bytes(b"kept")
+    kept = whole[1]  # a frame that is there is not drawn again; one that is empty or cut is
+    (tmp_path / "parts" / "0000.png").write_bytes(kept)
+    (tmp_path / "parts" / "0001.png").write_bytes(b"")
+    (tmp_path / "parts" / "0002.png").write_bytes(whole[2][:-20])
     draw(gl, made, Frames(tmp_path / "parts", told))
-    assert frames_of(tmp_path / "parts") == [b"kept", *whole[1:]]
+    assert frames_of(tmp_path / "parts") == [kept, *whole[1:]]
     other = description(turntable(stage, 5, 24.0), SMALL, 24.0, 20_000)
     with pytest.raises(UserError, match="another animation.*--overwrite"):
         Frames(tmp_path / "parts", other)

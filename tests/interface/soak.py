@@ -60,7 +60,7 @@ KEYS = (
 )
 CHORDS = (Key.z, Key.y, Key.c, Key.v, Key.d, Key.r, Key.e, Key.s, Key.n, Key.o, Key.q, Key._1, Key._2)
 MODIFIERS = ((), (), (), (Key.mod_shift,), (Key.mod_ctrl,), (Key.mod_alt,))
-TEXTS = ("1.5", "0", "-3", "1e9", "nan", "589.3", "N-BK7", "λ", "", "a" * 40)
+TEXTS = ("1.5", "0", "-3", "1e9", "nan", "inf", "-inf", "1e39", "589.3", "N-BK7", "λ", "", "a" * 40)
 LEAVES_THE_SCENE = (requests.NewScene, requests.Open, requests.Recover)
 """What the soak must not do: its history would begin anew."""
 TAKES_LONG = (requests.Animate, requests.Bake)

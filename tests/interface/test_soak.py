@@ -3,6 +3,7 @@ the first picture."""
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -94,6 +95,12 @@ def test_80_random_actions(gl: Context, own_folder: Path) -> None:
 @pytest.mark.slow
 def test_2000_random_actions(gl: Context, own_folder: Path) -> None:
     soak(gl, own_folder, 2000, seed=2)
+
+
+@pytest.mark.skipif("SPECTRASPLAT_SOAK" not in os.environ, reason="./test --soak chooses seed and length")
+def test_what_the_soak_asks_for(gl: Context, own_folder: Path) -> None:
+    seed, actions = map(int, os.environ["SPECTRASPLAT_SOAK"].split(":"))
+    soak(gl, own_folder, actions, seed)
 
 
 def test_a_closed_viewer_leaves_nothing_on_the_device(gl: Context, own_folder: Path) -> None:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import errno
 import os
+import subprocess
+import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
-from spectrasplat.base.atomic import atomic_output, check_writable
+from spectrasplat.base import atomic
+from spectrasplat.base.atomic import atomic_output, atomic_outputs, check_writable
 from spectrasplat.base.errors import UserError
 
 
@@ -118,3 +122,73 @@ def test_check_writable_leaves_the_file_alone(tmp_path: Path) -> None:
     target.write_text("old")
     check_writable(target)
     assert target.read_text() == "old"
+
+
+def test_what_is_done_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    happened: list[str] = []
+    fsync, replace = os.fsync, os.replace
+    monkeypatch.setattr(os, "fsync", lambda fd: (happened.append("sync"), fsync(fd))[1])
+    monkeypatch.setattr(os, "replace", lambda a, b: (happened.append("rename"), replace(a, b))[1])
+    with atomic_output(tmp_path / "a"):
+        pass
+    assert happened == ["sync", "rename", "sync"]  # the file, its name, the folder
+    happened.clear()
+    with atomic_output(tmp_path / "a", lasting=False):
+        pass
+    assert happened == ["rename"]
+
+
+def test_what_killed_processes_left_is_removed_and_what_others_write_is_not(tmp_path: Path) -> None:
+    script = (
+        "import os, signal, sys\n"
+        "from spectrasplat.base.atomic import atomic_output\n"
+        "with atomic_output(sys.argv[1]) as part:\n"
+        "    part.write_text('half')\n"
+        "    print(part.name, flush=True)\n"
+        "    sys.stdin.read() if sys.argv[2] == 'wait' else os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+
+    def start(how: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-c", script, str(tmp_path / "a.png"), how]
+        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    with start("kill") as killed:
+        assert killed.stdout is not None
+        left = killed.stdout.readline().strip()
+    assert (tmp_path / left).exists()
+    mine = tmp_path / ".notes.part.txt"  # a name that only resembles ours
+    mine.write_text("keep")
+    with start("wait") as living:
+        assert living.stdout is not None and living.stdin is not None
+        written = living.stdout.readline().strip()
+        assert not (tmp_path / left).exists() and (tmp_path / written).exists()
+        atomic._swept.clear()
+        check_writable(tmp_path / "b.png")
+        assert (tmp_path / written).exists()
+        living.stdin.close()
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == [mine.name, "a.png"]
+
+
+@pytest.mark.parametrize("fails", [0, 1, 2, 3])
+@pytest.mark.parametrize("old", [(), ("a",), ("a", "b")])
+def test_files_that_belong_together_appear_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails: int, old: tuple[str, ...]
+) -> None:
+    for name in old:
+        (tmp_path / name).write_text("old")
+    count, replace = 0, os.replace
+
+    def counted(a: object, b: object) -> None:
+        nonlocal count
+        count += 1
+        if count == fails:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        replace(a, b)  # type: ignore[type-var]
+
+    monkeypatch.setattr(os, "replace", counted)
+    raises = pytest.raises(UserError, match="disk is full") if 0 < fails <= len(old) + 2 else nullcontext()
+    with raises, atomic_outputs(tmp_path / "a", tmp_path / "b") as parts:
+        for part in parts:
+            part.write_text("new")
+    expected = dict.fromkeys(old, "old") if 0 < fails <= len(old) + 2 else {"a": "new", "b": "new"}
+    assert {entry.name: entry.read_text() for entry in tmp_path.iterdir()} == expected

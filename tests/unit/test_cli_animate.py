@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from spectrasplat.__main__ import main
+from spectrasplat.base.movie import MANIFEST, Frames
 
 GAIN = "objects.prism.dispersion_gain"
 CASES = {
@@ -80,3 +82,15 @@ def test_outputs(output: str, told: tuple[str, ...], here: Path, capsys: pytest.
 )
 def test_bake(arguments: list[str], told: tuple[str, ...], here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     refused(["bake", *arguments], told, here, capsys)
+
+
+@pytest.mark.parametrize("base_ev", ["NaN", "Infinity", '"0.5"', "[1]", "true"])
+def test_a_manifest_whose_exposure_is_none_draws_all_frames_again(tmp_path: Path, base_ev: str) -> None:
+    told = {"fps": 24.0}
+    frames = Frames(tmp_path, told)
+    frames.fix_exposure(0.5)
+    frames.write(0, np.zeros((2, 3, 3), np.uint8))
+    assert Frames(tmp_path, told).has(0)
+    (tmp_path / MANIFEST).write_text(f'{{"fps": 24.0, "base_ev": {base_ev}}}')
+    again = Frames(tmp_path, told)
+    assert again.base_ev is None and not again.has(0)

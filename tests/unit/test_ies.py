@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from reference.lamps import cosine, ies_text, isotropic, lamp, lopsided
+from spectrasplat.base import files
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import edits, parameters, presets
@@ -146,13 +147,13 @@ GOOD = ies_text(lambda v, h: 5.0 + 0.0 * v, [0.0, 45.0, 90.0], [0.0, 45.0, 90.0]
         (GOOD.replace(" 3 3 1 2 ", " 3 3 3 2 "), "photometric type A"),
         (GOOD.replace("5 5 5\n", "5 nan 5\n", 1), "not finite among candela"),
         (GOOD.replace("5 5 5\n", "5 inf 5\n", 1), "not finite among candela"),
-        (GOOD.replace("5 5 5\n", "5 five 5\n", 1), "has 'five' among candela, which is no number"),
+        (GOOD.replace("5 5 5\n", "5 five 5\n", 1), "has something among candela that is no number"),
         (GOOD.replace("5 5 5\n", "5 -5 5\n", 1), "negative or too large"),
         (GOOD.replace("5 5 5\n", "5 1e300 5\n").replace("1 1 0\n", "1e300 1 0\n"), "negative or too large"),
         (GOOD.replace("5 5 5\n", "0 0 0\n"), "gives no light in any direction"),
         (
             GOOD.replace("TILT=NONE", "TILT=lamp.tlt"),
-            "keeps its tilt factors in LAMP.TLT, which is not read; write TILT=",
+            "keeps its tilt factors in another file, which is not read; write TILT=",
         ),
         (GOOD.replace("TILT=NONE", "TILT=INCLUDE\n1\n999"), "ends within the factors for a tilted lamp"),
     ],
@@ -234,7 +235,10 @@ def test_a_bad_file_is_blamed_on_its_key(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("more", ["", "rotation_deg = 70\ntangent = [0, 0.8, 0.6]\nlumens = 800"])
 @pytest.mark.parametrize("suffix", [".toml", ".glb", ".gltf"])
-def test_every_kind_of_scene_file_keeps_it(tmp_path: Path, suffix: str, more: str) -> None:
+def test_every_kind_of_scene_file_keeps_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, more: str
+) -> None:
+    monkeypatch.setenv(files.ENVIRONMENT, str(tmp_path))
     before = scene(tmp_path, more)
     (tmp_path / "elsewhere").mkdir()
     path = tmp_path / "elsewhere" / f"saved{suffix}"

@@ -180,7 +180,7 @@ LIES = {
     "zero_bulk.obj": ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "line 4: the face names vertex 0"),
     "normal.obj": ("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//2\n", "line 5: the face names normal 2"),
     "word.obj": (TETRAHEDRON_OBJ.replace("v 0 1 0", "v 0 one 0"), "line 4: expected 3 numbers"),
-    "corner.obj": (TETRAHEDRON_OBJ.replace("f 1 2 4", "f 1 two 4"), "line 7: 'two' is no face corner"),
+    "corner.obj": (TETRAHEDRON_OBJ.replace("f 1 2 4", "f 1 two 4"), "line 7 holds what is no face corner"),
     "points.obj": ("v 0 0 0\n", "no faces"),
     "text.obj": ("hello\n", "no vertices"),
     "count.stl": (

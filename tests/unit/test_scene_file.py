@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
+from spectrasplat.base.files import own_files
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.lights.spot import spot_solid_angle_sr
@@ -386,8 +387,9 @@ def test_a_saved_scene_loads_as_itself(tmp_path: Path) -> None:
     scene = load(tmp_path, RICH)
     (tmp_path / "elsewhere").mkdir()
     saved = tmp_path / "elsewhere" / "saved.toml"
-    save_scene(scene, saved)
-    again = load_scene(saved)
+    with own_files():
+        save_scene(scene, saved)
+        again = load_scene(saved)
     assert_same(scene, again)
     assert again.objects[1].mesh is again.objects[2].mesh
     text = saved.read_text()

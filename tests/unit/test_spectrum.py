@@ -139,7 +139,7 @@ def test_csv(tmp_path: Path) -> None:
         ("400,1\n500,x\n", "line 2: expected two numbers"),
         ("nm,power\nagain,header\n400,1\n500,1\n", "line 2: expected two numbers"),
         ("400,1,7\n500,1,7\n", "line 1: expected two numbers"),
-        ("400,1\n500,nan\n", "line 2: '500,nan' holds no finite number"),
+        ("400,1\n500,nan\n", "line 2 holds a number that is not finite"),
         ("500,1\n400,1\n", "wavelengths must ascend"),
         ("400,1\n500,-1\n", "negative"),
         ("400,1\n", "found 1"),

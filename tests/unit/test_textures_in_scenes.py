@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from spectrasplat.base import files
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.image_io import write_image
 from spectrasplat.model.environment import sky, world_to_local
@@ -227,7 +228,8 @@ def test_without_an_environment_light_and_receiver_are_still_needed(folder: Path
 # -- saved and opened again ---------------------------------------------------------------
 
 
-def test_textures_survive_saving_elsewhere(folder: Path) -> None:
+def test_textures_survive_saving_elsewhere(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(files.ENVIRONMENT, str(folder))
     text = (
         LIGHT
         + BALL
@@ -270,7 +272,8 @@ def test_a_texture_without_a_file_gets_one(folder: Path, exact: bool) -> None:
         ),
     ],
 )
-def test_environments_survive_saving(folder: Path, lines: str) -> None:
+def test_environments_survive_saving(folder: Path, lines: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(files.ENVIRONMENT, str(folder))
     scene = load(folder, CAMERA + BALL + f"[environment]\n{lines}\n")
     (folder / "deep").mkdir()
     back = again(scene, folder / "deep" / "copy.toml")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -83,3 +84,14 @@ def test_a_folder_that_cannot_be_made_is_told(config: Path) -> None:
     assert settings == Settings() and notice is not None and "not remembered" in notice
     with pytest.raises(UserError, match="SPECTRASPLAT_CONFIG"):
         save_settings(settings)
+
+
+def test_recent_files_that_are_no_text_are_not_remembered_and_break_nothing(config: Path) -> None:
+    odd = Path(os.fsdecode(b"/tmp/\xff.toml"))
+    save_settings(Settings().opened(Path("/tmp/a.toml")).opened(odd))
+    assert load_settings()[0].recent == (Path("/tmp/a.toml"),)
+    (config / "settings.json").write_text('{"recent": [1, null]}', encoding="utf-8")
+    settings, said = load_settings()
+    assert settings == Settings() and "damaged" in (said or "")
+    long = Settings(recent=(Path("/" + "a" * 300), Path("/tmp/a\0b")))
+    assert long.existing_recent() == ()

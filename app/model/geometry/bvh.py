@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base import paths
+from ...base import files, paths
 from ...base.atomic import atomic_output
 from ...base.errors import UserError
 
@@ -131,7 +131,7 @@ def _cache_path(triangles: np.ndarray) -> Path | None:
 def _load(path: Path, triangle_count: int) -> Bvh | None:
     """The tree at `path`; None when it is missing, damaged or another version's."""
     try:
-        data = path.read_bytes()
+        data = files.read_bytes(path, _CACHE_BYTES + 4096)
     except OSError:
         return None
     start = len(_CACHE_VERSION) + _DIGEST_BYTES
@@ -150,7 +150,7 @@ def _save(path: Path, tree: Bvh) -> None:
     if len(payload) > _CACHE_BYTES:
         return
     with suppress(OSError, UserError):  # an unwritable or full cache only costs time
-        with atomic_output(path) as temporary:
+        with atomic_output(path, lasting=False) as temporary:
             temporary.write_bytes(_CACHE_VERSION + _digest(payload) + payload)
         _forget_oldest(path.parent)
 

@@ -6,7 +6,8 @@ import math
 
 from ...base.errors import UserError
 
-MAX_TRIANGLES = 8_000_000
+MAX_TRIANGLES = 4_000_000
+"""Of one shape: making twice as many takes more than 2 GiB."""
 
 
 def positive(shape: str, key: str, value: float) -> float:

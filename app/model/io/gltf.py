@@ -31,6 +31,7 @@ from ..scene import (
     SceneObject,
 )
 from ..scene_defaults import default_camera, default_light, default_table, environment_of
+from ..unique_names import Names
 from ..vectors import vec3
 from .gltf_document import GltfDocument, open_document
 from .gltf_extras import read_node_dabs, read_scene_extras
@@ -44,7 +45,8 @@ from .gltf_materials import (
     read_gltf_material,
 )
 from .gltf_textures import GltfTextures, turned_over
-from .scene_table import SceneTable
+from .mesh_raw import as_float64
+from .scene_table import MAX_MAGNITUDE, SceneTable
 
 LIGHTS = "KHR_lights_punctual"
 UNDERSTOOD = frozenset({LIGHTS, TRANSMISSION, VOLUME, IOR, DISPERSION, "KHR_mesh_quantization"})
@@ -79,7 +81,7 @@ def read_scene(document: GltfDocument) -> tuple[Scene, Origins]:
     """The scene and where its parts lie in the document."""
     try:
         return _Reader(document).read()
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
         # The document breaks glTF's schema somewhere we had no sentence of its own for.
         reason = f"{type(error).__name__}: {error}".partition("\n")[0][:80]
         raise document.fail(f"the file does not follow glTF 2.0 ({reason}); export it again") from error
@@ -97,7 +99,7 @@ class _Reader:
         self._materials: dict[int | None, Material] = {}
         self._textures = GltfTextures(document, self.notes)
         self.origins.textures = self._textures.numbers
-        self._names: set[str] = set()
+        self._names = Names()
 
     def read(self) -> tuple[Scene, Origins]:
         self._check_extensions()
@@ -115,12 +117,12 @@ class _Reader:
         if environment is None and not receives:
             table = default_table(upright)
             matrix = Y_UP_TO_Z_UP.T @ table.object_to_world
-            self.objects.append(replace(table, name=self._unique("table"), object_to_world=matrix))
+            self.objects.append(replace(table, name=self._names.unique("table"), object_to_world=matrix))
             self.notes.append("Nothing diffuse in the file: a light-grey table was put below the objects.")
         lights = self._read_lights(Surroundings(Y_UP_TO_Z_UP[:3, :3].T @ around.centre, around.radius))
         if not lights and (environment is None or receives):
             sun = default_light()
-            lights = (sun.changed(name=self._unique(sun.name), direction=_turned(sun.direction)),)
+            lights = (sun.changed(name=self._names.unique(sun.name), direction=_turned(sun.direction)),)
             self.notes.append("No light in the file: a white sun from behind on the left was added.")
         camera = self.camera
         if camera is None:
@@ -163,6 +165,10 @@ class _Reader:
                 )
             seen.add(index)
             world = parent @ self._local(node, index)
+            if np.abs(world).max() > MAX_MAGNITUDE:
+                raise self.document.fail(
+                    f"nodes[{index}] has a transform beyond {MAX_MAGNITUDE:g}; export the file in larger units"
+                )
             yield index, world
             stack += [(child, world) for child in reversed(node.get("children", []))]
 
@@ -171,17 +177,25 @@ class _Reader:
             matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T  # stored column by column
         else:
             matrix = np.eye(4)
-            matrix[:3, :3] = _rotation(node.get("rotation", (0, 0, 0, 1))) * np.array(
-                node.get("scale", (1, 1, 1)), float
-            )
+            with np.errstate(invalid="ignore", over="ignore"):  # refused below
+                matrix[:3, :3] = _rotation(node.get("rotation", (0, 0, 0, 1))) * np.array(
+                    node.get("scale", (1, 1, 1)), float
+                )
             matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
-        if not np.isfinite(matrix).all():
-            raise self.document.fail(f"nodes[{index}] has a transform that is not finite; export the file again")
+        if not (np.abs(matrix) <= MAX_MAGNITUDE).all():
+            raise self.document.fail(
+                f"nodes[{index}] has a transform that is not finite, or beyond {MAX_MAGNITUDE:g}; export the file again"
+            )
         return matrix
 
     def _node(self, index: int, world: np.ndarray) -> None:
         node = self.document.item("nodes", index)
         self.origins.world[index] = world
+        if abs(np.linalg.det(world[:3, :3])) <= 1e-30 * np.linalg.norm(world[:3, :3]) ** 3:
+            if node.keys() & {"mesh", "camera"} or LIGHTS in node.get("extensions", {}):
+                label = node.get("name") or f"node {index}"
+                self.notes.append(f"node '{label}' is flattened by a scale of 0 and is left out.")
+            return
         if "mesh" in node:
             self._place(index, node, world)
         if "camera" in node and self.camera is None:
@@ -196,28 +210,17 @@ class _Reader:
                 )
             self.lights.append((index, entries[light], world))
 
-    def _unique(self, name: str) -> str:
-        chosen, number = name, 1
-        while chosen in self._names:
-            number += 1
-            chosen = f"{name} {number}"
-        self._names.add(chosen)
-        return chosen
-
     # -- geometry -------------------------------------------------------------------------
 
     def _place(self, index: int, node: dict[str, Any], world: np.ndarray) -> None:
         entry = self.document.item("meshes", node["mesh"])
         label = str(node.get("name") or entry.get("name") or f"node {index}")
-        if abs(np.linalg.det(world[:3, :3])) <= 1e-30 * np.linalg.norm(world[:3, :3]) ** 3:
-            self.notes.append(f"node '{label}' is flattened by a scale of 0 and is left out.")
-            return
         for number, primitive in enumerate(entry["primitives"]):
             mesh = self._mesh(node["mesh"], number, primitive, entry)
             if mesh is None:
                 continue
             material = self._wearable(self._material(primitive.get("material")), mesh, label)
-            name = self._unique(label)
+            name = self._names.unique(label)
             matrix = world.copy()
             matrix.setflags(write=False)
             dabs = read_node_dabs(self.document, index, number, material)
@@ -257,7 +260,7 @@ class _Reader:
             return None
         if primitive.get("targets"):
             self.notes.append(f"meshes[{index}].primitives[{number}]: its morph targets are not applied.")
-        positions = self.document.accessor(attributes["POSITION"]).astype(np.float64)
+        positions = as_float64(self.document.accessor(attributes["POSITION"]))
         indices = primitive.get("indices")
         order = np.arange(len(positions)) if indices is None else self.document.accessor(indices).astype(np.int64)
         if positions.ndim != 2 or positions.shape[1] != 3 or order.ndim != 1:
@@ -282,7 +285,7 @@ class _Reader:
     def _attribute(self, attributes: dict[str, Any], name: str, count: int) -> np.ndarray | None:
         if name not in attributes:
             return None
-        values = self.document.accessor(attributes[name]).astype(np.float64)
+        values = as_float64(self.document.accessor(attributes[name]))
         if len(values) != count:
             raise self.document.fail(f"{name} has {len(values)} elements for {count} positions; export the file again")
         return values
@@ -312,7 +315,7 @@ class _Reader:
             if light is None:
                 self.notes.append(f"light '{label}' gives no light and is left out.")
                 continue
-            light = replace(light, name=self._unique(light.name))
+            light = replace(light, name=self._names.unique(light.name))
             self.origins.lights[light.name] = index
             lights.append(light)
         return tuple(lights)
@@ -371,9 +374,9 @@ def _triangles(order: np.ndarray, mode: int, where: str) -> np.ndarray:
 def _rotation(quaternion: Any) -> np.ndarray:
     """Rotation matrix (3, 3) of a quaternion x, y, z, w."""
     q = np.array(quaternion, dtype=np.float64)
-    length = np.linalg.norm(q)
-    if not length > 0.0:
-        raise ValueError("a rotation quaternion is zero")
+    length = math.hypot(*q)
+    if not 0.0 < length < math.inf:
+        raise ValueError("a rotation quaternion is zero or not finite")
     x, y, z, w = q / length
     return np.array(
         [

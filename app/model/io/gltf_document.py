@@ -17,11 +17,15 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from ...base import files
 from ...base.errors import UserError
 
 GLB_MAGIC = b"glTF"
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 MAX_ELEMENTS = 100_000_000
+"""Of all accessors that are read; many may show the same bytes."""
+MAX_UNSTORED = 1_000_000
+"""Elements of an accessor that stands for zeros, which no bytes of the file hold."""
 
 _COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
@@ -38,6 +42,8 @@ class GltfDocument:
     other_chunks: list[tuple[int, bytes]] = field(default_factory=list)
     """GLB chunks of unknown type, kept for saving."""
     _buffers: dict[int, bytes] = field(default_factory=dict)
+    _checked: dict[str, list] = field(default_factory=dict)
+    _elements_read: int = 0
 
     def fail(self, message: str) -> UserError:
         """The one sentence about this file."""
@@ -46,8 +52,10 @@ class GltfDocument:
     def items(self, key: str) -> list[dict[str, Any]]:
         """A top-level array such as "nodes"; empty when absent."""
         values = self.json.get(key, [])
-        if not isinstance(values, list) or not all(isinstance(v, dict) for v in values):
-            raise self.fail(f"'{key}' must be an array of objects; export the file again")
+        if values is not self._checked.get(key):  # once: a file may have tens of thousands
+            if not isinstance(values, list) or not all(isinstance(v, dict) for v in values):
+                raise self.fail(f"'{key}' must be an array of objects; export the file again")
+            self._checked[key] = values
         return values
 
     def item(self, key: str, index: Any) -> dict[str, Any]:
@@ -66,9 +74,14 @@ class GltfDocument:
             raise self.fail(f"{label} has an unknown type; export the file again")
         if not isinstance(count, int) or not 0 < count <= MAX_ELEMENTS:
             raise self.fail(f"{label}.count must be from 1 to {MAX_ELEMENTS}, not {count}; export the file again")
+        self._elements_read += count
+        if self._elements_read > MAX_ELEMENTS:
+            raise self.fail(f"its accessors hold more than {MAX_ELEMENTS} elements together; export a simpler scene")
         dtype, width = np.dtype(_COMPONENTS[component]), _WIDTHS[kind]
         if "bufferView" in accessor:
             values = self._view(label, accessor["bufferView"], accessor.get("byteOffset", 0), dtype, width, count)
+        elif count > MAX_UNSTORED:
+            raise self.fail(f"{label} promises {count} elements that no buffer holds; export the file again")
         else:
             values = np.zeros((count, width), dtype)
         if "sparse" in accessor:
@@ -148,8 +161,10 @@ class GltfDocument:
         if "://" in uri:
             raise self.fail(f"{what} lies at '{uri[:60]}'; download it and refer to a file beside this one")
         target = self.path.parent / unquote(uri)
+        if not files.may_read(target, self.path.parent):
+            raise self.fail(f"{what} names {target}, which {files.OUTSIDE}")
         try:
-            return target.read_bytes()
+            return files.read_bytes(target, files.DATA_BYTES)
         except OSError as error:
             raise self.fail(f"{what} needs {target}, which cannot be read ({error.strerror}); copy it there") from None
 
@@ -158,7 +173,7 @@ def open_document(path: str | os.PathLike[str]) -> GltfDocument:
     """Open a .glb or .gltf. Raises UserError for anything that is not a sound glTF 2.0 container."""
     path = Path(path)
     try:
-        data = path.read_bytes()
+        data = files.read_bytes(path, files.DATA_BYTES)
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror}; check the path and its permissions") from None
     if data[:4] == GLB_MAGIC:
@@ -217,7 +232,10 @@ def _parsed(path: Path, data: bytes) -> dict[str, Any]:
 
 
 def save_document(document: GltfDocument, path: str | os.PathLike[str]) -> None:
-    """Write .glb or .gltf by the suffix of `path`, atomically, with every buffer embedded."""
+    """Write .glb or .gltf by the suffix of `path`, atomically, with every buffer embedded that something refers to.
+
+    A file that nothing refers to stays what it is: a name.
+    """
     from ...base.atomic import atomic_output
 
     path = Path(path)
@@ -225,7 +243,11 @@ def save_document(document: GltfDocument, path: str | os.PathLike[str]) -> None:
     content = dict(document.json)
     content["buffers"] = buffers = []
     binary = b""
+    used = _used_buffers(document)
     for index, entry in enumerate(document.items("buffers")):
+        if index not in used and is_file_name(entry.get("uri")):
+            buffers.append(entry)
+            continue
         data = document.buffer(index)
         kept = {k: v for k, v in entry.items() if k not in ("uri", "byteLength")} | {"byteLength": len(data)}
         if as_glb and index == 0:
@@ -244,16 +266,72 @@ def save_document(document: GltfDocument, path: str | os.PathLike[str]) -> None:
         temporary.write_bytes(_glb(text.encode(), binary, document.other_chunks) if as_glb else text.encode())
 
 
+def is_file_name(uri: Any) -> bool:
+    """Whether a uri names a file beside the document (neither data nor something on the net)."""
+    return isinstance(uri, str) and not uri.startswith("data:") and "://" not in uri
+
+
+def _used_buffers(document: GltfDocument) -> set[int]:
+    """Buffers that meshes, skins, animations, shown images and extensions refer to."""
+    accessors: set[int] = set()
+    for key, names in (("meshes", _ACCESSORS_OF_MESHES), ("skins", ("inverseBindMatrices",))):
+        accessors |= _numbers_at(document.json.get(key), names)
+    accessors |= _numbers_at(document.json.get("animations"), ("input", "output"))
+    holders: list[Any] = [document.items("accessors")[i] for i in accessors if i < len(document.items("accessors"))]
+    shown = _shown_images(document)
+    holders += [image for i, image in enumerate(document.items("images")) if i in shown]
+    holders += [document.json.get("meshes"), document.json.get("extensions")]  # compressed ones name views themselves
+    views = document.items("bufferViews")
+    used = [views[i] for i in _numbers_at(holders, ("bufferView",)) if i < len(views)]
+    return _numbers_at(used, ("buffer",))  # also a second one, of EXT_meshopt_compression
+
+
+def _shown_images(document: GltfDocument) -> set[int]:
+    """Images that textures, or lights made of pictures (EXT_lights_image_based), refer to."""
+    holders = [document.json.get("textures"), document.json.get("extensions")]
+    return _numbers_at(holders, ("source", "specularImages"))
+
+
+_ACCESSORS_OF_MESHES = ("attributes", "indices", "targets")
+
+
+def _numbers_at(values: Any, names: tuple[str, ...], inside: bool = False) -> set[int]:
+    """All whole numbers below the keys `names`, at any depth."""
+    found: set[int] = set()
+    waiting = [(values, inside)]
+    while waiting:
+        value, counts = waiting.pop()
+        if isinstance(value, dict):
+            waiting += [(each, counts or key in names) for key, each in value.items()]
+        elif isinstance(value, list):
+            waiting += [(each, counts) for each in value]
+        elif counts and type(value) is int and value >= 0:
+            found.add(value)
+    return found
+
+
 def _with_embedded_images(document: GltfDocument, content: dict[str, Any]) -> dict[str, Any]:
-    """Images in files beside the old place would not be found from the new one."""
+    """Images in files beside the old place would not be found from the new one; only what is a picture goes along."""
     images = [dict(image) for image in document.items("images")]
+    shown = _shown_images(document)
     for index, image in enumerate(images):
-        uri = image.get("uri", "data:")
-        if not uri.startswith("data:") and "://" not in uri:
-            kind = "image/png" if uri.lower().endswith(".png") else "image/jpeg"
-            data = document.resource(uri, f"images[{index}]")
+        if index not in shown or not is_file_name(image.get("uri")):
+            continue
+        data = document.resource(image["uri"], f"images[{index}]")
+        kind = next((kind for start, kind in _IMAGES.items() if data.startswith(start)), None)
+        if kind is not None:
             image["uri"] = f"data:{image.get('mimeType', kind)};base64," + base64.b64encode(data).decode()
     return content | ({"images": images} if images else {})
+
+
+_IMAGES = {
+    b"\x89PNG": "image/png",
+    b"\xff\xd8\xff": "image/jpeg",
+    b"RIFF": "image/webp",
+    b"\xabKTX 20": "image/ktx2",
+    b"DDS ": "image/vnd-ms.dds",
+}
+"""How files of pictures begin."""
 
 
 def _glb(text: bytes, binary: bytes, others: list[tuple[int, bytes]]) -> bytes:

@@ -77,8 +77,11 @@ class _Writer:
         """Bring the document in line with `scene`."""
         self._materials_in_place(scene)
         new = {o.name: o for o in scene.objects}
-        for node in sorted({node for node, _ in self.origins.objects.values()}):
-            self._update_node(node, new)
+        names: dict[int, dict[int, str]] = {}
+        for name, (node, number) in self.origins.objects.items():
+            names.setdefault(node, {})[number] = name
+        for node in sorted(names):
+            self._update_node(node, names[node], new)
         for item in scene.objects:
             if item.name not in self.origins.objects:
                 entry = {"name": item.name, "mesh": self._mesh(item)}
@@ -94,10 +97,9 @@ class _Writer:
 
     # -- objects --------------------------------------------------------------------------
 
-    def _update_node(self, node: int, new: dict[str, SceneObject]) -> None:
-        """Rewrite a node's mesh, transform or both where its objects changed."""
+    def _update_node(self, node: int, names: dict[int, str], new: dict[str, SceneObject]) -> None:
+        """Rewrite a node's mesh, transform or both where its objects changed; `names`: primitive -> object."""
         entry = self.json["nodes"][node]
-        names = {number: name for name, (at, number) in self.origins.objects.items() if at == node}
         primitives = self.json["meshes"][entry["mesh"]]["primitives"]
         kept: dict[int, dict[str, Any]] = {}
         moved: dict[int, SceneObject] = {}
@@ -222,8 +224,9 @@ class _Writer:
     # -- lights and camera ----------------------------------------------------------------
 
     def _lights(self, scene: Scene) -> None:
+        left = {light.name for light in scene.lights}
         for name, index in self.origins.lights.items():
-            if name not in {light.name for light in scene.lights}:
+            if name not in left:
                 del self.json["nodes"][index]["extensions"][LIGHTS]
         for light in scene.lights:
             node = self.origins.lights.get(light.name)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...base import files
 from ...base.errors import UserError
 from ..geometry.mesh import Mesh, make_mesh
 from ..geometry.mesh_health import weld_map
@@ -56,11 +57,11 @@ def load_mesh(path: str | os.PathLike[str], smooth: bool | float | None = None, 
 
 def _read(path: Path, suffix: str) -> RawMesh:
     try:
-        data = path.read_bytes()
+        data = files.read_bytes(path, files.DATA_BYTES)
     except FileNotFoundError:
         raise UserError(f"{path}: no such mesh file; check the path, which is relative to the scene file") from None
     except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
+        raise UserError(f"{path}: cannot be read ({error.strerror}); check the file and its permissions") from None
     if not data:
         raise UserError(f"{path}: the file is empty; export the mesh again")
     if suffix == ".ply":

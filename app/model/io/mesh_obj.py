@@ -12,6 +12,8 @@ from ...base.errors import UserError
 from .mesh_raw import RawMesh, fan_corners
 
 _POSITION, _TEXTURE, _NORMAL = range(3)
+_LARGEST = 1 << 40
+"""Number of a vertex that no file can hold."""
 _WIDTHS = {"v": 3, "vt": 2, "vn": 3}
 
 
@@ -69,13 +71,13 @@ def _numbers(rows: list[tuple[int, str]], width: int, path: str) -> np.ndarray:
             return np.array([(*row, "0")[:2] for row in words], dtype=np.float64)
     except ValueError:
         pass
-    for (number, rest), row in zip(rows, words, strict=True):
+    for (number, _), row in zip(rows, words, strict=True):
         try:
             if len(list(map(float, row[:width]))) >= width:
                 continue
         except ValueError:
             pass
-        raise UserError(f"{path}: line {number}: expected {width} numbers, found '{rest.strip()[:60]}'")
+        raise UserError(f"{path}: line {number}: expected {width} numbers; export the mesh again")
     raise UserError(f"{path}: the OBJ file's numbers cannot be read; export the mesh again")
 
 
@@ -120,10 +122,10 @@ def _faces(kinds: dict[str, list[tuple[int, str]]], path: str) -> tuple[np.ndarr
             try:
                 for column, part in enumerate(word.split("/")):
                     corner[column] = int(part) if part or column == _POSITION else 0
+                    if abs(corner[column]) > _LARGEST:
+                        raise ValueError
             except (ValueError, IndexError):
-                raise UserError(
-                    f"{path}: line {number}: '{word[:40]}' is no face corner; export the mesh again"
-                ) from None
+                raise UserError(f"{path}: line {number} holds what is no face corner; export the mesh again") from None
             for column, index in enumerate(corner):
                 if index < 0:  # counts back from the last one defined so far
                     corner[column] = max(index + 1 + int(np.searchsorted(defined[column], number)), -1)

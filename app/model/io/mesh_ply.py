@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...base.errors import UserError
-from .mesh_raw import RawMesh, fan_corners
+from .mesh_raw import RawMesh, as_float64, fan_corners
 
 _TYPES = {
     "char": "i1",
@@ -32,6 +32,8 @@ _TYPES = {
     "float64": "f8",
 }
 _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
+_LARGEST = 1 << 40
+"""Number of a vertex, or of what a list holds, that no file can have."""
 _FACE_LISTS = ("vertex_indices", "vertex_index")
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 
@@ -57,6 +59,8 @@ def read_ply(data: bytes, path: str) -> RawMesh:
     reader = _AsciiBody(data[body:], path) if not order else _BinaryBody(data, body, order, path)
     vertex = face = None
     for element in elements:
+        if not element.properties:
+            continue  # takes no place, whatever its number
         columns = reader.element(element)
         if element.name == "vertex":
             vertex = columns
@@ -71,6 +75,8 @@ def read_ply(data: bytes, path: str) -> RawMesh:
     sizes, indices = corners
     if not len(sizes):
         raise UserError(f"{path}: the PLY file has no faces; a point cloud cannot be rendered")
+    if not (np.abs(indices) < _LARGEST).all():
+        raise UserError(f"{path}: a face of the PLY file names no vertex; export the mesh again")
     triangles = indices.astype(np.int64)[fan_corners(sizes)]
     vertices = _stack(vertex, ("x", "y", "z"))
     in_range = bool(((triangles >= 0) & (triangles < len(vertices))).all())
@@ -84,7 +90,7 @@ def read_ply(data: bytes, path: str) -> RawMesh:
 
 
 def _stack(columns: dict[str, np.ndarray], names: tuple[str, ...]) -> np.ndarray:
-    return np.stack([columns[name].astype(np.float64) for name in names], axis=1)
+    return np.stack([as_float64(columns[name]) for name in names], axis=1)
 
 
 def _header(data: bytes, path: str) -> tuple[str, list[_Element], int]:
@@ -115,16 +121,21 @@ def _header(data: bytes, path: str) -> tuple[str, list[_Element], int]:
                 case _:
                     raise ValueError
         except (KeyError, ValueError, IndexError):
-            raise UserError(f"{path}: line {number} of the PLY header is not valid: '{line[:60]}'") from None
+            raise UserError(f"{path}: line {number} of the PLY header is not valid; export the mesh again") from None
+        names = [p.name for p in elements[-1].properties] if elements else []
+        if len(set(names)) < len(names):
+            raise UserError(
+                f"{path}: line {number} of the PLY header names a property a second time; export the mesh again"
+            )
     if order is None:
         raise UserError(f"{path}: the PLY header names no format; export the mesh again")
     return order, elements, line_end + 1
 
 
 def _truncated(path: str, element: _Element, held: int) -> UserError:
+    what = f"of '{element.name}'" if element.name in ("vertex", "face") else "of something else"
     return UserError(
-        f"{path}: the header promises {element.count} of '{element.name}', but the file ends after {held}; "
-        f"copy or export it again"
+        f"{path}: the header promises {element.count} {what}, but the file ends after {held}; copy or export it again"
     )
 
 
@@ -146,7 +157,7 @@ class _BinaryBody:
                 return {
                     p.name: rows[p.name]
                     if p.count_kind is None
-                    else (np.full(element.count, sizes[p.name]), rows[p.name].reshape(-1))
+                    else (np.full(element.count, sizes.get(p.name, 0)), rows[p.name].reshape(-1))
                     for p in element.properties
                 }
         elif not sizes:
@@ -211,6 +222,11 @@ class _BinaryBody:
             raise UserError(f"{self._path}: {rest} bytes follow what the PLY header promises; export the mesh again")
 
 
+def _size(number: float) -> int:
+    """A list's length in an ASCII file; what is none is longer than any file."""
+    return int(number) if abs(number) < _LARGEST else _LARGEST
+
+
 def _joined(sizes: list[int], parts: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Lists of all rows one after another; an element may well have no rows."""
     return np.array(sizes, np.int64), np.concatenate(parts) if parts else np.zeros(0)
@@ -223,8 +239,8 @@ class _AsciiBody:
         self._path, self._at = path, 0
         try:
             self._values = np.array(body.split(), dtype=np.float64)
-        except ValueError as error:
-            raise UserError(f"{path}: the PLY body holds something that is no number ({error})") from None
+        except ValueError:
+            raise UserError(f"{path}: the PLY body holds something that is no number; export the mesh again") from None
 
     def element(self, element: _Element) -> dict:
         """As `_BinaryBody.element`."""
@@ -237,7 +253,7 @@ class _AsciiBody:
             rows = rest[: element.count * width].reshape(element.count, width)
             return {p.name: rows[:, i] for i, p in enumerate(element.properties)}
         if len(element.properties) == 1 and element.count and len(rest):
-            size = int(rest[0])
+            size = _size(rest[0])
             rows = rest[: element.count * (size + 1)]
             if size >= 0 and len(rows) == element.count * (size + 1):
                 rows = rows.reshape(element.count, size + 1)
@@ -258,7 +274,7 @@ class _AsciiBody:
                 if p.count_kind is not None:
                     if at >= end:
                         raise _truncated(self._path, element, row)
-                    size = max(0, int(values[at]))
+                    size = max(0, _size(values[at]))
                     at += 1
                 if at + size > end:
                     raise _truncated(self._path, element, row)

@@ -17,6 +17,12 @@ class RawMesh:
     uv: np.ndarray | None = None
 
 
+def as_float64(values: np.ndarray) -> np.ndarray:
+    """`values` as float64, also the NaNs of damaged files, over which a plain cast warns."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(np.float64)
+
+
 def fan_corners(sizes: np.ndarray) -> np.ndarray:
     """Corner numbers of the triangles of consecutive polygons with `sizes` corners, int64 (T, 3).
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base.errors import UserError
 from ..geometry.mesh_health import weld_map
-from .mesh_raw import RawMesh
+from .mesh_raw import RawMesh, as_float64
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEADER_BYTES = 84
@@ -18,8 +18,8 @@ def read_stl(data: bytes, path: str) -> RawMesh:
     """Welded vertices and triangles."""
     promised = int.from_bytes(data[80:_HEADER_BYTES], "little") if len(data) >= _HEADER_BYTES else -1
     held = (len(data) - _HEADER_BYTES) / _FACET.itemsize
-    if promised == held:  # before looking for "solid", with which some binary files begin too
-        corners = np.frombuffer(data, _FACET, promised, _HEADER_BYTES)["corners"].astype(np.float64)
+    if promised == held >= 0:  # before looking for "solid", with which some binary files begin too
+        corners = as_float64(np.frombuffer(data, _FACET, promised, _HEADER_BYTES)["corners"])
     elif re.match(rb"\s*solid\b", data) and b"facet" in data:
         corners = _ascii_corners(data, path)
     else:
@@ -44,8 +44,8 @@ def _ascii_corners(data: bytes, path: str) -> np.ndarray:
         )
     try:
         values = np.array(b" ".join(rows).replace(b"vertex", b"").split(), dtype=np.float64)
-    except ValueError as error:
-        raise UserError(f"{path}: a vertex of the STL file is not three numbers ({error})") from None
+    except ValueError:
+        raise UserError(f"{path}: a vertex of the STL file is not three numbers; export the mesh again") from None
     if values.size != 9 * facets:
         raise UserError(f"{path}: a vertex of the STL file is not three numbers; export the mesh again")
     return values.reshape(-1, 3, 3)

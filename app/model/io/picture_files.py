@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ...base import files
 from ...base.errors import UserError
+from ...base.image_io import MAX_PIXELS
 from ...base.tone_map import srgb_eotf
 
 PICTURE_SUFFIXES = (".hdr", ".pic", ".exr", ".npy", ".png", ".jpg", ".jpeg")
-MAX_PIXELS = 1 << 26
-"""805 MB as float32; a mistake rather than a wish."""
 _NOISE = 1e-3
 """Negatives this far below 0, as a share of the brightest value, come from compression and become 0."""
 
@@ -64,8 +64,11 @@ def decode_8bit(data: bytes, where: str) -> tuple[np.ndarray, tuple[str, ...]]:
 
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit below says it better
+            # The limit below says it better; and damaged Exif turns nothing.
+            warnings.simplefilter("ignore", UserWarning)
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             image = Image.open(io.BytesIO(data), formats=("PNG", "JPEG"))
+            upright = ImageOps.exif_transpose(image) if image.width * image.height <= MAX_PIXELS else image
         if image.width * image.height > MAX_PIXELS:
             raise UserError(
                 f"{where}: {image.width} × {image.height} pixels are more than {MAX_PIXELS >> 20} million; make "
@@ -75,7 +78,6 @@ def decode_8bit(data: bytes, where: str) -> tuple[np.ndarray, tuple[str, ...]]:
             raise UserError(
                 f"{where}: more than 8 bits a channel in a grey PNG are not understood; save it as 8 bit or as .exr"
             )
-        upright = ImageOps.exif_transpose(image)
         notes = _transparency(upright, where)
         encoded = np.asarray(upright.convert("RGB"))
     except UnidentifiedImageError as error:
@@ -89,11 +91,11 @@ def decode_8bit(data: bytes, where: str) -> tuple[np.ndarray, tuple[str, ...]]:
 
 def _bytes_of(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return files.read_bytes(path, files.DATA_BYTES)
     except FileNotFoundError:
         raise UserError(f"cannot read {path}: there is no such file; check the name") from None
     except OSError as error:
-        raise UserError(f"cannot read {path}: {error.strerror}; check its permissions") from None
+        raise UserError(f"cannot read {path}: {error.strerror}; check the file and its permissions") from None
 
 
 def _transparency(image, where: str) -> tuple[str, ...]:

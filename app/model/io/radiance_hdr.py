@@ -52,7 +52,7 @@ def _exposure(header: list[str], where: str) -> tuple[float, tuple[str, ...]]:
     for line in header[1:]:
         key, _, value = (part.strip() for part in line.partition("="))
         if key == "FORMAT" and value != _RGB_FORMAT:
-            raise UserError(f"{where}: its format is '{value[:40]}', not {_RGB_FORMAT}; convert it to RGB")
+            raise UserError(f"{where}: its format is not {_RGB_FORMAT}; convert it to RGB")
         if key == "EXPOSURE":
             try:
                 factor = float(value)
@@ -60,7 +60,7 @@ def _exposure(header: list[str], where: str) -> tuple[float, tuple[str, ...]]:
                 factor = 0.0
             exposure *= factor
             if not 1e-30 < factor < 1e30 or not 1e-30 < exposure < 1e30:
-                raise UserError(f"{where}: its EXPOSURE is '{value[:40]}', not a number above 0; export it again")
+                raise UserError(f"{where}: its EXPOSURE is not a number above 0; export it again")
         if key == "PRIMARIES" and not value.startswith("0.64"):
             notes.append(f"{where}: its own primaries are taken for those of Rec.709.")
     return exposure, tuple(notes)
@@ -73,10 +73,7 @@ def _resolution(data: bytes, start: int, where: str) -> tuple[int, int, int]:
     if len(words) != 4 or not (words[1].isdecimal() and words[3].isdecimal()):
         raise UserError(f"{where}: the line that gives its size is missing; copy or export it again")
     if (words[0], words[2]) != ("-Y", "+X"):
-        raise UserError(
-            f"{where}: its pixels run '{words[0]} {words[2]}', not from the top left ('-Y +X'); turn and export "
-            "it again"
-        )
+        raise UserError(f"{where}: its pixels do not run from the top left ('-Y +X'); turn and export it again")
     height, width = int(words[1]), int(words[3])
     if not (0 < height <= _MAX_SIDE and 0 < width <= _MAX_SIDE):
         raise UserError(f"{where}: its size is {width} × {height}; each side must be 1 to {_MAX_SIDE} pixels")

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ...base import files
 from ...base.errors import UserError
 from ..lights.light_file import read_light
 from ..materials.dielectric import DEFAULT_GLASS
@@ -44,8 +45,10 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
     rendered as it stands.
     """
     path = Path(path)
-    if not path.is_file():
-        problem = "is a folder, not a scene file" if path.is_dir() else "does not exist"
+    if not files.is_file(path):
+        problem = "is a folder, not a scene file" if os.path.isdir(path) else "does not exist"
+        if os.path.exists(path) and not os.path.isdir(path):
+            problem = "is a device or a pipe, not a scene file"
         raise UserError(f"{path} {problem}; give a .toml, .glb or .gltf scene or a .ply, .obj or .stl mesh")
     suffix = path.suffix.lower()
     if suffix == ".toml":
@@ -60,13 +63,14 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
         raise UserError(
             f"{path}: '{path.suffix}' is not a kind of scene; use .toml, {', '.join(GLTF_SUFFIXES + MESH_SUFFIXES)}"
         )
-    notes = [note for note in check_scene(scene, path.name) if note not in scene.notes]
+    told = set(scene.notes)
+    notes = [note for note in check_scene(scene, path.name) if note not in told]
     return replace(scene, notes=scene.notes + tuple(notes))
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        return tomllib.loads(files.read_text(path, files.SCENE_BYTES))
     except tomllib.TOMLDecodeError as error:
         raise UserError(f"{path.name} is not valid TOML: {error}; texts need quotes and keys one line each") from error
     except RecursionError as error:
@@ -75,8 +79,10 @@ def _read_toml(path: Path) -> dict[str, Any]:
         ) from error
     except UnicodeDecodeError as error:
         raise UserError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8") from error
+    except ValueError as error:  # Python's own, about an integer of thousands of digits
+        raise UserError(f"{path.name} holds a whole number that is too long; write it as 1e30, say") from error
     except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror}") from error
+        raise UserError(f"{path} cannot be read: {error.strerror}; give another scene file") from error
 
 
 def _scene_from_table(table: SceneTable) -> Scene:
@@ -111,9 +117,11 @@ def _read_lights(table: SceneTable, around: Surroundings, notes: list[str], dark
         notes.append("No lights given: a white sun from behind on the left was added.")
         return (default_light(),)
     lights = tuple(read_light(entry, i, around) for i, entry in enumerate(table.tables("lights")))
+    seen: set[str] = set()
     for i, light in enumerate(lights):
-        if light.name in [other.name for other in lights[:i]]:
+        if light.name in seen:
             table.fail(f"lights[{i}].name", f"is '{light.name}', which another light has already; give each its own")
+        seen.add(light.name)
     return lights
 
 

@@ -1,4 +1,5 @@
-"""Picture files beside a scene that is saved: named where there is one, written where a picture has none."""
+"""Files of a scene that is saved: named where the scene may read them, copied beside it where not, and pictures written
+where they have none."""
 
 from __future__ import annotations
 
@@ -8,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ...base import files
+from ...base.atomic import atomic_output
 from ...base.errors import UserError
 from ...base.tone_map import srgb_eotf, srgb_oetf
 
@@ -15,20 +18,13 @@ from ...base.tone_map import srgb_eotf, srgb_oetf
 def picture_file(rgb: np.ndarray, source: str | None, scene_path: Path) -> str:
     """Name, relative to the scene file `scene_path`, of a file that holds `rgb` float32 (H, W, 3), row 0 the top.
 
-    That is `source` while it exists. A picture without one (out of a .glb, say) is written into the folder
-    `<stem>_pictures` beside the scene, as PNG where 8 bits hold it exactly, else as EXR. Raises UserError when it
-    cannot be.
+    That is `source` while it exists (`kept_name`). A picture without one (out of a .glb, say) is written into the
+    folder `<stem>_pictures` beside the scene, as PNG where 8 bits hold it exactly, else as EXR. Raises UserError when
+    it cannot be.
     """
-    if source is not None and Path(source).is_file():
-        return relative_name(source, scene_path.parent)
-    folder = scene_path.parent / f"{scene_path.stem}_pictures"
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise UserError(
-            f"cannot write the pictures of {scene_path}: {folder} cannot be made ({error.strerror}); choose "
-            "another name"
-        ) from error
+    if source is not None and files.is_file(source):
+        return kept_name(source, scene_path)
+    folder = folder_beside(scene_path, "pictures")
     levels = eight_bit_levels(rgb)
     target = folder / f"{picture_name(rgb)}{'.exr' if levels is None else '.png'}"
     if levels is None:
@@ -36,8 +32,6 @@ def picture_file(rgb: np.ndarray, source: str | None, scene_path: Path) -> str:
 
         write_image(target, rgb)
     else:
-        from ...base.atomic import atomic_output
-
         with atomic_output(target) as temporary:
             temporary.write_bytes(png_bytes(levels))
     return relative_name(str(target), scene_path.parent)
@@ -70,6 +64,39 @@ def png_bytes(levels: np.ndarray) -> bytes:
     buffer = io.BytesIO()
     Image.fromarray(levels).save(buffer, "PNG")
     return buffer.getvalue()
+
+
+def kept_name(source: str, scene_path: Path) -> str:
+    """Name of the file `source`, relative to the scene file `scene_path`, with which that scene can be read again.
+
+    A file that the scene may not read from there (`files.may_read`) is copied into the folder `<stem>_files` beside it.
+    Raises UserError when it cannot be.
+    """
+    if files.may_read(source, scene_path.parent) or not files.is_file(source):
+        return relative_name(source, scene_path.parent)
+    try:
+        data = files.read_bytes(source, files.DATA_BYTES)
+    except OSError as error:
+        raise UserError(f"cannot copy {source} beside {scene_path}: {error.strerror}; check the file") from error
+    name = Path(source)
+    digest = hashlib.sha256(data).hexdigest()[:12]
+    target = folder_beside(scene_path, "files") / f"{name.stem[:60]}_{digest}{name.suffix}"
+    if not target.exists():  # the name says that it holds the same
+        with atomic_output(target) as temporary:
+            temporary.write_bytes(data)
+    return relative_name(str(target), scene_path.parent)
+
+
+def folder_beside(scene_path: Path, what: str) -> Path:
+    """The folder `<stem>_<what>` beside a scene file, made where it is missing. Raises UserError when it cannot be."""
+    folder = scene_path.parent / f"{scene_path.stem}_{what}"
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise UserError(
+            f"cannot write the {what} of {scene_path}: {folder} cannot be made ({error.strerror}); choose another name"
+        ) from error
+    return folder
 
 
 def relative_name(target: str, folder: Path) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ...base import files
 from ...base.atomic import atomic_output, check_writable
 from ...base.errors import UserError
 from ..geometry.mesh import Mesh
@@ -31,7 +32,7 @@ from ..scene_objects import INLINE
 from ..scene_render import render_values
 from ..texture import Environment
 from .scene_file import load_scene
-from .scene_pictures import relative_name
+from .scene_pictures import folder_beside, kept_name, relative_name
 from .toml_text import toml_text
 
 INLINE_TRIANGLES = 64
@@ -41,17 +42,17 @@ INLINE_TRIANGLES = 64
 def save_scene(scene: Scene, path: str | os.PathLike[str], over: bool = False) -> None:
     """Write `scene` to the TOML file `path`, whole or not at all.
 
-    Meshes without a description go to PLY files in the folder `<stem>_meshes` beside it, pictures
-    without a file to `<stem>_pictures`. `over`: where `path` holds a scene already, what did not change keeps the
-    words, order and comments it has there.
+    Meshes without a description go to PLY files in the folder `<stem>_meshes` beside it, pictures without a file to
+    `<stem>_pictures`, copies of files that the scene may not read from there to `<stem>_files`. `over`: where `path`
+    holds a scene already, what did not change keeps the words, order and comments it has there.
     Raises UserError when something cannot be written.
     """
     path = Path(path)
     check_writable(path)
     values, before = scene_values(scene, path), ""
-    if over and path.is_file():
+    if over and files.is_file(path):
         with suppress(UserError, OSError, ValueError):
-            before = path.read_text(encoding="utf-8-sig")
+            before = files.read_text(path, files.SCENE_BYTES)
             values = _kept(scene, path, tomllib.loads(before))
     text = toml_text(values, before)
     with atomic_output(path) as temporary:
@@ -209,21 +210,14 @@ def _mesh(mesh: Mesh, path: Path) -> dict[str, Any]:
         values = dict(recipe)
         for key in ("mesh", "heights"):
             if isinstance(values.get(key), str):
-                values[key] = relative_name(values[key], path.parent)
+                values[key] = kept_name(values[key], path)
         return values
     if mesh.corner_normals is None and len(mesh.triangles) <= INLINE_TRIANGLES:
         uv = {} if mesh.uv is None else {"uv": mesh.uv.reshape(-1, 2).tolist()}
         return {"shape": INLINE, "vertices": mesh.vertices.tolist(), "triangles": mesh.triangles.tolist()} | uv
     from .mesh_io import save_ply
 
-    folder = path.parent / f"{path.stem}_meshes"
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise UserError(
-            f"cannot write the meshes of {path}: {folder} cannot be made ({error.strerror}); choose another name"
-        ) from error
-    target = folder / f"{_file_stem(mesh)}.ply"
+    target = folder_beside(path, "meshes") / f"{_file_stem(mesh)}.ply"
     save_ply(mesh, target)
     return {"mesh": relative_name(str(target), path.parent)}
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn, cast
 
+from ...base import files
 from ...base.errors import UserError, nearest_names
 from ..vectors import Vec3
 
@@ -259,9 +260,11 @@ class SceneTable:
         return {name: outer.table(name) for name in outer._values}  # type: ignore[misc]
 
     def existing_file(self, key: str) -> Path:
-        """A file named relative to the scene file's folder; must exist."""
+        """A file named relative to the scene file's folder; must exist, where the scene may read."""
         path = self.file.parent / self.string(key)
-        if not path.is_file():
+        if not files.may_read(path, self.file.parent):
+            self.fail(key, f"names {path}, which {files.OUTSIDE}")
+        if not files.is_file(path):
             self.fail(key, f"names {path}, which is not a file")
         return path
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...base import files
 from ...base.errors import UserError
 from ...base.paths import assets_dir
 from ..io.scene_table import MAX_MAGNITUDE
@@ -103,12 +104,12 @@ def read_ies(path: str | os.PathLike[str]) -> Profile:
     """The profile in `path`. Raises UserError, one sentence with the file and a remedy, for what cannot be used."""
     path = Path(path)
     try:
-        if not path.is_file():
+        if not files.is_file(path):
             raise UserError(f"{path} is not a file; choose a .ies file")
         if path.stat().st_size > MAX_BYTES:
             raise UserError(f"{path} is longer than {MAX_BYTES >> 20} MiB, as no lamp's file is; choose a .ies file")
         # Makers write their names in any code page; numbers are ASCII in all of them.
-        text = path.read_bytes().decode("latin-1")
+        text = files.read_bytes(path, MAX_BYTES).decode("latin-1")
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror}; choose another file") from error
     return _Numbers(path, text).profile()
@@ -135,7 +136,7 @@ class _Numbers:
             self._take(1, "the lamp's place in the luminaire")
             self._take(2 * self._count("tilt angles"), "the factors for a tilted lamp")
         elif self._tilt != "NONE":
-            raise self._error(f"keeps its tilt factors in {self._tilt}, which is not read", "write TILT=NONE into it")
+            raise self._error("keeps its tilt factors in another file, which is not read", "write TILT=NONE into it")
         _, _, multiplier = self._take(3, "lamps, lumens and multiplier")
         verticals, horizontals = self._count("vertical angles"), self._count("horizontal angles")
         kind = int(self._take(1, "the photometric type")[0])
@@ -208,8 +209,7 @@ class _Numbers:
         try:
             numbers = [float(word) for word in words]
         except ValueError:
-            wrong = next(word for word in words if not _is_number(word))
-            raise self._error(f"has '{wrong[:20]}' among {what}, which is no number") from None
+            raise self._error(f"has something among {what} that is no number") from None
         if not all(map(math.isfinite, numbers)):
             raise self._error(f"has a number that is not finite among {what}")
         return numbers
@@ -228,11 +228,3 @@ def _from_zero(horizontal: np.ndarray, candela: np.ndarray) -> tuple[np.ndarray,
     at = int(np.flatnonzero(horizontal == 0.0)[0])
     turned = np.concatenate([horizontal[at:], horizontal[1 : at + 1] + 360.0])
     return turned, np.concatenate([candela[at:], candela[1 : at + 1]])
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
+from ...base import files
 from ...base.errors import UserError, suggestion
 from .colorimetry import (
     K_M,
@@ -235,7 +235,7 @@ def read_csv(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
     """
     shown = os.fspath(path)
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
+        text = files.read_text(path, files.TABLE_BYTES)
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not text"
         raise UserError(f"cannot read the spectrum {shown}: {reason}; give a CSV of wavelength_nm, power") from error
@@ -252,12 +252,10 @@ def read_csv(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
             continue
         header_allowed = False
         if len(parsed) != 2 or len(numbers) != 2:
-            raise UserError(
-                f"{shown}, line {number}: expected two numbers, wavelength_nm and power, but found '{raw.strip()}'"
-            )
+            raise UserError(f"{shown}, line {number}: expected two numbers, wavelength_nm and power")
         wavelength, value = numbers
         if not (math.isfinite(wavelength) and math.isfinite(value)):
-            raise UserError(f"{shown}, line {number}: '{raw.strip()}' holds no finite number; remove the row")
+            raise UserError(f"{shown}, line {number} holds a number that is not finite; remove the row")
         rows.append((wavelength, value))
     if len(rows) < 2:
         raise UserError(f"{shown}: a spectrum needs two or more rows of wavelength_nm, power (found {len(rows)})")

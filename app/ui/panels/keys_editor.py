@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -160,6 +161,7 @@ def _row(index: int, key: Key, names: dict[str, str], known: dict[str, Parameter
     widgets.tooltip("Delete this key.")
     if deleted:
         return None, False
+    moved, changed = moved and math.isfinite(time_s), changed and math.isfinite(value)  # "nan" can be typed
     after = replace(
         key,
         time_s=float(f"{time_s:.7g}") if moved else key.time_s,

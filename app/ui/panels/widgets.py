@@ -21,6 +21,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from ...edit.state import State
+from ...model.io.scene_table import MAX_MAGNITUDE
 from ...model.scene import Vec3
 from .. import item_rects, theme
 from .rows import (
@@ -62,7 +63,8 @@ FloatResult = tuple[bool, float, bool]
 
 Choice = TypeVar("Choice", bound=str)
 
-_FLOAT_MAX = 3e38
+_LARGEST = MAX_MAGNITUDE
+"""Numbers beyond could not be saved either."""
 
 
 def slider(
@@ -110,7 +112,7 @@ def reciprocal_slider(
         changed, moved = imgui.slider_float(f"##{label}", reverse, 1.0 / low, 0.0, shown)
         after = math.inf if abs(moved) < 1e-4 else float(f"{1.0 / moved:.5g}")
     explain(label, tip, unit, how_to(None if reset is None else "none" if math.isinf(reset) else format % reset))
-    return _settled(changed, value, after, reset, label_hit)
+    return _settled(changed, value, after, reset, label_hit, infinite=True)
 
 
 def drag(
@@ -132,11 +134,12 @@ def drag(
     """
     label_hit = begin_row(label)
     step = speed if speed is not None else max(abs(value) * 5e-3, 1e-4)
-    ends = max(low, -_FLOAT_MAX), min(high, _FLOAT_MAX)
+    ends = max(low, -_LARGEST), min(high, _LARGEST)
     flags = _flags(logarithmic, True) | _no_typing_by_double_click()
     changed, moved = imgui.drag_float(f"##{label}", value, step, *ends, _with_unit(format, unit), flags)
     explain(label, tip, unit, how_to(None if reset is None else (format % reset).strip()))
-    return _settled(changed, value, _tidy(moved), reset, label_hit)
+    # What was clamped to the end of all numbers was infinity, or meant to be.
+    return _settled(changed, value, _tidy(moved) if abs(moved) < 0.999 * _LARGEST else math.inf, reset, label_hit)
 
 
 def vec3(
@@ -159,6 +162,7 @@ def vec3(
     if reset is not None and (label_hit or double_clicked()):
         imgui.internal.clear_active_id()
         return reset != value, reset, False
+    changed = changed and all(abs(number) <= _LARGEST for number in after)
     # Only what moved is rounded to float32: the other two keep their digits.
     x, y, z = (_tidy(b) if np.float32(b) != np.float32(a) else a for a, b in zip(before, after, strict=True))
     return changed, (x, y, z) if changed else value, imgui.is_item_active()
@@ -222,7 +226,7 @@ def colour(label: str, rgb: Vec3, *, tip: str) -> tuple[bool, Vec3, bool]:
     changed, encoded = imgui.color_edit3(f"##{label}", [_encode(c) for c in rgb], flags)
     active = imgui.is_item_active()
     explain(label, tip)
-    if not changed:
+    if not changed or not all(map(math.isfinite, encoded[:3])):
         return False, rgb, active
     r, g, b = (_tidy(_decode(c)) for c in encoded[:3])
     return True, (r, g, b), active
@@ -303,11 +307,15 @@ def holding(state: State, active: bool) -> State:
 # ---- parts --------------------------------------------------------------------------------
 
 
-def _settled(changed: bool, before: float, after: float, reset: float | None, label_hit: bool) -> FloatResult:
+def _settled(
+    changed: bool, before: float, after: float, reset: float | None, label_hit: bool, infinite: bool = False
+) -> FloatResult:
     """What the last item and a double click on it or its label come to."""
     if reset is not None and (label_hit or double_clicked()):
         imgui.internal.clear_active_id()  # else the slider, still held, takes the value back in the next frame
         return reset != before, reset, False
+    # "nan", "inf" and what float32 does not hold can be typed, and are no numbers; infinity where it has a meaning.
+    changed = changed and (abs(after) <= _LARGEST or (infinite and math.isinf(after)))
     return changed, after if changed else before, imgui.is_item_active()
 
 

@@ -1,0 +1,108 @@
+"""How the program ends: by signals, with nothing to print to, and with full disks at each of its outputs."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from spectrasplat.__main__ import main
+from spectrasplat.base.interrupts import Interruption, Terminated, exit_code_of, interrupt_flag, terminations_raise
+
+from tests.fuzz.kills import COMMANDS, SCENE, kill_one, left_behind
+
+TINY = ["render", "scene.toml", "-o", "out.npy", "--size", "16x9", "--photons", "1k", "--spp", "1"]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "scene.toml").write_text(SCENE)
+    return tmp_path
+
+
+def test_signals_become_exit_codes() -> None:
+    assert [exit_code_of(e) for e in (KeyboardInterrupt(), Terminated(15), Terminated(1))] == [130, 143, 129]
+    assert Interruption().exit_code == 0
+    with terminations_raise(), pytest.raises(Terminated, match="SIGTERM"):
+        os.kill(os.getpid(), signal.SIGTERM)
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_the_first_signal_asks_and_the_second_insists(number: int, capsys: pytest.CaptureFixture[str]) -> None:
+    with interrupt_flag() as interrupted:
+        assert not interrupted()
+        os.kill(os.getpid(), number)
+        assert interrupted() and interrupted.exit_code == 128 + number
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), number)
+    assert "what is done will be written" in capsys.readouterr().err
+
+
+def test_what_nohup_ignores_stays_ignored() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with terminations_raise(), interrupt_flag() as interrupted:
+            os.kill(os.getpid(), signal.SIGHUP)
+            assert not interrupted()
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_some_kills_at_any_moment(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    for index in range(4):
+        folder = tmp_path / str(index)
+        folder.mkdir()
+        kill = kill_one(rng, folder)
+        assert not kill.faults, str(kill)
+
+
+@pytest.mark.parametrize(
+    ("redirected", "code"),
+    [(">/dev/full", 1), (">&-", 0), ("2>/dev/full", 0), (">&- 2>&- <&-", 0), (">/dev/full 2>/dev/full", 1)],
+)
+def test_the_picture_is_there_whatever_becomes_of_what_is_printed(folder: Path, redirected: str, code: int) -> None:
+    command = f'"{sys.executable}" -m spectrasplat {" ".join(TINY)} {redirected}'
+    done = subprocess.run(["sh", "-c", command], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == code and "Traceback" not in done.stderr
+    assert np.load(folder / "out.npy").shape == (9, 16, 3)
+    if redirected == ">/dev/full":
+        assert done.stderr.splitlines()[-1].startswith("spectrasplat: what was to be printed is lost: No space left")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: f"{command[0]} {command[-1]}")
+@pytest.mark.parametrize("limit", [0, 400, 4096])
+def test_a_full_disk_is_one_sentence_and_leaves_nothing(folder: Path, command: tuple[str, ...], limit: int) -> None:
+    def limited() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    done = subprocess.run(
+        [sys.executable, "-m", "spectrasplat", *command],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=limited,
+    )
+    told = done.stderr.strip().splitlines()
+    if done.returncode != 0:
+        assert done.returncode == 2 and told[-1].startswith("spectrasplat: cannot write "), done.stderr
+    assert "Traceback" not in done.stderr, done.stderr
+    assert left_behind(folder, killed=False) == []
+
+
+def test_an_error_of_the_disk_elsewhere_is_still_a_bug(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_arguments: object) -> int:
+        raise OSError(5, "Input/output error", "somewhere")
+
+    monkeypatch.setattr("spectrasplat.commands.program.run", fail)
+    with pytest.raises(OSError, match="somewhere"):
+        main(["doctor"])
