@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from pathlib import Path
 
 from .errors import UserError
@@ -26,6 +27,46 @@ def check_picture_memory(width: int, height: int, bins: int | None) -> None:
             f"--size {width}x{height}{with_bins} needs about {needed / _GIB:.1f} GiB "
             f"and this machine has {available / _GIB:.1f} GiB: choose a smaller one"
         )
+
+
+def peak_bytes() -> int:
+    """Most memory that this process has held at once."""
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak * (1 if sys.platform == "darwin" else 1024)
+
+
+def available_bytes() -> int:
+    """Memory this process may still take: the machine's free memory, what is left of its control group's, and of the
+    process's own limit of addresses (`ulimit -v`), whichever is least."""
+    found = [memory_bytes()]
+    found += [1024 * size for size in _kib("/proc/meminfo", "MemAvailable:")]
+    try:
+        used = int(Path("/sys/fs/cgroup/memory.current").read_text(encoding="ascii"))
+        reclaimable = sum(
+            int(line.split()[1])
+            for line in Path("/sys/fs/cgroup/memory.stat").read_text(encoding="ascii").splitlines()
+            if line.startswith(("inactive_file ", "active_file "))
+        )
+        found.append(max(memory_bytes() - used + reclaimable, 0))
+    except (OSError, ValueError):
+        pass
+    import resource
+
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY:
+        found += [max(limit - 1024 * size, 0) for size in _kib("/proc/self/status", "VmSize:")]
+    return min(found)
+
+
+def _kib(path: str, key: str) -> list[int]:
+    """The number that follows `key` in a file of the kernel's; nothing where there is none."""
+    try:
+        lines = Path(path).read_text(encoding="ascii", errors="replace").splitlines()
+    except OSError:
+        return []
+    return [int(line.split()[1]) for line in lines if line.startswith(key)]
 
 
 def memory_bytes() -> int:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.errors import UserError, suggestion
-from ..model.features import world_bounds
+from ..model.contacts import world_bounds
 from ..model.materials.dielectric import DEFAULT_GLASS
 from ..model.optics import catalogue
 from ..model.scene import Dielectric, Diffuse, Material, Scene, SceneObject

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from ..base.errors import UserError
-from ..model.features import world_bounds
+from ..model.contacts import world_bounds
 from ..model.scene import (
     Light,
     Scene,

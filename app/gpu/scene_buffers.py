@@ -13,13 +13,12 @@ import moderngl
 import numpy as np
 
 from ..base.errors import UserError
+from ..model.contacts import overlapping_solids, world_bounds
 from ..model.features import (
     MAX_GROUPS,
     Features,
     dispersive_materials,
     half_spaces,
-    overlapping_solids,
-    world_bounds,
 )
 from ..model.geometry.bvh import build_bvh
 from ..model.optics.colorimetry import VISIBLE_NM, rgb_partition

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .camera_rays import camera_frame
+from .contacts import contacts, overlapping_solids, world_bounds
 from .scene import (
     Camera,
     Scene,
@@ -63,6 +64,8 @@ class Features:
     absorption: bool
     medium_stack: bool
     """Transparent solids nest or touch, so priorities decide the medium."""
+    contacts: bool
+    """Other surfaces touch each other or glass: what lies at one place is one interface."""
     tree: bool
     """Triangles are found through a tree; otherwise by a loop."""
     loose_triangles: bool
@@ -118,6 +121,7 @@ class Features:
             "NORMAL_DERIVATIVES": self.normal_derivatives,
             "ABSORPTION": self.absorption,
             "MEDIUM_STACK": self.medium_stack,
+            "CONTACTS": self.contacts,
             "HAS_TREE": self.tree,
             "LOOSE_TRIANGLES": self.loose_triangles,
             "CONVEX_SOLIDS": self.convex_solids,
@@ -171,6 +175,7 @@ class Features:
             normal_derivatives=smooth and (footprints or groups > 0),
             absorption=absorbing,
             medium_stack=bool(overlapping_solids(scene)),
+            contacts=bool(contacts(scene)),
             tree=loose_triangles > MAX_LOOSE_TRIANGLES,
             loose_triangles=loose_triangles > 0,
             convex_solids=len(loose) < len(scene.objects),
@@ -312,31 +317,13 @@ def is_flat(item: SceneObject) -> bool:
     return bool(singular[-1] <= 1e-5 * max(singular[0], np.finfo(float).tiny))
 
 
-def world_bounds(item: SceneObject) -> np.ndarray:
-    """World axis-aligned bounds, float64 (2, 3)."""
-    points = item.mesh.vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]
-    return np.stack([points.min(axis=0), points.max(axis=0)])
-
-
-def overlapping_solids(scene: Scene) -> list[int]:
-    """Indices of dielectric objects whose bounds overlap or touch those of another one."""
-    indices = [i for i, o in enumerate(scene.objects) if o.material.transmits]
-    if len(indices) < 2:
-        return []
-    bounds = np.stack([world_bounds(scene.objects[i]) for i in indices])
-    slack = 1e-5 * np.ptp(bounds, axis=(0, 1)).max()
-    low, high = bounds[:, 0] - slack, bounds[:, 1] + slack
-    overlap = np.all((low[:, None] <= high[None]) & (low[None] <= high[:, None]), axis=-1)
-    np.fill_diagonal(overlap, False)
-    return [indices[i] for i in np.flatnonzero(overlap.any(axis=1))]
-
-
 def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
     """(feature, compiled in, reason) for every choice, for people."""
     glasses = [o.material.dispersion.name for i, o in enumerate(scene.objects) if i in dispersive_materials(scene)]
     loose = sum(len(o.mesh.triangles) for o in scene.objects if not is_convex_solid(o))
     solids = [o.name for o in scene.objects if is_convex_solid(o)]
     touching = [scene.objects[i].name for i in overlapping_solids(scene)]
+    in_contact = [f"{scene.objects[i].name} and {scene.objects[j].name}" for i, j in contacts(scene)]
     diffuse = [o for o in scene.objects if o.material.receives]
     worn = [o.name for o in diffuse if o.material.texture is not None]
     black = sum(o.material.is_black for o in scene.objects)
@@ -400,6 +387,13 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             "medium stack",
             features.medium_stack,
             f"{names(touching)} nest or touch" if features.medium_stack else "no two solids nest or touch",
+        ),
+        (
+            "contacts",
+            features.contacts,
+            f"may touch: {names(in_contact)}"
+            if features.contacts
+            else "no mirror, receiver or blocker touches another surface",
         ),
         (
             "triangle tree",

@@ -109,6 +109,9 @@ def _plane_domain(
 ) -> EmissionDomain | None:
     tangent, bitangent, _ = light.axes().T
     frame = np.stack([tangent, bitangent])
+    if light.has_place:
+        # About the beam's own axis, where float32 resolves the thinnest beam.
+        middle = middle + ((position - middle) @ frame.T) @ frame
     relative = triangles - middle
     flat = relative @ frame.T
     tilt = np.tan(light.angular_radius)
@@ -119,9 +122,8 @@ def _plane_domain(
     if light.has_place:
         half = np.array(light.half_extent) * space.scale
         light_u, light_v, is_disc = tangent / half[0], bitangent / half[1], light.is_disc
-        at = (position - middle) @ frame.T
         rim = _SOFT_EDGE * 2.0 * half
-        box_low, box_high = np.maximum(box_low, at - half - rim), np.minimum(box_high, at + half + rim)
+        box_low, box_high = np.maximum(box_low, -half - rim), np.minimum(box_high, half + rim)
         back = float((middle - position) @ direction)
     else:
         ends = np.concatenate([space.to_gpu(_world_corners(item)) for item in scene.objects])
@@ -130,7 +132,7 @@ def _plane_domain(
         return None
     rect, mask = _rect_and_mask(low, high, box_low, box_high)
     if is_disc:
-        mask &= _disc_mask(rect, (position - middle) @ frame.T, half[0] + rim[0])
+        mask &= _disc_mask(rect, np.zeros(2), half[0] + rim[0])
     area = rect[2] * rect[3] / space.scale**2
     return EmissionDomain(
         "plane",
@@ -144,7 +146,7 @@ def _plane_domain(
         back,
         light_u,
         light_v,
-        position,
+        middle,
         is_disc,
         (float(tilt), 0.0),
     )

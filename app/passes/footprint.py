@@ -208,6 +208,11 @@ class Footprints:
         dropped = int(np.frombuffer(self.commands.read(), np.uint32)[20])
         return {"outside_map_w": float(outside), "footprints_dropped": dropped, "dropped_w": float(dropped_w)}
 
+    @property
+    def bytes(self) -> int:
+        """Device memory of splat records and their lists."""
+        return self.splats.size + self.lists.size + self._unusual.size
+
     def reset_counts(self) -> None:
         self._unusual.clear()
         self.commands.clear()

@@ -45,10 +45,20 @@ def placement_rows(
 
 
 class MapAtlas:
-    """The textures of the caustic maps: `targets` RGBA32F scratch and total textures of one size."""
+    """The textures of the caustic maps: RGBA32F of one size, `targets` totals and scratch textures for the first of
+    them."""
 
-    def __init__(self, ctx: moderngl.Context, size: tuple[int, int], placements: np.ndarray, targets: int = 1) -> None:
-        """`size` from `pack`; `placements`: PLACEMENT records, indexed by the receivers."""
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        size: tuple[int, int],
+        placements: np.ndarray,
+        targets: int = 1,
+        scratched: int | None = None,
+    ) -> None:
+        """`size` from `pack`; `placements`: PLACEMENT records, indexed by the receivers. `scratched`: targets that have
+        a scratch texture, None for all; splats are added to the others' totals at once, which is right to about
+        1e-4."""
         from .accumulate import Accumulate
 
         self.ctx = ctx
@@ -57,9 +67,9 @@ class MapAtlas:
         self.placements = (
             ctx.buffer(np.ascontiguousarray(placements)) if len(placements) else ctx.buffer(reserve=PLACEMENT.stride)
         )
-        self.scratch_textures = [self._texture() for _ in range(targets)]
         self.total_textures = [self._texture() for _ in range(targets)]
-        self.framebuffer = ctx.framebuffer(self.scratch_textures)
+        self.scratch_textures = [self._texture() for _ in range(targets if scratched is None else scratched)]
+        self.framebuffer = ctx.framebuffer(self.scratch_textures + self.total_textures[len(self.scratch_textures) :])
         self._accumulate = Accumulate(ctx)
         self.pending = 0
         """Photons in the scratch textures."""
@@ -82,9 +92,22 @@ class MapAtlas:
     def flush(self) -> None:
         """Add the scratch textures to the total and clear them."""
         if self.pending:
-            for scratch, total in zip(self.scratch_textures, self.total_textures, strict=True):
+            for scratch, total in zip(self.scratch_textures, self.total_textures, strict=False):
                 self._accumulate.run(scratch, total)
             self.pending = 0
+
+    def settle(self) -> None:
+        """Flush for the last time: nothing is added any more, and the scratch textures are given back."""
+        self.flush()
+        _park(self.ctx)
+        shader.release(self.framebuffer, *self.scratch_textures)
+        self.scratch_textures = []
+
+    @property
+    def bytes(self) -> int:
+        """Device memory of the textures."""
+        width, height = self.size
+        return 16 * width * height * (len(self.scratch_textures) + len(self.total_textures))
 
     def clear(self) -> None:
         """Forget everything deposited."""

@@ -31,6 +31,11 @@ LEVEL_STEPS = (1, 2, 4, 8, 16, 32, 64)
 """Texel widths in which every window is kept: broad splats go to the wider ones (footprint.comp)."""
 TEXELS_PER_PIXEL = 2.0
 """Texels along a pixel's side in a fine window: a splat is blurred by half a texel, a picture by its pixel."""
+_MIN_PIXELS = MIN_TILE / TEXELS_PER_PIXEL
+"""Least side of a window, pixels: texels of the smallest tile are no finer than others then, and no camera sample steps
+over them."""
+_MIN_SIDE = 1e-4
+"""Least side of a window as a share of its coordinates: float32 places have some texels in it."""
 _QUANTILE = 0.01
 _MARGIN = 0.06
 
@@ -123,7 +128,12 @@ def layout_maps(
             )
             if receiver == map_receiver:
                 windows = [
-                    _with_aspect(windows[-1] if landed is None else _extent_of_light(frame, extent, landed), picture)
+                    _with_aspect(
+                        windows[-1]
+                        if landed is None
+                        else _at_least(_extent_of_light(frame, extent, landed), 0.0, extent),
+                        picture,
+                    )
                 ]
             for level, window in enumerate(windows):
                 largest = tile_max[1] if level else tile_max[0]
@@ -220,6 +230,13 @@ def _grown(window: Window, share: float) -> Window:
     return Window(window.low - margin, window.high + margin)
 
 
+def _at_least(window: Window, side: float, extent: Window) -> Window:
+    """The window, or a wider one about its middle with sides of at least `side`, as far as `extent` goes."""
+    middle, far = 0.5 * (window.low + window.high), np.maximum(np.abs(window.low), np.abs(window.high)).max()
+    half = 0.5 * np.maximum(window.size, max(side, _MIN_SIDE * far))
+    return _meet(Window(middle - half, middle + half), extent) or extent
+
+
 def _meet(a: Window, b: Window) -> Window | None:
     low, high = np.maximum(a.low, b.low), np.minimum(a.high, b.high)
     return Window(low, high) if np.all(high - low > 1e-12) else None
@@ -261,12 +278,19 @@ def _flat_windows(
     if landed is None or len(landed.positions) == 0:
         return [extent]
     flat = frame.project(landed.positions)
-    everything = _meet(_grown(_extent(flat), 0.02), extent) or extent
+
+    def widened(window: Window) -> Window:
+        """Where a caustic is thinner than a pixel."""
+        pixel = 0.0 if picture is None else _pixel(camera, buffers, frame, window, picture)
+        return _at_least(window, _MIN_PIXELS * pixel, extent)
+
+    everything = widened(_meet(_grown(_extent(flat), 0.02), extent) or extent)
     light = _meet(_grown(_quantile_box(flat, landed.flux_w, _QUANTILE), _MARGIN), extent) or everything
     seen = _visible(camera, buffers, frame, picture) if picture is not None else None
     fine = light if seen is None else _meet(light, _grown(seen, 0.02))
     if fine is None:
         return [everything]
+    fine = widened(fine)
     if np.prod(fine.size) > 0.6 * np.prod(everything.size):
         return [everything]
     return [fine, everything]
@@ -292,19 +316,23 @@ def _tile_size(
     camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, window: Window, picture: tuple[int, int], largest: int
 ) -> tuple[int, int]:
     """Texels of a window: `TEXELS_PER_PIXEL` where the camera sees it, within `largest`."""
-    size = window.size
+    count = np.ceil(window.size * TEXELS_PER_PIXEL / _pixel(camera, buffers, frame, window, picture))
+    count *= min(1.0, largest / count.max())
+    # Only a receiver of few pixels has a window so small.
+    least = np.clip(2.0 * count, 4, MIN_TILE)
+    width, height = np.clip(count, least, largest).astype(int)
+    return int(width), int(height)
+
+
+def _pixel(camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, window: Window, picture: tuple[int, int]) -> float:
+    """Side of a pixel where the camera sees a window, GPU units."""
     if camera.kind == "pinhole":
         # Pixels are smallest where the window comes nearest to the camera.
         u, v = np.meshgrid(np.linspace(window.low[0], window.high[0], 9), np.linspace(window.low[1], window.high[1], 9))
         points = frame.origin + np.stack([u.ravel(), v.ravel()], axis=-1) @ frame.axes
         distance = np.linalg.norm(points - buffers.space.to_gpu(np.array(camera.position)), axis=1)
-        pixel = np.quantile(distance, 0.25) * 2 * np.tan(np.radians(0.5 * camera.vertical_fov_deg)) / picture[1]
-    else:
-        pixel = camera.vertical_extent * buffers.space.scale / picture[1]
-    count = np.ceil(size * TEXELS_PER_PIXEL / pixel)
-    count *= min(1.0, largest / count.max())
-    width, height = np.clip(count, MIN_TILE, largest).astype(int)
-    return int(width), int(height)
+        return float(np.quantile(distance, 0.25) * 2 * np.tan(np.radians(0.5 * camera.vertical_fov_deg)) / picture[1])
+    return camera.vertical_extent * buffers.space.scale / picture[1]
 
 
 def check_map_receiver(scene: Scene, buffers: SceneBuffers, name: str) -> int:

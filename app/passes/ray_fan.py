@@ -13,7 +13,7 @@ import numpy as np
 
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
-from ..model.features import world_bounds
+from ..model.contacts import world_bounds
 from ..model.optics.glass import LINE_D_NM
 from ..model.scene import Light, SceneObject
 from .emission_domain import orthonormal_frame

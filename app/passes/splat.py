@@ -167,6 +167,11 @@ class Splatter:
     def reset_counts(self) -> None:
         self._footprints.reset_counts()
 
+    @property
+    def bytes(self) -> int:
+        """Device memory of splat records and their lists."""
+        return self._indices.size + self._footprints.bytes
+
     def release(self) -> None:
         for vertex_array in self._draws.values():
             shader.release(vertex_array.program)

@@ -69,6 +69,14 @@ class FluxTally:
         return abs(started - sum(self.ended.values()) - self.roulette) / started if started else 0.0
 
 
+def queue_bytes(features: Features, batch: int) -> int:
+    """Device memory that tracing `batch` lattice points at once takes."""
+    ray = records.ray_record(features.defines()["COLUMNS"]).stride
+    photon = records.photon_record(features.spectral_groups).stride
+    room = RAY_ROOM * batch
+    return room * (4 * ray + records.OUTCOME.stride + photon + 8) + PHOTON_ROOM * batch * photon
+
+
 @dataclass(frozen=True)
 class Batch:
     """What one batch left in the photon buffer."""
@@ -162,6 +170,10 @@ class TracePass:
         self._emit_parameters = ctx.buffer(reserve=records.EMIT_PARAMETERS.stride)
         self._trace_parameters = ctx.buffer(reserve=records.TRACE_PARAMETERS.stride)
 
+    def release_buffers(self) -> None:
+        """Free the queue: nothing is traced any more."""
+        shader.release(*self._rays, self._outcomes, self._slots, self._indices, self._counts, self.photons)
+
     def release(self) -> None:
         """Free every buffer and program."""
         shader.release(
@@ -186,10 +198,8 @@ class TracePass:
 
     @property
     def bytes(self) -> int:
-        """GPU memory held."""
-        return sum(
-            b.size for b in (*self._rays, self._outcomes, self._slots, self._indices, self._counts, self.photons)
-        )
+        """Device memory that the queue takes while photons are traced."""
+        return queue_bytes(self._features, self.batch)
 
     def run(self, piece: LatticeSlice, domain: EmissionDomain, max_depth: int | None = None) -> Batch:
         """Trace `piece.count` ≤ batch lattice points; their photons replace the buffer's content.

@@ -2,7 +2,8 @@
 
 The side of a surface a photon is on decides near the place it left, not an offset: on the object
 just left only the opposite crossing can be true, and of two touching solids the photon's own
-record of what it is inside of says which surface it has crossed already.
+record of what it is inside of says which surface it has crossed already. What is no glass and touches
+something is one interface with it, and comes first: silver, black and paint are met from within glass as from outside.
 """
 
 from __future__ import annotations
@@ -10,15 +11,20 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import compiled, inlined
+from .photon_scene import DIELECTRIC, GRATING
 
 SLACK = 1e-10
 """Barycentric: facets that share an edge overlap by this much, so that no ray slips between them."""
 STACK_SIZE = 64
+_LEANING = 0.9
+"""Surfaces in contact whose normals' cosine is less meet in an edge and are two."""
+_GRAZING = 0.1
+"""Rays that graze a surface in contact more than this (cosine) are met as if they did not."""
 
 
 @compiled
-def _enter(bounds, node, ox, oy, oz, ix, iy, iz, far):
-    """Distance at which the ray enters a node's box, or infinity."""
+def _enter(bounds, node, ox, oy, oz, ix, iy, iz, far, behind):
+    """Distance at which the ray enters a node's box, or infinity; boxes up to `behind` its start count."""
     a = (bounds[node, 0] - ox) * ix
     b = (bounds[node, 3] - ox) * ix
     low = min(a, b)
@@ -32,7 +38,7 @@ def _enter(bounds, node, ox, oy, oz, ix, iy, iz, far):
     low = max(low, min(a, b))
     high = min(high, max(a, b))
     slack = 1e-14 * (abs(low) + abs(high))
-    if low <= high + slack and high >= -slack and low <= far + slack:
+    if low <= high + slack and high >= -slack - behind and low <= far + slack:
         return low
     return np.inf
 
@@ -71,6 +77,22 @@ def _crossed_already(bit, mask, facing):
     return (inside == np.uint64(1)) == (facing < 0.0)
 
 
+@inlined
+def _height(scene, i, t, dx, dy, dz):
+    """Way to facet i along its normal, of a ray that meets it at distance t."""
+    n = scene.normals[i]
+    return t * abs(dx * n[0] + dy * n[1] + dz * n[2])
+
+
+@inlined
+def _behind(scene, i, t, dx, dy, dz, last):
+    """Whether a sheet's facet i, at distance t, is one interface with facet `last`, which the ray has left."""
+    n, m = scene.normals[i], scene.normals[last]
+    if abs(n[0] * m[0] + n[1] * m[1] + n[2] * m[2]) <= _LEANING:
+        return False
+    return _height(scene, i, t, dx, dy, dz) <= (scene.contact if scene.kind[scene.owner[i]] == GRATING else scene.near)
+
+
 @compiled
 def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stack, stack_distance):
     """(distance, triangle, u, v) of the nearest surface; triangle −1: none.
@@ -80,9 +102,9 @@ def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stac
     """
     ix, iy, iz = _inverse(dx), _inverse(dy), _inverse(dz)
     best_key, best, best_triangle, best_u, best_v = np.inf, np.inf, -1, 0.0, 0.0
-    near = scene.near
+    near, behind = scene.near, 2.0 * scene.contact / _GRAZING
     # Of two surfaces at one place the one that is entered comes first: no film of air between solids.
-    nested = scene.stack.shape[0] > 1
+    nested = scene.stack[0] >= 0
     node = 0
     top = 0
     while True:
@@ -94,22 +116,36 @@ def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stac
                 hit, t, u, v, facing = _meets(scene, i, ox, oy, oz, dx, dy, dz)
                 if not hit:
                     continue
-                key = t + near if nested and facing > 0.0 else t
-                if key >= best_key or t <= -near:
-                    continue
                 owner = scene.owner[i]
-                if t < near:
-                    if owner == last_object:
-                        if t <= 0.0 or within == (facing < 0.0):
-                            continue
-                    elif scene.bit[owner] >= 0 and _crossed_already(scene.bit[owner], mask, facing):
+                sheet = scene.kind[owner] != DIELECTRIC
+                key = t + near if nested and facing > 0.0 else t
+                if sheet:  # `contact` is meant along its normal
+                    key = t - scene.contact / max(_height(scene, i, 1.0, dx, dy, dz), _GRAZING)
+                if sheet and best_triangle >= 0 and abs(key - best_key) < near and owner != scene.owner[best_triangle]:
+                    if owner > scene.owner[best_triangle]:
                         continue
+                elif key >= best_key:
+                    continue
+                if owner == last_object:
+                    if t <= -near or (t < near and (t <= 0.0 or within == (facing < 0.0))):
+                        continue
+                elif sheet:
+                    if t <= -near or (last >= 0 and _behind(scene, i, t, dx, dy, dz, last)):
+                        continue
+                elif scene.bit[owner] >= 0:
+                    if t <= -behind or (
+                        (t < near or _height(scene, i, t, dx, dy, dz) < 2.0 * scene.contact)
+                        and _crossed_already(scene.bit[owner], mask, facing)
+                    ):
+                        continue
+                elif t <= -near:
+                    continue
                 best_key, best, best_triangle, best_u, best_v = key, t, i, u, v
         else:
             left = scene.node_first[node]
-            far = best_key + near
-            a = _enter(scene.node_bounds, left, ox, oy, oz, ix, iy, iz, far)
-            b = _enter(scene.node_bounds, left + 1, ox, oy, oz, ix, iy, iz, far)
+            far = best_key + behind + near
+            a = _enter(scene.node_bounds, left, ox, oy, oz, ix, iy, iz, far, behind)
+            b = _enter(scene.node_bounds, left + 1, ox, oy, oz, ix, iy, iz, far, behind)
             if a < np.inf or b < np.inf:
                 nearer = left if a <= b else left + 1
                 if a < np.inf and b < np.inf:
@@ -121,7 +157,7 @@ def nearest(scene, ox, oy, oz, dx, dy, dz, last, last_object, within, mask, stac
         node = -1
         while top > 0:
             top -= 1
-            if stack_distance[top] <= best_key + near:
+            if stack_distance[top] <= best_key + behind + near:
                 node = stack[top]
                 break
         if node < 0:
@@ -145,10 +181,10 @@ def blocked(scene, ox, oy, oz, dx, dy, dz, far, last, stack):
                     return True
         else:
             left = scene.node_first[node]
-            if _enter(scene.node_bounds, left, ox, oy, oz, ix, iy, iz, far) < np.inf:
+            if _enter(scene.node_bounds, left, ox, oy, oz, ix, iy, iz, far, 0.0) < np.inf:
                 stack[top] = left
                 top += 1
-            if _enter(scene.node_bounds, left + 1, ox, oy, oz, ix, iy, iz, far) < np.inf:
+            if _enter(scene.node_bounds, left + 1, ox, oy, oz, ix, iy, iz, far, 0.0) < np.inf:
                 stack[top] = left + 1
                 top += 1
         if top == 0:

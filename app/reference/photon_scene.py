@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.errors import UserError
+from ..model.contacts import overlapping_solids
 from ..model.geometry.bvh import Bvh, build_bvh
 from ..model.geometry.mesh import Mesh
 from ..model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, rgb_partition, xyz_to_rgb709_matrix
@@ -32,6 +33,9 @@ TABLE_NM = np.linspace(380.0, 780.0, 8001)
 """Grid of index and weight tables; linear between them n errs below 1e-8 for every catalogue glass."""
 _NEAR = 1e-9
 """Share of the scene's size below which two surfaces count as one place."""
+_CONTACT = 3e-5
+"""What counts as contact, where the radius of the specular objects is one or rounded down or up to a power of two. The
+renderer's own limit: how thick a film of air may be before it is one is a matter of definition."""
 _MAX_STACK = 60
 
 
@@ -80,6 +84,8 @@ class PhotonScene(NamedTuple):
     """float64 (R, 3): order / line spacing in 1/µm, efficiency, whether it is reflected."""
     near: float
     """Distances below this are the same place."""
+    contact: float
+    """Nearer than this, what is no glass is silver, black or paint on what it touches."""
 
 
 class Viewpoint(NamedTuple):
@@ -125,7 +131,7 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
     corners, owner = corners[order], owner[order].astype(np.int32)
     normals = np.concatenate([mesh.face_normals() for mesh in meshes])[order]
     smooth, corner_normals = _corner_normals(scene, meshes, order)
-    rank = _ranks(scene, meshes)
+    rank = _ranks(scene)
     media, weights = _Rows(), _Rows()
     kinds, medium, weight = [], [], []
     for item in scene.objects:
@@ -166,6 +172,7 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         weights.array(),
         *_gratings(scene),
         _NEAR * size,
+        _CONTACT * 2.0 ** round(float(np.log2(size))),
     ), centre
 
 
@@ -301,21 +308,9 @@ def _corner_normals(scene: Scene, meshes: list[Mesh], order: np.ndarray) -> tupl
     return index, np.ascontiguousarray(packed) if len(packed) else np.zeros((1, 9))
 
 
-def _ranks(scene: Scene, meshes: list[Mesh]) -> dict[int, int]:
-    """Rank of every transparent solid whose bounds meet another's: by priority, then by order."""
-    solids = [i for i, o in enumerate(scene.objects) if o.material.transmits]
-    if len(solids) < 2:
-        return {}
-    bounds = {i: np.array(meshes[i].bounds()) for i in solids}
-    slack = 1e-5 * np.ptp(np.concatenate(list(bounds.values())), axis=0).max()
-    meeting = [
-        i
-        for i in solids
-        if any(
-            j != i and (bounds[i][0] <= bounds[j][1] + slack).all() and (bounds[j][0] <= bounds[i][1] + slack).all()
-            for j in solids
-        )
-    ]
+def _ranks(scene: Scene) -> dict[int, int]:
+    """Rank of every transparent solid whose bounds meet another surface's: by priority, then by order."""
+    meeting = overlapping_solids(scene)
     if len(meeting) > _MAX_STACK:
         raise UserError(
             f"scene '{scene.name}': {len(meeting)} transparent solids nest or touch and at most {_MAX_STACK} may; "

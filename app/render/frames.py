@@ -123,6 +123,7 @@ class FrameRenderer:
             for share in traced_light(light, LightSampling.of(stage.scene, self._settings), stop):
                 yield _LIGHT_SHARE * share
             light.finish()
+            light.settle()
             started = time.perf_counter()
             if not self._shows_map:
                 if has_own_method(self._settings):

@@ -8,8 +8,10 @@ from dataclasses import replace
 import moderngl
 import numpy as np
 
+from ..gpu import shader
 from ..gpu.records import RECEIVER
 from ..gpu.shader import Releasable
+from ..gpu.tiles import Tile
 from ..model.features import Features
 from ..passes.accumulate import LevelsFold, SeamFold, copy_texture
 from ..passes.camera import CausticMaps
@@ -27,13 +29,16 @@ class LightMaps:
         # Only the layout tells whether a fine window pays: without one no splat is drawn twice.
         self.features = replace(features, nested_windows=any(len(windows) > 1 for windows in layout.windows.values()))
         self.splatter = Splatter(ctx, self.features)
-        self.atlas = MapAtlas(ctx, layout.size, layout.placements, features.targets)
+        # Tents only say how XYZ are shared out over the spectrum.
+        scratched = 1 if features.map_tents else None
+        self.atlas = MapAtlas(ctx, layout.size, layout.placements, features.targets, scratched)
         self.receivers = ctx.buffer(
             np.ascontiguousarray(layout.receivers if len(layout.receivers) else RECEIVER.zeros(1)).tobytes()
         )
         self.photon_weight = 0.0
         """What was deposited is energy times this."""
-        self._resolved = [ctx.texture(self.atlas.size, 4, dtype="f4") for _ in range(features.targets)]
+        self._resolved: list[moderngl.Texture] = []
+        self._is_settled = False
         self._levels_fold = LevelsFold(ctx, layout.folds)
         self._seam_fold = SeamFold(ctx, [(layout.tiles[r][0], charts) for r, charts in layout.charts.items()])
 
@@ -58,13 +63,32 @@ class LightMaps:
     def bytes(self) -> int:
         """Device memory of the textures."""
         width, height = self.atlas.size
-        return 16 * width * height * 4 * self.features.targets
+        return self.atlas.bytes + 16 * width * height * len(self._resolved)
+
+    def settle(self) -> None:
+        """No photons follow: give back all that only they needed."""
+        if self._is_settled:
+            return
+        self.atlas.settle()
+        self.splatter.release()
+        if self.layout.charts:
+            self.resolved_textures()
+            shader.release(*self.atlas.total_textures)
+        else:
+            self._resolved, self.atlas.total_textures = self.atlas.total_textures, []
+            self._levels_fold.run(self._resolved)
+        self.atlas.total_textures = []
+        self._is_settled = True
 
     def resolved_textures(self) -> list[moderngl.Texture]:
         """The summed maps for lookups: wide texels added to fine ones, charts' seams folded home."""
+        if self._is_settled:
+            return self._resolved
         self.atlas.flush()
         ctx = self._ctx
         total = self.atlas.total_textures
+        if not self._resolved:
+            self._resolved = [ctx.texture(self.atlas.size, 4, dtype="f4") for _ in total]
         if self.layout.charts:
             self._seam_fold.run(total, self._resolved)
         else:
@@ -77,31 +101,29 @@ class LightMaps:
         """As the camera reads them; `textures` where they are not `resolved_textures`."""
         return CausticMaps(textures or self.resolved_textures(), self.receivers, self.atlas.placements, self.scale)
 
-    def _read_resolved(self) -> np.ndarray:
-        """All maps put together, float32 (height, width, channels)."""
-        width, height = self.atlas.size
+    def _read(self, tile: Tile) -> np.ndarray:
+        """A tile of all maps put together, float32 (height, width, channels)."""
         layers = []
         for texture in self.resolved_textures():
-            layer = np.empty((height, width, 4), np.float32)
-            texture.read_into(layer)
+            layer = np.empty((tile.height, tile.width, 4), np.float32)
+            frame = self._ctx.framebuffer([texture])
+            frame.read_into(layer, (tile.x, tile.y, tile.width, tile.height), components=4, dtype="f4")
+            frame.release()
             layers.append(layer)
-        return np.concatenate(layers, axis=-1)
+        return np.concatenate(layers, axis=-1) if len(layers) > 1 else layers[0]
 
     def receiver(self, receiver: int) -> np.ndarray:
         """A receiver's finest map: float32 (height, width, channels), row 0 at texel y = 0."""
-        x0, y0, x1, y1 = self.layout.tiles[receiver][0].rect
-        return self._read_resolved()[y0:y1, x0:x1]
+        return self._read(self.layout.tiles[receiver][0])
 
     def flux(self, is_xyz: bool) -> float:
         """What the maps hold where they are read: the sum of XYZ maps' last channel (W), or of all bins."""
-        total = self._read_resolved()
-        total = total[..., 3] if is_xyz else total.sum(axis=-1)
         flux = 0.0
         for receiver, tiles in self.layout.tiles.items():
             charts = self.layout.charts.get(receiver)
             for level, tile in enumerate(tiles):
-                x0, y0, x1, y1 = tile.rect
-                energy = total[y0:y1, x0:x1].astype(float)
+                values = self._read(tile)
+                energy = (values[..., 3] if is_xyz else values.sum(axis=-1)).astype(float)
                 if charts is not None:
                     energy = energy[charts.owner >= 0]
                 elif level:
@@ -125,7 +147,7 @@ class LightMaps:
     def release(self) -> None:
         """Free everything."""
         owned: Iterable[Releasable] = (
-            self.splatter,
+            *(() if self._is_settled else (self.splatter,)),
             self.atlas,
             self.receivers,
             *self._resolved,

@@ -18,6 +18,7 @@ from typing import Protocol
 import moderngl
 import numpy as np
 
+from ..base.memory import available_bytes
 from ..base.random_words import Dimension, random_word, shift
 from ..gpu import records, splat_tables
 from ..gpu.context import Context
@@ -35,16 +36,18 @@ from ..passes.map_atlas import MapAtlas
 from ..passes.map_layout import MapLayout, check_map_receiver, layout_maps
 from ..passes.pilot import Pilot, landings_of, pilot_steps
 from ..passes.splat import Splatter
-from ..passes.trace import RAY_ROOM, Batch, FluxTally, TracePass
-from .beam_light import BeamLight, BeamStats, carries_everything
+from ..passes.trace import RAY_ROOM, Batch, FluxTally, TracePass, queue_bytes
 from . import shrinking
+from .beam_light import BeamLight, BeamStats, carries_everything
 from .light_maps import LightMaps
-from .light_plan import Division, Planner
+from .light_plan import SMALLEST_BATCH, Division, Planner
 from .map_fit import MapFit
 from .shown_spectra import PassTables, ShownSpectra, ShownTables
 from .splatting import Pace, Splatting
 
 DEFAULT_BATCH = 1 << 16
+QUEUE_BYTES = 128 << 20
+"""What the queue of a batch that nobody asked for may take; more on a GPU. Less where memory is short."""
 
 
 @dataclass
@@ -62,6 +65,8 @@ class LightStats:
     footprints_dropped: int = 0
     dropped_w: float = 0.0
     """Flux of those photons, splatted as one texel each."""
+    buffers: dict[str, int] = field(default_factory=dict)
+    """Device memory by what it is for, bytes, while photons were traced."""
 
 
 @dataclass(frozen=True)
@@ -161,6 +166,8 @@ class LightPass:
         self._records = photon_records or NoRecords()
         self._pace = pace or Pace.of(context)
         batch = settings.batch or DEFAULT_BATCH * context.traits.batch_scale
+        if settings.batch is None:
+            batch = min(batch, _batch_that_fits(features, QUEUE_BYTES * context.traits.batch_scale))
         batch = max(min(batch, _largest_batch(context, features)), self._pace.min_batch)
         self.trace = TracePass(context, features, buffers, batch, settings.max_depth)
         self.shown = ShownSpectra(context.ctx, scene, buffers, settings.bins)
@@ -516,10 +523,22 @@ class LightPass:
     def finish(self) -> None:
         """Sum what is pending and fetch the counters."""
         self.atlas.flush()
+        self.stats.buffers = {
+            "scene": self.buffers.bytes,
+            "photon queue": self.trace.bytes,
+            "splats": self.splatter.bytes,
+            "map sums": 16 * len(self.atlas.total_textures) * self.atlas.size[0] * self.atlas.size[1],
+            "map scratch": 16 * len(self.atlas.scratch_textures) * self.atlas.size[0] * self.atlas.size[1],
+        }
         counts = self.splatter.counts()
         self.stats.outside_map_w = counts["outside_map_w"]
         self.stats.footprints_dropped = int(counts["footprints_dropped"])
         self.stats.dropped_w = counts["dropped_w"]
+
+    def settle(self) -> None:
+        """After `finish`, where nothing is traced any more: what remains is what is read."""
+        self.trace.release_buffers()
+        self._maps.settle()
 
     def release(self) -> None:
         """Free everything."""
@@ -539,6 +558,14 @@ def scene_buffers(context: Context, scene: Scene, settings: RenderSettings) -> S
     """`scene` on the device, with the features that it and `settings` decide; the caller's."""
     features = Features.of(scene, settings)
     return SceneBuffers(context.ctx, scene, features, spectral_axis(scene, features))
+
+
+def _batch_that_fits(features: Features, most_bytes: int) -> int:
+    """The largest power of two whose queue takes no more than that, nor more than an eighth of the memory there is."""
+    batch = DEFAULT_BATCH << 2
+    while batch > SMALLEST_BATCH and queue_bytes(features, batch) > min(most_bytes, available_bytes() // 8):
+        batch >>= 1
+    return batch
 
 
 def _largest_batch(context: Context, features: Features) -> int:

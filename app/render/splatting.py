@@ -108,7 +108,7 @@ class Splatting:
             return
         height = atlas.size[1]
         dispatch_budget = DispatchBudget(FIRST_SUMMED, ROWS, -(-height // ROWS) * ROWS)
-        for scratch, total in zip(atlas.scratch_textures, atlas.total_textures, strict=True):
+        for scratch, total in zip(atlas.scratch_textures, atlas.total_textures, strict=False):
             row = 0
             while row < height:
                 started = time.perf_counter()

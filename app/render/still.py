@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from ..base.memory import peak_bytes
 from ..edit.parameters import Stage
 from ..gpu.context import Context, create_context
 from ..model.scene import Scene
@@ -41,7 +42,6 @@ class RenderStats:
     prepare_seconds: float
     camera_seconds: float
     atlas_size: tuple[int, int]
-    bytes: int
     map_flux_w: float
     camera_pass: CameraStats
     beams: BeamStats | None
@@ -79,9 +79,11 @@ class RenderStats:
                 f"camera              {camera.samples} samples a pixel, {camera.spectrum.words}; "
                 f"{_counted(camera.fallbacks)}"
             ),
+            (f"maps                {self.atlas_size[0]}×{self.atlas_size[1]} texels"),
             (
-                f"maps                {self.atlas_size[0]}×{self.atlas_size[1]} texels, "
-                f"buffers {self.bytes / 2**20:.0f} MiB"
+                "buffers             "
+                + ", ".join(f"{name} {size / 2**20:.0f}" for name, size in light.buffers.items())
+                + f" MiB; peak of the process {peak_bytes() / 2**20:.0f} MiB"
             ),
             (
                 f"seconds             prepare {self.prepare_seconds:.2f}, emit and trace {light.trace_seconds:.2f}, "
@@ -159,7 +161,6 @@ def _stats(context: Context, frames: FrameRenderer, settings: RenderSettings) ->
         frames.seconds.prepare,
         frames.seconds.camera,
         light.layout.size,
-        light.buffers.bytes + light.trace.bytes,
         light.map_flux() if settings.tally else 0.0,
         camera,
         light.beam_stats,

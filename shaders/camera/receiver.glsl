@@ -169,13 +169,15 @@ vec4 map_to_channels(vec4 texel)
 #endif
 }
 
-// Texels that a lookup in a map averages across and down at most; what it covers beyond is met by the pixel's other samples.
-#define MAX_TEXELS 4
+// Texels that a lookup in a map averages along one side at most, and in all; what it covers beyond is met by the pixel's other samples.
+#define MAX_TEXELS 16
+#define MAX_LOOKUPS 64
 
 // Irradiance of the map's targets `first` to `last`: their mean over a box of this many texels.
 void caustic_values(uint placement, vec2 texel, vec2 box, out vec4 values[MAP_TARGETS], const int first, const int last)
 {
     ivec2 lookups = clamp(ivec2(ceil(box)), ivec2(1), ivec2(MAX_TEXELS));
+    lookups = min(lookups, max(ivec2(8), MAX_LOOKUPS / lookups.yx));
     vec2 part = box / vec2(lookups), corner = texel - 0.5 * (box - part);
     COUNT_ROUNDS(lookups.x * lookups.y);
     float share = 1.0 / float(lookups.x * lookups.y);

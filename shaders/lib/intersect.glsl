@@ -16,6 +16,20 @@
 #define PLANE_BIT 0x80000000u
 // Distances below this (GPU units) are suspect: the same surface met again, or two that touch.
 #define NEAR_DISTANCE 3e-5
+#ifdef CONTACTS
+// Rays that graze a surface in contact more than this (cosine) are met as if they did not.
+#define GRAZING 0.1
+// How far a surface that is still to be crossed may lie behind a ray that has met another one in contact with it first.
+#define BEHIND (2.5 * NEAR_DISTANCE / GRAZING)
+// Surfaces that lean against each other by less (cosine) and touch are one interface.
+#define CONTACT_COSINE 0.9
+// Error of a distance along a normal, as a share of the place's coordinates.
+#define CONTACT_ROUNDING 4e-7
+// Of the surface that the ray starts on, unit; zero where it starts on none.
+vec3 left_normal = vec3(0.0);
+#else
+#define BEHIND NEAR_DISTANCE
+#endif
 #define FAR_DISTANCE 1e30
 // Rays that start farther than this from the middle of the scene are met from nearby.
 #define FAR_START 4.0
@@ -50,7 +64,7 @@ bool accept_hit(float distance, float facing, uint object, RayOrigin origin)
         repeated = bit != NONE && is_inside == (facing < 0.0);
     }
 #endif
-    return !repeated && distance > (same ? 0.0 : -NEAR_DISTANCE);
+    return !repeated && distance > (same ? 0.0 : -BEHIND);
 }
 
 // Touching solids: of two crossings at one place the entering one comes first, so that no film of
@@ -63,6 +77,32 @@ float crossing_key(float distance, float facing)
     return distance;
 #endif
 }
+
+#ifdef CONTACTS
+// Surfaces in contact are one interface, and what light passes gives way to what it ends at or is thrown back by: silver, black or paint on
+// glass is met from within the glass as from outside. Such a sheet lies behind a ray that has left it or anything in contact with it.
+// A grating, which is passed, is only met once. `height`: way to the sheet along its own normal; `normal`: unit.
+bool accept_sheet(float distance, float height, vec3 normal, uint kind, vec3 origin_p)
+{
+    bool in_contact = abs(dot(normal, left_normal)) > CONTACT_COSINE;
+    float rounding = CONTACT_ROUNDING * (2.0 + dot(abs(origin_p), vec3(1.0)));
+    return in_contact ? height > (kind == KIND_GRATING ? NEAR_DISTANCE : rounding) : distance > -NEAR_DISTANCE;
+}
+
+// Nobody enters a solid that he is in, nor leaves one that he is not: what says so has been crossed already, in another surface's place.
+bool crossed_in_contact(float height, float facing, uint stack_bit, RayOrigin origin)
+{
+    bool is_inside = stack_bit != NONE && (origin.inside_mask & (1u << (stack_bit & 31u))) != 0u;
+    return stack_bit != NONE && is_inside == (facing < 0.0) && height < 2.0 * NEAR_DISTANCE;
+}
+
+// Of two sheets that rounding cannot tell apart everybody meets the same one.
+bool comes_first(float key, float cosine, uint object, float best_key, uint best_object)
+{
+    float rounding = CONTACT_ROUNDING * (2.0 + abs(key)) / max(cosine, GRAZING);
+    return abs(key - best_key) < rounding && best_object != NONE && object != best_object ? object < best_object : key < best_key;
+}
+#endif
 
 // Rounding errors of the edge tests, as a share of |edge| (|origin - vertex| + |edge|): three products
 // and sums each. Where two facets share an edge at least one accepts the ray, however small they are.
@@ -87,13 +127,36 @@ void try_triangle(uint slot, vec3 near_p, float ahead, vec3 direction, RayOrigin
     // Of a facet seen edge-on the bound says nothing any more: no hit lies far outside it.
     float slack = min(EDGE_ERROR * edge * (sqrt(dot(to_origin, to_origin)) + edge) * abs(inverse), 0.1);
     // Comparisons are written so that NaN (an edge-on or degenerate triangle) fails them.
-    bool inside = u >= -slack && v >= -slack && u + v <= 1.0 + 2.0 * slack && key < best_key && slot != origin.primitive;
+    bool inside = u >= -slack && v >= -slack && u + v <= 1.0 + 2.0 * slack && slot != origin.primitive;
+#ifdef CONTACTS
+    if (inside) {
+        Object thing = object_at(facet.object);
+        bool sheet = thing.kind != KIND_DIELECTRIC;
+        vec3 unit_normal = normalize(normal);
+        float cosine = abs(dot(direction, unit_normal)), height = distance * cosine;
+        key = sheet ? distance - NEAR_DISTANCE / max(cosine, GRAZING) : key;
+        bool meets = accept_hit(distance, facing, facet.object, origin);
+        if (sheet && facet.object != origin.object) meets = accept_sheet(distance, height, unit_normal, thing.kind, near_p);
+#ifdef MEDIUM_STACK
+        meets = meets && !crossed_in_contact(height, facing, thing.stack_bit, origin);
+#endif
+        if (meets && comes_first(key, cosine, facet.object, best_key, hit.object)) {
+            best_key = key;
+            hit.distance = distance;
+            hit.primitive = slot;
+            hit.object = facet.object;
+            hit.bary = vec2(u, v);
+        }
+    }
+#else
+    inside = inside && key < best_key;
     if (inside && accept_hit(distance, facing, facet.object, origin)) {
         best_key = key;
         hit.distance = distance;
         hit.primitive = slot;
         hit.bary = vec2(u, v);
     }
+#endif
 }
 
 #ifdef HAS_TREE
@@ -119,7 +182,7 @@ void intersect_tree(vec3 near_p, float ahead, vec3 direction, RayOrigin origin, 
     // A zero component would make 0 * inf = NaN on a slab's plane.
     vec3 safe = mix(direction, vec3(1e-20), lessThan(abs(direction), vec3(1e-20)));
     vec3 inverse_direction = 1.0 / safe;
-    float start = -NEAR_DISTANCE - ahead;
+    float start = -BEHIND - ahead;
     uint stack[TREE_STACK + 1];
     stack[0] = NONE;
     int top = 1;
@@ -129,7 +192,7 @@ void intersect_tree(vec3 near_p, float ahead, vec3 direction, RayOrigin origin, 
             COUNT_ROUNDS(1);
             uint at = uint(TREE_AT) + 4u * current;
             uvec4 a = scene_texel(at), b = scene_texel(at + 1u), c = scene_texel(at + 2u), links = scene_texel(at + 3u);
-            float far = best_key + NEAR_DISTANCE - ahead;
+            float far = best_key + BEHIND - ahead;
             float enter0 = box_entry(uintBitsToFloat(a.xyz), uintBitsToFloat(uvec3(a.w, b.xy)), near_p, inverse_direction, start, far);
             float enter1 = box_entry(uintBitsToFloat(uvec3(b.zw, c.x)), uintBitsToFloat(c.yzw), near_p, inverse_direction, start, far);
             bool hit0 = enter0 < FAR_DISTANCE, hit1 = enter1 < FAR_DISTANCE;
@@ -174,6 +237,14 @@ void intersect_solid(uint solid, vec3 origin_p, vec3 direction, RayOrigin origin
     uint object = solids[solid].object;
     if (enter <= leave) {
         float key = crossing_key(enter, -1.0);
+#if defined(CONTACTS) && defined(MEDIUM_STACK)
+        // A solid in contact with a sheet has a bit.
+        uint bit = object_at(object).stack_bit;
+        bool crosses_in = enter_plane != NONE && !crossed_in_contact(enter * -dot(direction, planes[enter_plane].xyz), -1.0, bit, origin);
+        bool crosses_out = leave_plane != NONE && !crossed_in_contact(leave * dot(direction, planes[leave_plane].xyz), 1.0, bit, origin);
+        enter_plane = crosses_in ? enter_plane : NONE;
+        leave_plane = crosses_out ? leave_plane : NONE;
+#endif
         if (enter_plane != NONE && (PLANE_BIT | enter_plane) != origin.primitive && key < best_key && accept_hit(enter, -1.0, object, origin)) {
             best_key = key;
             hit.distance = enter;
@@ -199,6 +270,16 @@ bool intersect(vec3 origin_p, vec3 direction, float far, RayOrigin origin, bool 
     hit.normal_g = vec3(0.0);
     hit.bary = vec2(0.0);
     float best_key = far;
+#ifdef CONTACTS
+    left_normal = vec3(0.0);
+    if (origin.primitive != NONE) {
+        Triangle left = triangle_at(min(origin.primitive, uint(max(TRIANGLE_COUNT, 1)) - 1u));
+        left_normal = normalize(cross(left.edge1, left.edge2));
+#ifdef CONVEX_SOLIDS
+        if ((origin.primitive & PLANE_BIT) != 0u) left_normal = planes[origin.primitive & ~PLANE_BIT].xyz;
+#endif
+    }
+#endif
 #ifdef CONVEX_SOLIDS
     for (uint i = 0u; i < uint(SOLID_COUNT); ++i)
         intersect_solid(i, origin_p, direction, origin, best_key, hit);

@@ -75,12 +75,13 @@ void main()
 #else
     vec2 tilt = concentric_disc(on_disc) * p.cone.x;
     direction = normalize(p.axis + tilt.x * p.tangent + tilt.y * p.bitangent);
-    vec3 on_plane = p.origin + q.x * p.tangent + q.y * p.bitangent;
-    position = on_plane - p.back * direction;
+    vec3 across = q.x * p.tangent + q.y * p.bitangent;
+    position = p.origin + across - p.back * direction;
     dposition_ds = p.spacing.x * p.tangent;
     dposition_dt = p.spacing.y * p.bitangent;
     // A collimated beam ends at its aperture.
-    vec2 at = vec2(dot(on_plane - p.aperture_centre, p.light_u), dot(on_plane - p.aperture_centre, p.light_v));
+    vec3 off_axis = p.origin - p.aperture_centre + across;
+    vec2 at = vec2(dot(off_axis, p.light_u), dot(off_axis, p.light_v));
     vec2 half_size = 1.0 / max(vec2(length(p.light_u), length(p.light_v)), vec2(1e-20));
     vec2 inside = half_size * (1.0 - abs(at));
     weight *= p.light_u == vec3(0.0) ? 1.0 : p.is_disc != 0u ? coverage(half_size.x * (1.0 - length(at)), p.mean_spacing)

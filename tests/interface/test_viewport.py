@@ -248,7 +248,7 @@ def test_the_gizmo_snaps_with_ctrl_and_scales_about_the_middle(gl) -> None:
 
 
 def _middle(state: State, index: int) -> np.ndarray:
-    from spectrasplat.model.features import world_bounds
+    from spectrasplat.model.contacts import world_bounds
 
     return world_bounds(state.scene.objects[index]).mean(axis=0)
 

@@ -9,7 +9,7 @@ import pytest
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import placing
 from spectrasplat.edit.state import Selection
-from spectrasplat.model.features import world_bounds
+from spectrasplat.model.contacts import world_bounds
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.ui import gizmo
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 from ...gpu.mip_chain import level_count
 from ...gpu.records import photon_record, ray_record
 from ...gpu.scene_buffers import SAMPLES, TRIANGLE
-from ...model.features import Features, half_spaces, is_convex_solid, overlapping_solids
+from ...model.contacts import contacts, overlapping_solids
+from ...model.features import Features, half_spaces, is_convex_solid
 from ...model.scene import Scene
 from ...model.texture import Environment, Texture
 from ...passes.footprint import SPLAT
@@ -86,6 +87,7 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
         "interpolated normals": (features.smooth_normals, f"{3 * _TEXEL} B a facet, {size_words(3 * _TEXEL * smooth)}"),
         "normal derivatives": (features.normal_derivatives, "one more vector a column and surface"),
         "absorption": (features.absorption, f"3 lookups a flight, {size_words(row * absorbing)}"),
+        "contacts": (features.contacts, f"{len(contacts(scene))} pair(s) that may touch"),
         "medium stack": (features.medium_stack, f"{len(overlapping_solids(scene))} bit(s) of a ray's mask"),
         "triangle tree": (features.tree, f"about {size_words(triangles * (TRIANGLE.stride + _NODE // 2))}"),
         "half-space solids": (

@@ -64,6 +64,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     ),
     "normal derivatives": ("normal_columns",),
     "absorption": ("medium_weight_row", "alpha"),
+    "contacts": ("accept_sheet", "crossed_in_contact", "comes_first", "left_normal"),
     "medium stack": ("medium_of", "stack_objects", "STACK_OBJECTS", "mask_before"),
     "triangle tree": ("intersect_tree", "box_entry", "LEAF_BIT", "TREE_AT", "TREE_STACK"),
     "half-space solids": ("intersect_solid", "planes", "solids", "SOLID_COUNT"),

@@ -134,6 +134,8 @@ def _left_out(name: str, scene: Scene, base: Features, asked: Variant) -> tuple[
             )
         case "absorption":
             return asked, Variant(scene, replace(base, absorption=False)), ""
+        case "contacts":
+            return asked, Variant(scene, replace(base, contacts=False)), "without it light is lost between surfaces"
         case "medium stack":
             return asked, Variant(scene, replace(base, medium_stack=False)), "without it nested solids refract wrongly"
         case "triangle tree":
@@ -212,6 +214,8 @@ def _forced_in(name: str, scene: Scene, base: Features, asked: Variant) -> tuple
             )
         case "medium stack" if base.dielectrics:
             return Variant(scene, replace(base, medium_stack=True)), asked, "every solid on the stack"
+        case "contacts" if base.loose_triangles:
+            return Variant(scene, replace(base, contacts=True)), asked, ""
         case "triangle tree" if base.loose_triangles:
             return Variant(scene, replace(base, tree=True)), asked, "against a loop"
         case "charts":
