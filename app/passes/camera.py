@@ -252,7 +252,9 @@ class CameraPass:
         parameters["band_side"] = min(1.0, np.sqrt(self.spectrum.bands / (samples + sample_offset)))
         parameters["taps_per_pixel"] = TAPS_PER_PIXEL * (samples + sample_offset) ** 0.25
         parameters["primary_samples"] = (
-            1 if self.spectrum.single or samples + sample_offset > PRIMARY_SAMPLES_UNTIL else self.primary_samples
+            1
+            if samples + sample_offset > PRIMARY_SAMPLES_UNTIL or (self.spectrum.single and not self.shows_beams)
+            else max(self.primary_samples, PRIMARY_SAMPLES if self.shows_beams else 1)
         )
         if self.shows_beams and sample_offset == 0:
             yield from self._draw_beams(parameters, samples, maps)

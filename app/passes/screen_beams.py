@@ -20,13 +20,12 @@ from ..gpu.records import NONE
 from ..gpu.scene_texels import ROW_TEXELS
 from ..gpu.schema import Field, Struct
 from .map_atlas import park
+from .pixel_lattice import MOST_SHARED
 from .variants import BIND_BEAM_OBJECTS, BIND_BEAM_VIEW, IMAGE_POLYGONS, UNIT_POLYGONS, Defines
 
 if TYPE_CHECKING:
     from ..gpu.scene_buffers import SceneBuffers
 
-MOST_POINTS = 64
-"""Of a pixel, at which its edges are told."""
 FINE_PARTS, COARSE_PARTS = 16, 4
 """Parts of a pixel that are looked at one by one, where a polygon is strong, and where it is not weak …"""
 FINE_ABOVE, COARSE_ABOVE = 0.2, 0.05
@@ -59,7 +58,7 @@ SCREEN_POLYGON = Struct(
 _VIEW = Struct(
     "BeamView",
     (
-        Field("places", "vec4", "points of a pixel about its middle, two each, neighbours together", MOST_POINTS // 2),
+        Field("places", "vec4", "points of a pixel about its middle, two each, neighbours together", MOST_SHARED // 2),
         Field("size", "vec2", "pixels"),
         Field("points", "uint", "how many"),
         Field("first_edge_texel", "uint", "where edges begin"),
@@ -129,7 +128,7 @@ class ScreenBeams:
         places = ordered(places)
         view["places"][0].reshape(-1, 2)[: len(places)] = places - 0.5
         view["size"], view["points"], view["first_edge_texel"] = size, len(places), self._first_edge_texel
-        fine, coarse = (min(parts, len(places)) for parts in (FINE_PARTS, COARSE_PARTS))
+        fine, coarse = (largest_divisor(len(places), parts) for parts in (FINE_PARTS, COARSE_PARTS))
         view["fine_parts"], view["coarse_parts"] = fine, coarse
         view["fine_above"], view["coarse_above"] = FINE_ABOVE, COARSE_ABOVE
         view["reach"] = np.abs(places - 0.5).max() + 1e-4
@@ -271,6 +270,11 @@ def fans(polygons: ScreenPolygons) -> tuple[np.ndarray, np.ndarray, np.ndarray, 
     base = 3 * polygons.hull_start[:-1][which]
     triangles = np.column_stack([base, base + number + 1, base + number + 2]).astype(np.uint32)
     return grown, owners, triangles, starts
+
+
+def largest_divisor(number: int, most: int) -> int:
+    """Of `number`, up to `most`."""
+    return max(d for d in range(1, most + 1) if number % d == 0)
 
 
 def ordered(places: np.ndarray) -> np.ndarray:

@@ -13,11 +13,12 @@ import pytest
 from spectrasplat.beams.screen_polygons import ScreenPolygons
 from spectrasplat.model.environment import gradient
 from spectrasplat.model.geometry import primitives
+from spectrasplat.model.lights import DirectionalLight
 from spectrasplat.model.optics import glass
 from spectrasplat.model.optics.colorimetry import xyz_to_rgb709
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, SceneObject
 from spectrasplat.passes.pixel_lattice import pixel_lattice, shared_places
-from spectrasplat.passes.screen_beams import REACH, fans, ordered
+from spectrasplat.passes.screen_beams import REACH, fans, largest_divisor, ordered
 
 from tests.gpu.camera_rig import DOWN, WHITE, at, horizontal, opened_camera_pass, released
 from tests.reference.screen_beams import screen_polygons
@@ -29,11 +30,11 @@ PANE = SceneObject("pane", primitives.box((1.2, 1.0, 0.1)), Dielectric(glass.con
 SKY = gradient((0.2, 0.4, 2.0), (1.0, 1.0, 1.0), (0.1, 0.6, 0.2))
 
 
-def polygons_of(camera_pass, camera=BESIDE, size=SIZE, threshold=1e-4, bands=1, cell_px=1000.0) -> ScreenPolygons:
+def polygons_of(camera_pass, threshold=1e-4, bands=1) -> ScreenPolygons:
     scene = camera_pass.scene
     return screen_polygons(
-        scene.scene, scene.space, scene.axis, *size, threshold=threshold, bands=bands, cell_px=cell_px
-    ) if camera is scene.scene.camera else pytest.fail("the scene's own camera")
+        scene.scene, scene.space, scene.axis, *SIZE, threshold=threshold, bands=bands, cell_px=1000.0
+    )
 
 
 def by_beams(camera_pass, polygons: ScreenPolygons, samples=16, maps=None, size=SIZE) -> np.ndarray:
@@ -82,11 +83,13 @@ def prism_pass(gl):
 
 def test_in_a_white_room_nothing_is_seen(gl):
     """All polygons and what is seen directly fill every pixel, outlines included, whatever the number of samples."""
-    camera_pass = opened_camera_pass(gl, [PRISM], background=(1, 1, 1), camera=BESIDE)
-    polygons = polygons_of(camera_pass, threshold=1e-5)
-    for samples in (4, 16):
-        picture = by_beams(camera_pass, polygons, samples)
-        np.testing.assert_allclose(picture, 1.0, atol=4e-3)
+    still = replace(PRISM, material=Dielectric(glass.constant(1.5)))
+    camera_pass = opened_camera_pass(gl, [still], background=(1, 1, 1), camera=BESIDE)
+    polygons = polygons_of(camera_pass, threshold=1e-6)
+    for samples in (4, 9, 16):
+        off = np.abs(by_beams(camera_pass, polygons, samples) - 1.0).max(axis=-1)
+        # A point may lie within float32's error of an outline.
+        assert np.sum(off > 2e-5) <= 2 and off.max() < 1.1 / min(4 * samples, 64)
     # It would not be so without one of the first polygons' edges.
     edges = polygons.edges.copy()
     strong = int(np.argmax(polygons.throughput[:, 1] * (np.diff(polygons.edge_start) > 2)))
@@ -132,13 +135,11 @@ def test_beams_agree_with_the_reference(gl):
 def test_a_textured_floor_through_a_pane(gl):
     """What lies behind is a lit surface with an edge: every part of a pixel looks for itself, as other samples do."""
     boards = [horizontal(-2.0 + i, -1.0 + i, -2.0, 2.0, -0.4, Diffuse((0.2 + 0.6 * (i % 2),) * 3), f"board {i}") for i in range(4)]
-    from spectrasplat.model.lights import DirectionalLight
-
     sun = DirectionalLight("sun", WHITE, direction=DOWN)
     camera_pass = opened_camera_pass(gl, [PANE, *boards], [sun], camera=BESIDE, background=(0.3, 0.3, 0.3))
-    paths = by_paths(camera_pass, 64)
+    converged, paths = by_paths(camera_pass, 256), by_paths(camera_pass, 16)
     beams = by_beams(camera_pass, polygons_of(camera_pass))
-    assert relative(beams, paths) < 1.5e-2
+    assert relative(beams, converged) < 1.1 * relative(paths, converged)
     released(camera_pass)
 
 
@@ -177,9 +178,9 @@ def test_hulls_grow_by_a_pixel():
         u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         to = probes[:, None] - corners[:, 0]
         area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            a = (to[..., 0] * v[:, 1] - to[..., 1] * v[:, 0]) / area
-            b = (u[:, 0] * to[..., 1] - u[:, 1] * to[..., 0]) / area
+        flat = np.abs(area) < 1e-12
+        a = (to[..., 0] * v[:, 1] - to[..., 1] * v[:, 0]) / np.where(flat, 1e-12, area)
+        b = (u[:, 0] * to[..., 1] - u[:, 1] * to[..., 0]) / np.where(flat, 1e-12, area)
         assert np.all(np.any((a >= -1e-9) & (b >= -1e-9) & (a + b <= 1 + 1e-9), axis=1))
         assert abs(0.5 * area.sum()) <= 0.5 * abs(np.linalg.det(np.c_[shape[1] - shape[0], shape[2] - shape[0]])) + 2 * REACH * 30
 
@@ -187,9 +188,10 @@ def test_hulls_grow_by_a_pixel():
 def test_points_of_a_pixel():
     """Polygons' edges are told where a first launch looks at what is seen directly; a quarter of the points in order lies
     in about a quarter of the pixel."""
-    assert len(shared_places(16, 4)) == 64 and len(shared_places(16, 1)) == 16
-    assert len(shared_places(3, 4)) == len(shared_places(5, 4)) == len(shared_places(1000, 1)) == 64
+    assert len(shared_places(16, 4)) == 64 and len(shared_places(16, 1)) == 16 and len(shared_places(5, 4)) == 20
+    assert len(shared_places(3, 4)) == len(shared_places(1000, 1)) == len(shared_places(17, 1)) == 64
     off = shared_places(16, 1) - pixel_lattice(16, 0)
-    assert np.all(off == off[0]) and 0 < np.abs(off).max() < 2e-3
+    assert np.all((off > 0) & (off < 2e-3))
+    assert largest_divisor(20, 16) == 10 and largest_divisor(64, 16) == 16
     for quarter in ordered(shared_places(16, 4)).reshape(4, 16, 2):
-        assert np.all(np.ptp(quarter, axis=0) < 0.7)
+        assert np.all(np.std(quarter, axis=0) < 0.22)
