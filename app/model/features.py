@@ -16,7 +16,7 @@ from .scene import (
     Scene,
     SceneObject,
 )
-from .settings import RenderSettings
+from .settings import RenderSettings, divides_spectrum
 
 MAX_GROUPS = 4
 """Spectral columns a photon may carry; further dispersive materials share the last one."""
@@ -89,6 +89,8 @@ class Features:
     """Spectral channels of the caustic maps beside XYZ, for light whose dispersion the camera's adds to."""
     light_profiles: bool = False
     """Some light shines by a table of intensities over directions."""
+    beams: bool = False
+    """What meets certain flat-faceted objects first is left to beams (`spectrasplat.beams`): photons end there."""
     anchor_weights: bool = False
     """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
 
@@ -119,6 +121,7 @@ class Features:
             "NESTED_WINDOWS": self.nested_windows,
             "ANCHOR_WEIGHTS": self.anchor_weights,
             "LIGHT_PROFILES": self.light_profiles,
+            "BEAMS": self.beams,
         }
         return numbers | {name: 1 for name, on in switches.items() if on}
 
@@ -184,7 +187,7 @@ def _reindexed(scene: Scene, settings: RenderSettings, groups: int, *, coloured:
     from .optics.spectral_tables import SpectralAxis
 
     edited = settings.anchor_weights or (settings.local_gain and any(o.local_dispersion for o in scene.objects))
-    if not edited or groups != 1 or coloured or settings.method != "srd":
+    if not edited or groups != 1 or coloured or not divides_spectrum(settings.method):
         return False
     if any(o.material.is_grating for o in scene.objects):
         return False
@@ -420,6 +423,11 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             f"measured lamps: {names([light.name for light in scene.lights if light.profile is not None])}"
             if features.light_profiles
             else "no light comes from a photometric file",
+        ),
+        (
+            "beams",
+            features.beams,
+            "what flat facets throw is followed as beams" if features.beams else "all light is followed by photons",
         ),
         ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
     ]

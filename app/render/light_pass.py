@@ -33,7 +33,7 @@ from ..passes.map_atlas import MapAtlas
 from ..passes.map_layout import MapLayout, check_map_receiver, layout_maps
 from ..passes.pilot import Pilot, landings_of, pilot_steps
 from ..passes.splat import Splatter
-from ..passes.trace import RAY_ROOM, Batch, FluxTally, LatticeSlice, TracePass
+from ..passes.trace import RAY_ROOM, Batch, FluxTally, TracePass
 from .light_maps import LightMaps
 from .light_plan import Division, Planner
 from .map_fit import MapFit
@@ -370,16 +370,17 @@ class LightPass:
                 points = len(range(j, lattice, rounds))
                 if points:
                     part = plan.slice(self.seed, number, lattice, j, rounds, points, float(photons))
-                    for _ in self._slice_steps(part, plan.domain, RoundOf(number, j, rounds, i + 1 == len(self.plans))):
+                    of = RoundOf(number, j, rounds, i + 1 == len(self.plans))
+                    for _ in self.batch_steps(self.trace.steps(part, plan.domain), of):
                         yield PassStep(done / slices, False)
                 if i + 1 < len(self.plans):
                     yield PassStep((done + 1) / slices, False)
             self._maps.photon_weight += photons / rounds
             yield PassStep((j + 1) / rounds, True)
 
-    def _slice_steps(self, part: LatticeSlice, domain: EmissionDomain, of: RoundOf) -> Iterator[None]:
+    def batch_steps(self, steps: Generator[None, None, Batch], of: RoundOf) -> Iterator[None]:
+        """Trace a batch (`TracePass.steps`, `carry_on`), keep and splat what landed, and count it."""
         started = time.perf_counter()
-        steps = self.trace.steps(part, domain)
         while True:
             try:
                 next(steps)

@@ -1,0 +1,184 @@
+"""Finished beams as the plain arrays of `polygons`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .facets import BeamScene
+from .leaves import Leaves
+from .polygons import BeamPieces, BeamPolygons
+from .rays import jit
+from .search import LEAF_PIECE, LEAF_RECEIVER
+
+
+@jit
+def hulls_of(corners, starts, grow, out):
+    """Convex hulls, counter-clockwise, of groups of points [Andrew 1979], each point grown by `grow` of its group to
+    both sides along both axes. Returns the ends of the groups in `out`."""
+    ends = np.zeros(len(starts), np.int64)
+    count = 0
+    points, chain = np.empty((1024, 2)), np.empty((2050, 2))
+    for group in range(len(starts) - 1):
+        n = 0
+        for c in range(starts[group], starts[group + 1]):
+            for k in range(4 if grow[group] > 0.0 else 1):
+                if n < 1024:
+                    points[n, 0] = corners[c, 0] + (grow[group] if k & 1 else -grow[group])
+                    points[n, 1] = corners[c, 1] + (grow[group] if k & 2 else -grow[group])
+                    n += 1
+        # Shell sort by u, then v: groups are small.
+        gap = n // 2
+        while gap > 0:
+            for i in range(gap, n):
+                u, v = points[i, 0], points[i, 1]
+                j = i
+                while j >= gap and (points[j - gap, 0] > u or (points[j - gap, 0] == u and points[j - gap, 1] > v)):
+                    points[j, 0], points[j, 1] = points[j - gap, 0], points[j - gap, 1]
+                    j -= gap
+                points[j, 0], points[j, 1] = u, v
+            gap //= 2
+        m = 0
+        for turn in range(2):
+            base = m
+            for s in range(n):
+                p = points[s if turn == 0 else n - 1 - s]
+                if turn == 1 and s == 0:
+                    base = m - 1
+                    continue
+                while m - base >= 2:
+                    a, b = chain[m - 2], chain[m - 1]
+                    if (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) > 0.0:
+                        break
+                    m -= 1
+                chain[m, 0], chain[m, 1] = p[0], p[1]
+                m += 1
+        m = max(m - 1, 1)
+        for k in range(m):
+            out[count, 0], out[count, 1] = chain[k, 0], chain[k, 1]
+            count += 1
+        ends[group + 1] = count
+    return ends
+
+
+def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float) -> BeamPolygons:
+    """What lies on receivers. `unit`: GPU units a scene unit."""
+    chosen = _chosen(leaves, LEAF_RECEIVER)
+    head = chosen.head
+    edges = np.zeros((len(chosen.edges), 8))
+    edges[:, 0:3], edges[:, 4:7] = chosen.edges[:, 0], chosen.edges[:, 2]
+    edges[:, 3] = edges[:, 7] = chosen.soft
+    starts = np.concatenate([[0], np.cumsum(head[:, 6])]).astype(np.int32)
+    softest = np.maximum.reduceat(np.append(chosen.soft, 0.0), starts[:-1]) if len(head) else np.zeros(0)
+    hull_start, hulls = _hulls(chosen, softest)
+    return BeamPolygons(
+        np.full(len(head), light, np.int32),
+        scene.facets["receiver"][head[:, 1]].astype(np.int32),
+        head[:, 3].astype(np.int32),
+        head[:, 4].astype(np.int32),
+        chosen.x[:, 0],
+        chosen.x[:, 2],
+        chosen.density * unit * unit,
+        chosen.slope,
+        chosen.centre,
+        chosen.flux,
+        starts,
+        edges,
+        hull_start,
+        hulls,
+    )
+
+
+def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int) -> BeamPieces:
+    """What photons have to carry on."""
+    chosen = _chosen(leaves, LEAF_PIECE)
+    head = chosen.head
+    edges = np.concatenate([chosen.edges[:, 0], chosen.edges[:, 2]], axis=1)
+    counts = head[:, 6]
+    of_edge = np.repeat(np.arange(len(head)), counts)
+    for first in (0, 3):
+        edges[:, first + 2] += np.einsum("ek,ek->e", edges[:, first : first + 2], chosen.centre[of_edge])
+    hull_start, hulls = _hulls(chosen, np.zeros(len(head)))
+    hulls = hulls - chosen.centre[np.repeat(np.arange(len(head)), np.diff(hull_start))]
+    last = np.maximum(head[:, 2], 0)
+    towards = np.einsum("mk,mk->m", chosen.ray[:, 1, 1, 0], scene.facets["plane"][last, :3])
+    return BeamPieces(
+        np.full(len(head), light, np.int32),
+        head[:, 3].astype(np.int32),
+        head[:, 4].astype(np.int32),
+        chosen.x[:, 0],
+        chosen.x[:, 2],
+        chosen.centre,
+        chosen.ray[:, 0],
+        chosen.ray[:, 1],
+        chosen.density,
+        scene.facets["triangle"][last].astype(np.int32),
+        scene.facets["owner"][last].astype(np.int32),
+        towards < 0.0,
+        _objects_of(head[:, 5], scene),
+        chosen.flux,
+        np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        edges,
+        hull_start,
+        hulls,
+    )
+
+
+class _chosen:
+    """Leaves of one kind, packed."""
+
+    def __init__(self, leaves: list[Leaves], kind: int) -> None:
+        parts = [[], [], [], [], [], [], [], [], [], []]
+        for part in leaves:
+            n, e, c = part.count
+            head = part.head[:n]
+            keep = head[:, 0] == kind
+            edge_keep, corner_keep = np.repeat(keep, head[:, 6]), np.repeat(keep, head[:, 7])
+            for target, value in zip(
+                parts,
+                (
+                    head[keep],
+                    part.x[:n][keep],
+                    part.density[:n][keep],
+                    part.centre[:n][keep],
+                    part.slope[:n][keep],
+                    part.flux[:n][keep],
+                    part.ray[:n][keep],
+                    part.edge[:e][edge_keep],
+                    part.soft[:e][edge_keep],
+                    part.corner[:c][corner_keep],
+                ),
+                strict=True,
+            ):
+                target.append(value)
+        shapes = (8,), (3,), (3,), (2,), (2,), (), (2, 3, 3, 3), (3, 3), (), (2,)
+        (
+            self.head,
+            self.x,
+            self.density,
+            self.centre,
+            self.slope,
+            self.flux,
+            self.ray,
+            self.edges,
+            self.soft,
+            self.corners,
+        ) = (
+            np.concatenate(part) if part else np.zeros((0, *shape), np.int64 if i == 0 else float)
+            for i, (part, shape) in enumerate(zip(parts, shapes, strict=True))
+        )
+
+
+def _hulls(chosen: _chosen, grow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    starts = np.concatenate([[0], np.cumsum(chosen.head[:, 7])]).astype(np.int64)
+    out = np.empty((4 * len(chosen.corners) + 8, 2))
+    ends = hulls_of(chosen.corners, starts, grow.astype(float), out)
+    return ends.astype(np.int32), out[: ends[-1]]
+
+
+def _objects_of(mask: np.ndarray, scene: BeamScene) -> np.ndarray:
+    """Masks with a bit an object from masks with a bit a solid."""
+    result = np.zeros(len(mask), np.uint64)
+    for i, bit in enumerate(scene.solids["bit"]):
+        if bit >= 0:
+            result |= np.where((mask >> bit) & 1, np.uint64(1) << np.uint64(i), np.uint64(0))
+    return result

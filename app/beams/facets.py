@@ -1,0 +1,346 @@
+"""A scene as beams see it: convex flat facets with what lies on their two sides, and boxes round all that is not flat.
+
+Beams carry flat-faceted glass and flat mirrors. Flat receivers and blockers end them; what is neither is an obstacle,
+and a beam that may meet one goes on as photons.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model.features import is_flat
+from ..model.geometry.mesh import Mesh
+from ..model.optics.colorimetry import VISIBLE_NM, rgb_partition
+from ..model.optics.spectral_tables import SpectralAxis
+from ..model.scene import Scene, SceneObject
+
+DIELECTRIC, MIRROR, BLACK, RECEIVER = 0, 1, 2, 3
+MAX_SOLIDS = 62
+"""Transparent solids that fit the bits of a beam's medium."""
+MAX_FACETS = 4096
+"""An object of more facets is left to photons whatever it would cost."""
+MAX_CORNERS = 10
+"""A facet of more corners is cut into pieces."""
+SAMPLES = 2049
+"""Of every spectral table, equally spaced in x."""
+_COPLANAR = 2e-6
+"""Of an object's size: float32 coordinates know a plane to a few times 1e-7."""
+_NO_ROW = -1
+
+
+FACET = np.dtype(
+    [
+        # n, d with n . p = d; n points out of a solid.
+        ("plane", "f8", 4),
+        ("kind", "i8"),
+        ("owner", "i8"),
+        # Counter-clockwise seen from where n points.
+        ("corner", "f8", (MAX_CORNERS, 3)),
+        ("corners", "i8"),
+        # Of a ball that holds it.
+        ("centre", "f8", 3),
+        ("radius", "f8"),
+        # Origin and two axes of its plane; a receiver's are its map's.
+        ("frame", "f8", (3, 3)),
+        # Number of the receiver, -1: none; tolerated error of places on it, GPU units.
+        ("receiver", "i8"),
+        ("texel", "f8"),
+        # One of the object's triangles that it is made of.
+        ("triangle", "i8"),
+    ]
+)
+"""A facet, in GPU space. `kind`: DIELECTRIC, MIRROR, BLACK or RECEIVER; `owner`: object."""
+
+SOLID = np.dtype(
+    [
+        # Place in a medium's mask, the higher one wins; -1: not transparent. `of_bit` of record b: the object of bit b.
+        ("bit", "i8"),
+        ("of_bit", "i8"),
+        # Rows of the tables: refractive index; absorption per GPU unit (glass) or reflectance (mirror); -1: none.
+        ("glass", "i8"),
+        ("tint", "i8"),
+        # Facets first … last - 1.
+        ("first", "i8"),
+        ("last", "i8"),
+        # A convex solid: its facets never hide each other.
+        ("convex", "?"),
+        ("centre", "f8", 3),
+        ("radius", "f8"),
+    ]
+)
+"""What the search knows of an object."""
+
+
+@dataclass(frozen=True)
+class BeamScene:
+    """All of it, with which objects are met by beams."""
+
+    facets: np.ndarray
+    """FACET (F,), by owner."""
+    solids: np.ndarray
+    """SOLID (at least 64 and the objects,)."""
+    tables: np.ndarray
+    """(rows, SAMPLES): spectral tables over x."""
+    obstacles: np.ndarray
+    """(B, 2, 3): boxes round what is not flat."""
+    absorbs: bool
+    """Some medium absorbs."""
+    beam_objects: tuple[int, ...]
+    """Objects of glass and mirrors whose light is carried by beams."""
+    why_not: dict[int, str]
+    """Specular objects that beams do not carry, and why."""
+
+
+def is_faceted(item: SceneObject) -> bool:
+    """Whether all the object's specular facets are flat: no interpolated normals."""
+    mesh = item.mesh
+    if mesh.corner_normals is None:
+        return True
+    known = np.abs(mesh.corner_normals).sum(axis=2) > 0.0
+    cosine = np.einsum("tcj,tj->tc", mesh.corner_normals, mesh.face_normals())
+    return bool((~known | (cosine >= 1.0 - 1e-9)).all())
+
+
+def why_not_faceted(item: SceneObject) -> str | None:
+    """Why beams cannot carry what an object of glass or a mirror throws; None: they can."""
+    if item.material.is_grating:
+        return "a grating sends light into several orders"
+    if not is_faceted(item):
+        return "its normals are interpolated"
+    if len(item.mesh.triangles) > 8 * MAX_FACETS:
+        return f"it has {len(item.mesh.triangles)} triangles"
+    return None
+
+
+def beam_scene(
+    scene: Scene,
+    meshes: list[Mesh],
+    frames: dict[int, tuple[np.ndarray, np.ndarray]],
+    axis: SpectralAxis,
+    unit: float,
+    *,
+    sees: bool = False,
+) -> BeamScene:
+    """The facets of `scene`. `meshes`: each object's in GPU space; `frames`: origin (3,) and axes (2, 3) of every flat
+    receiver's map by number; `unit`: GPU units a scene unit. `sees`: for beams from the camera, which end where
+    they leave glass and mirrors."""
+    why_not: dict[int, str] = {}
+    outlines: dict[int, list[tuple[np.ndarray, int]]] = {}
+    receivers = [i for i, o in enumerate(scene.objects) if o.material.receives]
+    obstacles: list[int] = []
+    for i, item in enumerate(scene.objects):
+        if item.material.is_specular:
+            reason = why_not_faceted(item)
+            if reason is None:
+                outlines[i] = facets_of(meshes[i])
+                if len(outlines[i]) > MAX_FACETS:
+                    reason = f"it has {len(outlines[i])} facets"
+                    del outlines[i]
+            if reason is not None:
+                why_not[i] = reason
+                obstacles.append(i)
+        elif sees:
+            continue
+        elif item.material.receives and not is_flat(item) or len(item.mesh.triangles) > MAX_FACETS:
+            obstacles.append(i)
+        else:
+            outlines[i] = facets_of(meshes[i])
+    for i in _inside_of_obstacles(scene, meshes, [i for i in outlines if scene.objects[i].material.transmits], why_not):
+        why_not[i] = "it nests in, or touches, a solid that is not faceted"
+        obstacles.append(i)
+        del outlines[i]
+    transparent = [i for i in outlines if scene.objects[i].material.transmits]
+    for i in transparent[MAX_SOLIDS:]:
+        why_not[i] = f"more than {MAX_SOLIDS} transparent solids"
+        obstacles.append(i)
+        del outlines[i]
+    ranked = sorted(transparent[:MAX_SOLIDS], key=lambda i: (scene.objects[i].material.priority, i))
+    tables, glass, tint = _tables(scene, axis, unit)
+    facets = _facets(scene, outlines, receivers, frames)
+    return BeamScene(
+        facets,
+        _solids(scene, meshes, facets, {i: bit for bit, i in enumerate(ranked)}, glass, tint),
+        tables,
+        np.array([meshes[i].bounds() for i in obstacles], float).reshape(-1, 2, 3),
+        any(o.material.transmits and o.material.absorption is not None for o in scene.objects),
+        tuple(i for i in outlines if scene.objects[i].material.is_specular),
+        why_not,
+    )
+
+
+def facets_of(mesh: Mesh) -> list[tuple[np.ndarray, int]]:
+    """Convex polygons (corners (n, 3) counter-clockwise from outside, one of their triangles) that make up a mesh.
+
+    Coplanar neighbours become one facet where that is convex, triangles of no area none."""
+    areas, normals = mesh.areas(), mesh.face_normals()
+    low, high = mesh.bounds()
+    tolerance = _COPLANAR * float(np.linalg.norm(high - low))
+    corners = mesh.corners()
+    offset = np.einsum("tj,tj->t", normals, corners.mean(axis=1))
+    neighbours = _neighbours(mesh)
+    left = areas > 1e-14 * max(areas.max(), np.finfo(float).tiny)
+    facets: list[tuple[np.ndarray, int]] = []
+    for seed in np.argsort(-areas, kind="stable"):
+        if not left[seed]:
+            continue
+        patch, border = [int(seed)], [int(seed)]
+        left[seed] = False
+        while border:
+            for near in neighbours[border.pop()]:
+                flat = np.abs(corners[near] @ normals[seed] - offset[seed]).max() <= tolerance
+                if left[near] and flat and normals[near] @ normals[seed] > 0.9999:
+                    left[near] = False
+                    patch.append(near)
+                    border.append(near)
+        facets += _convex_parts(corners[patch], normals[seed], float(areas[patch].sum()), patch)
+    return facets
+
+
+def _neighbours(mesh: Mesh) -> list[list[int]]:
+    edges: dict[tuple[int, int], list[int]] = {}
+    for t, triangle in enumerate(mesh.triangles):
+        for a, b in zip(triangle, np.roll(triangle, -1), strict=True):
+            edges.setdefault((min(a, b), max(a, b)), []).append(t)
+    found: list[list[int]] = [[] for _ in mesh.triangles]
+    for triangles in edges.values():
+        for t in triangles:
+            found[t] += [other for other in triangles if other != t]
+    return found
+
+
+def _convex_parts(
+    corners: np.ndarray, normal: np.ndarray, area: float, patch: list[int]
+) -> list[tuple[np.ndarray, int]]:
+    guide = np.eye(3)[np.argmin(np.abs(normal))]
+    first = np.cross(normal, guide)
+    first /= np.linalg.norm(first)
+    second = np.cross(normal, first)
+    points = corners.reshape(-1, 3)
+    flat = np.column_stack([points @ first, points @ second])
+    hull = convex_hull(flat)
+    around = flat[hull]
+    hull_area = 0.5 * abs(
+        float(np.sum(around[:, 0] * np.roll(around[:, 1], -1) - around[:, 1] * np.roll(around[:, 0], -1)))
+    )
+    if abs(hull_area - area) > 1e-6 * hull_area:
+        return [(corners[k], patch[k]) for k in range(len(patch))]
+    outline = points[hull]
+    parts = []
+    for i in range(1, len(outline) - 1, MAX_CORNERS - 2):
+        parts.append((np.concatenate([outline[:1], outline[i : i + MAX_CORNERS - 1]]), patch[0]))
+    return parts
+
+
+def convex_hull(points: np.ndarray) -> np.ndarray:
+    """Indices of the corners of (n, 2) points' convex hull, counter-clockwise, without those on its edges to 1e-9
+    of its size [Andrew 1979]."""
+    order = np.lexsort((points[:, 1], points[:, 0]))
+    size = float(np.ptp(points, axis=0).max())
+
+    def half(sequence: np.ndarray) -> list[int]:
+        chain: list[int] = []
+        for i in sequence:
+            while len(chain) > 1:
+                a, b = points[chain[-2]], points[chain[-1]]
+                along, to = b - a, points[i] - a
+                if along[0] * to[1] - along[1] * to[0] > 1e-9 * size * np.hypot(*to):
+                    break
+                chain.pop()
+            if not chain or np.hypot(*(points[i] - points[chain[-1]])) > 1e-9 * size:
+                chain.append(int(i))
+        return chain
+
+    lower, upper = half(order), half(order[::-1])
+    return np.array(lower[:-1] + upper[:-1])
+
+
+def _facets(
+    scene: Scene,
+    outlines: dict[int, list[tuple[np.ndarray, int]]],
+    receivers: list[int],
+    frames: dict[int, tuple[np.ndarray, np.ndarray]],
+) -> np.ndarray:
+    records = np.zeros(sum(map(len, outlines.values())), FACET)
+    pieces = ((i, *piece) for i in sorted(outlines) for piece in outlines[i])
+    for record, (i, outline, triangle) in zip(records, pieces, strict=True):
+        material = scene.objects[i].material
+        middle = outline.mean(axis=0)
+        shifted = outline - middle
+        normal = np.cross(shifted, np.roll(shifted, -1, axis=0)).sum(axis=0)
+        normal /= np.linalg.norm(normal)
+        along = outline[1] - outline[0]
+        along /= np.linalg.norm(along)
+        record["plane"] = *normal, normal @ middle
+        record["kind"] = RECEIVER if material.receives else BLACK
+        if material.is_specular:
+            record["kind"] = DIELECTRIC if material.transmits else MIRROR
+        record["owner"], record["triangle"] = i, triangle
+        record["corner"][: len(outline)], record["corners"] = outline, len(outline)
+        record["centre"], record["radius"] = middle, np.linalg.norm(shifted, axis=1).max()
+        record["receiver"] = receivers.index(i) if material.receives else -1
+        record["frame"] = middle, along, np.cross(normal, along)
+        if record["receiver"] in frames:
+            origin, axes = frames[int(record["receiver"])]
+            record["frame"] = origin, axes[0], axes[1]
+    return records
+
+
+def _solids(
+    scene: Scene, meshes: list[Mesh], facets: np.ndarray, bits: dict[int, int], glass: list[int], tint: list[int]
+) -> np.ndarray:
+    records = np.zeros(max(len(scene.objects), 64), SOLID)
+    records["bit"] = -1
+    for i, bit in bits.items():
+        records[i]["bit"], records[bit]["of_bit"] = bit, i
+    for i, (mesh, item) in enumerate(zip(meshes, scene.objects, strict=True)):
+        low, high = mesh.bounds()
+        record = records[i]
+        record["glass"], record["tint"] = glass[i], tint[i]
+        record["first"], record["last"] = np.searchsorted(facets["owner"], [i, i + 1])
+        record["convex"] = item.mesh.convex_planes is not None
+        record["centre"], record["radius"] = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low)
+    return records
+
+
+def _tables(scene: Scene, axis: SpectralAxis, unit: float) -> tuple[np.ndarray, list[int], list[int]]:
+    """All rows, and each object's of its glass and of its tint."""
+    nm = axis.nm_of_samples(SAMPLES)
+    rows: list[np.ndarray] = []
+    glasses: list = []
+    row_of_glass: list[int] = []
+    glass, tint = [], []
+    for item in scene.objects:
+        material = item.material
+        glass.append(_NO_ROW)
+        tint.append(_NO_ROW)
+        if material.transmits:
+            if material.dispersion not in glasses:
+                glasses.append(material.dispersion)
+                row_of_glass.append(len(rows))
+                rows.append(material.dispersion.index(nm))
+            glass[-1] = row_of_glass[glasses.index(material.dispersion)]
+            if material.absorption is not None:
+                tint[-1] = len(rows)
+                rows.append(np.interp(nm, VISIBLE_NM, material.absorption.coefficient) / unit)
+        if material.is_mirror:
+            tint[-1] = len(rows)
+            rows.append(np.interp(nm, VISIBLE_NM, rgb_partition() @ np.asarray(material.reflectance_rgb, float)))
+    return np.array(rows, float).reshape(-1, SAMPLES), glass, tint
+
+
+def _inside_of_obstacles(
+    scene: Scene, meshes: list[Mesh], transparent: list[int], why_not: dict[int, str]
+) -> list[int]:
+    """Faceted solids whose boxes meet that of a solid that photons carry, or of another one of these."""
+    bounds = {i: np.array(mesh.bounds()) for i, mesh in enumerate(meshes)}
+    found = [i for i in why_not if scene.objects[i].material.transmits]
+    taken: list[int] = []
+    while found:
+        low, high = bounds[found.pop()]
+        for i in transparent:
+            if i not in taken and (bounds[i][0] <= high).all() and (bounds[i][1] >= low).all():
+                taken.append(i)
+                found.append(i)
+    return taken

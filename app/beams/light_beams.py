@@ -1,0 +1,165 @@
+"""Everything that a scene's lights throw by way of flat facets, in one call."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..model.geometry.mesh import Mesh
+from ..model.optics.spectral_tables import SpectralAxis
+from ..model.scene import Scene
+from .convert import pieces_of, polygons_of
+from .facets import BLACK, BeamScene, beam_scene
+from .find import Emission, Search, search
+from .polygons import BeamPieces, BeamPolygons, joined
+from .search import SUMS
+from .sources import emissions, mask_at, why_no_beams
+
+LIGHT_PARTS = 16
+"""Points that stand for an extended light; penumbrae blur each into the next."""
+
+
+@dataclass
+class LightBeams:
+    """The beams of all lights that have any."""
+
+    carried: dict[int, tuple[int, ...]]
+    """By light: objects whose light beams carry; photons that meet one of them first are not needed."""
+    polygons: BeamPolygons | None = None
+    pieces: BeamPieces | None = None
+    sums: dict[int, np.ndarray] = field(default_factory=dict)
+    """By light: flux per unit of spectral power by where it went (`search.SUM_…`)."""
+
+
+class BeamFinder:
+    """The beams of one scene, to be found at any fineness."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        world_meshes: list[Mesh],
+        frames: dict[int, tuple[np.ndarray, np.ndarray]],
+        texels: dict[int, float],
+        axis: SpectralAxis,
+        to_gpu: Callable[[np.ndarray], np.ndarray],
+        unit: float,
+    ) -> None:
+        """`frames`: origin and axes of every flat receiver's map by number, `texels`: side of its finest texel, GPU
+        units; `to_gpu`, `unit`: scene to GPU space, GPU units a scene unit."""
+        matrix = np.eye(4)
+        matrix[:3, :3] *= unit
+        matrix[:3, 3] = to_gpu(np.zeros(3))
+        self.meshes = [mesh.transformed(matrix) for mesh in world_meshes]
+        self.scene = beam_scene(scene, self.meshes, frames, axis, unit)
+        self._scene, self._axis, self._to_gpu, self._unit = scene, axis, to_gpu, unit
+        self.set_texels(texels)
+
+    def set_texels(self, texels: dict[int, float]) -> None:
+        """Other maps: sides of receivers' finest texels, GPU units."""
+        facets = self.scene.facets
+        self._texel = min(texels.values(), default=1e-3)
+        facets["texel"] = [_TOLERANCE * texels.get(int(r), self._texel) for r in facets["receiver"]]
+
+    @property
+    def lights(self) -> list[int]:
+        """Lights whose beams can be followed."""
+        if not self.scene.beam_objects:
+            return []
+        return [i for i, light in enumerate(self._scene.lights) if why_no_beams(light) is None]
+
+    def find(
+        self,
+        threshold: float,
+        depth: int,
+        seed: int,
+        light_parts: int = LIGHT_PARTS,
+        threads: int | None = None,
+        go_on: Callable[[], bool] = lambda: True,
+    ) -> Iterator[float | LightBeams]:
+        """All beams, pausing with the share that is done; what comes last is the result.
+
+        `threshold`: share of the light that meets facets below which a beam plays roulette; `depth`: most specular
+        events; `light_parts`: points of an extended light."""
+        todo: list[tuple[int, list[Emission]]] = []
+        for i in self.lights:
+            light = self._scene.lights[i]
+            place = 0
+            if light.has_place and not light.is_parallel:
+                place = mask_at(self._to_gpu(np.array(light.position)), self.scene, self.meshes)
+            parts = emissions(
+                light, self.scene, self._to_gpu, self._unit, self._axis, light_parts if light.has_extent else 1, place
+            )
+            if parts:
+                todo.append((i, parts))
+        watts = {i: _power(self._scene.lights[i]) for i, _ in todo}
+        reach = {i: sum(_reach(part) for part in parts) * watts[i] for i, parts in todo}
+        total, steps = sum(reach.values()), sum(len(parts) for _, parts in todo)
+        result, done = LightBeams({}), 0
+        polygons, pieces = [], []
+        for i, parts in todo:
+            sums, blocked = np.zeros(SUMS), set()
+            found = []
+            for number, part in enumerate(parts):
+                how = Search(
+                    threshold,
+                    seed + 7919 * number,
+                    depth,
+                    _TOLERANCE * self._texel,
+                    power=total / watts[i] if watts[i] > 0.0 else None,
+                )
+                leaves, part_sums, part_blocked = search(self.scene, part, how, threads, go_on)
+                found.append(leaves)
+                sums += part_sums
+                blocked |= part_blocked
+                done += 1
+                yield done / steps
+            if blocked:
+                # Photons carry what these objects throw: all of it, whichever point of the light it comes from.
+                found = [[leaves_without(leaves, blocked) for leaves in part] for part in found]
+            flat = [leaves for part in found for leaves in part]
+            polygons.append(polygons_of(flat, self.scene, i, self._unit))
+            pieces.append(pieces_of(flat, self.scene, i))
+            result.carried[i] = tuple(o for o in self.scene.beam_objects if o not in blocked)
+            result.sums[i] = sums
+        result.polygons = joined(polygons) if polygons else None
+        result.pieces = joined(pieces) if pieces else None
+        yield result
+
+
+_TOLERANCE = 0.25
+"""Texels."""
+
+
+def leaves_without(leaves, objects: set[int]):
+    """The leaves of beams that met none of `objects` first."""
+    from .leaves import Leaves
+
+    n, e, c = leaves.count
+    keep = ~np.isin(leaves.head[:n, 3], list(objects))
+    edges, corners = np.repeat(keep, leaves.head[:n, 6]), np.repeat(keep, leaves.head[:n, 7])
+    per_leaf = {
+        name: getattr(leaves, name)[:n][keep] for name in ("head", "x", "density", "centre", "slope", "flux", "ray")
+    }
+    count = np.array([keep.sum(), edges.sum(), corners.sum()])
+    return Leaves(
+        count=count,
+        **per_leaf,
+        edge=leaves.edge[:e][edges],
+        soft=leaves.soft[:e][edges],
+        corner=leaves.corner[:c][corners],
+    )
+
+
+def _power(light) -> float:
+    return float(light.spectral_power.xyz()[1] + light.spectral_power.power_w())
+
+
+def _reach(emission: Emission) -> float:
+    """Flux per unit of spectral power that may meet facets, roughly."""
+    side = 2.0 * emission.room[2]
+    if len(emission.limits) > 3:
+        side = min(side, 2.0 * math.sqrt(abs(float(np.median(emission.limits[:, 0]))) + 1e-12))
+    return emission.density * side * side

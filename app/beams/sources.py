@@ -1,0 +1,234 @@
+"""The scene's lights as sources of beams: parallel ones and points; extended ones as several, each a part of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ..model.geometry.mesh import Mesh
+from ..model.lights.light import Light
+from ..model.optics.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative
+from .facets import BLACK, SAMPLES, BeamScene
+from .find import Emission
+from .rays import PARALLEL, POINT, SOURCE
+
+_RIM = 64
+"""Corners of the polygon that stands for a round aperture or a cone, of the same area."""
+_WIDEST = math.tan(math.radians(55.0))
+"""Half side of a gnomonic plane up to which one is enough; else the six sides of a cube are taken."""
+_GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
+
+
+def why_no_beams(light: Light) -> str | None:
+    """Why a light's beams cannot be followed; None: they can."""
+    if light.emission == "profile":
+        return "its intensity is a table over directions"
+    return None
+
+
+def emissions(
+    light: Light,
+    scene: BeamScene,
+    to_gpu: Callable[[np.ndarray], np.ndarray],
+    unit: float,
+    axis: SpectralAxis,
+    parts: int,
+    inside: int = 0,
+) -> list[Emission]:
+    """`light` as sources; an extended one as about `parts` of equal power. `to_gpu`: scene to GPU space, `unit`: GPU
+    units a scene unit; `inside`: mask of the solids that the light stands in."""
+    corners = _specular_corners(scene)
+    if not len(corners):
+        return []
+    spectrum = cumulative(axis, light.spectral_power)
+    power = _importance(spectrum)
+    lines = [float(axis.x_of_nm(nm)) for nm, _ in light.spectral_power.lines]
+    shares = [float(watts) for _, watts in light.spectral_power.lines]
+    total = sum(shares) + float(np.sum(light.spectral_power.density))
+    common = (power, tuple(lines), tuple(s / total for s in shares), bool(np.any(light.spectral_power.density > 0.0)))
+    make = _parallel if light.is_parallel else _diverging
+    return make(light, corners, to_gpu, unit, parts, common, inside)
+
+
+def _specular_corners(scene: BeamScene) -> np.ndarray:
+    facets = scene.facets[scene.facets["kind"] < BLACK]
+    return np.concatenate([f["corner"][: f["corners"]] for f in facets]) if len(facets) else np.zeros((0, 3))
+
+
+def _importance(spectrum: CumulativeSpectrum) -> np.ndarray:
+    """Half by brightness, half by power, so that bins where the eye sees little are sampled too."""
+    values = spectrum.at(np.linspace(0.0, 1.0, SAMPLES))
+    y, w = values[:, 1], values[:, 3]
+    return 0.5 * y / max(float(y[-1]), 1e-300) + 0.5 * w / max(float(w[-1]), 1e-300)
+
+
+def _parallel(light, corners, to_gpu, unit, parts, common, inside) -> list[Emission]:
+    right, up, forward = light.axes().T
+    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    reach = float(np.linalg.norm(corners - middle, axis=1).max())
+    limits = np.zeros((0, 3))
+    if light.has_place:
+        at = (to_gpu(np.array(light.position)) - middle) @ np.stack([right, up]).T
+        half = np.array(light.half_extent) * unit
+        limits = _disc(at, float(half[0])) if light.is_disc else _rectangle(at, half)
+        back = float((middle - to_gpu(np.array(light.position))) @ forward)
+    else:
+        back = 4.0 * reach + 1e3
+    tangent = math.tan(light.angular_radius)
+    places = _places(parts if light.has_extent else 1) * tangent
+    result = []
+    for u, v in places:
+        tilted = forward + u * right + v * up
+        tilted /= np.linalg.norm(tilted)
+        spread = tangent / math.sqrt(len(places)) if tangent > 0.0 else 0.0
+        source = _source(PARALLEL, middle - back * tilted, tilted, right, up)
+        beside = tuple(
+            _source(PARALLEL, middle - back * _unit(tilted + w), _unit(tilted + w), right, up)
+            for w in (spread * right, spread * up)
+        )
+        grow = 1.0 + math.hypot(u, v)
+        room = np.array([0.0, 0.0, 1.05 * reach * grow])
+        result.append(Emission(source, limits, room, *common, 1.0 / unit**2 / len(places), inside, beside if spread else ()))
+    return result
+
+
+def _diverging(light, corners, to_gpu, unit, parts, common, inside) -> list[Emission]:
+    origin = to_gpu(np.array(light.position))
+    direction = light.axes()[:, 2]
+    is_area = light.has_outline
+    offsets, measure, spread = np.zeros((1, 3)), 1.0, ()
+    if is_area:
+        edge_u, edge_v, _ = light.axes().T
+        half = np.array(light.half_extent) * unit
+        places = _places(parts) if light.is_disc else _grid(parts)
+        offsets = places[:, :1] * half[0] * edge_u + places[:, 1:] * half[1] * edge_v
+        measure = light.area / len(offsets)
+        scale = 1.0 / math.sqrt(len(offsets))
+        spread = (edge_u * half[0] * scale, edge_v * half[1] * scale)
+    result = []
+    for offset in offsets:
+        place = origin + offset
+        for forward, right, up, room in _charts(place, corners):
+            limits = _cone(light, direction, forward, right, up)
+            if limits is None:
+                continue
+            if is_area:
+                limits = np.concatenate([limits, [_line_of(direction, forward, right, up)]])
+            args = (forward, right, up, direction, light.cone, is_area)
+            source = _source(POINT, place, *args)
+            beside = tuple(_source(POINT, place + s, *args) for s in spread)
+            result.append(Emission(source, limits, room, *common, measure, inside, beside))
+    return result
+
+
+def _charts(place, corners):
+    """Gnomonic planes that hold all corners as seen from a place: one, or the sides of a cube."""
+    towards = 0.5 * (corners.min(axis=0) + corners.max(axis=0)) - place
+    distance = float(np.linalg.norm(towards))
+    if distance > 1e-9:
+        forward = towards / distance
+        right = _unit(np.cross(forward, np.eye(3)[np.argmin(np.abs(forward))]))
+        up = np.cross(forward, right)
+        depth = (corners - place) @ forward
+        if depth.min() > 0.0:
+            flat = np.column_stack([(corners - place) @ right, (corners - place) @ up]) / depth[:, None]
+            if np.abs(flat).max() <= _WIDEST:
+                low, high = flat.min(axis=0), flat.max(axis=0)
+                half = 0.5 * float((high - low).max())
+                middle = 0.5 * (low + high)
+                return [(forward, right, up, np.array([*middle, 1.02 * half + 1e-9]))]
+    square = np.array([0.0, 0.0, 1.0])
+    eye = np.eye(3)
+    return [
+        (sign * eye[k], eye[(k + 1) % 3], sign * eye[(k + 2) % 3], square) for k in range(3) for sign in (1.0, -1.0)
+    ]
+
+
+def _line_of(normal, forward, right, up):
+    """normal . direction >= 0 on a gnomonic plane."""
+    return np.array([normal @ forward, normal @ right, normal @ up])
+
+
+def _cone(light, direction, forward, right, up) -> np.ndarray | None:
+    """Half-planes of a spot's cone on a gnomonic plane; None: the plane is all outside."""
+    outer = light.cone[1]
+    if outer >= math.pi:
+        return np.zeros((0, 3))
+    if outer > math.radians(85.0):
+        return np.array([_line_of(direction, forward, right, up)])
+    # Planes through the tip that touch the polygon of the cone's own area at its sides.
+    first = _unit(np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))]))
+    second = np.cross(direction, first)
+    step = 2.0 * math.pi / _RIM
+    rim = math.tan(outer) * math.sqrt(step / math.sin(step))
+    turn = step * np.arange(_RIM)
+    corners = direction + rim * (np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * second)
+    normals = np.cross(corners, np.roll(corners, -1, axis=0))
+    normals *= np.sign(normals @ direction)[:, None]
+    return np.stack([_line_of(n / np.linalg.norm(n), forward, right, up) for n in normals])
+
+
+def _disc(at: np.ndarray, radius: float) -> np.ndarray:
+    step = 2.0 * math.pi / _RIM
+    inner = radius * math.sqrt(step / math.sin(step)) * math.cos(0.5 * step)
+    turn = step * np.arange(_RIM)
+    normals = -np.column_stack([np.cos(turn), np.sin(turn)])
+    return np.column_stack([inner - normals @ at, normals])
+
+
+def _rectangle(at: np.ndarray, half: np.ndarray) -> np.ndarray:
+    normals = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    return np.column_stack([half[[0, 0, 1, 1]] - normals @ at, normals])
+
+
+def _places(count: int) -> np.ndarray:
+    """Points (count, 2) that share the unit disc evenly [Vogel 1979]; one lies in the middle."""
+    if count == 1:
+        return np.zeros((1, 2))
+    k = np.arange(count) + 0.5
+    return np.sqrt(k / count)[:, None] * np.column_stack([np.cos(_GOLDEN * k), np.sin(_GOLDEN * k)])
+
+
+def _grid(count: int) -> np.ndarray:
+    """Middles of the cells of [-1, 1]²."""
+    side = max(1, round(math.sqrt(count)))
+    middles = (2.0 * np.arange(side) + 1.0) / side - 1.0
+    u, v = np.meshgrid(middles, middles)
+    return np.column_stack([u.ravel(), v.ravel()])
+
+
+def _source(kind, origin, forward, right, up, axis=None, cone=(4.0, 4.0), lambert=False) -> np.ndarray:
+    record = np.zeros(1, SOURCE)
+    record["kind"], record["origin"], record["forward"] = kind, origin, forward
+    record["right"], record["up"] = right, up
+    record["axis"], record["cone"], record["lambert"] = forward if axis is None else axis, cone, lambert
+    return record
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)
+
+
+def mask_at(point: np.ndarray, scene: BeamScene, meshes: list[Mesh]) -> int:
+    """Solids that a point in GPU space lies in: those on whose inner side it is of the nearest facet along some line
+    [crossing parity]."""
+    mask = 0
+    towards = _unit(np.array([0.3713, 0.5471, 0.7502]))
+    for i, solid in enumerate(scene.solids[: len(meshes)]):
+        if solid["bit"] < 0:
+            continue
+        crossings = 0
+        for facet in scene.facets[solid["first"] : solid["last"]]:
+            facing = facet["plane"][:3] @ towards
+            if abs(facing) < 1e-12:
+                continue
+            t = (facet["plane"][3] - facet["plane"][:3] @ point) / facing
+            corners = facet["corner"][: facet["corners"]]
+            at = point + t * towards
+            along = np.roll(corners, -1, axis=0) - corners
+            inside = np.cross(along, at - corners) @ facet["plane"][:3] >= 0.0
+            crossings += bool(t > 0.0 and inside.all())
+        mask |= (crossings & 1) << int(solid["bit"])
+    return mask
