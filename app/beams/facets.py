@@ -141,8 +141,6 @@ def beam_scene(
             if reason is not None:
                 why_not[i] = reason
                 obstacles.append(i)
-        elif sees:
-            continue
         elif item.material.receives and not is_flat(item) or len(item.mesh.triangles) > MAX_FACETS:
             obstacles.append(i)
         else:

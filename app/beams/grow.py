@@ -407,8 +407,9 @@ def at_facet(nodes, top, facets, solids, tables, sources, task, leaves, sums, li
     if kind == 3:
         if nodes[_HAND].depth > 0:
             copy(nodes, _HAND, top)
+            ends = LEAF_OPEN if task.sees else LEAF_RECEIVER
             leaves = end(
-                nodes, top, LEAF_RECEIVER, facets, solids, tables, sources, task, leaves, sums, spare_corner, spare_side
+                nodes, top, ends, facets, solids, tables, sources, task, leaves, sums, spare_corner, spare_side
             )
         return top, leaves
     if nodes[_HAND].total == _LAY:
