@@ -304,7 +304,9 @@ def end(nodes, at, kind, facets, solids, tables, sources, task, leaves, sums, sp
         bent, uneven = lay_leaf(nodes, i, facets, kind, task.density, leaves)
         leaves.soft[leaves.count[1] : leaves.count[1] + nodes[i].lines] = 0.0
         wide = nodes[i].x[2] - nodes[i].x[0] > _NARROWEST
-        if room and wide and (bent > tolerance or uneven > _UNEVEN):
+        # What roulette left stands for many: that its own edges are straight would help none of them.
+        worth = not task.sees or power_of(nodes, i, tables, task) > task.threshold
+        if room and wide and worth and (bent > tolerance or uneven > _UNEVEN):
             middle = 0.5 * (nodes[i].x[0] + nodes[i].x[2])
             halve_spectrum(
                 nodes, i, top, middle, facets, solids, tables, sources[0], task, spare_corner, spare_side
@@ -313,7 +315,7 @@ def end(nodes, at, kind, facets, solids, tables, sources, task, leaves, sums, sp
             continue
         if bent >= 0.0:
             density_slope(nodes, i, facets, solids, tables, sources[0], task, kind, leaves)
-            if room and slope_over(leaves) > _STEEP and nodes[i].corners[1] > 0:
+            if room and worth and slope_over(leaves) > _STEEP and nodes[i].corners[1] > 0:
                 halve_space(nodes, i, top, spare_corner, spare_side)
                 top += 1
                 continue
