@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
+from ..beams.screen_polygons import ScreenPolygons
 from ..gpu import bindings, shader
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
@@ -30,9 +31,11 @@ from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
 from .camera_tables import CameraTables
 from .listed_pixels import GROUP, ListedPixels
 from .picture_channels import Channels
-from .pixel_lattice import is_in_strips, pixel_lattice
+from .pixel_lattice import is_in_strips, pixel_lattice, shared_places
+from .screen_beams import ScreenBeams
 from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
 from .variants import (
+    BIND_BEAM_OBJECTS,
     BIND_CELL_CDF,
     BIND_COUNTERS,
     BIND_LIGHTS,
@@ -42,6 +45,8 @@ from .variants import (
     BIND_RECEIVERS,
     UNIT_EMISSION,
     UNIT_PICTURES,
+    beam_defines,
+    beside_defines,
     camera_defines,
     direct_defines,
     halted_bytes,
@@ -140,7 +145,7 @@ class CameraPass:
         """Where bands serve a scene badly, wavelengths may be taken one by one. That takes a program of its own, which
         is compiled when it is needed."""
         self.max_taps = MAX_TAPS
-        self.primary_samples = PRIMARY_SAMPLES if self.chooses else 1
+        self.primary_samples = PRIMARY_SAMPLES if self._may_choose else 1
         """Of a sample, at what is seen directly, while a pixel has few samples."""
         self.split_threshold = SPLIT_THRESHOLD
         structs = (
@@ -168,10 +173,36 @@ class CameraPass:
             self._listed = ListedPixels(self._ctx, halted_bytes(shown) if halts else None)
             shown = halting_defines(shown) if halts else shown
         self._source = (shown, structs)
+        self._beams: ScreenBeams | None = None
+        self._beam_objects = np.zeros(len(scene.scene.objects), bool)
+        self._beam_objects_buffer: moderngl.Buffer | None = None
+        self._beside: moderngl.ComputeShader | None = None
         if "CAMERA_SPECULAR" in shown:
             self._beyond = shader.compute(self._ctx, "camera/camera.comp", shown, structs)
             shown = direct_defines(shown)
         self._program = shader.compute(self._ctx, "camera/camera.comp", shown, structs)
+
+    def take_beams(self, polygons: ScreenPolygons | None, objects: np.ndarray | None = None) -> None:
+        """From the next first sample on, show what is seen in these objects (O,) by polygons of the picture, which
+        belong to its camera, size and seed; None: by paths, as everything else."""
+        if polygons is None or objects is None or self._listed is None:
+            self._beam_objects[:] = False
+            return
+        shown, structs = self._source
+        if self._beams is None:
+            self._beams = ScreenBeams(self._ctx, beam_defines(shown), structs, self.channels.targets)
+            self._beside = shader.compute(self._ctx, "camera/camera.comp", beside_defines(shown), structs)
+            self._beam_objects_buffer = self._ctx.buffer(reserve=4 * len(self._beam_objects))
+        assert self._beam_objects_buffer is not None
+        self._beam_objects[:] = objects
+        self._beam_objects_buffer.write(self._beam_objects.astype("u4").tobytes())
+        brightness = np.frombuffer(self._tables.cell_cdf.read(), "f4") if self.disperses else None
+        self._beams.take(polygons, self.scene, brightness)
+
+    @property
+    def shows_beams(self) -> bool:
+        """Some objects are seen by polygons of the picture."""
+        return bool(self._beam_objects.any())
 
     def run(
         self,
@@ -221,8 +252,12 @@ class CameraPass:
         parameters["band_side"] = min(1.0, np.sqrt(self.spectrum.bands / (samples + sample_offset)))
         parameters["taps_per_pixel"] = TAPS_PER_PIXEL * (samples + sample_offset) ** 0.25
         parameters["primary_samples"] = (
-            1 if self.spectrum.single or samples + sample_offset > PRIMARY_SAMPLES_UNTIL else self.primary_samples
+            1
+            if samples + sample_offset > PRIMARY_SAMPLES_UNTIL or (self.spectrum.single and not self.shows_beams)
+            else max(self.primary_samples, PRIMARY_SAMPLES if self.shows_beams else 1)
         )
+        if self.shows_beams and sample_offset == 0:
+            yield from self._draw_beams(parameters, samples, maps)
         for index, place in enumerate(pixel_lattice(samples, sample_offset)):
             parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
             parameters["within_pixel"] = place
@@ -232,7 +267,12 @@ class CameraPass:
 
     @property
     def chooses(self) -> bool:
-        """`choose_spectrum` has something to choose: the method leaves it open."""
+        """`choose_spectrum` has something to choose: the method leaves it open, and some paths are followed."""
+        specular = [item.material.is_specular for item in self.scene.scene.objects]
+        return self._may_choose and not np.all(self._beam_objects[specular])
+
+    @property
+    def _may_choose(self) -> bool:
         return self.disperses and self.fixed_bands is None and not self.scene.features.random_wavelength
 
     def choose_spectrum(
@@ -347,7 +387,11 @@ class CameraPass:
     def release(self) -> None:
         """Free every buffer, texture and program."""
         shader.release(self._tables, self._lights, self._counters, *self._pictures, self._parameters_buffer)
-        for program in (self._program, self._beyond, self._single):
+        if self._beams is not None:
+            self._beams.release()
+        if self._beam_objects_buffer is not None:
+            self._beam_objects_buffer.release()
+        for program in (self._program, self._beyond, self._single, self._beside):
             if program is not None:
                 shader.release(program)
         if self._listed is not None:
@@ -431,12 +475,15 @@ class CameraPass:
                 self._listed.clear()
             self._rows.learn(
                 rows,
-                self._dispatch(self._program, parameters, maps, -(-width // _GROUP), -(-rows // _GROUP)),
+                self._dispatch(self._program_direct(), parameters, maps, -(-width // _GROUP), -(-rows // _GROUP)),
                 self.dispatch_seconds,
             )
             for share in self._follow_listed(parameters, maps):
                 self._within_rows = True
                 yield (row + share * rows) / height
+            if self.shows_beams:
+                assert self._beams is not None
+                self._beams.add(self._pictures, row, rows)
             self._within_rows = False
             self._samples_of_row[row : row + rows] += 1
             row += rows
@@ -463,6 +510,35 @@ class CameraPass:
         self._ctx.memory_barrier()
         self._ctx.finish()
         return time.perf_counter() - start
+
+    def _program_direct(self) -> moderngl.ComputeShader:
+        """What looks at what is seen directly."""
+        if not self.shows_beams:
+            return self._program
+        assert self._beside is not None and self._beam_objects_buffer is not None
+        self._beam_objects_buffer.bind_to_storage_buffer(BIND_BEAM_OBJECTS)
+        return self._beside
+
+    def _draw_beams(self, parameters: np.ndarray, samples: int, maps: CausticMaps) -> Iterator[float]:
+        """Draw what is seen by beams, yielding 0.0 after every portion."""
+        assert self._beams is not None
+        parameters["sample_index"] = parameters["draw_index"] = 0
+
+        def bind() -> Callable[[], float]:
+            self._bind(maps)
+            self._parameters_buffer.write(parameters.tobytes())
+            start = time.perf_counter()
+
+            def timed() -> float:
+                self._ctx.finish()
+                return time.perf_counter() - start
+
+            return timed
+
+        places = shared_places(samples, int(parameters["primary_samples"][0]))
+        as_image = self.scene.texels.as_image
+        for _ in self._beams.draw(self._size, places, as_image, bind, self.dispatch_seconds):
+            yield 0.0
 
     def _program_beyond(self) -> moderngl.ComputeShader:
         """What follows rays beyond glass and mirrors."""

@@ -114,7 +114,7 @@ class MapAtlas:
         for texture in self.total_textures:
             frame = self.ctx.framebuffer([texture])
             frame.clear()
-            _park(self.ctx)
+            park(self.ctx)
             frame.release()
         self.framebuffer.clear()
         self.pending = 0
@@ -137,13 +137,13 @@ class MapAtlas:
         return self.read_total()[y0:y1, x0:x1]
 
     def release(self) -> None:
-        _park(self.ctx)
+        park(self.ctx)
         shader.release(
             self.framebuffer, self._accumulate, *self.scratch_textures, *self.total_textures, self.placements
         )
 
 
-def _park(ctx: moderngl.Context) -> None:
+def park(ctx: moderngl.Context) -> None:
     """Bind a framebuffer that lives as long as the context.
 
     moderngl binds the last used framebuffer again after every clear; were it released meanwhile,

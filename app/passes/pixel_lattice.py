@@ -24,3 +24,22 @@ def pixel_lattice(samples: int, offset: int) -> np.ndarray:
     index = np.arange(samples)
     rank = np.argsort(np.argsort((0.5 + index * golden) % 1.0))
     return ((np.column_stack([index, rank]) + 0.5) / samples + shift) % 1.0
+
+
+FEWEST_SHARED, MOST_SHARED = 16, 64
+_HAIR = np.array([1.3e-4, 0.7e-4])
+"""So that none lies on the border of a pixel, where polygons like to meet."""
+_PRIMARIES = np.array([(-0.125, -0.375), (0.375, -0.125), (0.125, 0.375), (-0.375, 0.125)])
+"""As `primary_offsets` in shaders/camera/camera.comp."""
+
+
+def shared_places(samples: int, primaries: int) -> np.ndarray:
+    """(16 to 64, 2) places in a pixel at which polygons' edges are told: where a first launch of so many samples looks at
+    what is seen directly, so that both together fill every pixel; a lattice of their own where those are too few or too
+    many. An even number."""
+    places = pixel_lattice(samples, 0)
+    if primaries > 1:
+        places = (places[:, None] + _PRIMARIES / np.sqrt(samples)).reshape(-1, 2)
+    if not FEWEST_SHARED <= len(places) <= MOST_SHARED or len(places) % 2 or is_in_strips(samples, 0):
+        places = pixel_lattice(MOST_SHARED, 0)
+    return places + _HAIR

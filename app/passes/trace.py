@@ -71,8 +71,8 @@ class FluxTally:
 
 def queue_bytes(features: Features, batch: int) -> int:
     """Device memory that tracing `batch` lattice points at once takes."""
-    ray = records.ray_record(features.defines()["COLUMNS"]).stride
-    photon = records.photon_record(features.spectral_groups).stride
+    ray = records.ray_record(features.defines()["COLUMNS"], features.hero).stride
+    photon = records.photon_record(features.spectral_groups, features.hero).stride
     room = RAY_ROOM * batch
     return room * (4 * ray + records.OUTCOME.stride + photon + 8) + PHOTON_ROOM * batch * photon
 

@@ -49,8 +49,12 @@ TINT_STEPS = 48
     BIND_COUNTERS,
     BIND_LISTED,
     BIND_HALTED,
-) = range(8, 17)
-UNIT_EMISSION, UNIT_PICTURES = 10, 11
+    BIND_BEAM_OBJECTS,
+) = range(8, 18)
+UNIT_EMISSION, UNIT_PICTURES, UNIT_POLYGONS = 10, 11, 13
+BIND_BEAM_VIEW = 9
+"""Of uniform blocks."""
+IMAGE_POLYGONS = 0
 _BEYOND_ONLY = (
     "HAS_DISPERSION",
     "SPECTRAL_SWEEP",
@@ -263,6 +267,25 @@ def direct_defines(beyond: Mapping[str, int | float | str]) -> Defines:
         "SPECTRAL_GROUPS": 0,
         "LISTS_SPECULAR": 1,
         "MAX_EVENTS": 1,
+    }
+
+
+def beside_defines(beyond: Mapping[str, int | float | str]) -> Defines:
+    """For what is seen directly beside objects that camera beams show."""
+    return direct_defines(beyond) | {"BEAM_OBJECTS": 1, "BIND_BEAM_OBJECTS": BIND_BEAM_OBJECTS}
+
+
+def beam_defines(beyond: Mapping[str, int | float | str]) -> Defines:
+    """For polygons of the picture that camera beams see, from what the listed pixels are compiled with. A beam's one
+    spectral column is by x itself, and its throughput holds what was absorbed."""
+    left_out = {"CAMERA_SPECULAR", "ABSORPTION", "ABSORBERS", "NORMAL_DERIVATIVES", "RANDOM_WAVELENGTH", "HALTS"}
+    return {name: value for name, value in beyond.items() if name not in left_out} | {
+        "CAMERA_BEAMS": 1,
+        "SPECTRAL_GROUPS": 1 if "SPECTRAL_SWEEP" in beyond else 0,
+        "VARIABLE_ROW": beyond["X_ROW"],
+        "BIND_BEAM_VIEW": BIND_BEAM_VIEW,
+        "IMAGE_POLYGONS": IMAGE_POLYGONS,
+        "UNIT_POLYGONS": UNIT_POLYGONS,
     }
 
 

@@ -11,64 +11,20 @@ layout(local_size_x = 64) in;
 layout(local_size_x = 8, local_size_y = 8) in;
 #endif
 
-#ifdef HALTS
-// Rounds that this invocation's loops have run in this dispatch; see camera/halts.glsl.
-uint rounds = 0u;
-#define COUNT_ROUNDS(count) rounds += uint(count)
-#endif
+#include "camera/globals.glsl"
 
-#include "lib/medium.glsl"
-#include "lib/band.glsl"
-#include "lib/interface.glsl"
-#include "lib/camera.glsl"
-#include "lib/lights.glsl"
-#include "lib/lookup.glsl"
-#include "lib/random.glsl"
-
-layout(std140, binding = BIND_PARAMETERS) uniform Parameters { CameraParameters p; };
-// Every ray asks all lights: constants to all, where they fit a uniform block.
-#ifdef LIGHTS_IN_STORAGE
-layout(std430, binding = BIND_LIGHTS) readonly restrict buffer Lights { CameraLight lights[]; };
-#else
-layout(std140, binding = BIND_LIGHTS) uniform Lights { CameraLight lights[LIGHT_ROOM]; };
-#endif
-// Per object: reflectance in linear Rec.709; number of its absorption row, or -1.
-layout(std430, binding = BIND_OBJECT_COLOURS) readonly restrict buffer ObjectColours { vec4 object_colours[]; };
-#ifdef HAS_DISPERSION
-layout(std430, binding = BIND_CELL_CDF) readonly restrict buffer CellCdf { float cell_cdf[]; };
-#endif
-layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallbacks[5]; };
 #if defined(LISTS_SPECULAR) || defined(CAMERA_SPECULAR)
 // How many pixels are listed, how many of their paths have halted, and what is to be known of the listed ones.
 layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_count; uint halted_count; uint listed[]; };
 #endif
 layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
-
-#ifdef HAS_IMAGES
-#include "lib/textures.glsl"
+#ifdef BEAM_OBJECTS
+// Per object: whether camera beams show what is seen in it.
+layout(std430, binding = BIND_BEAM_OBJECTS) readonly restrict buffer BeamObjects { uint beam_objects[]; };
 #endif
 
-// An `if` whose body is left out where no ray takes it: a software renderer runs both sides of an `if` for all rays, but ends a loop
-// that none is in.
-#define WHEN(condition) for (bool wanted = (condition); wanted; wanted = false)
-
-#define FELL_COLUMNS 0
-#define FELL_DEPTH 1
-#define FELL_STACK 2
-#define FELL_CUT 3
-#define FELL_LOOPS 4
-
-// Which of its turns a pixel's dispersed sample takes, and whether this sample took one. A picture in colour counts them beside its sums, since
-// where glass fills a pixel in part only some samples are dispersed, and all bands must have had as many.
-uint turn = 0u;
-bool took_turn = false;
-
-#include "camera/path.glsl"
-
-// What a sample has found so far, and the paths that wait while another is followed. Global: an array handed from function to function is
-// copied there and back by some drivers.
-vec4 radiance[TARGETS];
 #ifdef CAMERA_SPECULAR
+// Paths that wait while another is followed; global as `radiance` is.
 int stack_size;
 #ifdef SPECTRAL_SWEEP
 // Rays traced to find out where paths diverge.
@@ -102,10 +58,6 @@ struct PathEnd {
 PathEnd ended[ENDS_HELD];
 #endif
 
-#include "camera/emission.glsl"
-#include "camera/footprint.glsl"
-#include "camera/receiver.glsl"
-#include "camera/taps.glsl"
 #include "camera/interface.glsl"
 #if defined(CAMERA_SPECULAR) && defined(SPECTRAL_SWEEP)
 #include "camera/cuts.glsl"
@@ -375,7 +327,17 @@ void main()
         Hit hit;
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
         uint kind = met ? object_at(hit.object).kind : NONE;
-        if (is_specular(kind)) {
+#ifdef BEAM_OBJECTS
+        bool by_beams = is_specular(kind) && beam_objects[hit.object] != 0u;
+#ifdef VISIBLE_LIGHTS
+        WHEN(by_beams) add_lights(path, hit.distance);
+#endif
+#else
+        const bool by_beams = false;
+#endif
+        if (by_beams) {
+            // The polygons of the picture show it.
+        } else if (is_specular(kind)) {
             specular_samples += 1u;
             // Each of them as likely: the newest of c with 1 / c.
             draw = hash_pcg(draw);

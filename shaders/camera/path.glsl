@@ -84,10 +84,21 @@ void ray_at(CameraPath path, float x, out vec3 position, out vec3 direction)
 #endif
 }
 
+#ifdef CAMERA_BEAMS
+// Side of the part of the pixel that is looked at, pixels; which of the parts it is.
+float beam_side;
+uint beam_draw;
+#define DRAW_INDEX beam_draw
+#else
+#define DRAW_INDEX p.draw_index
+#endif
+
 // Side of the share of its pixel that a sample of this path has, pixels.
 float sample_side(CameraPath path)
 {
-#ifdef LISTS_SPECULAR
+#if defined(CAMERA_BEAMS)
+    return beam_side;
+#elif defined(LISTS_SPECULAR)
     return p.sample_side * inversesqrt(float(p.primary_samples));
 #else
     return path.restricted ? p.band_side : p.sample_side;

@@ -69,7 +69,7 @@ vec3 painted(Paint paint, SurfaceInteraction seen)
 vec2 light_point(uint light, uint pixel_key)
 {
     uint key = hash_combine(pixel_key, light);
-    return vec2(kronecker(p.draw_index, PLASTIC_1, key), kronecker(p.draw_index, PLASTIC_2, hash_pcg(key)));
+    return vec2(kronecker(DRAW_INDEX, PLASTIC_1, key), kronecker(DRAW_INDEX, PLASTIC_2, hash_pcg(key)));
 }
 
 // Irradiance from one light, as a factor on its own quantity, before anything is in the way.

@@ -1,0 +1,68 @@
+// What all programs of the camera's pass have in common: parameters, lights, spectra, a path, and what is looked up where it ends.
+#ifndef CAMERA_GLOBALS_GLSL
+#define CAMERA_GLOBALS_GLSL
+
+#ifdef HALTS
+// Rounds that this invocation's loops have run in this dispatch; see camera/halts.glsl.
+uint rounds = 0u;
+#define COUNT_ROUNDS(count) rounds += uint(count)
+#endif
+
+#include "lib/medium.glsl"
+#include "lib/band.glsl"
+#include "lib/interface.glsl"
+#include "lib/camera.glsl"
+#include "lib/lights.glsl"
+#include "lib/lookup.glsl"
+#include "lib/random.glsl"
+
+layout(std140, binding = BIND_PARAMETERS) uniform Parameters { CameraParameters p; };
+// Every ray asks all lights: constants to all, where they fit a uniform block.
+#ifdef LIGHTS_IN_STORAGE
+layout(std430, binding = BIND_LIGHTS) readonly restrict buffer Lights { CameraLight lights[]; };
+#else
+layout(std140, binding = BIND_LIGHTS) uniform Lights { CameraLight lights[LIGHT_ROOM]; };
+#endif
+// Per object: reflectance in linear Rec.709; number of its absorption row, or -1.
+layout(std430, binding = BIND_OBJECT_COLOURS) readonly restrict buffer ObjectColours { vec4 object_colours[]; };
+#ifdef HAS_DISPERSION
+layout(std430, binding = BIND_CELL_CDF) readonly restrict buffer CellCdf { float cell_cdf[]; };
+#endif
+layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallbacks[5]; };
+
+#ifdef HAS_IMAGES
+#include "lib/textures.glsl"
+#endif
+
+// An `if` whose body is left out where no ray takes it: a software renderer runs both sides of an `if` for all rays, but ends a loop
+// that none is in.
+#define WHEN(condition) for (bool wanted = (condition); wanted; wanted = false)
+
+#define FELL_COLUMNS 0
+#define FELL_DEPTH 1
+#define FELL_STACK 2
+#define FELL_CUT 3
+#define FELL_LOOPS 4
+
+// Which of its turns a pixel's dispersed sample takes, and whether this sample took one. A picture in colour counts them beside its sums, since
+// where glass fills a pixel in part only some samples are dispersed, and all bands must have had as many.
+uint turn = 0u;
+bool took_turn = false;
+
+#include "camera/path.glsl"
+
+// What a sample has found so far. Global: an array handed from function to function is copied there and back by some drivers.
+vec4 radiance[TARGETS];
+
+#ifdef CAMERA_BEAMS
+#include "camera/beam_cover.glsl"
+#define MEAN_COVER(lo, hi) * mean_cover(lo, hi)
+#else
+#define MEAN_COVER(lo, hi)
+#endif
+#include "camera/emission.glsl"
+#include "camera/footprint.glsl"
+#include "camera/receiver.glsl"
+#include "camera/taps.glsl"
+
+#endif

@@ -1,0 +1,197 @@
+"""Polygons of the picture by camera beams: they fill it together with what is seen directly, and show what paths show.
+
+The polygons are those of a plain recursion in float64 (`tests/reference/screen_beams.py`). Under an orthographic camera
+they are exact, so what differs is chance of the paths, or wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from spectrasplat.beams.screen_polygons import ScreenPolygons
+from spectrasplat.model.environment import gradient
+from spectrasplat.model.geometry import primitives
+from spectrasplat.model.lights import DirectionalLight
+from spectrasplat.model.optics import glass
+from spectrasplat.model.optics.colorimetry import xyz_to_rgb709
+from spectrasplat.model.scene import Camera, Dielectric, Diffuse, SceneObject
+from spectrasplat.passes.pixel_lattice import pixel_lattice, shared_places
+from spectrasplat.passes.screen_beams import REACH, fans, largest_divisor, ordered
+
+from tests.gpu.camera_rig import DOWN, WHITE, at, horizontal, opened_camera_pass, released
+from tests.reference.screen_beams import screen_polygons
+
+SIZE = (48, 36)
+BESIDE = Camera(position=(2.1, -3.4, 3.0), target=(0.0, 0.0, 0.0), kind="orthographic", vertical_extent=1.9)
+PRISM = SceneObject("prism", primitives.prism(), Dielectric(glass.from_abbe(1.7847, 10.0)))
+PANE = SceneObject("pane", primitives.box((1.2, 1.0, 0.1)), Dielectric(glass.constant(1.5)), at(0.0, 0.0, 0.3))
+SKY = gradient((0.2, 0.4, 2.0), (1.0, 1.0, 1.0), (0.1, 0.6, 0.2))
+
+
+def polygons_of(camera_pass, threshold=1e-4, bands=1) -> ScreenPolygons:
+    scene = camera_pass.scene
+    return screen_polygons(
+        scene.scene, scene.space, scene.axis, *SIZE, threshold=threshold, bands=bands, cell_px=1000.0
+    )
+
+
+def by_beams(camera_pass, polygons: ScreenPolygons, samples=16, maps=None, size=SIZE) -> np.ndarray:
+    objects = np.zeros(len(camera_pass.scene.scene.objects), bool)
+    objects[0] = True
+    camera_pass.take_beams(polygons, objects)
+    assert camera_pass.shows_beams
+    assert camera_pass.run(camera_pass.scene.scene.camera, *size, samples, maps=maps)
+    picture = camera_pass.read_rgb()
+    camera_pass.take_beams(None)
+    return picture
+
+
+def by_paths(camera_pass, samples: int, size=SIZE) -> np.ndarray:
+    camera_pass.choose_spectrum(camera_pass.scene.scene.camera, *size, samples)
+    assert camera_pass.run(camera_pass.scene.scene.camera, *size, samples)
+    return camera_pass.read_rgb()
+
+
+def some(polygons: ScreenPolygons, kept: np.ndarray) -> ScreenPolygons:
+    """Those of these numbers, in this order."""
+    values = {}
+    for field in fields(polygons):
+        array = getattr(polygons, field.name)
+        if field.name in ("edges", "hulls"):
+            starts = getattr(polygons, field.name[:-1] + "_start")
+            array = np.concatenate([array[starts[i] : starts[i + 1]] for i in kept])
+        elif field.name.endswith("_start"):
+            array = np.concatenate([[0], np.cumsum(np.diff(array)[kept])]).astype(np.int32)
+        else:
+            array = array[kept]
+        values[field.name] = array
+    return ScreenPolygons(**values)
+
+
+def relative(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.sqrt(((a - b) ** 2).mean() / (b**2).mean()))
+
+
+@pytest.fixture(scope="module")
+def prism_pass(gl):
+    camera_pass = opened_camera_pass(gl, [PRISM], camera=BESIDE, environment=SKY)
+    yield camera_pass
+    released(camera_pass)
+
+
+def test_in_a_white_room_nothing_is_seen(gl):
+    """All polygons and what is seen directly fill every pixel, outlines included, whatever the number of samples."""
+    still = replace(PRISM, material=Dielectric(glass.constant(1.5)))
+    camera_pass = opened_camera_pass(gl, [still], background=(1, 1, 1), camera=BESIDE)
+    polygons = polygons_of(camera_pass, threshold=1e-6)
+    for samples in (4, 9, 16):
+        off = np.abs(by_beams(camera_pass, polygons, samples) - 1.0).max(axis=-1)
+        # A point may lie within float32's error of an outline.
+        assert np.sum(off > 2e-5) <= 2 and off.max() < 1.1 / min(4 * samples, 64)
+    # It would not be so without one of the first polygons' edges.
+    edges = polygons.edges.copy()
+    strong = int(np.argmax(polygons.throughput[:, 1] * (np.diff(polygons.edge_start) > 2)))
+    edges[polygons.edge_start[strong], [2, 5]] += 3.0
+    assert by_beams(camera_pass, replace(polygons, edges=edges)).max() > 1.02
+    released(camera_pass)
+
+
+@pytest.mark.parametrize("bands", [1, 4])
+def test_beams_show_what_paths_show(prism_pass, bands):
+    """Under a coloured sky, with strong dispersion: the mean of 512 samples of single wavelengths' paths."""
+    paths = by_paths(prism_pass, 512)
+    beams = by_beams(prism_pass, polygons_of(prism_pass, bands=bands))
+    assert relative(beams, paths) < 6e-3
+    np.testing.assert_allclose(beams.mean((0, 1)), paths.mean((0, 1)), rtol=1e-3)
+
+
+def test_a_sweep_is_the_sum_of_narrow_bands(prism_pass):
+    """Edges that move over the whole spectrum at once, or in 24 steps that hardly move."""
+    swept = by_beams(prism_pass, polygons_of(prism_pass, bands=2))
+    stepped = by_beams(prism_pass, polygons_of(prism_pass, bands=24))
+    assert relative(swept, stepped) < 4e-3
+    still = polygons_of(prism_pass, bands=2)
+    middle = 0.5 * (still.edges[:, :3] + still.edges[:, 3:])
+    still = replace(still, edges=np.concatenate([middle, middle], axis=1))
+    assert relative(by_beams(prism_pass, still), stepped) > 2 * relative(swept, stepped)
+
+
+def test_beams_agree_with_the_reference(gl):
+    """Against float64 paths that share no code: colours of a prism under a sky, outlines included."""
+    pytest.importorskip("numba")
+    from spectrasplat.reference.camera_reference import render_camera_reference
+
+    camera_pass = opened_camera_pass(gl, [PRISM], camera=BESIDE, environment=SKY)
+    reference = render_camera_reference(camera_pass.scene.scene, *SIZE, samples=2048)
+    beams = by_beams(camera_pass, polygons_of(camera_pass, bands=4))
+    noise = np.sqrt(reference.relmse)
+    assert noise < 3e-3
+    assert relative(beams, xyz_to_rgb709(reference.xyz)) < 6e-3
+    released(camera_pass)
+
+
+def test_a_textured_floor_through_a_pane(gl):
+    """What lies behind is a lit surface with an edge: every part of a pixel looks for itself, as other samples do."""
+    boards = [horizontal(-2.0 + i, -1.0 + i, -2.0, 2.0, -0.4, Diffuse((0.2 + 0.6 * (i % 2),) * 3), f"board {i}") for i in range(4)]
+    sun = DirectionalLight("sun", WHITE, direction=DOWN)
+    camera_pass = opened_camera_pass(gl, [PANE, *boards], [sun], camera=BESIDE, background=(0.3, 0.3, 0.3))
+    converged, paths = by_paths(camera_pass, 256), by_paths(camera_pass, 16)
+    beams = by_beams(camera_pass, polygons_of(camera_pass))
+    assert relative(beams, converged) < 1.1 * relative(paths, converged)
+    released(camera_pass)
+
+
+def test_the_order_of_polygons_and_repeats(prism_pass):
+    """The same polygons give the same picture to the bit; another order of them only rounds otherwise."""
+    polygons = polygons_of(prism_pass)
+    first, again = by_beams(prism_pass, polygons), by_beams(prism_pass, polygons)
+    assert np.array_equal(first, again)
+    turned = by_beams(prism_pass, some(polygons, np.arange(len(polygons))[::-1]))
+    np.testing.assert_allclose(turned, first, rtol=1e-5, atol=1e-6)
+
+
+def test_a_larger_picture_has_the_same_polygons(prism_pass):
+    polygons = polygons_of(prism_pass)
+    small = by_beams(prism_pass, polygons)
+    large = by_beams(prism_pass, polygons.scaled(2.0), size=(2 * SIZE[0], 2 * SIZE[1]))
+    halved = large.reshape(SIZE[1], 2, SIZE[0], 2, 3).mean((1, 3))
+    assert relative(halved, small) < 8e-3
+
+
+def test_hulls_grow_by_a_pixel():
+    """A fan holds the hull of every corner moved to all corners of a pixel, slivers and points included."""
+    rng = np.random.default_rng(5)
+    shapes = [rng.uniform(0, 9, (3, 2)) for _ in range(20)] + [np.array([[1.0, 1.0], [8.0, 1.2], [1.0, 1.001]])]
+    shapes = [shape if np.linalg.det(np.c_[shape[1] - shape[0], shape[2] - shape[0]]) > 0 else shape[::-1] for shape in shapes]
+    shapes += [shapes[0][::-1]]
+    starts = np.arange(0, 3 * len(shapes) + 1, 3)
+    blank = {field.name: np.zeros(len(shapes)) for field in fields(ScreenPolygons)}
+    polygons = ScreenPolygons(**blank | {"hulls": np.concatenate(shapes), "hull_start": starts})
+    places, owners, triangles, first = fans(polygons)
+    for number, shape in enumerate(shapes):
+        corners = places[triangles[first[number] // 3 : first[number + 1] // 3]]
+        assert set(owners[triangles[first[number] // 3 : first[number + 1] // 3]].ravel()) == {number}
+        probes = (shape[:, None] + 0.999 * REACH * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])).reshape(-1, 2)
+        probes = np.concatenate([probes, 0.5 * (probes[:, None] + probes).reshape(-1, 2)])
+        u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        to = probes[:, None] - corners[:, 0]
+        area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+        flat = np.abs(area) < 1e-12
+        a = (to[..., 0] * v[:, 1] - to[..., 1] * v[:, 0]) / np.where(flat, 1e-12, area)
+        b = (u[:, 0] * to[..., 1] - u[:, 1] * to[..., 0]) / np.where(flat, 1e-12, area)
+        assert np.all(np.any((a >= -1e-9) & (b >= -1e-9) & (a + b <= 1 + 1e-9), axis=1))
+        assert abs(0.5 * area.sum()) <= 0.5 * abs(np.linalg.det(np.c_[shape[1] - shape[0], shape[2] - shape[0]])) + 2 * REACH * 30
+
+
+def test_points_of_a_pixel():
+    """Polygons' edges are told where a first launch looks at what is seen directly; a quarter of the points in order lies
+    in about a quarter of the pixel."""
+    assert len(shared_places(16, 4)) == 64 and len(shared_places(16, 1)) == 16 and len(shared_places(5, 4)) == 20
+    assert len(shared_places(3, 4)) == len(shared_places(1000, 1)) == len(shared_places(17, 1)) == 64
+    off = shared_places(16, 1) - pixel_lattice(16, 0)
+    assert np.all((off > 0) & (off < 2e-3))
+    assert largest_divisor(20, 16) == 10 and largest_divisor(64, 16) == 16
+    for quarter in ordered(shared_places(16, 4)).reshape(4, 16, 2):
+        assert np.all(np.std(quarter, axis=0) < 0.22)
