@@ -52,13 +52,16 @@ LEAST_LEVEL = 0.05
 STILL = 0.02
 """Texels an edge may move over the band where it is drawn as if it stood in the middle."""
 FINEST_STEP, WIDEST_STEP = 0.125, 0.25
-"""Texels a narrow polygon moves from node to node: a quarter of its width, within these."""
+"""Windows (texels, unless a penumbra is wider) that a narrow polygon moves from node to node: a quarter of its width,
+within these."""
 PARTS = 3, 10
 """In which a texel's time is looked at that a wide polygon's edges cross, at least and at most."""
 BORDER = 2.0
 """Texels that a triangle costs besides its own, per texel of its sides: they are filled in blocks of 4 x 4."""
 WIDE = 2.0
-"""Texels; a wider polygon has texels that are all inside."""
+"""Windows; a wider polygon has texels that are all inside."""
+BROAD = 4.0
+"""Texels that a penumbra keeps at least where it is drawn in a map of wider ones."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +121,22 @@ def hull_boxes(polygons: BeamPolygons, corners: np.ndarray) -> np.ndarray:
     return np.concatenate([np.minimum.reduceat(corners, start), np.maximum.reduceat(corners, start)], axis=1)
 
 
+def levels(polygons: BeamPolygons, chosen: np.ndarray, to_texels: TexelMap, area_scale: float) -> np.ndarray:
+    """int64 (n,): how many times the texels may double for each of the `chosen`, since its penumbrae are broad.
+
+    A polygon far narrower than its penumbrae shows their mean only; of another the sharpest edge counts."""
+    rows, counts = ragged(polygons.edge_start, chosen)
+    first = np.cumsum(counts) - counts
+    softness = polygons.edges[rows][:, [3, 7]] * np.sqrt(abs(np.linalg.det(to_texels.matrix)))
+    windows = np.sqrt(1.0 + 4.0 * softness**2)
+    mean = np.add.reduceat(windows.mean(axis=1), first) / counts
+    widest = np.maximum.reduceat(windows.max(axis=1), first)
+    density = polygons.density[chosen].max(axis=1)
+    area = polygons.flux[chosen] / np.where(density > 0.0, density, 1.0) * area_scale
+    window = np.where(np.sqrt(area) < WIDE * widest, mean, np.minimum.reduceat(windows.min(axis=1), first))
+    return np.maximum(np.floor(np.log2(window / BROAD)), 0.0).astype(np.int64)
+
+
 def packed(
     polygons: BeamPolygons,
     chosen: np.ndarray,
@@ -157,7 +176,8 @@ def packed(
     parabola = np.stack([start, -3.0 * start + 4.0 * middle - end, 2.0 * (start - 2.0 * middle + end)], axis=1)
     records["anchor"], records["slope"] = anchor, slope / level[:, None]
     records["density"] = parabola * (energy_scale * level)[:, None]
-    nodes = np.ceil(motion / np.clip(0.25 * width, FINEST_STEP, WIDEST_STEP))
+    motion = motion / widest
+    nodes = np.ceil(motion / np.clip(0.25 * width / widest, FINEST_STEP, WIDEST_STEP))
     records["nodes"] = np.where(
         is_wide, -np.clip(np.ceil(2.0 + 6.0 * motion), *PARTS), np.clip(nodes, NODES_MIN, NODES_MAX)
     )

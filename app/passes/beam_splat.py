@@ -15,7 +15,7 @@ from ..beams.polygons import BeamPolygons
 from ..gpu import shader
 from ..gpu.records import NONE
 from ..gpu.schema import Field, Struct
-from .beam_records import BEAM, PackedBeams, TexelMap, hull_boxes, packed
+from .beam_records import BEAM, PackedBeams, TexelMap, hull_boxes, levels, packed
 from .variants import beam_defines
 
 if TYPE_CHECKING:
@@ -73,7 +73,8 @@ class BeamSplatter:
                 for beams in packed(polygons, part, to_texels, texel_area * weight, 1.0 / texel_area, curves):
                     self._draw(beams, tables, atlas, record["rect"])
                 atlas.pending += len(part)
-                atlas.flush()
+                if atlas.pending >= GROUP:
+                    atlas.flush()
         error = self._ctx.error
         if error != "GL_NO_ERROR":
             raise RuntimeError(f"{error} while drawing {len(polygons)} beam polygons")
@@ -136,7 +137,8 @@ def _windows(
             rect = record["rect"]
             touches = np.all((high > rect[:2]) & (low < rect[2:]), axis=1)
             if touches.any():
-                yield placement, int(receiver), chosen[touches]
+                for at, part in _by_width(polygons, chosen[touches], placement, frames[int(receiver)], layout):
+                    yield at, int(receiver), part
             following = int(record["next"])
             if following != NONE:
                 # The coarse map is read outside the fine window: up to its border, plus what a bilinear lookup reaches.
@@ -144,6 +146,21 @@ def _windows(
                 inside = np.all((low - margin > rect[:2]) & (high + margin < rect[2:]), axis=1)
                 chosen = chosen[~inside]
             placement = following
+
+
+def _by_width(
+    polygons: BeamPolygons, chosen: np.ndarray, placement: int, frame: PlaneFrame, layout: MapLayout
+) -> Iterator[tuple[int, np.ndarray]]:
+    """(placement, polygons): those with broad penumbrae go to the same window's wider texels, for a fraction of the
+    fragments."""
+    record = layout.placements[placement]
+    level = levels(polygons, chosen, TexelMap.of(record, frame), 1.0 / float(record["texel_area"]))
+    while len(chosen):
+        wider = int(layout.placements[placement]["blurred"])
+        is_here = (level <= 0) | (wider == NONE)
+        if is_here.any():
+            yield placement, chosen[is_here]
+        chosen, level, placement = chosen[~is_here], level[~is_here] - 1, wider
 
 
 def _corners(boxes: np.ndarray) -> np.ndarray:

@@ -235,3 +235,29 @@ def test_anisotropic_texels_and_an_oblique_frame(gl) -> None:
     rig.splatter.run(one, {0: PLANE}, layout, rig.tables, rig.atlas)
     drawn = rig.atlas.read_tile(rig.tile)[..., W].sum()
     assert drawn == pytest.approx(area * rig.light.power_w(), rel=2e-3)
+
+
+def test_broad_penumbrae_go_to_wider_texels_with_all_their_light(gl) -> None:
+    """A window kept in texels of 1, 2 and 4: each polygon goes to the widest that its penumbra allows."""
+    rig = BeamRig(gl.ctx)
+    tiles, size = pack([(64, 64), (32, 32), (16, 16)])
+    placements = np.concatenate(
+        [
+            placement_rows(tile, np.eye(2, 4) / step, float(step * step))
+            for tile, step in zip(tiles, (1, 2, 4), strict=True)
+        ]
+    )
+    placements["blurred"] = 1, 2, NONE
+    layout = MapLayout(size, placements, RECEIVER.zeros(1), {0: tiles[:1]}, {}, {}, ())
+    atlas = MapAtlas(gl.ctx, size, placements)
+    for softness, level in ((0.0, 0), (3.0, 0), (4.5, 1), (9.0, 2)):
+        for side in (0.5, 3.0):
+            atlas.clear()
+            one = soft(polygon(regular(4, (32.3, 31.8), side / np.sqrt(2.0), 0.3)), softness)
+            rig.splatter.run(one, {0: PLANE}, layout, rig.tables, atlas)
+            total = atlas.read_total()[..., W] / rig.light.power_w()
+            held = [total[y0:y1, x0:x1].sum() for x0, y0, x1, y1 in (tile.rect for tile in tiles)]
+            expected = np.zeros(3)
+            expected[level] = side * side
+            assert held == pytest.approx(expected.tolist(), rel=1e-3, abs=1e-6), (softness, side)
+    atlas.release()
