@@ -14,7 +14,7 @@ from contextlib import redirect_stderr, suppress
 from typing import Any, TextIO
 
 from .base.errors import UserError, plain
-from .base.interrupts import exit_code_of, terminations_raise
+from .base.interrupts import INTERRUPTED, exit_code_of, signals_raise
 
 USER_ERROR = 2
 NOT_PRINTED = 1  # as typer has it for a closed pipe
@@ -27,9 +27,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a terminal without × or ° shows "?" instead of failing
             stream.reconfigure(errors="replace")
-    with terminations_raise(), redirect_stderr(_Patient(sys.stderr)):
+    with signals_raise() as ended, redirect_stderr(_Patient(sys.stderr)):
         try:
-            return _printed(_run(arguments))
+            code = _run(arguments)
+            # Typer knows of Ctrl-C only.
+            return _printed(ended.exit_code if code == INTERRUPTED and ended() else code)
         except UserError as error:
             return _tell(str(error))
         except MemoryError:

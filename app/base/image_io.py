@@ -11,6 +11,7 @@ Files appear whole or not at all (`atomic`).
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 from collections.abc import Iterator, Mapping
@@ -188,7 +189,7 @@ def _write_exr(
         with OpenEXR.File(header, channels) as file:
             file.write(str(path))
     except RuntimeError as error:  # OpenEXR turns every failure to write into this
-        raise OSError(None, str(error), str(path)) from error
+        raise OSError(errno.EIO, "its pixels cannot be stored (is the disk full?)", str(path)) from error
 
 
 def _read_exr(path: Path) -> Picture:
