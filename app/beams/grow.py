@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import jit, part
+from .facets import MAX_CORNERS
 from .leaves import density_slope, has_room, lay_leaf
 from .nodes import (
     LEVELS,
@@ -311,8 +312,8 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     tolerance = facets[hand.facet].texel if kind == LEAF_RECEIVER else work.tolerance
     if room and not is_parallel and kind == LEAF_RECEIVER:
         if is_curved(hand, facets, solids, tables, source, tolerance, work) > 1.0:
-            halve_space(hand, nodes[work.top], work)
-            push_both(nodes, True, True, work)
+            low, high = halve_space(hand, nodes[work.top], work)
+            push_both(nodes, low, high, work)
             return
     bent, uneven = lay_leaf(hand, facets, kind, leaf, edge, corner, work)
     if bent < 0.0:
@@ -328,8 +329,8 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
         u, v = corner[c, 0] - new.centre[0], corner[c, 1] - new.centre[1]
         steepest = max(steepest, abs(new.slope[0] * u + new.slope[1] * v))
     if room and steepest > _STEEP and hand.corners[1] > 0:
-        halve_space(hand, nodes[work.top], work)
-        push_both(nodes, True, True, work)
+        low, high = halve_space(hand, nodes[work.top], work)
+        push_both(nodes, low, high, work)
         return
     if work.sources > 1:
         soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, work)
@@ -374,11 +375,11 @@ def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, wor
 @part
 def onset(hand, facets, solids, tables, source, before, after, low, high, work):
     """x between two places at which the facet of the beam in hand begins to reflect everything."""
-    position, direction = work.position, work.direction
+    position, direction = work.rays[0], work.rays[1]
     is_low = False
     for turn in range(45):
         x = low if turn == 0 else 0.5 * (low + high)
-        follow(source, facets, solids, tables, hand.path, hand.flight, x, hand.centre, position, direction)
+        follow(source, facets, solids, tables, hand.path, hand.flight, x, hand.centre[0], hand.centre[1], position, direction)
         cosine = facing(facets[hand.facet], direction)
         is_total = transmitted(cosine, index_of(tables, before, x) / index_of(tables, after, x)) <= 0.0
         if turn == 0:
@@ -412,9 +413,9 @@ def at_facet(nodes, facets, solids, tables, sources, work):
     if not is_parallel and hand.bend >= 0.0:
         bend = is_curved(hand, facets, solids, tables, source, work.tolerance, work)
         if bend > 1.0:
-            halve_space(hand, nodes[work.top], work)
+            low, high = halve_space(hand, nodes[work.top], work)
             hand.total = nodes[work.top].total = _LAY
-            push_both(nodes, True, True, work)
+            push_both(nodes, low, high, work)
             return
         hand.bend = -1.0 if bend < 0.01 else bend
     before = after = -1
@@ -460,10 +461,10 @@ def total_from(nodes, before, after, facets, solids, tables, sources, work):
         hand.total = _SOME if middle > 0.0 else _ALL
         return False
     least, most = 1e300, -1e300
-    flight, lines = hand.flight, work.line
+    flight, lines = hand.flight, work.lines[MAX_CORNERS]
     hand.path[flight, 2], hand.path[flight, 3] = before, after
     for a in range(first_place(hand), last_place(hand)):
-        total_line(facet, tables, before, after, hand.x[a], hand.direction[a], hand.centre, lines[a])
+        total_line(facet, tables, before, after, hand.x[a], hand.direction[a], hand.centre[0], hand.centre[1], lines[a])
     for c in range(hand.corners[1]):
         value = lines[1, 0] + lines[1, 1] * hand.corner[1, c, 0] + lines[1, 2] * hand.corner[1, c, 1]
         least, most = min(least, value), max(most, value)
@@ -472,10 +473,10 @@ def total_from(nodes, before, after, facets, solids, tables, sources, work):
         return False
     copy(hand, nodes[work.top])
     number = hand.facet
-    some = rest = False
+    some, rest, onset_edge = number < 0, number < 0, np.int64(TOTAL)
     for turn in range(2):
         part_of = nodes[HAND if turn == 0 else work.top]
-        is_left = cut(part_of, lines, 1.0 - 2.0 * turn, flight, number, TOTAL, work)
+        is_left = cut(part_of, lines, 1.0 - 2.0 * turn, flight, number, onset_edge, work)
         forget_idle_lines(part_of, work)
         recentre(part_of)
         part_of.key = mixed(part_of.key, 16 - turn)
@@ -515,7 +516,7 @@ def child(nodes, action, before, after, mask, facets, solids, tables, work):
     if power < work.threshold:
         chance = power / work.threshold
         flux = flux_as(hand, new, tables, work)
-        if unit(mixed(new.key, 17) ^ work.seed) >= chance:
+        if unit(mixed(new.key, np.int64(17)) ^ work.seed) >= chance:
             work.sums[SUM_ROULETTE] += flux
             return
         new.boost /= chance
@@ -532,7 +533,7 @@ def starts(hand, facets, solids, tables, source, work):
         return False
     if source.kind != PARALLEL:
         for a in range(3):
-            emit_straight(source, hand.centre, hand.position[a], hand.direction[a])
+            emit_straight(source, hand.centre[0], hand.centre[1], hand.position[a], hand.direction[a])
     hand.total = _UNKNOWN
     return True
 

@@ -84,18 +84,13 @@ WORK = np.dtype(
         ("spare_corner", "f8", (CORNERS, 2)),
         ("spare_side", "i4", CORNERS),
         ("height", "f8", CORNERS),
-        ("line", "f8", (3, 3)),
-        ("other_line", "f8", (3, 3)),
-        ("lines", "f8", (MAX_CORNERS, 3, 3)),
+        # Of a facet's edges by place, the last: another; which of them cut, how many are laid at each place.
+        ("lines", "f8", (MAX_CORNERS + 1, 3, 3)),
         ("cuts", "i8", MAX_CORNERS),
         ("laid", "i8", 3),
         ("renamed", "i8", LINES),
-        ("moment", "f8", (3, 3, 6)),
-        ("own_moment", "f8", (3, 6)),
-        ("position", "f8", (3, 3)),
-        ("direction", "f8", (3, 3)),
-        ("at", "f8", (3, 3)),
-        ("towards", "f8", (3, 3)),
+        ("moment", "f8", (4, 3, 6)),
+        ("rays", "f8", (4, 3, 3)),
         ("map", "f8", (3, 3, 2)),
         ("det", "f8", 3),
         ("point", "f8", 2),
@@ -236,7 +231,7 @@ def halve_spectrum(beam, other, at, facets, solids, tables, source, work):
     lo, hi = beam.x[0], beam.x[2]
     beam.x[1], beam.x[2] = 0.5 * (lo + at), at
     other.x[0], other.x[1] = at, 0.5 * (at + hi)
-    beam.key, other.key = mixed(beam.key, 11), mixed(other.key, 12)
+    beam.key, other.key = mixed(beam.key, np.int64(11)), mixed(other.key, np.int64(12))
     low = lay_out(beam, facets, solids, tables, source, work)
     return low, lay_out(other, facets, solids, tables, source, work)
 
@@ -246,17 +241,18 @@ def is_curved(beam, facets, solids, tables, source, tolerance, work):
     """How far, in tolerances, a beam's rays at its facet miss the affine map at the corners of its outline."""
     plane = facets[beam.facet].plane
     a = place_of(beam)
-    p = work.at
+    p, towards, exact, direction = work.rays[0], work.rays[1], work.rays[2], work.rays[3]
     for c in range(3):
         for k in range(3):
-            p[c, k], work.towards[c, k] = beam.position[a, c, k], beam.direction[a, c, k]
-    advance(p, work.towards, plane)
+            p[c, k], towards[c, k] = beam.position[a, c, k], beam.direction[a, c, k]
+    advance(p, towards, plane)
     worst = 0.0
     for c in range(beam.corners[a]):
-        q, exact = beam.corner[a, c], work.position
-        follow(source, facets, solids, tables, beam.path, beam.flight, beam.x[a], q, exact, work.direction)
-        advance(exact, work.direction, plane)
-        u, v = q[0] - beam.centre[0], q[1] - beam.centre[1]
+        u, v = beam.corner[a, c, 0], beam.corner[a, c, 1]
+        follow(source, facets, solids, tables, beam.path, beam.flight, beam.x[a], u, v, exact, direction)
+        advance(exact, direction, plane)
+        u -= beam.centre[0]
+        v -= beam.centre[1]
         off = 0.0
         for k in range(3):
             d = p[0, k] + u * p[1, k] + v * p[2, k] - exact[0, k]
@@ -267,7 +263,8 @@ def is_curved(beam, facets, solids, tables, source, tolerance, work):
 
 @part
 def halve_space(beam, other, work):
-    """Cut a beam across its longer side: one half stays, the other goes to `other`."""
+    """Cut a beam across its longer side: one half stays, the other goes to `other`. Returns (is it left, is the
+    other)."""
     low_u = low_v = 1e300
     high_u = high_v = -1e300
     for a in range(3):
@@ -277,17 +274,20 @@ def halve_space(beam, other, work):
             low_v, high_v = min(low_v, v), max(high_v, v)
     along = 0 if high_u - low_u >= high_v - low_v else 1
     at = 0.5 * (low_u + high_u) if along == 0 else 0.5 * (low_v + high_v)
+    line = work.lines[MAX_CORNERS]
     for a in range(3):
-        work.line[a, 0] = -at
-        work.line[a, 1 + along], work.line[a, 2 - along] = 1.0, 0.0
+        line[a, 0] = -at
+        line[a, 1 + along], line[a, 2 - along] = 1.0, 0.0
     copy(beam, other)
-    cut(beam, work.line, 1.0, 0, 0, STATIC, work)
-    cut(other, work.line, -1.0, 0, 0, STATIC, work)
-    beam.key, other.key = mixed(beam.key, 13), mixed(other.key, 14)
+    flight, static = np.int64(0), np.int64(STATIC)
+    low = cut(beam, line, 1.0, flight, flight, static, work)
+    high = cut(other, line, -1.0, flight, flight, static, work)
+    beam.key, other.key = mixed(beam.key, np.int64(13)), mixed(other.key, np.int64(14))
     forget_idle_lines(beam, work)
     recentre(beam)
     forget_idle_lines(other, work)
     recentre(other)
+    return low, high
 
 
 @part
@@ -391,10 +391,10 @@ def lay_edges(beam, flown, facet, work):
         work.cuts[e] = 0
     alive = False
     for a in range(lo, hi):
-        missed, e = beam.corners[a] == 0, 0
+        missed, e = beam.corners[a] == 0, np.int64(0)
         while e < facet.corners and not missed:
             line = work.lines[e, a]
-            edge_line(facet, e, work.moment[a], flown.centre, line)
+            edge_line(facet, e, work.moment[a], flown.centre[0], flown.centre[1], line)
             outside = heights(beam.corner[a], beam.corners[a], line, 1.0, work.height)
             if outside > 0:
                 work.cuts[e] = 1
@@ -405,5 +405,5 @@ def lay_edges(beam, flown, facet, work):
     if alive:
         for a in range(lo, hi):
             for e in range(work.laid[a], facet.corners):
-                edge_line(facet, e, work.moment[a], flown.centre, work.lines[e, a])
+                edge_line(facet, e, work.moment[a], flown.centre[0], flown.centre[1], work.lines[e, a])
     return alive
