@@ -27,9 +27,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()  # a closed pipe shows here, not in the interpreter's last breath
         return code
     except UserError as error:
-        return _tell(str(error))
+        return _tell(str(error), error.exit_code)
     except MemoryError:
         return _tell("out of memory: use fewer photons, a smaller picture or a simpler mesh")
+    except Exception as error:
+        # moderngl says so where a buffer, a texture or a program cannot be made; it may not even be imported.
+        if type(error).__module__.split(".")[0] not in ("moderngl", "_moderngl", "mgl"):
+            raise
+        return _tell(f"OpenGL failed ({error}): use a smaller picture or fewer photons, or update the driver")
     except KeyboardInterrupt:
         print("spectrasplat: interrupted", file=sys.stderr)
         return INTERRUPTED
@@ -45,9 +50,9 @@ def _run(arguments: Sequence[str] | None) -> int:
     return run(sys.argv[1:] if arguments is None else list(arguments))
 
 
-def _tell(message: str) -> int:
+def _tell(message: str, code: int = USER_ERROR) -> int:
     print("spectrasplat: " + " ".join(message.split()), file=sys.stderr)
-    return USER_ERROR
+    return code
 
 
 if __name__ == "__main__":
