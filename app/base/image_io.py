@@ -23,7 +23,7 @@ import numpy as np
 
 from . import files
 from .atomic import atomic_output
-from .errors import UserError
+from .errors import BrokenPictureError, UserError
 from .tone_map import auto_exposure, srgb_eotf, tone_map_8bit
 
 SUFFIXES = (".png", ".exr", ".npy")
@@ -71,7 +71,8 @@ def write_image(
     rgb: (H, W, 3) linear Rec.709 radiance. exposure_ev: stops added to the automatic exposure
     (PNG only). spectral: (H, W, B) radiance per bin in W/(m² sr), written as the channels
     `S0.<centre>nm` of an .exr; bin_edges_nm: (B + 1,) rising. metadata: short texts kept in .png
-    and .exr. Raises `UserError` for an unknown suffix or a place that cannot be written.
+    and .exr. Raises `UserError` for an unknown suffix or a place that cannot be written, `BrokenPictureError` for
+    numbers that are not finite.
     """
     check_suffix(path)
     with atomic_output(path) as temporary:
@@ -91,6 +92,11 @@ def write_into(
     rgb = np.ascontiguousarray(rgb, np.float32)
     if rgb.ndim != 3 or rgb.shape[2] != 3 or 0 in rgb.shape:
         raise ValueError(f"a picture is (H, W, 3) and not empty, got {rgb.shape}")
+    if not np.isfinite(rgb).all() or (spectral is not None and not np.isfinite(spectral).all()):
+        raise BrokenPictureError(
+            f"{path} is not written: the picture holds numbers that are not finite; a power or a size of the scene is "
+            "beyond what float32 can hold, choose others"
+        )
     metadata = dict(metadata or {})
     if suffix == ".png":
         _write_png(part, rgb, exposure_ev or 0.0, metadata)

@@ -16,7 +16,16 @@ import numpy as np
 from ..base.random_words import Dimension, random_word
 from ..beams.light_beams import BeamFinder, LightBeams
 from ..beams.polygons import BeamPolygons
-from ..beams.search import SUM_ABSORBED, SUM_BEAMS, SUM_DEPOSITED, SUM_ENTERED, SUM_ESCAPED, SUM_HANDED
+from ..beams.search import (
+    SUM_ABSORBED,
+    SUM_BEAMS,
+    SUM_DEPOSITED,
+    SUM_DEPTH,
+    SUM_ENTERED,
+    SUM_ESCAPED,
+    SUM_HANDED,
+    SUM_NUMERIC,
+)
 from ..gpu.beam_tables import BeamTables
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
@@ -40,6 +49,8 @@ _SUMS = {
     "handed": SUM_HANDED,
     "absorbed": SUM_ABSORBED,
     "escaped": SUM_ESCAPED,
+    "lost_depth": SUM_DEPTH,
+    "lost_numeric": SUM_NUMERIC,
 }
 
 
