@@ -516,7 +516,7 @@ def child(nodes, action, before, after, mask, facets, solids, tables, work):
     if power < work.threshold:
         chance = power / work.threshold
         flux = flux_as(hand, new, tables, work)
-        if unit(mixed(new.key, np.int64(17)) ^ work.seed) >= chance:
+        if unit(mixed(new.key ^ work.seed, np.int64(17))) >= chance:
             work.sums[SUM_ROULETTE] += flux
             return
         new.boost /= chance
