@@ -524,16 +524,9 @@ class CameraPass:
         assert self._beams is not None
         parameters["sample_index"] = parameters["draw_index"] = 0
 
-        def bind() -> Callable[[], float]:
+        def bind() -> None:
             self._bind(maps)
             self._parameters_buffer.write(parameters.tobytes())
-            start = time.perf_counter()
-
-            def timed() -> float:
-                self._ctx.finish()
-                return time.perf_counter() - start
-
-            return timed
 
         places = shared_places(samples, int(parameters["primary_samples"][0]))
         as_image = self.scene.texels.as_image

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
+from ..beams.screen_pairs import PIXEL_BITS
 from ..gpu import bindings, records
 from ..gpu.device_traits import DeviceTraits
 from ..gpu.map_channels import MapChannels
@@ -50,11 +51,20 @@ TINT_STEPS = 48
     BIND_LISTED,
     BIND_HALTED,
     BIND_BEAM_OBJECTS,
-) = range(8, 18)
+    BIND_BEAM_ENTRIES,
+    BIND_BEAM_RUNS,
+    BIND_BEAM_ORDER,
+    BIND_BEAM_FOUND,
+) = range(8, 22)
 UNIT_EMISSION, UNIT_PICTURES, UNIT_POLYGONS = 10, 11, 13
 BIND_BEAM_VIEW = 9
 """Of uniform blocks."""
 IMAGE_POLYGONS = 0
+GATHER_DEFINES = {
+    "BIND_BEAM_RUNS": BIND_BEAM_RUNS,
+    "BIND_BEAM_ORDER": BIND_BEAM_ORDER,
+    "BIND_BEAM_FOUND": BIND_BEAM_FOUND,
+}
 _BEYOND_ONLY = (
     "HAS_DISPERSION",
     "SPECTRAL_SWEEP",
@@ -284,6 +294,9 @@ def view_beam_defines(beyond: Mapping[str, int | float | str]) -> Defines:
         "SPECTRAL_GROUPS": 1 if "SPECTRAL_SWEEP" in beyond else 0,
         "VARIABLE_ROW": beyond["X_ROW"],
         "BIND_BEAM_VIEW": BIND_BEAM_VIEW,
+        "BIND_BEAM_ENTRIES": BIND_BEAM_ENTRIES,
+        "BIND_BEAM_FOUND": BIND_BEAM_FOUND,
+        "PIXEL_BITS": PIXEL_BITS,
         "IMAGE_POLYGONS": IMAGE_POLYGONS,
         "UNIT_POLYGONS": UNIT_POLYGONS,
     }

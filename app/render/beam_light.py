@@ -41,7 +41,7 @@ THRESHOLD = 4.0
 COARSEST, FINEST = 1e-2, 1e-8
 _SURVEY = 1e-3
 """Threshold of the search that tells which objects beams carry, and what they cost."""
-_DEAREST = 90.0
+_DEAREST = 4.0
 """Seconds of a survey after which photons are thought cheaper."""
 _SUMS = {
     "entered": SUM_ENTERED,
@@ -101,12 +101,14 @@ class BeamLight:
 
     def survey(self) -> None:
         """Find out which objects' light beams carry, and whether that pays."""
+        # The first search of all may have to be compiled, which says nothing about the scene.
+        self._find(1.0, 0, light_parts=1)
         started = time.perf_counter()
 
         def pays() -> bool:
             return time.perf_counter() - started < _DEAREST
 
-        found = self._find(_SURVEY, 0, go_on=pays)
+        found = self._find(_SURVEY, 0, light_parts=4, go_on=pays)
         if not pays():
             self.why_not = f"more than {_DEAREST:g} s for the strongest beams: photons are cheaper"
             return
