@@ -24,9 +24,6 @@ from ..gpu.scene_texels import ROW_TEXELS
 from ..gpu.schema import Field, Struct
 from .map_atlas import park
 from .pixel_lattice import MOST_SHARED
-<<<<<<< HEAD
-from .variants import BIND_BEAM_VIEW, IMAGE_POLYGONS, UNIT_POLYGONS, Defines
-=======
 from .variants import (
     BIND_BEAM_ENTRIES,
     BIND_BEAM_FOUND,
@@ -38,7 +35,6 @@ from .variants import (
     UNIT_POLYGONS,
     Defines,
 )
->>>>>>> cam
 
 if TYPE_CHECKING:
     from ..gpu.scene_buffers import SceneBuffers
@@ -109,39 +105,17 @@ class ScreenBeams:
         self._budget = DispatchBudget(_FIRST, _GROUP, MOST_ENTRIES)
 
     def take(self, polygons: ScreenPolygons, scene: SceneBuffers, brightness: np.ndarray | None) -> None:
-<<<<<<< HEAD
-        """Pack and upload; `brightness`: how much of what looks bright lies below each of equally spaced x."""
-        self._forget()
-        records = packed(polygons, scene, brightness)
-        edges = np.zeros((len(polygons.edges), 2, 4), np.float32)
-        edges[:, 0, :3], edges[:, 1, :3] = _about_centres(polygons)
-        words = np.concatenate([records.view(np.uint32).ravel(), edges.view(np.uint32).ravel()])
-        self._first_edge_texel = len(records) * SCREEN_POLYGON.stride // 16
-        rows = max(1, -(-len(words) // (4 * ROW_TEXELS)))
-        image = np.zeros(rows * ROW_TEXELS * 4, np.uint32)
-        image[: len(words)] = words
-        self._texels = self._ctx.texture((ROW_TEXELS, rows), 4, image, dtype="u4")
-        self._texels.filter = moderngl.NEAREST, moderngl.NEAREST
-        places, owners, triangles, self._first_corner = fans(polygons)
-        vertices = np.zeros(len(places), [("place", "f4", 2), ("polygon", "u4")])
-        vertices["place"], vertices["polygon"] = places, owners
-        corners, indices = (
-            self._ctx.buffer(vertices.tobytes() or bytes(12)),
-            self._ctx.buffer(triangles.tobytes() or bytes(4)),
-        )
-        self._fans = self._ctx.vertex_array(
-            self._program, [(corners, "2f4 1u4", "in_place", "in_polygon")], index_buffer=indices
-=======
         """Pack; `brightness`: how much of what looks bright lies below each of equally spaced x."""
         self._polygons = polygons
         # A sky alone is filtered as it is looked up, and has no edges within a pixel.
         self._sees_edges = any(not item.material.is_specular for item in scene.scene.objects) or any(
             light.has_extent for light in scene.scene.lights
->>>>>>> cam
         )
         self._records = packed(polygons, scene, brightness)
 
-    def draw(self, size: tuple[int, int], places: np.ndarray, as_image: bool, bind: Callable[[], None], seconds: float) -> Iterator[float]:
+    def draw(
+        self, size: tuple[int, int], places: np.ndarray, as_image: bool, bind: Callable[[], None], seconds: float
+    ) -> Iterator[float]:
         """Draw all polygons into the beams' own picture, yielding the share done after every portion.
 
         `places`: (points, 2) of a pixel, 0 to 1, at which its edges are told; `bind`: binds what the camera's programs
@@ -213,7 +187,6 @@ class ScreenBeams:
         self._blend()
         self._triangle.render(moderngl.TRIANGLES, 3)
         self._ctx.enable_only(moderngl.NOTHING)
-        framebuffer.scissor = None
         park(self._ctx)
         framebuffer.release()
 
@@ -282,7 +255,8 @@ def _about_centres(polygons: ScreenPolygons) -> tuple[np.ndarray, np.ndarray]:
 
 
 def by_pixel(pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """uint32 (n,): entries sorted by their pixels, in order within each; (m, 4): pixel, first and end of its entries."""
+    """uint32 (n,): entries sorted by their pixels, in order within each; (m, 4): pixel, first and end of its
+    entries."""
     order = np.argsort(pixels, kind="stable").astype(np.uint32)
     ranked = pixels[order]
     starts = np.flatnonzero(np.diff(ranked, prepend=np.uint32(0xFFFFFFFF)) != 0)
