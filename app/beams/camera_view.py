@@ -79,7 +79,13 @@ class CameraView:
         if entered <= 0.0:
             return [], np.zeros(SUMS), set()
         share = how.threshold * footprint**2 / entered
-        return search(self.scene, emission, Search(share, how.seed, how.depth, how.tolerance, how.drift, sees=True), threads, go_on)
+        return search(
+            self.scene,
+            emission,
+            Search(share, how.seed, how.depth, how.tolerance, how.drift, sees=True),
+            threads,
+            go_on,
+        )
 
     def _entered(self, emission: Emission) -> float:
         """What enters (`search.SUM_ENTERED`), by a search that ends at once."""
@@ -118,9 +124,7 @@ class CameraView:
         return Emission(source, limits, room, power, (), (), True, 1.0, mask), footprint
 
 
-def _screen_polygons(
-    leaves: list[Leaves], scene: BeamScene, middle: np.ndarray, footprint: float
-) -> ScreenPolygons:
+def _screen_polygons(leaves: list[Leaves], scene: BeamScene, middle: np.ndarray, footprint: float) -> ScreenPolygons:
     parts = [(_chosen(leaves, kind), kind) for kind in (LEAF_OPEN, LEAF_PIECE)]
     head = np.concatenate([part.head for part, _ in parts])
     count = [len(part.head) for part, _ in parts]

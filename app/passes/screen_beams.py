@@ -85,7 +85,7 @@ class ScreenBeams:
     """Owns the programs, what the polygons are packed in and the picture of them."""
 
     def __init__(self, ctx: moderngl.Context, defines: Defines, structs: Sequence[Struct], targets: int) -> None:
-        """`defines`: `beam_defines` of the camera's; `structs`: the camera's records."""
+        """`defines`: `screen_beam_defines` of the camera's; `structs`: the camera's records."""
         self._ctx = ctx
         self._targets = targets
         self._look = shader.compute(ctx, "camera/beam.comp", defines, (*structs, SCREEN_POLYGON, _VIEW))
@@ -113,7 +113,9 @@ class ScreenBeams:
         )
         self._records = packed(polygons, scene, brightness)
 
-    def draw(self, size: tuple[int, int], places: np.ndarray, as_image: bool, bind: Callable[[], None], seconds: float) -> Iterator[float]:
+    def draw(
+        self, size: tuple[int, int], places: np.ndarray, as_image: bool, bind: Callable[[], None], seconds: float
+    ) -> Iterator[float]:
         """Draw all polygons into the beams' own picture, yielding the share done after every portion.
 
         `places`: (points, 2) of a pixel, 0 to 1, at which its edges are told; `bind`: binds what the camera's programs
@@ -185,7 +187,6 @@ class ScreenBeams:
         self._blend()
         self._triangle.render(moderngl.TRIANGLES, 3)
         self._ctx.enable_only(moderngl.NOTHING)
-        framebuffer.scissor = None
         park(self._ctx)
         framebuffer.release()
 
@@ -254,7 +255,8 @@ def _about_centres(polygons: ScreenPolygons) -> tuple[np.ndarray, np.ndarray]:
 
 
 def by_pixel(pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """uint32 (n,): entries sorted by their pixels, in order within each; (m, 4): pixel, first and end of its entries."""
+    """uint32 (n,): entries sorted by their pixels, in order within each; (m, 4): pixel, first and end of its
+    entries."""
     order = np.argsort(pixels, kind="stable").astype(np.uint32)
     ranked = pixels[order]
     starts = np.flatnonzero(np.diff(ranked, prepend=np.uint32(0xFFFFFFFF)) != 0)
