@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .rays import jit
+from .compiling import jit
 from .screen_polygons import ScreenPolygons
 
 PIXEL_BITS = 27

@@ -85,7 +85,7 @@ class ScreenBeams:
     """Owns the programs, what the polygons are packed in and the picture of them."""
 
     def __init__(self, ctx: moderngl.Context, defines: Defines, structs: Sequence[Struct], targets: int) -> None:
-        """`defines`: `view_beam_defines` of the camera's; `structs`: the camera's records."""
+        """`defines`: `screen_beam_defines` of the camera's; `structs`: the camera's records."""
         self._ctx = ctx
         self._targets = targets
         self._look = shader.compute(ctx, "camera/beam.comp", defines, (*structs, SCREEN_POLYGON, _VIEW))

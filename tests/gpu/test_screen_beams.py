@@ -135,7 +135,10 @@ def test_beams_agree_with_the_reference(gl):
 
 def test_a_textured_floor_through_a_pane(gl):
     """What lies behind is a lit surface with an edge: every part of a pixel looks for itself, as other samples do."""
-    boards = [horizontal(-2.0 + i, -1.0 + i, -2.0, 2.0, -0.4, Diffuse((0.2 + 0.6 * (i % 2),) * 3), f"board {i}") for i in range(4)]
+    boards = [
+        horizontal(-2.0 + i, -1.0 + i, -2.0, 2.0, -0.4, Diffuse((0.2 + 0.6 * (i % 2),) * 3), f"board {i}")
+        for i in range(4)
+    ]
     sun = DirectionalLight("sun", WHITE, direction=DOWN)
     camera_pass = opened_camera_pass(gl, [PANE, *boards], [sun], camera=BESIDE, background=(0.3, 0.3, 0.3))
     converged, paths = by_paths(camera_pass, 256), by_paths(camera_pass, 16)
@@ -177,7 +180,8 @@ def test_pixels_that_a_polygon_touches():
     blank = {field.name: np.zeros(30) for field in fields(ScreenPolygons)}
     starts = np.arange(0, 91, 3)
     polygons = ScreenPolygons(
-        **blank | {"hulls": np.concatenate(hulls), "hull_start": starts, "edges": np.concatenate(edges), "edge_start": starts}
+        **blank
+        | {"hulls": np.concatenate(hulls), "hull_start": starts, "edges": np.concatenate(edges), "edge_start": starts}
     )
     parts = np.where(np.arange(30) % 2, 4, 1)
     entries = pixel_parts(polygons, (12, 9), 0.5, parts)
@@ -205,8 +209,8 @@ def test_entries_by_pixel():
 
 
 def test_points_of_a_pixel():
-    """Polygons' edges are told where a first launch looks at what is seen directly; a quarter of the points in order lies
-    in about a quarter of the pixel."""
+    """Polygons' edges are told where a first launch looks at what is seen directly; a quarter of the points in order
+    lies in about a quarter of the pixel."""
     assert len(shared_places(16, 4)) == 64 and len(shared_places(16, 1)) == 16 and len(shared_places(5, 4)) == 20
     assert len(shared_places(3, 4)) == len(shared_places(1000, 1)) == len(shared_places(17, 1)) == 64
     off = shared_places(16, 1) - pixel_lattice(16, 0)
