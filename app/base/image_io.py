@@ -76,7 +76,7 @@ def write_image(
     """
     check_suffix(path)
     with atomic_output(path) as temporary:
-        write_into(temporary, rgb, exposure_ev, spectral, bin_edges_nm, metadata)
+        write_into(temporary, rgb, exposure_ev, spectral, bin_edges_nm, metadata, str(path))
 
 
 def write_into(
@@ -86,16 +86,18 @@ def write_into(
     spectral: np.ndarray | None = None,
     bin_edges_nm: np.ndarray | None = None,
     metadata: Mapping[str, str] | None = None,
+    name: str = "",
 ) -> None:
-    """As `write_image`, into a file that the caller got from `atomic_outputs`, together with others."""
+    """As `write_image`, into a file that the caller got from `atomic_outputs`, together with others; `name`: what
+    messages call it."""
     suffix = part.suffix.lower()
     rgb = np.ascontiguousarray(rgb, np.float32)
     if rgb.ndim != 3 or rgb.shape[2] != 3 or 0 in rgb.shape:
         raise ValueError(f"a picture is (H, W, 3) and not empty, got {rgb.shape}")
     if not np.isfinite(rgb).all() or (spectral is not None and not np.isfinite(spectral).all()):
         raise BrokenPictureError(
-            f"{path} is not written: the picture holds numbers that are not finite; a power or a size of the scene is "
-            "beyond what float32 can hold, choose others"
+            f"{name or part.name} is not written: the picture holds numbers that are not finite; a power or a size of the "
+            "scene is beyond what float32 can hold, choose others"
         )
     metadata = dict(metadata or {})
     if suffix == ".png":
