@@ -8,7 +8,8 @@ import numpy as np
 
 from .compiling import part
 from .nodes import first_place, last_place
-from .rays import PARALLEL, advance, follow
+from .rays import PARALLEL, advance, at_x, follow
+from .search import medium
 
 
 class Leaves(NamedTuple):
@@ -177,6 +178,14 @@ def lay_leaf(beam, facets, kind, leaf, edge, corner, work):
 
 
 @part
+def passes(solids, tables, inside, x, distance):
+    """Share of light that goes through so much of a solid's medium; `inside` -1: air."""
+    if inside < 0 or solids[inside].tint < 0:
+        return 1.0
+    return np.exp(-at_x(tables, solids[inside].tint, x) * max(distance, 0.0))
+
+
+@part
 def density_slope(beam, facets, solids, tables, source, kind, new, work):
     """Set the slope of the leaf just laid, of a diverging light: relative change of weight and spread over the target."""
     if source.kind == PARALLEL and not work.absorbing:
@@ -199,8 +208,10 @@ def density_slope(beam, facets, solids, tables, source, kind, new, work):
                 source, facets, solids, tables, beam.path, beam.flight, beam.x[1], at[0], at[1], position, direction
             )
             if kind == 0:
-                _, det = plane_map(facets[beam.facet], position, direction, m, work)
+                distance, det = plane_map(facets[beam.facet], position, direction, m, work)
                 value /= max(abs(det), 1e-30)
+                if work.absorbing:
+                    value *= passes(solids, tables, medium(solids, beam.mask), beam.x[1], distance)
             if sign == 0:
                 low = value
             else:

@@ -238,11 +238,11 @@ def moments(position, direction, out):
 
 
 @part
-def edge_line(facet, edge, moment, u, v, line):
+def edge_line(facet, edge, sign, moment, u, v, line):
     """Which side of a facet's edge rays pass: line[0] + line[1] q_u + line[2] q_v >= 0 inside, the side product of
-    ray and edge [Pluecker]; it stays finite where the ray runs along the facet."""
-    n, e = facet.plane, facet.edge
-    sign = -1.0 if n[0] * moment[0, 0] + n[1] * moment[0, 1] + n[2] * moment[0, 2] < 0.0 else 1.0
+    ray and edge [Pluecker]; it stays finite where the ray runs along the facet. `sign`: 1 for rays that leave through
+    the facet (along its normal), -1 for those that come in; rays of the other way are inside of no facet."""
+    e = facet.edge
     for c in range(3):
         side = 0.0
         for k in range(3):

@@ -279,9 +279,9 @@ def halve_space(beam, other, work):
         line[a, 0] = -at
         line[a, 1 + along], line[a, 2 - along] = 1.0, 0.0
     copy(beam, other)
-    flight, static = np.int64(0), np.int64(STATIC)
-    low = cut(beam, line, 1.0, flight, flight, static, work)
-    high = cut(other, line, -1.0, flight, flight, static, work)
+    zero, static, way = np.int64(0), np.int64(STATIC), np.int64(1)
+    low = cut(beam, line, 1.0, zero, zero, static, way, work)
+    high = cut(other, line, -1.0, zero, zero, static, way, work)
     beam.key, other.key = mixed(beam.key, np.int64(13)), mixed(other.key, np.int64(14))
     forget_idle_lines(beam, work)
     recentre(beam)
@@ -310,12 +310,17 @@ def facing(facet, direction):
 
 
 @part
-def is_ahead(facet, solids, beam, cosine):
-    """Whether a beam may meet a facet from this side: into a solid from outside, out of one from inside."""
-    if facet.kind == 0:
-        inside = (beam.mask >> solids[facet.owner].bit) & 1
-        return cosine > 0.0 if inside == 1 else cosine < 0.0
-    return abs(cosine) > 0.0
+def is_ahead(facet, solids, beam, outward, is_parallel):
+    """Whether a beam may meet a facet along its normal (`outward` 1) or against it (0): a solid's from outside, unless
+    it is inside. The rays of a parallel light all have the chief ray's direction, though not at each place of the
+    band."""
+    if facet.kind == 0 and (beam.mask >> solids[facet.owner].bit) & 1 != outward:
+        return False
+    for a in range(first_place(beam), last_place(beam)):
+        cosine = facing(facet, beam.direction[a])
+        if not is_parallel or (cosine > 0.0 if outward == 1 else cosine < 0.0):
+            return True
+    return False
 
 
 @part
@@ -383,10 +388,10 @@ def may_touch(nodes, i, length, obstacles, works):
 
 
 @part
-def lay_edges(beam, flown, facet, work):
-    """Whether a facet, met on the flight of beam `flown`, may leave anything of an outline. If so its edges lie in
+def lay_edges(beam, flown, facet, hit, work):
+    """Whether a facet, met as `hit` says (`grow.facet_of`) on the flight of beam `flown`, may leave anything of an outline. If so its edges lie in
     `work.lines` and `work.cuts` says which of them cut. `work.moment` holds the flight's rays."""
-    lo, hi = first_place(flown), last_place(flown)
+    lo, hi, sign = first_place(flown), last_place(flown), 1.0 if hit >= 0 else -1.0
     for e in range(facet.corners):
         work.cuts[e] = 0
     alive = False
@@ -394,7 +399,7 @@ def lay_edges(beam, flown, facet, work):
         missed, e = beam.corners[a] == 0, np.int64(0)
         while e < facet.corners and not missed:
             line = work.lines[e, a]
-            edge_line(facet, e, work.moment[a], flown.centre[0], flown.centre[1], line)
+            edge_line(facet, e, sign, work.moment[a], flown.centre[0], flown.centre[1], line)
             outside = heights(beam.corner[a], beam.corners[a], line, 1.0, work.height)
             if outside > 0:
                 work.cuts[e] = 1
@@ -405,5 +410,5 @@ def lay_edges(beam, flown, facet, work):
     if alive:
         for a in range(lo, hi):
             for e in range(work.laid[a], facet.corners):
-                edge_line(facet, e, work.moment[a], flown.centre[0], flown.centre[1], work.lines[e, a])
+                edge_line(facet, e, sign, work.moment[a], flown.centre[0], flown.centre[1], work.lines[e, a])
     return alive
