@@ -36,9 +36,12 @@ from ..passes.map_layout import MapLayout, plane_frame
 from .light_maps import LightMaps
 from .shown_spectra import ShownSpectra
 
-THRESHOLD = 4.0
-"""Over the number of photons asked for: the share of the light below which a beam plays roulette."""
-COARSEST, FINEST = 1e-2, 1e-8
+PHOTONS_A_BEAM = 4.0
+"""A beam is followed and drawn in about the time that so many photons take."""
+COARSEST, FINEST = 1e-2, 1e-9
+"""Thresholds: the share of the light below which a beam plays roulette."""
+_GROWTH = 0.8
+"""The number of beams goes about as this power of one over the threshold, where a stone throws light to and fro."""
 _SURVEY = 1e-3
 """Threshold of the search that tells which objects beams carry, and what they cost."""
 _DEAREST = 4.0
@@ -96,6 +99,7 @@ class BeamLight:
         self.why_not = ""
         """Why there are none after all."""
         self.stats = BeamStats()
+        self._surveyed = 1.0
         self.found: LightBeams | None = None
         """The last that were drawn."""
 
@@ -113,6 +117,7 @@ class BeamLight:
             self.why_not = f"more than {_DEAREST:g} s for the strongest beams: photons are cheaper"
             return
         self.carried = {light: objects for light, objects in found.carried.items() if objects}
+        self._surveyed = max(1.0, sum(float(sums[SUM_BEAMS]) for sums in found.sums.values()))
 
     def lay_out(self, layout: MapLayout) -> None:
         """Polygons will be drawn into maps that lie so."""
@@ -136,7 +141,7 @@ class BeamLight:
         """Find beams as fine as `photons` ask and add them to `maps` times `weight`, pausing with the share done."""
         assert self._tables is not None, "begin() comes first"
         stats, started = self.stats, time.perf_counter()
-        threshold = float(np.clip(THRESHOLD / max(photons, 1.0), FINEST, COARSEST))
+        threshold = self.threshold(photons)
         word = random_word(seed, 0, number, Dimension.BRANCH)
         for step in self.finder.find(threshold, self._depth, word):
             stats.find_seconds += time.perf_counter() - started
@@ -152,6 +157,11 @@ class BeamLight:
             self._context.finish()
         stats.draw_seconds += time.perf_counter() - started
         yield 1.0
+
+    def threshold(self, photons: float) -> float:
+        """Threshold at which beams take about as long as so many photons."""
+        beams = max(photons, 1.0) / PHOTONS_A_BEAM
+        return float(np.clip(_SURVEY * (self._surveyed / beams) ** (1.0 / _GROWTH), FINEST, COARSEST))
 
     def draw(self, polygons: BeamPolygons, maps: LightMaps, weight: float) -> None:
         """Add polygons to `maps`."""
