@@ -42,6 +42,8 @@ COARSEST, FINEST = 1e-2, 1e-9
 """Thresholds: the share of the light below which a beam plays roulette."""
 _GROWTH = 0.8
 """The number of beams goes about as this power of one over the threshold, where a stone throws light to and fro."""
+_ENOUGH = 4.0
+"""A search that followed this many times fewer beams than there is time for is done again."""
 _SURVEY = 1e-3
 """Threshold of the search that tells which objects beams carry, and what they cost."""
 _DEAREST = 4.0
@@ -141,15 +143,21 @@ class BeamLight:
         """Find beams as fine as `photons` ask and add them to `maps` times `weight`, pausing with the share done."""
         assert self._tables is not None, "begin() comes first"
         stats, started = self.stats, time.perf_counter()
-        threshold = self.threshold(photons)
         word = random_word(seed, 0, number, Dimension.BRANCH)
-        for step in self.finder.find(threshold, self._depth, word):
-            stats.find_seconds += time.perf_counter() - started
-            if isinstance(step, LightBeams):
-                self.found = step
-            else:
-                yield 0.5 * step
-            started = time.perf_counter()
+        while True:
+            threshold, followed = self.threshold(photons), 0.0
+            for step in self.finder.find(threshold, self._depth, word):
+                stats.find_seconds += time.perf_counter() - started
+                if isinstance(step, LightBeams):
+                    self.found = step
+                    followed = sum(float(sums[SUM_BEAMS]) for sums in step.sums.values())
+                else:
+                    yield 0.5 * step
+                started = time.perf_counter()
+            # Where light leaves for good, fewer weak beams follow than thought: such are searched for again, finer.
+            self._surveyed = max(followed, 1.0) * (threshold / _SURVEY) ** _GROWTH
+            if _ENOUGH * followed * PHOTONS_A_BEAM >= photons or self.threshold(photons) >= threshold:
+                break
         assert self.found is not None
         self._count(self.found)
         if self.found.polygons is not None:
