@@ -172,7 +172,9 @@ def facets_of(mesh: Mesh) -> list[tuple[np.ndarray, int]]:
                     patch.append(near)
                     border.append(near)
         facets += _convex_parts(corners[patch], normals[seed], float(areas[patch].sum()), patch)
-    return facets
+    # In an order that does not depend on how the mesh was cut into triangles: roulette knows facets by number.
+    size = float(np.linalg.norm(high - low))
+    return sorted(facets, key=lambda facet: tuple(np.round((facet[0].mean(axis=0) - low) / size, 6)))
 
 
 def _neighbours(mesh: Mesh) -> list[list[int]]:
