@@ -84,7 +84,8 @@ def test_flux_closes_in_every_shipped_scene(gl, name: str) -> None:
     assert (result.stats.light.tally.ended["deposited"] > 0.0 or by_beams > 0.0) == throws
     if beams is not None:
         ended = sum(watts for fate, watts in beams.flux_w.items() if fate != "entered")
-        assert ended == pytest.approx(beams.flux_w["entered"], rel=0.02)
+        # But for roulette, whose part is 0 in the mean.
+        assert ended == pytest.approx(beams.flux_w["entered"], rel=0.08)
         assert beams.flux_w["lost_numeric"] <= 1e-4 * beams.flux_w["entered"]
     assert result.stats.light.tally.imbalance < 1e-4
     assert result.stats.light.tally.ended["lost_numeric"] <= 2e-4 * result.stats.light.tally.emitted
