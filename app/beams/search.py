@@ -392,7 +392,8 @@ def may_touch(nodes, i, length, obstacles, works):
 @part
 def lay_edges(beam, flown, facet, hit, work):
     """Whether a facet, met as `hit` says (`grow.facet_of`) on the flight of beam `flown`, may leave anything of
-    an outline. If so its edges lie in `work.lines`, and `work.cuts` says which of them cut. `work.moment` holds the flight's rays."""
+    an outline. If so its edges lie in `work.lines`, and `work.cuts` says which of them cut. `work.moment` holds the
+    flight's rays."""
     lo, hi, sign = first_place(flown), last_place(flown), 1.0 if hit >= 0 else -1.0
     for e in range(facet.corners):
         work.cuts[e] = 0
