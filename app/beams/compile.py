@@ -1,6 +1,6 @@
 """Compiles the search for beams, some 20 s the first time, so that nobody waits for it at a first picture:
 
-    python -m spectrasplat.beams.compile
+python -m spectrasplat.beams.compile
 """
 
 from __future__ import annotations

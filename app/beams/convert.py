@@ -14,7 +14,8 @@ from .search import LEAF_PIECE, LEAF_RECEIVER
 @jit
 def hulls_of(corners, starts, grow, points, chain, ends, out):
     """Convex hulls, counter-clockwise, of groups of points [Andrew 1979], each point grown by `grow` of its group to
-    both sides along both axes. `ends` gets those of the groups in `out`; `points` and `chain` (more than twice as long): scratch."""
+    both sides along both axes. `ends` gets those of the groups in `out`; `points`, and `chain` of more than twice
+    the length, are scratch."""
     count = 0
     for group in range(len(starts) - 1):
         n = 0

@@ -1,4 +1,5 @@
-"""The steps of the search: flight, facet, end. The beam in hand is row HAND of the stack; what becomes of it goes on top."""
+"""The steps of the search: flight, facet, end. The beam in hand is row HAND of the stack; what becomes of it goes on
+top."""
 
 from __future__ import annotations
 
@@ -325,11 +326,13 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     # Where rays graze, and where a cone fades away, there is no end to halving: what is faint is straight enough.
     room = work.top + 2 < len(nodes) and power_as(hand, hand, tables, work) > _FAINT * work.threshold
     tolerance = facets[hand.facet].texel if kind == LEAF_RECEIVER else work.tolerance
+    bend = 0.0
     if room and not is_parallel and kind == LEAF_RECEIVER:
-        if is_curved(hand, facets, solids, tables, source, tolerance, work) > 1.0:
-            low, high = halve_space(hand, nodes[work.top], work)
-            push_both(nodes, low, high, work)
-            return
+        bend = is_curved(hand, facets, solids, tables, source, tolerance, work)
+    if bend > 1.0:
+        low, high = halve_space(hand, nodes[work.top], work)
+        push_both(nodes, low, high, work)
+        return
     if kind == LEAF_RECEIVER and work.absorbing:
         absorb(hand, facets, solids, tables, work)
     bent, uneven = lay_leaf(hand, facets, kind, leaf, edge, corner, work)
@@ -385,17 +388,17 @@ def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, wor
             copy(hand, spare)
             lay_out(spare, facets, solids, tables, sources[turn], work)
             lay_leaf(spare, facets, kind, leaf, edge, corner, work)
-        for l in range(n):
-            e = edge[first + l].line
+        for ln in range(n):
+            e = edge[first + ln].line
             at = e[1, 0] * cu + e[1, 1] * cv + e[1, 2]
             if turn == 0:
-                own[l], soft[l] = at, 0.0
-            elif hand.made[l, 2] != STATIC or kind == LEAF_RECEIVER:
-                soft[l] += (at - own[l]) * (at - own[l])
+                own[ln], soft[ln] = at, 0.0
+            elif hand.made[ln, 2] != STATIC or kind == LEAF_RECEIVER:
+                soft[ln] += (at - own[ln]) * (at - own[ln])
     lay_leaf(hand, facets, kind, leaf, edge, corner, work)
     new.slope[0], new.slope[1] = slope_u, slope_v
-    for l in range(n):
-        edge[first + l].soft = 0.8660254 * np.sqrt(soft[l])
+    for ln in range(n):
+        edge[first + ln].soft = 0.8660254 * np.sqrt(soft[ln])
 
 
 @part
@@ -405,7 +408,8 @@ def onset(hand, facets, solids, tables, source, before, after, low, high, work):
     is_low = False
     for turn in range(45):
         x = low if turn == 0 else 0.5 * (low + high)
-        follow(source, facets, solids, tables, hand.path, hand.flight, x, hand.centre[0], hand.centre[1], position, direction)
+        u, v = hand.centre[0], hand.centre[1]
+        follow(source, facets, solids, tables, hand.path, hand.flight, x, u, v, position, direction)
         cosine = facing(facets[hand.facet], direction)
         is_total = transmitted(cosine, index_of(tables, before, x) / index_of(tables, after, x)) <= 0.0
         if turn == 0:
@@ -432,8 +436,8 @@ def at_facet(nodes, facets, solids, tables, sources, work):
     if facet.kind == 2:
         work.sums[SUM_ABSORBED] += flux_of(hand, tables, work)
         return
-    weak = power_as(hand, hand, tables, work) < work.threshold
-    if not weak and drifts(hand, work):
+    power = power_as(hand, hand, tables, work)
+    if power > work.threshold and drifts(hand, power, work):
         halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
         return
     if not is_parallel and hand.bend >= 0.0:
@@ -461,9 +465,9 @@ def at_facet(nodes, facets, solids, tables, sources, work):
         keeps = one == other
         before = solids[one].glass if one >= 0 else -1
         after = solids[other].glass if other >= 0 else -1
-        if not keeps and hand.total == _UNKNOWN:
-            if total_from(nodes, before, after, facets, solids, tables, sources, work):
-                return
+        unknown = not keeps and hand.total == _UNKNOWN
+        if unknown and total_from(nodes, before, after, facets, solids, tables, sources, work):
+            return
     work.sums[SUM_ABSORBED] += (1.0 - kept) * flux_of(hand, tables, work)
     for turn in range(2):
         # One call of `child`, which is long, for all cases.
@@ -539,9 +543,7 @@ def child(nodes, action, before, after, mask, facets, solids, tables, work):
     row[0], row[1], row[2], row[3] = hand.facet, action, before, after
     row[4] = solids[inside].tint if inside >= 0 else -1
     for a in range(first_place(hand), last_place(hand)):
-        new.weight[a] *= meet(
-            facets, solids, tables, new.path, flight, new.x[a], new.position[a], new.direction[a]
-        )
+        new.weight[a] *= meet(facets, solids, tables, new.path, flight, new.x[a], new.position[a], new.direction[a])
     new.flight, new.depth, new.mask = flight + 1, depth, mask
     new.facet, new.total = -1, _UNKNOWN
     new.key = mixed(hand.key, 3 + action)

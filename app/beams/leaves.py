@@ -86,8 +86,8 @@ def has_room(leaf, edge, corner, work):
 
 @part
 def plane_map(facet, position, direction, out, work):
-    """Where a bundle meets a receiver, in the coordinates of its map: out = [[r_u, r_v], [d/dq_u], [d/dq_v]]; returns the
-    distance and the determinant."""
+    """Where a bundle meets a receiver, in the coordinates of its map: out = [[r_u, r_v], [d/dq_u], [d/dq_v]]; returns
+    the distance and the determinant."""
     at, towards, frame = work.rays[2], work.rays[3], facet.frame
     for c in range(3):
         for k in range(3):
@@ -122,10 +122,10 @@ def lay_leaf(beam, facets, kind, leaf, edge, corner, work):
             maps[a, 1, 1] = maps[a, 2, 0] = 0.0
         new.density[a] = density
     n = beam.lines
-    for l in range(n):
-        edge[first + l].soft = 0.0
+    for ln in range(n):
+        edge[first + ln].soft = 0.0
         for a in range(lo, hi):
-            line, m, out = beam.line[l, a], maps[a], edge[first + l].line
+            line, m, out = beam.line[ln, a], maps[a], edge[first + ln].line
             value = line[0] + line[1] * beam.centre[0] + line[2] * beam.centre[1]
             d = det[a] if abs(det[a]) > 1e-30 else 1e-30
             au = (line[1] * m[2, 1] - line[2] * m[1, 1]) / d
@@ -187,7 +187,8 @@ def passes(solids, tables, inside, x, distance):
 
 @part
 def density_slope(beam, facets, solids, tables, source, kind, new, work):
-    """Set the slope of the leaf just laid, of a diverging light: relative change of weight and spread over the target."""
+    """Set the slope of the leaf just laid, of a diverging light or where a medium absorbs: relative change of weight
+    and spread over the target."""
     if source.kind == PARALLEL and not work.absorbing:
         return
     size = 0.0

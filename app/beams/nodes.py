@@ -146,12 +146,12 @@ def copy_head(beam, other):
 def copy_outline(beam, other):
     """The outline of a beam to another."""
     other.lines = beam.lines
-    for l in range(beam.lines):
+    for ln in range(beam.lines):
         for a in range(3):
             for c in range(3):
-                other.line[l, a, c] = beam.line[l, a, c]
+                other.line[ln, a, c] = beam.line[ln, a, c]
         for c in range(4):
-            other.made[l, c] = beam.made[l, c]
+            other.made[ln, c] = beam.made[ln, c]
     for a in range(3):
         other.corners[a], other.held[a] = beam.corners[a], beam.held[a]
         for c in range(beam.corners[a]):
@@ -171,21 +171,21 @@ def copy(beam, other):
 def forget_idle_lines(beam, work):
     """Drop half-planes that bound no polygon of a beam and emptied none."""
     renamed = work.renamed
-    for l in range(beam.lines):
-        renamed[l] = -1
+    for ln in range(beam.lines):
+        renamed[ln] = -1
     for a in range(3):
         for c in range(max(beam.corners[a], beam.held[a])):
             renamed[beam.side[a, c]] = 0
     kept = 0
-    for l in range(beam.lines):
-        if renamed[l] == 0:
-            renamed[l] = kept
-            if kept != l:
+    for ln in range(beam.lines):
+        if renamed[ln] == 0:
+            renamed[ln] = kept
+            if kept != ln:
                 for a in range(3):
                     for c in range(3):
-                        beam.line[kept, a, c] = beam.line[l, a, c]
+                        beam.line[kept, a, c] = beam.line[ln, a, c]
                 for c in range(4):
-                    beam.made[kept, c] = beam.made[l, c]
+                    beam.made[kept, c] = beam.made[ln, c]
             kept += 1
     if kept < beam.lines:
         beam.lines = kept
@@ -234,7 +234,12 @@ def cut(beam, line, sign, flight, facet, edge, way, work):
             for c in range(3):
                 beam.line[label, a, c] = sign * line[a, c]
         made = beam.made
-        made[label, 0], made[label, 1], made[label, 2], made[label, 3] = flight, facet, edge, way if sign > 0.0 else -way
+        made[label, 0], made[label, 1], made[label, 2], made[label, 3] = (
+            flight,
+            facet,
+            edge,
+            way if sign > 0.0 else -way,
+        )
         beam.lines = label + 1
     return left
 
@@ -244,15 +249,15 @@ def lay_lines(beam, a, flight, plain, facets, tables, work, position, direction)
     """Lay a beam's half-planes of one flight anew at place a, for rays about its centre; `plain`: 1 facets' edges
     only, 2 others only, 3 all."""
     ready = False
-    for l in range(beam.lines):
-        edge = np.int64(beam.made[l, 2])
-        if edge == STATIC or beam.made[l, 0] != flight or (plain & (1 if edge >= 0 else 2)) == 0:
+    for ln in range(beam.lines):
+        edge = np.int64(beam.made[ln, 2])
+        if edge == STATIC or beam.made[ln, 0] != flight or (plain & (1 if edge >= 0 else 2)) == 0:
             continue
         if not ready:
             moments(position, direction, work.moment[3])
             ready = True
-        line, way = beam.line[l, a], beam.made[l, 3]
-        facet = facets[beam.made[l, 1]]
+        line, way = beam.line[ln, a], beam.made[ln, 3]
+        facet = facets[beam.made[ln, 1]]
         if edge == TOTAL:
             path = beam.path
             before, after = np.int64(path[flight, 2]), np.int64(path[flight, 3])
@@ -296,13 +301,13 @@ def lay_out(beam, facets, solids, tables, source, work):
             side[c] = 0
         beam.corners[a] = 4
         m = beam.corners[a]
-        for l in range(n):
+        for ln in range(n):
             before = m
-            if heights(corner, m, beam.line[l, a], 1.0, work.height) == 0:
+            if heights(corner, m, beam.line[ln, a], 1.0, work.height) == 0:
                 continue
-            m = clip(corner, side, m, l, work)
+            m = clip(corner, side, m, ln, work)
             if m == 0:
-                side[before] = l
+                side[before] = ln
                 beam.held[a] = before + 1
                 break
         beam.corners[a] = m

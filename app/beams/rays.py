@@ -29,14 +29,14 @@ SOURCE = np.dtype(
     ]
 )
 """Where beams set out from. Parallel: from origin + q_u right + q_v up along `forward`. Diverging: from `origin` along
-forward + q_u right + q_v up, made a unit vector (a gnomonic plane: straight edges stay straight). `axis` and `cone`: of a
-spot, and the half angles between which it fades, rad; beyond pi: none; `lambert`: by the cosine to `axis`. Records instead of tuples of arrays throughout:
-what numba compiles takes a hundredth of the time."""
+forward + q_u right + q_v up, made a unit vector (a gnomonic plane: straight edges stay straight). `axis` and `cone`: of
+a spot, and the half angles between which it fades, rad; beyond pi: none; `lambert`: by the cosine to `axis`. Records
+instead of tuples of arrays throughout: what numba compiles takes a hundredth of the time."""
 
 
 FACET, ACTION, BEFORE, AFTER, ABSORBS = range(5)
-"""Columns of a path (flights, 5): the facet at the end of each flight, what the beam does there, rows of the glass on the
-side it comes from and behind (-1: air), row of what the flight's medium absorbs (-1: nothing)."""
+"""Columns of a path (flights, 5): the facet at the end of each flight, what the beam does there, rows of the glass on
+the side it comes from and behind (-1: air), row of what the flight's medium absorbs (-1: nothing)."""
 
 
 @part

@@ -30,6 +30,8 @@ from .rays import advance, at_x, edge_line, follow
 LEAF_RECEIVER, LEAF_PIECE, LEAF_OPEN = 0, 1, 2
 NARROWEST = 1.0 / 256.0
 """Bands are not halved below this."""
+_STEADY = 100.0
+"""Widths of itself that an outline of the threshold's power may move over a band, for a `drift` of 1."""
 FRAGMENTS = 192
 """Most facets that a beam is cut by in one flight."""
 (
@@ -48,7 +50,6 @@ FRAGMENTS = 192
 """What a search sums up: flux by where it ended, per unit of spectral power; beams followed; leaves."""
 
 
-
 WORK = np.dtype(
     [
         # What is to be done. Row of the tables: share of the light's power below x, for importance.
@@ -62,7 +63,7 @@ WORK = np.dtype(
         ("density", "f8"),
         # Error of places on what goes on, GPU units (from the camera: q).
         ("tolerance", "f8"),
-        # How far, in widths of itself, an outline may move over a band.
+        # How far outlines may move over a band (`drifts`).
         ("drift", "f8"),
         # Of the light's power, of a band without width.
         ("line_share", "f8"),
@@ -202,9 +203,9 @@ def recentre(beam):
 
 
 @part
-def drifts(beam, work):
-    """Whether a beam's outline moves over its band by more than `work.drift` of its own width, or exists at one end
-    only."""
+def drifts(beam, power, work):
+    """Whether a beam's outline moves too far over its band, or exists at one end only. What is strong may move less:
+    halving a weak beam costs as much, and spares less error."""
     if beam.x[2] - beam.x[0] <= NARROWEST:
         return False
     there, size, first, last = 0, 0.0, -1, -1
@@ -219,7 +220,8 @@ def drifts(beam, work):
     centroid(beam.corner[first], beam.corners[first], work.point)
     centroid(beam.corner[last], beam.corners[last], work.other)
     u, v = work.other[0] - work.point[0], work.other[1] - work.point[1]
-    return u * u + v * v > work.drift * work.drift * size
+    most = work.drift * _STEADY * work.threshold / power
+    return u * u + v * v > most * most * size
 
 
 @part
@@ -389,8 +391,9 @@ def may_touch(nodes, i, length, obstacles, works):
 
 @part
 def lay_edges(beam, flown, facet, hit, work):
-    """Whether a facet, met as `hit` says (`grow.facet_of`) on the flight of beam `flown`, may leave anything of an outline. If so its edges lie in
-    `work.lines` and `work.cuts` says which of them cut. `work.moment` holds the flight's rays."""
+    """Whether a facet, met as `hit` says (`grow.facet_of`) on the flight of beam `flown`, may leave anything of
+    an outline. If so its edges lie in `work.lines`, and `work.cuts` says which of them cut. `work.moment` holds the
+    flight's rays."""
     lo, hi, sign = first_place(flown), last_place(flown), 1.0 if hit >= 0 else -1.0
     for e in range(facet.corners):
         work.cuts[e] = 0

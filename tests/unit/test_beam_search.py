@@ -1,0 +1,56 @@
+"""The search for beams keeps its books, whatever the threads and the seed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from spectrasplat.base.paths import assets_dir
+from spectrasplat.beams.facets import BeamScene, beam_scene
+from spectrasplat.beams.find import Emission, Search, search
+from spectrasplat.beams.search import SUM_ENTERED, SUM_ROULETTE
+from spectrasplat.beams.sources import emissions
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics.spectral_tables import SpectralAxis
+
+
+@pytest.fixture(scope="module")
+def stone() -> tuple[BeamScene, Emission]:
+    """The brilliant and its narrow beam."""
+    scene = load_scene(assets_dir() / "scenes" / "brilliant.toml")
+    meshes = [o.mesh.transformed(o.object_to_world) for o in scene.objects]
+    axis = SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.dispersion])
+    frames = {0: (meshes[1].vertices.mean(axis=0), np.eye(3)[:2])}
+    beams = beam_scene(scene, meshes, frames, axis, 1.0)
+    beams.facets["texel"] = 1e-3
+    return beams, emissions(scene.lights[0], beams, lambda p: np.asarray(p, float), 1.0, axis, 1)[0]
+
+
+def fluxes(stone: tuple[BeamScene, Emission], seed: int, threads: int) -> tuple[np.ndarray, np.ndarray]:
+    leaves, sums, blocked = search(*stone, Search(1e-3, seed, 96, 1e-3), threads)
+    assert not blocked
+    return np.concatenate([part.flux for part in leaves]), sums
+
+
+def test_what_enters_ends_somewhere(stone: tuple[BeamScene, Emission]) -> None:
+    # At one index: bands are counted by their middles.
+    scene, emission = stone
+    single = replace(emission, lines=(0.4,), line_shares=(1.0,), is_continuous=False)
+    _, sums = fluxes((scene, single), 1, 1)
+    assert sums[SUM_ENTERED] > 0.0
+    assert sums[: SUM_ROULETTE + 1].sum() == pytest.approx(sums[SUM_ENTERED], rel=1e-6)
+
+
+def test_threads_do_not_matter(stone: tuple[BeamScene, Emission]) -> None:
+    one, sums = fluxes(stone, 1, 1)
+    two, sums_of_two = fluxes(stone, 1, 2)
+    np.testing.assert_array_equal(one, two)
+    np.testing.assert_array_equal(sums, sums_of_two)
+
+
+@pytest.mark.parametrize("other", [2, 3])
+def test_seeds_next_to_each_other_play_other_roulettes(stone: tuple[BeamScene, Emission], other: int) -> None:
+    first, _ = fluxes(stone, 1, 2)
+    second, _ = fluxes(stone, other, 2)
+    assert first.shape != second.shape or not np.allclose(first, second)
