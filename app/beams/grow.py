@@ -4,10 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from .leaves import density_slope, grown, has_room, lay_leaf
+from .leaves import density_slope, grown, has_room, lay_leaf, passes
 from .nodes import LEVELS, STATIC, TOTAL, copy, copy_head, copy_outline, cut, forget_idle_lines, lay_out
-from .rays import PARALLEL, PASS, REFLECT, REFRACT, edge_line, follow, index_of, jit, meet, reflectance, total_line
-from .rays import transmitted
+from .rays import (
+    PARALLEL,
+    PASS,
+    REFLECT,
+    REFRACT,
+    advance,
+    at_x,
+    edge_line,
+    follow,
+    index_of,
+    jit,
+    meet,
+    total_line,
+    transmitted,
+)
 from .search import (
     _MOST_FRAGMENTS,
     _NARROWEST,
@@ -45,6 +58,8 @@ _UNEVEN = 0.15
 """A density that leaves the straight line by more is not a parabola for certain."""
 _STEEP = 0.3
 """A relative change of the density over a leaf that is no longer linear."""
+_FAINT = 0.02
+"""Share of the threshold below which a beam is not halved."""
 _HAND, _SPARE = 0, 1
 """Rows of the stack that are the beam in hand, and room to try a cut."""
 FIRST = 2
@@ -57,18 +72,26 @@ _LAY, _UNKNOWN, _SOME, _ALL = -2, -1, 0, 1
 
 
 @jit
-def facet_lines(nodes, i, facets, facet, edge, lines):
+def facet_lines(nodes, i, facets, facet, edge, sign, lines):
     """The half-planes of a facet's edge for beam i's flight, (3, 3) by place."""
     for a in range(3):
-        edge_line(facets, facet, edge, nodes[i].position[a], nodes[i].direction[a], nodes[i].centre, lines[a])
+        edge_line(facets, facet, edge, sign, nodes[i].position[a], nodes[i].direction[a], nodes[i].centre, lines[a])
 
 
 @jit
-def cut_to_facet(nodes, i, facets, facet, lines, made, spare_corner, spare_side):
-    """Keep of outline i what meets a facet; `i` flies as the beam in hand does."""
-    made[0], made[1], made[3] = nodes[_HAND].flight, facet, 1
+def facet_of(hit):
+    """The facet of a hit (`cut_to_facet`)."""
+    return hit if hit >= 0 else ~hit
+
+
+@jit
+def cut_to_facet(nodes, i, facets, hit, lines, made, spare_corner, spare_side):
+    """Keep of outline i what meets a facet; `i` flies as the beam in hand does. `hit`: the facet's number, met from its
+    inner side; ~number: from outside."""
+    facet, sign = facet_of(hit), 1.0 if hit >= 0 else -1.0
+    made[0], made[1], made[3] = nodes[_HAND].flight, facet, 1 if hit >= 0 else 2
     for e in range(facets[facet].corners):
-        facet_lines(nodes, _HAND, facets, facet, e, lines)
+        facet_lines(nodes, _HAND, facets, facet, e, sign, lines)
         made[2] = e
         if not cut(nodes, i, lines, made, spare_corner, spare_side):
             return False
@@ -76,21 +99,23 @@ def cut_to_facet(nodes, i, facets, facet, lines, made, spare_corner, spare_side)
 
 
 @jit
-def subtract(nodes, first, top, facets, facet, lines, made, spare_corner, spare_side):
+def subtract(nodes, first, top, facets, hit, lines, made, spare_corner, spare_side):
     """Take what meets a facet away from all outlines first … top; returns the new top."""
+    facet, sign = facet_of(hit), 1.0 if hit >= 0 else -1.0
+    way = 1 if hit >= 0 else 2
     end = top
     for j in range(first, end):
         copy(nodes, j, _SPARE)
         nodes[j].facet = _DEAD
         for e in range(facets[facet].corners):
-            facet_lines(nodes, _HAND, facets, facet, e, lines)
-            made[0], made[1], made[2], made[3] = nodes[_HAND].flight, facet, e, -1
+            facet_lines(nodes, _HAND, facets, facet, e, sign, lines)
+            made[0], made[1], made[2], made[3] = nodes[_HAND].flight, facet, e, -way
             copy(nodes, _SPARE, top)
             if cut(nodes, top, -lines, made, spare_corner, spare_side):
                 forget_idle_lines(nodes, top)
                 nodes[top].key = mixed(nodes[_SPARE].key, 1000 + e)
                 top += 1
-            made[3] = 1
+            made[3] = way
             if not cut(nodes, _SPARE, lines, made, spare_corner, spare_side):
                 break
     return closed_up(nodes, first, top)
@@ -152,57 +177,62 @@ def fly(
     first = top
     spread = np.empty(2)
     spread_of(nodes, _HAND, spread)
-    chief = nodes[_HAND].direction[1, 0]
     flight = nodes[_HAND].flight
     last = nodes[_HAND].path[0, flight - 1] if flight > 0 else -1
     owner, crossing = -1, False
     hits = np.empty(_MOST_FRAGMENTS, np.int64)
     count = 0
-    reached = 0.0
     for o in range(len(solids)):
         if solids[o].first == solids[o].last:
             continue
         if flight > 0 and not near_sphere(nodes, _HAND, solids[o].centre, solids[o].radius, spread):
             continue
-        for f in range(solids[o].first, solids[o].last):
-            cosine = facing(facets, f, chief)
-            if f == last or not is_ahead(facets, solids, nodes, _HAND, f, cosine):
+        for turn in range(2 * solids[o].first, 2 * solids[o].last):
+            f = turn >> 1
+            hit = f if turn & 1 else ~f
+            if f == last or not is_ahead(facets, solids, nodes, _HAND, f, turn & 1, sources[0].kind == PARALLEL):
                 continue
             if flight > 0 and not near_sphere(nodes, _HAND, facets[f].centre, facets[f].radius, spread):
                 continue
             copy_outline(nodes, _HAND, top)
-            if not cut_to_facet(nodes, top, facets, f, lines, made, spare_corner, spare_side):
+            if not cut_to_facet(nodes, top, facets, hit, lines, made, spare_corner, spare_side):
                 continue
             copy_head(nodes, _HAND, top)
             recentre(nodes, top)
             distance, towards = distance_at(nodes, top, nodes[top].centre, facets, f)
-            if distance < -_TOUCHES or towards * cosine <= 0.0:
+            if distance < -_TOUCHES or (towards > 0.0) != (hit >= 0):
                 continue
             nodes[top].facet, nodes[top].total = f, _LAY
             nodes[top].key = mixed(nodes[_HAND].key, 2000 + f)
             forget_idle_lines(nodes, top)
-            crossing = crossing or (owner >= 0 and owner != o) or not solids[o].convex
+            # Light meets both sides of what is not glass.
+            crossing = crossing or (owner >= 0 and owner != o) or not solids[o].convex or facets[f].kind != 0
             owner = o
-            reached += _flux(nodes, top, tables, task)
-            hits[count] = f
+            hits[count] = hit
             count += 1
             top += 1
             if count == _MOST_FRAGMENTS:
                 break
         if count == _MOST_FRAGMENTS:
-            sums[SUM_NUMERIC] += max(_flux(nodes, _HAND, tables, task) - reached, 0.0)
             break
-    original = top
     if crossing:
-        top = hide(nodes, first, original, hits, facets, solids, lines, made, spare_corner, spare_side)
+        top = hide(nodes, first, top, hits, facets, solids, lines, made, spare_corner, spare_side)
+    reached = 0.0
+    for j in range(first, top):
+        reached += _flux(nodes, j, tables, task)
+    missed = max(_flux(nodes, _HAND, tables, task) - reached, 0.0)
     boxed = len(obstacles) > 0 and near_boxes(nodes, _HAND, 1e9, obstacles, spread)
     if boxed:
         top, leaves = hand_over(
             nodes, first, top, facets, solids, tables, sources, obstacles, spread, task, leaves, sums, spare_corner,
             spare_side,
         )
+    if count == _MOST_FRAGMENTS or nodes[_HAND].mask != 0 and not boxed:
+        # There is no way out of a solid but through its facets.
+        sums[SUM_NUMERIC] += missed
+        return top, leaves
     if not (boxed or task.sees):
-        sums[SUM_ESCAPED] += max(_flux(nodes, _HAND, tables, task) - reached, 0.0)
+        sums[SUM_ESCAPED] += missed
         return top, leaves
     # What meets no facet.
     rest = top
@@ -234,17 +264,18 @@ def hide(nodes, first, original, hits, facets, solids, lines, made, spare_corner
         for g in range(count):
             if g == h:
                 continue
-            same = facets[hits[g]].owner == facets[hits[h]].owner
-            if same and solids[facets[hits[g]].owner].convex:
+            one, other = facet_of(hits[g]), facet_of(hits[h])
+            same = facets[one].owner == facets[other].owner
+            if same and solids[facets[one].owner].convex and facets[one].kind == 0:
                 continue
             copy(nodes, first + h, _SPARE)
             if not cut_to_facet(nodes, _SPARE, facets, hits[g], lines, made, spare_corner, spare_side):
                 continue
             recentre(nodes, _SPARE)
             q = nodes[_SPARE].centre.copy()
-            t_h, _ = distance_at(nodes, _SPARE, q, facets, hits[h])
-            t_g, _ = distance_at(nodes, _SPARE, q, facets, hits[g])
-            hidden[h, g] = t_g >= -_TOUCHES and is_nearer(facets, solids, nodes, hits[g], hits[h], t_g, t_h)
+            t_h, _ = distance_at(nodes, _SPARE, q, facets, other)
+            t_g, _ = distance_at(nodes, _SPARE, q, facets, one)
+            hidden[h, g] = t_g >= -_TOUCHES and is_nearer(facets, solids, nodes, one, other, t_g, t_h)
     for h in range(count):
         if not hidden[h].any():
             continue
@@ -292,13 +323,16 @@ def end(nodes, at, kind, facets, solids, tables, sources, task, leaves, sums, sp
         if not lay_out(nodes, i, facets, solids, tables, sources[0], task.room, spare_corner, spare_side):
             top -= 1
             continue
-        room = top + 2 < len(nodes)
+        # Where rays graze, and where a cone fades away, there is no end to halving: what is faint is straight enough.
+        room = top + 2 < len(nodes) and power_of(nodes, i, tables, task) > _FAINT * task.threshold
         tolerance = facets[nodes[i].facet].texel if kind == LEAF_RECEIVER else task.tolerance
         if room and sources[0].kind != PARALLEL and kind == LEAF_RECEIVER:
             if is_curved(nodes, i, facets, solids, tables, sources[0], tolerance, 1) > 1.0:
                 halve_space(nodes, i, top, spare_corner, spare_side)
                 top += 1
                 continue
+        if kind == LEAF_RECEIVER and task.absorbing:
+            absorb(nodes, i, facets, solids, tables)
         if not has_room(leaves):
             leaves = grown(leaves)
         bent, uneven = lay_leaf(nodes, i, facets, kind, task.density, leaves)
@@ -323,6 +357,16 @@ def end(nodes, at, kind, facets, solids, tables, sources, task, leaves, sums, sp
             sums[SUM_DEPOSITED if kind == LEAF_RECEIVER else SUM_HANDED] += _flux(nodes, i, tables, task)
         top -= 1
     return leaves
+
+
+@jit
+def absorb(nodes, i, facets, solids, tables):
+    """Take from beam i what the medium of its last flight absorbs."""
+    inside = medium(solids, nodes[i].mask)
+    for a in range(3):
+        at, towards = nodes[i].position[a].copy(), nodes[i].direction[a].copy()
+        distance, _, _ = advance(at, towards, facets[nodes[i].facet].plane)
+        nodes[i].weight[a] *= passes(solids, tables, inside, nodes[i].x[a], distance)
 
 
 @jit
@@ -413,7 +457,7 @@ def at_facet(nodes, top, facets, solids, tables, sources, task, leaves, sums, li
         return top, leaves
     if nodes[_HAND].total == _LAY:
         recentre(nodes, _HAND)
-        if sources[0].kind != PARALLEL:
+        if sources[0].kind != PARALLEL or task.absorbing:
             if not lay_out(nodes, _HAND, facets, solids, tables, sources[0], task.room, spare_corner, spare_side):
                 return top, leaves
             recentre(nodes, _HAND)
@@ -431,32 +475,42 @@ def at_facet(nodes, top, facets, solids, tables, sources, task, leaves, sums, li
         return pushed(nodes, top, low, high), leaves
     if sources[0].kind != PARALLEL and nodes[_HAND].bend >= 0.0:
         bend = is_curved(nodes, _HAND, facets, solids, tables, sources[0], task.tolerance, 0)
-        if bend > 1.0:
+        if bend > 1.0 and power_of(nodes, _HAND, tables, task) > _FAINT * task.threshold:
             halve_space(nodes, _HAND, top, spare_corner, spare_side)
             nodes[_HAND].total = nodes[top].total = _LAY
             return pushed(nodes, top, True, True), leaves
         nodes[_HAND].bend = -1.0 if bend < 0.01 else bend
     owner = facets[facet].owner
+    inside_of = medium(solids, nodes[_HAND].mask)
+    kept = 1.0
+    if task.absorbing:
+        distance, _ = distance_at(nodes, _HAND, nodes[_HAND].centre, facets, facet)
+        kept = passes(solids, tables, inside_of, nodes[_HAND].x[1], distance)
     if kind == 1:
+        kept *= at_x(tables, solids[owner].tint, nodes[_HAND].x[1])
+        sums[SUM_ABSORBED] += (1.0 - kept) * _flux(nodes, _HAND, tables, task)
         top = child(nodes, top, REFLECT, -1, -1, nodes[_HAND].mask, facets, solids, tables, task, sums)
         return top, leaves
     bit = np.int64(1) << solids[owner].bit
     inside = (nodes[_HAND].mask & bit) != 0
     mask = nodes[_HAND].mask ^ bit
-    one, other = medium(solids, nodes[_HAND].mask), medium(solids, mask)
+    one, other = inside_of, medium(solids, mask)
     # A facet that is left for the same medium as before, under a solid of higher priority.
     before = solids[one].glass if one >= 0 else -1
     after = solids[other].glass if other >= 0 else -1
     if one == other:
+        sums[SUM_ABSORBED] += (1.0 - kept) * _flux(nodes, _HAND, tables, task)
         return child(nodes, top, PASS, before, after, mask, facets, solids, tables, task, sums), leaves
     if nodes[_HAND].total == _UNKNOWN:
         k = np.empty(3)
         for a in range(3):
             eta = index_of(tables, before, nodes[_HAND].x[a]) / index_of(tables, after, nodes[_HAND].x[a])
             k[a] = transmitted(facing(facets, facet, nodes[_HAND].direction[a, 0]), eta)
-        for a in range(2):
-            if (k[a] > _GRAZING and k[a + 1] < -_GRAZING) or (k[a] < -_GRAZING and k[a + 1] > _GRAZING):
-                x = onset(nodes, facets, solids, tables, sources, before, after, nodes[_HAND].x[a], nodes[_HAND].x[a + 1])
+        for a in range(3):
+            # Lower half, upper half, and both ends, should the middle be at the onset itself.
+            one, other = (a, a + 1) if a < 2 else (0, 2)
+            if (k[one] > _GRAZING and k[other] < -_GRAZING) or (k[one] < -_GRAZING and k[other] > _GRAZING):
+                x = onset(nodes, facets, solids, tables, sources, before, after, nodes[_HAND].x[one], nodes[_HAND].x[other])
                 low, high = halve_spectrum(
                     nodes, _HAND, top, x, facets, solids, tables, sources[0], task, spare_corner, spare_side
                 )
@@ -487,7 +541,8 @@ def at_facet(nodes, top, facets, solids, tables, sources, task, leaves, sums, li
                     lay_out(nodes, j, facets, solids, tables, sources[0], task.room, spare_corner, spare_side)
                 nodes[_HAND].total, nodes[top].total = _SOME, _ALL
                 return pushed(nodes, top, some, rest), leaves
-        nodes[_HAND].total = _SOME if k[1] > 0.0 else _ALL
+        nodes[_HAND].total = _SOME if max(k[0], max(k[1], k[2])) > 0.0 else _ALL
+    sums[SUM_ABSORBED] += (1.0 - kept) * _flux(nodes, _HAND, tables, task)
     total = nodes[_HAND].total == _ALL
     top = child(nodes, top, REFLECT, before, after, nodes[_HAND].mask, facets, solids, tables, task, sums)
     if not total:

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .rays import PARALLEL, advance, dot, follow, jit
+from .rays import PARALLEL, advance, at_x, dot, follow, jit
+from .search import medium
 
 
 class Leaves(NamedTuple):
@@ -162,6 +163,14 @@ def lay_leaf(nodes, i, facets, kind, density, leaves):
 
 
 @jit
+def passes(solids, tables, inside, x, distance):
+    """Share of light that goes through so much of a solid's medium; `inside` -1: air."""
+    if inside < 0 or solids[inside].tint < 0:
+        return 1.0
+    return np.exp(-at_x(tables, solids[inside].tint, x) * max(distance, 0.0))
+
+
+@jit
 def density_slope(nodes, i, facets, solids, tables, source, task, kind, leaves):
     """Set the slope of the leaf just laid, of a diverging light: relative change of weight and spread over the target."""
     if source.kind == PARALLEL and not task.absorbing:
@@ -176,6 +185,7 @@ def density_slope(nodes, i, facets, solids, tables, source, task, kind, leaves):
     step = 0.5 * size
     position, direction, m = np.empty((3, 3)), np.empty((3, 3)), np.zeros((3, 2))
     change, at = np.zeros(2), np.zeros(2)
+    inside = medium(solids, nodes[i].mask)
     for w in range(2):
         values = np.zeros(2)
         for sign in range(2):
@@ -185,8 +195,10 @@ def density_slope(nodes, i, facets, solids, tables, source, task, kind, leaves):
                 source, facets, solids, tables, nodes[i].path, nodes[i].flight, nodes[i].x[1], at, position, direction
             )
             if kind == 0:
-                _, det = plane_map(facets, nodes[i].facet, position, direction, m)
+                distance, det = plane_map(facets, nodes[i].facet, position, direction, m)
                 values[sign] /= max(abs(det), 1e-30)
+                if task.absorbing:
+                    values[sign] *= passes(solids, tables, inside, nodes[i].x[1], distance)
         total = values[0] + values[1]
         change[w] = (values[1] - values[0]) / (step * total) if total > 0.0 else 0.0
     if kind == 0:

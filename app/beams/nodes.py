@@ -29,7 +29,8 @@ NODE = np.dtype(
         ("corners", "i4", 3),
         ("held", "i4", 3),
         # Half-planes: line[0] + line[1] q_u + line[2] q_v >= 0 at each place, and how to make them again: flight,
-        # facet, edge (or STATIC, TOTAL), sign.
+        # facet, edge (or STATIC, TOTAL), sign: 1 for the inside of what is met from its inner side, 2 from outside, -1
+        # and -2 for what is beyond the edge.
         ("line", "f8", (LINES, 3, 3)),
         ("made", "i4", (LINES, 4)),
         ("lines", "i8"),
@@ -113,7 +114,7 @@ def copy_head(nodes, i, k):
     nodes[k].total = nodes[i].total
     nodes[k].mask = nodes[i].mask
     for r in range(5):
-        for level in range(nodes[i].flight):
+        for level in range(nodes[i].flight + 1):
             nodes[k].path[r, level] = nodes[i].path[r, level]
     nodes[k].key = nodes[i].key
     nodes[k].boost = nodes[i].boost
@@ -202,7 +203,7 @@ def lay_line(nodes, i, l, a, facets, tables, source, position, direction, centre
         path = nodes[i].path
         total_line(facets, tables, path[2, flight], path[3, flight], facet, nodes[i].x[a], direction, centre, line)
     else:
-        edge_line(facets, facet, edge, position, direction, centre, line)
+        edge_line(facets, facet, edge, 1.0 if abs(sign) == 1 else -1.0, position, direction, centre, line)
     if sign < 0:
         for c in range(3):
             line[c] = -line[c]

@@ -224,17 +224,15 @@ def follow(source, facets, solids, tables, path, flights, x, centre, position, d
 
 
 @jit
-def edge_line(facets, facet, edge, position, direction, centre, line):
+def edge_line(facets, facet, edge, sign, position, direction, centre, line):
     """Which side of a facet's edge rays pass: line[0] + line[1] q_u + line[2] q_v >= 0 inside, the side product of
-    ray and edge [Pluecker]; it stays finite where the ray runs along the facet."""
+    ray and edge [Pluecker]; it stays finite where the ray runs along the facet. `sign`: 1 for rays that leave through
+    the facet (along its normal), -1 for those that come in; rays of the other way are inside of no facet."""
     p = facets[facet].corner[edge]
     o = facets[facet].corner[(edge + 1) % facets[facet].corners]
     ex, ey, ez = o[0] - p[0], o[1] - p[1], o[2] - p[2]
     length = np.sqrt(ex * ex + ey * ey + ez * ez)
     ex, ey, ez = ex / length, ey / length, ez / length
-    n = facets[facet].plane
-    facing = n[0] * direction[0, 0] + n[1] * direction[0, 1] + n[2] * direction[0, 2]
-    sign = -1.0 if facing < 0.0 else 1.0
     for c in range(3):
         line[c] = 0.0
     for c in range(3):

@@ -241,13 +241,20 @@ def facing(facets, facet, direction):
 
 
 @jit
-def is_ahead(facets, solids, nodes, i, facet, cosine):
-    """Whether beam i may meet a facet from this side: into a solid from outside, out of one from inside."""
+def is_ahead(facets, solids, nodes, i, facet, outward, parallel):
+    """Whether beam i may meet a facet along its normal (`outward` 1) or against it (0): a solid's from outside, unless
+    it is inside. The rays of a parallel light all have the chief ray's direction, though not at each place of the band."""
     if facets[facet].kind == 0:
         bit = solids[facets[facet].owner].bit
-        inside = (nodes[i].mask >> bit) & 1
-        return cosine > 0.0 if inside == 1 else cosine < 0.0
-    return abs(cosine) > 0.0
+        if (nodes[i].mask >> bit) & 1 != outward:
+            return False
+    if not parallel:
+        return True
+    for a in range(3):
+        cosine = facing(facets, facet, nodes[i].direction[a, 0])
+        if cosine > 0.0 if outward == 1 else cosine < 0.0:
+            return True
+    return False
 
 
 @jit

@@ -158,6 +158,13 @@ def at_index(emission: Emission, *x: float) -> Emission:
     return replace(emission, lines=tuple(x), line_shares=(1.0,) * len(x), is_continuous=False)
 
 
+def grid_about(rig: Rig, polygons, side: int, least: float = 0.5, most: float = 5.0) -> Grid:
+    """`side`² cells about where nine tenths of the hulls' corners lie."""
+    low, high = np.percentile(polygons.hulls, 5, axis=0), np.percentile(polygons.hulls, 95, axis=0)
+    middle, half = 0.5 * (low + high), float(np.clip(0.5 * (high - low).max(), least, most))
+    return rig.grid(tuple(middle - half), tuple(middle + half), side)
+
+
 def scores(found: np.ndarray, exact: np.ndarray, variance: np.ndarray, weight: float, least: float = 25.0) -> np.ndarray:
     """Standard scores by cell of what rays of mean `weight` found; cells that expect fewer than `least` rays are one."""
     few = exact < least * weight
