@@ -171,6 +171,10 @@ def _roots(
     top, _ = fly(
         nodes, FIRST, *args, emission.source, nothing, task[0], empty_leaves(8), np.zeros(SUMS), lines, made, spare_corner, spare_side
     )
+    if s["kind"] != PARALLEL:
+        # Their weights are still those of the plane's middle.
+        for row in range(FIRST, top):
+            lay_out(nodes, row, *args, s, larger, spare_corner, spare_side)
     return top
 
 

@@ -56,6 +56,8 @@ from .search import (
 
 _UNEVEN = 0.15
 """A density that leaves the straight line by more is not a parabola for certain."""
+_COLOURED = 0.02
+"""The same where absorption has a colour."""
 _STEEP = 0.3
 """A relative change of the density over a leaf that is no longer linear."""
 _FAINT = 0.02
@@ -161,12 +163,14 @@ def is_nearer(facets, solids, nodes, one, other, t_one, t_other):
 
 @jit
 def rank(facets, solids, nodes, facet):
-    """Order of surfaces in contact, with the facet's number to tell equals apart."""
+    """Order of surfaces in contact: of several solids that are entered the one that wins comes first, of several that
+    are left it comes last, so that light meets one interface. The facet's number tells equals apart."""
     kind = facets[facet].kind
-    first = 1 + kind
+    first = (1 + kind) * 64
     if kind == 0:
-        first = 1 if (nodes[_HAND].mask >> solids[facets[facet].owner].bit) & 1 else 0
-    return first * 1000000 + facet
+        bit = solids[facets[facet].owner].bit
+        first = 64 + bit if (nodes[_HAND].mask >> bit) & 1 else 63 - bit
+    return (first << 32) + facet
 
 
 @jit
@@ -338,7 +342,9 @@ def end(nodes, at, kind, facets, solids, tables, sources, task, leaves, sums, sp
         bent, uneven = lay_leaf(nodes, i, facets, kind, task.density, leaves)
         leaves.soft[leaves.count[1] : leaves.count[1] + nodes[i].lines] = 0.0
         wide = nodes[i].x[2] - nodes[i].x[0] > _NARROWEST
-        if room and wide and (bent > tolerance or uneven > _UNEVEN):
+        # What absorbs may be coloured, with steps that three places do not see.
+        most = _COLOURED if task.absorbing else _UNEVEN
+        if room and wide and (bent > tolerance or uneven > most):
             middle = 0.5 * (nodes[i].x[0] + nodes[i].x[2])
             halve_spectrum(
                 nodes, i, top, middle, facets, solids, tables, sources[0], task, spare_corner, spare_side
@@ -566,9 +572,6 @@ def child(nodes, top, action, before, after, mask, facets, solids, tables, task,
     """Send the beam in hand on from its facet; returns the new top."""
     flight = nodes[_HAND].flight
     depth = nodes[_HAND].depth + (0 if action == PASS else 1)
-    if depth > task.depth or flight >= LEVELS - 2:
-        sums[SUM_DEPTH] += _flux(nodes, _HAND, tables, task)
-        return top
     copy_head(nodes, _HAND, top)
     row = nodes[top].path
     row[0, flight], row[1, flight] = nodes[_HAND].facet, action
@@ -576,7 +579,6 @@ def child(nodes, top, action, before, after, mask, facets, solids, tables, task,
     inside = medium(solids, nodes[_HAND].mask)
     row[4, flight] = solids[inside].tint if inside >= 0 else -1
     path = nodes[top].path
-    lost = 0.0
     for a in range(3):
         if a > 0 and nodes[top].x[a] == nodes[top].x[a - 1]:
             nodes[top].position[a] = nodes[top].position[a - 1]
@@ -591,13 +593,16 @@ def child(nodes, top, action, before, after, mask, facets, solids, tables, task,
     nodes[top].facet, nodes[top].total = -1, _UNKNOWN
     nodes[top].key = mixed(nodes[_HAND].key, 3 + action)
     copy_outline(nodes, _HAND, top)
+    if depth > task.depth or flight >= LEVELS - 2:
+        sums[SUM_DEPTH] += _flux(nodes, top, tables, task)
+        return top
     power = power_of(nodes, top, tables, task)
     if power <= 0.0:
         return top
     if power < task.threshold:
         chance = power / task.threshold
         flux = _flux(nodes, top, tables, task)
-        if unit(mixed(nodes[top].key, 17) ^ task.seed) >= chance:
+        if unit(mixed(nodes[top].key ^ task.seed, 17)) >= chance:
             sums[SUM_ROULETTE] += flux
             return top
         nodes[top].boost /= chance
