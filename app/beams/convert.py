@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
+from .compiling import jit
 from .facets import BeamScene
 from .leaves import Leaves
 from .polygons import BeamPieces, BeamPolygons
-from .rays import jit
 from .search import LEAF_PIECE, LEAF_RECEIVER
 
 
 @jit
-def hulls_of(corners, starts, grow, out):
+def hulls_of(corners, starts, grow, points, chain, ends, out):
     """Convex hulls, counter-clockwise, of groups of points [Andrew 1979], each point grown by `grow` of its group to
-    both sides along both axes. Returns the ends of the groups in `out`."""
-    ends = np.zeros(len(starts), np.int64)
+    both sides along both axes. `ends` gets those of the groups in `out`; `points` and `chain` (more than twice as long): scratch."""
     count = 0
-    points, chain = np.empty((1024, 2)), np.empty((2050, 2))
     for group in range(len(starts) - 1):
         n = 0
         for c in range(starts[group], starts[group + 1]):
             for k in range(4 if grow[group] > 0.0 else 1):
-                if n < 1024:
-                    points[n, 0] = corners[c, 0] + (grow[group] if k & 1 else -grow[group])
-                    points[n, 1] = corners[c, 1] + (grow[group] if k & 2 else -grow[group])
-                    n += 1
+                points[n, 0] = corners[c, 0] + (grow[group] if k & 1 else -grow[group])
+                points[n, 1] = corners[c, 1] + (grow[group] if k & 2 else -grow[group])
+                n += 1
         # Shell sort by u, then v: groups are small.
         gap = n // 2
         while gap > 0:
@@ -57,19 +54,18 @@ def hulls_of(corners, starts, grow, out):
             out[count, 0], out[count, 1] = chain[k, 0], chain[k, 1]
             count += 1
         ends[group + 1] = count
-    return ends
 
 
 def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float) -> BeamPolygons:
     """What lies on receivers. `unit`: GPU units a scene unit."""
-    chosen = _chosen(leaves, LEAF_RECEIVER)
+    chosen = Chosen(leaves, (LEAF_RECEIVER,))
     head = chosen.head
     edges = np.zeros((len(chosen.edges), 8))
     edges[:, 0:3], edges[:, 4:7] = chosen.edges[:, 0], chosen.edges[:, 2]
     edges[:, 3] = edges[:, 7] = chosen.soft
     starts = np.concatenate([[0], np.cumsum(head[:, 6])]).astype(np.int32)
     softest = np.maximum.reduceat(np.append(chosen.soft, 0.0), starts[:-1]) if len(head) else np.zeros(0)
-    hull_start, hulls = _hulls(chosen, softest)
+    hull_start, hulls = hulls_around(chosen, softest)
     return BeamPolygons(
         np.full(len(head), light, np.int32),
         scene.facets["receiver"][head[:, 1]].astype(np.int32),
@@ -90,14 +86,14 @@ def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float)
 
 def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int) -> BeamPieces:
     """What photons have to carry on."""
-    chosen = _chosen(leaves, LEAF_PIECE)
+    chosen = Chosen(leaves, (LEAF_PIECE,))
     head = chosen.head
     edges = np.concatenate([chosen.edges[:, 0], chosen.edges[:, 2]], axis=1)
     counts = head[:, 6]
     of_edge = np.repeat(np.arange(len(head)), counts)
     for first in (0, 3):
         edges[:, first + 2] += np.einsum("ek,ek->e", edges[:, first : first + 2], chosen.centre[of_edge])
-    hull_start, hulls = _hulls(chosen, np.zeros(len(head)))
+    hull_start, hulls = hulls_around(chosen, np.zeros(len(head)))
     hulls = hulls - chosen.centre[np.repeat(np.arange(len(head)), np.diff(hull_start))]
     last = np.maximum(head[:, 2], 0)
     towards = np.einsum("mk,mk->m", chosen.ray[:, 1, 1, 0], scene.facets["plane"][last, :3])
@@ -114,7 +110,7 @@ def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int) -> BeamPieces:
         scene.facets["triangle"][last].astype(np.int32),
         scene.facets["owner"][last].astype(np.int32),
         towards < 0.0,
-        _objects_of(head[:, 5], scene),
+        objects_of(head[:, 5], scene),
         chosen.flux,
         np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
         edges,
@@ -123,15 +119,15 @@ def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int) -> BeamPieces:
     )
 
 
-class _chosen:
-    """Leaves of one kind, packed."""
+class Chosen:
+    """Leaves of some kinds, packed."""
 
-    def __init__(self, leaves: list[Leaves], kind: int) -> None:
-        parts = [[], [], [], [], [], [], [], [], [], []]
+    def __init__(self, leaves: list[Leaves], kinds: tuple[int, ...]) -> None:
+        parts: list[list[np.ndarray]] = [[] for _ in range(10)]
         for part in leaves:
             n, e, c = part.count
             head = part.head[:n]
-            keep = head[:, 0] == kind
+            keep = np.isin(head[:, 0], kinds)
             edge_keep, corner_keep = np.repeat(keep, head[:, 6]), np.repeat(keep, head[:, 7])
             for target, value in zip(
                 parts,
@@ -150,7 +146,7 @@ class _chosen:
                 strict=True,
             ):
                 target.append(value)
-        shapes = (8,), (3,), (3,), (2,), (2,), (), (2, 3, 3, 3), (3, 3), (), (2,)
+        shapes = (9,), (3,), (3,), (2,), (2,), (), (2, 3, 3, 3), (3, 3), (), (2,)
         (
             self.head,
             self.x,
@@ -168,14 +164,17 @@ class _chosen:
         )
 
 
-def _hulls(chosen: _chosen, grow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def hulls_around(chosen: Chosen, grow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Starts and corners of the leaves' convex hulls, grown by `grow` of each."""
     starts = np.concatenate([[0], np.cumsum(chosen.head[:, 7])]).astype(np.int64)
     out = np.empty((4 * len(chosen.corners) + 8, 2))
-    ends = hulls_of(chosen.corners, starts, grow.astype(float), out)
+    ends = np.zeros(len(starts), np.int64)
+    points = np.empty((4 * int(chosen.head[:, 7].max(initial=0)), 2))
+    hulls_of(chosen.corners, starts, grow.astype(float), points, np.empty((2 * len(points) + 2, 2)), ends, out)
     return ends.astype(np.int32), out[: ends[-1]]
 
 
-def _objects_of(mask: np.ndarray, scene: BeamScene) -> np.ndarray:
+def objects_of(mask: np.ndarray, scene: BeamScene) -> np.ndarray:
     """Masks with a bit an object from masks with a bit a solid."""
     result = np.zeros(len(mask), np.uint64)
     for i, bit in enumerate(scene.solids["bit"]):

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.features import is_flat
+from ..model.features import is_flat, why_no_beams
 from ..model.geometry.mesh import Mesh
 from ..model.optics.colorimetry import VISIBLE_NM, rgb_partition
 from ..model.optics.spectral_tables import SpectralAxis
-from ..model.scene import Scene, SceneObject
+from ..model.scene import Scene
 
 DIELECTRIC, MIRROR, BLACK, RECEIVER = 0, 1, 2, 3
 MAX_SOLIDS = 62
@@ -39,6 +39,8 @@ FACET = np.dtype(
         # Counter-clockwise seen from where n points.
         ("corner", "f8", (MAX_CORNERS, 3)),
         ("corners", "i8"),
+        # Of the edge from each corner to the next: unit vector e, moment P x e [Pluecker].
+        ("edge", "f8", (MAX_CORNERS, 6)),
         # Of a ball that holds it.
         ("centre", "f8", 3),
         ("radius", "f8"),
@@ -93,46 +95,22 @@ class BeamScene:
     """Specular objects that beams do not carry, and why."""
 
 
-def is_faceted(item: SceneObject) -> bool:
-    """Whether all the object's specular facets are flat: no interpolated normals."""
-    mesh = item.mesh
-    if mesh.corner_normals is None:
-        return True
-    known = np.abs(mesh.corner_normals).sum(axis=2) > 0.0
-    cosine = np.einsum("tcj,tj->tc", mesh.corner_normals, mesh.face_normals())
-    return bool((~known | (cosine >= 1.0 - 1e-9)).all())
-
-
-def why_not_faceted(item: SceneObject) -> str | None:
-    """Why beams cannot carry what an object of glass or a mirror throws; None: they can."""
-    if item.material.is_grating:
-        return "a grating sends light into several orders"
-    if not is_faceted(item):
-        return "its normals are interpolated"
-    if len(item.mesh.triangles) > 8 * MAX_FACETS:
-        return f"it has {len(item.mesh.triangles)} triangles"
-    return None
-
-
 def beam_scene(
     scene: Scene,
     meshes: list[Mesh],
     frames: dict[int, tuple[np.ndarray, np.ndarray]],
     axis: SpectralAxis,
     unit: float,
-    *,
-    sees: bool = False,
 ) -> BeamScene:
     """The facets of `scene`. `meshes`: each object's in GPU space; `frames`: origin (3,) and axes (2, 3) of every flat
-    receiver's map by number; `unit`: GPU units a scene unit. `sees`: for beams from the camera, which end where
-    they leave glass and mirrors."""
+    receiver's map by number; `unit`: GPU units a scene unit."""
     why_not: dict[int, str] = {}
     outlines: dict[int, list[tuple[np.ndarray, int]]] = {}
     receivers = [i for i, o in enumerate(scene.objects) if o.material.receives]
     obstacles: list[int] = []
     for i, item in enumerate(scene.objects):
         if item.material.is_specular:
-            reason = why_not_faceted(item)
+            reason = why_no_beams(item)
             if reason is None:
                 outlines[i] = facets_of(meshes[i])
                 if len(outlines[i]) > MAX_FACETS:
@@ -141,8 +119,6 @@ def beam_scene(
             if reason is not None:
                 why_not[i] = reason
                 obstacles.append(i)
-        elif sees:
-            continue
         elif item.material.receives and not is_flat(item) or len(item.mesh.triangles) > MAX_FACETS:
             obstacles.append(i)
         else:
@@ -346,6 +322,9 @@ def _facets(
             record["kind"] = DIELECTRIC if material.transmits else MIRROR
         record["owner"], record["triangle"] = i, triangle
         record["corner"][: len(outline)], record["corners"] = outline, len(outline)
+        edge = np.roll(outline, -1, axis=0) - outline
+        edge /= np.linalg.norm(edge, axis=1)[:, None]
+        record["edge"][: len(outline)] = np.concatenate([edge, np.cross(outline, edge)], axis=1)
         record["centre"], record["radius"] = middle, np.linalg.norm(shifted, axis=1).max()
         record["receiver"] = receivers.index(i) if material.receives else -1
         record["frame"] = middle, along, np.cross(normal, along)
@@ -367,7 +346,7 @@ def _solids(
         record = records[i]
         record["glass"], record["tint"] = glass[i], tint[i]
         record["first"], record["last"] = np.searchsorted(facets["owner"], [i, i + 1])
-        record["convex"] = item.mesh.convex_planes is not None
+        record["convex"] = item.mesh.convex_planes is not None or record["last"] - record["first"] == 1
         record["centre"], record["radius"] = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low)
     return records
 

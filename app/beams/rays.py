@@ -7,16 +7,14 @@ centre, and beams are kept small enough.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
+
+from .compiling import part
 
 PARALLEL, POINT, PINHOLE = 0, 1, 2
 """Kinds of sources. Rays of the last two diverge; a pinhole's weigh the same all over the picture."""
 REFLECT, REFRACT, PASS = 0, 1, 2
 """What a beam does at a facet; PASS: the medium does not change there."""
-
-jit = numba.njit(cache=True, nogil=True, error_model="numpy")
-
 
 SOURCE = np.dtype(
     [
@@ -37,11 +35,11 @@ what numba compiles takes a hundredth of the time."""
 
 
 FACET, ACTION, BEFORE, AFTER, ABSORBS = range(5)
-"""Rows of a path (5, flights): the facet at the end of each flight, what the beam does there, rows of the glass on the
+"""Columns of a path (flights, 5): the facet at the end of each flight, what the beam does there, rows of the glass on the
 side it comes from and behind (-1: air), row of what the flight's medium absorbs (-1: nothing)."""
 
 
-@jit
+@part
 def at_x(table, row, x):
     """A row of a spectral table at x, linear between its samples."""
     place = min(max(x, 0.0), 1.0) * (table.shape[1] - 1)
@@ -50,73 +48,80 @@ def at_x(table, row, x):
     return (1.0 - part) * table[row, i] + part * table[row, i + 1]
 
 
-@jit
+@part
 def dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@jit
-def emit(source, centre, position, direction):
-    """The bundle that leaves a source about q = `centre`."""
+@part
+def emit(source, u, v, position, direction):
+    """The bundle that leaves a source about q = (u, v)."""
     for k in range(3):
         if source.kind == PARALLEL:
-            position[0, k] = source.origin[k] + centre[0] * source.right[k] + centre[1] * source.up[k]
+            position[0, k] = source.origin[k] + u * source.right[k] + v * source.up[k]
             position[1, k], position[2, k] = source.right[k], source.up[k]
             direction[0, k] = source.forward[k]
             direction[1, k] = direction[2, k] = 0.0
         else:
             position[0, k] = source.origin[k]
             position[1, k] = position[2, k] = 0.0
-            direction[0, k] = source.forward[k] + centre[0] * source.right[k] + centre[1] * source.up[k]
+            direction[0, k] = source.forward[k] + u * source.right[k] + v * source.up[k]
             direction[1, k], direction[2, k] = source.right[k], source.up[k]
     if source.kind != PARALLEL:
-        shrink = 1.0 / np.sqrt(dot(direction[0], direction[0]))
+        length = 0.0
         for k in range(3):
-            direction[0, k] *= shrink
-        for c in range(1, 3):
-            along = dot(direction[0], direction[c])
+            length += direction[0, k] * direction[0, k]
+        shrink = 1.0 / np.sqrt(length)
+        for c in range(3):
+            along = 0.0
             for k in range(3):
-                direction[c, k] = shrink * (direction[c, k] - along * direction[0, k])
+                along += direction[0, k] * direction[c, k]
+            for k in range(3):
+                direction[c, k] = shrink * (direction[c, k] - (along * direction[0, k] if c > 0 else 0.0))
 
 
-@jit
-def emit_straight(source, centre, position, direction):
+@part
+def emit_straight(source, u, v, position, direction):
     """The same for a source that diverges, its directions not made unit vectors: exactly affine."""
     for k in range(3):
         position[0, k] = source.origin[k]
         position[1, k] = position[2, k] = 0.0
-        direction[0, k] = source.forward[k] + centre[0] * source.right[k] + centre[1] * source.up[k]
+        direction[0, k] = source.forward[k] + u * source.right[k] + v * source.up[k]
         direction[1, k], direction[2, k] = source.right[k], source.up[k]
 
 
-@jit
-def emitted(source, centre, direction):
-    """Relative intensity of a source towards q = `centre`, per unit of q: equal steps on a gnomonic plane are smaller
+@part
+def emitted(source, u, v, direction):
+    """Relative intensity of a source towards q = (u, v), per unit of q: equal steps on a gnomonic plane are smaller
     solid angles farther out, and a spot fades (`spot.glsl`)."""
     if source.kind != POINT:
         return 1.0
-    r, u = dot(source.right, source.right), dot(source.up, source.up)
-    weight = np.sqrt(r * u) / (1.0 + centre[0] * centre[0] * r + centre[1] * centre[1] * u) ** 1.5
+    right, up = dot(source.right, source.right), dot(source.up, source.up)
+    weight = np.sqrt(right * up) / (1.0 + u * u * right + v * v * up) ** 1.5
+    d, axis = direction, source.axis
+    cosine = d[0, 0] * axis[0] + d[0, 1] * axis[1] + d[0, 2] * axis[2]
     if source.cone[1] - source.cone[0] > 1e-7:
-        d, a = direction[0], source.axis
-        x, y, z = d[1] * a[2] - d[2] * a[1], d[2] * a[0] - d[0] * a[2], d[0] * a[1] - d[1] * a[0]
-        angle = np.arctan2(np.sqrt(x * x + y * y + z * z), dot(d, a))
+        across = 0.0
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            side = d[0, i] * axis[j] - d[0, j] * axis[i]
+            across += side * side
+        angle = np.arctan2(np.sqrt(across), cosine)
         t = min(max((source.cone[1] - angle) / (source.cone[1] - source.cone[0]), 0.0), 1.0)
         weight *= t * t * (3.0 - 2.0 * t)
     if source.lambert:
-        weight *= max(dot(direction[0], source.axis), 0.0)
+        weight *= max(cosine, 0.0)
     return weight
 
 
-@jit
+@part
 def advance(position, direction, plane):
-    """Move a bundle to the plane (n, d); returns the distance at the centre, and its derivatives."""
+    """Move a bundle to the plane (n, d); returns the distance at the centre."""
     cosine = plane[0] * direction[0, 0] + plane[1] * direction[0, 1] + plane[2] * direction[0, 2]
     if abs(cosine) < 1e-12:
         cosine = 1e-12 if cosine >= 0.0 else -1e-12
     away = plane[3] - (plane[0] * position[0, 0] + plane[1] * position[0, 1] + plane[2] * position[0, 2])
     distance = away / cosine
-    change_u = change_v = 0.0
     for c in range(1, 3):
         moved = 0.0
         for k in range(3):
@@ -125,22 +130,18 @@ def advance(position, direction, plane):
         change = -moved / cosine
         for k in range(3):
             position[c, k] += change * direction[0, k]
-        if c == 1:
-            change_u = change
-        else:
-            change_v = change
     for k in range(3):
         position[0, k] += distance * direction[0, k]
-    return distance, change_u, change_v
+    return distance
 
 
-@jit
+@part
 def transmitted(cosine, eta):
     """Squared cosine of the transmitted angle, <= 0: total reflection; `eta` = n_incident / n_transmitted."""
     return (1.0 - eta) * (1.0 + eta) + eta * eta * cosine * cosine
 
 
-@jit
+@part
 def reflectance(cosine_i, eta, cosine2_t):
     """Unpolarised Fresnel reflectance; `cosine_i` > 0."""
     if cosine2_t <= 0.0:
@@ -151,7 +152,7 @@ def reflectance(cosine_i, eta, cosine2_t):
     return 0.5 * (s * s + p * p)
 
 
-@jit
+@part
 def reflect(direction, plane):
     """Turn a bundle's directions at a facet."""
     for c in range(3):
@@ -160,7 +161,7 @@ def reflect(direction, plane):
             direction[c, k] -= twice * plane[k]
 
 
-@jit
+@part
 def refract(direction, plane, eta):
     """The same by refraction; grazing where it would be totally reflected. Derivatives: physics of `optics.glsl`,
     written for a flat facet."""
@@ -182,81 +183,82 @@ def refract(direction, plane, eta):
         direction[0, k] /= np.sqrt(length)
 
 
-@jit
+@part
 def index_of(tables, glass, x):
     """Refractive index of a glass's row, 1 for air."""
     return 1.0 if glass < 0 else at_x(tables, glass, x)
 
 
-@jit
+@part
 def meet(facets, solids, tables, path, k, x, position, direction):
     """End flight k of a bundle at its facet and send it on as the path says; returns the share of its power that goes
     this way, what the medium absorbed on the flight included."""
-    facet = path[FACET, k]
+    facet = path[k, FACET]
     plane = facets[facet].plane
-    distance, _, _ = advance(position, direction, plane)
+    distance = advance(position, direction, plane)
     weight = 1.0
-    if path[ABSORBS, k] >= 0:
-        weight = np.exp(-at_x(tables, path[ABSORBS, k], x) * max(distance, 0.0))
-    if path[ACTION, k] == PASS:
+    if path[k, ABSORBS] >= 0:
+        weight = np.exp(-at_x(tables, np.int64(path[k, ABSORBS]), x) * max(distance, 0.0))
+    if path[k, ACTION] == PASS:
         return weight
     if facets[facet].kind == 1:
         reflect(direction, plane)
         return weight * at_x(tables, solids[facets[facet].owner].tint, x)
     theta = plane[0] * direction[0, 0] + plane[1] * direction[0, 1] + plane[2] * direction[0, 2]
-    eta = index_of(tables, path[BEFORE, k], x) / index_of(tables, path[AFTER, k], x)
+    eta = index_of(tables, np.int64(path[k, BEFORE]), x) / index_of(tables, np.int64(path[k, AFTER]), x)
     share = reflectance(abs(theta), eta, transmitted(theta, eta))
-    if path[ACTION, k] == REFLECT:
+    if path[k, ACTION] == REFLECT:
         reflect(direction, plane)
         return weight * share
     refract(direction, plane, eta)
     return weight * (1.0 - share)
 
 
-@jit
-def follow(source, facets, solids, tables, path, flights, x, centre, position, direction):
-    """A bundle about q = `centre` from the source through the first `flights` facets of its path; returns its weight."""
-    emit(source, centre, position, direction)
-    weight = emitted(source, centre, direction)
+@part
+def follow(source, facets, solids, tables, path, flights, x, u, v, position, direction):
+    """A bundle about q = (u, v) from the source through the first `flights` facets of its path; returns its weight."""
+    emit(source, u, v, position, direction)
+    weight = emitted(source, u, v, direction)
     for k in range(flights):
         weight *= meet(facets, solids, tables, path, k, x, position, direction)
     return weight
 
 
-@jit
-def edge_line(facets, facet, edge, sign, position, direction, centre, line):
+@part
+def moments(position, direction, out):
+    """A bundle's rays as lines [Pluecker]: out[c] = direction, moment X x D; their derivatives for c > 0."""
+    for c in range(3):
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            moment = position[c, i] * direction[0, j] - position[c, j] * direction[0, i]
+            if c > 0:
+                moment += position[0, i] * direction[c, j] - position[0, j] * direction[c, i]
+            out[c, k] = direction[c, k]
+            out[c, 3 + k] = moment
+
+
+@part
+def edge_line(facet, edge, sign, moment, u, v, line):
     """Which side of a facet's edge rays pass: line[0] + line[1] q_u + line[2] q_v >= 0 inside, the side product of
     ray and edge [Pluecker]; it stays finite where the ray runs along the facet. `sign`: 1 for rays that leave through
     the facet (along its normal), -1 for those that come in; rays of the other way are inside of no facet."""
-    p = facets[facet].corner[edge]
-    o = facets[facet].corner[(edge + 1) % facets[facet].corners]
-    ex, ey, ez = o[0] - p[0], o[1] - p[1], o[2] - p[2]
-    length = np.sqrt(ex * ex + ey * ey + ez * ez)
-    ex, ey, ez = ex / length, ey / length, ez / length
+    e = facet.edge
     for c in range(3):
-        line[c] = 0.0
-    for c in range(3):
-        # d/dq of (D x e) . (X - P) = (D_c x e) . (X - P) + (D x e) . X_c
-        dx, dy, dz = direction[c, 0], direction[c, 1], direction[c, 2]
-        cx, cy, cz = dy * ez - dz * ey, dz * ex - dx * ez, dx * ey - dy * ex
-        side = (
-            cx * (position[0, 0] - p[0]) + cy * (position[0, 1] - p[1]) + cz * (position[0, 2] - p[2])
-        )
-        line[c] += sign * side
-        if c == 0:
-            for w in range(1, 3):
-                line[w] += sign * (cx * position[w, 0] + cy * position[w, 1] + cz * position[w, 2])
-    line[0] -= line[1] * centre[0] + line[2] * centre[1]
+        side = 0.0
+        for k in range(3):
+            side += e[edge, k] * moment[c, 3 + k] + e[edge, 3 + k] * moment[c, k]
+        line[c] = sign * side
+    line[0] -= line[1] * u + line[2] * v
 
 
-@jit
-def total_line(facets, tables, path_before, path_after, facet, x, direction, centre, line):
+@part
+def total_line(facet, tables, before, after, x, direction, u, v, line):
     """Where a facet transmits: the squared cosine of the transmitted angle to first order, as a line."""
-    n = facets[facet].plane
-    eta = index_of(tables, path_before, x) / index_of(tables, path_after, x)
+    n = facet.plane
+    eta = index_of(tables, before, x) / index_of(tables, after, x)
     theta = n[0] * direction[0, 0] + n[1] * direction[0, 1] + n[2] * direction[0, 2]
     line[0] = transmitted(theta, eta)
     for c in range(1, 3):
         change = n[0] * direction[c, 0] + n[1] * direction[c, 1] + n[2] * direction[c, 2]
         line[c] = 2.0 * eta * eta * theta * change
-    line[0] -= line[1] * centre[0] + line[2] * centre[1]
+    line[0] -= line[1] * u + line[2] * v

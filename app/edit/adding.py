@@ -25,6 +25,7 @@ SHAPES = (
     "polygon_prism",
     "lens",
     "brilliant",
+    "step_cut",
     "torus",
     "rippled_water",
     "plane",

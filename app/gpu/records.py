@@ -150,8 +150,9 @@ OUTCOME = Struct(
     texels=True,
 )
 
-CATEGORIES = ("deposited", "absorbed", "escaped", "direct", "lost_depth", "lost_numeric")
-"""Where flux may end. `direct`: met a receiver without any specular event (the camera pass draws it)."""
+CATEGORIES = ("deposited", "absorbed", "escaped", "direct", "lost_depth", "lost_numeric", "beams")
+"""Where flux may end. `direct`: met a receiver without any specular event (the camera pass draws it). `beams`: met an
+object first whose light beams carry."""
 
 FALLBACKS = ("footprint_dropped", "shading_normal", "band_cut", "queue_overflow")
 """Counted fall-backs, in the order of `Outcome.what`'s bits from 8."""
@@ -235,6 +236,9 @@ EMIT_PARAMETERS = Struct(
         ),
     ),
 )
+MAX_OBJECTS = 0xFFFF
+"""A photon remembers the object it met first in 16 bits, all of them set for none."""
+
 TRACE_PARAMETERS = Struct(
     "TraceParameters",
     (
@@ -242,5 +246,8 @@ TRACE_PARAMETERS = Struct(
         Field("split_threshold", "float", "survival below which a child plays roulette"),
         Field("power_row", "uint", "row of the light's cumulative power over x"),
         Field("lattices", "uint", "sub-lattices of the pass: photon_id = lattice point · lattices + sub-lattice"),
+        Field(
+            "beam_objects", "uvec4", "one bit an object: who meets it first is left to beams", -(-MAX_OBJECTS // 128)
+        ),
     ),
 )

@@ -7,6 +7,7 @@ glass equally well in a scene of micrometres and in one that stands ten kilometr
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import moderngl
 import numpy as np
@@ -33,6 +34,8 @@ from .texture_store import textured_objects
 
 SAMPLES = 1025
 """Equally spaced samples of every spectral table over x in [0, 1]; linear interpolation errs below 2e-7 in n."""
+_PLANE_BIT = 0x80000000
+"""Of a primitive's number: a plane of a half-space solid, not a triangle (shaders/lib/intersect.glsl)."""
 
 
 TRIANGLE = Struct(
@@ -227,6 +230,19 @@ class SceneBuffers:
         if packed:
             self._buffers[bindings.PROFILES] = self.ctx.buffer(np.concatenate(packed).astype("f4"))
 
+    @cached_property
+    def primitives(self) -> np.ndarray:
+        """uint32 (T,): what a ray that left each triangle has as `last_primitive`; T counts all objects' triangles."""
+        numbers = np.full(self.first_triangle[-1], NONE, np.uint32)
+        numbers[self._triangle_order] = np.arange(len(self._triangle_order))
+        for first, count, index, _ in self._solids:
+            planes = self._planes[first : first + count].astype(float)
+            corners = self.space.to_gpu(self.world_meshes[index].corners())
+            off = np.abs(corners @ planes[:, :3].T - planes[:, 3]).max(axis=1)
+            start = self.first_triangle[index]
+            numbers[start : start + len(corners)] = _PLANE_BIT | (first + off.argmin(axis=1))
+        return numbers
+
     def profile_start(self, light: Light) -> int:
         """Where the light's intensity table begins among the profiles; 0 without one."""
         return 0 if light.profile is None else self._profile_start[light.profile]
@@ -257,11 +273,13 @@ class SceneBuffers:
         for record, values in zip(solid_records, solids, strict=True):
             record["first_plane"], record["plane_count"], record["object"], _ = values
         self.solid_count = len(solids)
+        self._solids, self._triangle_order = solids, np.zeros(0, int)
         all_planes = np.concatenate(planes).astype("f4") if planes else np.zeros((0, 4), "f4")
         self.defines["PLANE_COUNT"] = len(all_planes)
         self._in_storage = max(all_planes.nbytes, solid_records.nbytes) > self.ctx.info["GL_MAX_UNIFORM_BLOCK_SIZE"]
         if self._in_storage:
             self.defines["SOLIDS_IN_STORAGE"] = 1
+        self._planes = all_planes
         if planes:
             self._buffers = {
                 bindings.SOLIDS: self.ctx.buffer(solid_records),
@@ -288,7 +306,7 @@ class SceneBuffers:
         records["edge1"] = all_corners[:, 1] - all_corners[:, 0]
         records["edge2"] = all_corners[:, 2] - all_corners[:, 0]
         records["object"] = np.concatenate(owner)[order]
-        records["source"] = np.concatenate(source)[order]
+        records["source"] = self._triangle_order = np.concatenate(source)[order]
         all_normals = np.take_along_axis(np.concatenate(normals), turned, axis=1)[order]
         smooth = np.isfinite(all_normals).all(axis=(1, 2)) & (np.abs(all_normals).sum(axis=2) > 0).all(axis=1)
         # A facet whose three corner normals agree is flat: its normal has no derivative to compute.

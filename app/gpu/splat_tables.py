@@ -88,7 +88,7 @@ class SplatTables:
         running = np.zeros((*shape[:2], targets, CUMULATIVE_SAMPLES, 4), np.float32)
         for i, light in enumerate(lights):
             for j, reflectance in enumerate(reflectances):
-                source = _Source.of(axis, light, reflectance, channels)
+                source = FoldedSpectrum.of(axis, light, reflectance, channels)
                 density[i, j] = _by_target(source.density(), targets)
                 running[i, j] = _by_target(source.cumulative(np.linspace(0.0, 1.0, CUMULATIVE_SAMPLES)), targets)
                 edges = np.array(bands[i], np.float64)
@@ -135,7 +135,7 @@ _blurred: dict[tuple[object, ...], tuple[np.ndarray, np.ndarray, np.ndarray]] = 
 
 
 @dataclass(frozen=True)
-class _Source:
+class FoldedSpectrum:
     """One light under one reflectance: a running integral without its lines, and the lines."""
 
     smooth: CumulativeSpectrum
@@ -146,7 +146,9 @@ class _Source:
     """Columns that say where in a band its light is: Y, or all bins."""
 
     @classmethod
-    def of(cls, axis: SpectralAxis, light: Spectrum, reflectance: np.ndarray | None, channels: MapChannels) -> _Source:
+    def of(
+        cls, axis: SpectralAxis, light: Spectrum, reflectance: np.ndarray | None, channels: MapChannels
+    ) -> FoldedSpectrum:
         folded = np.ones(401) if reflectance is None else np.asarray(reflectance, np.float64)
         smooth = cumulative(axis, Spectrum(light.density * folded), channels.cell_weights())
         line_nm, power = np.array(light.lines, np.float64).reshape(-1, 2).T

@@ -16,7 +16,7 @@ from .scene import (
     Scene,
     SceneObject,
 )
-from .settings import RenderSettings
+from .settings import RenderSettings, divides_spectrum
 
 MAX_GROUPS = 4
 """Spectral columns a photon may carry; further dispersive materials share the last one."""
@@ -89,6 +89,8 @@ class Features:
     """Spectral channels of the caustic maps beside XYZ, for light whose dispersion the camera's adds to."""
     light_profiles: bool = False
     """Some light shines by a table of intensities over directions."""
+    beams: bool = False
+    """What meets certain flat-faceted objects first is left to beams (`spectrasplat.beams`): photons end there."""
     anchor_weights: bool = False
     """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
 
@@ -119,6 +121,7 @@ class Features:
             "NESTED_WINDOWS": self.nested_windows,
             "ANCHOR_WEIGHTS": self.anchor_weights,
             "LIGHT_PROFILES": self.light_profiles,
+            "BEAMS": self.beams,
         }
         return numbers | {name: 1 for name, on in switches.items() if on}
 
@@ -174,6 +177,7 @@ class Features:
             reindexed=_reindexed(scene, settings, groups, coloured=absorbing or coloured_mirror),
             local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
             anchor_weights=settings.anchor_weights,
+            beams=_has_beams(scene, settings),
             light_profiles=any(light.profile is not None for light in scene.lights),
         )
 
@@ -184,12 +188,49 @@ def _reindexed(scene: Scene, settings: RenderSettings, groups: int, *, coloured:
     from .optics.spectral_tables import SpectralAxis
 
     edited = settings.anchor_weights or (settings.local_gain and any(o.local_dispersion for o in scene.objects))
-    if not edited or groups != 1 or coloured or settings.method != "srd":
+    if not edited or groups != 1 or coloured or not divides_spectrum(settings.method):
         return False
     if any(o.material.is_grating for o in scene.objects):
         return False
     (turning,) = SpectralAxis.build([o.material.dispersion for o in scene.objects if o.material.transmits]).turning_nm
     return len(turning) == 2
+
+
+MAX_BEAM_TRIANGLES = 8192
+"""A mesh of more is never tried as facets of beams; whether fewer pay is measured (`render.beam_light`)."""
+
+
+def is_faceted(item: SceneObject) -> bool:
+    """Whether all the object's facets are flat: no interpolated normals."""
+    mesh = item.mesh
+    if mesh.corner_normals is None:
+        return True
+    known = np.abs(mesh.corner_normals).sum(axis=2) > 0.0
+    cosine = np.einsum("tcj,tj->tc", mesh.corner_normals, mesh.face_normals())
+    return bool((~known | (cosine >= 1.0 - 1e-9)).all())
+
+
+def why_no_beams(item: SceneObject) -> str | None:
+    """Why beams cannot carry what an object of glass or a mirror throws; None: they can."""
+    if item.material.is_grating:
+        return "a grating sends light into several orders"
+    if len(item.mesh.triangles) > MAX_BEAM_TRIANGLES:
+        return f"it has {len(item.mesh.triangles)} triangles"
+    if not is_faceted(item):
+        return "its normals are interpolated"
+    return None
+
+
+def beam_objects(scene: Scene) -> list[int]:
+    """Objects of flat-faceted glass or mirrors, whose light may go as beams."""
+    return [i for i, o in enumerate(scene.objects) if o.material.is_specular and why_no_beams(o) is None]
+
+
+def _has_beams(scene: Scene, settings: RenderSettings) -> bool:
+    painted = settings.local_gain and any(o.local_dispersion for o in scene.objects)
+    receives = any(o.material.receives and is_flat(o) for o in scene.objects)
+    shines = any(light.profile is None for light in scene.lights)
+    return settings.method == "srd" and not settings.anchor_weights and receives and shines and not painted and bool(beam_objects(scene))
 
 
 def camera_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:
@@ -421,8 +462,31 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             if features.light_profiles
             else "no light comes from a photometric file",
         ),
+        (
+            "beams",
+            features.beams,
+            _beam_words(scene, features),
+        ),
         ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
     ]
+
+
+def _beam_words(scene: Scene, features: Features) -> str:
+    specular = [o for o in scene.objects if o.material.is_specular]
+    if features.beams:
+        carried = [scene.objects[i].name for i in beam_objects(scene)]
+        others = [f"{o.name}: {why_no_beams(o)}" for o in specular if why_no_beams(o)]
+        return f"what {', '.join(carried)} throw(s) goes as polygons" + (f"; photons for {'; '.join(others)}" if others else "")
+    if features.method != "srd":
+        return f"method {features.method} follows photons"
+    reasons = [f"{o.name}: {why_no_beams(o)}" for o in specular if why_no_beams(o)]
+    if not specular or len(reasons) == len(specular):
+        return "; ".join(reasons) or "there is neither glass nor mirror"
+    if not any(o.material.receives and is_flat(o) for o in scene.objects):
+        return "no receiver is flat"
+    if any(o.local_dispersion for o in scene.objects):
+        return "the dispersion brush was used on a receiver"
+    return "no light can be followed as beams"
 
 
 def _target_words(features: Features) -> str:

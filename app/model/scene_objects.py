@@ -151,6 +151,7 @@ _SHAPES = (
     "lens",
     "doublet",
     "brilliant",
+    "step_cut",
     "torus",
     "revolution",
     "height_field",

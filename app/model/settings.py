@@ -4,10 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-METHODS = ("srd", "srd-lambda", "stochastic", "stochastic-even", "stochastic-point", "regular-7", "regular-16")
+METHODS = (
+    "srd",
+    "srd-photons",
+    "srd-lambda",
+    "stochastic",
+    "stochastic-even",
+    "stochastic-point",
+    "regular-7",
+    "regular-16",
+)
 """Sampling methods that every comparison holds (README, "Methods")."""
 CAMERA_METHODS = tuple(name for name in METHODS if name != "stochastic-point")
 """Of those, the ones that camera rays may follow too."""
+
+
+def divides_spectrum(method: str) -> bool:
+    """Whether photons and camera rays are swept along as many spectral bands as the scene asks for, one column a glass:
+    `srd`, with or without beams."""
+    return method in ("srd", "srd-photons")
 
 
 @dataclass(frozen=True)

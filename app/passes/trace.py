@@ -46,6 +46,8 @@ class FluxTally:
     """Where flux went, W, in float64; `merge` adds batches."""
 
     emitted: float = 0.0
+    handed: float = 0.0
+    """What beams left to photons on their way (`beam_emission`), besides what lights emitted."""
     ended: dict[str, float] = field(default_factory=lambda: dict.fromkeys(records.CATEGORIES, 0.0))
     roulette: float = 0.0
     fallbacks: dict[str, int] = field(default_factory=lambda: dict.fromkeys(records.FALLBACKS, 0))
@@ -53,6 +55,7 @@ class FluxTally:
     def merge(self, other: FluxTally) -> None:
         """Add another batch."""
         self.emitted += other.emitted
+        self.handed += other.handed
         self.roulette += other.roulette
         for name in self.ended:
             self.ended[name] += other.ended[name]
@@ -61,10 +64,9 @@ class FluxTally:
 
     @property
     def imbalance(self) -> float:
-        """|emitted − all that ended − roulette's balance| / emitted."""
-        if self.emitted == 0.0:
-            return 0.0
-        return abs(self.emitted - sum(self.ended.values()) - self.roulette) / self.emitted
+        """|emitted + handed − all that ended − roulette's balance|, as a share of emitted + handed."""
+        started = self.emitted + self.handed
+        return abs(started - sum(self.ended.values()) - self.roulette) / started if started else 0.0
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,8 @@ class LatticeSlice:
     """Place on an extended light when `light_points` is 1."""
     weight: float = 1.0
     """Factor on every weight; a pass uses its photon count, so that passes add up by size."""
+    beam_objects: tuple[int, ...] = ()
+    """Objects whose light beams carry: photons that meet one of them first end there (`Features.beams`)."""
 
     @property
     def count(self) -> int:
@@ -125,10 +129,10 @@ class TracePass:
         self.rays_traced = 0
         """Rays emitted since this pass was made, pilots and all."""
         self.split_threshold = split_threshold
-        self._ray = records.ray_record(features.defines()["COLUMNS"])
+        self.ray = records.ray_record(features.defines()["COLUMNS"])
         self.photon = records.photon_record(features.spectral_groups)
         ctx = context.ctx
-        structs = (*SCENE_STRUCTS, self._ray, self.photon, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE)
+        structs = (*SCENE_STRUCTS, self.ray, self.photon, records.OUTCOME, records.CHUNK_COUNT, records.QUEUE_STATE)
         defines = light_defines(features, context.traits) | scene.defines
         self._features = features
         self._defines = defines
@@ -147,7 +151,7 @@ class TracePass:
         self._state_zero = records.QUEUE_STATE.zeros(1)
         self._state_zero["ray_capacity"] = ray_capacity
         self._state_zero["photon_capacity"] = PHOTON_ROOM * batch
-        self._rays = [ctx.buffer(reserve=2 * ray_capacity * self._ray.stride) for _ in range(2)]
+        self._rays = [ctx.buffer(reserve=2 * ray_capacity * self.ray.stride) for _ in range(2)]
         self._outcomes = ctx.buffer(reserve=ray_capacity * records.OUTCOME.stride)
         self._slots = ctx.buffer(reserve=ray_capacity * self.photon.stride)
         self._indices = ctx.buffer(reserve=2 * ray_capacity * 4)
@@ -205,8 +209,9 @@ class TracePass:
         max_depth = self.max_depth if max_depth is None else min(max_depth, self.max_depth)
         if piece.count > self.batch:
             raise ValueError(f"{piece.count} lattice points in a batch of {self.batch}")
+        if piece.beam_objects and not self._features.beams:
+            raise ValueError("objects are left to beams, and the programs were made without them")
         self._start(piece, domain, max_depth)
-        ctx = self.context.ctx
         self.scene.bind()
         self._bind_queue(0)
         self._emit_parameters.bind_to_storage_buffer(bindings.PARAMETERS)
@@ -215,15 +220,42 @@ class TracePass:
         self._indices.bind_to_storage_buffer(bindings.INDICES)
         self._list_children(first=True, chunks=-(-piece.count // _CHUNK))
         emitted = int(self._read_state()["alive"])
-        self.rays_traced += emitted
+        return (yield from self._follow(emitted, max_depth))
 
+    def carry_on(self, rays: np.ndarray, light: int, max_depth: int | None = None) -> Generator[None, None, Batch]:
+        """`steps` for `rays` of one light that are on their way already: records (n,) of `ray` with n ≤ `batch`. Their
+        flux counts as handed."""
+        max_depth = self.max_depth if max_depth is None else min(max_depth, self.max_depth)
+        count = len(rays)
+        if count > self.batch:
+            raise ValueError(f"{count} rays in a batch of {self.batch}")
+        chunks = -(-count // _CHUNK)
+        state = self._state_zero.copy()
+        state["alive"] = count
+        state["trace_groups"] = (-(-count // _GROUP), 1, 1, 0)
+        state["next_chunk_groups"] = (-(-chunks // _GROUP), 1, 1, 0)
+        self._state.write(state.tobytes())
+        self._counts.write(self._counts_zero)
+        self._rays[0].write(np.ascontiguousarray(rays))
+        self._indices.write(np.arange(count, dtype=np.uint32))
+        self._trace_values = self._trace_parameters_of(light, 1, max_depth)
+        self._trace_parameters.write(self._trace_values.tobytes())
+        batch = yield from self._follow(count, max_depth)
+        batch.tally.handed = float(rays["flux_w"].sum(dtype=float))
+        return batch
+
+    def _follow(self, alive: int, max_depth: int) -> Generator[None, None, Batch]:
+        """Event after event of the rays in flight, until none is left."""
+        ctx, emitted = self.context.ctx, alive
+        self.rays_traced += emitted
         # Walking through covered surfaces, cutting bands and all but one of a grating's orders take steps without
         # being events.
         limit = (2 + self.scene.most_orders) * max_depth + 32
-        step, alive = 0, emitted
+        step = 0
         while alive and step < limit:
             if step == limit - 1:
-                self._write_trace_parameters(piece, max_depth=0)
+                self._trace_values["max_depth"] = 0
+                self._trace_parameters.write(self._trace_values.tobytes())
             self.scene.bind()
             self._trace_parameters.bind_to_uniform_block(bindings.PARAMETERS)
             self._bind_queue(step + 1)
@@ -276,14 +308,20 @@ class TracePass:
         p["light"], p["stride"] = piece.light, piece.stride
         p["mask"] = np.packbits(domain.mask.ravel(), bitorder="little").view("<u4")
         self._emit_parameters.write(p.tobytes())
-        self._write_trace_parameters(piece, max_depth)
+        lattices = len(piece.bands) * piece.light_points
+        self._trace_values = self._trace_parameters_of(piece.light, lattices, max_depth, piece.beam_objects)
+        self._trace_parameters.write(self._trace_values.tobytes())
 
-    def _write_trace_parameters(self, piece: LatticeSlice, max_depth: int) -> None:
+    def _trace_parameters_of(
+        self, light: int, lattices: int, max_depth: int, beam_objects: tuple[int, ...] = ()
+    ) -> np.ndarray:
         p = records.TRACE_PARAMETERS.zeros(1)
-        p["max_depth"], p["split_threshold"] = max_depth, self.split_threshold
-        p["power_row"] = self.scene.layout.power_row + piece.light
-        p["lattices"] = len(piece.bands) * piece.light_points
-        self._trace_parameters.write(p.tobytes())
+        p["max_depth"], p["split_threshold"], p["lattices"] = max_depth, self.split_threshold, lattices
+        p["power_row"] = self.scene.layout.power_row + light
+        bits = np.zeros(p["beam_objects"].size * 32, bool)
+        bits[list(beam_objects)] = True
+        p["beam_objects"] = np.packbits(bits, bitorder="little").view("<u4").reshape(p["beam_objects"].shape)
+        return p
 
     def _bind_queue(self, step: int) -> None:
         # Step 0 (emission) writes rays[0]; step k reads rays[(k-1) % 2].

@@ -155,6 +155,13 @@ def draw_variants(features: SplatFeatures) -> dict[int, tuple[str, Defines]]:
     return variants
 
 
+def beam_defines(targets: int, edges: int, is_still: bool) -> Defines:
+    """Defines of the programs that draw beam polygons of up to `edges` edges (0: any number), moving over their band or
+    not."""
+    counts: Defines = {"TARGETS": targets, "EDGES": edges}
+    return counts | ({"STILL": 1} if is_still else {})
+
+
 # -- camera pass --------------------------------------------------------------------------
 # A scene that shows glass or mirrors has two programs: one for what is seen directly, which lists the pixels that meet
 # something specular first, and one for those, which holds all that is expensive. A third is for samples of single

@@ -18,6 +18,7 @@ from typing import Protocol
 import moderngl
 import numpy as np
 
+from ..base.random_words import Dimension, random_word, shift
 from ..gpu import records
 from ..gpu.context import Context
 from ..gpu.map_channels import MapChannels
@@ -27,13 +28,15 @@ from ..model.features import Features
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
+from ..passes.beam_emission import BeamEmission
 from ..passes.camera import CausticMaps
 from ..passes.emission_domain import EmissionDomain, emission_domain
 from ..passes.map_atlas import MapAtlas
 from ..passes.map_layout import MapLayout, check_map_receiver, layout_maps
 from ..passes.pilot import Pilot, landings_of, pilot_steps
 from ..passes.splat import Splatter
-from ..passes.trace import RAY_ROOM, Batch, FluxTally, LatticeSlice, TracePass
+from ..passes.trace import RAY_ROOM, Batch, FluxTally, TracePass
+from .beam_light import BeamLight, BeamStats, carries_everything
 from .light_maps import LightMaps
 from .light_plan import Division, Planner
 from .map_fit import MapFit
@@ -164,6 +167,7 @@ class LightPass:
         self.smoothing = settings.smoothing
         """Standard deviation of a footprint in lattice spacings."""
         self.maps: LightMaps | None = None
+        self._beams: BeamLight | None = None
 
     # ---- once for a scene --------------------------------------------------------------------
 
@@ -193,6 +197,11 @@ class LightPass:
                 self.trace, self.scene, i, domain, self._full_power(i), self._needs_spectral_pilot
             )
         yield
+        if self.features.beams and self.domains:
+            targets = self.features.targets
+            self._beams = BeamLight(self.context, self.scene, self.buffers, self.shown, targets, self.trace.max_depth)
+            self._beams.survey()
+            yield
         shows_map = self.settings.layer.startswith("map:")
         self.map_receiver = check_map_receiver(self.scene, self.buffers, self.settings.layer[4:]) if shows_map else None
         self.lay_out(self.fit)
@@ -204,6 +213,8 @@ class LightPass:
         self.maps, self.fit = None, fit
         self.maps = LightMaps(self.context.ctx, self.layout_for(fit), self.features)
         self.features = self.maps.features
+        if self._beams is not None:
+            self._beams.lay_out(self.maps.layout)
 
     def layout_for(self, fit: MapFit) -> MapLayout:
         """Where maps fitted to `fit` lie."""
@@ -328,6 +339,13 @@ class LightPass:
         limits = {plan.index: [(b.x_lo, b.x_hi) for b in plan.bands] for plan in self.plans}
         spans = [limits.get(i, [(0.0, 1.0)]) for i in range(len(self.scene.lights))]
         self._records.begin(self.shown, spans, photons)
+        if self._beams is not None:
+            self._beams.begin()
+            self.plans = [
+                replace(plan, beam_objects=self._beams.carried.get(plan.index, ()))
+                for plan in self.plans
+                if not carries_everything(self.scene, self._beams.carried.get(plan.index, ()))
+            ]
 
     def run_pass(self, number: int, photons: int, proceed: Callable[[float], bool]) -> bool:
         """One shifted set of lattices with about `photons` points over all lights. `proceed(fraction)` is asked after
@@ -360,26 +378,71 @@ class LightPass:
 
         `first_round`: where a pass goes on that was left before."""
         if not self.plans:
+            if self._has_beams and not first_round:
+                yield from self._beam_steps(number, photons, RoundOf(number, 0, 1, True))
+                self._maps.photon_weight += photons
+                self.stats.photons += photons
+                yield PassStep(1.0, True)
             return
         counts = [plan.lattice_count(photons) for plan in self.plans]
         rounds = max(-(-n // (self.trace.batch // plan.lattices)) for n, plan in zip(counts, self.plans, strict=True))
         slices = rounds * len(self.plans)
         for j in range(first_round, rounds):
+            yield from self._beam_steps(number, photons, RoundOf(number, j, rounds, False), j / rounds)
             for i, (plan, lattice) in enumerate(zip(self.plans, counts, strict=True)):
                 done = j * len(self.plans) + i
                 points = len(range(j, lattice, rounds))
                 if points:
                     part = plan.slice(self.seed, number, lattice, j, rounds, points, float(photons))
-                    for _ in self._slice_steps(part, plan.domain, RoundOf(number, j, rounds, i + 1 == len(self.plans))):
+                    of = RoundOf(number, j, rounds, i + 1 == len(self.plans))
+                    for _ in self.batch_steps(self.trace.steps(part, plan.domain), of):
                         yield PassStep(done / slices, False)
                 if i + 1 < len(self.plans):
                     yield PassStep((done + 1) / slices, False)
             self._maps.photon_weight += photons / rounds
             yield PassStep((j + 1) / rounds, True)
 
-    def _slice_steps(self, part: LatticeSlice, domain: EmissionDomain, of: RoundOf) -> Iterator[None]:
+    @property
+    def _has_beams(self) -> bool:
+        return self._beams is not None and bool(self._beams.carried)
+
+    @property
+    def beam_stats(self) -> BeamStats | None:
+        """What beams did; None without any."""
+        return self._beams.stats if self._beams is not None and self._beams.carried else None
+
+    def _beam_steps(self, number: int, photons: int, of: RoundOf, done: float = 0.0) -> Iterator[PassStep]:
+        """The beams of one round, and what they hand to photons."""
+        if not self._has_beams:
+            return
+        assert self._beams is not None
+        share = photons / of.count
+        before = self._beams.stats.find_seconds, self._beams.stats.draw_seconds
+        for _ in self._beams.steps(share, share, self.seed, number * of.count + of.index, self._maps):
+            yield PassStep(done, False)
+        after = self._beams.stats.find_seconds, self._beams.stats.draw_seconds
+        self.stats.trace_seconds += after[0] - before[0]
+        self.stats.splat_seconds += after[1] - before[1]
+        found = self._beams.found
+        if found is None or found.pieces is None or not len(found.pieces):
+            return
+        emission = BeamEmission(self.buffers, self.trace.ray, found.pieces, self.tables.spans)
+        for light in found.carried:
+            watts = emission.flux_w(light)
+            if watts <= 0.0:
+                continue
+            entered = max(self._beams.stats.flux_w["entered"], 1e-300)
+            count = max(256, int(share * min(1.0, watts / entered)))
+            lattice = shift(self.seed, light, number * of.count + of.index, Dimension.LATTICE_U)
+            other = shift(self.seed, light, number * of.count + of.index, Dimension.LATTICE_V)
+            key = random_word(self.seed, light, number * of.count + of.index, Dimension.BRANCH)
+            for rays in emission.batches(light, count, share, (lattice, other), key, self.trace.batch):
+                for _ in self.batch_steps(self.trace.carry_on(rays, light), of):
+                    yield PassStep(done, False)
+
+    def batch_steps(self, steps: Generator[None, None, Batch], of: RoundOf) -> Iterator[None]:
+        """Trace a batch (`TracePass.steps`, `carry_on`), keep and splat what landed, and count it."""
         started = time.perf_counter()
-        steps = self.trace.steps(part, domain)
         while True:
             try:
                 next(steps)
@@ -451,7 +514,7 @@ class LightPass:
 
     def release(self) -> None:
         """Free everything."""
-        for owned in (self.trace, self._records, self._splatting, self.shown, self.maps):
+        for owned in (self.trace, self._records, self._splatting, self.shown, self.maps, self._beams):
             if owned is not None:
                 owned.release()
 

@@ -14,7 +14,7 @@ from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import Features
 from ..model.optics.spectral_tables import CumulativeSpectrum
 from ..model.scene import Scene
-from ..model.settings import RenderSettings
+from ..model.settings import RenderSettings, divides_spectrum
 from ..passes.emission_domain import EmissionDomain
 from ..passes.pilot import MAX_LIGHT_POINTS, Pilot, PilotFit
 from ..passes.trace import Band, LatticeSlice
@@ -35,6 +35,8 @@ class LightPlan:
     light_points: int
     share: float
     """Share of the photons."""
+    beam_objects: tuple[int, ...] = ()
+    """Objects whose light beams carry, not photons."""
 
     @property
     def lattices(self) -> int:
@@ -64,6 +66,7 @@ class LightPlan:
             key,
             self.light_points,
             weight=weight,
+            beam_objects=self.beam_objects,
         )
 
 
@@ -156,7 +159,7 @@ class Planner:
             edges = axis.x_of_nm(edges_nm)
             middles = axis.x_of_nm(0.5 * (edges_nm[:-1] + edges_nm[1:]))
         else:
-            count = fit.band_count() if method == "srd" and self.features.spectral_groups else 1
+            count = fit.band_count() if divides_spectrum(method) and self.features.spectral_groups else 1
             lo_nm, hi_nm = max(lo_nm - 0.5, 380.0), min(hi_nm + 0.5, 780.0)
             edges = np.linspace(float(axis.x_of_nm(lo_nm)), float(axis.x_of_nm(hi_nm)), count + 1)
             if self._tinted and count < TINTED_BANDS:

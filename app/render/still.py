@@ -11,6 +11,7 @@ from ..gpu.context import Context, create_context
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.spectrum_choice import Spectrum
+from .beam_light import BeamStats
 from .frames import FrameRenderer, Picture
 from .light_pass import LightStats
 
@@ -43,6 +44,7 @@ class RenderStats:
     bytes: int
     map_flux_w: float
     camera_pass: CameraStats
+    beams: BeamStats | None
 
     @property
     def photons(self) -> int:
@@ -70,6 +72,7 @@ class RenderStats:
                 f"outside every map {light.outside_map_w / deposited:.6f}"
             ),
             f"fall-backs          {_counted(tally.fallbacks)}, splat_footprint_dropped {dropped}",
+            *self._beam_lines(),
             f"bands × points      {', '.join(bands)}",
             (
                 f"camera              {camera.samples} samples a pixel, {camera.spectrum.words}; "
@@ -84,6 +87,27 @@ class RenderStats:
                 f"splat {light.splat_seconds:.2f}, camera {self.camera_seconds:.2f}, all {self.seconds:.2f}"
             ),
         ]
+
+    def _beam_lines(self) -> list[str]:
+        """What went by beams, and what by photons."""
+        beams, tally = self.beams, self.light.tally
+        if beams is None:
+            return []
+        entered = beams.flux_w["entered"]
+        photons = max(tally.emitted - tally.ended.get("beams", 0.0), 0.0)
+        return [
+            (
+                f"beams               {beams.beams} followed, {beams.polygons} polygons, of {entered:.6e} W that met "
+                f"flat facets first: {_shares(beams.flux_w)}"
+            ),
+            f"carried             {entered:.6e} W by beams, {photons:.6e} W by photons from the lights on",
+            f"                    found in {beams.find_seconds:.2f} s, drawn in {beams.draw_seconds:.2f} s",
+        ]
+
+
+def _shares(flux_w: Mapping[str, float]) -> str:
+    entered = flux_w["entered"] or 1.0
+    return ", ".join(f"{name} {watts / entered:.6f}" for name, watts in flux_w.items() if name != "entered")
 
 
 def _counted(counts: Mapping[str, int]) -> str:
@@ -137,4 +161,5 @@ def _stats(context: Context, frames: FrameRenderer, settings: RenderSettings) ->
         light.buffers.bytes + light.trace.bytes,
         light.map_flux() if settings.tally else 0.0,
         camera,
+        light.beam_stats,
     )

@@ -421,6 +421,14 @@ void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint k
 #endif
 }
 
+#ifdef BEAMS
+// Whether beams carry what meets this object first.
+bool is_beam_object(uint object)
+{
+    return ((p.beam_objects[object >> 7u][(object >> 5u) & 3u] >> (object & 31u)) & 1u) != 0u;
+}
+#endif
+
 void main()
 {
     uint k = gl_GlobalInvocationID.x;
@@ -454,6 +462,11 @@ void main()
         ray.dposition[c].xyz = transfer_column(ray.dposition[c].xyz, ray.ddirection[c].xyz, ray.direction, hit.normal_g, hit.distance);
 #endif
 
+#ifdef BEAMS
+    if (met && (ray.light_and_source >> 16) == 0xffffu && is_beam_object(hit.object)) {
+        outcome = Outcome(LEFT_TO_BEAMS, ray.flux_w, 0.0, 0.0);
+    } else
+#endif
     if (kind == KIND_DIFFUSE) {
         land(ray, thing.receiver, facet.source, abs(dot(ray.direction, hit.normal_g)), k, outcome);
     } else if (kind == KIND_BLACK) {

@@ -17,6 +17,7 @@ layout(std430, binding = BIND_STATE) readonly restrict buffer StateBlock { Queue
 #define DIRECT (3u << 16)
 #define LOST_DEPTH (4u << 16)
 #define LOST_NUMERIC (5u << 16)
+#define LEFT_TO_BEAMS (6u << 16)
 // … fall-backs …
 #define FELL_FOOTPRINT (1u << 8)
 #define FELL_NORMAL (1u << 9)

@@ -52,10 +52,12 @@ EVERYTHING = Features(
     camera_specular=True,
     camera_disperses=True,
     map_tents=8,
+    beams=True,
 )
 PLAIN_CAMERA = {"camera_disperses": False, "map_tents": 0}
 """What the camera sees disperses nothing: the camera carries the spectrum in the same way as the light pass."""
 WITHOUT = {
+    "beams": {"beams": False},
     "light profiles": {"light_profiles": False},
     "spectral columns": {
         "spectral_groups": 0,
@@ -329,3 +331,14 @@ def test_a_guard_forgotten_in_a_shader_is_noticed(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(paths, "shaders_dir", lambda: mutant)
     proofs = prove(program_texts(sources(scene_features("prism"))), dict.fromkeys(FEATURE_SYMBOLS, False))
     assert not next(p for p in proofs if p.feature == "triangle tree").holds
+
+
+@pytest.mark.parametrize("anchored", [False, True])
+@pytest.mark.parametrize("scene", ["prism", "brilliant", "spectrometer"])
+def test_without_beams_photons_need_what_they_always_did(scene: str, anchored: bool) -> None:
+    loaded = load_scene(paths.assets_dir() / "scenes" / f"{scene}.toml")
+    found, alone = (
+        Features.of(loaded, RenderSettings(method=method, anchor_weights=anchored)) for method in ("srd", "srd-photons")
+    )
+    assert alone == replace(found, method="srd-photons", beams=False)
+    assert scene != "prism" or alone.reindexed == anchored

@@ -1,6 +1,6 @@
 """The rooms of app/ stand in layers: a file imports from its own or from lower ones, and no files import in a circle.
 
-    base < model < gpu, edit < passes < render < ui, reference < bench < stress < commands
+    base < model < gpu, edit, beams < passes < render < ui, reference < bench < stress < commands
 
 Rooms of one layer do not import each other, but for `ui`, whose compare panel shows the reference.
 """
@@ -18,7 +18,7 @@ APP = Path(spectrasplat.__path__[0])
 LAYERS = (
     ("base",),
     ("model",),
-    ("gpu", "edit"),
+    ("gpu", "edit", "beams"),
     ("passes",),
     ("render",),
     ("ui", "reference"),

@@ -74,6 +74,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "camera refraction": ("meet_surface", "reflect_path", "path_stack", "stack_size", "listed"),
     "camera spectral taps": (r"restrict_to_band\(path, pixel_key\)", "taps_of", "onset_of"),
     "spectral maps": ("BIN_ROW", "BIN_SPECTRUM_ROW", "BIN_TARGET"),
+    "beams": ("is_beam_object",),
     "light profiles": ("profile_intensity", "profile_stretch"),
     "spectral bins": ("define TARGETS [2-9]", "define TARGETS 1[0-9]"),
 }

@@ -13,7 +13,7 @@ import numpy as np
 
 from .mesh import Mesh, make_mesh
 from .primitives_check import count, in_range, positive
-from .primitives_gem import brilliant
+from .primitives_gem import brilliant, step_cut
 from .primitives_lens import doublet, lens
 from .primitives_round import ellipsoid, solid_of_revolution, sphere, torus
 from .primitives_uv import with_box_uv
@@ -22,6 +22,7 @@ from .primitives_water import height_field, rippled_water
 __all__ = [
     "box",
     "brilliant",
+    "step_cut",
     "disc",
     "doublet",
     "ellipsoid",

@@ -1,4 +1,5 @@
-"""The round brilliant: 57 facets of Tolkowsky's proportions and a thin faceted girdle, convex and closed.
+"""Cut stones, convex and closed: the round brilliant, 57 facets of Tolkowsky's proportions and a thin faceted girdle;
+the step cut, rows of long facets like an emerald's.
 
 All facet planes meet in a few kinds of points, so the vertices are written down directly;
 no half-space intersection is needed.
@@ -85,4 +86,46 @@ def brilliant(
     planes = mesh.convex_planes
     if planes is None or len(planes) != len(facets):
         raise UserError("brilliant: these proportions do not make a convex stone; move them towards the defaults")
+    return mesh
+
+
+def step_cut(
+    width: float = 1.0,
+    length: float = 1.4,
+    corner: float = 0.18,
+    table: float = 0.6,
+    crown_height: float = 0.16,
+    pavilion_depth: float = 0.45,
+    girdle: float = 0.03,
+    name: str = "step_cut",
+) -> Mesh:
+    """An emerald cut, its table facing +z and the middle of its girdle in z = 0; 3 rows of facets above and 3 below.
+
+    The outline is a rectangle of `width` by `length` whose corners are cut off by `corner` times the width. `table`:
+    its size as a share of the outline; `crown_height`, `pavilion_depth`, `girdle`: fractions of the width. Rows grow
+    steeper towards the girdle. Raises UserError when the proportions do not make a convex stone.
+    """
+    shape = "step_cut"
+    half = 0.5 * positive(shape, "width", width)
+    long_half = 0.5 * positive(shape, "length", length)
+    cut = 2.0 * half * in_range(shape, "corner", corner, 0.0, 0.5)
+    crown = 2.0 * half * in_range(shape, "crown_height", crown_height, 0.0, 2.0)
+    pavilion = 2.0 * half * in_range(shape, "pavilion_depth", pavilion_depth, 0.0, 2.0)
+    thin = half * in_range(shape, "girdle", girdle, 0.0, 0.5)
+    size = in_range(shape, "table", table, 0.0, 1.0)
+    a, b, c = half, long_half, min(cut, 0.9 * min(half, long_half))
+    outline = np.array([(a, -b + c), (a, b - c), (a - c, b), (-a + c, b), (-a, b - c), (-a, -b + c), (-a + c, -b), (a - c, -b)])
+    # Rows by the share of the way from girdle to table (or culet) and of the height; steeper at the girdle.
+    above = [(1.0 - (1.0 - size) * at, thin + crown * up) for at, up in ((0.0, 0.0), (0.26, 0.42), (0.6, 0.75), (1.0, 1.0))]
+    below = [(1.0 - 0.97 * at, -thin - pavilion * down) for at, down in ((0.0, 0.0), (0.25, 0.4), (0.58, 0.75), (1.0, 1.0))]
+    rings = [np.column_stack([scale * outline, np.full(8, z)]) for scale, z in (*above[::-1], *below)]
+    facets: list[tuple[int, ...]] = [tuple(range(8)), tuple(8 * (len(rings) - 1) + k for k in reversed(range(8)))]
+    for row in range(len(rings) - 1):
+        for k in range(8):
+            upper, lower, after = 8 * row, 8 * row + 8, (k + 1) % 8
+            facets.append((lower + k, lower + after, upper + after, upper + k))
+    triangles = [(facet[0], facet[i], facet[i + 1]) for facet in facets for i in range(1, len(facet) - 1)]
+    mesh = make_mesh(name, np.concatenate(rings), np.array(triangles))
+    if mesh.convex_planes is None or len(mesh.convex_planes) != len(facets):
+        raise UserError("step_cut: these proportions do not make a convex stone; move them towards the defaults")
     return mesh

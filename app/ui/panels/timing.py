@@ -30,6 +30,7 @@ _COUNTERS = {
     "escaped": ("Left the scene", "Met nothing any more."),
     "lost_depth": ("Path too long", "Given up after the scene's largest number of refractions and reflections."),
     "lost_numeric": ("Not a number", "Lost to arithmetic; anything but zero here is a fault."),
+    "beams": ("Left to beams", "Met flat facets first, whose light is followed as beams instead of photons."),
     "footprint_dropped": (
         "Footprint dropped",
         "The derivatives of the path overflowed: the photon keeps its light and becomes a point.",

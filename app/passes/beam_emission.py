@@ -1,0 +1,152 @@
+"""Pieces of beams become rays on their way: what flat facets did to light is done, photons carry it on.
+
+What a beam leaves to photons (`beams.polygons.BeamPieces`) starts at the surface that it left last, with the weights,
+the medium and the derivatives that a photon of the emission lattice would have after the same events.
+`TracePass.carry_on` takes the records.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..beams.piece_lattice import PieceLattice, PieceRays, pieces_where
+from ..beams.polygons import BeamPieces
+from ..gpu.records import FLAG_INSIDE, NONE
+from ..gpu.reindex import Spans
+from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.schema import Struct
+
+_SAME_X = 1e-6
+
+
+class BeamEmission:
+    """The pieces of one search, ready to be emitted in any number of passes."""
+
+    def __init__(self, scene: SceneBuffers, ray: Struct, pieces: BeamPieces, spans: Spans) -> None:
+        """`ray`: the trace pass's records; `spans`: bands of the spectral tables that photons are splatted by.
+
+        A photon's interval may be any part of the spectrum where bands may be cut, else it is that of a table's band.
+        An emission line within a band that photons carry too is in their share, so that its own pieces are not taken.
+        Raises ValueError for a piece whose interval no table has.
+        """
+        self._scene = scene
+        self._ray = ray
+        self._features = scene.features
+        band = _bands(pieces, spans, any_interval=self._features.band_cuts)
+        within = _is_line_within(pieces)
+        self.pieces = pieces_where(pieces, ~within)
+        self._band = band[~within]
+        missing = self._band < 0
+        if missing.any():
+            which = int(np.argmax(missing))
+            light, x_lo, x_hi = self.pieces.light[which], self.pieces.x_lo[which], self.pieces.x_hi[which]
+            raise ValueError(f"no spectral table of light {light} has the band {x_lo:.6f} to {x_hi:.6f} of a beam")
+        measures = [scene.space.scale**-2 if light.is_parallel else 1.0 for light in scene.scene.lights]
+        self._lattice = PieceLattice(self.pieces, scene.light_power, measures)
+        stacked = {index: bit for bit, index in enumerate(scene.stack_objects)}
+        self._inside_mask = np.zeros(len(self.pieces), np.uint32)
+        self._inside_object = np.full(len(self.pieces), NONE, np.uint32)
+        for index in range(min(len(scene.scene.objects), 64)):
+            inside = (self.pieces.inside >> np.uint64(index)) & np.uint64(1) != 0
+            if index in stacked:
+                self._inside_mask[inside] |= np.uint32(1 << stacked[index])
+            else:
+                self._inside_object[inside] = index
+        triangles = scene.first_triangle[self.pieces.last_object] + self.pieces.last_triangle
+        self._primitive = scene.primitives[triangles]
+
+    def flux_w(self, light: int) -> float:
+        """W that all pieces of a light hold."""
+        return float(self._lattice.flux_w[self.pieces.light == light].sum())
+
+    def batches(
+        self,
+        light: int,
+        count: int,
+        weight: float,
+        shift: tuple[int, int],
+        key: int,
+        most: int,
+        first: int = 0,
+        stride: int = 1,
+    ) -> Iterator[np.ndarray]:
+        """Ray records of sub-lattice `first` of `stride` of about `count` points over a light's pieces, at most `most`
+        at once. `weight`, `shift` and `key` as of a `LatticeSlice`: its weight, shift and seed."""
+        rays = self._lattice.rays(light, count, shift, key, first, stride)
+        records = self._records(rays, light, weight, key)
+        for start in range(0, len(records), most):
+            yield records[start : start + most]
+
+    def _records(self, rays: PieceRays, light: int, weight: float, key: int) -> np.ndarray:
+        pieces, own = self.pieces, rays.piece
+        records = self._ray.zeros(len(rays))
+        records["position"], records["direction"] = rays.position, rays.direction
+        records["flux_w"], records["throughput"] = weight * rays.flux_w, weight * rays.throughput
+        records["x_lo"], records["x_anchor"], records["x_hi"] = rays.band.T
+        records["footprint_scale"] = records["survival"] = 1.0
+        records["photon_id"] = rays.number & 0xFFFFFFFF
+        records["light_and_source"] = light | self._band[own] << 8 | pieces.source[own].astype(np.int64) << 16
+        records["branch_key"] = _hashed(key ^ _hashed(own.astype(np.uint32)))
+        records["flags"] = np.where(pieces.is_inside[own], FLAG_INSIDE, 0)
+        records["depth"] = pieces.depth[own]
+        records["last_primitive"], records["last_object"] = self._primitive[own], pieces.last_object[own]
+        records["inside_mask"], records["inside_object"] = self._inside_mask[own], self._inside_object[own]
+        spatial = 0
+        if self._features.footprints:
+            spatial = 2
+            records["dposition"][:, :2, :3], records["ddirection"][:, :2, :3] = (
+                rays.dposition[:, :2],
+                rays.ddirection[:, :2],
+            )
+        if self._features.spectral_groups:
+            group, per_variable = self._spectral_scale(rays.band)
+            at = np.arange(len(rays)), spatial + group
+            records["dposition"][*at, :3] = rays.dposition[:, 2] * per_variable[:, None]
+            records["ddirection"][*at, :3] = rays.ddirection[:, 2] * per_variable[:, None]
+        return records
+
+    def _spectral_scale(self, band: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of each ray the group whose variable changes most over its band, and dx by that variable there."""
+        table = self._scene.variables
+        x = np.linspace(0.0, 1.0, table.shape[1])
+        change = np.stack([np.interp(band[:, 2], x, row) - np.interp(band[:, 0], x, row) for row in table])
+        group = np.abs(change).argmax(axis=0)
+        change = change[group, np.arange(len(band))]
+        moves = change != 0.0
+        return group, np.where(moves, (band[:, 2] - band[:, 0]) / np.where(moves, change, 1.0), 0.0)
+
+
+def _bands(pieces: BeamPieces, spans: Spans, *, any_interval: bool) -> np.ndarray:
+    """Table's band of each piece, int64 (M,); -1: there is none."""
+    found = np.full(len(pieces), -1, np.int64)
+    for light, edges in enumerate(np.array(bands, float) for bands in spans):
+        mine = np.flatnonzero(pieces.light == light)
+        ends = np.column_stack([pieces.x_lo[mine], pieces.x_hi[mine]])
+        off = np.abs(ends[:, None] - edges).max(axis=-1)
+        nearest = off.argmin(axis=1)
+        same = off[np.arange(len(mine)), nearest] < _SAME_X
+        # What is cut out of a band is drawn by the light's running integral, whichever the band.
+        cut = any_interval & (ends[:, 1] > ends[:, 0])
+        found[mine] = np.where(same | cut, nearest, -1)
+    return found
+
+
+def _is_line_within(pieces: BeamPieces) -> np.ndarray:
+    """Whether each piece is of an emission line in a band that the same light has pieces of, bool (M,)."""
+    lines = pieces.x_lo == pieces.x_hi
+    within = np.zeros(len(pieces), bool)
+    for light in np.unique(pieces.light[lines]):
+        mine = pieces.light == light
+        bands = np.unique(np.column_stack([pieces.x_lo, pieces.x_hi])[mine & ~lines], axis=0)
+        x = pieces.x_lo[mine & lines, None]
+        within[mine & lines] = ((x > bands[:, 0]) & (x <= bands[:, 1])).any(axis=1)
+    return within
+
+
+def _hashed(value: np.ndarray) -> np.ndarray:
+    """PCG's output permutation as a hash, uint32 (shaders/lib/random.glsl)."""
+    state = value * np.uint32(747796405) + np.uint32(2891336453)
+    word = ((state >> ((state >> np.uint32(28)) + np.uint32(4))) ^ state) * np.uint32(277803737)
+    return (word >> np.uint32(22)) ^ word

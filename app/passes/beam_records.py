@@ -1,0 +1,311 @@
+"""Beam polygons in texels of one window, as the shaders read them: records, edges and the hulls to fill.
+
+Everything lies about a whole texel near the polygon, so that float32 knows a polygon of a hundredth of a texel at the
+far end of a wide map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..beams.polygons import BeamPolygons
+from ..gpu.beam_tables import CurveParts
+from ..gpu.schema import Field, Struct
+from .map_layout import PlaneFrame
+
+BEAM = Struct(
+    "BeamRecord",
+    (
+        Field("anchor", "vec2", "a texel corner near the polygon, atlas texels"),
+        Field("slope", "vec2", "change of the density per texel, relative to that at the anchor"),
+        Field("density", "vec3", "energy per texel and per unit of the curve: 1, t, t²; at the anchor"),
+        Field("nodes", "float", "narrow: equal parts of the band in each of which it stands still; wide: -most parts"),
+        Field("place", "vec2", "where the band begins on its curve, and its length there; samples"),
+        Field("curve_row", "float", "the curve of target 0; the other targets' follow"),
+        Field("edge_count", "float", ""),
+    ),
+    texels=True,
+)
+
+EDGE = Struct(
+    "BeamEdge",
+    (
+        Field("start", "vec4", "x, y, c, window at the band's start: inside is x, y · texel + c >= 0"),
+        Field("change", "vec4", "from there to its end"),
+    ),
+)
+"""`window`: side of the square over which the covered part is taken there, texels."""
+
+EDGES = 4, 6, 8
+"""Edges that programs of their own hold as flat inputs; polygons of more are read from the texture."""
+ROW_TEXELS = 4096
+"""At most in a row of the texture."""
+NODES_MAX = 4096
+NODES_MIN = 4
+NO_EDGE = 1.0, 0.0, 1e6, 1.0
+"""Start of an edge that everything lies inside of."""
+LEAST_LEVEL = 0.05
+"""Of the density at the anchor over that at the polygon's centre."""
+STILL = 0.02
+"""Texels an edge may move over the band where it is drawn as if it stood in the middle."""
+FINEST_STEP, WIDEST_STEP = 0.125, 0.25
+"""Texels a narrow polygon moves from node to node: a quarter of its width, within these."""
+PARTS = 3, 10
+"""In which a texel's time is looked at that a wide polygon's edges cross, at least and at most."""
+BORDER = 2.0
+"""Texels that a triangle costs besides its own, per texel of its sides: they are filled in blocks of 4 x 4."""
+WIDE = 2.0
+"""Texels; a wider polygon has texels that are all inside."""
+
+
+@dataclass(frozen=True)
+class TexelMap:
+    """From a receiver's plane (GPU units) to the atlas (texels)."""
+
+    matrix: np.ndarray
+    """float64 (2, 2)."""
+    offset: np.ndarray
+    """float64 (2,)."""
+
+    @classmethod
+    def of(cls, placement: np.void, frame: PlaneFrame) -> TexelMap:
+        """Of one PLACEMENT record."""
+        rows = np.stack([placement["row_u"], placement["row_v"]]).astype(np.float64)
+        return cls(rows[:, :3] @ frame.axes.T, rows[:, :3] @ frame.origin + rows[:, 3])
+
+    def texels(self, points: np.ndarray) -> np.ndarray:
+        """(..., 2) points of the plane, in atlas texels."""
+        return points @ self.matrix.T + self.offset
+
+
+@dataclass(frozen=True)
+class PackedBeams:
+    """What is uploaded for one draw."""
+
+    edges: int
+    """One of `EDGES`, or 0: any number."""
+    is_still: bool
+    texels: np.ndarray
+    """uint32 (rows, `per_row` polygons, texels a polygon, 4): BEAM, then EDGE by EDGE."""
+    vertices: np.ndarray
+    """`VERTEX` dtype."""
+    indices: np.ndarray
+    """uint32, triangles."""
+
+
+VERTEX = np.dtype([("position", "f4", 2), ("polygon", "u4")])
+
+
+def ragged(start: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows start[i] … start[i + 1] of the `chosen` items one after the other: (indices, counts)."""
+    counts = (start[1:] - start[:-1])[chosen].astype(np.int64)
+    first = np.cumsum(counts) - counts
+    return np.repeat(start[:-1][chosen] - first, counts) + np.arange(counts.sum()), counts
+
+
+def _rows_of(rows: np.ndarray, first: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of the `chosen` items, one after the other, and where each begins."""
+    picked, sizes = ragged(np.append(first, len(rows)), chosen)
+    return rows[picked], np.concatenate([[0], np.cumsum(sizes)])
+
+
+def hull_boxes(polygons: BeamPolygons, corners: np.ndarray) -> np.ndarray:
+    """(n, 4): x0, y0, x1, y1 of each hull, of all hulls' `corners` (H, 2); every hull has corners."""
+    start = polygons.hull_start[:-1]
+    return np.concatenate([np.minimum.reduceat(corners, start), np.maximum.reduceat(corners, start)], axis=1)
+
+
+def packed(
+    polygons: BeamPolygons,
+    chosen: np.ndarray,
+    to_texels: TexelMap,
+    energy_scale: float,
+    area_scale: float,
+    curves: CurveParts,
+) -> Iterator[PackedBeams]:
+    """The `chosen` polygons (n,), all on one window, a draw for each kind of program that they need. `curves` of these;
+    `energy_scale`: from flux per scene unit² to what a whole texel holds; `area_scale`: texels a scene unit²."""
+    hull_rows, hull_counts = ragged(polygons.hull_start, chosen)
+    hulls = to_texels.texels(polygons.hulls[hull_rows])
+    hull_first = np.cumsum(hull_counts) - hull_counts
+    low, high = np.minimum.reduceat(hulls, hull_first), np.maximum.reduceat(hulls, hull_first)
+    anchor = np.floor(0.5 * (low + high))
+    diagonal = np.linalg.norm(high - low, axis=1)
+
+    edge_rows, counts = ragged(polygons.edge_start, chosen)
+    first = np.cumsum(counts) - counts
+    owner = np.repeat(np.arange(len(chosen)), counts)
+    is_line = (polygons.x_hi <= polygons.x_lo)[chosen]
+    start, middle, end = polygons.density[chosen].T
+    middle, end = np.where(is_line, start, middle), np.where(is_line, start, end)
+    lines, moves = _lines(polygons.edges[edge_rows], to_texels, anchor[owner], is_line[owner], 0.5 * diagonal[owner])
+    motion = np.maximum.reduceat(moves, first)
+    area = polygons.flux[chosen] / np.where(middle > 0.0, middle, 1.0) * area_scale
+    width = area / np.maximum(diagonal - motion, np.sqrt(area) + 1e-9)
+    windows, widest = _windows(lines[..., 3], first, owner, width)
+    is_wide = width > WIDE * widest
+    edges = _edges(lines[..., :3], windows)
+
+    records = BEAM.zeros(len(chosen))
+    inverse = np.linalg.inv(to_texels.matrix)
+    slope = polygons.slope[chosen] @ inverse
+    level = 1.0 + np.sum(slope * (anchor - to_texels.texels(polygons.centre[chosen])), axis=1)
+    level = np.maximum(level, LEAST_LEVEL)
+    parabola = np.stack([start, -3.0 * start + 4.0 * middle - end, 2.0 * (start - 2.0 * middle + end)], axis=1)
+    records["anchor"], records["slope"] = anchor, slope / level[:, None]
+    records["density"] = parabola * (energy_scale * level)[:, None]
+    nodes = np.ceil(motion / np.clip(0.25 * width, FINEST_STEP, WIDEST_STEP))
+    records["nodes"] = np.where(
+        is_wide, -np.clip(np.ceil(2.0 + 6.0 * motion), *PARTS), np.clip(nodes, NODES_MIN, NODES_MAX)
+    )
+    records["place"] = np.stack([curves.place[:, 0], curves.place[:, 1] - curves.place[:, 0]], axis=1)
+    records["curve_row"], records["edge_count"] = curves.row, counts
+
+    is_still = motion < STILL
+    held = np.append(EDGES, 0)[np.searchsorted(EDGES, counts)]
+    column = np.arange(len(owner)) - first[owner]
+    for kind in np.unique(2 * held + is_still):
+        of_kind = np.flatnonzero(2 * held + is_still == kind)
+        size = int(kind // 2) or int(counts[of_kind].max())
+        texels = BEAM.stride // 16 + 2 * size
+        per_row = ROW_TEXELS // texels
+        data = np.zeros((-(-len(of_kind) // per_row) * per_row, texels, 4), np.uint32)
+        data[: len(of_kind), : BEAM.stride // 16] = records[of_kind].view(np.uint32).reshape(len(of_kind), -1, 4)
+        lines = data[: len(of_kind), BEAM.stride // 16 :].view(np.float32)
+        lines[:, ::2] = NO_EDGE
+        place = np.full(len(chosen), -1)
+        place[of_kind] = np.arange(len(of_kind))
+        mine = np.flatnonzero(place[owner] >= 0)
+        for offset, name in enumerate(("start", "change")):
+            lines[place[owner[mine]], 2 * column[mine] + offset] = edges[name][mine]
+        yield PackedBeams(
+            int(kind // 2),
+            bool(kind % 2),
+            data.reshape(-1, per_row, texels, 4),
+            *_filled(*_rows_of(hulls, hull_first, of_kind), widest[of_kind]),
+        )
+
+
+def _lines(
+    edges: np.ndarray, to_texels: TexelMap, anchor: np.ndarray, is_line: np.ndarray, radius: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Edges about `anchor` (E, 2 ends, 4): x, y, c and softness in texels; and how far each moves over the band within
+    `radius`, texels."""
+    inverse = np.linalg.inv(to_texels.matrix)
+    a = edges.reshape(-1, 2, 4)[..., :2] @ inverse
+    c = edges.reshape(-1, 2, 4)[..., 2] + np.sum(a * (anchor - to_texels.offset)[:, None], axis=-1)
+    lines = np.concatenate([a, c[..., None], edges.reshape(-1, 2, 4)[..., 3:]], axis=-1)
+    # One factor for both ends: the line in between is a mixture of the two as they are.
+    lines *= (2.0 / np.linalg.norm(a, axis=-1).sum(axis=1))[:, None, None]
+    lines[is_line, 1] = lines[is_line, 0]
+    change = lines[:, 1] - lines[:, 0]
+    return lines, np.abs(change[:, 2]) + np.linalg.norm(change[:, :2], axis=1) * radius
+
+
+def _windows(
+    softness: np.ndarray, first: np.ndarray, owner: np.ndarray, width: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Sides of the squares over which the covered part is taken at each edge (E, 2 ends), texels: a texel blurred by
+    the edge's penumbra (of the same variance); and the largest of each polygon.
+
+    At the edges of a narrow polygon they are all the same and whole texels, or it would lose or gain light."""
+    windows = np.sqrt(1.0 + 4.0 * softness**2)
+    counts = np.diff(np.append(first, len(owner)))
+    mean = np.add.reduceat(windows.mean(axis=1), first) / counts
+    widest = np.maximum.reduceat(windows.max(axis=1), first)
+    is_narrow = width <= WIDE * widest
+    widest = np.where(is_narrow, np.round(mean), widest)
+    return np.where(is_narrow[owner, None], widest[owner, None], windows), widest
+
+
+def _edges(lines: np.ndarray, windows: np.ndarray) -> np.ndarray:
+    """EDGE records of lines (E, 2 ends, 3)."""
+    ends = np.concatenate([lines, windows[..., None]], axis=-1)
+    records = EDGE.zeros(len(lines))
+    records["start"], records["change"] = ends[:, 0], ends[:, 1] - ends[:, 0]
+    return records
+
+
+def _grown(hulls: np.ndarray, start: np.ndarray, windows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Convex polygons start[i] … start[i + 1] of `hulls` (H, 2), each grown to every texel it touches: the same for
+    their Minkowski sums with a square of side `windows`.
+
+    A corner becomes the texel's corners that are farthest out along the normals between its two sides."""
+    counts = np.diff(start)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    place = np.arange(len(hulls)) - start[owner]
+    following = start[owner] + (place + 1) % counts[owner]
+    before = start[owner] + (place - 1) % counts[owner]
+    along = hulls[following] - hulls
+    quarter = _quarter(along)
+    steps = (quarter - quarter[before]) % 4
+    rows = np.repeat(np.arange(len(hulls)), steps + 1)
+    nth = np.arange(len(rows)) - np.repeat(np.cumsum(steps + 1) - steps - 1, steps + 1)
+    corner = TEXEL_CORNERS[(quarter[before][rows] + nth) % 4]
+    sizes = np.add.reduceat(steps + 1, start[:-1])
+    return hulls[rows] + corner * windows[owner[rows], None], np.concatenate([[0], np.cumsum(sizes)])
+
+
+TEXEL_CORNERS = (0.5 + 1e-3) * np.array([[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
+"""Farthest out for a side of a counter-clockwise polygon that goes up and right, up and left, …"""
+
+
+def _quarter(along: np.ndarray) -> np.ndarray:
+    """0-3: a direction from right (included) to up, from up to left, …"""
+    x, y = along.T
+    return np.where(
+        (x > 0.0) & (y >= 0.0), 0, np.where((x <= 0.0) & (y > 0.0), 1, np.where((x < 0.0) & (y <= 0.0), 2, 3))
+    )
+
+
+def _filled(hulls: np.ndarray, start: np.ndarray, windows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles that hold each polygon start[i] … start[i + 1] of `hulls`, grown by half of `windows`.
+
+    `VERTEX` and indices: a fan of its corners, a rectangle along its longest side, or a triangle round one along the
+    axes, what costs least."""
+    grown, grown_start = _grown(hulls, start, windows)
+    first, counts = grown_start[:-1], np.diff(grown_start)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    following = np.arange(len(grown)) + 1
+    following[grown_start[1:] - 1] = first
+    along, about = grown[following] - grown, grown - grown[first][owner]
+    length, diagonal = np.linalg.norm(along, axis=1), np.linalg.norm(about, axis=1)
+    twice = about[:, 0] * along[:, 1] - about[:, 1] * along[:, 0]
+    fan_cost = 0.5 * np.add.reduceat(twice, first) + BORDER * np.add.reduceat(length + 2.0 * diagonal, first)
+    # Where corners coincide, the turns of the sides do not add up to one round.
+    fan_cost[counts != np.diff(start) + 4] = np.inf
+
+    longest = np.maximum.reduceat(length, first)
+    is_longest = np.flatnonzero(length == longest[owner])
+    chosen = is_longest[np.searchsorted(owner[is_longest], np.arange(len(counts)))]
+    axis = along[chosen] / np.maximum(longest, 1e-12)[:, None]
+    corners: list[np.ndarray] = []
+    costs = [fan_cost]
+    for direction in (axis, np.broadcast_to([1.0, 0.0], axis.shape)):
+        across = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
+        x, y = np.sum(grown * direction[owner], axis=1), np.sum(grown * across[owner], axis=1)
+        low = np.stack([np.minimum.reduceat(x, first), np.minimum.reduceat(y, first)], axis=1)
+        size = np.stack([np.maximum.reduceat(x, first), np.maximum.reduceat(y, first)], axis=1) - low
+        unit = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) if not corners else np.array([[0, 0], [2, 0], [0, 2]])
+        at = low[:, None] + unit * size[:, None]
+        corners.append(at[..., :1] * direction[:, None] + at[..., 1:] * across[:, None])
+        border = size.sum(axis=1) * 2.0 + 2.0 * np.hypot(*size.T)
+        costs.append(np.prod(size, axis=1) * len(corners) + BORDER * border)
+    kind = np.argmin(costs, axis=0)
+
+    sizes = np.choose(kind, [counts, 4, 3])
+    begin = np.cumsum(sizes) - sizes
+    vertices = np.zeros(sizes.sum(), VERTEX)
+    vertices["polygon"] = np.repeat(np.arange(len(sizes)), sizes)
+    is_fan = np.repeat(kind == 0, sizes)
+    vertices["position"][is_fan] = grown[(kind == 0)[owner]]
+    for which, points in enumerate(corners, start=1):
+        rows = begin[kind == which, None] + np.arange(points.shape[1])
+        vertices["position"][rows.ravel()] = points[kind == which].reshape(-1, 2)
+    triangles = sizes - 2
+    base = np.repeat(begin, triangles)
+    nth = np.arange(triangles.sum()) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    return vertices, np.stack([base, base + nth + 1, base + nth + 2], axis=1).astype(np.uint32).reshape(-1)

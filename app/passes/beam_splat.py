@@ -1,0 +1,151 @@
+"""Draws beam polygons into the flat windows of the caustic maps, swept along the spectrum in closed form.
+
+A texel's share of a polygon is its covered area, summed over the band: exact where edges meet, a difference of two
+values of the light's running spectrum where the texel is all inside. Additive blending in the polygons' own order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..beams.polygons import BeamPolygons
+from ..gpu import shader
+from ..gpu.records import NONE
+from ..gpu.schema import Field, Struct
+from .beam_records import BEAM, PackedBeams, TexelMap, hull_boxes, packed
+from .variants import beam_defines
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from ..gpu.beam_tables import BeamTables
+    from .map_atlas import MapAtlas
+    from .map_layout import MapLayout, PlaneFrame
+
+GROUP = 1 << 14
+"""Polygons that are uploaded and drawn at a time, and between two flushes of the scratch textures."""
+
+PARAMETERS = Struct(
+    "BeamDrawParameters",
+    (
+        Field("atlas_size", "vec2", "texels"),
+        Field("texels", "uint", "of a polygon"),
+        Field("per_row", "uint", "polygons in a row of their texture"),
+    ),
+)
+
+
+class BeamSplatter:
+    """The pass that draws polygons into maps of `targets` RGBA32F targets."""
+
+    def __init__(self, ctx: moderngl.Context, targets: int = 1) -> None:
+        self._ctx = ctx
+        self._targets = targets
+        self._programs: dict[tuple[int, bool], moderngl.Program] = {}
+        self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
+
+    def run(
+        self,
+        polygons: BeamPolygons,
+        frames: Mapping[int, PlaneFrame],
+        layout: MapLayout,
+        tables: BeamTables,
+        atlas: MapAtlas,
+        weight: float = 1.0,
+    ) -> None:
+        """Add the energy of all polygons to `atlas`, times `weight` (what its sums hold per unit of energy:
+        `LightMaps.photon_weight` where photons are added too).
+
+        `frames`: the plane of every receiver that polygons lie on. What no window holds is left out."""
+        if not len(polygons):
+            return
+        for placement, receiver, chosen in _windows(polygons, frames, layout):
+            record = layout.placements[placement]
+            to_texels = TexelMap.of(record, frames[receiver])
+            reflectance_class = int(layout.receivers[receiver]["reflectance_class"])
+            texel_area = float(record["texel_area"])
+            for start in range(0, len(chosen), GROUP):
+                part = chosen[start : start + GROUP]
+                curves = tables.parts(polygons.light[part], reflectance_class, polygons.x_lo[part], polygons.x_hi[part])
+                for beams in packed(polygons, part, to_texels, texel_area * weight, 1.0 / texel_area, curves):
+                    self._draw(beams, tables, atlas, record["rect"])
+                atlas.pending += len(part)
+                atlas.flush()
+        error = self._ctx.error
+        if error != "GL_NO_ERROR":
+            raise RuntimeError(f"{error} while drawing {len(polygons)} beam polygons")
+
+    def _draw(self, beams: PackedBeams, tables: BeamTables, atlas: MapAtlas, rect: np.ndarray) -> None:
+        import moderngl
+
+        ctx = self._ctx
+        rows, per_row, texels, _ = beams.texels.shape
+        values = PARAMETERS.zeros(1)
+        values[0] = (atlas.size, texels, per_row)
+        self._parameters.write(values.tobytes())
+        self._parameters.bind_to_uniform_block(0)
+        texture = ctx.texture((per_row * texels, rows), 4, beams.texels, dtype="u4")
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        vertices, indices = ctx.buffer(beams.vertices), ctx.buffer(beams.indices)
+        array = ctx.vertex_array(
+            self._program(beams.edges, beams.is_still), [(vertices, "2f4 1u4", "in_position", "in_polygon")], indices
+        )
+        texture.use(0)
+        tables.texture.use(1)
+        x0, y0, x1, y1 = (int(v) for v in rect)
+        atlas.framebuffer.use()
+        ctx.scissor = x0, y0, x1 - x0, y1 - y0
+        ctx.enable_only(moderngl.BLEND)
+        ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
+        ctx.blend_func = moderngl.ONE, moderngl.ONE
+        array.render(moderngl.TRIANGLES)
+        ctx.enable_only(moderngl.NOTHING)
+        ctx.scissor = None
+        for resource in (array, vertices, indices, texture):
+            resource.release()
+
+    def _program(self, edges: int, is_still: bool) -> moderngl.Program:
+        """Compiled when it is first needed."""
+        kind = edges, is_still
+        if kind not in self._programs:
+            defines = beam_defines(self._targets, edges, is_still)
+            self._programs[kind] = shader.program(self._ctx, "light/beam.vert", "light/beam.frag", defines, (BEAM,))
+        return self._programs[kind]
+
+    def release(self) -> None:
+        """Free program and buffers."""
+        shader.release(*self._programs.values(), self._parameters)
+
+
+def _windows(
+    polygons: BeamPolygons, frames: Mapping[int, PlaneFrame], layout: MapLayout
+) -> Iterator[tuple[int, int, np.ndarray]]:
+    """(placement, receiver, polygons to draw there): those that touch its rectangle, and in a coarser window only what
+    is not all inside the finer one, as for splats."""
+    boxes = hull_boxes(polygons, polygons.hulls)
+    for receiver in np.unique(polygons.receiver):
+        chosen = np.flatnonzero(polygons.receiver == receiver)
+        placement = int(layout.receivers[receiver]["placement"])
+        while placement != NONE and len(chosen):
+            record = layout.placements[placement]
+            corners = TexelMap.of(record, frames[int(receiver)]).texels(_corners(boxes[chosen]))
+            low, high = corners.min(axis=1), corners.max(axis=1)
+            rect = record["rect"]
+            touches = np.all((high > rect[:2]) & (low < rect[2:]), axis=1)
+            if touches.any():
+                yield placement, int(receiver), chosen[touches]
+            following = int(record["next"])
+            if following != NONE:
+                # The coarse map is read outside the fine window: up to its border, plus what a bilinear lookup reaches.
+                margin = 3.0 * np.sqrt(layout.placements[following]["texel_area"] / record["texel_area"])
+                inside = np.all((low - margin > rect[:2]) & (high + margin < rect[2:]), axis=1)
+                chosen = chosen[~inside]
+            placement = following
+
+
+def _corners(boxes: np.ndarray) -> np.ndarray:
+    """(n, 4): x0, y0, x1, y1 -> (n, 4, 2)."""
+    return boxes[:, [0, 1, 2, 1, 0, 3, 2, 3]].reshape(-1, 4, 2)
