@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from reference.beam_rig import Rig, at_index, grid_about, scene_of, scores
+from reference.beam_worlds import Rig, at_index, grid_about, scene_of, scores
 from reference.beam_scenes import CASES, EXTREMES, NEAR
 from reference.beam_sums import cells
 from reference.facet_rays import landed

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from reference.beam_rig import Rig, at_index, grid_about, scene_of
+from reference.beam_worlds import Rig, at_index, grid_about, scene_of
 from reference.beam_scenes import ONSET, SWEPT
 from reference.beam_sums import cells
 
