@@ -111,6 +111,7 @@ def box(size: Sequence[float], at: Sequence[float], more: str, name: str = "box"
     )
 
 
+SUN = lamp((), (0.2, 0.1, -1.0), (), "directional")
 DOWN = lamp((-0.2, 0.1, 4.0), (0.05, 0.03, -1.0), (0.46,))
 AMICI_LIGHT = lamp((-6.3, 0.0, 1.5), (0.992546, 0.0, -0.121869), (0.10, 1.1), more="tangent = [0.0, 1.0, 0.0]")
 PRISM_LIGHT = lamp((-2.0, 0.4, 1.9), (0.85, -0.1, -0.4), (0.3, 0.8), more="tangent = [0.0, 1.0, 0.0]")

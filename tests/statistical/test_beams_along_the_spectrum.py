@@ -10,14 +10,16 @@ from reference.beam_scenes import ONSET, SWEPT
 from reference.beam_sums import cells
 
 PLACES = (np.arange(400) + 0.5) / 400.0
+FEW = (np.arange(40) + 0.5) / 40.0
 
 
-def swept_and_summed(text: str, places: np.ndarray = PLACES, threshold: float = 1e-6):
-    """Mean over the places of what lands by cell, and of all that lands: by swept polygons, and by single indices."""
+def swept_and_summed(text: str, places: np.ndarray = PLACES, threshold: float = 1e-8):
+    """Mean over the places of what lands by cell, and of all that lands: by swept polygons, and by single indices. Few
+    beams play roulette: at the ends of the spectrum, where the eye sees little, its noise is more than 1e-3."""
     rig = Rig(scene_of(text))
     emission = rig.emissions()[0]
     swept, sums = rig.polygons(emission, threshold)
-    single, _ = rig.polygons(at_index(emission, *places), threshold / len(places))
+    single, _ = rig.polygons(at_index(emission, *places), threshold)
     grid = grid_about(rig, single, 60)
     found = [cells(swept, 0, grid, x, from_hulls=True)[:2] for x in places]
     one = np.mean([of[0] for of in found], axis=0)
@@ -28,6 +30,14 @@ def swept_and_summed(text: str, places: np.ndarray = PLACES, threshold: float = 
 
 @pytest.mark.parametrize("name", SWEPT)
 def test_swept_polygons_are_the_sum_of_single_indices(name: str) -> None:
+    swept, summed, total, total_summed, _ = swept_and_summed(SWEPT[name], FEW)
+    assert np.abs(swept - summed).max() < 1e-3 * summed.max()
+    assert total == pytest.approx(total_summed, rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SWEPT)
+def test_swept_polygons_are_the_sum_of_400_indices(name: str) -> None:
     swept, summed, total, total_summed, _ = swept_and_summed(SWEPT[name])
     assert np.abs(swept - summed).max() < 1e-3 * summed.max()
     assert total == pytest.approx(total_summed, rel=1e-3)
