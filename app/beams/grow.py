@@ -76,6 +76,8 @@ _TOUCHES = 1e-7
 """GPU units: surfaces this close are in contact."""
 _UNEVEN = 0.15
 """A density that leaves the straight line by more is not a parabola for certain."""
+_COLOURED = 0.02
+"""The same where absorption has a colour."""
 _STEEP = 0.3
 """A relative change of the density over a leaf that is no longer linear."""
 HAND, _SPARE = 0, 1
@@ -170,11 +172,13 @@ def is_nearer(facets, solids, hand, one, other, t_one, t_other):
 
 @part
 def rank(facets, solids, hand, facet):
-    """Order of surfaces in contact, with the facet's number to tell equals apart."""
-    first = 1 + facets[facet].kind
-    if first == 1:
-        first = (hand.mask >> solids[facets[facet].owner].bit) & 1
-    return first * 1000000 + facet
+    """Order of surfaces in contact: of several solids that are entered the one that wins comes first, of several that
+    are left it comes last, so that light meets one interface. The facet's number tells equals apart."""
+    first = 64 * (1 + facets[facet].kind)
+    if first == 64:
+        bit = solids[facets[facet].owner].bit
+        first = 64 + bit if (hand.mask >> bit) & 1 else 63 - bit
+    return (first << 32) + facet
 
 
 @part
@@ -338,7 +342,9 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     bent, uneven = lay_leaf(hand, facets, kind, leaf, edge, corner, work)
     if bent < 0.0:
         return
-    if room and hand.x[2] - hand.x[0] > NARROWEST and (bent > tolerance or uneven > _UNEVEN):
+    # What absorbs may be coloured, with steps that three places do not see.
+    most = _COLOURED if work.absorbing else _UNEVEN
+    if room and hand.x[2] - hand.x[0] > NARROWEST and (bent > tolerance or uneven > most):
         halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
         return
     row, first = work.count[0], work.count[2]
@@ -535,9 +541,6 @@ def child(nodes, action, before, after, mask, facets, solids, tables, work):
     hand, new = nodes[HAND], nodes[work.top]
     flight = hand.flight
     depth = hand.depth + (0 if action == PASS else 1)
-    if depth > work.depth or flight >= LEVELS - 2:
-        work.sums[SUM_DEPTH] += flux_of(hand, tables, work)
-        return
     copy_head(hand, new)
     row, inside = new.path[flight], medium(solids, hand.mask)
     row[0], row[1], row[2], row[3] = hand.facet, action, before, after
@@ -547,6 +550,9 @@ def child(nodes, action, before, after, mask, facets, solids, tables, work):
     new.flight, new.depth, new.mask = flight + 1, depth, mask
     new.facet, new.total = -1, _UNKNOWN
     new.key = mixed(hand.key, 3 + action)
+    if depth > work.depth or flight >= LEVELS - 2:
+        work.sums[SUM_DEPTH] += flux_as(hand, new, tables, work)
+        return
     power = power_as(hand, new, tables, work)
     if power <= 0.0:
         return

@@ -111,6 +111,7 @@ def box(size: Sequence[float], at: Sequence[float], more: str, name: str = "box"
     )
 
 
+SUN = lamp((), (0.2, 0.1, -1.0), (), "directional")
 DOWN = lamp((-0.2, 0.1, 4.0), (0.05, 0.03, -1.0), (0.46,))
 AMICI_LIGHT = lamp((-6.3, 0.0, 1.5), (0.992546, 0.0, -0.121869), (0.10, 1.1), more="tangent = [0.0, 1.0, 0.0]")
 PRISM_LIGHT = lamp((-2.0, 0.4, 1.9), (0.85, -0.1, -0.4), (0.3, 0.8), more="tangent = [0.0, 1.0, 0.0]")
@@ -138,12 +139,16 @@ CASES = {
     + box((0.02, 0.5, 3.0), (-0.9, 0.44, 1.6), 'material = "black"', "left")
     + box((0.02, 0.5, 3.0), (-0.9, -0.26, 1.6), 'material = "black"', "right"),
     "tinted": PRISM_LIGHT + TINTED,
+    "crossing": DOWN
+    + box((0.8, 0.7, 0.6), (0.0, 0.0, 1.0), 'glass = "N-BK7"', "one", (10, 20, 30))
+    + box((0.8, 0.7, 0.6), (0.3, 0.1, 0.9), 'glass = "N-SF11"', "other", (-20, 15, 50)),
+    "sunk": DOWN + box((0.8, 0.7, 0.6), (0.0, 0.0, 0.1), 'glass = "N-BK7"', "sunk", (10, 20, 30)),
     "mirror": PRISM_LIGHT
     + PRISM
     + box((0.02, 2.0, 2.0), (1.6, 0.0, 1.0), 'material = { kind = "mirror", reflectance = [0.8, 0.6, 0.4] }', "mirror", (0, 12, 8)),
 }
 """What light does in them: refraction; steps; sixty facets; cement; a solid that hides parts of itself; one solid that
-shades another; black before glass; absorption; a mirror."""
+shades another; black before glass; absorption; solids that overlap; one sunk into the floor; a mirror."""
 
 SPOT = "half_angle_deg = 14.0\nsoftness = 0.5"
 NEAR = {
@@ -154,8 +159,74 @@ NEAR = {
     "between": lamp((0.0, 0.0, 2.0), (), (), "point")
     + box((0.5, 1.0, 1.0), (-1.2, 0.0, 0.9), 'glass = "N-BK7"', "left")
     + box((0.5, 1.0, 1.0), (1.2, 0.1, 0.9), 'glass = "N-BK7"', "right"),
-    "inside": lamp((0.1, 0.05, 0.9), (), (), "point")
-    + box((1.0, 0.8, 0.6), (0.0, 0.0, 0.9), 'glass = "N-BK7"'),
     "point brilliant": lamp((-0.8, 0.5, 3.0), (), (), "point") + BRILLIANT,
 }
-"""Points of light: far from a prism, close above a block, a soft spot, between two blocks, inside of one."""
+"""Points of light: far from a prism, close above a block, a soft spot, between two blocks, before a brilliant."""
+
+
+def block(size: Sequence[float], at: Sequence[float], glass: str = "N-SF11") -> str:
+    """A box of glass, named after it."""
+    return box(size, at, f'glass = "{glass}"', glass)
+
+
+def twin(text: str) -> str:
+    """A box whose every triangle has corners of its own."""
+    corners = np.array([(x, y, z) for x in (-0.4, 0.4) for y in (-0.3, 0.3) for z in (0.8, 1.3)])
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = [t for s in sides for t in ((s[0], s[1], s[2]), (s[0], s[2], s[3]))]
+    apart = np.concatenate([corners[list(t)] for t in triangles])
+    return solid(apart, np.arange(len(apart)).reshape(-1, 3), text)
+
+
+def needles(count: int) -> str:
+    """A box whose lid is a fan of needles."""
+    across = np.linspace(-0.4, 0.4, count)
+    top = [(x, -0.3, 1.3) for x in across] + [(0.4, 0.3, 1.3), (-0.4, 0.3, 1.3)]
+    low = [(-0.4, -0.3, 0.9), (0.4, -0.3, 0.9), (0.4, 0.3, 0.9), (-0.4, 0.3, 0.9)]
+    n = len(top)
+    faces = [[n - 1, k, k + 1] for k in range(n - 2)]
+    faces += [[n + 3, n + 2, n + 1, n]]
+    faces += [[n, n + 1, count - 1, *range(count - 2, -1, -1)], [n + 1, n + 2, n - 2, count - 1]]
+    faces += [[n + 2, n + 3, n - 1, n - 2], [n + 3, n, 0, n - 1]]
+    return solid(np.array(top + low), faces)
+
+
+def pyramid(sides: int, height: float) -> str:
+    """A round block, on it a pyramid whose tip lies on the z axis."""
+    turn = 2.0 * np.pi * np.arange(sides) / sides
+    rim = 0.5 * np.column_stack([np.cos(turn), np.sin(turn)])
+    corners = np.concatenate([ring(rim, 0.8), ring(rim, 1.0), [(0.0, 0.0, 1.0 + height)]])
+    after = np.roll(np.arange(sides), -1)
+    faces = [list(range(sides))[::-1]]
+    faces += [[k, after[k], after[k] + sides, k + sides] for k in range(sides)]
+    faces += [[k + sides, after[k] + sides, 2 * sides] for k in range(sides)]
+    return solid(corners, faces)
+
+
+_STRAIGHT = lamp((0.0, 0.0, 4.0), (0.0, 0.0, -1.0), (0.45,))
+_SLANTED = lamp((-1.3, 0.0, 3.0), (0.45, 0.0, -0.89), (0.35,))
+_SPLINTER = np.array([(-0.4, -0.3), (0.4, -0.3), (0.4, -0.299999), (-0.4, 0.3)])
+EXTREMES = {
+    "slab": _SLANTED + block((3.0, 3.0, 0.05), (0.0, 0.0, 1.0)),
+    "edge-on": _STRAIGHT + block((0.6, 0.5, 0.5), (0.1, 0.0, 1.0)),
+    "edge on edge": _STRAIGHT
+    + block((0.4, 0.6, 0.4), (-0.2, 0.0, 1.2))
+    + block((0.4, 0.6, 0.4), (0.2, 0.0, 0.7), "N-BK7"),
+    "touching": _SLANTED + block((0.5, 0.6, 0.5), (-0.25, 0.0, 1.0)) + block((0.5, 0.6, 0.5), (0.25, 0.0, 1.0), "N-BK7"),
+    "same": _SLANTED + block((0.5, 0.6, 0.5), (0.0, 0.0, 1.0)) + block((0.5, 0.6, 0.5), (0.0, 0.0, 1.0), "N-BK7"),
+    "doubled corners": _SLANTED + twin('glass = "N-SF11"'),
+    "needles": _SLANTED + needles(60),
+    "splinter": _SLANTED + lofted([ring(_SPLINTER, 0.9), ring(_SPLINTER, 1.3)]),
+    "tip in the axis": _STRAIGHT + pyramid(8, 0.4),
+    "tip, many sides": _STRAIGHT + pyramid(40, 0.3),
+    "flat tip": _STRAIGHT + pyramid(12, 1e-6),
+    "thin": _SLANTED + block((0.6, 0.6, 1e-5), (0.0, 0.0, 1.0)),
+}
+"""A slab with dozens of events between parallel faces; facets along the light; edges on edges; faces in contact; two
+solids in one place; corners that are not shared; needles; a facet a millionth wide; a lamp's axis through a corner;
+facets a millionth apart from one plane; a film."""
+SWEPT = {name: CASES[name] for name in ("prism", "step cut", "amici", "L", "two stones", "tinted", "mirror")}
+ONSET = lamp((-2.0, -0.9, 1.85), (0.8296, 0.4790, -0.2873), (0.3, 0.5), more="tangent = [-0.5, 0.866, 0.0]") + PRISM.replace(
+    "[-90.0, 7.0, 3.0]", "[-90.0, 0.0, 0.0]"
+)
+"""A prism whose second face reflects everything below 470 nm and lets light through above."""
