@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
+from .compiling import jit
 from .facets import BeamScene
 from .leaves import Leaves
 from .polygons import BeamPieces, BeamPolygons
-from .rays import jit
 from .search import LEAF_PIECE, LEAF_RECEIVER
 
 
 @jit
-def hulls_of(corners, starts, grow, out):
+def hulls_of(corners, starts, grow, points, chain, ends, out):
     """Convex hulls, counter-clockwise, of groups of points [Andrew 1979], each point grown by `grow` of its group to
-    both sides along both axes. Returns the ends of the groups in `out`."""
-    ends = np.zeros(len(starts), np.int64)
+    both sides along both axes. `ends` gets those of the groups in `out`; `points` and `chain` (more than twice as long): scratch."""
     count = 0
-    points, chain = np.empty((1024, 2)), np.empty((2050, 2))
     for group in range(len(starts) - 1):
         n = 0
         for c in range(starts[group], starts[group + 1]):
             for k in range(4 if grow[group] > 0.0 else 1):
-                if n < 1024:
-                    points[n, 0] = corners[c, 0] + (grow[group] if k & 1 else -grow[group])
-                    points[n, 1] = corners[c, 1] + (grow[group] if k & 2 else -grow[group])
-                    n += 1
+                points[n, 0] = corners[c, 0] + (grow[group] if k & 1 else -grow[group])
+                points[n, 1] = corners[c, 1] + (grow[group] if k & 2 else -grow[group])
+                n += 1
         # Shell sort by u, then v: groups are small.
         gap = n // 2
         while gap > 0:
@@ -57,7 +54,6 @@ def hulls_of(corners, starts, grow, out):
             out[count, 0], out[count, 1] = chain[k, 0], chain[k, 1]
             count += 1
         ends[group + 1] = count
-    return ends
 
 
 def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float) -> BeamPolygons:
@@ -172,7 +168,9 @@ def hulls_around(chosen: Chosen, grow: np.ndarray) -> tuple[np.ndarray, np.ndarr
     """Starts and corners of the leaves' convex hulls, grown by `grow` of each."""
     starts = np.concatenate([[0], np.cumsum(chosen.head[:, 7])]).astype(np.int64)
     out = np.empty((4 * len(chosen.corners) + 8, 2))
-    ends = hulls_of(chosen.corners, starts, grow.astype(float), out)
+    ends = np.zeros(len(starts), np.int64)
+    points = np.empty((4 * int(chosen.head[:, 7].max(initial=0)), 2))
+    hulls_of(chosen.corners, starts, grow.astype(float), points, np.empty((2 * len(points) + 2, 2)), ends, out)
     return ends.astype(np.int32), out[: ends[-1]]
 
 

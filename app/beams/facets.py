@@ -39,6 +39,8 @@ FACET = np.dtype(
         # Counter-clockwise seen from where n points.
         ("corner", "f8", (MAX_CORNERS, 3)),
         ("corners", "i8"),
+        # Of the edge from each corner to the next: unit vector e, moment P x e [Pluecker].
+        ("edge", "f8", (MAX_CORNERS, 6)),
         # Of a ball that holds it.
         ("centre", "f8", 3),
         ("radius", "f8"),
@@ -252,6 +254,9 @@ def _facets(
             record["kind"] = DIELECTRIC if material.transmits else MIRROR
         record["owner"], record["triangle"] = i, triangle
         record["corner"][: len(outline)], record["corners"] = outline, len(outline)
+        edge = np.roll(outline, -1, axis=0) - outline
+        edge /= np.linalg.norm(edge, axis=1)[:, None]
+        record["edge"][: len(outline)] = np.concatenate([edge, np.cross(outline, edge)], axis=1)
         record["centre"], record["radius"] = middle, np.linalg.norm(shifted, axis=1).max()
         record["receiver"] = receivers.index(i) if material.receives else -1
         record["frame"] = middle, along, np.cross(normal, along)
@@ -273,7 +278,7 @@ def _solids(
         record = records[i]
         record["glass"], record["tint"] = glass[i], tint[i]
         record["first"], record["last"] = np.searchsorted(facets["owner"], [i, i + 1])
-        record["convex"] = item.mesh.convex_planes is not None
+        record["convex"] = item.mesh.convex_planes is not None or record["last"] - record["first"] == 1
         record["centre"], record["radius"] = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low)
     return records
 

@@ -12,13 +12,14 @@ from itertools import pairwise
 import numpy as np
 
 from .facets import DIELECTRIC, MIRROR, SAMPLES, BeamScene
-from .grow import FIRST, fly, run
-from .leaves import Leaves, empty_leaves
-from .nodes import NODE, STATIC, lay_out
-from .rays import PARALLEL
-from .search import SUM_ENTERED, SUMS, TASK, near_boxes, power_of, spread_of
+from .grow import FIRST, START, run
+from .leaves import Leaves, Store
+from .nodes import NODE, STATIC
+from .search import SUM_ENTERED, SUMS, WORK, may_touch, power_of
 
 _STACK = 1200
+_STEPS = 20_000
+"""Beams followed before `go_on` is asked again."""
 _ROOT_BANDS = 4
 """Into which the spectrum is cut from the beginning, so that threads have something to share."""
 
@@ -74,105 +75,95 @@ def search(
     """Follow one source's beams. Returns the leaves, in an order that depends on the scene alone, sums over all of
     them (`search.SUM_…`), and objects that something not flat may stand before, so that photons carry what this source
     throws on them. `go_on` False ends it early, for what is thrown away."""
-    nodes = _rows(_STACK)
     sums = np.zeros(SUMS)
     tables = np.vstack([scene.tables, emission.power])
     bands = [(x, x, share) for x, share in zip(emission.lines, emission.line_shares, strict=True)]
     if emission.is_continuous:
         edges = np.linspace(0.0, 1.0, _ROOT_BANDS + 1).tolist()
         bands += [(lo, hi, 1.0) for lo, hi in pairwise(edges)]
+    sources = np.concatenate([emission.source, *emission.beside])
+    args = scene.facets, scene.solids, tables, sources
     starts: list[tuple[int, np.ndarray, np.ndarray]] = []
     blocked: set[int] = set()
+    stack = _take_stack()
     for lo, hi, share in bands:
-        task = _task(scene, emission, how, 0.0, share)
-        top = _roots(nodes, (lo, hi), scene, tables, emission, task)
-        spread = np.empty(2)
-        spread_of(nodes, 0, spread)
-        for row in range(FIRST, top):
-            facet = nodes[row]["facet"]
+        work = _work(scene, emission, how, share, len(sources))
+        for row in range(FIRST, _roots(stack, (lo, hi), emission, work.copy(), args)):
+            facet = stack[row]["facet"]
             if scene.facets["kind"][facet] not in (DIELECTRIC, MIRROR):
                 continue
             owner = int(scene.facets["owner"][facet])
-            nodes[1] = nodes[row]
-            spread_of(nodes, 1, spread)
-            reach = float(scene.solids["radius"][owner] + np.linalg.norm(scene.facets["centre"][facet] - nodes[row]["position"][1, 0]))
-            if near_boxes(nodes, 1, reach, scene.obstacles, spread):
-                blocked.add(owner)
-            own = _rows(FIRST + 1)
-            own[FIRST] = nodes[row]
-            starts.append((owner, own, task))
-    jobs = [(own, task) for owner, own, task in starts if owner not in blocked]
-    sums[SUM_ENTERED] = entered = sum(power_of(own, FIRST, tables, task[0]) for own, task in jobs)
+            if len(scene.obstacles):
+                away = scene.facets["centre"][facet] - stack[row]["position"][1, 0]
+                reach = float(scene.solids["radius"][owner] + np.linalg.norm(away))
+                if may_touch(stack, row, reach, scene.obstacles, work):
+                    blocked.add(owner)
+            starts.append((owner, stack[row : row + 1].copy(), work.copy()))
+    _stacks.append(stack)
+    jobs = [(root, work) for owner, root, work in starts if owner not in blocked]
+    sums[SUM_ENTERED] = entered = sum(power_of(root, 0, tables, work) for root, work in jobs)
     if not jobs or entered <= 0.0:
         return [], sums, blocked
-    for _, task in jobs:
-        task["threshold"] = how.threshold * entered if how.power is None else how.threshold * math.sqrt(entered * how.power)
+    relative = entered if how.power is None else math.sqrt(entered * how.power)
+    for _, work in jobs:
+        work["threshold"] = how.threshold * relative
 
-    sources = np.concatenate([emission.source, *emission.beside])
-
-    def one(job: tuple[np.ndarray, np.ndarray]) -> tuple[Leaves, np.ndarray]:
-        own, task = job
-        stack = _stacks.pop() if _stacks else _rows(_STACK)
-        stack[FIRST] = own[FIRST]
-        mine = np.zeros(SUMS)
-        leaves = empty_leaves(256)
-        if go_on():
-            leaves = run(
-                stack, FIRST + 1, scene.facets, scene.solids, tables, sources, scene.obstacles, task[0],
-                leaves, mine,
-            )
+    def one(job: tuple[np.ndarray, np.ndarray]) -> Leaves:
+        root, work = job
+        store = Store()
+        stack = _take_stack()
+        stack[FIRST : FIRST + 1] = root
+        work["top"] = FIRST + 1
+        while go_on() and work["top"][0] > FIRST:
+            work["steps"] = _STEPS
+            run(stack, *args, scene.obstacles, work, store.leaf, store.edge, store.corner)
+            if work["steps"][0] > 0 and work["top"][0] > FIRST:
+                store.grow()
         _stacks.append(stack)
-        return leaves, mine
+        return store.leaves(work["count"][0])
 
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         done = list(pool.map(one, jobs))
-    for _, mine in done:
-        sums += mine
-    return [leaves for leaves, _ in done], sums, blocked
+    for _, work in jobs:
+        sums += work["sums"][0]
+    return done, sums, blocked
 
 
 _stacks: list[np.ndarray] = []
 
 
-def _task(scene: BeamScene, emission: Emission, how: Search, threshold: float, share: float) -> np.ndarray:
-    task = np.zeros(1, TASK)
-    task["power"], task["threshold"], task["seed"], task["depth"] = len(scene.tables), threshold, how.seed, how.depth
-    task["density"], task["tolerance"], task["drift"] = emission.density, how.tolerance, how.drift
-    task["line_share"], task["room"], task["sees"], task["absorbing"] = share, emission.room, how.sees, scene.absorbs
-    return task
+def _take_stack() -> np.ndarray:
+    return _stacks.pop() if _stacks else np.zeros(_STACK, NODE)
+
+
+def _work(scene: BeamScene, emission: Emission, how: Search, share: float, sources: int) -> np.ndarray:
+    work = np.zeros(1, WORK)
+    work["power"], work["seed"], work["depth"] = len(scene.tables), how.seed, how.depth
+    work["density"], work["tolerance"], work["drift"] = emission.density, how.tolerance, how.drift
+    work["line_share"], work["room"], work["sees"], work["absorbing"] = share, emission.room, how.sees, scene.absorbs
+    work["objects"], work["sources"] = len(scene.solids), sources
+    return work
 
 
 def _roots(
-    nodes: np.ndarray, band: tuple[float, float], scene: BeamScene, tables: np.ndarray, emission: Emission, task: np.ndarray
+    stack: np.ndarray, band: tuple[float, float], emission: Emission, work: np.ndarray, args: tuple[np.ndarray, ...]
 ) -> int:
     """Put the fragments of a source's whole light that meet a facet first on the stack; returns its top."""
-    spare_corner, spare_side = np.empty((128, 2)), np.empty(128, np.int64)
-    i = 0
-    nodes[i]["x"] = band[0], 0.5 * (band[0] + band[1]), band[1]
-    nodes[i]["centre"] = emission.room[:2]
-    nodes[i]["flight"] = nodes[i]["depth"] = 0
-    nodes[i]["facet"], nodes[i]["total"], nodes[i]["mask"] = -1, -1, emission.mask
-    nodes[i]["key"], nodes[i]["boost"], nodes[i]["bend"] = np.uint64(hash(band) & 0xFFFFFFFF), 1.0, 0.0
-    room = emission.room
-    square = np.array([[room[2] - room[0], 1, 0], [room[2] + room[0], -1, 0], [room[2] - room[1], 0, 1], [room[2] + room[1], 0, -1]])
+    root = stack[FIRST]
+    u, v, half = emission.room
+    root["x"] = band[0], 0.5 * (band[0] + band[1]), band[1]
+    root["centre"] = u, v
+    root["flight"] = root["depth"] = 0
+    root["facet"], root["ends"], root["total"], root["mask"] = -1, -1, START, emission.mask
+    root["key"], root["boost"], root["bend"] = np.uint64(hash(band) & 0xFFFFFFFF), 1.0, 0.0
+    square = np.array([[half - u, 1, 0], [half + u, -1, 0], [half - v, 0, 1], [half + v, 0, -1]])
     limits = np.concatenate([square, emission.limits.reshape(-1, 3)])
-    nodes[i]["lines"] = len(limits)
-    nodes[i]["line"][: len(limits)] = limits[:, None, :]
-    nodes[i]["made"][: len(limits)] = 0, 0, STATIC, 1
-    args = scene.facets, scene.solids, tables
-    larger = room * np.array([1.0, 1.0, 1.5])
-    if not lay_out(nodes, i, *args, emission.source[0], larger, spare_corner, spare_side):
-        return FIRST
-    s = emission.source[0]
-    if s["kind"] != PARALLEL:
-        nodes[i]["direction"][:] = s["forward"] + room[0] * s["right"] + room[1] * s["up"], s["right"], s["up"]
-    lines, made = np.zeros((3, 3)), np.zeros(4, np.int64)
-    nothing = np.zeros((0, 2, 3))
-    top, _ = fly(
-        nodes, FIRST, *args, emission.source, nothing, task[0], empty_leaves(8), np.zeros(SUMS), lines, made, spare_corner, spare_side
-    )
-    return top
-
-
-def _rows(count: int) -> np.ndarray:
-    return np.zeros(count, NODE)
+    root["lines"] = len(limits)
+    root["line"][: len(limits)] = limits[:, None, :]
+    root["made"][: len(limits)] = 0, 0, STATIC, 1
+    # What is kept where nothing is met (`sees`) is no root.
+    work["room"], work["sees"] = emission.room * (1.0, 1.0, 1.5), False
+    work["top"], work["steps"] = FIRST + 1, 1
+    store = Store()
+    run(stack, *args, np.zeros((0, 2, 3)), work, store.leaf, store.edge, store.corner)
+    return int(work["top"][0])

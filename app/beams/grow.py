@@ -1,20 +1,43 @@
-"""The steps of the search: flight, facet, end."""
+"""The steps of the search: flight, facet, end. The beam in hand is row HAND of the stack; what becomes of it goes on top."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from .leaves import density_slope, grown, has_room, lay_leaf
-from .nodes import LEVELS, STATIC, TOTAL, copy, copy_head, copy_outline, cut, forget_idle_lines, lay_out
-from .rays import PARALLEL, PASS, REFLECT, REFRACT, edge_line, follow, index_of, jit, meet, reflectance, total_line
-from .rays import transmitted
+from .compiling import jit, part
+from .leaves import density_slope, has_room, lay_leaf
+from .nodes import (
+    LEVELS,
+    STATIC,
+    TOTAL,
+    copy,
+    copy_head,
+    copy_outline,
+    cut,
+    first_place,
+    forget_idle_lines,
+    last_place,
+    lay_out,
+)
+from .rays import (
+    PARALLEL,
+    PASS,
+    REFLECT,
+    REFRACT,
+    emit_straight,
+    follow,
+    index_of,
+    meet,
+    moments,
+    total_line,
+    transmitted,
+)
 from .search import (
-    _MOST_FRAGMENTS,
-    _NARROWEST,
-    _TOUCHES,
+    FRAGMENTS,
     LEAF_OPEN,
     LEAF_PIECE,
     LEAF_RECEIVER,
+    NARROWEST,
     SUM_ABSORBED,
     SUM_BEAMS,
     SUM_DEPOSITED,
@@ -24,551 +47,512 @@ from .search import (
     SUM_LEAVES,
     SUM_NUMERIC,
     SUM_ROULETTE,
-    _flux,
     drifts,
     facing,
+    flux_as,
+    flux_of,
     halve_space,
     halve_spectrum,
     is_ahead,
     is_curved,
+    lay_edges,
     medium,
     mixed,
     near_boxes,
     near_sphere,
-    power_of,
+    place_of,
+    power_as,
     recentre,
     spread_of,
     unit,
 )
 
+_TOUCHES = 1e-7
+"""GPU units: surfaces this close are in contact."""
 _UNEVEN = 0.15
 """A density that leaves the straight line by more is not a parabola for certain."""
 _STEEP = 0.3
 """A relative change of the density over a leaf that is no longer linear."""
-_HAND, _SPARE = 0, 1
+HAND, _SPARE = 0, 1
 """Rows of the stack that are the beam in hand, and room to try a cut."""
 FIRST = 2
 _DEAD = -3
 """Facet of an outline that is no longer."""
 _GRAZING = 1e-9
 """Squared cosines below this may count as either side of total reflection."""
+START = -3
 _LAY, _UNKNOWN, _SOME, _ALL = -2, -1, 0, 1
-"""States of `Nodes.total`; _LAY: rays are those of a larger outline."""
+"""States of a beam's `total`; START: a source's whole light; _LAY: rays are those of a larger outline."""
 
 
-@jit
-def facet_lines(nodes, i, facets, facet, edge, lines):
-    """The half-planes of a facet's edge for beam i's flight, (3, 3) by place."""
-    for a in range(3):
-        edge_line(facets, facet, edge, nodes[i].position[a], nodes[i].direction[a], nodes[i].centre, lines[a])
-
-
-@jit
-def cut_to_facet(nodes, i, facets, facet, lines, made, spare_corner, spare_side):
-    """Keep of outline i what meets a facet; `i` flies as the beam in hand does."""
-    made[0], made[1], made[3] = nodes[_HAND].flight, facet, 1
-    for e in range(facets[facet].corners):
-        facet_lines(nodes, _HAND, facets, facet, e, lines)
-        made[2] = e
-        if not cut(nodes, i, lines, made, spare_corner, spare_side):
+@part
+def cut_to_facet(beam, flight, number, facet, work):
+    """Keep of an outline what meets a facet whose edges `lay_edges` laid; returns whether anything is left."""
+    for e in range(facet.corners):
+        if work.cuts[e] != 0 and not cut(beam, work.lines[e], 1.0, flight, number, e, work):
             return False
     return True
 
 
-@jit
-def subtract(nodes, first, top, facets, facet, lines, made, spare_corner, spare_side):
+@part
+def subtract(nodes, first, top, number, facets, work):
     """Take what meets a facet away from all outlines first … top; returns the new top."""
+    hand, spare = nodes[HAND], nodes[_SPARE]
+    facet = facets[number]
     end = top
     for j in range(first, end):
-        copy(nodes, j, _SPARE)
+        if not lay_edges(nodes[j], hand, facet, work):
+            continue
+        copy(nodes[j], spare)
         nodes[j].facet = _DEAD
-        for e in range(facets[facet].corners):
-            facet_lines(nodes, _HAND, facets, facet, e, lines)
-            made[0], made[1], made[2], made[3] = nodes[_HAND].flight, facet, e, -1
-            copy(nodes, _SPARE, top)
-            if cut(nodes, top, -lines, made, spare_corner, spare_side):
-                forget_idle_lines(nodes, top)
-                nodes[top].key = mixed(nodes[_SPARE].key, 1000 + e)
+        for e in range(facet.corners):
+            if work.cuts[e] == 0:
+                continue
+            copy(spare, nodes[top])
+            if cut(nodes[top], work.lines[e], -1.0, hand.flight, number, e, work):
+                forget_idle_lines(nodes[top], work)
+                nodes[top].key = mixed(spare.key, 1000 + e)
                 top += 1
-            made[3] = 1
-            if not cut(nodes, _SPARE, lines, made, spare_corner, spare_side):
+            if not cut(spare, work.lines[e], 1.0, hand.flight, number, e, work):
                 break
     return closed_up(nodes, first, top)
 
 
-@jit
+@part
 def closed_up(nodes, first, top):
     """Close the gaps that dead beams leave between first and top; returns the new top."""
     kept = first
     for j in range(first, top):
         if nodes[j].facet != _DEAD:
             if j != kept:
-                copy(nodes, j, kept)
+                copy(nodes[j], nodes[kept])
             kept += 1
     return kept
 
 
-@jit
-def distance_at(nodes, i, q, facets, facet):
-    """Distance from the beam in hand's ray of q to a facet's plane, at the place where outline i exists; and its
-    cosine."""
-    a = 1 if nodes[i].corners[1] > 0 else (0 if nodes[i].corners[0] > 0 else 2)
-    u, v = q[0] - nodes[_HAND].centre[0], q[1] - nodes[_HAND].centre[1]
-    n = facets[facet].plane
+@part
+def distance_at(hand, beam, facet):
+    """Distance from the beam in hand's ray of an outline's centre to a facet's plane, at the place where the outline
+    exists; and its cosine."""
+    a = place_of(beam)
+    u, v = beam.centre[0] - hand.centre[0], beam.centre[1] - hand.centre[1]
+    n, p, d = facet.plane, hand.position, hand.direction
     at = towards = 0.0
     for k in range(3):
-        p, d = nodes[_HAND].position[a], nodes[_HAND].direction[a]
-        at += n[k] * (p[0, k] + u * p[1, k] + v * p[2, k])
-        towards += n[k] * (d[0, k] + u * d[1, k] + v * d[2, k])
+        at += n[k] * (p[a, 0, k] + u * p[a, 1, k] + v * p[a, 2, k])
+        towards += n[k] * (d[a, 0, k] + u * d[a, 1, k] + v * d[a, 2, k])
     if abs(towards) < 1e-14:
         return -1.0, 0.0
     return (n[3] - at) / towards, towards
 
 
-@jit
-def is_nearer(facets, solids, nodes, one, other, t_one, t_other):
+@part
+def is_nearer(facets, solids, hand, one, other, t_one, t_other):
     """Whether facet `one` is met before `other`; of surfaces in contact a solid is entered before one is left, and
     glass comes before what is opaque."""
     if abs(t_one - t_other) > _TOUCHES:
         return t_one < t_other
-    return rank(facets, solids, nodes, one) < rank(facets, solids, nodes, other)
+    return rank(facets, solids, hand, one) < rank(facets, solids, hand, other)
 
 
-@jit
-def rank(facets, solids, nodes, facet):
+@part
+def rank(facets, solids, hand, facet):
     """Order of surfaces in contact, with the facet's number to tell equals apart."""
-    kind = facets[facet].kind
-    first = 1 + kind
-    if kind == 0:
-        first = 1 if (nodes[_HAND].mask >> solids[facets[facet].owner].bit) & 1 else 0
+    first = 1 + facets[facet].kind
+    if first == 1:
+        first = (hand.mask >> solids[facets[facet].owner].bit) & 1
     return first * 1000000 + facet
 
 
-@jit
-def fly(
-    nodes, top, facets, solids, tables, sources, obstacles, task, leaves, sums, lines, made, spare_corner, spare_side
-):
-    """Cut the beam in hand by the facets ahead; the fragments lie on the stack afterwards. Returns (top, leaves)."""
-    first = top
-    spread = np.empty(2)
-    spread_of(nodes, _HAND, spread)
-    chief = nodes[_HAND].direction[1, 0]
-    flight = nodes[_HAND].flight
-    last = nodes[_HAND].path[0, flight - 1] if flight > 0 else -1
+@part
+def fly(nodes, facets, solids, tables, obstacles, work):
+    """Cut the beam in hand by the facets ahead; the fragments lie on the stack afterwards."""
+    first = top = work.top
+    hand, spread, flight = nodes[HAND], work.spread, nodes[HAND].flight
+    spread_of(hand, spread)
+    for a in range(first_place(hand), last_place(hand)):
+        moments(hand.position[a], hand.direction[a], work.moment[a])
+    last = np.int64(hand.path[flight - 1, 0]) if flight > 0 else -1
     owner, crossing = -1, False
-    hits = np.empty(_MOST_FRAGMENTS, np.int64)
-    count = 0
     reached = 0.0
-    for o in range(len(solids)):
+    for o in range(work.objects):
         if solids[o].first == solids[o].last:
             continue
-        if flight > 0 and not near_sphere(nodes, _HAND, solids[o].centre, solids[o].radius, spread):
+        if flight > 0 and not near_sphere(hand, solids[o].centre, solids[o].radius, spread):
             continue
         for f in range(solids[o].first, solids[o].last):
-            cosine = facing(facets, f, chief)
-            if f == last or not is_ahead(facets, solids, nodes, _HAND, f, cosine):
+            cosine = facing(facets[f], hand.direction[1])
+            if f == last or top - first == FRAGMENTS or not is_ahead(facets[f], solids, hand, cosine):
                 continue
-            if flight > 0 and not near_sphere(nodes, _HAND, facets[f].centre, facets[f].radius, spread):
+            if flight > 0 and not near_sphere(hand, facets[f].centre, facets[f].radius, spread):
                 continue
-            copy_outline(nodes, _HAND, top)
-            if not cut_to_facet(nodes, top, facets, f, lines, made, spare_corner, spare_side):
+            if not lay_edges(hand, hand, facets[f], work):
                 continue
-            copy_head(nodes, _HAND, top)
-            recentre(nodes, top)
-            distance, towards = distance_at(nodes, top, nodes[top].centre, facets, f)
+            new = nodes[top]
+            copy(hand, new)
+            if not cut_to_facet(new, flight, f, facets[f], work):
+                continue
+            recentre(new)
+            distance, towards = distance_at(hand, new, facets[f])
             if distance < -_TOUCHES or towards * cosine <= 0.0:
                 continue
-            nodes[top].facet, nodes[top].total = f, _LAY
-            nodes[top].key = mixed(nodes[_HAND].key, 2000 + f)
-            forget_idle_lines(nodes, top)
+            new.facet, new.total = f, _LAY
+            new.key = mixed(hand.key, 2000 + f)
+            forget_idle_lines(new, work)
             crossing = crossing or (owner >= 0 and owner != o) or not solids[o].convex
             owner = o
-            reached += _flux(nodes, top, tables, task)
-            hits[count] = f
-            count += 1
+            reached += flux_of(new, tables, work)
+            work.hits[top - first] = f
             top += 1
-            if count == _MOST_FRAGMENTS:
-                break
-        if count == _MOST_FRAGMENTS:
-            sums[SUM_NUMERIC] += max(_flux(nodes, _HAND, tables, task) - reached, 0.0)
-            break
-    original = top
+    count = top - first
+    missing = max(flux_of(hand, tables, work) - reached, 0.0)
+    if count == FRAGMENTS:
+        work.sums[SUM_NUMERIC] += missing
+        missing = 0.0
     if crossing:
-        top = hide(nodes, first, original, hits, facets, solids, lines, made, spare_corner, spare_side)
-    boxed = len(obstacles) > 0 and near_boxes(nodes, _HAND, 1e9, obstacles, spread)
+        top = hide(nodes, first, top, facets, solids, work)
+    boxed = len(obstacles) > 0 and near_boxes(hand, 1e9, obstacles, spread)
     if boxed:
-        top, leaves = hand_over(
-            nodes, first, top, facets, solids, tables, sources, obstacles, spread, task, leaves, sums, spare_corner,
-            spare_side,
-        )
-    if not (boxed or task.sees):
-        sums[SUM_ESCAPED] += max(_flux(nodes, _HAND, tables, task) - reached, 0.0)
-        return top, leaves
+        # What may meet an obstacle before its facet is handed over.
+        for j in range(first, top):
+            distance, _ = distance_at(hand, nodes[j], facets[nodes[j].facet])
+            if near_boxes(hand, distance + spread[0], obstacles, spread):
+                nodes[j].facet, nodes[j].ends = -1, LEAF_PIECE
+    if not (boxed or work.sees):
+        work.sums[SUM_ESCAPED] += missing
+        work.top = top
+        return
     # What meets no facet.
     rest = top
-    copy(nodes, _HAND, top)
+    copy(hand, nodes[top])
     nodes[top].facet = -1
     top += 1
     for h in range(count):
-        top = subtract(nodes, rest, top, facets, hits[h], lines, made, spare_corner, spare_side)
-    while top > rest:
-        top -= 1
-        blocked = boxed and near_boxes(nodes, top, 1e9, obstacles, spread)
-        if task.sees or blocked:
-            leaves = end(
-                nodes, top, LEAF_PIECE if blocked else LEAF_OPEN, facets, solids, tables, sources, task, leaves, sums,
-                spare_corner, spare_side,
-            )
+        top = subtract(nodes, rest, top, work.hits[h], facets, work)
+    for j in range(rest, top):
+        # Of the part alone: its rays are still about the whole beam's centre.
+        spread_of(nodes[j], spread)
+        if boxed and near_boxes(nodes[j], 1e9, obstacles, spread):
+            nodes[j].ends = LEAF_PIECE
+        elif work.sees:
+            nodes[j].ends = LEAF_OPEN
         else:
-            sums[SUM_ESCAPED] += _flux(nodes, top, tables, task)
-    return top, leaves
+            work.sums[SUM_ESCAPED] += flux_of(nodes[j], tables, work)
+            nodes[j].facet = _DEAD
+    work.top = closed_up(nodes, rest, top)
 
 
-@jit
-def hide(nodes, first, original, hits, facets, solids, lines, made, spare_corner, spare_side):
+@part
+def hide(nodes, first, top, facets, solids, work):
     """Take from every fragment what nearer facets hide; returns the new top. Fragment first + h meets hits[h]."""
-    top = original
-    count = original - first
-    hidden = np.zeros((count, count), np.bool_)
+    hand, spare, hits, hidden = nodes[HAND], nodes[_SPARE], work.hits, work.hidden
+    count = top - first
     for h in range(count):
+        own = facets[hits[h]].owner
+        some = False
         for g in range(count):
-            if g == h:
+            hidden[h, g] = 0
+            facet = facets[hits[g]]
+            if g == h or (facet.owner == own and solids[own].convex):
                 continue
-            same = facets[hits[g]].owner == facets[hits[h]].owner
-            if same and solids[facets[hits[g]].owner].convex:
+            if not lay_edges(nodes[first + h], hand, facet, work):
                 continue
-            copy(nodes, first + h, _SPARE)
-            if not cut_to_facet(nodes, _SPARE, facets, hits[g], lines, made, spare_corner, spare_side):
+            copy(nodes[first + h], spare)
+            if not cut_to_facet(spare, hand.flight, hits[g], facet, work):
                 continue
-            recentre(nodes, _SPARE)
-            q = nodes[_SPARE].centre.copy()
-            t_h, _ = distance_at(nodes, _SPARE, q, facets, hits[h])
-            t_g, _ = distance_at(nodes, _SPARE, q, facets, hits[g])
-            hidden[h, g] = t_g >= -_TOUCHES and is_nearer(facets, solids, nodes, hits[g], hits[h], t_g, t_h)
-    for h in range(count):
-        if not hidden[h].any():
-            continue
-        copy(nodes, first + h, top)
-        nodes[first + h].facet = _DEAD
-        start = top
-        top += 1
-        for g in range(count):
-            if hidden[h, g]:
-                top = subtract(nodes, start, top, facets, hits[g], lines, made, spare_corner, spare_side)
+            recentre(spare)
+            t_h, _ = distance_at(hand, spare, facets[hits[h]])
+            t_g, _ = distance_at(hand, spare, facet)
+            if t_g >= -_TOUCHES and is_nearer(facets, solids, hand, hits[g], hits[h], t_g, t_h):
+                hidden[h, g], some = 1, True
+        if some:
+            start = top
+            copy(nodes[first + h], nodes[top])
+            nodes[first + h].facet = _DEAD
+            top += 1
+            for g in range(count):
+                if hidden[h, g] != 0:
+                    top = subtract(nodes, start, top, hits[g], facets, work)
     return closed_up(nodes, first, top)
 
 
-@jit
-def hand_over(
-    nodes, first, top, facets, solids, tables, sources, obstacles, spread, task, leaves, sums, spare_corner, spare_side
-):
-    """Keep as pieces those fragments that may meet an obstacle before their facet; returns (top, leaves)."""
-    kept = first
-    for j in range(first, top):
-        distance, _ = distance_at(nodes, j, nodes[j].centre, facets, nodes[j].facet)
-        if near_boxes(nodes, _HAND, distance + spread[0], obstacles, spread):
-            copy(nodes, j, top)
-            nodes[top].facet = -1
-            leaves = end(
-                nodes, top, LEAF_PIECE, facets, solids, tables, sources, task, leaves, sums, spare_corner, spare_side
-            )
-        else:
-            if j != kept:
-                copy(nodes, j, kept)
-            kept += 1
-    return kept, leaves
+@part
+def push_both(nodes, low, high, work):
+    """Leave on the stack what is left of the beam in hand and of that at the top."""
+    if high:
+        work.top += 1
+    if low:
+        copy(nodes[HAND], nodes[work.top])
+        work.top += 1
 
 
-@jit
-def end(nodes, at, kind, facets, solids, tables, sources, task, leaves, sums, spare_corner, spare_side):
-    """Write the beam at row `at` (rows above are free), halved until it is straight enough; returns the leaves."""
-    if nodes[at].depth == 0:
-        if kind == LEAF_PIECE:
-            return leaves
-    top = at + 1
-    while top > at:
-        i = top - 1
-        recentre(nodes, i)
-        if not lay_out(nodes, i, facets, solids, tables, sources[0], task.room, spare_corner, spare_side):
-            top -= 1
-            continue
-        room = top + 2 < len(nodes)
-        tolerance = facets[nodes[i].facet].texel if kind == LEAF_RECEIVER else task.tolerance
-        if room and sources[0].kind != PARALLEL and kind == LEAF_RECEIVER:
-            if is_curved(nodes, i, facets, solids, tables, sources[0], tolerance, 1) > 1.0:
-                halve_space(nodes, i, top, spare_corner, spare_side)
-                top += 1
-                continue
-        if not has_room(leaves):
-            leaves = grown(leaves)
-        bent, uneven = lay_leaf(nodes, i, facets, kind, task.density, leaves)
-        leaves.soft[leaves.count[1] : leaves.count[1] + nodes[i].lines] = 0.0
-        wide = nodes[i].x[2] - nodes[i].x[0] > _NARROWEST
-        if room and wide and (bent > tolerance or uneven > _UNEVEN):
-            middle = 0.5 * (nodes[i].x[0] + nodes[i].x[2])
-            halve_spectrum(
-                nodes, i, top, middle, facets, solids, tables, sources[0], task, spare_corner, spare_side
-            )
-            top += 1
-            continue
-        if bent >= 0.0:
-            density_slope(nodes, i, facets, solids, tables, sources[0], task, kind, leaves)
-            if room and slope_over(leaves) > _STEEP and nodes[i].corners[1] > 0:
-                halve_space(nodes, i, top, spare_corner, spare_side)
-                top += 1
-                continue
-            if len(sources) > 1:
-                soften(nodes, i, top, kind, facets, solids, tables, sources, task, leaves, spare_corner, spare_side)
-            finish(nodes, i, tables, task, leaves, sums)
-            sums[SUM_DEPOSITED if kind == LEAF_RECEIVER else SUM_HANDED] += _flux(nodes, i, tables, task)
-        top -= 1
-    return leaves
+@part
+def halve(nodes, x, facets, solids, tables, sources, work):
+    """Cut the beam in hand at x and leave both on the stack."""
+    low, high = halve_spectrum(nodes[HAND], nodes[work.top], x, facets, solids, tables, sources[0], work)
+    push_both(nodes, low, high, work)
 
 
-@jit
-def soften(nodes, i, spare, kind, facets, solids, tables, sources, task, leaves, spare_corner, spare_side):
+@part
+def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
+    """Write the beam in hand as a leaf, or halve it where it is not straight enough."""
+    hand, source, kind = nodes[HAND], sources[0], nodes[HAND].ends
+    if hand.depth == 0 and kind != LEAF_OPEN:
+        return
+    is_parallel = source.kind == PARALLEL
+    recentre(hand)
+    if not is_parallel and not lay_out(hand, facets, solids, tables, source, work):
+        return
+    room = work.top + 2 < len(nodes)
+    tolerance = facets[hand.facet].texel if kind == LEAF_RECEIVER else work.tolerance
+    if room and not is_parallel and kind == LEAF_RECEIVER:
+        if is_curved(hand, facets, solids, tables, source, tolerance, work) > 1.0:
+            halve_space(hand, nodes[work.top], work)
+            push_both(nodes, True, True, work)
+            return
+    bent, uneven = lay_leaf(hand, facets, kind, leaf, edge, corner, work)
+    if bent < 0.0:
+        return
+    if room and hand.x[2] - hand.x[0] > NARROWEST and (bent > tolerance or uneven > _UNEVEN):
+        halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
+        return
+    row, first = work.count[0], work.count[2]
+    new = leaf[row]
+    density_slope(hand, facets, solids, tables, source, kind, new, work)
+    steepest = 0.0
+    for c in range(first, first + new.head[7]):
+        u, v = corner[c, 0] - new.centre[0], corner[c, 1] - new.centre[1]
+        steepest = max(steepest, abs(new.slope[0] * u + new.slope[1] * v))
+    if room and steepest > _STEEP and hand.corners[1] > 0:
+        halve_space(hand, nodes[work.top], work)
+        push_both(nodes, True, True, work)
+        return
+    if work.sources > 1:
+        soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, work)
+    flux = flux_of(hand, tables, work)
+    new.flux = flux
+    work.count[0] += 1
+    work.count[1] += new.head[6]
+    work.count[2] += new.head[7]
+    work.sums[SUM_LEAVES] += 1.0
+    work.sums[SUM_DEPOSITED if kind == LEAF_RECEIVER else SUM_HANDED] += flux
+
+
+@part
+def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, work):
     """Set the penumbra of the leaf just laid from where its edges lie for two other points of an extended light.
 
     The light's part is a disc whose radius is the way to those points. An edge's cover over it rises as the disc's
     cumulative profile; a ramp of the same variance is sqrt(3)/2 of the disc's projected radius wide to each side."""
-    row, first = leaves.count[0], leaves.count[1]
-    n = nodes[i].lines
-    soft, own = np.zeros(n), np.empty(n)
-    centre = leaves.centre[row].copy()
-    density, slope, bounds = leaves.density[row].copy(), leaves.slope[row].copy(), leaves.head[row].copy()
-    for l in range(n):
-        e = leaves.edge[first + l, 1]
-        own[l] = e[0] * centre[0] + e[1] * centre[1] + e[2]
-    for other in range(1, len(sources)):
-        copy(nodes, i, spare)
-        lay_out(nodes, spare, facets, solids, tables, sources[other], task.room, spare_corner, spare_side)
-        lay_leaf(nodes, spare, facets, kind, task.density, leaves)
+    hand, spare = nodes[HAND], nodes[_SPARE]
+    first, n = work.count[1], nodes[HAND].lines
+    soft, own = work.soft, work.own
+    new = leaf[work.count[0]]
+    cu, cv, slope_u, slope_v = new.centre[0], new.centre[1], new.slope[0], new.slope[1]
+    for turn in range(work.sources):
+        if turn > 0:
+            copy(hand, spare)
+            lay_out(spare, facets, solids, tables, sources[turn], work)
+            lay_leaf(spare, facets, kind, leaf, edge, corner, work)
         for l in range(n):
-            if nodes[i].made[l, 2] != STATIC or kind == LEAF_RECEIVER:
-                e = leaves.edge[first + l, 1]
-                soft[l] += (e[0] * centre[0] + e[1] * centre[1] + e[2] - own[l]) ** 2
-    lay_leaf(nodes, i, facets, kind, task.density, leaves)
-    leaves.head[row], leaves.density[row], leaves.slope[row] = bounds, density, slope
+            e = edge[first + l].line
+            at = e[1, 0] * cu + e[1, 1] * cv + e[1, 2]
+            if turn == 0:
+                own[l], soft[l] = at, 0.0
+            elif hand.made[l, 2] != STATIC or kind == LEAF_RECEIVER:
+                soft[l] += (at - own[l]) * (at - own[l])
+    lay_leaf(hand, facets, kind, leaf, edge, corner, work)
+    new.slope[0], new.slope[1] = slope_u, slope_v
     for l in range(n):
-        leaves.soft[first + l] = 0.8660254 * np.sqrt(soft[l])
+        edge[first + l].soft = 0.8660254 * np.sqrt(soft[l])
 
 
-@jit
-def slope_over(leaves):
-    """Largest relative change of the density of the leaf just laid, from its centre to a corner."""
-    row, first = leaves.count[0], leaves.count[2]
-    most = 0.0
-    for c in range(first, first + leaves.head[row, 7]):
-        u, v = leaves.corner[c, 0] - leaves.centre[row, 0], leaves.corner[c, 1] - leaves.centre[row, 1]
-        most = max(most, abs(leaves.slope[row, 0] * u + leaves.slope[row, 1] * v))
-    return most
-
-
-@jit
-def finish(nodes, i, tables, task, leaves, sums):
-    """Count the leaf that was laid."""
-    row = leaves.count[0]
-    leaves.flux[row] = _flux(nodes, i, tables, task)
-    leaves.count[1] += leaves.head[row, 6]
-    leaves.count[2] += leaves.head[row, 7]
-    leaves.count[0] += 1
-    sums[SUM_LEAVES] += 1.0
-
-
-@jit
-def onset(nodes, facets, solids, tables, sources, before, after, low, high):
+@part
+def onset(hand, facets, solids, tables, source, before, after, low, high, work):
     """x between two places at which the facet of the beam in hand begins to reflect everything."""
-    path = nodes[_HAND].path
-    plane = facets[nodes[_HAND].facet].plane
-    position, direction = np.empty((3, 3)), np.empty((3, 3))
-    ends = np.zeros(2)
-    at = np.array([low, high])
+    position, direction = work.position, work.direction
+    is_low = False
     for turn in range(45):
-        x = at[turn] if turn < 2 else 0.5 * (at[0] + at[1])
-        follow(
-            sources[0], facets, solids, tables, path, nodes[_HAND].flight, x, nodes[_HAND].centre, position, direction
-        )
-        cosine = plane[0] * direction[0, 0] + plane[1] * direction[0, 1] + plane[2] * direction[0, 2]
-        k = transmitted(cosine, index_of(tables, before, x) / index_of(tables, after, x))
-        if turn < 2:
-            ends[turn] = k
-        elif (k > 0.0) == (ends[0] > 0.0):
-            at[0] = x
+        x = low if turn == 0 else 0.5 * (low + high)
+        follow(source, facets, solids, tables, hand.path, hand.flight, x, hand.centre, position, direction)
+        cosine = facing(facets[hand.facet], direction)
+        is_total = transmitted(cosine, index_of(tables, before, x) / index_of(tables, after, x)) <= 0.0
+        if turn == 0:
+            is_low = is_total
+        elif is_total == is_low:
+            low = x
         else:
-            at[1] = x
-    return 0.5 * (at[0] + at[1])
+            high = x
+    return 0.5 * (low + high)
 
 
-@jit
-def at_facet(nodes, top, facets, solids, tables, sources, task, leaves, sums, lines, made, spare_corner, spare_side):
-    """The beam in hand meets its facet: halved where it has to be, ended, or sent on. Returns (top, leaves)."""
-    facet = nodes[_HAND].facet
-    kind = facets[facet].kind
-    if kind == 3 or (kind == 2 and task.sees):
-        if nodes[_HAND].depth > 0:
-            copy(nodes, _HAND, top)
-            leaves = end(
-                nodes, top, LEAF_OPEN if task.sees else LEAF_RECEIVER, facets, solids, tables, sources, task, leaves, sums, spare_corner, spare_side
-            )
-        return top, leaves
-    if nodes[_HAND].total == _LAY:
-        recentre(nodes, _HAND)
-        if sources[0].kind != PARALLEL:
-            if not lay_out(nodes, _HAND, facets, solids, tables, sources[0], task.room, spare_corner, spare_side):
-                return top, leaves
-            recentre(nodes, _HAND)
-        nodes[_HAND].total = _UNKNOWN
-    if kind == 2:
-        sums[SUM_ABSORBED] += _flux(nodes, _HAND, tables, task)
-        return top, leaves
-    # Nothing of it can be followed farther for certain.
-    weak = power_of(nodes, _HAND, tables, task) < task.threshold
-    if not weak and drifts(nodes, _HAND, task.drift):
-        middle = 0.5 * (nodes[_HAND].x[0] + nodes[_HAND].x[2])
-        low, high = halve_spectrum(
-            nodes, _HAND, top, middle, facets, solids, tables, sources[0], task, spare_corner, spare_side
-        )
-        return pushed(nodes, top, low, high), leaves
-    if sources[0].kind != PARALLEL and nodes[_HAND].bend >= 0.0:
-        bend = is_curved(nodes, _HAND, facets, solids, tables, sources[0], task.tolerance, 0)
+@part
+def at_facet(nodes, facets, solids, tables, sources, work):
+    """The beam in hand meets its facet: halved where it has to be, or sent on."""
+    hand, source, is_parallel = nodes[HAND], sources[0], sources[0].kind == PARALLEL
+    facet = facets[hand.facet]
+    if hand.total == _LAY:
+        recentre(hand)
+        if not is_parallel:
+            if not lay_out(hand, facets, solids, tables, source, work):
+                return
+            recentre(hand)
+        hand.total = _UNKNOWN
+    if facet.kind == 2:
+        work.sums[SUM_ABSORBED] += flux_of(hand, tables, work)
+        return
+    weak = power_as(hand, hand, tables, work) < work.threshold
+    if not weak and drifts(hand, work):
+        halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
+        return
+    if not is_parallel and hand.bend >= 0.0:
+        bend = is_curved(hand, facets, solids, tables, source, work.tolerance, work)
         if bend > 1.0:
-            halve_space(nodes, _HAND, top, spare_corner, spare_side)
-            nodes[_HAND].total = nodes[top].total = _LAY
-            return pushed(nodes, top, True, True), leaves
-        nodes[_HAND].bend = -1.0 if bend < 0.01 else bend
-    owner = facets[facet].owner
-    if kind == 1:
-        top = child(nodes, top, REFLECT, -1, -1, nodes[_HAND].mask, facets, solids, tables, task, sums)
-        return top, leaves
-    bit = np.int64(1) << solids[owner].bit
-    inside = (nodes[_HAND].mask & bit) != 0
-    mask = nodes[_HAND].mask ^ bit
-    one, other = medium(solids, nodes[_HAND].mask), medium(solids, mask)
-    # A facet that is left for the same medium as before, under a solid of higher priority.
-    before = solids[one].glass if one >= 0 else -1
-    after = solids[other].glass if other >= 0 else -1
-    if one == other:
-        return child(nodes, top, PASS, before, after, mask, facets, solids, tables, task, sums), leaves
-    if nodes[_HAND].total == _UNKNOWN:
-        k = np.empty(3)
-        for a in range(3):
-            eta = index_of(tables, before, nodes[_HAND].x[a]) / index_of(tables, after, nodes[_HAND].x[a])
-            k[a] = transmitted(facing(facets, facet, nodes[_HAND].direction[a, 0]), eta)
-        for a in range(2):
-            if (k[a] > _GRAZING and k[a + 1] < -_GRAZING) or (k[a] < -_GRAZING and k[a + 1] > _GRAZING):
-                x = onset(nodes, facets, solids, tables, sources, before, after, nodes[_HAND].x[a], nodes[_HAND].x[a + 1])
-                low, high = halve_spectrum(
-                    nodes, _HAND, top, x, facets, solids, tables, sources[0], task, spare_corner, spare_side
-                )
-                return pushed(nodes, top, low, high), leaves
-        if sources[0].kind != PARALLEL:
-            least, most = 1e300, -1e300
-            path_row = nodes[_HAND].flight
-            nodes[_HAND].path[2, path_row], nodes[_HAND].path[3, path_row] = before, after
-            for a in range(3):
-                total_line(
-                    facets, tables, before, after, facet, nodes[_HAND].x[a], nodes[_HAND].direction[a],
-                    nodes[_HAND].centre, lines[a],
-                )
-            for c in range(nodes[_HAND].corners[1]):
-                q = nodes[_HAND].corner[1, c]
-                value = lines[1, 0] + lines[1, 1] * q[0] + lines[1, 2] * q[1]
-                least, most = min(least, value), max(most, value)
-            if least < -_GRAZING and most > _GRAZING:
-                made[0], made[1], made[2], made[3] = path_row, facet, TOTAL, 1
-                copy(nodes, _HAND, top)
-                some = cut(nodes, _HAND, lines, made, spare_corner, spare_side)
-                made[3] = -1
-                rest = cut(nodes, top, -lines, made, spare_corner, spare_side)
-                for j in (_HAND, top):
-                    forget_idle_lines(nodes, j)
-                    recentre(nodes, j)
-                    nodes[j].key = mixed(nodes[j].key, 15 if j == top else 16)
-                    lay_out(nodes, j, facets, solids, tables, sources[0], task.room, spare_corner, spare_side)
-                nodes[_HAND].total, nodes[top].total = _SOME, _ALL
-                return pushed(nodes, top, some, rest), leaves
-        nodes[_HAND].total = _SOME if k[1] > 0.0 else _ALL
-    total = nodes[_HAND].total == _ALL
-    top = child(nodes, top, REFLECT, before, after, nodes[_HAND].mask, facets, solids, tables, task, sums)
-    if not total:
-        top = child(nodes, top, REFRACT, before, after, mask, facets, solids, tables, task, sums)
-    return top, leaves
+            halve_space(hand, nodes[work.top], work)
+            hand.total = nodes[work.top].total = _LAY
+            push_both(nodes, True, True, work)
+            return
+        hand.bend = -1.0 if bend < 0.01 else bend
+    before = after = -1
+    mask = hand.mask
+    passes = False
+    if facet.kind == 0:
+        mask ^= np.int64(1) << solids[facet.owner].bit
+        one, other = medium(solids, hand.mask), medium(solids, mask)
+        # A facet that is left for the same medium as before, under a solid of higher priority.
+        passes = one == other
+        before = solids[one].glass if one >= 0 else -1
+        after = solids[other].glass if other >= 0 else -1
+        if not passes and hand.total == _UNKNOWN:
+            if total_from(nodes, before, after, facets, solids, tables, sources, work):
+                return
+    for turn in range(2):
+        # One call of `child`, which is long, for all cases.
+        action = PASS if passes else (REFLECT if turn == 0 else REFRACT)
+        if turn == 1 and (passes or facet.kind == 1 or hand.total == _ALL):
+            break
+        child(nodes, action, before, after, hand.mask if action == REFLECT else mask, facets, solids, tables, work)
 
 
-@jit
-def pushed(nodes, top, low, high):
-    """Leave on the stack what is left of the beam in hand and of that at `top`; returns the new top."""
-    if high:
-        top += 1
-    if low:
-        copy(nodes, _HAND, top)
-        top += 1
-    return top
-
-
-@jit
-def child(nodes, top, action, before, after, mask, facets, solids, tables, task, sums):
-    """Send the beam in hand on from its facet; returns the new top."""
-    flight = nodes[_HAND].flight
-    depth = nodes[_HAND].depth + (0 if action == PASS else 1)
-    if depth > task.depth or flight >= LEVELS - 2:
-        sums[SUM_DEPTH] += _flux(nodes, _HAND, tables, task)
-        return top
-    copy_head(nodes, _HAND, top)
-    row = nodes[top].path
-    row[0, flight], row[1, flight] = nodes[_HAND].facet, action
-    row[2, flight], row[3, flight] = before, after
-    inside = medium(solids, nodes[_HAND].mask)
-    row[4, flight] = solids[inside].tint if inside >= 0 else -1
-    path = nodes[top].path
-    lost = 0.0
-    for a in range(3):
-        if a > 0 and nodes[top].x[a] == nodes[top].x[a - 1]:
-            nodes[top].position[a] = nodes[top].position[a - 1]
-            nodes[top].direction[a] = nodes[top].direction[a - 1]
-            nodes[top].weight[a] = nodes[top].weight[a - 1]
-            continue
-        share = meet(
-            facets, solids, tables, path, flight, nodes[top].x[a], nodes[top].position[a], nodes[top].direction[a]
-        )
-        nodes[top].weight[a] *= share
-    nodes[top].flight, nodes[top].depth, nodes[top].mask = flight + 1, depth, mask
-    nodes[top].facet, nodes[top].total = -1, _UNKNOWN
-    nodes[top].key = mixed(nodes[_HAND].key, 3 + action)
-    copy_outline(nodes, _HAND, top)
-    power = power_of(nodes, top, tables, task)
-    if power <= 0.0:
-        return top
-    if power < task.threshold:
-        chance = power / task.threshold
-        flux = _flux(nodes, top, tables, task)
-        if unit(mixed(nodes[top].key, 17) ^ task.seed) >= chance:
-            sums[SUM_ROULETTE] += flux
-            return top
-        nodes[top].boost /= chance
-        sums[SUM_ROULETTE] -= flux * (1.0 / chance - 1.0)
-    sums[SUM_BEAMS] += 1.0
-    return top + 1
-
-
-@jit
-def run(nodes, top, facets, solids, tables, sources, obstacles, task, leaves, sums):
-    """Follow all beams on the stack (rows FIRST … top) to their ends; returns the leaves."""
-    lines, made = np.zeros((3, 3)), np.zeros(4, np.int64)
-    spare_corner, spare_side = np.empty((128, 2)), np.empty(128, np.int64)
-    limit = len(nodes) - 2 * _MOST_FRAGMENTS - 64
-    while top > FIRST:
-        top -= 1
-        copy(nodes, top, _HAND)
-        if top > limit:
-            sums[SUM_NUMERIC] += _flux(nodes, _HAND, tables, task)
-        elif nodes[_HAND].facet >= 0:
-            top, leaves = at_facet(
-                nodes, top, facets, solids, tables, sources, task, leaves, sums, lines, made, spare_corner, spare_side
-            )
+@part
+def total_from(nodes, before, after, facets, solids, tables, sources, work):
+    """Find out whether the facet of the beam in hand reflects everything; where that changes over its band or its
+    outline, cut it, leave the parts on the stack and return True."""
+    hand, source = nodes[HAND], sources[0]
+    facet = facets[hand.facet]
+    last = middle = 0.0
+    for a in range(first_place(hand), last_place(hand)):
+        eta = index_of(tables, before, hand.x[a]) / index_of(tables, after, hand.x[a])
+        k = transmitted(facing(facet, hand.direction[a]), eta)
+        if (last > _GRAZING and k < -_GRAZING) or (last < -_GRAZING and k > _GRAZING):
+            low, high = hand.x[a - 1], hand.x[a]
+            x = onset(hand, facets, solids, tables, source, before, after, low, high, work)
+            halve(nodes, x, facets, solids, tables, sources, work)
+            return True
+        last = k
+        if a == 1:
+            middle = k
+    if source.kind == PARALLEL:
+        hand.total = _SOME if middle > 0.0 else _ALL
+        return False
+    least, most = 1e300, -1e300
+    flight, lines = hand.flight, work.line
+    hand.path[flight, 2], hand.path[flight, 3] = before, after
+    for a in range(first_place(hand), last_place(hand)):
+        total_line(facet, tables, before, after, hand.x[a], hand.direction[a], hand.centre, lines[a])
+    for c in range(hand.corners[1]):
+        value = lines[1, 0] + lines[1, 1] * hand.corner[1, c, 0] + lines[1, 2] * hand.corner[1, c, 1]
+        least, most = min(least, value), max(most, value)
+    if not (least < -_GRAZING and most > _GRAZING):
+        hand.total = _SOME if middle > 0.0 else _ALL
+        return False
+    copy(hand, nodes[work.top])
+    number = hand.facet
+    some = rest = False
+    for turn in range(2):
+        part_of = nodes[HAND if turn == 0 else work.top]
+        is_left = cut(part_of, lines, 1.0 - 2.0 * turn, flight, number, TOTAL, work)
+        forget_idle_lines(part_of, work)
+        recentre(part_of)
+        part_of.key = mixed(part_of.key, 16 - turn)
+        lay_out(part_of, facets, solids, tables, source, work)
+        part_of.total = _SOME if turn == 0 else _ALL
+        if turn == 0:
+            some = is_left
         else:
-            top, leaves = fly(
-                nodes, top, facets, solids, tables, sources, obstacles, task, leaves, sums, lines, made, spare_corner,
-                spare_side,
-            )
-    return leaves
+            rest = is_left
+    push_both(nodes, some, rest, work)
+    return True
+
+
+@part
+def child(nodes, action, before, after, mask, facets, solids, tables, work):
+    """Send the beam in hand on from its facet."""
+    hand, new = nodes[HAND], nodes[work.top]
+    flight = hand.flight
+    depth = hand.depth + (0 if action == PASS else 1)
+    if depth > work.depth or flight >= LEVELS - 2:
+        work.sums[SUM_DEPTH] += flux_of(hand, tables, work)
+        return
+    copy_head(hand, new)
+    row, inside = new.path[flight], medium(solids, hand.mask)
+    row[0], row[1], row[2], row[3] = hand.facet, action, before, after
+    row[4] = solids[inside].tint if inside >= 0 else -1
+    for a in range(first_place(hand), last_place(hand)):
+        new.weight[a] *= meet(
+            facets, solids, tables, new.path, flight, new.x[a], new.position[a], new.direction[a]
+        )
+    new.flight, new.depth, new.mask = flight + 1, depth, mask
+    new.facet, new.total = -1, _UNKNOWN
+    new.key = mixed(hand.key, 3 + action)
+    power = power_as(hand, new, tables, work)
+    if power <= 0.0:
+        return
+    if power < work.threshold:
+        chance = power / work.threshold
+        flux = flux_as(hand, new, tables, work)
+        if unit(mixed(new.key, 17) ^ work.seed) >= chance:
+            work.sums[SUM_ROULETTE] += flux
+            return
+        new.boost /= chance
+        work.sums[SUM_ROULETTE] -= flux * (1.0 / chance - 1.0)
+    work.sums[SUM_BEAMS] += 1.0
+    copy_outline(hand, new)
+    work.top += 1
+
+
+@part
+def starts(hand, facets, solids, tables, source, work):
+    """Lay out a source's whole light, its rays not of unit length where they diverge: exactly affine."""
+    if not lay_out(hand, facets, solids, tables, source, work):
+        return False
+    if source.kind != PARALLEL:
+        for a in range(3):
+            emit_straight(source, hand.centre, hand.position[a], hand.direction[a])
+    hand.total = _UNKNOWN
+    return True
+
+
+@jit
+def run(nodes, facets, solids, tables, sources, obstacles, works, leaf, edge, corner):
+    """Follow all beams on the stack (rows FIRST … `top` of the work) to their ends, for so many steps at most or until
+    there is no room for leaves."""
+    work, hand = works[0], nodes[HAND]
+    limit = len(nodes) - 2 * FRAGMENTS - 64
+    while work.top > FIRST and work.steps > 0 and has_room(leaf, edge, corner, work):
+        work.steps -= 1
+        work.top -= 1
+        copy(nodes[work.top], hand)
+        if hand.facet >= 0 and hand.ends < 0:
+            kind = facets[hand.facet].kind
+            if kind == 3 or (kind == 2 and work.sees and hand.depth > 0):
+                hand.ends = LEAF_OPEN if work.sees else LEAF_RECEIVER
+        if hand.ends >= 0:
+            if hand.depth > 0 or hand.facet < 0:
+                end(nodes, facets, solids, tables, sources, leaf, edge, corner, work)
+        elif work.top > limit:
+            work.sums[SUM_NUMERIC] += flux_of(hand, tables, work)
+        elif hand.facet >= 0:
+            at_facet(nodes, facets, solids, tables, sources, work)
+        elif hand.total != START or starts(hand, facets, solids, tables, sources[0], work):
+            fly(nodes, facets, solids, tables, obstacles, work)

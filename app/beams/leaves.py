@@ -6,17 +6,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .rays import PARALLEL, advance, dot, follow, jit
+from .compiling import part
+from .nodes import first_place, last_place
+from .rays import PARALLEL, advance, dot, follow
 
 
 class Leaves(NamedTuple):
-    """Rows of finished beams, with room to spare; `count` says how much is used."""
+    """Rows of finished beams; `count` says how much is used."""
 
     count: np.ndarray
     """int64 (3,): leaves, edges, corners."""
     head: np.ndarray
-    """int64 (L, 9): kind, facet it ends on (-1: none), facet left last, object first met, depth, mask, edges, corners, hash of
-    its path."""
+    """int64 (L, 9): kind, facet it ends on (-1: none), facet left last, object first met, depth, mask, edges, corners,
+    hash of its path."""
     x: np.ndarray
     """(L, 3)."""
     density: np.ndarray
@@ -37,165 +39,176 @@ class Leaves(NamedTuple):
     """(H, 2): of the polygons at all places."""
 
 
-def empty_leaves(leaves: int) -> Leaves:
-    """Room for so many."""
-    return Leaves(
-        np.zeros(3, np.int64),
-        np.empty((leaves, 9), np.int64),
-        np.empty((leaves, 3)),
-        np.empty((leaves, 3)),
-        np.empty((leaves, 2)),
-        np.zeros((leaves, 2)),
-        np.empty(leaves),
-        np.empty((leaves, 2, 3, 3, 3)),
-        np.empty((8 * leaves + 256, 3, 3)),
-        np.zeros(8 * leaves + 256),
-        np.empty((24 * leaves + 512, 2)),
-    )
+LEAF = np.dtype(
+    [
+        ("head", "i8", 9),
+        ("x", "f8", 3),
+        ("density", "f8", 3),
+        ("centre", "f8", 2),
+        ("slope", "f8", 2),
+        ("flux", "f8"),
+        ("ray", "f8", (2, 3, 3, 3)),
+    ]
+)
+EDGE = np.dtype([("line", "f8", (3, 3)), ("soft", "f8")])
 
 
-@jit
-def has_room(leaves):
+class Store:
+    """Leaves while they are being found, with room to spare."""
+
+    def __init__(self, leaves: int = 256) -> None:
+        self.leaf = np.empty(leaves, LEAF)
+        self.edge = np.empty(8 * leaves + 256, EDGE)
+        self.corner = np.empty((24 * leaves + 512, 2))
+
+    def grow(self) -> None:
+        """Twice the room."""
+        for name in ("leaf", "edge", "corner"):
+            old = getattr(self, name)
+            new = np.empty((2 * len(old), *old.shape[1:]), old.dtype)
+            new[: len(old)] = old
+            setattr(self, name, new)
+
+    def leaves(self, count: np.ndarray) -> Leaves:
+        """What was written: leaves, edges, corners by `count`."""
+        leaf, edge = self.leaf[: count[0]].copy(), self.edge[: count[1]].copy()
+        fields = (leaf[name] for name in LEAF.names or ())
+        return Leaves(count.copy(), *fields, edge["line"], edge["soft"], self.corner[: count[2]].copy())
+
+
+@part
+def has_room(leaf, edge, corner, work):
     """Whether one more of any size fits."""
-    n = leaves.count
-    return (
-        n[0] + 1 < leaves.head.shape[0] and n[1] + 128 < leaves.edge.shape[0] and n[2] + 256 < leaves.corner.shape[0]
-    )
+    n = work.count
+    return n[0] + 1 < len(leaf) and n[1] + 128 < len(edge) and n[2] + 256 < len(corner)
 
 
-@jit
-def grown(leaves):
-    """The same with twice the room."""
-    a, e, h = leaves.count[0], leaves.count[1], leaves.count[2]
-    n, m, k = 2 * leaves.head.shape[0], 2 * leaves.edge.shape[0] + 256, 2 * leaves.corner.shape[0] + 384
-    head, x, density = np.empty((n, 9), np.int64), np.empty((n, 3)), np.empty((n, 3))
-    centre, slope, flux = np.empty((n, 2)), np.zeros((n, 2)), np.empty(n)
-    ray, edge, corner = np.empty((n, 2, 3, 3, 3)), np.empty((m, 3, 3)), np.empty((k, 2))
-    soft = np.zeros(m)
-    soft[:e] = leaves.soft[:e]
-    head[:a], x[:a], density[:a] = leaves.head[:a], leaves.x[:a], leaves.density[:a]
-    centre[:a], slope[:a], flux[:a], ray[:a] = leaves.centre[:a], leaves.slope[:a], leaves.flux[:a], leaves.ray[:a]
-    edge[:e], corner[:h] = leaves.edge[:e], leaves.corner[:h]
-    return Leaves(leaves.count, head, x, density, centre, slope, flux, ray, edge, soft, corner)
-
-
-@jit
-def plane_map(facets, facet, position, direction, out):
+@part
+def plane_map(facet, position, direction, out, work):
     """Where a bundle meets a receiver, in the coordinates of its map: out = [[r_u, r_v], [d/dq_u], [d/dq_v]]; returns the
     distance and the determinant."""
-    at, towards = position.copy(), direction.copy()
-    distance, _, _ = advance(at, towards, facets[facet].plane)
-    frame = facets[facet].frame
+    for c in range(3):
+        for k in range(3):
+            work.at[c, k], work.towards[c, k] = position[c, k], direction[c, k]
+    distance, _, _ = advance(work.at, work.towards, facet.plane)
+    frame = facet.frame
     for w in range(2):
         for c in range(3):
-            out[c, w] = dot(at[c], frame[1 + w])
+            out[c, w] = dot(work.at[c], frame[1 + w])
         out[0, w] -= dot(frame[0], frame[1 + w])
     return distance, out[1, 0] * out[2, 1] - out[1, 1] * out[2, 0]
 
 
-@jit
-def lay_leaf(nodes, i, facets, kind, density, leaves):
-    """Write beam i's outline behind the last leaf without counting it; returns how far its edges are from moving
+@part
+def lay_leaf(beam, facets, kind, leaf, edge, corner, work):
+    """Write a beam's outline behind the last leaf without counting it; returns how far its edges are from moving
     linearly with x (in the target's lengths), and the relative deviation of its density; the first is negative where
     nothing can be drawn."""
-    row, first = leaves.count[0], leaves.count[1]
-    maps, det = np.zeros((3, 3, 2)), np.ones(3)
-    for a in range(3):
+    row, first, corners = work.count[0], work.count[1], work.count[2]
+    new, maps, det = leaf[row], work.map, work.det
+    lo, hi = first_place(beam), last_place(beam)
+    for a in range(lo, hi):
+        density = beam.weight[a] * beam.boost * work.density
         if kind == 0:
-            distance, det[a] = plane_map(
-                facets, nodes[i].facet, nodes[i].position[a], nodes[i].direction[a], maps[a]
-            )
-            leaves.density[row, a] = nodes[i].weight[a] * nodes[i].boost * density / max(abs(det[a]), 1e-30)
+            distance, det[a] = plane_map(facets[beam.facet], beam.position[a], beam.direction[a], maps[a], work)
+            density /= max(abs(det[a]), 1e-30)
             if distance < 0.0 or abs(det[a]) < 1e-30:
-                leaves.density[row, a] = 0.0
+                density = 0.0
         else:
-            maps[a, 0, 0], maps[a, 0, 1] = nodes[i].centre[0], nodes[i].centre[1]
-            maps[a, 1, 0] = maps[a, 2, 1] = 1.0
-            leaves.density[row, a] = nodes[i].weight[a] * nodes[i].boost * density
-    n = nodes[i].lines
+            maps[a, 0, 0], maps[a, 0, 1] = beam.centre[0], beam.centre[1]
+            maps[a, 1, 0] = maps[a, 2, 1] = det[a] = 1.0
+            maps[a, 1, 1] = maps[a, 2, 0] = 0.0
+        new.density[a] = density
+    n = beam.lines
     for l in range(n):
-        for a in range(3):
-            line, m = nodes[i].line[l, a], maps[a]
-            value = line[0] + line[1] * nodes[i].centre[0] + line[2] * nodes[i].centre[1]
+        edge[first + l].soft = 0.0
+        for a in range(lo, hi):
+            line, m, out = beam.line[l, a], maps[a], edge[first + l].line
+            value = line[0] + line[1] * beam.centre[0] + line[2] * beam.centre[1]
             d = det[a] if abs(det[a]) > 1e-30 else 1e-30
             au = (line[1] * m[2, 1] - line[2] * m[1, 1]) / d
             av = (line[2] * m[1, 0] - line[1] * m[2, 0]) / d
             c = value - au * m[0, 0] - av * m[0, 1]
-            size = max(np.hypot(au, av), 1e-300)
-            leaves.edge[first + l, a, 0], leaves.edge[first + l, a, 1] = au / size, av / size
-            leaves.edge[first + l, a, 2] = c / size
-    corners = leaves.count[2]
+            size = max(np.sqrt(au * au + av * av), 1e-300)
+            out[a, 0], out[a, 1], out[a, 2] = au / size, av / size, c / size
+            if lo == 1:
+                for b in (0, 2):
+                    out[b, 0], out[b, 1], out[b, 2] = out[1, 0], out[1, 1], out[1, 2]
     bent = 0.0
-    for a in range(3):
-        for c in range(nodes[i].corners[a]):
-            u = nodes[i].corner[a, c, 0] - nodes[i].centre[0]
-            v = nodes[i].corner[a, c, 1] - nodes[i].centre[1]
+    for a in range(lo, hi):
+        for c in range(beam.corners[a]):
+            u, v = beam.corner[a, c, 0] - beam.centre[0], beam.corner[a, c, 1] - beam.centre[1]
             pu = maps[a, 0, 0] + u * maps[a, 1, 0] + v * maps[a, 2, 0]
             pv = maps[a, 0, 1] + u * maps[a, 1, 1] + v * maps[a, 2, 1]
-            leaves.corner[corners, 0], leaves.corner[corners, 1] = pu, pv
+            corner[corners, 0], corner[corners, 1] = pu, pv
             corners += 1
-            if a == 1:
-                before = c - 1 if c > 0 else nodes[i].corners[a] - 1
-                for l in (nodes[i].side[a, c], nodes[i].side[a, before]):
-                    e = leaves.edge[first + l]
+            if a == 1 and lo == 0:
+                before = c - 1 if c > 0 else beam.corners[a] - 1
+                for b in (before, c):
+                    e = edge[first + beam.side[a, b]].line
                     off = 0.5 * ((e[0, 0] + e[2, 0]) * pu + (e[0, 1] + e[2, 1]) * pv + e[0, 2] + e[2, 2])
                     bent = max(bent, abs(off))
-    if nodes[i].corners[1] == 0 and nodes[i].x[2] > nodes[i].x[0]:
-        bent = 1e300
     for w in range(2):
-        leaves.centre[row, w] = maps[1, 0, w]
-        leaves.slope[row, w] = 0.0
-    d = leaves.density[row]
+        new.centre[w] = maps[1, 0, w]
+        new.slope[w] = 0.0
+    d = new.density
+    if lo == 1:
+        d[0] = d[2] = d[1]
     most = max(d[0], max(d[1], d[2]))
-    uneven = abs(d[1] - 0.5 * (d[0] + d[2])) / most if most > 0.0 else 0.0
-    if most <= 0.0 or corners == leaves.count[2]:
+    if most <= 0.0 or corners == work.count[2]:
         return -1.0, 0.0
-    head = leaves.head[row]
-    head[0], head[1], head[6], head[7] = kind, nodes[i].facet if kind == 0 else -1, n, corners - leaves.count[2]
-    flight = nodes[i].flight
-    head[2] = nodes[i].path[0, flight - 1] if flight > 0 else -1
-    head[3] = facets[nodes[i].path[0, 0]].owner if flight > 0 else -1
-    head[4], head[5] = nodes[i].depth, nodes[i].mask
-    head[8] = np.int64(nodes[i].key >> np.uint64(33))
-    leaves.x[row] = nodes[i].x
-    leaves.ray[row, 0] = nodes[i].position
-    leaves.ray[row, 1] = nodes[i].direction
-    return bent, uneven
+    if beam.corners[1] == 0:
+        bent = 1e300
+    head, flight = new.head, beam.flight
+    head[0], head[1], head[6], head[7] = kind, beam.facet if kind == 0 else -1, n, corners - work.count[2]
+    head[2] = beam.path[flight - 1, 0] if flight > 0 else -1
+    head[3] = facets[beam.path[0, 0]].owner if flight > 0 else -1
+    head[4], head[5] = beam.depth, beam.mask
+    head[8] = np.int64(beam.key >> np.uint64(33))
+    for a in range(3):
+        b = a if lo == 0 else 1
+        new.x[a] = beam.x[a]
+        for c in range(3):
+            for k in range(3):
+                new.ray[0, a, c, k] = beam.position[b, c, k]
+                new.ray[1, a, c, k] = beam.direction[b, c, k]
+    return bent, abs(d[1] - 0.5 * (d[0] + d[2])) / most
 
 
-@jit
-def density_slope(nodes, i, facets, solids, tables, source, task, kind, leaves):
+@part
+def density_slope(beam, facets, solids, tables, source, kind, new, work):
     """Set the slope of the leaf just laid, of a diverging light: relative change of weight and spread over the target."""
-    if source.kind == PARALLEL and not task.absorbing:
+    if source.kind == PARALLEL and not work.absorbing:
         return
-    row = leaves.count[0]
     size = 0.0
-    for c in range(nodes[i].corners[1]):
-        u, v = nodes[i].corner[1, c, 0] - nodes[i].centre[0], nodes[i].corner[1, c, 1] - nodes[i].centre[1]
-        size = max(size, np.hypot(u, v))
-    if size <= 0.0 or nodes[i].weight[1] <= 0.0:
+    for c in range(beam.corners[1]):
+        u, v = beam.corner[1, c, 0] - beam.centre[0], beam.corner[1, c, 1] - beam.centre[1]
+        size = max(size, np.sqrt(u * u + v * v))
+    if size <= 0.0 or beam.weight[1] <= 0.0:
         return
     step = 0.5 * size
-    position, direction, m = np.empty((3, 3)), np.empty((3, 3)), np.zeros((3, 2))
-    change, at = np.zeros(2), np.zeros(2)
+    change, at, m = work.other, work.point, work.map[0]
     for w in range(2):
-        values = np.zeros(2)
+        low = high = 0.0
         for sign in range(2):
-            at[0], at[1] = nodes[i].centre[0], nodes[i].centre[1]
+            at[0], at[1] = beam.centre[0], beam.centre[1]
             at[w] += step * (2 * sign - 1)
-            values[sign] = follow(
-                source, facets, solids, tables, nodes[i].path, nodes[i].flight, nodes[i].x[1], at, position, direction
+            value = follow(
+                source, facets, solids, tables, beam.path, beam.flight, beam.x[1], at, work.position, work.direction
             )
             if kind == 0:
-                _, det = plane_map(facets, nodes[i].facet, position, direction, m)
-                values[sign] /= max(abs(det), 1e-30)
-        total = values[0] + values[1]
-        change[w] = (values[1] - values[0]) / (step * total) if total > 0.0 else 0.0
+                _, det = plane_map(facets[beam.facet], work.position, work.direction, m, work)
+                value /= max(abs(det), 1e-30)
+            if sign == 0:
+                low = value
+            else:
+                high = value
+        change[w] = (high - low) / (step * (low + high)) if low + high > 0.0 else 0.0
     if kind == 0:
-        _, det = plane_map(facets, nodes[i].facet, nodes[i].position[1], nodes[i].direction[1], m)
+        _, det = plane_map(facets[beam.facet], beam.position[1], beam.direction[1], m, work)
         if abs(det) < 1e-30:
             return
-        leaves.slope[row, 0] = (change[0] * m[2, 1] - change[1] * m[1, 1]) / det
-        leaves.slope[row, 1] = (change[1] * m[1, 0] - change[0] * m[2, 0]) / det
+        new.slope[0] = (change[0] * m[2, 1] - change[1] * m[1, 1]) / det
+        new.slope[1] = (change[1] * m[1, 0] - change[0] * m[2, 0]) / det
     else:
-        leaves.slope[row, 0], leaves.slope[row, 1] = change[0], change[1]
+        new.slope[0], new.slope[1] = change[0], change[1]

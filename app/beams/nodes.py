@@ -1,14 +1,16 @@
 """Beams on the search's stack: their outlines at three places of a band, and how half-planes cut them.
 
-A node's outline is kept twice: as half-planes, which move with the wavelength, and as polygons at the start, the middle
-and the end of the band. A polygon's corner carries the half-plane of the side that starts there.
+A beam's outline is kept twice: as half-planes, which move with the wavelength, and as polygons at the start, the middle
+and the end of the band. A polygon's corner carries the half-plane of the side that starts there. Of a band without
+width the middle alone is kept.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from .rays import PARALLEL, edge_line, emit_straight, follow, jit, meet, total_line
+from .compiling import part
+from .rays import PARALLEL, edge_line, emit, emit_straight, emitted, meet, moments, total_line
 
 CORNERS, LINES, LEVELS = 84, 96, 160
 """Room for corners of a polygon, half-planes of a beam, facets on its path."""
@@ -17,7 +19,6 @@ THIN = 1e-10
 STATIC, TOTAL = -1, -2
 """Kinds of half-planes besides a facet's edge: one that does not move (an aperture, a cell), and the onset of total
 reflection."""
-FLY, AT_FACET = 0, 1
 
 
 NODE = np.dtype(
@@ -26,8 +27,8 @@ NODE = np.dtype(
         # polygon is empty, `held` entries of `side` name the half-planes that left nothing.
         ("corner", "f8", (3, CORNERS, 2)),
         ("side", "i4", (3, CORNERS)),
-        ("corners", "i4", 3),
-        ("held", "i4", 3),
+        ("corners", "i8", 3),
+        ("held", "i8", 3),
         # Half-planes: line[0] + line[1] q_u + line[2] q_v >= 0 at each place, and how to make them again: flight,
         # facet, edge (or STATIC, TOTAL), sign.
         ("line", "f8", (LINES, 3, 3)),
@@ -45,238 +46,258 @@ NODE = np.dtype(
         # The facet that the whole outline meets next, -1: not yet known; whether it reflects everything (`grow`).
         ("facet", "i8"),
         ("total", "i8"),
+        # The kind of leaf that it is to end as, -1: it goes on.
+        ("ends", "i8"),
         # Solids that it is inside of.
         ("mask", "i8"),
-        ("path", "i4", (5, LEVELS)),
+        ("path", "i4", (LEVELS, 5)),
         # Hash of all choices so far, what roulette gave, curvature last measured.
         ("key", "u8"),
         ("boost", "f8"),
         ("bend", "f8"),
     ]
 )
-"""A beam on the stack. An array of them is what the functions here call `nodes`."""
+"""A beam on the stack: what functions here call `beam`."""
 
 
-@jit
-def clip(corner, side, count, line, label, out_corner, out_side):
-    """Part of a convex polygon where line >= 0 [Sutherland, Hodgman 1974]; returns its corners."""
+@part
+def first_place(beam):
+    """The first of a beam's places."""
+    return 0 if beam.x[2] > beam.x[0] else 1
+
+
+@part
+def last_place(beam):
+    """One behind the last of a beam's places."""
+    return 3 if beam.x[2] > beam.x[0] else 2
+
+
+@part
+def clip(corner, side, count, label, work):
+    """Keep the part of a convex polygon where `work.height`, given at its corners, is not negative [Sutherland,
+    Hodgman 1974]; returns its corners."""
+    height, spare, spare_side = work.height, work.spare_corner, work.spare_side
     kept = 0
     for i in range(count):
         j = i + 1 if i + 1 < count else 0
-        here = line[0] + line[1] * corner[i, 0] + line[2] * corner[i, 1]
-        there = line[0] + line[1] * corner[j, 0] + line[2] * corner[j, 1]
-        if here >= 0.0:
-            if kept < CORNERS - 1:
-                out_corner[kept, 0], out_corner[kept, 1], out_side[kept] = corner[i, 0], corner[i, 1], side[i]
-                kept += 1
-        if (here >= 0.0) != (there >= 0.0):
+        here, there = height[i], height[j]
+        if here >= 0.0 and kept < CORNERS - 1:
+            spare[kept, 0], spare[kept, 1], spare_side[kept] = corner[i, 0], corner[i, 1], side[i]
+            kept += 1
+        if (here >= 0.0) != (there >= 0.0) and kept < CORNERS - 1:
             at = here / (here - there)
-            u = corner[i, 0] + at * (corner[j, 0] - corner[i, 0])
-            v = corner[i, 1] + at * (corner[j, 1] - corner[i, 1])
-            if kept < CORNERS - 1:
-                out_corner[kept, 0], out_corner[kept, 1] = u, v
-                out_side[kept] = label if here >= 0.0 else side[i]
-                kept += 1
-    return kept if kept > 2 else 0
+            spare[kept, 0] = corner[i, 0] + at * (corner[j, 0] - corner[i, 0])
+            spare[kept, 1] = corner[i, 1] + at * (corner[j, 1] - corner[i, 1])
+            spare_side[kept] = label if here >= 0.0 else side[i]
+            kept += 1
+    if kept < 3:
+        return 0
+    longest = twice = 0.0
+    for i in range(1, kept):
+        u, v = spare[i, 0] - spare[0, 0], spare[i, 1] - spare[0, 1]
+        longest = max(longest, abs(u) + abs(v))
+        if i + 1 < kept:
+            twice += u * (spare[i + 1, 1] - spare[0, 1]) - v * (spare[i + 1, 0] - spare[0, 0])
+    if 0.5 * abs(twice) <= THIN * longest:
+        # A line but for rounding.
+        return 0
+    for i in range(kept):
+        corner[i, 0], corner[i, 1], side[i] = spare[i, 0], spare[i, 1], spare_side[i]
+    return kept
 
 
-@jit
-def is_thin(corner, count):
-    """Whether a polygon is a line but for rounding."""
-    longest = 0.0
-    for i in range(1, count):
-        longest = max(longest, abs(corner[i, 0] - corner[0, 0]) + abs(corner[i, 1] - corner[0, 1]))
-    return abs(area_of(corner, count)) <= THIN * longest
-
-
-@jit
+@part
 def area_of(corner, count):
-    """Signed area of a polygon; positive counter-clockwise."""
+    """Area of a convex polygon."""
     twice = 0.0
     for i in range(1, count - 1):
         twice += (corner[i, 0] - corner[0, 0]) * (corner[i + 1, 1] - corner[0, 1])
         twice -= (corner[i, 1] - corner[0, 1]) * (corner[i + 1, 0] - corner[0, 0])
-    return 0.5 * twice
+    return 0.5 * abs(twice)
 
 
-@jit
-def copy_head(nodes, i, k):
-    """Everything of beam i but its outline to k."""
-    nodes[k].position[:] = nodes[i].position
-    nodes[k].direction[:] = nodes[i].direction
-    nodes[k].weight[:] = nodes[i].weight
-    nodes[k].x[:] = nodes[i].x
-    nodes[k].centre[:] = nodes[i].centre
-    nodes[k].flight = nodes[i].flight
-    nodes[k].depth = nodes[i].depth
-    nodes[k].facet = nodes[i].facet
-    nodes[k].total = nodes[i].total
-    nodes[k].mask = nodes[i].mask
-    for r in range(5):
-        for level in range(nodes[i].flight):
-            nodes[k].path[r, level] = nodes[i].path[r, level]
-    nodes[k].key = nodes[i].key
-    nodes[k].boost = nodes[i].boost
-    nodes[k].bend = nodes[i].bend
-
-
-@jit
-def copy_outline(nodes, i, k):
-    """The outline of beam i to k."""
-    n = nodes[i].lines
-    nodes[k].lines = n
-    nodes[k].line[:n] = nodes[i].line[:n]
-    nodes[k].made[:n] = nodes[i].made[:n]
+@part
+def copy_head(beam, other):
+    """Everything of a beam but its outline to another."""
     for a in range(3):
-        m = nodes[i].corners[a]
-        nodes[k].corners[a] = m
-        nodes[k].corner[a, :m] = nodes[i].corner[a, :m]
-        nodes[k].held[a] = nodes[i].held[a]
-        m = m if m > 0 else nodes[i].held[a]
-        nodes[k].side[a, :m] = nodes[i].side[a, :m]
+        for c in range(3):
+            for k in range(3):
+                other.position[a, c, k] = beam.position[a, c, k]
+                other.direction[a, c, k] = beam.direction[a, c, k]
+        other.weight[a] = beam.weight[a]
+        other.x[a] = beam.x[a]
+    other.centre[0], other.centre[1] = beam.centre[0], beam.centre[1]
+    for level in range(beam.flight):
+        for c in range(5):
+            other.path[level, c] = beam.path[level, c]
+    other.flight = beam.flight
+    other.depth = beam.depth
+    other.facet = beam.facet
+    other.total = beam.total
+    other.ends = beam.ends
+    other.mask = beam.mask
+    other.key = beam.key
+    other.boost = beam.boost
+    other.bend = beam.bend
 
 
-@jit
-def copy(nodes, i, k):
-    """Beam i to k."""
-    copy_head(nodes, i, k)
-    copy_outline(nodes, i, k)
-
-
-@jit
-def forget_idle_lines(nodes, i):
-    """Drop half-planes that bound no polygon of beam i and emptied none."""
-    renamed = np.full(LINES, -1, np.int64)
+@part
+def copy_outline(beam, other):
+    """The outline of a beam to another."""
+    other.lines = beam.lines
+    for l in range(beam.lines):
+        for a in range(3):
+            for c in range(3):
+                other.line[l, a, c] = beam.line[l, a, c]
+        for c in range(4):
+            other.made[l, c] = beam.made[l, c]
     for a in range(3):
-        for c in range(max(nodes[i].corners[a], nodes[i].held[a])):
-            renamed[nodes[i].side[a, c]] = 0
+        other.corners[a], other.held[a] = beam.corners[a], beam.held[a]
+        for c in range(beam.corners[a]):
+            other.corner[a, c, 0], other.corner[a, c, 1] = beam.corner[a, c, 0], beam.corner[a, c, 1]
+        for c in range(max(beam.corners[a], beam.held[a])):
+            other.side[a, c] = beam.side[a, c]
+
+
+@part
+def copy(beam, other):
+    """A beam to another row of the stack."""
+    copy_head(beam, other)
+    copy_outline(beam, other)
+
+
+@part
+def forget_idle_lines(beam, work):
+    """Drop half-planes that bound no polygon of a beam and emptied none."""
+    renamed = work.renamed
+    for l in range(beam.lines):
+        renamed[l] = -1
+    for a in range(3):
+        for c in range(max(beam.corners[a], beam.held[a])):
+            renamed[beam.side[a, c]] = 0
     kept = 0
-    for line in range(nodes[i].lines):
-        if renamed[line] == 0:
-            renamed[line] = kept
-            if kept != line:
-                nodes[i].line[kept] = nodes[i].line[line]
-                nodes[i].made[kept] = nodes[i].made[line]
+    for l in range(beam.lines):
+        if renamed[l] == 0:
+            renamed[l] = kept
+            if kept != l:
+                for a in range(3):
+                    for c in range(3):
+                        beam.line[kept, a, c] = beam.line[l, a, c]
+                for c in range(4):
+                    beam.made[kept, c] = beam.made[l, c]
             kept += 1
-    nodes[i].lines = kept
-    for a in range(3):
-        for c in range(max(nodes[i].corners[a], nodes[i].held[a])):
-            nodes[i].side[a, c] = renamed[nodes[i].side[a, c]]
+    if kept < beam.lines:
+        beam.lines = kept
+        for a in range(3):
+            for c in range(max(beam.corners[a], beam.held[a])):
+                beam.side[a, c] = renamed[beam.side[a, c]]
 
 
-@jit
-def cut(nodes, i, line, made, spare_corner, spare_side):
-    """Cut beam i by one more half-plane, `line` (3, 3) by place; returns whether anything is left."""
-    if nodes[i].lines >= LINES - 1:
-        forget_idle_lines(nodes, i)
-        if nodes[i].lines >= LINES - 1:
+@part
+def heights(corner, count, line, sign, height):
+    """sign * line at a polygon's corners; returns how many are outside."""
+    outside = 0
+    for c in range(count):
+        height[c] = sign * (line[0] + line[1] * corner[c, 0] + line[2] * corner[c, 1])
+        if not height[c] >= 0.0:
+            outside += 1
+    return outside
+
+
+@part
+def cut(beam, line, sign, flight, facet, edge, work):
+    """Cut a beam by one more half-plane, sign * `line` (3, 3) by place; returns whether anything is left."""
+    if beam.lines >= LINES - 1:
+        forget_idle_lines(beam, work)
+        if beam.lines >= LINES - 1:
             return False
-    label = nodes[i].lines
-    nodes[i].line[label] = line
-    nodes[i].made[label] = made
-    nodes[i].lines = label + 1
-    left = False
-    for a in range(3):
-        before = nodes[i].corners[a]
-        m = clip(nodes[i].corner[a], nodes[i].side[a], before, line[a], label, spare_corner, spare_side)
-        if m > 0 and is_thin(spare_corner, m):
-            m = 0
-        nodes[i].corners[a] = m
-        if m == 0 and before > 0:
-            nodes[i].side[a, before] = label
-            nodes[i].held[a] = before + 1
-        for c in range(m):
-            nodes[i].corner[a, c, 0], nodes[i].corner[a, c, 1] = spare_corner[c, 0], spare_corner[c, 1]
-            nodes[i].side[a, c] = spare_side[c]
-        left = left or m > 0
+    label = beam.lines
+    left = used = False
+    for a in range(first_place(beam), last_place(beam)):
+        before = beam.corners[a]
+        if before == 0:
+            continue
+        if heights(beam.corner[a], before, line[a], sign, work.height) == 0:
+            left = True
+            continue
+        used = True
+        beam.corners[a] = clip(beam.corner[a], beam.side[a], before, label, work)
+        if beam.corners[a] == 0:
+            beam.side[a, before] = label
+            beam.held[a] = before + 1
+        else:
+            left = True
+    if used:
+        for a in range(3):
+            for c in range(3):
+                beam.line[label, a, c] = sign * line[a, c]
+        made = beam.made
+        made[label, 0], made[label, 1], made[label, 2], made[label, 3] = flight, facet, edge, 1 if sign > 0.0 else -1
+        beam.lines = label + 1
     return left
 
 
-@jit
-def lay_line(nodes, i, l, a, facets, tables, source, position, direction, centre):
-    """Half-plane l of beam i at place a for rays (position, direction) of its flight about q = `centre`."""
-    facet, edge, sign = nodes[i].made[l, 1], nodes[i].made[l, 2], nodes[i].made[l, 3]
-    line = nodes[i].line[l, a]
-    if edge == TOTAL:
-        flight = nodes[i].made[l, 0]
-        path = nodes[i].path
-        total_line(facets, tables, path[2, flight], path[3, flight], facet, nodes[i].x[a], direction, centre, line)
-    else:
-        edge_line(facets, facet, edge, position, direction, centre, line)
-    if sign < 0:
-        for c in range(3):
-            line[c] = -line[c]
+@part
+def lay_lines(beam, a, flight, plain, facets, tables, work, position, direction):
+    """Lay a beam's half-planes of one flight anew at place a, for rays about its centre; `plain`: 1 facets' edges
+    only, 2 others only, 3 all."""
+    ready = False
+    for l in range(beam.lines):
+        edge = np.int64(beam.made[l, 2])
+        if edge == STATIC or beam.made[l, 0] != flight or (plain & (1 if edge >= 0 else 2)) == 0:
+            continue
+        if not ready:
+            moments(position, direction, work.own_moment)
+            ready = True
+        line = beam.line[l, a]
+        facet = facets[beam.made[l, 1]]
+        if edge == TOTAL:
+            path = beam.path
+            total_line(facet, tables, np.int64(path[flight, 2]), np.int64(path[flight, 3]), beam.x[a], direction, beam.centre, line)
+        else:
+            edge_line(facet, edge, work.own_moment, beam.centre, line)
+        if beam.made[l, 3] < 0:
+            for c in range(3):
+                line[c] = -line[c]
 
 
-@jit
-def lay_out(nodes, i, facets, solids, tables, source, room, spare_corner, spare_side):
-    """Make rays, half-planes and polygons of beam i anew at its three places about its centre; `room`: a square in q
-    that holds everything (centre, half side). Returns whether anything is left."""
-    path = nodes[i].path
-    flights = nodes[i].flight
-    n = nodes[i].lines
-    moving = False
-    for l in range(n):
-        moving = moving or nodes[i].made[l, 2] != STATIC
+@part
+def lay_out(beam, facets, solids, tables, source, work):
+    """Make rays, half-planes and polygons of a beam anew at its places about its centre. Returns whether anything is
+    left."""
+    room, n = work.room, beam.lines
     left = False
     for a in range(3):
-        if a > 0 and nodes[i].x[a] == nodes[i].x[a - 1]:
-            nodes[i].position[a], nodes[i].direction[a] = nodes[i].position[a - 1], nodes[i].direction[a - 1]
-            nodes[i].weight[a] = nodes[i].weight[a - 1]
-            for l in range(n):
-                nodes[i].line[l, a] = nodes[i].line[l, a - 1]
+        beam.corners[a] = beam.held[a] = 0
+    for a in range(first_place(beam), last_place(beam)):
+        position, direction = beam.position[a], beam.direction[a]
+        emit(source, beam.centre, position, direction)
+        weight = emitted(source, beam.centre, direction)
+        if source.kind == PARALLEL:
+            lay_lines(beam, a, 0, 3, facets, tables, work, position, direction)
         else:
-            position, direction = nodes[i].position[a], nodes[i].direction[a]
-            if moving:
-                nodes[i].weight[a] = _follow_with_lines(
-                    nodes, i, a, path, flights, facets, solids, tables, source, position, direction
-                )
-            else:
-                nodes[i].weight[a] = follow(
-                    source, facets, solids, tables, path, flights, nodes[i].x[a], nodes[i].centre, position, direction
-                )
-        corner, side = nodes[i].corner[a], nodes[i].side[a]
+            emit_straight(source, beam.centre, work.at, work.towards)
+            lay_lines(beam, a, 0, 1, facets, tables, work, work.at, work.towards)
+            lay_lines(beam, a, 0, 2, facets, tables, work, position, direction)
+        for k in range(beam.flight):
+            weight *= meet(facets, solids, tables, beam.path, k, beam.x[a], position, direction)
+            lay_lines(beam, a, k + 1, 3, facets, tables, work, position, direction)
+        beam.weight[a] = weight
+        corner, side = beam.corner[a], beam.side[a]
         for c in range(4):
             corner[c, 0] = room[0] + (room[2] if c == 1 or c == 2 else -room[2])
             corner[c, 1] = room[1] + (room[2] if c > 1 else -room[2])
             side[c] = 0
         m = 4
-        nodes[i].held[a] = 0
         for l in range(n):
             before = m
-            m = clip(corner, side, m, nodes[i].line[l, a], l, spare_corner, spare_side)
-            if m > 0 and is_thin(spare_corner, m):
-                m = 0
-            for c in range(m):
-                corner[c, 0], corner[c, 1], side[c] = spare_corner[c, 0], spare_corner[c, 1], spare_side[c]
+            if heights(corner, m, beam.line[l, a], 1.0, work.height) == 0:
+                continue
+            m = clip(corner, side, m, l, work)
             if m == 0:
                 side[before] = l
-                nodes[i].held[a] = before + 1
+                beam.held[a] = before + 1
                 break
-        nodes[i].corners[a] = m
+        beam.corners[a] = m
         left = left or m > 0
     return left
-
-
-@jit
-def _follow_with_lines(nodes, i, a, path, flights, facets, solids, tables, source, position, direction):
-    """`follow`, laying every half-plane on the way in its own flight."""
-    from_source = nodes[i].centre
-    weight = follow(source, facets, solids, tables, path, 0, nodes[i].x[a], from_source, position, direction)
-    n = nodes[i].lines
-    for k in range(flights + 1):
-        if k == 0 and source.kind != PARALLEL:
-            straight, apart = np.empty((3, 3)), np.empty((3, 3))
-            emit_straight(source, from_source, straight, apart)
-            for l in range(n):
-                if nodes[i].made[l, 2] >= 0 and nodes[i].made[l, 0] == 0:
-                    lay_line(nodes, i, l, a, facets, tables, source, straight, apart, from_source)
-        for l in range(n):
-            if k == 0 and source.kind != PARALLEL and nodes[i].made[l, 2] >= 0:
-                continue
-            if nodes[i].made[l, 2] != STATIC and nodes[i].made[l, 0] == k:
-                lay_line(nodes, i, l, a, facets, tables, source, position, direction, from_source)
-        if k < flights:
-            weight *= meet(facets, solids, tables, path, k, nodes[i].x[a], position, direction)
-    return weight
-

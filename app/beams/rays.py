@@ -7,16 +7,14 @@ centre, and beams are kept small enough.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
+
+from .compiling import part
 
 PARALLEL, POINT, PINHOLE = 0, 1, 2
 """Kinds of sources. Rays of the last two diverge; a pinhole's weigh the same all over the picture."""
 REFLECT, REFRACT, PASS = 0, 1, 2
 """What a beam does at a facet; PASS: the medium does not change there."""
-
-jit = numba.njit(cache=True, nogil=True, error_model="numpy")
-
 
 SOURCE = np.dtype(
     [
@@ -37,11 +35,11 @@ what numba compiles takes a hundredth of the time."""
 
 
 FACET, ACTION, BEFORE, AFTER, ABSORBS = range(5)
-"""Rows of a path (5, flights): the facet at the end of each flight, what the beam does there, rows of the glass on the
+"""Columns of a path (flights, 5): the facet at the end of each flight, what the beam does there, rows of the glass on the
 side it comes from and behind (-1: air), row of what the flight's medium absorbs (-1: nothing)."""
 
 
-@jit
+@part
 def at_x(table, row, x):
     """A row of a spectral table at x, linear between its samples."""
     place = min(max(x, 0.0), 1.0) * (table.shape[1] - 1)
@@ -50,12 +48,12 @@ def at_x(table, row, x):
     return (1.0 - part) * table[row, i] + part * table[row, i + 1]
 
 
-@jit
+@part
 def dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@jit
+@part
 def emit(source, centre, position, direction):
     """The bundle that leaves a source about q = `centre`."""
     for k in range(3):
@@ -79,7 +77,7 @@ def emit(source, centre, position, direction):
                 direction[c, k] = shrink * (direction[c, k] - along * direction[0, k])
 
 
-@jit
+@part
 def emit_straight(source, centre, position, direction):
     """The same for a source that diverges, its directions not made unit vectors: exactly affine."""
     for k in range(3):
@@ -89,7 +87,7 @@ def emit_straight(source, centre, position, direction):
         direction[1, k], direction[2, k] = source.right[k], source.up[k]
 
 
-@jit
+@part
 def emitted(source, centre, direction):
     """Relative intensity of a source towards q = `centre`, per unit of q: equal steps on a gnomonic plane are smaller
     solid angles farther out, and a spot fades (`spot.glsl`)."""
@@ -108,7 +106,7 @@ def emitted(source, centre, direction):
     return weight
 
 
-@jit
+@part
 def advance(position, direction, plane):
     """Move a bundle to the plane (n, d); returns the distance at the centre, and its derivatives."""
     cosine = plane[0] * direction[0, 0] + plane[1] * direction[0, 1] + plane[2] * direction[0, 2]
@@ -134,13 +132,13 @@ def advance(position, direction, plane):
     return distance, change_u, change_v
 
 
-@jit
+@part
 def transmitted(cosine, eta):
     """Squared cosine of the transmitted angle, <= 0: total reflection; `eta` = n_incident / n_transmitted."""
     return (1.0 - eta) * (1.0 + eta) + eta * eta * cosine * cosine
 
 
-@jit
+@part
 def reflectance(cosine_i, eta, cosine2_t):
     """Unpolarised Fresnel reflectance; `cosine_i` > 0."""
     if cosine2_t <= 0.0:
@@ -151,7 +149,7 @@ def reflectance(cosine_i, eta, cosine2_t):
     return 0.5 * (s * s + p * p)
 
 
-@jit
+@part
 def reflect(direction, plane):
     """Turn a bundle's directions at a facet."""
     for c in range(3):
@@ -160,7 +158,7 @@ def reflect(direction, plane):
             direction[c, k] -= twice * plane[k]
 
 
-@jit
+@part
 def refract(direction, plane, eta):
     """The same by refraction; grazing where it would be totally reflected. Derivatives: physics of `optics.glsl`,
     written for a flat facet."""
@@ -182,38 +180,38 @@ def refract(direction, plane, eta):
         direction[0, k] /= np.sqrt(length)
 
 
-@jit
+@part
 def index_of(tables, glass, x):
     """Refractive index of a glass's row, 1 for air."""
     return 1.0 if glass < 0 else at_x(tables, glass, x)
 
 
-@jit
+@part
 def meet(facets, solids, tables, path, k, x, position, direction):
     """End flight k of a bundle at its facet and send it on as the path says; returns the share of its power that goes
     this way, what the medium absorbed on the flight included."""
-    facet = path[FACET, k]
+    facet = path[k, FACET]
     plane = facets[facet].plane
     distance, _, _ = advance(position, direction, plane)
     weight = 1.0
-    if path[ABSORBS, k] >= 0:
-        weight = np.exp(-at_x(tables, path[ABSORBS, k], x) * max(distance, 0.0))
-    if path[ACTION, k] == PASS:
+    if path[k, ABSORBS] >= 0:
+        weight = np.exp(-at_x(tables, np.int64(path[k, ABSORBS]), x) * max(distance, 0.0))
+    if path[k, ACTION] == PASS:
         return weight
     if facets[facet].kind == 1:
         reflect(direction, plane)
         return weight * at_x(tables, solids[facets[facet].owner].tint, x)
     theta = plane[0] * direction[0, 0] + plane[1] * direction[0, 1] + plane[2] * direction[0, 2]
-    eta = index_of(tables, path[BEFORE, k], x) / index_of(tables, path[AFTER, k], x)
+    eta = index_of(tables, np.int64(path[k, BEFORE]), x) / index_of(tables, np.int64(path[k, AFTER]), x)
     share = reflectance(abs(theta), eta, transmitted(theta, eta))
-    if path[ACTION, k] == REFLECT:
+    if path[k, ACTION] == REFLECT:
         reflect(direction, plane)
         return weight * share
     refract(direction, plane, eta)
     return weight * (1.0 - share)
 
 
-@jit
+@part
 def follow(source, facets, solids, tables, path, flights, x, centre, position, direction):
     """A bundle about q = `centre` from the source through the first `flights` facets of its path; returns its weight."""
     emit(source, centre, position, direction)
@@ -223,39 +221,38 @@ def follow(source, facets, solids, tables, path, flights, x, centre, position, d
     return weight
 
 
-@jit
-def edge_line(facets, facet, edge, position, direction, centre, line):
+@part
+def moments(position, direction, out):
+    """A bundle's rays as lines [Pluecker]: out[c] = direction, moment X x D; their derivatives for c > 0."""
+    for c in range(3):
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            moment = position[c, i] * direction[0, j] - position[c, j] * direction[0, i]
+            if c > 0:
+                moment += position[0, i] * direction[c, j] - position[0, j] * direction[c, i]
+            out[c, k] = direction[c, k]
+            out[c, 3 + k] = moment
+
+
+@part
+def edge_line(facet, edge, moment, centre, line):
     """Which side of a facet's edge rays pass: line[0] + line[1] q_u + line[2] q_v >= 0 inside, the side product of
     ray and edge [Pluecker]; it stays finite where the ray runs along the facet."""
-    p = facets[facet].corner[edge]
-    o = facets[facet].corner[(edge + 1) % facets[facet].corners]
-    ex, ey, ez = o[0] - p[0], o[1] - p[1], o[2] - p[2]
-    length = np.sqrt(ex * ex + ey * ey + ez * ez)
-    ex, ey, ez = ex / length, ey / length, ez / length
-    n = facets[facet].plane
-    facing = n[0] * direction[0, 0] + n[1] * direction[0, 1] + n[2] * direction[0, 2]
-    sign = -1.0 if facing < 0.0 else 1.0
+    n, e = facet.plane, facet.edge
+    sign = -1.0 if n[0] * moment[0, 0] + n[1] * moment[0, 1] + n[2] * moment[0, 2] < 0.0 else 1.0
     for c in range(3):
-        line[c] = 0.0
-    for c in range(3):
-        # d/dq of (D x e) . (X - P) = (D_c x e) . (X - P) + (D x e) . X_c
-        dx, dy, dz = direction[c, 0], direction[c, 1], direction[c, 2]
-        cx, cy, cz = dy * ez - dz * ey, dz * ex - dx * ez, dx * ey - dy * ex
-        side = (
-            cx * (position[0, 0] - p[0]) + cy * (position[0, 1] - p[1]) + cz * (position[0, 2] - p[2])
-        )
-        line[c] += sign * side
-        if c == 0:
-            for w in range(1, 3):
-                line[w] += sign * (cx * position[w, 0] + cy * position[w, 1] + cz * position[w, 2])
+        side = 0.0
+        for k in range(3):
+            side += e[edge, k] * moment[c, 3 + k] + e[edge, 3 + k] * moment[c, k]
+        line[c] = sign * side
     line[0] -= line[1] * centre[0] + line[2] * centre[1]
 
 
-@jit
-def total_line(facets, tables, path_before, path_after, facet, x, direction, centre, line):
+@part
+def total_line(facet, tables, before, after, x, direction, centre, line):
     """Where a facet transmits: the squared cosine of the transmitted angle to first order, as a line."""
-    n = facets[facet].plane
-    eta = index_of(tables, path_before, x) / index_of(tables, path_after, x)
+    n = facet.plane
+    eta = index_of(tables, before, x) / index_of(tables, after, x)
     theta = n[0] * direction[0, 0] + n[1] * direction[0, 1] + n[2] * direction[0, 2]
     line[0] = transmitted(theta, eta)
     for c in range(1, 3):

@@ -1,24 +1,37 @@
 """The search for beams: from one facet that a light sees, through all facets that light meets after it.
 
-Depth first over an explicit stack. A beam flies (`_fly`): the facets ahead cut it into fragments, each of which meets one
-facet. A fragment is halved in the spectrum where its outline moves too far, in space where rays are too far from
-affine; then it ends on a receiver, or goes on reflected and refracted. Weak children play Russian roulette, whose number
-is a hash of the path, so that the same beams live from frame to frame.
+Depth first over an explicit stack. A beam flies (`grow.fly`): the facets ahead cut it into fragments, each of which
+meets one facet. A fragment is halved in the spectrum where its outline moves too far, in space where rays are too far
+from affine; then it ends on a receiver, or goes on reflected and refracted. Weak children play Russian roulette, whose
+number is a hash of the path, so that the same beams live from frame to frame.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from .nodes import STATIC, area_of, copy, copy_outline, cut, forget_idle_lines, lay_out
-from .rays import advance, at_x, follow, jit
+from .compiling import jit, part
+from .facets import MAX_CORNERS
+from .nodes import (
+    CORNERS,
+    LINES,
+    STATIC,
+    area_of,
+    copy,
+    cut,
+    first_place,
+    forget_idle_lines,
+    heights,
+    last_place,
+    lay_out,
+)
+from .rays import advance, at_x, edge_line, follow
 
 LEAF_RECEIVER, LEAF_PIECE, LEAF_OPEN = 0, 1, 2
-_TOUCHES = 1e-7
-"""GPU units: surfaces this close are in contact."""
-_NARROWEST = 1.0 / 256.0
+NARROWEST = 1.0 / 256.0
 """Bands are not halved below this."""
-_MOST_FRAGMENTS = 192
+FRAGMENTS = 192
+"""Most facets that a beam is cut by in one flight."""
 (
     SUM_DEPOSITED,
     SUM_HANDED,
@@ -35,30 +48,70 @@ _MOST_FRAGMENTS = 192
 """What a search sums up: flux by where it ended, per unit of spectral power; beams followed; leaves."""
 
 
-TASK = np.dtype(
+
+WORK = np.dtype(
     [
+        # What is to be done. Row of the tables: share of the light's power below x, for importance.
         ("power", "i8"),
+        # Power (flux per unit of spectral power) below which a beam plays roulette.
         ("threshold", "f8"),
         ("seed", "u8"),
+        # Most specular events.
         ("depth", "i8"),
+        # Flux per unit of q and of spectral power.
         ("density", "f8"),
+        # Error of places on what goes on, GPU units (from the camera: q).
         ("tolerance", "f8"),
+        # How far, in widths of itself, an outline may move over a band.
         ("drift", "f8"),
+        # Of the light's power, of a band without width.
         ("line_share", "f8"),
+        # Centre and half side of a square in q that holds everything.
         ("room", "f8", 3),
+        # Beams from the camera: what leaves the facets is kept.
         ("sees", "?"),
+        # Some medium absorbs.
         ("absorbing", "?"),
+        # Objects of the scene; sources (more than one: parts of an extended light beside the first).
+        ("objects", "i8"),
+        ("sources", "i8"),
+        # How far it is: end of the stack, steps to go; leaves, edges, corners written; sums.
+        ("top", "i8"),
+        ("steps", "i8"),
+        ("count", "i8", 3),
+        ("sums", "f8", SUMS),
+        # Scratch.
+        ("spare_corner", "f8", (CORNERS, 2)),
+        ("spare_side", "i4", CORNERS),
+        ("height", "f8", CORNERS),
+        ("line", "f8", (3, 3)),
+        ("other_line", "f8", (3, 3)),
+        ("lines", "f8", (MAX_CORNERS, 3, 3)),
+        ("cuts", "i8", MAX_CORNERS),
+        ("laid", "i8", 3),
+        ("renamed", "i8", LINES),
+        ("moment", "f8", (3, 3, 6)),
+        ("own_moment", "f8", (3, 6)),
+        ("position", "f8", (3, 3)),
+        ("direction", "f8", (3, 3)),
+        ("at", "f8", (3, 3)),
+        ("towards", "f8", (3, 3)),
+        ("map", "f8", (3, 3, 2)),
+        ("det", "f8", 3),
+        ("point", "f8", 2),
+        ("other", "f8", 2),
+        ("spread", "f8", 2),
+        ("soft", "f8", LINES),
+        ("own", "f8", LINES),
+        ("hits", "i8", FRAGMENTS),
+        ("hidden", "i1", (FRAGMENTS, FRAGMENTS)),
     ]
 )
-"""What one search is to do, besides the scene and the source. `power`: row of the tables, share of the light's power
-below x, for importance; `threshold`: power (flux per unit of spectral power) below which a beam plays roulette; `depth`:
-most specular events; `density`: flux per unit of q and of spectral power; `tolerance`: error of places on what goes on,
-GPU units (from the camera: q); `line_share`: of the light's power, of a band without width; `drift`: how far, in widths of itself, an outline may move over a band; `room`: centre and
-half side of a square in q that holds everything; `sees`: beams from the camera, what leaves the facets is kept;
-`absorbing`: some medium absorbs."""
+"""One search's task, state and scratch: what compiled functions call `work`. Records instead of many arrays: what numba
+compiles takes far less time."""
 
 
-@jit
+@part
 def mixed(key, word):
     """Hash of a key and one more choice [SplitMix64]."""
     z = key + np.uint64(0x9E3779B97F4A7C15) * (np.uint64(word) + np.uint64(1))
@@ -67,47 +120,54 @@ def mixed(key, word):
     return z ^ (z >> np.uint64(31))
 
 
-@jit
+@part
 def unit(key):
     """A number in [0, 1) from a hash."""
     return float(key >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@jit
-def power_of(nodes, i, tables, task):
-    """Power of beam i: its area in q times its weight, over its band."""
-    best = 0.0
-    for a in range(3):
-        if nodes[i].corners[a] > 0:
-            best = max(best, abs(area_of(nodes[i].corner[a], nodes[i].corners[a])))
-    middle = abs(area_of(nodes[i].corner[1], nodes[i].corners[1])) if nodes[i].corners[1] > 0 else 0.0
-    area = max(middle, 0.5 * best)
-    return area * _per_area(nodes, i, tables, task)
+@part
+def band_power(beam, tables, work):
+    """Flux per unit of q of a beam's band before it met anything, roulette's gain included."""
+    share = work.line_share
+    if beam.x[2] > beam.x[0]:
+        share = at_x(tables, work.power, beam.x[2]) - at_x(tables, work.power, beam.x[0])
+    return beam.boost * share * work.density
+
+
+@part
+def power_as(outline, beam, tables, work):
+    """Power of a beam with another's outline: its area in q times its weight, over its band."""
+    best = most = 0.0
+    for a in range(first_place(beam), last_place(beam)):
+        if outline.corners[a] > 0:
+            best = max(best, area_of(outline.corner[a], outline.corners[a]))
+        most = max(most, beam.weight[a])
+    middle = area_of(outline.corner[1], outline.corners[1]) if outline.corners[1] > 0 else 0.0
+    return max(middle, 0.5 * best) * max(beam.weight[1], 0.25 * most) * band_power(beam, tables, work)
 
 
 @jit
-def _per_area(nodes, i, tables, task):
-    band = task.line_share
-    if nodes[i].x[2] > nodes[i].x[0]:
-        band = at_x(tables, task.power, nodes[i].x[2]) - at_x(tables, task.power, nodes[i].x[0])
-    return max(nodes[i].weight[1], 0.25 * max(nodes[i].weight[0], nodes[i].weight[2])) * nodes[i].boost * band * (
-        task.density
-    )
+def power_of(nodes, i, tables, works):
+    """Power of beam i."""
+    return power_as(nodes[i], nodes[i], tables, works[0])
 
 
-@jit
-def _flux(nodes, i, tables, task):
-    """Power of beam i at the middle of its band."""
-    if nodes[i].corners[1] == 0:
+@part
+def flux_as(outline, beam, tables, work):
+    """Power of a beam with another's outline, at the middle of its band."""
+    if outline.corners[1] == 0:
         return 0.0
-    band = task.line_share
-    if nodes[i].x[2] > nodes[i].x[0]:
-        band = at_x(tables, task.power, nodes[i].x[2]) - at_x(tables, task.power, nodes[i].x[0])
-    area = abs(area_of(nodes[i].corner[1], nodes[i].corners[1]))
-    return area * nodes[i].weight[1] * nodes[i].boost * band * task.density
+    return area_of(outline.corner[1], outline.corners[1]) * beam.weight[1] * band_power(beam, tables, work)
 
 
-@jit
+@part
+def flux_of(beam, tables, work):
+    """Power of a beam at the middle of its band."""
+    return flux_as(beam, beam, tables, work)
+
+
+@part
 def centroid(corner, count, out):
     """Centre of a polygon's area."""
     area = u = v = 0.0
@@ -118,110 +178,119 @@ def centroid(corner, count, out):
         area += twice
         u += twice * (au + bu) / 3.0
         v += twice * (av + bv) / 3.0
+    out[0], out[1] = corner[0, 0], corner[0, 1]
     if abs(area) > 0.0:
-        out[0], out[1] = corner[0, 0] + u / area, corner[0, 1] + v / area
-    else:
-        out[0], out[1] = corner[0, 0], corner[0, 1]
+        out[0] += u / area
+        out[1] += v / area
 
 
-@jit
-def recentre(nodes, i):
-    """Take the middle of beam i's outline as its centre, about which its rays are written."""
-    for a in (1, 0, 2):
-        if nodes[i].corners[a] > 0:
-            u, v = nodes[i].centre[0], nodes[i].centre[1]
-            centroid(nodes[i].corner[a], nodes[i].corners[a], nodes[i].centre)
-            u, v = nodes[i].centre[0] - u, nodes[i].centre[1] - v
-            for b in range(3):
-                for k in range(3):
-                    nodes[i].position[b, 0, k] += u * nodes[i].position[b, 1, k] + v * nodes[i].position[b, 2, k]
-                    nodes[i].direction[b, 0, k] += u * nodes[i].direction[b, 1, k] + v * nodes[i].direction[b, 2, k]
-            return
+@part
+def place_of(beam):
+    """The middle, or a place where the outline exists."""
+    return 1 if beam.corners[1] > 0 else (0 if beam.corners[0] > 0 else 2)
 
 
-@jit
-def drifts(nodes, i, most):
-    """Whether beam i's outline moves over its band by more than `most` of its own width, or exists at one end only."""
-    if nodes[i].x[2] - nodes[i].x[0] <= _NARROWEST:
+@part
+def recentre(beam):
+    """Take the middle of a beam's outline as its centre, about which its rays are written."""
+    a = place_of(beam)
+    if beam.corners[a] == 0:
+        return
+    u, v = beam.centre[0], beam.centre[1]
+    centroid(beam.corner[a], beam.corners[a], beam.centre)
+    u, v = beam.centre[0] - u, beam.centre[1] - v
+    for b in range(first_place(beam), last_place(beam)):
+        p, d = beam.position[b], beam.direction[b]
+        for k in range(3):
+            p[0, k] += u * p[1, k] + v * p[2, k]
+            d[0, k] += u * d[1, k] + v * d[2, k]
+
+
+@part
+def drifts(beam, work):
+    """Whether a beam's outline moves over its band by more than `work.drift` of its own width, or exists at one end
+    only."""
+    if beam.x[2] - beam.x[0] <= NARROWEST:
         return False
     there, size, first, last = 0, 0.0, -1, -1
     for a in range(3):
-        if nodes[i].corners[a] > 0:
+        if beam.corners[a] > 0:
             there += 1
-            size = max(size, abs(area_of(nodes[i].corner[a], nodes[i].corners[a])))
+            size = max(size, area_of(beam.corner[a], beam.corners[a]))
             first = a if first < 0 else first
             last = a
     if there < 2:
         return True
-    one, other = np.empty(2), np.empty(2)
-    centroid(nodes[i].corner[first], nodes[i].corners[first], one)
-    centroid(nodes[i].corner[last], nodes[i].corners[last], other)
-    moved = np.hypot(other[0] - one[0], other[1] - one[1])
-    return moved > most * np.sqrt(size)
+    centroid(beam.corner[first], beam.corners[first], work.point)
+    centroid(beam.corner[last], beam.corners[last], work.other)
+    u, v = work.other[0] - work.point[0], work.other[1] - work.point[1]
+    return u * u + v * v > work.drift * work.drift * size
 
 
-@jit
-def halve_spectrum(nodes, i, k, at, facets, solids, tables, source, task, spare_corner, spare_side):
-    """Cut beam i's band at x = `at`: the lower part stays at i, the upper one goes to k. Returns (is i left, is k)."""
-    copy(nodes, i, k)
-    forget_idle_lines(nodes, i)
-    copy_outline(nodes, i, k)
-    lo, hi = nodes[i].x[0], nodes[i].x[2]
-    nodes[i].x[1], nodes[i].x[2] = 0.5 * (lo + at), at
-    nodes[k].x[0], nodes[k].x[1] = at, 0.5 * (at + hi)
-    nodes[i].key, nodes[k].key = mixed(nodes[i].key, 11), mixed(nodes[k].key, 12)
-    low = lay_out(nodes, i, facets, solids, tables, source, task.room, spare_corner, spare_side)
-    high = lay_out(nodes, k, facets, solids, tables, source, task.room, spare_corner, spare_side)
-    return low, high
+@part
+def halve_spectrum(beam, other, at, facets, solids, tables, source, work):
+    """Cut a beam's band at x = `at`: the lower part stays, the upper one goes to `other`. Returns (is it left, is the
+    other)."""
+    forget_idle_lines(beam, work)
+    copy(beam, other)
+    lo, hi = beam.x[0], beam.x[2]
+    beam.x[1], beam.x[2] = 0.5 * (lo + at), at
+    other.x[0], other.x[1] = at, 0.5 * (at + hi)
+    beam.key, other.key = mixed(beam.key, 11), mixed(other.key, 12)
+    low = lay_out(beam, facets, solids, tables, source, work)
+    return low, lay_out(other, facets, solids, tables, source, work)
 
 
-@jit
-def is_curved(nodes, i, facets, solids, tables, source, tolerance, place):
-    """How far, in tolerances, beam i's rays at its facet miss the affine map at the corners of its outline."""
-    path = nodes[i].path
-    plane = facets[nodes[i].facet].plane
-    a = 1 if nodes[i].corners[1] > 0 else (0 if nodes[i].corners[0] > 0 else 2)
-    position, direction = nodes[i].position[a].copy(), nodes[i].direction[a].copy()
-    advance(position, direction, plane)
-    exact, towards = np.empty((3, 3)), np.empty((3, 3))
+@part
+def is_curved(beam, facets, solids, tables, source, tolerance, work):
+    """How far, in tolerances, a beam's rays at its facet miss the affine map at the corners of its outline."""
+    plane = facets[beam.facet].plane
+    a = place_of(beam)
+    p = work.at
+    for c in range(3):
+        for k in range(3):
+            p[c, k], work.towards[c, k] = beam.position[a, c, k], beam.direction[a, c, k]
+    advance(p, work.towards, plane)
     worst = 0.0
-    for c in range(nodes[i].corners[a]):
-        q = nodes[i].corner[a, c]
-        follow(source, facets, solids, tables, path, nodes[i].flight, nodes[i].x[a], q, exact, towards)
-        advance(exact, towards, plane)
+    for c in range(beam.corners[a]):
+        q, exact = beam.corner[a, c], work.position
+        follow(source, facets, solids, tables, beam.path, beam.flight, beam.x[a], q, exact, work.direction)
+        advance(exact, work.direction, plane)
+        u, v = q[0] - beam.centre[0], q[1] - beam.centre[1]
         off = 0.0
         for k in range(3):
-            u, v = q[0] - nodes[i].centre[0], q[1] - nodes[i].centre[1]
-            d = position[0, k] + u * position[1, k] + v * position[2, k] - exact[0, k]
+            d = p[0, k] + u * p[1, k] + v * p[2, k] - exact[0, k]
             off += d * d
-        worst = max(worst, np.sqrt(off))
-    return worst / tolerance
+        worst = max(worst, off)
+    return np.sqrt(worst) / tolerance
 
 
-@jit
-def halve_space(nodes, i, k, spare_corner, spare_side):
-    """Cut beam i across its longer side: one half stays, the other goes to k."""
-    low, high = np.full(2, 1e300), np.full(2, -1e300)
+@part
+def halve_space(beam, other, work):
+    """Cut a beam across its longer side: one half stays, the other goes to `other`."""
+    low_u = low_v = 1e300
+    high_u = high_v = -1e300
     for a in range(3):
-        for c in range(nodes[i].corners[a]):
-            for w in range(2):
-                low[w] = min(low[w], nodes[i].corner[a, c, w])
-                high[w] = max(high[w], nodes[i].corner[a, c, w])
-    along = 0 if high[0] - low[0] >= high[1] - low[1] else 1
-    at = 0.5 * (low[along] + high[along])
-    copy(nodes, i, k)
-    line, made = np.zeros((3, 3)), np.array([0, 0, STATIC, 1])
-    line[:, 0] = -at
-    line[:, 1 + along] = 1.0
-    cut(nodes, i, line, made, spare_corner, spare_side)
-    cut(nodes, k, -line, made, spare_corner, spare_side)
-    for j in (i, k):
-        forget_idle_lines(nodes, j)
-        recentre(nodes, j)
-    nodes[i].key, nodes[k].key = mixed(nodes[i].key, 13), mixed(nodes[k].key, 14)
+        for c in range(beam.corners[a]):
+            u, v = beam.corner[a, c, 0], beam.corner[a, c, 1]
+            low_u, high_u = min(low_u, u), max(high_u, u)
+            low_v, high_v = min(low_v, v), max(high_v, v)
+    along = 0 if high_u - low_u >= high_v - low_v else 1
+    at = 0.5 * (low_u + high_u) if along == 0 else 0.5 * (low_v + high_v)
+    for a in range(3):
+        work.line[a, 0] = -at
+        work.line[a, 1 + along], work.line[a, 2 - along] = 1.0, 0.0
+    copy(beam, other)
+    cut(beam, work.line, 1.0, 0, 0, STATIC, work)
+    cut(other, work.line, -1.0, 0, 0, STATIC, work)
+    beam.key, other.key = mixed(beam.key, 13), mixed(other.key, 14)
+    forget_idle_lines(beam, work)
+    recentre(beam)
+    forget_idle_lines(other, work)
+    recentre(other)
 
 
-@jit
+@part
 def medium(solids, mask):
     """Object whose medium a mask stands for, -1: air."""
     if mask == 0:
@@ -233,75 +302,108 @@ def medium(solids, mask):
     return solids[bit].of_bit
 
 
-@jit
-def facing(facets, facet, direction):
-    """Cosine between a direction and a facet's normal."""
-    n = facets[facet].plane
-    return n[0] * direction[0] + n[1] * direction[1] + n[2] * direction[2]
+@part
+def facing(facet, direction):
+    """Cosine between a bundle's chief ray and a facet's normal."""
+    n = facet.plane
+    return n[0] * direction[0, 0] + n[1] * direction[0, 1] + n[2] * direction[0, 2]
 
 
-@jit
-def is_ahead(facets, solids, nodes, i, facet, cosine):
-    """Whether beam i may meet a facet from this side: into a solid from outside, out of one from inside."""
-    if facets[facet].kind == 0:
-        bit = solids[facets[facet].owner].bit
-        inside = (nodes[i].mask >> bit) & 1
+@part
+def is_ahead(facet, solids, beam, cosine):
+    """Whether a beam may meet a facet from this side: into a solid from outside, out of one from inside."""
+    if facet.kind == 0:
+        inside = (beam.mask >> solids[facet.owner].bit) & 1
         return cosine > 0.0 if inside == 1 else cosine < 0.0
     return abs(cosine) > 0.0
 
 
-@jit
-def spread_of(nodes, i, spread):
-    """Radius of beam i's rays about the chief ray: spread[0] + distance spread[1]."""
-    spread[0] = spread[1] = 0.0
-    a0 = 1
-    for a in range(3):
-        for c in range(nodes[i].corners[a]):
-            u = nodes[i].corner[a, c, 0] - nodes[i].centre[0]
-            v = nodes[i].corner[a, c, 1] - nodes[i].centre[1]
-            off = away = 0.0
+@part
+def spread_of(beam, spread):
+    """Radius of a beam's rays about the chief ray: spread[0] + distance spread[1]."""
+    p, d = beam.position, beam.direction
+    at = away = 0.0
+    for a in range(first_place(beam), last_place(beam)):
+        for c in range(beam.corners[a]):
+            u, v = beam.corner[a, c, 0] - beam.centre[0], beam.corner[a, c, 1] - beam.centre[1]
+            off = apart = 0.0
             for k in range(3):
-                p = nodes[i].position[a, 0, k] + u * nodes[i].position[a, 1, k] + v * nodes[i].position[a, 2, k]
-                d = nodes[i].direction[a, 0, k] + u * nodes[i].direction[a, 1, k] + v * nodes[i].direction[a, 2, k]
-                p -= nodes[i].position[a0, 0, k]
-                d -= nodes[i].direction[a0, 0, k]
-                off += p * p
-                away += d * d
-            spread[0], spread[1] = max(spread[0], np.sqrt(off)), max(spread[1], np.sqrt(away))
+                x = p[a, 0, k] + u * p[a, 1, k] + v * p[a, 2, k] - p[1, 0, k]
+                y = d[a, 0, k] + u * d[a, 1, k] + v * d[a, 2, k] - d[1, 0, k]
+                off += x * x
+                apart += y * y
+            at, away = max(at, off), max(away, apart)
+    spread[0], spread[1] = np.sqrt(at), np.sqrt(away)
 
 
-@jit
-def near_sphere(nodes, i, centre, radius, spread):
-    """Whether beam i may touch a ball ahead of it."""
-    p, d = nodes[i].position[1, 0], nodes[i].direction[1, 0]
-    tx, ty, tz = centre[0] - p[0], centre[1] - p[1], centre[2] - p[2]
-    along = tx * d[0] + ty * d[1] + tz * d[2]
+@part
+def near_sphere(beam, centre, radius, spread):
+    """Whether a beam may touch a ball ahead of it."""
+    p, d = beam.position, beam.direction
+    along = off2 = 0.0
+    for k in range(3):
+        t = centre[k] - p[1, 0, k]
+        along += t * d[1, 0, k]
+        off2 += t * t
     if along < -(radius + spread[0]):
         return False
-    off2 = tx * tx + ty * ty + tz * tz - along * along
     reach = radius + spread[0] + spread[1] * (max(along, 0.0) + radius)
-    return off2 <= reach * reach
+    return off2 - along * along <= reach * reach
 
 
-@jit
-def near_boxes(nodes, i, length, obstacles, spread):
-    """Whether beam i may touch an obstacle within `length`."""
-    p, d = nodes[i].position[1, 0], nodes[i].direction[1, 0]
+@part
+def near_boxes(beam, length, obstacles, spread):
+    """Whether a beam may touch an obstacle within `length`."""
+    p, d = beam.position, beam.direction
     for b in range(len(obstacles)):
         # Grown by the beam's radius where it passes the box's far side.
         far = 0.0
         for k in range(3):
-            far += max(abs(obstacles[b, 0, k] - p[k]), abs(obstacles[b, 1, k] - p[k])) ** 2
+            far += max(abs(obstacles[b, 0, k] - p[1, 0, k]), abs(obstacles[b, 1, k] - p[1, 0, k])) ** 2
         grow = spread[0] + spread[1] * min(np.sqrt(far), length)
         first, last = 0.0, length
         for k in range(3):
-            lo, hi = obstacles[b, 0, k] - grow - p[k], obstacles[b, 1, k] + grow - p[k]
-            if abs(d[k]) < 1e-12:
+            lo, hi = obstacles[b, 0, k] - grow - p[1, 0, k], obstacles[b, 1, k] + grow - p[1, 0, k]
+            if abs(d[1, 0, k]) < 1e-12:
                 if lo > 0.0 or hi < 0.0:
                     last = -1.0
             else:
-                one, other = lo / d[k], hi / d[k]
+                one, other = lo / d[1, 0, k], hi / d[1, 0, k]
                 first, last = max(first, min(one, other)), min(last, max(one, other))
         if first <= last:
             return True
     return False
+
+
+@jit
+def may_touch(nodes, i, length, obstacles, works):
+    """Whether beam i may touch an obstacle within `length`."""
+    spread_of(nodes[i], works[0].spread)
+    return near_boxes(nodes[i], length, obstacles, works[0].spread)
+
+
+@part
+def lay_edges(beam, flown, facet, work):
+    """Whether a facet, met on the flight of beam `flown`, may leave anything of an outline. If so its edges lie in
+    `work.lines` and `work.cuts` says which of them cut. `work.moment` holds the flight's rays."""
+    lo, hi = first_place(flown), last_place(flown)
+    for e in range(facet.corners):
+        work.cuts[e] = 0
+    alive = False
+    for a in range(lo, hi):
+        missed, e = beam.corners[a] == 0, 0
+        while e < facet.corners and not missed:
+            line = work.lines[e, a]
+            edge_line(facet, e, work.moment[a], flown.centre, line)
+            outside = heights(beam.corner[a], beam.corners[a], line, 1.0, work.height)
+            if outside > 0:
+                work.cuts[e] = 1
+                missed = outside == beam.corners[a]
+            e += 1
+        work.laid[a] = e
+        alive = alive or not missed
+    if alive:
+        for a in range(lo, hi):
+            for e in range(work.laid[a], facet.corners):
+                edge_line(facet, e, work.moment[a], flown.centre, work.lines[e, a])
+    return alive
