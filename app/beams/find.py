@@ -17,7 +17,7 @@ from .leaves import Leaves, Store
 from .nodes import NODE, STATIC
 from .search import SUM_ENTERED, SUMS, WORK, may_touch, power_of
 
-_STACK = 1200
+_STACK = 1800
 _STEPS = 20_000
 """Beams followed before `go_on` is asked again."""
 _ROOT_BANDS = 4

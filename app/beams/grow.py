@@ -95,7 +95,7 @@ def cut_to_facet(beam, flight, number, facet, work):
 
 
 @part
-def subtract(nodes, first, top, number, facets, work):
+def subtract(nodes, first, top, number, facets, tables, work):
     """Take what meets a facet away from all outlines first … top; returns the new top."""
     hand, spare = nodes[HAND], nodes[_SPARE]
     facet = facets[number]
@@ -210,7 +210,7 @@ def fly(nodes, facets, solids, tables, obstacles, work):
         work.sums[SUM_NUMERIC] += missing
         missing = 0.0
     if crossing:
-        top = hide(nodes, first, top, facets, solids, work)
+        top = hide(nodes, first, top, facets, solids, tables, work)
     boxed = len(obstacles) > 0 and near_boxes(hand, 1e9, obstacles, spread)
     if boxed:
         # What may meet an obstacle before its facet is handed over.
@@ -228,7 +228,7 @@ def fly(nodes, facets, solids, tables, obstacles, work):
     nodes[top].facet = -1
     top += 1
     for h in range(count):
-        top = subtract(nodes, rest, top, work.hits[h], facets, work)
+        top = subtract(nodes, rest, top, work.hits[h], facets, tables, work)
     for j in range(rest, top):
         # Of the part alone: its rays are still about the whole beam's centre.
         spread_of(nodes[j], spread)
@@ -243,12 +243,16 @@ def fly(nodes, facets, solids, tables, obstacles, work):
 
 
 @part
-def hide(nodes, first, top, facets, solids, work):
+def hide(nodes, first, top, facets, solids, tables, work):
     """Take from every fragment what nearer facets hide; returns the new top. Fragment first + h meets hits[h]."""
     hand, spare, hits, hidden = nodes[HAND], nodes[_SPARE], work.hits, work.hidden
     count = top - first
     for h in range(count):
         own = facets[hits[h]].owner
+        if hand.depth == 0 and facets[hits[h]].kind > 1:
+            # What a light throws on it directly is no beam; it only hides others.
+            nodes[first + h].facet = _DEAD
+            continue
         some = False
         for g in range(count):
             hidden[h, g] = 0
@@ -272,7 +276,7 @@ def hide(nodes, first, top, facets, solids, work):
             top += 1
             for g in range(count):
                 if hidden[h, g] != 0:
-                    top = subtract(nodes, start, top, hits[g], facets, work)
+                    top = subtract(nodes, start, top, hits[g], facets, tables, work)
     return closed_up(nodes, first, top)
 
 

@@ -243,7 +243,14 @@ def _has_beams(scene: Scene, settings: RenderSettings) -> bool:
     painted = settings.local_gain and any(o.local_dispersion for o in scene.objects)
     receives = any(o.material.receives and is_flat(o) for o in scene.objects)
     shines = any(light.profile is None for light in scene.lights)
-    return settings.method == "srd" and not settings.anchor_weights and receives and shines and not painted and bool(beam_objects(scene))
+    return (
+        settings.method == "srd"
+        and not settings.anchor_weights
+        and receives
+        and shines
+        and not painted
+        and bool(beam_objects(scene))
+    )
 
 
 def camera_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:
@@ -478,7 +485,9 @@ def _beam_words(scene: Scene, features: Features) -> str:
     if features.beams:
         carried = [scene.objects[i].name for i in beam_objects(scene)]
         others = [f"{o.name}: {why_no_beams(o)}" for o in specular if why_no_beams(o)]
-        return f"what {', '.join(carried)} throw(s) goes as polygons" + (f"; photons for {'; '.join(others)}" if others else "")
+        return f"what {', '.join(carried)} throw(s) goes as polygons" + (
+            f"; photons for {'; '.join(others)}" if others else ""
+        )
     if features.method != "srd":
         return f"method {features.method} follows photons"
     reasons = [f"{o.name}: {why_no_beams(o)}" for o in specular if why_no_beams(o)]

@@ -45,13 +45,13 @@ from .variants import (
     BIND_RECEIVERS,
     UNIT_EMISSION,
     UNIT_PICTURES,
-    beam_defines,
     beside_defines,
     camera_defines,
     direct_defines,
     halted_bytes,
     halting_defines,
     single_defines,
+    view_beam_defines,
 )
 
 SPLIT_THRESHOLD = 0.004
@@ -190,7 +190,7 @@ class CameraPass:
             return
         shown, structs = self._source
         if self._beams is None:
-            self._beams = ScreenBeams(self._ctx, beam_defines(shown), structs, self.channels.targets)
+            self._beams = ScreenBeams(self._ctx, view_beam_defines(shown), structs, self.channels.targets)
             self._beside = shader.compute(self._ctx, "camera/camera.comp", beside_defines(shown), structs)
             self._beam_objects_buffer = self._ctx.buffer(reserve=4 * len(self._beam_objects))
         assert self._beam_objects_buffer is not None

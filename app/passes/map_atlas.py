@@ -99,7 +99,7 @@ class MapAtlas:
     def settle(self) -> None:
         """Flush for the last time: nothing is added any more, and the scratch textures are given back."""
         self.flush()
-        _park(self.ctx)
+        park(self.ctx)
         shader.release(self.framebuffer, *self.scratch_textures)
         self.scratch_textures = []
 

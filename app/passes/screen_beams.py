@@ -21,7 +21,7 @@ from ..gpu.scene_texels import ROW_TEXELS
 from ..gpu.schema import Field, Struct
 from .map_atlas import park
 from .pixel_lattice import MOST_SHARED
-from .variants import BIND_BEAM_OBJECTS, BIND_BEAM_VIEW, IMAGE_POLYGONS, UNIT_POLYGONS, Defines
+from .variants import BIND_BEAM_VIEW, IMAGE_POLYGONS, UNIT_POLYGONS, Defines
 
 if TYPE_CHECKING:
     from ..gpu.scene_buffers import SceneBuffers
@@ -76,7 +76,7 @@ class ScreenBeams:
     """Owns the programs, what the polygons are packed in and the picture of them."""
 
     def __init__(self, ctx: moderngl.Context, defines: Defines, structs: Sequence[Struct], targets: int) -> None:
-        """`defines`: `beam_defines` of the camera's; `structs`: the camera's records."""
+        """`defines`: `view_beam_defines` of the camera's; `structs`: the camera's records."""
         self._ctx = ctx
         self._targets = targets
         self._program = shader.program(
@@ -111,7 +111,10 @@ class ScreenBeams:
         places, owners, triangles, self._first_corner = fans(polygons)
         vertices = np.zeros(len(places), [("place", "f4", 2), ("polygon", "u4")])
         vertices["place"], vertices["polygon"] = places, owners
-        corners, indices = self._ctx.buffer(vertices.tobytes() or bytes(12)), self._ctx.buffer(triangles.tobytes() or bytes(4))
+        corners, indices = (
+            self._ctx.buffer(vertices.tobytes() or bytes(12)),
+            self._ctx.buffer(triangles.tobytes() or bytes(4)),
+        )
         self._fans = self._ctx.vertex_array(
             self._program, [(corners, "2f4 1u4", "in_place", "in_polygon")], index_buffer=indices
         )

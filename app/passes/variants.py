@@ -275,7 +275,7 @@ def beside_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     return direct_defines(beyond) | {"BEAM_OBJECTS": 1, "BIND_BEAM_OBJECTS": BIND_BEAM_OBJECTS}
 
 
-def beam_defines(beyond: Mapping[str, int | float | str]) -> Defines:
+def view_beam_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     """For polygons of the picture that camera beams see, from what the listed pixels are compiled with. A beam's one
     spectral column is by x itself, and its throughput holds what was absorbed."""
     left_out = {"CAMERA_SPECULAR", "ABSORPTION", "ABSORBERS", "NORMAL_DERIVATIVES", "RANDOM_WAVELENGTH", "HALTS"}

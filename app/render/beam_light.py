@@ -176,4 +176,3 @@ class BeamLight:
 def carries_everything(scene: Scene, carried: tuple[int, ...]) -> bool:
     """Whether no photon of a light is needed at its first surface: all glass and mirrors are carried by beams."""
     return all(i in carried for i, item in enumerate(scene.objects) if item.material.is_specular)
-

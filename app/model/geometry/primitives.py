@@ -22,7 +22,6 @@ from .primitives_water import height_field, rippled_water
 __all__ = [
     "box",
     "brilliant",
-    "step_cut",
     "disc",
     "doublet",
     "ellipsoid",
@@ -35,6 +34,7 @@ __all__ = [
     "slab",
     "solid_of_revolution",
     "sphere",
+    "step_cut",
     "torus",
 ]
 

@@ -114,10 +114,16 @@ def step_cut(
     thin = half * in_range(shape, "girdle", girdle, 0.0, 0.5)
     size = in_range(shape, "table", table, 0.0, 1.0)
     a, b, c = half, long_half, min(cut, 0.9 * min(half, long_half))
-    outline = np.array([(a, -b + c), (a, b - c), (a - c, b), (-a + c, b), (-a, b - c), (-a, -b + c), (-a + c, -b), (a - c, -b)])
+    outline = np.array(
+        [(a, -b + c), (a, b - c), (a - c, b), (-a + c, b), (-a, b - c), (-a, -b + c), (-a + c, -b), (a - c, -b)]
+    )
     # Rows by the share of the way from girdle to table (or culet) and of the height; steeper at the girdle.
-    above = [(1.0 - (1.0 - size) * at, thin + crown * up) for at, up in ((0.0, 0.0), (0.26, 0.42), (0.6, 0.75), (1.0, 1.0))]
-    below = [(1.0 - 0.97 * at, -thin - pavilion * down) for at, down in ((0.0, 0.0), (0.25, 0.4), (0.58, 0.75), (1.0, 1.0))]
+    above = [
+        (1.0 - (1.0 - size) * at, thin + crown * up) for at, up in ((0.0, 0.0), (0.26, 0.42), (0.6, 0.75), (1.0, 1.0))
+    ]
+    below = [
+        (1.0 - 0.97 * at, -thin - pavilion * down) for at, down in ((0.0, 0.0), (0.25, 0.4), (0.58, 0.75), (1.0, 1.0))
+    ]
     rings = [np.column_stack([scale * outline, np.full(8, z)]) for scale, z in (*above[::-1], *below)]
     facets: list[tuple[int, ...]] = [tuple(range(8)), tuple(8 * (len(rings) - 1) + k for k in reversed(range(8)))]
     for row in range(len(rings) - 1):
