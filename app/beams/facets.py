@@ -6,7 +6,7 @@ and a beam that may meet one goes on as photons.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -144,6 +144,14 @@ def beam_scene(
         tuple(i for i in outlines if scene.objects[i].material.is_specular),
         why_not,
     )
+
+
+def shown_as(beams: BeamScene, scene: Scene, axis: SpectralAxis, unit: float) -> BeamScene:
+    """The same facets with the glass, tints and mirrors of `scene`, whose objects stand where those of `beams` do."""
+    tables, glass, tint = _tables(scene, axis, unit)
+    solids = beams.solids.copy()
+    solids["glass"][: len(glass)], solids["tint"][: len(tint)] = glass, tint
+    return replace(beams, tables=tables, solids=solids)
 
 
 def facets_of(mesh: Mesh) -> list[tuple[np.ndarray, int]]:

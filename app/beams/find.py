@@ -133,7 +133,10 @@ _stacks: list[np.ndarray] = []
 
 
 def _take_stack() -> np.ndarray:
-    return _stacks.pop() if _stacks else np.zeros(_STACK, NODE)
+    try:
+        return _stacks.pop()
+    except IndexError:  # also where another thread took the last one
+        return np.zeros(_STACK, NODE)
 
 
 def _work(scene: BeamScene, emission: Emission, how: Search, share: float, sources: int) -> np.ndarray:
