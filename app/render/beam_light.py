@@ -75,7 +75,7 @@ class MovingBeams:
             )
 
 
-MOVING_PARTS = 4
+MOVING_PARTS = 1
 """Points that stand for an extended light in motion."""
 MOVING_COARSEST, MOVING_FINEST = 2e-2, 1e-5
 _MOVING_WORD = 1
