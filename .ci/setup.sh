@@ -87,9 +87,10 @@ offer_xvfb() {
     { command -v xvfb-run && command -v Xvfb && command -v xauth; } >/dev/null 2>&1 || apt_install xvfb xauth || true
 }
 
-# Compile the tree builder ahead of time, so that the first picture does not wait for it.
+# Compile the tree builder and the search for beams ahead of time, so that the first picture does not wait for it.
 warm_caches() {
     "$venv_python" -P -m spectrasplat.model.geometry.bvh --warm >/dev/null 2>&1 || true
+    "$venv_python" -P -m spectrasplat.beams.compile >/dev/null 2>&1 || true
 }
 
 is_installed() {

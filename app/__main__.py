@@ -14,7 +14,7 @@ from contextlib import redirect_stderr, suppress
 from typing import Any, TextIO
 
 from .base.errors import UserError, plain
-from .base.interrupts import exit_code_of, terminations_raise
+from .base.interrupts import INTERRUPTED, exit_code_of, signals_raise
 
 USER_ERROR = 2
 NOT_PRINTED = 1  # as typer has it for a closed pipe
@@ -27,11 +27,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a terminal without × or ° shows "?" instead of failing
             stream.reconfigure(errors="replace")
-    with terminations_raise(), redirect_stderr(_Patient(sys.stderr)):
+    with signals_raise() as ended, redirect_stderr(_Patient(sys.stderr)):
         try:
-            return _printed(_run(arguments))
+            code = _run(arguments)
+            # Typer knows of Ctrl-C only.
+            return _printed(ended.exit_code if code == INTERRUPTED and ended() else code)
         except UserError as error:
-            return _tell(str(error))
+            return _tell(str(error), error.exit_code)
         except MemoryError:
             return _tell("out of memory: use fewer photons, a smaller picture or a simpler mesh")
         except KeyboardInterrupt as interrupt:
@@ -40,6 +42,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if error.filename is not None or error.errno not in _OF_PRINTING:
                 raise
             return _lost(error)
+        except Exception as error:
+            # moderngl says so where a buffer, a texture or a program cannot be made; it may not even be imported.
+            if type(error).__module__.split(".")[0] not in ("moderngl", "_moderngl", "mgl"):
+                raise
+            return _tell(f"OpenGL failed ({error}): use a smaller picture or fewer photons, or update the driver")
 
 
 class _Patient:
@@ -104,7 +111,7 @@ def _lost(error: OSError) -> int:
 
 
 def _tell(message: str, code: int = USER_ERROR) -> int:
-    print(f"spectrasplat: {plain(message)}", file=sys.stderr)
+    print(f"spectrasplat: {plain(' '.join(message.split()))}", file=sys.stderr)
     return code
 
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from .errors import UserError
 
 _PART = re.compile(r"\..*\.[0-9a-f]{8}\.part(\.[^.]*)?", re.DOTALL)
+_open_parts: set[Path] = set()
 _swept: set[str] = set()
 """Folders that this process has looked through for what others left behind."""
 
@@ -73,6 +74,13 @@ def atomic_outputs(*paths: str | os.PathLike[str], lasting: bool = True) -> Iter
             _settle(folder)
 
 
+def remove_parts() -> None:
+    """Remove what is being written, for a process that ends on the spot."""
+    for part in tuple(_open_parts):
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
 def _put_in_place(parts: list[Path], targets: list[Path]) -> None:
     """Rename all `parts`, or none; of several targets the old ones are set aside until then."""
     if len(parts) == 1:
@@ -119,6 +127,7 @@ def _reserved(target: Path, part: Path) -> Iterator[int]:
         # A rename would put a file where a device or a pipe was.
         raise UserError(f"cannot write {target}: it is a device or a pipe; give the name of an ordinary file")
     descriptor = -1
+    _open_parts.add(part)
     try:
         try:
             with suppress(FileNotFoundError):
@@ -139,6 +148,7 @@ def _reserved(target: Path, part: Path) -> Iterator[int]:
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
+        _open_parts.discard(part)
         if descriptor >= 0:
             os.close(descriptor)
 

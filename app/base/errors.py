@@ -15,6 +15,18 @@ from collections.abc import Iterable
 class UserError(Exception):
     """A mistake in what the user gave us, told in one sentence with a way out."""
 
+    exit_code = 2
+
+
+class BrokenPictureError(UserError):
+    """A picture that would be wrong, and is not written."""
+
+    exit_code = 1
+
+
+class DeviceError(UserError, RuntimeError):
+    """OpenGL could not do what was asked of it."""
+
 
 def visible(text: str) -> str:
     """`text` with what could command a terminal (control and direction characters) written out, but for white space.

@@ -11,6 +11,7 @@ Files appear whole or not at all (`atomic`).
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 from collections.abc import Iterator, Mapping
@@ -22,7 +23,7 @@ import numpy as np
 
 from . import files
 from .atomic import atomic_output
-from .errors import UserError
+from .errors import BrokenPictureError, UserError
 from .tone_map import auto_exposure, srgb_eotf, tone_map_8bit
 
 SUFFIXES = (".png", ".exr", ".npy")
@@ -70,11 +71,12 @@ def write_image(
     rgb: (H, W, 3) linear Rec.709 radiance. exposure_ev: stops added to the automatic exposure
     (PNG only). spectral: (H, W, B) radiance per bin in W/(m² sr), written as the channels
     `S0.<centre>nm` of an .exr; bin_edges_nm: (B + 1,) rising. metadata: short texts kept in .png
-    and .exr. Raises `UserError` for an unknown suffix or a place that cannot be written.
+    and .exr. Raises `UserError` for an unknown suffix or a place that cannot be written, `BrokenPictureError` for
+    numbers that are not finite.
     """
     check_suffix(path)
     with atomic_output(path) as temporary:
-        write_into(temporary, rgb, exposure_ev, spectral, bin_edges_nm, metadata)
+        write_into(temporary, rgb, exposure_ev, spectral, bin_edges_nm, metadata, str(path))
 
 
 def write_into(
@@ -84,12 +86,19 @@ def write_into(
     spectral: np.ndarray | None = None,
     bin_edges_nm: np.ndarray | None = None,
     metadata: Mapping[str, str] | None = None,
+    name: str = "",
 ) -> None:
-    """As `write_image`, into a file that the caller got from `atomic_outputs`, together with others."""
+    """As `write_image`, into a file that the caller got from `atomic_outputs`, together with others; `name`: what
+    messages call it."""
     suffix = part.suffix.lower()
     rgb = np.ascontiguousarray(rgb, np.float32)
     if rgb.ndim != 3 or rgb.shape[2] != 3 or 0 in rgb.shape:
         raise ValueError(f"a picture is (H, W, 3) and not empty, got {rgb.shape}")
+    if not np.isfinite(rgb).all() or (spectral is not None and not np.isfinite(spectral).all()):
+        raise BrokenPictureError(
+            f"{name or part.name} is not written: the picture holds numbers that are not finite; a power or a size of the "
+            "scene is beyond what float32 can hold, choose others"
+        )
     metadata = dict(metadata or {})
     if suffix == ".png":
         _write_png(part, rgb, exposure_ev or 0.0, metadata)
@@ -188,7 +197,7 @@ def _write_exr(
         with OpenEXR.File(header, channels) as file:
             file.write(str(path))
     except RuntimeError as error:  # OpenEXR turns every failure to write into this
-        raise OSError(None, str(error), str(path)) from error
+        raise OSError(errno.EIO, "its pixels cannot be stored (is the disk full?)", str(path)) from error
 
 
 def _read_exr(path: Path) -> Picture:

@@ -1,17 +1,24 @@
 """Ctrl-C, SIGTERM and SIGHUP: one way to end, which cleans up and keeps what is done.
 
-Outside `interrupt_flag` each of them raises KeyboardInterrupt, so that `finally` removes partial files.
+Outside `interrupt_flag` each of them raises KeyboardInterrupt, so that `finally` removes partial files; but for
+imports, which an exception may leave locked for ever: there the process ends at once.
 """
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from .atomic import remove_parts
+
 _OTHERS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+
+INTERRUPTED = 130
 
 
 class Terminated(KeyboardInterrupt):
@@ -43,14 +50,30 @@ def exit_code_of(interrupt: KeyboardInterrupt) -> int:
 
 
 @contextmanager
-def terminations_raise() -> Iterator[None]:
-    """Within the block SIGTERM and SIGHUP raise `Terminated`, unless somebody chose otherwise (nohup ignores one)."""
+def signals_raise() -> Iterator[Interruption]:
+    """Within the block SIGTERM and SIGHUP raise `Terminated`, unless somebody chose otherwise (nohup ignores one), and
+    Ctrl-C raises KeyboardInterrupt as ever; what is yielded knows of it where the exception was lost on the way."""
+    interruption = Interruption()
 
-    def end(number: int, _frame: FrameType | None) -> None:
-        raise Terminated(number)
+    def end(number: int, frame: FrameType | None) -> None:
+        interruption.number = number
+        if _is_importing(frame):
+            remove_parts()
+            os.write(2, b"spectrasplat: interrupted\n")
+            os._exit(interruption.exit_code)
+        raise KeyboardInterrupt if number == signal.SIGINT else Terminated(number)
 
-    with _handled({number: end for number in _OTHERS if signal.getsignal(number) is signal.SIG_DFL}):
-        yield
+    usual = (signal.SIG_DFL, signal.default_int_handler)
+    with _handled({number: end for number in (signal.SIGINT, *_OTHERS) if signal.getsignal(number) in usual}):
+        yield interruption
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 @contextmanager

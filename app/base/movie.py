@@ -236,7 +236,7 @@ def _ffmpeg() -> str:
 
 def _last_line(told: bytes) -> str:
     lines = [line for line in told.decode(errors="replace").splitlines() if line.strip()]
-    return f"ffmpeg says '{lines[-1].strip()}'" if lines else "ffmpeg ended without a word"
+    return f"ffmpeg says '{lines[-1].strip()}'" if lines else "ffmpeg ended without a word (is the disk full?)"
 
 
 def open_sink(

@@ -12,7 +12,7 @@ from ..model.optics.colorimetry import daylight_per_lumen
 from ..model.optics.spectral_tables import SpectralAxis, cumulative
 from ..model.optics.spectrum import Spectrum
 from ..model.scene import Camera, Scene
-from .convert import _chosen, _hulls, _objects_of
+from .convert import Chosen, hulls_around, objects_of
 from .facets import BLACK, SAMPLES, BeamScene, beam_scene
 from .find import Emission, Search, search
 from .leaves import Leaves
@@ -43,7 +43,7 @@ class CameraView:
         matrix[:3, :3] *= unit
         matrix[:3, 3] = to_gpu(np.zeros(3))
         self._meshes = [mesh.transformed(matrix) for mesh in world_meshes]
-        self.scene: BeamScene = beam_scene(scene, self._meshes, {}, axis, unit, sees=True)
+        self.scene: BeamScene = beam_scene(scene, self._meshes, {}, axis, unit)
         self._objects, self._axis, self._to_gpu, self._unit = len(scene.objects), axis, to_gpu, unit
         self.beams = 0
         """Followed by the last search."""
@@ -79,7 +79,13 @@ class CameraView:
         if entered <= 0.0:
             return [], np.zeros(SUMS), set()
         share = how.threshold * footprint**2 / entered
-        return search(self.scene, emission, Search(share, how.seed, how.depth, how.tolerance, how.drift, sees=True), threads, go_on)
+        return search(
+            self.scene,
+            emission,
+            Search(share, how.seed, how.depth, how.tolerance, how.drift, sees=True),
+            threads,
+            go_on,
+        )
 
     def _entered(self, emission: Emission) -> float:
         """What enters (`search.SUM_ENTERED`), by a search that ends at once."""
@@ -118,10 +124,8 @@ class CameraView:
         return Emission(source, limits, room, power, (), (), True, 1.0, mask), footprint
 
 
-def _screen_polygons(
-    leaves: list[Leaves], scene: BeamScene, middle: np.ndarray, footprint: float
-) -> ScreenPolygons:
-    parts = [(_chosen(leaves, kind), kind) for kind in (LEAF_OPEN, LEAF_PIECE)]
+def _screen_polygons(leaves: list[Leaves], scene: BeamScene, middle: np.ndarray, footprint: float) -> ScreenPolygons:
+    parts = [(Chosen(leaves, (kind,)), kind) for kind in (LEAF_OPEN, LEAF_PIECE)]
     head = np.concatenate([part.head for part, _ in parts])
     count = [len(part.head) for part, _ in parts]
     x = np.concatenate([part.x for part, _ in parts])
@@ -132,11 +136,11 @@ def _screen_polygons(
     edges = np.concatenate([edges[:, 0], edges[:, 2]], axis=1)
     for k in (0, 3):
         edges[:, k + 2] = edges[:, k + 2] / footprint - edges[:, k : k + 2] @ middle
-    hulls = [_hulls(part, np.zeros(len(part.head))) for part, _ in parts]
+    hulls = [hulls_around(part, np.zeros(len(part.head))) for part, _ in parts]
     hull_start = np.concatenate([hulls[0][0], hulls[0][0][-1] + hulls[1][0][1:]])
     last = np.maximum(head[:, 2], 0)
     towards = np.einsum("mk,mk->m", ray[:, 1, 1, 0], scene.facets["plane"][last, :3])
-    key = (head[:, 2] * 2654435761 + head[:, 4] * 40503 + np.arange(len(head)) * 97) & 0xFFFFFFFF
+    key = head[:, 8] & 0xFFFFFFFF
     return ScreenPolygons(
         np.repeat([False, True], count),
         head[:, 3].astype(np.int32),
@@ -151,7 +155,7 @@ def _screen_polygons(
         scene.facets["triangle"][last].astype(np.int32),
         scene.facets["owner"][last].astype(np.int32),
         towards < 0.0,
-        _objects_of(head[:, 5], scene),
+        objects_of(head[:, 5], scene),
         np.concatenate([[0], np.cumsum(head[:, 6])]).astype(np.int32),
         edges,
         hull_start.astype(np.int32),

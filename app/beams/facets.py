@@ -132,6 +132,7 @@ def beam_scene(
         why_not[i] = f"more than {MAX_SOLIDS} transparent solids"
         obstacles.append(i)
         del outlines[i]
+    _cut_where_they_cross(outlines)
     ranked = sorted(transparent[:MAX_SOLIDS], key=lambda i: (scene.objects[i].material.priority, i))
     tables, glass, tint = _tables(scene, axis, unit)
     facets = _facets(scene, outlines, receivers, frames)
@@ -238,6 +239,73 @@ def convex_hull(points: np.ndarray) -> np.ndarray:
 
     lower, upper = half(order), half(order[::-1])
     return np.array(lower[:-1] + upper[:-1])
+
+
+def _cut_where_they_cross(outlines: dict[int, list[tuple[np.ndarray, int]]]) -> None:
+    """Cut facets of different objects that cross each other along the line where they do: which one is nearer may
+    change from one side of it to the other, but nowhere else."""
+    whole = {i: [corners for corners, _ in pieces] for i, pieces in outlines.items()}
+    low = {i: np.array([c.min(axis=0) for c in pieces]).reshape(-1, 3) for i, pieces in whole.items()}
+    high = {i: np.array([c.max(axis=0) for c in pieces]).reshape(-1, 3) for i, pieces in whole.items()}
+    for i, pieces in outlines.items():
+        for j in outlines:
+            if i == j or not len(low[i]) or not len(low[j]):
+                continue
+            if (low[i].min(axis=0) > high[j].max(axis=0)).any() or (low[j].min(axis=0) > high[i].max(axis=0)).any():
+                continue
+            result = []
+            for corners, triangle in pieces:
+                near = (corners.min(axis=0) <= high[j]).all(axis=1) & (corners.max(axis=0) >= low[j]).all(axis=1)
+                parts = [corners]
+                for other in np.flatnonzero(near):
+                    parts = [part for whole_part in parts for part in _cut_by(whole_part, whole[j][other])]
+                result += [(part, triangle) for part in parts]
+            pieces[:] = result
+
+
+def _cut_by(corners: np.ndarray, other: np.ndarray) -> list[np.ndarray]:
+    """A convex facet, in two where another one crosses it."""
+    normal, apart = _plane_and_side(other, corners)
+    own_normal, other_apart = _plane_and_side(corners, other)
+    along = np.cross(normal, own_normal)
+    length = float(np.linalg.norm(along))
+    size = float(np.ptp(corners, axis=0).max() + np.ptp(other, axis=0).max())
+    least = _COPLANAR * size
+    if length < 1e-6 or min(apart.max(), -apart.min(), other_apart.max(), -other_apart.min()) <= least:
+        return [corners]
+    spans = [np.sort(_on_plane(c, d) @ along / length) for c, d in ((corners, apart), (other, other_apart))]
+    if min(spans[0][-1], spans[1][-1]) - max(spans[0][0], spans[1][0]) <= least:
+        return [corners]
+    result = []
+    for sign in (1.0, -1.0):
+        part = []
+        for k in range(len(corners)):
+            here, there = sign * apart[k - 1], sign * apart[k]
+            if (here > 0.0) != (there > 0.0):
+                part.append(corners[k - 1] + here / (here - there) * (corners[k] - corners[k - 1]))
+            if there > 0.0:
+                part.append(corners[k])
+        if len(part) > MAX_CORNERS:
+            result.append(np.array([part[0], *part[MAX_CORNERS - 1 :]]))
+            part = part[:MAX_CORNERS]
+        result.append(np.array(part))
+    return result
+
+
+def _plane_and_side(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Normal of a polygon's plane, and how far before it points lie."""
+    middle = corners.mean(axis=0)
+    normal = np.cross(corners - middle, np.roll(corners, -1, axis=0) - middle).sum(axis=0)
+    normal /= np.linalg.norm(normal)
+    return normal, (points - middle) @ normal
+
+
+def _on_plane(corners: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """Where a polygon's outline meets a plane that its corners lie so far before."""
+    after, there = np.roll(corners, -1, axis=0), np.roll(apart, -1)
+    across = (apart > 0.0) != (there > 0.0)
+    part = (apart / np.where(across, apart - there, 1.0))[across, None]
+    return corners[across] + part * (after - corners)[across]
 
 
 def _facets(

@@ -85,7 +85,7 @@ def search(
     args = scene.facets, scene.solids, tables, sources
     starts: list[tuple[int, np.ndarray, np.ndarray]] = []
     blocked: set[int] = set()
-    stack = _take_stack()
+    stack = take_stack()
     for lo, hi, share in bands:
         work = _work(scene, emission, how, share, len(sources))
         for row in range(FIRST, _roots(stack, (lo, hi), emission, work.copy(), args)):
@@ -111,7 +111,7 @@ def search(
     def one(job: tuple[np.ndarray, np.ndarray]) -> Leaves:
         root, work = job
         store = Store()
-        stack = _take_stack()
+        stack = take_stack()
         stack[FIRST : FIRST + 1] = root
         work["top"] = FIRST + 1
         while go_on() and work["top"][0] > FIRST:
@@ -132,11 +132,17 @@ def search(
 _stacks: list[np.ndarray] = []
 
 
+<<<<<<< HEAD
 def _take_stack() -> np.ndarray:
     try:
         return _stacks.pop()
     except IndexError:  # also where another thread took the last one
         return np.zeros(_STACK, NODE)
+=======
+def take_stack() -> np.ndarray:
+    """Rows for beams to be followed; what they hold is anything."""
+    return _stacks.pop() if _stacks else np.zeros(_STACK, NODE)
+>>>>>>> core
 
 
 def _work(scene: BeamScene, emission: Emission, how: Search, share: float, sources: int) -> np.ndarray:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import jit, part
-from .leaves import density_slope, has_room, lay_leaf
+from .facets import MAX_CORNERS
+from .leaves import density_slope, has_room, lay_leaf, passes, plane_map
 from .nodes import (
     LEVELS,
     STATIC,
@@ -24,6 +25,7 @@ from .rays import (
     PASS,
     REFLECT,
     REFRACT,
+    at_x,
     emit_straight,
     follow,
     index_of,
@@ -67,6 +69,8 @@ from .search import (
     unit,
 )
 
+_FAINT = 0.02
+"""Share of the threshold below which a beam is not halved."""
 _TOUCHES = 1e-7
 """GPU units: surfaces this close are in contact."""
 _UNEVEN = 0.15
@@ -86,22 +90,30 @@ _LAY, _UNKNOWN, _SOME, _ALL = -2, -1, 0, 1
 
 
 @part
-def cut_to_facet(beam, flight, number, facet, work):
+def facet_of(hit):
+    """The facet of a hit: its number where it is met from its inner side, else ~number."""
+    return hit if hit >= 0 else ~hit
+
+
+@part
+def cut_to_facet(beam, flight, hit, facet, work):
     """Keep of an outline what meets a facet whose edges `lay_edges` laid; returns whether anything is left."""
+    way = 1 if hit >= 0 else 2
     for e in range(facet.corners):
-        if work.cuts[e] != 0 and not cut(beam, work.lines[e], 1.0, flight, number, e, work):
+        if work.cuts[e] != 0 and not cut(beam, work.lines[e], 1.0, flight, facet_of(hit), e, way, work):
             return False
     return True
 
 
 @part
-def subtract(nodes, first, top, number, facets, tables, work):
+def subtract(nodes, first, top, hit, facets, tables, work):
     """Take what meets a facet away from all outlines first … top; returns the new top."""
     hand, spare = nodes[HAND], nodes[_SPARE]
+    number, way = facet_of(hit), 1 if hit >= 0 else 2
     facet = facets[number]
     end = top
     for j in range(first, end):
-        if not lay_edges(nodes[j], hand, facet, work):
+        if not lay_edges(nodes[j], hand, facet, hit, work):
             continue
         copy(nodes[j], spare)
         nodes[j].facet = _DEAD
@@ -109,11 +121,11 @@ def subtract(nodes, first, top, number, facets, tables, work):
             if work.cuts[e] == 0:
                 continue
             copy(spare, nodes[top])
-            if cut(nodes[top], work.lines[e], -1.0, hand.flight, number, e, work):
+            if cut(nodes[top], work.lines[e], -1.0, hand.flight, number, e, way, work):
                 forget_idle_lines(nodes[top], work)
                 nodes[top].key = mixed(spare.key, 1000 + e)
                 top += 1
-            if not cut(spare, work.lines[e], 1.0, hand.flight, number, e, work):
+            if not cut(spare, work.lines[e], 1.0, hand.flight, number, e, way, work):
                 break
     return closed_up(nodes, first, top)
 
@@ -165,7 +177,7 @@ def rank(facets, solids, hand, facet):
 
 
 @part
-def fly(nodes, facets, solids, tables, obstacles, work):
+def fly(nodes, facets, solids, tables, source, obstacles, work):
     """Cut the beam in hand by the facets ahead; the fragments lie on the stack afterwards."""
     first = top = work.top
     hand, spread, flight = nodes[HAND], work.spread, nodes[HAND].flight
@@ -173,44 +185,45 @@ def fly(nodes, facets, solids, tables, obstacles, work):
     for a in range(first_place(hand), last_place(hand)):
         moments(hand.position[a], hand.direction[a], work.moment[a])
     last = np.int64(hand.path[flight - 1, 0]) if flight > 0 else -1
-    owner, crossing = -1, False
-    reached = 0.0
+    owner, crossing, is_parallel = -1, False, source.kind == PARALLEL
     for o in range(work.objects):
         if solids[o].first == solids[o].last:
             continue
         if flight > 0 and not near_sphere(hand, solids[o].centre, solids[o].radius, spread):
             continue
-        for f in range(solids[o].first, solids[o].last):
-            cosine = facing(facets[f], hand.direction[1])
-            if f == last or top - first == FRAGMENTS or not is_ahead(facets[f], solids, hand, cosine):
+        for turn in range(2 * solids[o].first, 2 * solids[o].last):
+            f = turn >> 1
+            hit = f if turn & 1 else ~f
+            if f == last or top - first == FRAGMENTS or not is_ahead(facets[f], solids, hand, turn & 1, is_parallel):
                 continue
             if flight > 0 and not near_sphere(hand, facets[f].centre, facets[f].radius, spread):
                 continue
-            if not lay_edges(hand, hand, facets[f], work):
+            if not lay_edges(hand, hand, facets[f], hit, work):
                 continue
             new = nodes[top]
             copy(hand, new)
-            if not cut_to_facet(new, flight, f, facets[f], work):
+            if not cut_to_facet(new, flight, hit, facets[f], work):
                 continue
             recentre(new)
             distance, towards = distance_at(hand, new, facets[f])
-            if distance < -_TOUCHES or towards * cosine <= 0.0:
+            if distance < -_TOUCHES or (towards > 0.0) != (hit >= 0):
                 continue
             new.facet, new.total = f, _LAY
             new.key = mixed(hand.key, 2000 + f)
             forget_idle_lines(new, work)
-            crossing = crossing or (owner >= 0 and owner != o) or not solids[o].convex
+            # Light meets both sides of what is not glass.
+            crossing = crossing or (owner >= 0 and owner != o) or not solids[o].convex or facets[f].kind != 0
             owner = o
-            reached += flux_of(new, tables, work)
-            work.hits[top - first] = f
+            work.hits[top - first] = hit
             top += 1
     count = top - first
-    missing = max(flux_of(hand, tables, work) - reached, 0.0)
-    if count == FRAGMENTS:
-        work.sums[SUM_NUMERIC] += missing
-        missing = 0.0
-    if crossing:
+    if crossing and count > 1:
         top = hide(nodes, first, top, facets, solids, tables, work)
+    missing = flux_of(hand, tables, work)
+    for j in range(first, top):
+        missing -= flux_of(nodes[j], tables, work)
+    # What a source sends past all facets never was a beam.
+    missing = max(missing, 0.0) if flight > 0 else 0.0
     boxed = len(obstacles) > 0 and near_boxes(hand, 1e9, obstacles, spread)
     if boxed:
         # What may meet an obstacle before its facet is handed over.
@@ -218,8 +231,10 @@ def fly(nodes, facets, solids, tables, obstacles, work):
             distance, _ = distance_at(hand, nodes[j], facets[nodes[j].facet])
             if near_boxes(hand, distance + spread[0], obstacles, spread):
                 nodes[j].facet, nodes[j].ends = -1, LEAF_PIECE
-    if not (boxed or work.sees):
-        work.sums[SUM_ESCAPED] += missing
+    is_lost = count == FRAGMENTS or (hand.mask != 0 and not boxed)
+    if is_lost or not (boxed or work.sees):
+        # There is no way out of a solid but through its facets.
+        work.sums[SUM_NUMERIC if is_lost else SUM_ESCAPED] += missing
         work.top = top
         return
     # What meets no facet.
@@ -248,26 +263,26 @@ def hide(nodes, first, top, facets, solids, tables, work):
     hand, spare, hits, hidden = nodes[HAND], nodes[_SPARE], work.hits, work.hidden
     count = top - first
     for h in range(count):
-        own = facets[hits[h]].owner
-        if hand.depth == 0 and facets[hits[h]].kind > 1:
+        one = facets[facet_of(hits[h])]
+        if hand.depth == 0 and one.kind > 1:
             # What a light throws on it directly is no beam; it only hides others.
             nodes[first + h].facet = _DEAD
             continue
         some = False
         for g in range(count):
             hidden[h, g] = 0
-            facet = facets[hits[g]]
-            if g == h or (facet.owner == own and solids[own].convex):
+            other = facets[facet_of(hits[g])]
+            if g == h or (one.owner == other.owner and solids[one.owner].convex and other.kind == 0):
                 continue
-            if not lay_edges(nodes[first + h], hand, facet, work):
+            if not lay_edges(nodes[first + h], hand, other, hits[g], work):
                 continue
             copy(nodes[first + h], spare)
-            if not cut_to_facet(spare, hand.flight, hits[g], facet, work):
+            if not cut_to_facet(spare, hand.flight, hits[g], other, work):
                 continue
             recentre(spare)
-            t_h, _ = distance_at(hand, spare, facets[hits[h]])
-            t_g, _ = distance_at(hand, spare, facet)
-            if t_g >= -_TOUCHES and is_nearer(facets, solids, hand, hits[g], hits[h], t_g, t_h):
+            t_h, _ = distance_at(hand, spare, one)
+            t_g, _ = distance_at(hand, spare, other)
+            if t_g >= -_TOUCHES and is_nearer(facets, solids, hand, facet_of(hits[g]), facet_of(hits[h]), t_g, t_h):
                 hidden[h, g], some = 1, True
         if some:
             start = top
@@ -305,15 +320,18 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
         return
     is_parallel = source.kind == PARALLEL
     recentre(hand)
-    if not is_parallel and not lay_out(hand, facets, solids, tables, source, work):
+    if (not is_parallel or work.absorbing) and not lay_out(hand, facets, solids, tables, source, work):
         return
-    room = work.top + 2 < len(nodes)
+    # Where rays graze, and where a cone fades away, there is no end to halving: what is faint is straight enough.
+    room = work.top + 2 < len(nodes) and power_as(hand, hand, tables, work) > _FAINT * work.threshold
     tolerance = facets[hand.facet].texel if kind == LEAF_RECEIVER else work.tolerance
     if room and not is_parallel and kind == LEAF_RECEIVER:
         if is_curved(hand, facets, solids, tables, source, tolerance, work) > 1.0:
-            halve_space(hand, nodes[work.top], work)
-            push_both(nodes, True, True, work)
+            low, high = halve_space(hand, nodes[work.top], work)
+            push_both(nodes, low, high, work)
             return
+    if kind == LEAF_RECEIVER and work.absorbing:
+        absorb(hand, facets, solids, tables, work)
     bent, uneven = lay_leaf(hand, facets, kind, leaf, edge, corner, work)
     if bent < 0.0:
         return
@@ -328,8 +346,8 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
         u, v = corner[c, 0] - new.centre[0], corner[c, 1] - new.centre[1]
         steepest = max(steepest, abs(new.slope[0] * u + new.slope[1] * v))
     if room and steepest > _STEEP and hand.corners[1] > 0:
-        halve_space(hand, nodes[work.top], work)
-        push_both(nodes, True, True, work)
+        low, high = halve_space(hand, nodes[work.top], work)
+        push_both(nodes, low, high, work)
         return
     if work.sources > 1:
         soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, work)
@@ -340,6 +358,15 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     work.count[2] += new.head[7]
     work.sums[SUM_LEAVES] += 1.0
     work.sums[SUM_DEPOSITED if kind == LEAF_RECEIVER else SUM_HANDED] += flux
+
+
+@part
+def absorb(beam, facets, solids, tables, work):
+    """Take from a beam what the medium of its last flight absorbs."""
+    inside = medium(solids, beam.mask)
+    for a in range(first_place(beam), last_place(beam)):
+        distance, _ = plane_map(facets[beam.facet], beam.position[a], beam.direction[a], work.map[a], work)
+        beam.weight[a] *= passes(solids, tables, inside, beam.x[a], distance)
 
 
 @part
@@ -374,11 +401,11 @@ def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, wor
 @part
 def onset(hand, facets, solids, tables, source, before, after, low, high, work):
     """x between two places at which the facet of the beam in hand begins to reflect everything."""
-    position, direction = work.position, work.direction
+    position, direction = work.rays[0], work.rays[1]
     is_low = False
     for turn in range(45):
         x = low if turn == 0 else 0.5 * (low + high)
-        follow(source, facets, solids, tables, hand.path, hand.flight, x, hand.centre, position, direction)
+        follow(source, facets, solids, tables, hand.path, hand.flight, x, hand.centre[0], hand.centre[1], position, direction)
         cosine = facing(facets[hand.facet], direction)
         is_total = transmitted(cosine, index_of(tables, before, x) / index_of(tables, after, x)) <= 0.0
         if turn == 0:
@@ -397,7 +424,7 @@ def at_facet(nodes, facets, solids, tables, sources, work):
     facet = facets[hand.facet]
     if hand.total == _LAY:
         recentre(hand)
-        if not is_parallel:
+        if not is_parallel or work.absorbing:
             if not lay_out(hand, facets, solids, tables, source, work):
                 return
             recentre(hand)
@@ -411,29 +438,37 @@ def at_facet(nodes, facets, solids, tables, sources, work):
         return
     if not is_parallel and hand.bend >= 0.0:
         bend = is_curved(hand, facets, solids, tables, source, work.tolerance, work)
-        if bend > 1.0:
-            halve_space(hand, nodes[work.top], work)
+        if bend > 1.0 and power_as(hand, hand, tables, work) > _FAINT * work.threshold:
+            low, high = halve_space(hand, nodes[work.top], work)
             hand.total = nodes[work.top].total = _LAY
-            push_both(nodes, True, True, work)
+            push_both(nodes, low, high, work)
             return
         hand.bend = -1.0 if bend < 0.01 else bend
     before = after = -1
     mask = hand.mask
-    passes = False
+    keeps = False
+    one = medium(solids, hand.mask)
+    kept = 1.0
+    if work.absorbing:
+        distance, _ = distance_at(hand, hand, facet)
+        kept = passes(solids, tables, one, hand.x[1], distance)
+    if facet.kind == 1:
+        kept *= at_x(tables, solids[facet.owner].tint, hand.x[1])
     if facet.kind == 0:
         mask ^= np.int64(1) << solids[facet.owner].bit
-        one, other = medium(solids, hand.mask), medium(solids, mask)
+        other = medium(solids, mask)
         # A facet that is left for the same medium as before, under a solid of higher priority.
-        passes = one == other
+        keeps = one == other
         before = solids[one].glass if one >= 0 else -1
         after = solids[other].glass if other >= 0 else -1
-        if not passes and hand.total == _UNKNOWN:
+        if not keeps and hand.total == _UNKNOWN:
             if total_from(nodes, before, after, facets, solids, tables, sources, work):
                 return
+    work.sums[SUM_ABSORBED] += (1.0 - kept) * flux_of(hand, tables, work)
     for turn in range(2):
         # One call of `child`, which is long, for all cases.
-        action = PASS if passes else (REFLECT if turn == 0 else REFRACT)
-        if turn == 1 and (passes or facet.kind == 1 or hand.total == _ALL):
+        action = PASS if keeps else (REFLECT if turn == 0 else REFRACT)
+        if turn == 1 and (keeps or facet.kind == 1 or hand.total == _ALL):
             break
         child(nodes, action, before, after, hand.mask if action == REFLECT else mask, facets, solids, tables, work)
 
@@ -444,38 +479,39 @@ def total_from(nodes, before, after, facets, solids, tables, sources, work):
     outline, cut it, leave the parts on the stack and return True."""
     hand, source = nodes[HAND], sources[0]
     facet = facets[hand.facet]
-    last = middle = 0.0
+    last, most, side = 0.0, -1e300, 0
     for a in range(first_place(hand), last_place(hand)):
         eta = index_of(tables, before, hand.x[a]) / index_of(tables, after, hand.x[a])
         k = transmitted(facing(facet, hand.direction[a]), eta)
         if (last > _GRAZING and k < -_GRAZING) or (last < -_GRAZING and k > _GRAZING):
-            low, high = hand.x[a - 1], hand.x[a]
-            x = onset(hand, facets, solids, tables, source, before, after, low, high, work)
+            # Since the last place that is not at the onset itself.
+            x = onset(hand, facets, solids, tables, source, before, after, hand.x[side], hand.x[a], work)
             halve(nodes, x, facets, solids, tables, sources, work)
             return True
-        last = k
-        if a == 1:
-            middle = k
+        if abs(k) > _GRAZING:
+            last, side = k, a
+        most = max(most, k)
+    total = _SOME if most > 0.0 else _ALL
     if source.kind == PARALLEL:
-        hand.total = _SOME if middle > 0.0 else _ALL
+        hand.total = total
         return False
     least, most = 1e300, -1e300
-    flight, lines = hand.flight, work.line
+    flight, lines = hand.flight, work.lines[MAX_CORNERS]
     hand.path[flight, 2], hand.path[flight, 3] = before, after
     for a in range(first_place(hand), last_place(hand)):
-        total_line(facet, tables, before, after, hand.x[a], hand.direction[a], hand.centre, lines[a])
+        total_line(facet, tables, before, after, hand.x[a], hand.direction[a], hand.centre[0], hand.centre[1], lines[a])
     for c in range(hand.corners[1]):
         value = lines[1, 0] + lines[1, 1] * hand.corner[1, c, 0] + lines[1, 2] * hand.corner[1, c, 1]
         least, most = min(least, value), max(most, value)
     if not (least < -_GRAZING and most > _GRAZING):
-        hand.total = _SOME if middle > 0.0 else _ALL
+        hand.total = total
         return False
     copy(hand, nodes[work.top])
     number = hand.facet
-    some = rest = False
+    some, rest, onset_edge, way = number < 0, number < 0, np.int64(TOTAL), np.int64(1)
     for turn in range(2):
         part_of = nodes[HAND if turn == 0 else work.top]
-        is_left = cut(part_of, lines, 1.0 - 2.0 * turn, flight, number, TOTAL, work)
+        is_left = cut(part_of, lines, 1.0 - 2.0 * turn, flight, number, onset_edge, way, work)
         forget_idle_lines(part_of, work)
         recentre(part_of)
         part_of.key = mixed(part_of.key, 16 - turn)
@@ -515,7 +551,7 @@ def child(nodes, action, before, after, mask, facets, solids, tables, work):
     if power < work.threshold:
         chance = power / work.threshold
         flux = flux_as(hand, new, tables, work)
-        if unit(mixed(new.key, 17) ^ work.seed) >= chance:
+        if unit(mixed(new.key ^ work.seed, np.int64(17))) >= chance:
             work.sums[SUM_ROULETTE] += flux
             return
         new.boost /= chance
@@ -532,7 +568,7 @@ def starts(hand, facets, solids, tables, source, work):
         return False
     if source.kind != PARALLEL:
         for a in range(3):
-            emit_straight(source, hand.centre, hand.position[a], hand.direction[a])
+            emit_straight(source, hand.centre[0], hand.centre[1], hand.position[a], hand.direction[a])
     hand.total = _UNKNOWN
     return True
 
@@ -559,4 +595,4 @@ def run(nodes, facets, solids, tables, sources, obstacles, works, leaf, edge, co
         elif hand.facet >= 0:
             at_facet(nodes, facets, solids, tables, sources, work)
         elif hand.total != START or starts(hand, facets, solids, tables, sources[0], work):
-            fly(nodes, facets, solids, tables, obstacles, work)
+            fly(nodes, facets, solids, tables, sources[0], obstacles, work)

@@ -8,7 +8,8 @@ import numpy as np
 
 from .compiling import part
 from .nodes import first_place, last_place
-from .rays import PARALLEL, advance, dot, follow
+from .rays import PARALLEL, advance, at_x, follow
+from .search import medium
 
 
 class Leaves(NamedTuple):
@@ -87,15 +88,16 @@ def has_room(leaf, edge, corner, work):
 def plane_map(facet, position, direction, out, work):
     """Where a bundle meets a receiver, in the coordinates of its map: out = [[r_u, r_v], [d/dq_u], [d/dq_v]]; returns the
     distance and the determinant."""
+    at, towards, frame = work.rays[2], work.rays[3], facet.frame
     for c in range(3):
         for k in range(3):
-            work.at[c, k], work.towards[c, k] = position[c, k], direction[c, k]
-    distance, _, _ = advance(work.at, work.towards, facet.plane)
-    frame = facet.frame
+            at[c, k], towards[c, k] = position[c, k], direction[c, k]
+    distance = advance(at, towards, facet.plane)
+    for k in range(3):
+        at[0, k] -= frame[0, k]
     for w in range(2):
         for c in range(3):
-            out[c, w] = dot(work.at[c], frame[1 + w])
-        out[0, w] -= dot(frame[0], frame[1 + w])
+            out[c, w] = at[c, 0] * frame[1 + w, 0] + at[c, 1] * frame[1 + w, 1] + at[c, 2] * frame[1 + w, 2]
     return distance, out[1, 0] * out[2, 1] - out[1, 1] * out[2, 0]
 
 
@@ -176,6 +178,14 @@ def lay_leaf(beam, facets, kind, leaf, edge, corner, work):
 
 
 @part
+def passes(solids, tables, inside, x, distance):
+    """Share of light that goes through so much of a solid's medium; `inside` -1: air."""
+    if inside < 0 or solids[inside].tint < 0:
+        return 1.0
+    return np.exp(-at_x(tables, solids[inside].tint, x) * max(distance, 0.0))
+
+
+@part
 def density_slope(beam, facets, solids, tables, source, kind, new, work):
     """Set the slope of the leaf just laid, of a diverging light: relative change of weight and spread over the target."""
     if source.kind == PARALLEL and not work.absorbing:
@@ -188,17 +198,20 @@ def density_slope(beam, facets, solids, tables, source, kind, new, work):
         return
     step = 0.5 * size
     change, at, m = work.other, work.point, work.map[0]
+    position, direction = work.rays[0], work.rays[1]
     for w in range(2):
         low = high = 0.0
         for sign in range(2):
             at[0], at[1] = beam.centre[0], beam.centre[1]
             at[w] += step * (2 * sign - 1)
             value = follow(
-                source, facets, solids, tables, beam.path, beam.flight, beam.x[1], at, work.position, work.direction
+                source, facets, solids, tables, beam.path, beam.flight, beam.x[1], at[0], at[1], position, direction
             )
             if kind == 0:
-                _, det = plane_map(facets[beam.facet], work.position, work.direction, m, work)
+                distance, det = plane_map(facets[beam.facet], position, direction, m, work)
                 value /= max(abs(det), 1e-30)
+                if work.absorbing:
+                    value *= passes(solids, tables, medium(solids, beam.mask), beam.x[1], distance)
             if sign == 0:
                 low = value
             else:

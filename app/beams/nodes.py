@@ -30,7 +30,8 @@ NODE = np.dtype(
         ("corners", "i8", 3),
         ("held", "i8", 3),
         # Half-planes: line[0] + line[1] q_u + line[2] q_v >= 0 at each place, and how to make them again: flight,
-        # facet, edge (or STATIC, TOTAL), sign.
+        # facet, edge (or STATIC, TOTAL), sign: 1 for the inside of what is met from its inner side, 2 from outside, -1
+        # and -2 for what is beyond the edge.
         ("line", "f8", (LINES, 3, 3)),
         ("made", "i4", (LINES, 4)),
         ("lines", "i8"),
@@ -127,7 +128,7 @@ def copy_head(beam, other):
         other.weight[a] = beam.weight[a]
         other.x[a] = beam.x[a]
     other.centre[0], other.centre[1] = beam.centre[0], beam.centre[1]
-    for level in range(beam.flight):
+    for level in range(beam.flight + 1):
         for c in range(5):
             other.path[level, c] = beam.path[level, c]
     other.flight = beam.flight
@@ -205,8 +206,9 @@ def heights(corner, count, line, sign, height):
 
 
 @part
-def cut(beam, line, sign, flight, facet, edge, work):
-    """Cut a beam by one more half-plane, sign * `line` (3, 3) by place; returns whether anything is left."""
+def cut(beam, line, sign, flight, facet, edge, way, work):
+    """Cut a beam by one more half-plane, sign * `line` (3, 3) by place, made by a flight's meeting a facet's edge (or
+    STATIC, TOTAL) its `way` (1 from inside, 2 from outside); returns whether anything is left."""
     if beam.lines >= LINES - 1:
         forget_idle_lines(beam, work)
         if beam.lines >= LINES - 1:
@@ -232,7 +234,7 @@ def cut(beam, line, sign, flight, facet, edge, work):
             for c in range(3):
                 beam.line[label, a, c] = sign * line[a, c]
         made = beam.made
-        made[label, 0], made[label, 1], made[label, 2], made[label, 3] = flight, facet, edge, 1 if sign > 0.0 else -1
+        made[label, 0], made[label, 1], made[label, 2], made[label, 3] = flight, facet, edge, way if sign > 0.0 else -way
         beam.lines = label + 1
     return left
 
@@ -247,16 +249,17 @@ def lay_lines(beam, a, flight, plain, facets, tables, work, position, direction)
         if edge == STATIC or beam.made[l, 0] != flight or (plain & (1 if edge >= 0 else 2)) == 0:
             continue
         if not ready:
-            moments(position, direction, work.own_moment)
+            moments(position, direction, work.moment[3])
             ready = True
-        line = beam.line[l, a]
+        line, way = beam.line[l, a], beam.made[l, 3]
         facet = facets[beam.made[l, 1]]
         if edge == TOTAL:
             path = beam.path
-            total_line(facet, tables, np.int64(path[flight, 2]), np.int64(path[flight, 3]), beam.x[a], direction, beam.centre, line)
+            before, after = np.int64(path[flight, 2]), np.int64(path[flight, 3])
+            total_line(facet, tables, before, after, beam.x[a], direction, beam.centre[0], beam.centre[1], line)
         else:
-            edge_line(facet, edge, work.own_moment, beam.centre, line)
-        if beam.made[l, 3] < 0:
+            edge_line(facet, edge, 1.0 if abs(way) == 1 else -1.0, work.moment[3], beam.centre[0], beam.centre[1], line)
+        if way < 0:
             for c in range(3):
                 line[c] = -line[c]
 
@@ -271,24 +274,28 @@ def lay_out(beam, facets, solids, tables, source, work):
         beam.corners[a] = beam.held[a] = 0
     for a in range(first_place(beam), last_place(beam)):
         position, direction = beam.position[a], beam.direction[a]
-        emit(source, beam.centre, position, direction)
-        weight = emitted(source, beam.centre, direction)
-        if source.kind == PARALLEL:
-            lay_lines(beam, a, 0, 3, facets, tables, work, position, direction)
-        else:
-            emit_straight(source, beam.centre, work.at, work.towards)
-            lay_lines(beam, a, 0, 1, facets, tables, work, work.at, work.towards)
-            lay_lines(beam, a, 0, 2, facets, tables, work, position, direction)
-        for k in range(beam.flight):
-            weight *= meet(facets, solids, tables, beam.path, k, beam.x[a], position, direction)
-            lay_lines(beam, a, k + 1, 3, facets, tables, work, position, direction)
+        weight = 1.0
+        for k in range(-1, beam.flight):
+            if k >= 0:
+                weight *= meet(facets, solids, tables, beam.path, k, beam.x[a], position, direction)
+            else:
+                emit(source, beam.centre[0], beam.centre[1], position, direction)
+                weight = emitted(source, beam.centre[0], beam.centre[1], direction)
+                if source.kind != PARALLEL:
+                    emit_straight(source, beam.centre[0], beam.centre[1], work.rays[2], work.rays[3])
+            straight = k < 0 and source.kind != PARALLEL
+            for turn in range(2 if straight else 1):
+                p = work.rays[2] if straight and turn == 0 else position
+                d = work.rays[3] if straight and turn == 0 else direction
+                lay_lines(beam, a, k + 1, (1 + turn) if straight else 3, facets, tables, work, p, d)
         beam.weight[a] = weight
         corner, side = beam.corner[a], beam.side[a]
         for c in range(4):
             corner[c, 0] = room[0] + (room[2] if c == 1 or c == 2 else -room[2])
             corner[c, 1] = room[1] + (room[2] if c > 1 else -room[2])
             side[c] = 0
-        m = 4
+        beam.corners[a] = 4
+        m = beam.corners[a]
         for l in range(n):
             before = m
             if heights(corner, m, beam.line[l, a], 1.0, work.height) == 0:

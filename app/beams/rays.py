@@ -54,67 +54,74 @@ def dot(a, b):
 
 
 @part
-def emit(source, centre, position, direction):
-    """The bundle that leaves a source about q = `centre`."""
+def emit(source, u, v, position, direction):
+    """The bundle that leaves a source about q = (u, v)."""
     for k in range(3):
         if source.kind == PARALLEL:
-            position[0, k] = source.origin[k] + centre[0] * source.right[k] + centre[1] * source.up[k]
+            position[0, k] = source.origin[k] + u * source.right[k] + v * source.up[k]
             position[1, k], position[2, k] = source.right[k], source.up[k]
             direction[0, k] = source.forward[k]
             direction[1, k] = direction[2, k] = 0.0
         else:
             position[0, k] = source.origin[k]
             position[1, k] = position[2, k] = 0.0
-            direction[0, k] = source.forward[k] + centre[0] * source.right[k] + centre[1] * source.up[k]
+            direction[0, k] = source.forward[k] + u * source.right[k] + v * source.up[k]
             direction[1, k], direction[2, k] = source.right[k], source.up[k]
     if source.kind != PARALLEL:
-        shrink = 1.0 / np.sqrt(dot(direction[0], direction[0]))
+        length = 0.0
         for k in range(3):
-            direction[0, k] *= shrink
-        for c in range(1, 3):
-            along = dot(direction[0], direction[c])
+            length += direction[0, k] * direction[0, k]
+        shrink = 1.0 / np.sqrt(length)
+        for c in range(3):
+            along = 0.0
             for k in range(3):
-                direction[c, k] = shrink * (direction[c, k] - along * direction[0, k])
+                along += direction[0, k] * direction[c, k]
+            for k in range(3):
+                direction[c, k] = shrink * (direction[c, k] - (along * direction[0, k] if c > 0 else 0.0))
 
 
 @part
-def emit_straight(source, centre, position, direction):
+def emit_straight(source, u, v, position, direction):
     """The same for a source that diverges, its directions not made unit vectors: exactly affine."""
     for k in range(3):
         position[0, k] = source.origin[k]
         position[1, k] = position[2, k] = 0.0
-        direction[0, k] = source.forward[k] + centre[0] * source.right[k] + centre[1] * source.up[k]
+        direction[0, k] = source.forward[k] + u * source.right[k] + v * source.up[k]
         direction[1, k], direction[2, k] = source.right[k], source.up[k]
 
 
 @part
-def emitted(source, centre, direction):
-    """Relative intensity of a source towards q = `centre`, per unit of q: equal steps on a gnomonic plane are smaller
+def emitted(source, u, v, direction):
+    """Relative intensity of a source towards q = (u, v), per unit of q: equal steps on a gnomonic plane are smaller
     solid angles farther out, and a spot fades (`spot.glsl`)."""
     if source.kind != POINT:
         return 1.0
-    r, u = dot(source.right, source.right), dot(source.up, source.up)
-    weight = np.sqrt(r * u) / (1.0 + centre[0] * centre[0] * r + centre[1] * centre[1] * u) ** 1.5
+    right, up = dot(source.right, source.right), dot(source.up, source.up)
+    weight = np.sqrt(right * up) / (1.0 + u * u * right + v * v * up) ** 1.5
+    d, axis = direction, source.axis
+    cosine = d[0, 0] * axis[0] + d[0, 1] * axis[1] + d[0, 2] * axis[2]
     if source.cone[1] - source.cone[0] > 1e-7:
-        d, a = direction[0], source.axis
-        x, y, z = d[1] * a[2] - d[2] * a[1], d[2] * a[0] - d[0] * a[2], d[0] * a[1] - d[1] * a[0]
-        angle = np.arctan2(np.sqrt(x * x + y * y + z * z), dot(d, a))
+        across = 0.0
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            side = d[0, i] * axis[j] - d[0, j] * axis[i]
+            across += side * side
+        angle = np.arctan2(np.sqrt(across), cosine)
         t = min(max((source.cone[1] - angle) / (source.cone[1] - source.cone[0]), 0.0), 1.0)
         weight *= t * t * (3.0 - 2.0 * t)
     if source.lambert:
-        weight *= max(dot(direction[0], source.axis), 0.0)
+        weight *= max(cosine, 0.0)
     return weight
 
 
 @part
 def advance(position, direction, plane):
-    """Move a bundle to the plane (n, d); returns the distance at the centre, and its derivatives."""
+    """Move a bundle to the plane (n, d); returns the distance at the centre."""
     cosine = plane[0] * direction[0, 0] + plane[1] * direction[0, 1] + plane[2] * direction[0, 2]
     if abs(cosine) < 1e-12:
         cosine = 1e-12 if cosine >= 0.0 else -1e-12
     away = plane[3] - (plane[0] * position[0, 0] + plane[1] * position[0, 1] + plane[2] * position[0, 2])
     distance = away / cosine
-    change_u = change_v = 0.0
     for c in range(1, 3):
         moved = 0.0
         for k in range(3):
@@ -123,13 +130,9 @@ def advance(position, direction, plane):
         change = -moved / cosine
         for k in range(3):
             position[c, k] += change * direction[0, k]
-        if c == 1:
-            change_u = change
-        else:
-            change_v = change
     for k in range(3):
         position[0, k] += distance * direction[0, k]
-    return distance, change_u, change_v
+    return distance
 
 
 @part
@@ -192,7 +195,7 @@ def meet(facets, solids, tables, path, k, x, position, direction):
     this way, what the medium absorbed on the flight included."""
     facet = path[k, FACET]
     plane = facets[facet].plane
-    distance, _, _ = advance(position, direction, plane)
+    distance = advance(position, direction, plane)
     weight = 1.0
     if path[k, ABSORBS] >= 0:
         weight = np.exp(-at_x(tables, np.int64(path[k, ABSORBS]), x) * max(distance, 0.0))
@@ -212,10 +215,10 @@ def meet(facets, solids, tables, path, k, x, position, direction):
 
 
 @part
-def follow(source, facets, solids, tables, path, flights, x, centre, position, direction):
-    """A bundle about q = `centre` from the source through the first `flights` facets of its path; returns its weight."""
-    emit(source, centre, position, direction)
-    weight = emitted(source, centre, direction)
+def follow(source, facets, solids, tables, path, flights, x, u, v, position, direction):
+    """A bundle about q = (u, v) from the source through the first `flights` facets of its path; returns its weight."""
+    emit(source, u, v, position, direction)
+    weight = emitted(source, u, v, direction)
     for k in range(flights):
         weight *= meet(facets, solids, tables, path, k, x, position, direction)
     return weight
@@ -235,21 +238,21 @@ def moments(position, direction, out):
 
 
 @part
-def edge_line(facet, edge, moment, centre, line):
+def edge_line(facet, edge, sign, moment, u, v, line):
     """Which side of a facet's edge rays pass: line[0] + line[1] q_u + line[2] q_v >= 0 inside, the side product of
-    ray and edge [Pluecker]; it stays finite where the ray runs along the facet."""
-    n, e = facet.plane, facet.edge
-    sign = -1.0 if n[0] * moment[0, 0] + n[1] * moment[0, 1] + n[2] * moment[0, 2] < 0.0 else 1.0
+    ray and edge [Pluecker]; it stays finite where the ray runs along the facet. `sign`: 1 for rays that leave through
+    the facet (along its normal), -1 for those that come in; rays of the other way are inside of no facet."""
+    e = facet.edge
     for c in range(3):
         side = 0.0
         for k in range(3):
             side += e[edge, k] * moment[c, 3 + k] + e[edge, 3 + k] * moment[c, k]
         line[c] = sign * side
-    line[0] -= line[1] * centre[0] + line[2] * centre[1]
+    line[0] -= line[1] * u + line[2] * v
 
 
 @part
-def total_line(facet, tables, before, after, x, direction, centre, line):
+def total_line(facet, tables, before, after, x, direction, u, v, line):
     """Where a facet transmits: the squared cosine of the transmitted angle to first order, as a line."""
     n = facet.plane
     eta = index_of(tables, before, x) / index_of(tables, after, x)
@@ -258,4 +261,4 @@ def total_line(facet, tables, before, after, x, direction, centre, line):
     for c in range(1, 3):
         change = n[0] * direction[c, 0] + n[1] * direction[c, 1] + n[2] * direction[c, 2]
         line[c] = 2.0 * eta * eta * theta * change
-    line[0] -= line[1] * centre[0] + line[2] * centre[1]
+    line[0] -= line[1] * u + line[2] * v

@@ -42,8 +42,8 @@ class ScreenPolygons:
     direction: np.ndarray
     """(N, 3, 3, 3) likewise; the first of each is a unit vector."""
     throughput: np.ndarray
-    """(N, 3): radiance that arrives at the camera per radiance that enters the last facet, at x_lo, in the middle and at
-    x_hi: Fresnel, absorption, tints of mirrors, and one over the probability that the beam was kept."""
+    """(N, 3): radiance that arrives at the camera per radiance that enters the last facet, at x_lo, in the middle and
+    at x_hi: Fresnel, absorption, tints of mirrors, and one over the probability that the beam was kept."""
     last_triangle: np.ndarray
     """int32 (N,), some triangle (of the scene's, in the object's order) of the facet that was left last."""
     last_object: np.ndarray

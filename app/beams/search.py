@@ -84,18 +84,13 @@ WORK = np.dtype(
         ("spare_corner", "f8", (CORNERS, 2)),
         ("spare_side", "i4", CORNERS),
         ("height", "f8", CORNERS),
-        ("line", "f8", (3, 3)),
-        ("other_line", "f8", (3, 3)),
-        ("lines", "f8", (MAX_CORNERS, 3, 3)),
+        # Of a facet's edges by place, the last: another; which of them cut, how many are laid at each place.
+        ("lines", "f8", (MAX_CORNERS + 1, 3, 3)),
         ("cuts", "i8", MAX_CORNERS),
         ("laid", "i8", 3),
         ("renamed", "i8", LINES),
-        ("moment", "f8", (3, 3, 6)),
-        ("own_moment", "f8", (3, 6)),
-        ("position", "f8", (3, 3)),
-        ("direction", "f8", (3, 3)),
-        ("at", "f8", (3, 3)),
-        ("towards", "f8", (3, 3)),
+        ("moment", "f8", (4, 3, 6)),
+        ("rays", "f8", (4, 3, 3)),
         ("map", "f8", (3, 3, 2)),
         ("det", "f8", 3),
         ("point", "f8", 2),
@@ -236,7 +231,7 @@ def halve_spectrum(beam, other, at, facets, solids, tables, source, work):
     lo, hi = beam.x[0], beam.x[2]
     beam.x[1], beam.x[2] = 0.5 * (lo + at), at
     other.x[0], other.x[1] = at, 0.5 * (at + hi)
-    beam.key, other.key = mixed(beam.key, 11), mixed(other.key, 12)
+    beam.key, other.key = mixed(beam.key, np.int64(11)), mixed(other.key, np.int64(12))
     low = lay_out(beam, facets, solids, tables, source, work)
     return low, lay_out(other, facets, solids, tables, source, work)
 
@@ -246,17 +241,18 @@ def is_curved(beam, facets, solids, tables, source, tolerance, work):
     """How far, in tolerances, a beam's rays at its facet miss the affine map at the corners of its outline."""
     plane = facets[beam.facet].plane
     a = place_of(beam)
-    p = work.at
+    p, towards, exact, direction = work.rays[0], work.rays[1], work.rays[2], work.rays[3]
     for c in range(3):
         for k in range(3):
-            p[c, k], work.towards[c, k] = beam.position[a, c, k], beam.direction[a, c, k]
-    advance(p, work.towards, plane)
+            p[c, k], towards[c, k] = beam.position[a, c, k], beam.direction[a, c, k]
+    advance(p, towards, plane)
     worst = 0.0
     for c in range(beam.corners[a]):
-        q, exact = beam.corner[a, c], work.position
-        follow(source, facets, solids, tables, beam.path, beam.flight, beam.x[a], q, exact, work.direction)
-        advance(exact, work.direction, plane)
-        u, v = q[0] - beam.centre[0], q[1] - beam.centre[1]
+        u, v = beam.corner[a, c, 0], beam.corner[a, c, 1]
+        follow(source, facets, solids, tables, beam.path, beam.flight, beam.x[a], u, v, exact, direction)
+        advance(exact, direction, plane)
+        u -= beam.centre[0]
+        v -= beam.centre[1]
         off = 0.0
         for k in range(3):
             d = p[0, k] + u * p[1, k] + v * p[2, k] - exact[0, k]
@@ -267,7 +263,8 @@ def is_curved(beam, facets, solids, tables, source, tolerance, work):
 
 @part
 def halve_space(beam, other, work):
-    """Cut a beam across its longer side: one half stays, the other goes to `other`."""
+    """Cut a beam across its longer side: one half stays, the other goes to `other`. Returns (is it left, is the
+    other)."""
     low_u = low_v = 1e300
     high_u = high_v = -1e300
     for a in range(3):
@@ -277,17 +274,20 @@ def halve_space(beam, other, work):
             low_v, high_v = min(low_v, v), max(high_v, v)
     along = 0 if high_u - low_u >= high_v - low_v else 1
     at = 0.5 * (low_u + high_u) if along == 0 else 0.5 * (low_v + high_v)
+    line = work.lines[MAX_CORNERS]
     for a in range(3):
-        work.line[a, 0] = -at
-        work.line[a, 1 + along], work.line[a, 2 - along] = 1.0, 0.0
+        line[a, 0] = -at
+        line[a, 1 + along], line[a, 2 - along] = 1.0, 0.0
     copy(beam, other)
-    cut(beam, work.line, 1.0, 0, 0, STATIC, work)
-    cut(other, work.line, -1.0, 0, 0, STATIC, work)
-    beam.key, other.key = mixed(beam.key, 13), mixed(other.key, 14)
+    zero, static, way = np.int64(0), np.int64(STATIC), np.int64(1)
+    low = cut(beam, line, 1.0, zero, zero, static, way, work)
+    high = cut(other, line, -1.0, zero, zero, static, way, work)
+    beam.key, other.key = mixed(beam.key, np.int64(13)), mixed(other.key, np.int64(14))
     forget_idle_lines(beam, work)
     recentre(beam)
     forget_idle_lines(other, work)
     recentre(other)
+    return low, high
 
 
 @part
@@ -310,12 +310,17 @@ def facing(facet, direction):
 
 
 @part
-def is_ahead(facet, solids, beam, cosine):
-    """Whether a beam may meet a facet from this side: into a solid from outside, out of one from inside."""
-    if facet.kind == 0:
-        inside = (beam.mask >> solids[facet.owner].bit) & 1
-        return cosine > 0.0 if inside == 1 else cosine < 0.0
-    return abs(cosine) > 0.0
+def is_ahead(facet, solids, beam, outward, is_parallel):
+    """Whether a beam may meet a facet along its normal (`outward` 1) or against it (0): a solid's from outside, unless
+    it is inside. The rays of a parallel light all have the chief ray's direction, though not at each place of the
+    band."""
+    if facet.kind == 0 and (beam.mask >> solids[facet.owner].bit) & 1 != outward:
+        return False
+    for a in range(first_place(beam), last_place(beam)):
+        cosine = facing(facet, beam.direction[a])
+        if not is_parallel or (cosine > 0.0 if outward == 1 else cosine < 0.0):
+            return True
+    return False
 
 
 @part
@@ -383,18 +388,18 @@ def may_touch(nodes, i, length, obstacles, works):
 
 
 @part
-def lay_edges(beam, flown, facet, work):
-    """Whether a facet, met on the flight of beam `flown`, may leave anything of an outline. If so its edges lie in
+def lay_edges(beam, flown, facet, hit, work):
+    """Whether a facet, met as `hit` says (`grow.facet_of`) on the flight of beam `flown`, may leave anything of an outline. If so its edges lie in
     `work.lines` and `work.cuts` says which of them cut. `work.moment` holds the flight's rays."""
-    lo, hi = first_place(flown), last_place(flown)
+    lo, hi, sign = first_place(flown), last_place(flown), 1.0 if hit >= 0 else -1.0
     for e in range(facet.corners):
         work.cuts[e] = 0
     alive = False
     for a in range(lo, hi):
-        missed, e = beam.corners[a] == 0, 0
+        missed, e = beam.corners[a] == 0, np.int64(0)
         while e < facet.corners and not missed:
             line = work.lines[e, a]
-            edge_line(facet, e, work.moment[a], flown.centre, line)
+            edge_line(facet, e, sign, work.moment[a], flown.centre[0], flown.centre[1], line)
             outside = heights(beam.corner[a], beam.corners[a], line, 1.0, work.height)
             if outside > 0:
                 work.cuts[e] = 1
@@ -405,5 +410,5 @@ def lay_edges(beam, flown, facet, work):
     if alive:
         for a in range(lo, hi):
             for e in range(work.laid[a], facet.corners):
-                edge_line(facet, e, work.moment[a], flown.centre, work.lines[e, a])
+                edge_line(facet, e, sign, work.moment[a], flown.centre[0], flown.centre[1], work.lines[e, a])
     return alive

@@ -13,6 +13,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from ..base import files
 from ..base.atomic import atomic_output, check_writable
 from ..base.errors import UserError
 from ..reference.metrics import ReferencePicture
@@ -171,6 +172,6 @@ def _settings_difference(earlier: BenchSettings, wanted: BenchSettings) -> str:
 
 def _load_array(path: Path) -> np.ndarray | None:
     try:
-        return np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError):
+        return np.array(files.read_npy(path))
+    except (OSError, ValueError):
         return None

@@ -23,6 +23,8 @@ _GROWTH = 3.0
 """From one budget beyond the first horizon to the next."""
 _ALIKE = 2.5
 """Kernels that differ by at most this factor belong to one minimum."""
+_FOLLOWED = 3
+"""Minima that are followed from one budget to the next: few photons leave noise that has many."""
 _SLOPES = (0.3, 1.0)
 """Between which the exponent of error against time is believed."""
 
@@ -106,7 +108,7 @@ class _Sweep:
                     break
                 at = least
             minima.add(at)
-        self._starts = minima
+        self._starts = set(sorted(minima, key=error)[:_FOLLOWED])
 
     def between(self, chosen: Sequence[Trial], budget: int) -> float:
         """The best kernel for a budget between those of `chosen`: in between theirs where they are alike, else the

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..base.errors import UserError, plain
 from ..base.interrupts import interrupt_flag
 from ..base.memory import check_picture_memory
@@ -68,6 +66,8 @@ def render_command(request: RenderRequest) -> int:
     with interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
         result = render(scene, settings, progress=progress, cancelled=interrupted)
         stopped = interrupted()
+    for notice in result.stats.notices:
+        print(f"note: {notice}", file=sys.stderr)
     write_image(
         request.output,
         result.rgb,
@@ -75,11 +75,6 @@ def render_command(request: RenderRequest) -> int:
         spectral=result.spectral,
         bin_edges_nm=result.bin_edges_nm,
     )
-    if not np.isfinite(result.rgb).all():
-        print(
-            f"note: {request.output} holds numbers that are not finite: a power or a size is beyond float32",
-            file=sys.stderr,
-        )
     print(_summary(request, settings, result.stats, stopped))
     if request.stats:
         print("\n".join(result.stats.lines()))

@@ -11,7 +11,7 @@ import os
 import sys
 from typing import TYPE_CHECKING, Any, Literal, Self
 
-from ..base.errors import UserError, suggestion
+from ..base.errors import DeviceError, UserError, suggestion
 from .device_traits import DeviceTraits
 from .limits import Limits
 
@@ -28,6 +28,13 @@ GL_VERSION_CODE = 100 * GL_VERSION[0] + 10 * GL_VERSION[1]
 APT_LINE = "apt-get install libegl1 libgl1 libgl1-mesa-dri"
 APT_LINE_OSMESA = "apt-get install libosmesa6"
 _MAX_EGL_DEVICES = 16
+
+
+def device_sentence(error: str, where: str) -> str:
+    """OpenGL's error as a sentence with a way out."""
+    if error == "GL_OUT_OF_MEMORY":
+        return f"the device is out of memory ({error} in {where}): use a smaller picture or a smaller --batch"
+    return f"OpenGL failed ({error} in {where}): update the graphics driver, or try another with 'doctor'"
 
 
 class Context:
@@ -57,13 +64,13 @@ class Context:
         self.ctx.finish()
 
     def check(self, where: str) -> None:
-        """Raise RuntimeError if OpenGL has reported an error since the last check.
+        """Raise `DeviceError` if OpenGL has reported an error since the last check.
 
         moderngl does not look by itself: a dispatch past the limits silently does nothing.
         """
         error = self.ctx.error
         if error != "GL_NO_ERROR":
-            raise RuntimeError(f"{error} in {where} ({self.renderer}, OpenGL {self.version})")
+            raise DeviceError(device_sentence(error, f"{where} ({self.renderer}, OpenGL {self.version})"))
 
     def release(self) -> None:
         """Destroy the context; its buffers, textures and programs are gone with it."""

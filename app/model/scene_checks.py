@@ -12,7 +12,11 @@ from .geometry.mesh import Mesh
 from .scene import Light, Scene, SceneObject
 
 MAX_SIZE_RATIO = 1e12
-"""Largest to smallest object."""
+"""Largest to smallest object; also to the side of an area light."""
+MAX_FAR_RATIO = 1e9
+"""Distance from the origin to the largest object's size: float64 then tells a millionth of it."""
+MIN_SIZE = 1e-12
+"""Of the largest object, and one over its greatest: areas in their inverse squares are numbers in float32 then."""
 
 
 def check_scene(scene: Scene, file_name: str) -> list[str]:
@@ -40,7 +44,11 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
         if light.has_place:
             check_outside(light, glasses, file_name)
         check_lines(light, glasses, file_name)
-    return _glass_notes(glasses)
+    return _glass_notes(glasses) + [
+        f"light '{light.name}' has no power: it gives no light"
+        for light in scene.lights
+        if not light.spectral_power.power_w() > 0.0
+    ]
 
 
 def contains(item: SceneObject, point: np.ndarray) -> bool:
@@ -97,6 +105,25 @@ def _winding(mesh: Mesh, point: np.ndarray) -> float:
 def _check_sizes(scene: Scene, file_name: str) -> None:
     """Refuse an object that float32 cannot tell from a point beside the others (a slip of units)."""
     sizes = {o.name: _size(o) for o in scene.objects}
+    largest = max(sizes.values())
+    if not MIN_SIZE <= largest <= 1.0 / MIN_SIZE:
+        raise UserError(
+            f"{file_name}: the largest object is {largest:.2g} units large; choose units in which it is between "
+            f"{MIN_SIZE:g} and {1.0 / MIN_SIZE:g}"
+        )
+    for light in scene.lights:
+        if light.has_outline and light.area < (largest / MAX_SIZE_RATIO) ** 2:
+            raise UserError(
+                f"{file_name}: light '{light.name}' is {light.area:.2g} square units large beside objects of "
+                f"{largest:.2g} units; make it larger, or a point light"
+            )
+    places = [np.asarray(item.object_to_world[:3, 3]) for item in scene.objects]
+    far = float(max(np.abs(place).max() for place in places))
+    if far > MAX_FAR_RATIO * largest:
+        raise UserError(
+            f"{file_name}: objects of {largest:.2g} units stand {far:.2g} units off the origin, where their own form "
+            "is rounded away; move the scene nearer to the origin"
+        )
     small, large = min(sizes, key=sizes.__getitem__), max(sizes, key=sizes.__getitem__)
     if sizes[small] * MAX_SIZE_RATIO < sizes[large]:
         raise UserError(

@@ -50,8 +50,8 @@ from .variants import (
     direct_defines,
     halted_bytes,
     halting_defines,
+    screen_beam_defines,
     single_defines,
-    view_beam_defines,
 )
 
 SPLIT_THRESHOLD = 0.004
@@ -190,7 +190,7 @@ class CameraPass:
             return
         shown, structs = self._source
         if self._beams is None:
-            self._beams = ScreenBeams(self._ctx, view_beam_defines(shown), structs, self.channels.targets)
+            self._beams = ScreenBeams(self._ctx, screen_beam_defines(shown), structs, self.channels.targets)
             self._beside = shader.compute(self._ctx, "camera/camera.comp", beside_defines(shown), structs)
             self._beam_objects_buffer = self._ctx.buffer(reserve=4 * len(self._beam_objects))
         assert self._beam_objects_buffer is not None
@@ -524,16 +524,9 @@ class CameraPass:
         assert self._beams is not None
         parameters["sample_index"] = parameters["draw_index"] = 0
 
-        def bind() -> Callable[[], float]:
+        def bind() -> None:
             self._bind(maps)
             self._parameters_buffer.write(parameters.tobytes())
-            start = time.perf_counter()
-
-            def timed() -> float:
-                self._ctx.finish()
-                return time.perf_counter() - start
-
-            return timed
 
         places = shared_places(samples, int(parameters["primary_samples"][0]))
         as_image = self.scene.texels.as_image

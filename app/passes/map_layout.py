@@ -16,7 +16,7 @@ from ..base.errors import UserError
 from ..gpu.records import NONE, PLACEMENT, RECEIVER
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.tiles import Tile, pack
-from ..model.camera_rays import camera_rays
+from ..model.camera_rays import camera_frame, camera_rays
 from ..model.features import is_flat
 from ..model.scene import Camera, Scene
 from .map_atlas import placement_rows
@@ -281,7 +281,7 @@ def _flat_windows(
 
     def widened(window: Window) -> Window:
         """Where a caustic is thinner than a pixel."""
-        pixel = 0.0 if picture is None else _pixel(camera, buffers, frame, window, picture)
+        pixel = 0.0 if picture is None else pixel_side(camera, buffers, frame, window, picture)
         return _at_least(window, _MIN_PIXELS * pixel, extent)
 
     everything = widened(_meet(_grown(_extent(flat), 0.02), extent) or extent)
@@ -316,7 +316,7 @@ def _tile_size(
     camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, window: Window, picture: tuple[int, int], largest: int
 ) -> tuple[int, int]:
     """Texels of a window: `TEXELS_PER_PIXEL` where the camera sees it, within `largest`."""
-    count = np.ceil(window.size * TEXELS_PER_PIXEL / _pixel(camera, buffers, frame, window, picture))
+    count = np.ceil(window.size * TEXELS_PER_PIXEL / pixel_side(camera, buffers, frame, window, picture))
     count *= min(1.0, largest / count.max())
     # Only a receiver of few pixels has a window so small.
     least = np.clip(2.0 * count, 4, MIN_TILE)
@@ -324,7 +324,22 @@ def _tile_size(
     return int(width), int(height)
 
 
-def _pixel(camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, window: Window, picture: tuple[int, int]) -> float:
+def project(camera: Camera, picture: tuple[int, int], points: np.ndarray) -> np.ndarray:
+    """Where world `points` (n, 3) lie in the picture: pixels (n, 2) from the left and the top; NaN behind a pinhole."""
+    right, up, forward = camera_frame(camera)
+    offset = points - np.asarray(camera.position, float)
+    if camera.kind == "orthographic":
+        half, depth = 0.5 * camera.vertical_extent, np.ones(len(points))
+    else:
+        half, depth = np.tan(np.radians(0.5 * camera.vertical_fov_deg)), offset @ forward
+    depth = np.where(depth > 0.0, depth, np.nan)
+    x, y = offset @ right / (half * depth), offset @ up / (half * depth)
+    return np.stack([0.5 * (picture[0] + x * picture[1]), 0.5 * picture[1] * (1.0 - y)], axis=-1)
+
+
+def pixel_side(
+    camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, window: Window, picture: tuple[int, int]
+) -> float:
     """Side of a pixel where the camera sees a window, GPU units."""
     if camera.kind == "pinhole":
         # Pixels are smallest where the window comes nearest to the camera.

@@ -34,9 +34,10 @@ _PRIMARIES = np.array([(-0.125, -0.375), (0.375, -0.125), (0.125, 0.375), (-0.37
 
 
 def shared_places(samples: int, primaries: int) -> np.ndarray:
-    """(16 to 64, 2) places in a pixel at which polygons' edges are told: where a first launch of so many samples looks at
-    what is seen directly, so that both together fill every pixel; a lattice of their own where those are too few or too
-    many. An even number."""
+    """(16 to 64, 2) places in a pixel at which polygons' edges are told, an even number.
+
+    They are where a first launch of so many samples looks at what is seen directly, so that both together fill every
+    pixel; a lattice of their own where those are too few or too many."""
     places = pixel_lattice(samples, 0)
     if primaries > 1:
         places = (places[:, None] + _PRIMARIES / np.sqrt(samples)).reshape(-1, 2)

@@ -1,18 +1,21 @@
 """Draws screen polygons (`beams.screen_polygons`): what a picture shows by way of flat glass and mirrors.
 
-A polygon's hull is a triangle fan, and its fragments look up what lies behind; they are blended in order, so the sums
-do not depend on timing. The picture is drawn once for a view and added with every sample of what is seen directly:
-progress, stops and what reads the sums know nothing of it.
+Pixels that a polygon touches are listed polygon by polygon, looked at side by side, and added up pixel by pixel in the
+order of the list, so that sums do not depend on timing. (Triangle fans whose fragments do the looking took a software
+renderer ten times as long: most of their lanes slept.) The picture is drawn once for a view and added with every sample
+of what is seen directly: progress, stops and what reads the sums know nothing of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
 
+from ..beams.screen_pairs import PIXEL_BITS, pixel_parts
 from ..beams.screen_polygons import ScreenPolygons
 from ..gpu import shader
 from ..gpu.dispatch_budget import DispatchBudget
@@ -21,7 +24,17 @@ from ..gpu.scene_texels import ROW_TEXELS
 from ..gpu.schema import Field, Struct
 from .map_atlas import park
 from .pixel_lattice import MOST_SHARED
-from .variants import BIND_BEAM_VIEW, IMAGE_POLYGONS, UNIT_POLYGONS, Defines
+from .variants import (
+    BIND_BEAM_ENTRIES,
+    BIND_BEAM_FOUND,
+    BIND_BEAM_ORDER,
+    BIND_BEAM_RUNS,
+    BIND_BEAM_VIEW,
+    GATHER_DEFINES,
+    IMAGE_POLYGONS,
+    UNIT_POLYGONS,
+    Defines,
+)
 
 if TYPE_CHECKING:
     from ..gpu.scene_buffers import SceneBuffers
@@ -30,9 +43,10 @@ FINE_PARTS, COARSE_PARTS = 16, 4
 """Parts of a pixel that are looked at one by one, where a polygon is strong, and where it is not weak …"""
 FINE_ABOVE, COARSE_ABOVE = 0.2, 0.05
 """… which is said by its share of what the pixel sees."""
-_FIRST = 64
-REACH = 0.6
-"""Pixels from a pixel's middle to the farthest of its points, a little more: primary samples reach over its border."""
+MOST_ENTRIES = 1 << 16
+"""That are looked at together."""
+_FIRST = 1024
+_GROUP = 64
 
 SCREEN_POLYGON = Struct(
     "ScreenPolygon",
@@ -49,7 +63,7 @@ SCREEN_POLYGON = Struct(
         Field("last_object", "uint", "that the ray left"),
         Field("inside_mask", "uint", "medium stack"),
         Field("inside_object", "uint", "solid outside the stack, or NONE"),
-        Field("reserved", "uint", ""),
+        Field("parts", "uint", "of a pixel that are looked at one by one"),
         Field("position", "vec4", "coefficients of 1, t, t²: value at the centre, its two columns per pixel", 9),
         Field("direction", "vec4", "likewise", 9),
     ),
@@ -59,15 +73,10 @@ _VIEW = Struct(
     "BeamView",
     (
         Field("places", "vec4", "points of a pixel about its middle, two each, neighbours together", MOST_SHARED // 2),
-        Field("size", "vec2", "pixels"),
         Field("points", "uint", "how many"),
         Field("first_edge_texel", "uint", "where edges begin"),
-        Field("fine_parts", "uint", "of a pixel that are looked at one by one"),
-        Field("coarse_parts", "uint"),
-        Field("fine_above", "float", "strength of a polygon"),
-        Field("coarse_above", "float"),
+        Field("entry_count", "uint", "of this dispatch"),
         Field("reach", "float", "from a pixel's middle to its outermost points, pixels"),
-        Field("reserved", "float", "", 3),
     ),
 )
 
@@ -76,88 +85,97 @@ class ScreenBeams:
     """Owns the programs, what the polygons are packed in and the picture of them."""
 
     def __init__(self, ctx: moderngl.Context, defines: Defines, structs: Sequence[Struct], targets: int) -> None:
-        """`defines`: `view_beam_defines` of the camera's; `structs`: the camera's records."""
+        """`defines`: `screen_beam_defines` of the camera's; `structs`: the camera's records."""
         self._ctx = ctx
         self._targets = targets
-        self._program = shader.program(
-            ctx, "camera/beam.vert", "camera/beam.frag", defines, (*structs, SCREEN_POLYGON, _VIEW)
-        )
+        self._look = shader.compute(ctx, "camera/beam.comp", defines, (*structs, SCREEN_POLYGON, _VIEW))
+        self._gather = shader.compute(ctx, "camera/beam_gather.comp", {"TARGETS": targets} | GATHER_DEFINES, ())
         self._sum_program = shader.program(
             ctx, "camera/beam_sum.vert", "camera/beam_sum.frag", {"TARGETS": targets}, ()
         )
         self._triangle = ctx.vertex_array(self._sum_program, [])
         self._view = ctx.buffer(reserve=_VIEW.stride)
-        self._drawn: list[moderngl.Buffer | moderngl.VertexArray | moderngl.Texture] = []
-        self._fans: moderngl.VertexArray | None = None
-        self._first_corner = np.zeros(1, int)
+        words = {BIND_BEAM_ENTRIES: 2, BIND_BEAM_RUNS: 4, BIND_BEAM_ORDER: 1, BIND_BEAM_FOUND: 4 * targets}
+        self._lists = {binding: ctx.buffer(reserve=4 * count * MOST_ENTRIES) for binding, count in words.items()}
+        self._polygons: ScreenPolygons | None = None
+        self._sees_edges = True
+        self._records = SCREEN_POLYGON.zeros(0)
         self._texels: moderngl.Texture | None = None
         self._pictures: list[moderngl.Texture] = []
-        self._budget = DispatchBudget(_FIRST, 1, 1)
-        self._first_edge_texel = 0
+        self._budget = DispatchBudget(_FIRST, _GROUP, MOST_ENTRIES)
 
     def take(self, polygons: ScreenPolygons, scene: SceneBuffers, brightness: np.ndarray | None) -> None:
-        """Pack and upload; `brightness`: how much of what looks bright lies below each of equally spaced x."""
-        self._forget()
-        records = packed(polygons, scene, brightness)
-        edges = np.zeros((len(polygons.edges), 2, 4), np.float32)
-        edges[:, 0, :3], edges[:, 1, :3] = _about_centres(polygons)
-        words = np.concatenate([records.view(np.uint32).ravel(), edges.view(np.uint32).ravel()])
-        self._first_edge_texel = len(records) * SCREEN_POLYGON.stride // 16
-        rows = max(1, -(-len(words) // (4 * ROW_TEXELS)))
-        image = np.zeros(rows * ROW_TEXELS * 4, np.uint32)
-        image[: len(words)] = words
-        self._texels = self._ctx.texture((ROW_TEXELS, rows), 4, image, dtype="u4")
-        self._texels.filter = moderngl.NEAREST, moderngl.NEAREST
-        places, owners, triangles, self._first_corner = fans(polygons)
-        vertices = np.zeros(len(places), [("place", "f4", 2), ("polygon", "u4")])
-        vertices["place"], vertices["polygon"] = places, owners
-        corners, indices = (
-            self._ctx.buffer(vertices.tobytes() or bytes(12)),
-            self._ctx.buffer(triangles.tobytes() or bytes(4)),
+        """Pack; `brightness`: how much of what looks bright lies below each of equally spaced x."""
+        self._polygons = polygons
+        # A sky alone is filtered as it is looked up, and has no edges within a pixel.
+        self._sees_edges = any(not item.material.is_specular for item in scene.scene.objects) or any(
+            light.has_extent for light in scene.scene.lights
         )
-        self._fans = self._ctx.vertex_array(
-            self._program, [(corners, "2f4 1u4", "in_place", "in_polygon")], index_buffer=indices
-        )
-        self._drawn = [self._fans, corners, indices, self._texels]
-        self._budget = DispatchBudget(_FIRST, 1, max(1, len(polygons)))
+        self._records = packed(polygons, scene, brightness)
 
-    def draw(self, size: tuple[int, int], places: np.ndarray, as_image: bool, bind, seconds: float) -> Iterator[float]:
+    def draw(
+        self, size: tuple[int, int], places: np.ndarray, as_image: bool, bind: Callable[[], None], seconds: float
+    ) -> Iterator[float]:
         """Draw all polygons into the beams' own picture, yielding the share done after every portion.
 
         `places`: (points, 2) of a pixel, 0 to 1, at which its edges are told; `bind`: binds what the camera's programs
-        read, and returns what finishes a portion and says how long it took."""
+        read; `seconds`: what a portion should take."""
+        assert self._polygons is not None
         self._resize(size)
-        view = _VIEW.zeros(1)
         places = ordered(places)
-        view["places"][0].reshape(-1, 2)[: len(places)] = places - 0.5
-        view["size"], view["points"], view["first_edge_texel"] = size, len(places), self._first_edge_texel
-        fine, coarse = (largest_divisor(len(places), parts) for parts in (FINE_PARTS, COARSE_PARTS))
-        view["fine_parts"], view["coarse_parts"] = fine, coarse
-        view["fine_above"], view["coarse_above"] = FINE_ABOVE, COARSE_ABOVE
-        view["reach"] = np.abs(places - 0.5).max() + 1e-4
-        self._view.write(view.tobytes())
-        assert self._fans is not None and self._texels is not None
-        framebuffer = self._ctx.framebuffer(self._pictures)
-        framebuffer.clear()
-        count, done = len(self._first_corner) - 1, 0
-        while done < count:
-            portion = min(self._budget.units, count - done)
-            timed = bind()
+        view = self._view_of(size, places)
+        entries = pixel_parts(self._polygons, size, float(view["reach"][0]), self._records["parts"].astype(np.int64))
+        done = 0
+        while done < len(entries):
+            part = entries[done : done + self._budget.units]
+            order, runs = by_pixel(part[:, 1] & ((1 << PIXEL_BITS) - 1))
+            for binding, values in ((BIND_BEAM_ENTRIES, part), (BIND_BEAM_RUNS, runs), (BIND_BEAM_ORDER, order)):
+                self._lists[binding].write(np.ascontiguousarray(values).tobytes())
+            view["entry_count"] = len(part)
+            self._view.write(view.tobytes())
+            bind()
             self._view.bind_to_uniform_block(BIND_BEAM_VIEW)
+            for binding, buffer in self._lists.items():
+                buffer.bind_to_storage_buffer(binding)
+            assert self._texels is not None
             if as_image:
                 self._texels.bind_to_image(IMAGE_POLYGONS, read=True, write=False)
             else:
                 self._texels.use(UNIT_POLYGONS)
-            framebuffer.use()
-            self._blend()
-            first, last = self._first_corner[done], self._first_corner[done + portion]
-            self._fans.render(moderngl.TRIANGLES, int(last - first), first=int(first))
-            self._ctx.enable_only(moderngl.NOTHING)
-            self._budget.learn(portion, timed(), seconds)
-            done += portion
-            yield done / count
-        park(self._ctx)
-        framebuffer.release()
+            start = time.perf_counter()
+            self._look.run(-(-len(part) // _GROUP))
+            self._ctx.memory_barrier()
+            for unit, picture in enumerate(self._pictures):
+                picture.bind_to_image(unit, read=True, write=True)
+            self._gather["run_count"].value = len(runs)
+            self._gather.run(-(-len(runs) // _GROUP))
+            self._ctx.memory_barrier()
+            self._ctx.finish()
+            self._budget.learn(len(part), time.perf_counter() - start, seconds)
+            done += len(part)
+            yield done / len(entries)
+
+    def _view_of(self, size: tuple[int, int], places: np.ndarray) -> np.ndarray:
+        """Upload the polygons for so many points of a pixel."""
+        assert self._polygons is not None
+        strength = self._records["strength"] if self._sees_edges else np.zeros(len(self._records))
+        parts = [largest_divisor(len(places), most) for most in (FINE_PARTS, COARSE_PARTS, 1)]
+        self._records["parts"] = np.select([strength > FINE_ABOVE, strength > COARSE_ABOVE], parts[:2], parts[2])
+        edges = np.zeros((len(self._polygons.edges), 2, 4), np.float32)
+        edges[:, 0, :3], edges[:, 1, :3] = _about_centres(self._polygons)
+        words = np.concatenate([self._records.view(np.uint32).ravel(), edges.view(np.uint32).ravel()])
+        rows = max(1, -(-len(words) // (4 * ROW_TEXELS)))
+        image = np.zeros(rows * ROW_TEXELS * 4, np.uint32)
+        image[: len(words)] = words
+        if self._texels is not None:
+            self._texels.release()
+        self._texels = self._ctx.texture((ROW_TEXELS, rows), 4, image, dtype="u4")
+        self._texels.filter = moderngl.NEAREST, moderngl.NEAREST
+        view = _VIEW.zeros(1)
+        view["places"][0].reshape(-1, 2)[: len(places)] = places - 0.5
+        view["points"], view["first_edge_texel"] = len(places), len(self._records) * SCREEN_POLYGON.stride // 16
+        view["reach"] = np.abs(places - 0.5).max() + 1e-4
+        return view
 
     def add(self, sums: Sequence[moderngl.Texture], first_row: int, rows: int) -> None:
         """Add what was drawn to these rows of the camera's sums."""
@@ -169,7 +187,6 @@ class ScreenBeams:
         self._blend()
         self._triangle.render(moderngl.TRIANGLES, 3)
         self._ctx.enable_only(moderngl.NOTHING)
-        framebuffer.scissor = None
         park(self._ctx)
         framebuffer.release()
 
@@ -179,25 +196,22 @@ class ScreenBeams:
         self._ctx.blend_func = moderngl.ONE, moderngl.ONE
 
     def _resize(self, size: tuple[int, int]) -> None:
-        if self._pictures and self._pictures[0].size == size:
-            return
+        if not self._pictures or self._pictures[0].size != size:
+            for picture in self._pictures:
+                picture.release()
+            self._pictures = [self._ctx.texture(size, 4, dtype="f4") for _ in range(self._targets)]
+        zeros = bytes(16 * size[0] * size[1])
         for picture in self._pictures:
-            picture.release()
-        self._pictures = [self._ctx.texture(size, 4, dtype="f4") for _ in range(self._targets)]
-
-    def _forget(self) -> None:
-        for owned in self._drawn:
-            owned.release()
-        self._drawn, self._fans, self._texels = [], None, None
+            picture.write(zeros)
 
     def release(self) -> None:
         """Free everything."""
-        self._forget()
         self._triangle.release()
-        shader.release(self._program, self._sum_program)
-        for owned in (self._view, *self._pictures):
-            owned.release()
-        self._pictures = []
+        shader.release(self._look, self._gather, self._sum_program)
+        for owned in (self._view, *self._lists.values(), *self._pictures, self._texels):
+            if owned is not None:
+                owned.release()
+        self._pictures, self._lists, self._texels = [], {}, None
 
 
 def packed(polygons: ScreenPolygons, scene: SceneBuffers, brightness: np.ndarray | None) -> np.ndarray:
@@ -240,39 +254,15 @@ def _about_centres(polygons: ScreenPolygons) -> tuple[np.ndarray, np.ndarray]:
     return lines[:, 0], lines[:, 1]
 
 
-def fans(polygons: ScreenPolygons) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Hulls grown by `REACH` to all sides, as triangles: corners (C, 2) in pixels, the polygon of each, uint32
-    indices of triangles' corners, and (N + 1,) where each polygon's indices begin.
-
-    Grown: the Minkowski sum with a pixel. Each corner moves along with both of its edges, and to the corner of the
-    pixel that lies between where these move apart."""
-    counts = np.diff(polygons.hull_start)
-    owner = np.repeat(np.arange(len(polygons)), counts)
-    corner = np.arange(len(polygons.hulls))
-    following = np.where(corner + 1 == polygons.hull_start[1:][owner], polygons.hull_start[:-1][owner], corner + 1)
-    previous = np.empty_like(following)
-    previous[following] = corner
-    places = polygons.hulls
-    x, y = places.T
-    area = np.zeros(len(polygons))
-    np.add.at(area, owner, x * y[following] - x[following] * y)
-    along = (places[following] - places) * np.where(area < 0.0, -1.0, 1.0)[owner][:, None]
-    outward = np.column_stack([along[:, 1], -along[:, 0]])
-    moved = np.where(outward >= 0.0, REACH, -REACH)
-    # Where these lie opposite each other, the corner between them on the way round.
-    before = moved[previous]
-    spin = np.where(area < 0.0, -1.0, 1.0)[owner]
-    quarter = np.column_stack([-before[:, 1], before[:, 0]]) * spin[:, None]
-    between = np.where(np.all(before != moved, axis=1)[:, None], quarter, moved)
-    grown = np.stack([places + before, places + between, places + moved], axis=1).reshape(-1, 2)
-    owners = np.repeat(owner, 3).astype(np.uint32)
-    triangles_of = np.maximum(3 * counts - 2, 0)
-    starts = np.concatenate([[0], np.cumsum(3 * triangles_of)])
-    which = np.repeat(np.arange(len(polygons)), triangles_of)
-    number = np.arange(len(which)) - np.repeat(starts[:-1] // 3, triangles_of)
-    base = 3 * polygons.hull_start[:-1][which]
-    triangles = np.column_stack([base, base + number + 1, base + number + 2]).astype(np.uint32)
-    return grown, owners, triangles, starts
+def by_pixel(pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """uint32 (n,): entries sorted by their pixels, in order within each; (m, 4): pixel, first and end of its
+    entries."""
+    order = np.argsort(pixels, kind="stable").astype(np.uint32)
+    ranked = pixels[order]
+    starts = np.flatnonzero(np.diff(ranked, prepend=np.uint32(0xFFFFFFFF)) != 0)
+    runs = np.zeros((len(starts), 4), np.uint32)
+    runs[:, 0], runs[:, 1], runs[:, 2] = ranked[starts], starts, np.append(starts[1:], len(ranked))
+    return order, runs
 
 
 def largest_divisor(number: int, most: int) -> int:

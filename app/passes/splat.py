@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.errors import DeviceError
 from ..gpu import shader
+from ..gpu.context import device_sentence
 from ..gpu.schema import Field, Struct
 from .footprint import (
     SPLAT,
@@ -124,9 +126,8 @@ class Splatter:
                 atlas.flush()
         error = self._ctx.error
         if error != "GL_NO_ERROR":
-            raise RuntimeError(
-                f"{error} while splatting {count} photons into a {atlas.size[0]} x {atlas.size[1]} atlas"
-            )
+            where = f"splatting {count} photons into a {atlas.size[0]} x {atlas.size[1]} atlas"
+            raise DeviceError(device_sentence(error, where))
 
     def draw(self, tables: SplatTables, atlas: MapAtlas) -> None:
         """Add the splats of the last group of photons to the atlas's scratch textures."""

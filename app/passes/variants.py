@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
+from ..beams.screen_pairs import PIXEL_BITS
 from ..gpu import bindings, records
 from ..gpu.device_traits import DeviceTraits
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
-from ..gpu.splat_tables import DENSITY_CELLS
 from ..gpu.texture_store import place_defines
 from ..model.features import Features
 from .camera_tables import EMISSION_CELLS
@@ -50,11 +50,20 @@ TINT_STEPS = 48
     BIND_LISTED,
     BIND_HALTED,
     BIND_BEAM_OBJECTS,
-) = range(8, 18)
+    BIND_BEAM_ENTRIES,
+    BIND_BEAM_RUNS,
+    BIND_BEAM_ORDER,
+    BIND_BEAM_FOUND,
+) = range(8, 22)
 UNIT_EMISSION, UNIT_PICTURES, UNIT_POLYGONS = 10, 11, 13
 BIND_BEAM_VIEW = 9
 """Of uniform blocks."""
 IMAGE_POLYGONS = 0
+GATHER_DEFINES = {
+    "BIND_BEAM_RUNS": BIND_BEAM_RUNS,
+    "BIND_BEAM_ORDER": BIND_BEAM_ORDER,
+    "BIND_BEAM_FOUND": BIND_BEAM_FOUND,
+}
 _BEYOND_ONLY = (
     "HAS_DISPERSION",
     "SPECTRAL_SWEEP",
@@ -119,8 +128,6 @@ class SplatFeatures(Protocol):
     def local_gain(self) -> bool: ...
     @property
     def reindexed(self) -> bool: ...
-    @property
-    def hero(self) -> bool: ...
 
 
 def splat_defines(features: SplatFeatures) -> Defines:
@@ -131,11 +138,8 @@ def splat_defines(features: SplatFeatures) -> Defines:
         # A splat that no wavelength moves is a Gaussian of one colour.
         "ONE_COLOUR": features.point_spectrum or features.spectral_groups == 0,
         "CHARTS": features.charts,
-        "HERO": features.hero,
     }
     counts: Defines = {"TARGETS": features.targets, "SLOTS": 2 if features.nested_windows else 1}
-    if features.hero:
-        counts["DENSITY_CELLS"] = f"{DENSITY_CELLS}u"
     return counts | {name: 1 for name, on in switches.items() if on}
 
 
@@ -275,7 +279,7 @@ def beside_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     return direct_defines(beyond) | {"BEAM_OBJECTS": 1, "BIND_BEAM_OBJECTS": BIND_BEAM_OBJECTS}
 
 
-def view_beam_defines(beyond: Mapping[str, int | float | str]) -> Defines:
+def screen_beam_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     """For polygons of the picture that camera beams see, from what the listed pixels are compiled with. A beam's one
     spectral column is by x itself, and its throughput holds what was absorbed."""
     left_out = {"CAMERA_SPECULAR", "ABSORPTION", "ABSORBERS", "NORMAL_DERIVATIVES", "RANDOM_WAVELENGTH", "HALTS"}
@@ -284,6 +288,9 @@ def view_beam_defines(beyond: Mapping[str, int | float | str]) -> Defines:
         "SPECTRAL_GROUPS": 1 if "SPECTRAL_SWEEP" in beyond else 0,
         "VARIABLE_ROW": beyond["X_ROW"],
         "BIND_BEAM_VIEW": BIND_BEAM_VIEW,
+        "BIND_BEAM_ENTRIES": BIND_BEAM_ENTRIES,
+        "BIND_BEAM_FOUND": BIND_BEAM_FOUND,
+        "PIXEL_BITS": PIXEL_BITS,
         "IMAGE_POLYGONS": IMAGE_POLYGONS,
         "UNIT_POLYGONS": UNIT_POLYGONS,
     }

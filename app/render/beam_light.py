@@ -17,7 +17,16 @@ import numpy as np
 
 from ..beams.light_beams import LIGHT_PARTS, BeamFinder, LightBeams
 from ..beams.polygons import BeamPolygons
-from ..beams.search import SUM_ABSORBED, SUM_BEAMS, SUM_DEPOSITED, SUM_ENTERED, SUM_ESCAPED, SUM_HANDED
+from ..beams.search import (
+    SUM_ABSORBED,
+    SUM_BEAMS,
+    SUM_DEPOSITED,
+    SUM_DEPTH,
+    SUM_ENTERED,
+    SUM_ESCAPED,
+    SUM_HANDED,
+    SUM_NUMERIC,
+)
 from ..gpu.beam_tables import BeamTables
 from ..gpu.context import Context
 from ..gpu.map_channels import MapChannels
@@ -34,7 +43,7 @@ THRESHOLD = 4.0
 COARSEST, FINEST = 1e-2, 1e-8
 _SURVEY = 1e-3
 """Threshold of the search that tells which objects beams carry, and what they cost."""
-_DEAREST = 90.0
+_DEAREST = 4.0
 """Seconds of a survey after which photons are thought cheaper."""
 _PAUSE_S = 0.003
 """How long a pause lasts while a search runs beside whoever draws."""
@@ -44,6 +53,8 @@ _SUMS = {
     "handed": SUM_HANDED,
     "absorbed": SUM_ABSORBED,
     "escaped": SUM_ESCAPED,
+    "lost_depth": SUM_DEPTH,
+    "lost_numeric": SUM_NUMERIC,
 }
 
 
@@ -75,11 +86,16 @@ class MovingBeams:
             )
 
 
+SURVEY_PARTS = 4
 MOVING_PARTS = 1
 """Points that stand for an extended light in motion."""
 MOVING_COARSEST, MOVING_FINEST = 2e-2, 1e-5
 _MOVING_WORD = 1
 """Roulette's seed in motion: the same beams from frame to frame."""
+
+
+_compiled: list[bool] = []
+"""Holds something once a search has run in this process."""
 
 
 class _Canvas:
@@ -161,7 +177,12 @@ class BeamLight:
         """Find out which objects' light beams carry, and whether that pays, with pauses; afterwards `found` holds the
         strongest beams, or those of `moving`."""
         threshold = _SURVEY if moving is None else moving.threshold
-        light_parts = LIGHT_PARTS if moving is None else MOVING_PARTS
+        light_parts = SURVEY_PARTS if moving is None else MOVING_PARTS
+        if not _compiled:
+            # The first search of all may have to be compiled, which says nothing about the scene.
+            for _ in self._searched(self.finder, 1.0, _MOVING_WORD, 1, threads=None):
+                yield
+            _compiled.append(True)
         started = time.perf_counter()
 
         def pays() -> bool:

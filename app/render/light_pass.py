@@ -33,7 +33,7 @@ from ..passes.beam_emission import BeamEmission
 from ..passes.camera import CausticMaps
 from ..passes.emission_domain import EmissionDomain, emission_domain
 from ..passes.map_atlas import MapAtlas
-from ..passes.map_layout import MapLayout, check_map_receiver, layout_maps
+from ..passes.map_layout import MapLayout, Window, check_map_receiver, layout_maps, pixel_side, plane_frame
 from ..passes.pilot import Pilot, landings_of, pilot_steps
 from ..passes.splat import Splatter
 from ..passes.trace import RAY_ROOM, Batch, FluxTally, TracePass, queue_bytes
@@ -585,6 +585,18 @@ class LightPass:
             area = self.layout.placements["texel_area"][record["placement"]]
             sides.append(np.sqrt(area) * self.buffers.space.scale)
         return np.array(sides)
+
+    @property
+    def lit_receivers(self) -> list[int]:
+        """Receivers that pilot photons landed on."""
+        return sorted(landings_of(self.pilots.values()))
+
+    def window_pixels(self, receiver: int, window: Window) -> float:
+        """Longest side of a flat receiver's window, pixels of the picture that maps are fitted to."""
+        points = self.buffers.space.to_gpu(self.buffers.world_meshes[self.buffers.receivers[receiver]].vertices)
+        size = self.fit.width, self.fit.height
+        pixel = pixel_side(self.fit.view, self.buffers, plane_frame(points), window, size)
+        return float(window.size.max()) / pixel
 
     def show_gains(self, scene: Scene | None) -> None:
         """Splat from now on with the brush's dabs of `scene`; None without."""

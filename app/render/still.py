@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ..base.memory import peak_bytes
 from ..edit.parameters import Stage
@@ -15,6 +15,7 @@ from ..passes.spectrum_choice import Spectrum
 from .beam_light import BeamStats
 from .frames import FrameRenderer, Picture
 from .light_pass import LightStats
+from .notices import light_notices, picture_notices
 
 Progress = Callable[[float, str], None]
 Cancelled = Callable[[], bool]
@@ -45,6 +46,8 @@ class RenderStats:
     map_flux_w: float
     camera_pass: CameraStats
     beams: BeamStats | None
+    notices: tuple[str, ...] = ()
+    """What must be told without being asked."""
 
     @property
     def photons(self) -> int:
@@ -140,7 +143,11 @@ def render(
         for share in frames.steps(stage, cancelled):
             progress(share, frames.phase)
         picture = frames.picture
-        return RenderResult(**vars(picture), stats=_stats(context, frames, settings))
+        notices = (
+            *light_notices(frames.light),
+            *picture_notices(frames.light, scene.camera, settings, picture.rgb),
+        )
+        return RenderResult(**vars(picture), stats=replace(_stats(context, frames, settings), notices=notices))
     finally:
         frames.release()
         if own:

@@ -92,6 +92,7 @@ def _work(session: Session, budget_s: float) -> None:
     try:
         session.picture.show(session.state, now, session.delta_s, session.jobs.comparison)
         session.jobs.follow(session.state, session.picture, now)
+        session.tell_losses()
     except UserError as error:
         session.messages.tell(sentence(str(error)), is_error=True)
     except Exception as error:  # noqa: BLE001 - a bug, or the device is lost

@@ -19,6 +19,7 @@ from ..edit.document import Document
 from ..edit.preferences import Settings, config_dir, load_settings, save_settings
 from ..edit.state import Selection, State
 from ..gpu.shader_watch import ShaderWatch
+from ..render.notices import loss_notices
 from .background_jobs import BackgroundJobs
 from .crash_log import write_crash
 from .export import write_codes
@@ -56,6 +57,7 @@ class Session:
         self.document = Document.new() if path is None else Document.open(path)
         self.settings, notice = load_settings()
         self.messages = MessageBox(clock)
+        self._told_losses: tuple[str, ...] = ()
         self.autosave = Autosave(config_dir())
         self.recovery: Recovery | None = next(iter(recoveries(config_dir())), None)
         self.picture = LivePicture(context, make_engine)
@@ -165,6 +167,16 @@ class Session:
         self.picture.new_scene()
         self.tell_notes()
         self._remember_file(document.source)
+
+    def tell_losses(self) -> None:
+        """Once a picture is whole: what of its light was lost."""
+        stats = self.picture.stats
+        if stats.converged and stats.photons:
+            lost = tuple(loss_notices(stats.lost))
+            for notice in lost:
+                if notice not in self._told_losses:
+                    self.messages.tell(notice)
+            self._told_losses = lost
 
     def tell_notes(self) -> None:
         """What was assumed while loading."""

@@ -31,6 +31,8 @@ vec3 left_normal = vec3(0.0);
 #define BEHIND NEAR_DISTANCE
 #endif
 #define FAR_DISTANCE 1e30
+// Rays from a lamp that lies on a surface leave it.
+#define START_DISTANCE 2e-7
 // Rays that start farther than this from the middle of the scene are met from nearby.
 #define FAR_START 4.0
 
@@ -64,7 +66,9 @@ bool accept_hit(float distance, float facing, uint object, RayOrigin origin)
         repeated = bit != NONE && is_inside == (facing < 0.0);
     }
 #endif
-    return !repeated && distance > (same ? 0.0 : -BEHIND);
+    // What is no surface, a lamp or a camera, has nothing in contact with it.
+    float least = origin.object == NONE ? START_DISTANCE : -BEHIND;
+    return !repeated && distance > (same ? 0.0 : least);
 }
 
 // Touching solids: of two crossings at one place the entering one comes first, so that no film of

@@ -312,9 +312,10 @@ def test_which_hits_count(scene: Scene) -> None:
             if same:  # a solid is not left twice nor entered from within at once
                 want = distance > 0 and not (distance < near and bool(inside) == enters)
             elif stack and obj in ORDER and distance < near:  # what the mask knows to be crossed is not crossed again
-                want = distance > -near and (mask >> ORDER.index(obj) & 1 == 1) != enters
-            else:
-                want = distance > -near
+                least = 2e-7 if from_object == NONE else -near
+                want = distance > least and (mask >> ORDER.index(obj) & 1 == 1) != enters
+            else:  # nothing is in contact with a lamp or a camera
+                want = distance > (2e-7 if from_object == NONE else -near)
             assert got["ok"][row] == want, (stack, cases[row])
         leaves = np.array([facing > 0 for _, facing, *_ in cases])
         np.testing.assert_allclose(got["key"] - inputs["distance"], np.where(leaves & stack, near, 0.0), atol=1e-7)

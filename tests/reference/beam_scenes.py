@@ -10,11 +10,13 @@ import numpy as np
 def lamp(
     position: Sequence[float], direction: Sequence[float], size: Sequence[float], kind: str = "collimated", more: str = ""
 ) -> str:
-    """A light; `size`: radius, or width and height, of a collimated or an area one."""
-    shape = f"radius = {size[0]}" if len(size) == 1 else f'shape = "rectangle"\nsize = [{size[0]}, {size[1] if len(size) > 1 else 0}]'
-    shape = shape if len(size) else ""
-    place = f"position = {list(position)}" if len(position) else ""
-    return f'[[lights]]\nkind = "{kind}"\n{place}\ndirection = {list(direction)}\n{shape}\n{more}\n'
+    """A light; `size`: radius, or width and height, of a collimated or an area one. What is empty is not written."""
+    told = [f'kind = "{kind}"', more]
+    told += [f"position = {list(position)}"] if len(position) else []
+    told += [f"direction = {list(direction)}"] if len(direction) else []
+    told += [f"radius = {size[0]}"] if len(size) == 1 else []
+    told += [f'shape = "rectangle"\nsize = {list(size)}'] if len(size) == 2 else []
+    return "[[lights]]\n" + "\n".join(told) + "\n"
 
 
 def solid(vertices: np.ndarray, faces: Sequence[Sequence[int]], more: str = 'glass = "N-BK7"', name: str = "solid") -> str:
@@ -142,3 +144,18 @@ CASES = {
 }
 """What light does in them: refraction; steps; sixty facets; cement; a solid that hides parts of itself; one solid that
 shades another; black before glass; absorption; a mirror."""
+
+SPOT = "half_angle_deg = 14.0\nsoftness = 0.5"
+NEAR = {
+    "point far": lamp((-2.0, 0.4, 2.6), (), (), "point") + PRISM,
+    "point near": lamp((-0.5, 0.1, 1.7), (), (), "point")
+    + box((1.0, 1.0, 0.4), (0.0, 0.0, 0.9), 'glass = "N-SF11"'),
+    "spot": lamp((-2.0, 0.4, 2.6), (0.75, -0.1, -0.65), (), "spot", SPOT) + PRISM,
+    "between": lamp((0.0, 0.0, 2.0), (), (), "point")
+    + box((0.5, 1.0, 1.0), (-1.2, 0.0, 0.9), 'glass = "N-BK7"', "left")
+    + box((0.5, 1.0, 1.0), (1.2, 0.1, 0.9), 'glass = "N-BK7"', "right"),
+    "inside": lamp((0.1, 0.05, 0.9), (), (), "point")
+    + box((1.0, 0.8, 0.6), (0.0, 0.0, 0.9), 'glass = "N-BK7"'),
+    "point brilliant": lamp((-0.8, 0.5, 3.0), (), (), "point") + BRILLIANT,
+}
+"""Points of light: far from a prism, close above a block, a soft spot, between two blocks, inside of one."""

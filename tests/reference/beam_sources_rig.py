@@ -129,19 +129,21 @@ class Rig:
             back = 3.0 * reach
             half = reach + back * tangent
             return Lamp(middle - back * forward, forward, right, up, (half, half), False, tangent)
-        place = np.array(it.position)
+        place, half = np.array(it.position), it.half_extent
+        if it.has_outline:
+            return Lamp(place, forward, right, up, half, it.is_disc, 0.0, True, axis=forward, lambert=True)
         towards = corners.mean(axis=0) - place
         towards /= np.linalg.norm(towards)
         side = np.cross(towards, np.eye(3)[np.argmin(np.abs(towards))])
         side /= np.linalg.norm(side)
         other = np.cross(towards, side)
         depth = (corners - place) @ towards
-        flat = np.stack([(corners - place) @ side, (corners - place) @ other]) / depth
-        assert depth.min() > 0.0
-        half = np.array(it.half_extent)
-        assert not half.any()
-        low, high = flat.min(axis=1), flat.max(axis=1)
-        window = (low[0], high[0], low[1], high[1])
+        window = (0.0, 0.0, 0.0, 0.0)
+        if depth.min() > 0.0:
+            flat = np.stack([(corners - place) @ side, (corners - place) @ other]) / depth
+            low, high = flat.min(axis=1), flat.max(axis=1)
+            if np.abs(flat).max() < 3.0:
+                window = (low[0], high[0], low[1], high[1])
         return Lamp(place, towards, side, other, (0.0, 0.0), False, 0.0, True, window, forward, it.cone)
 
     def grid(self, low: tuple[float, float], high: tuple[float, float], cells: int, receiver: int = 0) -> Grid:
@@ -159,7 +161,8 @@ def at_index(emission: Emission, *x: float) -> Emission:
 def scores(found: np.ndarray, exact: np.ndarray, variance: np.ndarray, weight: float, least: float = 25.0) -> np.ndarray:
     """Standard scores by cell of what rays of mean `weight` found; cells that expect fewer than `least` rays are one."""
     few = exact < least * weight
-    spread = np.maximum(variance, exact * weight)
-    z = (found - exact)[~few] / np.sqrt(spread[~few])
-    rest = max(float(spread[few].sum()), weight * weight)
+    # The weight of a ray in this cell: what varies with its number is only how many there are.
+    each = np.where(found > 0.0, variance / np.where(found > 0.0, found, 1.0), weight)
+    z = (found - exact)[~few] / np.sqrt((exact * each)[~few])
+    rest = max(float((exact * weight)[few].sum()), weight * weight)
     return np.append(z, (found - exact)[few].sum() / np.sqrt(rest))

@@ -69,7 +69,7 @@ class Lamp:
     tangent: float = 0.0
     is_point: bool = False
     window: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    """Gnomonic plane sampled: x from, to, y from, to."""
+    """Gnomonic plane sampled: x from, to, y from, to; all zero: the whole sphere."""
     axis: np.ndarray = field(default_factory=lambda: np.zeros(3))
     cone: tuple[float, float] = (4.0, 4.0)
     lambert: bool = False
@@ -159,14 +159,19 @@ def _trace(
                 while x * x + y * y > 1.0:
                     x, y = 2.0 * np.random.random() - 1.0, 2.0 * np.random.random() - 1.0
             x, y = x * tangent, y * tangent
-        else:
+        elif window[1] > window[0]:
             x = window[0] + (window[1] - window[0]) * np.random.random()
             y = window[2] + (window[3] - window[2]) * np.random.random()
             weight = (1.0 + x * x + y * y) ** -1.5
+        else:
+            x, y = 2.0 * np.random.random() - 1.0, 2.0 * np.pi * np.random.random()
         length = 0.0
         for k in range(3):
             o[k] = frame[0, k] + a * half[0] * frame[2, k] + b * half[1] * frame[3, k]
-            d[k] = frame[1, k] + x * frame[2, k] + y * frame[3, k]
+            if lamp_kind < 2 or window[1] > window[0]:
+                d[k] = frame[1, k] + x * frame[2, k] + y * frame[3, k]
+            else:
+                d[k] = x * frame[1, k] + np.sqrt(1.0 - x * x) * (np.cos(y) * frame[2, k] + np.sin(y) * frame[3, k])
             length += d[k] * d[k]
         cosine = 0.0
         for k in range(3):
@@ -288,7 +293,8 @@ def landed(
     domain = area
     if lamp.is_point:
         window = lamp.window
-        domain = (window[1] - window[0]) * (window[3] - window[2]) * (area if lamp.lambert else 1.0)
+        domain = (window[1] - window[0]) * (window[3] - window[2]) or 4.0 * np.pi
+        domain *= area if lamp.lambert else 1.0
 
     def chunk(number: int):
         count = min(_CHUNK, rays - number * _CHUNK)

@@ -1,4 +1,4 @@
-"""Screen polygons of one convex flat solid in air, by a plain recursion in numpy: what tests of the camera's beams draw.
+"""Screen polygons of one convex flat solid in air, by a plain recursion in numpy: what tests of camera beams draw.
 
 A beam is nine rays, of three places at three wavelengths, that are carried from facet to facet without asking whether
 they hit it; where they do is what the edges say. Slow, short, and nothing in common with `app/beams`.
@@ -10,7 +10,6 @@ import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
-
 from spectrasplat.beams.screen_polygons import ScreenPolygons
 from spectrasplat.model.camera_rays import camera_frame
 from spectrasplat.model.scene import Camera, Scene
@@ -56,8 +55,8 @@ def screen_polygons(
     cell_px: float = 32.0,
     max_depth: int = 24,
 ) -> ScreenPolygons:
-    """Polygons of `scene.objects[solid]`; of those of less than `threshold` pixels times throughput, some that stand for
-    all. `space`: the scene's `GpuSpace`; `axis`: its `SpectralAxis`."""
+    """Polygons of `scene.objects[solid]`; of those of less than `threshold` pixels times throughput, some that stand
+    for all. `space`: the scene's `GpuSpace`; `axis`: its `SpectralAxis`."""
     item = scene.objects[solid]
     facets = _facets(item, space)
     found = _Found()
@@ -146,9 +145,7 @@ def _first_beams(camera, space, width, height, facet, cell_px):
         about = np.array([[*line[:2], line[2] + line[:2] @ centre] * 2 for line in lines])
         yield (
             centre,
-            _Beam(
-                np.stack([origin] * 3), np.stack([direction] * 3), np.ones(3), [polygon - centre] * 3, about, key=17
-            ),
+            _Beam(np.stack([origin] * 3), np.stack([direction] * 3), np.ones(3), [polygon - centre] * 3, about, key=17),
         )
 
 
@@ -165,13 +162,12 @@ def _follow(found, facets, number, beam, index, outside, threshold, max_depth, a
     reflectance = _fresnel(-facing[:, 0], eta[:, 0])
     key = (beam.key * 1000003 + 31 * number + 7) & 0xFFFFFFFF
     mirrored = beam.direction - 2.0 * facing[..., None] * normal
-    bent = (
-        eta[..., None] * beam.direction
-        - (eta * facing + np.sqrt(np.maximum(1.0 - sine2, 0.0)))[..., None] * normal
-    )
+    bent = eta[..., None] * beam.direction - (eta * facing + np.sqrt(np.maximum(1.0 - sine2, 0.0)))[..., None] * normal
     children = [(mirrored, reflectance, outside, 2 * key)]
     if not np.any(sine2[1] >= 1.0):
-        children.append((bent / np.linalg.norm(bent, axis=-1, keepdims=True), 1.0 - reflectance, not outside, 2 * key + 1))
+        children.append(
+            (bent / np.linalg.norm(bent, axis=-1, keepdims=True), 1.0 - reflectance, not outside, 2 * key + 1)
+        )
     for direction, share, is_out, name in children:
         child = _Beam(
             position, direction, beam.throughput * share, beam.polygons, beam.edges, beam.depth + 1, name & 0xFFFFFFFF
@@ -238,9 +234,7 @@ def _leave(found: _Found, beam: _Beam, about) -> None:
         return
 
     def columns(rays: np.ndarray) -> np.ndarray:
-        return np.stack(
-            [rays[:, 0], (rays[:, 1] - rays[:, 0]) / STEP_PX, (rays[:, 2] - rays[:, 0]) / STEP_PX], axis=1
-        )
+        return np.stack([rays[:, 0], (rays[:, 1] - rays[:, 0]) / STEP_PX, (rays[:, 2] - rays[:, 0]) / STEP_PX], axis=1)
 
     found.rows.append(
         {

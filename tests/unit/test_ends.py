@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.__main__ import main
-from spectrasplat.base.interrupts import Interruption, Terminated, exit_code_of, interrupt_flag, terminations_raise
+from spectrasplat.base.interrupts import Interruption, Terminated, exit_code_of, interrupt_flag, signals_raise
 
 from tests.fuzz.kills import COMMANDS, SCENE, kill_one, left_behind
 
@@ -28,7 +28,7 @@ def folder(tmp_path: Path) -> Path:
 def test_signals_become_exit_codes() -> None:
     assert [exit_code_of(e) for e in (KeyboardInterrupt(), Terminated(15), Terminated(1))] == [130, 143, 129]
     assert Interruption().exit_code == 0
-    with terminations_raise(), pytest.raises(Terminated, match="SIGTERM"):
+    with signals_raise(), pytest.raises(Terminated, match="SIGTERM"):
         os.kill(os.getpid(), signal.SIGTERM)
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
@@ -44,10 +44,26 @@ def test_the_first_signal_asks_and_the_second_insists(number: int, capsys: pytes
     assert "what is done will be written" in capsys.readouterr().err
 
 
+def test_a_signal_while_something_is_imported_ends_the_process_at_once(tmp_path: Path) -> None:
+    (tmp_path / "slow.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGTERM)\n")
+    script = (
+        "from spectrasplat.base.atomic import atomic_output\n"
+        "from spectrasplat.base.interrupts import signals_raise\n"
+        "with signals_raise(), atomic_output('a.png'):\n"
+        "    import slow\n"
+    )
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 143 and done.stderr == "spectrasplat: interrupted\n"
+    assert not [path for path in tmp_path.iterdir() if "part" in path.name]
+
+
 def test_what_nohup_ignores_stays_ignored() -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        with terminations_raise(), interrupt_flag() as interrupted:
+        with signals_raise(), interrupt_flag() as interrupted:
             os.kill(os.getpid(), signal.SIGHUP)
             assert not interrupted()
     finally:

@@ -294,6 +294,7 @@ class _Reader:
 
     def _camera(self, node: dict[str, Any], world: np.ndarray) -> Camera:
         entry = self.document.item("cameras", node["camera"])
+        self._check_turn(world, f"camera '{node.get('name', entry.get('name', 'camera'))}'")
         distance = float(own_extras(node).get("target_distance", _DEFAULT_DISTANCE))
         position, forward, up = world[:3, 3], -_unit(world[:3, 2]), _unit(world[:3, 1])
         camera = Camera(vec3(position), vec3(position + distance * forward), vec3(up))
@@ -306,6 +307,14 @@ class _Reader:
         if not 0.0 < fov < 180.0:
             raise self.document.fail(f"a camera's yfov is {fov:g} degrees; it must lie between 0 and 180")
         return replace(camera, vertical_fov_deg=fov)
+
+    def _check_turn(self, world: np.ndarray, label: str) -> None:
+        """Refuse a place whose axes have no direction."""
+        lengths = np.linalg.norm(world[:3, :3], axis=0)
+        if not (np.isfinite(world).all() and (lengths > 1e-30).all()):
+            raise self.document.fail(
+                f"{label} stands under a scale of zero and looks nowhere; give its nodes a scale above 0"
+            )
 
     def _read_lights(self, around: Surroundings) -> tuple[Light, ...]:
         lights = []
@@ -324,6 +333,7 @@ class _Reader:
         from ..optics.colorimetry import illuminant_table, rgb709_to_xyz_matrix, rgb_partition
         from ..optics.spectrum import Spectrum
 
+        self._check_turn(world, f"light '{label}'")
         position, direction = vec3(world[:3, 3]), vec3(-_unit(world[:3, 2]))
         own = own_extras(entry).get("light")
         if own is not None:

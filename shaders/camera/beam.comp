@@ -1,6 +1,8 @@
 // What a pixel sees by way of one screen polygon: a camera beam that keeps its facets (app/beams/screen_polygons.py). How much of the pixel it covers,
 // and at which wavelengths, follows from its edges; the ray that leaves its last facet from its columns. What lies behind is looked up along the sweep as
-// for any camera path. Polygons are added up in order.
+// for any camera path. An invocation is of one pixel, or of a part of one, of one polygon.
+layout(local_size_x = 64) in;
+
 #include "camera/globals.glsl"
 
 #ifdef SPECTRAL_SWEEP
@@ -16,8 +18,9 @@ layout(rgba32ui, binding = IMAGE_POLYGONS) uniform readonly restrict uimage2D po
 layout(binding = UNIT_POLYGONS) uniform usampler2D polygon_texels;
 #endif
 
-flat in uint polygon;
-layout(location = 0) out vec4 found[TARGETS];
+// Polygon; pixel, and which part of it.
+layout(std430, binding = BIND_BEAM_ENTRIES) readonly restrict buffer Entries { uvec2 entries[]; };
+layout(std430, binding = BIND_BEAM_FOUND) writeonly restrict buffer Found { vec4 found[]; };
 
 // Edges that cross the pixel which are kept at hand; more are fetched for every point.
 #define EDGES_KEPT 6
@@ -136,22 +139,24 @@ void look_behind(CameraPath path, uint pixel_key)
 
 void main()
 {
-    uvec2 pixel = uvec2(gl_FragCoord.xy);
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= view.entry_count) return;
+    uvec2 entry = entries[index];
+    uint number = bitfieldExtract(entry.y, 0, PIXEL_BITS), part = entry.y >> PIXEL_BITS;
+    uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
     for (int t = 0; t < TARGETS; ++t) radiance[t] = vec4(0.0);
-    ScreenPolygon beam = polygon_at(polygon);
+    ScreenPolygon beam = polygon_at(entry.x);
     vec2 middle = vec2(pixel) + 0.5 - beam.centre;
 
     // Edges that pass through the pixel; few do.
     vec3 kept_lo[EDGES_KEPT], kept_hi[EDGES_KEPT];
     int kept = 0;
     uint beyond = beam.end_edge;
-    bool outside = false;
-    for (uint e = beam.first_edge; e < beam.end_edge && !outside; ++e) {
+    for (uint e = beam.first_edge; e < beam.end_edge; ++e) {
         vec3 line_lo, line_hi;
         edge_at(e, line_lo, line_hi);
         vec2 at = vec2(distance_inside(line_lo, middle), distance_inside(line_hi, middle));
         vec2 reach = view.reach * vec2(abs(line_lo.x) + abs(line_lo.y), abs(line_hi.x) + abs(line_hi.y));
-        outside = all(lessThan(at, -reach));
         if (any(lessThan(at, reach))) {
             if (kept == EDGES_KEPT) beyond = min(beyond, e);
             for (int k = 0; k < EDGES_KEPT; ++k)
@@ -162,46 +167,41 @@ void main()
             kept = min(kept + 1, EDGES_KEPT);
         }
     }
-    if (outside) discard;
 
-    // Strong polygons are looked at in every part of the pixel, as other surfaces are; of weak ones one ray must do.
-    uint pixel_key = hash_combine(hash_combine(hash_combine(p.seed, pixel.x), pixel.y), beam.key);
-    uint parts = beam.strength > view.fine_above ? view.fine_parts : (beam.strength > view.coarse_above ? view.coarse_parts : 1u);
-    uint points_of_part = view.points / parts;
+    uint points_of_part = view.points / beam.parts;
+    cover.low = cover.high = vec4(0.0);
     cover.x_lo = beam.x_lo;
     cover.per_x = 1.0 / max(beam.x_hi - beam.x_lo, 1e-6);
-    for (uint part = 0u; part < parts; ++part) {
-        cover.low = cover.high = vec4(0.0);
-        float t_lo = 1.0, t_hi = 0.0, sum = 0.0;
-        vec2 centre_seen = vec2(0.0);
-        for (uint i = part * points_of_part; i < (part + 1u) * points_of_part; ++i) {
-            vec4 two = view.places[i >> 1u];
-            vec2 place = middle + ((i & 1u) == 0u ? two.xy : two.zw);
-            float lo = 0.0, hi = 1.0;
-            for (int k = 0; k < EDGES_KEPT; ++k)
-                if (k < kept) cut_interval(distance_inside(kept_lo[k], place), distance_inside(kept_hi[k], place), lo, hi);
-            for (uint e = beyond; e < beam.end_edge; ++e) {
-                vec3 line_lo, line_hi;
-                edge_at(e, line_lo, line_hi);
-                cut_interval(distance_inside(line_lo, place), distance_inside(line_hi, place), lo, hi);
-            }
-            if (hi > lo) {
-                add_cover(lo, hi);
-                t_lo = min(t_lo, lo);
-                t_hi = max(t_hi, hi);
-                centre_seen += (hi - lo) * place;
-                sum += hi - lo;
-            }
+    float t_lo = 1.0, t_hi = 0.0, sum = 0.0;
+    vec2 centre_seen = vec2(0.0);
+    for (uint i = part * points_of_part; i < (part + 1u) * points_of_part; ++i) {
+        vec4 two = view.places[i >> 1u];
+        vec2 place = middle + ((i & 1u) == 0u ? two.xy : two.zw);
+        float lo = 0.0, hi = 1.0;
+        for (int k = 0; k < EDGES_KEPT; ++k)
+            if (k < kept) cut_interval(distance_inside(kept_lo[k], place), distance_inside(kept_hi[k], place), lo, hi);
+        for (uint e = beyond; e < beam.end_edge; ++e) {
+            vec3 line_lo, line_hi;
+            edge_at(e, line_lo, line_hi);
+            cut_interval(distance_inside(line_lo, place), distance_inside(line_hi, place), lo, hi);
         }
-        WHEN(sum > 0.0) {
-            float per_point = 1.0 / float(view.points);
-            cover.low *= per_point;
-            cover.high *= per_point;
-            cover.varies = any(notEqual(vec4(cover.low.x), cover.low)) || any(notEqual(vec4(cover.low.x), cover.high));
-            beam_side = sqrt(min(sum * per_point / max(t_hi - t_lo, 1e-3), 1.0));
-            beam_draw = part;
-            look_behind(path_beyond(beam, centre_seen / sum, t_lo, t_hi), pixel_key);
+        if (hi > lo) {
+            add_cover(lo, hi);
+            t_lo = min(t_lo, lo);
+            t_hi = max(t_hi, hi);
+            centre_seen += (hi - lo) * place;
+            sum += hi - lo;
         }
     }
-    for (int t = 0; t < TARGETS; ++t) found[t] = radiance[t];
+    WHEN(sum > 0.0) {
+        float per_point = 1.0 / float(view.points);
+        cover.low *= per_point;
+        cover.high *= per_point;
+        cover.varies = any(notEqual(vec4(cover.low.x), cover.low)) || any(notEqual(vec4(cover.low.x), cover.high));
+        beam_side = sqrt(min(sum * per_point / max(t_hi - t_lo, 1e-3), 1.0));
+        beam_draw = part;
+        uint pixel_key = hash_combine(hash_combine(hash_combine(p.seed, pixel.x), pixel.y), beam.key);
+        look_behind(path_beyond(beam, centre_seen / sum, t_lo, t_hi), pixel_key);
+    }
+    for (int t = 0; t < TARGETS; ++t) found[index * uint(TARGETS) + uint(t)] = radiance[t];
 }

@@ -1,0 +1,37 @@
+"""Compiles the search for beams, some 20 s the first time, so that nobody waits for it at a first picture:
+
+    python -m spectrasplat.beams.compile
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from .convert import hulls_of
+from .facets import FACET, SAMPLES, SOLID
+from .find import take_stack
+from .grow import FIRST, run
+from .leaves import Store
+from .rays import SOURCE
+from .search import WORK, may_touch, power_of
+
+
+def warm_up() -> float:
+    """Compile everything, or load it where that was done before; returns the seconds that took."""
+    start = time.perf_counter()
+    stack, work, store = take_stack(), np.zeros(1, WORK), Store()
+    tables, obstacles = np.zeros((1, SAMPLES)), np.zeros((0, 2, 3))
+    work["top"] = FIRST
+    args = np.zeros(1, FACET), np.zeros(1, SOLID), tables, np.zeros(1, SOURCE)
+    run(stack, *args, obstacles, work, store.leaf, store.edge, store.corner)
+    power_of(stack, FIRST, tables, work)
+    may_touch(stack, FIRST, 1.0, obstacles, work)
+    ends, corner = np.zeros(1, np.int64), np.zeros((0, 2))
+    hulls_of(corner, ends, np.zeros(0), corner, corner, ends.copy(), corner)
+    return time.perf_counter() - start
+
+
+if __name__ == "__main__":
+    print(f"beams: compiled in {warm_up():.1f} s")

@@ -1,0 +1,153 @@
+"""What a rendering says without being asked: light that was lost, lights that reached nothing, maps and pictures that
+do not hold what they should. One line each; a picture that needs none is right as far as the program knows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..model.contacts import world_bounds
+from ..model.optics.colorimetry import rgb709_to_xyz_matrix
+from ..model.scene import Camera
+from ..model.settings import RenderSettings
+from ..passes.map_layout import plane_frame, project
+from .light_pass import LightPass, LightStats
+
+LOST_SHARE = 0.01
+"""Of the light that meets glass or mirrors, beyond which its loss is told."""
+HELD_SHARE = 0.5
+"""Of the light that a map puts into pixels which see it, below which a picture does not hold its map: where a pixel is
+a slanting patch, 16 samples weigh a spot within it to a quarter."""
+_BRIGHTEST = 4096
+"""Texels that are looked for in the picture."""
+
+
+def loss_notices(lost: dict[str, float], max_depth: int | None = None) -> list[str]:
+    """`lost`: shares of the light by how it ended."""
+    words = {
+        "lost_depth": "was given up after the largest number of refractions and reflections"
+        + (f" ({max_depth}; --max-depth allows more)" if max_depth is not None else ""),
+        "lost_numeric": "was lost to numerics, for instance where a mesh is open",
+    }
+    return [
+        f"{100.0 * lost.get(fate, 0.0):.1f} % of the light that meets glass or mirrors {told}: it lacks in the picture"
+        for fate, told in words.items()
+        if lost.get(fate, 0.0) > LOST_SHARE
+    ]
+
+
+def shares(stats: LightStats) -> dict[str, float]:
+    """Where light ended, as shares of what was emitted; empty where nothing was."""
+    tally = stats.tally
+    return {fate: flux / tally.emitted for fate, flux in tally.ended.items()} if tally.emitted else {}
+
+
+def light_notices(light: LightPass) -> list[str]:
+    """Of a light pass that has finished."""
+    found = loss_notices(shares(light.stats), light.settings.max_depth)
+    if light.beam_stats is not None and not found:
+        flux = light.beam_stats.flux_w
+        found = loss_notices(
+            {fate: watts / (flux["entered"] or 1.0) for fate, watts in flux.items()}, light.settings.max_depth
+        )
+    for index in light.domains:
+        name = light.scene.lights[index].name
+        if light.buffers.light_power[index].band(0.0, 1.0)[3] > 0.0 and not len(light.pilots[index].whole):
+            found.append(f"light '{name}': nothing that meets glass or mirrors reaches a receiver; it makes no caustic")
+    outside = light.stats.outside_map_w
+    deposited = light.stats.tally.ended["deposited"]
+    if deposited and outside > LOST_SHARE * deposited:
+        found.append(
+            f"{100.0 * outside / deposited:.1f} % of the caustics lies beside all maps and lacks in the picture"
+        )
+    for receiver, windows in light.layout.windows.items():
+        pixels = [light.window_pixels(receiver, window) for window in windows]
+        if receiver in light.lit_receivers and pixels and max(pixels) < 1.0:
+            item = light.scene.objects[light.buffers.receivers[receiver]]
+            found.append(
+                f"the caustic map of '{item.name}' is smaller than a pixel; choose a larger --size or come nearer"
+            )
+    return found
+
+
+def picture_notices(light: LightPass, camera: Camera, settings: RenderSettings, rgb: np.ndarray) -> list[str]:
+    """Whether a picture (H, W, 3) with caustics in it holds what the maps of flat receivers put into its pixels, where
+    nothing may be in the way."""
+    if settings.bins or settings.layer not in ("beauty", "caustic") or not np.isfinite(rgb).all():
+        return []
+    expected, held = 0.0, 0.0
+    luminance = rgb.astype(float) @ rgb709_to_xyz_matrix()[1]
+    for receiver in light.lit_receivers:
+        if light.layout.windows[receiver]:
+            found = _pixels_of(light, receiver, camera, settings)
+            about = np.zeros(luminance.shape, bool)
+            for row, column in found:
+                about[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] = True
+            energy = sum(found.values())
+            expected, held = expected + energy, held + min(float(luminance[about].sum()), energy)
+    if held >= HELD_SHARE * expected:
+        return []
+    share = 100.0 * held / expected
+    told = f"the picture holds only {share:.0f} % of the light that its brightest caustics have in the maps"
+    return [f"{told}; choose more --spp"]
+
+
+def _pixels_of(
+    light: LightPass, receiver: int, camera: Camera, settings: RenderSettings
+) -> dict[tuple[int, int], float]:
+    """Luminance, summed, that the brightest texels of a flat receiver's finest map give to pixels (row, column) that
+    see them past all other objects' bounds."""
+    number = light.buffers.receivers[receiver]
+    item, space = light.scene.objects[number], light.buffers.space
+    luminous = light.resolved_map(receiver)[..., 1].astype(float) * light.map_scale
+    height, width = luminous.shape
+    chosen = np.argsort(luminous, axis=None)[-_BRIGHTEST:]
+    chosen = chosen[luminous.flat[chosen] > 0.0]
+    if not len(chosen):
+        return {}
+    rows, columns = np.unravel_index(chosen, luminous.shape)
+    frame = plane_frame(space.to_gpu(light.buffers.world_meshes[number].vertices))
+    window = light.layout.windows[receiver][0]
+    step = window.size / (width, height)
+    at = window.low + (np.stack([columns, rows], axis=-1) + 0.5) * step
+    places = space.to_world(frame.origin + at @ frame.axes)
+    sides = [space.to_world(frame.origin + (at + step * offset) @ frame.axes) for offset in ((1.0, 0.0), (0.0, 1.0))]
+    size = settings.width, settings.height
+    middle, right, up = (project(camera, size, points) for points in (places, *sides))
+    inside = np.all((middle >= 0.0) & (middle < size), axis=-1)
+    across, along = right - middle, up - middle
+    area_px = np.abs(across[:, 0] * along[:, 1] - across[:, 1] * along[:, 0])
+    material = item.material
+    reflectance = (
+        1.0 if material.reflectance is not None else float(rgb709_to_xyz_matrix()[1] @ material.reflectance_rgb)
+    )
+    if material.texture is not None:
+        return {}
+    texel_area = float(np.prod(step)) / space.scale**2
+    energy = luminous.flat[chosen] / texel_area * reflectance / np.pi * area_px
+    inside &= np.isfinite(energy) & ~_may_be_hidden(light, number, camera, places)
+    found: dict[tuple[int, int], float] = {}
+    for (column, row), value in zip(
+        np.floor(middle[inside]).astype(int).tolist(), energy[inside].tolist(), strict=True
+    ):
+        found[row, column] = found.get((row, column), 0.0) + value
+    return found
+
+
+def _may_be_hidden(light: LightPass, receiver: int, camera: Camera, places: np.ndarray) -> np.ndarray:
+    """Whether the bounds of another object meet the way from the camera to `places` (n, 3)."""
+    position = np.asarray(camera.position, float)
+    if camera.kind == "orthographic":
+        forward = np.asarray(camera.target, float) - position
+        forward /= np.linalg.norm(forward)
+        start = places - forward * ((places - position) @ forward)[:, None]
+    else:
+        start = np.broadcast_to(position, places.shape)
+    way, hidden = places - start, np.zeros(len(places), bool)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for index, item in enumerate(light.scene.objects):
+            if index != receiver:
+                low, high = ((bound - start) / way for bound in world_bounds(item))
+                enter = np.nanmax(np.minimum(low, high), axis=1)
+                leave = np.nanmin(np.maximum(low, high), axis=1)
+                hidden |= (enter <= np.minimum(leave, 1.0)) & (leave >= 0.0)
+    return hidden
