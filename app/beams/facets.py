@@ -7,6 +7,7 @@ and a beam that may meet one goes on as photons.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -112,7 +113,7 @@ def beam_scene(
         if item.material.is_specular:
             reason = why_no_beams(item)
             if reason is None:
-                outlines[i] = facets_of(meshes[i])
+                outlines[i] = _facets_kept(item.mesh, meshes[i])
                 if len(outlines[i]) > MAX_FACETS:
                     reason = f"it has {len(outlines[i])} facets"
                     del outlines[i]
@@ -122,7 +123,7 @@ def beam_scene(
         elif item.material.receives and not is_flat(item) or len(item.mesh.triangles) > MAX_FACETS:
             obstacles.append(i)
         else:
-            outlines[i] = facets_of(meshes[i])
+            outlines[i] = _facets_kept(item.mesh, meshes[i])
     for i in _inside_of_obstacles(scene, meshes, [i for i in outlines if scene.objects[i].material.transmits], why_not):
         why_not[i] = "it nests in, or touches, a solid that is not faceted"
         obstacles.append(i)
@@ -153,6 +154,23 @@ def shown_as(beams: BeamScene, scene: Scene, axis: SpectralAxis, unit: float) ->
     solids = beams.solids.copy()
     solids["glass"][: len(glass)], solids["tint"][: len(tint)] = glass, tint
     return replace(beams, tables=tables, solids=solids)
+
+
+_KEPT: WeakKeyDictionary[Mesh, list[tuple[np.ndarray, int]]] = WeakKeyDictionary()
+"""Facets of meshes as they are modelled: what is turned from frame to frame keeps them."""
+
+
+def _facets_kept(mesh: Mesh, placed: Mesh) -> list[tuple[np.ndarray, int]]:
+    """`facets_of` of an object's own mesh, where `placed` puts it: an affine map keeps what is flat and convex."""
+    own, there = mesh.vertices - mesh.vertices.mean(axis=0), placed.vertices - placed.vertices.mean(axis=0)
+    matrix, _, rank, _ = np.linalg.lstsq(own, there)
+    if rank < 3:  # flat, so of few facets
+        return facets_of(placed)
+    if mesh not in _KEPT:
+        _KEPT[mesh] = facets_of(mesh)
+    turn = -1 if np.linalg.det(matrix) < 0.0 else 1
+    from_middle, to = mesh.vertices.mean(axis=0), placed.vertices.mean(axis=0)
+    return [(((corners - from_middle) @ matrix + to)[::turn], triangle) for corners, triangle in _KEPT[mesh]]
 
 
 def facets_of(mesh: Mesh) -> list[tuple[np.ndarray, int]]:

@@ -132,17 +132,12 @@ def search(
 _stacks: list[np.ndarray] = []
 
 
-<<<<<<< HEAD
-def _take_stack() -> np.ndarray:
+def take_stack() -> np.ndarray:
+    """Rows for beams to be followed; what they hold is anything."""
     try:
         return _stacks.pop()
     except IndexError:  # also where another thread took the last one
         return np.zeros(_STACK, NODE)
-=======
-def take_stack() -> np.ndarray:
-    """Rows for beams to be followed; what they hold is anything."""
-    return _stacks.pop() if _stacks else np.zeros(_STACK, NODE)
->>>>>>> core
 
 
 def _work(scene: BeamScene, emission: Emission, how: Search, share: float, sources: int) -> np.ndarray:
