@@ -141,6 +141,8 @@ class LiveLight:
             if owned is not None:
                 owned.release()
         self._preview = self._guess = None
+        if self.light_pass.beams is not None and self.only_beams:
+            self.light_pass.beams.survey_again()
         self.light_pass.lay_out(self.fit_of(inputs))
 
     @staticmethod
