@@ -124,45 +124,23 @@ class Chosen:
     """Leaves of some kinds, packed."""
 
     def __init__(self, leaves: list[Leaves], kinds: tuple[int, ...]) -> None:
-        parts: list[list[np.ndarray]] = [[] for _ in range(10)]
-        for part in leaves:
-            n, e, c = part.count
-            head = part.head[:n]
-            keep = np.isin(head[:, 0], kinds)
-            edge_keep, corner_keep = np.repeat(keep, head[:, 6]), np.repeat(keep, head[:, 7])
-            for target, value in zip(
-                parts,
-                (
-                    head[keep],
-                    part.x[:n][keep],
-                    part.density[:n][keep],
-                    part.centre[:n][keep],
-                    part.slope[:n][keep],
-                    part.flux[:n][keep],
-                    part.ray[:n][keep],
-                    part.edge[:e][edge_keep],
-                    part.soft[:e][edge_keep],
-                    part.corner[:c][corner_keep],
-                ),
-                strict=True,
-            ):
-                target.append(value)
-        shapes = (9,), (3,), (3,), (2,), (2,), (), (2, 3, 3, 3), (3, 3), (), (2,)
-        (
-            self.head,
-            self.x,
-            self.density,
-            self.centre,
-            self.slope,
-            self.flux,
-            self.ray,
-            self.edges,
-            self.soft,
-            self.corners,
-        ) = (
-            np.concatenate(part) if part else np.zeros((0, *shape), np.int64 if i == 0 else float)
-            for i, (part, shape) in enumerate(zip(parts, shapes, strict=True))
-        )
+        head = _packed([part.head for part in leaves], (9,), np.int64)
+        keep = np.isin(head[:, 0], kinds)
+        edge_keep, corner_keep = np.repeat(keep, head[:, 6]), np.repeat(keep, head[:, 7])
+        self.head = head[keep]
+        self.x = _packed([part.x for part in leaves], (3,))[keep]
+        self.density = _packed([part.density for part in leaves], (3,))[keep]
+        self.centre = _packed([part.centre for part in leaves], (2,))[keep]
+        self.slope = _packed([part.slope for part in leaves], (2,))[keep]
+        self.flux = _packed([part.flux for part in leaves], ())[keep]
+        self.ray = _packed([part.ray for part in leaves], (2, 3, 3, 3))[keep]
+        self.edges = _packed([part.edge for part in leaves], (3, 3))[edge_keep]
+        self.soft = _packed([part.soft for part in leaves], ())[edge_keep]
+        self.corners = _packed([part.corner for part in leaves], (2,))[corner_keep]
+
+
+def _packed(arrays: list[np.ndarray], shape: tuple[int, ...], dtype: type = float) -> np.ndarray:
+    return np.concatenate(arrays) if arrays else np.zeros((0, *shape), dtype)
 
 
 def hulls_around(chosen: Chosen, grow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

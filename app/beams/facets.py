@@ -6,7 +6,8 @@ and a beam that may meet one goes on as photons.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -112,17 +113,17 @@ def beam_scene(
         if item.material.is_specular:
             reason = why_no_beams(item)
             if reason is None:
-                outlines[i] = facets_of(meshes[i])
+                outlines[i] = _facets_kept(item.mesh, meshes[i])
                 if len(outlines[i]) > MAX_FACETS:
                     reason = f"it has {len(outlines[i])} facets"
                     del outlines[i]
             if reason is not None:
                 why_not[i] = reason
                 obstacles.append(i)
-        elif item.material.receives and not is_flat(item) or len(item.mesh.triangles) > MAX_FACETS:
+        elif (item.material.receives and not is_flat(item)) or len(item.mesh.triangles) > MAX_FACETS:
             obstacles.append(i)
         else:
-            outlines[i] = facets_of(meshes[i])
+            outlines[i] = _facets_kept(item.mesh, meshes[i])
     for i in _inside_of_obstacles(scene, meshes, [i for i in outlines if scene.objects[i].material.transmits], why_not):
         why_not[i] = "it nests in, or touches, a solid that is not faceted"
         obstacles.append(i)
@@ -145,6 +146,31 @@ def beam_scene(
         tuple(i for i in outlines if scene.objects[i].material.is_specular),
         why_not,
     )
+
+
+def shown_as(beams: BeamScene, scene: Scene, axis: SpectralAxis, unit: float) -> BeamScene:
+    """The same facets with the glass, tints and mirrors of `scene`, whose objects stand where those of `beams` do."""
+    tables, glass, tint = _tables(scene, axis, unit)
+    solids = beams.solids.copy()
+    solids["glass"][: len(glass)], solids["tint"][: len(tint)] = glass, tint
+    return replace(beams, tables=tables, solids=solids)
+
+
+_KEPT: WeakKeyDictionary[Mesh, list[tuple[np.ndarray, int]]] = WeakKeyDictionary()
+"""Facets of meshes as they are modelled: what is turned from frame to frame keeps them."""
+
+
+def _facets_kept(mesh: Mesh, placed: Mesh) -> list[tuple[np.ndarray, int]]:
+    """`facets_of` of an object's own mesh, where `placed` puts it: an affine map keeps what is flat and convex."""
+    own, there = mesh.vertices - mesh.vertices.mean(axis=0), placed.vertices - placed.vertices.mean(axis=0)
+    matrix, _, rank, _ = np.linalg.lstsq(own, there)
+    if rank < 3:  # flat, so of few facets
+        return facets_of(placed)
+    if mesh not in _KEPT:
+        _KEPT[mesh] = facets_of(mesh)
+    turn = -1 if np.linalg.det(matrix) < 0.0 else 1
+    from_middle, to = mesh.vertices.mean(axis=0), placed.vertices.mean(axis=0)
+    return [(((corners - from_middle) @ matrix + to)[::turn], triangle) for corners, triangle in _KEPT[mesh]]
 
 
 def facets_of(mesh: Mesh) -> list[tuple[np.ndarray, int]]:
@@ -206,10 +232,10 @@ def _convex_parts(
     if abs(hull_area - area) > 1e-6 * hull_area:
         return [(corners[k], patch[k]) for k in range(len(patch))]
     outline = points[hull]
-    parts = []
-    for i in range(1, len(outline) - 1, MAX_CORNERS - 2):
-        parts.append((np.concatenate([outline[:1], outline[i : i + MAX_CORNERS - 1]]), patch[0]))
-    return parts
+    return [
+        (np.concatenate([outline[:1], outline[i : i + MAX_CORNERS - 1]]), patch[0])
+        for i in range(1, len(outline) - 1, MAX_CORNERS - 2)
+    ]
 
 
 def convex_hull(points: np.ndarray) -> np.ndarray:

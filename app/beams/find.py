@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -137,7 +138,10 @@ _stacks: list[np.ndarray] = []
 
 def take_stack() -> np.ndarray:
     """Rows for beams to be followed; what they hold is anything."""
-    return _stacks.pop() if _stacks else np.zeros(_STACK, NODE)
+    try:
+        return _stacks.pop()
+    except IndexError:  # also where another thread took the last one
+        return np.zeros(_STACK, NODE)
 
 
 def _work(scene: BeamScene, emission: Emission, how: Search, share: float, sources: int) -> np.ndarray:

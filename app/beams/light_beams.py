@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from ..model.geometry.mesh import Mesh
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 from .convert import pieces_of, polygons_of
-from .facets import BLACK, BeamScene, beam_scene
+from .facets import beam_scene, shown_as
 from .find import Emission, Search, search
 from .polygons import BeamPieces, BeamPolygons, joined
 from .search import SUMS
@@ -58,10 +59,24 @@ class BeamFinder:
         self.set_texels(texels)
 
     def set_texels(self, texels: dict[int, float]) -> None:
-        """Other maps: sides of receivers' finest texels, GPU units."""
-        facets = self.scene.facets
+        """Other maps: sides of receivers' finest texels, GPU units. A search that runs goes on with those before."""
+        facets = self.scene.facets.copy()
         self._texel = min(texels.values(), default=1e-3)
         facets["texel"] = [_TOLERANCE * texels.get(int(r), self._texel) for r in facets["receiver"]]
+        self.scene = replace(self.scene, facets=facets)
+
+    @property
+    def shown(self) -> Scene:
+        """What is shown."""
+        return self._scene
+
+    def shown_as(self, scene: Scene) -> BeamFinder:
+        """A finder for `scene`, which has other glass, tints and spectra, and nothing else that differs. x stays that
+        of the scene it was made for."""
+        other = copy.copy(self)
+        other._scene = scene
+        other.scene = shown_as(self.scene, scene, self._axis, self._unit)
+        return other
 
     @property
     def lights(self) -> list[int]:
@@ -83,18 +98,19 @@ class BeamFinder:
 
         `threshold`: share of the light that meets facets below which a beam plays roulette; `depth`: most specular
         events; `light_parts`: points of an extended light."""
+        beams, scene, texel = self.scene, self._scene, self._texel
         todo: list[tuple[int, list[Emission]]] = []
         for i in self.lights:
-            light = self._scene.lights[i]
+            light = scene.lights[i]
             place = 0
             if light.has_place and not light.is_parallel:
-                place = mask_at(self._to_gpu(np.array(light.position)), self.scene, self.meshes)
+                place = mask_at(self._to_gpu(np.array(light.position)), beams, self.meshes)
             parts = emissions(
-                light, self.scene, self._to_gpu, self._unit, self._axis, light_parts if light.has_extent else 1, place
+                light, beams, self._to_gpu, self._unit, self._axis, light_parts if light.has_extent else 1, place
             )
             if parts:
                 todo.append((i, parts))
-        watts = {i: _power(self._scene.lights[i]) for i, _ in todo}
+        watts = {i: _power(scene.lights[i]) for i, _ in todo}
         reach = {i: sum(_reach(part) for part in parts) * watts[i] for i, parts in todo}
         total, steps = sum(reach.values()), sum(len(parts) for _, parts in todo)
         result, done = LightBeams({}), 0
@@ -107,10 +123,10 @@ class BeamFinder:
                     threshold,
                     seed + 7919 * number,
                     depth,
-                    _TOLERANCE * self._texel,
+                    _TOLERANCE * texel,
                     power=total / watts[i] if watts[i] > 0.0 else None,
                 )
-                leaves, part_sums, part_blocked = search(self.scene, part, how, threads, go_on)
+                leaves, part_sums, part_blocked = search(beams, part, how, threads, go_on)
                 found.append(leaves)
                 sums += part_sums
                 blocked |= part_blocked
@@ -120,9 +136,9 @@ class BeamFinder:
                 # Photons carry what these objects throw: all of it, whichever point of the light it comes from.
                 found = [[leaves_without(leaves, blocked) for leaves in part] for part in found]
             flat = [leaves for part in found for leaves in part]
-            polygons.append(polygons_of(flat, self.scene, i, self._unit))
-            pieces.append(pieces_of(flat, self.scene, i))
-            result.carried[i] = tuple(o for o in self.scene.beam_objects if o not in blocked)
+            polygons.append(polygons_of(flat, beams, i, self._unit))
+            pieces.append(pieces_of(flat, beams, i))
+            result.carried[i] = tuple(o for o in beams.beam_objects if o not in blocked)
             result.sums[i] = sums
         result.polygons = joined(polygons) if polygons else None
         result.pieces = joined(pieces) if pieces else None

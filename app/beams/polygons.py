@@ -39,7 +39,7 @@ class BeamPolygons:
     """(N, 3), at x_lo, in the middle and at x_hi (a parabola between): flux per scene unit² on the receiver, per unit of
     the light's spectral power (`SceneBuffers.light_power`, what `emit.comp`'s `weight` multiplies)."""
     slope: np.ndarray
-    """(N, 2), relative change of the density per GPU unit along u and v, about `centre`; 0 for parallel light."""
+    """(N, 2), relative change of the density per GPU unit along u and v, about `centre`."""
     centre: np.ndarray
     """(N, 2), where `density` is taken (middle of the band)."""
     flux: np.ndarray

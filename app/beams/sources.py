@@ -90,7 +90,8 @@ def _parallel(light, corners, to_gpu, unit, parts, common, inside) -> list[Emiss
         )
         grow = 1.0 + math.hypot(u, v)
         room = np.array([0.0, 0.0, 1.05 * reach * grow])
-        result.append(Emission(source, limits, room, *common, 1.0 / unit**2 / len(places), inside, beside if spread else ()))
+        density = 1.0 / unit**2 / len(places)
+        result.append(Emission(source, limits, room, *common, density, inside, beside if spread else ()))
     return result
 
 
@@ -216,7 +217,7 @@ def mask_at(point: np.ndarray, scene: BeamScene, meshes: list[Mesh]) -> int:
     [crossing parity]."""
     mask = 0
     towards = _unit(np.array([0.3713, 0.5471, 0.7502]))
-    for i, solid in enumerate(scene.solids[: len(meshes)]):
+    for solid in scene.solids[: len(meshes)]:
         if solid["bit"] < 0:
             continue
         crossings = 0

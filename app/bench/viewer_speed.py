@@ -1,5 +1,5 @@
-"""How fast the viewer answers: frame times while light gathers, while walking round and while the dispersion is
-dragged.
+"""How fast the viewer answers: frame times while light gathers, while walking round, while the dispersion is dragged
+and while the glass is turned.
 
 The whole interface is drawn without a window and worked by a synthetic hand, so that the figures can be had on any
 machine, again and again. Every frame is finished on the device before its time is taken; no screen is waited for.
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 ORBIT_PX = 3.0
 """Of the mouse in a frame."""
+TURN_DEG = 1.0
+"""Of the glass in a frame."""
 PATIENCE_S = 120.0
 NUDGES = 8
 """Single inputs whose answers are timed."""
@@ -43,6 +45,8 @@ class Phase:
     frame_ms: np.ndarray
     photons_per_second: float
     rays_traced: int
+    pictures_per_second: float
+    """New ones: what is seen to move."""
     scale: float
     """Side of the picture shown in motion over the side asked for, on average."""
 
@@ -52,6 +56,7 @@ class Phase:
         median, worst = np.percentile(self.frame_ms, [50, 95])
         return (
             f"{self.name:<24} {median:8.1f} ms {worst:8.1f} ms {1000 / median:8.1f} /s "
+            f"{self.pictures_per_second:8.1f} /s "
             f"{self.photons_per_second / 1e6:8.3f} M/s "
             f"{self.rays_traced:>12,} {100 * self.scale:6.0f} %"
         )
@@ -63,7 +68,8 @@ def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) ->
     try:
         yield f"{scene.stem}, viewport {bench.viewport[0]}×{bench.viewport[1]}, {context.renderer}"
         yield f"first picture after {bench.wait_for_picture():.2f} s"
-        yield f"{'':<24} {'median':>11} {'95 %':>11} {'frames':>11} {'photons':>12} {'rays traced':>12} {'side':>8}"
+        heads = "".join(f" {head:>11}" for head in ("median", "95 %", "frames", "pictures"))
+        yield f"{'':<24}{heads} {'photons':>12} {'rays traced':>12} {'side':>8}"
         yield bench.phase("accumulating", seconds, bench.rest).line
         with bench.holding_middle_button():
             yield bench.phase("orbiting", seconds, bench.orbit).line
@@ -71,6 +77,10 @@ def run(context: Context, scene: Path, size: tuple[int, int], seconds: float) ->
             bench.interface.frame()
         with bench.holding_gain():
             yield bench.phase("dragging dispersion", seconds, bench.drag_gain).line
+        for _ in range(30):
+            bench.interface.frame()
+        with bench.holding_gain():
+            yield bench.phase("turning the glass", seconds, bench.turn_glass).line
         yield (
             f"input to picture: camera {bench.latency(bench.nudge_camera):.0f} ms, dispersion "
             f"{bench.latency(bench.nudge_gain):.0f} ms (median of {NUDGES})"
@@ -140,6 +150,9 @@ class _Bench:
     def phase(self, name: str, seconds: float, act: Callable[[], None]) -> Phase:
         """Frames for `seconds`, with `act` before each."""
         times, scales = [], []
+        engine = self.session.picture.engine
+        assert engine is not None
+        version, pictures = engine.picture_version, 0
         before = self.session.picture.stats
         started = time.perf_counter()
         while time.perf_counter() - started < seconds:
@@ -147,9 +160,11 @@ class _Bench:
             self.interface.frame()
             times.append(self.session.frame_ms[-1])
             scales.append(self.session.picture.stats.resolution_scale)
+            pictures += engine.picture_version != version
+            version = engine.picture_version
         elapsed = time.perf_counter() - started
         rays = self.session.picture.stats.rays_traced - before.rays_traced
-        return Phase(name, np.array(times), rays / elapsed, rays, float(np.mean(scales)))
+        return Phase(name, np.array(times), rays / elapsed, rays, pictures / elapsed, float(np.mean(scales)))
 
     def rest(self) -> None:
         """Do nothing."""
@@ -175,6 +190,20 @@ class _Bench:
         """Move the slider to and fro."""
         self._turn += 1
         self.interface.put_mouse(self.interface.find("Dispersion gain").at(0.25 + 0.15 * math.sin(0.1 * self._turn)))
+
+    def turn_glass(self) -> None:
+        """Turn the object a little about the vertical axis through its middle, as the gizmo does."""
+        angle, state = math.radians(TURN_DEG), self.session.state
+        turn, item = np.eye(4), state.scene.objects[self._glass]
+        turn[:2, :2] = (math.cos(angle), -math.sin(angle)), (math.sin(angle), math.cos(angle))
+        matrix = item.object_to_world.copy()
+        middle = matrix[:3, 3].copy()
+        matrix[:3, 3] = 0.0
+        matrix = turn @ matrix
+        matrix[:3, 3] = middle
+        objects = list(state.scene.objects)
+        objects[self._glass] = replace(item, object_to_world=matrix)
+        self.session.state = replace(state, scene=replace(state.scene, objects=tuple(objects)))
 
     def pause(self) -> None:
         """Let everything come to rest, with what has been traced."""

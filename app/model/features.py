@@ -239,18 +239,16 @@ def beam_objects(scene: Scene) -> list[int]:
     return [i for i, o in enumerate(scene.objects) if o.material.is_specular and why_no_beams(o) is None]
 
 
+def is_painted(scene: Scene, local_gain: bool) -> bool:
+    """Whether the dispersion brush moves light: photons follow it, beams do not."""
+    return local_gain and any(o.local_dispersion for o in scene.objects)
+
+
 def _has_beams(scene: Scene, settings: RenderSettings) -> bool:
-    painted = settings.local_gain and any(o.local_dispersion for o in scene.objects)
+    painted = is_painted(scene, settings.local_gain)
     receives = any(o.material.receives and is_flat(o) for o in scene.objects)
     shines = any(light.profile is None for light in scene.lights)
-    return (
-        settings.method == "srd"
-        and not settings.anchor_weights
-        and receives
-        and shines
-        and not painted
-        and bool(beam_objects(scene))
-    )
+    return settings.method == "srd" and receives and shines and not painted and bool(beam_objects(scene))
 
 
 def camera_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:

@@ -7,14 +7,15 @@ photons asks and with roulette's numbers of its own, so that a pass is even when
 
 from __future__ import annotations
 
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..base.random_words import Dimension, random_word
-from ..beams.light_beams import BeamFinder, LightBeams
+from ..beams.light_beams import LIGHT_PARTS, BeamFinder, LightBeams
 from ..beams.polygons import BeamPolygons
 from ..beams.search import (
     SUM_ABSORBED,
@@ -28,11 +29,12 @@ from ..beams.search import (
 )
 from ..gpu.beam_tables import BeamTables
 from ..gpu.context import Context
+from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import is_flat
 from ..model.scene import Scene
 from ..passes.beam_splat import BeamSplatter
-from ..passes.map_layout import MapLayout, plane_frame
+from ..passes.map_layout import Landings, MapLayout, plane_frame
 from .light_maps import LightMaps
 from .shown_spectra import ShownSpectra
 
@@ -48,6 +50,8 @@ _SURVEY = 1e-3
 """Threshold of the search that tells which objects beams carry, and what they cost."""
 _DEAREST = 4.0
 """Seconds of a survey after which photons are thought cheaper."""
+_PAUSE_S = 0.003
+"""How long a pause lasts while a search runs beside whoever draws."""
 _SUMS = {
     "entered": SUM_ENTERED,
     "deposited": SUM_DEPOSITED,
@@ -72,20 +76,91 @@ class BeamStats:
     draw_seconds: float = 0.0
 
 
+@dataclass
+class MovingBeams:
+    """How fine beams are while something is dragged: as fine as their time allows. One value for all light passes of a
+    live rendering."""
+
+    threshold: float = _SURVEY
+
+    def learn(self, took: float, seconds: float) -> None:
+        """A search and its drawing `took` so long. Small changes are left out: other beams would play roulette."""
+        if not 0.5 * seconds <= took <= 1.2 * seconds:
+            self.threshold = float(
+                np.clip(self.threshold * np.clip(took / seconds, 0.5, 2.0), MOVING_FINEST, MOVING_COARSEST)
+            )
+
+
+SURVEY_PARTS = 4
+MOVING_PARTS = 1
+"""Points that stand for an extended light in motion."""
+MOVING_COARSEST, MOVING_FINEST = 2e-3, 1e-5
+"""A coarser search takes hardly less time (a brilliant: 50 ms of the processor at 1e-2, 70 ms at 1e-3)."""
+_MOVING_WORD = 1
+"""Roulette's seed in motion: the same beams from frame to frame."""
+
+
+_compiled: list[bool] = []
+"""Holds something once a search has run in this process."""
+
+
+class _Canvas:
+    """What draws polygons into maps of so many targets."""
+
+    def __init__(self, context: Context, targets: int) -> None:
+        self._context = context
+        self._splatter = BeamSplatter(context.ctx, targets)
+        self._tables: BeamTables | None = None
+
+    def tables(self, buffers: SceneBuffers, shown: ShownSpectra, channels: MapChannels) -> BeamTables:
+        """Made when they are needed."""
+        if self._tables is None:
+            self._tables = BeamTables.build(
+                self._context.ctx, buffers.axis, shown.spectra, shown.reflectances, channels
+            )
+        return self._tables
+
+    @property
+    def splatter(self) -> BeamSplatter:
+        """Its programs."""
+        return self._splatter
+
+    def forget_tables(self) -> None:
+        """Other spectra are shown."""
+        if self._tables is not None:
+            self._tables.release()
+        self._tables = None
+
+    def release(self) -> None:
+        """Free everything."""
+        self.forget_tables()
+        self._splatter.release()
+
+
 class BeamLight:
     """Finds and draws the beams of one scene's lights."""
 
     def __init__(
-        self, context: Context, scene: Scene, buffers: SceneBuffers, shown: ShownSpectra, targets: int, depth: int
+        self,
+        context: Context,
+        scene: Scene,
+        buffers: SceneBuffers,
+        shown: ShownSpectra,
+        depth: int,
+        *,
+        beside: bool = False,
     ) -> None:
+        """`beside`: search in a thread of its own, with pauses in which somebody draws."""
         self._context, self._scene, self._buffers, self._shown = context, scene, buffers, shown
         self._depth = depth
+        self._worker = ThreadPoolExecutor(1, "beams") if beside else None
+        self._stop = threading.Event()
         self.frames = {
             r: plane_frame(buffers.space.to_gpu(buffers.world_meshes[i].vertices))
             for r, i in enumerate(buffers.receivers)
             if is_flat(scene.objects[i])
         }
-        self.finder = BeamFinder(
+        self._traced = self.finder = BeamFinder(
             scene,
             buffers.world_meshes,
             {r: (frame.origin, frame.axes) for r, frame in self.frames.items()},
@@ -94,62 +169,88 @@ class BeamLight:
             buffers.space.to_gpu,
             buffers.space.scale,
         )
-        self._splatter = BeamSplatter(context.ctx, targets)
-        self._tables: BeamTables | None = None
+        self._coarse: tuple[MapLayout, BeamFinder] | None = None
+        self._canvases: dict[int, _Canvas] = {}
         self.carried: dict[int, tuple[int, ...]] = {}
         """By light: the objects whose light beams carry."""
         self.why_not = ""
         """Why there are none after all."""
         self.stats = BeamStats()
         self._surveyed = 1.0
+        self._survey_polygons: BeamPolygons | None = None
+        """What maps are fitted to."""
         self.found: LightBeams | None = None
-        """The last that were drawn."""
+        """The last that were drawn, or found by the survey."""
 
-    def survey(self) -> None:
-        """Find out which objects' light beams carry, and whether that pays."""
-        # The first search of all may have to be compiled, which says nothing about the scene.
-        self._find(1.0, 0, light_parts=1)
+    def surveying(self, moving: MovingBeams | None = None) -> Iterator[None]:
+        """Find out which objects' light beams carry, and whether that pays, with pauses; afterwards `found` holds the
+        strongest beams, or those of `moving`."""
+        threshold = _SURVEY if moving is None else moving.threshold
+        light_parts = SURVEY_PARTS if moving is None else MOVING_PARTS
+        if not _compiled:
+            # The first search of all may have to be compiled, which says nothing about the scene.
+            for _ in self._searched(self.finder, 1.0, _MOVING_WORD, 1, threads=None):
+                yield
+            _compiled.append(True)
         started = time.perf_counter()
 
         def pays() -> bool:
             return time.perf_counter() - started < _DEAREST
 
-        found = self._find(_SURVEY, 0, light_parts=4, go_on=pays)
+        found = LightBeams({})
+        for step in self._searched(self.finder, threshold, _MOVING_WORD, light_parts, pays, None):
+            if isinstance(step, LightBeams):
+                found = step
+            yield
         if not pays():
             self.why_not = f"more than {_DEAREST:g} s for the strongest beams: photons are cheaper"
             return
+        self.found, self._survey_polygons = found, found.polygons
         self.carried = {light: objects for light, objects in found.carried.items() if objects}
-        self._surveyed = max(1.0, sum(float(sums[SUM_BEAMS]) for sums in found.sums.values()))
+        # As many as there would be at the survey's own threshold.
+        followed = max(1.0, sum(float(sums[SUM_BEAMS]) for sums in found.sums.values()))
+        self._surveyed = followed * (threshold / _SURVEY) ** _GROWTH
+
+    def show(self, scene: Scene) -> None:
+        """Follow `scene` from now on: other glass and spectra, which `shown` has too."""
+        self.finder = self._traced.shown_as(scene)
+        self._coarse = None
+        self._forget_tables()
 
     def lay_out(self, layout: MapLayout) -> None:
         """Polygons will be drawn into maps that lie so."""
+        texels = self._texels(layout)
+        self.finder.set_texels(texels)
+        self._traced.set_texels(texels)
+        self._coarse = None
+
+    def _texels(self, layout: MapLayout) -> dict[int, float]:
         texels = {}
         for r in self.frames:
             record = layout.placements[layout.receivers[r]["placement"]]
             texels[r] = float(np.sqrt(record["texel_area"])) * self._buffers.space.scale
-        self.finder.set_texels(texels)
+        return texels
 
     def begin(self) -> None:
         """Spectra and glass are now what is shown."""
-        if self._tables is not None:
-            self._tables.release()
-        shown = self._shown
-        self._tables = BeamTables.build(
-            self._context.ctx, self._buffers.axis, shown.spectra, shown.reflectances, shown.channels
-        )
+        self._forget_tables()
         self.stats = BeamStats()
 
-    def steps(self, photons: float, weight: float, seed: int, number: int, maps: LightMaps) -> Iterator[float]:
-        """Find beams as fine as `photons` ask and add them to `maps` times `weight`, pausing with the share done."""
-        assert self._tables is not None, "begin() comes first"
+    def _forget_tables(self) -> None:
+        for canvas in self._canvases.values():
+            canvas.forget_tables()
+
+    def steps(self, photons: float, weight: float, word: int, maps: LightMaps) -> Iterator[float]:
+        """Find beams as fine as `photons` ask and add them to `maps` times `weight`, pausing with the share done.
+        `word`: roulette's seed."""
         stats, started = self.stats, time.perf_counter()
-        word = random_word(seed, 0, number, Dimension.BRANCH)
+        found = LightBeams({})
         while True:
             threshold, followed = self.threshold(photons), 0.0
-            for step in self.finder.find(threshold, self._depth, word):
+            for step in self._searched(self.finder, threshold, word):
                 stats.find_seconds += time.perf_counter() - started
                 if isinstance(step, LightBeams):
-                    self.found = step
+                    found = step
                     followed = sum(float(sums[SUM_BEAMS]) for sums in step.sums.values())
                 else:
                     yield 0.5 * step
@@ -158,10 +259,10 @@ class BeamLight:
             self._surveyed = max(followed, 1.0) * (threshold / _SURVEY) ** _GROWTH
             if _ENOUGH * followed * PHOTONS_A_BEAM >= photons or self.threshold(photons) >= threshold:
                 break
-        assert self.found is not None
-        self._count(self.found)
-        if self.found.polygons is not None:
-            self.draw(self.found.polygons, maps, weight)
+        self.found = found
+        self._count(found)
+        if found.polygons is not None:
+            self.draw(found.polygons, maps, weight)
             self._context.finish()
         stats.draw_seconds += time.perf_counter() - started
         yield 1.0
@@ -171,17 +272,105 @@ class BeamLight:
         beams = max(photons, 1.0) / PHOTONS_A_BEAM
         return float(np.clip(_SURVEY * (self._surveyed / beams) ** (1.0 / _GROWTH), FINEST, COARSEST))
 
+    def draw_moving(self, maps: LightMaps, weight: float, moving: MovingBeams, seconds: float) -> None:
+        """Find beams at once, as fine as `seconds` allow, and add them to `maps` of any layout times `weight`."""
+        started = time.perf_counter()
+        if self._coarse is None or self._coarse[0] is not maps.layout:
+            finder = self.finder.shown_as(self.finder.shown)
+            finder.set_texels(self._texels(maps.layout))
+            self._coarse = maps.layout, finder
+        for step in self._coarse[1].find(moving.threshold, self._depth, _MOVING_WORD, MOVING_PARTS):
+            if isinstance(step, LightBeams):
+                self.found = step
+        if self.found is not None and self.found.polygons is not None:
+            self.draw(self.found.polygons, maps, weight)
+            self._context.finish()
+        moving.learn(time.perf_counter() - started, seconds)
+
     def draw(self, polygons: BeamPolygons, maps: LightMaps, weight: float) -> None:
         """Add polygons to `maps`."""
-        assert self._tables is not None
-        self._splatter.run(polygons, self.frames, maps.layout, self._tables, maps.atlas, weight)
+        targets, channels = maps.atlas.targets, self._shown.channels
+        if targets not in self._canvases:
+            self._canvases[targets] = _Canvas(self._context, targets)
+        canvas = self._canvases[targets]
+        if targets != channels.targets:
+            # A preview's: in colour only.
+            channels = MapChannels(channels.edges_nm)
+        tables = canvas.tables(self._buffers, self._shown, channels)
+        canvas.splatter.run(polygons, self.frames, maps.layout, tables, maps.atlas, weight)
 
-    def _find(self, threshold: float, seed: int, **options) -> LightBeams:
-        found = LightBeams({})
-        for step in self.finder.find(threshold, self._depth, seed, **options):
+    def draw_found(self, maps: LightMaps, threshold: float) -> None:
+        """Draw what the survey found, with the weight that photons for such a `threshold` would have."""
+        beams = self._surveyed * (_SURVEY / threshold) ** _GROWTH
+        maps.photon_weight = PHOTONS_A_BEAM * beams
+        if self.found is not None:
+            self._count(self.found)
+            if self.found.polygons is not None:
+                self.draw(self.found.polygons, maps, maps.photon_weight)
+
+    def landings(self) -> dict[int, Landings]:
+        """Where beams arrive, by receiver, for maps to be fitted to: corners of their hulls, weighed by their flux (W),
+        and without weight the receiver's own: weak beams go anywhere."""
+        polygons = self._survey_polygons
+        result = {}
+        for r, frame in self.frames.items():
+            own = self._buffers.world_meshes[self._buffers.receivers[r]].vertices
+            places, flux = [self._buffers.space.to_gpu(own)], [np.zeros(len(own))]
+            if polygons is not None and (polygons.receiver == r).any():
+                corners = np.diff(polygons.hull_start)
+                power = np.array([float(p.band(0.0, 1.0)[3]) for p in self._buffers.light_power])
+                each = np.repeat(polygons.flux * power[polygons.light] / np.maximum(corners, 1), corners)
+                mine = np.repeat(polygons.receiver, corners) == r
+                places.append(frame.origin + polygons.hulls[mine] @ frame.axes)
+                flux.append(each[mine])
+                result[r] = Landings(np.concatenate(places), np.concatenate(flux))
+        return result
+
+    def survey_again(self) -> None:
+        """Know better where light lands: with the glass that is shown, and as finely as for a still."""
+        for step in self.finder.find(_SURVEY, self._depth, _MOVING_WORD, MOVING_PARTS):
             if isinstance(step, LightBeams):
-                found = step
-        return found
+                self._survey_polygons = step.polygons
+
+    def _searched(
+        self,
+        finder: BeamFinder,
+        threshold: float,
+        word: int,
+        light_parts: int = LIGHT_PARTS,
+        go_on: Callable[[], bool] = lambda: True,
+        threads: int | None = 1,
+    ) -> Iterator[float | LightBeams]:
+        """`BeamFinder.find`, beside whoever draws if so asked (by `threads`); stopped where nobody waits for it any
+        more."""
+        if self._worker is None:
+            yield from finder.find(threshold, self._depth, word, light_parts, None, go_on)
+            return
+        stop, done = self._stop, [0.0]
+        stop.set()  # the search before, if it still runs, is not wanted
+        self._stop = stop = threading.Event()
+
+        def work() -> LightBeams:
+            found = LightBeams({})
+            for step in finder.find(
+                threshold, self._depth, word, light_parts, threads, lambda: go_on() and not stop.is_set()
+            ):
+                if isinstance(step, LightBeams):
+                    found = step
+                else:
+                    done[0] = step
+                if stop.is_set():
+                    break
+            return found
+
+        future: Future[LightBeams] = self._worker.submit(work)
+        try:
+            while not future.done():
+                wait([future], _PAUSE_S)
+                yield done[0]
+            yield future.result()
+        finally:
+            stop.set()
 
     def _count(self, found: LightBeams) -> None:
         stats, n = self.stats, self.stats.searches
@@ -197,11 +386,12 @@ class BeamLight:
             stats.flux_w[name] += (value - stats.flux_w[name]) / (n + 1)
 
     def release(self) -> None:
-        """Free everything."""
-        self._splatter.release()
-        if self._tables is not None:
-            self._tables.release()
-        self._tables = None
+        """Free everything; a search that runs ends soon."""
+        self._stop.set()
+        if self._worker is not None:
+            self._worker.shutdown(wait=False, cancel_futures=True)
+        for canvas in self._canvases.values():
+            canvas.release()
 
 
 def carries_everything(scene: Scene, carried: tuple[int, ...]) -> bool:

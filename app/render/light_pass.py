@@ -38,7 +38,7 @@ from ..passes.pilot import Pilot, landings_of, pilot_steps
 from ..passes.splat import Splatter
 from ..passes.trace import RAY_ROOM, Batch, FluxTally, TracePass, queue_bytes
 from . import shrinking
-from .beam_light import BeamLight, BeamStats, carries_everything
+from .beam_light import BeamLight, BeamStats, MovingBeams, carries_everything
 from .light_maps import LightMaps
 from .light_plan import SMALLEST_BATCH, Division, Planner
 from .map_fit import MapFit
@@ -151,9 +151,11 @@ class LightPass:
         division: Division | None = None,
         photon_records: PhotonRecords | None = None,
         pace: Pace | None = None,
+        moving: MovingBeams | None = None,
     ) -> None:
         """`fit` None fits maps to the scene's camera and the picture of `settings`. `photon_records` becomes the light
-        pass's own."""
+        pass's own. `moving`: beams are first found as fast as while something is dragged, and where they carry all,
+        maps are fitted to those instead of pilots."""
         self.context = context
         self.scene = scene
         self.settings = settings
@@ -177,6 +179,7 @@ class LightPass:
         """Standard deviation of a footprint in lattice spacings; where passes shrink it, of the first one's."""
         self.maps: LightMaps | None = None
         self._beams: BeamLight | None = None
+        self._moving = moving
 
     # ---- once for a scene --------------------------------------------------------------------
 
@@ -199,21 +202,35 @@ class LightPass:
             for i, light in enumerate(self.scene.lights)
         }
         self.domains: dict[int, EmissionDomain] = {i: d for i, d in domains.items() if d is not None}
-        self.pilots: dict[int, Pilot] = {}
-        for i, domain in self.domains.items():
-            yield
-            self.pilots[i] = yield from pilot_steps(
-                self.trace, self.scene, i, domain, self._full_power(i), self._needs_spectral_pilot
-            )
-        yield
         if self.features.beams and self.domains:
-            targets = self.features.targets
-            self._beams = BeamLight(self.context, self.scene, self.buffers, self.shown, targets, self.trace.max_depth)
-            self._beams.survey()
             yield
+            self._beams = BeamLight(
+                self.context,
+                self.scene,
+                self.buffers,
+                self.shown,
+                self.trace.max_depth,
+                beside=self._pace.searches_beside,
+            )
+            yield
+            yield from self._beams.surveying(self._moving)
+            yield
+        self.pilots: dict[int, Pilot] = {}
+        if self._moving is None or not self.only_beams:
+            self.pilots = yield from self._pilot_steps()
+        yield
         shows_map = self.settings.layer.startswith("map:")
         self.map_receiver = check_map_receiver(self.scene, self.buffers, self.settings.layer[4:]) if shows_map else None
         self.lay_out(self.fit)
+
+    def _pilot_steps(self) -> Generator[None, None, dict[int, Pilot]]:
+        pilots: dict[int, Pilot] = {}
+        for i, domain in self.domains.items():
+            yield
+            pilots[i] = yield from pilot_steps(
+                self.trace, self.scene, i, domain, self._full_power(i), self._needs_spectral_pilot
+            )
+        return pilots
 
     def lay_out(self, fit: MapFit) -> None:
         """Maps fitted to where light lands and to `fit`; empty."""
@@ -227,10 +244,14 @@ class LightPass:
 
     def layout_for(self, fit: MapFit) -> MapLayout:
         """Where maps fitted to `fit` lie."""
+        if self._beams is not None and not self.pilots:
+            landings = self._beams.landings()
+        else:
+            landings = landings_of(fit.landings(list(self.pilots.values()), self.buffers.space))
         layout = layout_maps(
             replace(self.scene, camera=fit.view),
             self.buffers,
-            landings_of(fit.landings(list(self.pilots.values()), self.buffers.space)),
+            landings,
             (fit.width, fit.height),
             self.reflectance_class,
             self.map_receiver,
@@ -336,17 +357,8 @@ class LightPass:
         self.seed = seed
         self.stats = LightStats()
         self._maps.clear()
-        planner = Planner(
-            self.scene,
-            self.settings,
-            self.features,
-            self.buffers,
-            self.domains,
-            self.pilots,
-            self.trace.batch,
-            self._division,
-        )
-        self.plans = planner.plans(photons, self._texel_size())
+        # Without pilots beams carry everything.
+        self.plans = self._planner(self.pilots).plans(photons, self._texel_size()) if self.pilots else []
         for plan in self.plans:
             name = self.scene.lights[plan.index].name
             self.stats.bands[name], self.stats.light_points[name] = len(plan.bands), plan.light_points
@@ -358,8 +370,43 @@ class LightPass:
             self.plans = [
                 replace(plan, beam_objects=self._beams.carried.get(plan.index, ()))
                 for plan in self.plans
-                if not carries_everything(self.scene, self._beams.carried.get(plan.index, ()))
+                if not self._is_carried(plan.index)
             ]
+
+    def _planner(self, pilots: dict[int, Pilot]) -> Planner:
+        return Planner(
+            self.scene,
+            self.settings,
+            self.features,
+            self.buffers,
+            self.domains,
+            pilots,
+            self.trace.batch,
+            self._division,
+        )
+
+    def sample_steps(self, photons: int, keep: Callable[[moderngl.Buffer, int, int, RoundOf], None]) -> Iterator[None]:
+        """Trace about `photons` as if there were no beams and hand them to `keep` (records, how many, bytes of one,
+        where they belong); the maps stay as they are."""
+        pilots = self.pilots or (yield from self._pilot_steps())
+        plans = self._planner(pilots).plans(photons, self._texel_size())
+        counts = [plan.lattice_count(photons) for plan in plans]
+        rounds = max(
+            (-(-n // (self.trace.batch // plan.lattices)) for n, plan in zip(counts, plans, strict=True)), default=0
+        )
+        for j in range(rounds):
+            for i, (plan, lattice) in enumerate(zip(plans, counts, strict=True)):
+                points = len(range(j, lattice, rounds))
+                if points:
+                    part = plan.slice(self.settings.seed, 0, lattice, j, rounds, points, float(photons))
+                    batch = yield from self.trace.steps(part, plan.domain)
+                    keep(
+                        self.trace.photons,
+                        batch.photons,
+                        self.trace.photon.stride,
+                        RoundOf(0, j, rounds, i + 1 == len(plans)),
+                    )
+                yield
 
     def run_pass(self, number: int, photons: int, proceed: Callable[[float], bool]) -> bool:
         """One shifted set of lattices with about `photons` points over all lights. `proceed(fraction)` is asked after
@@ -392,7 +439,7 @@ class LightPass:
 
         `first_round`: where a pass goes on that was left before."""
         if not self.plans:
-            if self._has_beams and not first_round:
+            if self.has_beams and not first_round:
                 yield from self._beam_steps(number, photons, RoundOf(number, 0, 1, True))
                 self._maps.photon_weight += photons
                 self.stats.photons += photons
@@ -417,8 +464,23 @@ class LightPass:
             yield PassStep((j + 1) / rounds, True)
 
     @property
-    def _has_beams(self) -> bool:
+    def has_beams(self) -> bool:
+        """Beams carry part of the light."""
         return self._beams is not None and bool(self._beams.carried)
+
+    @property
+    def only_beams(self) -> bool:
+        """No light needs photons but for what beams hand to them."""
+        return self.has_beams and all(self._is_carried(i) for i in self.domains)
+
+    def _is_carried(self, light: int) -> bool:
+        assert self._beams is not None
+        return carries_everything(self.scene, self._beams.carried.get(light, ()))
+
+    @property
+    def beams(self) -> BeamLight | None:
+        """What finds and draws them; None where there are none."""
+        return self._beams if self.has_beams else None
 
     @property
     def beam_stats(self) -> BeamStats | None:
@@ -427,12 +489,12 @@ class LightPass:
 
     def _beam_steps(self, number: int, photons: int, of: RoundOf, done: float = 0.0) -> Iterator[PassStep]:
         """The beams of one round, and what they hand to photons."""
-        if not self._has_beams:
+        if not self.has_beams:
             return
         assert self._beams is not None
         share = photons / of.count
         before = self._beams.stats.find_seconds, self._beams.stats.draw_seconds
-        for _ in self._beams.steps(share, share, self.seed, number * of.count + of.index, self._maps):
+        for _ in self._beams.steps(share, share, self._word(number * of.count + of.index), self._maps):
             yield PassStep(done, False)
         after = self._beams.stats.find_seconds, self._beams.stats.draw_seconds
         self.stats.trace_seconds += after[0] - before[0]
@@ -440,7 +502,7 @@ class LightPass:
         found = self._beams.found
         if found is None or found.pieces is None or not len(found.pieces):
             return
-        emission = BeamEmission(self.buffers, self.trace.ray, found.pieces, self.tables.spans)
+        emission = BeamEmission(self.buffers, self.trace.ray, found.pieces, self._records.tables.spans)
         for light in found.carried:
             watts = emission.flux_w(light)
             if watts <= 0.0:
@@ -453,6 +515,17 @@ class LightPass:
             for rays in emission.batches(light, count, share, (lattice, other), key, self.trace.batch):
                 for _ in self.batch_steps(self.trace.carry_on(rays, light), of):
                     yield PassStep(done, False)
+
+    def beam_steps_again(self, photons: float) -> Iterator[None]:
+        """Add what beams of a pass of so many photons throw to the maps, as they are shown now; nothing is handed to
+        photons."""
+        if self._beams is not None and self.has_beams and photons > 0.0:
+            for _ in self._beams.steps(photons, photons, self._word(0), self._maps):
+                yield
+
+    def _word(self, number: int) -> int:
+        """Roulette's seed in round `number` of all passes."""
+        return random_word(self.seed, 0, number, Dimension.BRANCH)
 
     def batch_steps(self, steps: Generator[None, None, Batch], of: RoundOf) -> Iterator[None]:
         """Trace a batch (`TracePass.steps`, `carry_on`), keep and splat what landed, and count it."""

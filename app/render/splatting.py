@@ -41,6 +41,8 @@ class Pace:
     frame."""
     min_batch: int = SMALLEST_BATCH
     """Rays in flight, at least. With fewer than `SMALLEST_BATCH` the plan depends on the batch."""
+    searches_beside: bool = False
+    """Beams are searched for in a thread of their own."""
 
     @staticmethod
     def of(context: Context) -> Pace:
@@ -50,7 +52,7 @@ class Pace:
     @staticmethod
     def within_frames(context: Context) -> Pace:
         """For one that takes little of every frame; extended lights make do with as many points."""
-        return Pace(True, context.traits.viewer_splat_photons, True, 1024)
+        return Pace(True, context.traits.viewer_splat_photons, True, 1024, True)
 
 
 class Splatting:

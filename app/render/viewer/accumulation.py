@@ -32,6 +32,11 @@ class Accumulation:
     number: int = 0
     """Passes of this size that are complete."""
     begun: bool = False
+    first: int = 0
+    """Photons of the first pass."""
+
+    def __post_init__(self) -> None:
+        self.first = self.photons
 
     @property
     def is_done(self) -> bool:
@@ -49,31 +54,45 @@ class Accumulation:
 
     def steps(self) -> Iterator[None]:
         """Everything from here to the target, pausing often."""
+        light_pass = self.light.light_pass
         while not self.is_done:
-            if not self.begun:
-                self.light.light_pass.begin(self.photons, self.seed)
-                self.begun = True
-                yield
-            yield from self._pass(0 if self.number else self.light.rounds_running)
-            if not self.light.light_pass.plans:
+            yield from self._pass()
+            if not light_pass.plans and not light_pass.has_beams:
                 self.number, self.photons = 1, self.largest
                 self.publish()
                 return
-            self.number += 1
-            yield from self.light.light_pass.settling()
+            yield from light_pass.settling()
             self.publish()
             yield
-            if self.photons < self.largest:
-                self.photons = min(self.photons * FINER, self.largest)
-                self.number, self.begun = 0, False
+            yield from self._refine()
 
-    def _pass(self, first_round: int) -> Iterator[None]:
-        for _ in self.light.light_pass.pass_steps(self.number, self.photons, first_round):
+    def survey(self) -> Iterator[None]:
+        """What is there before anything else, published; nothing where photons are needed."""
+        light_pass = self.light.light_pass
+        if self.light.only_beams:
+            light_pass.begin(self.photons, self.seed)
             yield
+            self.light.show_survey()
+            yield
+            yield from light_pass.settling()
+            self.publish()
+            yield
+
+    def _pass(self) -> Iterator[None]:
+        light_pass = self.light.light_pass
+        if not self.begun:
+            light_pass.begin(self.photons, self.seed)
+            self.begun = True
+            yield
+        for _ in light_pass.pass_steps(self.number, self.photons, 0 if self.number else self.light.rounds_running):
+            yield
+        self.number += 1
 
     def resumed(self) -> Iterator[None]:
         """Go on tracing after `show_stored`: a pass that was running continues with the round it was in."""
-        if self.number > 0:
+        if self.light.only_beams:
+            yield from self._refine()
+        elif self.number > 0:
             # Of the finished passes only the first is stored: the others are due again.
             self.number = 1
             self.light.light_pass.stats.photons = min(self.light.light_pass.stats.photons, self.photons)
@@ -81,9 +100,21 @@ class Accumulation:
             yield from self.light.splat_stored(of_running=True)
         yield from self.steps()
 
+    def _refine(self) -> Iterator[None]:
+        """After a pass: a finer one is next, until passes are as fine as they may be."""
+        yield from self.light.sample(self.first)
+        if self.number and self.photons < self.largest:
+            self.photons = min(self.photons * FINER, self.largest)
+            self.number, self.begun = 0, False
+
     def show_stored(self) -> Iterator[None]:
-        """Splat the stored photons and publish them."""
-        if self.light.photons_stored:
+        """Splat the stored photons and publish them; where there are none, all beams again from the coarsest."""
+        if self.light.only_beams:
+            self.photons, self.number, self.begun = self.first, 0, False
+            yield from self._pass()
+        elif self.light.photons_stored:
             yield from self.light.splat_stored()
-            yield from self.light.light_pass.settling()
-            self.publish()
+        else:
+            return
+        yield from self.light.light_pass.settling()
+        self.publish()

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from ...model.settings import RenderSettings
+from ..beam_light import MovingBeams
 from ..map_fit import preview_size
 from .accumulation import Accumulation
 from .live_light import LiveLight
@@ -47,12 +49,19 @@ class Shown:
 
 
 def build(
-    context: Context, budget: Budget, wanted: LiveInputs, largest: int, target: int, publish: Callable[[], None]
+    context: Context,
+    budget: Budget,
+    wanted: LiveInputs,
+    largest: int,
+    target: int,
+    publish: Callable[[], None],
+    moving: MovingBeams,
 ) -> Iterator[Shown | None]:
     """Everything for a scene that photons must be traced for, up to its first picture; None while it is not done.
 
     `largest`: photons of the finest pass, `target`: after which nothing more is traced. `publish` is called for every
-    later picture. What was made is freed when the generator is closed before its end.
+    later picture, `moving`: how fine the first beams are. What was made is freed when the generator is closed
+    before its end.
     """
     width, height = preview_size(wanted.width, wanted.height)
     settings = RenderSettings(
@@ -68,7 +77,7 @@ def build(
         any_view=True,
     )
     scene = replace(wanted.scene, camera=wanted.camera)
-    light = LiveLight(context, scene, settings, budget.store_bytes)
+    light = LiveLight(context, scene, settings, budget.store_bytes, moving)
     try:
         yield None
         for _ in light.light_pass.preparing():
@@ -77,7 +86,7 @@ def build(
         published: list[bool] = []
         first = min(budget.first_photons, largest)
         accumulation = Accumulation(light, first, largest, target, wanted.seed, lambda: published.append(True))
-        steps = accumulation.steps()
+        steps = chain(accumulation.survey(), accumulation.steps())
         while not published:
             next(steps, None)
             yield None

@@ -20,6 +20,7 @@ from ...edit.live_inputs import LiveInputs
 from ...gpu import shader
 from ...passes.camera import CausticMaps
 from ...passes.pick import Picker, PickHit
+from ..beam_light import MovingBeams
 from ..light_maps import LightMaps
 from ..solo import scene_seen
 from . import schedule as events
@@ -73,6 +74,7 @@ class LiveEngine:
         self._picker: Picker | None = None
         self._rays_before = 0
         self._preview_photons = 1 << 13
+        self._moving = MovingBeams()
         self._times = {"trace": 0.0, "splat": 0.0, "camera": 0.0}
         self._history: list[tuple[float, int, float]] = []
         self._published_photons = 0.0
@@ -131,7 +133,7 @@ class LiveEngine:
         assert self._wanted is not None
         if self._shown is None or self._inputs is None:
             return DirtyLevel.BUILD
-        return dirty_level(self._shown.traced, self._inputs, self._wanted)
+        return dirty_level(self._shown.traced, self._inputs, self._wanted, self._shown.light.may_have_beams)
 
     def retrace(self) -> None:
         """Trace with the glass that is shown, where the picture followed an edit to first order only."""
@@ -218,7 +220,13 @@ class LiveEngine:
             case Action.BUILD:
                 self.problem = None
                 self._building = build(
-                    self.context, self.budget, self._wanted, self._largest, self._target_photons, self._maps_ready
+                    self.context,
+                    self.budget,
+                    self._wanted,
+                    self._largest,
+                    self._target_photons,
+                    self._maps_ready,
+                    self._moving,
                 )
             case Action.FOLLOW_PHOTONS:
                 self._follow_photons(self._wanted, 0.4 * budget_s)
@@ -289,7 +297,7 @@ class LiveEngine:
             return
         self._set_maps(maps)
         self._tell(events.PreviewShown())
-        took = time.perf_counter() - started
+        took = time.perf_counter() - started - self._shown.light.beam_seconds
         self._preview_photons = int(
             np.clip(self._preview_photons * np.clip(seconds / max(took, 1e-4), 0.5, 2.0), 1 << 12, 1 << 24)
         )
@@ -414,6 +422,7 @@ class LiveEngine:
         light = self._shown.light
         light_pass = light.light_pass
         tally = light_pass.stats.tally
+        beams = light_pass.beam_stats
         seconds = sum(h[2] for h in self._history)
         return replace(
             common,
@@ -431,6 +440,9 @@ class LiveEngine:
             fallbacks=dict(tally.fallbacks),
             lost={name: flux / tally.emitted for name, flux in tally.ended.items()} if tally.emitted else {},
             bands=dict(light_pass.stats.bands),
+            beams=0 if beams is None else beams.beams,
+            polygons=0 if beams is None else beams.polygons,
+            only_beams=light.only_beams,
         )
 
     @property

@@ -13,6 +13,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from ...edit.live_inputs import LiveInputs
+from ...model.features import is_painted
 from ...model.optics.glass import Dispersion
 from ...model.scene import (
     Light,
@@ -26,8 +27,11 @@ SAME_INDEX = 1e-6
 """Difference in n_d up to which a glass keeps the paths."""
 
 
-def dirty_level(traced: LiveInputs, shown: LiveInputs, new: LiveInputs) -> DirtyLevel:
-    """What `new` asks for where the photons stand for `traced` and the picture for `shown`."""
+def dirty_level(traced: LiveInputs, shown: LiveInputs, new: LiveInputs, beams: bool = False) -> DirtyLevel:
+    """What `new` asks for where the photons stand for `traced` and the picture for `shown`. `beams`: light goes as
+    beams while nothing is painted, which the brush cannot move."""
+    if beams and is_painted(traced.scene, traced.local_gain) != is_painted(new.scene, new.local_gain):
+        return DirtyLevel.BUILD
     paths = max(_inputs(traced, new), _scene(traced.scene, new.scene))
     if paths >= DirtyLevel.TRACE:
         return paths

@@ -3,39 +3,54 @@ traced again."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...model.features import Features
+from ..beam_light import MovingBeams
 from ..light_maps import LightMaps
 from ..light_pass import LightPass, scene_buffers
 from ..map_fit import PREVIEW_TILE_MAX, MapFit
-from ..solo import solo
+from ..solo import solo, solo_scene
 from ..splatting import Pace
 from .invalidation import shown_glasses
+from .photon_store import PhotonStore
 from .spectrum_guess import SpectrumGuess
-from .stored_passes import StoredPasses
+from .stored_passes import StoredPass, StoredPasses
 
 if TYPE_CHECKING:
     from ...edit.live_inputs import LiveInputs
     from ...gpu.context import Context
-    from ...model.features import Features
     from ...model.scene import Scene
     from ...model.settings import RenderSettings
     from ...passes.camera import CausticMaps
+
+BEAM_SECONDS = 0.03
+"""What finding and drawing beams should take while something is dragged."""
 
 
 class LiveLight:
     """Photons of one traced scene and how they are shown. Owns the scene's buffers as well."""
 
-    def __init__(self, context: Context, scene: Scene, settings: RenderSettings, capacity_bytes: int) -> None:
+    def __init__(
+        self,
+        context: Context,
+        scene: Scene,
+        settings: RenderSettings,
+        capacity_bytes: int,
+        moving: MovingBeams | None = None,
+    ) -> None:
         """The first maps are fitted to the scene's camera and the size in `settings`, with the windows of a
-        preview."""
+        preview. `moving`: how fine beams are while something is dragged."""
         self._context = context
         self.buffers = scene_buffers(context, scene, settings)
         self.stored = StoredPasses(context.ctx, capacity_bytes)
+        self._samples = PhotonStore(context.ctx, capacity_bytes)
+        self.moving = moving or MovingBeams()
         fit = MapFit(scene.camera, settings.width, settings.height, PREVIEW_TILE_MAX, avoids_powers_of_two=True)
         self.light_pass = LightPass(
             context,
@@ -46,7 +61,12 @@ class LiveLight:
             fit=fit,
             photon_records=self.stored,
             pace=Pace.within_frames(context),
+            moving=self.moving,
         )
+        self.may_have_beams = Features.of(scene, replace(settings, local_gain=False)).beams
+        """Light goes as beams while nothing is painted."""
+        self.beam_seconds = 0.0
+        """What beams took in the last preview."""
         self.judged_view: object = None
         """The view for which `refit` last looked whether the maps fit."""
         self._preview: LightMaps | None = None
@@ -89,8 +109,13 @@ class LiveLight:
         self.light_pass.smoothing = inputs.smoothing
         self._show_gains(inputs)
         stale = shown.show_spectra(spectra)
-        if shown.show_glass({a: b for a, b in glasses.items() if a != b}) or stale:
+        before = shown.changed
+        forgets = shown.show_glass({a: b for a, b in glasses.items() if a != b})
+        if forgets or stale:
             self.stored.forget_tables()
+        beams = self.light_pass.beams
+        if beams is not None and (stale or shown.changed != before):
+            beams.show(solo_scene(inputs.scene, inputs.solo_nm))
 
     def _show_gains(self, inputs: LiveInputs) -> None:
         light_pass = self.light_pass
@@ -116,6 +141,8 @@ class LiveLight:
             if owned is not None:
                 owned.release()
         self._preview = self._guess = None
+        if self.light_pass.beams is not None and self.only_beams:
+            self.light_pass.beams.survey_again()
         self.light_pass.lay_out(self.fit_of(inputs))
 
     @staticmethod
@@ -136,7 +163,8 @@ class LiveLight:
         return self.stored.running.store.rounds if self.stored.running else 0
 
     def splat_stored(self, *, of_running: bool = False) -> Iterator[None]:
-        """Empty maps, then the stored photons as they are shown now, pausing after every slab.
+        """Empty maps, then the stored photons as they are shown now, pausing after every slab, and beams as fine as
+        those.
 
         Where only the first rounds are stored, footprints are as much wider. `of_running`: those of the running pass as
         they are, so that it can go on. Nothing is shown where nothing is stored.
@@ -150,51 +178,87 @@ class LiveLight:
         if of_running:
             store.drop_unfinished()
         share = store.rounds / store.rounds_of_pass
+        if self.only_beams:
+            share = 1.0
         for slab in store.of_rounds(0, store.rounds):
             coarsening = 1.0 if of_running else share**-0.5
             yield from self.light_pass.splat_steps(slab.buffer, slab.count, coarsening, kept.tables.full)
             yield
+        yield from self.light_pass.beam_steps_again(kept.pass_photons * share)
         maps.photon_weight = kept.pass_photons * share
 
     def splat_preview(self, photons: int) -> LightMaps | None:
-        """About so many stored photons as they are shown now, in small maps of their own (`MapFit.preview`); None where
-        none are stored.
+        """About so many stored photons as they are shown now, in small maps of their own (`MapFit.preview`), and the
+        strongest beams; None where there is nothing.
 
         For while something is dragged: the maps that accumulate are left alone.
         """
         kept, light_pass = self.stored.fullest, self.light_pass
-        if kept is None or not kept.store.rounds:
+        has_photons = kept is not None and bool(kept.store.rounds)
+        if not has_photons and not self.only_beams:
             return None
         if self._preview is None:
             layout = light_pass.layout_for(light_pass.fit.preview)
             self._preview = LightMaps(self._context.ctx, layout, self._preview_features)
         self._preview.clear()
+        self._preview.photon_weight = 1.0
+        if kept is not None and has_photons:
+            self._splat_some(kept, photons, self._preview)
+        started = time.perf_counter()
+        if light_pass.beams is not None:
+            weight = self._preview.photon_weight
+            light_pass.beams.draw_moving(self._preview, weight, self.moving, BEAM_SECONDS)
+        self.beam_seconds = time.perf_counter() - started
+        return self._preview
+
+    def _splat_some(self, kept: StoredPass, photons: int, maps: LightMaps) -> None:
         rounds = kept.store.first_rounds(photons)
         slabs = kept.store.of_rounds(0, rounds)
         # Records follow a space-filling curve over the lattice: every so manieth is nearly a lattice again.
         stride = max(1, sum(slab.count for slab in slabs) // photons)
         share = rounds / kept.store.rounds_of_pass / stride
         for slab in slabs:
-            for _ in light_pass.splat_steps(
-                slab.buffer, -(-slab.count // stride), share**-0.5, kept.tables.preview, self._preview, stride
+            for _ in self.light_pass.splat_steps(
+                slab.buffer, -(-slab.count // stride), share**-0.5, kept.tables.preview, maps, stride
             ):
                 pass
-        self._preview.photon_weight = kept.pass_photons * share
-        return self._preview
+        maps.photon_weight = kept.pass_photons * share
+
+    # ---- beams -------------------------------------------------------------------------------
+
+    @property
+    def only_beams(self) -> bool:
+        """All light goes as beams, but for what those hand to photons."""
+        return self.light_pass.only_beams
+
+    def show_survey(self) -> None:
+        """The beams that were found first, in the light pass's maps."""
+        beams, maps = self.light_pass.beams, self.light_pass.maps
+        assert beams is not None and maps is not None
+        beams.draw_found(maps, self.moving.threshold)
+
+    def sample(self, photons: int) -> Iterator[None]:
+        """Trace photons that answer questions (`stored_records`) about what beams carry; nothing where there are
+        some."""
+        if self.light_pass.has_beams and not self._samples.photons:
+            yield from self.light_pass.sample_steps(photons, self._samples.keep)
 
     def stored_records(self, limit: int) -> np.ndarray:
-        """About `limit` stored records (`gpu.records.photon_record`)."""
+        """About `limit` stored records (`gpu.records.photon_record`) of all light, beams' too."""
         dtype = self.light_pass.trace.photon.dtype
+        if self.light_pass.has_beams:
+            return self._samples.read(limit, dtype)
         return self.stored.fullest.store.read(limit, dtype) if self.stored.fullest else np.zeros(0, dtype)
 
     @property
     def bytes(self) -> int:
         """Device memory of photons, queues, maps and scene."""
         maps = sum(maps.bytes for maps in (self.light_pass.maps, self._preview) if maps is not None)
-        return self.stored.bytes + self.light_pass.trace.bytes + self.buffers.bytes + maps
+        return self.stored.bytes + self._samples.bytes + self.light_pass.trace.bytes + self.buffers.bytes + maps
 
     def release(self) -> None:
         """Free everything, the stored photons and the scene's buffers too."""
+        self._samples.clear()
         for owned in (self._preview, self._guess, self.light_pass, self.buffers):
             if owned is not None:
                 owned.release()

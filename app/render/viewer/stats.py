@@ -40,5 +40,11 @@ class LiveStats:
     fallbacks: dict[str, int] = field(default_factory=dict)
     lost: dict[str, float] = field(default_factory=dict)
     """Shares of the emitted flux by how it ended."""
+    beams: int = 0
+    """Beams followed for the running pass."""
+    polygons: int = 0
+    """What they threw on the receivers."""
+    only_beams: bool = False
+    """All light goes as beams: photons stand for how finely those are followed."""
     bands: dict[str, int] = field(default_factory=dict)
     """Spectral bands of each light."""

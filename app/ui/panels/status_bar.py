@@ -66,10 +66,14 @@ def _progress(state: State, view_model: ViewModel) -> State:
     imgui.set_cursor_pos_y(imgui.get_cursor_pos_y() + theme.em(0.55))
     imgui.progress_bar(share, imgui.ImVec2(theme.em(7), theme.em(0.4)), "")
     imgui.pop_style_color()
-    rows.explain("Progress", f"{stats.photons:,} of {target:,} photons.")
+    said = "beams, as fine as that many photons" if stats.only_beams else "photons"
+    rows.explain("Progress", f"{stats.photons:,} of {target:,} {said}.")
     imgui.same_line()
     word = "Done" if stats.converged else "Accumulating" if state.playing else "Paused"
-    imgui.text_unformatted(f"{word}, {numbers.count(stats.photons)} photons")
+    found = (
+        f"{numbers.count(stats.polygons)} polygons" if stats.only_beams else f"{numbers.count(stats.photons)} photons"
+    )
+    imgui.text_unformatted(f"{word}, {found}")
     return state
 
 
@@ -103,7 +107,7 @@ def _right_end(view_model: ViewModel) -> None:
     """Rate and frame time, flush with the window's edge, where there is room."""
     recent = view_model.frame_ms[-10:]
     parts = []
-    if view_model.stats.photons_per_second > 0:
+    if view_model.stats.photons_per_second > 0 and not view_model.stats.only_beams:
         parts.append(f"{numbers.count(view_model.stats.photons_per_second)} photons/s")
     if recent:
         parts.append(f"{numbers.milliseconds(sum(recent) / len(recent))} a frame")

@@ -183,6 +183,14 @@ def _numbers(state: State, stats: LiveStats) -> None:
         ),
         ("Rate", f"{numbers.count(stats.photons_per_second)}/s", "Emitted photons per second of trace and splat time."),
         (
+            "Beams",
+            f"{numbers.count(stats.beams)}, {numbers.count(stats.polygons)} polygons",
+            (
+                "Light followed from facet to facet as beams, and the polygons that those throw, in the passes that "
+                "the map holds. Where they carry all light, photons only say how finely they are followed."
+            ),
+        ),
+        (
             "Stored",
             numbers.count(stats.photons_stored),
             "Photon records kept, to be splatted again after an edit of dispersion.",

@@ -1,0 +1,109 @@
+"""Beams in the viewer: an edited glass is followed exactly, anew for every edit, and the brush goes by photons."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.render.beam_light import MovingBeams
+from spectrasplat.render.viewer.dirty_level import DirtyLevel
+from spectrasplat.render.viewer.engine import Budget, LiveEngine
+from spectrasplat.render.viewer.invalidation import dirty_level
+from spectrasplat.render.viewer.live_light import LiveLight
+
+from tests.gpu.test_live_light import SETTINGS, SIZE, difference, edited, inputs, maps, nrmse, painted, shipped
+
+PHOTONS = 20_000
+BEAMS: RenderSettings = replace(SETTINGS, method="srd")
+
+
+def begun(gl: Context, scene) -> LiveLight:
+    light = LiveLight(gl, scene, BEAMS, 64 << 20)
+    light.light_pass.prepare()
+    light.light_pass.begin(PHOTONS, 1)
+    return light
+
+
+def drawn(light: LiveLight) -> np.ndarray:
+    for _ in light.splat_stored():
+        pass
+    return maps(light)
+
+
+def test_an_edited_glass_throws_what_a_fresh_one_does(gl: Context) -> None:
+    scene = shipped("prism")
+    light, fresh = begun(gl, scene), begun(gl, edited(scene, 2.0))
+    try:
+        assert light.only_beams and not light.light_pass.plans
+        before = drawn(light)
+        light.show(inputs(edited(scene, 2.0)))
+        after = drawn(light)
+        assert difference(after, before) > 0.05
+        assert after[..., 3].sum() == pytest.approx(drawn(fresh)[..., 3].sum(), rel=0.01)
+        light.show(inputs(scene))
+        assert nrmse(drawn(light), before) < 1e-6
+    finally:
+        light.release()
+        fresh.release()
+
+
+def test_a_preview_holds_the_same_light_and_does_not_flicker(gl: Context) -> None:
+    light = begun(gl, shipped("prism"))
+    try:
+        drawn(light)
+        full = light.light_pass.map_flux() * light.light_pass.map_scale
+        preview = light.splat_preview(4096)
+        assert preview is not None
+        first = preview.flux(True)
+        assert first == pytest.approx(full, rel=0.05)
+        light.moving.threshold = MovingBeams().threshold
+        again = light.splat_preview(4096)
+        assert again is not None and again.flux(True) == pytest.approx(first, rel=0.01)
+    finally:
+        light.release()
+
+
+def test_moving_beams_get_coarser_where_they_take_too_long() -> None:
+    moving = MovingBeams(1e-4)
+    moving.learn(0.03, 0.03)
+    assert moving.threshold == 1e-4
+    moving.learn(0.06, 0.03)
+    assert moving.threshold == pytest.approx(2e-4)
+    moving.learn(0.003, 0.03)
+    assert moving.threshold == pytest.approx(1e-4)
+
+
+def test_the_brush_asks_for_photons_and_back(gl: Context) -> None:
+    scene = shipped("prism")
+    plain, dabbed = inputs(scene), inputs(painted(scene, 1.0))
+    assert dirty_level(plain, plain, dabbed, True) == DirtyLevel.BUILD
+    assert dirty_level(dabbed, dabbed, plain, True) == DirtyLevel.BUILD
+    assert dirty_level(plain, plain, replace(dabbed, local_gain=False), True) < DirtyLevel.TRACE
+    light = LiveLight(gl, painted(scene, 1.0), BEAMS, 64 << 20)
+    try:
+        assert light.may_have_beams and not light.light_pass.features.beams
+    finally:
+        light.release()
+
+
+def test_the_engine_answers_questions_about_beams(gl: Context) -> None:
+    engine = LiveEngine(gl, replace(Budget.of(gl), first_photons=1 << 12, largest_photons=1 << 14))
+    engine.target_photons, engine.camera_samples = 1 << 14, 1
+    try:
+        wanted = inputs(shipped("prism"))
+        engine.set(wanted)
+        deadline = time.monotonic() + 120.0
+        while not engine.is_idle:
+            engine.advance(0.05)
+            assert engine.problem is None and time.monotonic() < deadline
+        stats = engine.stats
+        assert stats.only_beams and stats.polygons > 0 and stats.photons >= 1 << 14 and stats.converged
+        photons = engine.stored_photons()
+        assert len(photons.position) > 100 and set(photons.source) >= {0}
+        assert engine.picture is not None and engine.picture.size == SIZE
+    finally:
+        engine.release()
