@@ -96,8 +96,8 @@ def write_into(
         raise ValueError(f"a picture is (H, W, 3) and not empty, got {rgb.shape}")
     if not np.isfinite(rgb).all() or (spectral is not None and not np.isfinite(spectral).all()):
         raise BrokenPictureError(
-            f"{name or part.name} is not written: the picture holds numbers that are not finite; a power or a size of the "
-            "scene is beyond what float32 can hold, choose others"
+            f"{name or part.name} is not written: the picture holds numbers that are not finite; a power or a size of "
+            "the scene is beyond what float32 can hold, choose others"
         )
     metadata = dict(metadata or {})
     if suffix == ".png":

@@ -38,4 +38,5 @@ def jit(function: Callable, **more: Any) -> Callable:
 
 def part(function: Callable) -> Callable:
     """The same for what compiled functions alone call: neither wrapped for Python nor kept on disk by itself."""
-    return njit(**_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+    options: dict[str, Any] = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return njit(**options)(function)

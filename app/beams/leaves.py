@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,7 +12,8 @@ from .rays import PARALLEL, advance, at_x, follow
 from .search import medium
 
 
-class Leaves(NamedTuple):
+@dataclass(frozen=True)
+class Leaves:
     """Rows of finished beams; `count` says how much is used."""
 
     count: np.ndarray
@@ -73,8 +74,19 @@ class Store:
     def leaves(self, count: np.ndarray) -> Leaves:
         """What was written: leaves, edges, corners by `count`."""
         leaf, edge = self.leaf[: count[0]].copy(), self.edge[: count[1]].copy()
-        fields = (leaf[name] for name in LEAF.names or ())
-        return Leaves(count.copy(), *fields, edge["line"], edge["soft"], self.corner[: count[2]].copy())
+        return Leaves(
+            count=count.copy(),
+            head=leaf["head"],
+            x=leaf["x"],
+            density=leaf["density"],
+            centre=leaf["centre"],
+            slope=leaf["slope"],
+            flux=leaf["flux"],
+            ray=leaf["ray"],
+            edge=edge["line"],
+            soft=edge["soft"],
+            corner=self.corner[: count[2]].copy(),
+        )
 
 
 @part

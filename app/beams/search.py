@@ -399,7 +399,7 @@ def lay_edges(beam, flown, facet, hit, work):
         work.cuts[e] = 0
     alive = False
     for a in range(lo, hi):
-        missed, e = beam.corners[a] == 0, np.int64(0)
+        missed, e = beam.corners[a] == 0, 0
         while e < facet.corners and not missed:
             line = work.lines[e, a]
             edge_line(facet, e, sign, work.moment[a], flown.centre[0], flown.centre[1], line)

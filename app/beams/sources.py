@@ -47,9 +47,15 @@ def emissions(
     lines = [float(axis.x_of_nm(nm)) for nm, _ in light.spectral_power.lines]
     shares = [float(watts) for _, watts in light.spectral_power.lines]
     total = sum(shares) + float(np.sum(light.spectral_power.density))
-    common = (power, tuple(lines), tuple(s / total for s in shares), bool(np.any(light.spectral_power.density > 0.0)))
+    common = {
+        "power": power,
+        "lines": tuple(lines),
+        "line_shares": tuple(s / total for s in shares),
+        "is_continuous": bool(np.any(light.spectral_power.density > 0.0)),
+        "mask": inside,
+    }
     make = _parallel if light.is_parallel else _diverging
-    return make(light, corners, to_gpu, unit, parts, common, inside)
+    return make(light, corners, to_gpu, unit, parts, common)
 
 
 def _specular_corners(scene: BeamScene) -> np.ndarray:
@@ -64,7 +70,7 @@ def _importance(spectrum: CumulativeSpectrum) -> np.ndarray:
     return 0.5 * y / max(float(y[-1]), 1e-300) + 0.5 * w / max(float(w[-1]), 1e-300)
 
 
-def _parallel(light, corners, to_gpu, unit, parts, common, inside) -> list[Emission]:
+def _parallel(light, corners, to_gpu, unit, parts, common) -> list[Emission]:
     right, up, forward = light.axes().T
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     reach = float(np.linalg.norm(corners - middle, axis=1).max())
@@ -91,15 +97,17 @@ def _parallel(light, corners, to_gpu, unit, parts, common, inside) -> list[Emiss
         grow = 1.0 + math.hypot(u, v)
         room = np.array([0.0, 0.0, 1.05 * reach * grow])
         density = 1.0 / unit**2 / len(places)
-        result.append(Emission(source, limits, room, *common, density, inside, beside if spread else ()))
+        shifted = beside if spread else ()
+        result.append(Emission(source, limits, room, density=density, beside=shifted, **common))
     return result
 
 
-def _diverging(light, corners, to_gpu, unit, parts, common, inside) -> list[Emission]:
+def _diverging(light, corners, to_gpu, unit, parts, common) -> list[Emission]:
     origin = to_gpu(np.array(light.position))
     direction = light.axes()[:, 2]
     is_area = light.has_outline
-    offsets, measure, spread = np.zeros((1, 3)), 1.0, ()
+    offsets, measure = np.zeros((1, 3)), 1.0
+    spread: tuple[np.ndarray, ...] = ()
     if is_area:
         edge_u, edge_v, _ = light.axes().T
         half = np.array(light.half_extent) * unit
@@ -120,7 +128,7 @@ def _diverging(light, corners, to_gpu, unit, parts, common, inside) -> list[Emis
             args = (forward, right, up, direction, light.cone, is_area)
             source = _source(POINT, place, *args)
             beside = tuple(_source(POINT, place + s, *args) for s in spread)
-            result.append(Emission(source, limits, room, *common, measure, inside, beside))
+            result.append(Emission(source, limits, room, density=measure, beside=beside, **common))
     return result
 
 

@@ -73,7 +73,11 @@ def test_no_light_is_lost_or_doubled(name: str) -> None:
     entered = ended = lost = 0.0
     for emission in rig.emissions():
         _, sums = rig.polygons(at_index(emission, 0.0, X, 1.0), 1e-5)
-        entered, ended, lost = entered + sums[SUM_ENTERED], ended + sums[: SUM_ROULETTE + 1].sum(), lost + sums[SUM_NUMERIC]
+        entered, ended, lost = (
+            entered + sums[SUM_ENTERED],
+            ended + sums[: SUM_ROULETTE + 1].sum(),
+            lost + sums[SUM_NUMERIC],
+        )
     # Absorption is that of a piece's middle.
     tolerance = 1e-3 if name == "tinted" else 1e-12
     assert ended == pytest.approx(entered, rel=tolerance)
