@@ -219,6 +219,8 @@ class LiveEngine:
         match action:
             case Action.BUILD:
                 self.problem = None
+                if self._shown is not None and self._shown.light.light_pass.beams is not None:
+                    self._shown.light.light_pass.beams.pause()
                 self._building = build(
                     self.context,
                     self.budget,
