@@ -263,9 +263,12 @@ class BeamLight:
         for step in self._coarse[1].find(moving.threshold, self._depth, _MOVING_WORD, MOVING_PARTS):
             if isinstance(step, LightBeams):
                 self.found = step
-        if self.found is not None and self.found.polygons is not None:
-            self.draw(self.found.polygons, maps, weight)
-            self._context.finish()
+        if self.found is not None:
+            self.stats = BeamStats()
+            self._count(self.found)
+            if self.found.polygons is not None:
+                self.draw(self.found.polygons, maps, weight)
+                self._context.finish()
         moving.learn(time.perf_counter() - started, seconds)
 
     def draw(self, polygons: BeamPolygons, maps: LightMaps, weight: float) -> None:

@@ -22,7 +22,7 @@ def test_walking_round_and_dragging_the_dispersion_trace_nothing(gl: Context, mo
         dragging = bench.phase("dragging dispersion", 0.4, bench.drag_gain)
     gain = bench.session.state.scene.objects[bench._glass].material.dispersion.gain
     assert gain != 1.0
-    assert bench.session.picture.stats.polygons > 0 and resting.pictures_per_second > 0.0
+    assert bench.session.picture.stats.polygons > 0 and dragging.pictures_per_second > 0.0
     assert orbiting.rays_traced == dragging.rays_traced == 0
     assert len(dragging.frame_ms) > 2 and "ms" in dragging.line
     assert 0 < bench.latency(bench.nudge_camera) < 5000
