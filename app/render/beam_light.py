@@ -263,13 +263,18 @@ class BeamLight:
         for step in self._coarse[1].find(moving.threshold, self._depth, _MOVING_WORD, MOVING_PARTS):
             if isinstance(step, LightBeams):
                 self.found = step
-        if self.found is not None:
-            self.stats = BeamStats()
-            self._count(self.found)
-            if self.found.polygons is not None:
-                self.draw(self.found.polygons, maps, weight)
-                self._context.finish()
+        if self.found is not None and self.found.polygons is not None:
+            self.draw(self.found.polygons, maps, weight)
+            self._context.finish()
         moving.learn(time.perf_counter() - started, seconds)
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Beams and polygons of the last search that was finished."""
+        if self.found is None:
+            return 0, 0
+        beams = sum(int(sums[SUM_BEAMS]) for sums in self.found.sums.values())
+        return beams, 0 if self.found.polygons is None else len(self.found.polygons)
 
     def draw(self, polygons: BeamPolygons, maps: LightMaps, weight: float) -> None:
         """Add polygons to `maps`."""
