@@ -10,7 +10,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -274,6 +274,7 @@ class BeamLight:
 
     def draw_moving(self, maps: LightMaps, weight: float, moving: MovingBeams, seconds: float) -> None:
         """Find beams at once, as fine as `seconds` allow, and add them to `maps` of any layout times `weight`."""
+        self.pause()
         started = time.perf_counter()
         if self._coarse is None or self._coarse[0] is not maps.layout:
             finder = self.finder.shown_as(self.finder.shown)
@@ -286,6 +287,14 @@ class BeamLight:
             self.draw(self.found.polygons, maps, weight)
             self._context.finish()
         moving.learn(time.perf_counter() - started, seconds)
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Beams and polygons of the last search that was finished."""
+        if self.found is None:
+            return 0, 0
+        beams = sum(int(sums[SUM_BEAMS]) for sums in self.found.sums.values())
+        return beams, 0 if self.found.polygons is None else len(self.found.polygons)
 
     def draw(self, polygons: BeamPolygons, maps: LightMaps, weight: float) -> None:
         """Add polygons to `maps`."""
@@ -346,31 +355,48 @@ class BeamLight:
         if self._worker is None:
             yield from finder.find(threshold, self._depth, word, light_parts, None, go_on)
             return
-        stop, done = self._stop, [0.0]
-        stop.set()  # the search before, if it still runs, is not wanted
-        self._stop = stop = threading.Event()
+        while True:
+            self.pause()  # nobody waits for the one before
+            stop, done = threading.Event(), [0.0]
+            self._stop = stop
+            future = self._worker.submit(self._search, finder, threshold, word, light_parts, threads, go_on, stop, done)
+            try:
+                while not future.done():
+                    wait([future], _PAUSE_S)
+                    yield done[0]
+                if not stop.is_set():
+                    yield future.result()
+                    return
+            finally:
+                stop.set()
 
-        def work() -> LightBeams:
-            found = LightBeams({})
-            for step in finder.find(
-                threshold, self._depth, word, light_parts, threads, lambda: go_on() and not stop.is_set()
-            ):
-                if isinstance(step, LightBeams):
-                    found = step
-                else:
-                    done[0] = step
-                if stop.is_set():
-                    break
-            return found
+    def _search(
+        self,
+        finder: BeamFinder,
+        threshold: float,
+        word: int,
+        light_parts: int,
+        threads: int | None,
+        go_on: Callable[[], bool],
+        stop: threading.Event,
+        done: list[float],
+    ) -> LightBeams:
+        """In the worker; what is stopped returns nothing of use."""
+        found = LightBeams({})
+        for step in finder.find(
+            threshold, self._depth, word, light_parts, threads, lambda: go_on() and not stop.is_set()
+        ):
+            if stop.is_set():
+                break
+            if isinstance(step, LightBeams):
+                found = step
+            else:
+                done[0] = step
+        return found
 
-        future: Future[LightBeams] = self._worker.submit(work)
-        try:
-            while not future.done():
-                wait([future], _PAUSE_S)
-                yield done[0]
-            yield future.result()
-        finally:
-            stop.set()
+    def pause(self) -> None:
+        """Stop the search that runs beside, for something more urgent; whoever goes on waiting for it begins again."""
+        self._stop.set()
 
     def _count(self, found: LightBeams) -> None:
         stats, n = self.stats, self.stats.searches
@@ -387,7 +413,7 @@ class BeamLight:
 
     def release(self) -> None:
         """Free everything; a search that runs ends soon."""
-        self._stop.set()
+        self.pause()
         if self._worker is not None:
             self._worker.shutdown(wait=False, cancel_futures=True)
         for canvas in self._canvases.values():

@@ -219,6 +219,8 @@ class LiveEngine:
         match action:
             case Action.BUILD:
                 self.problem = None
+                if self._shown is not None and self._shown.light.light_pass.beams is not None:
+                    self._shown.light.light_pass.beams.pause()
                 self._building = build(
                     self.context,
                     self.budget,
@@ -422,7 +424,7 @@ class LiveEngine:
         light = self._shown.light
         light_pass = light.light_pass
         tally = light_pass.stats.tally
-        beams = light_pass.beam_stats
+        beams, polygons = (0, 0) if light_pass.beams is None else light_pass.beams.counts
         seconds = sum(h[2] for h in self._history)
         return replace(
             common,
@@ -440,8 +442,8 @@ class LiveEngine:
             fallbacks=dict(tally.fallbacks),
             lost={name: flux / tally.emitted for name, flux in tally.ended.items()} if tally.emitted else {},
             bands=dict(light_pass.stats.bands),
-            beams=0 if beams is None else beams.beams,
-            polygons=0 if beams is None else beams.polygons,
+            beams=beams,
+            polygons=polygons,
             only_beams=light.only_beams,
         )
 

@@ -41,7 +41,7 @@ class LiveStats:
     lost: dict[str, float] = field(default_factory=dict)
     """Shares of the emitted flux by how it ended."""
     beams: int = 0
-    """Beams followed for the running pass."""
+    """Beams followed by the last search."""
     polygons: int = 0
     """What they threw on the receivers."""
     only_beams: bool = False

@@ -186,8 +186,8 @@ def _numbers(state: State, stats: LiveStats) -> None:
             "Beams",
             f"{numbers.count(stats.beams)}, {numbers.count(stats.polygons)} polygons",
             (
-                "Light followed from facet to facet as beams, and the polygons that those throw, in the passes that "
-                "the map holds. Where they carry all light, photons only say how finely they are followed."
+                "Light followed from facet to facet as beams, and the polygons that those throw, in the last search. "
+                "Where they carry all light, photons only say how finely they are followed."
             ),
         ),
         (
