@@ -8,7 +8,11 @@ import numpy as np
 
 
 def lamp(
-    position: Sequence[float], direction: Sequence[float], size: Sequence[float], kind: str = "collimated", more: str = ""
+    position: Sequence[float],
+    direction: Sequence[float],
+    size: Sequence[float],
+    kind: str = "collimated",
+    more: str = "",
 ) -> str:
     """A light; `size`: radius, or width and height, of a collimated or an area one. What is empty is not written."""
     told = [f'kind = "{kind}"', more]
@@ -19,7 +23,9 @@ def lamp(
     return "[[lights]]\n" + "\n".join(told) + "\n"
 
 
-def solid(vertices: np.ndarray, faces: Sequence[Sequence[int]], more: str = 'glass = "N-BK7"', name: str = "solid") -> str:
+def solid(
+    vertices: np.ndarray, faces: Sequence[Sequence[int]], more: str = 'glass = "N-BK7"', name: str = "solid"
+) -> str:
     """A mesh from faces with their corners counter-clockwise from outside, cut into fans."""
     triangles = [[face[0], face[i], face[i + 1]] for face in faces for i in range(1, len(face) - 1)]
     points = [[float(c) for c in v] for v in vertices]
@@ -47,15 +53,29 @@ def octagon(width: float, depth: float, corner: float) -> np.ndarray:
     """A rectangle with its corners cut."""
     w, d = 0.5 * width, 0.5 * depth
     return np.array(
-        [(w, -d + corner), (w, d - corner), (w - corner, d), (-w + corner, d), (-w, d - corner), (-w, -d + corner),
-         (-w + corner, -d), (w - corner, -d)]
+        [
+            (w, -d + corner),
+            (w, d - corner),
+            (w - corner, d),
+            (-w + corner, d),
+            (-w, d - corner),
+            (-w, -d + corner),
+            (-w + corner, -d),
+            (w - corner, -d),
+        ]
     )
 
 
 def step_cut(glass: str = "N-SF11") -> str:
     """An emerald cut: 8 sides, three steps below, two above."""
-    sizes = [(0.42, 0.1, 0.02, -0.55), (0.85, 0.45, 0.1, -0.30), (1.1, 0.75, 0.18, -0.04), (1.1, 0.75, 0.18, 0.02),
-             (0.92, 0.6, 0.14, 0.14), (0.7, 0.42, 0.1, 0.22)]
+    sizes = [
+        (0.42, 0.1, 0.02, -0.55),
+        (0.85, 0.45, 0.1, -0.30),
+        (1.1, 0.75, 0.18, -0.04),
+        (1.1, 0.75, 0.18, 0.02),
+        (0.92, 0.6, 0.14, 0.14),
+        (0.7, 0.42, 0.1, 0.22),
+    ]
     rings = [ring(octagon(w, d, c), z) for w, d, c, z in sizes]
     more = f'glass = "{glass}"\nrotation_deg = [9.0, -7.0, 23.0]\nposition = [0.0, 0.0, 1.2]'
     return lofted(rings, more, "step cut")
@@ -103,7 +123,9 @@ def amici() -> str:
     )
 
 
-def box(size: Sequence[float], at: Sequence[float], more: str, name: str = "box", turn: Sequence[float] = (0, 0, 0)) -> str:
+def box(
+    size: Sequence[float], at: Sequence[float], more: str, name: str = "box", turn: Sequence[float] = (0, 0, 0)
+) -> str:
     """A box, its middle at `at`."""
     return (
         f'[[objects]]\nname = "{name}"\nshape = "box"\nsize = {list(size)}\nposition = {list(at)}\n'
@@ -145,7 +167,13 @@ CASES = {
     "sunk": DOWN + box((0.8, 0.7, 0.6), (0.0, 0.0, 0.1), 'glass = "N-BK7"', "sunk", (10, 20, 30)),
     "mirror": PRISM_LIGHT
     + PRISM
-    + box((0.02, 2.0, 2.0), (1.6, 0.0, 1.0), 'material = { kind = "mirror", reflectance = [0.8, 0.6, 0.4] }', "mirror", (0, 12, 8)),
+    + box(
+        (0.02, 2.0, 2.0),
+        (1.6, 0.0, 1.0),
+        'material = { kind = "mirror", reflectance = [0.8, 0.6, 0.4] }',
+        "mirror",
+        (0, 12, 8),
+    ),
 }
 """What light does in them: refraction; steps; sixty facets; cement; a solid that hides parts of itself; one solid that
 shades another; black before glass; absorption; solids that overlap; one sunk into the floor; a mirror."""
@@ -153,8 +181,7 @@ shades another; black before glass; absorption; solids that overlap; one sunk in
 SPOT = "half_angle_deg = 14.0\nsoftness = 0.5"
 NEAR = {
     "point far": lamp((-2.0, 0.4, 2.6), (), (), "point") + PRISM,
-    "point near": lamp((-0.5, 0.1, 1.7), (), (), "point")
-    + box((1.0, 1.0, 0.4), (0.0, 0.0, 0.9), 'glass = "N-SF11"'),
+    "point near": lamp((-0.5, 0.1, 1.7), (), (), "point") + box((1.0, 1.0, 0.4), (0.0, 0.0, 0.9), 'glass = "N-SF11"'),
     "spot": lamp((-2.0, 0.4, 2.6), (0.75, -0.1, -0.65), (), "spot", SPOT) + PRISM,
     "between": lamp((0.0, 0.0, 2.0), (), (), "point")
     + box((0.5, 1.0, 1.0), (-1.2, 0.0, 0.9), 'glass = "N-BK7"', "left")
@@ -212,7 +239,9 @@ EXTREMES = {
     "edge on edge": _STRAIGHT
     + block((0.4, 0.6, 0.4), (-0.2, 0.0, 1.2))
     + block((0.4, 0.6, 0.4), (0.2, 0.0, 0.7), "N-BK7"),
-    "touching": _SLANTED + block((0.5, 0.6, 0.5), (-0.25, 0.0, 1.0)) + block((0.5, 0.6, 0.5), (0.25, 0.0, 1.0), "N-BK7"),
+    "touching": _SLANTED
+    + block((0.5, 0.6, 0.5), (-0.25, 0.0, 1.0))
+    + block((0.5, 0.6, 0.5), (0.25, 0.0, 1.0), "N-BK7"),
     "same": _SLANTED + block((0.5, 0.6, 0.5), (0.0, 0.0, 1.0)) + block((0.5, 0.6, 0.5), (0.0, 0.0, 1.0), "N-BK7"),
     "doubled corners": _SLANTED + twin('glass = "N-SF11"'),
     "needles": _SLANTED + needles(60),
@@ -226,7 +255,7 @@ EXTREMES = {
 solids in one place; corners that are not shared; needles; a facet a millionth wide; a lamp's axis through a corner;
 facets a millionth apart from one plane; a film."""
 SWEPT = {name: CASES[name] for name in ("prism", "step cut", "amici", "L", "two stones", "tinted", "mirror")}
-ONSET = lamp((-2.0, -0.9, 1.85), (0.8296, 0.4790, -0.2873), (0.3, 0.5), more="tangent = [-0.5, 0.866, 0.0]") + PRISM.replace(
-    "[-90.0, 7.0, 3.0]", "[-90.0, 0.0, 0.0]"
-)
+ONSET = lamp(
+    (-2.0, -0.9, 1.85), (0.8296, 0.4790, -0.2873), (0.3, 0.5), more="tangent = [-0.5, 0.866, 0.0]"
+) + PRISM.replace("[-90.0, 7.0, 3.0]", "[-90.0, 0.0, 0.0]")
 """A prism whose second face reflects everything below 470 nm and lets light through above."""

@@ -50,8 +50,23 @@ def _moments(points, count):
 
 @numba.njit(cache=True)
 def _add(
-    x, x_lo, x_hi, density, slope, centre, edge_start, edges, hull_start, hulls, chosen, from_hulls, low, side, out,
-    outside, each,
+    x,
+    x_lo,
+    x_hi,
+    density,
+    slope,
+    centre,
+    edge_start,
+    edges,
+    hull_start,
+    hulls,
+    chosen,
+    from_hulls,
+    low,
+    side,
+    out,
+    outside,
+    each,
 ):
     """Add all polygons at spectral coordinate x to the cells `out`."""
     one, two, strip, cell = np.empty((_MOST, 2)), np.empty((_MOST, 2)), np.empty((_MOST, 2)), np.empty((_MOST, 2))
@@ -126,8 +141,22 @@ def cells(
     instead of the whole plane. Edges' softness is not regarded."""
     out, outside, each = np.zeros(grid.shape), np.zeros(1), np.zeros(len(polygons))
     _add(
-        float(x), polygons.x_lo, polygons.x_hi, polygons.density, polygons.slope, polygons.centre, polygons.edge_start,
-        polygons.edges, polygons.hull_start, polygons.hulls, polygons.receiver == receiver, from_hulls,
-        np.array(grid.low, float), float(grid.side), out, outside, each,
+        float(x),
+        polygons.x_lo,
+        polygons.x_hi,
+        polygons.density,
+        polygons.slope,
+        polygons.centre,
+        polygons.edge_start,
+        polygons.edges,
+        polygons.hull_start,
+        polygons.hulls,
+        polygons.receiver == receiver,
+        from_hulls,
+        np.array(grid.low, float),
+        float(grid.side),
+        out,
+        outside,
+        each,
     )
     return out, float(outside[0]), each

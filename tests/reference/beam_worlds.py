@@ -150,7 +150,9 @@ class Rig:
         """Square cells, `cells` along u, from `low` to about `high`."""
         side = (high[0] - low[0]) / cells
         origin, axes = self.frames[receiver]
-        return Grid(self.receivers[receiver], origin, axes, low, side, (cells, max(1, round((high[1] - low[1]) / side))))
+        return Grid(
+            self.receivers[receiver], origin, axes, low, side, (cells, max(1, round((high[1] - low[1]) / side)))
+        )
 
 
 def at_index(emission: Emission, *x: float) -> Emission:
@@ -165,7 +167,9 @@ def grid_about(rig: Rig, polygons, side: int, least: float = 0.5, most: float = 
     return rig.grid(tuple(middle - half), tuple(middle + half), side)
 
 
-def scores(found: np.ndarray, exact: np.ndarray, variance: np.ndarray, weight: float, least: float = 25.0) -> np.ndarray:
+def scores(
+    found: np.ndarray, exact: np.ndarray, variance: np.ndarray, weight: float, least: float = 25.0
+) -> np.ndarray:
     """Standard scores by cell of what rays of mean `weight` found; cells that expect fewer than `least` rays are one."""
     few = exact < least * weight
     # The weight of a ray in this cell: what varies with its number is only how many there are.

@@ -85,6 +85,8 @@ class Landed:
     total: float
     """On the receiver, inside the grid or not."""
     total_variance: float
+    weight: float
+    """Of a ray that landed, by mean square over mean."""
 
 
 @numba.njit(cache=True, nogil=True)
@@ -140,8 +142,37 @@ def _medium(mask, of_rank):
 
 @numba.njit(cache=True, nogil=True)
 def _trace(
-    seed, rays, lamp_kind, frame, half, tangent, window, axis, cone, lambert, edges, normal, owner, ball, kind, rank,
-    of_rank, index, absorption, rho, receiver, origin, axes, low, side, start_mask, depth, sums, squares, hits, total,
+    seed,
+    rays,
+    lamp_kind,
+    frame,
+    half,
+    tangent,
+    window,
+    axis,
+    cone,
+    lambert,
+    edges,
+    normal,
+    owner,
+    ball,
+    kind,
+    rank,
+    of_rank,
+    index,
+    absorption,
+    rho,
+    receiver,
+    origin,
+    axes,
+    low,
+    side,
+    start_mask,
+    depth,
+    sums,
+    squares,
+    hits,
+    total,
 ):
     np.random.seed(seed)
     o, d, start, n = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
@@ -301,11 +332,37 @@ def landed(
         sums, squares = np.zeros(grid.shape), np.zeros(grid.shape)
         hits, total = np.zeros(grid.shape, np.int64), np.zeros(2)
         _trace(
-            seed * 1_000_003 + number, count, kind, frame, np.array(lamp.half, float), float(lamp.tangent),
-            np.array(lamp.window, float), np.asarray(lamp.axis, float), np.array(lamp.cone, float), lamp.lambert, edges,
-            normal, owner, ball, world.kind, world.rank, of_rank, world.index, world.absorption, world.reflectance,
-            grid.receiver, grid.origin, grid.axes, np.array(grid.low, float), float(grid.side), np.int64(inside), depth,
-            sums, squares, hits, total,
+            seed * 1_000_003 + number,
+            count,
+            kind,
+            frame,
+            np.array(lamp.half, float),
+            float(lamp.tangent),
+            np.array(lamp.window, float),
+            np.asarray(lamp.axis, float),
+            np.array(lamp.cone, float),
+            lamp.lambert,
+            edges,
+            normal,
+            owner,
+            ball,
+            world.kind,
+            world.rank,
+            of_rank,
+            world.index,
+            world.absorption,
+            world.reflectance,
+            grid.receiver,
+            grid.origin,
+            grid.axes,
+            np.array(grid.low, float),
+            float(grid.side),
+            np.int64(inside),
+            depth,
+            sums,
+            squares,
+            hits,
+            total,
         )
         return sums, squares, hits, total
 
@@ -319,4 +376,5 @@ def landed(
         hits,
         float(total[0] * scale),
         float((total[1] - total[0] ** 2 / rays) * scale**2),
+        float(total[1] / max(total[0], 1e-300) * scale),
     )

@@ -37,9 +37,8 @@ def compare(text: str, rays: int, threshold: float, texel: float, side: int = 40
     # A faint piece of a cone's rim holds what its slope says, not what its middle does.
     assert each.sum() == pytest.approx(polygons.flux.sum(), rel=1e-4)
     rays_found = landed(rig.world(X), rig.lamp(), grid, rays)
-    weight = rays_found.total_variance / rays_found.total
     total = (rays_found.total - exact.sum() - outside) / np.sqrt(rays_found.total_variance)
-    return total, scores(rays_found.flux, exact, rays_found.variance, weight, 50.0)
+    return total, scores(rays_found.flux, exact, rays_found.variance, rays_found.weight, 50.0)
 
 
 def agree(total: float, by_cell: np.ndarray) -> bool:
@@ -73,7 +72,11 @@ def test_no_light_is_lost_or_doubled(name: str) -> None:
     entered = ended = lost = 0.0
     for emission in rig.emissions():
         _, sums = rig.polygons(at_index(emission, 0.0, X, 1.0), 1e-5)
-        entered, ended, lost = entered + sums[SUM_ENTERED], ended + sums[: SUM_ROULETTE + 1].sum(), lost + sums[SUM_NUMERIC]
+        entered, ended, lost = (
+            entered + sums[SUM_ENTERED],
+            ended + sums[: SUM_ROULETTE + 1].sum(),
+            lost + sums[SUM_NUMERIC],
+        )
     # Absorption is that of a piece's middle.
     tolerance = 1e-3 if name == "tinted" else 1e-12
     assert ended == pytest.approx(entered, rel=tolerance)
