@@ -1,3 +1,4 @@
+# ruff: noqa: NPY002 (what numba compiles has the old generator only)
 """Light through flat facets by chance alone: float64 rays over triangles, Fresnel by a random number.
 
 What beams (`spectrasplat.beams`) are held against. Nothing is shared with them: no facets, no half-planes, no affine
@@ -175,7 +176,7 @@ def _trace(
     total,
 ):
     np.random.seed(seed)
-    o, d, start, n = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    o, d, n = np.empty(3), np.empty(3), np.empty(3)
     nearest, found = np.empty(1), np.empty(16, np.int64)
     for _ in range(rays):
         a, b = 2.0 * np.random.random() - 1.0, 2.0 * np.random.random() - 1.0

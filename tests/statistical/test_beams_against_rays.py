@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from reference.beam_worlds import Rig, at_index, grid_about, scene_of, scores
 from reference.beam_scenes import BRILLIANT, CASES, EXTREMES, NEAR, SUN, step_cut
 from reference.beam_sums import cells
+from reference.beam_worlds import Rig, at_index, grid_about, scene_of, scores
 from reference.facet_rays import landed
 from spectrasplat.beams.facets import convex_hull
 from spectrasplat.beams.polygons import joined

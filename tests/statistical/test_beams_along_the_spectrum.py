@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from reference.beam_worlds import Rig, at_index, grid_about, scene_of
 from reference.beam_scenes import ONSET, SWEPT
 from reference.beam_sums import cells
+from reference.beam_worlds import Rig, at_index, grid_about, scene_of
 
 PLACES = (np.arange(400) + 0.5) / 400.0
 BOUND = {"amici": 2e-3, "onset": 2e-3}
-"""Where 1e-3 of the maximum is not reached: the parabola of a density that rises as a square root, and cement at grazing
-incidence (1.0e-3 and 1.5e-3 were measured)."""
+"""Where 1e-3 of the maximum is not reached: the parabola of a density that rises as a square root, and cement at
+grazing incidence (1.0e-3 and 1.5e-3 were measured)."""
 FEW = (np.arange(40) + 0.5) / 40.0
 
 

@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 import pytest
-
 import spectrasplat
 
 TESTS = Path(__file__).parent
@@ -32,8 +31,8 @@ MUTANTS = {
     ),
     "a child counts twice": (
         "grow.py",
-        "        child(nodes, action, before, after, hand.mask if action == REFLECT else mask, facets, solids, tables, work)",
-        "        for _ in range(2):\n            child(nodes, action, before, after, hand.mask if action == REFLECT else mask, facets, solids, tables, work)",
+        "        child(nodes, action,",
+        "        for _ in range(2):\n          child(nodes, action,",
         RAYS,
         "lost_or_doubled and prism",
     ),
