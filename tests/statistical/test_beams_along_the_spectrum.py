@@ -16,18 +16,26 @@ FEW = (np.arange(40) + 0.5) / 40.0
 
 
 def swept_and_summed(text: str, places: np.ndarray = PLACES, threshold: float = 1e-8):
-    """Mean over the places of what lands by cell, and of all that lands: by swept polygons, and by single indices. Few
+    """Mean over the places of what lands by cell, as it is and times x, and of all that lands: by swept
+    polygons, and by single indices. Few
     beams play roulette: at the ends of the spectrum, where the eye sees little, its noise is more than 1e-3."""
     rig = Rig(scene_of(text))
     emission = rig.emissions()[0]
     swept, sums = rig.polygons(emission, threshold)
     single, _ = rig.polygons(at_index(emission, *places), threshold)
     grid = grid_about(rig, single, 60)
-    found = [cells(swept, 0, grid, x, from_hulls=True)[:2] for x in places]
-    one = np.mean([of[0] for of in found], axis=0)
-    other, outside, _ = cells(single, 0, grid)
-    total = one.sum() + np.mean([of[1] for of in found])
-    return one, other / len(places), total, (other.sum() + outside) / len(places), sums
+    # Weighed by x too: a sweep to and fro has the same mean either way.
+    colour = np.stack([np.ones(len(places)), places]) / len(places)
+    one, other, total, total_summed = 0.0, 0.0, 0.0, 0.0
+    for x, weights in zip(places, colour.T, strict=True):
+        cell, outside, _ = cells(swept, 0, grid, x, from_hulls=True)
+        one, total = one + np.multiply.outer(weights, cell), total + weights[0] * (cell.sum() + outside)
+        cell, outside, _ = cells(single, 0, grid, x)
+        other, total_summed = (
+            other + np.multiply.outer(weights, cell),
+            total_summed + weights[0] * (cell.sum() + outside),
+        )
+    return one, other, total, total_summed, sums
 
 
 @pytest.mark.parametrize("name", SWEPT)

@@ -102,7 +102,7 @@ CASES = (
     Case(
         "beam-slivers",
         "Beams through a facet ever thinner",
-        "A beam cut to almost nothing has corners that rounding decides. What its outline loses its neighbour must get.",
+        "A beam cut to almost nothing has corners that rounding decides. What it loses its neighbour must get.",
         "width",
         measure_slivers,
         steps=4,
