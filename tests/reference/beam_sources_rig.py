@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-
 from spectrasplat.beams.convert import pieces_of, polygons_of
 from spectrasplat.beams.facets import BeamScene, beam_scene
 from spectrasplat.beams.find import Emission, Search, search

@@ -1,3 +1,4 @@
+# ruff: noqa: NPY002 (what numba compiles has the old generator only)
 """Light through flat facets by chance alone: float64 rays over triangles, Fresnel by a random number.
 
 What beams (`spectrasplat.beams`) are held against. Nothing is shared with them: no facets, no half-planes, no affine
@@ -85,6 +86,8 @@ class Landed:
     total: float
     """On the receiver, inside the grid or not."""
     total_variance: float
+    weight: float
+    """Of a ray that landed, by mean square over mean."""
 
 
 @numba.njit(cache=True, nogil=True)
@@ -173,7 +176,7 @@ def _trace(
     total,
 ):
     np.random.seed(seed)
-    o, d, start, n = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    o, d, n = np.empty(3), np.empty(3), np.empty(3)
     nearest, found = np.empty(1), np.empty(16, np.int64)
     for _ in range(rays):
         a, b = 2.0 * np.random.random() - 1.0, 2.0 * np.random.random() - 1.0
@@ -374,4 +377,5 @@ def landed(
         hits,
         float(total[0] * scale),
         float((total[1] - total[0] ** 2 / rays) * scale**2),
+        float(total[1] / max(total[0], 1e-300) * scale),
     )

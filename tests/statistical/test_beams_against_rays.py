@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from reference.beam_worlds import Rig, at_index, grid_about, scene_of, scores
 from reference.beam_scenes import BRILLIANT, CASES, EXTREMES, NEAR, SUN, step_cut
 from reference.beam_sums import cells
+from reference.beam_worlds import Rig, at_index, grid_about, scene_of, scores
 from reference.facet_rays import landed
 from spectrasplat.beams.facets import convex_hull
 from spectrasplat.beams.polygons import joined
@@ -37,9 +36,8 @@ def compare(text: str, rays: int, threshold: float, texel: float, side: int = 40
     # A faint piece of a cone's rim holds what its slope says, not what its middle does.
     assert each.sum() == pytest.approx(polygons.flux.sum(), rel=1e-4)
     rays_found = landed(rig.world(X), rig.lamp(), grid, rays)
-    weight = rays_found.total_variance / rays_found.total
     total = (rays_found.total - exact.sum() - outside) / np.sqrt(rays_found.total_variance)
-    return total, scores(rays_found.flux, exact, rays_found.variance, weight, 50.0)
+    return total, scores(rays_found.flux, exact, rays_found.variance, rays_found.weight, 50.0)
 
 
 def agree(total: float, by_cell: np.ndarray) -> bool:
