@@ -169,12 +169,8 @@ def grid_about(rig: Rig, polygons, side: int, least: float = 0.5, most: float = 
 def scores(
     found: np.ndarray, exact: np.ndarray, variance: np.ndarray, weight: float, least: float = 25.0
 ) -> np.ndarray:
-<<<<<<< HEAD
-    """Standard scores by cell of what rays of mean `weight` found; cells that expect fewer than `least` rays are one."""
-=======
     """Standard scores by cell of what rays of mean `weight` found; cells that expect fewer than `least` rays are
     one."""
->>>>>>> check
     few = exact < least * weight
     # The weight of a ray in this cell: what varies with its number is only how many there are.
     each = np.where(found > 0.0, variance / np.where(found > 0.0, found, 1.0), weight)
