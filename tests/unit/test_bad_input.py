@@ -307,7 +307,7 @@ def use_renderer(monkeypatch: pytest.MonkeyPatch, render: Callable[..., Any]) ->
 
 def grey_picture(_scene: object, settings: Any, **_: object) -> SimpleNamespace:
     """What a renderer returns, without one."""
-    stats = SimpleNamespace(photons=1, splats=1, seconds=0.1, renderer="none", is_software=True)
+    stats = SimpleNamespace(photons=1, splats=1, seconds=0.1, renderer="none", is_software=True, notices=())
     rgb = np.full((settings.height, settings.width, 3), 0.5, np.float32)
     return SimpleNamespace(rgb=rgb, spectral=None, bin_edges_nm=None, stats=stats)
 

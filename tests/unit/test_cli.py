@@ -38,6 +38,7 @@ class FakeStats:
     seconds: float = 1.5
     renderer: str = "llvmpipe (LLVM 15)"
     is_software: bool = True
+    notices: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         return ["deposited 40.0 %", "escaped 60.0 %"]

@@ -11,7 +11,7 @@ from ...gpu.mip_chain import level_count
 from ...gpu.records import photon_record, ray_record
 from ...gpu.scene_buffers import SAMPLES, TRIANGLE
 from ...model.contacts import contacts, overlapping_solids
-from ...model.features import Features, half_spaces, is_convex_solid
+from ...model.features import Features, beam_objects, half_spaces, is_convex_solid
 from ...model.scene import Scene
 from ...model.texture import Environment, Texture
 from ...passes.footprint import SPLAT
@@ -109,6 +109,7 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
             beyond is not None,
             f"about {size_words(picture_bytes(beyond))}" if beyond is not None else "",
         ),
+        "beams": (features.beams, f"{len(beam_objects(scene))} object(s) searched on the processor; one bit an object"),
         "spectral bins": (features.targets > 1, f"{sizes.texel} B a texel instead of {_TEXEL}"),
     }
     return {name: words for name, (included, words) in costs.items() if included}
