@@ -13,7 +13,7 @@ BOUND = {"amici": 2e-3, "onset": 2e-3}
 """Where 1e-3 of the maximum is not reached: the parabola of a density that rises as a square root, and cement at
 grazing incidence (1.0e-3 and 1.5e-3 were measured)."""
 FINE = {"prism": 240}
-"""Cells along a side where more than usual: an edge must cross one over a band, or its sweep could as well be reversed."""
+"""Cells along a side where more than usual: an edge must cross one over a band, or a reversed sweep is not seen."""
 FEW = (np.arange(40) + 0.5) / 40.0
 
 
