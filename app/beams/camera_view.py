@@ -70,7 +70,10 @@ class CameraView:
         leaves, sums, blocked = self._search(emission, how, threads, go_on, footprint)
         self.beams = int(sums[SUM_BEAMS])
         shown[[o for o in self.scene.beam_objects if o not in blocked]] = True
-        return _screen_polygons(leaves, self.scene, 0.5 * np.array(size, float), footprint), shown
+        polygons = _screen_polygons(leaves, self.scene, 0.5 * np.array(size, float), footprint)
+        # Nobody takes a polygon's paths up yet: what would hand some over is seen by paths altogether.
+        shown[polygons.source[polygons.is_handed]] = False
+        return polygons.of(np.flatnonzero(shown[polygons.source])), shown
 
     def _search(
         self, emission: Emission, how: Search, threads: int | None, go_on: Callable[[], bool], footprint: float
