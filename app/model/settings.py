@@ -64,7 +64,7 @@ class RenderSettings:
     any_view: bool = False
     """The camera may go anywhere (viewer, animation): what a scene needs is not judged by what its camera sees."""
     camera_beams: bool = False
-    """Let the camera of `srd` see flat-faceted glass and mirrors by beams where that is predicted to be cheaper. Off: a
-    beam that Russian roulette kept may see a lamp, and leave a bright pixel (docs/beams.md)."""
+    """Let the camera of `srd` see flat-faceted glass and mirrors by beams where that is predicted to be cheaper. Off:
+    at equal error they were dearer, and left single bright pixels (docs/beams.md)."""
     tally: bool = False
     """Also sum up what the maps hold, for `--stats`."""
