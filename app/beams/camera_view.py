@@ -24,7 +24,7 @@ from .sources import mask_at
 TOLERANCE_PX = 0.1
 """How far, in pixels at the objects' distance, places and edges may be from linear."""
 MAX_DEPTH = 48
-"""Specular events that a beam is followed for."""
+"""Specular events that a beam is followed for: as many as a camera path (`passes.variants.MAX_DEPTH`)."""
 
 
 class CameraView:
@@ -47,6 +47,9 @@ class CameraView:
         self._objects, self._axis, self._to_gpu, self._unit = len(scene.objects), axis, to_gpu, unit
         self.beams = 0
         """Followed by the last search."""
+        self.tail = 0.0
+        """At most this share of what it saw lies in beams below the threshold, some of which roulette kept for the
+        rest."""
 
     def find_screen_polygons(
         self,
@@ -69,8 +72,13 @@ class CameraView:
         how = Search(threshold, seed, MAX_DEPTH, TOLERANCE_PX * footprint, sees=True)
         leaves, sums, blocked = self._search(emission, how, threads, go_on, footprint)
         self.beams = int(sums[SUM_BEAMS])
+        flux = np.concatenate([part.flux[: part.count[0]] for part in leaves]) if leaves else np.zeros(0)
+        self.tail = float(flux[flux < threshold * footprint**2].sum() / max(flux.sum(), 1e-300))
         shown[[o for o in self.scene.beam_objects if o not in blocked]] = True
-        return _screen_polygons(leaves, self.scene, 0.5 * np.array(size, float), footprint), shown
+        polygons = _screen_polygons(leaves, self.scene, 0.5 * np.array(size, float), footprint)
+        # Nobody takes a polygon's paths up yet: what would hand some over is seen by paths altogether.
+        shown[polygons.source[polygons.is_handed]] = False
+        return polygons.of(np.flatnonzero(shown[polygons.source])), shown
 
     def _search(
         self, emission: Emission, how: Search, threads: int | None, go_on: Callable[[], bool], footprint: float

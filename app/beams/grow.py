@@ -595,6 +595,9 @@ def run(nodes, facets, solids, tables, sources, obstacles, works, leaf, edge, co
             kind = facets[hand.facet].kind
             if kind == 3 or (kind == 2 and work.sees and hand.depth > 0):
                 hand.ends = LEAF_OPEN if work.sees else LEAF_RECEIVER
+            elif work.sees and hand.depth >= work.depth:
+                # Light that would still be caught inside is seen as if it left here, as camera paths do.
+                hand.ends = LEAF_OPEN
         if hand.ends >= 0:
             if hand.depth > 0 or hand.facet < 0:
                 end(nodes, facets, solids, tables, sources, leaf, edge, corner, work)

@@ -94,6 +94,8 @@ class Features:
     """Some light shines by a table of intensities over directions."""
     beams: bool = False
     """What meets certain flat-faceted objects first is left to beams (`spectrasplat.beams`): photons end there."""
+    camera_beams: bool = False
+    """The camera may see flat-faceted glass and mirrors by beams, where that is cheaper (`render.camera_beams`)."""
     anchor_weights: bool = False
     """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
     draws_by_power: bool = False
@@ -189,6 +191,7 @@ class Features:
             local_gain=groups > 0 and settings.local_gain and any(o.local_dispersion for o in scene.objects),
             anchor_weights=settings.anchor_weights,
             beams=_has_beams(scene, settings),
+            camera_beams=settings.camera_beams and why_no_camera_beams(scene, settings) is None,
             light_profiles=any(light.profile is not None for light in scene.lights),
             draws_by_power=random and settings.bins is not None,
             hero=settings.method == "hero",
@@ -249,6 +252,20 @@ def _has_beams(scene: Scene, settings: RenderSettings) -> bool:
     receives = any(o.material.receives and is_flat(o) for o in scene.objects)
     shines = any(light.profile is None for light in scene.lights)
     return settings.method == "srd" and receives and shines and not painted and bool(beam_objects(scene))
+
+
+def why_no_camera_beams(scene: Scene, settings: RenderSettings) -> str | None:
+    """Why the camera sees glass and mirrors by paths alone; None: beams may serve it (where they were asked for)."""
+    if settings.method != "srd":
+        return f"method {settings.method} follows paths"
+    if not camera_needs(scene, settings)[0]:
+        return "no glass and no mirror is in view"
+    if settings.bins:
+        return "the picture is in bins"
+    aspect = settings.width / settings.height
+    if not any(settings.any_view or in_view(scene.objects[i], scene.camera, aspect) for i in beam_objects(scene)):
+        return "no flat-faceted glass or mirror is in view"
+    return None
 
 
 def camera_needs(scene: Scene, settings: RenderSettings) -> tuple[bool, bool]:
@@ -474,8 +491,23 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             features.beams,
             _beam_words(scene, features),
         ),
+        (
+            "camera beams",
+            features.camera_beams,
+            "flat facets in view may be seen by beams, where that is cheaper"
+            if features.camera_beams
+            else _no_camera_beams_words(scene, features),
+        ),
         ("blockers", black > 0, f"{black} black object(s)" if black else "no black object"),
     ]
+
+
+def _no_camera_beams_words(scene: Scene, features: Features) -> str:
+    if features.method != "srd":
+        return f"method {features.method} follows paths"
+    if not features.camera_specular:
+        return "no glass and no mirror is in view"
+    return "the camera follows paths" if beam_objects(scene) else "no glass and no mirror has flat facets only"
 
 
 def _beam_words(scene: Scene, features: Features) -> str:

@@ -24,6 +24,7 @@ from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
+from .camera_beams import CameraBeams
 from .frame_fit import FrameFit, Survey, inputs_of, share_light, stages_to_survey
 from .light_pass import LightPass, scene_buffers, spectral_axis
 from .map_picture import map_picture
@@ -61,6 +62,8 @@ class _Traced:
     camera_buffers: SceneBuffers | None = None
     """The camera's own, where it has a method of its own."""
     camera_pass: CameraPass | None = None
+    camera_beams: CameraBeams | None = None
+    """Where its scene's features have them."""
 
     def release(self) -> None:
         for owned in (self.camera_pass, self.camera_buffers, self.light, self.buffers):
@@ -135,6 +138,8 @@ class FrameRenderer:
                     light.reflectances,
                     light.map_channels,
                 )
+                if traced.camera_pass.scene.features.camera_beams:
+                    traced.camera_beams = CameraBeams(traced.camera_pass, self._context.is_software)
             self.seconds.camera = time.perf_counter() - started
         except BaseException:
             traced.release()
@@ -149,10 +154,15 @@ class FrameRenderer:
         settings, camera_pass = self._settings, self._traced.camera_pass
         maps = self._traced.light.caustic_maps()
         view = stage.camera, settings.width, settings.height
-        # A stop asked for while tracing still wants a picture: only the first sample is owed then.
+        # Polygons belong to one view. A stop asked for while tracing still wants a picture: only the first sample is
+        # owed then.
+        camera_pass.take_beams(None)
         stops_at_once, samples = stop(), 1
         if not stops_at_once:
             sampling = CameraSampling.of(settings)
+            if self._traced.camera_beams is not None:
+                for _ in self._traced.camera_beams.choosing(*view, sampling.budget, settings.seed):
+                    yield _LIGHT_SHARE
             for _ in sampling.choosing(camera_pass, *view, maps):
                 yield _LIGHT_SHARE
             samples = sampling.samples(camera_pass)
@@ -180,6 +190,11 @@ class FrameRenderer:
     def camera_pass(self) -> CameraPass | None:
         """Of the last frame; None for a map."""
         return self._traced.camera_pass if self._traced is not None else None
+
+    @property
+    def camera_beams(self) -> CameraBeams | None:
+        """Of the last frame; None where only paths were thought of."""
+        return self._traced.camera_beams if self._traced is not None else None
 
     @property
     def picture(self) -> Picture:

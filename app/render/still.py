@@ -13,6 +13,7 @@ from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.spectrum_choice import Spectrum
 from .beam_light import BeamStats
+from .camera_beams import CameraBeamStats
 from .frames import FrameRenderer, Picture
 from .light_pass import LightStats
 from .notices import light_notices, picture_notices
@@ -30,6 +31,8 @@ class CameraStats:
     spectrum: Spectrum = field(default_factory=Spectrum)
     """How samples saw it."""
     fallbacks: Mapping[str, int] = field(default_factory=dict)
+    beams: CameraBeamStats | None = None
+    """None: only paths were thought of."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +85,7 @@ class RenderStats:
                 f"camera              {camera.samples} samples a pixel, {camera.spectrum.words}; "
                 f"{_counted(camera.fallbacks)}"
             ),
+            *([f"camera's facets      seen {camera.beams.words}"] if camera.beams is not None else []),
             (f"maps                {self.atlas_size[0]}×{self.atlas_size[1]} texels"),
             (
                 "buffers             "
@@ -154,12 +158,16 @@ def render(
             context.release()
 
 
+def _camera_beams(frames: FrameRenderer) -> CameraBeamStats | None:
+    return frames.camera_beams.stats if frames.camera_beams is not None else None
+
+
 def _stats(context: Context, frames: FrameRenderer, settings: RenderSettings) -> RenderStats:
     light, camera_pass = frames.light, frames.camera_pass
     camera = CameraStats()
     if camera_pass is not None:
         fallbacks = camera_pass.fallbacks if settings.tally else {}
-        camera = CameraStats(camera_pass.samples_taken, camera_pass.spectrum, fallbacks)
+        camera = CameraStats(camera_pass.samples_taken, camera_pass.spectrum, fallbacks, _camera_beams(frames))
     return RenderStats(
         context.renderer,
         context.is_software,

@@ -55,22 +55,6 @@ def by_paths(camera_pass, samples: int, size=SIZE) -> np.ndarray:
     return camera_pass.read_rgb()
 
 
-def some(polygons: ScreenPolygons, kept: np.ndarray) -> ScreenPolygons:
-    """Those of these numbers, in this order."""
-    values = {}
-    for field in fields(polygons):
-        array = getattr(polygons, field.name)
-        if field.name in ("edges", "hulls"):
-            starts = getattr(polygons, field.name[:-1] + "_start")
-            array = np.concatenate([array[starts[i] : starts[i + 1]] for i in kept])
-        elif field.name.endswith("_start"):
-            array = np.concatenate([[0], np.cumsum(np.diff(array)[kept])]).astype(np.int32)
-        else:
-            array = array[kept]
-        values[field.name] = array
-    return ScreenPolygons(**values)
-
-
 def relative(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.sqrt(((a - b) ** 2).mean() / (b**2).mean()))
 
@@ -152,7 +136,7 @@ def test_the_order_of_polygons_and_repeats(prism_pass):
     polygons = polygons_of(prism_pass)
     first, again = by_beams(prism_pass, polygons), by_beams(prism_pass, polygons)
     assert np.array_equal(first, again)
-    turned = by_beams(prism_pass, some(polygons, np.arange(len(polygons))[::-1]))
+    turned = by_beams(prism_pass, polygons.of(np.arange(len(polygons))[::-1]))
     np.testing.assert_allclose(turned, first, rtol=1e-5, atol=1e-6)
 
 

@@ -1,0 +1,64 @@
+"""Beams in stills: the same picture as by paths, and when they are chosen at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from spectrasplat.beams import camera_view
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes import variants
+from spectrasplat.render import camera_beams
+from spectrasplat.render.camera_beams import predicted_seconds
+from spectrasplat.render.still import RenderResult, render
+
+SCENES = Path(__file__).parents[2] / "assets" / "scenes"
+
+
+def seen(gl, name: str, **settings) -> RenderResult:
+    chosen = {"camera_beams": True, "photons": 20_000, "width": 96, "height": 54} | settings
+    return render(load_scene(SCENES / f"{name}.toml"), RenderSettings(**chosen), context=gl)
+
+
+@pytest.fixture
+def beams_at_all_costs(monkeypatch):
+    monkeypatch.setattr(camera_beams, "predicted_seconds", lambda *_: (0.0, 1.0))
+    monkeypatch.setattr(camera_beams, "_MOST_LOOKING", 1e9)
+    monkeypatch.setattr(camera_beams, "_MOST_TAIL", 1.0)
+    monkeypatch.setattr(camera_beams, "_MOST_TAIL_WITH_LAMPS", 1.0)
+    # Few rays of a strong lamp must not decide what a small picture's mean is.
+    monkeypatch.setattr(camera_beams, "needed_threshold", lambda samples: 0.05 / samples)
+
+
+@pytest.mark.parametrize("name", ["default", "prism"])
+def test_beams_show_what_paths_show(gl, beams_at_all_costs, monkeypatch, name):
+    paths, beams = seen(gl, name, camera_beams=False, spp=64), seen(gl, name)
+    assert beams.stats.camera_pass.beams.by_beams and beams.stats.camera_pass.beams.polygons > 100
+    assert any("by beams" in line for line in beams.stats.lines())
+    np.testing.assert_allclose(beams.rgb.mean((0, 1)), paths.rgb.mean((0, 1)), rtol=0.01)
+    find = camera_view.search
+    monkeypatch.setattr(camera_view, "search", lambda *args, **more: find(*args[:3], 1, *args[4:], **more))
+    assert np.array_equal(beams.rgb, seen(gl, name).rgb)
+
+
+def test_other_methods_follow_paths(gl, beams_at_all_costs):
+    for settings in ({"camera_method": "srd-photons"}, {"method": "srd-photons"}, {"camera_beams": False}):
+        assert seen(gl, "prism", spp=1, **settings).stats.camera_pass.beams is None
+
+
+def test_where_in_doubt_paths(gl):
+    """A brilliant's light goes to and fro too long."""
+    stats = seen(gl, "brilliant_studio").stats.camera_pass.beams
+    assert not stats.by_beams and stats.reason
+
+
+def test_costs_grow_on_as_between_the_searches():
+    beams, paths = predicted_seconds([(1000, 100), (2000, 200)], 500, 16)
+    assert beams == pytest.approx(4000 * camera_beams._BEAM_S + 400 * camera_beams._ENTRY_S)
+    assert paths == pytest.approx(8000 * camera_beams._PATH_S)
+
+
+def test_beams_are_followed_as_far_as_paths():
+    assert camera_view.MAX_DEPTH == variants.MAX_DEPTH
