@@ -44,7 +44,7 @@ def test_beams_show_what_paths_show(gl, beams_at_all_costs, monkeypatch, name):
 
 
 def test_other_methods_follow_paths(gl, beams_at_all_costs):
-    for settings in ({"camera_method": "srd-photons"}, {"method": "srd-photons"}, {"camera_beams": False}):
+    for settings in ({"camera_method": "srd-lambda"}, {"method": "srd-lambda"}, {"camera_beams": False}):
         assert seen(gl, "prism", spp=1, **settings).stats.camera_pass.beams is None
 
 

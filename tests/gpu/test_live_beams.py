@@ -18,7 +18,7 @@ from spectrasplat.render.viewer.live_light import LiveLight
 from tests.gpu.test_live_light import SETTINGS, SIZE, difference, edited, inputs, maps, nrmse, painted, shipped
 
 PHOTONS = 20_000
-BEAMS: RenderSettings = replace(SETTINGS, method="srd")
+BEAMS: RenderSettings = replace(SETTINGS, method="srd-beams")
 
 
 def begun(gl: Context, scene) -> LiveLight:

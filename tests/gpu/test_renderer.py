@@ -208,7 +208,7 @@ def test_subdividing_a_flat_face_does_not_matter(gl, tmp_path: Path) -> None:
     glass = scene.objects[0]
     fine = replace(glass, mesh=subdivided(glass.mesh))
     same = replace(scene, objects=(fine, *scene.objects[1:]))
-    photons = replace(SMALL, method="srd-photons")
+    photons = replace(SMALL, method="srd")
     before, after = (render(each, photons, context=gl).rgb for each in (scene, same))
     assert np.abs(after - before).max() <= 1e-3 * np.abs(before).max()
     # Beams of a lamp nearby are cut where their rays are no longer affine: elsewhere, where corners move by rounding.
@@ -248,7 +248,7 @@ def test_a_stop_keeps_what_is_done(gl, tmp_path: Path) -> None:
     """Asked to stop at once, a rendering still is a complete (coarser) picture of the right brightness."""
     scene = scene_of(tmp_path)
     # Beams are searched for once a pass; photons come in rounds.
-    settings = replace(SMALL, photons=200_000, batch=8_192, method="srd-photons")
+    settings = replace(SMALL, photons=200_000, batch=8_192, method="srd")
     full = render(scene, settings, context=gl)
     part = render(scene, settings, context=gl, cancelled=lambda: True)
     assert part.stats.photons < 0.3 * full.stats.photons

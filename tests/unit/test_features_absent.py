@@ -339,8 +339,8 @@ def test_a_guard_forgotten_in_a_shader_is_noticed(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize("scene", ["prism", "brilliant", "spectrometer"])
 def test_without_beams_photons_need_what_they_always_did(scene: str, anchored: bool) -> None:
     loaded = load_scene(paths.assets_dir() / "scenes" / f"{scene}.toml")
-    found, alone = (
-        Features.of(loaded, RenderSettings(method=method, anchor_weights=anchored)) for method in ("srd", "srd-photons")
+    alone, found = (
+        Features.of(loaded, RenderSettings(method=method, anchor_weights=anchored)) for method in ("srd", "srd-beams")
     )
-    assert alone == replace(found, method="srd-photons", beams=False)
+    assert alone == replace(found, method="srd", beams=False)
     assert scene != "prism" or alone.reindexed == anchored

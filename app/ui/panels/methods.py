@@ -4,7 +4,7 @@ from __future__ import annotations
 
 METHOD_NAMES = {
     "srd": "Spectral ray differentials",
-    "srd-photons": "Differentials, photons alone",
+    "srd-beams": "Differentials, with beams",
     "srd-lambda": "Differentials by wavelength",
     "stochastic": "Random wavelengths",
     "stochastic-even": "Even random wavelengths",
@@ -18,7 +18,7 @@ METHOD_NAMES = {
 
 METHOD_TIPS = {
     "srd": "The default: each photon is swept along its own spectrum in closed form; as many spectral bands as needed.",
-    "srd-photons": "The same without beams: what flat facets throw is left to photons too.",
+    "srd-beams": "The same, but what flat facets throw is followed as polygons instead of photons.",
     "srd-lambda": "One derivative by wavelength and one anchor a photon: the published method.",
     "stochastic": "One random wavelength a photon with a footprint: the usual way.",
     "stochastic-even": "The same with wavelengths from a low-discrepancy sequence: the usual way at its best.",
