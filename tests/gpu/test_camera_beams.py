@@ -14,6 +14,8 @@ from spectrasplat.render import camera_beams
 from spectrasplat.render.camera_beams import predicted_seconds
 from spectrasplat.render.still import RenderResult, render
 
+pytestmark = pytest.mark.slow  # camera beams are off unless asked for
+
 SCENES = Path(__file__).parents[2] / "assets" / "scenes"
 
 

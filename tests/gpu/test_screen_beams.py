@@ -24,6 +24,8 @@ from spectrasplat.passes.screen_beams import by_pixel, largest_divisor, ordered
 from tests.gpu.camera_rig import DOWN, WHITE, at, horizontal, opened_camera_pass, released
 from tests.reference.screen_beams import screen_polygons
 
+pytestmark = pytest.mark.slow  # camera beams are off unless asked for
+
 SIZE = (48, 36)
 BESIDE = Camera(position=(2.1, -3.4, 3.0), target=(0.0, 0.0, 0.0), kind="orthographic", vertical_extent=1.9)
 PRISM = SceneObject("prism", primitives.prism(), Dielectric(glass.from_abbe(1.7847, 10.0)))
