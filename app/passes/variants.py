@@ -13,6 +13,7 @@ from ..gpu import bindings, records
 from ..gpu.device_traits import DeviceTraits
 from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.splat_tables import DENSITY_CELLS
 from ..gpu.texture_store import place_defines
 from ..model.features import Features
 from .camera_tables import EMISSION_CELLS
@@ -140,8 +141,11 @@ def splat_defines(features: SplatFeatures) -> Defines:
         # A splat that no wavelength moves is a Gaussian of one colour.
         "ONE_COLOUR": features.point_spectrum or features.spectral_groups == 0,
         "CHARTS": features.charts,
+        "HERO": features.hero,
     }
     counts: Defines = {"TARGETS": features.targets, "SLOTS": 2 if features.nested_windows else 1}
+    if features.hero:
+        counts["DENSITY_CELLS"] = f"{DENSITY_CELLS}u"
     return counts | {name: 1 for name, on in switches.items() if on}
 
 

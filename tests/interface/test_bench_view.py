@@ -13,7 +13,7 @@ def test_walking_round_and_dragging_the_dispersion_trace_nothing(gl: Context, mo
     bench = viewer_speed._Bench(gl, assets_dir() / "scenes" / "prism.toml", (640, 400))
     assert abs(bench.viewport[0] - 640) <= 2 and abs(bench.viewport[1] - 400) <= 2
     bench.wait_for_picture()
-    bench.phase("accumulating", 2.0, bench.rest)  # the first of it goes into finer maps
+    resting = bench.phase("accumulating", 2.0, bench.rest)  # the first of it goes into finer maps
     camera = bench.session.state.camera
     with bench.holding_middle_button():
         orbiting = bench.phase("orbiting", 0.3, bench.orbit)
@@ -22,7 +22,7 @@ def test_walking_round_and_dragging_the_dispersion_trace_nothing(gl: Context, mo
         dragging = bench.phase("dragging dispersion", 0.4, bench.drag_gain)
     gain = bench.session.state.scene.objects[bench._glass].material.dispersion.gain
     assert gain != 1.0
-    assert bench.session.picture.stats.polygons > 0 and dragging.pictures_per_second > 0.0
+    assert resting.rays_traced > 0
     assert orbiting.rays_traced == dragging.rays_traced == 0
     assert len(dragging.frame_ms) > 2 and "ms" in dragging.line
     assert 0 < bench.latency(bench.nudge_camera) < 5000

@@ -99,8 +99,7 @@ def test_undo_and_redo_bring_the_pictures_back(hands: Hands) -> None:
 
 
 def test_brushing_widens_the_colours_where_it_paints(hands: Hands) -> None:
-    before = hands.settle()
-    assert hands.session.picture.stats.only_beams
+    before, traced = hands.settle(), hands.rays_traced
     hands.interface.key(imgui.Key.b)
     assert hands.session.state.tool == "brush"
     hands.session.state = replace(hands.session.state, brush=Brush(radius=0.3, strength=8.0))
@@ -109,13 +108,13 @@ def test_brushing_widens_the_colours_where_it_paints(hands: Hands) -> None:
     dabs = hands.session.state.scene.objects[hands.receiver()].local_dispersion
     assert dabs and all(dab.log2_gain > 0 for dab in dabs)
     painted = hands.settle()
-    assert not hands.session.picture.stats.only_beams  # what is painted goes by photons
     assert difference(before, painted) > 0.01
     hands.interface.key(imgui.Key.v)  # the physical picture, for comparison
     assert hands.session.state.physical
     assert difference(hands.settle(), before) < SAME
     hands.interface.key(imgui.Key.v)
     assert difference(hands.settle(), painted) < SAME
+    assert hands.rays_traced == traced
 
 
 def test_walking_round_traces_nothing(hands: Hands) -> None:

@@ -117,7 +117,7 @@ def compiled_sources(context: Context, scene: Scene, settings: RenderSettings) -
     """The source of every program that a rendering of `scene` builds, each once."""
     from ...render.still import render
 
-    small = replace(settings, width=32, height=18, photons=_PHOTONS, spp=1, seconds=None)
+    small = replace(settings, width=128, height=72, photons=_PHOTONS, spp=1, seconds=None)
     with recorded() as sources:
         render(scene, small, context=context)
     return list({(source.name, source.text): source for source in sources}.values())
