@@ -68,7 +68,7 @@ def light_of(
     gl, scene: Scene, beams: bool, bands: int = 1, photons: int = PHOTONS, seed: int = 1
 ) -> Iterator[LightPass]:
     """A light pass that is begun, with at least `bands` bands; with `beams` it leaves the first object to them."""
-    settings = RenderSettings(width=96, height=96, photons=photons, layer="map:table", seed=seed)
+    settings = RenderSettings(width=96, height=96, photons=photons, layer="map:table", seed=seed, batch=1 << 17)
     features = replace(Features.of(scene, settings), beams=beams)
     buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
     light = LightPass(gl, scene, settings, features, buffers, division=Division({0: (bands, 1)}))

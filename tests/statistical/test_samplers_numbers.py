@@ -168,7 +168,11 @@ def survives_source() -> str:
     text = (paths.shaders_dir() / "light/trace.comp").read_text()
     softness = re.search(r"#define SURVIVOR_SOFTNESS .*", text)[0]
     function = "\n".join(re.findall(r"^bool survives\(.*?^}", text, re.MULTILINE | re.DOTALL))
-    return f"{softness}\nTraceParameters p = TraceParameters(64u, {THRESHOLD}, 0u, {LATTICES}u);\n{function}"
+    values = (
+        f"made.max_depth = 64u; made.split_threshold = {THRESHOLD}; made.power_row = 0u; made.lattices = {LATTICES}u;"
+    )
+    made = f"TraceParameters parameters() {{ TraceParameters made; {values} return made; }}"
+    return f"{softness}\n{made}\nTraceParameters p = parameters();\n{function}"
 
 
 def generators() -> list[int]:
