@@ -21,6 +21,8 @@ from .search import SUM_ENTERED, SUMS, WORK, may_touch, power_of
 _STACK = 1800
 _STEPS = 20_000
 """Beams followed before `go_on` is asked again."""
+GoOn = Callable[[int], bool]
+"""Told how many steps were taken since it was last asked; False ends a search."""
 _FINE = 16
 """Steps along a side in which the mean intensity over a facet is taken."""
 
@@ -71,11 +73,11 @@ def search(
     emission: Emission,
     how: Search,
     threads: int | None = None,
-    go_on: Callable[[], bool] = lambda: True,
+    go_on: GoOn = lambda steps: True,
 ) -> tuple[list[Leaves], np.ndarray, set[int]]:
     """Follow one source's beams. Returns the leaves, in an order that depends on the scene alone, sums over all of
     them (`search.SUM_…`), and objects that something not flat may stand before, so that photons carry what this source
-    throws on them. `go_on` False ends it early, for what is thrown away."""
+    throws on them. `go_on` ends it early, for what is thrown away: it is told of every step once, in any order."""
     sums = np.zeros(SUMS)
     tables = np.vstack([scene.tables, emission.power])
     bands = [(x, x, share) for x, share in zip(emission.lines, emission.line_shares, strict=True)]
@@ -110,7 +112,7 @@ def search(
         return [], sums, blocked
     relative = entered if how.power is None else math.sqrt(entered * how.power)
     for _, work in jobs:
-        work["threshold"] = how.threshold * relative
+        work["threshold"] = _rounded(how.threshold * relative)
 
     def one(job: tuple[np.ndarray, np.ndarray]) -> Leaves:
         root, work = job
@@ -118,9 +120,11 @@ def search(
         stack = take_stack()
         stack[FIRST : FIRST + 1] = root
         work["top"] = FIRST + 1
-        while go_on() and work["top"][0] > FIRST:
+        while work["top"][0] > FIRST:
             work["steps"] = _STEPS
             run(stack, *args, scene.obstacles, work, store.leaf, store.edge, store.corner)
+            if not go_on(_STEPS - int(work["steps"][0])):
+                break
             if work["steps"][0] > 0 and work["top"][0] > FIRST:
                 store.grow()
         _stacks.append(stack)
@@ -131,6 +135,11 @@ def search(
     for _, work in jobs:
         sums += work["sums"][0]
     return done, sums, blocked
+
+
+def _rounded(threshold: float) -> float:
+    """A power of two: roulette falls out the same while something changes a little from frame to frame."""
+    return 2.0 ** round(math.log2(threshold)) if threshold > 0.0 else 0.0
 
 
 _stacks: list[np.ndarray] = []

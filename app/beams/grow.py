@@ -102,9 +102,14 @@ def facet_of(hit):
 def cut_to_facet(beam, flight, hit, facet, work):
     """Keep of an outline what meets a facet whose edges `lay_edges` laid; returns whether anything is left."""
     way = 1 if hit >= 0 else 2
-    for e in range(facet.corners):
-        if work.cuts[e] != 0 and not cut(beam, work.lines[e], 1.0, flight, facet_of(hit), e, way, work):
-            return False
+    for turn in range(2):
+        if turn == 1 and beam.corners[first_place(beam)] > 0 and beam.corners[last_place(beam) - 1] > 0:
+            break
+        # Where a place is empty, edges that cut at none of the others may cut in between.
+        for e in range(facet.corners):
+            is_turn = (work.cuts[e] != 0) == (turn == 0)
+            if is_turn and not cut(beam, work.lines[e], 1.0, flight, facet_of(hit), e, way, work):
+                return False
     return True
 
 

@@ -14,7 +14,7 @@ from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 from .convert import pieces_of, polygons_of
 from .facets import beam_scene, shown_as
-from .find import Emission, Search, search
+from .find import Emission, GoOn, Search, search
 from .polygons import BeamPieces, BeamPolygons, joined
 from .search import SUMS
 from .sources import emissions, mask_at, why_no_beams
@@ -92,7 +92,7 @@ class BeamFinder:
         seed: int,
         light_parts: int = LIGHT_PARTS,
         threads: int | None = None,
-        go_on: Callable[[], bool] = lambda: True,
+        go_on: GoOn = lambda steps: True,
     ) -> Iterator[float | LightBeams]:
         """All beams, pausing with the share that is done; what comes last is the result.
 

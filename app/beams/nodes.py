@@ -14,6 +14,8 @@ from .rays import PARALLEL, edge_line, emit, emit_straight, emitted, meet, momen
 
 CORNERS, LINES, LEVELS = 84, 96, 160
 """Room for corners of a polygon, half-planes of a beam, facets on its path."""
+SPARE_LINES = LINES // 2
+"""Half-planes of a beam up to which those are kept that may bound its outline only at other places than its three."""
 THIN = 1e-10
 """Width in q below which a polygon is rounding's."""
 STATIC, TOTAL = -1, -2
@@ -24,7 +26,7 @@ reflection."""
 NODE = np.dtype(
     [
         # Polygons in q at the three places; `side` names the half-plane of the side that starts at a corner. Where a
-        # polygon is empty, `held` entries of `side` name the half-planes that left nothing.
+        # polygon is empty, `held` entries of `side` name the half-planes that left nothing, and all that came later.
         ("corner", "f8", (3, CORNERS, 2)),
         ("side", "i4", (3, CORNERS)),
         ("corners", "i8", 3),
@@ -169,7 +171,7 @@ def copy(beam, other):
 
 @part
 def forget_idle_lines(beam, work):
-    """Drop half-planes that bound no polygon of a beam and emptied none."""
+    """Drop half-planes that bound no polygon of a beam and are held by none that is empty."""
     renamed = work.renamed
     for ln in range(beam.lines):
         renamed[ln] = -1
@@ -212,12 +214,17 @@ def cut(beam, line, sign, flight, facet, edge, way, work):
     if beam.lines >= LINES - 1:
         forget_idle_lines(beam, work)
         if beam.lines >= LINES - 1:
+            for a in range(3):
+                beam.held[a] = min(beam.held[a], SPARE_LINES)
+            forget_idle_lines(beam, work)
+        if beam.lines >= LINES - 1:
             return False
     label = beam.lines
-    left = used = False
+    left = used = some_empty = False
     for a in range(first_place(beam), last_place(beam)):
         before = beam.corners[a]
         if before == 0:
+            some_empty = True
             continue
         if heights(beam.corner[a], before, line[a], sign, work.height) == 0:
             left = True
@@ -229,8 +236,13 @@ def cut(beam, line, sign, flight, facet, edge, way, work):
             beam.held[a] = before + 1
         else:
             left = True
-    if used:
+    if used or (some_empty and left and beam.lines < SPARE_LINES):
         for a in range(3):
+            if some_empty and beam.corners[a] == 0 and 0 < beam.held[a] < CORNERS:
+                # Nearer to the places that are left it may be what bounds the outline.
+                if beam.side[a, beam.held[a] - 1] != label:
+                    beam.side[a, beam.held[a]] = label
+                    beam.held[a] += 1
             for c in range(3):
                 beam.line[label, a, c] = sign * line[a, c]
         made = beam.made
@@ -307,8 +319,10 @@ def lay_out(beam, facets, solids, tables, source, work):
                 continue
             m = clip(corner, side, m, ln, work)
             if m == 0:
-                side[before] = ln
-                beam.held[a] = before + 1
+                # Any line may bound what is left nearer to the other places.
+                beam.held[a] = min(n, CORNERS)
+                for other in range(beam.held[a]):
+                    side[other] = other
                 break
         beam.corners[a] = m
         left = left or m > 0

@@ -15,11 +15,11 @@ DEFAULT_METHODS = (
     "regular-7",
     "regular-16",
     "srd-lambda",
-    "srd-beams",
+    "srd-photons",
     "srd",
 )
 
-OWN_METHODS = ("srd", "srd-beams", "progressive")
+OWN_METHODS = ("srd", "srd-photons", "progressive")
 """The program's own, measured as they ship; all others are baselines, each at its best (`tuning`)."""
 TARGETS = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)
 """relMSE at which methods are compared."""

@@ -109,7 +109,7 @@ def parse_settings(request: BenchRequest) -> BenchSettings:
         asked |= {
             "measured_pass": "camera",
             "seconds": CAMERA_SECONDS,
-            "methods": tuple(name for name in DEFAULT_METHODS if name in CAMERA_METHODS and name != "srd-beams"),
+            "methods": tuple(name for name in DEFAULT_METHODS if name in CAMERA_METHODS and name != "srd-photons"),
         }
     if request.seconds is not None:
         asked["seconds"] = _seconds("--seconds", request.seconds)

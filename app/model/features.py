@@ -251,12 +251,12 @@ def _has_beams(scene: Scene, settings: RenderSettings) -> bool:
     painted = is_painted(scene, settings.local_gain)
     receives = any(o.material.receives and is_flat(o) for o in scene.objects)
     shines = any(light.profile is None for light in scene.lights)
-    return settings.method == "srd-beams" and receives and shines and not painted and bool(beam_objects(scene))
+    return settings.method == "srd" and receives and shines and not painted and bool(beam_objects(scene))
 
 
 def why_no_camera_beams(scene: Scene, settings: RenderSettings) -> str | None:
     """Why the camera sees glass and mirrors by paths alone; None: beams may serve it (where they were asked for)."""
-    if settings.method not in ("srd", "srd-beams"):
+    if settings.method not in ("srd", "srd-photons"):
         return f"method {settings.method} follows paths"
     if not camera_needs(scene, settings)[0]:
         return "no glass and no mirror is in view"
@@ -503,7 +503,7 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
 
 
 def _no_camera_beams_words(scene: Scene, features: Features) -> str:
-    if features.method != "srd-beams":
+    if features.method != "srd":
         return f"method {features.method} follows paths"
     if not features.camera_specular:
         return "no glass and no mirror is in view"
@@ -518,7 +518,7 @@ def _beam_words(scene: Scene, features: Features) -> str:
         return f"what {', '.join(carried)} throw(s) goes as polygons" + (
             f"; photons for {'; '.join(others)}" if others else ""
         )
-    if features.method != "srd-beams":
+    if features.method != "srd":
         return f"method {features.method} follows photons"
     reasons = [f"{o.name}: {why_no_beams(o)}" for o in specular if why_no_beams(o)]
     if not specular or len(reasons) == len(specular):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 METHODS = (
     "srd",
-    "srd-beams",
+    "srd-photons",
     "srd-lambda",
     "stochastic",
     "stochastic-even",
@@ -28,7 +28,7 @@ CAMERA_METHODS = tuple(name for name in METHODS if name not in LIGHT_METHODS)
 def divides_spectrum(method: str) -> bool:
     """Whether photons and camera rays are swept along as many spectral bands as the scene asks for, one column a glass:
     `srd`, with or without beams."""
-    return method in ("srd", "srd-beams")
+    return method in ("srd", "srd-photons")
 
 
 @dataclass(frozen=True)

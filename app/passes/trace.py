@@ -8,7 +8,7 @@ photons is a function of the lattice alone.
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import moderngl
 import numpy as np
@@ -47,7 +47,8 @@ class FluxTally:
 
     emitted: float = 0.0
     handed: float = 0.0
-    """What beams left to photons on their way (`beam_emission`), besides what lights emitted."""
+    """What photons took over from beams on their way (`beam_emission`), besides what lights emitted; less what beams
+    handed to them, where both are counted."""
     ended: dict[str, float] = field(default_factory=lambda: dict.fromkeys(records.CATEGORIES, 0.0))
     roulette: float = 0.0
     fallbacks: dict[str, int] = field(default_factory=lambda: dict.fromkeys(records.FALLBACKS, 0))
@@ -61,6 +62,12 @@ class FluxTally:
             self.ended[name] += other.ended[name]
         for name in self.fallbacks:
             self.fallbacks[name] += other.fallbacks[name]
+
+    @property
+    def without_beams(self) -> FluxTally:
+        """As if lights had not emitted what photons left to beams: those count it themselves."""
+        left = self.ended["beams"]
+        return replace(self, emitted=self.emitted - left, ended=self.ended | {"beams": 0.0})
 
     @property
     def imbalance(self) -> float:

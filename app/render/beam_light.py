@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
+from ..beams.find import GoOn
 from ..beams.light_beams import LIGHT_PARTS, BeamFinder, LightBeams
 from ..beams.polygons import BeamPolygons
 from ..beams.search import (
@@ -26,6 +27,7 @@ from ..beams.search import (
     SUM_ESCAPED,
     SUM_HANDED,
     SUM_NUMERIC,
+    SUM_ROULETTE,
 )
 from ..gpu.beam_tables import BeamTables
 from ..gpu.context import Context
@@ -35,6 +37,7 @@ from ..model.features import is_flat
 from ..model.scene import Scene
 from ..passes.beam_splat import BeamSplatter
 from ..passes.map_layout import Landings, MapLayout, plane_frame
+from ..passes.trace import FluxTally
 from .light_maps import LightMaps
 from .shown_spectra import ShownSpectra
 
@@ -48,19 +51,21 @@ _ENOUGH = 4.0
 """A search that followed this many times fewer beams than there is time for is done again."""
 _SURVEY = 1e-3
 """Threshold of the search that tells which objects beams carry, and what they cost."""
-_DEAREST = 4.0
-"""Seconds of a survey after which photons are thought cheaper."""
+_DEAREST = 1e8
+"""Steps of a survey, each times `_STEP_FACETS` and the scene's facets, after which photons are thought cheaper: about
+four seconds of a core. Counted, not timed: the same scene must go the same way on every machine."""
+_STEP_FACETS = 60
+"""A step costs as much as it takes to look at so many facets, besides those of the scene."""
 _PAUSE_S = 0.003
 """How long a pause lasts while a search runs beside whoever draws."""
-_SUMS = {
-    "entered": SUM_ENTERED,
+_ENDS = {
     "deposited": SUM_DEPOSITED,
-    "handed": SUM_HANDED,
     "absorbed": SUM_ABSORBED,
     "escaped": SUM_ESCAPED,
     "lost_depth": SUM_DEPTH,
     "lost_numeric": SUM_NUMERIC,
 }
+"""Where beams end, by the names of `FluxTally.ended`."""
 
 
 @dataclass
@@ -70,8 +75,11 @@ class BeamStats:
     searches: int = 0
     beams: int = 0
     polygons: int = 0
-    flux_w: dict[str, float] = field(default_factory=lambda: dict.fromkeys(_SUMS, 0.0))
-    """W by where it went, mean over the searches."""
+    entered_w: float = 0.0
+    """W of lights that met flat facets first; mean over the searches."""
+    deposited_w: float = 0.0
+    handed_w: float = 0.0
+    """W that photons carry on."""
     find_seconds: float = 0.0
     draw_seconds: float = 0.0
 
@@ -177,6 +185,7 @@ class BeamLight:
         """Why there are none after all."""
         self.stats = BeamStats()
         self._surveyed = 1.0
+        """Beams that are followed at `_SURVEY`."""
         self._survey_polygons: BeamPolygons | None = None
         """What maps are fitted to."""
         self.found: LightBeams | None = None
@@ -192,18 +201,20 @@ class BeamLight:
             for _ in self._searched(self.finder, 1.0, _MOVING_WORD, 1, threads=None):
                 yield
             _compiled.append(True)
-        started = time.perf_counter()
+        each, work = _STEP_FACETS + len(self.finder.scene.facets), 0
 
-        def pays() -> bool:
-            return time.perf_counter() - started < _DEAREST
+        def pays(steps: int) -> bool:
+            nonlocal work
+            work += each * steps
+            return work < _DEAREST
 
         found = LightBeams({})
         for step in self._searched(self.finder, threshold, _MOVING_WORD, light_parts, pays, None):
             if isinstance(step, LightBeams):
                 found = step
             yield
-        if not pays():
-            self.why_not = f"more than {_DEAREST:g} s for the strongest beams: photons are cheaper"
+        if not pays(0):
+            self.why_not = "the strongest beams alone are so many that photons are cheaper"
             return
         self.found, self._survey_polygons = found, found.polygons
         self.carried = {light: objects for light, objects in found.carried.items() if objects}
@@ -244,9 +255,9 @@ class BeamLight:
         """Find beams as fine as `photons` ask and add them to `maps` times `weight`, pausing with the share done.
         `word`: roulette's seed."""
         stats, started = self.stats, time.perf_counter()
-        found = LightBeams({})
+        found, surveyed = LightBeams({}), self._surveyed
         while True:
-            threshold, followed = self.threshold(photons), 0.0
+            threshold, followed = self._threshold(photons, surveyed), 0.0
             for step in self._searched(self.finder, threshold, word):
                 stats.find_seconds += time.perf_counter() - started
                 if isinstance(step, LightBeams):
@@ -256,8 +267,9 @@ class BeamLight:
                     yield 0.5 * step
                 started = time.perf_counter()
             # Where light leaves for good, fewer weak beams follow than thought: such are searched for again, finer.
-            self._surveyed = max(followed, 1.0) * (threshold / _SURVEY) ** _GROWTH
-            if _ENOUGH * followed * PHOTONS_A_BEAM >= photons or self.threshold(photons) >= threshold:
+            # What is learnt here is forgotten: a pass must not depend on those before it.
+            surveyed = max(followed, 1.0) * (threshold / _SURVEY) ** _GROWTH
+            if _ENOUGH * followed * PHOTONS_A_BEAM >= photons or self._threshold(photons, surveyed) >= threshold:
                 break
         self.found = found
         self._count(found)
@@ -267,10 +279,11 @@ class BeamLight:
         stats.draw_seconds += time.perf_counter() - started
         yield 1.0
 
-    def threshold(self, photons: float) -> float:
-        """Threshold at which beams take about as long as so many photons."""
+    @staticmethod
+    def _threshold(photons: float, surveyed: float) -> float:
+        """Threshold at which beams take about as long as so many photons; `surveyed` are followed at `_SURVEY`."""
         beams = max(photons, 1.0) / PHOTONS_A_BEAM
-        return float(np.clip(_SURVEY * (self._surveyed / beams) ** (1.0 / _GROWTH), FINEST, COARSEST))
+        return float(np.clip(_SURVEY * (surveyed / beams) ** (1.0 / _GROWTH), FINEST, COARSEST))
 
     def draw_moving(self, maps: LightMaps, weight: float, moving: MovingBeams, seconds: float) -> None:
         """Find beams at once, as fine as `seconds` allow, and add them to `maps` of any layout times `weight`."""
@@ -347,7 +360,7 @@ class BeamLight:
         threshold: float,
         word: int,
         light_parts: int = LIGHT_PARTS,
-        go_on: Callable[[], bool] = lambda: True,
+        go_on: GoOn = lambda steps: True,
         threads: int | None = 1,
     ) -> Iterator[float | LightBeams]:
         """`BeamFinder.find`, beside whoever draws if so asked (by `threads`); stopped where nobody waits for it any
@@ -377,14 +390,14 @@ class BeamLight:
         word: int,
         light_parts: int,
         threads: int | None,
-        go_on: Callable[[], bool],
+        go_on: GoOn,
         stop: threading.Event,
         done: list[float],
     ) -> LightBeams:
         """In the worker; what is stopped returns nothing of use."""
         found = LightBeams({})
         for step in finder.find(
-            threshold, self._depth, word, light_parts, threads, lambda: go_on() and not stop.is_set()
+            threshold, self._depth, word, light_parts, threads, lambda steps: go_on(steps) and not stop.is_set()
         ):
             if stop.is_set():
                 break
@@ -399,17 +412,26 @@ class BeamLight:
         self._stop.set()
 
     def _count(self, found: LightBeams) -> None:
-        stats, n = self.stats, self.stats.searches
+        stats = self.stats
         stats.searches += 1
         stats.polygons += 0 if found.polygons is None else len(found.polygons)
-        watts = dict.fromkeys(_SUMS, 0.0)
-        for light, sums in found.sums.items():
-            power = float(self._buffers.light_power[light].band(0.0, 1.0)[3])
-            stats.beams += int(sums[SUM_BEAMS])
-            for name, index in _SUMS.items():
-                watts[name] += power * float(sums[index])
-        for name, value in watts.items():
-            stats.flux_w[name] += (value - stats.flux_w[name]) / (n + 1)
+        stats.beams += int(sum(sums[SUM_BEAMS] for sums in found.sums.values()))
+        tally = self.tally(1.0)
+        stats.entered_w += (tally.emitted - stats.entered_w) / stats.searches
+        stats.deposited_w += (tally.ended["deposited"] - stats.deposited_w) / stats.searches
+        stats.handed_w += (-tally.handed - stats.handed_w) / stats.searches
+
+    def tally(self, weight: float) -> FluxTally:
+        """Where the light of the last search went, W times `weight`."""
+        tally = FluxTally()
+        for light, sums in self.found.sums.items() if self.found is not None else ():
+            watts = weight * float(self._buffers.light_power[light].band(0.0, 1.0)[3])
+            tally.emitted += watts * float(sums[SUM_ENTERED])
+            tally.handed -= watts * float(sums[SUM_HANDED])
+            tally.roulette += watts * float(sums[SUM_ROULETTE])
+            for name, index in _ENDS.items():
+                tally.ended[name] += watts * float(sums[index])
+        return tally
 
     def release(self) -> None:
         """Free everything; a search that runs ends soon."""

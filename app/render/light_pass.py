@@ -499,6 +499,7 @@ class LightPass:
         after = self._beams.stats.find_seconds, self._beams.stats.draw_seconds
         self.stats.trace_seconds += after[0] - before[0]
         self.stats.splat_seconds += after[1] - before[1]
+        self.stats.tally.merge(self._beams.tally(share))
         found = self._beams.found
         if found is None or found.pieces is None or not len(found.pieces):
             return
@@ -549,7 +550,7 @@ class LightPass:
         )
         self.stats.photons += batch.emitted_photons
         self.stats.splats += batch.photons
-        self.stats.tally.merge(batch.tally)
+        self.stats.tally.merge(batch.tally.without_beams)
 
     def splat_steps(
         self,

@@ -44,11 +44,6 @@ def shares(stats: LightStats) -> dict[str, float]:
 def light_notices(light: LightPass) -> list[str]:
     """Of a light pass that has finished."""
     found = loss_notices(shares(light.stats), light.settings.max_depth)
-    if light.beam_stats is not None and not found:
-        flux = light.beam_stats.flux_w
-        found = loss_notices(
-            {fate: watts / (flux["entered"] or 1.0) for fate, watts in flux.items()}, light.settings.max_depth
-        )
     for index in light.domains:
         name = light.scene.lights[index].name
         if light.buffers.light_power[index].band(0.0, 1.0)[3] > 0.0 and not len(light.pilots[index].whole):

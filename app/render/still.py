@@ -100,24 +100,20 @@ class RenderStats:
 
     def _beam_lines(self) -> list[str]:
         """What went by beams, and what by photons."""
-        beams, tally = self.beams, self.light.tally
+        beams = self.beams
         if beams is None:
             return []
-        entered = beams.flux_w["entered"]
-        photons = max(tally.emitted - tally.ended.get("beams", 0.0), 0.0)
+        emitted = self.light.tally.emitted / max(self.light.photons, 1)
         return [
             (
-                f"beams               {beams.beams} followed, {beams.polygons} polygons, of {entered:.6e} W that met "
-                f"flat facets first: {_shares(beams.flux_w)}"
+                f"beams               {beams.beams} followed, {beams.polygons} polygons, found in "
+                f"{beams.find_seconds:.2f} s, drawn in {beams.draw_seconds:.2f} s"
             ),
-            f"carried             {entered:.6e} W by beams, {photons:.6e} W by photons from the lights on",
-            f"                    found in {beams.find_seconds:.2f} s, drawn in {beams.draw_seconds:.2f} s",
+            (
+                f"carried             {beams.entered_w:.6e} W by beams, of which they left {beams.handed_w:.3e} W to "
+                f"photons on the way; {max(emitted - beams.entered_w, 0.0):.6e} W by photons from the lights on"
+            ),
         ]
-
-
-def _shares(flux_w: Mapping[str, float]) -> str:
-    entered = flux_w["entered"] or 1.0
-    return ", ".join(f"{name} {watts / entered:.6f}" for name, watts in flux_w.items() if name != "entered")
 
 
 def _counted(counts: Mapping[str, int]) -> str:

@@ -18,10 +18,12 @@ const int LOOKED_AT_EVENLY = 4;
 const float SHORT_RAMP = 0.2;
 const float INVERSE_SQRT_3 = 0.57735027;
 
+// Not mix(), which is not exact where both are the same: a spectrum that has ended must not light anything by rounding.
 vec4 curve_at(int g, float t) {
     float place = band.x + t * band.y;
     int i = int(place), row = int(band.z) + g;
-    return mix(texelFetch(curves, ivec2(i, row), 0), texelFetch(curves, ivec2(i + 1, row), 0), place - float(i));
+    vec4 below = texelFetch(curves, ivec2(i, row), 0);
+    return below + (place - float(i)) * (texelFetch(curves, ivec2(i + 1, row), 0) - below);
 }
 
 float density_at(float t) { return density_nodes.x + t * (density_nodes.y + t * density_nodes.z); }
@@ -146,6 +148,7 @@ void main() {
     crossings = is_single ? 0 : crossings;
     ADD_PARTS(intervals, single, half_plane_share)
     ADD_PARTS(intervals, several, covered_share)
-    for (int g = 0; g < TARGETS; ++g) deposited[g] *= tilt;
+    // Differences of the running spectrum are rounded: what divides by the maps must never meet a negative sum.
+    for (int g = 0; g < TARGETS; ++g) deposited[g] = max(tilt * deposited[g], 0.0);
 #endif
 }

@@ -25,7 +25,8 @@ uvec4 texel(int i) { return texelFetch(beams, polygon + ivec2(i, 0), 0); }
 
 vec4 curve_at(int row, float place) {
     int i = int(place);
-    return mix(texelFetch(curves, ivec2(i, row), 0), texelFetch(curves, ivec2(i + 1, row), 0), place - float(i));
+    vec4 below = texelFetch(curves, ivec2(i, row), 0);  // exact where both are the same, which mix() is not
+    return below + (place - float(i)) * (texelFetch(curves, ivec2(i + 1, row), 0) - below);
 }
 
 void main() {

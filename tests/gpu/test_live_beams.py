@@ -18,7 +18,7 @@ from spectrasplat.render.viewer.live_light import LiveLight
 from tests.gpu.test_live_light import SETTINGS, SIZE, difference, edited, inputs, maps, nrmse, painted, shipped
 
 PHOTONS = 20_000
-BEAMS: RenderSettings = replace(SETTINGS, method="srd-beams")
+BEAMS = SETTINGS
 
 
 def begun(gl: Context, scene) -> LiveLight:
@@ -94,7 +94,7 @@ def test_the_engine_answers_questions_about_beams(gl: Context) -> None:
     engine = LiveEngine(gl, replace(Budget.of(gl), first_photons=1 << 12, largest_photons=1 << 14))
     engine.target_photons, engine.camera_samples = 1 << 14, 1
     try:
-        wanted = inputs(shipped("prism"), method="srd-beams")
+        wanted = inputs(shipped("prism"))
         engine.set(wanted)
         deadline = time.monotonic() + 120.0
         while not engine.is_idle:

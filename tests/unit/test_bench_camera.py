@@ -196,7 +196,7 @@ def test_the_report_speaks_of_samples(tmp_path: Path) -> None:
         *(PROSE["camera"].methods[name] for name in names),
     ):
         assert told in text, told
-    without_caustic = text.replace("67 M photons", "").replace("srd-beams", "")
+    without_caustic = text.replace("67 M photons", "").replace("srd-photons", "")
     assert not re.search(r"photon", without_caustic, re.IGNORECASE), re.findall(r".{40}photon.{40}", without_caustic)
     stems = {path.stem for path in (tmp_path / "plots").iterdir()}
     assert {

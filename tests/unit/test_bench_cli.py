@@ -211,7 +211,7 @@ def test_the_camera_has_its_own_defaults(seen: Seen, tmp_path: Path) -> None:
     assert main(["bench", "--camera", "-o", str(tmp_path)]) == 0
     methods = ("stochastic", "stochastic-even", "regular-7", "regular-16", "srd-lambda", "srd")
     assert seen.settings == BenchSettings(20.0, methods=methods, measured_pass="camera")
-    assert {*methods, "srd-beams"} == set(CAMERA_METHODS)
+    assert {*methods, "srd-photons"} == set(CAMERA_METHODS)
     assert seen.scenes == ["prism_edge", "lens_text", "brilliant_studio", "ball_caustic"]
     assert shlex.split(seen.command)[:4] == ["spectrasplat", "bench", "--camera", "prism_edge"]
     assert (

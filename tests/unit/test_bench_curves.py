@@ -248,7 +248,7 @@ def test_the_best_baseline_is_the_best_where_all_are_followed() -> None:
     long_run = curve("stochastic", [Point(10, 30.0, 0.001, 0.001, 0.001, 0.0, 0.001), *law(1.0)][::-1])
     short = curve("stochastic-even", law(0.5))
     assert best_baseline([long_run, short, curve("srd", law(1e-6))]).method == "stochastic-even"  # type: ignore[union-attr]
-    assert best_baseline([curve("srd", law(1.0)), curve("srd-beams", law(1.0))]) is None
+    assert best_baseline([curve("srd", law(1.0)), curve("srd-photons", law(1.0))]) is None
 
 
 def test_a_bias_floor_is_named() -> None:

@@ -340,7 +340,7 @@ def test_a_guard_forgotten_in_a_shader_is_noticed(monkeypatch: pytest.MonkeyPatc
 def test_without_beams_photons_need_what_they_always_did(scene: str, anchored: bool) -> None:
     loaded = load_scene(paths.assets_dir() / "scenes" / f"{scene}.toml")
     alone, found = (
-        Features.of(loaded, RenderSettings(method=method, anchor_weights=anchored)) for method in ("srd", "srd-beams")
+        Features.of(loaded, RenderSettings(method=method, anchor_weights=anchored)) for method in ("srd", "srd-photons")
     )
     assert alone == replace(found, method="srd", beams=False)
     assert scene != "prism" or alone.reindexed == anchored

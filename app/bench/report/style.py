@@ -33,7 +33,7 @@ PALETTE = {
     "grid": (GRID, "#33373d"),
     "wash": (WASH, "#1f2226"),
     "srd": ("#c8380c", "#ff7a4d"),
-    "srd-beams": ("#a8552f", "#d99a78"),
+    "srd-photons": ("#a8552f", "#d99a78"),
     "srd-lambda": ("#2f6f9f", "#74b3e0"),
     "stochastic": ("#3d4147", "#c3c7cd"),
     "stochastic-even": ("#575b62", "#aeb3bb"),
@@ -84,7 +84,7 @@ _STYLES: dict[str, tuple[float, Dash, str, int]] = {
     "hero": (1.4, (0.0, (4.0, 1.0, 1.0, 1.0)), "h", 3),
     "srd-lambda": (1.7, "-", "D", 5),
     "progressive": (1.7, "-", "P", 6),
-    "srd-beams": (1.7, (0.0, (6.0, 1.5)), "p", 7),
+    "srd-photons": (1.7, (0.0, (6.0, 1.5)), "p", 7),
     "srd": (2.6, "-", "o", 8),
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 METHOD_NAMES = {
     "srd": "Spectral ray differentials",
-    "srd-beams": "Differentials, with beams",
+    "srd-photons": "Differentials, photons only",
     "srd-lambda": "Differentials by wavelength",
     "stochastic": "Random wavelengths",
     "stochastic-even": "Even random wavelengths",
@@ -17,8 +17,8 @@ METHOD_NAMES = {
 """Method of `METHODS` -> what it is called on the screen."""
 
 METHOD_TIPS = {
-    "srd": "The default: each photon is swept along its own spectrum in closed form; as many spectral bands as needed.",
-    "srd-beams": "The same, but what flat facets throw is followed as polygons instead of photons.",
+    "srd": "The default: flat facets throw polygons, all else photons, both swept along the spectrum in closed form.",
+    "srd-photons": "The same without polygons: photons carry all light.",
     "srd-lambda": "One derivative by wavelength and one anchor a photon: the published method.",
     "stochastic": "One random wavelength a photon with a footprint: the usual way.",
     "stochastic-even": "The same with wavelengths from a low-discrepancy sequence: the usual way at its best.",
