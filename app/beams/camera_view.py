@@ -14,7 +14,7 @@ from ..model.optics.spectrum import Spectrum
 from ..model.scene import Camera, Scene
 from .convert import Chosen, hulls_around, objects_of
 from .facets import BLACK, SAMPLES, BeamScene, beam_scene
-from .find import Emission, Search, search
+from .find import Emission, GoOn, Search, search
 from .leaves import Leaves
 from .rays import PARALLEL, PINHOLE, SOURCE
 from .screen_polygons import ScreenPolygons
@@ -58,7 +58,7 @@ class CameraView:
         threshold: float,
         seed: int = 1,
         threads: int | None = None,
-        go_on: Callable[[], bool] = lambda: True,
+        go_on: GoOn = lambda steps: True,
     ) -> tuple[ScreenPolygons, np.ndarray]:
         """Polygons of a picture of `size` pixels, and bool (O,): which objects they show. Camera rays that meet another
         object first are not among them.
@@ -81,7 +81,7 @@ class CameraView:
         return polygons.of(np.flatnonzero(shown[polygons.source])), shown
 
     def _search(
-        self, emission: Emission, how: Search, threads: int | None, go_on: Callable[[], bool], footprint: float
+        self, emission: Emission, how: Search, threads: int | None, go_on: GoOn, footprint: float
     ) -> tuple[list[Leaves], np.ndarray, set[int]]:
         entered = self._entered(emission)
         if entered <= 0.0:
@@ -99,7 +99,7 @@ class CameraView:
         """What enters (`search.SUM_ENTERED`), by a search that ends at once."""
         from .search import SUM_ENTERED
 
-        _, sums, _ = search(self.scene, emission, Search(1.0, 1, 1, 1e9, sees=True), 1, lambda: False)
+        _, sums, _ = search(self.scene, emission, Search(1.0, 1, 1, 1e9, sees=True), 1, lambda steps: False)
         return float(sums[SUM_ENTERED])
 
     def _emission(self, camera: Camera, size: tuple[int, int]) -> tuple[Emission | None, float]:
@@ -129,7 +129,7 @@ class CameraView:
         bright = cumulative(self._axis, Spectrum(daylight_per_lumen())).at(np.linspace(0.0, 1.0, SAMPLES))
         power = 0.5 * bright[:, 1] / bright[-1, 1] + 0.5 * bright[:, 3] / bright[-1, 3]
         mask = mask_at(place, self.scene, self._meshes)
-        return Emission(source, limits, room, power, (), (), True, 1.0, mask), footprint
+        return Emission(source, limits, room, power, power, (), (), True, 1.0, mask), footprint
 
 
 def _screen_polygons(leaves: list[Leaves], scene: BeamScene, middle: np.ndarray, footprint: float) -> ScreenPolygons:

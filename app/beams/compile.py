@@ -15,18 +15,19 @@ from .find import take_stack
 from .grow import FIRST, run
 from .leaves import Store
 from .rays import SOURCE
-from .search import WORK, may_touch, power_of
+from .search import WORK, flux_in, may_touch, power_of
 
 
 def warm_up() -> float:
     """Compile everything, or load it where that was done before; returns the seconds that took."""
     start = time.perf_counter()
     stack, work, store = take_stack(), np.zeros(1, WORK), Store()
-    tables, obstacles = np.zeros((1, SAMPLES)), np.zeros((0, 2, 3))
+    tables, obstacles = np.zeros((2, SAMPLES)), np.zeros((0, 2, 3))
     work["top"] = FIRST
     args = np.zeros(1, FACET), np.zeros(1, SOLID), tables, np.zeros(1, SOURCE)
     run(stack, *args, obstacles, work, store.leaf, store.edge, store.corner)
     power_of(stack, FIRST, tables, work)
+    flux_in(stack, FIRST, tables, work)
     may_touch(stack, FIRST, 1.0, obstacles, work)
     ends, corner = np.zeros(1, np.int64), np.zeros((0, 2))
     hulls_of(corner, ends, np.zeros(0), corner, corner, ends.copy(), corner)

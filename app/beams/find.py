@@ -16,7 +16,7 @@ from .grow import FIRST, START, run
 from .leaves import Leaves, Store
 from .nodes import NODE, STATIC
 from .rays import PARALLEL, POINT
-from .search import SUM_ENTERED, SUMS, WORK, may_touch, power_of
+from .search import SUM_ENTERED, SUMS, WORK, flux_in, may_touch, power_of
 
 _STACK = 1800
 _STEPS = 20_000
@@ -38,7 +38,9 @@ class Emission:
     room: np.ndarray
     """(3,): centre and half side of a square in q that holds all facets."""
     power: np.ndarray
-    """(SAMPLES,): share of its power below x, for importance."""
+    """(SAMPLES,): share of its importance below x, lines left out."""
+    watts: np.ndarray
+    """(SAMPLES,): share of its radiant power below x, lines left out."""
     lines: tuple[float, ...]
     """x of its emission lines."""
     line_shares: tuple[float, ...]
@@ -79,7 +81,7 @@ def search(
     them (`search.SUM_…`), and objects that something not flat may stand before, so that photons carry what this source
     throws on them. `go_on` ends it early, for what is thrown away: it is told of every step once, in any order."""
     sums = np.zeros(SUMS)
-    tables = np.vstack([scene.tables, emission.power])
+    tables = np.vstack([scene.tables, emission.power, emission.watts])
     bands = [(x, x, share) for x, share in zip(emission.lines, emission.line_shares, strict=True)]
     if emission.is_continuous:
         # In one piece: for the same time that is half the error of four bands in a cut stone.
@@ -107,7 +109,8 @@ def search(
             starts.append((owner, root, work.copy()))
     _stacks.append(stack)
     jobs = [(root, work) for owner, root, work in starts if owner not in blocked]
-    sums[SUM_ENTERED] = entered = sum(power_of(root, 0, tables, work) for root, work in jobs)
+    sums[SUM_ENTERED] = sum(flux_in(root, 0, tables, work) for root, work in jobs)
+    entered = sum(power_of(root, 0, tables, work) for root, work in jobs)
     if not jobs or entered <= 0.0:
         return [], sums, blocked
     relative = entered if how.power is None else math.sqrt(entered * how.power)

@@ -52,7 +52,7 @@ FRAGMENTS = 192
 
 WORK = np.dtype(
     [
-        # What is to be done. Row of the tables: share of the light's power below x, for importance.
+        # What is to be done. Row of the tables: share of the light's importance below x; of its watts, the next row.
         ("power", "i8"),
         # Power (flux per unit of spectral power) below which a beam plays roulette.
         ("threshold", "f8"),
@@ -124,7 +124,7 @@ def unit(key):
 
 @part
 def band_power(beam, tables, work):
-    """Flux per unit of q of a beam's band before it met anything, roulette's gain included."""
+    """Importance per unit of q of a beam's band before it met anything, roulette's gain included."""
     share = work.line_share
     if beam.x[2] > beam.x[0]:
         share = at_x(tables, work.power, beam.x[2]) - at_x(tables, work.power, beam.x[0])
@@ -150,17 +150,38 @@ def power_of(nodes, i, tables, works):
 
 
 @part
-def flux_as(outline, beam, tables, work):
-    """Power of a beam with another's outline, at the middle of its band."""
-    if outline.corners[1] == 0:
+def passes_at(outline, beam, a):
+    """Area in q of an outline times a beam's weight, at place a."""
+    if outline.corners[a] == 0:
         return 0.0
-    return area_of(outline.corner[1], outline.corners[1]) * beam.weight[1] * band_power(beam, tables, work)
+    return area_of(outline.corner[a], outline.corners[a]) * beam.weight[a]
+
+
+@part
+def flux_as(outline, beam, tables, work):
+    """Flux of a beam with another's outline over its band, per unit of the light's power: a parabola through the three
+    places, each half of the band by its own share of the light."""
+    middle = passes_at(outline, beam, 1)
+    if beam.x[2] <= beam.x[0]:
+        return middle * beam.boost * work.line_share * work.density
+    low, high = passes_at(outline, beam, 0), passes_at(outline, beam, 2)
+    row = work.power + 1
+    half = at_x(tables, row, beam.x[1])
+    lower, upper = half - at_x(tables, row, beam.x[0]), at_x(tables, row, beam.x[2]) - half
+    sum = lower * (5.0 * low + 8.0 * middle - high) + upper * (5.0 * high + 8.0 * middle - low)
+    return max(sum, 0.0) / 12.0 * beam.boost * work.density
 
 
 @part
 def flux_of(beam, tables, work):
-    """Power of a beam at the middle of its band."""
+    """Flux of a beam over its band, per unit of the light's power."""
     return flux_as(beam, beam, tables, work)
+
+
+@jit
+def flux_in(nodes, i, tables, works):
+    """`flux_of` beam i."""
+    return flux_of(nodes[i], tables, works[0])
 
 
 @part

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..model.geometry.mesh import Mesh
 from ..model.lights.light import Light
-from ..model.optics.spectral_tables import CumulativeSpectrum, SpectralAxis, cumulative
+from ..model.optics.spectral_tables import SpectralAxis, cumulative
+from ..model.optics.spectrum import Spectrum
 from .facets import BLACK, SAMPLES, BeamScene
 from .find import Emission
 from .rays import PARALLEL, POINT, SOURCE
@@ -42,13 +43,15 @@ def emissions(
     corners = _specular_corners(scene)
     if not len(corners):
         return []
-    spectrum = cumulative(axis, light.spectral_power)
-    power = _importance(spectrum)
+    # Lines are followed by themselves.
+    smooth = cumulative(axis, Spectrum(light.spectral_power.density)).at(np.linspace(0.0, 1.0, SAMPLES))
+    whole = cumulative(axis, light.spectral_power).at(1.0)
     lines = [float(axis.x_of_nm(nm)) for nm, _ in light.spectral_power.lines]
     shares = [float(watts) for _, watts in light.spectral_power.lines]
     total = sum(shares) + float(np.sum(light.spectral_power.density))
     common = {
-        "power": power,
+        "power": _importance(smooth, whole),
+        "watts": smooth[:, 3] / max(float(whole[3]), 1e-300),
         "lines": tuple(lines),
         "line_shares": tuple(s / total for s in shares),
         "is_continuous": bool(np.any(light.spectral_power.density > 0.0)),
@@ -63,11 +66,9 @@ def _specular_corners(scene: BeamScene) -> np.ndarray:
     return np.concatenate([f["corner"][: f["corners"]] for f in facets]) if len(facets) else np.zeros((0, 3))
 
 
-def _importance(spectrum: CumulativeSpectrum) -> np.ndarray:
+def _importance(smooth: np.ndarray, whole: np.ndarray) -> np.ndarray:
     """Half by brightness, half by power, so that bins where the eye sees little are sampled too."""
-    values = spectrum.at(np.linspace(0.0, 1.0, SAMPLES))
-    y, w = values[:, 1], values[:, 3]
-    return 0.5 * y / max(float(y[-1]), 1e-300) + 0.5 * w / max(float(w[-1]), 1e-300)
+    return 0.5 * smooth[:, 1] / max(float(whole[1]), 1e-300) + 0.5 * smooth[:, 3] / max(float(whole[3]), 1e-300)
 
 
 def _parallel(light, corners, to_gpu, unit, parts, common) -> list[Emission]:
