@@ -18,7 +18,7 @@ import numpy as np
 from ...base.errors import UserError
 from ...edit.live_inputs import LiveInputs
 from ...gpu import shader
-from ...passes.camera import CausticMaps
+from ...passes.caustic_maps import CausticMaps
 from ...passes.pick import Picker, PickHit
 from ..beam_light import MovingBeams
 from ..light_maps import LightMaps
