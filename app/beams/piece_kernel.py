@@ -10,10 +10,10 @@ place against t: what a moving edge or a moving sliver lights one after the othe
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
-from numba import njit
+
+from .compiling import allocating
 
 STEPS = 16
 """Places of the band at which a whole piece is measured …"""
@@ -30,15 +30,7 @@ _LINE_X = 1e-9
 """An emission line is looked for so far on both sides of its x."""
 
 
-def _compiled(function: Callable) -> Callable:
-    """`function` as machine code, kept on disk where some folder can be written (else compiled anew each run)."""
-    try:
-        return njit(cache=True, nogil=True, error_model="numpy")(function)
-    except RuntimeError:  # numba: no folder for the cache
-        return njit(nogil=True, error_model="numpy")(function)
-
-
-@_compiled
+@allocating
 def _power_below(curve_x, curve_w, x):
     """Cumulative power at x, a line there included (`CumulativeSpectrum.at`)."""
     x = min(max(x, 0.0), 1.0)
@@ -48,26 +40,26 @@ def _power_below(curve_x, curve_w, x):
     return curve_w[i] + share * (curve_w[i + 1] - curve_w[i])
 
 
-@_compiled
+@allocating
 def _power(curve_x, curve_w, x_lo, x_hi):
     """Power between two places of the spectrum; of the line, where they are one."""
     widen = _LINE_X if x_hi == x_lo else 0.0
     return _power_below(curve_x, curve_w, x_hi + widen) - _power_below(curve_x, curve_w, x_lo - widen)
 
 
-@_compiled
+@allocating
 def _parabola(t):
     """Weights of the values at 0, 1/2, 1."""
     return 2.0 * (t - 0.5) * (t - 1.0), 4.0 * t * (1.0 - t), 2.0 * t * (t - 0.5)
 
 
-@_compiled
+@allocating
 def _weight_at(weight, t):
     a, b, c = _parabola(t)
     return max(a * weight[0] + b * weight[1] + c * weight[2], 0.0)
 
 
-@_compiled
+@allocating
 def _clip(polygon, count, scratch, a_u, a_v, c):
     """Keep a . p + c >= 0 of a convex polygon, in place; the number of corners left."""
     kept = 0
@@ -88,7 +80,7 @@ def _clip(polygon, count, scratch, a_u, a_v, c):
     return kept
 
 
-@_compiled
+@allocating
 def _moments(polygon, count, out):
     """Area, first moments, second moments uu, uv, vv about the origin."""
     out[:] = 0.0
@@ -104,7 +96,7 @@ def _moments(polygon, count, out):
         out[5] += cross * (y * y + y * w + w * w) / 12.0
 
 
-@_compiled
+@allocating
 def _lit(edges, t, u, v, polygon, count, scratch):
     """Clip a polygon about (u, v) by all edges at t."""
     for e in range(len(edges)):
@@ -117,7 +109,7 @@ def _lit(edges, t, u, v, polygon, count, scratch):
     return count
 
 
-@_compiled
+@allocating
 def contents(
     x_lo, x_hi, weight, edge_start, edges, hull_start, hulls, light, curve_start, curve_x, curve_w, out, powers
 ):
@@ -144,7 +136,7 @@ def contents(
         out[i] = total
 
 
-@_compiled
+@allocating
 def _frame(own, hull, moves, out):
     """Principal axis (cosine, sine) of what is lit at some time; low and high of the hull, and of that, along it and
     across it; area of the convex hull of that."""
@@ -202,12 +194,12 @@ def _frame(own, hull, moves, out):
     return out[10] > 0.0
 
 
-@_compiled
+@allocating
 def _widen(span, value):
     span[0], span[1] = min(span[0], value), max(span[1], value)
 
 
-@_compiled
+@allocating
 def _cell_body(edges, weight, x_lo, x_hi, curve_x, curve_w, cell, band_content, polygon, scratch, body):
     """The part of a cell that is lit: `body` is content, mean u, v, first and last t, slope of u, v by t, spread uu,
     uv, vv. `cell`: u, v of its middle, its half axes' u, v, u, v."""
@@ -297,7 +289,7 @@ def _cell_body(edges, weight, x_lo, x_hi, curve_x, curve_w, cell, band_content, 
     return True
 
 
-@_compiled
+@allocating
 def _at(affine, t, u, v, out):
     """X + X_u u + X_v v at t, `affine` (3, 3, 3)."""
     a, b, c = _parabola(t)
@@ -309,14 +301,14 @@ def _at(affine, t, u, v, out):
         )
 
 
-@_compiled
+@allocating
 def _normalise(direction):
     length = math.sqrt(direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2)
     direction /= length
     return length
 
 
-@_compiled
+@allocating
 def _ray(position, direction, weight, x_lo, x_hi, curve_x, curve_w, body, content, ray):
     """The ray of a lit cell that carries `content`."""
     first, last = body[3], body[4]
@@ -375,7 +367,7 @@ def _ray(position, direction, weight, x_lo, x_hi, curve_x, curve_w, body, conten
     return True
 
 
-@_compiled
+@allocating
 def _mixed(state):
     """SplitMix64's output function ("Mix13" of Stafford 2011)."""
     state = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -383,7 +375,7 @@ def _mixed(state):
     return state ^ (state >> np.uint64(31))
 
 
-@_compiled
+@allocating
 def _random(key, piece, dimension):
     """Uniform in [0, 1)."""
     state = _mixed(np.uint64(key) + np.uint64(0x9E3779B97F4A7C15))
@@ -392,7 +384,7 @@ def _random(key, piece, dimension):
     return float(state >> np.uint64(11)) / 9007199254740992.0
 
 
-@_compiled
+@allocating
 def _divide(frame, points):
     """Cells of a lattice of about `points` over what is lit, along and across it."""
     length, width = frame[7] - frame[6], frame[9] - frame[8]
@@ -401,7 +393,7 @@ def _divide(frame, points):
     return max(1.0, np.rint(cells / across)), across
 
 
-@_compiled
+@allocating
 def rays(
     chosen,
     points,
