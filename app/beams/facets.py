@@ -13,7 +13,7 @@ import numpy as np
 
 from ..model.features import is_flat, why_no_beams
 from ..model.geometry.mesh import Mesh
-from ..model.optics.colorimetry import VISIBLE_NM, rgb_partition
+from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 
@@ -401,7 +401,7 @@ def _tables(scene: Scene, axis: SpectralAxis, unit: float) -> tuple[np.ndarray, 
                 rows.append(np.interp(nm, VISIBLE_NM, material.absorption.coefficient) / unit)
         if material.is_mirror:
             tint[-1] = len(rows)
-            rows.append(np.interp(nm, VISIBLE_NM, rgb_partition() @ np.asarray(material.reflectance_rgb, float)))
+            rows.append(mirror_reflectance(material.reflectance_rgb, nm))
     return np.array(rows, float).reshape(-1, SAMPLES), glass, tint
 
 
