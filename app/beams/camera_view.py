@@ -12,7 +12,7 @@ from ..model.optics.colorimetry import daylight_per_lumen
 from ..model.optics.spectral_tables import SpectralAxis, cumulative
 from ..model.optics.spectrum import Spectrum
 from ..model.scene import Camera, Scene
-from .convert import Chosen, hulls_around, objects_of
+from .convert import hulls_around, objects_of, of_kind
 from .facets import BLACK, SAMPLES, BeamScene, beam_scene
 from .find import Emission, Search, search
 from .leaves import Leaves
@@ -72,7 +72,7 @@ class CameraView:
         how = Search(threshold, seed, MAX_DEPTH, TOLERANCE_PX * footprint, sees=True)
         leaves, sums, blocked = self._search(emission, how, threads, go_on, footprint)
         self.beams = int(sums[SUM_BEAMS])
-        flux = np.concatenate([part.flux[: part.count[0]] for part in leaves]) if leaves else np.zeros(0)
+        flux = Leaves.joined(leaves).flux
         self.tail = float(flux[flux < threshold * footprint**2].sum() / max(flux.sum(), 1e-300))
         shown[[o for o in self.scene.beam_objects if o not in blocked]] = True
         polygons = _screen_polygons(leaves, self.scene, 0.5 * np.array(size, float), footprint)
@@ -133,14 +133,14 @@ class CameraView:
 
 
 def _screen_polygons(leaves: list[Leaves], scene: BeamScene, middle: np.ndarray, footprint: float) -> ScreenPolygons:
-    parts = [(Chosen(leaves, (kind,)), kind) for kind in (LEAF_OPEN, LEAF_PIECE)]
+    parts = [(of_kind(leaves, kind), kind) for kind in (LEAF_OPEN, LEAF_PIECE)]
     head = np.concatenate([part.head for part, _ in parts])
     count = [len(part.head) for part, _ in parts]
     x = np.concatenate([part.x for part, _ in parts])
     ray = np.concatenate([part.ray for part, _ in parts]) * np.array([1.0, footprint, footprint])[:, None]
     length = np.linalg.norm(ray[:, 1, :, :1], axis=-1, keepdims=True)
     ray[:, 1] /= length
-    edges = np.concatenate([part.edges for part, _ in parts])
+    edges = np.concatenate([part.edge for part, _ in parts])
     edges = np.concatenate([edges[:, 0], edges[:, 2]], axis=1)
     for k in (0, 3):
         edges[:, k + 2] = edges[:, k + 2] / footprint - edges[:, k : k + 2] @ middle

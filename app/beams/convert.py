@@ -59,10 +59,10 @@ def hulls_of(corners, starts, grow, points, chain, ends, out):
 
 def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float) -> BeamPolygons:
     """What lies on receivers. `unit`: GPU units a scene unit."""
-    chosen = Chosen(leaves, (LEAF_RECEIVER,))
+    chosen = of_kind(leaves, LEAF_RECEIVER)
     head = chosen.head
-    edges = np.zeros((len(chosen.edges), 8))
-    edges[:, 0:3], edges[:, 4:7] = chosen.edges[:, 0], chosen.edges[:, 2]
+    edges = np.zeros((len(chosen.edge), 8))
+    edges[:, 0:3], edges[:, 4:7] = chosen.edge[:, 0], chosen.edge[:, 2]
     edges[:, 3] = edges[:, 7] = chosen.soft
     starts = np.concatenate([[0], np.cumsum(head[:, 6])]).astype(np.int32)
     softest = np.maximum.reduceat(np.append(chosen.soft, 0.0), starts[:-1]) if len(head) else np.zeros(0)
@@ -87,9 +87,9 @@ def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float)
 
 def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int) -> BeamPieces:
     """What photons have to carry on."""
-    chosen = Chosen(leaves, (LEAF_PIECE,))
+    chosen = of_kind(leaves, LEAF_PIECE)
     head = chosen.head
-    edges = np.concatenate([chosen.edges[:, 0], chosen.edges[:, 2]], axis=1)
+    edges = np.concatenate([chosen.edge[:, 0], chosen.edge[:, 2]], axis=1)
     counts = head[:, 6]
     of_edge = np.repeat(np.arange(len(head)), counts)
     for first in (0, 3):
@@ -120,36 +120,18 @@ def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int) -> BeamPieces:
     )
 
 
-class Chosen:
-    """Leaves of some kinds, packed."""
-
-    def __init__(self, leaves: list[Leaves], kinds: tuple[int, ...]) -> None:
-        head = _packed([part.head for part in leaves], (9,), np.int64)
-        keep = np.isin(head[:, 0], kinds)
-        edge_keep, corner_keep = np.repeat(keep, head[:, 6]), np.repeat(keep, head[:, 7])
-        self.head = head[keep]
-        self.x = _packed([part.x for part in leaves], (3,))[keep]
-        self.density = _packed([part.density for part in leaves], (3,))[keep]
-        self.centre = _packed([part.centre for part in leaves], (2,))[keep]
-        self.slope = _packed([part.slope for part in leaves], (2,))[keep]
-        self.flux = _packed([part.flux for part in leaves], ())[keep]
-        self.ray = _packed([part.ray for part in leaves], (2, 3, 3, 3))[keep]
-        self.edges = _packed([part.edge for part in leaves], (3, 3))[edge_keep]
-        self.soft = _packed([part.soft for part in leaves], ())[edge_keep]
-        self.corners = _packed([part.corner for part in leaves], (2,))[corner_keep]
+def of_kind(leaves: list[Leaves], kind: int) -> Leaves:
+    """Leaves of one kind (`search.LEAF_…`)."""
+    return Leaves.joined([part.where(part.head[:, 0] == kind) for part in leaves])
 
 
-def _packed(arrays: list[np.ndarray], shape: tuple[int, ...], dtype: type = float) -> np.ndarray:
-    return np.concatenate(arrays) if arrays else np.zeros((0, *shape), dtype)
-
-
-def hulls_around(chosen: Chosen, grow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def hulls_around(chosen: Leaves, grow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Starts and corners of the leaves' convex hulls, grown by `grow` of each."""
     starts = np.concatenate([[0], np.cumsum(chosen.head[:, 7])]).astype(np.int64)
-    out = np.empty((4 * len(chosen.corners) + 8, 2))
+    out = np.empty((4 * len(chosen.corner) + 8, 2))
     ends = np.zeros(len(starts), np.int64)
     points = np.empty((4 * int(chosen.head[:, 7].max(initial=0)), 2))
-    hulls_of(chosen.corners, starts, grow.astype(float), points, np.empty((2 * len(points) + 2, 2)), ends, out)
+    hulls_of(chosen.corner, starts, grow.astype(float), points, np.empty((2 * len(points) + 2, 2)), ends, out)
     return ends.astype(np.int32), out[: ends[-1]]
 
 
