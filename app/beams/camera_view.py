@@ -13,12 +13,12 @@ from ..model.optics.spectral_tables import SpectralAxis, cumulative
 from ..model.optics.spectrum import Spectrum
 from ..model.scene import Camera, Scene
 from .convert import hulls_around, objects_of, of_kind
-from .facets import BLACK, SAMPLES, BeamScene, beam_scene
+from .facets import BLACK, SAMPLES, BeamScene, beam_scene, in_gpu_space
 from .find import Emission, Search, search
 from .leaves import Leaves
 from .rays import PARALLEL, PINHOLE, SOURCE
 from .screen_polygons import ScreenPolygons
-from .search import LEAF_OPEN, LEAF_PIECE, SUM_BEAMS, SUMS
+from .search import LEAF_OPEN, LEAF_PIECE, SUM_BEAMS, SUM_ENTERED, SUMS
 from .sources import mask_at
 
 TOLERANCE_PX = 0.1
@@ -39,10 +39,7 @@ class CameraView:
         unit: float,
     ) -> None:
         """`to_gpu`, `unit`: scene to GPU space, GPU units a scene unit; `axis`: that of the camera's tables."""
-        matrix = np.eye(4)
-        matrix[:3, :3] *= unit
-        matrix[:3, 3] = to_gpu(np.zeros(3))
-        self._meshes = [mesh.transformed(matrix) for mesh in world_meshes]
+        self._meshes = in_gpu_space(world_meshes, to_gpu, unit)
         self.scene: BeamScene = beam_scene(scene, self._meshes, {}, axis, unit)
         self._objects, self._axis, self._to_gpu, self._unit = len(scene.objects), axis, to_gpu, unit
         self.beams = 0
@@ -97,8 +94,6 @@ class CameraView:
 
     def _entered(self, emission: Emission) -> float:
         """What enters (`search.SUM_ENTERED`), by a search that ends at once."""
-        from .search import SUM_ENTERED
-
         _, sums, _ = search(self.scene, emission, Search(1.0, 1, 1, 1e9, sees=True), 1, lambda: False)
         return float(sums[SUM_ENTERED])
 

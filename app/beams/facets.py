@@ -6,6 +6,7 @@ and a beam that may meet one goes on as photons.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
@@ -94,6 +95,14 @@ class BeamScene:
     """Objects of glass and mirrors whose light is carried by beams."""
     why_not: dict[int, str]
     """Specular objects that beams do not carry, and why."""
+
+
+def in_gpu_space(world_meshes: list[Mesh], to_gpu: Callable[[np.ndarray], np.ndarray], unit: float) -> list[Mesh]:
+    """Meshes as `beam_scene` takes them. `to_gpu`, `unit`: scene to GPU space, GPU units a scene unit."""
+    matrix = np.eye(4)
+    matrix[:3, :3] *= unit
+    matrix[:3, 3] = to_gpu(np.zeros(3))
+    return [mesh.transformed(matrix) for mesh in world_meshes]
 
 
 def beam_scene(

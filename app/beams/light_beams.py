@@ -13,7 +13,7 @@ from ..model.geometry.mesh import Mesh
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 from .convert import pieces_of, polygons_of
-from .facets import beam_scene, shown_as
+from .facets import beam_scene, in_gpu_space, shown_as
 from .find import Emission, Search, search
 from .leaves import Leaves
 from .polygons import BeamPieces, BeamPolygons, joined
@@ -51,10 +51,7 @@ class BeamFinder:
     ) -> None:
         """`frames`: origin and axes of every flat receiver's map by number, `texels`: side of its finest texel, GPU
         units; `to_gpu`, `unit`: scene to GPU space, GPU units a scene unit."""
-        matrix = np.eye(4)
-        matrix[:3, :3] *= unit
-        matrix[:3, 3] = to_gpu(np.zeros(3))
-        self.meshes = [mesh.transformed(matrix) for mesh in world_meshes]
+        self.meshes = in_gpu_space(world_meshes, to_gpu, unit)
         self.scene = beam_scene(scene, self.meshes, frames, axis, unit)
         self._scene, self._axis, self._to_gpu, self._unit = scene, axis, to_gpu, unit
         self.set_texels(texels)
