@@ -12,11 +12,12 @@ from itertools import pairwise
 import numpy as np
 
 from .facets import DIELECTRIC, MIRROR, BeamScene
-from .grow import FIRST, START, run
+from .hand import FIRST, START
 from .leaves import Leaves, Store
 from .nodes import NODE, STATIC
 from .rays import PARALLEL, intensities
 from .search import SUM_ENTERED, SUMS, WORK, may_touch, power_of
+from .steps import run
 
 _STACK = 1800
 _STEPS = 20_000

@@ -14,9 +14,9 @@ import spectrasplat
 TESTS = Path(__file__).parent
 RAYS, SPECTRUM = TESTS / "test_beams_against_rays.py", TESTS / "test_beams_along_the_spectrum.py"
 MUTANTS = {
-    "none: what is copied passes": ("grow.py", "FIRST = 2\n", "FIRST = 2\n", RAYS, "lost_or_doubled and prism"),
+    "none: what is copied passes": ("hand.py", "FIRST = 2\n", "FIRST = 2\n", RAYS, "lost_or_doubled and prism"),
     "an edge's half-plane is forgotten": (
-        "grow.py",
+        "flight.py",
         "    for e in range(facet.corners):\n        if work.cuts[e] != 0 and not cut(",
         "    for e in range(1, facet.corners):\n        if work.cuts[e] != 0 and not cut(",
         RAYS,
@@ -24,41 +24,41 @@ MUTANTS = {
     ),
     "a sweep is reversed": (
         "convert.py",
-        "edges[:, 0:3], edges[:, 4:7] = chosen.edges[:, 0], chosen.edges[:, 2]",
-        "edges[:, 0:3], edges[:, 4:7] = chosen.edges[:, 2], chosen.edges[:, 0]",
+        "edges[:, 0:3], edges[:, 4:7] = chosen.edge[:, 0], chosen.edge[:, 2]",
+        "edges[:, 0:3], edges[:, 4:7] = chosen.edge[:, 2], chosen.edge[:, 0]",
         SPECTRUM,
         "single_indices and prism",
     ),
     "a child counts twice": (
-        "grow.py",
+        "at_facet.py",
         "        child(nodes, action,",
         "        for _ in range(2):\n          child(nodes, action,",
         RAYS,
         "lost_or_doubled and prism",
     ),
     "a band is not cut at the onset of total reflection": (
-        "grow.py",
+        "at_facet.py",
         "        if (last > _GRAZING and k < -_GRAZING) or (last < -_GRAZING and k > _GRAZING):",
         "        if k > 1e9:",
         SPECTRUM,
         "onset",
     ),
     "what survives roulette is not boosted": (
-        "grow.py",
+        "at_facet.py",
         "        new.boost /= chance\n",
         "        new.boost /= 1.0\n",
         RAYS,
         "roulette",
     ),
     "the seed is not drawn": (
-        "grow.py",
+        "at_facet.py",
         "unit(mixed(new.key ^ work.seed, np.int64(17)))",
         "unit(mixed(new.key, np.int64(17)))",
         RAYS,
         "roulette",
     ),
     "nearer facets do not hide farther ones": (
-        "grow.py",
+        "flight.py",
         "return t_one < t_other",
         "return False",
         RAYS,
