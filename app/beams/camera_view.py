@@ -12,13 +12,13 @@ from ..model.optics.colorimetry import daylight_per_lumen
 from ..model.optics.spectral_tables import SpectralAxis, cumulative
 from ..model.optics.spectrum import Spectrum
 from ..model.scene import Camera, Scene
-from .convert import Chosen, hulls_around, objects_of
-from .facets import BLACK, SAMPLES, BeamScene, beam_scene
+from .convert import hulls_around, objects_of, of_kind
+from .facets import BLACK, SAMPLES, BeamScene, beam_scene, in_gpu_space
 from .find import Emission, GoOn, Search, search
 from .leaves import Leaves
 from .rays import PARALLEL, PINHOLE, SOURCE
 from .screen_polygons import ScreenPolygons
-from .search import LEAF_OPEN, LEAF_PIECE, SUM_BEAMS, SUMS
+from .search import LEAF_OPEN, LEAF_PIECE, SUM_BEAMS, SUM_ENTERED, SUMS
 from .sources import mask_at
 
 TOLERANCE_PX = 0.1
@@ -39,10 +39,7 @@ class CameraView:
         unit: float,
     ) -> None:
         """`to_gpu`, `unit`: scene to GPU space, GPU units a scene unit; `axis`: that of the camera's tables."""
-        matrix = np.eye(4)
-        matrix[:3, :3] *= unit
-        matrix[:3, 3] = to_gpu(np.zeros(3))
-        self._meshes = [mesh.transformed(matrix) for mesh in world_meshes]
+        self._meshes = in_gpu_space(world_meshes, to_gpu, unit)
         self.scene: BeamScene = beam_scene(scene, self._meshes, {}, axis, unit)
         self._objects, self._axis, self._to_gpu, self._unit = len(scene.objects), axis, to_gpu, unit
         self.beams = 0
@@ -72,7 +69,7 @@ class CameraView:
         how = Search(threshold, seed, MAX_DEPTH, TOLERANCE_PX * footprint, sees=True)
         leaves, sums, blocked = self._search(emission, how, threads, go_on, footprint)
         self.beams = int(sums[SUM_BEAMS])
-        flux = np.concatenate([part.flux[: part.count[0]] for part in leaves]) if leaves else np.zeros(0)
+        flux = Leaves.joined(leaves).flux
         self.tail = float(flux[flux < threshold * footprint**2].sum() / max(flux.sum(), 1e-300))
         shown[[o for o in self.scene.beam_objects if o not in blocked]] = True
         polygons = _screen_polygons(leaves, self.scene, 0.5 * np.array(size, float), footprint)
@@ -97,8 +94,6 @@ class CameraView:
 
     def _entered(self, emission: Emission) -> float:
         """What enters (`search.SUM_ENTERED`), by a search that ends at once."""
-        from .search import SUM_ENTERED
-
         _, sums, _ = search(self.scene, emission, Search(1.0, 1, 1, 1e9, sees=True), 1, lambda steps: False)
         return float(sums[SUM_ENTERED])
 
@@ -133,18 +128,18 @@ class CameraView:
 
 
 def _screen_polygons(leaves: list[Leaves], scene: BeamScene, middle: np.ndarray, footprint: float) -> ScreenPolygons:
-    parts = [(Chosen(leaves, (kind,)), kind) for kind in (LEAF_OPEN, LEAF_PIECE)]
+    parts = [(of_kind(leaves, kind), kind) for kind in (LEAF_OPEN, LEAF_PIECE)]
     head = np.concatenate([part.head for part, _ in parts])
     count = [len(part.head) for part, _ in parts]
     x = np.concatenate([part.x for part, _ in parts])
     ray = np.concatenate([part.ray for part, _ in parts]) * np.array([1.0, footprint, footprint])[:, None]
     length = np.linalg.norm(ray[:, 1, :, :1], axis=-1, keepdims=True)
     ray[:, 1] /= length
-    edges = np.concatenate([part.edges for part, _ in parts])
+    edges = np.concatenate([part.edge for part, _ in parts])
     edges = np.concatenate([edges[:, 0], edges[:, 2]], axis=1)
     for k in (0, 3):
         edges[:, k + 2] = edges[:, k + 2] / footprint - edges[:, k : k + 2] @ middle
-    hulls = [hulls_around(part, np.zeros(len(part.head))) for part, _ in parts]
+    hulls = [hulls_around(part.corner, part.head[:, 7], np.zeros(len(part.head))) for part, _ in parts]
     hull_start = np.concatenate([hulls[0][0], hulls[0][0][-1] + hulls[1][0][1:]])
     last = np.maximum(head[:, 2], 0)
     towards = np.einsum("mk,mk->m", ray[:, 1, 1, 0], scene.facets["plane"][last, :3])

@@ -7,6 +7,7 @@ import numpy as np
 from .compiling import jit
 from .facets import BeamScene
 from .leaves import Leaves
+from .lifetimes import lifetimes_of
 from .polygons import BeamPieces, BeamPolygons
 from .search import LEAF_PIECE, LEAF_RECEIVER
 
@@ -58,43 +59,61 @@ def hulls_of(corners, starts, grow, points, chain, ends, out):
 
 
 def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float) -> BeamPolygons:
-    """What lies on receivers. `unit`: GPU units a scene unit."""
-    chosen = Chosen(leaves, (LEAF_RECEIVER,))
-    head = chosen.head
-    edges = np.zeros((len(chosen.edges), 8))
-    edges[:, 0:3], edges[:, 4:7] = chosen.edges[:, 0], chosen.edges[:, 2]
+    """What lies on receivers, each in the part of its band in which it exists. `unit`: GPU units a scene unit."""
+    chosen = of_kind(leaves, LEAF_RECEIVER)
+    starts = np.append(0, np.cumsum(chosen.head[:, 6]))
+    corner_starts = np.append(0, np.cumsum(chosen.head[:, 7]))
+    edges = np.zeros((len(chosen.edge), 8))
+    edges[:, 0:3], edges[:, 4:7] = chosen.edge[:, 0], chosen.edge[:, 2]
     edges[:, 3] = edges[:, 7] = chosen.soft
-    starts = np.concatenate([[0], np.cumsum(head[:, 6])]).astype(np.int32)
-    softest = np.maximum.reduceat(np.append(chosen.soft, 0.0), starts[:-1]) if len(head) else np.zeros(0)
-    hull_start, hulls = hulls_around(chosen, softest)
+    lives = lifetimes_of(edges, starts, chosen.corner, corner_starts)
+    exists = lives.bands[:, 1] > lives.bands[:, 0]
+    t = lives.bands[exists]
+    counts = np.diff(starts)[exists]
+    kept = edges[np.repeat(exists, np.diff(starts))]
+    own = np.repeat(np.arange(len(t)), counts)
+    change = kept[:, 4:] - kept[:, :4]
+    hull_counts = np.diff(lives.starts)[exists]
+    softest = np.maximum.reduceat(kept[:, 3], np.cumsum(counts) - counts) if len(kept) else np.zeros(0)
+    hull_start, hulls = hulls_around(lives.corners, hull_counts, softest)
+    head, x = chosen.head[exists], chosen.x[exists]
     return BeamPolygons(
-        np.full(len(head), light, np.int32),
+        np.full(len(t), light, np.int32),
         scene.facets["receiver"][head[:, 1]].astype(np.int32),
         head[:, 3].astype(np.int32),
         head[:, 4].astype(np.int32),
-        chosen.x[:, 0],
-        chosen.x[:, 2],
-        chosen.density * unit * unit,
-        chosen.slope,
-        chosen.centre,
-        chosen.flux,
-        starts,
-        edges,
+        x[:, 0] + t[:, 0] * (x[:, 2] - x[:, 0]),
+        x[:, 0] + t[:, 1] * (x[:, 2] - x[:, 0]),
+        np.maximum(_parabola(chosen.density[exists], t), 0.0) * unit * unit,
+        chosen.slope[exists],
+        chosen.centre[exists],
+        chosen.flux[exists],
+        np.append(0, np.cumsum(counts)).astype(np.int32),
+        np.concatenate([kept[:, :4] + t[own, k, None] * change for k in range(2)], axis=1),
         hull_start,
         hulls,
+        lives.areas[exists],
     )
+
+
+def _parabola(values: np.ndarray, band: np.ndarray) -> np.ndarray:
+    """(N, 3) at the ends and the middle of part t0 … t1 (N, 2) of [0, 1], of parabolas given by `values` (N, 3) at the
+    ends and the middle of the whole."""
+    low, middle, high = values.T[..., None]
+    t = np.column_stack([band[:, 0], 0.5 * band.sum(axis=1), band[:, 1]])
+    return low + t * ((4.0 * middle - 3.0 * low - high) + t * 2.0 * (low - 2.0 * middle + high))
 
 
 def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int) -> BeamPieces:
     """What photons have to carry on."""
-    chosen = Chosen(leaves, (LEAF_PIECE,))
+    chosen = of_kind(leaves, LEAF_PIECE)
     head = chosen.head
-    edges = np.concatenate([chosen.edges[:, 0], chosen.edges[:, 2]], axis=1)
+    edges = np.concatenate([chosen.edge[:, 0], chosen.edge[:, 2]], axis=1)
     counts = head[:, 6]
     of_edge = np.repeat(np.arange(len(head)), counts)
     for first in (0, 3):
         edges[:, first + 2] += np.einsum("ek,ek->e", edges[:, first : first + 2], chosen.centre[of_edge])
-    hull_start, hulls = hulls_around(chosen, np.zeros(len(head)))
+    hull_start, hulls = hulls_around(chosen.corner, head[:, 7], np.zeros(len(head)))
     hulls = hulls - chosen.centre[np.repeat(np.arange(len(head)), np.diff(hull_start))]
     last = np.maximum(head[:, 2], 0)
     towards = np.einsum("mk,mk->m", chosen.ray[:, 1, 1, 0], scene.facets["plane"][last, :3])
@@ -120,36 +139,19 @@ def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int) -> BeamPieces:
     )
 
 
-class Chosen:
-    """Leaves of some kinds, packed."""
-
-    def __init__(self, leaves: list[Leaves], kinds: tuple[int, ...]) -> None:
-        head = _packed([part.head for part in leaves], (9,), np.int64)
-        keep = np.isin(head[:, 0], kinds)
-        edge_keep, corner_keep = np.repeat(keep, head[:, 6]), np.repeat(keep, head[:, 7])
-        self.head = head[keep]
-        self.x = _packed([part.x for part in leaves], (3,))[keep]
-        self.density = _packed([part.density for part in leaves], (3,))[keep]
-        self.centre = _packed([part.centre for part in leaves], (2,))[keep]
-        self.slope = _packed([part.slope for part in leaves], (2,))[keep]
-        self.flux = _packed([part.flux for part in leaves], ())[keep]
-        self.ray = _packed([part.ray for part in leaves], (2, 3, 3, 3))[keep]
-        self.edges = _packed([part.edge for part in leaves], (3, 3))[edge_keep]
-        self.soft = _packed([part.soft for part in leaves], ())[edge_keep]
-        self.corners = _packed([part.corner for part in leaves], (2,))[corner_keep]
+def of_kind(leaves: list[Leaves], kind: int) -> Leaves:
+    """Leaves of one kind (`search.LEAF_…`)."""
+    return Leaves.joined([part.where(part.head[:, 0] == kind) for part in leaves])
 
 
-def _packed(arrays: list[np.ndarray], shape: tuple[int, ...], dtype: type = float) -> np.ndarray:
-    return np.concatenate(arrays) if arrays else np.zeros((0, *shape), dtype)
-
-
-def hulls_around(chosen: Chosen, grow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Starts and corners of the leaves' convex hulls, grown by `grow` of each."""
-    starts = np.concatenate([[0], np.cumsum(chosen.head[:, 7])]).astype(np.int64)
-    out = np.empty((4 * len(chosen.corners) + 8, 2))
+def hulls_around(corners: np.ndarray, counts: np.ndarray, grow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Starts and corners of the convex hulls of groups of so many `corners`, one after the other, grown by `grow` of
+    each."""
+    starts = np.append(0, np.cumsum(counts)).astype(np.int64)
+    out = np.empty((4 * len(corners) + 8, 2))
     ends = np.zeros(len(starts), np.int64)
-    points = np.empty((4 * int(chosen.head[:, 7].max(initial=0)), 2))
-    hulls_of(chosen.corners, starts, grow.astype(float), points, np.empty((2 * len(points) + 2, 2)), ends, out)
+    points = np.empty((4 * int(counts.max(initial=0)), 2))
+    hulls_of(corners, starts, grow.astype(float), points, np.empty((2 * len(points) + 2, 2)), ends, out)
     return ends.astype(np.int32), out[: ends[-1]]
 
 

@@ -6,6 +6,7 @@ and a beam that may meet one goes on as photons.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from ..model.features import is_flat, why_no_beams
 from ..model.geometry.mesh import Mesh
-from ..model.optics.colorimetry import VISIBLE_NM, rgb_partition
+from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 
@@ -94,6 +95,14 @@ class BeamScene:
     """Objects of glass and mirrors whose light is carried by beams."""
     why_not: dict[int, str]
     """Specular objects that beams do not carry, and why."""
+
+
+def in_gpu_space(world_meshes: list[Mesh], to_gpu: Callable[[np.ndarray], np.ndarray], unit: float) -> list[Mesh]:
+    """Meshes as `beam_scene` takes them. `to_gpu`, `unit`: scene to GPU space, GPU units a scene unit."""
+    matrix = np.eye(4)
+    matrix[:3, :3] *= unit
+    matrix[:3, 3] = to_gpu(np.zeros(3))
+    return [mesh.transformed(matrix) for mesh in world_meshes]
 
 
 def beam_scene(
@@ -401,7 +410,7 @@ def _tables(scene: Scene, axis: SpectralAxis, unit: float) -> tuple[np.ndarray, 
                 rows.append(np.interp(nm, VISIBLE_NM, material.absorption.coefficient) / unit)
         if material.is_mirror:
             tint[-1] = len(rows)
-            rows.append(np.interp(nm, VISIBLE_NM, rgb_partition() @ np.asarray(material.reflectance_rgb, float)))
+            rows.append(mirror_reflectance(material.reflectance_rgb, nm))
     return np.array(rows, float).reshape(-1, SAMPLES), glass, tint
 
 

@@ -12,11 +12,12 @@ from itertools import pairwise
 import numpy as np
 
 from .facets import DIELECTRIC, MIRROR, BeamScene
-from .grow import FIRST, START, run
+from .hand import FIRST, START
 from .leaves import Leaves, Store
 from .nodes import NODE, STATIC
-from .rays import PARALLEL, POINT
+from .rays import PARALLEL, intensities
 from .search import SUM_ENTERED, SUMS, WORK, flux_in, may_touch, power_of
+from .steps import run
 
 _STACK = 1800
 _STEPS = 20_000
@@ -105,7 +106,7 @@ def search(
                     blocked.add(owner)
             root = stack[row : row + 1].copy()
             if emission.source["kind"][0] != PARALLEL:
-                root["weight"] = _mean_weight(root[0], emission.source[0])
+                root["weight"] = _mean_weight(root[0], emission.source)
             starts.append((owner, root, work.copy()))
     _stacks.append(stack)
     jobs = [(root, work) for owner, root, work in starts if owner not in blocked]
@@ -166,34 +167,21 @@ def _work(scene: BeamScene, emission: Emission, how: Search, share: float, sourc
 
 
 def _mean_weight(root: np.ndarray, source: np.ndarray) -> float:
-    """Mean of a diverging source's intensity (`rays.emitted`) over the outline of what it throws on one facet."""
+    """Mean of a diverging source's intensity (SOURCE (1,)) over the outline of what it throws on one facet."""
     place = int(np.argmax(root["corners"] > 0))
     corners = root["corner"][place, : root["corners"][place]]
     middles = (np.arange(_FINE) + 0.5) / _FINE
     s, t = (grid.ravel() for grid in np.meshgrid(middles, middles))
     total = area = 0.0
+    intensity = np.empty(len(s))
     for one, other in pairwise(corners[1:] - corners[0]):
         # A triangle as the square s, t: the farther from its tip, the wider.
         q = corners[0] + s[:, None] * (one + t[:, None] * (other - one))
         share = abs(one[0] * other[1] - one[1] * other[0]) * s / len(s)
-        total += float(share @ _intensity(source, q))
+        intensities(source, q, intensity, *np.empty((2, 3, 3)))
+        total += float(share @ intensity)
         area += float(share.sum())
     return total / area if area > 0.0 else 0.0
-
-
-def _intensity(source: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """`rays.emitted` of many directions."""
-    if source["kind"] != POINT:
-        return np.ones(len(q))
-    away = source["forward"] + q @ np.stack([source["right"], source["up"]])
-    length = np.linalg.norm(away, axis=1)
-    weight = np.linalg.norm(source["right"]) * np.linalg.norm(source["up"]) / length**3
-    cosine = np.clip(away @ source["axis"] / length, -1.0, 1.0)
-    inner, outer = source["cone"]
-    if outer - inner > 1e-7:
-        part = np.clip((outer - np.arccos(cosine)) / (outer - inner), 0.0, 1.0)
-        weight *= part * part * (3.0 - 2.0 * part)
-    return weight * np.maximum(cosine, 0.0) if source["lambert"] else weight
 
 
 def _roots(

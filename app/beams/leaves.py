@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -14,10 +14,8 @@ from .search import medium
 
 @dataclass(frozen=True)
 class Leaves:
-    """Rows of finished beams; `count` says how much is used."""
+    """Rows of finished beams: L leaves with all their E edges and H corners, in their order."""
 
-    count: np.ndarray
-    """int64 (3,): leaves, edges, corners."""
     head: np.ndarray
     """int64 (L, 9): kind, facet it ends on (-1: none), facet left last, object first met, depth, mask, edges, corners,
     hash of its path."""
@@ -39,6 +37,18 @@ class Leaves:
     """(E,): half width of the penumbra, target's lengths."""
     corner: np.ndarray
     """(H, 2): of the polygons at all places."""
+
+    def where(self, keep: np.ndarray) -> Leaves:
+        """Those that `keep`, bool (L,), names, with their edges and corners."""
+        of_edge, of_corner = np.repeat(keep, self.head[:, 6]), np.repeat(keep, self.head[:, 7])
+        rows = {"edge": of_edge, "soft": of_edge, "corner": of_corner}
+        return Leaves(**{f.name: getattr(self, f.name)[rows.get(f.name, keep)] for f in fields(self)})
+
+    @classmethod
+    def joined(cls, parts: list[Leaves]) -> Leaves:
+        """All leaves of some; of none, none."""
+        parts = parts or [Store(0).leaves(np.zeros(3, np.int64))]
+        return cls(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)})
 
 
 LEAF = np.dtype(
@@ -75,7 +85,6 @@ class Store:
         """What was written: leaves, edges, corners by `count`."""
         leaf, edge = self.leaf[: count[0]].copy(), self.edge[: count[1]].copy()
         return Leaves(
-            count=count.copy(),
             head=leaf["head"],
             x=leaf["x"],
             density=leaf["density"],

@@ -7,6 +7,8 @@ fewer texels, and a few places of its band show it as it is.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .compiling import jit, part
@@ -16,8 +18,8 @@ PLACES = 17
 """At which a polygon that is empty at an end is looked for."""
 _HALVINGS = 8
 """Of a place, to find where it appears or vanishes."""
-_ROOM = 128
-"""Corners."""
+ROOM = 128
+"""Corners of an outline, the last two a box."""
 
 
 @part
@@ -37,10 +39,10 @@ def outline_at(edges, first, last, box, t, corner, spare):
             j = i + 1 if i + 1 < n else 0
             here = a * corner[i, 0] + b * corner[i, 1] + c
             there = a * corner[j, 0] + b * corner[j, 1] + c
-            if here >= 0.0 and kept < _ROOM - 1:
+            if here >= 0.0 and kept < ROOM - 4:
                 spare[kept, 0], spare[kept, 1] = corner[i, 0], corner[i, 1]
                 kept += 1
-            if (here >= 0.0) != (there >= 0.0) and kept < _ROOM - 1:
+            if (here >= 0.0) != (there >= 0.0) and kept < ROOM - 4:
                 at = here / (here - there)
                 spare[kept, 0] = corner[i, 0] + at * (corner[j, 0] - corner[i, 0])
                 spare[kept, 1] = corner[i, 1] + at * (corner[j, 1] - corner[i, 1])
@@ -67,17 +69,71 @@ def border(edges, first, last, box, alive, dead, corner, spare):
 
 
 @jit
-def lifetimes(edges, starts, hulls, hull_starts, is_band, corner, spare, lives, areas):
-    """For every polygon the part of [0, 1] in which it exists, in `lives` (N, 2), equal where it never does; and its
-    area in the middle of that, in `areas`. `corner`, `spare` (128, 2): scratch."""
-    box = spare[_ROOM]
+def lifetimes(edges, starts, corners, corner_starts, corner, spare, lives, areas, kept, kept_ends):
+    """For every polygon the part of its band in which it exists, into `lives` (N, 2) (both 0 where it never does), and
+    its area in the middle of that, into `areas` (N,). `corners` are those of each polygon at its places; those of what
+    exists go to `kept`, up to `kept_ends` (N + 1,). `corner`, `spare` (`ROOM`, 2): scratch."""
+    box, step, count = corner[ROOM - 2 :].ravel(), 1.0 / (PLACES - 1), 0
     for i in range(len(starts) - 1):
         first, last = starts[i], starts[i + 1]
-        low_u = low_v = 1e300
-        high_u = high_v = -1e300
-        for h in range(hull_starts[i], hull_starts[i + 1]):
-            low_u, high_u = min(low_u, hulls[h, 0]), max(high_u, hulls[h, 0])
-            low_v, high_v = min(low_v, hulls[h, 1]), max(high_v, hulls[h, 1])
-        grow = 1e-6 * (high_u - low_u + high_v - low_v)
-        box[0, 0] = low_u - grow
-        lives[i, 0], lives[i, 1] = 0.0, 1.0
+        box[0] = box[1] = 1e300
+        box[2] = box[3] = -1e300
+        for h in range(corner_starts[i], corner_starts[i + 1]):
+            for k in range(2):
+                box[k], box[2 + k] = min(box[k], corners[h, k]), max(box[2 + k], corners[h, k])
+        grow = 1e-6 * (box[2] - box[0] + box[3] - box[1])
+        for k in range(2):
+            box[k] -= grow
+            box[2 + k] += grow
+        low = high = -1.0
+        for k in range(PLACES):
+            t = k * step
+            if outline_at(edges, first, last, box, t, corner, spare) > 0:
+                low = t if low < 0.0 else low
+                high = t
+                # Most exist everywhere.
+                if k == 0 and outline_at(edges, first, last, box, 1.0, corner, spare) > 0:
+                    high = 1.0
+                    break
+        lives[i, 0] = lives[i, 1] = areas[i] = 0.0
+        if low >= 0.0:
+            lives[i, 0] = 0.0 if low <= 0.0 else border(edges, first, last, box, low, low - step, corner, spare)
+            lives[i, 1] = 1.0 if high >= 1.0 else border(edges, first, last, box, high, high + step, corner, spare)
+            is_whole = lives[i, 0] <= 0.0 and lives[i, 1] >= 1.0
+            for turn in range(3):
+                t = lives[i, 0] + 0.5 * turn * (lives[i, 1] - lives[i, 0])
+                n = outline_at(edges, first, last, box, t, corner, spare)
+                if turn == 1:
+                    areas[i] = area_of(corner, n)
+                for c in range(0 if is_whole else n):
+                    kept[count, 0], kept[count, 1] = corner[c, 0], corner[c, 1]
+                    count += 1
+            for h in range(corner_starts[i], corner_starts[i + 1] if is_whole else corner_starts[i]):
+                kept[count, 0], kept[count, 1] = corners[h, 0], corners[h, 1]
+                count += 1
+        kept_ends[i + 1] = count
+
+
+@dataclass(frozen=True)
+class Lifetimes:
+    """Of N polygons."""
+
+    bands: np.ndarray
+    """(N, 2): first and last place t in [0, 1] of the band; the same where there never is anything."""
+    areas: np.ndarray
+    """(N,), in the middle between."""
+    starts: np.ndarray
+    """int64 (N + 1,), into `corners`."""
+    corners: np.ndarray
+    """(H, 2), of the polygons at several places between."""
+
+
+def lifetimes_of(edges: np.ndarray, starts: np.ndarray, corners: np.ndarray, corner_starts: np.ndarray) -> Lifetimes:
+    """Of polygons by their `edges` (E, 8) (`BeamPolygons`), and `corners` (H, 2) that hold them at all places; both
+    with starts (N + 1,)."""
+    n = len(starts) - 1
+    bands, areas, ends = np.zeros((n, 2)), np.zeros(n), np.zeros(n + 1, np.int64)
+    kept = np.empty((max(3 * (len(edges) + 4 * n), 0) + len(corners), 2))
+    corner, spare = np.empty((2, ROOM, 2))
+    lifetimes(edges, starts, corners, corner_starts, corner, spare, bands, areas, kept, ends)
+    return Lifetimes(bands, areas, ends, kept[: ends[-1]])

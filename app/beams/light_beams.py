@@ -13,8 +13,9 @@ from ..model.geometry.mesh import Mesh
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 from .convert import pieces_of, polygons_of
-from .facets import beam_scene, shown_as
+from .facets import beam_scene, in_gpu_space, shown_as
 from .find import Emission, GoOn, Search, search
+from .leaves import Leaves
 from .polygons import BeamPieces, BeamPolygons, joined
 from .search import SUMS
 from .sources import emissions, mask_at, why_no_beams
@@ -50,10 +51,7 @@ class BeamFinder:
     ) -> None:
         """`frames`: origin and axes of every flat receiver's map by number, `texels`: side of its finest texel, GPU
         units; `to_gpu`, `unit`: scene to GPU space, GPU units a scene unit."""
-        matrix = np.eye(4)
-        matrix[:3, :3] *= unit
-        matrix[:3, 3] = to_gpu(np.zeros(3))
-        self.meshes = [mesh.transformed(matrix) for mesh in world_meshes]
+        self.meshes = in_gpu_space(world_meshes, to_gpu, unit)
         self.scene = beam_scene(scene, self.meshes, frames, axis, unit)
         self._scene, self._axis, self._to_gpu, self._unit = scene, axis, to_gpu, unit
         self.set_texels(texels)
@@ -117,7 +115,7 @@ class BeamFinder:
         polygons, pieces = [], []
         for i, parts in todo:
             sums, blocked = np.zeros(SUMS), set()
-            found = []
+            found: list[Leaves] = []
             for number, part in enumerate(parts):
                 how = Search(
                     threshold,
@@ -127,17 +125,16 @@ class BeamFinder:
                     power=total / watts[i] if watts[i] > 0.0 else None,
                 )
                 leaves, part_sums, part_blocked = search(beams, part, how, threads, go_on)
-                found.append(leaves)
+                found += leaves
                 sums += part_sums
                 blocked |= part_blocked
                 done += 1
                 yield done / steps
             if blocked:
                 # Photons carry what these objects throw: all of it, whichever point of the light it comes from.
-                found = [[leaves_without(leaves, blocked) for leaves in part] for part in found]
-            flat = [leaves for part in found for leaves in part]
-            polygons.append(polygons_of(flat, beams, i, self._unit))
-            pieces.append(pieces_of(flat, beams, i))
+                found = [leaves.where(~np.isin(leaves.head[:, 3], list(blocked))) for leaves in found]
+            polygons.append(polygons_of(found, beams, i, self._unit))
+            pieces.append(pieces_of(found, beams, i))
             result.carried[i] = tuple(o for o in beams.beam_objects if o not in blocked)
             result.sums[i] = sums
         result.polygons = joined(polygons) if polygons else None
@@ -147,26 +144,6 @@ class BeamFinder:
 
 _TOLERANCE = 0.25
 """Texels."""
-
-
-def leaves_without(leaves, objects: set[int]):
-    """The leaves of beams that met none of `objects` first."""
-    from .leaves import Leaves
-
-    n, e, c = leaves.count
-    keep = ~np.isin(leaves.head[:n, 3], list(objects))
-    edges, corners = np.repeat(keep, leaves.head[:n, 6]), np.repeat(keep, leaves.head[:n, 7])
-    per_leaf = {
-        name: getattr(leaves, name)[:n][keep] for name in ("head", "x", "density", "centre", "slope", "flux", "ray")
-    }
-    count = np.array([keep.sum(), edges.sum(), corners.sum()])
-    return Leaves(
-        count=count,
-        **per_leaf,
-        edge=leaves.edge[:e][edges],
-        soft=leaves.soft[:e][edges],
-        corner=leaves.corner[:c][corners],
-    )
 
 
 def _power(light) -> float:

@@ -76,6 +76,15 @@ def last_place(beam):
 
 
 @part
+def exists_throughout(beam):
+    """Whether a beam's outline is empty at none of its places."""
+    for a in range(first_place(beam), last_place(beam)):
+        if beam.corners[a] == 0:
+            return False
+    return True
+
+
+@part
 def clip(corner, side, count, label, work):
     """Keep the part of a convex polygon where `work.height`, given at its corners, is not negative [Sutherland,
     Hodgman 1974]; returns its corners."""

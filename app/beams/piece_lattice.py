@@ -53,7 +53,7 @@ class PieceLattice:
         """`powers` of the lights (`SceneBuffers.light_power`); `measures`: what one unit of each light's q counts
         (scene unit² or sr). Raises UserError without numba."""
         try:
-            from . import piece_kernel
+            from . import piece_kernel, piece_measure
         except ImportError as error:
             raise UserError(f"following beams needs numba ({error}); install it with: pip install numba") from error
         self._kernel = piece_kernel
@@ -72,7 +72,7 @@ class PieceLattice:
         self._bands = np.ascontiguousarray(pieces.x_lo, float), np.ascontiguousarray(pieces.x_hi, float)
         self._weight = np.ascontiguousarray(pieces.weight, float)
         self._content, self._power = np.zeros(len(pieces)), np.zeros(len(pieces))
-        piece_kernel.contents(
+        piece_measure.contents(
             *self._bands,
             self._weight,
             *self._edges,

@@ -43,8 +43,7 @@ class BeamPolygons:
     centre: np.ndarray
     """(N, 2), where `density` is taken (middle of the band)."""
     flux: np.ndarray
-    """(N,), what of the light's spectral power the polygon holds at the middle of its band: density integrated over the
-    polygon, per unit of spectral power."""
+    """(N,), W that the polygon holds, per W that the light has over its whole spectrum."""
     edge_start: np.ndarray
     """int32 (N + 1,), polygon i has edges edge_start[i] … edge_start[i + 1]."""
     edges: np.ndarray
@@ -55,6 +54,8 @@ class BeamPolygons:
     hulls: np.ndarray
     """(H, 2), corners, counter-clockwise, of a convex polygon that holds the lit places of the whole band (penumbra
     included)."""
+    area: np.ndarray
+    """(N,), GPU units², at the middle of the band."""
 
     def __len__(self) -> int:
         return len(self.light)

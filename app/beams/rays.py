@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .compiling import part
+from .compiling import jit, part
 
 PARALLEL, POINT, PINHOLE = 0, 1, 2
 """Kinds of sources. Rays of the last two diverge; a pinhole's weigh the same all over the picture."""
@@ -112,6 +112,14 @@ def emitted(source, u, v, direction):
     if source.lambert:
         weight *= max(cosine, 0.0)
     return weight
+
+
+@jit
+def intensities(sources, q, out, position, direction):
+    """`emitted` of the first source towards each q (N, 2), into `out` (N,); the other two are scratch, (3, 3)."""
+    for i in range(len(q)):
+        emit(sources[0], q[i, 0], q[i, 1], position, direction)
+        out[i] = emitted(sources[0], q[i, 0], q[i, 1], direction)
 
 
 @part

@@ -20,7 +20,8 @@ from ..model.features import Features
 from ..model.optics.colorimetry import rgb709_to_xyz
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
-from ..passes.camera import CameraPass, CausticMaps
+from ..passes.camera import CameraPass
+from ..passes.caustic_maps import CausticMaps
 from ..passes.spectrum_choice import Spectrum
 from ..render.light_pass import LightPass, scene_buffers, spectral_axis
 from ..render.sampling import CameraSampling

@@ -5,11 +5,8 @@ A file that cannot be understood is set aside under another name and reported, l
 
 from __future__ import annotations
 
-import os
 import tomllib
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -24,7 +21,7 @@ from ..model.materials.material_file import read_material
 from ..model.placement import Surroundings
 from ..model.scene import Camera, Light, Material
 from ..model.scene_camera import camera_values, read_camera
-from .preferences import config_dir
+from .preferences import config_dir, set_aside
 from .presets import LightPreset, MaterialPreset, ViewPreset
 
 Preset = TypeVar("Preset", MaterialPreset, LightPreset, ViewPreset)
@@ -71,12 +68,12 @@ def load_own_presets() -> tuple[OwnPresets, str | None]:
     except (OSError, UserError) as error:
         return OwnPresets(), f"Your presets cannot be read: {error}."
     except UnicodeDecodeError as error:
-        return OwnPresets(), _set_aside(path, error)
+        return OwnPresets(), set_aside(path, "Your presets", error) + "."
     try:
         with files.own_files():
             return _read(SceneTable(tomllib.loads(text), path)), None
     except (ValueError, UserError, RecursionError) as error:
-        return OwnPresets(), _set_aside(path, error)
+        return OwnPresets(), set_aside(path, "Your presets", error) + "."
 
 
 def save_own_presets(presets: OwnPresets) -> None:
@@ -115,12 +112,3 @@ def _named(name: str) -> str:
     if not plain:
         raise UserError("the preset needs a name")
     return plain
-
-
-def _set_aside(path: Path, error: Exception) -> str:
-    aside = path.with_name(f"{path.stem}.broken{path.suffix}")
-    reason = str(error).partition("\n")[0]
-    with suppress(OSError):
-        os.replace(path, aside)
-        return f"Your presets were damaged ({reason}) and are kept as {aside}."
-    return f"Your presets in {path} are damaged ({reason})."

@@ -91,7 +91,8 @@ def load_settings() -> tuple[Settings, str | None]:
     try:
         settings = msgspec.json.decode(data, type=Settings, dec_hook=_decode_path)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        return Settings(), _set_aside(path, error)
+        told = set_aside(path, "The settings", error)
+        return Settings(), f"{told}; those of a new installation are used."
     return _sound(settings), None
 
 
@@ -121,13 +122,14 @@ def _sound(settings: Settings) -> Settings:
     return replace(settings, preferences=preferences, window=window, recent=settings.recent[:MAX_RECENT])
 
 
-def _set_aside(path: Path, error: Exception) -> str:
+def set_aside(path: Path, what: str, error: Exception) -> str:
+    """Keep a damaged file under another name; says so, opened by `what` ("The settings"), without its full stop."""
     aside = path.with_name(f"{path.stem}.broken{path.suffix}")
     reason = str(error).partition("\n")[0]
     with suppress(OSError):
         os.replace(path, aside)
-        return f"The settings were damaged ({reason}) and are kept as {aside}; those of a new installation are used."
-    return f"The settings in {path} are damaged ({reason}); those of a new installation are used."
+        return f"{what} were damaged ({reason}) and are kept as {aside}"
+    return f"{what} in {path} are damaged ({reason})"
 
 
 def _is_text(path: Path) -> bool:

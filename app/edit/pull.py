@@ -8,18 +8,17 @@ large, so the place of a colour is linear in k, and one division solves for it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ..base.errors import UserError
 from ..model.local_dispersion import MAX_LOG2_GAIN, MIN_LOG2_GAIN, gain_at
 from ..model.optics.colorimetry import VISIBLE_NM, cmf_xyz, illuminant_table
-from ..model.optics.glass import LINE_D_NM
 from ..model.scene import Dab, Scene, SceneObject, Vec3
 from ..model.vectors import vec3
 from .requests import Pull
+from .stored_photons import StoredPhotons
 
 MAX_GAIN = 10.0
 _GRID_NM = np.arange(380.0, 781.0, 4.0)
@@ -31,51 +30,6 @@ _PREFERRED_SHARE = 0.05
 _MIN_PURITY = 0.12
 _SHORTEST = 0.25
 """Least displacement that can be pulled by, in radii of the point taken."""
-
-
-@dataclass(frozen=True)
-class PullPhotons:
-    """Stored photons as a pull needs them; the first axis of every array counts photons."""
-
-    position: np.ndarray
-    """(n, 3) world, where the anchor wavelength lands."""
-    dposition_dn: np.ndarray
-    """(n, groups, 3) world, per unit of each spectral group's variable (the index of its glass)."""
-    n_anchor: np.ndarray
-    """(n, groups): the variables at the anchor wavelength, by the glass that the photons were traced through."""
-    flux_w: np.ndarray
-    """(n,)."""
-    source: np.ndarray
-    """(n,) scene object that the photon met first."""
-    receiver: np.ndarray
-    """(n,) scene object it landed on."""
-    band_nm: np.ndarray
-    """(n, 2) first and last wavelength."""
-    variables: tuple[Callable[[np.ndarray], np.ndarray], ...]
-    """Each group's variable over the wavelength in nm, by the glass that is shown (`Dispersion.index`)."""
-    group_of_object: Mapping[int, int]
-    """Spectral group of every dispersive glass object."""
-
-    def chosen(self, index: np.ndarray) -> PullPhotons:
-        """Some of the photons."""
-        fields = ("position", "dposition_dn", "n_anchor", "flux_w", "source", "receiver", "band_nm")
-        return replace(self, **{name: getattr(self, name)[index] for name in fields})
-
-    def landing(self, wavelength_nm: np.ndarray) -> np.ndarray:
-        """Where each photon's light of some wavelengths (w,) lands: (n, w, 3) world."""
-        shift = (
-            np.stack([variable(wavelength_nm) for variable in self.variables], axis=0)[None] - self.n_anchor[:, :, None]
-        )
-        return self.position[:, None] + np.einsum("ngj,ngw->nwj", self.dposition_dn, shift)
-
-    def displacement(self, wavelength_nm: float, group: int | None) -> np.ndarray:
-        """From the d line's landing point to that of a wavelength, by one group's glass or by all: (n, 3)."""
-        groups = range(len(self.variables)) if group is None else [group]
-        line = np.array([wavelength_nm, LINE_D_NM])
-        return sum(
-            (self.dposition_dn[:, g] * float(np.subtract(*self.variables[g](line))) for g in groups),
-            np.zeros_like(self.position),
-        )
 
 
 def dominant_nm(xyz: np.ndarray) -> float | None:
@@ -95,7 +49,7 @@ def dominant_nm(xyz: np.ndarray) -> float | None:
 
 
 def begin_pull(
-    photons: PullPhotons,
+    photons: StoredPhotons,
     scene: Scene,
     point: Vec3 | np.ndarray,
     normal: Vec3 | np.ndarray,
@@ -147,7 +101,7 @@ def begin_pull(
     return replace(pull, gain_at_start=local_gain(receiver, pull)) if local else pull
 
 
-def _candidates(photons: PullPhotons, point: np.ndarray, radius: float, receiver: int) -> PullPhotons:
+def _candidates(photons: StoredPhotons, point: np.ndarray, radius: float, receiver: int) -> StoredPhotons:
     """Photons of the receiver whose band passes within three radii of the point, thinned evenly where there are
     many."""
     index = np.flatnonzero((photons.receiver == receiver) & (photons.flux_w > 0.0))
@@ -165,7 +119,7 @@ def _candidates(photons: PullPhotons, point: np.ndarray, radius: float, receiver
     return some.chosen(index[:: max(1, len(index) // _MAX_CANDIDATES)])
 
 
-def _weights(photons: PullPhotons, point: np.ndarray, radius: float, wavelength_nm: float | None) -> np.ndarray:
+def _weights(photons: StoredPhotons, point: np.ndarray, radius: float, wavelength_nm: float | None) -> np.ndarray:
     """Share of each photon (n,) and wavelength of `_GRID_NM` in the light at the point: (n, w)."""
     if not len(photons.position):
         return np.zeros((0, len(_GRID_NM)))
@@ -187,7 +141,7 @@ def _weights(photons: PullPhotons, point: np.ndarray, radius: float, wavelength_
     return around if around.sum() > 0.0 else weights
 
 
-def _owner(photons: PullPhotons) -> np.ndarray:
+def _owner(photons: StoredPhotons) -> np.ndarray:
     """The glass that a photon's colours are owed to, (n,): the object met first, else the one that displaces most."""
     owner = photons.source.astype(np.int64)
     dispersive = np.isin(owner, list(photons.group_of_object))
@@ -199,7 +153,7 @@ def _owner(photons: PullPhotons) -> np.ndarray:
     return np.where(dispersive, owner, [first_of_group.get(int(group), -1) for group in strongest])
 
 
-def _source(photons: PullPhotons, weight: np.ndarray, prefer: int | None) -> int:
+def _source(photons: StoredPhotons, weight: np.ndarray, prefer: int | None) -> int:
     owner = _owner(photons)
     sums = {
         int(item): float(weight[owner == item].sum()) for item in np.unique(owner) if item in photons.group_of_object

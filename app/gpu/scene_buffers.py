@@ -21,7 +21,7 @@ from ..model.features import (
     half_spaces,
 )
 from ..model.geometry.bvh import build_bvh
-from ..model.optics.colorimetry import VISIBLE_NM, rgb_partition
+from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
 from ..model.optics.glass import Dispersion
 from ..model.optics.spectral_tables import (
     CumulativeSpectrum,
@@ -454,12 +454,6 @@ def _best_corner_first(corners: np.ndarray) -> np.ndarray:
     size = np.linalg.norm(to_next, axis=2) * np.linalg.norm(from_last, axis=2)
     cosine = np.abs(np.divide(along, size, out=np.ones_like(along), where=size > 0.0))
     return ((cosine.argmin(axis=1)[:, None] + np.arange(3)) % 3)[..., None]
-
-
-def mirror_reflectance(rgb: tuple[float, float, float], nm: np.ndarray) -> np.ndarray:
-    """Smooth spectral reflectance whose bands average to the linear RGB."""
-    partition = rgb_partition() @ np.asarray(rgb, float)
-    return np.interp(nm, VISIBLE_NM, partition)
 
 
 def _transformed_planes(planes: np.ndarray, matrix: np.ndarray) -> np.ndarray:

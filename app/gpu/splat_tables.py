@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 CUT = 3.0
 """Standard deviations that a splat reaches beyond its sweep (as in footprint.comp)."""
 SIGMAS = np.concatenate([2.0 ** (np.arange(16) / 4.0 - 8.0), 2.0 ** (np.arange(73) / 8.0 - 4.0)])
-"""Standard deviation / sweep length of each row: 2^-8 to 2^5, closer together from 2^-4 on (as in footprint.comp),
+"""Standard deviation / sweep length of each row: 2^-8 to 2^5, closer together from 2^-4 on (as in splat_shapes.glsl),
 where it shapes the splat. The footprint pass makes every splat fit a row, so that the nearest texel serves; filtering
 would cost a software renderer a fifth of its rate."""
 WIDTH, WIDTH_WITH_LINES = 512, 1024

@@ -121,7 +121,7 @@ def hull_boxes(polygons: BeamPolygons, corners: np.ndarray) -> np.ndarray:
     return np.concatenate([np.minimum.reduceat(corners, start), np.maximum.reduceat(corners, start)], axis=1)
 
 
-def levels(polygons: BeamPolygons, chosen: np.ndarray, to_texels: TexelMap, area_scale: float) -> np.ndarray:
+def levels(polygons: BeamPolygons, chosen: np.ndarray, to_texels: TexelMap) -> np.ndarray:
     """int64 (n,): how many times the texels may double for each of the `chosen`, since its penumbrae are broad.
 
     A polygon far narrower than its penumbrae shows their mean only; of another the sharpest edge counts."""
@@ -131,8 +131,7 @@ def levels(polygons: BeamPolygons, chosen: np.ndarray, to_texels: TexelMap, area
     windows = np.sqrt(1.0 + 4.0 * softness**2)
     mean = np.add.reduceat(windows.mean(axis=1), first) / counts
     widest = np.maximum.reduceat(windows.max(axis=1), first)
-    density = polygons.density[chosen].max(axis=1)
-    area = polygons.flux[chosen] / np.where(density > 0.0, density, 1.0) * area_scale
+    area = polygons.area[chosen] * abs(np.linalg.det(to_texels.matrix))
     window = np.where(np.sqrt(area) < WIDE * widest, mean, np.minimum.reduceat(windows.min(axis=1), first))
     return np.maximum(np.floor(np.log2(window / BROAD)), 0.0).astype(np.int64)
 
@@ -142,11 +141,10 @@ def packed(
     chosen: np.ndarray,
     to_texels: TexelMap,
     energy_scale: float,
-    area_scale: float,
     curves: CurveParts,
 ) -> Iterator[PackedBeams]:
     """The `chosen` polygons (n,), all on one window, a draw for each kind of program that they need. `curves` of these;
-    `energy_scale`: from flux per scene unit² to what a whole texel holds; `area_scale`: texels a scene unit²."""
+    `energy_scale`: from flux per scene unit² to what a whole texel holds."""
     hull_rows, hull_counts = ragged(polygons.hull_start, chosen)
     hulls = to_texels.texels(polygons.hulls[hull_rows])
     hull_first = np.cumsum(hull_counts) - hull_counts
@@ -162,7 +160,7 @@ def packed(
     middle, end = np.where(is_line, start, middle), np.where(is_line, start, end)
     lines, moves = _lines(polygons.edges[edge_rows], to_texels, anchor[owner], is_line[owner], 0.5 * diagonal[owner])
     motion = np.maximum.reduceat(moves, first)
-    area = polygons.flux[chosen] / np.where(middle > 0.0, middle, 1.0) * area_scale
+    area = polygons.area[chosen] * abs(np.linalg.det(to_texels.matrix))
     width = area / np.maximum(diagonal - motion, np.sqrt(area) + 1e-9)
     windows, widest = _windows(lines[..., 3], first, owner, width)
     is_wide = width > WIDE * widest

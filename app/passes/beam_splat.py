@@ -70,7 +70,7 @@ class BeamSplatter:
             for start in range(0, len(chosen), GROUP):
                 part = chosen[start : start + GROUP]
                 curves = tables.parts(polygons.light[part], reflectance_class, polygons.x_lo[part], polygons.x_hi[part])
-                for beams in packed(polygons, part, to_texels, texel_area * weight, 1.0 / texel_area, curves):
+                for beams in packed(polygons, part, to_texels, texel_area * weight, curves):
                     self._draw(beams, tables, atlas, record["rect"])
                 atlas.pending += len(part)
                 if atlas.pending >= GROUP:
@@ -154,7 +154,7 @@ def _by_width(
     """(placement, polygons): those with broad penumbrae go to the same window's wider texels, for a fraction of the
     fragments."""
     record = layout.placements[placement]
-    level = levels(polygons, chosen, TexelMap.of(record, frame), 1.0 / float(record["texel_area"]))
+    level = levels(polygons, chosen, TexelMap.of(record, frame))
     while len(chosen):
         wider = int(layout.placements[placement]["blurred"])
         is_here = (level <= 0) | (wider == NONE)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass
 
 import moderngl
 import numpy as np
@@ -20,17 +19,16 @@ from ..gpu import bindings, shader
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.map_channels import MapChannels
-from ..gpu.records import NONE, PLACEMENT, RECEIVER
+from ..gpu.records import PLACEMENT, RECEIVER
 from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
 from ..gpu.texture_store import PICTURE, TextureStore
-from ..model.camera_rays import camera_frame
-from ..model.optics.colorimetry import xyz_to_rgb709_matrix
 from ..model.scene import Camera
-from ..model.scene_checks import contains
-from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
+from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, camera_parameters, light_record
 from .camera_tables import CameraTables
+from .caustic_maps import CausticMaps
 from .listed_pixels import GROUP, ListedPixels
 from .picture_channels import Channels
+from .picture_sums import PictureSums
 from .pixel_lattice import is_in_strips, pixel_lattice, shared_places
 from .screen_beams import ScreenBeams
 from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
@@ -73,20 +71,6 @@ FALLBACKS = ("columns_dropped", "depth_reached", "stack_full", "band_uncut", "lo
 """What the shader counts, in its order."""
 
 
-@dataclass(frozen=True)
-class CausticMaps:
-    """The light pass's result, as the camera reads it."""
-
-    textures: Sequence[moderngl.Texture]
-    """RGBA32F, energy per texel: XYZ and W with spectral tents after them, or four bins each."""
-    receivers: moderngl.Buffer
-    """RECEIVER records."""
-    placements: moderngl.Buffer
-    """PLACEMENT records."""
-    scale: float = 1.0
-    """Factor on every texel: one over the number of passes summed in it."""
-
-
 class CameraPass:
     """Owns the program, the sums and the light tables; `run` adds samples, `read_*` divide by their number."""
 
@@ -126,8 +110,7 @@ class CameraPass:
         self._counters = self._ctx.buffer(bytes(4 * len(FALLBACKS)))
         self._parameters_buffer = self._ctx.buffer(reserve=CAMERA_PARAMETERS.stride)
         self._empty: CausticMaps | None = None
-        self._pictures: list[moderngl.Texture] = []
-        self._samples_of_row = np.zeros(0, int)
+        self._sums = PictureSums(self._ctx, self.channels.targets)
         self._rows = DispatchBudget(1, 1, 1)
         self._within_rows = False
         """Some listed pixels of a band of rows have this sample, others are still to get it."""
@@ -241,7 +224,7 @@ class CameraPass:
         seed: int = 1,
     ) -> Iterator[float]:
         """`run`, pausing after every dispatch with the share done: whoever draws meanwhile may bind what it likes."""
-        if sample_offset == 0 or self._size != (width, height):
+        if sample_offset == 0 or self._sums.size != (width, height):
             self._clear(width, height)
         maps = maps or self._no_maps()
         parameters = self._parameters(camera, width, height, maps.scale, seed)
@@ -301,7 +284,7 @@ class CameraPass:
                 self.spectrum = stop.value
                 break
             picture = yield from self._coarse_picture(look, camera, width, height, samples, maps or self._no_maps())
-        self._clear(*self._size)
+        self._clear(*self._sums.size)
 
     def _coarse_picture(
         self, look: PilotRender, camera: Camera, width: int, height: int, samples: int, maps: CausticMaps
@@ -324,7 +307,7 @@ class CameraPass:
         for number in range(look.spectrum.bands):
             parameters["sample_index"] = parameters["draw_index"] = number
             yield from self._add_sample(parameters, columns, rows, maps)
-        picture = self._read().astype(np.float64)
+        picture = self._sums.mean().astype(np.float64)
         # Beside a picture in colour, turns are counted.
         return picture[..., :3] if self.channels.edges_nm is None else picture
 
@@ -352,8 +335,7 @@ class CameraPass:
         self._parameters_buffer.bind_to_uniform_block(bindings.PARAMETERS)
         for unit, texture in enumerate(maps.textures):
             texture.use(location=unit)
-        for unit, picture in enumerate(self._pictures):
-            picture.bind_to_image(unit, read=True, write=True)
+        self._sums.bind()
 
     @property
     def fallbacks(self) -> dict[str, int]:
@@ -364,7 +346,7 @@ class CameraPass:
     @property
     def sums(self) -> Sequence[moderngl.Texture]:
         """RGBA32F sums over the samples taken, four channels each."""
-        return self._pictures
+        return self._sums.textures
 
     @property
     def is_even(self) -> bool:
@@ -374,19 +356,20 @@ class CameraPass:
     @property
     def samples_taken(self) -> int:
         """Samples that every pixel has."""
-        return int(self._samples_of_row.min()) if len(self._samples_of_row) else 0
+        rows = self._sums.samples_of_row
+        return int(rows.min()) if len(rows) else 0
 
     def read_rgb(self) -> np.ndarray:
         """Linear Rec.709 radiance, float32 (H, W, 3), lm/(sr unit²) per channel of white; row 0 on top."""
-        return self.channels.to_rgb709(self._read())
+        return self.channels.to_rgb709(self._sums.mean())
 
     def read_spectral(self) -> np.ndarray:
         """Radiance of each bin, float32 (H, W, bins), W/(sr unit²)."""
-        return self.channels.to_spectral(self._read())
+        return self.channels.to_spectral(self._sums.mean())
 
     def release(self) -> None:
         """Free every buffer, texture and program."""
-        shader.release(self._tables, self._lights, self._counters, *self._pictures, self._parameters_buffer)
+        shader.release(self._tables, self._lights, self._counters, self._sums, self._parameters_buffer)
         if self._beams is not None:
             self._beams.release()
         if self._beam_objects_buffer is not None:
@@ -399,68 +382,25 @@ class CameraPass:
         if self._owns_pictures:
             self.pictures.release()
         if self._empty is not None:
-            shader.release(*self._empty.textures, self._empty.receivers, self._empty.placements)
-        self._pictures, self._empty = [], None
+            self._empty.release()
+        self._empty = None
 
     # ---- private ---------------------------------------------------------------------------
 
-    @property
-    def _size(self) -> tuple[int, int]:
-        return self._pictures[0].size if self._pictures else (0, 0)
-
     def _parameters(self, camera: Camera, width: int, height: int, map_scale: float, seed: int) -> np.ndarray:
-        space = self.scene.space
-        right, up, forward = camera_frame(camera)
-        orthographic = camera.kind == "orthographic"
-        half_height = (
-            0.5 * camera.vertical_extent * space.scale
-            if orthographic
-            else np.tan(np.radians(0.5 * camera.vertical_fov_deg))
-        )
-        parameters = CAMERA_PARAMETERS.zeros(1)
-        parameters["position"] = space.to_gpu(np.array(camera.position))
-        parameters["orthographic"] = orthographic
-        parameters["forward"] = forward
-        parameters["half_right"] = right * half_height * width / height
-        parameters["half_up"] = up * half_height
+        parameters = camera_parameters(self.scene, camera, width, height)
         parameters["seed"] = seed & 0xFFFFFFFF
-        for name, row in zip(("red_of_xyz", "green_of_xyz", "blue_of_xyz"), xyz_to_rgb709_matrix(), strict=True):
-            parameters[name][0, :3] = row
-        parameters["size"] = width, height
-        parameters["pixel_width"] = parameters["pixel_height"] = 1.0
-        parameters["background"][0, :3] = self.scene.scene.background_rgb
-        environment = self.scene.scene.environment
-        if environment is not None:
-            for name, column in zip(
-                ("sky_x", "sky_y", "sky_z"), np.asarray(environment.world_to_local, float).T, strict=True
-            ):
-                parameters[name] = column
         bands = self.spectrum.bands
         parameters["bands"], parameters["dithered"], parameters["counts_turns"] = bands, bands > 1, 1
         parameters["max_taps"], parameters["split_threshold"] = self.max_taps, self.split_threshold
         parameters["map_scale"] = map_scale
-        parameters["primary_samples"] = 1
-        parameters["inside_object"] = NONE
-        for index, item in enumerate(self.scene.scene.objects):
-            if item.material.transmits and contains(item, np.array(camera.position)):
-                if index in self.scene.stack_objects:
-                    parameters["inside_mask"] |= np.uint32(1 << self.scene.stack_objects.index(index))
-                else:
-                    parameters["inside_object"] = index
         return parameters
 
     def _clear(self, width: int, height: int) -> None:
-        if self._size != (width, height):
-            for picture in self._pictures:
-                picture.release()
-            self._pictures = [self._ctx.texture((width, height), 4, dtype="f4") for _ in range(self.channels.targets)]
+        if self._sums.clear(width, height):
             self._rows = DispatchBudget(_FIRST_ROWS, _GROUP, -(-height // _GROUP) * _GROUP)
             if self._listed is not None:
                 self._listed.resize(width * height, width * (-(-height // _GROUP) * _GROUP))
-        zeros = bytes(width * height * 16)
-        for picture in self._pictures:
-            picture.write(zeros)
-        self._samples_of_row = np.zeros(height, int)
         self._within_rows = False
 
     def _add_sample(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
@@ -483,9 +423,9 @@ class CameraPass:
                 yield (row + share * rows) / height
             if self.shows_beams:
                 assert self._beams is not None
-                self._beams.add(self._pictures, row, rows)
+                self._beams.add(self._sums.textures, row, rows)
             self._within_rows = False
-            self._samples_of_row[row : row + rows] += 1
+            self._sums.samples_of_row[row : row + rows] += 1
             row += rows
             yield row / height
 
@@ -530,7 +470,7 @@ class CameraPass:
 
         places = shared_places(samples, int(parameters["primary_samples"][0]))
         as_image = self.scene.texels.as_image
-        for _ in self._beams.draw(self._size, places, as_image, bind, self.dispatch_seconds):
+        for _ in self._beams.draw(self._sums.size, places, as_image, bind, self.dispatch_seconds):
             yield 0.0
 
     def _program_beyond(self) -> moderngl.ComputeShader:
@@ -543,24 +483,7 @@ class CameraPass:
             self._single = shader.compute(self._ctx, "camera/camera.comp", single_defines(shown), structs)
         return self._single
 
-    def _read(self) -> np.ndarray:
-        if not self._pictures:
-            raise RuntimeError("the camera pass has not run yet")
-        width, height = self._size
-        sums = np.empty((height, width, 4 * len(self._pictures)), np.float32)
-        layer = np.empty((height, width, 4), np.float32)
-        for t, picture in enumerate(self._pictures):
-            picture.read_into(layer)
-            sums[:, :, 4 * t : 4 * t + 4] = layer
-        sums /= np.maximum(self._samples_of_row, 1).astype(np.float32)[:, None, None]
-        return sums
-
     def _no_maps(self) -> CausticMaps:
         if self._empty is None:
-            receivers = RECEIVER.zeros(max(1, len(self.scene.receivers)))
-            receivers["placement"] = NONE
-            textures = [self._ctx.texture((1, 1), 4, bytes(16), dtype="f4") for _ in range(self._map_targets)]
-            self._empty = CausticMaps(
-                textures, self._ctx.buffer(receivers.tobytes()), self._ctx.buffer(reserve=PLACEMENT.stride)
-            )
+            self._empty = CausticMaps.without_light(self._ctx, len(self.scene.receivers), self._map_targets)
         return self._empty

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..gpu.records import NONE
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.schema import Field, Struct
-from ..model.scene import Light
+from ..model.camera_rays import camera_frame
+from ..model.optics.colorimetry import xyz_to_rgb709_matrix
+from ..model.scene import Camera, Light
+from ..model.scene_checks import contains
 
 CAMERA_LIGHT = Struct(
     "CameraLight",
@@ -87,3 +91,40 @@ def light_record(light: Light, scene: SceneBuffers) -> np.void:
         record["half_u"], record["half_v"] = light.across
     record["cone"] = light.cone
     return record
+
+
+def camera_parameters(scene: SceneBuffers, camera: Camera, width: int, height: int) -> np.ndarray:
+    """CAMERA_PARAMETERS (1,) with what the camera and the scene round it decide; how its samples are spread is left."""
+    space = scene.space
+    right, up, forward = camera_frame(camera)
+    orthographic = camera.kind == "orthographic"
+    half_height = (
+        0.5 * camera.vertical_extent * space.scale
+        if orthographic
+        else np.tan(np.radians(0.5 * camera.vertical_fov_deg))
+    )
+    parameters = CAMERA_PARAMETERS.zeros(1)
+    parameters["position"] = space.to_gpu(np.array(camera.position))
+    parameters["orthographic"] = orthographic
+    parameters["forward"] = forward
+    parameters["half_right"] = right * half_height * width / height
+    parameters["half_up"] = up * half_height
+    for name, row in zip(("red_of_xyz", "green_of_xyz", "blue_of_xyz"), xyz_to_rgb709_matrix(), strict=True):
+        parameters[name][0, :3] = row
+    parameters["size"] = width, height
+    parameters["pixel_width"] = parameters["pixel_height"] = 1.0
+    parameters["primary_samples"] = 1
+    parameters["background"][0, :3] = scene.scene.background_rgb
+    environment = scene.scene.environment
+    if environment is not None:
+        columns = np.asarray(environment.world_to_local, float).T
+        for name, column in zip(("sky_x", "sky_y", "sky_z"), columns, strict=True):
+            parameters[name] = column
+    parameters["inside_object"] = NONE
+    for index, item in enumerate(scene.scene.objects):
+        if item.material.transmits and contains(item, np.array(camera.position)):
+            if index in scene.stack_objects:
+                parameters["inside_mask"] |= np.uint32(1 << scene.stack_objects.index(index))
+            else:
+                parameters["inside_object"] = index
+    return parameters

@@ -14,7 +14,7 @@ from ..gpu.shader import Releasable
 from ..gpu.tiles import Tile
 from ..model.features import Features
 from ..passes.accumulate import LevelsFold, SeamFold, copy_texture
-from ..passes.camera import CausticMaps
+from ..passes.caustic_maps import CausticMaps
 from ..passes.map_atlas import MapAtlas
 from ..passes.map_layout import MapLayout
 from ..passes.splat import Splatter

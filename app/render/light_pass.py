@@ -30,7 +30,7 @@ from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.beam_emission import BeamEmission
-from ..passes.camera import CausticMaps
+from ..passes.caustic_maps import CausticMaps
 from ..passes.emission_domain import EmissionDomain, emission_domain
 from ..passes.map_atlas import MapAtlas
 from ..passes.map_layout import MapLayout, Window, check_map_receiver, layout_maps, pixel_side, plane_frame

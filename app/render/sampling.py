@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from ..model.features import Features
 from ..model.scene import Camera, Scene
 from ..model.settings import LIGHT_METHODS, RenderSettings
-from ..passes.camera import CameraPass, CausticMaps
+from ..passes.camera import CameraPass
+from ..passes.caustic_maps import CausticMaps
 from ..passes.spectrum_choice import MAX_BANDS, MIN_SAMPLES, SAMPLES_A_BAND, Spectrum
 
 DEFAULT_SAMPLES = 16

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..edit.projection import View
-from ..edit.pull import PullPhotons, begin_pull
+from ..edit.pull import begin_pull
 from ..edit.requests import BeginPull, Pull
 from ..model.optics.colorimetry import rgb709_to_xyz
 from .session import Session
@@ -26,21 +26,9 @@ def begin_pull_at(session: Session, request: BeginPull) -> Pull:
         raise UserError("the picture is being made anew; try again in a moment")
     if engine is None or hit is None or not hit.is_receiver:
         raise UserError("there is no caustic here; take hold of a coloured part of one")
-    stored = engine.stored_photons(PHOTONS)
-    photons = PullPhotons(
-        stored.position,
-        stored.dposition_dn,
-        stored.n_anchor,
-        stored.flux_w,
-        stored.source,
-        stored.receiver,
-        stored.band_nm,
-        stored.variables,
-        stored.group_of_object,
-    )
     rgb = np.array(session.picture.pixel((request.x, request.y)) or (0.0, 0.0, 0.0))
     return begin_pull(
-        photons,
+        engine.stored_photons(PHOTONS),
         state.scene,
         hit.position,
         hit.normal,

@@ -16,7 +16,8 @@ from spectrasplat.model.optics import spectrum
 from spectrasplat.model.optics.colorimetry import K_M, cmf_xyz, daylight_per_lumen, rgb709_to_xyz, xyz_to_rgb709
 from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes.camera import CameraPass, CausticMaps
+from spectrasplat.passes.camera import CameraPass
+from spectrasplat.passes.caustic_maps import CausticMaps
 from spectrasplat.render.light_pass import spectral_axis
 
 REFLECTANCE = 0.5

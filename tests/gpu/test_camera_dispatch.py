@@ -57,7 +57,7 @@ def test_a_stop_leaves_whole_rows(gl, after: int) -> None:
         return len(asked) >= after
 
     assert not camera_pass.run(CAMERA, *SIZE, 4, sample_offset=1, cancelled=stops)
-    samples = camera_pass._samples_of_row
+    samples = camera_pass._sums.samples_of_row
     assert samples.min() < samples.max(), "it stopped between two samples"
     assert (
         np.abs(camera_pass.read_rgb() - 1.0).max() < 0.1

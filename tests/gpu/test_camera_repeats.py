@@ -21,7 +21,8 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes import variants
-from spectrasplat.passes.camera import CameraPass, CausticMaps
+from spectrasplat.passes.camera import CameraPass
+from spectrasplat.passes.caustic_maps import CausticMaps
 from spectrasplat.render.light_pass import spectral_axis
 
 from tests.gpu.camera_rig import released

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import moderngl
 import numpy as np
 from spectrasplat.edit.live_inputs import LiveInputs
+from spectrasplat.edit.stored_photons import StoredPhotons
 from spectrasplat.gpu.context import Context
 from spectrasplat.passes.pick import PickHit
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
-from spectrasplat.render.viewer.photon_queries import StoredPhotons
 from spectrasplat.render.viewer.stats import LiveStats
 
 

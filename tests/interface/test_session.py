@@ -12,10 +12,10 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.edit import requests
 from spectrasplat.edit.preferences import config_dir
 from spectrasplat.edit.state import Selection, State
+from spectrasplat.edit.stored_photons import StoredPhotons
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse
 from spectrasplat.passes.pick import PickHit
-from spectrasplat.render.viewer.photon_queries import StoredPhotons
 from spectrasplat.ui.crash_log import FILE_NAME
 from spectrasplat.ui.frame import run_frame
 from spectrasplat.ui.live_picture import LivePicture

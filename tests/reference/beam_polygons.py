@@ -129,6 +129,7 @@ def polygon(
         edges=np.column_stack([_lines(start), np.zeros(len(start)), _lines(end), np.zeros(len(start))]),
         hull_start=np.array([0, 4], np.int32),
         hulls=hull,
+        area=np.array([area_of(middle)]),
     )
 
 

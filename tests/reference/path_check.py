@@ -20,8 +20,7 @@ from reference.tracer import (
     follow,
     make_ray,
 )
-from spectrasplat.gpu.scene_buffers import mirror_reflectance
-from spectrasplat.model.optics.colorimetry import VISIBLE_NM
+from spectrasplat.model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
 from spectrasplat.model.optics.glass import Dispersion
 from spectrasplat.model.scene import Dielectric, Diffuse, Mirror, SceneObject
 from spectrasplat.reference import glasses

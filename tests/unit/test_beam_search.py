@@ -9,6 +9,7 @@ import pytest
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.beams.facets import BeamScene, beam_scene
 from spectrasplat.beams.find import Emission, Search, search
+from spectrasplat.beams.leaves import Leaves
 from spectrasplat.beams.search import SUM_ENTERED, SUM_ROULETTE
 from spectrasplat.beams.sources import emissions
 from spectrasplat.model.io.scene_file import load_scene
@@ -54,3 +55,16 @@ def test_seeds_next_to_each_other_play_other_roulettes(stone: tuple[BeamScene, E
     first, _ = fluxes(stone, 1, 2)
     second, _ = fluxes(stone, other, 2)
     assert first.shape != second.shape or not np.allclose(first, second)
+
+
+def test_leaves_keep_their_own_edges_and_corners(stone: tuple[BeamScene, Emission]) -> None:
+    every = Leaves.joined(search(*stone, Search(1e-3, 1, 96, 1e-3), 1)[0])
+    keep = np.arange(len(every.head)) % 3 == 1
+    some = every.where(keep)
+    for column, rows, kept in ((6, every.edge, some.edge), (7, every.corner, some.corner)):
+        by_leaf = np.split(rows, np.cumsum(every.head[:, column])[:-1])
+        np.testing.assert_array_equal(kept, np.concatenate([by_leaf[i] for i in np.flatnonzero(keep)]))
+    assert len(every.head) > 3 and len(some.soft) == len(some.edge) and len(some.x) == keep.sum()
+    parts = [every.where(keep), every.where(~keep)]
+    assert Leaves.joined(parts).flux.sum() == pytest.approx(every.flux.sum())
+    assert len(Leaves.joined([]).head) == len(Leaves.joined([]).corner) == 0

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.edit import pull as pulling
+from spectrasplat.edit.stored_photons import StoredPhotons
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.local_dispersion import gain_at
 from spectrasplat.model.optics import glass
@@ -39,13 +40,13 @@ def place_of(nm: float, dispersion=FLINT, velocity=VELOCITY) -> np.ndarray:
 
 def photons(
     count: int = 400, bands: int = 1, source: int = PRISM, velocity=VELOCITY, anchor_nm: float = 520.0
-) -> pulling.PullPhotons:
+) -> StoredPhotons:
     """A white beam of width 0.02 through the flint, one record a photon and band."""
     rng = np.random.default_rng(5)
     edges = np.linspace(400.0, 700.0, bands + 1)
     band = np.arange(count) % bands
     jitter = np.column_stack([rng.normal(0.0, 0.01, (count, 2)), np.zeros(count)])
-    return pulling.PullPhotons(
+    return StoredPhotons(
         position=place_of(anchor_nm, velocity=velocity) + jitter,
         dposition_dn=np.broadcast_to(velocity, (count, 1, 3)).copy(),
         n_anchor=np.full((count, 1), float(FLINT.index(anchor_nm))),
@@ -53,6 +54,7 @@ def photons(
         source=np.full(count, source),
         receiver=np.full(count, FLOOR),
         band_nm=np.column_stack([edges[band], edges[band + 1]]),
+        light=np.zeros(count, int),
         variables=(FLINT.index,),
         group_of_object={PRISM: 0},
     )
@@ -97,7 +99,7 @@ def test_the_colour_of_the_picture_tells_the_wavelength() -> None:
     assert pull.wavelength_nm == pytest.approx(470.0, abs=2.0)
 
 
-def two_sources() -> pulling.PullPhotons:
+def two_sources() -> StoredPhotons:
     """The flint's rainbow along x, and twice as much light through the crown along y, crossing at 450 nm of both."""
     one, shift = photons(), place_of(450.0)
     velocity = np.array([0.0, 90.0, 0.0])
@@ -106,7 +108,7 @@ def two_sources() -> pulling.PullPhotons:
     )
     n = len(one.position)
     zero = np.zeros((n, 3))
-    return pulling.PullPhotons(
+    return StoredPhotons(
         position=np.concatenate([one.position, other_position]),
         dposition_dn=np.concatenate(
             [np.stack([one.dposition_dn[:, 0], zero], 1), np.stack([zero, zero + velocity], 1)]
@@ -116,6 +118,7 @@ def two_sources() -> pulling.PullPhotons:
         source=np.concatenate([one.source, np.full(n, OTHER)]),
         receiver=np.full(2 * n, FLOOR),
         band_nm=np.tile(one.band_nm, (2, 1)),
+        light=np.zeros(2 * n, int),
         variables=(FLINT.index, CROWN.index),
         group_of_object={PRISM: 0, OTHER: 1},
     )

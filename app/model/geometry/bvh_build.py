@@ -7,10 +7,9 @@ Goldsmith and Salmon 1987 (the cost).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-from numba import njit
+
+from ...base.compiling import compiled
 
 BIN_COUNT = 16
 # A visit fetches and tests two boxes. On llvmpipe 1 to 5 trace equally fast; 2 needs half the nodes of 1.
@@ -18,15 +17,7 @@ NODE_COST = 2.0
 TRIANGLE_COST = 1.0
 
 
-def _compiled(function: Callable) -> Callable:
-    """`function` as machine code, kept on disk where some folder can be written (else compiled anew each run)."""
-    try:
-        return njit(cache=True)(function)
-    except RuntimeError:  # numba: no folder for the cache
-        return njit(function)
-
-
-@_compiled
+@compiled
 def _half_area(box):
     """Half the surface of a box (min xyz, max xyz); 0 for one that holds nothing."""
     dx = box[3] - box[0]
@@ -37,21 +28,21 @@ def _half_area(box):
     return dx * dy + dy * dz + dz * dx
 
 
-@_compiled
+@compiled
 def _clear(box):
     for k in range(3):
         box[k] = np.inf
         box[3 + k] = -np.inf
 
 
-@_compiled
+@compiled
 def _grow(box, other):
     for k in range(3):
         box[k] = min(box[k], other[k])
         box[3 + k] = max(box[3 + k], other[3 + k])
 
 
-@_compiled
+@compiled
 def _bin_scale(low, high, bins):
     """Bins per unit; 0 where the centroids coincide or their spread is too small to divide by."""
     spread = high - low
@@ -61,7 +52,7 @@ def _bin_scale(low, high, bins):
     return scale if np.isfinite(scale) else 0.0
 
 
-@_compiled
+@compiled
 def _select(order, key, first, count, middle):
     """Permute order[first:first+count] so that keys left of `middle` are <= those from it on (Hoare)."""
     low = first
@@ -87,7 +78,7 @@ def _select(order, key, first, count, middle):
             return
 
 
-@_compiled
+@compiled
 def _best_split(boxes, order, first, count, centroid_box, limit, bin_boxes, bin_counts, right_cost):
     """Cheapest bin boundary whose two sides hold at most `limit` triangles.
 
@@ -136,7 +127,7 @@ def _best_split(boxes, order, first, count, centroid_box, limit, bin_boxes, bin_
     return best_cost, best_axis, best_boundary
 
 
-@_compiled
+@compiled
 def _partition(boxes, order, first, count, axis, low, scale, boundary):
     """Move the triangles of the bins below `boundary` to the front; returns where the others start."""
     i = first
@@ -153,7 +144,7 @@ def _partition(boxes, order, first, count, axis, low, scale, boundary):
     return i
 
 
-@_compiled
+@compiled
 def build(triangles_xyz, max_depth, max_leaf, bounds, links):
     """Fill `bounds` (2T-1, 6) float32 and `links` (2T-1, 2) uint32.
 

@@ -81,12 +81,7 @@ def brilliant(
         if not sharp:
             facets.append((below + tip, below + middle, above + middle, above + tip))
             facets.append((below + middle, below + next_tip, above + next_tip, above + middle))
-    triangles = [(facet[0], facet[i], facet[i + 1]) for facet in facets for i in range(1, len(facet) - 1)]
-    mesh = make_mesh(name, np.concatenate(rings), np.array(triangles))
-    planes = mesh.convex_planes
-    if planes is None or len(planes) != len(facets):
-        raise UserError("brilliant: these proportions do not make a convex stone; move them towards the defaults")
-    return mesh
+    return _stone(shape, name, rings, facets)
 
 
 def step_cut(
@@ -130,8 +125,13 @@ def step_cut(
         for k in range(8):
             upper, lower, after = 8 * row, 8 * row + 8, (k + 1) % 8
             facets.append((lower + k, lower + after, upper + after, upper + k))
+    return _stone(shape, name, rings, facets)
+
+
+def _stone(shape: str, name: str, rings: list[np.ndarray], facets: list[tuple[int, ...]]) -> Mesh:
+    """Facets through corners of `rings`, numbered on from one to the next; refused unless they make a convex stone."""
     triangles = [(facet[0], facet[i], facet[i + 1]) for facet in facets for i in range(1, len(facet) - 1)]
     mesh = make_mesh(name, np.concatenate(rings), np.array(triangles))
     if mesh.convex_planes is None or len(mesh.convex_planes) != len(facets):
-        raise UserError("step_cut: these proportions do not make a convex stone; move them towards the defaults")
+        raise UserError(f"{shape}: these proportions do not make a convex stone; move them towards the defaults")
     return mesh

@@ -5,24 +5,15 @@ In a file of its own so that numba is imported (0.4 s) only when such a picture 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-from numba import njit
+
+from ...base.compiling import compiled
 
 ENDED, DAMAGED = -1, -2
 """Returned in the place of a position: the bytes end too early, or a run leaves its row."""
 
 
-def _compiled(function: Callable) -> Callable:
-    """`function` as machine code, kept on disk where some folder can be written (else compiled anew each run)."""
-    try:
-        return njit(cache=True)(function)
-    except RuntimeError:  # numba: no folder for the cache
-        return njit(function)
-
-
-@_compiled
+@compiled
 def decode(data: np.ndarray, pixels: np.ndarray) -> tuple[int, int]:
     """Fill `pixels` uint8 (H, W, 4) from `data` uint8 (N,); rows filled, and bytes used, ENDED or DAMAGED."""
     at = 0
@@ -33,7 +24,7 @@ def decode(data: np.ndarray, pixels: np.ndarray) -> tuple[int, int]:
     return pixels.shape[0], at
 
 
-@_compiled
+@compiled
 def _decode_row(data, at, row):
     """One row from position `at`; the position behind it, ENDED or DAMAGED."""
     width = row.shape[0]
@@ -45,7 +36,7 @@ def _decode_row(data, at, row):
     return _old_row(data, at, row)
 
 
-@_compiled
+@compiled
 def _new_row(data, at, row):
     """Four planes, each of runs: a count above 128 repeats one byte, any other is followed by as many."""
     width = row.shape[0]
@@ -70,7 +61,7 @@ def _new_row(data, at, row):
     return at
 
 
-@_compiled
+@compiled
 def _old_row(data, at, row):
     """Whole pixels; one of mantissas 1, 1, 1 repeats the pixel before it, and in a row of such each counts 256 times
     the last."""

@@ -124,6 +124,11 @@ def rgb_partition() -> np.ndarray:
     return _frozen(np.stack([red, above_blue * (1.0 - red), (1.0 - above_blue) * (1.0 - red)], axis=-1))
 
 
+def mirror_reflectance(rgb: tuple[float, float, float], nm: np.ndarray) -> np.ndarray:
+    """Smooth spectral reflectance at wavelengths (N,) whose bands average to the linear Rec.709 `rgb`, float64 (N,)."""
+    return np.interp(nm, VISIBLE_NM, rgb_partition() @ np.asarray(rgb, float))
+
+
 def attenuation_from_colour(rgb: tuple[float, float, float], distance: float, where: str = "") -> np.ndarray:
     """Absorption coefficient α(λ) on `VISIBLE_NM`, float64 (401,), per unit of `distance`.
 

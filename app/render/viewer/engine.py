@@ -17,8 +17,9 @@ import numpy as np
 
 from ...base.errors import UserError
 from ...edit.live_inputs import LiveInputs
+from ...edit.stored_photons import StoredPhotons
 from ...gpu import shader
-from ...passes.camera import CausticMaps
+from ...passes.caustic_maps import CausticMaps
 from ...passes.pick import Picker, PickHit
 from ..beam_light import MovingBeams
 from ..light_maps import LightMaps
@@ -29,7 +30,7 @@ from .dirty_level import DirtyLevel
 from .invalidation import appearance_differs, dirty_level
 from .live_camera import LiveCamera
 from .live_light import LiveLight
-from .photon_queries import StoredPhotons, caustic_spectrum, reach_of, world_photons
+from .photon_queries import caustic_spectrum, reach_of, world_photons
 from .refit import is_judged, wants_new_maps
 from .schedule import Action, CameraState, Schedule, ShowMaps
 from .stats import LiveStats

@@ -20,7 +20,8 @@ import numpy as np
 from ...gpu import shader
 from ...gpu.map_channels import MapChannels
 from ...gpu.texture_store import TextureStore
-from ...passes.camera import MAX_TAPS, CameraPass, CausticMaps
+from ...passes.camera import MAX_TAPS, CameraPass
+from ...passes.caustic_maps import CausticMaps
 from ...passes.spectrum_choice import Spectrum
 from ..sampling import CameraSampling, whole_cycles
 from .schedule import CameraState

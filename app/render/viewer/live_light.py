@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ...gpu.context import Context
     from ...model.scene import Scene
     from ...model.settings import RenderSettings
-    from ...passes.camera import CausticMaps
+    from ...passes.caustic_maps import CausticMaps
 
 BEAM_SECONDS = 0.03
 """What finding and drawing beams should take while something is dragged."""

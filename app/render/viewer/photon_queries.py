@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...edit.stored_photons import StoredPhotons
 from ...model.features import is_flat
 from .invalidation import shown_glasses
 
@@ -16,49 +16,6 @@ if TYPE_CHECKING:
     from .live_light import LiveLight
 
 NO_OBJECT = 0xFFFF
-
-
-@dataclass(frozen=True)
-class StoredPhotons:
-    """Photon records in world space; the first axis of every array counts photons."""
-
-    position: np.ndarray
-    """(n, 3) world, where the anchor wavelength lands."""
-    dposition_dn: np.ndarray
-    """(n, groups, 3) world, per unit of each spectral group's variable (the index of its glass)."""
-    n_anchor: np.ndarray
-    """(n, groups): the variables at the anchor wavelength, by the glass that the photons were traced through."""
-    flux_w: np.ndarray
-    """(n,)."""
-    source: np.ndarray
-    """(n,) scene object that the photon met first; -1 for none."""
-    receiver: np.ndarray
-    """(n,) scene object it landed on."""
-    band_nm: np.ndarray
-    """(n, 2) first and last wavelength."""
-    light: np.ndarray
-    """(n,) index of the light."""
-    variables: tuple[Callable[[np.ndarray], np.ndarray], ...]
-    """Each group's variable over the wavelength in nm, by the glass that is shown."""
-    group_of_object: Mapping[int, int]
-    """Spectral group of every dispersive glass object."""
-
-    @staticmethod
-    def none() -> StoredPhotons:
-        """No photons."""
-        empty = np.zeros(0)
-        ints = np.zeros(0, int)
-        return StoredPhotons(
-            np.zeros((0, 3)), np.zeros((0, 0, 3)), np.zeros((0, 0)), empty, ints, ints, np.zeros((0, 2)), ints, (), {}
-        )
-
-    def landing(self, wavelength_nm: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """Where the light of some wavelengths (w,) of the photons `chosen` (m,) lands: (m, w, 3) world."""
-        places = np.repeat(self.position[chosen, None], len(wavelength_nm), axis=1)
-        for g, variable in enumerate(self.variables):
-            shift = variable(wavelength_nm)[None] - self.n_anchor[chosen, g, None]
-            places += self.dposition_dn[chosen, g, None] * shift[..., None]
-        return places
 
 
 def world_photons(light: LiveLight, inputs: LiveInputs, limit: int) -> StoredPhotons:
@@ -126,14 +83,14 @@ def caustic_spectrum(
         return centres, power
     ends = np.array([380.0, 780.0])
     reach = (
-        np.linalg.norm(np.diff(photons.landing(ends, mine), axis=1)[:, 0], axis=1)
+        np.linalg.norm(np.diff(photons.chosen(mine).landing(ends), axis=1)[:, 0], axis=1)
         if photons.variables
         else np.zeros(len(mine))
     )
     near = mine[np.linalg.norm(photons.position[mine] - position, axis=1) <= radius + reach]
     if not len(near):
         return centres, power
-    places = photons.landing(centres, near)
+    places = photons.chosen(near).landing(centres)
     inside = np.linalg.norm(places - position, axis=2) <= radius
     low, high = photons.band_nm.min(axis=1)[near, None], photons.band_nm.max(axis=1)[near, None]
     # Share of each bin that the photon's band covers; a band narrower than a bin stands for a line.

@@ -1,0 +1,122 @@
+"""The end of a beam: a leaf of the map, or halved where it is not straight enough."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .compiling import part
+from .hand import FAINT, HAND, SPARE, halve, push_both
+from .leaves import density_slope, lay_leaf, passes, plane_map
+from .nodes import STATIC, copy, first_place, last_place, lay_out
+from .rays import PARALLEL
+from .search import (
+    LEAF_OPEN,
+    LEAF_RECEIVER,
+    NARROWEST,
+    SUM_DEPOSITED,
+    SUM_HANDED,
+    SUM_LEAVES,
+    flux_of,
+    halve_space,
+    is_curved,
+    medium,
+    power_as,
+    recentre,
+)
+
+_UNEVEN = 0.15
+"""A density that leaves the straight line by more is not a parabola for certain."""
+_COLOURED = 0.02
+"""The same where absorption has a colour."""
+_STEEP = 0.3
+"""A relative change of the density over a leaf that is no longer linear."""
+
+
+@part
+def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
+    """Write the beam in hand as a leaf, or halve it where it is not straight enough."""
+    hand, source, kind = nodes[HAND], sources[0], nodes[HAND].ends
+    if hand.depth == 0 and kind != LEAF_OPEN:
+        return
+    is_parallel = source.kind == PARALLEL
+    recentre(hand)
+    if (not is_parallel or work.absorbing) and not lay_out(hand, facets, solids, tables, source, work):
+        return
+    # Where rays graze, and where a cone fades away, there is no end to halving: what is faint is straight enough.
+    room = work.top + 2 < len(nodes) and power_as(hand, hand, tables, work) > FAINT * work.threshold
+    tolerance = facets[hand.facet].texel if kind == LEAF_RECEIVER else work.tolerance
+    bend = 0.0
+    if room and not is_parallel and kind == LEAF_RECEIVER:
+        bend = is_curved(hand, facets, solids, tables, source, tolerance, work)
+    if bend > 1.0:
+        low, high = halve_space(hand, nodes[work.top], work)
+        push_both(nodes, low, high, work)
+        return
+    if kind == LEAF_RECEIVER and work.absorbing:
+        absorb(hand, facets, solids, tables, work)
+    bent, uneven = lay_leaf(hand, facets, kind, leaf, edge, corner, work)
+    if bent < 0.0:
+        return
+    # What absorbs may be coloured, with steps that three places do not see.
+    most = _COLOURED if work.absorbing else _UNEVEN
+    if room and hand.x[2] - hand.x[0] > NARROWEST and (bent > tolerance or uneven > most):
+        halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
+        return
+    row, first = work.count[0], work.count[2]
+    new = leaf[row]
+    density_slope(hand, facets, solids, tables, source, kind, new, work)
+    steepest = 0.0
+    for c in range(first, first + new.head[7]):
+        u, v = corner[c, 0] - new.centre[0], corner[c, 1] - new.centre[1]
+        steepest = max(steepest, abs(new.slope[0] * u + new.slope[1] * v))
+    if room and steepest > _STEEP and hand.corners[1] > 0:
+        low, high = halve_space(hand, nodes[work.top], work)
+        push_both(nodes, low, high, work)
+        return
+    if work.sources > 1:
+        soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, work)
+    flux = flux_of(hand, tables, work)
+    new.flux = flux
+    work.count[0] += 1
+    work.count[1] += new.head[6]
+    work.count[2] += new.head[7]
+    work.sums[SUM_LEAVES] += 1.0
+    work.sums[SUM_DEPOSITED if kind == LEAF_RECEIVER else SUM_HANDED] += flux
+
+
+@part
+def absorb(beam, facets, solids, tables, work):
+    """Take from a beam what the medium of its last flight absorbs."""
+    inside = medium(solids, beam.mask)
+    for a in range(first_place(beam), last_place(beam)):
+        distance, _ = plane_map(facets[beam.facet], beam.position[a], beam.direction[a], work.map[a], work)
+        beam.weight[a] *= passes(solids, tables, inside, beam.x[a], distance)
+
+
+@part
+def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, work):
+    """Set the penumbra of the leaf just laid from where its edges lie for two other points of an extended light.
+
+    The light's part is a disc whose radius is the way to those points. An edge's cover over it rises as the disc's
+    cumulative profile; a ramp of the same variance is sqrt(3)/2 of the disc's projected radius wide to each side."""
+    hand, spare = nodes[HAND], nodes[SPARE]
+    first, n = work.count[1], nodes[HAND].lines
+    soft, own = work.soft, work.own
+    new = leaf[work.count[0]]
+    cu, cv, slope_u, slope_v = new.centre[0], new.centre[1], new.slope[0], new.slope[1]
+    for turn in range(work.sources):
+        if turn > 0:
+            copy(hand, spare)
+            lay_out(spare, facets, solids, tables, sources[turn], work)
+            lay_leaf(spare, facets, kind, leaf, edge, corner, work)
+        for ln in range(n):
+            e = edge[first + ln].line
+            at = e[1, 0] * cu + e[1, 1] * cv + e[1, 2]
+            if turn == 0:
+                own[ln], soft[ln] = at, 0.0
+            elif hand.made[ln, 2] != STATIC or kind == LEAF_RECEIVER:
+                soft[ln] += (at - own[ln]) * (at - own[ln])
+    lay_leaf(hand, facets, kind, leaf, edge, corner, work)
+    new.slope[0], new.slope[1] = slope_u, slope_v
+    for ln in range(n):
+        edge[first + ln].soft = 0.8660254 * np.sqrt(soft[ln])

@@ -1,0 +1,52 @@
+"""The beam in hand, row HAND of the stack; what becomes of it goes on top."""
+
+from __future__ import annotations
+
+from .compiling import part
+from .nodes import copy
+from .search import halve_spectrum, place_of
+
+HAND, SPARE = 0, 1
+"""Rows of the stack that are the beam in hand, and room to try a cut."""
+FIRST = 2
+DEAD = -3
+"""Facet of an outline that is no longer."""
+START = -3
+LAY, UNKNOWN, SOME, ALL = -2, -1, 0, 1
+"""States of a beam's `total`, whether its facet reflects everything; START: a source's whole light; LAY: rays are those
+of a larger outline."""
+FAINT = 0.02
+"""Share of the threshold below which a beam is not halved."""
+
+
+@part
+def push_both(nodes, low, high, work):
+    """Leave on the stack what is left of the beam in hand and of that at the top."""
+    if high:
+        work.top += 1
+    if low:
+        copy(nodes[HAND], nodes[work.top])
+        work.top += 1
+
+
+@part
+def halve(nodes, x, facets, solids, tables, sources, work):
+    """Cut the beam in hand at x and leave both on the stack."""
+    low, high = halve_spectrum(nodes[HAND], nodes[work.top], x, facets, solids, tables, sources[0], work)
+    push_both(nodes, low, high, work)
+
+
+@part
+def distance_at(hand, beam, facet):
+    """Distance from the beam in hand's ray of an outline's centre to a facet's plane, at the place where the outline
+    exists; and its cosine."""
+    a = place_of(beam)
+    u, v = beam.centre[0] - hand.centre[0], beam.centre[1] - hand.centre[1]
+    n, p, d = facet.plane, hand.position, hand.direction
+    at = towards = 0.0
+    for k in range(3):
+        at += n[k] * (p[a, 0, k] + u * p[a, 1, k] + v * p[a, 2, k])
+        towards += n[k] * (d[a, 0, k] + u * d[a, 1, k] + v * d[a, 2, k])
+    if abs(towards) < 1e-14:
+        return -1.0, 0.0
+    return (n[3] - at) / towards, towards

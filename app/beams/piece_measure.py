@@ -1,0 +1,121 @@
+"""What is lit of a piece of a beam at any place of its band, and how much light that is: compiled.
+
+Imported late, with `piece_kernel`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .compiling import allocating
+
+STEPS = 16
+"""Places of the band at which a whole piece is measured."""
+_LINE_X = 1e-9
+"""An emission line is looked for so far on both sides of its x."""
+
+
+@allocating
+def _power_below(curve_x, curve_w, x):
+    """Cumulative power at x, a line there included (`CumulativeSpectrum.at`)."""
+    x = min(max(x, 0.0), 1.0)
+    i = min(max(np.searchsorted(curve_x, x, side="right") - 1, 0), len(curve_x) - 2)
+    span = curve_x[i + 1] - curve_x[i]
+    share = (x - curve_x[i]) / span if span > 0.0 else 1.0
+    return curve_w[i] + share * (curve_w[i + 1] - curve_w[i])
+
+
+@allocating
+def power_between(curve_x, curve_w, x_lo, x_hi):
+    """Power between two places of the spectrum; of the line, where they are one."""
+    widen = _LINE_X if x_hi == x_lo else 0.0
+    return _power_below(curve_x, curve_w, x_hi + widen) - _power_below(curve_x, curve_w, x_lo - widen)
+
+
+@allocating
+def parabola(t):
+    """Weights of the values at 0, 1/2, 1."""
+    return 2.0 * (t - 0.5) * (t - 1.0), 4.0 * t * (1.0 - t), 2.0 * t * (t - 0.5)
+
+
+@allocating
+def weight_at(weight, t):
+    a, b, c = parabola(t)
+    return max(a * weight[0] + b * weight[1] + c * weight[2], 0.0)
+
+
+@allocating
+def clip(polygon, count, scratch, a_u, a_v, c):
+    """Keep a . p + c >= 0 of a convex polygon, in place; the number of corners left."""
+    kept = 0
+    for i in range(count):
+        j = i + 1 if i + 1 < count else 0
+        h_i = a_u * polygon[i, 0] + a_v * polygon[i, 1] + c
+        h_j = a_u * polygon[j, 0] + a_v * polygon[j, 1] + c
+        if h_i >= 0.0:
+            scratch[kept, 0], scratch[kept, 1] = polygon[i, 0], polygon[i, 1]
+            kept += 1
+        if (h_i >= 0.0) != (h_j >= 0.0):
+            s = h_i / (h_i - h_j)
+            scratch[kept, 0] = polygon[i, 0] + s * (polygon[j, 0] - polygon[i, 0])
+            scratch[kept, 1] = polygon[i, 1] + s * (polygon[j, 1] - polygon[i, 1])
+            kept += 1
+    for i in range(kept):
+        polygon[i, 0], polygon[i, 1] = scratch[i, 0], scratch[i, 1]
+    return kept
+
+
+@allocating
+def moments_of(polygon, count, out):
+    """Area, first moments, second moments uu, uv, vv about the origin."""
+    out[:] = 0.0
+    for i in range(count):
+        j = i + 1 if i + 1 < count else 0
+        x, y, z, w = polygon[i, 0], polygon[i, 1], polygon[j, 0], polygon[j, 1]
+        cross = x * w - z * y
+        out[0] += cross / 2.0
+        out[1] += cross * (x + z) / 6.0
+        out[2] += cross * (y + w) / 6.0
+        out[3] += cross * (x * x + x * z + z * z) / 12.0
+        out[4] += cross * (x * w + 2.0 * x * y + 2.0 * z * w + z * y) / 24.0
+        out[5] += cross * (y * y + y * w + w * w) / 12.0
+
+
+@allocating
+def keep_lit(edges, t, u, v, polygon, count, scratch):
+    """Clip a polygon about (u, v) by all edges at t."""
+    for e in range(len(edges)):
+        if count == 0:
+            break
+        a_u = edges[e, 0] + t * (edges[e, 3] - edges[e, 0])
+        a_v = edges[e, 1] + t * (edges[e, 4] - edges[e, 1])
+        c = edges[e, 2] + t * (edges[e, 5] - edges[e, 2])
+        count = clip(polygon, count, scratch, a_u, a_v, c + a_u * u + a_v * v)
+    return count
+
+
+@allocating
+def contents(
+    x_lo, x_hi, weight, edge_start, edges, hull_start, hulls, light, curve_start, curve_x, curve_w, out, powers
+):
+    """What each piece holds, `out` (M,): weight · power · area, W per unit of the measure's scale; `powers` (M,) of the
+    bands, W."""
+    moments = np.empty(6)
+    for i in range(len(out)):
+        own = edges[edge_start[i] : edge_start[i + 1]]
+        hull = hulls[hull_start[i] : hull_start[i + 1]]
+        room = len(own) + len(hull) + 4
+        polygon, scratch = np.empty((room, 2)), np.empty((2 * room, 2))
+        first, end = curve_start[light[i]], curve_start[light[i] + 1]
+        steps = STEPS if x_hi[i] > x_lo[i] else 1
+        total = 0.0
+        for k in range(steps):
+            t = (k + 0.5) / steps if steps > 1 else 0.0
+            lo = x_lo[i] + (x_hi[i] - x_lo[i]) * k / steps
+            hi = x_lo[i] + (x_hi[i] - x_lo[i]) * (k + 1) / steps
+            power = power_between(curve_x[first:end], curve_w[first:end], lo, hi)
+            polygon[: len(hull)] = hull
+            moments_of(polygon, keep_lit(own, t, 0.0, 0.0, polygon, len(hull), scratch), moments)
+            total += moments[0] * power * weight_at(weight[i], t)
+            powers[i] += power
+        out[i] = total

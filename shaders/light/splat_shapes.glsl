@@ -1,0 +1,173 @@
+// A footprint as the record of a splat to be drawn, for `footprint.comp`: smaller than a texel, or swept along the spectrum.
+// Sum over texel centres of the splat to be drawn, by Poisson's formula: 1 plus the harmonics that the texel grid sees.
+// `box_along`: a cut band's blur along the sweep is a box, so wide; else it is Gaussian, of variance along2.
+float grid_sum(vec2 centre, vec2 e, vec2 m, float shear, float box, float s2, float along2, float box_along, float sweep) {
+    float total = 1.0;
+    vec2 phase = centre - 0.5;
+    for (int i = 0; i < 4; ++i) {
+        vec2 k = i == 0 ? vec2(1.0, 0.0) : i == 1 ? vec2(0.0, 1.0) : i == 2 ? vec2(1.0, 1.0) : vec2(1.0, -1.0);
+        float ke = dot(k, e);
+        float km = dot(k, m) + shear * ke;
+        float damping = exp(-0.5 * TWO_PI * TWO_PI * (s2 * km * km + along2 * ke * ke));
+        total += 2.0 * damping * sinc_pi(box * km) * sinc_pi(box_along * ke) * sinc_pi(sweep * ke) * cos(TWO_PI * dot(k, phase));
+    }
+    return clamp(total, 0.7, 1.4);
+}
+
+// Throughput averaged over the band (piecewise linear through low end, anchor, high end).
+float mean_throughput(PhotonRecord photon) {
+#if defined(HERO)
+    // Each of the four wavelengths has its own (`carry_companions`).
+    return 1.0;
+#elif defined(POINT_SPECTRUM)
+    return photon.throughput.y;
+#else
+    float width = photon.x_hi - photon.x_lo;
+    if (width <= 0.0) {
+        return photon.throughput.y;
+    }
+    float below = (photon.throughput.x + photon.throughput.y) * (photon.x_anchor - photon.x_lo);
+    float above = (photon.throughput.y + photon.throughput.z) * (photon.x_hi - photon.x_anchor);
+    return 0.5 * (below + above) / width;
+#endif
+}
+
+// Whether the photon has another range than its table's band: a part of it, or what a local gain put there. One of no width stands for all of it.
+bool is_cut(PhotonRecord photon, vec4 band) {
+    return photon.x_hi > photon.x_lo && any(greaterThan(abs(vec2(photon.x_lo, photon.x_hi) - band.xy), vec2(1e-5)));
+}
+
+#ifdef HERO
+// Weights of the hero and its companions, and where in the tables they look up their energies: two cells a number, exact below 2^24.
+void carry_companions(inout SplatRecord splat, PhotonRecord photon) {
+    splat.throughput = vec4(photon.throughput.y, photon.companion_throughput.xyz);
+    vec4 x = vec4(photon.x_anchor, photon.companion_x.xyz);
+    vec4 cell = min(floor(x * float(DENSITY_CELLS)), float(DENSITY_CELLS - 1u));
+    splat.x_range = cell.xz * float(DENSITY_CELLS) + cell.yw;
+}
+#endif
+
+SplatRecord small_splat(PhotonRecord photon, Footprint f, vec4 band) {
+    SplatRecord splat;
+    float cut = 0.0;
+#ifdef BAND_CUTS
+    cut = is_cut(photon, band) ? 1.0 : 0.0;
+#endif
+    vec2 variance = f.axis_s * f.axis_s + f.axis_t * f.axis_t + f.chord * f.chord * TEXEL_VARIANCE;
+    vec2 sigma = sqrt(max(variance, vec2(1e-3)));
+    splat.centre = f.centre + f.chord * (cut > 0.0 ? 0.0 : band.z - 0.5);
+    splat.along = 0.5 + CUT * sigma;
+    splat.across = SQRT_HALF / sigma;
+    splat.amplitude = mean_throughput(photon);
+    splat.table_row = 0.0;
+    splat.y_edge = 0.0;
+    splat.y_box = 0.0;
+    splat.throughput = vec4(photon.x_anchor, photon.throughput.y, 0.0, 0.0);
+    splat.x_range = vec2(photon.x_lo, photon.x_hi);
+    splat.xi_half = cut;
+    splat.inverse_sigma_xi = 0.0;
+    splat.kind = 1u;
+    return splat;
+}
+
+// Share of a box of width `box`, blurred by `s`, within `edge` of its middle.
+float kept_by_cut(float edge, float box, float s) {
+    return 1.0 - 2.0 * s / box * (normal_excess((edge - 0.5 * box) / s) - normal_excess((edge + 0.5 * box) / s));
+}
+
+SplatRecord swept_splat(PhotonRecord photon, Footprint f, vec4 band) {
+    SplatRecord splat;
+    vec3 cov = vec3(f.axis_s.x * f.axis_s.x + f.axis_t.x * f.axis_t.x, f.axis_s.x * f.axis_s.y + f.axis_t.x * f.axis_t.y,
+                    f.axis_s.y * f.axis_s.y + f.axis_t.y * f.axis_t.y);  // xx, xy, yy
+
+    // The frame: along the chord. But a thin footprint must have its thin side across, where the texel's box is exact:
+    // along its long axis then, if the chord leaves that by less than half a texel (blurred, its colours as one).
+    float sweep = length(f.chord);
+    float difference = 0.5 * (cov.x - cov.z);
+    float radius = sqrt(difference * difference + cov.y * cov.y);
+    vec2 e = difference >= 0.0 ? vec2(radius + difference, cov.y) : vec2(cov.y, radius - difference);
+    e = dot(e, e) > 0.0 ? normalize(e) : vec2(1.0, 0.0);
+    e *= dot(e, f.chord) < 0.0 ? -1.0 : 1.0;
+    float aside = abs(e.x * f.chord.y - e.y * f.chord.x);
+    float thin = 0.5 * (cov.x + cov.z) - radius;
+    float blur = 0.0;
+    if (sweep < 1e-4 || (thin < THIN_VARIANCE && aside < 0.5 && radius > aside * aside * TEXEL_VARIANCE)) {
+        sweep = dot(e, f.chord);
+        blur = aside * aside * TEXEL_VARIANCE;
+    } else {
+        e = f.chord / sweep;
+    }
+    vec2 m = vec2(-e.y, e.x);
+    float a = cov.x * e.x * e.x + 2.0 * cov.y * e.x * e.y + cov.z * e.y * e.y;
+    float b = cov.x * e.x * m.x + cov.y * (e.x * m.y + e.y * m.x) + cov.z * e.y * m.y;
+    float c = cov.x * m.x * m.x + 2.0 * cov.y * m.x * m.y + cov.z * m.y * m.y + blur;
+
+    // A texel seen along its m direction is a trapezoid: a box as wide as its longer side and, for the shorter, a
+    // Gaussian of the same variance. The box is kept exactly (no ripple over the grid), the rest is Gaussian.
+    vec2 side = abs(m);
+    float box = max(side.x, side.y);
+    float narrow = min(side.x, side.y);
+    float s2 = max(c, ACROSS_FLOOR * ACROSS_FLOOR) + narrow * narrow * TEXEL_VARIANCE;
+    float c_total = s2 + box * box * TEXEL_VARIANCE;
+    float shear = b / c_total;
+    float along2 = max(a + TEXEL_VARIANCE - b * shear, SAMPLED_VARIANCE * (1.0 + shear * shear));
+    float sigma = sqrt(along2);
+
+    sigma = max(sigma, sweep * MIN_SIGMA_TO_SWEEP);
+    bool cut = false;
+#ifdef BAND_CUTS
+    cut = is_cut(photon, band);
+#endif
+    float row = 0.0;
+    if (cut) {
+        sweep = max(sweep, 0.05 * sigma);
+    } else {
+        // To the nearest row of the table, by changing what the picture depends on least: a blur that is small in the sweep, or a
+        // sweep that is small in the blur.
+        // Rows: 4 an octave from 2^-8, 8 an octave from 2^-4.
+        float octave = log2(clamp(sigma / max(sweep, 1e-6), MIN_SIGMA_TO_SWEEP, MAX_SIGMA_TO_SWEEP));
+        row = octave < -4.0 ? round(4.0 * (octave + 8.0)) : 16.0 + round(8.0 * (octave + 4.0));
+        float ratio = exp2(row < 16.0 ? 0.25 * row - 8.0 : 0.125 * (row - 16.0) - 4.0);
+        if (ratio > 0.3) {
+            sweep = sigma / ratio;
+        } else {
+            sigma = ratio * sweep;
+        }
+    }
+    float reach = 0.5 * sweep + CUT * sigma;
+    float xi_half = 0.5 * sweep / reach;
+
+    float s = sqrt(s2);
+    float y_edge = CUT * sqrt(c_total);
+    float kept = kept_by_cut(y_edge, box, s);
+    float on_grid = grid_sum(f.centre, e, m, shear, box, s2, cut ? 0.0 : sigma * sigma, cut ? sqrt(12.0) * sigma : 0.0, sweep);
+
+    splat.centre = f.centre;
+    splat.along = e * reach;
+    splat.across = (m + shear * e) * y_edge;
+    splat.amplitude = 1.0 / (reach * box * kept * on_grid);
+    splat.table_row = (row + 0.5) / float(table_rows);
+    splat.y_edge = y_edge * SQRT_HALF / s;
+    splat.y_box = 0.5 * box * SQRT_HALF / s;
+#ifdef ONE_COLOUR
+    splat.throughput = vec4(photon.x_anchor, mean_throughput(photon), 0.0, 0.0);
+#else
+    float width = photon.x_hi - photon.x_lo;
+    float anchor = width > 0.0 ? clamp((photon.x_anchor - photon.x_lo) / width, 0.0, 1.0) : 0.5;
+    // Slopes by xi, or by x for a cut band.
+    vec2 ends = cut ? vec2(photon.x_lo, photon.x_hi) : vec2(-xi_half, xi_half);
+    float at = mix(ends.x, ends.y, anchor);
+    splat.throughput = vec4(at, photon.throughput.y,
+                            anchor > 1e-3 && width > 0.0 ? (photon.throughput.y - photon.throughput.x) / (at - ends.x) : 0.0,
+                            anchor < 0.999 && width > 0.0 ? (photon.throughput.z - photon.throughput.y) / (ends.y - at) : 0.0);
+#endif
+    splat.x_range = vec2(photon.x_lo, photon.x_hi);
+    splat.xi_half = xi_half;
+    splat.inverse_sigma_xi = SQRT_HALF * reach / sigma;
+    splat.kind = cut ? 3u : 2u;
+    return splat;
+}
+
+SplatRecord empty_splat() {
+    return SplatRecord(vec2(0.0), vec2(0.0), vec2(0.0), 0.0, 0.0, 0.0, 0.0, 0u, 0u, vec4(0.0), vec2(0.0), 0.0, 0.0, vec4(0.0));
+}
