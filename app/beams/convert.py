@@ -69,9 +69,10 @@ def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float)
     lives = lifetimes_of(edges, starts, chosen.corner, corner_starts)
     exists = lives.bands[:, 1] > lives.bands[:, 0]
     t = lives.bands[exists]
-    counts = np.diff(starts)[exists]
-    kept = edges[np.repeat(exists, np.diff(starts))]
-    own = np.repeat(np.arange(len(t)), counts)
+    own = np.repeat(np.cumsum(exists) - 1, np.diff(starts))
+    bounds = lives.bounds & np.repeat(exists, np.diff(starts))
+    kept, own = edges[bounds], own[bounds]
+    counts = np.bincount(own, minlength=len(t))
     change = kept[:, 4:] - kept[:, :4]
     hull_counts = np.diff(lives.starts)[exists]
     softest = np.maximum.reduceat(kept[:, 3], np.cumsum(counts) - counts) if len(kept) else np.zeros(0)

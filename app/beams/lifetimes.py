@@ -1,8 +1,8 @@
 """The part of its band in which a polygon exists.
 
-A beam whose outline is empty at an end of its band throws a polygon that appears, or vanishes, in between. Its lines are
-known for all of the band, so the band can be cut to where something is left, exactly: the polygon then moves less, covers
-fewer texels, and a few places of its band show it as it is.
+A beam whose outline is empty at an end of its band throws a polygon that appears, or vanishes, in between. Its lines
+are known for all of the band, so the band can be cut to where something is left, exactly: the polygon then moves less,
+covers fewer texels, and a few places of its band show it as it is. Lines that bound it nowhere are left out.
 """
 
 from __future__ import annotations
@@ -16,17 +16,20 @@ from .nodes import area_of
 
 PLACES = 17
 """At which a polygon that is empty at an end is looked for."""
+LOOKS = 5
+"""Places of what exists at which lines are looked at, odd."""
 _HALVINGS = 8
 """Of a place, to find where it appears or vanishes."""
 ROOM = 128
-"""Corners of an outline, the last two a box."""
+"""Corners of an outline."""
 
 
 @part
-def outline_at(edges, first, last, box, t, corner, spare):
-    """The polygon at t in [0, 1] of its band: corners of the rectangle `box` (u0, v0, u1, v1) cut by all its lines;
-    returns how many."""
+def outline_at(edges, first, last, box, t, corner, spare, side, spare_side):
+    """The polygon at t in [0, 1] of its band: corners of the rectangle `box` (u0, v0, u1, v1) cut by all its lines, and
+    the line of the side from each to the next (-1: the rectangle's); returns how many."""
     for c in range(4):
+        side[c] = -1
         corner[c, 0] = box[2] if c == 1 or c == 2 else box[0]
         corner[c, 1] = box[3] if c > 1 else box[1]
     n = 4
@@ -39,28 +42,29 @@ def outline_at(edges, first, last, box, t, corner, spare):
             j = i + 1 if i + 1 < n else 0
             here = a * corner[i, 0] + b * corner[i, 1] + c
             there = a * corner[j, 0] + b * corner[j, 1] + c
-            if here >= 0.0 and kept < ROOM - 4:
-                spare[kept, 0], spare[kept, 1] = corner[i, 0], corner[i, 1]
+            if here >= 0.0 and kept < ROOM - 1:
+                spare[kept, 0], spare[kept, 1], spare_side[kept] = corner[i, 0], corner[i, 1], side[i]
                 kept += 1
-            if (here >= 0.0) != (there >= 0.0) and kept < ROOM - 4:
+            if (here >= 0.0) != (there >= 0.0) and kept < ROOM - 1:
                 at = here / (here - there)
                 spare[kept, 0] = corner[i, 0] + at * (corner[j, 0] - corner[i, 0])
                 spare[kept, 1] = corner[i, 1] + at * (corner[j, 1] - corner[i, 1])
+                spare_side[kept] = e if here >= 0.0 else side[i]
                 kept += 1
         n = kept
         for i in range(n):
-            corner[i, 0], corner[i, 1] = spare[i, 0], spare[i, 1]
+            corner[i, 0], corner[i, 1], side[i] = spare[i, 0], spare[i, 1], spare_side[i]
         if n < 3:
             return 0
     return n
 
 
 @part
-def border(edges, first, last, box, alive, dead, corner, spare):
+def border(edges, first, last, box, alive, dead, corner, spare, side, spare_side):
     """Place between one where there is a polygon and one where there is none, on the side of the latter."""
     for _ in range(_HALVINGS):
         t = 0.5 * (alive + dead)
-        n = outline_at(edges, first, last, box, t, corner, spare)
+        n = outline_at(edges, first, last, box, t, corner, spare, side, spare_side)
         if n > 0 and area_of(corner, n) > 0.0:
             alive = t
         else:
@@ -69,11 +73,14 @@ def border(edges, first, last, box, alive, dead, corner, spare):
 
 
 @jit
-def lifetimes(edges, starts, corners, corner_starts, corner, spare, lives, areas, kept, kept_ends):
+def lifetimes(
+    edges, starts, corners, corner_starts, corner, spare, side, spare_side, box, lives, areas, bounds, kept, kept_ends
+):
     """For every polygon the part of its band in which it exists, into `lives` (N, 2) (both 0 where it never does), and
-    its area in the middle of that, into `areas` (N,). `corners` are those of each polygon at its places; those of what
-    exists go to `kept`, up to `kept_ends` (N + 1,). `corner`, `spare` (`ROOM`, 2): scratch."""
-    box, step, count = corner[ROOM - 2 :].ravel(), 1.0 / (PLACES - 1), 0
+    its area in the middle of that, into `areas` (N,); `bounds` (E,) becomes True for lines that bound something.
+    `corners` are those of each polygon at its places; those of what exists go to `kept`, up to `kept_ends` (N + 1,).
+    `corner`, `spare` (`ROOM`, 2), `side`, `spare_side` (`ROOM`,) and `box` (4,): scratch."""
+    step, count = 1.0 / (PLACES - 1), 0
     for i in range(len(starts) - 1):
         first, last = starts[i], starts[i + 1]
         box[0] = box[1] = 1e300
@@ -88,23 +95,32 @@ def lifetimes(edges, starts, corners, corner_starts, corner, spare, lives, areas
         low = high = -1.0
         for k in range(PLACES):
             t = k * step
-            if outline_at(edges, first, last, box, t, corner, spare) > 0:
+            if outline_at(edges, first, last, box, t, corner, spare, side, spare_side) > 0:
                 low = t if low < 0.0 else low
                 high = t
                 # Most exist everywhere.
-                if k == 0 and outline_at(edges, first, last, box, 1.0, corner, spare) > 0:
+                if k == 0 and outline_at(edges, first, last, box, 1.0, corner, spare, side, spare_side) > 0:
                     high = 1.0
                     break
         lives[i, 0] = lives[i, 1] = areas[i] = 0.0
         if low >= 0.0:
-            lives[i, 0] = 0.0 if low <= 0.0 else border(edges, first, last, box, low, low - step, corner, spare)
-            lives[i, 1] = 1.0 if high >= 1.0 else border(edges, first, last, box, high, high + step, corner, spare)
+            lives[i, 0] = (
+                0.0 if low <= 0.0 else border(edges, first, last, box, low, low - step, corner, spare, side, spare_side)
+            )
+            lives[i, 1] = (
+                1.0
+                if high >= 1.0
+                else border(edges, first, last, box, high, high + step, corner, spare, side, spare_side)
+            )
             is_whole = lives[i, 0] <= 0.0 and lives[i, 1] >= 1.0
-            for turn in range(3):
-                t = lives[i, 0] + 0.5 * turn * (lives[i, 1] - lives[i, 0])
-                n = outline_at(edges, first, last, box, t, corner, spare)
-                if turn == 1:
+            for turn in range(LOOKS):
+                t = lives[i, 0] + turn / (LOOKS - 1) * (lives[i, 1] - lives[i, 0])
+                n = outline_at(edges, first, last, box, t, corner, spare, side, spare_side)
+                if 2 * turn == LOOKS - 1:
                     areas[i] = area_of(corner, n)
+                for c in range(n):
+                    if side[c] >= 0:
+                        bounds[side[c]] = True
                 for c in range(0 if is_whole else n):
                     kept[count, 0], kept[count, 1] = corner[c, 0], corner[c, 1]
                     count += 1
@@ -122,6 +138,8 @@ class Lifetimes:
     """(N, 2): first and last place t in [0, 1] of the band; the same where there never is anything."""
     areas: np.ndarray
     """(N,), in the middle between."""
+    bounds: np.ndarray
+    """bool (E,), lines that bound the polygon somewhere between."""
     starts: np.ndarray
     """int64 (N + 1,), into `corners`."""
     corners: np.ndarray
@@ -133,7 +151,23 @@ def lifetimes_of(edges: np.ndarray, starts: np.ndarray, corners: np.ndarray, cor
     with starts (N + 1,)."""
     n = len(starts) - 1
     bands, areas, ends = np.zeros((n, 2)), np.zeros(n), np.zeros(n + 1, np.int64)
-    kept = np.empty((max(3 * (len(edges) + 4 * n), 0) + len(corners), 2))
-    corner, spare = np.empty((2, ROOM, 2))
-    lifetimes(edges, starts, corners, corner_starts, corner, spare, bands, areas, kept, ends)
-    return Lifetimes(bands, areas, ends, kept[: ends[-1]])
+    bounds = np.zeros(len(edges), bool)
+    kept = np.empty((LOOKS * (len(edges) + 4 * n) + len(corners), 2))
+    (corner, spare), (side, spare_side) = np.empty((2, ROOM, 2)), np.empty((2, ROOM), np.int64)
+    lifetimes(
+        edges,
+        starts,
+        corners,
+        corner_starts,
+        corner,
+        spare,
+        side,
+        spare_side,
+        np.zeros(4),
+        bands,
+        areas,
+        bounds,
+        kept,
+        ends,
+    )
+    return Lifetimes(bands, areas, bounds, ends, kept[: ends[-1]])

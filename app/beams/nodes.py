@@ -78,10 +78,10 @@ def last_place(beam):
 @part
 def exists_throughout(beam):
     """Whether a beam's outline is empty at none of its places."""
+    throughout = True
     for a in range(first_place(beam), last_place(beam)):
-        if beam.corners[a] == 0:
-            return False
-    return True
+        throughout = throughout and beam.corners[a] > 0
+    return throughout
 
 
 @part
@@ -247,11 +247,11 @@ def cut(beam, line, sign, flight, facet, edge, way, work):
             left = True
     if used or (some_empty and left and beam.lines < SPARE_LINES):
         for a in range(3):
-            if some_empty and beam.corners[a] == 0 and 0 < beam.held[a] < CORNERS:
+            held = beam.held[a]
+            if beam.corners[a] == 0 and 0 < held < CORNERS and beam.side[a, held - 1] != label:
                 # Nearer to the places that are left it may be what bounds the outline.
-                if beam.side[a, beam.held[a] - 1] != label:
-                    beam.side[a, beam.held[a]] = label
-                    beam.held[a] += 1
+                beam.side[a, held] = label
+                beam.held[a] += 1
             for c in range(3):
                 beam.line[label, a, c] = sign * line[a, c]
         made = beam.made
@@ -323,7 +323,6 @@ def lay_out(beam, facets, solids, tables, source, work):
         beam.corners[a] = 4
         m = beam.corners[a]
         for ln in range(n):
-            before = m
             if heights(corner, m, beam.line[ln, a], 1.0, work.height) == 0:
                 continue
             m = clip(corner, side, m, ln, work)
