@@ -42,6 +42,9 @@ from .search import (
 _GRAZING = 1e-9
 """Squared cosines below this may count as either side of total reflection."""
 
+_DRIFTING = 0.03
+"""Share of the threshold below which a beam is not halved for its outline's motion."""
+
 
 @part
 def at_facet(nodes, facets, solids, tables, sources, work):
@@ -59,7 +62,7 @@ def at_facet(nodes, facets, solids, tables, sources, work):
         work.sums[SUM_ABSORBED] += flux_of(hand, tables, work)
         return
     power = power_as(hand, hand, tables, work)
-    if power > work.threshold and drifts(hand, power, work):
+    if power > _DRIFTING * work.threshold and drifts(hand, power, work):
         halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
         return
     if not is_parallel and hand.bend >= 0.0:

@@ -72,6 +72,15 @@ def border(edges, first, last, box, alive, dead, corner, spare, side, spare_side
     return dead
 
 
+@part
+def is_same(one, other):
+    """Whether two lines are one, at both ends of the band: that of an edge between two facets, met as either's."""
+    far = 0.0
+    for k in range(8):
+        far = max(far, abs(one[k] - other[k]))
+    return far < 1e-10
+
+
 @jit
 def lifetimes(
     edges, starts, corners, corner_starts, corner, spare, side, spare_side, box, lives, areas, bounds, kept, kept_ends
@@ -124,6 +133,10 @@ def lifetimes(
                 for c in range(0 if is_whole else n):
                     kept[count, 0], kept[count, 1] = corner[c, 0], corner[c, 1]
                     count += 1
+            for e in range(first, last):
+                for f in range(first, e if bounds[e] else first):
+                    if bounds[f] and is_same(edges[e], edges[f]):
+                        bounds[e] = False
             for h in range(corner_starts[i], corner_starts[i + 1] if is_whole else corner_starts[i]):
                 kept[count, 0], kept[count, 1] = corners[h, 0], corners[h, 1]
                 count += 1

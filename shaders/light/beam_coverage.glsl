@@ -35,10 +35,12 @@ float reach_of(vec4 line) { return 0.5 * (abs(line.x) + abs(line.y)) * line.w; }
 // Part of the line `own` (a point of it is -h n + s perpendicular) within the half-plane `other`, as an interval of s. Of two lines that are the same one counts.
 vec2 cut(vec2 interval, vec3 own, vec3 other, bool own_first) {
     float along = own.x * other.y - own.y * other.x;
-    float inside = other.z - own.z * dot(own.xy, other.xy);  // of the other, at s = 0
-    float s = -inside / along;
+    float turn = dot(own.xy, other.xy);
+    float s = (own.z * turn - other.z) / along;
     bool is_parallel = abs(along) < 1e-7;
-    bool nothing = is_parallel && (inside < 0.0 || (inside == 0.0 && !own_first && dot(own.xy, other.xy) > 0.0));
+    // Differences of the same two numbers, so that of two lines in one place exactly one counts however they are rounded.
+    float inside = turn > 0.0 ? other.z - own.z : other.z + own.z;
+    bool nothing = is_parallel && (inside < 0.0 || (inside == 0.0 && !own_first && turn > 0.0));
     float low = nothing ? 1.0 : is_parallel || along < 0.0 ? interval.x : max(interval.x, s);
     float high = nothing ? -1.0 : is_parallel || along > 0.0 ? interval.y : min(interval.y, s);
     return vec2(low, high);
