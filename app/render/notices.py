@@ -3,6 +3,9 @@ do not hold what they should. One line each; a picture that needs none is right 
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
+
 import numpy as np
 
 from ..model.contacts import world_bounds
@@ -19,6 +22,34 @@ HELD_SHARE = 0.5
 a slanting patch, 16 samples weigh a spot within it to a quarter."""
 _BRIGHTEST = 4096
 """Texels that are looked for in the picture."""
+
+
+class FrameNotices:
+    """What the frames of a job say, each kind once, however its shares change from frame to frame."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, tuple[str, int, int]] = {}
+
+    def take(self, notices: Iterable[str], number: int = 1) -> None:
+        """Those of frame `number`, from 1 on."""
+        for notice in notices:
+            kind = re.sub(r"[\d.]+ %", "%", notice)
+            text, first, count = self._found.get(kind, (notice, number, 0))
+            self._found[kind] = text, first, count + 1
+
+    def lines(self, of_frames: bool = False) -> list[str]:
+        """A line for each kind; with the frames that it was said of."""
+        if not of_frames:
+            return [text for text, _, _ in self._found.values()]
+        return [
+            f"frame {first}" + (f" and {count - 1} more" if count > 1 else "") + f": {text}"
+            for text, first, count in self._found.values()
+        ]
+
+
+def frame_notices(light: LightPass, camera: Camera, settings: RenderSettings, rgb: np.ndarray) -> list[str]:
+    """Of a finished frame: of its light and of its picture (H, W, 3)."""
+    return [*light_notices(light), *picture_notices(light, camera, settings, rgb)]
 
 
 def loss_notices(lost: dict[str, float], max_depth: int | None = None) -> list[str]:
@@ -59,6 +90,8 @@ def light_notices(light: LightPass) -> list[str]:
         found.append(
             f"{100.0 * outside / deposited:.1f} % of the caustics lies beside all maps and lacks in the picture"
         )
+    if light.map_receiver is not None:  # its texels are the picture's
+        return found
     for receiver, windows in light.layout.windows.items():
         pixels = [light.window_pixels(receiver, window) for window in windows]
         if receiver in light.lit_receivers and pixels and max(pixels) < 1.0:

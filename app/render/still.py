@@ -16,7 +16,7 @@ from .beam_light import BeamStats
 from .camera_beams import CameraBeamStats
 from .frames import FrameRenderer, Picture
 from .light_pass import LightStats
-from .notices import light_notices, picture_notices
+from .notices import frame_notices
 
 Progress = Callable[[float, str], None]
 Cancelled = Callable[[], bool]
@@ -147,10 +147,7 @@ def render(
         for share in frames.steps(stage, cancelled):
             progress(share, frames.phase)
         picture = frames.picture
-        notices = (
-            *light_notices(frames.light),
-            *picture_notices(frames.light, scene.camera, settings, picture.rgb),
-        )
+        notices = tuple(frame_notices(frames.light, scene.camera, settings, picture.rgb))
         return RenderResult(**vars(picture), stats=replace(_stats(context, frames, settings), notices=notices))
     finally:
         frames.release()
