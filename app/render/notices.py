@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from ..gpu.tiles import Tile
 from ..model.contacts import world_bounds
 from ..model.optics.colorimetry import rgb709_to_xyz_matrix
 from ..model.scene import Camera
@@ -108,15 +109,15 @@ def picture_notices(light: LightPass, camera: Camera, settings: RenderSettings, 
     if settings.bins or settings.layer not in ("beauty", "caustic") or not np.isfinite(rgb).all():
         return []
     expected, held = 0.0, 0.0
-    luminance = rgb.astype(float) @ rgb709_to_xyz_matrix()[1]
     for receiver in light.lit_receivers:
         if light.layout.windows[receiver]:
             found = _pixels_of(light, receiver, camera, settings)
-            about = np.zeros(luminance.shape, bool)
+            about = np.zeros(rgb.shape[:2], bool)
             for row, column in found:
                 about[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] = True
             energy = sum(found.values())
-            expected, held = expected + energy, held + min(float(luminance[about].sum()), energy)
+            there = float((rgb[about].astype(float) @ rgb709_to_xyz_matrix()[1]).sum())
+            expected, held = expected + energy, held + min(there, energy)
     if held >= HELD_SHARE * expected:
         return []
     share = 100.0 * held / expected
@@ -131,16 +132,13 @@ def _pixels_of(
     see them past all other objects' bounds."""
     number = light.buffers.receivers[receiver]
     item, space = light.scene.objects[number], light.buffers.space
-    luminous = light.resolved_map(receiver)[..., 1].astype(float) * light.map_scale
-    height, width = luminous.shape
-    chosen = np.argsort(luminous, axis=None)[-_BRIGHTEST:]
-    chosen = chosen[luminous.flat[chosen] > 0.0]
-    if not len(chosen):
+    tile = light.layout.tiles[receiver][0]
+    rows, columns, luminous = _brightest(light, tile)
+    if not len(luminous):
         return {}
-    rows, columns = np.unravel_index(chosen, luminous.shape)
     frame = plane_frame(space.to_gpu(light.buffers.world_meshes[number].vertices))
     window = light.layout.windows[receiver][0]
-    step = window.size / (width, height)
+    step = window.size / (tile.width, tile.height)
     at = window.low + (np.stack([columns, rows], axis=-1) + 0.5) * step
     places = space.to_world(frame.origin + at @ frame.axes)
     sides = [space.to_world(frame.origin + (at + step * offset) @ frame.axes) for offset in ((1.0, 0.0), (0.0, 1.0))]
@@ -156,7 +154,7 @@ def _pixels_of(
     if material.texture is not None:
         return {}
     texel_area = float(np.prod(step)) / space.scale**2
-    energy = luminous.flat[chosen] / texel_area * reflectance / np.pi * area_px
+    energy = luminous * light.map_scale / texel_area * reflectance / np.pi * area_px
     inside &= np.isfinite(energy) & ~_may_be_hidden(light, number, camera, places)
     found: dict[tuple[int, int], float] = {}
     for (column, row), value in zip(
@@ -164,6 +162,22 @@ def _pixels_of(
     ):
         found[row, column] = found.get((row, column), 0.0) + value
     return found
+
+
+def _brightest(light: LightPass, tile: Tile) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows, columns and luminance, as summed, of the brightest texels of a map: (n,) each. Read in portions, for a map
+    takes more memory than all else."""
+    assert light.maps is not None
+    places, values = np.zeros(0, np.int64), np.zeros(0)
+    for first, texels in light.maps.portions(tile):
+        luminous = texels[..., 1].ravel()
+        lit = np.flatnonzero(luminous > 0.0)
+        places = np.concatenate([places, first * tile.width + lit])
+        values = np.concatenate([values, luminous[lit].astype(float)])
+        if len(values) > _BRIGHTEST:
+            kept = np.argpartition(values, -_BRIGHTEST)[-_BRIGHTEST:]
+            places, values = places[kept], values[kept]
+    return places // tile.width, places % tile.width, values
 
 
 def _may_be_hidden(light: LightPass, receiver: int, camera: Camera, places: np.ndarray) -> np.ndarray:
