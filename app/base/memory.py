@@ -29,6 +29,21 @@ def check_picture_memory(width: int, height: int, bins: int | None) -> None:
         )
 
 
+def waste_little() -> None:
+    """Give memory back as soon as it is free, where the C library is GNU's: with an arena for each thread and a
+    threshold that grows, a tenth of what a rendering takes is held for nothing."""
+    import ctypes
+
+    arenas_at_most, mapped_from, trimmed_from = -8, -3, -1  # M_ARENA_MAX, M_MMAP_THRESHOLD, M_TRIM_THRESHOLD
+    try:
+        mallopt = ctypes.CDLL(None).mallopt
+    except (AttributeError, OSError, TypeError):
+        return
+    mallopt(arenas_at_most, 1)
+    mallopt(mapped_from, 1 << 20)
+    mallopt(trimmed_from, 1 << 20)
+
+
 def peak_bytes() -> int:
     """Most memory that this process has held at once."""
     import resource

@@ -150,7 +150,7 @@ def hulls_around(chosen: Chosen, grow: np.ndarray) -> tuple[np.ndarray, np.ndarr
     ends = np.zeros(len(starts), np.int64)
     points = np.empty((4 * int(chosen.head[:, 7].max(initial=0)), 2))
     hulls_of(chosen.corners, starts, grow.astype(float), points, np.empty((2 * len(points) + 2, 2)), ends, out)
-    return ends.astype(np.int32), out[: ends[-1]]
+    return ends.astype(np.int32), out[: ends[-1]].copy()
 
 
 def objects_of(mask: np.ndarray, scene: BeamScene) -> np.ndarray:

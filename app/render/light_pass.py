@@ -46,7 +46,7 @@ from .shown_spectra import PassTables, ShownSpectra, ShownTables
 from .splatting import Pace, Splatting
 
 DEFAULT_BATCH = 1 << 16
-QUEUE_BYTES = 128 << 20
+QUEUE_BYTES = 64 << 20
 """What the queue of a batch that nobody asked for may take; more on a GPU. Less where memory is short."""
 
 
