@@ -79,7 +79,7 @@ def available_bytes() -> int:
     found = [memory_bytes()]
     found += [1024 * size for size in _kib("/proc/meminfo", "MemAvailable:")]
     for limit, used, reclaimable in _groups():
-        found.append(max(min(limit, memory_bytes()) - used + reclaimable, 0))
+        found.append(max(min(limit, _physical_bytes()) - used + reclaimable, 0))
     import resource
 
     for limit, key in ((resource.RLIMIT_AS, "VmSize:"), (resource.RLIMIT_DATA, "VmData:")):
@@ -108,8 +108,11 @@ def _kib(path: str, key: str) -> list[int]:
 
 def memory_bytes() -> int:
     """Memory this process may use: the machine's, or its control groups' where that is less."""
-    total = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    return min([total, *(limit for limit, _, _ in _groups())])
+    return min([_physical_bytes(), *(limit for limit, _, _ in _groups())])
+
+
+def _physical_bytes() -> int:
+    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
 
 
 _V1, _V2 = Path("/sys/fs/cgroup/memory"), Path("/sys/fs/cgroup")

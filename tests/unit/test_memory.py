@@ -38,6 +38,16 @@ def test_a_control_group_limits(groups: Path) -> None:
     assert memory.available_bytes() == 200 << 20  # files that are only kept do not count
 
 
+def test_what_others_use_counts_against_their_group_only(groups: Path) -> None:
+    """Around a group of 400 MiB lies one without a limit that uses much more."""
+    own = Path("/proc/self/cgroup").read_text().splitlines()
+    paths = [line.split(":", 2)[2] for line in own if line.startswith("0::")] or ["/"]
+    names = ("memory.max", "memory.current")
+    group(groups / "v1", ("memory.limit_in_bytes", "memory.usage_in_bytes"), str(1 << 62), GIB, "total_inactive_file")
+    group(groups / paths[0].lstrip("/"), names, str(400 << 20), 300 << 20, "inactive_file")
+    assert memory.available_bytes() == 200 << 20
+
+
 def test_the_older_kind_too(groups: Path) -> None:
     group(
         groups / "v1",
