@@ -12,9 +12,9 @@ from ..passes.map_layout import MapLayout
 from .light_pass import LightPass
 
 _MIB = 1 << 20
-_SPLAT_PROGRAMS = 160 * _MIB
-"""Programs that splat, compiled on the processor, with their tables and lists: 100 to 180 MiB were measured."""
-_ALL_PROGRAMS = 190 * _MIB
+_SPLAT_PROGRAMS = 130 * _MIB
+"""Programs that splat, compiled on the processor, with their tables and lists: 65 to 200 MiB were measured."""
+_ALL_PROGRAMS = 170 * _MIB
 """With the camera's."""
 _TEXEL_BYTES = 16
 _SPARE = 0.02
@@ -29,7 +29,8 @@ class MemoryEstimate:
     light: int
     """More while photons are traced: maps, their scratch textures, programs."""
     camera: int
-    """More while the camera looks: maps, the picture's sums, what is read of them."""
+    """More while the camera looks: maps, the picture's sums, what is read of them. Mesa holds released scratch textures
+    until it is closed."""
 
     @property
     def peak(self) -> int:
@@ -54,11 +55,8 @@ def estimate(light: LightPass, layout: MapLayout, settings: RenderSettings) -> M
     scratched = 1 if light.features.map_tents else targets
     # Charts are folded into textures of their own while the sums are still there.
     resolved = targets if layout.charts else 0
-    return MemoryEstimate(
-        now,
-        texture * (targets + max(scratched, resolved)) + _SPLAT_PROGRAMS,
-        texture * targets + (0 if shows_map else _ALL_PROGRAMS) + picture,
-    )
+    maps = texture * (targets + max(scratched, resolved))
+    return MemoryEstimate(now, maps + _SPLAT_PROGRAMS, maps + (0 if shows_map else _ALL_PROGRAMS) + picture)
 
 
 def check_room(expected: MemoryEstimate, settings: RenderSettings) -> None:
