@@ -15,6 +15,7 @@ from typing import Any, TextIO
 
 from .base.errors import UserError, plain
 from .base.interrupts import INTERRUPTED, exit_code_of, signals_raise
+from .base.memory import waste_little
 
 USER_ERROR = 2
 NOT_PRINTED = 1  # as typer has it for a closed pipe
@@ -71,6 +72,7 @@ class _Patient:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
+    waste_little()
     from .commands.program import run
 
     return run(sys.argv[1:] if arguments is None else list(arguments))

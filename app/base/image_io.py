@@ -94,11 +94,7 @@ def write_into(
     rgb = np.ascontiguousarray(rgb, np.float32)
     if rgb.ndim != 3 or rgb.shape[2] != 3 or 0 in rgb.shape:
         raise ValueError(f"a picture is (H, W, 3) and not empty, got {rgb.shape}")
-    if not np.isfinite(rgb).all() or (spectral is not None and not np.isfinite(spectral).all()):
-        raise BrokenPictureError(
-            f"{name or part.name} is not written: the picture holds numbers that are not finite; a power or a size of "
-            "the scene is beyond what float32 can hold, choose others"
-        )
+    check_finite(name or part.name, rgb, spectral)
     metadata = dict(metadata or {})
     if suffix == ".png":
         _write_png(part, rgb, exposure_ev or 0.0, metadata)
@@ -109,6 +105,15 @@ def write_into(
             # Not np.save: the error of its tofile does not say that the disk is full.
             np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(rgb))
             file.write(rgb.data)
+
+
+def check_finite(name: str, *pictures: np.ndarray | None) -> None:
+    """Raise `BrokenPictureError` where a picture that is to be written as `name` holds NaN or infinity."""
+    if not all(picture is None or np.isfinite(picture).all() for picture in pictures):
+        raise BrokenPictureError(
+            f"{name} is not written: the picture holds numbers that are not finite; a power or a size of the scene is "
+            "beyond what float32 can hold, choose others"
+        )
 
 
 def read_image(path: Path | str) -> Picture:

@@ -5,28 +5,59 @@ from __future__ import annotations
 import math
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import UserError
 
 MAX_SIDE_PX = 16384
 """Largest texture side OpenGL 4.3 promises."""
-_BYTES_PER_TARGET_PX = 16  # RGBA32F
-_GIB = 1 << 30
+_TEXEL_BYTES = 16  # RGBA32F
+_GIB, _MIB = 1 << 30, 1 << 20
+_LEAST_BYTES = 160 * _MIB
+"""What any rendering takes beyond the interpreter: OpenGL and its compiler, programs, the queue of photons."""
+_LEAST_ADDRESSES = 560 * _MIB
+"""The same where addresses are counted (`ulimit -v`): libraries reserve more than they touch."""
+
+
+def picture_bytes(width: int, height: int, bins: int | None) -> int:
+    """Most memory that a picture takes at once while it is sampled and read back: the sums on the device with the list
+    of pixels that see glass, what is read of them, and what is made of that (`CameraPass`, `Channels`)."""
+    targets = math.ceil(bins / 4) if bins else 1
+    sums = targets * _TEXEL_BYTES
+    read = max(_TEXEL_BYTES + sums, sums + 4 * (bins or 0) + 12)
+    return width * height * (sums + 4 + read)
 
 
 def check_picture_memory(width: int, height: int, bins: int | None) -> None:
-    """Refuse a picture whose targets would not fit into the machine's memory."""
-    targets = 1 + math.ceil((bins or 0) / 4)
-    # Accumulation on the device, its read-back, and the float32 picture made from it.
-    needed = 3 * width * height * targets * _BYTES_PER_TARGET_PX
-    available = memory_bytes()
+    """Refuse a picture that would not fit into the memory there is, before anything else is made."""
+    needed, available = picture_bytes(width, height, bins), available_bytes()
+    least = _LEAST_BYTES if address_limit() is None else _LEAST_ADDRESSES
+    if least > available:
+        raise UserError(
+            f"a rendering needs at least {least // _MIB} MiB and {available // _MIB} MiB are left: give it more memory"
+        )
     if needed > available:
         with_bins = f" with --bins {bins}" if bins else ""
         raise UserError(
             f"--size {width}x{height}{with_bins} needs about {needed / _GIB:.1f} GiB "
-            f"and this machine has {available / _GIB:.1f} GiB: choose a smaller one"
+            f"and {available / _GIB:.1f} GiB are left: choose a smaller one"
         )
+
+
+def waste_little() -> None:
+    """Give memory back as soon as it is free, where the C library is GNU's: with an arena for each thread and a
+    threshold that grows, a tenth of what a rendering takes is held for nothing."""
+    import ctypes
+
+    arenas_at_most, mapped_from, trimmed_from = -8, -3, -1  # M_ARENA_MAX, M_MMAP_THRESHOLD, M_TRIM_THRESHOLD
+    try:
+        mallopt = ctypes.CDLL(None).mallopt
+    except (AttributeError, OSError, TypeError):
+        return
+    mallopt(arenas_at_most, 1)
+    mallopt(mapped_from, 1 << 20)
+    mallopt(trimmed_from, 1 << 20)
 
 
 def peak_bytes() -> int:
@@ -37,27 +68,33 @@ def peak_bytes() -> int:
     return peak * (1 if sys.platform == "darwin" else 1024)
 
 
+def resident_bytes() -> int:
+    """Memory that this process holds now; 0 where the system does not say."""
+    return sum(1024 * size for size in _kib("/proc/self/status", "VmRSS:"))
+
+
 def available_bytes() -> int:
-    """Memory this process may still take: the machine's free memory, what is left of its control group's, and of the
-    process's own limit of addresses (`ulimit -v`), whichever is least."""
+    """Memory this process may still take: the machine's free memory, what is left of its control groups', and of the
+    process's own limits of data and addresses (`ulimit -d`, `-v`), whichever is least."""
     found = [memory_bytes()]
     found += [1024 * size for size in _kib("/proc/meminfo", "MemAvailable:")]
-    try:
-        used = int(Path("/sys/fs/cgroup/memory.current").read_text(encoding="ascii"))
-        reclaimable = sum(
-            int(line.split()[1])
-            for line in Path("/sys/fs/cgroup/memory.stat").read_text(encoding="ascii").splitlines()
-            if line.startswith(("inactive_file ", "active_file "))
-        )
-        found.append(max(memory_bytes() - used + reclaimable, 0))
-    except (OSError, ValueError):
-        pass
+    for limit, used, reclaimable in _groups():
+        found.append(max(min(limit, _physical_bytes()) - used + reclaimable, 0))
+    import resource
+
+    for limit, key in ((resource.RLIMIT_AS, "VmSize:"), (resource.RLIMIT_DATA, "VmData:")):
+        most = resource.getrlimit(limit)[0]
+        if most != resource.RLIM_INFINITY:
+            found += [max(most - 1024 * size, 0) for size in _kib("/proc/self/status", key)]
+    return min(found)
+
+
+def address_limit() -> int | None:
+    """What `ulimit -v` allows; None where it is not set."""
     import resource
 
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if limit != resource.RLIM_INFINITY:
-        found += [max(limit - 1024 * size, 0) for size in _kib("/proc/self/status", "VmSize:")]
-    return min(found)
+    return None if limit == resource.RLIM_INFINITY else limit
 
 
 def _kib(path: str, key: str) -> list[int]:
@@ -70,10 +107,42 @@ def _kib(path: str, key: str) -> list[int]:
 
 
 def memory_bytes() -> int:
-    """Memory this process may use: the machine's, or its control group's where that is less."""
-    total = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    """Memory this process may use: the machine's, or its control groups' where that is less."""
+    return min([_physical_bytes(), *(limit for limit, _, _ in _groups())])
+
+
+def _physical_bytes() -> int:
+    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+
+
+_V1, _V2 = Path("/sys/fs/cgroup/memory"), Path("/sys/fs/cgroup")
+
+
+def _groups() -> Iterator[tuple[int, int, int]]:
+    """(limit, used, of which files that can be dropped), bytes, of every control group of this process that limits
+    memory: its own and those around it, of either version of the kernel's interface."""
+    own = {_V1: "/", _V2: "/"}
     try:
-        limit = Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii").strip()
-    except OSError:
-        return total
-    return min(total, int(limit)) if limit.isdigit() else total
+        for line in Path("/proc/self/cgroup").read_text(encoding="utf-8", errors="replace").splitlines():
+            _, controllers, path = line.split(":", 2)
+            if not controllers or "memory" in controllers.split(","):
+                own[_V1 if controllers else _V2] = path
+    except (OSError, ValueError):
+        pass
+    names = {
+        _V1: ("memory.limit_in_bytes", "memory.usage_in_bytes", ("total_inactive_file", "total_active_file")),
+        _V2: ("memory.max", "memory.current", ("inactive_file", "active_file")),
+    }
+    for root, path in own.items():
+        limit, used, files = names[root]
+        inside = Path(path.lstrip("/"))
+        for part in (inside, *inside.parents) if inside != Path() else (inside,):
+            folder = root / part
+            try:
+                most = (folder / limit).read_text(encoding="ascii").strip()
+                held = int((folder / used).read_text(encoding="ascii"))
+                stat = (folder / "memory.stat").read_text(encoding="ascii").splitlines()
+            except (OSError, ValueError):
+                continue
+            if most.isdigit():
+                yield int(most), held, sum(int(row.split()[1]) for row in stat if row.split()[0] in files)

@@ -153,7 +153,7 @@ def hulls_around(corners: np.ndarray, counts: np.ndarray, grow: np.ndarray) -> t
     ends = np.zeros(len(starts), np.int64)
     points = np.empty((4 * int(counts.max(initial=0)), 2))
     hulls_of(corners, starts, grow.astype(float), points, np.empty((2 * len(points) + 2, 2)), ends, out)
-    return ends.astype(np.int32), out[: ends[-1]]
+    return ends.astype(np.int32), out[: ends[-1]].copy()
 
 
 def objects_of(mask: np.ndarray, scene: BeamScene) -> np.ndarray:

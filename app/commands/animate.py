@@ -47,6 +47,7 @@ def animate_command(request: AnimateRequest) -> int:
     from ..edit.parameters import Stage
     from ..model.io.scene_file import load_scene
     from ..render.animate import description, render_animation
+    from ..render.notices import FrameNotices
 
     frames = None if request.frames is None else options.parse_integer("--frames", request.frames, 1, 1_000_000)
     fps = DEFAULT_FPS if request.fps is None else _parse_fps(request.fps)
@@ -63,7 +64,7 @@ def animate_command(request: AnimateRequest) -> int:
     from ..gpu.context import create_context
     from ..gpu.shader import keep_programs
 
-    count, started = len(animation.times_s), time.perf_counter()
+    count, started, notices = len(animation.times_s), time.perf_counter(), FrameNotices()
     there = sum(sink.has(i) for i in range(count))
     try:
         context = create_context()
@@ -72,12 +73,17 @@ def animate_command(request: AnimateRequest) -> int:
         raise
     with context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
         keep_programs(context.ctx)  # frames of an edited scene need the same ones
-        work, done = render_animation(context, animation, settings, sink), 0.0
-        for done in work:
-            progress(done, f"frame {min(int(done * count) + 1, count)} of {count}")
-            if interrupted():
-                break
-        work.close()
+        work, done = render_animation(context, animation, settings, sink, notices=notices), 0.0
+        try:
+            for done in work:
+                progress(done, f"frame {min(int(done * count) + 1, count)} of {count}")
+                if interrupted():
+                    break
+        finally:
+            work.close()
+            progress.close()
+            for notice in notices.lines(of_frames=count > 1):
+                print(f"note: {plain(notice)}", file=sys.stderr)
         stopped = done < 1.0
     written = int(done * count + 1e-6)
     kept = f" ({there} were there)" if there else ""

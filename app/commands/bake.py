@@ -33,6 +33,7 @@ def bake_command(request: BakeRequest) -> int:
     from ..edit.parameters import Stage
     from ..model.io.scene_file import load_scene
     from ..render import bake
+    from ..render.notices import FrameNotices
 
     bake.check_output(request.output)
     width, height = bake.DEFAULT_SIZE if request.size is None else options.parse_size(request.size)
@@ -49,13 +50,16 @@ def bake_command(request: BakeRequest) -> int:
 
     from ..gpu.context import create_context
 
-    started = time.perf_counter()
+    started, notices = time.perf_counter(), FrameNotices()
     with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
-        for share in bake.bake(context, Stage(scene, scene.camera), settings, request.receiver, request.output):
+        stage = Stage(scene, scene.camera)
+        for share in bake.bake(context, stage, settings, request.receiver, request.output, notices):
             progress(share, "baking")
             if interrupted() and share < 1.0:
                 print("spectrasplat: nothing was written: a map is whole or not at all", file=sys.stderr)
                 return interrupted.exit_code
+    for notice in notices.lines():
+        print(f"note: {plain(notice)}", file=sys.stderr)
     place = request.output.resolve()
     print(
         f"{place}: caustic map of '{request.receiver}' in {time.perf_counter() - started:.1f} s; where it lies is in "

@@ -67,7 +67,7 @@ def render_command(request: RenderRequest) -> int:
         result = render(scene, settings, progress=progress, cancelled=interrupted)
         stopped = interrupted()
     for notice in result.stats.notices:
-        print(f"note: {notice}", file=sys.stderr)
+        print(f"note: {plain(notice)}", file=sys.stderr)
     write_image(
         request.output,
         result.rgb,

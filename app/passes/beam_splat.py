@@ -25,8 +25,10 @@ if TYPE_CHECKING:
     from .map_atlas import MapAtlas
     from .map_layout import MapLayout, PlaneFrame
 
-GROUP = 1 << 14
-"""Polygons that are uploaded and drawn at a time, and between two flushes of the scratch textures."""
+GROUP = 1 << 11
+"""Polygons that are uploaded and drawn at a time: a software renderer sorts all of them into tiles before it draws."""
+FLUSH = 1 << 14
+"""Polygons between two flushes of the scratch textures."""
 
 PARAMETERS = Struct(
     "BeamDrawParameters",
@@ -72,8 +74,10 @@ class BeamSplatter:
                 curves = tables.parts(polygons.light[part], reflectance_class, polygons.x_lo[part], polygons.x_hi[part])
                 for beams in packed(polygons, part, to_texels, texel_area * weight, curves):
                     self._draw(beams, tables, atlas, record["rect"])
+                # What is drawn later is kept until then.
+                self._ctx.finish()
                 atlas.pending += len(part)
-                if atlas.pending >= GROUP:
+                if atlas.pending >= FLUSH:
                     atlas.flush()
         error = self._ctx.error
         if error != "GL_NO_ERROR":

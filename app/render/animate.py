@@ -8,6 +8,7 @@ from dataclasses import astuple
 
 import numpy as np
 
+from ..base.image_io import check_finite
 from ..base.movie import Frames, Sink
 from ..base.tone_map import auto_exposure, tone_map_8bit
 from ..edit.animation import Animation
@@ -16,6 +17,7 @@ from ..model.scene import Scene
 from ..model.scene_key import scene_key
 from ..model.settings import RenderSettings
 from .frames import FrameRenderer
+from .notices import FrameNotices, frame_notices
 
 Develop = Callable[[np.ndarray, float], np.ndarray]
 """(linear Rec.709 (H, W, 3), absolute exposure in EV) → sRGB codes uint8 (H, W, 3)."""
@@ -28,8 +30,10 @@ def render_animation(
     sink: Sink,
     base_ev: float | None = None,
     develop: Develop = tone_map_8bit,
+    notices: FrameNotices | None = None,
 ) -> Generator[float]:
     """Render all frames that `sink` lacks, pausing with the share done; the sink is closed however it ends.
+    What frames say of themselves goes to `notices`. Raises `BrokenPictureError` at a frame that is not finite.
 
     All frames share one exposure: `base_ev` plus the stage's own; `base_ev` None takes the automatic one of the first
     frame. Leaving the iteration early (`close()`) keeps the frames that are done.
@@ -45,6 +49,9 @@ def render_animation(
                 for share in renderer.steps(stage):
                     yield (index + 0.99 * share) / len(stages)  # the rest is developing and writing
                 rgb = renderer.picture.rgb
+                check_finite(f"frame {index + 1} of {len(stages)}", rgb)
+                if notices is not None:
+                    notices.take(frame_notices(renderer.light, stage.camera, settings, rgb), index + 1)
                 if base_ev is None:
                     base_ev = auto_exposure(rgb)
                     if isinstance(sink, Frames):

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.atomic import atomic_outputs
 from ..base.errors import UserError, suggestion
-from ..base.image_io import check_suffix, write_into
+from ..base.image_io import check_finite, check_suffix, write_into
 from ..base.tone_map import auto_exposure
 from ..edit.parameters import Stage
 from ..gpu.context import Context
@@ -26,6 +26,7 @@ from ..model.settings import RenderSettings
 from ..passes.map_layout import plane_frame
 from .frames import FrameRenderer
 from .light_pass import LightPass
+from .notices import FrameNotices, light_notices
 
 DEFAULT_SIZE = (1024, 1024)
 UNITS = "irradiance, lm/unit² (linear Rec.709, white counts in full), without the receiver's reflectance"
@@ -56,11 +57,18 @@ def check_output(path: Path) -> Path:
     return path
 
 
-def bake(context: Context, stage: Stage, settings: RenderSettings, receiver: str, path: Path) -> Iterator[float]:
+def bake(
+    context: Context,
+    stage: Stage,
+    settings: RenderSettings,
+    receiver: str,
+    path: Path,
+    notices: FrameNotices | None = None,
+) -> Iterator[float]:
     """Bake in steps, pausing with the share done; writes `path` and its placement at the end, or nothing if it is left
     before.
 
-    `settings.width`, `height`: texels. Raises `UserError`.
+    `settings.width`, `height`: texels. What the light pass says of itself goes to `notices`. Raises `UserError`.
     """
     check_receiver(stage.scene, receiver)
     check_output(path)
@@ -69,8 +77,11 @@ def bake(context: Context, stage: Stage, settings: RenderSettings, receiver: str
         for share in renderer.steps(stage):
             yield 0.98 * share
         rgb, where = renderer.picture.rgb, placement(renderer.light)
+        if notices is not None:
+            notices.take(light_notices(renderer.light))
     finally:
         renderer.release()
+    check_finite(path.name, rgb)
     told = {**where, "receiver": receiver, "scene": stage.scene.name, "file": path.name, "units": UNITS}
     if path.suffix.lower() == ".png":
         told["exposure_ev"] = auto_exposure(rgb)

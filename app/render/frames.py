@@ -24,10 +24,12 @@ from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
+from ..passes.map_layout import MapLayout
 from .camera_beams import CameraBeams
 from .frame_fit import FrameFit, Survey, inputs_of, share_light, stages_to_survey
 from .light_pass import LightPass, scene_buffers, spectral_axis
 from .map_picture import map_picture
+from .memory_estimate import MemoryEstimate, check_room, estimate
 from .sampling import CameraSampling, LightSampling, camera_settings, has_own_method
 from .shrinking import METHOD, PASS_PHOTONS, passes
 from .solo import scene_seen
@@ -98,6 +100,8 @@ class FrameRenderer:
         """What `steps` is at."""
         self.seconds = FrameSeconds()
         """Of the last frame."""
+        self.memory: MemoryEstimate | None = None
+        """Expected of the last frame that was traced."""
         self.traces = 0
         """How often photons were traced."""
 
@@ -238,6 +242,12 @@ class FrameRenderer:
         buffers = SceneBuffers(self._context.ctx, scene, features, self._axis(scene, features))
         fit, division = self._fit.maps(scene.camera), self._fit.division
         light = LightPass(self._context, scene, settings, features, buffers, fit=fit, division=division)
+
+        def look_at_memory(layout: MapLayout) -> None:
+            self.memory = estimate(light, layout, settings)
+            check_room(self.memory, settings)
+
+        light.before_maps = look_at_memory
         return _Traced(inputs, buffers, light)
 
     def _axis(self, scene: Scene, features: Features) -> SpectralAxis:

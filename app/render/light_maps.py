@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import moderngl
@@ -18,6 +18,9 @@ from ..passes.caustic_maps import CausticMaps
 from ..passes.map_atlas import MapAtlas
 from ..passes.map_layout import MapLayout
 from ..passes.splat import Splatter
+
+_ROWS = 256
+"""Of a map, that are read at once."""
 
 
 class LightMaps:
@@ -101,48 +104,54 @@ class LightMaps:
         """As the camera reads them; `textures` where they are not `resolved_textures`."""
         return CausticMaps(textures or self.resolved_textures(), self.receivers, self.atlas.placements, self.scale)
 
-    def _read(self, tile: Tile) -> np.ndarray:
-        """A tile of all maps put together, float32 (height, width, channels)."""
-        layers = []
-        for texture in self.resolved_textures():
-            layer = np.empty((tile.height, tile.width, 4), np.float32)
-            frame = self._ctx.framebuffer([texture])
-            frame.read_into(layer, (tile.x, tile.y, tile.width, tile.height), components=4, dtype="f4")
+    def portions(self, tile: Tile, target: int = 0) -> Iterator[tuple[int, np.ndarray]]:
+        """A tile of one texture in rows that take little memory: (first of them, float32 (rows, width, 4))."""
+        frame = self._ctx.framebuffer([self.resolved_textures()[target]])
+        try:
+            for first in range(0, tile.height, _ROWS):
+                rows = np.empty((min(_ROWS, tile.height - first), tile.width, 4), np.float32)
+                frame.read_into(rows, (tile.x, tile.y + first, tile.width, len(rows)), components=4, dtype="f4")
+                yield first, rows
+        finally:
             frame.release()
-            layers.append(layer)
-        return np.concatenate(layers, axis=-1) if len(layers) > 1 else layers[0]
 
     def receiver(self, receiver: int) -> np.ndarray:
         """A receiver's finest map: float32 (height, width, channels), row 0 at texel y = 0."""
-        return self._read(self.layout.tiles[receiver][0])
+        tile, targets = self.layout.tiles[receiver][0], len(self.resolved_textures())
+        texels = np.empty((tile.height, tile.width, 4 * targets), np.float32)
+        for target in range(targets):
+            for first, rows in self.portions(tile, target):
+                texels[first : first + len(rows), :, 4 * target : 4 * target + 4] = rows
+        return texels
 
     def flux(self, is_xyz: bool) -> float:
         """What the maps hold where they are read: the sum of XYZ maps' last channel (W), or of all bins."""
         flux = 0.0
+        targets = 1 if is_xyz else len(self.resolved_textures())
         for receiver, tiles in self.layout.tiles.items():
             charts = self.layout.charts.get(receiver)
             for level, tile in enumerate(tiles):
-                values = self._read(tile)
-                energy = (values[..., 3] if is_xyz else values.sum(axis=-1)).astype(float)
-                if charts is not None:
-                    energy = energy[charts.owner >= 0]
-                elif level:
-                    energy = self._outside_finer(receiver, level, energy)
-                flux += energy.sum()
+                finer = self._finer_share(receiver, level, tile) if level and charts is None else None
+                for target in range(targets):
+                    for first, rows in self.portions(tile, target):
+                        energy = (rows[..., 3] if is_xyz else rows.sum(axis=-1)).astype(float)
+                        if charts is not None:
+                            energy = energy[charts.owner[first : first + len(rows)] >= 0]
+                        elif finer is not None:
+                            energy *= 1.0 - finer[1][first : first + len(rows), None] * finer[0]
+                        flux += energy.sum()
         return flux
 
-    def _outside_finer(self, receiver: int, level: int, energy: np.ndarray) -> np.ndarray:
-        """Energy of a coarse window without the part that the finer window is read for."""
+    def _finer_share(self, receiver: int, level: int, tile: Tile) -> list[np.ndarray]:
+        """How much of each column and of each row of a coarse window the finer window is read for."""
         fine, coarse = self.layout.windows[receiver][level - 1 : level + 1]
-        height, width = energy.shape
-        share = [
+        return [
             np.clip(np.minimum(high_f, edges[1:]) - np.maximum(low_f, edges[:-1]), 0.0, None) / np.diff(edges)
             for low_f, high_f, edges in (
-                (fine.low[0], fine.high[0], np.linspace(coarse.low[0], coarse.high[0], width + 1)),
-                (fine.low[1], fine.high[1], np.linspace(coarse.low[1], coarse.high[1], height + 1)),
+                (fine.low[0], fine.high[0], np.linspace(coarse.low[0], coarse.high[0], tile.width + 1)),
+                (fine.low[1], fine.high[1], np.linspace(coarse.low[1], coarse.high[1], tile.height + 1)),
             )
         ]
-        return energy * (1.0 - share[1][:, None] * share[0])
 
     def release(self) -> None:
         """Free everything."""

@@ -46,7 +46,7 @@ from .shown_spectra import PassTables, ShownSpectra, ShownTables
 from .splatting import Pace, Splatting
 
 DEFAULT_BATCH = 1 << 16
-QUEUE_BYTES = 128 << 20
+QUEUE_BYTES = 64 << 20
 """What the queue of a batch that nobody asked for may take; more on a GPU. Less where memory is short."""
 
 
@@ -178,6 +178,8 @@ class LightPass:
         self.smoothing = settings.smoothing * (shrinking.FIRST_KERNEL if self._shrinks else 1.0)
         """Standard deviation of a footprint in lattice spacings; where passes shrink it, of the first one's."""
         self.maps: LightMaps | None = None
+        self.before_maps: Callable[[MapLayout], None] = lambda layout: None
+        """Asked before maps are made, which take the most memory; may refuse them."""
         self._beams: BeamLight | None = None
         self._moving = moving
 
@@ -237,7 +239,9 @@ class LightPass:
         if self.maps is not None:
             self.maps.release()
         self.maps, self.fit = None, fit
-        self.maps = LightMaps(self.context.ctx, self.layout_for(fit), self.features)
+        layout = self.layout_for(fit)
+        self.before_maps(layout)
+        self.maps = LightMaps(self.context.ctx, layout, self.features)
         self.features = self.maps.features
         if self._beams is not None:
             self._beams.lay_out(self.maps.layout)

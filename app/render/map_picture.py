@@ -13,12 +13,24 @@ from .light_pass import LightPass
 def map_picture(light: LightPass) -> tuple[np.ndarray, np.ndarray | None]:
     """Irradiance (or reflected light, where the reflectance is spectral) on the receiver of the settings' layer, row 0
     on top: linear Rec.709 float32 (H, W, 3), lm/unit² for white, and W/unit² a bin (H, W, bins), or None."""
-    assert light.map_receiver is not None
-    texels = light.resolved_map(light.map_receiver).astype(float) * light.map_scale
-    texels = np.ascontiguousarray((texels / texel_areas(light, light.map_receiver))[::-1])
-    if light.bin_edges_nm is None:
-        return xyz_to_rgb709(texels[..., :3]).astype(np.float32), None
-    channels, bins = Channels(tuple(light.bin_edges_nm.tolist())), texels.astype(np.float32)
+    assert light.map_receiver is not None and light.maps is not None
+    tile, areas = light.layout.tiles[light.map_receiver][0], texel_areas(light, light.map_receiver)
+    edges_nm = light.bin_edges_nm
+    is_xyz = edges_nm is None
+    bins = np.empty((tile.height, tile.width, 3 if is_xyz else 4 * light.features.targets), np.float32)
+    for target in range(1 if is_xyz else light.features.targets):
+        for first, rows in light.maps.portions(tile, target):
+            covers = areas if len(areas) == 1 else areas[first : first + len(rows)]
+            texels = rows.astype(float) * light.map_scale / covers
+            # Row 0 of the map is the picture's last.
+            above = slice(tile.height - first - len(rows), tile.height - first)
+            if is_xyz:
+                bins[above] = xyz_to_rgb709(texels[::-1, :, :3])
+            else:
+                bins[above, :, 4 * target : 4 * target + 4] = texels[::-1]
+    if edges_nm is None:
+        return bins, None
+    channels = Channels(tuple(edges_nm.tolist()))
     return channels.to_rgb709(bins), channels.to_spectral(bins)
 
 

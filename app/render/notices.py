@@ -3,8 +3,12 @@ do not hold what they should. One line each; a picture that needs none is right 
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
+
 import numpy as np
 
+from ..gpu.tiles import Tile
 from ..model.contacts import world_bounds
 from ..model.optics.colorimetry import rgb709_to_xyz_matrix
 from ..model.scene import Camera
@@ -19,6 +23,34 @@ HELD_SHARE = 0.5
 a slanting patch, 16 samples weigh a spot within it to a quarter."""
 _BRIGHTEST = 4096
 """Texels that are looked for in the picture."""
+
+
+class FrameNotices:
+    """What the frames of a job say, each kind once, however its shares change from frame to frame."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, tuple[str, int, int]] = {}
+
+    def take(self, notices: Iterable[str], number: int = 1) -> None:
+        """Those of frame `number`, from 1 on."""
+        for notice in notices:
+            kind = re.sub(r"[\d.]+ %", "%", notice)
+            text, first, count = self._found.get(kind, (notice, number, 0))
+            self._found[kind] = text, first, count + 1
+
+    def lines(self, of_frames: bool = False) -> list[str]:
+        """A line for each kind; with the frames that it was said of."""
+        if not of_frames:
+            return [text for text, _, _ in self._found.values()]
+        return [
+            f"frame {first}" + (f" and {count - 1} more" if count > 1 else "") + f": {text}"
+            for text, first, count in self._found.values()
+        ]
+
+
+def frame_notices(light: LightPass, camera: Camera, settings: RenderSettings, rgb: np.ndarray) -> list[str]:
+    """Of a finished frame: of its light and of its picture (H, W, 3)."""
+    return [*light_notices(light), *picture_notices(light, camera, settings, rgb)]
 
 
 def loss_notices(lost: dict[str, float], max_depth: int | None = None) -> list[str]:
@@ -54,6 +86,8 @@ def light_notices(light: LightPass) -> list[str]:
         found.append(
             f"{100.0 * outside / deposited:.1f} % of the caustics lies beside all maps and lacks in the picture"
         )
+    if light.map_receiver is not None:  # its texels are the picture's
+        return found
     for receiver, windows in light.layout.windows.items():
         pixels = [light.window_pixels(receiver, window) for window in windows]
         if receiver in light.lit_receivers and pixels and max(pixels) < 1.0:
@@ -70,15 +104,15 @@ def picture_notices(light: LightPass, camera: Camera, settings: RenderSettings, 
     if settings.bins or settings.layer not in ("beauty", "caustic") or not np.isfinite(rgb).all():
         return []
     expected, held = 0.0, 0.0
-    luminance = rgb.astype(float) @ rgb709_to_xyz_matrix()[1]
     for receiver in light.lit_receivers:
         if light.layout.windows[receiver]:
             found = _pixels_of(light, receiver, camera, settings)
-            about = np.zeros(luminance.shape, bool)
+            about = np.zeros(rgb.shape[:2], bool)
             for row, column in found:
                 about[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] = True
             energy = sum(found.values())
-            expected, held = expected + energy, held + min(float(luminance[about].sum()), energy)
+            there = float((rgb[about].astype(float) @ rgb709_to_xyz_matrix()[1]).sum())
+            expected, held = expected + energy, held + min(there, energy)
     if held >= HELD_SHARE * expected:
         return []
     share = 100.0 * held / expected
@@ -93,16 +127,13 @@ def _pixels_of(
     see them past all other objects' bounds."""
     number = light.buffers.receivers[receiver]
     item, space = light.scene.objects[number], light.buffers.space
-    luminous = light.resolved_map(receiver)[..., 1].astype(float) * light.map_scale
-    height, width = luminous.shape
-    chosen = np.argsort(luminous, axis=None)[-_BRIGHTEST:]
-    chosen = chosen[luminous.flat[chosen] > 0.0]
-    if not len(chosen):
+    tile = light.layout.tiles[receiver][0]
+    rows, columns, luminous = _brightest(light, tile)
+    if not len(luminous):
         return {}
-    rows, columns = np.unravel_index(chosen, luminous.shape)
     frame = plane_frame(space.to_gpu(light.buffers.world_meshes[number].vertices))
     window = light.layout.windows[receiver][0]
-    step = window.size / (width, height)
+    step = window.size / (tile.width, tile.height)
     at = window.low + (np.stack([columns, rows], axis=-1) + 0.5) * step
     places = space.to_world(frame.origin + at @ frame.axes)
     sides = [space.to_world(frame.origin + (at + step * offset) @ frame.axes) for offset in ((1.0, 0.0), (0.0, 1.0))]
@@ -118,7 +149,7 @@ def _pixels_of(
     if material.texture is not None:
         return {}
     texel_area = float(np.prod(step)) / space.scale**2
-    energy = luminous.flat[chosen] / texel_area * reflectance / np.pi * area_px
+    energy = luminous * light.map_scale / texel_area * reflectance / np.pi * area_px
     inside &= np.isfinite(energy) & ~_may_be_hidden(light, number, camera, places)
     found: dict[tuple[int, int], float] = {}
     for (column, row), value in zip(
@@ -126,6 +157,22 @@ def _pixels_of(
     ):
         found[row, column] = found.get((row, column), 0.0) + value
     return found
+
+
+def _brightest(light: LightPass, tile: Tile) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows, columns and luminance, as summed, of the brightest texels of a map: (n,) each. Read in portions, for a map
+    takes more memory than all else."""
+    assert light.maps is not None
+    places, values = np.zeros(0, np.int64), np.zeros(0)
+    for first, texels in light.maps.portions(tile):
+        luminous = texels[..., 1].ravel()
+        lit = np.flatnonzero(luminous > 0.0)
+        places = np.concatenate([places, first * tile.width + lit])
+        values = np.concatenate([values, luminous[lit].astype(float)])
+        if len(values) > _BRIGHTEST:
+            kept = np.argpartition(values, -_BRIGHTEST)[-_BRIGHTEST:]
+            places, values = places[kept], values[kept]
+    return places // tile.width, places % tile.width, values
 
 
 def _may_be_hidden(light: LightPass, receiver: int, camera: Camera, places: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from .beam_light import BeamStats
 from .camera_beams import CameraBeamStats
 from .frames import FrameRenderer, Picture
 from .light_pass import LightStats
-from .notices import light_notices, picture_notices
+from .notices import frame_notices
 
 Progress = Callable[[float, str], None]
 Cancelled = Callable[[], bool]
@@ -49,6 +49,8 @@ class RenderStats:
     map_flux_w: float
     camera_pass: CameraStats
     beams: BeamStats | None
+    expected_bytes: int = 0
+    """Peak of the process, as thought before maps were made."""
     notices: tuple[str, ...] = ()
     """What must be told without being asked."""
 
@@ -90,7 +92,8 @@ class RenderStats:
             (
                 "buffers             "
                 + ", ".join(f"{name} {size / 2**20:.0f}" for name, size in light.buffers.items())
-                + f" MiB; peak of the process {peak_bytes() / 2**20:.0f} MiB"
+                + f" MiB; peak of the process {peak_bytes() / 2**20:.0f} MiB, "
+                f"{self.expected_bytes / 2**20:.0f} expected"
             ),
             (
                 f"seconds             prepare {self.prepare_seconds:.2f}, emit and trace {light.trace_seconds:.2f}, "
@@ -143,10 +146,7 @@ def render(
         for share in frames.steps(stage, cancelled):
             progress(share, frames.phase)
         picture = frames.picture
-        notices = (
-            *light_notices(frames.light),
-            *picture_notices(frames.light, scene.camera, settings, picture.rgb),
-        )
+        notices = tuple(frame_notices(frames.light, scene.camera, settings, picture.rgb))
         return RenderResult(**vars(picture), stats=replace(_stats(context, frames, settings), notices=notices))
     finally:
         frames.release()
@@ -175,4 +175,5 @@ def _stats(context: Context, frames: FrameRenderer, settings: RenderSettings) ->
         light.map_flux() if settings.tally else 0.0,
         camera,
         light.beam_stats,
+        frames.memory.peak if frames.memory is not None else 0,
     )

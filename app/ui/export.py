@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.atomic import atomic_output, check_writable
 from ..base.errors import UserError
-from ..base.image_io import check_suffix, write_image
+from ..base.image_io import check_finite, check_suffix, write_image
 from ..base.memory import MAX_SIDE_PX, check_picture_memory
 from ..edit import requests
 from ..edit.parameters import Stage
@@ -21,6 +21,7 @@ from ..edit.state import Display as DisplaySettings
 from ..edit.state import State
 from ..model.settings import RenderSettings
 from ..passes.display import Display
+from ..render.notices import FrameNotices, frame_notices
 from .view_model import JobInfo
 
 if TYPE_CHECKING:
@@ -98,30 +99,33 @@ class Exports:
         self, request: requests.Screenshot | requests.Bake | requests.Animate, state: State, shown: Shown
     ) -> _Job:
         stage = Stage(state.scene, state.camera, shown.exposure_ev, state.solo_nm)
-        name = request.path.name
+        name, notices = request.path.name, FrameNotices()
         if isinstance(request, requests.Screenshot):
-            work = _spectral(self._context, request.path, stage, state, shown.photons)
+            work = _spectral(self._context, request.path, stage, state, shown.photons, notices)
             return _Job(
                 f"Spectral picture: {name}",
                 work,
                 f"Saved {name}.",
                 "Nothing was written: a picture is whole or not at all.",
+                notices,
             )
         if isinstance(request, requests.Bake):
-            work = _bake(self._context, request, stage, state)
+            work = _bake(self._context, request, stage, state, notices)
             return _Job(
                 f"Caustic map: {name}",
                 work,
                 f"Baked {name}; its place is in {request.path.with_suffix('.json').name}.",
                 "Nothing was written: a map is whole or not at all.",
+                notices,
             )
-        work, frames = _animate(self._context, request, stage, state)
+        work, frames = _animate(self._context, request, stage, state, notices)
         title = "Turntable" if request.kind == "turntable" else "Animation"
         return _Job(
             f"{title}: {name}",
             work,
             f"Saved {name}, {frames} frames.",
             f"Stopped {name}; the frames that are done stay.",
+            notices,
             frames,
         )
 
@@ -129,8 +133,16 @@ class Exports:
 class _Job:
     """A generator of shares, with a note about it."""
 
-    def __init__(self, title: str, work: Iterator[float], finished: str, cancelled: str, frames: int = 0) -> None:
-        self._title, self._work = title, work
+    def __init__(
+        self,
+        title: str,
+        work: Iterator[float],
+        finished: str,
+        cancelled: str,
+        notices: FrameNotices,
+        frames: int = 0,
+    ) -> None:
+        self._title, self._work, self._notices = title, work, notices
         self._finished, self._cancelled = finished, cancelled
         self._frames = frames
         self._fraction, self._worked_s = 0.0, 0.0
@@ -145,7 +157,7 @@ class _Job:
             while time.perf_counter() - started < budget_s:
                 self._fraction = max(self._fraction, next(self._work))
         except StopIteration:
-            return self._finished
+            return self._told(self._finished)
         finally:
             self._worked_s += time.perf_counter() - started
         return None
@@ -154,7 +166,12 @@ class _Job:
         close = getattr(self._work, "close", None)
         if close is not None:
             close()
-        return self._cancelled
+        return self._told(self._cancelled)
+
+    def _told(self, sentence: str) -> str:
+        """With what the pictures say of themselves."""
+        notices = self._notices.lines(of_frames=self._frames > 1)
+        return " ".join([sentence, *(f"Note: {notice}." for notice in notices)])
 
     def _text(self) -> str:
         frame = (
@@ -173,6 +190,7 @@ def save_screenshot(path: Path, shown: Shown) -> str:
     """Write what is shown: .png as it is on the screen, .exr and .npy linear without tone curve. Returns the sentence
     to tell."""
     if check_suffix(path) == ".png":
+        check_finite(path.name, _texels(shown.radiance))
         write_codes(path, texture_codes(shown.codes))
     else:
         write_image(path, _texels(shown.radiance))
@@ -218,7 +236,9 @@ def _settings(state: State, size: tuple[int, int], photons: int, **changes: Any)
     )
 
 
-def _spectral(context: Context, path: Path, stage: Stage, state: State, photons: int) -> Iterator[float]:
+def _spectral(
+    context: Context, path: Path, stage: Stage, state: State, photons: int, notices: FrameNotices
+) -> Iterator[float]:
     from ..render.frames import FrameRenderer
 
     if check_suffix(path) != ".exr":
@@ -235,6 +255,7 @@ def _spectral(context: Context, path: Path, stage: Stage, state: State, photons:
             for share in renderer.steps(stage):
                 yield 0.98 * share
             picture = renderer.picture
+            notices.take(frame_notices(renderer.light, stage.camera, settings, picture.rgb))
             write_image(path, picture.rgb, spectral=picture.spectral, bin_edges_nm=picture.bin_edges_nm)
         finally:
             renderer.release()
@@ -242,17 +263,22 @@ def _spectral(context: Context, path: Path, stage: Stage, state: State, photons:
     return work()
 
 
-def _bake(context: Context, request: requests.Bake, stage: Stage, state: State) -> Iterator[float]:
+def _bake(
+    context: Context, request: requests.Bake, stage: Stage, state: State, notices: FrameNotices
+) -> Iterator[float]:
     from ..render import bake
 
     bake.check_output(request.path)
     bake.check_receiver(stage.scene, request.receiver)
     check_writable(request.path)
     check_writable(bake.placement_path(request.path))
-    return bake.bake(context, stage, _settings(state, request.size, request.photons), request.receiver, request.path)
+    settings = _settings(state, request.size, request.photons)
+    return bake.bake(context, stage, settings, request.receiver, request.path, notices)
 
 
-def _animate(context: Context, request: requests.Animate, stage: Stage, state: State) -> tuple[Iterator[float], int]:
+def _animate(
+    context: Context, request: requests.Animate, stage: Stage, state: State, notices: FrameNotices
+) -> tuple[Iterator[float], int]:
     from ..base.movie import open_sink
     from ..edit import animation
     from ..render.animate import description, render_animation
@@ -274,7 +300,7 @@ def _animate(context: Context, request: requests.Animate, stage: Stage, state: S
     def work() -> Iterator[float]:
         try:
             yield 0.0
-            yield from render_animation(context, made, settings, sink, 0.0, develop)
+            yield from render_animation(context, made, settings, sink, 0.0, develop, notices)
         finally:
             develop.release()
             sink.close()

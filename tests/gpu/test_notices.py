@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from spectrasplat.__main__ import main
 from spectrasplat.base.errors import BrokenPictureError, DeviceError, UserError
 from spectrasplat.base.image_io import write_image
 from spectrasplat.gpu.context import device_sentence
@@ -17,7 +18,8 @@ from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import Diffuse, Mirror, Scene, SceneObject
 from spectrasplat.model.scene_checks import check_scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.render.notices import light_notices, picture_notices
+from spectrasplat.render.frames import FrameRenderer, Picture
+from spectrasplat.render.notices import FrameNotices, light_notices, loss_notices, picture_notices
 from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.probe import light_pass
 from spectrasplat.stress.rigs.scene_parts import BEAM, TABLE, solid, stage
@@ -104,3 +106,65 @@ def test_what_opengl_says_is_a_sentence() -> None:
     told = device_sentence("GL_OUT_OF_MEMORY", "the splat pass")
     assert "out of memory" in told and "smaller picture" in told
     assert issubclass(DeviceError, UserError) and DeviceError.exit_code == 2
+
+
+GIVEN_UP = """
+[camera]
+position = [0, -5, 2]
+[[lights]]
+kind = "point"
+position = [0, 0, 4]
+[[objects]]
+name = "ball"
+shape = "sphere"
+triangles = 300
+[[objects]]
+name = "floor"
+shape = "plane"
+material = "diffuse"
+position = [0, 0, -1.5]
+[render]
+max_depth = 2
+"""
+FEW = ("--size", "32x18", "--photons", "4k")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("render", "scene.toml", "-o", "out.npy", *FEW),
+        ("animate", "scene.toml", "-o", "frames", "--frames", "3", *FEW, "--spp", "1"),
+        ("bake", "scene.toml", "floor", "-o", "map.npy", *FEW),
+    ],
+    ids=lambda command: command[0],
+)
+def test_each_command_says_it_once(command: tuple[str, ...], tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(GIVEN_UP)
+    assert main(list(command)) == 0
+    told = [line for line in capsys.readouterr().err.splitlines() if "given up" in line]
+    assert len(told) == 1 and told[0].startswith("note: ")
+    assert ("frame 1 and 2 more: " in told[0]) == (command[0] == "animate")
+
+
+@pytest.mark.parametrize("command", ["animate", "bake"])
+def test_no_command_writes_what_is_not_finite(command: str, tmp_path: Path, monkeypatch, capsys) -> None:
+    broken = property(lambda self: Picture(np.full((18, 32, 3), np.nan, np.float32)))
+    monkeypatch.setattr(FrameRenderer, "picture", broken)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(GIVEN_UP)
+    options = ("-o", "x", "--frames", "2", "--spp", "1") if command == "animate" else ("floor", "-o", "x.png")
+    assert main([command, "scene.toml", *options, *FEW]) == 1
+    told = [line for line in capsys.readouterr().err.splitlines() if "not finite" in line]
+    assert len(told) == 1 and "is not written" in told[0]
+    assert not [path for path in tmp_path.rglob("*") if path.suffix in (".png", ".part")]
+    assert not (tmp_path / "x.json").exists()
+
+
+def test_shares_that_change_from_frame_to_frame_are_one_notice() -> None:
+    notices = FrameNotices()
+    for number, share in enumerate((2.0, 7.5), 1):
+        notices.take(loss_notices({"lost_numeric": 0.01 * share}), number)
+    notices.take(loss_notices({"lost_depth": 0.5}, 9), 2)
+    first, second = notices.lines(of_frames=True)
+    assert first.startswith("frame 1 and 1 more: 2.0 %") and second.startswith("frame 2: 50.0 %")

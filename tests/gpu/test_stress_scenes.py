@@ -12,7 +12,8 @@ from spectrasplat.__main__ import main
 from spectrasplat.gpu import records
 from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.lights import PointLight
-from spectrasplat.stress.cases import contact_cases, sweep_cases
+from spectrasplat.render import still
+from spectrasplat.stress.cases import contact_cases, loss_cases, sweep_cases
 from spectrasplat.stress.rigs import probe
 from spectrasplat.stress.rigs.probe import WatchedRecords, with_photons
 from spectrasplat.stress.rigs.scene_parts import (
@@ -133,3 +134,21 @@ def test_the_whole_run_keeps_every_promise(tmp_path: Path, capsys) -> None:
     held = json.loads((tmp_path / "stress.json").read_text(encoding="utf-8"))
     assert not held["partial"] and held["broken"] == []
     assert sum(len(case["measurements"]) for case in held["cases"]) > 200
+
+
+@pytest.mark.parametrize("case", [case for case in loss_cases.CASES if case.steps < 6], ids=lambda case: case.name)
+def test_little_is_lost_and_nothing_in_silence(gl, case, monkeypatch) -> None:
+    monkeypatch.setattr(loss_cases, "GAPS", (1e-5, 0.0))
+    monkeypatch.setattr(loss_cases, "HEIGHTS", (1e-2, 0.0))
+    assert [m.broken() for m in case.measure(gl) if m.broken()] == []
+
+
+def test_a_loss_without_a_word_is_found(gl) -> None:
+    """Mutant: notices are not said."""
+    settings = replace(FEW, max_depth=2)
+    said = still.render(block(), settings, context=gl)
+    silent = replace(said, stats=replace(said.stats, notices=()))
+    assert "unsaid" not in " ".join(loss_cases.measured(said, 1.0, "").broken())
+    assert any("unsaid" in s for s in loss_cases.measured(silent, 1.0, "").broken())
+    found = loss_cases.measured(still.render(block(), FEW, context=gl), 1.0, "", lacking=0.9)
+    assert found.note == "a picture that lacks light"

@@ -232,9 +232,9 @@ class TestRender:
         capsys: pytest.CaptureFixture[str],
         monkeypatch: pytest.MonkeyPatch,
     ) -> None:
-        monkeypatch.setattr("spectrasplat.base.memory.memory_bytes", lambda: 1 << 30)
+        monkeypatch.setattr("spectrasplat.base.memory.available_bytes", lambda: 1 << 30)
         told = complaint(capsys, "render", scene_path, "-o", tmp_path / "o.exr", "--size", "4096x4096", "--bins", "32")
-        assert "--size 4096x4096 with --bins 32 needs about 6.8 GiB and this machine has 1.0 GiB" in told
+        assert "--size 4096x4096 with --bins 32 needs about 6.2 GiB and 1.0 GiB are left" in told
 
     @pytest.mark.parametrize(
         ("output", "sentence"),

@@ -10,6 +10,9 @@ from ...base.errors import UserError
 from .mesh import Mesh, make_mesh, normalised
 from .primitives_check import MAX_TRIANGLES, count, in_range, positive
 
+MAX_HEIGHT = 1e30
+"""Beyond it slopes overflow."""
+
 
 def height_field(
     heights: np.ndarray,
@@ -27,6 +30,8 @@ def height_field(
     z = np.array(heights, dtype=np.float64)
     if z.ndim != 2 or min(z.shape, default=0) < 3 or not np.isfinite(z).all():
         raise UserError("height field: heights must be a grid of at least 3 × 3 finite numbers")
+    if np.abs(z).max() > MAX_HEIGHT:
+        raise UserError(f"height field: heights beyond {MAX_HEIGHT:g} units; give them in larger units")
     if 2 * z.size > MAX_TRIANGLES:
         raise UserError(f"height field: {z.size} heights are too many (limit {MAX_TRIANGLES // 2})")
     width, height = (positive("height field", f"size along {axis}", s) for axis, s in zip("xy", size, strict=True))

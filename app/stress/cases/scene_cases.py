@@ -18,7 +18,7 @@ from ...model.scene import Scene
 from ..case import Case, Measurement
 from ..rigs.probe import Held, measurement, probe
 from ..rigs.scene_parts import SUN, solid, stage
-from . import contact_cases, light_cases, mesh_file_cases
+from . import contact_cases, light_cases, loss_cases, mesh_file_cases
 from .sweep_cases import against_single_wavelengths, scene_sweep
 
 LEFT_IN_MAPS = {"lens_text": 0.05, "water": 0.05, "wine_glass": 0.03}
@@ -108,6 +108,7 @@ def default_sweeps() -> tuple[Case, ...]:
 CASES: tuple[Case, ...] = (
     *contact_cases.CASES,
     *light_cases.CASES,
+    *loss_cases.CASES,
     *mesh_file_cases.CASES,
     Case(
         "gems",

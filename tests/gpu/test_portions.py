@@ -1,0 +1,60 @@
+"""In what portions work is given to the device changes a picture by rounding alone: batches of photons, dispatches of
+the camera, and both at once. (Threads and dispatches alone change no bit: `test_camera_repeats.py`.)"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from spectrasplat.gpu.context import Context
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes import camera
+from spectrasplat.render.light_plan import SMALLEST_BATCH
+from spectrasplat.render.still import render
+
+SCENES = sorted(Path("assets/scenes").glob("*.toml"))
+BATCHES = (4 * SMALLEST_BATCH, SMALLEST_BATCH, 2 * SMALLEST_BATCH)
+SECONDS = (0.15, 0.01, 1.0)
+SAME = 1e-6
+"""Of the brightest value: sums of the same numbers in another order."""
+AT_A_FOCUS = {"ball_caustic": 2e-6}
+"""Where most photons land in a few texels: 1.05e-6 was measured."""
+PHOTONS = 60_000
+"""Several batches of the smallest."""
+
+
+def pictures(gl: Context, path: Path, monkeypatch: pytest.MonkeyPatch) -> list[np.ndarray]:
+    scene, found = load_scene(path), []
+    for batch, seconds in zip(BATCHES, SECONDS, strict=True):
+        monkeypatch.setattr(camera, "_TARGET_SECONDS", seconds)
+        settings = RenderSettings(width=96, height=54, photons=PHOTONS, spp=4, seed=7, batch=batch)
+        found.append(render(scene, settings, context=gl).rgb.astype(float))
+    return found
+
+
+def check(gl: Context, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first, *others = pictures(gl, path, monkeypatch)
+    for other in others:
+        assert np.abs(other - first).max() <= AT_A_FOCUS.get(path.stem, SAME) * np.abs(first).max()
+
+
+def test_portions_do_not_show(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    check(gl, Path("assets/scenes/prism.toml"), monkeypatch)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+def test_portions_show_in_no_scene(path: Path, gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    check(gl, path, monkeypatch)
+
+
+def test_another_seed_shows(gl: Context) -> None:
+    """Mutant: what the tests above see is far less than chance."""
+    scene = load_scene(Path("assets/scenes/prism.toml"))
+    one, other = (
+        render(scene, RenderSettings(width=96, height=54, photons=PHOTONS, spp=4, seed=seed), context=gl).rgb
+        for seed in (7, 8)
+    )
+    assert np.abs(one - other).max() > 1e3 * SAME * np.abs(one).max()
