@@ -57,8 +57,7 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     bent, uneven = lay_leaf(hand, facets, kind, leaf, edge, corner, work)
     if bent < 0.0:
         return
-    # What absorbs may be coloured, with steps that three places do not see.
-    most = _COLOURED if work.absorbing else _UNEVEN
+    most = _COLOURED if work.coloured else _UNEVEN
     if room and hand.x[2] - hand.x[0] > NARROWEST and (bent > tolerance or uneven > most):
         halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
         return

@@ -91,6 +91,8 @@ class BeamScene:
     """(B, 2, 3): boxes round what is not flat."""
     absorbs: bool
     """Some medium absorbs."""
+    coloured: bool
+    """Some mirror reflects one colour more than another."""
     beam_objects: tuple[int, ...]
     """Objects of glass and mirrors whose light is carried by beams."""
     why_not: dict[int, str]
@@ -152,6 +154,7 @@ def beam_scene(
         tables,
         np.array([meshes[i].bounds() for i in obstacles], float).reshape(-1, 2, 3),
         any(o.material.transmits and o.material.absorption is not None for o in scene.objects),
+        any(o.material.is_mirror and len(set(o.material.reflectance_rgb)) > 1 for o in scene.objects),
         tuple(i for i in outlines if scene.objects[i].material.is_specular),
         why_not,
     )
@@ -213,8 +216,10 @@ def facets_of(mesh: Mesh) -> list[tuple[np.ndarray, int]]:
 
 
 def _neighbours(mesh: Mesh) -> list[list[int]]:
+    # By place: triangles may have corners of their own.
+    _, place = np.unique(mesh.vertices.round(9), axis=0, return_inverse=True)
     edges: dict[tuple[int, int], list[int]] = {}
-    for t, triangle in enumerate(mesh.triangles):
+    for t, triangle in enumerate(place.reshape(-1)[mesh.triangles]):
         for a, b in zip(triangle, np.roll(triangle, -1), strict=True):
             edges.setdefault((min(a, b), max(a, b)), []).append(t)
     found: list[list[int]] = [[] for _ in mesh.triangles]

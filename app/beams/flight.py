@@ -25,7 +25,9 @@ from .search import (
 )
 
 _TOUCHES = 1e-7
-"""GPU units: surfaces this close are in contact."""
+"""GPU units: surfaces of glass this close are in contact."""
+_COATS = 3e-5
+"""GPU units: what is opaque and this close to glass is a coat on it (NEAR_DISTANCE of shaders/lib/intersect.glsl)."""
 
 
 @part
@@ -89,8 +91,9 @@ def closed_up(nodes, first, top):
 @part
 def is_nearer(facets, solids, hand, one, other, t_one, t_other):
     """Whether facet `one` is met before `other`; of surfaces in contact a solid is entered before one is left, and
-    glass comes before what is opaque."""
-    if abs(t_one - t_other) > _TOUCHES:
+    what is opaque comes before glass: a coat is met from inside as from outside."""
+    is_coat = (facets[one].kind == 0) != (facets[other].kind == 0)
+    if abs(t_one - t_other) > (_COATS if is_coat else _TOUCHES):
         return t_one < t_other
     return rank(facets, solids, hand, one) < rank(facets, solids, hand, other)
 
@@ -99,10 +102,10 @@ def is_nearer(facets, solids, hand, one, other, t_one, t_other):
 def rank(facets, solids, hand, facet):
     """Order of surfaces in contact: of several solids that are entered the one that wins comes first, of several that
     are left it comes last, so that light meets one interface. The facet's number tells equals apart."""
-    first = 64 * (1 + facets[facet].kind)
-    if first == 64:
+    first = facets[facet].kind
+    if first == 0:
         bit = solids[facets[facet].owner].bit
-        first = 64 + bit if (hand.mask >> bit) & 1 else 63 - bit
+        first = 128 + bit if (hand.mask >> bit) & 1 else 127 - bit
     return (first << 32) + facet
 
 

@@ -74,6 +74,8 @@ WORK = np.dtype(
         ("sees", "?"),
         # Some medium absorbs.
         ("absorbing", "?"),
+        # Something may take steps over the spectrum that three places do not see.
+        ("coloured", "?"),
         # Objects of the scene; sources (more than one: parts of an extended light beside the first).
         ("objects", "i8"),
         ("sources", "i8"),
