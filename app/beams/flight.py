@@ -89,11 +89,12 @@ def closed_up(nodes, first, top):
 
 
 @part
-def is_nearer(facets, solids, hand, one, other, t_one, t_other):
-    """Whether facet `one` is met before `other`; of surfaces in contact a solid is entered before one is left, and
-    what is opaque comes before glass: a coat is met from inside as from outside."""
+def is_nearer(facets, solids, hand, one, other, t_one, t_other, cosine):
+    """Whether facet `one` is met before `other`, at distances along a ray that meets them at such a `cosine`. Of
+    surfaces in contact a solid is entered before one is left, and what is opaque comes before glass: a coat is met from
+    inside as from outside."""
     is_coat = (facets[one].kind == 0) != (facets[other].kind == 0)
-    if abs(t_one - t_other) > (_COATS if is_coat else _TOUCHES):
+    if abs(t_one - t_other) * (abs(cosine) if is_coat else 1.0) > (_COATS if is_coat else _TOUCHES):
         return t_one < t_other
     return rank(facets, solids, hand, one) < rank(facets, solids, hand, other)
 
@@ -213,9 +214,11 @@ def hide(nodes, first, top, facets, solids, tables, work):
             if not cut_to_facet(spare, hand.flight, hits[g], other, work):
                 continue
             recentre(spare)
-            t_h, _ = distance_at(hand, spare, one)
+            t_h, towards = distance_at(hand, spare, one)
             t_g, _ = distance_at(hand, spare, other)
-            if t_g >= -_TOUCHES and is_nearer(facets, solids, hand, facet_of(hits[g]), facet_of(hits[h]), t_g, t_h):
+            if t_g >= -_TOUCHES and is_nearer(
+                facets, solids, hand, facet_of(hits[g]), facet_of(hits[h]), t_g, t_h, towards
+            ):
                 hidden[h, g], some = 1, True
         if some:
             start = top

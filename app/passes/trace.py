@@ -49,6 +49,8 @@ class FluxTally:
     handed: float = 0.0
     """What photons took over from beams on their way (`beam_emission`), besides what lights emitted; less what beams
     handed to them, where both are counted."""
+    left_to_beams: float = 0.0
+    """What photons of the emission lattice left to beams (`without_beams`)."""
     ended: dict[str, float] = field(default_factory=lambda: dict.fromkeys(records.CATEGORIES, 0.0))
     roulette: float = 0.0
     fallbacks: dict[str, int] = field(default_factory=lambda: dict.fromkeys(records.FALLBACKS, 0))
@@ -57,6 +59,7 @@ class FluxTally:
         """Add another batch."""
         self.emitted += other.emitted
         self.handed += other.handed
+        self.left_to_beams += other.left_to_beams
         self.roulette += other.roulette
         for name in self.ended:
             self.ended[name] += other.ended[name]
@@ -67,7 +70,12 @@ class FluxTally:
     def without_beams(self) -> FluxTally:
         """As if lights had not emitted what photons left to beams: those count it themselves."""
         left = self.ended["beams"]
-        return replace(self, emitted=self.emitted - left, ended=self.ended | {"beams": 0.0})
+        return replace(
+            self,
+            emitted=self.emitted - left,
+            left_to_beams=self.left_to_beams + left,
+            ended=self.ended | {"beams": 0.0},
+        )
 
     @property
     def imbalance(self) -> float:

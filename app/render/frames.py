@@ -293,7 +293,7 @@ def _traced_for(light: LightPass, seconds: float, seed: int, stop: Stop) -> Iter
         light.begin(PASS_PHOTONS, seed)
         for number in itertools.count():
             yield from one_pass(number, PASS_PHOTONS)
-            if ends() or not light.plans:
+            if ends() or not light.has_work:
                 return
     photons = FIRST_PASS_PHOTONS
     light.begin(photons, seed)
@@ -306,6 +306,6 @@ def _traced_for(light: LightPass, seconds: float, seed: int, stop: Stop) -> Iter
     else:
         number, photons = 0, affordable
         light.begin(photons, seed)
-    while not ends() and light.plans:
+    while not ends() and light.has_work:
         yield from one_pass(number, photons)
         number += 1

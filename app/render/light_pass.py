@@ -46,6 +46,8 @@ from .shown_spectra import PassTables, ShownSpectra, ShownTables
 from .splatting import Pace, Splatting
 
 DEFAULT_BATCH = 1 << 16
+BEAM_ROUND = 1 << 20
+"""Photons' worth of beams, where they carry everything, after which a pass may be left."""
 QUEUE_BYTES = 64 << 20
 """What the queue of a batch that nobody asked for may take; more on a GPU. Less where memory is short."""
 
@@ -443,11 +445,13 @@ class LightPass:
 
         `first_round`: where a pass goes on that was left before."""
         if not self.plans:
-            if self.has_beams and not first_round:
-                yield from self._beam_steps(number, photons, RoundOf(number, 0, 1, True))
-                self._maps.photon_weight += photons
-                self.stats.photons += photons
-                yield PassStep(1.0, True)
+            rounds = -(-photons // BEAM_ROUND) if self.has_beams else 0
+            for j in range(first_round, rounds):
+                for step in self._beam_steps(number, photons, RoundOf(number, j, rounds, True)):
+                    yield PassStep((j + step.fraction) / rounds, False)
+                self._maps.photon_weight += photons / rounds
+                self.stats.photons += photons // rounds
+                yield PassStep((j + 1) / rounds, True)
             return
         counts = [plan.lattice_count(photons) for plan in self.plans]
         rounds = max(-(-n // (self.trace.batch // plan.lattices)) for n, plan in zip(counts, self.plans, strict=True))
@@ -466,6 +470,11 @@ class LightPass:
                     yield PassStep((done + 1) / slices, False)
             self._maps.photon_weight += photons / rounds
             yield PassStep((j + 1) / rounds, True)
+
+    @property
+    def has_work(self) -> bool:
+        """A pass throws some light."""
+        return bool(self.plans) or self.has_beams
 
     @property
     def has_beams(self) -> bool:
@@ -498,8 +507,8 @@ class LightPass:
         assert self._beams is not None
         share = photons / of.count
         before = self._beams.stats.find_seconds, self._beams.stats.draw_seconds
-        for _ in self._beams.steps(share, share, self._word(number * of.count + of.index), self._maps):
-            yield PassStep(done, False)
+        for part in self._beams.steps(share, share, self._word(number * of.count + of.index), self._maps):
+            yield PassStep(done if self.plans else part, False)
         after = self._beams.stats.find_seconds, self._beams.stats.draw_seconds
         self.stats.trace_seconds += after[0] - before[0]
         self.stats.splat_seconds += after[1] - before[1]

@@ -32,14 +32,15 @@ def prism() -> Scene:
 
 
 def test_a_rig_renders_what_render_does_again_and_again(gl: Any, prism: Scene) -> None:
-    rig = MethodRig(gl, prism, "srd", WIDTH, HEIGHT)
+    rig = MethodRig(gl, prism, "srd-photons", WIDTH, HEIGHT)
     try:
         first, other, again = rig.render(3000, 5), rig.render(700, 6), rig.render(3000, 5)
         budgets = rig.budgets(0.02, 4)
     finally:
         rig.release()
     settings = RenderSettings(
-        width=WIDTH, height=HEIGHT, photons=3000, seed=5, layer="caustic", max_depth=prism.render.max_depth
+        width=WIDTH, height=HEIGHT, photons=3000, seed=5, layer="caustic", method="srd-photons",
+        max_depth=prism.render.max_depth
     )
     picture = rgb709_to_xyz(render(prism, settings, context=gl).rgb.astype(float))
     assert np.allclose(first.xyz, picture, rtol=1e-4, atol=1e-5 * picture.max())
@@ -82,8 +83,8 @@ def test_a_rig_renders_all_passes_of_a_method_that_has_several(gl: Any, prism: S
 
 
 def test_more_photons_err_less(gl: Any, prism: Scene) -> None:
-    """The reference is srd's own picture of many photons: only that the chain from photons to relMSE holds together."""
-    rig = MethodRig(gl, prism, "srd", WIDTH, HEIGHT)
+    """The reference is the method's own picture of many photons: only that the chain to relMSE holds together."""
+    rig = MethodRig(gl, prism, "srd-photons", WIDTH, HEIGHT)
     try:
         fine = rig.render(100_000, 1).xyz
         reference_image = ReferencePicture(fine, np.zeros_like(fine))

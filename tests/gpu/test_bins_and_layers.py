@@ -204,7 +204,8 @@ def test_depth_darkens(render: Render) -> None:
 
 
 def test_seed_decides(render: Render) -> None:
-    first, again, other = (render(PRISM_SCENE, f"--layer caustic --seed {seed}").rgb for seed in (5, 5, 6))
+    options = "--layer caustic --method srd-photons --seed"
+    first, again, other = (render(PRISM_SCENE, f"{options} {seed}").rgb for seed in (5, 5, 6))
     assert first == pytest.approx(again, abs=1e-6 * float(first.max()))
     assert np.abs(first - other).max() > 1e-3 * first.max()
     # A few thousand photons behind a slit: another lattice lets another handful through.
@@ -213,6 +214,9 @@ def test_seed_decides(render: Render) -> None:
 
 def test_stats_close_the_balance(render: Render) -> None:
     render(PRISM_SCENE, "--stats")
+    # Beams are counted at three places of their bands; the finer they are, the nearer to all of it.
+    assert abs(share(render, "unaccounted")) <= 0.02
+    render(PRISM_SCENE, "--stats --method srd-photons")
     ended = {
         name: share(render, name)
         for name in ("deposited", "absorbed", "escaped", "direct", "lost_depth", "lost_numeric", "roulette")
@@ -310,7 +314,7 @@ def test_instances_each_cast_a_caustic(render: Render) -> None:
 
 def test_a_glb_is_opened_as_a_scene(render: Render) -> None:
     picture = render(assets_dir() / "meshes" / "gems.glb", "--layer caustic --stats")
-    assert luminance(picture).sum() > 0.0 and abs(share(render, "unaccounted")) <= 1e-4
+    assert luminance(picture).sum() > 0.0 and abs(share(render, "unaccounted")) <= 0.03
 
 
 def test_a_bare_mesh_is_glass_on_a_table(render: Render) -> None:

@@ -23,6 +23,7 @@ COVERS = {"intersect.glsl": ("accept_sheet", "crossed_in_contact", "comes_first"
 GAPS = (0.0, 1e-7, 1e-6, 1e-5, 1e-4, -1e-6)
 """Negative: the sheet lies in the glass."""
 CAUSTIC = replace(SMALL, layer="caustic")
+PHOTONS = replace(CAUSTIC, method="srd-photons")
 ROUNDING = 2e-3
 """Share of the light: rays at the rim of a sheet, and roulette."""
 
@@ -45,7 +46,11 @@ def shares(found: Probe) -> dict[str, float]:
 @pytest.mark.parametrize("material", [Mirror(), Black(), Diffuse()], ids=["silver", "black", "paint"])
 def test_a_coat_on_glass_loses_nothing_and_is_what_the_reference_says(gl, material: Material) -> None:
     for gap in GAPS:
-        found = shares(probe(gl, coated(material, gap), CAUSTIC))
+        beams, photons = (probe(gl, coated(material, gap), settings) for settings in (CAUSTIC, PHOTONS))
+        for name in ("deposited", "absorbed", "lost_depth", "lost_numeric"):
+            by_beams, by_photons = (p.stats.tally.ended[name] / beams.stats.tally.emitted for p in (beams, photons))
+            assert by_beams == pytest.approx(by_photons, abs=0.01), (gap, name)
+        found = shares(photons)
         assert found["lost_depth"] + found["lost_numeric"] < ROUNDING, (gap, found)
         run = ReferenceRun(coated(material, gap), 16, 9)
         run.advance(200_000)

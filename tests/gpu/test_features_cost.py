@@ -56,7 +56,12 @@ def scene_of(tmp_path: Path, name: str) -> Scene:
 
 
 def settings_of(scene: Scene) -> RenderSettings:
-    return RenderSettings(width=scene.render.width, height=scene.render.height, max_depth=scene.render.max_depth)
+    return RenderSettings(
+        width=scene.render.width,
+        height=scene.render.height,
+        max_depth=scene.render.max_depth,
+        method="srd-photons",
+    )
 
 
 def begun(gl: Context, scene: Scene) -> LightPass:

@@ -17,7 +17,7 @@ from spectrasplat.render.viewer.live_light import LiveLight
 from tests.gpu.test_live_light import SETTINGS, SIZE, difference, edited, inputs, maps, nrmse, painted, shipped
 
 PHOTONS = 20_000
-BEAMS = SETTINGS
+BEAMS = replace(SETTINGS, method="srd")
 
 
 def begun(gl: Context, scene) -> LiveLight:

@@ -75,7 +75,12 @@ def measure(
     context: Context, scene: Scene, repeats: int = REPEATS, seconds: float = _TARGET_SECONDS
 ) -> Iterator[tuple[FeatureReport, float]]:
     """(the report so far, share done) after the proof and after each feature."""
-    settings = RenderSettings(width=scene.render.width, height=scene.render.height, max_depth=scene.render.max_depth)
+    settings = RenderSettings(
+        width=scene.render.width,
+        height=scene.render.height,
+        max_depth=scene.render.max_depth,
+        method="srd-photons",
+    )
     features = Features.of(scene, settings)
     report = FeatureReport(
         __version__,
