@@ -31,7 +31,7 @@ from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, light_record
 from .camera_tables import CameraTables
 from .listed_pixels import GROUP, ListedPixels
 from .picture_channels import Channels
-from .pixel_lattice import is_in_strips, pixel_lattice, shared_places
+from .pixel_lattice import LOOKS, is_in_strips, looks_lattice, pixel_lattice, shared_places
 from .screen_beams import ScreenBeams
 from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
 from .variants import (
@@ -60,7 +60,7 @@ MAX_TAPS = 24
 """Looks along one sweep."""
 TAPS_PER_PIXEL = 1.2
 """Of one sample; between two looks colours are not told apart, so the more samples there are, the closer they lie."""
-PRIMARY_SAMPLES = 4
+PRIMARY_SAMPLES = LOOKS
 """Of one sample at what is seen directly: outlines and textures there cost a tenth of what glass costs …"""
 PRIMARY_SAMPLES_UNTIL = 16
 """… and with more samples than these they are smooth as they are."""
@@ -258,9 +258,13 @@ class CameraPass:
         )
         if self.shows_beams and sample_offset == 0:
             yield from self._draw_beams(parameters, samples, maps)
+        looks = np.zeros((samples, LOOKS, 2))
+        if parameters["primary_samples"][0] > 1:
+            looks = looks_lattice(samples, sample_offset)
         for index, place in enumerate(pixel_lattice(samples, sample_offset)):
             parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
             parameters["within_pixel"] = place
+            parameters["looks"] = looks[index].reshape(-1, 4)
             for share in self._add_sample(parameters, width, height, maps):
                 yield (index + share) / samples
         self.context.check("the camera pass")

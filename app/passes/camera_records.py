@@ -45,6 +45,7 @@ CAMERA_PARAMETERS = Struct(
         Field("sample_side", "float", "side of a sample's share of its pixel, pixels"),
         Field("sky_z", "vec3"),
         Field("pixel_width", "float", "of a pixel whose columns rays carry, in pixels of this picture"),
+        Field("looks", "vec4", "places of a sample's looks at what is seen directly, two each", 2),
         Field("size", "uvec2", "picture, pixels"),
         Field("within_pixel", "vec2", "this sample's place in its pixel, 0 to 1"),
         Field("inside_mask", "uint", "solids the camera stands in, bits of the medium stack"),

@@ -63,14 +63,15 @@ PathEnd ended[ENDS_HELD];
 #include "camera/cuts.glsl"
 #endif
 
-// Looks of one sample at what is seen directly, which costs little, lie round the sample's own place within its share of the pixel. Those that
-// meet something specular go on as one of them, chosen by chance; as the sample itself where all of them do.
+// Looks of one sample at what is seen directly, which costs little, have places of their own. Those that meet something specular go on as one
+// of them, chosen by chance; as the sample itself, which lies at one of them, where all do.
 #define THE_SAMPLE 4u
-const vec2 primary_offsets[5] = vec2[](vec2(-0.125, -0.375), vec2(0.375, -0.125), vec2(0.125, 0.375), vec2(-0.375, 0.125), vec2(0.0));
 
 vec2 primary_sample_place(uint primary_sample)
 {
-    return p.within_pixel + p.sample_side * vec2(p.pixel_width, p.pixel_height) * primary_offsets[primary_sample];
+    if (primary_sample == THE_SAMPLE) return p.within_pixel;
+    vec4 two = p.looks[primary_sample >> 1u];
+    return (primary_sample & 1u) == 0u ? two.xy : two.zw;
 }
 
 // A listed pixel: its number, the primary sample that goes on, and of how many it is one.
