@@ -64,6 +64,9 @@ class Search:
     power: float | None = None
     """Power of all lights, per unit of this one's spectral power: a dim light is followed less far."""
     sees: bool = False
+    faint: float = 0.0
+    """Above 0 (of what the camera sees): beams below the threshold end as `search.LEAF_TAIL`, and roulette is played
+    below this share only."""
 
 
 def search(
@@ -110,7 +113,7 @@ def search(
         return [], sums, blocked
     relative = entered if how.power is None else math.sqrt(entered * how.power)
     for _, work in jobs:
-        work["threshold"] = how.threshold * relative
+        work["threshold"], work["faint"] = how.threshold * relative, how.faint * relative
 
     def one(job: tuple[np.ndarray, np.ndarray]) -> Leaves:
         root, work = job

@@ -40,6 +40,7 @@ from .search import (
     LEAF_OPEN,
     LEAF_PIECE,
     LEAF_RECEIVER,
+    LEAF_TAIL,
     NARROWEST,
     SUM_ABSORBED,
     SUM_BEAMS,
@@ -76,6 +77,8 @@ _TOUCHES = 1e-7
 """GPU units: surfaces this close are in contact."""
 _UNEVEN = 0.15
 """A density that leaves the straight line by more is not a parabola for certain."""
+_TAIL_BENT = 0.2
+"""What is handed over is so weak that its edges need not be as straight."""
 _COLOURED = 0.02
 """The same where absorption has a colour."""
 _STEEP = 0.3
@@ -344,6 +347,8 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
         return
     # What absorbs may be coloured, with steps that three places do not see.
     most = _COLOURED if work.absorbing else _UNEVEN
+    if kind == LEAF_TAIL:
+        bent *= _TAIL_BENT
     if room and hand.x[2] - hand.x[0] > NARROWEST and (bent > tolerance or uneven > most):
         halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
         return
@@ -556,15 +561,20 @@ def child(nodes, action, before, after, mask, facets, solids, tables, work):
     power = power_as(hand, new, tables, work)
     if power <= 0.0:
         return
-    if power < work.threshold:
-        chance = power / work.threshold
+    hands_over = power < work.threshold and work.faint > 0.0
+    limit = work.faint if hands_over else work.threshold
+    if power < limit:
+        chance = power / limit
         flux = flux_as(hand, new, tables, work)
         if unit(mixed(new.key ^ work.seed, np.int64(17))) >= chance:
             work.sums[SUM_ROULETTE] += flux
             return
         new.boost /= chance
         work.sums[SUM_ROULETTE] -= flux * (1.0 / chance - 1.0)
-    work.sums[SUM_BEAMS] += 1.0
+    if hands_over:
+        new.ends = LEAF_TAIL
+    else:
+        work.sums[SUM_BEAMS] += 1.0
     copy_outline(hand, new)
     work.top += 1
 

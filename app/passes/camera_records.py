@@ -64,6 +64,8 @@ CAMERA_PARAMETERS = Struct(
         Field("end_listed", "uint", "… and the one after its last"),
         Field("first_place", "uint", "where the first of them waits; NONE where this dispatch takes up halted ones"),
         Field("queue", "uint", "of the two, the one that samples which halt are put on"),
+        Field("start_share", "float", "of a sample, that a path which carries a beam on stands for"),
+        Field("reserved", "float", "", 3),
     ),
 )
 

@@ -108,6 +108,9 @@ CameraPath path_beyond(ScreenPolygon beam, vec2 place, float lo, float hi)
     path.dposition[SPATIAL] = per_x * (path.end_position[1] - path.end_position[0]);
     path.ddirection[SPATIAL] = normalized_column(per_x * (path.end_direction[1] - path.end_direction[0]), path.direction);
     set_steps(path);
+    // A whole spectrum that has been bent is swept as well.
+    vec3 moved = path.end_direction[1] - path.end_direction[0], shifted = path.end_position[1] - path.end_position[0];
+    path.restricted = path.restricted || dot(moved, moved) + dot(shifted, shifted) > 1e-14;
 #endif
     return path;
 }
