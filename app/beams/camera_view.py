@@ -19,13 +19,15 @@ from .find import Emission, Search, search
 from .leaves import Leaves
 from .rays import PARALLEL, PINHOLE, SOURCE
 from .screen_polygons import ScreenPolygons
-from .search import LEAF_OPEN, LEAF_PIECE, LEAF_TAIL, SUM_BEAMS, SUM_ENTERED, SUMS
+from .search import LEAF_OPEN, LEAF_PIECE, LEAF_TAIL, SUM_BEAMS, SUM_ENTERED, SUM_LEAVES, SUMS
 from .sources import mask_at
 
 TOLERANCE_PX = 0.1
 """How far, in pixels at the objects' distance, places and edges may be from linear."""
 MAX_DEPTH = 48
 """Specular events that a beam is followed for: as many as a camera path (`passes.variants.MAX_DEPTH`)."""
+_MOST_LEAVES = 50_000
+"""Of one facet, 2 kB each."""
 
 
 class CameraView:
@@ -47,9 +49,11 @@ class CameraView:
         self.scene: BeamScene = beam_scene(scene, self._meshes, {}, axis, unit)
         self._objects, self._axis, self._to_gpu, self._unit = len(scene.objects), axis, to_gpu, unit
         self.beams = 0
-        """Followed by the last search."""
+        """Followed by the last search, with what they ended as."""
         self.covered = 0.0
         """Pixels that it saw facets in, about."""
+        self.gave_up = False
+        """It found too much to go on; what it returned is a part."""
 
     def find_screen_polygons(
         self,
@@ -71,9 +75,10 @@ class CameraView:
         if emission is None:
             return _screen_polygons([], self.scene, np.zeros(2), 1.0), shown
         # `search` takes a share of what enters: of as many pixels, about, as the objects cover.
-        how = Search(threshold, seed, MAX_DEPTH, TOLERANCE_PX * footprint, sees=True, faint=faint)
+        how = Search(threshold, seed, MAX_DEPTH, TOLERANCE_PX * footprint, sees=True, faint=faint, most=_MOST_LEAVES)
         leaves, sums, blocked = self._search(emission, how, threads, go_on, footprint)
-        self.beams = int(sums[SUM_BEAMS])
+        self.beams = int(sums[SUM_BEAMS] + sums[SUM_LEAVES])
+        self.gave_up = any(part.count[0] >= _MOST_LEAVES for part in leaves)
         self.covered = float(sums[SUM_ENTERED]) / footprint**2
         shown[[o for o in self.scene.beam_objects if o not in blocked]] = True
         polygons = _screen_polygons(leaves, self.scene, 0.5 * np.array(size, float), footprint)

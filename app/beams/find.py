@@ -67,6 +67,8 @@ class Search:
     faint: float = 0.0
     """Above 0 (of what the camera sees): beams below the threshold end as `search.LEAF_TAIL`, and roulette is played
     below this share only."""
+    most: int = 1 << 40
+    """Leaves of one facet that the source sees: with more, a search is given up."""
 
 
 def search(
@@ -121,7 +123,7 @@ def search(
         stack = take_stack()
         stack[FIRST : FIRST + 1] = root
         work["top"] = FIRST + 1
-        while go_on() and work["top"][0] > FIRST:
+        while go_on() and work["top"][0] > FIRST and work["count"][0, 0] < how.most:
             work["steps"] = _STEPS
             run(stack, *args, scene.obstacles, work, store.leaf, store.edge, store.corner)
             if work["steps"][0] > 0 and work["top"][0] > FIRST:

@@ -71,14 +71,12 @@ from .search import (
     unit,
 )
 
-_FAINT = 0.02
-"""Share of the threshold below which a beam is not halved."""
+_FAINT, _FAINT_HANDED = 0.02, 0.25
+"""Share of the threshold below which a beam is not halved; where all that comes of it is handed over."""
 _TOUCHES = 1e-7
 """GPU units: surfaces this close are in contact."""
 _UNEVEN = 0.15
 """A density that leaves the straight line by more is not a parabola for certain."""
-_TAIL_BENT = 0.2
-"""What is handed over is so weak that its edges need not be as straight."""
 _COLOURED = 0.02
 """The same where absorption has a colour."""
 _STEEP = 0.3
@@ -304,6 +302,12 @@ def hide(nodes, first, top, facets, solids, tables, work):
 
 
 @part
+def faint_share(work):
+    """Share of the threshold below which a beam is not halved."""
+    return _FAINT_HANDED if work.faint > 0.0 else _FAINT
+
+
+@part
 def push_both(nodes, low, high, work):
     """Leave on the stack what is left of the beam in hand and of that at the top."""
     if high:
@@ -331,7 +335,8 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     if (not is_parallel or work.absorbing) and not lay_out(hand, facets, solids, tables, source, work):
         return
     # Where rays graze, and where a cone fades away, there is no end to halving: what is faint is straight enough.
-    room = work.top + 2 < len(nodes) and power_as(hand, hand, tables, work) > _FAINT * work.threshold
+    faint = work.threshold if kind == LEAF_TAIL else faint_share(work) * work.threshold
+    room = work.top + 2 < len(nodes) and power_as(hand, hand, tables, work) > faint
     tolerance = facets[hand.facet].texel if kind == LEAF_RECEIVER else work.tolerance
     bend = 0.0
     if room and not is_parallel and kind == LEAF_RECEIVER:
@@ -345,10 +350,11 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     bent, uneven = lay_leaf(hand, facets, kind, leaf, edge, corner, work)
     if bent < 0.0:
         return
+    if work.sees and room and hand.x[2] - hand.x[0] > NARROWEST and strays(hand, facets, solids, tables, source, work):
+        halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
+        return
     # What absorbs may be coloured, with steps that three places do not see.
     most = _COLOURED if work.absorbing else _UNEVEN
-    if kind == LEAF_TAIL:
-        bent *= _TAIL_BENT
     if room and hand.x[2] - hand.x[0] > NARROWEST and (bent > tolerance or uneven > most):
         halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
         return
@@ -372,6 +378,37 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     work.count[2] += new.head[7]
     work.sums[SUM_LEAVES] += 1.0
     work.sums[SUM_DEPOSITED if kind == LEAF_RECEIVER else SUM_HANDED] += flux
+
+
+@part
+def strays(hand, facets, solids, tables, source, work):
+    """Whether rays over the band leave the parabola through those at its three places by more than the tolerance."""
+    position, direction = work.rays[0], work.rays[1]
+    for turn in range(2):
+        x = hand.x[2 * turn] + (0.25 - 0.5 * turn) * (hand.x[2] - hand.x[0])
+        follow(
+            source,
+            facets,
+            solids,
+            tables,
+            hand.path,
+            hand.flight,
+            x,
+            hand.centre[0],
+            hand.centre[1],
+            position,
+            direction,
+        )
+        off = 0.0
+        per = 0.0
+        for k in range(3):
+            near, middle, far = hand.direction[2 * turn], hand.direction[1], hand.direction[2 - 2 * turn]
+            change = direction[0, k] - (0.375 * near[0, k] + 0.75 * middle[0, k] - 0.125 * far[0, k])
+            off += change * change
+            per = max(per, middle[1, k] * middle[1, k] + middle[2, k] * middle[2, k])
+        if off > work.tolerance * work.tolerance * per and per > 0.0:
+            return True
+    return False
 
 
 @part
@@ -453,7 +490,7 @@ def at_facet(nodes, facets, solids, tables, sources, work):
         return
     if not is_parallel and hand.bend >= 0.0:
         bend = is_curved(hand, facets, solids, tables, source, work.tolerance, work)
-        if bend > 1.0 and power_as(hand, hand, tables, work) > _FAINT * work.threshold:
+        if bend > 1.0 and power_as(hand, hand, tables, work) > faint_share(work) * work.threshold:
             low, high = halve_space(hand, nodes[work.top], work)
             hand.total = nodes[work.top].total = _LAY
             push_both(nodes, low, high, work)

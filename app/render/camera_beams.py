@@ -36,8 +36,8 @@ _COARSE = 8.0
 """Threshold of the search that tells, in those that the picture needs."""
 _MOST_LOOKING = 0.1
 """Of what paths are predicted to cost, that the coarse search may take: the next is dearer."""
-_BEAM_S, _ENTRY_S, _START_S, _SAMPLE_S = 15e-6, 8e-6, 30e-6, 60e-6
-"""Seconds of a processor: a beam followed, a part of a pixel looked at, a path that carries on a beam, a sample of a
+_BEAM_S, _ENTRY_S, _START_S, _SAMPLE_S = 25e-6, 2.5e-6, 30e-6, 60e-6
+"""Seconds of a processor: a beam followed or ended, a part of a pixel looked at, a path that carries on a beam, a sample of a
 pixel by paths alone."""
 _SURE = 0.8
 """Of what paths are predicted to cost: beams must cost less."""
@@ -108,13 +108,18 @@ class CameraBeams:
         self.find(*view, times=_COARSE)
         yield 0.0
         by_paths = self.stats.predicted_seconds(samples)[1]
-        if not self.stats.covered:
+        if self._view.gave_up:
+            self.stats.reason = f"more than {self.stats.beams} beams {_COARSE:g} times too coarse"
+        elif not self.stats.covered:
             self.stats.reason = "what is in view hands its light on to something not flat"
         elif self.stats.beams * _BEAM_S > _MOST_LOOKING * by_paths:
             self.stats.reason = f"{self.stats.beams} beams {_COARSE:g} times too coarse"
         if self.stats.reason:
             return
         found = self.find(*view)
+        if self._view.gave_up:
+            self.stats.reason = f"more than {self.stats.beams} beams"
+            return
         by_beams, by_paths = self.stats.predicted_seconds(samples)
         if by_beams > _SURE * by_paths:
             self.stats.reason = f"{by_paths:.2g} s predicted, {by_beams:.2g} s by beams"
