@@ -81,6 +81,8 @@ _COLOURED = 0.02
 """The same where absorption has a colour."""
 _STEEP = 0.3
 """A relative change of the density over a leaf that is no longer linear."""
+_STRAY = 0.1
+"""Of the tolerance: how far rays may leave their parabola over the band (what they see is swept over many pixels)."""
 HAND, _SPARE = 0, 1
 """Rows of the stack that are the beam in hand, and room to try a cut."""
 FIRST = 2
@@ -399,14 +401,15 @@ def strays(hand, facets, solids, tables, source, work):
             position,
             direction,
         )
-        off = 0.0
-        per = 0.0
+        off = across = along = 0.0
+        near, middle, far = hand.direction[2 * turn], hand.direction[1], hand.direction[2 - 2 * turn]
         for k in range(3):
-            near, middle, far = hand.direction[2 * turn], hand.direction[1], hand.direction[2 - 2 * turn]
             change = direction[0, k] - (0.375 * near[0, k] + 0.75 * middle[0, k] - 0.125 * far[0, k])
             off += change * change
-            per = max(per, middle[1, k] * middle[1, k] + middle[2, k] * middle[2, k])
-        if off > work.tolerance * work.tolerance * per and per > 0.0:
+            across += middle[1, k] * middle[1, k]
+            along += middle[2, k] * middle[2, k]
+        per = min(across, along)
+        if off > _STRAY * _STRAY * work.tolerance * work.tolerance * per and per > 0.0:
             return True
     return False
 

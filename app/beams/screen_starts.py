@@ -74,6 +74,8 @@ def screen_starts(
     t = np.clip((x - polygons.x_lo[polygon]) / width, 0.0, 1.0)
     place, weight = np.zeros((len(marks), 2)), np.zeros(len(marks))
     _draw(*shapes, polygon, t, numbers[:, 1:], scratch, place, weight)
+    off = place - polygons.centre[polygon]
+    weight *= np.maximum(1.0 + np.einsum("si,si->s", polygons.slope[polygon], off), 0.0)
     weight *= share / np.maximum(drawn_by[polygon], 1e-300)
     place = np.clip(place, 0.0, np.array(size) - 1e-6)
     pixel = place[:, 1].astype(int) * size[0] + place[:, 0].astype(int)

@@ -160,7 +160,7 @@ def render(
         Text,
         typer.Option(
             metavar="HOW",
-            help="How flat-faceted glass is seen: beams (default: where predicted to cost less) or paths.",
+            help="How stills show flat-faceted glass: paths (default), or beams where these should cost less.",
         ),
     ] = None,
     batch: Annotated[

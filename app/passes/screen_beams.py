@@ -67,6 +67,8 @@ SCREEN_POLYGON = Struct(
         Field("inside_mask", "uint", "medium stack"),
         Field("inside_object", "uint", "solid outside the stack, or NONE"),
         Field("parts", "uint", "of a pixel that are looked at one by one"),
+        Field("slope", "vec2", "relative change of the throughput per pixel"),
+        Field("reserved", "float", "", 2),
         Field("position", "vec4", "coefficients of 1, t, t²: value at the centre, its two columns per pixel", 9),
         Field("direction", "vec4", "likewise", 9),
     ),
@@ -258,7 +260,7 @@ def strength_of(polygons: ScreenPolygons, brightness: np.ndarray | None) -> np.n
 def packed(polygons: ScreenPolygons, scene: SceneBuffers, brightness: np.ndarray | None) -> np.ndarray:
     """SCREEN_POLYGON records."""
     records = SCREEN_POLYGON.zeros(len(polygons))
-    for name in ("centre", "x_lo", "x_hi", "key", "last_object"):
+    for name in ("centre", "x_lo", "x_hi", "key", "last_object", "slope"):
         records[name] = getattr(polygons, name)
     records["first_edge"], records["end_edge"] = polygons.edge_start[:-1], polygons.edge_start[1:]
     records["throughput"] = _powers(polygons.throughput, 1)

@@ -88,7 +88,7 @@ CameraPath path_beyond(ScreenPolygon beam, vec2 place, float lo, float hi)
     }
     vec3 t = vec3(lo, middle, hi);
     path.band = beam.x_lo + width * t;
-    path.weight = max(beam.throughput.x + t * (beam.throughput.y + t * beam.throughput.z), 0.0);
+    path.weight = max(beam.throughput.x + t * (beam.throughput.y + t * beam.throughput.z), 0.0) * max(1.0 + dot(beam.slope, place), 0.0);
     path.inverse_pdf = 1.0;
     path.branch_weight = path.weight.y;
     path.key = beam.key;
