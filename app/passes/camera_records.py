@@ -65,7 +65,8 @@ CAMERA_PARAMETERS = Struct(
         Field("first_place", "uint", "where the first of them waits; NONE where this dispatch takes up halted ones"),
         Field("queue", "uint", "of the two, the one that samples which halt are put on"),
         Field("start_share", "float", "of a sample, that a path which carries a beam on stands for"),
-        Field("reserved", "float", "", 3),
+        Field("reserved", "float", ""),
+        Field("reserved_too", "vec2", ""),
     ),
 )
 

@@ -68,7 +68,7 @@ SCREEN_POLYGON = Struct(
         Field("inside_object", "uint", "solid outside the stack, or NONE"),
         Field("parts", "uint", "of a pixel that are looked at one by one"),
         Field("slope", "vec2", "relative change of the throughput per pixel"),
-        Field("reserved", "float", "", 2),
+        Field("reserved", "vec2", ""),
         Field("position", "vec4", "coefficients of 1, t, t²: value at the centre, its two columns per pixel", 9),
         Field("direction", "vec4", "likewise", 9),
     ),

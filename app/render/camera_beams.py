@@ -37,8 +37,8 @@ _COARSE = 8.0
 _MOST_LOOKING = 0.1
 """Of what paths are predicted to cost, that the coarse search may take: the next is dearer."""
 _BEAM_S, _ENTRY_S, _START_S, _SAMPLE_S = 25e-6, 2.5e-6, 30e-6, 60e-6
-"""Seconds of a processor: a beam followed or ended, a part of a pixel looked at, a path that carries on a beam, a sample
-of a pixel by paths alone."""
+"""Seconds of a processor: a beam followed or ended, a part of a pixel looked at, a path that carries on a beam, a
+sample of a pixel by paths alone."""
 _SURE = 0.8
 """Of what paths are predicted to cost: beams must cost less."""
 
