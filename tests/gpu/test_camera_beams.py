@@ -47,8 +47,8 @@ def test_other_methods_follow_paths(gl, beams_at_all_costs):
 
 
 def test_where_in_doubt_paths(gl):
-    """Two stones that cover few pixels have as many beams as large ones."""
-    stats = seen(gl, "two_stones").stats.camera_pass.beams
+    """A prism that fills the picture: paths through it are short."""
+    stats = seen(gl, "prism_edge").stats.camera_pass.beams
     assert not stats.by_beams and stats.reason
 
 
@@ -57,7 +57,8 @@ def test_costs_are_told_by_counts():
     beams, paths = stats.predicted_seconds(16)
     costs = camera_beams._BEAM_S, camera_beams._ENTRY_S, camera_beams._START_S
     assert beams == pytest.approx(np.dot((1000, 500, 100), costs))
-    assert paths == pytest.approx(50 * 16 * camera_beams._SAMPLE_S)
+    handed = 100 / (50 * 16 * camera_beams.STARTS)
+    assert paths == pytest.approx(50 * 16 * (camera_beams._SAMPLE_S + handed * camera_beams._DEEP_S))
 
 
 def test_beams_are_followed_as_far_as_paths():
