@@ -6,7 +6,7 @@ import numpy as np
 
 from .compiling import part
 from .facets import MAX_CORNERS
-from .hand import ALL, FAINT, HAND, LAY, SOME, UNKNOWN, distance_at, halve, push_both
+from .hand import ALL, HAND, LAY, SOME, UNKNOWN, distance_at, faint_share, halve, push_both
 from .leaves import passes
 from .nodes import (
     LEVELS,
@@ -22,6 +22,7 @@ from .nodes import (
 )
 from .rays import PARALLEL, PASS, REFLECT, REFRACT, at_x, follow, index_of, meet, total_line, transmitted
 from .search import (
+    LEAF_TAIL,
     SUM_ABSORBED,
     SUM_BEAMS,
     SUM_DEPTH,
@@ -67,7 +68,7 @@ def at_facet(nodes, facets, solids, tables, sources, work):
         return
     if not is_parallel and hand.bend >= 0.0:
         bend = is_curved(hand, facets, solids, tables, source, work.tolerance, work)
-        if bend > 1.0 and power_as(hand, hand, tables, work) > FAINT * work.threshold:
+        if bend > 1.0 and power_as(hand, hand, tables, work) > faint_share(work) * work.threshold:
             low, high = halve_space(hand, nodes[work.top], work)
             hand.total = nodes[work.top].total = LAY
             push_both(nodes, low, high, work)
@@ -195,14 +196,19 @@ def child(nodes, action, before, after, mask, facets, solids, tables, work):
     power = power_as(hand, new, tables, work)
     if power <= 0.0:
         return
-    if power < work.threshold:
-        chance = power / work.threshold
+    hands_over = power < work.threshold and work.faint > 0.0
+    limit = work.faint if hands_over else work.threshold
+    if power < limit:
+        chance = power / limit
         flux = flux_as(hand, new, tables, work)
         if unit(mixed(new.key ^ work.seed, np.int64(17))) >= chance:
             work.sums[SUM_ROULETTE] += flux
             return
         new.boost /= chance
         work.sums[SUM_ROULETTE] -= flux * (1.0 / chance - 1.0)
-    work.sums[SUM_BEAMS] += 1.0
+    if hands_over:
+        new.ends = LEAF_TAIL
+    else:
+        work.sums[SUM_BEAMS] += 1.0
     copy_outline(hand, new)
     work.top += 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,13 +19,15 @@ from .find import Emission, GoOn, Search, search
 from .leaves import Leaves
 from .rays import PARALLEL, PINHOLE, SOURCE
 from .screen_polygons import ScreenPolygons
-from .search import LEAF_OPEN, LEAF_PIECE, SUM_BEAMS, SUM_ENTERED, SUMS
+from .search import LEAF_OPEN, LEAF_PIECE, LEAF_TAIL, SUM_BEAMS, SUM_ENTERED, SUM_LEAVES, SUMS
 from .sources import mask_at
 
 TOLERANCE_PX = 0.1
 """How far, in pixels at the objects' distance, places and edges may be from linear."""
 MAX_DEPTH = 48
 """Specular events that a beam is followed for: as many as a camera path (`passes.variants.MAX_DEPTH`)."""
+_MOST_LEAVES = 50_000
+"""Of one facet, 2 kB each."""
 
 
 class CameraView:
@@ -43,10 +46,11 @@ class CameraView:
         self.scene: BeamScene = beam_scene(scene, self._meshes, {}, axis, unit)
         self._objects, self._axis, self._to_gpu, self._unit = len(scene.objects), axis, to_gpu, unit
         self.beams = 0
-        """Followed by the last search."""
-        self.tail = 0.0
-        """At most this share of what it saw lies in beams below the threshold, some of which roulette kept for the
-        rest."""
+        """Followed by the last search, with what they ended as."""
+        self.covered = 0.0
+        """Pixels that it saw facets in, about."""
+        self.gave_up = False
+        """It found too much to go on; what it returned is a part."""
 
     def find_screen_polygons(
         self,
@@ -54,27 +58,27 @@ class CameraView:
         size: tuple[int, int],
         threshold: float,
         seed: int = 1,
+        faint: float = 0.0,
         threads: int | None = None,
         go_on: GoOn = lambda steps: True,
     ) -> tuple[ScreenPolygons, np.ndarray]:
         """Polygons of a picture of `size` pixels, and bool (O,): which objects they show. Camera rays that meet another
         object first are not among them.
 
-        `threshold`: pixels times throughput and share of the spectrum below which a beam plays roulette."""
+        `threshold`: pixels times throughput and share of the spectrum below which a beam is handed to paths; `faint`:
+        below which it plays roulette first. 0: nothing is handed, and roulette is played below the threshold."""
         shown = np.zeros(self._objects, bool)
         emission, footprint = self._emission(camera, size)
         if emission is None:
             return _screen_polygons([], self.scene, np.zeros(2), 1.0), shown
         # `search` takes a share of what enters: of as many pixels, about, as the objects cover.
-        how = Search(threshold, seed, MAX_DEPTH, TOLERANCE_PX * footprint, sees=True)
+        how = Search(threshold, seed, MAX_DEPTH, TOLERANCE_PX * footprint, sees=True, faint=faint, most=_MOST_LEAVES)
         leaves, sums, blocked = self._search(emission, how, threads, go_on, footprint)
-        self.beams = int(sums[SUM_BEAMS])
-        flux = Leaves.joined(leaves).flux
-        self.tail = float(flux[flux < threshold * footprint**2].sum() / max(flux.sum(), 1e-300))
+        self.beams = int(sums[SUM_BEAMS] + sums[SUM_LEAVES])
+        self.gave_up = any(len(part.head) >= _MOST_LEAVES for part in leaves)
+        self.covered = float(sums[SUM_ENTERED]) / footprint**2
         shown[[o for o in self.scene.beam_objects if o not in blocked]] = True
         polygons = _screen_polygons(leaves, self.scene, 0.5 * np.array(size, float), footprint)
-        # Nobody takes a polygon's paths up yet: what would hand some over is seen by paths altogether.
-        shown[polygons.source[polygons.is_handed]] = False
         return polygons.of(np.flatnonzero(shown[polygons.source])), shown
 
     def _search(
@@ -83,14 +87,9 @@ class CameraView:
         entered = self._entered(emission)
         if entered <= 0.0:
             return [], np.zeros(SUMS), set()
-        share = how.threshold * footprint**2 / entered
-        return search(
-            self.scene,
-            emission,
-            Search(share, how.seed, how.depth, how.tolerance, how.drift, sees=True),
-            threads,
-            go_on,
-        )
+        of_entered = footprint**2 / entered
+        how = replace(how, threshold=how.threshold * of_entered, faint=how.faint * of_entered)
+        return search(self.scene, emission, how, threads, go_on)
 
     def _entered(self, emission: Emission) -> float:
         """What enters (`search.SUM_ENTERED`), by a search that ends at once."""
@@ -128,7 +127,7 @@ class CameraView:
 
 
 def _screen_polygons(leaves: list[Leaves], scene: BeamScene, middle: np.ndarray, footprint: float) -> ScreenPolygons:
-    parts = [(of_kind(leaves, kind), kind) for kind in (LEAF_OPEN, LEAF_PIECE)]
+    parts = [(of_kind(leaves, kind), kind) for kind in (LEAF_OPEN, LEAF_PIECE, LEAF_TAIL)]
     head = np.concatenate([part.head for part, _ in parts])
     count = [len(part.head) for part, _ in parts]
     x = np.concatenate([part.x for part, _ in parts])
@@ -140,12 +139,13 @@ def _screen_polygons(leaves: list[Leaves], scene: BeamScene, middle: np.ndarray,
     for k in (0, 3):
         edges[:, k + 2] = edges[:, k + 2] / footprint - edges[:, k : k + 2] @ middle
     hulls = [hulls_around(part.corner, part.head[:, 7], np.zeros(len(part.head))) for part, _ in parts]
-    hull_start = np.concatenate([hulls[0][0], hulls[0][0][-1] + hulls[1][0][1:]])
+    counts = np.concatenate([np.diff(starts) for starts, _ in hulls])
+    hull_start = np.concatenate([[0], np.cumsum(counts)])
     last = np.maximum(head[:, 2], 0)
     towards = np.einsum("mk,mk->m", ray[:, 1, 1, 0], scene.facets["plane"][last, :3])
     key = head[:, 8] & 0xFFFFFFFF
     return ScreenPolygons(
-        np.repeat([False, True], count),
+        np.repeat([False, True, True], count),
         head[:, 3].astype(np.int32),
         head[:, 4].astype(np.int32),
         key.astype(np.uint32),
@@ -155,6 +155,7 @@ def _screen_polygons(leaves: list[Leaves], scene: BeamScene, middle: np.ndarray,
         ray[:, 0],
         ray[:, 1],
         np.concatenate([part.density for part, _ in parts]),
+        np.concatenate([part.slope for part, _ in parts]) * footprint,
         scene.facets["triangle"][last].astype(np.int32),
         scene.facets["owner"][last].astype(np.int32),
         towards < 0.0,

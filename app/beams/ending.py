@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import part
-from .hand import FAINT, HAND, SPARE, halve, push_both
+from .hand import HAND, SPARE, faint_share, halve, push_both
 from .leaves import density_slope, lay_leaf, passes, plane_map
 from .nodes import STATIC, copy, first_place, last_place, lay_out
-from .rays import PARALLEL
+from .rays import PARALLEL, follow
 from .search import (
     LEAF_OPEN,
     LEAF_RECEIVER,
+    LEAF_TAIL,
     NARROWEST,
     SUM_DEPOSITED,
     SUM_HANDED,
@@ -30,6 +31,8 @@ _COLOURED = 0.02
 """The same where absorption has a colour."""
 _STEEP = 0.3
 """A relative change of the density over a leaf that is no longer linear."""
+_STRAY = 0.1
+"""Of the tolerance: how far rays may leave their parabola over the band (what they see is swept over many pixels)."""
 
 
 @part
@@ -43,7 +46,8 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     if (not is_parallel or work.absorbing) and not lay_out(hand, facets, solids, tables, source, work):
         return
     # Where rays graze, and where a cone fades away, there is no end to halving: what is faint is straight enough.
-    room = work.top + 2 < len(nodes) and power_as(hand, hand, tables, work) > FAINT * work.threshold
+    faint = work.threshold if kind == LEAF_TAIL else faint_share(work) * work.threshold
+    room = work.top + 2 < len(nodes) and power_as(hand, hand, tables, work) > faint
     tolerance = facets[hand.facet].texel if kind == LEAF_RECEIVER else work.tolerance
     bend = 0.0
     if room and not is_parallel and kind == LEAF_RECEIVER:
@@ -56,6 +60,9 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
         absorb(hand, facets, solids, tables, work)
     bent, uneven = lay_leaf(hand, facets, kind, leaf, edge, corner, work)
     if bent < 0.0:
+        return
+    if work.sees and room and hand.x[2] - hand.x[0] > NARROWEST and strays(hand, facets, solids, tables, source, work):
+        halve(nodes, 0.5 * (hand.x[0] + hand.x[2]), facets, solids, tables, sources, work)
         return
     most = _COLOURED if work.coloured else _UNEVEN
     if room and hand.x[2] - hand.x[0] > NARROWEST and (bent > tolerance or uneven > most):
@@ -81,6 +88,27 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     work.count[2] += new.head[7]
     work.sums[SUM_LEAVES] += 1.0
     work.sums[SUM_DEPOSITED if kind == LEAF_RECEIVER else SUM_HANDED] += flux
+
+
+@part
+def strays(hand, facets, solids, tables, source, work):
+    """Whether rays over the band leave the parabola through those at its three places by more than the tolerance."""
+    position, direction = work.rays[0], work.rays[1]
+    u, v = hand.centre[0], hand.centre[1]
+    for turn in range(2):
+        x = hand.x[2 * turn] + (0.25 - 0.5 * turn) * (hand.x[2] - hand.x[0])
+        follow(source, facets, solids, tables, hand.path, hand.flight, x, u, v, position, direction)
+        off = across = along = 0.0
+        near, middle, far = hand.direction[2 * turn], hand.direction[1], hand.direction[2 - 2 * turn]
+        for k in range(3):
+            change = direction[0, k] - (0.375 * near[0, k] + 0.75 * middle[0, k] - 0.125 * far[0, k])
+            off += change * change
+            across += middle[1, k] * middle[1, k]
+            along += middle[2, k] * middle[2, k]
+        per = min(across, along)
+        if off > _STRAY * _STRAY * work.tolerance * work.tolerance * per and per > 0.0:
+            return True
+    return False
 
 
 @part

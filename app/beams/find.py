@@ -69,6 +69,11 @@ class Search:
     power: float | None = None
     """Power of all lights, per unit of this one's spectral power: a dim light is followed less far."""
     sees: bool = False
+    faint: float = 0.0
+    """Above 0 (of what the camera sees): beams below the threshold end as `search.LEAF_TAIL`, and roulette is played
+    below this share only."""
+    most: int = 1 << 40
+    """Leaves of one facet that the source sees: with more, a search is given up."""
 
 
 def search(
@@ -116,7 +121,8 @@ def search(
         return [], sums, blocked
     relative = entered if how.power is None else math.sqrt(entered * how.power)
     for _, work in jobs:
-        work["threshold"] = _rounded(how.threshold * relative)
+        work["threshold"] = threshold = _rounded(how.threshold * relative)
+        work["faint"] = how.faint / how.threshold * threshold
 
     def one(job: tuple[np.ndarray, np.ndarray]) -> Leaves:
         root, work = job
@@ -124,7 +130,7 @@ def search(
         stack = take_stack()
         stack[FIRST : FIRST + 1] = root
         work["top"] = FIRST + 1
-        while work["top"][0] > FIRST:
+        while work["top"][0] > FIRST and work["count"][0, 0] < how.most:
             work["steps"] = _STEPS
             run(stack, *args, scene.obstacles, work, store.leaf, store.edge, store.corner)
             if not go_on(_STEPS - int(work["steps"][0])):

@@ -15,8 +15,14 @@ START = -3
 LAY, UNKNOWN, SOME, ALL = -2, -1, 0, 1
 """States of a beam's `total`, whether its facet reflects everything; START: a source's whole light; LAY: rays are those
 of a larger outline."""
-FAINT = 0.02
-"""Share of the threshold below which a beam is not halved."""
+_FAINT, _FAINT_HANDED = 0.02, 0.25
+"""Share of the threshold below which a beam is not halved; where all that comes of it is handed over."""
+
+
+@part
+def faint_share(work):
+    """Share of the threshold below which a beam is not halved."""
+    return _FAINT_HANDED if work.faint > 0.0 else _FAINT
 
 
 @part

@@ -11,22 +11,60 @@ PIXEL_BITS = 27
 """Of an entry's second word; the others hold the part of the pixel."""
 
 
-def pixel_parts(polygons: ScreenPolygons, size: tuple[int, int], reach: float, parts: np.ndarray) -> np.ndarray:
+_NOTHING = np.empty((0, 2), np.uint32)
+
+
+def pixel_parts(
+    polygons: ScreenPolygons,
+    size: tuple[int, int],
+    reach: float,
+    parts: np.ndarray,
+    which: tuple[int, int] | None = None,
+) -> np.ndarray:
     """uint32 (n, 2): polygon; pixel (row by row) and, from bit `PIXEL_BITS` on, part of it; polygon after polygon.
 
-    `reach`: pixels from a pixel's middle to its outermost points; `parts` (N,): of every pixel, by polygon."""
-    args = polygons.edge_start, polygons.edges, polygons.hull_start, polygons.hulls, size[0], size[1], reach, parts
-    nothing = np.empty((0, 2), np.uint32)
-    found = np.empty((_listed(*args, nothing), 2), np.uint32)
+    `reach`: pixels from a pixel's middle to its outermost points; `parts` (N,): of every pixel, by polygon; `which`:
+    the first polygon and the one after the last."""
+    args = _arguments(polygons, size, reach, parts, which)
+    found = np.empty((_listed(*args, _NOTHING), 2), np.uint32)
     _listed(*args, found)
     return found
 
 
+def count_pixel_parts(polygons: ScreenPolygons, size: tuple[int, int], reach: float, parts: np.ndarray) -> int:
+    """How many `pixel_parts` lists."""
+    return int(_listed(*_arguments(polygons, size, reach, parts, None), _NOTHING))
+
+
+def portions(polygons: ScreenPolygons, size: tuple[int, int], parts: np.ndarray, most: int) -> list[tuple[int, int]]:
+    """Polygons in turn, as few portions as possible of at most about `most` parts of pixels each (a polygon of more is
+    a portion of its own)."""
+    corners = np.clip(polygons.hulls, 0.0, np.array(size, float))
+    starts = polygons.hull_start[:-1]
+    some = np.diff(polygons.hull_start) > 0
+    pixels = np.zeros(len(polygons))
+    if some.any():
+        span = np.maximum.reduceat(corners, starts[some]) - np.minimum.reduceat(corners, starts[some])
+        pixels[some] = np.prod(span + 2.0, axis=1)
+    result, first, held = [], 0, 0.0
+    for i, count in enumerate(pixels * parts):
+        if held > 0.0 and held + count > most:
+            result.append((first, i))
+            first, held = i, 0.0
+        held += count
+    return [*result, (first, len(polygons))] if len(polygons) else []
+
+
+def _arguments(polygons, size, reach, parts, which):
+    shapes = polygons.edge_start, polygons.edges, polygons.hull_start, polygons.hulls
+    return *shapes, size[0], size[1], reach, parts, *(which or (0, len(polygons)))
+
+
 @jit
-def _listed(edge_start, edges, hull_start, hulls, width, height, reach, parts, out):
+def _listed(edge_start, edges, hull_start, hulls, width, height, reach, parts, start, end, out):
     """Number of entries; written to `out` where it has room."""
     count = 0
-    for i in range(len(parts)):
+    for i in range(start, end):
         if hull_start[i] == hull_start[i + 1]:
             continue
         x0 = y0 = 1e300

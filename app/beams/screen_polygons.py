@@ -44,6 +44,8 @@ class ScreenPolygons:
     throughput: np.ndarray
     """(N, 3): radiance that arrives at the camera per radiance that enters the last facet, at x_lo, in the middle and
     at x_hi: Fresnel, absorption, tints of mirrors, and one over the probability that the beam was kept."""
+    slope: np.ndarray
+    """(N, 2): relative change of the throughput with the place, per pixel."""
     last_triangle: np.ndarray
     """int32 (N,), some triangle (of the scene's, in the object's order) of the facet that was left last."""
     last_object: np.ndarray

@@ -27,7 +27,9 @@ from .nodes import (
 )
 from .rays import advance, at_x, edge_line, follow
 
-LEAF_RECEIVER, LEAF_PIECE, LEAF_OPEN = 0, 1, 2
+LEAF_RECEIVER, LEAF_PIECE, LEAF_OPEN, LEAF_TAIL = 0, 1, 2, 3
+"""What lies on a receiver; what photons carry on; what leaves all facets towards what the camera sees (`sees`); what is
+too weak to be followed as a beam, and is handed to the camera's paths."""
 NARROWEST = 1.0 / 256.0
 """Bands are not halved below this."""
 _STEADY = 3.0
@@ -57,6 +59,8 @@ WORK = np.dtype(
         ("power", "i8"),
         # Power (flux per unit of spectral power) below which a beam plays roulette.
         ("threshold", "f8"),
+        # Above 0: weaker ones are handed over as tails, and only below this they play roulette.
+        ("faint", "f8"),
         ("seed", "u8"),
         # Most specular events.
         ("depth", "i8"),

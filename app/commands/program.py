@@ -156,6 +156,13 @@ def render(
         Text, typer.Option("--max-depth", metavar="N", help="Specular events on a light path, at most; default: 64.")
     ] = None,
     spp: Annotated[Text, typer.Option(metavar="N", help="Camera samples a pixel.")] = None,
+    camera: Annotated[
+        Text,
+        typer.Option(
+            metavar="HOW",
+            help="How stills show flat-faceted glass: paths (default), or beams where these should cost less.",
+        ),
+    ] = None,
     batch: Annotated[
         Text, typer.Option(metavar="N", help="Photons in flight at once (never changes the picture).")
     ] = None,
@@ -181,6 +188,7 @@ def render(
         exposure,
         max_depth,
         spp,
+        camera,
         batch,
         stats,
     )

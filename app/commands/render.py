@@ -34,6 +34,7 @@ class RenderRequest:
     exposure: str | None = None
     max_depth: str | None = None
     spp: str | None = None
+    camera: str | None = None
     batch: str | None = None
     stats: bool = False
 
@@ -96,6 +97,7 @@ def _parse(request: RenderRequest) -> dict[str, Any]:
         "exposure_ev": (request.exposure, options.parse_exposure),
         "max_depth": (request.max_depth, _integer("--max-depth", 1, options.MAX_DEPTH)),
         "spp": (request.spp, _integer("--spp", 1, options.MAX_SPP)),
+        "camera_beams": (request.camera, options.parse_camera),
         "batch": (request.batch, options.parse_batch),
     }
     asked = {field: parse(text) for field, (text, parse) in parsers.items() if text is not None}

@@ -503,11 +503,11 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
 
 
 def _no_camera_beams_words(scene: Scene, features: Features) -> str:
-    if features.method != "srd":
+    if not divides_spectrum(features.method):
         return f"method {features.method} follows paths"
     if not features.camera_specular:
         return "no glass and no mirror is in view"
-    return "the camera follows paths" if beam_objects(scene) else "no glass and no mirror has flat facets only"
+    return "--camera beams would try them" if beam_objects(scene) else "no glass and no mirror has flat facets only"
 
 
 def _beam_words(scene: Scene, features: Features) -> str:

@@ -65,6 +65,6 @@ class RenderSettings:
     """The camera may go anywhere (viewer, animation): what a scene needs is not judged by what its camera sees."""
     camera_beams: bool = False
     """Let the camera of `srd` see flat-faceted glass and mirrors by beams where that is predicted to be cheaper. Off:
-    at equal error they were dearer, and left single bright pixels (docs/beams.md)."""
+    not yet as exact as paths in every scene (docs/beams.md)."""
     tally: bool = False
     """Also sum up what the maps hold, for `--stats`."""

@@ -15,6 +15,7 @@ import moderngl
 import numpy as np
 
 from ..beams.screen_polygons import ScreenPolygons
+from ..beams.screen_starts import ScreenStarts
 from ..gpu import bindings, shader
 from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
@@ -23,14 +24,15 @@ from ..gpu.records import PLACEMENT, RECEIVER
 from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
 from ..gpu.texture_store import PICTURE, TextureStore
 from ..model.scene import Camera
+from .beam_starts import BeamStarts
 from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, camera_parameters, light_record
 from .camera_tables import CameraTables
 from .caustic_maps import CausticMaps
 from .listed_pixels import GROUP, ListedPixels
 from .picture_channels import Channels
 from .picture_sums import PictureSums
-from .pixel_lattice import is_in_strips, pixel_lattice, shared_places
-from .screen_beams import ScreenBeams
+from .pixel_lattice import LOOKS, is_in_strips, looks_lattice, pixel_lattice, shared_places
+from .screen_beams import MOST_ENTRIES, ScreenBeams
 from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
 from .variants import (
     BIND_BEAM_OBJECTS,
@@ -50,15 +52,18 @@ from .variants import (
     halting_defines,
     screen_beam_defines,
     single_defines,
+    start_defines,
 )
 
 SPLIT_THRESHOLD = 0.004
 """Share of a sample's power above which both parts of a split path are followed."""
+START_SHARE = 0.25
+"""Of a sample's power, that a path which carries on a beam stands for."""
 MAX_TAPS = 24
 """Looks along one sweep."""
 TAPS_PER_PIXEL = 1.2
 """Of one sample; between two looks colours are not told apart, so the more samples there are, the closer they lie."""
-PRIMARY_SAMPLES = 4
+PRIMARY_SAMPLES = LOOKS
 """Of one sample at what is seen directly: outlines and textures there cost a tenth of what glass costs …"""
 PRIMARY_SAMPLES_UNTIL = 16
 """… and with more samples than these they are smooth as they are."""
@@ -157,6 +162,7 @@ class CameraPass:
             shown = halting_defines(shown) if halts else shown
         self._source = (shown, structs)
         self._beams: ScreenBeams | None = None
+        self._starts: BeamStarts | None = None
         self._beam_objects = np.zeros(len(scene.scene.objects), bool)
         self._beam_objects_buffer: moderngl.Buffer | None = None
         self._beside: moderngl.ComputeShader | None = None
@@ -165,9 +171,16 @@ class CameraPass:
             shown = direct_defines(shown)
         self._program = shader.compute(self._ctx, "camera/camera.comp", shown, structs)
 
-    def take_beams(self, polygons: ScreenPolygons | None, objects: np.ndarray | None = None) -> None:
+    def take_beams(
+        self,
+        polygons: ScreenPolygons | None,
+        objects: np.ndarray | None = None,
+        starts: tuple[ScreenStarts, ScreenPolygons] | None = None,
+        width: int = 0,
+    ) -> None:
         """From the next first sample on, show what is seen in these objects (O,) by polygons of the picture, which
-        belong to its camera, size and seed; None: by paths, as everything else."""
+        belong to its camera, size and seed; None: by paths, as everything else. `starts`: paths that carry on handed
+        polygons, with those, of a picture so wide."""
         if polygons is None or objects is None or self._listed is None:
             self._beam_objects[:] = False
             return
@@ -179,8 +192,17 @@ class CameraPass:
         assert self._beam_objects_buffer is not None
         self._beam_objects[:] = objects
         self._beam_objects_buffer.write(self._beam_objects.astype("u4").tobytes())
-        brightness = np.frombuffer(self._tables.cell_cdf.read(), "f4") if self.disperses else None
-        self._beams.take(polygons, self.scene, brightness)
+        self._beams.take(polygons, self.scene, self.brightness)
+        if starts is not None and self._starts is None:
+            self._starts = BeamStarts(self._ctx, start_defines(shown), structs, MOST_ENTRIES)
+        if self._starts is not None:
+            drawn, handed = starts or (ScreenStarts.none(), polygons)
+            self._starts.take(drawn, handed, self.scene, width)
+
+    @property
+    def brightness(self) -> np.ndarray | None:
+        """How much of what looks bright lies below each of equally spaced x; None where nothing disperses."""
+        return np.frombuffer(self._tables.cell_cdf.read(), "f4").astype(float) if self.disperses else None
 
     @property
     def shows_beams(self) -> bool:
@@ -241,9 +263,13 @@ class CameraPass:
         )
         if self.shows_beams and sample_offset == 0:
             yield from self._draw_beams(parameters, samples, maps)
+        looks = np.zeros((samples, LOOKS, 2))
+        if parameters["primary_samples"][0] > 1:
+            looks = looks_lattice(samples, sample_offset)
         for index, place in enumerate(pixel_lattice(samples, sample_offset)):
             parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
             parameters["within_pixel"] = place
+            parameters["looks"] = looks[index].reshape(-1, 4)
             for share in self._add_sample(parameters, width, height, maps):
                 yield (index + share) / samples
         self.context.check("the camera pass")
@@ -370,8 +396,9 @@ class CameraPass:
     def release(self) -> None:
         """Free every buffer, texture and program."""
         shader.release(self._tables, self._lights, self._counters, self._sums, self._parameters_buffer)
-        if self._beams is not None:
-            self._beams.release()
+        for beams in (self._beams, self._starts):
+            if beams is not None:
+                beams.release()
         if self._beam_objects_buffer is not None:
             self._beam_objects_buffer.release()
         for program in (self._program, self._beyond, self._single, self._beside):
@@ -472,6 +499,16 @@ class CameraPass:
         as_image = self.scene.texels.as_image
         for _ in self._beams.draw(self._sums.size, places, as_image, bind, self.dispatch_seconds):
             yield 0.0
+        if self._starts is not None:
+            assert self._listed is not None
+            found, gather = self._beams.found, self._beams.gather
+            parameters["start_share"] = START_SHARE
+
+            def dispatch(program: moderngl.ComputeShader, count: int) -> float:
+                return self._dispatch(program, parameters, maps, -(-count // GROUP), 1)
+
+            for _ in self._starts.follow(self._listed, parameters, dispatch, found, gather, self.dispatch_seconds):
+                yield 0.0
 
     def _program_beyond(self) -> moderngl.ComputeShader:
         """What follows rays beyond glass and mirrors."""

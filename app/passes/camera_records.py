@@ -49,6 +49,7 @@ CAMERA_PARAMETERS = Struct(
         Field("sample_side", "float", "side of a sample's share of its pixel, pixels"),
         Field("sky_z", "vec3"),
         Field("pixel_width", "float", "of a pixel whose columns rays carry, in pixels of this picture"),
+        Field("looks", "vec4", "places of a sample's looks at what is seen directly, two each", 2),
         Field("size", "uvec2", "picture, pixels"),
         Field("within_pixel", "vec2", "this sample's place in its pixel, 0 to 1"),
         Field("inside_mask", "uint", "solids the camera stands in, bits of the medium stack"),
@@ -67,6 +68,9 @@ CAMERA_PARAMETERS = Struct(
         Field("end_listed", "uint", "… and the one after its last"),
         Field("first_place", "uint", "where the first of them waits; NONE where this dispatch takes up halted ones"),
         Field("queue", "uint", "of the two, the one that samples which halt are put on"),
+        Field("start_share", "float", "of a sample, that a path which carries a beam on stands for"),
+        Field("reserved", "float", ""),
+        Field("reserved_too", "vec2", ""),
     ),
 )
 

@@ -34,6 +34,8 @@ class ListedPixels:
         self._ctx = ctx
         self._halted = None if bytes_of_halted is None else ctx.buffer(reserve=_PLACES * bytes_of_halted)
         self._list: moderngl.Buffer | None = None
+        self.room = 0
+        """What the list holds."""
         self.budget = self.resumed = DispatchBudget(1, 1, 1)
         """How many pixels, and how many halted samples, a dispatch is given."""
 
@@ -42,6 +44,7 @@ class ListedPixels:
         if self._list is not None:
             self._list.release()
         self._list = self._ctx.buffer(reserve=8 + 4 * room)
+        self.room = room
         self.budget = DispatchBudget(_FIRST, GROUP, max(pixels, GROUP))
         self.resumed = DispatchBudget(_FIRST, GROUP, _PLACES)
 
@@ -49,6 +52,11 @@ class ListedPixels:
         """Nothing is listed and nothing has halted."""
         assert self._list is not None
         self._list.write(bytes(8))
+
+    def fill(self, count: int) -> None:
+        """The numbers from 0 on are listed, and nothing has halted."""
+        assert self._list is not None and count <= self.room
+        self._list.write(np.concatenate([[count, 0], np.arange(count)]).astype("u4").tobytes())
 
     def bind(self) -> None:
         """To the places that the programs read."""

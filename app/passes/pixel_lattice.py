@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 
 def is_in_strips(samples: int, offset: int) -> bool:
@@ -26,21 +27,33 @@ def pixel_lattice(samples: int, offset: int) -> np.ndarray:
     return ((np.column_stack([index, rank]) + 0.5) / samples + shift) % 1.0
 
 
+LOOKS = 4
+"""Of a sample, at what is seen directly."""
+
+
+def looks_lattice(samples: int, offset: int) -> np.ndarray:
+    """(samples, LOOKS, 2) places in a pixel at which the samples of `pixel_lattice` look at what is seen directly: one
+    lattice all together, shared out so that each sample's lie about it."""
+    looks = pixel_lattice(LOOKS * samples, offset)
+    away = looks - np.repeat(pixel_lattice(samples, offset), LOOKS, axis=0)[:, None]
+    away = (away + 0.5) % 1.0 - 0.5
+    if is_in_strips(samples, offset):
+        away[..., 1] = 0.0
+    _, chosen = linear_sum_assignment((away**2).sum(axis=-1))
+    return looks[chosen].reshape(samples, LOOKS, 2)
+
+
 FEWEST_SHARED, MOST_SHARED = 16, 64
 _HAIR = np.array([1.3e-4, 0.7e-4])
 """So that none lies on the border of a pixel, where polygons like to meet."""
-_PRIMARIES = np.array([(-0.125, -0.375), (0.375, -0.125), (0.125, 0.375), (-0.375, 0.125)])
-"""As `primary_offsets` in shaders/camera/camera.comp."""
 
 
-def shared_places(samples: int, primaries: int) -> np.ndarray:
+def shared_places(samples: int, looks: int) -> np.ndarray:
     """(16 to 64, 2) places in a pixel at which polygons' edges are told, an even number.
 
     They are where a first launch of so many samples looks at what is seen directly, so that both together fill every
     pixel; a lattice of their own where those are too few or too many."""
-    places = pixel_lattice(samples, 0)
-    if primaries > 1:
-        places = (places[:, None] + _PRIMARIES / np.sqrt(samples)).reshape(-1, 2)
+    places = pixel_lattice(samples, 0) if looks == 1 else looks_lattice(samples, 0).reshape(-1, 2)
     if not FEWEST_SHARED <= len(places) <= MOST_SHARED or len(places) % 2 or is_in_strips(samples, 0):
         places = pixel_lattice(MOST_SHARED, 0)
     return places + _HAIR

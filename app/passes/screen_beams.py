@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
-from ..beams.screen_pairs import PIXEL_BITS, pixel_parts
+from ..beams.screen_pairs import PIXEL_BITS, pixel_parts, portions
 from ..beams.screen_polygons import ScreenPolygons
 from ..gpu import shader
 from ..gpu.dispatch_budget import DispatchBudget
-from ..gpu.records import NONE
 from ..gpu.scene_texels import ROW_TEXELS
 from ..gpu.schema import Field, Struct
+from ..model.scene import Scene
+from .beam_starts import media
 from .map_atlas import park
 from .pixel_lattice import MOST_SHARED
 from .variants import (
@@ -41,10 +42,12 @@ if TYPE_CHECKING:
 
 FINE_PARTS, COARSE_PARTS = 16, 4
 """Parts of a pixel that are looked at one by one, where a polygon is strong, and where it is not weak …"""
-FINE_ABOVE, COARSE_ABOVE = 0.2, 0.05
+FINE_ABOVE, COARSE_ABOVE = 0.05, 0.01
 """… which is said by its share of what the pixel sees."""
 MOST_ENTRIES = 1 << 16
 """That are looked at together."""
+MOST_LISTED = 1 << 22
+"""Entries that are listed before they are looked at."""
 _FIRST = 1024
 _GROUP = 64
 
@@ -64,6 +67,8 @@ SCREEN_POLYGON = Struct(
         Field("inside_mask", "uint", "medium stack"),
         Field("inside_object", "uint", "solid outside the stack, or NONE"),
         Field("parts", "uint", "of a pixel that are looked at one by one"),
+        Field("slope", "vec2", "relative change of the throughput per pixel"),
+        Field("reserved", "vec2", ""),
         Field("position", "vec4", "coefficients of 1, t, t²: value at the centre, its two columns per pixel", 9),
         Field("direction", "vec4", "likewise", 9),
     ),
@@ -107,16 +112,13 @@ class ScreenBeams:
     def take(self, polygons: ScreenPolygons, scene: SceneBuffers, brightness: np.ndarray | None) -> None:
         """Pack; `brightness`: how much of what looks bright lies below each of equally spaced x."""
         self._polygons = polygons
-        # A sky alone is filtered as it is looked up, and has no edges within a pixel.
-        self._sees_edges = any(not item.material.is_specular for item in scene.scene.objects) or any(
-            light.has_extent for light in scene.scene.lights
-        )
+        self._sees_edges = sees_edges(scene.scene)
         self._records = packed(polygons, scene, brightness)
 
     def draw(
         self, size: tuple[int, int], places: np.ndarray, as_image: bool, bind: Callable[[], None], seconds: float
-    ) -> Iterator[float]:
-        """Draw all polygons into the beams' own picture, yielding the share done after every portion.
+    ) -> Iterator[None]:
+        """Draw all polygons into the beams' own picture, pausing after every portion.
 
         `places`: (points, 2) of a pixel, 0 to 1, at which its edges are told; `bind`: binds what the camera's programs
         read; `seconds`: what a portion should take."""
@@ -124,19 +126,25 @@ class ScreenBeams:
         self._resize(size)
         places = ordered(places)
         view = self._view_of(size, places)
-        entries = pixel_parts(self._polygons, size, float(view["reach"][0]), self._records["parts"].astype(np.int64))
+        parts = self._records["parts"].astype(np.int64)
+        for which in portions(self._polygons, size, parts, MOST_LISTED):
+            entries = pixel_parts(self._polygons, size, float(view["reach"][0]), parts, which)
+            yield from self._draw_listed(entries, view, as_image, bind, seconds)
+
+    def _draw_listed(
+        self, entries: np.ndarray, view: np.ndarray, as_image: bool, bind: Callable[[], None], seconds: float
+    ) -> Iterator[None]:
+        """Draw these entries, pausing after every portion."""
         done = 0
         while done < len(entries):
             part = entries[done : done + self._budget.units]
-            order, runs = by_pixel(part[:, 1] & ((1 << PIXEL_BITS) - 1))
-            for binding, values in ((BIND_BEAM_ENTRIES, part), (BIND_BEAM_RUNS, runs), (BIND_BEAM_ORDER, order)):
-                self._lists[binding].write(np.ascontiguousarray(values).tobytes())
+            self._lists[BIND_BEAM_ENTRIES].write(part.tobytes())
             view["entry_count"] = len(part)
             self._view.write(view.tobytes())
             bind()
             self._view.bind_to_uniform_block(BIND_BEAM_VIEW)
-            for binding, buffer in self._lists.items():
-                buffer.bind_to_storage_buffer(binding)
+            for binding in (BIND_BEAM_ENTRIES, BIND_BEAM_FOUND):
+                self._lists[binding].bind_to_storage_buffer(binding)
             assert self._texels is not None
             if as_image:
                 self._texels.bind_to_image(IMAGE_POLYGONS, read=True, write=False)
@@ -145,22 +153,34 @@ class ScreenBeams:
             start = time.perf_counter()
             self._look.run(-(-len(part) // _GROUP))
             self._ctx.memory_barrier()
-            for unit, picture in enumerate(self._pictures):
-                picture.bind_to_image(unit, read=True, write=True)
-            self._gather["run_count"].value = len(runs)
-            self._gather.run(-(-len(runs) // _GROUP))
-            self._ctx.memory_barrier()
-            self._ctx.finish()
+            self.gather(part[:, 1] & ((1 << PIXEL_BITS) - 1))
             self._budget.learn(len(part), time.perf_counter() - start, seconds)
             done += len(part)
-            yield done / len(entries)
+            yield
+
+    @property
+    def found(self) -> moderngl.Buffer:
+        """What was found, for up to `MOST_ENTRIES` at a time."""
+        return self._lists[BIND_BEAM_FOUND]
+
+    def gather(self, pixels: np.ndarray) -> None:
+        """Add what was found to these pixels of the picture."""
+        order, runs = by_pixel(pixels)
+        for binding, values in ((BIND_BEAM_RUNS, runs), (BIND_BEAM_ORDER, order)):
+            self._lists[binding].write(values.tobytes())
+        for binding in (BIND_BEAM_RUNS, BIND_BEAM_ORDER, BIND_BEAM_FOUND):
+            self._lists[binding].bind_to_storage_buffer(binding)
+        for unit, picture in enumerate(self._pictures):
+            picture.bind_to_image(unit, read=True, write=True)
+        self._gather["run_count"].value = len(runs)
+        self._gather.run(-(-len(runs) // _GROUP))
+        self._ctx.memory_barrier()
+        self._ctx.finish()
 
     def _view_of(self, size: tuple[int, int], places: np.ndarray) -> np.ndarray:
         """Upload the polygons for so many points of a pixel."""
         assert self._polygons is not None
-        strength = self._records["strength"] if self._sees_edges else np.zeros(len(self._records))
-        parts = [largest_divisor(len(places), most) for most in (FINE_PARTS, COARSE_PARTS, 1)]
-        self._records["parts"] = np.select([strength > FINE_ABOVE, strength > COARSE_ABOVE], parts[:2], parts[2])
+        self._records["parts"] = parts_of(self._records["strength"], len(places), self._sees_edges)
         edges = np.zeros((len(self._polygons.edges), 2, 4), np.float32)
         edges[:, 0, :3], edges[:, 1, :3] = _about_centres(self._polygons)
         words = np.concatenate([self._records.view(np.uint32).ravel(), edges.view(np.uint32).ravel()])
@@ -214,29 +234,41 @@ class ScreenBeams:
         self._pictures, self._lists, self._texels = [], {}, None
 
 
+def sees_edges(scene: Scene) -> bool:
+    """Whether what is looked up may have edges within a pixel. A sky alone is filtered as it is looked up."""
+    return any(not item.material.is_specular for item in scene.objects) or any(
+        light.has_extent for light in scene.lights
+    )
+
+
+def parts_of(strength: np.ndarray, points: int, has_edges: bool) -> np.ndarray:
+    """int (N,): parts of a pixel of so many points that are looked at one by one, by the polygons' strength."""
+    parts = [largest_divisor(points, most) for most in (FINE_PARTS, COARSE_PARTS, 1)]
+    strength = strength if has_edges else np.zeros(len(strength))
+    return np.select([strength > FINE_ABOVE, strength > COARSE_ABOVE], parts[:2], parts[2])
+
+
+def strength_of(polygons: ScreenPolygons, brightness: np.ndarray | None) -> np.ndarray:
+    """(N,): throughput times the band's share of what looks bright."""
+    share = polygons.x_hi - polygons.x_lo
+    if brightness is not None:
+        x = np.linspace(0.0, 1.0, len(brightness))
+        share = np.interp(polygons.x_hi, x, brightness) - np.interp(polygons.x_lo, x, brightness)
+    return polygons.throughput.max(axis=1, initial=0.0) * share
+
+
 def packed(polygons: ScreenPolygons, scene: SceneBuffers, brightness: np.ndarray | None) -> np.ndarray:
     """SCREEN_POLYGON records."""
     records = SCREEN_POLYGON.zeros(len(polygons))
-    for name in ("centre", "x_lo", "x_hi", "key", "last_object"):
+    for name in ("centre", "x_lo", "x_hi", "key", "last_object", "slope"):
         records[name] = getattr(polygons, name)
     records["first_edge"], records["end_edge"] = polygons.edge_start[:-1], polygons.edge_start[1:]
     records["throughput"] = _powers(polygons.throughput, 1)
     for name in ("position", "direction"):
         records[name][:, :, :3] = _powers(getattr(polygons, name), 1).reshape(-1, 9, 3)
-    share = polygons.x_hi - polygons.x_lo
-    if brightness is not None:
-        x = np.linspace(0.0, 1.0, len(brightness))
-        share = np.interp(polygons.x_hi, x, brightness) - np.interp(polygons.x_lo, x, brightness)
-    records["strength"] = polygons.throughput.max(axis=1, initial=0.0) * share
+    records["strength"] = strength_of(polygons, brightness)
     records["flags"] = polygons.is_inside.astype(np.uint32) | (polygons.depth.astype(np.uint32) << 8)
-    records["inside_object"] = NONE
-    bits = {number: bit for bit, number in enumerate(scene.stack_objects)}
-    for number in range(len(scene.scene.objects)):
-        inside = (polygons.inside >> np.uint64(number)) & np.uint64(1) > 0
-        if number in bits:
-            records["inside_mask"] |= np.where(inside, 1 << bits[number], 0).astype(np.uint32)
-        else:
-            records["inside_object"][inside] = number
+    records["inside_mask"], records["inside_object"] = media(polygons.inside, scene)
     return records
 
 

@@ -302,6 +302,15 @@ def screen_beam_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     }
 
 
+def start_defines(beyond: Mapping[str, int | float | str]) -> Defines:
+    """For paths that carry on what camera beams hand over."""
+    return single_defines(beyond) | {
+        "BEAM_STARTS": 1,
+        "BIND_BEAM_ENTRIES": BIND_BEAM_ENTRIES,
+        "BIND_BEAM_FOUND": BIND_BEAM_FOUND,
+    }
+
+
 def single_defines(beyond: Mapping[str, int | float | str]) -> Defines:
     """For listed pixels whose samples are of one wavelength each."""
     return {name: value for name, value in beyond.items() if name != "SPECTRAL_SWEEP"} | {

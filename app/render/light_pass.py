@@ -521,7 +521,7 @@ class LightPass:
             watts = emission.flux_w(light)
             if watts <= 0.0:
                 continue
-            entered = max(self._beams.stats.flux_w["entered"], 1e-300)
+            entered = max(self._beams.stats.entered_w, 1e-300)
             count = max(256, int(share * min(1.0, watts / entered)))
             lattice = shift(self.seed, light, number * of.count + of.index, Dimension.LATTICE_U)
             other = shift(self.seed, light, number * of.count + of.index, Dimension.LATTICE_V)

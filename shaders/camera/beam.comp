@@ -88,7 +88,7 @@ CameraPath path_beyond(ScreenPolygon beam, vec2 place, float lo, float hi)
     }
     vec3 t = vec3(lo, middle, hi);
     path.band = beam.x_lo + width * t;
-    path.weight = max(beam.throughput.x + t * (beam.throughput.y + t * beam.throughput.z), 0.0);
+    path.weight = max(beam.throughput.x + t * (beam.throughput.y + t * beam.throughput.z), 0.0) * max(1.0 + dot(beam.slope, place), 0.0);
     path.inverse_pdf = 1.0;
     path.branch_weight = path.weight.y;
     path.key = beam.key;
@@ -108,6 +108,9 @@ CameraPath path_beyond(ScreenPolygon beam, vec2 place, float lo, float hi)
     path.dposition[SPATIAL] = per_x * (path.end_position[1] - path.end_position[0]);
     path.ddirection[SPATIAL] = normalized_column(per_x * (path.end_direction[1] - path.end_direction[0]), path.direction);
     set_steps(path);
+    // A whole spectrum that has been bent is swept as well.
+    vec3 moved = path.end_direction[1] - path.end_direction[0], shifted = path.end_position[1] - path.end_position[0];
+    path.restricted = path.restricted || dot(moved, moved) + dot(shifted, shifted) > 1e-14;
 #endif
     return path;
 }

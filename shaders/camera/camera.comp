@@ -18,6 +18,11 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(std430, binding = BIND_LISTED) restrict buffer Listed { uint listed_count; uint halted_count; uint listed[]; };
 #endif
 layout(rgba32f, binding = 0) uniform image2D picture[TARGETS];
+#ifdef BEAM_STARTS
+// Paths that carry on what camera beams hand over, and what they find.
+layout(std430, binding = BIND_BEAM_ENTRIES) readonly restrict buffer Starts { BeamStart starts[]; };
+layout(std430, binding = BIND_BEAM_FOUND) writeonly restrict buffer Found { vec4 found_light[]; };
+#endif
 #ifdef BEAM_OBJECTS
 // Per object: whether camera beams show what is seen in it.
 layout(std430, binding = BIND_BEAM_OBJECTS) readonly restrict buffer BeamObjects { uint beam_objects[]; };
@@ -63,14 +68,15 @@ PathEnd ended[ENDS_HELD];
 #include "camera/cuts.glsl"
 #endif
 
-// Looks of one sample at what is seen directly, which costs little, lie round the sample's own place within its share of the pixel. Those that
-// meet something specular go on as one of them, chosen by chance; as the sample itself where all of them do.
+// Looks of one sample at what is seen directly, which costs little, have places of their own. Those that meet something specular go on as one
+// of them, chosen by chance; as the sample itself, which lies at one of them, where all do.
 #define THE_SAMPLE 4u
-const vec2 primary_offsets[5] = vec2[](vec2(-0.125, -0.375), vec2(0.375, -0.125), vec2(0.125, 0.375), vec2(-0.375, 0.125), vec2(0.0));
 
 vec2 primary_sample_place(uint primary_sample)
 {
-    return p.within_pixel + p.sample_side * vec2(p.pixel_width, p.pixel_height) * primary_offsets[primary_sample];
+    if (primary_sample == THE_SAMPLE) return p.within_pixel;
+    vec4 two = p.looks[primary_sample >> 1u];
+    return (primary_sample & 1u) == 0u ? two.xy : two.zw;
 }
 
 // A listed pixel: its number, the primary sample that goes on, and of how many it is one.
@@ -125,6 +131,34 @@ CameraPath camera_path(uvec2 pixel, uint primary_sample, float gain)
 #endif
     return path;
 }
+
+#ifdef BEAM_STARTS
+// The path that a beam has brought so far. It is of one cell of the table; a band's border may lie within, but how often its wavelengths are drawn
+// is told by whole cells.
+CameraPath started_path(BeamStart start)
+{
+    CameraPath path = camera_path(uvec2(0u), THE_SAMPLE, 1.0);
+    path.position = start.position;
+    path.direction = start.direction;
+    path.origin = RayOrigin(start.last_primitive, start.last_object, start.is_inside != 0u, start.inside_mask);
+    path.medium = MediumStack(start.inside_mask, start.inside_object);
+    path.dposition[0] = start.dposition_x;
+    path.dposition[1] = start.dposition_y;
+    path.ddirection[0] = start.ddirection_x;
+    path.ddirection[1] = start.ddirection_y;
+    path.inverse_pdf = start.weight;
+    path.branch_weight = p.start_share;
+    path.key = start.key;
+    path.depth = int(start.depth);
+#ifdef HAS_DISPERSION
+    uint cell = min(uint(start.x * float(EMISSION_CELLS)), uint(EMISSION_CELLS - 1));
+    path.band = vec3(float(cell), start.x * float(EMISSION_CELLS), float(cell + 1u)) / float(EMISSION_CELLS);
+    path.inverse_pdf /= max(cell_cdf[cell + 1u] - cell_cdf[cell], 1e-9);
+    path.restricted = true;
+#endif
+    return path;
+}
+#endif
 
 #ifdef CAMERA_SPECULAR
 #if defined(HAS_DIELECTRIC) || defined(HAS_GRATING)
@@ -296,15 +330,23 @@ void main()
 #else
     uint entry = listed[at_listed];
 #endif
+#ifdef BEAM_STARTS
+    uint number = starts[entry].pixel;
+    uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
+#else
     uint number = bitfieldExtract(entry, 0, int(LISTED_BITS)), primary_sample = bitfieldExtract(entry, int(LISTED_BITS), 3);
     float gain = float((entry >> (LISTED_BITS + 3u)) + 1u) / float(p.primary_samples);
     uvec2 pixel = uvec2(number % p.size.x, number / p.size.x);
+#endif
 #else
     uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, p.first_row);
     if (pixel.x >= p.size.x || pixel.y >= p.size.y) return;
 #endif
     uint pixel_key = hash_combine(hash_combine(p.seed, pixel.x), pixel.y);
-#ifndef LISTS_SPECULAR
+#ifdef BEAM_STARTS
+    CameraPath path = started_path(starts[entry]);
+    pixel_key = hash_combine(pixel_key, starts[entry].key);
+#elif !defined(LISTS_SPECULAR)
 #ifndef CAMERA_SPECULAR
     uint primary_sample = THE_SAMPLE;
     float gain = 1.0;
@@ -431,6 +473,9 @@ void main()
     bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
     see_directly(path, met, hit, met ? object_at(hit.object).kind : NONE, pixel_key);
 #endif
+#ifdef BEAM_STARTS
+    for (int t = 0; t < TARGETS; ++t) found_light[entry * uint(TARGETS) + uint(t)] = radiance[t];
+#else
 #ifdef RGB_CHANNELS
     radiance[0].w = took_turn ? 1.0 : 0.0;
 #endif
@@ -438,4 +483,5 @@ void main()
         vec4 sum = imageLoad(picture[t], ivec2(pixel));
         imageStore(picture[t], ivec2(pixel), sum + radiance[t]);
     }
+#endif
 }

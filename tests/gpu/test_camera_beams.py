@@ -11,7 +11,7 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes import variants
 from spectrasplat.render import camera_beams
-from spectrasplat.render.camera_beams import predicted_seconds
+from spectrasplat.render.camera_beams import CameraBeamStats
 from spectrasplat.render.still import RenderResult, render
 
 pytestmark = pytest.mark.slow  # camera beams are off unless asked for
@@ -26,12 +26,8 @@ def seen(gl, name: str, **settings) -> RenderResult:
 
 @pytest.fixture
 def beams_at_all_costs(monkeypatch):
-    monkeypatch.setattr(camera_beams, "predicted_seconds", lambda *_: (0.0, 1.0))
+    monkeypatch.setattr(CameraBeamStats, "predicted_seconds", lambda *_: (0.0, 1.0))
     monkeypatch.setattr(camera_beams, "_MOST_LOOKING", 1e9)
-    monkeypatch.setattr(camera_beams, "_MOST_TAIL", 1.0)
-    monkeypatch.setattr(camera_beams, "_MOST_TAIL_WITH_LAMPS", 1.0)
-    # Few rays of a strong lamp must not decide what a small picture's mean is.
-    monkeypatch.setattr(camera_beams, "needed_threshold", lambda samples: 0.05 / samples)
 
 
 @pytest.mark.parametrize("name", ["default", "prism"])
@@ -51,15 +47,18 @@ def test_other_methods_follow_paths(gl, beams_at_all_costs):
 
 
 def test_where_in_doubt_paths(gl):
-    """A brilliant's light goes to and fro too long."""
-    stats = seen(gl, "brilliant_studio").stats.camera_pass.beams
+    """A prism that fills the picture: paths through it are short."""
+    stats = seen(gl, "prism_edge").stats.camera_pass.beams
     assert not stats.by_beams and stats.reason
 
 
-def test_costs_grow_on_as_between_the_searches():
-    beams, paths = predicted_seconds([(1000, 100), (2000, 200)], 500, 16)
-    assert beams == pytest.approx(4000 * camera_beams._BEAM_S + 400 * camera_beams._ENTRY_S)
-    assert paths == pytest.approx(8000 * camera_beams._PATH_S)
+def test_costs_are_told_by_counts():
+    stats = CameraBeamStats(beams=1000, entries=500, starts=100, covered=50.0)
+    beams, paths = stats.predicted_seconds(16)
+    costs = camera_beams._BEAM_S, camera_beams._ENTRY_S, camera_beams._START_S
+    assert beams == pytest.approx(np.dot((1000, 500, 100), costs))
+    handed = 100 / (50 * 16 * camera_beams.STARTS)
+    assert paths == pytest.approx(50 * 16 * (camera_beams._SAMPLE_S + handed * camera_beams._DEEP_S))
 
 
 def test_beams_are_followed_as_far_as_paths():

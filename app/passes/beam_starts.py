@@ -1,0 +1,137 @@
+"""Camera paths that carry on what camera beams hand over (`beams.screen_starts`): each starts at the facet that its
+beam left last, at one wavelength, and is followed as the samples of single wavelengths are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import moderngl
+import numpy as np
+
+from ..beams.screen_polygons import ScreenPolygons
+from ..beams.screen_starts import ScreenStarts
+from ..gpu import shader
+from ..gpu.records import NONE
+from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.schema import Field, Struct
+from .listed_pixels import Dispatch, ListedPixels
+from .variants import BIND_BEAM_ENTRIES, BIND_BEAM_FOUND, Defines
+
+BEAM_START = Struct(
+    "BeamStart",
+    (
+        Field("position", "vec3", "GPU space"),
+        Field("pixel", "uint", "row by row"),
+        Field("direction", "vec3", "unit"),
+        Field("x", "float", "its wavelength"),
+        Field("dposition_x", "vec3", "per pixel to the right"),
+        Field("weight", "float", "as of `beams.screen_starts`"),
+        Field("dposition_y", "vec3", "per pixel downwards"),
+        Field("key", "uint", "random numbers"),
+        Field("ddirection_x", "vec3"),
+        Field("depth", "uint", "specular events so far"),
+        Field("ddirection_y", "vec3"),
+        Field("last_object", "uint", "that it left"),
+        Field("last_primitive", "uint", "facet of that"),
+        Field("is_inside", "uint", "on the inner side of that"),
+        Field("inside_mask", "uint", "medium stack"),
+        Field("inside_object", "uint", "solid outside the stack, or NONE"),
+    ),
+)
+
+
+class BeamStarts:
+    """Owns the program and the starts of one portion."""
+
+    def __init__(self, ctx: moderngl.Context, defines: Defines, structs: Sequence[Struct], room: int) -> None:
+        """`defines`: `start_defines` of the camera's; `room`: paths of a portion."""
+        self._program = shader.compute(ctx, "camera/camera.comp", defines, (*structs, BEAM_START))
+        self._buffer = ctx.buffer(reserve=BEAM_START.stride * room)
+        self._room = room
+        self._records = BEAM_START.zeros(0)
+
+    def take(self, starts: ScreenStarts, polygons: ScreenPolygons, scene: SceneBuffers, width: int) -> None:
+        """Pack paths of these polygons of a picture so wide."""
+        self._records = packed(starts, polygons, scene, width)
+
+    def follow(
+        self,
+        listed: ListedPixels,
+        parameters: np.ndarray,
+        dispatch: Callable[[moderngl.ComputeShader, int], float],
+        found: moderngl.Buffer,
+        gather: Callable[[np.ndarray], None],
+        seconds: float,
+    ) -> Iterator[None]:
+        """Follow all paths, pausing after every portion. What each finds is in `found`, where `gather` adds it to the
+        pixels given."""
+        room = min(self._room, listed.room)
+        for first in range(0, len(self._records), room):
+            part = self._records[first : first + room]
+            self._buffer.write(part.tobytes())
+            listed.fill(len(part))
+
+            def dispatched(count: int) -> float:
+                self._buffer.bind_to_storage_buffer(BIND_BEAM_ENTRIES)
+                found.bind_to_storage_buffer(BIND_BEAM_FOUND)
+                return dispatch(self._program, count)
+
+            follow: Dispatch = dispatched
+            for _ in listed.follow(parameters, follow, seconds):
+                yield
+            gather(part["pixel"])
+            yield
+
+    def release(self) -> None:
+        """Free everything."""
+        shader.release(self._program, self._buffer)
+
+
+def packed(starts: ScreenStarts, polygons: ScreenPolygons, scene: SceneBuffers, width: int) -> np.ndarray:
+    """BEAM_START records."""
+    records = BEAM_START.zeros(len(starts))
+    of = starts.polygon
+    off = starts.place - polygons.centre[of]
+    for name in ("position", "direction"):
+        # About the polygon's centre: value and columns at the path's own wavelength.
+        at = _at(getattr(polygons, name)[of], starts.t)
+        records[name] = at[:, 0] + off[:, :1] * at[:, 1] + off[:, 1:] * at[:, 2]
+        records[f"d{name}_x"], records[f"d{name}_y"] = at[:, 1], at[:, 2]
+    direction = records["direction"].astype(float)
+    length = np.linalg.norm(direction, axis=1, keepdims=True)
+    records["direction"] = direction = direction / length
+    for name in ("ddirection_x", "ddirection_y"):
+        column = records[name] / length
+        records[name] = column - np.einsum("si,si->s", column, direction)[:, None] * direction
+    pixel = np.floor(starts.place).astype(np.uint32)
+    records["pixel"] = pixel[:, 1] * np.uint32(width) + pixel[:, 0]
+    records["x"], records["weight"] = starts.x, starts.weight
+    records["key"] = polygons.key[of] ^ (np.arange(len(starts), dtype=np.uint32) * np.uint32(2654435769))
+    records["depth"], records["is_inside"] = polygons.depth[of], polygons.is_inside[of]
+    records["last_object"] = polygons.last_object[of]
+    records["last_primitive"] = scene.primitives[scene.first_triangle[polygons.last_object] + polygons.last_triangle][
+        of
+    ]
+    mask, inside_object = media(polygons.inside, scene)
+    records["inside_mask"], records["inside_object"] = mask[of], inside_object[of]
+    return records
+
+
+def media(inside: np.ndarray, scene: SceneBuffers) -> tuple[np.ndarray, np.ndarray]:
+    """uint32 (N,) each: the medium stack, and the solid outside it or NONE, from bits per object."""
+    mask, other = np.zeros(len(inside), np.uint32), np.full(len(inside), NONE, np.uint32)
+    bits = {number: bit for bit, number in enumerate(scene.stack_objects)}
+    for number in range(len(scene.scene.objects)):
+        is_inside = (inside >> np.uint64(number)) & np.uint64(1) > 0
+        if number in bits:
+            mask |= np.where(is_inside, 1 << bits[number], 0).astype(np.uint32)
+        else:
+            other[is_inside] = number
+    return mask, other
+
+
+def _at(values: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """(S, 3, 3) of (S, 3, 3, 3) at t = 0, 1/2, 1: by the parabola through them."""
+    t = t[:, None, None]
+    lo, middle, hi = values[:, 0], values[:, 1], values[:, 2]
+    return lo + t * (4.0 * middle - 3.0 * lo - hi + t * 2.0 * (lo + hi - 2.0 * middle))

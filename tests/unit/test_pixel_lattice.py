@@ -1,0 +1,31 @@
+"""Places of samples and looks in a pixel."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from spectrasplat.passes.pixel_lattice import LOOKS, looks_lattice, pixel_lattice
+
+
+def rows_and_columns(places: np.ndarray) -> tuple[list[int], list[int]]:
+    cells = np.floor(places * len(places) + 1e-9).astype(int)
+    return sorted(cells[:, 0]), sorted(cells[:, 1])
+
+
+@pytest.mark.parametrize("samples", [1, 2, 3, 4, 7, 16])
+def test_all_looks_together_tell_outlines_apart(samples):
+    """One in each of as many columns and rows as there are: an upright or level edge is known to one of them. (Four
+    about each of sixteen samples, all turned alike, fell on seventeen columns.)"""
+    looks = looks_lattice(samples, 0)
+    assert looks.shape == (samples, LOOKS, 2)
+    columns, rows = rows_and_columns(looks.reshape(-1, 2))
+    assert columns == rows == list(range(LOOKS * samples))
+
+
+@pytest.mark.parametrize("offset", [0, 16, 48])
+def test_looks_lie_about_their_sample(offset):
+    """So that where all of them meet glass, the sample does."""
+    off = looks_lattice(16, offset) - pixel_lattice(16, offset)[:, None]
+    off = (off + 0.5) % 1.0 - 0.5
+    assert np.linalg.norm(off, axis=-1).max() < 0.3
+    assert np.linalg.norm(off.mean(axis=1), axis=-1).max() < 0.1
