@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..model.geometry.mesh import Mesh
+from ..model.lights.light import Light
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 from .convert import pieces_of, polygons_of
@@ -81,7 +82,15 @@ class BeamFinder:
         """Lights whose beams can be followed."""
         if not self.scene.beam_objects:
             return []
-        return [i for i, light in enumerate(self._scene.lights) if why_no_beams(light) is None]
+        return [
+            i
+            for i, light in enumerate(self._scene.lights)
+            if why_no_beams(light) is None and not (light.is_parallel and self._is_thin(light))
+        ]
+
+    def _is_thin(self, light: Light) -> bool:
+        """Whether a parallel light is too thin for float32 to draw what its beams throw: photons carry it."""
+        return light.has_place and min(light.half_extent) * self._unit < _THINNEST
 
     def find(
         self,
@@ -144,6 +153,8 @@ class BeamFinder:
 
 _TOLERANCE = 0.25
 """Texels."""
+_THINNEST = 1e-3
+"""GPU units."""
 
 
 def _power(light) -> float:

@@ -143,11 +143,10 @@ def test_records_say_where_a_piece_is(gl, tmp_path: Path) -> None:
     more = WITHIN + BALL.format(radius=0.3, position=[4.0, 0.0, 0.5]).replace('"ball"', '"apart"')
     with light_of(gl, scene_of(tmp_path, more), True) as light:
         buffers = light.buffers
+        all_corners = [buffers.space.to_gpu(mesh.corners()) for mesh in buffers.world_meshes]
         for triangle, number in enumerate(buffers.primitives.tolist()):
             item = int(np.searchsorted(buffers.first_triangle, triangle, side="right")) - 1
-            corners = buffers.space.to_gpu(buffers.world_meshes[item].corners())[
-                triangle - buffers.first_triangle[item]
-            ]
+            corners = all_corners[item][triangle - buffers.first_triangle[item]]
             if item == 0:
                 normal, offset = np.split(buffers._planes[number & 0x7FFFFFFF].astype(float), [3])
                 assert number >> 31 and corners @ normal == pytest.approx(float(offset[0]), abs=1e-6)

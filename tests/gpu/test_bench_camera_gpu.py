@@ -33,6 +33,7 @@ def ball() -> Scene:
     return load_scene(find_scene("ball_caustic"))
 
 
+@pytest.mark.slow
 def test_a_rig_looks_as_render_does_again_and_again(gl: Any, ball: Scene) -> None:
     told: list[str] = []
     light = SharedLight(gl, ball, WIDTH, HEIGHT, told.append, PHOTONS)

@@ -74,6 +74,7 @@ def test_parted_colours_go_their_own_ways(gl, edge: Scene, drawn, monkeypatch, t
     assert cut < 1.2e-3 and whole > 1.5 * cut, (cut, whole)
 
 
+@pytest.mark.slow
 def test_a_part_chosen_by_chance_stands_for_both(gl, edge: Scene, monkeypatch) -> None:
     both = picture(gl, edge, 64)
     monkeypatch.setattr(variants, "CUT_THRESHOLD", 2.0)
@@ -101,6 +102,7 @@ def single_wavelengths(gl, edge: Scene) -> Iterator[CameraPass]:
     released(camera_pass)
 
 
+@pytest.mark.slow
 def test_single_wavelengths_of_a_pass_of_bands_are_those_of_their_own_method(
     gl, edge: Scene, drawn, single_wavelengths: CameraPass
 ) -> None:

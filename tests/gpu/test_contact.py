@@ -22,7 +22,7 @@ from spectrasplat.stress.rigs.scene_parts import BEAM, SUN, solid, stage, turn
 COVERS = {"intersect.glsl": ("accept_sheet", "crossed_in_contact", "comes_first")}
 GAPS = (0.0, 1e-7, 1e-6, 1e-5, 1e-4, -1e-6)
 """Negative: the sheet lies in the glass."""
-CAUSTIC = replace(SMALL, layer="caustic")
+CAUSTIC = replace(SMALL, layer="caustic", method="srd")
 PHOTONS = replace(CAUSTIC, method="srd-photons")
 ROUNDING = 2e-3
 """Share of the light: rays at the rim of a sheet, and roulette."""

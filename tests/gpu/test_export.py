@@ -71,6 +71,7 @@ def test_a_png_is_what_is_on_the_screen_and_an_exr_what_is_behind_it(
         exports.begin(Screenshot(tmp_path / "a.jpg"), state, shown)
 
 
+@pytest.mark.slow
 def test_a_spectral_screenshot_adds_up_to_its_colours(
     exports: Exports, state: State, shown: Shown, tmp_path: Path, monkeypatch
 ) -> None:

@@ -42,7 +42,7 @@ def picture(gl, light: Light, **settings: object) -> np.ndarray:
     return render(ball_under(light), replace(SETTINGS, **settings), context=gl).rgb.astype(float)
 
 
-@pytest.mark.parametrize("method", ["srd", "stochastic"])
+@pytest.mark.parametrize("method", ["srd", pytest.param("stochastic", marks=pytest.mark.slow)])
 def test_an_isotropic_table_is_a_point_light(gl, tmp_path: Path, method: str) -> None:
     point = picture(gl, PointLight("lamp", POWER, PLACE), method=method)
     turned = lamp(tmp_path, POWER, isotropic(), position=PLACE, direction=(0.6, 0.0, -0.8), rotation_deg=77.0)

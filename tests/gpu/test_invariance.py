@@ -211,6 +211,7 @@ def test_all_may_turn_together(gl, original: np.ndarray, axis: tuple[float, floa
     assert after.sum() == pytest.approx(original.sum(), rel=ENERGY)
 
 
+@pytest.mark.slow
 def test_what_does_not_move_along_is_seen(gl, original: np.ndarray) -> None:
     """Mutants: the scene turned by two degrees, or made 2 % larger, without its lights."""
     for matrix in (turned((0.0, 0.0, 1.0), 2.0), placed(1.02)):

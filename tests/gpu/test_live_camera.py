@@ -138,6 +138,7 @@ def test_a_moving_camera_sees_no_colour_grain_in_glass(
     assert colour_grain(viewpoint.read_rgb().astype(float), mask) > 5 * GREY
 
 
+@pytest.mark.slow
 def test_only_whole_cycles_of_bands_are_shown_and_smooth_samples_before(engine: LiveEngine, stage: Scene) -> None:
     shown: list[tuple[int, int, int]] = []
 
@@ -200,6 +201,7 @@ def test_an_edited_dispersion_changes_what_is_seen_in_glass_and_traces_nothing(
     assert np.sqrt(((after - expected)[mask] ** 2).mean()) < 0.15 * np.sqrt(((before - expected)[mask] ** 2).mean())
 
 
+@pytest.mark.slow
 def test_environments_are_only_looked_at_and_a_turned_one_is_not_sent_again(engine: LiveEngine, stage: Scene) -> None:
     plain = settle(engine, inputs(stage))
     rays, shown = engine.stats.rays_traced, engine._shown

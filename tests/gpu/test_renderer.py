@@ -16,6 +16,7 @@ from spectrasplat.model.settings import METHODS, RenderSettings
 from spectrasplat.render.still import render
 
 SCENES = sorted(p.stem for p in (assets_dir() / "scenes").glob("*.toml"))
+QUICK = ("ball", "brilliant", "default", "prism_edge", "spectrometer", "two_stones", "wine_glass")
 SMALL = RenderSettings(width=96, height=54, photons=20_000, spp=2)
 
 PRISM = """
@@ -73,7 +74,9 @@ def scene_of(tmp_path: Path, shape: str = "prism") -> Scene:
     return load_scene(file)
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SCENES]
+)
 def test_flux_closes_in_every_shipped_scene(gl, name: str) -> None:
     result = render(load_scene(assets_dir() / "scenes" / f"{name}.toml"), SMALL, context=gl)
     # The one has no light, the other's lamp throws nothing through the glass onto what is there.
@@ -100,7 +103,7 @@ def test_a_bubble_in_a_flint_block_neither_breeds_rays_nor_loses_them(gl, tmp_pa
     assert tally.imbalance < 1e-4
 
 
-@pytest.mark.parametrize("shape", ["prism", "sphere"])
+@pytest.mark.parametrize("shape", ["prism", pytest.param("sphere", marks=pytest.mark.slow)])
 def test_batch_size_does_not_change_the_picture(gl, tmp_path: Path, shape: str) -> None:
     scene = scene_of(tmp_path, shape)
     whole = render(scene, replace(SMALL, photons=60_000, batch=65_536), context=gl).rgb

@@ -14,7 +14,7 @@ from spectrasplat.model.scene import Camera, Scene
 from spectrasplat.stress.rigs.probe import SMALL, probe
 from spectrasplat.stress.rigs.scene_parts import FROM_BELOW, solid, stage
 
-CAUSTIC = replace(SMALL, layer="caustic")
+CAUSTIC = replace(SMALL, layer="caustic", method="srd")
 PIXEL = FROM_BELOW.vertical_extent / SMALL.height
 ASLANT = Camera((0.0, -4.0, -5.0), (0.0, 0.0, 0.0), vertical_fov_deg=40.0)
 
@@ -40,7 +40,7 @@ def test_the_picture_holds_a_beam_however_thin(gl, samples: int) -> None:
     sums = np.array([p.picture.sum() for p in found])
     np.testing.assert_allclose(sums, sums[0], rtol=2e-3, err_msg=str(pixels))
     for p in found:
-        assert p.map_error < 1e-4 and p.nonfinite == 0
+        assert p.map_error < 2e-3 and p.nonfinite == 0
 
 
 def test_aslant_too(gl) -> None:

@@ -8,9 +8,10 @@ from spectrasplat.bench import viewer_speed
 from spectrasplat.gpu.context import Context
 
 
+@pytest.mark.slow
 def test_walking_round_and_dragging_the_dispersion_trace_nothing(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(viewer_speed, "NUDGES", 1)
-    bench = viewer_speed._Bench(gl, assets_dir() / "scenes" / "prism.toml", (640, 400))
+    bench = viewer_speed._Bench(gl, assets_dir() / "scenes" / "ball.toml", (640, 400))
     assert abs(bench.viewport[0] - 640) <= 2 and abs(bench.viewport[1] - 400) <= 2
     bench.wait_for_picture()
     resting = bench.phase("accumulating", 2.0, bench.rest)  # the first of it goes into finer maps

@@ -39,14 +39,14 @@ ALLOWED = {
     "stochastic": 0.01,
     "stochastic-even": 0.01,
     "progressive-stochastic": 0.01,
-    "srd": 0.01,
+    "srd-photons": 0.01,
 }
 DETECTABLE = {
     "stochastic-point": 0.09,
     "stochastic": 0.09,
     "stochastic-even": 0.01,
     "progressive-stochastic": 0.045,
-    "srd": 0.01,
+    "srd-photons": 0.01,
 }
 """Smallest error of the whole map that is seen: wavelengths drawn by chance leave more noise than a lattice of them."""
 PASSES = {"progressive-stochastic": 16}
@@ -229,7 +229,7 @@ def reference(gl) -> tuple[np.ndarray, np.ndarray, Window]:
 
 
 @pytest.mark.parametrize(
-    "method", ["stochastic-point", "stochastic", "stochastic-even", "progressive-stochastic", "srd"]
+    "method", ["stochastic-point", "stochastic", "stochastic-even", "progressive-stochastic", "srd-photons"]
 )
 def test_maps_are_the_histogram_of_random_photons(
     gl, reference: tuple[np.ndarray, np.ndarray, Window], method: str

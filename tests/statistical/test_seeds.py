@@ -167,7 +167,9 @@ def drawn_shifts(rng: np.random.Generator) -> Shift:
 @pytest.fixture(params=["prism_case", pytest.param("rod", marks=pytest.mark.slow)])
 def light(gl: Context, request: pytest.FixtureRequest) -> Iterator[LightPass]:
     scene = load_scene(assets_dir() / "scenes" / f"{request.param}.toml")
-    settings = RenderSettings(width=96, height=96, layer="caustic", max_depth=scene.render.max_depth)
+    settings = RenderSettings(
+        width=96, height=96, layer="caustic", max_depth=scene.render.max_depth, method="srd-photons"
+    )
     features = Features.of(scene, settings)
     buffers = SceneBuffers(gl.ctx, scene, features, spectral_axis(scene, features))
     half = LightPass(gl, scene, settings, features, buffers)

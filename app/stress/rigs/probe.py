@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from ...render.light_pass import RoundOf
     from ...render.shown_spectra import PassTables, ShownSpectra
 
-SMALL = RenderSettings(width=160, height=90, photons=32_768, spp=16)
+SMALL = RenderSettings(width=160, height=90, photons=32_768, spp=16, method="srd-photons")
 """What a sweep renders unless the case is about just that. Fewer than 16 samples a pixel would miss texels of a sharp
-focus."""
+focus. By photons: beams have cases of their own (`cases.beam_cases`)."""
 LOST_TO_NUMERICS = 1e-3
 """Largest share of the flux that may end for numerical reasons (cracks, overflows): a tenth of what a picture shows."""
 
