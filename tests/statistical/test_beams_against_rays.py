@@ -52,7 +52,10 @@ def test_polygons_hold_what_rays_find(name: str) -> None:
     assert agree(total, by_cell), (total, by_cell)
 
 
-@pytest.mark.parametrize("name", NEAR)
+LONG = ("point brilliant",)
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in NEAR])
 def test_polygons_of_points_hold_what_rays_find(name: str) -> None:
     total, by_cell = compare(NEAR[name], 1_000_000, 1e-6, 4e-3, 24)
     assert agree(total, by_cell), (total, by_cell)

@@ -40,7 +40,10 @@ def swept_and_summed(text: str, places: np.ndarray = PLACES, side: int = 60, thr
     return one, other, total, total_summed, sums
 
 
-@pytest.mark.parametrize("name", SWEPT)
+LONG = ("step cut",)
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in SWEPT])
 def test_swept_polygons_are_the_sum_of_single_indices(name: str) -> None:
     swept, summed, total, total_summed, _ = swept_and_summed(SWEPT[name], FEW, FINE.get(name, 60))
     assert np.abs(swept - summed).max() < BOUND.get(name, 1e-3) * summed.max()
