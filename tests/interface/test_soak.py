@@ -88,8 +88,8 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_30_random_actions(gl: Context, own_folder: Path) -> None:
-    soak(gl, own_folder, 30, seed=1)
+def test_50_random_actions(gl: Context, own_folder: Path) -> None:
+    soak(gl, own_folder, 50, seed=1)
 
 
 @pytest.mark.slow
