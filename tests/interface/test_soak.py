@@ -88,8 +88,8 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_50_random_actions(gl: Context, own_folder: Path) -> None:
-    soak(gl, own_folder, 50, seed=1)
+def test_80_random_actions(gl: Context, own_folder: Path) -> None:
+    soak(gl, own_folder, 80, seed=1)
 
 
 @pytest.mark.slow
