@@ -8,7 +8,7 @@ from .compiling import jit
 from .facets import BeamScene
 from .leaves import Leaves
 from .lifetimes import lifetimes_of
-from .polygons import BeamPieces, BeamPolygons
+from .polygons import BeamPieces, BeamPolygons, parabola_at
 from .search import LEAF_PIECE, LEAF_RECEIVER
 
 
@@ -78,6 +78,8 @@ def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float)
     softest = np.maximum.reduceat(kept[:, 3], np.cumsum(counts) - counts) if len(kept) else np.zeros(0)
     hull_start, hulls = hulls_around(lives.corners, hull_counts, softest)
     head, x = chosen.head[exists], chosen.x[exists]
+    places = t[:, 0], 0.5 * t.sum(axis=1), t[:, 1]
+    density = np.stack([parabola_at(chosen.density[exists], place) for place in places], axis=1)
     return BeamPolygons(
         np.full(len(t), light, np.int32),
         scene.facets["receiver"][head[:, 1]].astype(np.int32),
@@ -85,7 +87,7 @@ def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float)
         head[:, 4].astype(np.int32),
         x[:, 0] + t[:, 0] * (x[:, 2] - x[:, 0]),
         x[:, 0] + t[:, 1] * (x[:, 2] - x[:, 0]),
-        np.maximum(_parabola(chosen.density[exists], t), 0.0) * unit * unit,
+        np.maximum(density, 0.0) * unit * unit,
         chosen.slope[exists],
         chosen.centre[exists],
         chosen.flux[exists],
@@ -95,14 +97,6 @@ def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float)
         hulls,
         lives.areas[exists],
     )
-
-
-def _parabola(values: np.ndarray, band: np.ndarray) -> np.ndarray:
-    """(N, 3) at the ends and the middle of part t0 … t1 (N, 2) of [0, 1], of parabolas given by `values` (N, 3) at the
-    ends and the middle of the whole."""
-    low, middle, high = values.T[..., None]
-    t = np.column_stack([band[:, 0], 0.5 * band.sum(axis=1), band[:, 1]])
-    return low + t * ((4.0 * middle - 3.0 * low - high) + t * 2.0 * (low - 2.0 * middle + high))
 
 
 def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int) -> BeamPieces:

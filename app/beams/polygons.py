@@ -131,6 +131,13 @@ class BeamTally:
     """int64 (L,), beams followed."""
 
 
+def parabola_at(values: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """(N, …) at t (N,) in [0, 1], of parabolas through `values` (N, 3, …) at the start, the middle and the end."""
+    t = t.reshape(-1, *(1,) * (values.ndim - 2))
+    low, middle, high = values[:, 0], values[:, 1], values[:, 2]
+    return low + t * (4.0 * middle - 3.0 * low - high + t * 2.0 * (low + high - 2.0 * middle))
+
+
 def joined(parts: list[BeamPolygons] | list[BeamPieces]):
     """One value that holds all of `parts` in order."""
     kind = type(parts[0])

@@ -202,6 +202,22 @@ class SceneBuffers:
         self._sections.clear()
         self.defines |= self.texels.defines
 
+    def primitive_of(self, index: np.ndarray, triangle: np.ndarray) -> np.ndarray:
+        """Shaders' numbers of triangles, given by object `index` and place in its own order: uint32 (N,)."""
+        return self.primitives[self.first_triangle[index] + triangle]
+
+    def media_of(self, inside: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Medium stack, and the solid outside it or NONE, uint32 (N,) each, from a bit per object, uint64 (N,)."""
+        mask, other = np.zeros(len(inside), np.uint32), np.full(len(inside), NONE, np.uint32)
+        bits = {index: bit for bit, index in enumerate(self.stack_objects)}
+        for index in range(min(len(self.scene.objects), 64)):
+            is_inside = (inside >> np.uint64(index)) & np.uint64(1) != 0
+            if index in bits:
+                mask[is_inside] |= np.uint32(1 << bits[index])
+            else:
+                other[is_inside] = index
+        return mask, other
+
     def bind(self) -> None:
         """Bind every scene texture and buffer to its place."""
         self.texels.bind()

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..beams.piece_lattice import PieceLattice, PieceRays, pieces_where
 from ..beams.polygons import BeamPieces
-from ..gpu.records import FLAG_INSIDE, NONE
+from ..gpu.records import FLAG_INSIDE
 from ..gpu.reindex import Spans
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.schema import Struct
@@ -45,17 +45,8 @@ class BeamEmission:
             raise ValueError(f"no spectral table of light {light} has the band {x_lo:.6f} to {x_hi:.6f} of a beam")
         measures = [scene.space.scale**-2 if light.is_parallel else 1.0 for light in scene.scene.lights]
         self._lattice = PieceLattice(self.pieces, scene.light_power, measures)
-        stacked = {index: bit for bit, index in enumerate(scene.stack_objects)}
-        self._inside_mask = np.zeros(len(self.pieces), np.uint32)
-        self._inside_object = np.full(len(self.pieces), NONE, np.uint32)
-        for index in range(min(len(scene.scene.objects), 64)):
-            inside = (self.pieces.inside >> np.uint64(index)) & np.uint64(1) != 0
-            if index in stacked:
-                self._inside_mask[inside] |= np.uint32(1 << stacked[index])
-            else:
-                self._inside_object[inside] = index
-        triangles = scene.first_triangle[self.pieces.last_object] + self.pieces.last_triangle
-        self._primitive = scene.primitives[triangles]
+        self._inside_mask, self._inside_object = scene.media_of(self.pieces.inside)
+        self._primitive = scene.primitive_of(self.pieces.last_object, self.pieces.last_triangle)
 
     def flux_w(self, light: int) -> float:
         """W that all pieces of a light hold."""

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Sequence
 import moderngl
 import numpy as np
 
+from ..beams.polygons import parabola_at
 from ..beams.screen_polygons import ScreenPolygons
 from ..beams.screen_starts import ScreenStarts
 from ..gpu import shader
-from ..gpu.records import NONE
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.schema import Field, Struct
 from .listed_pixels import Dispatch, ListedPixels
@@ -94,7 +94,7 @@ def packed(starts: ScreenStarts, polygons: ScreenPolygons, scene: SceneBuffers, 
     off = starts.place - polygons.centre[of]
     for name in ("position", "direction"):
         # About the polygon's centre: value and columns at the path's own wavelength.
-        at = _at(getattr(polygons, name)[of], starts.t)
+        at = parabola_at(getattr(polygons, name)[of], starts.t)
         records[name] = at[:, 0] + off[:, :1] * at[:, 1] + off[:, 1:] * at[:, 2]
         records[f"d{name}_x"], records[f"d{name}_y"] = at[:, 1], at[:, 2]
     direction = records["direction"].astype(float)
@@ -109,29 +109,7 @@ def packed(starts: ScreenStarts, polygons: ScreenPolygons, scene: SceneBuffers, 
     records["key"] = polygons.key[of] ^ (np.arange(len(starts), dtype=np.uint32) * np.uint32(2654435769))
     records["depth"], records["is_inside"] = polygons.depth[of], polygons.is_inside[of]
     records["last_object"] = polygons.last_object[of]
-    records["last_primitive"] = scene.primitives[scene.first_triangle[polygons.last_object] + polygons.last_triangle][
-        of
-    ]
-    mask, inside_object = media(polygons.inside, scene)
+    records["last_primitive"] = scene.primitive_of(polygons.last_object[of], polygons.last_triangle[of])
+    mask, inside_object = scene.media_of(polygons.inside)
     records["inside_mask"], records["inside_object"] = mask[of], inside_object[of]
     return records
-
-
-def media(inside: np.ndarray, scene: SceneBuffers) -> tuple[np.ndarray, np.ndarray]:
-    """uint32 (N,) each: the medium stack, and the solid outside it or NONE, from bits per object."""
-    mask, other = np.zeros(len(inside), np.uint32), np.full(len(inside), NONE, np.uint32)
-    bits = {number: bit for bit, number in enumerate(scene.stack_objects)}
-    for number in range(len(scene.scene.objects)):
-        is_inside = (inside >> np.uint64(number)) & np.uint64(1) > 0
-        if number in bits:
-            mask |= np.where(is_inside, 1 << bits[number], 0).astype(np.uint32)
-        else:
-            other[is_inside] = number
-    return mask, other
-
-
-def _at(values: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """(S, 3, 3) of (S, 3, 3, 3) at t = 0, 1/2, 1: by the parabola through them."""
-    t = t[:, None, None]
-    lo, middle, hi = values[:, 0], values[:, 1], values[:, 2]
-    return lo + t * (4.0 * middle - 3.0 * lo - hi + t * 2.0 * (lo + hi - 2.0 * middle))

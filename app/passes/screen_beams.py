@@ -22,7 +22,6 @@ from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.scene_texels import ROW_TEXELS
 from ..gpu.schema import Field, Struct
 from ..model.scene import Scene
-from .beam_starts import media
 from .map_atlas import park
 from .pixel_lattice import MOST_SHARED
 from .variants import (
@@ -268,7 +267,7 @@ def packed(polygons: ScreenPolygons, scene: SceneBuffers, brightness: np.ndarray
         records[name][:, :, :3] = _powers(getattr(polygons, name), 1).reshape(-1, 9, 3)
     records["strength"] = strength_of(polygons, brightness)
     records["flags"] = polygons.is_inside.astype(np.uint32) | (polygons.depth.astype(np.uint32) << 8)
-    records["inside_mask"], records["inside_object"] = media(polygons.inside, scene)
+    records["inside_mask"], records["inside_object"] = scene.media_of(polygons.inside)
     return records
 
 

@@ -498,22 +498,22 @@ class LightPass:
     @property
     def beam_stats(self) -> BeamStats | None:
         """What beams did; None without any."""
-        return self._beams.stats if self._beams is not None and self._beams.carried else None
+        return self.beams.stats if self.beams is not None else None
 
     def _beam_steps(self, number: int, photons: int, of: RoundOf, done: float = 0.0) -> Iterator[PassStep]:
         """The beams of one round, and what they hand to photons."""
-        if not self.has_beams:
+        beams, nth = self.beams, number * of.count + of.index
+        if beams is None:
             return
-        assert self._beams is not None
         share = photons / of.count
-        before = self._beams.stats.find_seconds, self._beams.stats.draw_seconds
-        for part in self._beams.steps(share, share, self._word(number * of.count + of.index), self._maps):
+        before = beams.stats.find_seconds, beams.stats.draw_seconds
+        for part in beams.steps(share, share, self._word(nth), self._maps):
             yield PassStep(done if self.plans else part, False)
-        after = self._beams.stats.find_seconds, self._beams.stats.draw_seconds
+        after = beams.stats.find_seconds, beams.stats.draw_seconds
         self.stats.trace_seconds += after[0] - before[0]
         self.stats.splat_seconds += after[1] - before[1]
-        self.stats.tally.merge(self._beams.tally(share))
-        found = self._beams.found
+        self.stats.tally.merge(beams.tally(share))
+        found = beams.found
         if found is None or found.pieces is None or not len(found.pieces):
             return
         emission = BeamEmission(self.buffers, self.trace.ray, found.pieces, self._records.tables.spans)
@@ -521,11 +521,11 @@ class LightPass:
             watts = emission.flux_w(light)
             if watts <= 0.0:
                 continue
-            entered = max(self._beams.stats.entered_w, 1e-300)
+            entered = max(beams.stats.entered_w, 1e-300)
             count = max(256, int(share * min(1.0, watts / entered)))
-            lattice = shift(self.seed, light, number * of.count + of.index, Dimension.LATTICE_U)
-            other = shift(self.seed, light, number * of.count + of.index, Dimension.LATTICE_V)
-            key = random_word(self.seed, light, number * of.count + of.index, Dimension.BRANCH)
+            lattice = shift(self.seed, light, nth, Dimension.LATTICE_U)
+            other = shift(self.seed, light, nth, Dimension.LATTICE_V)
+            key = random_word(self.seed, light, nth, Dimension.BRANCH)
             for rays in emission.batches(light, count, share, (lattice, other), key, self.trace.batch):
                 for _ in self.batch_steps(self.trace.carry_on(rays, light), of):
                     yield PassStep(done, False)
@@ -533,8 +533,8 @@ class LightPass:
     def beam_steps_again(self, photons: float) -> Iterator[None]:
         """Add what beams of a pass of so many photons throw to the maps, as they are shown now; nothing is handed to
         photons."""
-        if self._beams is not None and self.has_beams and photons > 0.0:
-            for _ in self._beams.steps(photons, photons, self._word(0), self._maps):
+        if self.beams is not None and photons > 0.0:
+            for _ in self.beams.steps(photons, photons, self._word(0), self._maps):
                 yield
 
     def _word(self, number: int) -> int:

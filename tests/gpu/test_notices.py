@@ -24,6 +24,8 @@ from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.probe import light_pass
 from spectrasplat.stress.rigs.scene_parts import BEAM, TABLE, solid, stage
 
+from tests.fuzz.kills import SCENE
+
 SETTINGS = RenderSettings(width=80, height=45, photons=8192, spp=4, layer="caustic")
 BLOCK = solid("block", box(), constant(1.5, "n"), (0.3, 0.0, 1.2))
 WHITE = illuminant("D65").scaled_to_luminous(10.0)
@@ -108,24 +110,7 @@ def test_what_opengl_says_is_a_sentence() -> None:
     assert issubclass(DeviceError, UserError) and DeviceError.exit_code == 2
 
 
-GIVEN_UP = """
-[camera]
-position = [0, -5, 2]
-[[lights]]
-kind = "point"
-position = [0, 0, 4]
-[[objects]]
-name = "ball"
-shape = "sphere"
-triangles = 300
-[[objects]]
-name = "floor"
-shape = "plane"
-material = "diffuse"
-position = [0, 0, -1.5]
-[render]
-max_depth = 2
-"""
+GIVEN_UP = SCENE + "[render]\nmax_depth = 2\n"
 FEW = ("--size", "32x18", "--photons", "4k")
 
 
