@@ -20,6 +20,7 @@ import numpy as np
 
 from ..base.memory import available_bytes
 from ..base.random_words import Dimension, random_word, shift
+from ..beams.polygons import BeamPieces
 from ..gpu import records, splat_tables
 from ..gpu.context import Context
 from ..gpu.map_channels import MapChannels
@@ -48,6 +49,8 @@ from .splatting import Pace, Splatting
 DEFAULT_BATCH = 1 << 16
 BEAM_ROUND = 1 << 20
 """Photons' worth of beams, where they carry everything, after which a pass may be left."""
+BEAM_LEAST = 1 << 17
+"""Photons, at least, whose beams are found at once, where photons are traced besides."""
 QUEUE_BYTES = 64 << 20
 """What the queue of a batch that nobody asked for may take; more on a GPU. Less where memory is short."""
 
@@ -450,14 +453,18 @@ class LightPass:
                 for step in self._beam_steps(number, photons, RoundOf(number, j, rounds, True)):
                     yield PassStep((j + step.fraction) / rounds, False)
                 self._maps.photon_weight += photons / rounds
-                self.stats.photons += photons // rounds
+                self.stats.photons += photons * (j + 1) // rounds - photons * j // rounds
                 yield PassStep((j + 1) / rounds, True)
             return
         counts = [plan.lattice_count(photons) for plan in self.plans]
         rounds = max(-(-n // (self.trace.batch // plan.lattices)) for n, plan in zip(counts, self.plans, strict=True))
         slices = rounds * len(self.plans)
+        # Few photons' worth of beams are coarse ones: some rounds have theirs together.
+        together = max(1, -(-BEAM_LEAST * rounds // photons)) if self.has_beams else 1
         for j in range(first_round, rounds):
-            yield from self._beam_steps(number, photons, RoundOf(number, j, rounds, False), j / rounds)
+            if j == first_round or j % together == 0:
+                end = min((j // together + 1) * together, rounds)
+                yield from self._beam_steps(number, photons, RoundOf(number, j, rounds, False), j / rounds, end - j)
             for i, (plan, lattice) in enumerate(zip(self.plans, counts, strict=True)):
                 done = j * len(self.plans) + i
                 points = len(range(j, lattice, rounds))
@@ -469,7 +476,7 @@ class LightPass:
                 if i + 1 < len(self.plans):
                     yield PassStep((done + 1) / slices, False)
             self._maps.photon_weight += photons / rounds
-            yield PassStep((j + 1) / rounds, True)
+            yield PassStep((j + 1) / rounds, (j + 1) % together == 0 or j + 1 == rounds)
 
     @property
     def has_work(self) -> bool:
@@ -500,12 +507,14 @@ class LightPass:
         """What beams did; None without any."""
         return self.beams.stats if self.beams is not None else None
 
-    def _beam_steps(self, number: int, photons: int, of: RoundOf, done: float = 0.0) -> Iterator[PassStep]:
-        """The beams of one round, and what they hand to photons."""
+    def _beam_steps(
+        self, number: int, photons: int, of: RoundOf, done: float = 0.0, rounds: int = 1
+    ) -> Iterator[PassStep]:
+        """The beams of so many `rounds` from one on, and what they hand to photons."""
         beams, nth = self.beams, number * of.count + of.index
         if beams is None:
             return
-        share = photons / of.count
+        share = photons * rounds / of.count
         before = beams.stats.find_seconds, beams.stats.draw_seconds
         for part in beams.steps(share, share, self._word(nth), self._maps):
             yield PassStep(done if self.plans else part, False)
@@ -513,35 +522,54 @@ class LightPass:
         self.stats.trace_seconds += after[0] - before[0]
         self.stats.splat_seconds += after[1] - before[1]
         self.stats.tally.merge(beams.tally(share))
-        found = beams.found
-        if found is None or found.pieces is None or not len(found.pieces):
+        if beams.found is None or beams.found.pieces is None:
             return
-        emission = BeamEmission(self.buffers, self.trace.ray, found.pieces, self._records.tables.spans)
-        for light in found.carried:
-            watts = emission.flux_w(light)
+        pieces = beams.found.pieces
+        for is_tail in (False, True):
+            if (pieces.is_tail == is_tail).any():
+                yield from self._carry_on(pieces.where(pieces.is_tail == is_tail), is_tail, share, nth, of, done)
+
+    def _carry_on(
+        self, pieces: BeamPieces, is_tail: bool, share: float, nth: int, of: RoundOf, done: float
+    ) -> Iterator[PassStep]:
+        """Photons that carry on what beams left in the `nth` round; tails are not kept, since whoever shows photons
+        again has those beams play roulette."""
+        assert self._beams is not None
+        started = time.perf_counter()
+        emission = BeamEmission(self.buffers, self.trace.ray, pieces, self._records.tables.spans)
+        flux_w = {int(light): emission.flux_w(int(light)) for light in np.unique(pieces.light)}
+        entered = max(self._beams.stats.entered_w, 1e-300)
+        total = sum(flux_w.values())
+        roots = sum(watts**0.5 for watts in flux_w.values())
+        for light, watts in flux_w.items():
             if watts <= 0.0:
                 continue
-            entered = max(beams.stats.entered_w, 1e-300)
-            count = max(256, int(share * min(1.0, watts / entered)))
+            count = share * min(1.0, watts / entered)
+            if is_tail:
+                count = self._beams.tail_photons(share, total / entered) * watts**0.5 / roots
+                if count < 1.0:
+                    continue  # less than a 64th of a photon's power
             lattice = shift(self.seed, light, nth, Dimension.LATTICE_U)
             other = shift(self.seed, light, nth, Dimension.LATTICE_V)
             key = random_word(self.seed, light, nth, Dimension.BRANCH)
-            for rays in emission.batches(light, count, share, (lattice, other), key, self.trace.batch):
-                for _ in self.batch_steps(self.trace.carry_on(rays, light), of):
+            for rays in emission.batches(light, max(256, int(count)), share, (lattice, other), key, self.trace.batch):
+                self.stats.trace_seconds += time.perf_counter() - started
+                for _ in self.batch_steps(self.trace.carry_on(rays, light), of, keeps=not is_tail):
                     yield PassStep(done, False)
+                started = time.perf_counter()
 
     def beam_steps_again(self, photons: float) -> Iterator[None]:
         """Add what beams of a pass of so many photons throw to the maps, as they are shown now; nothing is handed to
         photons."""
         if self.beams is not None and photons > 0.0:
-            for _ in self.beams.steps(photons, photons, self._word(0), self._maps):
+            for _ in self.beams.steps(photons, photons, self._word(0), self._maps, hands=False):
                 yield
 
     def _word(self, number: int) -> int:
         """Roulette's seed in round `number` of all passes."""
         return random_word(self.seed, 0, number, Dimension.BRANCH)
 
-    def batch_steps(self, steps: Generator[None, None, Batch], of: RoundOf) -> Iterator[None]:
+    def batch_steps(self, steps: Generator[None, None, Batch], of: RoundOf, *, keeps: bool = True) -> Iterator[None]:
         """Trace a batch (`TracePass.steps`, `carry_on`), keep and splat what landed, and count it."""
         started = time.perf_counter()
         while True:
@@ -556,7 +584,8 @@ class LightPass:
             yield
             started = time.perf_counter()
         self.stats.trace_seconds += time.perf_counter() - started
-        self._records.keep(self.trace.photons, batch, self.trace.photon.stride, of)
+        if keeps:
+            self._records.keep(self.trace.photons, batch, self.trace.photon.stride, of)
         yield
         yield from self.splat_steps(
             self.trace.photons, batch.photons, shrinking.kernel_scale(of.number) if self._shrinks else 1.0
