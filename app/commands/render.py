@@ -117,6 +117,8 @@ def _complete(asked: dict[str, Any], scene: Scene, stats: bool) -> RenderSetting
             "exposure_ev": wishes.exposure_ev,
             "photons": None if "seconds" in asked else wishes.photons,
             "tally": stats,
+            # Who asks for photons alone compares them with what else there is.
+            "camera_beams": asked.get("method", "srd") == "srd",
             **asked,
         }
     )
