@@ -8,7 +8,7 @@ part of the piece holds, so no light is lost at an edge, and its footprint is as
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -98,7 +98,7 @@ class PieceLattice:
                 self._power[part],
             )
 
-        _in_threads(measure, len(pieces))
+        _in_threads(measure, 0, len(pieces))
 
     @property
     def flux_w(self) -> np.ndarray:
@@ -108,29 +108,26 @@ class PieceLattice:
     def rays(
         self, light: int, count: int, shift: tuple[int, int], key: int, first: int = 0, stride: int = 1
     ) -> PieceRays:
-        """Sub-lattice `first` of `stride` of lattices with about `count` points over all pieces of `light`.
+        """All of `portions` at once."""
+        (rays,) = self.portions(light, count, shift, key, first, stride, most=1 << 62)
+        return rays
+
+    def portions(
+        self, light: int, count: int, shift: tuple[int, int], key: int, first: int = 0, stride: int = 1, *, most: int
+    ) -> Iterator[PieceRays]:
+        """Sub-lattice `first` of `stride` of lattices with about `count` points over all pieces of `light`, about
+        `most` rays at once.
 
         Points are shared out by flux per unit of spectral power, and by the bands' widths: no colour is coarser than
         another, as on the emission lattices. Tails have points by the root of that: where it is dim, the weakest are
         all that there is. Of pieces that would have less than one, some are drawn to stand for all.
         `shift` of the lattices modulo 2³², and `key` of what is drawn: of one pass."""
-        pieces = self.pieces
-        mine = np.flatnonzero((pieces.light == light) & (self._content > 0.0))
-        share = self._content[mine] / self._power[mine]
-        share *= np.where(pieces.x_hi[mine] > pieces.x_lo[mine], pieces.x_hi[mine] - pieces.x_lo[mine], 1.0)
-        share = np.where(pieces.is_tail[mine], np.sqrt(share), share)
-        points = count * share / share.sum() if len(mine) else share
-        # Systematic sampling: as many of the small ones as they have points together.
-        running = np.cumsum(np.where(points < 1.0, points, 0.0)) + (key & 0xFFFFFFFF) / _WORD
-        drawn = np.floor(running) > np.floor(np.concatenate([[(key & 0xFFFFFFFF) / _WORD], running[:-1]]))
-        kept = drawn | (points >= 1.0)
-        mine, points = mine[kept], points[kept]
+        mine, points = self._drawn(light, count, key)
         boost = self._measures[light] / np.minimum(points, 1.0)
         points = np.maximum(points, 1.0)
-        numbers = np.floor(np.cumsum(4.0 * points))  # lattices have cells beside what is lit
+        running = np.cumsum(points)
         position, direction = (
-            np.ascontiguousarray(pieces.position, float),
-            np.ascontiguousarray(pieces.direction, float),
+            np.ascontiguousarray(rays, float) for rays in (self.pieces.position, self.pieces.direction)
         )
 
         def lay(start: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -151,29 +148,52 @@ class PieceLattice:
                 key,
                 first,
                 stride,
-                int(numbers[start - 1]) if start else 0,
+                # Lattices have cells beside what is lit: room for them, so that numbers differ.
+                int(4.0 * running[start - 1]) if start else 0,
             )
 
-        parts = _in_threads(lay, len(mine)) or [
-            (np.zeros((0, self._kernel.COLUMNS)), np.zeros(0, int), np.zeros(0, int))
-        ]
-        found, owner, number = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-        n = len(found)
-        columns = found[:, 6:24].reshape(n, 6, 3)
-        return PieceRays(
-            owner,
-            number,
-            found[:, 0:3],
-            found[:, 3:6],
-            columns[:, [0, 1, 4]],
-            columns[:, [2, 3, 5]],
-            found[:, 24:27],
-            found[:, 27:30],
-            found[:, 30],
-        )
+        start = 0
+        while start == 0 or start < len(mine):
+            before = running[start - 1] if start else 0.0
+            end = int(np.searchsorted(running, before + stride * float(most)))
+            end = max(end - end % _CHUNK, start + _CHUNK) if end < len(mine) else len(mine)
+            yield _joined(_in_threads(lay, start, end), self._kernel.COLUMNS)
+            start = max(end, 1)
+
+    def _drawn(self, light: int, count: int, key: int) -> tuple[np.ndarray, np.ndarray]:
+        """Pieces that have rays, and how many points each would have by rights."""
+        pieces = self.pieces
+        mine = np.flatnonzero((pieces.light == light) & (self._content > 0.0))
+        share = self._content[mine] / self._power[mine]
+        share *= np.where(pieces.x_hi[mine] > pieces.x_lo[mine], pieces.x_hi[mine] - pieces.x_lo[mine], 1.0)
+        share = np.where(pieces.is_tail[mine], np.sqrt(share), share)
+        points = count * share / share.sum() if len(mine) else share
+        # Systematic sampling: as many of the small ones as they have points together.
+        running = np.cumsum(np.where(points < 1.0, points, 0.0)) + (key & 0xFFFFFFFF) / _WORD
+        drawn = np.floor(running) > np.floor(np.concatenate([[(key & 0xFFFFFFFF) / _WORD], running[:-1]]))
+        kept = drawn | (points >= 1.0)
+        return mine[kept], points[kept]
 
 
-def _in_threads(work: Callable[[int], Any], count: int) -> list[Any]:
-    """What `work` returns for every first of `_CHUNK` rows of `count`, in order."""
+def _joined(parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]], columns: int) -> PieceRays:
+    """Rays as the kernel writes them."""
+    parts = parts or [(np.zeros((0, columns)), np.zeros(0, int), np.zeros(0, int))]
+    found, owner, number = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    derivatives = found[:, 6:24].reshape(len(found), 6, 3)
+    return PieceRays(
+        owner,
+        number,
+        found[:, 0:3],
+        found[:, 3:6],
+        derivatives[:, [0, 1, 4]],
+        derivatives[:, [2, 3, 5]],
+        found[:, 24:27],
+        found[:, 27:30],
+        found[:, 30],
+    )
+
+
+def _in_threads(work: Callable[[int], Any], first: int, end: int) -> list[Any]:
+    """What `work` returns for every first of `_CHUNK` rows up to `end`, in order."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(work, range(0, count, _CHUNK)))
+        return list(pool.map(work, range(first, end, _CHUNK)))

@@ -19,6 +19,8 @@ from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.schema import Struct
 
 _SAME_X = 1e-6
+_BATCHES = 8
+"""That are laid out at once: few threads wait for each other, and half a million rays would take 400 MiB."""
 
 
 class BeamEmission:
@@ -67,10 +69,10 @@ class BeamEmission:
     ) -> Iterator[np.ndarray]:
         """Ray records of sub-lattice `first` of `stride` of about `count` points over a light's pieces, at most `most`
         at once. `weight`, `shift` and `key` as of a `LatticeSlice`: its weight, shift and seed."""
-        rays = self._lattice.rays(light, count, shift, key, first, stride)
-        records = self._records(rays, light, weight, key)
-        for start in range(0, len(records), most):
-            yield records[start : start + most]
+        for rays in self._lattice.portions(light, count, shift, key, first, stride, most=_BATCHES * most):
+            records = self._records(rays, light, weight, key)
+            for start in range(0, len(records), most):
+                yield records[start : start + most]
 
     def _records(self, rays: PieceRays, light: int, weight: float, key: int) -> np.ndarray:
         pieces, own = self.pieces, rays.piece
