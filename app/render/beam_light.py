@@ -57,11 +57,6 @@ four seconds of a core. Counted, not timed: the same scene must go the same way 
 MANY = 800.0
 """Beams of a survey above which photons carry all where weak beams play roulette, which is noisier: the tail of a cut
 stone holds much of its picture. Surveys: brilliant 3000, default 1400, step_cut 860; amici 620, prism 120."""
-_TAIL_SHARE = 0.5
-"""Photons that carry on weak beams, of those that a round asks for. `brilliant` at 250 k, variance and bias² of relMSE
-together: 0.81 with twice the beams and 0.33; 0.78; 0.83 with half the beams and 0.6."""
-_TAIL_DENSITY = 64.0
-"""As many times more of them than an even lattice would have there, at most."""
 _STEP_FACETS = 60
 """A step costs as much as it takes to look at so many facets, besides those of the scene."""
 _PAUSE_S = 0.003
@@ -302,11 +297,6 @@ class BeamLight:
             self._context.finish()
         stats.draw_seconds += time.perf_counter() - started
         yield 1.0
-
-    @staticmethod
-    def tail_photons(photons: float, share: float) -> float:
-        """How many of a round of so many photons carry on weak beams that hold `share` of the light."""
-        return photons * min(_TAIL_SHARE, _TAIL_DENSITY * share)
 
     @staticmethod
     def _threshold(photons: float, surveyed: float, growth: float) -> float:

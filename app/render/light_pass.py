@@ -13,18 +13,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import moderngl
 import numpy as np
 
 from ..base.memory import available_bytes
-from ..base.random_words import Dimension, random_word, shift
-from ..beams.polygons import BeamPieces
+from ..base.random_words import Dimension, random_word
 from ..gpu import records, splat_tables
 from ..gpu.context import Context
 from ..gpu.map_channels import MapChannels
-from ..gpu.reindex import Spans
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import Features
 from ..model.optics.spectral_tables import SpectralAxis
@@ -40,10 +37,12 @@ from ..passes.splat import Splatter
 from ..passes.trace import RAY_ROOM, Batch, FluxTally, TracePass, queue_bytes
 from . import shrinking
 from .beam_light import BeamLight, BeamStats, MovingBeams, carries_everything
+from .handed_rays import handed_rays
 from .light_maps import LightMaps
 from .light_plan import SMALLEST_BATCH, Division, Planner
 from .map_fit import MapFit
-from .shown_spectra import PassTables, ShownSpectra, ShownTables
+from .photon_records import NoRecords, PhotonRecords, RoundOf
+from .shown_spectra import ShownSpectra, ShownTables
 from .splatting import Pace, Splatting
 
 DEFAULT_BATCH = 1 << 16
@@ -82,63 +81,6 @@ class PassStep:
     """Share of the pass that is done."""
     round_done: bool
     """What is summed up is an even lattice: the maps may be shown."""
-
-
-@dataclass(frozen=True)
-class RoundOf:
-    """Where a batch belongs."""
-
-    number: int
-    """Pass."""
-    index: int
-    count: int
-    """Round `index` of `count`, each an even sub-lattice."""
-    is_last_light: bool
-
-
-class PhotonRecords(Protocol):
-    """Where traced photons go besides the maps, with the spectral tables that belong to them."""
-
-    @property
-    def tables(self) -> PassTables:
-        """Of the passes that run; `begin` comes first."""
-
-    def begin(self, shown: ShownSpectra, spans: Spans, photons: int) -> None:
-        """Passes of `photons` in bands of `spans` follow."""
-
-    def keep(self, photons: moderngl.Buffer, batch: Batch, stride: int, of: RoundOf) -> None:
-        """A batch was traced; `photons` holds its records of `stride` bytes until the next."""
-
-    def release(self) -> None:
-        """Free everything."""
-
-
-class NoRecords:
-    """`PhotonRecords` for photons that are splatted and forgotten."""
-
-    def __init__(self) -> None:
-        self._tables: PassTables | None = None
-
-    @property
-    def tables(self) -> PassTables:
-        """Kept as long as the bands stay."""
-        assert self._tables is not None, "begin() comes first"
-        return self._tables
-
-    def begin(self, shown: ShownSpectra, spans: Spans, photons: int) -> None:
-        """See `PhotonRecords`."""
-        if self._tables is None or spans != self._tables.spans:
-            self.release()
-            self._tables = PassTables(shown, spans)
-
-    def keep(self, photons: moderngl.Buffer, batch: Batch, stride: int, of: RoundOf) -> None:
-        """Nothing is kept."""
-
-    def release(self) -> None:
-        """Free the tables."""
-        if self._tables is not None:
-            self._tables.forget()
-        self._tables = None
 
 
 class LightPass:
@@ -524,37 +466,16 @@ class LightPass:
         self.stats.tally.merge(beams.tally(share))
         if beams.found is None or beams.found.pieces is None:
             return
-        pieces = beams.found.pieces
-        for is_tail in (False, True):
-            if (pieces.is_tail == is_tail).any():
-                yield from self._carry_on(pieces.where(pieces.is_tail == is_tail), is_tail, share, nth, of, done)
-
-    def _carry_on(
-        self, pieces: BeamPieces, is_tail: bool, share: float, nth: int, of: RoundOf, done: float
-    ) -> Iterator[PassStep]:
-        """Photons that carry on what beams left in the `nth` round; tails are not kept, since whoever shows photons
-        again has those beams play roulette."""
-        assert self._beams is not None
-        started = time.perf_counter()
-        emission = BeamEmission(self.buffers, self.trace.ray, pieces, self._records.tables.spans)
-        flux_w = {int(light): emission.flux_w(int(light)) for light in np.unique(pieces.light)}
-        entered = max(self._beams.stats.entered_w, 1e-300)
-        total = sum(flux_w.values())
-        roots = sum(watts**0.5 for watts in flux_w.values())
-        for light, watts in flux_w.items():
-            if watts <= 0.0:
+        for tails in (False, True):
+            pieces, started = beams.found.pieces, time.perf_counter()
+            pieces = pieces.where(pieces.is_tail == tails)
+            if not len(pieces):
                 continue
-            count = share * min(1.0, watts / entered)
-            if is_tail:
-                count = self._beams.tail_photons(share, total / entered) * watts**0.5 / roots
-                if count < 1.0:
-                    continue  # less than a 64th of a photon's power
-            lattice = shift(self.seed, light, nth, Dimension.LATTICE_U)
-            other = shift(self.seed, light, nth, Dimension.LATTICE_V)
-            key = random_word(self.seed, light, nth, Dimension.BRANCH)
-            for rays in emission.batches(light, max(256, int(count)), share, (lattice, other), key, self.trace.batch):
+            emission = BeamEmission(self.buffers, self.trace.ray, pieces, self._records.tables.spans)
+            for light, rays in handed_rays(emission, beams.stats.entered_w, share, self.trace.batch, self.seed, nth):
                 self.stats.trace_seconds += time.perf_counter() - started
-                for _ in self.batch_steps(self.trace.carry_on(rays, light), of, keeps=not is_tail):
+                # Whoever shows photons again has weak beams play roulette: tails are not kept.
+                for _ in self.batch_steps(self.trace.carry_on(rays, light), of, keeps=not tails):
                     yield PassStep(done, False)
                 started = time.perf_counter()
 

@@ -19,8 +19,9 @@ from spectrasplat.model.optics.spectrum import constant, laser
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.beam_emission import BeamEmission
-from spectrasplat.render.light_pass import LightPass, RoundOf, spectral_axis
+from spectrasplat.render.light_pass import LightPass, spectral_axis
 from spectrasplat.render.light_plan import Division
+from spectrasplat.render.photon_records import RoundOf
 
 from tests.reference.first_events import diverging_first_event, first_events
 

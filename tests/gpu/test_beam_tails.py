@@ -15,7 +15,8 @@ from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.trace import Batch
 from spectrasplat.render import light_pass as light_passes
-from spectrasplat.render.light_pass import LightPass, NoRecords, RoundOf, scene_buffers
+from spectrasplat.render.light_pass import LightPass, scene_buffers
+from spectrasplat.render.photon_records import NoRecords, RoundOf
 
 PHOTONS = 60_000
 # Seven times as large as what GPU space holds as it is.
