@@ -98,17 +98,16 @@ def search(
     stack = take_stack()
     for lo, hi, share in bands:
         work = _work(scene, emission, how, share, len(sources))
-        for row in range(FIRST, _roots(stack, (lo, hi), emission, work.copy(), args)):
-            facet = stack[row]["facet"]
+        for root in _roots(stack, (lo, hi), emission, work.copy(), args):
+            facet = root["facet"][0]
             if scene.facets["kind"][facet] not in (DIELECTRIC, MIRROR):
                 continue
             owner = int(scene.facets["owner"][facet])
             if len(scene.obstacles):
-                away = scene.facets["centre"][facet] - stack[row]["position"][1, 0]
+                away = scene.facets["centre"][facet] - root["position"][0, 1, 0]
                 reach = float(scene.solids["radius"][owner] + np.linalg.norm(away))
-                if may_touch(stack, row, reach, scene.obstacles, work):
+                if may_touch(root, 0, reach, scene.obstacles, work):
                     blocked.add(owner)
-            root = stack[row : row + 1].copy()
             if emission.source["kind"][0] != PARALLEL:
                 root["weight"] = _mean_weight(root[0], emission.source)
             starts.append((owner, root, work.copy()))
@@ -192,8 +191,8 @@ def _mean_weight(root: np.ndarray, source: np.ndarray) -> float:
 
 def _roots(
     stack: np.ndarray, band: tuple[float, float], emission: Emission, work: np.ndarray, args: tuple[np.ndarray, ...]
-) -> int:
-    """Put the fragments of a source's whole light that meet a facet first on the stack; returns its top."""
+) -> list[np.ndarray]:
+    """NODE (1,) each: fragments of a source's whole light, by the facet that they meet first."""
     root = stack[FIRST]
     u, v, half = emission.room
     root["x"] = band[0], 0.5 * (band[0] + band[1]), band[1]
@@ -208,7 +207,13 @@ def _roots(
     root["made"][: len(limits)] = 0, 0, STATIC, 1
     # What is kept where nothing is met (`sees`) is no root.
     work["room"], work["sees"] = emission.room * (1.0, 1.0, 1.5), False
-    work["top"], work["steps"] = FIRST + 1, 1
-    store = Store()
-    run(stack, *args, np.zeros((0, 2, 3)), work, store.leaf, store.edge, store.corner)
-    return int(work["top"][0])
+    store, whole = Store(), [stack[FIRST : FIRST + 1].copy()]
+    found: list[np.ndarray] = []
+    while whole:
+        # Too many facets ahead leave two halves instead of fragments.
+        stack[FIRST : FIRST + 1] = whole.pop()
+        work["top"], work["steps"] = FIRST + 1, 1
+        run(stack, *args, np.zeros((0, 2, 3)), work, store.leaf, store.edge, store.corner)
+        for row in range(FIRST, int(work["top"][0])):
+            (found if stack[row]["facet"] >= 0 else whole).append(stack[row : row + 1].copy())
+    return found

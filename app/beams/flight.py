@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import part
-from .hand import DEAD, HAND, LAY, SPARE, distance_at
+from .hand import DEAD, HAND, LAY, SPARE, distance_at, push_both
 from .nodes import copy, cut, exists_throughout, first_place, forget_idle_lines, last_place
 from .rays import PARALLEL, moments
 from .search import (
@@ -15,17 +15,21 @@ from .search import (
     SUM_ESCAPED,
     SUM_NUMERIC,
     flux_of,
+    halve_space,
     is_ahead,
     lay_edges,
     mixed,
     near_boxes,
     near_sphere,
+    power_as,
     recentre,
     spread_of,
 )
 
 _TOUCHES = 1e-7
 """GPU units: surfaces of glass this close are in contact."""
+_WORTHLESS = 1e-6
+"""Share of the threshold below which a beam with too many facets ahead is lost instead of halved."""
 _COATS = 3e-5
 """GPU units: what is opaque and this close to glass is a coat on it (NEAR_DISTANCE of shaders/lib/intersect.glsl)."""
 
@@ -151,6 +155,11 @@ def fly(nodes, facets, solids, tables, source, obstacles, work):
             work.hits[top - first] = hit
             top += 1
     count = top - first
+    if count == FRAGMENTS and power_as(hand, hand, tables, work) > _WORTHLESS * work.threshold:
+        # There may be more facets ahead than can be kept: each half meets fewer.
+        low, high = halve_space(hand, nodes[work.top], work)
+        push_both(nodes, low, high, work)
+        return
     if crossing and count > 1:
         top = hide(nodes, first, top, facets, solids, tables, work)
     missing = flux_of(hand, tables, work)

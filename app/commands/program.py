@@ -478,6 +478,18 @@ def bench_speed() -> None:
         print(line, flush=True)
 
 
+@app.command("bench-beams")
+def bench_beams(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for beam_costs.json and the plot.")
+    ] = Path("bench_beams"),
+) -> None:
+    """Measure the search for beams by facets and threshold, and what is left to photons."""
+    from .bench_beams import bench_beams_command
+
+    raise typer.Exit(bench_beams_command(output))
+
+
 @app.command("bench-view")
 def bench_view(
     scene: Annotated[

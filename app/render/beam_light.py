@@ -41,7 +41,12 @@ from .light_maps import LightMaps
 from .shown_spectra import ShownSpectra
 
 PHOTONS_A_BEAM = 8.0
-"""Photons' time that there is for a beam, half of it for what it leaves to photons."""
+"""Photons' time that there is for a beam, half of it for what it leaves to photons, …"""
+_FACETS_A_BEAM = 350.0
+"""… and as much again for so many facets of the scene: 14 µs a beam in a brilliant, 45 with 1,000 facets, 150 with
+4,000."""
+_FINER = 32.0
+"""A search that followed n beams tells of thresholds down to this times root n finer."""
 COARSEST, FINEST = 1e-2, 1e-9
 """Thresholds: the share of the light below which a beam is handed to photons, or plays roulette."""
 _GROWTH, _GROWTH_HANDED = 0.8, 1.0
@@ -274,8 +279,9 @@ class BeamLight:
         hands = hands and self.finder is self._traced
         found, surveyed = LightBeams({}), self._handing if hands else self._surveyed
         growth = _GROWTH_HANDED if hands else _GROWTH
+        finest = _finest(_SURVEY, surveyed)
         while True:
-            threshold = self._threshold(photons, surveyed, growth)
+            threshold = max(self._threshold(photons, surveyed, growth), finest)
             for step in self._searched(self.finder, threshold, word, hands=hands):
                 stats.find_seconds += time.perf_counter() - started
                 if isinstance(step, LightBeams):
@@ -286,8 +292,8 @@ class BeamLight:
             # Where light leaves for good, fewer weak beams follow than thought: such are searched for again, finer.
             # What is learnt here is forgotten: a pass must not depend on those before it.
             followed = found.followed()
-            surveyed = max(followed, 1.0) * (threshold / _SURVEY) ** growth
-            enough = _ENOUGH * followed * PHOTONS_A_BEAM >= photons
+            surveyed, finest = max(followed, 1.0) * (threshold / _SURVEY) ** growth, _finest(threshold, followed)
+            enough = _ENOUGH * followed * self._photons_a_beam >= photons
             if enough or self._threshold(photons, surveyed, growth) >= threshold:
                 break
         self.found = found
@@ -298,10 +304,13 @@ class BeamLight:
         stats.draw_seconds += time.perf_counter() - started
         yield 1.0
 
-    @staticmethod
-    def _threshold(photons: float, surveyed: float, growth: float) -> float:
+    @property
+    def _photons_a_beam(self) -> float:
+        return PHOTONS_A_BEAM * (1.0 + len(self.finder.scene.facets) / _FACETS_A_BEAM)
+
+    def _threshold(self, photons: float, surveyed: float, growth: float) -> float:
         """Threshold at which beams take about as long as so many photons; `surveyed` are followed at `_SURVEY`."""
-        beams = max(photons, 1.0) / PHOTONS_A_BEAM
+        beams = max(photons, 1.0) / self._photons_a_beam
         return float(np.clip(_SURVEY * (surveyed / beams) ** (1.0 / growth), FINEST, COARSEST))
 
     def draw_moving(self, maps: LightMaps, weight: float, moving: MovingBeams, seconds: float) -> None:
@@ -342,7 +351,7 @@ class BeamLight:
     def draw_found(self, maps: LightMaps, threshold: float) -> None:
         """Draw what the survey found, with the weight that photons for such a `threshold` would have."""
         beams = self._surveyed * (_SURVEY / threshold) ** _GROWTH
-        maps.photon_weight = PHOTONS_A_BEAM * beams
+        maps.photon_weight = self._photons_a_beam * beams
         if self.found is not None:
             self._count(self.found)
             if self.found.polygons is not None:
@@ -469,6 +478,10 @@ class BeamLight:
             self._worker.shutdown(wait=False, cancel_futures=True)
         for canvas in self._canvases.values():
             canvas.release()
+
+
+def _finest(threshold: float, followed: float) -> float:
+    return threshold / (_FINER * max(followed, 1.0) ** 0.5)
 
 
 def carries_everything(scene: Scene, carried: tuple[int, ...]) -> bool:
