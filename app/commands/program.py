@@ -327,12 +327,20 @@ def bake(
 
 
 @app.command()
-def inspect(scene: SceneArgument, allow_outside: AllowOutside = False) -> None:
+def inspect(
+    scene: SceneArgument,
+    programs: Annotated[
+        bool,
+        typer.Option("--programs", help="List instead what each of its programs asks of the driver; compiles them."),
+    ] = False,
+    allow_outside: AllowOutside = False,
+) -> None:
     """Show what a scene holds, its glasses and mesh health, and which features its programs need."""
     from ..model.io.scene_file import load_scene
+    from .inspect_programs import programs_text
     from .inspect_report import inspect_text
 
-    _print(inspect_text(load_scene(options.find_scene(scene))))
+    _print((programs_text if programs else inspect_text)(load_scene(options.find_scene(scene))))
 
 
 @app.command()

@@ -80,6 +80,14 @@ def test_limit_too_small(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found("limit texture_px").usable
 
 
+def test_limits_beyond_what_opengl_promises_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FakeContext, "limits", replace(NEEDED, vertex_storage_blocks=0))
+    assert "another GPU" in found("limit vertex_storage_blocks").remedy
+    assert found("limit of the brush").state == "optional"
+    monkeypatch.setattr(FakeContext, "limits", replace(NEEDED, storage_blocks=16))
+    assert all(check.name != "limit of the brush" for check in doctor.examine())
+
+
 def test_python_too_old(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor.sys, "version_info", (3, 10, 4, "final", 0))
     assert found("Python") == Check("Python", "3.10.4, needed 3.11", "missing", "install Python 3.11 or newer")
