@@ -18,6 +18,7 @@ from ..base.errors import UserError, visible
 from ..base.files import allow_outside
 from ..model.settings import CAMERA_METHODS, METHODS
 from . import completion, options
+from .prove_gpu import prove_gpu
 
 if TYPE_CHECKING:
     from rich.text import Text as RichText
@@ -502,6 +503,9 @@ def bench_view(
     from .bench_view import BenchViewRequest, bench_view_command
 
     raise typer.Exit(bench_view_command(BenchViewRequest(scene, size, seconds)))
+
+
+app.command("prove-gpu")(prove_gpu)
 
 
 def _print(content: object) -> None:
