@@ -24,15 +24,15 @@ from ..model.settings import RenderSettings
 if TYPE_CHECKING:
     from ..gpu.context import Context
 
-SCENES = ("prism", "prism_case", "ball", "lens", "star", "water", "wine_glass", "spectrometer")
+SCENES = ("prism", "prism_case", "ball", "lens", "star", "water", "spectrometer")
 """Facets, smooth glass, nested and touching solids, beams and photons, narrow slits."""
 SIZE = (96, 54)
 BLOCK_PX = 6
 """Pictures are compared by the means of blocks with this side: fewer photons are then enough."""
-LARGEST_ERROR = 0.05
-"""Of block means, as `block_error` has it. Llvmpipe comes to at most 0.02 with other photons."""
+LARGEST_ERROR = 0.04
+"""Of block means, as `block_error` has it. Llvmpipe comes to at most 0.015 with other photons."""
 _STORED = {"photons": 4_000_000, "spp": 64, "seed": 7}
-_COMPARED = {"photons": 400_000, "spp": 8, "seed": 1}
+_COMPARED = {"photons": 200_000, "spp": 8, "seed": 1}
 
 
 @dataclass(frozen=True)
@@ -62,9 +62,11 @@ def compare(context: Context, scenes: tuple[str, ...] = SCENES) -> Iterator[Comp
 
 
 def block_error(picture: np.ndarray, reference: np.ndarray) -> float:
-    """Root mean square difference of block means over the reference's root mean square; both (H, W, 3)."""
+    """Sum of absolute differences of block means over the sum of the reference's; both (H, W, 3).
+
+    Squares would be the few pixels' where a caustic is seen through glass."""
     a, b = _blocks(picture), _blocks(reference)
-    return float(np.sqrt(np.mean((a - b) ** 2) / np.mean(b**2)))
+    return float(np.abs(a - b).sum() / np.abs(b).sum())
 
 
 def _blocks(picture: np.ndarray) -> np.ndarray:

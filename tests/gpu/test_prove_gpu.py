@@ -56,7 +56,9 @@ def test_the_whole_short_form_on_this_machine(tmp_path: Path, capsys: pytest.Cap
 def test_a_driver_that_crashes_ends_one_part(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    crash = "out.write('{\"name\": \"first\", \"value\": \"fine\"}\\n'); print('mesa: error', file=sys.stderr, flush=True)\n"
+    crash = (
+        'out.write(\'{"name": "first", "value": "fine"}\\n\'); print(\'mesa: error\', file=sys.stderr, flush=True)\n'
+    )
     told(monkeypatch, programs=crash + "os.kill(os.getpid(), signal.SIGSEGV)", answers="sys.exit(2)")
     code, proof = proved(tmp_path)
     assert code == prove_gpu.FIRST_CODE + 1
@@ -98,7 +100,7 @@ def test_without_a_device_nothing_else_is_tried(tmp_path: Path, monkeypatch: pyt
 
 
 def test_ctrl_c_keeps_what_was_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    told(monkeypatch, answers="out.write('{\"name\": \"gap\", \"value\": \"holds\"}\\n'); time.sleep(60)")
+    told(monkeypatch, answers='out.write(\'{"name": "gap", "value": "holds"}\\n\'); time.sleep(60)')
     real = prove_gpu._take_in
 
     def interrupted(file: Path, result: prove_gpu.PartResult) -> float:
