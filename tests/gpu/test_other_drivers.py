@@ -1,6 +1,6 @@
-"""The same pictures and answers on a second driver: zink, which turns our GLSL into SPIR-V, on lavapipe, a Vulkan driver
-for the processor (Debian: mesa-vulkan-drivers). A third front end, another optimiser, and a driver that crashes where
-the first one is lenient. `./test --drivers` runs all of it.
+"""The same pictures and answers on a second driver: zink, which turns our GLSL into SPIR-V, on lavapipe, a Vulkan
+driver for the processor (Debian: mesa-vulkan-drivers). It crashes where the first one is lenient.
+`./test --drivers` runs all of it.
 """
 
 from __future__ import annotations

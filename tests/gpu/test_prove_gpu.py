@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.__main__ import main
-from spectrasplat.bench.stored_pictures import SCENES, block_error, stored
+from spectrasplat.bench.stored_pictures import LARGEST_ERROR, SCENES, block_error, stored
 from spectrasplat.commands import prove_gpu
 from spectrasplat.commands.proof_steps import PARTS
 
@@ -128,6 +128,8 @@ def test_stored_pictures_tell_a_wrong_one() -> None:
         picture = stored()[name]
         assert np.all(np.isfinite(picture)) and picture.max() > 0.0
         assert block_error(picture, picture) == 0.0
-        assert block_error(1.1 * picture, picture) > 0.05
-        assert block_error(picture[..., ::-1], picture) > 0.05, name  # red for blue
-        assert not block_error(np.where(picture == picture.max(), np.nan, picture), picture) <= 0.05
+        assert block_error(1.1 * picture, picture) > LARGEST_ERROR
+        assert block_error(picture[:, ::-1], picture) > LARGEST_ERROR, name
+        assert not block_error(np.where(picture == picture.max(), np.nan, picture), picture) <= LARGEST_ERROR
+    for name in ("prism", "prism_case", "spectrometer"):
+        assert block_error(stored()[name][..., ::-1], stored()[name]) > LARGEST_ERROR, name  # red for blue
