@@ -278,7 +278,7 @@ def _bench(short: bool, folder: Path) -> Iterator[Finding]:
 
 PARTS = (
     Part("doctor", "Machine, driver, limits", _doctor, (5, 3), (60, 60)),
-    Part("programs", "Every program compiles, and is GLSL by the book", _programs, (90, 25), (180, 240)),
+    Part("programs", "Every program compiles, and is GLSL by the book", _programs, (90, 25), (240, 240)),
     Part("answers", "Known answers", _answers, (35, 6), (90, 120)),
     Part("pictures", "Pictures against stored ones", _pictures, (40, 15), (90, 240)),
     Part("stress", "Stress", _stress, (50, 16), (120, 240)),

@@ -157,12 +157,12 @@ def _run_all(
         ) -> None:
             progress((before + own * share) / all_s, name)
 
-        limit = min(part.limit_s[form], WHOLE_S - (time.monotonic() - started))
-        if limit <= 0.0:
+        left = WHOLE_S - (time.monotonic() - started)
+        if left <= 0.0:
             return
         tell(0.0)
         try:
-            _run(part, result, _Run(proof.short, folder, limit, tell))
+            _run(part, result, _Run(proof.short, folder, part.limit_s[form], left, tell))
         finally:
             _keep(proof, folder)
         done_s += own_s
@@ -180,6 +180,9 @@ class _Run:
     short: bool
     folder: Path
     limit_s: float
+    """The part's own; beyond it something is wrong."""
+    left_s: float
+    """Of the whole."""
     tell: Callable[[float], None]
 
 
@@ -220,6 +223,9 @@ def _watched(process: subprocess.Popen, file: Path, result: PartResult, how: _Ru
         if time.monotonic() - started > how.limit_s:
             result.detail = f"not done after {how.limit_s:.0f} s."
             return "too slow"
+        if time.monotonic() - started > how.left_s:
+            result.detail = f"the proof's {WHOLE_S:.0f} s were over."
+            return "stopped"
         time.sleep(_LOOK_EVERY_S)
         how.tell(_take_in(file, result))
     _take_in(file, result)

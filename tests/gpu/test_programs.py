@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from spectrasplat.base.paths import assets_dir
+from spectrasplat.base.paths import assets_dir, shaders_dir
 from spectrasplat.bench import viewer_speed
 from spectrasplat.bench.programs import compiled_programs, unique
 from spectrasplat.gpu import shader, strict_compilers
@@ -97,6 +98,17 @@ def test_strict_compilers_refuse_what_drivers_let_pass() -> None:
         built_of("a.frag", "in vec4 x;", "out vec4 o;", "void main() { o = x; }").stages[0],
     ]
     assert "Types must match" in " ".join(strict_compilers.complaints(Built(tuple(ends), 0.0)))
+
+
+def test_flags_that_lie_in_memory_are_no_bools() -> None:
+    """See shaders/README.md: structs that are held in arrays, and arrays."""
+    texts = [
+        path.read_text() for path in shaders_dir().rglob("*") if path.suffix in (".glsl", ".comp", ".frag", ".vert")
+    ]
+    assert [found for text in texts for found in re.findall(r"\bbool\s+\w+\s*\[.*", text)] == []
+    bodies = {name: body for text in texts for name, body in re.findall(r"struct (\w+) \{(.*?)\n\};", text, re.DOTALL)}
+    for name in ("CameraPath", "RayOrigin", "ShadingFrame", "PathEnd", "Hit"):
+        assert not re.search(r"^\s*bool\b", bodies[name], re.MULTILINE), name
 
 
 def test_what_a_program_uses_is_read_from_its_text() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -83,12 +84,22 @@ def test_what_does_not_hold_is_told(
 
 def test_a_part_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told(monkeypatch, answers="time.sleep(60)")
-    monkeypatch.setattr(prove_gpu, "WHOLE_S", 2.0)
+    impatient = [replace(part, limit_s=(1.0, 1.0) if part.key == "answers" else part.limit_s) for part in PARTS]
+    monkeypatch.setattr(prove_gpu, "PARTS", impatient)
     started = time.monotonic()
     code, proof = proved(tmp_path, "--parts", "answers,stress")
     assert time.monotonic() - started < 20.0
     assert code == prove_gpu.FIRST_CODE + 1
-    assert [part["state"] for part in proof["parts"]] == ["holds", "too slow", "not begun"]
+    assert [part["state"] for part in proof["parts"]] == ["holds", "too slow", "holds"]
+
+
+def test_it_ends_in_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told(monkeypatch, answers="time.sleep(60)")
+    monkeypatch.setattr(prove_gpu, "WHOLE_S", 2.0)
+    code, proof = proved(tmp_path, "--parts", "answers,stress")
+    assert code == 130
+    assert [part["state"] for part in proof["parts"]] == ["holds", "stopped", "not begun"]
+    assert "2 s were over" in proof["parts"][1]["detail"]
 
 
 def test_without_a_device_nothing_else_is_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
