@@ -16,7 +16,7 @@ from typing import Literal
 from ..base.errors import UserError
 from ..base.paths import assets_dir, cache_dir, shaders_dir
 from ..gpu import context as gpu
-from ..gpu.limits import NEEDED, Limits
+from ..gpu.limits import BRUSH_STORAGE_BLOCKS, NEEDED, Limits
 
 PACKAGE = "spectrasplat"
 PYTHON = (3, 11)
@@ -25,7 +25,12 @@ _NATIVE_MODULES = ("numpy", "moderngl", "imgui_bundle", "glfw", "numba", "OpenEX
 """Modules with compiled parts, which can be installed and still not load; imgui_bundle must precede glfw."""
 _WINDOW_MODULES = ("imgui_bundle", "glfw")
 """Rendering to files does without them."""
-
+_MORE_THAN_PROMISED = dict.fromkeys(
+    ("vertex_storage_blocks", "storage_bindings"),
+    "update the graphics driver or use another GPU: OpenGL 4.3 promises fewer, but splats are drawn by vertex shaders "
+    "that read them",
+)
+"""Remedies of limits where `NEEDED` asks for more than OpenGL 4.3 promises."""
 
 State = Literal["ok", "optional", "missing"]
 
@@ -141,6 +146,9 @@ def _opengl() -> Iterator[Check]:
     yield Check("OpenGL", f"{context.version} through {context.backend.upper()}", "ok")
     yield Check("renderer", f"{context.renderer} ({kind})", "ok")
     yield Check("vendor", context.vendor, "ok")
+    if context.advice:
+        found, _, remedy = context.advice.partition(": ")
+        yield Check("better GPU", found, "optional", remedy)
     yield from _limits(context.limits)
     context.release()
 
@@ -153,7 +161,16 @@ def _limits(limits: Limits) -> Iterator[Check]:
             f"limit {field.name}",
             f"{_number(found)} (needed {_number(needed)})",
             "ok" if enough else "missing",
-            "" if enough else "update the graphics driver: OpenGL 4.3 promises more",
+            ""
+            if enough
+            else _MORE_THAN_PROMISED.get(field.name, "update the graphics driver: OpenGL 4.3 promises more"),
+        )
+    if NEEDED.storage_blocks <= limits.storage_blocks < BRUSH_STORAGE_BLOCKS:
+        yield Check(
+            "limit of the brush",
+            f"{limits.storage_blocks} storage blocks (local dispersion takes {BRUSH_STORAGE_BLOCKS})",
+            "optional",
+            "update the graphics driver to brush dispersion onto glass",
         )
 
 

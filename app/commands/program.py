@@ -18,6 +18,7 @@ from ..base.errors import UserError, visible
 from ..base.files import allow_outside
 from ..model.settings import CAMERA_METHODS, METHODS
 from . import completion, options
+from .prove_gpu import prove_gpu
 
 if TYPE_CHECKING:
     from rich.text import Text as RichText
@@ -327,12 +328,20 @@ def bake(
 
 
 @app.command()
-def inspect(scene: SceneArgument, allow_outside: AllowOutside = False) -> None:
+def inspect(
+    scene: SceneArgument,
+    programs: Annotated[
+        bool,
+        typer.Option("--programs", help="List instead what each of its programs asks of the driver; compiles them."),
+    ] = False,
+    allow_outside: AllowOutside = False,
+) -> None:
     """Show what a scene holds, its glasses and mesh health, and which features its programs need."""
     from ..model.io.scene_file import load_scene
+    from .inspect_programs import programs_text
     from .inspect_report import inspect_text
 
-    _print(inspect_text(load_scene(options.find_scene(scene))))
+    _print((programs_text if programs else inspect_text)(load_scene(options.find_scene(scene))))
 
 
 @app.command()
@@ -506,6 +515,9 @@ def bench_view(
     from .bench_view import BenchViewRequest, bench_view_command
 
     raise typer.Exit(bench_view_command(BenchViewRequest(scene, size, seconds)))
+
+
+app.command("prove-gpu")(prove_gpu)
 
 
 def _print(content: object) -> None:

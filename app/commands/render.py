@@ -62,11 +62,14 @@ def render_command(request: RenderRequest) -> int:
     for note in (*scene.notes, *_unused_options(request)):
         print(f"note: {plain(note)}", file=sys.stderr)
 
+    from ..gpu.better_device import advice
     from ..render.still import render
 
     with interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
         result = render(scene, settings, progress=progress, cancelled=interrupted)
         stopped = interrupted()
+    if better := advice(result.stats.renderer, result.stats.is_software):
+        print(f"note: {better}", file=sys.stderr)
     for notice in result.stats.notices:
         print(f"note: {plain(notice)}", file=sys.stderr)
     write_image(

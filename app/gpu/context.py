@@ -9,9 +9,11 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 from ..base.errors import DeviceError, UserError, suggestion
+from .better_device import advice
 from .device_traits import DeviceTraits
 from .limits import Limits
 
@@ -58,6 +60,11 @@ class Context:
     def is_software(self) -> bool:
         """Whether the processor draws, not a GPU (timer queries are then meaningless)."""
         return self.traits.is_software
+
+    @cached_property
+    def advice(self) -> str:
+        """A sentence where a better GPU may be there than this one, and how to choose it; else ""."""
+        return advice(self.renderer, self.is_software)
 
     def finish(self) -> None:
         """Wait until everything sent so far is done."""

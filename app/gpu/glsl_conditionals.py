@@ -97,6 +97,22 @@ class _Macros:
         return body
 
 
+def macros_of(units: Sequence[Unit]) -> _Macros:
+    """What is defined at the end of a text without conditionals."""
+    macros = _Macros()
+    for unit in units:
+        macros.note(unit, certain=True)
+    return macros
+
+
+def value_of(expression: str, macros: _Macros) -> int | None:
+    """An integer expression's value; None where only the driver can tell."""
+    try:
+        return _expression([found.group(1) for found in _CONDITION_TOKEN.finditer(expression)], macros, 0)
+    except _UnknownError:
+        return None
+
+
 def resolve_conditionals(units: Sequence[Unit], macros: _Macros | None = None) -> tuple[list[Unit], bool]:
     """The units whose conditions hold, and whether every condition could be told.
 

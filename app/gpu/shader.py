@@ -10,6 +10,7 @@ from flattened line to (file, line) turns a compiler message back into something
 from __future__ import annotations
 
 import re
+import time
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -195,24 +196,51 @@ def _kept_or(ctx: moderngl.Context, texts: tuple[str, ...], compiled: Callable[[
     return programs[texts]  # type: ignore[return-value]
 
 
-_recordings: list[list[Source]] = []
+@dataclass(frozen=True)
+class Built:
+    """A program as it was handed to the driver."""
+
+    stages: tuple[Source, ...]
+    """Of a drawing program the vertex shader first."""
+    seconds: float
+    """Until the driver had compiled and linked it (some do the rest at the first use); 0 where it was kept."""
+
+    @property
+    def name(self) -> str:
+        """Its shaders' names."""
+        return " + ".join(stage.name for stage in self.stages)
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """What tells it from others."""
+        return tuple(stage.text for stage in self.stages)
+
+
+_recordings: list[list[Built]] = []
 
 
 @contextmanager
-def recorded() -> Iterator[list[Source]]:
-    """Collects the sources of every program that is built meanwhile."""
-    sources: list[Source] = []
-    _recordings.append(sources)
+def recorded() -> Iterator[list[Built]]:
+    """Collects every program that is built meanwhile, also those that were kept."""
+    programs: list[Built] = []
+    _recordings.append(programs)
     try:
-        yield sources
+        yield programs
     finally:
         _recordings.pop()
 
 
-def _handed_over(source: Source) -> str:
-    for sources in _recordings:
-        sources.append(source)
-    return source.text
+def _built(ctx: moderngl.Context, stages: tuple[Source, ...], compiled: Callable[[], P]) -> P:
+    """The program of these stages, kept or new. It is recorded before it is compiled, in case that ends everything."""
+    texts = tuple(stage.text for stage in stages)
+    started = time.perf_counter()
+    is_new = texts not in _kept.get(id(ctx), ())
+    for programs in _recordings:
+        programs.append(Built(stages, 0.0))
+    program = _kept_or(ctx, texts, compiled)
+    for programs in _recordings:
+        programs[-1] = Built(stages, time.perf_counter() - started if is_new else 0.0)
+    return program
 
 
 def compute(
@@ -223,9 +251,8 @@ def compute(
 ) -> moderngl.ComputeShader:
     """Compile the compute shader `name`; raises `ShaderError` with file and line."""
     source = load_source(name, defines, structs)
-    text = _handed_over(source)
     try:
-        return _kept_or(ctx, (text,), lambda: ctx.compute_shader(text))
+        return _built(ctx, (source,), lambda: ctx.compute_shader(source.text))
     except Exception as error:  # moderngl raises its own Error type with the driver's log
         raise ShaderError(f"{name} does not compile:\n{source.explain(str(error))}") from error
 
@@ -240,9 +267,13 @@ def program(
     """Compile and link a vertex and a fragment shader; raises `ShaderError` with file and line."""
     vertex_source = load_source(vertex, defines, structs)
     fragment_source = load_source(fragment, defines, structs)
-    texts = _handed_over(vertex_source), _handed_over(fragment_source)
+    stages = vertex_source, fragment_source
     try:
-        return _kept_or(ctx, texts, lambda: ctx.program(vertex_shader=texts[0], fragment_shader=texts[1]))
+        return _built(
+            ctx,
+            stages,
+            lambda: ctx.program(vertex_shader=vertex_source.text, fragment_shader=fragment_source.text),
+        )
     except Exception as error:
         log = str(error)
         source = fragment_source if "fragment" in log.lower() else vertex_source

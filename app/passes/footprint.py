@@ -122,9 +122,9 @@ class Footprints:
         structs = (photon_record(groups, features.hero), PLACEMENT, RECEIVER, SPLAT, GAIN_BOX)
         self._program = shader.compute(ctx, "light/footprint.comp", defines, structs)
         self._parameters = ctx.buffer(reserve=PARAMETERS.stride)
-        self._unusual = ctx.buffer(np.zeros((group, 2), np.float32))
-        self.commands = ctx.buffer(np.zeros(21, np.uint32))
-        """Indirect draws of kinds 1 to 4, five words each; then the dropped footprints."""
+        self._unusual = ctx.buffer(np.zeros((group, 4), np.float32))
+        self.commands = ctx.buffer(np.zeros(20, np.uint32))
+        """Indirect draws of kinds 1 to 4, five words each."""
         self.slots_per_photon = int(defines["SLOTS"])
         self.capacity = group * self.slots_per_photon
         """Splats of a kind that the lists have room for."""
@@ -184,7 +184,6 @@ class Footprints:
                 variables.buffer,
                 tables.band_buffer,
                 self._unusual,
-                self.commands,
             )
         ):
             buffer.bind_to_storage_buffer(binding)
@@ -194,6 +193,7 @@ class Footprints:
         self.commands.write(np.array([[vertices, 1, 0, 0, 0] for vertices in VERTICES], np.uint32))
         self._program.run(group_x=-(-count // WORKGROUP))
         self._ctx.memory_barrier()
+        self.commands.bind_to_storage_buffer(7)
         self.lists.bind_to_storage_buffer(8)
         self._list["capacity"].value = self.capacity
         self._list["slots"].value = slots
@@ -202,11 +202,9 @@ class Footprints:
     def counts(self) -> dict[str, float]:
         """Since the last reset: `outside_map_w` (flux of photons whose centre no window holds, W),
         `footprints_dropped` (number of photons), `dropped_w` (their flux, W)."""
-        outside, dropped_w = (
-            np.frombuffer(self._unusual.read(), np.float32).reshape(-1, 2).sum(axis=0, dtype=np.float64)
-        )
-        dropped = int(np.frombuffer(self.commands.read(), np.uint32)[20])
-        return {"outside_map_w": float(outside), "footprints_dropped": dropped, "dropped_w": float(dropped_w)}
+        records = np.frombuffer(self._unusual.read(), np.float32).reshape(-1, 4)
+        outside, dropped_w, dropped, _ = records.sum(axis=0, dtype=np.float64)
+        return {"outside_map_w": float(outside), "footprints_dropped": int(dropped), "dropped_w": float(dropped_w)}
 
     @property
     def bytes(self) -> int:
@@ -215,7 +213,6 @@ class Footprints:
 
     def reset_counts(self) -> None:
         self._unusual.clear()
-        self.commands.clear()
 
     def release(self) -> None:
         shader.release(

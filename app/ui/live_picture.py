@@ -58,7 +58,7 @@ class LivePicture:
         self._exposure = AutoExposure()
         self._size = (0, 0)
         self._reload_error: str | None = None
-        self.stats = LiveStats(renderer=context.renderer, is_software=context.is_software)
+        self.stats = LiveStats(renderer=context.renderer, is_software=context.is_software, device_advice=context.advice)
         """The engine's, as of the last frame."""
         self._developed: tuple[object, ...] | None = None
         """What `shown` was made of."""

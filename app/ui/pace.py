@@ -5,6 +5,8 @@ from __future__ import annotations
 SOFTWARE_FRAME_S = 0.04
 """A frame on the software renderer: with the batch that runs over its end, within the 50 ms in which input must
 have its effect."""
+FIRST_FRAME_S = 0.15
+"""Until the first whole picture, while nobody touches anything: what the interface costs is then spent less often."""
 GPU_SHARE = 0.75
 """Of the time between two pictures of the screen; the rest is the driver's and the window system's."""
 MIN_SHARE = 0.25
@@ -16,13 +18,22 @@ class Pace:
     """`budget_s` for the next frame, from what the last ones cost beside the engine."""
 
     def __init__(self, is_software: bool, refresh_s: float = 1 / 60) -> None:
+        self._is_software = is_software
         self.frame_s = SOFTWARE_FRAME_S if is_software else GPU_SHARE * refresh_s
         self._besides_s = 0.0
 
     @property
     def budget_s(self) -> float:
         """Seconds for the engine."""
-        return max(self.frame_s - self._besides_s, MIN_SHARE * self.frame_s)
+        return self._left_of(self.frame_s)
+
+    @property
+    def first_budget_s(self) -> float:
+        """The same where there is no whole picture yet that an input could change."""
+        return self._left_of(max(self.frame_s, FIRST_FRAME_S) if self._is_software else self.frame_s)
+
+    def _left_of(self, frame_s: float) -> float:
+        return max(frame_s - self._besides_s, MIN_SHARE * frame_s)
 
     def note(self, besides_s: float) -> None:
         """A frame took `besides_s` seconds beside the engine's work (without waiting for the screen)."""

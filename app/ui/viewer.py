@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from imgui_bundle import imgui
 
 from ..edit.state import Preferences
 from .frame import Draw, run_frame
@@ -24,6 +25,8 @@ class Viewer:
         self.pace = Pace(session.context.is_software, refresh_s)
         self._draw = draw
         self._drawn_at = 0.0
+        self._has_shown = False
+        """A whole picture."""
 
     def prepare(self, interface_scale: float = 1.0, framebuffer_scale: float = 1.0) -> None:
         """Before a frame."""
@@ -33,7 +36,10 @@ class Viewer:
 
     def draw(self) -> None:
         """One frame."""
-        run_frame(self.session, self._draw, self.pace.budget_s)
+        stats = self.session.picture.stats
+        self._has_shown |= stats.camera_samples >= 1 and stats.resolution_scale >= 1
+        waits = not self._has_shown and not _is_touched()
+        run_frame(self.session, self._draw, self.pace.first_budget_s if waits else self.pace.budget_s)
 
     def rendered(self) -> None:
         """imgui has drawn; the screen has not been waited for."""
@@ -73,6 +79,18 @@ class Viewer:
     def wants_to_close(self) -> bool:
         """The window may close."""
         return self.session.wants_to_close
+
+
+def _is_touched() -> bool:
+    """Whether the mouse moves, or holds something, in this frame."""
+    io = imgui.get_io()
+    return (
+        io.mouse_delta.x != 0.0
+        or io.mouse_delta.y != 0.0
+        or io.mouse_wheel != 0.0
+        or any(io.mouse_down)
+        or imgui.is_any_item_active()
+    )
 
 
 def headless_viewer(viewer: Viewer, size: tuple[int, int] = (1280, 720)) -> HeadlessInterface:

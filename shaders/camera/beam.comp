@@ -80,7 +80,7 @@ CameraPath path_beyond(ScreenPolygon beam, vec2 place, float lo, float hi)
     float middle = 0.5 * (lo + hi), width = beam.x_hi - beam.x_lo;
     path.position = at_place(beam.position, place, middle);
     path.direction = normalize(at_place(beam.direction, place, middle));
-    path.origin = RayOrigin(NONE, beam.last_object, (beam.flags & 1u) != 0u, beam.inside_mask);
+    path.origin = RayOrigin(NONE, beam.last_object, uint((beam.flags & 1u) != 0u), beam.inside_mask);
     path.medium = MediumStack(beam.inside_mask, beam.inside_object);
     for (int c = 0; c < 2; ++c) {
         path.dposition[c] = column_at(beam.position, c + 1, middle);
@@ -93,9 +93,9 @@ CameraPath path_beyond(ScreenPolygon beam, vec2 place, float lo, float hi)
     path.branch_weight = path.weight.y;
     path.key = beam.key;
     path.depth = int(beam.flags >> 8u);
-    path.restricted = width * (hi - lo) < 0.999;
-    path.recut = false;
-    path.planar_so_far = true;
+    path.restricted = uint(width * (hi - lo) < 0.999);
+    path.recut = 0u;
+    path.planar_so_far = 1u;
     path.cuts = 0;
 #ifdef SPECTRAL_SWEEP
     // The one column is by x itself: the parabola's slope in the middle.
@@ -110,7 +110,7 @@ CameraPath path_beyond(ScreenPolygon beam, vec2 place, float lo, float hi)
     set_steps(path);
     // A whole spectrum that has been bent is swept as well.
     vec3 moved = path.end_direction[1] - path.end_direction[0], shifted = path.end_position[1] - path.end_position[0];
-    path.restricted = path.restricted || dot(moved, moved) + dot(shifted, shifted) > 1e-14;
+    path.restricted = uint(path.restricted != 0u || dot(moved, moved) + dot(shifted, shifted) > 1e-14);
 #endif
     return path;
 }
@@ -126,7 +126,7 @@ void look_behind(CameraPath path, uint pixel_key)
     if (unexpected) atomicAdd(fallbacks[FELL_DEPTH], 1u);
     met = met && !unexpected;
 #ifdef SPECTRAL_SWEEP
-    bool asks = path.restricted && kind != KIND_BLACK && !unexpected && sweep_pixels(path, met ? hit.distance : FAR_DISTANCE) > MIN_SWEEP;
+    bool asks = path.restricted != 0u && kind != KIND_BLACK && !unexpected && sweep_pixels(path, met ? hit.distance : FAR_DISTANCE) > MIN_SWEEP;
     for (int end = 0; end < 2 && asks; ++end) {
         bool same = true;
         Hit other;

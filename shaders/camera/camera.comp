@@ -57,8 +57,8 @@ float cut_at;
 struct PathEnd {
     CameraPath path;
     Hit hit;
-    bool met;
-    bool same_hit;
+    uint met;  // 1: `hit` was met
+    uint same_hit;
 };
 PathEnd ended[ENDS_HELD];
 #endif
@@ -93,7 +93,7 @@ CameraPath camera_path(uvec2 pixel, uint primary_sample, float gain)
     CameraPath path;
     path.position = ray.position;
     path.direction = ray.direction;
-    path.origin = RayOrigin(NONE, NONE, false, p.inside_mask);
+    path.origin = RayOrigin(NONE, NONE, 0u, p.inside_mask);
     path.medium = MediumStack(p.inside_mask, p.inside_object);
     for (int c = 0; c < COLUMNS_HELD; ++c) path.dposition[c] = path.ddirection[c] = vec3(0.0);
     vec3 right = p.half_right * (2.0 * p.pixel_width / float(p.size.x)), up = p.half_up * (2.0 * p.pixel_height / float(p.size.y));
@@ -112,9 +112,9 @@ CameraPath camera_path(uvec2 pixel, uint primary_sample, float gain)
     path.branch_weight = 1.0;
     path.key = 0u;
     path.depth = 0;
-    path.restricted = false;
-    path.recut = false;
-    path.planar_so_far = true;
+    path.restricted = 0u;
+    path.recut = 0u;
+    path.planar_so_far = 1u;
     path.cuts = 0;
 #ifdef HAS_GRATING
     path.order = 0u;
@@ -140,7 +140,7 @@ CameraPath started_path(BeamStart start)
     CameraPath path = camera_path(uvec2(0u), THE_SAMPLE, 1.0);
     path.position = start.position;
     path.direction = start.direction;
-    path.origin = RayOrigin(start.last_primitive, start.last_object, start.is_inside != 0u, start.inside_mask);
+    path.origin = RayOrigin(start.last_primitive, start.last_object, uint(start.is_inside != 0u), start.inside_mask);
     path.medium = MediumStack(start.inside_mask, start.inside_object);
     path.dposition[0] = start.dposition_x;
     path.dposition[1] = start.dposition_y;
@@ -154,7 +154,7 @@ CameraPath started_path(BeamStart start)
     uint cell = min(uint(start.x * float(EMISSION_CELLS)), uint(EMISSION_CELLS - 1));
     path.band = vec3(float(cell), start.x * float(EMISSION_CELLS), float(cell + 1u)) / float(EMISSION_CELLS);
     path.inverse_pdf /= max(cell_cdf[cell + 1u] - cell_cdf[cell], 1e-9);
-    path.restricted = true;
+    path.restricted = 1u;
 #endif
     return path;
 }
@@ -180,8 +180,8 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
 {
     bool entering = dot(whole.direction, hit.normal_g) < 0.0;
     MediumInterface boundary = cross_boundary(path.medium, hit.object, entering);
-    RayOrigin origin_beyond = RayOrigin(hit.primitive, hit.object, entering, boundary.behind.mask);
-    RayOrigin origin_back = RayOrigin(hit.primitive, hit.object, !entering, path.medium.mask);
+    RayOrigin origin_beyond = RayOrigin(hit.primitive, hit.object, uint(entering), boundary.behind.mask);
+    RayOrigin origin_back = RayOrigin(hit.primitive, hit.object, uint(!entering), path.medium.mask);
     if (!boundary.changes) {
         path.medium = boundary.behind;
         path.origin = origin_beyond;
@@ -199,7 +199,7 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
         mirror_weight = begins ? mirror_weight : reflectance;
 #ifdef HAS_DISPERSION
         // What is reflected off the outside of glass knows no wavelength but in its strength: it stays whole. What goes on is one band.
-        if (round == 1 || path.restricted || (n_i.x == n_i.z && n_t.x == n_t.z)) break;
+        if (round == 1 || path.restricted != 0u || (n_i.x == n_i.z && n_t.x == n_t.z)) break;
         begins = all(greaterThan(cosine2, vec3(0.0)));
         restrict_to_band(path, pixel_key);
         if (!begins) mirrored = path;
@@ -209,24 +209,24 @@ void cross_glass(inout CameraPath path, CameraPath whole, Hit hit, Triangle face
     }
 #ifdef SPECTRAL_SWEEP
     bvec3 passes = greaterThan(cosine2, vec3(0.0));
-    bool may_cut = path.restricted && any(passes) && !all(passes) && !path.recut;
+    bool may_cut = path.restricted != 0u && any(passes) && !all(passes) && path.recut == 0u;
     bool cut = false;
     WHEN(may_cut) {
         float at = cell_border(onset_of(path, theta3, boundary, passes));
         cut = may_cut_at(path, at);
-        bool near = cut && (whole.planar_so_far || cut_is_near(whole, at, hit.distance));
+        bool near = cut && (whole.planar_so_far != 0u || cut_is_near(whole, at, hit.distance));
         if (cut && !near) atomicAdd(fallbacks[FELL_CUT], 1u);
         cut = near;
         WHEN(cut) {
             // Both parts meet this surface again, each from its own start.
             path = whole;
-            path.recut = true;
+            path.recut = 1u;
             cut_at = at;
         }
     }
     if (cut) return;
 #endif
-    path.recut = mirrored.recut = false;
+    path.recut = mirrored.recut = 0u;
     Deflection refracted = refract_at(frame.shading, path.direction, n_i.y / n_t.y);
     bool total = !refracted.exists, reflects = total;
     float likely = total ? 1.0 : dot(reflectance, vec3(0.25, 0.5, 0.25));
@@ -275,16 +275,16 @@ void meet_surface(inout CameraPath path, Hit hit, uint kind, uint pixel_key)
     path.position = surface_point(hit, facet, whole.position, whole.direction);
 #ifdef SPECTRAL_SWEEP
 #ifdef NORMAL_DERIVATIVES
-    path.planar_so_far = path.planar_so_far && ((hit.primitive & PLANE_BIT) != 0u || facet.normals == NONE);
+    path.planar_so_far = uint(path.planar_so_far != 0u && ((hit.primitive & PLANE_BIT) != 0u || facet.normals == NONE));
 #endif
-    WHEN(path.restricted) transfer_ends(path, hit.normal_g);
+    WHEN(path.restricted != 0u) transfer_ends(path, hit.normal_g);
 #endif
     path.depth += 1;
 #ifdef HAS_MIRROR
     WHEN(kind == KIND_MIRROR) {
         reflect_path(path, path_frame(path, hit, facet));
-        path.origin = RayOrigin(hit.primitive, hit.object, dot(path.direction, hit.normal_g) < 0.0, path.origin.inside_mask);
-        path.recut = false;
+        path.origin = RayOrigin(hit.primitive, hit.object, uint(dot(path.direction, hit.normal_g) < 0.0), path.origin.inside_mask);
+        path.recut = 0u;
         vec3 colour = object_colours[hit.object].rgb;
 #ifdef ABSORPTION
         // A coloured mirror lets through like a glass of its own, once a reflection.
@@ -413,7 +413,7 @@ void main()
             pushes_path = false;
 #ifdef SPECTRAL_SWEEP
             cut_at = -1.0;
-            bool asks = path.restricted && !event_limit_reached && (ends || (path.planar_so_far && kind != KIND_BLACK && asked < MAX_ASKED));
+            bool asks = path.restricted != 0u && !event_limit_reached && (ends || (path.planar_so_far != 0u && kind != KIND_BLACK && asked < MAX_ASKED));
             if (asks) asks = sweep_pixels(path, met ? hit.distance : FAR_DISTANCE) > (ends ? MIN_SWEEP : MIN_CUT_SWEEP * sample_side(path));
             WHEN(asks) cut_at = where_paths_diverge(path, met, ends, hit, same_hit);
             parts = cut_at >= 0.0;
@@ -421,9 +421,9 @@ void main()
             WHEN(!parts) {
 #if defined(LAYER_BEAUTY) && defined(VISIBLE_LIGHTS)
 #ifdef HAS_GRATING
-                bool met_before = path.recut || path.order != 0u;
+                bool met_before = path.recut != 0u || path.order != 0u;
 #else
-                bool met_before = path.recut;
+                bool met_before = path.recut != 0u;
 #endif
                 WHEN(!met_before) add_lights(path, met ? hit.distance : FAR_DISTANCE);
 #endif
@@ -433,7 +433,7 @@ void main()
 #ifdef HAS_GRATING
                 WHEN(leaves && kind == KIND_GRATING) path.weight *= efficiency_left(path, hit.object);
 #endif
-                WHEN(ends || leaves) ended[found++] = PathEnd(path, hit, met && ends, same_hit || leaves);
+                WHEN(ends || leaves) ended[found++] = PathEnd(path, hit, uint(met && ends), uint(same_hit || leaves));
                 goes_on = specular && !leaves;
                 WHEN(goes_on) meet_surface(path, hit, kind, pixel_key);
 #ifdef HAS_GRATING
@@ -459,7 +459,7 @@ void main()
             WHEN(pushes_path) STACKED(stack_size++) = pending_path;
 #endif
         }
-        for (int e = 0; e < found; ++e) add_end(ended[e].path, ended[e].met, ended[e].hit, ended[e].same_hit, pixel_key);
+        for (int e = 0; e < found; ++e) add_end(ended[e].path, ended[e].met != 0u, ended[e].hit, ended[e].same_hit != 0u, pixel_key);
     }
 #ifdef HALTS
     if (!loops_run()) atomicAdd(fallbacks[FELL_LOOPS], 1u);

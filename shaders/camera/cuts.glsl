@@ -111,7 +111,7 @@ float where_paths_diverge(CameraPath path, bool met, bool ends, Hit hit, out boo
             parted = goes ? parted : x;
         }
         if (i == 1) {
-            bisects = parts && path.planar_so_far && path.cuts < MAX_CUTS;
+            bisects = parts && path.planar_so_far != 0u && path.cuts < MAX_CUTS;
             WHEN(bisects && met && other.object == hit.object) {
                 // Two facets of one solid part in the edge where they meet: where both are as far.
                 vec3 position, direction;
@@ -131,7 +131,7 @@ float where_paths_diverge(CameraPath path, bool met, bool ends, Hit hit, out boo
         }
     }
     float at = cell_border(0.5 * (along + parted));
-    return parts && path.planar_so_far && path.cuts < MAX_CUTS && may_cut_at(path, at) ? at : -1.0;
+    return parts && path.planar_so_far != 0u && path.cuts < MAX_CUTS && may_cut_at(path, at) ? at : -1.0;
 }
 
 #endif

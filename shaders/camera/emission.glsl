@@ -96,7 +96,7 @@ void add_colour(CameraPath path, WavelengthInterval interval, uint row, vec3 col
 // Factor on every channel of light whose spectrum is no longer known: that of white light along the same path.
 void channel_factors(CameraPath path, WavelengthInterval interval, out vec4 factors[TARGETS])
 {
-    bool whole = interval.steps == 1 && !path.restricted;
+    bool whole = interval.steps == 1 && path.restricted == 0u;
     for (int t = 0; t < TARGETS; ++t) factors[t] = vec4(interval.through);
     WHEN(!whole) {
         COUNT_ROUNDS(interval.steps * TARGETS);

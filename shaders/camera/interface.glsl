@@ -19,7 +19,7 @@ PathFrame path_frame(CameraPath path, Hit hit, Triangle facet)
     frame.shading = shading_frame(hit, facet, path.direction);
 #ifdef SPECTRAL_SWEEP
     for (int end = 0; end < 2; ++end)
-        frame.end_normal[end] = normal_beside(frame.shading, path.restricted ? path.end_position[end] - path.position : vec3(0.0));
+        frame.end_normal[end] = normal_beside(frame.shading, path.restricted != 0u ? path.end_position[end] - path.position : vec3(0.0));
 #endif
 #ifdef NORMAL_DERIVATIVES
     for (int c = 0; c < COLUMNS_HELD; ++c) frame.columns[c] = normal_column(frame.shading, path.dposition[c]);
@@ -77,7 +77,7 @@ vec3 incidence_over_band(CameraPath path, PathFrame frame)
 {
     vec3 theta = vec3(dot(path.direction, frame.shading.normal));
 #ifdef SPECTRAL_SWEEP
-    if (path.restricted) {
+    if (path.restricted != 0u) {
         theta.x = dot(path.end_direction[0], frame.end_normal[0]);
         theta.z = dot(path.end_direction[1], frame.end_normal[1]);
         theta.xz = clamp(theta.xz, -1.0, -1e-6);

@@ -22,9 +22,9 @@ struct CameraPath {
     float branch_weight;  // throughput as far as branches are worth following
     uint key;                       // says which branch this is
     int depth;                      // surfaces met
-    bool restricted;  // stands for one band
-    bool recut;  // its band was cut before the surface ahead, and is not again
-    bool planar_so_far;  // its band's ends have kept to its own facets: it met flat ones only
+    uint restricted;  // 1: stands for one band
+    uint recut;  // 1: its band was cut before the surface ahead, and is not again
+    uint planar_so_far;  // 1: its band's ends have kept to its own facets: it met flat ones only
     int cuts;                       // of its band, where paths diverged
 #ifdef HAS_GRATING
     uint order;                     // of the grating ahead, the next to be followed; see camera/grating.glsl
@@ -101,7 +101,7 @@ float sample_side(CameraPath path)
 #elif defined(LISTS_SPECULAR)
     return p.sample_side * inversesqrt(float(p.primary_samples));
 #else
-    return path.restricted ? p.band_side : p.sample_side;
+    return path.restricted != 0u ? p.band_side : p.sample_side;
 #endif
 }
 
@@ -122,7 +122,7 @@ float quantile(vec2 brightness, float share)
 // From here on the path stands for one band only; all others have their turn in other samples.
 void restrict_to_band(inout CameraPath path, uint pixel_key)
 {
-    path.restricted = true;
+    path.restricted = 1u;
 #ifdef RANDOM_WAVELENGTH
     // One of the table's cells, by how bright it looks.
 #ifdef EVEN_WAVELENGTHS

@@ -19,7 +19,7 @@ void main()
     uint id = gl_GlobalInvocationID.x;
     if (id >= p.count) return;
     vec3 position = starts[id].position, direction = starts[id].direction;
-    RayOrigin origin = RayOrigin(NONE, NONE, false, p.inside_mask);
+    RayOrigin origin = RayOrigin(NONE, NONE, 0u, p.inside_mask);
     MediumStack medium = MediumStack(p.inside_mask, p.inside_object);
     PathEnd path;
     path.first_object = NONE;
@@ -51,7 +51,7 @@ void main()
 #ifdef HAS_MIRROR
         if (kind == KIND_MIRROR) {
             direction = turned.direction;
-            origin = RayOrigin(hit.primitive, hit.object, !entering, origin.inside_mask);
+            origin = RayOrigin(hit.primitive, hit.object, uint(!entering), origin.inside_mask);
             goes_on = true;
         }
 #endif
@@ -66,7 +66,7 @@ void main()
                 direction = total ? turned.direction : refracted.direction;
             }
             if (!total) medium = boundary.behind;
-            origin = RayOrigin(hit.primitive, hit.object, total ? !entering : entering, medium.mask);
+            origin = RayOrigin(hit.primitive, hit.object, uint(total ? !entering : entering), medium.mask);
             goes_on = true;
         }
 #endif
@@ -84,7 +84,7 @@ void main()
                 if (!sent.exists || order.efficiency <= strongest) continue;
                 strongest = order.efficiency;
                 direction = sent.direction;
-                origin = RayOrigin(hit.primitive, hit.object, dot(direction, hit.normal_g) < 0.0, origin.inside_mask);
+                origin = RayOrigin(hit.primitive, hit.object, uint(dot(direction, hit.normal_g) < 0.0), origin.inside_mask);
                 goes_on = true;
             }
         }

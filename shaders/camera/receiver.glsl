@@ -82,7 +82,7 @@ float unshadowed(uint light, SurfaceInteraction seen, uint pixel_key, out LightS
 
 bool hidden_from(LightSample s, SurfaceInteraction seen)
 {
-    RayOrigin origin = RayOrigin(seen.primitive, seen.object, dot(seen.direction, seen.normal_g) > 0.0, 0u);
+    RayOrigin origin = RayOrigin(seen.primitive, seen.object, uint(dot(seen.direction, seen.normal_g) > 0.0), 0u);
     // Up to the light, less a hair so that a surface the light lies on does not hide it.
     return intersect_any(seen.position, s.toward, s.distance * 0.99999, origin);
 }
@@ -140,20 +140,20 @@ Steady steady_lights(SurfaceInteraction seen, vec3 lo, vec3 hi, uint pixel_key)
     float share = clamp(dot(middle - lo, steady.along), 0.0, 1.0);
     for (uint i = 0u; i < uint(min(LIGHT_COUNT, STEADY_LIGHTS)); ++i) {
         float gains[3];
-        bool hidden[2];
+        uint hidden[2];
         LightSample s;
         gains[2] = unshadowed(i, seen, pixel_key, s);
         for (int end = 0; end < 2; ++end) {
             seen.position = end == 0 ? lo : hi;
             gains[end] = unshadowed(i, seen, pixel_key, s);
-            hidden[end] = false;
-            WHEN(gains[end] > 0.0) hidden[end] = hidden_from(s, seen);
+            hidden[end] = 0u;
+            WHEN(gains[end] > 0.0) hidden[end] = uint(hidden_from(s, seen));
         }
         seen.position = middle;
         bool straight = abs(gains[2] - mix(gains[0], gains[1], share)) <= STEADY_TOLERANCE * max(gains[0], gains[1]);
-        if (hidden[0] == hidden[1] && (straight || hidden[0])) steady.lights |= 1u << i;
-        steady.gains[2u * i] = hidden[0] ? 0.0 : gains[0];
-        steady.gains[2u * i + 1u] = hidden[1] ? 0.0 : gains[1];
+        if (hidden[0] == hidden[1] && (straight || hidden[0] != 0u)) steady.lights |= 1u << i;
+        steady.gains[2u * i] = hidden[0] != 0u ? 0.0 : gains[0];
+        steady.gains[2u * i + 1u] = hidden[1] != 0u ? 0.0 : gains[1];
     }
     return steady;
 }
@@ -240,7 +240,7 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval
     float scale = p.map_scale * INVERSE_PI;
 #ifdef MAP_BINS
     // The caustic's own dispersion meets the camera's: every spectral channel that the interval touches is read by itself.
-    WHEN(path.restricted) {
+    WHEN(path.restricted != 0u) {
         float x = 0.5 * (interval.lo + interval.hi);
         float first = spectral_row(uint(BIN_ROW), interval.lo), last = spectral_row(uint(BIN_ROW), interval.hi);
         int from = int(floor(first)), to = max(from, int(ceil(last)) - BIN_OVERLAP);
@@ -284,7 +284,7 @@ void add_caustic_at(CameraPath path, SurfaceInteraction seen, WavelengthInterval
         }
 #endif
     }
-    WHEN(!path.restricted)
+    WHEN(path.restricted == 0u)
 #endif
     {
         vec4 factors[TARGETS], values[MAP_TARGETS];

@@ -76,7 +76,7 @@ void add_lights(CameraPath path, float far)
     vec2 width = sample_width(path), sweep = vec2(0.0);
     int taps = 1;
 #ifdef SPECTRAL_SWEEP
-    if (path.restricted) {
+    if (path.restricted != 0u) {
         vec3 p_lo = path.end_position[0], d_lo = path.end_direction[0], p_hi = path.end_position[1], d_hi = path.end_direction[1];
         sweep = vec2(distance(p_lo, p_hi), distance(d_lo, d_hi));
         taps = taps_of(path, far);
@@ -158,7 +158,7 @@ void add_end(CameraPath path, bool met, Hit hit, bool same_hit, uint pixel_key)
 {
     int taps = 1;
 #ifdef SPECTRAL_SWEEP
-    if (path.restricted) taps = taps_of(path, met ? hit.distance : FAR_DISTANCE);
+    if (path.restricted != 0u) taps = taps_of(path, met ? hit.distance : FAR_DISTANCE);
 #ifndef HAS_ENVIRONMENT_MAP
     // The same all round.
     if (same_hit && !met) taps = 1;

@@ -72,7 +72,7 @@ Deflection diffract_at(ShadingFrame frame, vec3 direction, vec3 lines, float sid
         omega = sqrt(max(cosine2, 1e-12));
         turned = diffract_direction(direction, normal, theta, shift, omega, reflects);
         bool wrong = dot(turned, frame.normal_g) * (reflects ? 1.0 : -1.0) <= 0.0;
-        if (!frame.interpolated || !wrong || geometric) break;
+        if (frame.interpolated == 0u || !wrong || geometric) break;
         geometric = true;
         normal = frame.normal_g;
     }

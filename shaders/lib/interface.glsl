@@ -14,8 +14,8 @@
 struct ShadingFrame {
     vec3 normal;        // unit; decides where the ray goes
     vec3 normal_g;      // unit; the facet's, which judges
-    bool interpolated;  // `normal` differs from place to place
-    bool refused;       // the interpolated normal sees the ray from behind, and is not used
+    uint interpolated;  // 1: `normal` differs from place to place
+    uint refused;       // 1: the interpolated normal sees the ray from behind, and is not used
 #ifdef NORMAL_DERIVATIVES
     vec3 summed;        // interpolated normal before it is made a unit vector …
     vec3 gradient_u;    // … and its change over the facet: along dp by dot(gradient_u, dp) along_u + dot(gradient_v, dp) along_v
@@ -40,7 +40,7 @@ ShadingFrame shading_frame(Hit hit, Triangle facet, vec3 direction)
     ShadingFrame frame;
     bool entering = dot(direction, hit.normal_g) < 0.0;
     frame.normal = frame.normal_g = entering ? hit.normal_g : -hit.normal_g;
-    frame.interpolated = frame.refused = false;
+    frame.interpolated = frame.refused = 0u;
 #ifdef SMOOTH_NORMALS
     // Without a branch: some corners' normals where the facet has none. Software renderers execute both sides anyway.
     bool has_normals = (hit.primitive & PLANE_BIT) == 0u && facet.normals != NONE;
@@ -50,9 +50,9 @@ ShadingFrame shading_frame(Hit hit, Triangle facet, vec3 direction)
     vec3 summed = (1.0 - hit.bary.x - hit.bary.y) * n0 + hit.bary.x * n1 + hit.bary.y * n2;
     vec3 normal = normalize(summed);
     // NaN is refused too.
-    frame.interpolated = has_normals && dot(direction, normal) < -MIN_SHADING_COSINE;
-    frame.refused = has_normals && !frame.interpolated;
-    frame.normal = frame.interpolated ? normal : frame.normal_g;
+    frame.interpolated = uint(has_normals && dot(direction, normal) < -MIN_SHADING_COSINE);
+    frame.refused = uint(has_normals && frame.interpolated == 0u);
+    frame.normal = frame.interpolated != 0u ? normal : frame.normal_g;
 #ifdef NORMAL_DERIVATIVES
     frame.summed = summed;
     barycentric_gradients(facet.edge1, facet.edge2, frame.gradient_u, frame.gradient_v);
@@ -74,14 +74,14 @@ vec3 summed_change(ShadingFrame frame, vec3 along)
 vec3 normal_column(ShadingFrame frame, vec3 dposition)
 {
     vec3 dnormal = normalised_derivative(frame.summed, summed_change(frame, dposition));
-    return frame.interpolated ? dnormal : vec3(0.0);
+    return frame.interpolated != 0u ? dnormal : vec3(0.0);
 }
 
 // Shading normal at the place `off` beside the one that was hit.
 vec3 normal_beside(ShadingFrame frame, vec3 off)
 {
     vec3 summed = frame.summed + summed_change(frame, off);
-    return frame.interpolated ? summed * inversesqrt(max(dot(summed, summed), 1e-12)) : frame.normal;
+    return frame.interpolated != 0u ? summed * inversesqrt(max(dot(summed, summed), 1e-12)) : frame.normal;
 }
 #else
 #define normal_column(frame, dposition) vec3(0.0)

@@ -48,7 +48,7 @@ struct Hit {
 struct RayOrigin {
     uint primitive;   // facet it starts on, or NONE
     uint object;      // object of that facet
-    bool inside;      // it travels on that object's inner side
+    uint inside;      // 1: it travels on that object's inner side (no bool: see shaders/README.md)
     uint inside_mask; // solids of the medium stack it is inside of (see medium.glsl)
 };
 
@@ -57,7 +57,7 @@ bool accept_hit(float distance, float facing, uint object, RayOrigin origin)
     // facing = dot(direction, outward normal): < 0 enters. On the surface just left only the
     // opposite crossing can be true; another object may touch at distance 0.
     bool same = object == origin.object;
-    bool repeated = same && distance < NEAR_DISTANCE && (origin.inside == (facing < 0.0));
+    bool repeated = same && distance < NEAR_DISTANCE && ((origin.inside != 0u) == (facing < 0.0));
 #ifdef MEDIUM_STACK
     // Of two surfaces at one place both lie near for ever; the mask knows which was crossed already.
     if (!same && distance < NEAR_DISTANCE) {

@@ -28,8 +28,7 @@ layout(std430, binding = 2) readonly buffer Placements { Placement placements[];
 layout(std430, binding = 3) readonly buffer Receivers { Receiver receivers[]; };
 layout(std430, binding = 4) readonly buffer VarTables { float var_table[]; };
 layout(std430, binding = 5) readonly buffer Bands { vec4 table_bands[]; };  // x_lo, x_hi, mean place of the light in it (0..1), unused
-layout(std430, binding = 6) buffer Unusual { vec2 unusual_w[]; };  // x: centre in no window, y: drawn as one texel
-layout(std430, binding = 7) buffer Commands { uint draw_words[20]; uint count_dropped; };
+layout(std430, binding = 6) buffer Unusual { vec4 unusual[]; };  // of the photons of this thread: W with the centre in no window, W drawn as one texel, how many so
 
 #ifdef LOCAL_GAIN
 layout(std430, binding = 9) readonly buffer GainBoxes { GainBox gain_boxes[]; };
@@ -277,8 +276,7 @@ void main() {
         middle = vec3(0.0);
         sweep = vec3(0.0);
         f = footprint_in(place, photon, middle, sweep);
-        atomicAdd(count_dropped, 1u);
-        unusual_w[i].y += photon.flux_w;
+        unusual[i].yz += vec2(photon.flux_w, 1.0);
     }
 
     uint layer = table * uint(TARGETS);
@@ -327,6 +325,6 @@ void main() {
 #endif
 
     if (!inside) {
-        unusual_w[i].x += photon.flux_w;
+        unusual[i].x += photon.flux_w;
     }
 }

@@ -6,7 +6,7 @@ layout(local_size_x = WORKGROUP) in;
 const uint KINDS = 4u;
 
 layout(std430, binding = 1) readonly buffer Splats { SplatRecord splats[]; };
-layout(std430, binding = 7) buffer Commands { uint draw_words[20]; uint count_dropped; };
+layout(std430, binding = 7) buffer Commands { uint draw_words[20]; };
 layout(std430, binding = 8) writeonly buffer Lists { uint lists[]; };  // `capacity` a kind
 
 uniform uint slots;

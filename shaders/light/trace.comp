@@ -254,7 +254,7 @@ void send_on(inout RayRecord child, Deflection turned, vec3 share, inout Outcome
 void scatter(RayRecord ray, RayRecord start, Hit hit, ShadingFrame frame, uint kind, uint weight_row, uint slot, inout Outcome outcome)
 {
     bool entering = dot(ray.direction, hit.normal_g) < 0.0;
-    outcome.what |= frame.refused ? FELL_NORMAL : 0u;
+    outcome.what |= frame.refused != 0u ? FELL_NORMAL : 0u;
     if ((ray.light_and_source >> 16) == 0xffffu)
         ray.light_and_source = (ray.light_and_source & 0xffffu) | (hit.object << 16);
 
@@ -411,7 +411,7 @@ void main()
     RayRecord ray = load_ray(indices[k]), start = ray;
     Outcome outcome = Outcome(0u, 0.0, 0.0, 0.0);
 
-    RayOrigin origin = RayOrigin(ray.last_primitive, ray.last_object, (ray.flags & FLAG_INSIDE) != 0u, ray.inside_mask);
+    RayOrigin origin = RayOrigin(ray.last_primitive, ray.last_object, uint((ray.flags & FLAG_INSIDE) != 0u), ray.inside_mask);
     Hit hit;
     bool met = intersect_closest(ray.position, ray.direction, FAR_DISTANCE, origin, hit);
 #ifdef LOOPS_MAY_END

@@ -238,14 +238,14 @@ MUTANTS = {
     ),
     "flat normals": (
         "lib/interface.glsl",
-        "return frame.interpolated ? dnormal : vec3(0.0);",
+        "return frame.interpolated != 0u ? dnormal : vec3(0.0);",
         "return vec3(0.0);",
         "inner reflections",
     ),
     "normal not turned inside": (
         "lib/interface.glsl",
-        "return frame.interpolated ? dnormal",
-        "return frame.interpolated ? sign(dot(frame.summed, vec3(1.0))) * dnormal",
+        "return frame.interpolated != 0u ? dnormal",
+        "return frame.interpolated != 0u ? sign(dot(frame.summed, vec3(1.0))) * dnormal",
         "beam",
     ),
     "mirror forgets the normal": (

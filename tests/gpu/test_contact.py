@@ -139,8 +139,8 @@ def test_the_rules_of_contact_by_themselves(gl) -> None:
     body = """
     left_normal = vec3(0.0, 0.0, 1.0);
     sheet = accept_sheet(height / cosine, height, normal, kind, vec3(0.0)) ? 1u : 0u;
-    crossed_in = crossed_in_contact(height, -1.0, bit, RayOrigin(NONE, NONE, false, mask)) ? 1u : 0u;
-    crossed_out = crossed_in_contact(height, 1.0, bit, RayOrigin(NONE, NONE, false, mask)) ? 1u : 0u;
+    crossed_in = crossed_in_contact(height, -1.0, bit, RayOrigin(NONE, NONE, 0u, mask)) ? 1u : 0u;
+    crossed_out = crossed_in_contact(height, 1.0, bit, RayOrigin(NONE, NONE, 0u, mask)) ? 1u : 0u;
     comes = comes_first(key, cosine, first, other_key, second) ? 1u : 0u;
     """
     defines = {**bindings.SCENE_DEFINES, **texels.defines, "TRIANGLE_COUNT": 0, "SPECTRAL_SAMPLES": 2, "CONTACTS": 1}

@@ -39,7 +39,7 @@ def test_the_box_of_three_sides_has_their_covariance(gl) -> None:
 
 PATH = {"SPECTRAL_GROUPS": 0, "NONE": "0xffffffffu"}
 STANDALONE = """
-struct RayOrigin { uint primitive; uint object; bool inside; uint inside_mask; };
+struct RayOrigin { uint primitive; uint object; uint inside; uint inside_mask; };
 struct MediumStack { uint mask; uint object; };
 #define COLUMN_LIMIT 1e6
 struct CameraParameters { uint sample_index; uint draw_index; uint dithered; uint bands; };

@@ -24,7 +24,7 @@ COVERS = {
 }
 BODY = """
     Hit hit;
-    RayOrigin origin = RayOrigin(from, from_object, inside != 0u, 0u);
+    RayOrigin origin = RayOrigin(from, from_object, uint(inside != 0u), 0u);
     bool met = intersect_closest(o, d, FAR_DISTANCE, origin, hit);
     distance = met ? hit.distance : -1.0;
     slot = hit.primitive;

@@ -94,7 +94,7 @@ def test_frames_and_directions(gl, facets: Facets) -> None:
     body = """
     facing = frame.normal_g;
     shading = frame.normal;
-    is_ = (frame.interpolated ? 1u : 0u) + (frame.refused ? 2u : 0u);
+    is_ = frame.interpolated + 2u * frame.refused;
     Deflection back = reflect_at(frame, d), on = refract_at(frame, d, eta);
     mirrored = back.direction;
     bent = on.direction;

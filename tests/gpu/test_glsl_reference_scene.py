@@ -301,7 +301,7 @@ def test_which_hits_count(scene: Scene) -> None:
         for name, column in zip(("object", "from_object", "inside", "mask"), columns[2:], strict=True)
     }
     body = """
-    RayOrigin o = RayOrigin(NONE, from_object, inside != 0u, mask);
+    RayOrigin o = RayOrigin(NONE, from_object, uint(inside != 0u), mask);
     ok = accept_hit(distance, facing, object, o) ? 1u : 0u;
     key = crossing_key(distance, facing);
     """

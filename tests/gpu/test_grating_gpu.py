@@ -182,7 +182,7 @@ def test_water_shortens_waves(gl: Context) -> None:
 FUNCTIONS = """
     ShadingFrame frame;
     frame.normal = frame.normal_g = dot(d, n) < 0.0 ? n : -n;
-    frame.interpolated = frame.refused = false;
+    frame.interpolated = frame.refused = 0u;
     float side = dot(d, n) < 0.0 ? 1.0 : -1.0;
     Deflection turned = diffract_at(frame, d, l, side, step_, REFLECTS);
     out_d = turned.direction;

@@ -89,7 +89,7 @@ def soup_rays(count: int, seed: int) -> dict[str, np.ndarray]:
 
 CLOSEST = """
     Hit hit;
-    bool met = intersect_closest(o, d, FAR_DISTANCE, RayOrigin(NONE, NONE, false, 0u), hit);
+    bool met = intersect_closest(o, d, FAR_DISTANCE, RayOrigin(NONE, NONE, 0u, 0u), hit);
     distance = met ? hit.distance : -1.0;
     slot = hit.primitive;
 """
@@ -150,7 +150,7 @@ def test_an_image_and_a_texture_are_read_alike(gl) -> None:
 def test_anything_within_reach_is_what_the_nearest_says(gl) -> None:
     triangles = soup(2000, 0.1, 5)
     rays = soup_rays(3000, 6) | {"far": as_f32(np.random.default_rng(7).uniform(0, 2, 3000))}
-    body = CLOSEST + "any = intersect_any(o, d, far, RayOrigin(NONE, NONE, false, 0u)) ? 1u : 0u;"
+    body = CLOSEST + "any = intersect_any(o, d, far, RayOrigin(NONE, NONE, 0u, 0u)) ? 1u : 0u;"
     got = tree_of(gl, triangles).run(gl, body, rays, {"distance": "float", "slot": "uint", "any": "uint"})
     expected = (got["distance"] > 0) & (got["distance"] < rays["far"])
     np.testing.assert_array_equal(got["any"] == 1, expected)
@@ -168,7 +168,7 @@ def test_a_million_rays_stay_in_a_ball(gl, ball: np.ndarray) -> None:
     count = 250_000
     inputs = {"o": rng.uniform(-0.5, 0.5, (count, 3)), "d": unit(rng.normal(size=(count, 3)))}
     body = """
-    RayOrigin origin = RayOrigin(NONE, NONE, false, 0u);
+    RayOrigin origin = RayOrigin(NONE, NONE, 0u, 0u);
     for (int bounce = 0; bounce < 4 && lost == 0u; ++bounce) {
         Hit hit;
         if (intersect_closest(o, d, FAR_DISTANCE, origin, hit) && dot(hit.normal_g, d) > 0.0) {
@@ -176,7 +176,7 @@ def test_a_million_rays_stay_in_a_ball(gl, ball: np.ndarray) -> None:
             o = facet.vertex + hit.bary.x * facet.edge1 + hit.bary.y * facet.edge2;
             off = max(off, abs(length(o) - 1.0));
             d = normalize(d - 2.0 * dot(d, hit.normal_g) * hit.normal_g);
-            origin = RayOrigin(hit.primitive, hit.object, true, 0u);
+            origin = RayOrigin(hit.primitive, hit.object, 1u, 0u);
         } else {
             lost = 1u;
         }
@@ -239,7 +239,7 @@ def test_touching_boxes_are_left_and_entered_once_each(gl) -> None:
     upward = np.arange(count) % 2 == 0
     sign = np.where(upward, 1.0, -1.0)[:, None] * np.array([0.0, 0, 1]) + np.array([1.0, 1, 0])
     body = """
-    RayOrigin origin = RayOrigin(NONE, NONE, false, 0u);
+    RayOrigin origin = RayOrigin(NONE, NONE, 0u, 0u);
     Hit hit;
     while (crossings < 9u && intersect_closest(o, d, FAR_DISTANCE, origin, hit)) {
         bool entering = dot(d, hit.normal_g) < 0.0;
@@ -249,7 +249,7 @@ def test_touching_boxes_are_left_and_entered_once_each(gl) -> None:
         void_inside |= crossings < 3u && inside == 0u ? 1u : 0u;
         Triangle facet = triangle_at(hit.primitive);
         o = facet.vertex + hit.bary.x * facet.edge1 + hit.bary.y * facet.edge2;
-        origin = RayOrigin(hit.primitive, hit.object, entering, inside);
+        origin = RayOrigin(hit.primitive, hit.object, uint(entering), inside);
         ++crossings;
     }
     """

@@ -151,8 +151,8 @@ MUTANTS = {
     "bands that are not cut": (
         "eye-cut",
         "camera/camera.comp",
-        "bool may_cut = path.restricted",
-        "bool may_cut = false && path.restricted",
+        "bool may_cut = path.restricted != 0u",
+        "bool may_cut = false && path.restricted != 0u",
         "colour",
     ),
     "lamps as bright as they are where they only graze a sample": (

@@ -35,6 +35,7 @@ def full_view_model() -> ViewModel:
     """Something in every fact that the shell's panels show."""
     stats = LiveStats(
         renderer="llvmpipe",
+        device_advice="the processor draws although there is a GPU by AMD: unset LIBGL_ALWAYS_SOFTWARE",
         rays_traced=18_400_000,
         photons=12_345_678,
         photons_stored=1_000_000,

@@ -18,7 +18,7 @@ REAL_REQUIREMENTS = doctor.requirements
 
 class FakeContext:
     renderer, vendor, version = "NVIDIA H200", "NVIDIA Corporation", "4.6.0"
-    backend, is_software, limits = "egl", False, NEEDED
+    backend, is_software, limits, advice = "egl", False, NEEDED, ""
 
     def release(self) -> None:
         pass
@@ -78,6 +78,21 @@ def test_limit_too_small(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found("limit draw_buffers").found == "4 (needed 8)"
     assert not found("limit work_group_count").usable
     assert found("limit texture_px").usable
+
+
+def test_a_better_gpu_is_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(FakeContext, "advice", "the processor draws although there is a GPU by AMD: set A=1: now")
+    assert main(["doctor"]) == 0
+    out = capsys.readouterr().out
+    assert "--  better GPU" in out and "better GPU: set A=1: now" in out
+
+
+def test_limits_beyond_what_opengl_promises_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FakeContext, "limits", replace(NEEDED, vertex_storage_blocks=0))
+    assert "another GPU" in found("limit vertex_storage_blocks").remedy
+    assert found("limit of the brush").state == "optional"
+    monkeypatch.setattr(FakeContext, "limits", replace(NEEDED, storage_blocks=16))
+    assert all(check.name != "limit of the brush" for check in doctor.examine())
 
 
 def test_python_too_old(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,8 @@ from spectrasplat.base import paths
 from spectrasplat.bench.features.static_costs import RecordSizes, static_costs
 from spectrasplat.bench.features.symbol_proof import FEATURE_SYMBOLS, occurring, program_texts, prove
 from spectrasplat.gpu import records, shader
+from spectrasplat.gpu.limits import BRUSH_STORAGE_BLOCKS, NEEDED
+from spectrasplat.gpu.program_use import use_of
 from spectrasplat.gpu.scene_buffers import SCENE_STRUCTS
 from spectrasplat.gpu.texture_store import PICTURE
 from spectrasplat.model.features import Features, explain
@@ -344,3 +346,13 @@ def test_without_beams_photons_need_what_they_always_did(scene: str, anchored: b
     )
     assert replace(alone, beams=False) == replace(found, method="srd")
     assert scene != "prism" or alone.reindexed == anchored
+
+
+def test_storage_blocks_are_as_many_as_the_doctor_asks_for() -> None:
+    """Of the footprint's program, which has most: with the brush and without."""
+    brushed, plain = (
+        next(len(use_of(s).storage) for s in sources(features) if s.name == "light/footprint.comp")
+        for features in (EVERYTHING, replace(EVERYTHING, local_gain=False))
+    )
+    assert brushed == BRUSH_STORAGE_BLOCKS
+    assert plain == NEEDED.storage_blocks

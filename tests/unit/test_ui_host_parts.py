@@ -35,6 +35,16 @@ def test_the_engine_gets_what_the_rest_of_a_frame_leaves() -> None:
     assert pace.budget_s == pytest.approx(MIN_SHARE * SOFTWARE_FRAME_S)
 
 
+def test_the_first_picture_is_not_held_up_by_the_interface() -> None:
+    pace = Pace(is_software=True)
+    pace.note(0.02)
+    assert pace.first_budget_s > 3.0 * pace.budget_s
+    pace.frame_s = 0.2  # whoever wants longer frames keeps them
+    assert pace.first_budget_s == pace.budget_s
+    gpu = Pace(is_software=False)
+    assert gpu.first_budget_s == gpu.budget_s
+
+
 def test_a_gpu_keeps_to_the_screen() -> None:
     assert Pace(is_software=False, refresh_s=1 / 144).budget_s == pytest.approx(GPU_SHARE / 144)
 

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ...gpu.dead_code import words
-from ...gpu.shader import Source, recorded
+from ...gpu.shader import Source
+from ..programs import compiled_programs
 
 if TYPE_CHECKING:
     from ...gpu.context import Context
@@ -82,7 +83,6 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
 """By `explain`'s names. Names that only this feature uses; one with a space is a pattern for a line, where the camera,
 whose rays always carry a pixel's columns and weights over a band, uses a name that in the light pass belongs to a
 feature."""
-_PHOTONS = 4096
 
 
 @dataclass(frozen=True)
@@ -115,11 +115,7 @@ class Proof:
 
 def compiled_sources(context: Context, scene: Scene, settings: RenderSettings) -> list[Source]:
     """The source of every program that a rendering of `scene` builds, each once."""
-    from ...render.still import render
-
-    small = replace(settings, width=128, height=72, photons=_PHOTONS, spp=1, seconds=None)
-    with recorded() as sources:
-        render(scene, small, context=context)
+    sources = (stage for built in compiled_programs(context, scene, settings) for stage in built.stages)
     return list({(source.name, source.text): source for source in sources}.values())
 
 

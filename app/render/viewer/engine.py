@@ -415,6 +415,7 @@ class LiveEngine:
         common = LiveStats(
             renderer=context.renderer,
             is_software=context.is_software,
+            device_advice=context.advice,
             camera_samples=float(camera_pass.shown_samples),
             resolution_scale=camera_pass.scale,
             camera_bands=camera_pass.shown_bands,

@@ -11,6 +11,8 @@ class LiveStats:
 
     renderer: str = ""
     is_software: bool = True
+    device_advice: str = ""
+    """How to choose a better GPU, where one may be there."""
     rays_traced: int = 0
     """Rays emitted since the engine was made. Does not move when photons are only splatted again."""
     photons: int = 0

@@ -233,6 +233,9 @@ def _numbers(state: State, stats: LiveStats) -> None:
     if stats.renderer:
         widgets.hint(stats.renderer + (" (software)" if stats.is_software else ""))
         widgets.tooltip("What draws: the graphics driver's name.")
+    if stats.device_advice:
+        widgets.hint("A better GPU may be there.")
+        widgets.tooltip(f"{stats.device_advice[:1].upper()}{stats.device_advice[1:]}.")
 
 
 def _samples(stats: LiveStats) -> str:

@@ -1,0 +1,80 @@
+"""What each program of a scene asks of the device, for `inspect --programs`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..gpu.limits import NEEDED
+from ..gpu.program_use import StageUse, uses
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from ..gpu.shader import Built
+    from ..model.scene import Scene
+
+HEADINGS = ("program", "lines", "kB", "storage blocks", "uniform blocks", "textures", "images", "shared B", "driver s")
+"""Of a table of programs; numbers but for the first."""
+
+
+@dataclass(frozen=True)
+class ProgramRow:
+    """One shader of one program."""
+
+    use: StageUse
+    seconds: float | None
+    """The driver's, of the whole program; None for a program's further stages."""
+
+    def cells(self) -> tuple[str, ...]:
+        """In the order of `HEADINGS`."""
+        use = self.use
+        return (
+            use.name,
+            f"{use.lines:,}",
+            f"{use.bytes / 1000:.1f}",
+            str(len(use.storage)),
+            str(len(use.uniform)),
+            str(use.textures),
+            str(use.images),
+            f"{use.shared_bytes:,}",
+            "" if self.seconds is None else f"{self.seconds:.2f}",
+        )
+
+
+def program_rows(programs: Sequence[Built]) -> list[ProgramRow]:
+    """The largest programs first, each with its stages together."""
+    largest = sorted(programs, key=lambda built: -sum(map(len, built.texts)))
+    return [ProgramRow(use, None if at else built.seconds) for built in largest for at, use in enumerate(uses(built))]
+
+
+def beyond_promises(programs: Sequence[Built]) -> list[str]:
+    """A sentence for each limit that a program needs beyond what is asked of a driver."""
+    return [sentence for built in programs for use in uses(built) for sentence in use.over(NEEDED)]
+
+
+def programs_text(scene: Scene) -> RenderableType:
+    """The table of all programs that a small rendering of `scene` builds. Raises `UserError` without OpenGL."""
+    from rich.console import Group
+    from rich.table import Table
+
+    from ..bench.programs import compiled_programs
+    from ..gpu.context import create_context
+    from ..model.settings import RenderSettings
+
+    with create_context() as context:
+        programs = compiled_programs(context, scene, RenderSettings(max_depth=scene.render.max_depth))
+        renderer = context.renderer
+    table = Table(title=f"Programs, as compiled by {renderer}", title_justify="left")
+    for at, heading in enumerate(HEADINGS):
+        table.add_column(heading, justify="right" if at else "left", overflow="fold")
+    for row in program_rows(programs):
+        table.add_row(*row.cells())
+    seconds = sum(built.seconds for built in programs)
+    return Group(
+        table,
+        f"{len(programs)} programs, {seconds:.1f} s in the driver; some drivers compile the rest when a program first "
+        "runs.",
+        *beyond_promises(programs),
+    )

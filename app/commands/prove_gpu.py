@@ -1,0 +1,300 @@
+"""The prove-gpu command: everything that must be known of a device that was never seen before, within ten minutes, as
+one JSON and one HTML file.
+
+Each part runs in a process of its own, so that a driver which crashes or hangs ends that part alone; what is found is
+kept as it is found.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+import typer
+
+from .. import __version__
+from ..base.errors import UserError, plain
+from .proof_steps import PARTS, Finding, Part
+
+JSON, HTML = "proof.json", "proof.html"
+WHOLE_S = 600.0
+"""No part is begun, and none goes on, after this."""
+FIRST_CODE = 10
+"""Exit code where the first part is the first that is broken; the second has one more, and so on."""
+_LOOK_EVERY_S = 0.2
+
+State = Literal["holds", "broken", "crashed", "too slow", "stopped", "not begun"]
+
+
+class PartResult(msgspec.Struct):
+    """What one part found."""
+
+    key: str
+    title: str
+    state: State = "not begun"
+    seconds: float = 0.0
+    findings: list[Finding] = []
+    detail: str = ""
+    """The end of what the process wrote to stderr, where it did not end well."""
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether something is to be mended."""
+        return self.state in ("broken", "crashed", "too slow")
+
+
+class Proof(msgspec.Struct):
+    """One run."""
+
+    version: str
+    date: str
+    short: bool
+    parts: list[PartResult]
+    seconds: float = 0.0
+
+    @property
+    def machine(self) -> dict[str, str]:
+        """What the doctor told of it."""
+        told = {f.name: f.value for part in self.parts if part.key == "doctor" for f in part.findings}
+        return {name.removeprefix("machine "): value for name, value in told.items() if name.startswith("machine ")}
+
+    @property
+    def is_software(self) -> bool:
+        """Whether the processor draws."""
+        return any(f.name == "is software" and f.value == "yes" for part in self.parts for f in part.findings)
+
+    @property
+    def exit_code(self) -> int:
+        """0 where everything holds; else which part is the first that does not; 130 where it was stopped before."""
+        for at, part in enumerate(self.parts):
+            if part.is_wrong:
+                return FIRST_CODE + at
+        return 0 if all(part.state == "holds" for part in self.parts) else 130
+
+
+def prove_gpu(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help=f"Folder for {JSON}, {HTML} and the bench's report.")
+    ],
+    short: Annotated[
+        bool,
+        typer.Option("--short", help="Smaller pictures and fewer scenes, as on a software renderer in any case."),
+    ] = False,
+    parts: Annotated[
+        str | None,
+        typer.Option(metavar="A,B", help=f"Only these parts beside doctor: {', '.join(p.key for p in PARTS[1:])}."),
+    ] = None,
+) -> None:
+    """Prove that this machine's GPU draws what it should, and measure how fast; exits with 10 and up where not."""
+    from ..base.progress import ProgressReporter
+
+    chosen = chosen_parts(parts)
+    _prepare(output)
+    started = time.monotonic()
+    proof = Proof(
+        __version__,
+        datetime.now(UTC).isoformat(timespec="seconds"),
+        short,
+        [PartResult(part.key, part.title) for part in chosen],
+    )
+    with ProgressReporter("proof") as progress:
+        try:
+            _run_all(proof, chosen, output, progress, started)
+        except KeyboardInterrupt:
+            print("spectrasplat: stopped; what was found is kept", file=sys.stderr)
+    proof.seconds = time.monotonic() - started
+    _keep(proof, output)
+    print(summary(proof))
+    print((output / HTML).resolve())
+    raise typer.Exit(proof.exit_code)
+
+
+def chosen_parts(names: str | None) -> list[Part]:
+    """The parts called so, separated by commas, in their own order, the doctor always; None: all."""
+    if names is None:
+        return list(PARTS)
+    wanted = {name.strip() for name in names.split(",") if name.strip()}
+    known = {part.key for part in PARTS}
+    if unknown := sorted(wanted - known):
+        raise UserError(f"--parts '{unknown[0]}' is no part of the proof: choose among {', '.join(known)}")
+    return [part for part in PARTS if part.key in wanted | {"doctor"}]
+
+
+def summary(proof: Proof) -> str:
+    """A line for each part, what is wrong below it."""
+    lines = []
+    for part in proof.parts:
+        lines.append(f"{part.state:<10} {part.title} ({part.seconds:.0f} s)")
+        lines += [f"           {f.name}: {plain(f.value)}" for f in part.findings if f.broken]
+        lines += [f"           {plain(part.detail)[-300:]}"] if part.is_wrong and part.detail else []
+    return "\n".join(lines)
+
+
+# -- running ------------------------------------------------------------------------------
+
+
+def _run_all(
+    proof: Proof, parts: Sequence[Part], folder: Path, progress: Callable[[float, str], None], started: float
+) -> None:
+    done_s = 0.0
+    for part, result in zip(parts, proof.parts, strict=True):
+        form = 1 if proof.short else 0
+        weights = [p.seconds[form] for p in parts]
+        all_s, own_s = sum(weights), part.seconds[form]
+
+        def tell(
+            share: float, before: float = done_s, own: float = own_s, all_s: float = all_s, name: str = part.title
+        ) -> None:
+            progress((before + own * share) / all_s, name)
+
+        left = WHOLE_S - (time.monotonic() - started)
+        if left <= 0.0:
+            return
+        tell(0.0)
+        try:
+            _run(part, result, _Run(proof.short, folder, part.limit_s[form], left, tell))
+        finally:
+            _keep(proof, folder)
+        done_s += own_s
+        if part.key == "doctor":
+            if result.is_wrong:  # nothing else can run
+                return
+            proof.short |= proof.is_software
+            done_s = part.seconds[1 if proof.short else 0]
+
+
+@dataclass(frozen=True)
+class _Run:
+    """How a part is run."""
+
+    short: bool
+    folder: Path
+    limit_s: float
+    """The part's own; beyond it something is wrong."""
+    left_s: float
+    """Of the whole."""
+    tell: Callable[[float], None]
+
+
+def command_of(part: Part, short: bool, findings: Path, folder: Path) -> list[str]:
+    """The command line that runs a part alone."""
+    command = [sys.executable, "-P", "-m", "spectrasplat.commands.proof_steps", part.key]
+    return [*command, "short" if short else "full", str(findings), str(folder)]
+
+
+def _run(part: Part, result: PartResult, how: _Run) -> None:
+    """Run one part in a process of its own and take in what it finds. Ctrl-C ends the process, and goes on."""
+    started = time.monotonic()
+    with tempfile.TemporaryDirectory() as scratch:
+        file, errors = Path(scratch) / "findings", Path(scratch) / "stderr"
+        with errors.open("wb") as stderr:
+            process = subprocess.Popen(
+                command_of(part, how.short, file, how.folder),
+                stdin=subprocess.DEVNULL,
+                stdout=stderr,
+                stderr=stderr,
+                start_new_session=True,
+            )
+            try:
+                result.state = _watched(process, file, result, how, started)
+            except BaseException:
+                result.state = "stopped"
+                raise
+            finally:
+                _end(process)
+                _take_in(file, result)
+                result.seconds = time.monotonic() - started
+                if result.state in ("crashed", "too slow"):
+                    result.detail += " " + errors.read_text(encoding="utf-8", errors="replace")[-3000:].strip()
+
+
+def _watched(process: subprocess.Popen, file: Path, result: PartResult, how: _Run, started: float) -> State:
+    while (code := process.poll()) is None:
+        if time.monotonic() - started > how.limit_s:
+            result.detail = f"not done after {how.limit_s:.0f} s."
+            return "too slow"
+        if time.monotonic() - started > how.left_s:
+            result.detail = f"the proof's {WHOLE_S:.0f} s were over."
+            return "stopped"
+        time.sleep(_LOOK_EVERY_S)
+        how.tell(_take_in(file, result))
+    _take_in(file, result)
+    if code < 0:
+        result.detail = f"ended by {signal.Signals(-code).name}."
+    elif code:
+        result.detail = f"ended with {code}."
+    if code:
+        return "crashed"
+    return "broken" if any(finding.broken for finding in result.findings) else "holds"
+
+
+def _take_in(file: Path, result: PartResult) -> float:
+    """What the process has written so far; returns the share done."""
+    try:
+        written = file.read_bytes()
+    except OSError:
+        return 0.0
+    whole = written[: written.rfind(b"\n") + 1].splitlines()
+    found = [msgspec.json.decode(line, type=Finding) for line in whole]
+    result.findings = [finding for finding in found if finding.done is None]
+    return max((finding.done for finding in found if finding.done is not None), default=0.0)
+
+
+def _end(process: subprocess.Popen) -> None:
+    """End a process that we started, and what it started."""
+    if process.poll() is not None:
+        return
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        try:
+            os.killpg(process.pid, number)
+            process.wait(5.0)
+        except subprocess.TimeoutExpired:
+            continue
+        except ProcessLookupError:
+            pass
+        return
+
+
+# -- what is kept -------------------------------------------------------------------------
+
+
+def _prepare(folder: Path) -> None:
+    """Make the folder, and refuse now what could not be written in minutes."""
+    from ..base.atomic import check_writable
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(
+            f"cannot make the folder {folder}: {error.strerror or error}; give another one with -o"
+        ) from error
+    for name in (JSON, HTML):
+        check_writable(folder / name)
+
+
+def _keep(proof: Proof, folder: Path) -> None:
+    """Both files, each whole or not at all."""
+    from ..base.atomic import atomic_output
+    from ..bench.report.page import Table, render
+
+    with atomic_output(folder / JSON) as temporary:
+        temporary.write_bytes(msgspec.json.format(msgspec.json.encode(proof), indent=1))
+    tables = {
+        (part.key, at): Table(finding.rows[0], finding.rows[1:])
+        for part in proof.parts
+        for at, finding in enumerate(part.findings)
+        if finding.rows
+    }
+    page = render("proof.html", proof=proof, tables=tables, wrong=[p.title for p in proof.parts if p.is_wrong])
+    with atomic_output(folder / HTML) as temporary:
+        temporary.write_text(page, encoding="utf-8")

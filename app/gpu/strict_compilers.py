@@ -1,0 +1,92 @@
+"""Programs before compilers that forgive nothing: Khronos' reference front end and the validator of its SPIR-V.
+
+Drivers are lenient in different places; what both of these accept is GLSL by the book. They are programs of their own
+(Debian: glslang-tools, spirv-tools), so a machine may lack them.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+from ..base.errors import UserError
+from .shader import Built
+
+FRONT_END, VALIDATOR = "glslangValidator", "spirv-val"
+APT_LINE = "apt-get install glslang-tools spirv-tools"
+PATIENCE_S = 60.0
+_REFLECTION = "Uniform block reflection:"
+_UNKNOWN = "0:"
+
+
+def missing() -> str:
+    """A sentence that names what is not installed and how to get it; "" where all is there."""
+    absent = [tool for tool in (FRONT_END, VALIDATOR) if shutil.which(tool) is None]
+    return f"{' and '.join(absent)} not installed: run '{APT_LINE}' as root" if absent else ""
+
+
+def complaints(built: Built) -> list[str]:
+    """What the two say against a program, with files and lines; empty where they accept it.
+
+    Raises `UserError` where they are not installed or hang."""
+    with tempfile.TemporaryDirectory() as folder:
+        files = _written(built, Path(folder))
+        said = [*_run(FRONT_END, "-l", *files)]
+        if said:  # what does not compile need not be translated
+            return [_located(built, line) for line in said]
+        for file in files:
+            said += _run(FRONT_END, "-G", "--auto-map-locations", "-o", f"{file}.spv", file)
+            said += _run(VALIDATOR, "--target-env", "opengl4.5", f"{file}.spv")
+    return [_located(built, line) for line in said]
+
+
+def blocks(built: Built) -> set[str]:
+    """Names of the uniform and storage blocks that the front end finds in use, all stages together."""
+    with tempfile.TemporaryDirectory() as folder:
+        told = _output(FRONT_END, "-q", "-l", *_written(built, Path(folder)))[1]
+    _, _, after = told.partition(_REFLECTION)
+    return {line.partition(":")[0] for line in after.strip().split("\n\n")[0].splitlines() if ": offset" in line}
+
+
+def _written(built: Built, folder: Path) -> list[str]:
+    files = []
+    for stage in built.stages:
+        file = folder / stage.name.replace("/", "_")
+        file.write_text(stage.text, encoding="utf-8")
+        files.append(str(file))
+    return files
+
+
+def _run(*command: str) -> list[str]:
+    """The lines of a tool's complaint; none where it has none."""
+    code, told = _output(*command)
+    lines = [line for line in told.splitlines() if re.search(r"\b(?:error|warning)\b", line, re.IGNORECASE)]
+    return lines or ([f"{command[0]} ended with {code}: {told.strip()[-300:]}"] if code else [])
+
+
+def _output(*command: str) -> tuple[int, str]:
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=PATIENCE_S, check=False, stdin=subprocess.DEVNULL
+        )
+    except OSError as error:
+        raise UserError(f"{command[0]} cannot be run ({error.strerror or error}): run '{APT_LINE}' as root") from error
+    except subprocess.TimeoutExpired as error:
+        raise UserError(f"{command[0]} did not answer within {PATIENCE_S:.0f} s") from error
+    return done.returncode, done.stdout + done.stderr
+
+
+def _located(built: Built, line: str) -> str:
+    """A complaint with the file and line that people wrote, where it names a line."""
+    found = re.match(r"(ERROR|WARNING): (?:(\S+):)?(\d+):(.*)", line)
+    if found is None:
+        return f"{built.name}: {line.strip()}"
+    kind, file, number, words = found.groups()
+    # Of several stages the message says which by its file's name; linking names none.
+    stage = next((s for s in built.stages if file and file.endswith(s.name.replace("/", "_"))), built.stages[0])
+    at = int(number)
+    place = "{}:{}".format(*stage.origin[at - 1]) if 1 <= at <= len(stage.origin) else stage.name
+    return f"{place}: {kind.lower()}: {words.strip()}"
