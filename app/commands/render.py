@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..base.errors import UserError, plain
 from ..base.interrupts import interrupt_flag
@@ -15,6 +15,9 @@ from ..base.memory import check_picture_memory
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from . import options
+
+if TYPE_CHECKING:
+    from ..edit.opening import Opening
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,7 @@ class RenderRequest:
     camera: str | None = None
     batch: str | None = None
     stats: bool = False
+    opening: Opening | None = None
 
 
 def render_command(request: RenderRequest) -> int:
@@ -54,9 +58,7 @@ def render_command(request: RenderRequest) -> int:
         raise UserError(f"cannot write {request.output}: it is the scene itself; choose another name")
     check_writable(request.output)
 
-    from ..model.io.scene_file import load_scene
-
-    scene = load_scene(scene_file)
+    scene = options.open_scene(request.scene, request.opening)
     settings = _complete(asked, scene, request.stats)
     # Before the work: who waits for minutes should know what was assumed, and also if it fails.
     for note in (*scene.notes, *_unused_options(request)):

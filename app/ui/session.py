@@ -16,9 +16,11 @@ from typing import TYPE_CHECKING
 from ..base.errors import UserError
 from ..edit.autosave import Autosave, Recovery, recoveries
 from ..edit.document import Document
+from ..edit.opening import Opening
 from ..edit.preferences import Settings, config_dir, load_settings, save_settings
 from ..edit.state import Selection, State
 from ..gpu.shader_watch import ShaderWatch
+from ..model.staging import Staging
 from ..render.notices import loss_notices
 from .background_jobs import BackgroundJobs
 from .crash_log import write_crash
@@ -52,10 +54,11 @@ class Session:
         path: Path | None = None,
         make_engine: Callable[[Context], LiveEngine] | None = None,
         clock: Callable[[], float] = time.monotonic,
+        opening: Opening | None = None,
     ) -> None:
         self.context = context
-        self.document = Document.new() if path is None else Document.open(path)
         self.settings, notice = load_settings()
+        self.document = Document.new() if path is None else Document.open(path, opening or self.opening_of(path))
         self.messages = MessageBox(clock)
         self._told_losses: tuple[str, ...] = ()
         self.autosave = Autosave(config_dir())
@@ -140,6 +143,10 @@ class Session:
         )
 
     # What requests use
+
+    def opening_of(self, path: Path) -> Opening:
+        """What the user said before of the file at `path`."""
+        return Opening(Staging(up=self.settings.up_of(path)))
 
     def show_scene(self, scene: Scene) -> None:
         """Another scene of the same document, as after undo; what was selected stays if it is still there."""

@@ -21,6 +21,7 @@ from .panels import (
     inspector,
     menu,
     messages,
+    opened_card,
     outliner,
     spectrum,
     start_page,
@@ -111,9 +112,12 @@ def _draw_picture(state: State, view_model: ViewModel) -> State:
     imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(0, 0))
     shown, _ = imgui.begin(layout.VIEWPORT, None, flags)
     imgui.pop_style_var()
+    corner, size = imgui.get_window_pos(), imgui.get_window_size()
     if shown:
         state = draw_viewport(state, view_model)
     imgui.end()
+    if shown:
+        state = opened_card.draw_opened_card(state, view_model, corner.x + 0.5 * size.x, corner.y)
     return state
 
 

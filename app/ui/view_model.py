@@ -9,6 +9,7 @@ import numpy as np
 
 from ..edit.history import HistoryEntry
 from ..model.scene import Vec3
+from ..model.staging import UpAxis
 from ..passes.ray_line import RayLine
 from ..render.viewer.stats import LiveStats
 
@@ -91,6 +92,8 @@ class ViewModel:
     title: str = "untitled"
     path: Path | None = None
     unsaved: bool = False
+    up: UpAxis | None = None
+    """The axis taken to be up of a file that was just opened and may lie on its side."""
     undo: str | None = None
     """Label of what undo would take back."""
     redo: str | None = None

@@ -21,6 +21,7 @@ def view_model_of(session: Session) -> ViewModel:
         title=document.title,
         path=document.path,
         unsaved=document.unsaved,
+        up=document.up,
         undo=document.history.undo_label,
         redo=document.history.redo_label,
         history=document.history.entries,
