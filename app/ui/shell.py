@@ -117,7 +117,7 @@ def _draw_picture(state: State, view_model: ViewModel) -> State:
         state = draw_viewport(state, view_model)
     imgui.end()
     if shown:
-        state = opened_card.draw_opened_card(state, view_model, corner.x + 0.5 * size.x, corner.y)
+        state = opened_card.draw_opened_card(state, view_model, corner.x + 0.5 * size.x, corner.y + size.y)
     return state
 
 

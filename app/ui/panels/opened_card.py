@@ -21,8 +21,7 @@ _FLAGS = (
     | imgui.WindowFlags_.no_docking
     | imgui.WindowFlags_.no_move
 )
-_TOP_EM = 4.5
-"""Below the viewport's own tools."""
+_BORDER_EM = 0.8
 _WIDTH_EM = 26.0
 _MOST_PARTS = 12
 
@@ -30,8 +29,8 @@ _memory = {"closed": "", "part": "0", "glass": DEFAULT_GLASS}
 """The file whose questions were closed, and what was last chosen: memory of the interface."""
 
 
-def draw_opened_card(state: State, view_model: ViewModel, middle_x: float, top: float) -> State:
-    """The questions of this file on the picture, whose upper border has its middle at `middle_x`, `top`; nothing where
+def draw_opened_card(state: State, view_model: ViewModel, middle_x: float, bottom: float) -> State:
+    """The questions of this file on the picture, whose lower border has its middle at `middle_x`, `bottom`; nothing where
     there are none or they were closed."""
     parts = [item.name for item in state.scene.objects]
     nothing_is_glass = bool(parts) and not any(item.material.transmits for item in state.scene.objects)
@@ -40,7 +39,7 @@ def draw_opened_card(state: State, view_model: ViewModel, middle_x: float, top: 
     if _memory["closed"] == view_model.title:
         return state
     imgui.set_next_window_size((theme.em(_WIDTH_EM), 0.0))
-    imgui.set_next_window_pos((middle_x, top + theme.em(_TOP_EM)), imgui.Cond_.always, imgui.ImVec2(0.5, 0.0))
+    imgui.set_next_window_pos((middle_x, bottom - theme.em(_BORDER_EM)), imgui.Cond_.always, imgui.ImVec2(0.5, 1.0))
     imgui.push_style_color(imgui.Col_.window_bg, (*theme.palette().raised[:3], 0.94))
     imgui.begin("##opened", None, _FLAGS)
     item_rects.note("Window: opened")
