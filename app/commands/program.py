@@ -152,7 +152,9 @@ def render(
     photons: Annotated[
         Text, typer.Option(metavar="N", help="Photons to emit, for example 4M; default: the scene's.")
     ] = None,
-    seconds: Annotated[Text, typer.Option(metavar="S", help="Emit photons for this long instead.")] = None,
+    seconds: Annotated[
+        Text, typer.Option(metavar="S", help="Seconds that the picture may take in all, instead.")
+    ] = None,
     seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
     method: MethodOption = None,
     camera_method: CameraMethodOption = None,

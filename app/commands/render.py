@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,6 +46,7 @@ class RenderRequest:
 
 def render_command(request: RenderRequest) -> int:
     """Render to a file; returns the exit code. Raises `UserError`."""
+    begun = time.perf_counter()
     from ..base.atomic import check_writable
     from ..base.image_io import check_suffix, write_image
     from ..base.progress import ProgressReporter
@@ -67,7 +69,7 @@ def render_command(request: RenderRequest) -> int:
     from ..render.still import render
 
     with interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
-        result = render(scene, settings, progress=progress, cancelled=interrupted)
+        result = render(scene, settings, progress=progress, cancelled=interrupted, begun=begun)
         stopped = interrupted()
     for notice in result.stats.notices:
         print(f"note: {plain(notice)}", file=sys.stderr)

@@ -30,7 +30,7 @@ _memory = {"closed": "", "part": "0", "glass": DEFAULT_GLASS}
 
 
 def draw_opened_card(state: State, view_model: ViewModel, middle_x: float, bottom: float) -> State:
-    """The questions of this file on the picture, whose lower border has its middle at `middle_x`, `bottom`; nothing where
+    """This file's questions on the picture, whose lower border has its middle at `middle_x`, `bottom`; nothing where
     there are none or they were closed."""
     parts = [item.name for item in state.scene.objects]
     nothing_is_glass = bool(parts) and not any(item.material.transmits for item in state.scene.objects)
