@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from ..edit.opening import Opening
 
 
+AROUND_S = 0.5
+"""What a process takes to start, to write its picture and to end: --seconds holds that too."""
+
+
 @dataclass(frozen=True)
 class RenderRequest:
     """The render command's options as typed; None where the user said nothing."""
@@ -46,7 +50,7 @@ class RenderRequest:
 
 def render_command(request: RenderRequest) -> int:
     """Render to a file; returns the exit code. Raises `UserError`."""
-    begun = time.perf_counter()
+    begun = time.perf_counter() - AROUND_S
     from ..base.atomic import check_writable
     from ..base.image_io import check_suffix, write_image
     from ..base.progress import ProgressReporter

@@ -31,7 +31,13 @@ class CursorInfo:
     spectrum_nm: np.ndarray | None = None
     """Bin centres, when a spectrum was asked for (`Panels.spectrum`)."""
     spectrum: np.ndarray | None = None
-    """Shape of the caustic's spectrum there: irradiance of each bin over that of the brightest."""
+    """Spectral irradiance there, W/(unit² nm), mean of each bin: caustic, and direct light where that is known."""
+    spectrum_error: float = 0.0
+    """Standard error of a bin of the caustic, relative."""
+    too_few_photons: bool = False
+    """Of the caustic only that it is there is known: `spectrum` lacks it."""
+    direct_illuminance: float | None = None
+    """Of `spectrum`, lm/unit² that came straight from lights; None where that is not known, and lacks."""
     magnified: int | None = None
     """Texture id of the magnifier's picture."""
 
