@@ -79,7 +79,11 @@ class Cursor:
         self._spectrum_s = now_s
         # An answer that is still awaited is asked for again.
         self._spectrum_key = key if gains is not None or self._direct.is_hopeless else ()
-        if found is not None:
+        is_awaited = gains is None and not self._direct.is_hopeless
+        if is_awaited and before is not None and before.spectrum is not None:
+            # The answer before stays until the next is whole: no flicker while the cursor moves.
+            self.view_model = replace(self.view_model, **{name: getattr(before, name) for name in _SPECTRUM_FIELDS})
+        elif found is not None:
             self.view_model = replace(self.view_model, **_told(found, scene.lights, gains))
 
     def release(self) -> None:

@@ -102,8 +102,10 @@ def caustic_spectrum(
     photons' `flux_w` is power times. `traced`, `shown`: each light's spectrum then and now.
     """
     found = None
+    flux, distance = _around(photons, receiver, position, 4.0 * radius, traced, shown)
     for reach in (radius, 2.0 * radius, 4.0 * radius):
-        sums = _binned(photons, receiver, position, reach, traced, shown)
+        counted = flux * (distance <= reach)
+        sums = np.stack([counted.sum(axis=0), (counted**2).sum(axis=0)])
         area = math.pi * reach**2 * max(weight, 1e-300)
         for bins in (FINEST_BINS, FINEST_BINS // 2, FINEST_BINS // 4):
             merged = sums.reshape(2, bins, -1).sum(axis=2)
@@ -118,31 +120,28 @@ def caustic_spectrum(
     return found or CausticSpectrum(centres, np.zeros(len(centres)), 0.0)
 
 
-def _binned(
+def _around(
     photons: StoredPhotons,
     receiver: int,
     position: np.ndarray,
     radius: float,
     traced: Sequence[Spectrum],
     shown: Sequence[Spectrum],
-) -> np.ndarray:
-    """Flux of the finest bins within `radius`, and the sum of its photons' squares: (2, FINEST_BINS)."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Photons that come within `radius`: flux in each of the finest bins and how far off, (n, FINEST_BINS) each."""
     edges = np.linspace(380.0, 780.0, FINEST_BINS + 1)
     centres = 0.5 * (edges[:-1] + edges[1:])
     mine = np.flatnonzero(photons.receiver == receiver)
-    if not len(mine):
-        return np.zeros((2, FINEST_BINS))
     ends = np.array([380.0, 780.0])
     reach = (
         np.linalg.norm(np.diff(photons.chosen(mine).landing(ends), axis=1)[:, 0], axis=1)
-        if photons.variables
+        if photons.variables and len(mine)
         else np.zeros(len(mine))
     )
     near = mine[np.linalg.norm(photons.position[mine] - position, axis=1) <= radius + reach]
     if not len(near):
-        return np.zeros((2, FINEST_BINS))
-    places = photons.chosen(near).landing(centres)
-    inside = np.linalg.norm(places - position, axis=2) <= radius
+        return np.zeros((0, FINEST_BINS)), np.zeros((0, FINEST_BINS))
+    distance = np.linalg.norm(photons.chosen(near).landing(centres) - position, axis=2)
     low, high = photons.band_nm.min(axis=1)[near, None], photons.band_nm.max(axis=1)[near, None]
     # Share of each bin that the photon's band covers; a band narrower than a bin stands for a line.
     covered = np.clip(np.minimum(high, edges[1:]) - np.maximum(low, edges[:-1]), 0.0, None) / (edges[1] - edges[0])
@@ -153,8 +152,7 @@ def _binned(
     brighter = np.array([_ratio(now.power_w(), then.power_w()) for now, then in zip(shown, traced, strict=True)])
     in_band = np.maximum((covered * before).sum(axis=1, keepdims=True), 1e-300)
     share = np.where(lines[:, None], covered * brighter[light, None], covered * now / in_band)
-    flux = photons.flux_w[near, None] * share * inside
-    return np.stack([flux.sum(axis=0), (flux**2).sum(axis=0)])
+    return photons.flux_w[near, None] * share, distance
 
 
 def _ratio(now: float, then: float) -> float:

@@ -109,13 +109,16 @@ def _plot(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> None:
     implot.setup_axis_limits(implot.ImAxis_.x1, 380, 780, implot.Cond_.always)
     implot.setup_axis_limits(implot.ImAxis_.y1, 0, 1.1 * float(scaled.max()), implot.Cond_.always)
     implot.push_plot_clip_rect()
-    _fill(wavelengths_nm, scaled)
+    # Bins as they are: how wide they are says how much is known.
+    half = 0.5 * float(wavelengths_nm[1] - wavelengths_nm[0])
+    edges = np.append(wavelengths_nm - half, wavelengths_nm[-1] + half)
+    _fill(edges, scaled)
     implot.pop_plot_clip_rect()
     outline = imgui.ImVec4(*theme.palette().text[:3], 0.85)
     implot.plot_line(
         "##outline",
-        np.ascontiguousarray(wavelengths_nm, float),
-        scaled,
+        np.repeat(edges, 2)[1:-1],
+        np.repeat(scaled, 2),
         implot.Spec(line_color=outline, line_weight=1.2),
     )
     implot.end_plot()
@@ -132,11 +135,11 @@ def _scaled(spectrum: np.ndarray) -> tuple[np.ndarray, str]:
     return values * 1e12, "pW"
 
 
-def _fill(wavelengths_nm: np.ndarray, values: np.ndarray) -> None:
+def _fill(edges_nm: np.ndarray, values: np.ndarray) -> None:
     """A bar of its own colour for every nanometre, a pixel wider than that: no seam must show between them."""
     drawing = implot.get_plot_draw_list()
-    fine = np.arange(float(wavelengths_nm[0]), float(wavelengths_nm[-1]), 1.0)
-    heights = np.interp(fine + 0.5, wavelengths_nm, values)
+    fine = np.arange(float(edges_nm[0]), float(edges_nm[-1]), 1.0)
+    heights = values[np.searchsorted(edges_nm, fine + 0.5) - 1]
     for left, height in zip(fine.tolist(), heights.tolist(), strict=True):
         low, high = implot.plot_to_pixels(left, height), implot.plot_to_pixels(left + 1.0, 0.0)
         drawing.add_rect_filled(low, imgui.ImVec2(high.x + 1.0, high.y), spectral_colour.colour_of_nm(left + 0.5))
