@@ -143,7 +143,10 @@ def render(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", metavar="OUT", help="The picture: .png (to look at), .exr or .npy (linear, to work on)."
+            "-o",
+            "--output",
+            metavar="OUT",
+            help="The picture: .png, .jpg, .webp (to look at), .exr or .npy (linear, to work on).",
         ),
     ],
     size: Annotated[
@@ -171,7 +174,7 @@ def render(
         ),
     ] = None,
     exposure: Annotated[
-        Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than automatic; .png only.")
+        Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than automatic; not of .exr and .npy.")
     ] = None,
     max_depth: Annotated[
         Text, typer.Option("--max-depth", metavar="N", help="Specular events on a light path, at most; default: 64.")

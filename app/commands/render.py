@@ -135,12 +135,14 @@ def _complete(asked: dict[str, Any], scene: Scene, stats: bool) -> RenderSetting
 
 def _unused_options(request: RenderRequest) -> list[str]:
     """A sentence for each option that the output's format has no use for."""
+    from ..base.image_io import SHOWN_SUFFIXES
+
     suffix = request.output.suffix.lower()
     notes = []
     if request.bins is not None and suffix != ".exr":
         notes.append(f"--bins: a {suffix} picture holds no spectral channels; write an .exr to keep them")
-    if request.exposure is not None and suffix != ".png":
-        notes.append(f"--exposure does not change a {suffix} picture, which is linear; it is for .png")
+    if request.exposure is not None and suffix not in SHOWN_SUFFIXES:
+        notes.append(f"--exposure does not change a {suffix} picture, which is linear; it is for pictures to look at")
     return notes
 
 

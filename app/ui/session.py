@@ -58,6 +58,8 @@ class Session:
     ) -> None:
         self.context = context
         self.settings, notice = load_settings()
+        self._kept_settings = self.settings
+        """As they are on the disk."""
         self.document = Document.new() if path is None else Document.open(path, opening or self.opening_of(path))
         self.messages = MessageBox(clock)
         self._told_losses: tuple[str, ...] = ()
@@ -115,6 +117,7 @@ class Session:
 
     def finished(self) -> None:
         """After the frame is on the screen."""
+        self._keep_settings()
         self.frame_ms.append(1000.0 * (self.clock() - self._frame_started))
 
     def wait_s(self) -> float:
@@ -234,9 +237,16 @@ class Session:
     def close(self) -> None:
         """The end in good order: settings are remembered, nothing is left to recover."""
         self.autosave.close()
-        with suppress(UserError):
-            save_settings(self.settings)
+        self._keep_settings()
         self.release()
+
+    def _keep_settings(self) -> None:
+        """Write what is remembered as soon as it changes, but not while something is dragged: a crash costs none of
+        it."""
+        if self.settings != self._kept_settings and not self.state.interacting:
+            self._kept_settings = self.settings
+            with suppress(UserError):
+                save_settings(self.settings)
 
     def release(self) -> None:
         """Free what the device holds."""

@@ -110,6 +110,9 @@ class ViewModel:
     shader_error: str | None = None
     recovery: Path | None = None
     """An autosave found at the start."""
+    recovery_title: str = ""
+    recovery_time: str = ""
+    """Whose it is, and when it was written."""
     asks_to_quit: bool = False
     """Unsaved changes: the dialogue with Save, Discard and Cancel is open."""
     curves: tuple[ErrorCurve, ...] = ()

@@ -30,6 +30,8 @@ def view_model_of(session: Session) -> ViewModel:
         messages=session.messages.messages(),
         shader_error=picture.shader_error,
         recovery=None if session.recovery is None else session.recovery.path,
+        recovery_title="" if session.recovery is None else session.recovery.note.title,
+        recovery_time="" if session.recovery is None else session.recovery.written,
         asks_to_quit=session.asks_to_quit,
         curves=comparison.curves,
         reference_progress=comparison.progress,

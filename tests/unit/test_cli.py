@@ -243,7 +243,7 @@ class TestRender:
     @pytest.mark.parametrize(
         ("output", "sentence"),
         [
-            ("out.jpg", "'.jpg' is not a picture format"),
+            ("out.gif", "'.gif' is not a picture format"),
             ("out", "no suffix"),
             ("nowhere/out.png", "does not exist"),
             ("folder.png", "is a folder"),
