@@ -120,7 +120,8 @@ class _Reader:
         if self.document.items("animations") or self.document.items("skins"):
             self.notes.append("Animations and skins are not played (they are kept when saving).")
         self.objects = with_glass(self.objects, self.staging, self.document.path.name)
-        if (note := opaque_note(self.objects)) is not None:
+        is_whole = self.camera is not None and bool(self.lights)
+        if not is_whole and (note := opaque_note(self.objects)) is not None:
             self.notes.append(note)
         background, environment, render = read_scene_extras(self.document, self.notes)
         upright = [replace(o, object_to_world=self._to_z_up @ o.object_to_world) for o in self.objects]
