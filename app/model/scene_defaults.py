@@ -46,6 +46,8 @@ _ASPECT = 1.5
 _FILLED = 0.86
 """Share of the frame that objects and caustic fill."""
 _FRAMED_POINTS = 20_000
+_FLAT = 0.1
+"""Height over width of what may be a ground."""
 
 
 def bounds_of(objects: Sequence[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
@@ -56,9 +58,28 @@ def bounds_of(objects: Sequence[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
 
 def environment_of(objects: Sequence[SceneObject]) -> Surroundings:
     """Middle and half diagonal of what is worth looking at: everything but the receivers, if there is more."""
-    interesting = [o for o in objects if not o.material.receives] or list(objects)
-    low, high = bounds_of(interesting)
+    return surroundings_of([o for o in objects if not o.material.receives] or list(objects))
+
+
+def surroundings_of(objects: Sequence[SceneObject]) -> Surroundings:
+    """Middle and half diagonal of all of `objects`."""
+    low, high = bounds_of(objects)
     return Surroundings(0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), 1e-12))
+
+
+def parts_of(objects: Sequence[SceneObject]) -> list[SceneObject]:
+    """`objects` of a z-up world without the ground they stand on: receivers that are flat and reach beyond the rest.
+    All, where nothing else is there."""
+
+    def is_ground(item: SceneObject) -> bool:
+        others = [o for o in objects if o is not item]
+        if not (item.material.receives and others):
+            return False
+        low, high = bounds_of([item])
+        wide, rest = (high - low)[:2], np.subtract(*bounds_of(others)[::-1])[:2]
+        return bool(high[2] - low[2] <= _FLAT * wide.max() and (wide >= rest).all())
+
+    return [o for o in objects if not is_ground(o)] or list(objects)
 
 
 def default_camera(around: Surroundings) -> Camera:
@@ -71,9 +92,8 @@ def default_camera(around: Surroundings) -> Camera:
 
 
 def framing_camera(objects: Sequence[SceneObject]) -> Camera:
-    """Sees all that is no receiver, and where the studio's lamp casts its shadow and caustic, as large as they fit."""
-    interesting = [o for o in objects if not o.material.receives] or list(objects)
-    points = np.concatenate([_some_points(o) for o in interesting])
+    """Sees all but the ground, and where the studio's lamp casts its shadow and caustic, as large as they fit."""
+    points = np.concatenate([_some_points(o) for o in parts_of(objects)])
     floor = points[:, 2].min()
     x, y, z = key_direction()
     shadow = points - np.outer((points[:, 2] - floor) / z, (x, y, z))

@@ -155,6 +155,13 @@ def test_glass_for_all_and_for_one(tmp_path: Path) -> None:
     assert table.receives and not any("Nothing here is glass" in note for note in scene.notes)
 
 
+def test_what_is_not_glass_stays_in_the_picture(tmp_path: Path) -> None:
+    path = opaque_file(tmp_path / "own.glb")
+    before, after = load_scene(path), load_scene(path, Staging(glass=(("foot", "N-SF11"),)))
+    assert [o.name for o in after.objects] == ["stone", "foot", "table"] and after.camera == before.camera
+    assert [light.position for light in after.lights] == [light.position for light in before.lights]
+
+
 @pytest.mark.parametrize(
     ("glass", "said"),
     [

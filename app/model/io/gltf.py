@@ -31,12 +31,13 @@ from ..scene import (
     SceneObject,
 )
 from ..scene_defaults import (
-    bounds_of,
     default_table,
     environment_of,
     framing_camera,
+    parts_of,
     studio_environment,
     studio_lights,
+    surroundings_of,
 )
 from ..staging import AS_FOUND, Y_UP_TO_Z_UP, Staging, opaque_note, with_glass
 from ..unique_names import Names
@@ -130,14 +131,14 @@ class _Reader:
         # An environment shows glass and mirrors without a light and without anything it falls on.
         receives = any(o.material.receives for o in self.objects)
         is_bare = self.camera is None and not self.lights and environment is None and not any(background)
-        if (environment is None and not receives) or (is_bare and not _has_ground(upright)):
+        if (environment is None and not receives) or (is_bare and len(parts_of(upright)) == len(upright)):
             table = default_table(upright)
             matrix = self._to_z_up.T @ table.object_to_world
             self.objects.append(replace(table, name=self._names.unique("table"), object_to_world=matrix))
             self.notes.append("Nothing in the file to stand on: a grey table was put below the objects.")
             receives = True
         if not lights and (environment is None or receives):
-            lights = tuple(self._as_in_file(light) for light in studio_lights(around))
+            lights = tuple(self._as_in_file(light) for light in studio_lights(surroundings_of(parts_of(upright))))
             self.notes.append(
                 "No light in the file: a lamp from behind on the left and weak light from above were added."
             )
@@ -432,15 +433,3 @@ def _rotation(quaternion: Any) -> np.ndarray:
 
 def _unit(vector: np.ndarray) -> np.ndarray:
     return vector / np.linalg.norm(vector)
-
-
-def _has_ground(upright: list[SceneObject]) -> bool:
-    """Whether a receiver reaches well beyond what is not one, so that caustics fall on it. Where nothing is glass
-    everything is a part, and nothing the ground."""
-    if all(o.material.receives for o in upright):
-        return False
-    low, high = bounds_of([o for o in upright if not o.material.receives])
-    ground_low, ground_high = (
-        bounds_of(receivers) if (receivers := [o for o in upright if o.material.receives]) else (low, high)
-    )
-    return bool(((ground_high - ground_low)[:2] > 1.5 * (high - low)[:2]).all())
