@@ -3,6 +3,7 @@
 | suffix | content |
 |---|---|
 | .png | 8-bit sRGB through `tone_map`: for looking at |
+| .jpg, .jpeg, .webp | the same, smaller, by a little that is lost |
 | .exr | float32 scene-referred linear Rec.709, negatives kept, and spectral channels where given: for working on |
 | .npy | float32 (H, W, 3) scene-referred linear Rec.709: for comparing |
 
@@ -26,7 +27,10 @@ from .atomic import atomic_output
 from .errors import BrokenPictureError, UserError
 from .tone_map import auto_exposure, srgb_eotf, tone_map_8bit
 
-SUFFIXES = (".png", ".exr", ".npy")
+SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".exr", ".npy")
+SHOWN_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
+"""Of pictures for looking at: tone mapped, 8 bits."""
+_READ_SUFFIXES = (".png", ".exr", ".npy")
 MAX_PIXELS = 1 << 26
 """Of a picture that is read; 805 MB as float32: a mistake rather than a wish."""
 
@@ -69,7 +73,7 @@ def write_image(
     """Write a picture; row 0 of the arrays is its top.
 
     rgb: (H, W, 3) linear Rec.709 radiance. exposure_ev: stops added to the automatic exposure
-    (PNG only). spectral: (H, W, B) radiance per bin in W/(m² sr), written as the channels
+    (of pictures for looking at only). spectral: (H, W, B) radiance per bin in W/(m² sr), written as the channels
     `S0.<centre>nm` of an .exr; bin_edges_nm: (B + 1,) rising. metadata: short texts kept in .png
     and .exr. Raises `UserError` for an unknown suffix or a place that cannot be written, `BrokenPictureError` for
     numbers that are not finite.
@@ -98,6 +102,8 @@ def write_into(
     metadata = dict(metadata or {})
     if suffix == ".png":
         _write_png(part, rgb, exposure_ev or 0.0, metadata)
+    elif suffix in SHOWN_SUFFIXES:
+        save_codes(part, tone_map_8bit(rgb, auto_exposure(rgb) + (exposure_ev or 0.0)))
     elif suffix == ".exr":
         _write_exr(part, rgb, _spectral_channels(rgb, spectral, bin_edges_nm), bin_edges_nm, metadata)
     else:
@@ -122,7 +128,7 @@ def read_image(path: Path | str) -> Picture:
     suffix = path.suffix.lower()
     reader = {".png": _read_png, ".exr": _read_exr, ".npy": _read_npy}.get(suffix)
     if reader is None:
-        raise UserError(f"cannot read {path}: '{suffix}' is not a picture format; use one of {', '.join(SUFFIXES)}")
+        raise UserError(f"cannot read {path}: '{suffix}' cannot be read; use one of {', '.join(_READ_SUFFIXES)}")
     if not os.path.exists(path):
         raise UserError(f"cannot read {path}: there is no such file; check the name")
     try:
@@ -141,6 +147,22 @@ def channel_name(wavelength_nm: float) -> str:
     Fichet, Pacanowski, Wilkie: An OpenEXR Layout for Spectral Images, JCGT 10(3), 2021.
     """
     return f"S0.{wavelength_nm:.6f}nm".replace(".", ",").replace(",", ".", 1)
+
+
+def save_codes(path: Path, codes: np.ndarray) -> None:
+    """Save sRGB codes uint8 (H, W, 3) in the format of the suffix, one of `SHOWN_SUFFIXES`."""
+    from PIL import Image, PngImagePlugin
+
+    suffix = path.suffix.lower()
+    if suffix == ".png":
+        texts = PngImagePlugin.PngInfo()
+        texts.add(b"sRGB", b"\x00")  # rendering intent: perceptual
+        Image.fromarray(codes).save(path, format="PNG", pnginfo=texts, compress_level=6)
+    elif suffix == ".webp":
+        Image.fromarray(codes).save(path, format="WEBP", quality=95, method=4)
+    else:
+        # Colours at full resolution: those of a caustic change from pixel to pixel.
+        Image.fromarray(codes).save(path, format="JPEG", quality=95, subsampling=0)
 
 
 def _write_png(path: Path, rgb: np.ndarray, exposure_ev: float, metadata: dict[str, str]) -> None:

@@ -39,6 +39,8 @@ class ProgressReporter:
         self._clock = clock
         self._started = clock()
         self._told = self._started
+        self._last = (0.0, self._started)
+        """What was told last, and when."""
         self._bar: Progress | None = None
         self._task: TaskID | None = None
 
@@ -81,6 +83,10 @@ class ProgressReporter:
     def _log(self, fraction: float, text: str, now: float) -> None:
         elapsed = now - self._started
         detail = f", {text}" if text else ""
+        # Of late: one phase may be slower than those before it.
+        (before, then), self._last = self._last, (fraction, now)
+        if fraction > before:
+            detail += f", about {(1.0 - fraction) * (now - then) / (fraction - before):.0f} s left"
         print(
             f"{self._title}: {100.0 * fraction:.0f} % after {elapsed:.0f} s{detail}",
             file=self._stream,

@@ -6,6 +6,7 @@ import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..base.errors import UserError, plain
 from ..base.interrupts import interrupt_flag
@@ -13,6 +14,9 @@ from ..base.memory import check_picture_memory
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from . import options
+
+if TYPE_CHECKING:
+    from ..edit.opening import Opening
 
 DEFAULT_FRAMES = 120
 DEFAULT_FPS = 24.0
@@ -38,6 +42,7 @@ class AnimateRequest:
     method: str | None = None
     camera_method: str | None = None
     overwrite: bool = False
+    opening: Opening | None = None
 
 
 def animate_command(request: AnimateRequest) -> int:
@@ -45,13 +50,12 @@ def animate_command(request: AnimateRequest) -> int:
     from ..base.movie import MANIFEST, open_sink
     from ..base.progress import ProgressReporter
     from ..edit.parameters import Stage
-    from ..model.io.scene_file import load_scene
     from ..render.animate import description, render_animation
     from ..render.notices import FrameNotices
 
     frames = None if request.frames is None else options.parse_integer("--frames", request.frames, 1, 1_000_000)
     fps = DEFAULT_FPS if request.fps is None else _parse_fps(request.fps)
-    scene = load_scene(options.find_scene(request.scene))
+    scene = options.open_scene(request.scene, request.opening)
     settings = _settings(request, scene)
     exposure = scene.render.exposure_ev if request.exposure is None else options.parse_exposure(request.exposure)
     animation = _animation(request, Stage(scene, scene.camera, exposure), frames, fps)

@@ -6,12 +6,16 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..base.errors import plain
 from ..base.interrupts import interrupt_flag
 from ..base.memory import check_picture_memory
 from ..model.settings import RenderSettings
 from . import options
+
+if TYPE_CHECKING:
+    from ..edit.opening import Opening
 
 
 @dataclass(frozen=True)
@@ -24,6 +28,7 @@ class BakeRequest:
     size: str | None = None
     photons: str | None = None
     seed: str | None = None
+    opening: Opening | None = None
 
 
 def bake_command(request: BakeRequest) -> int:
@@ -31,7 +36,6 @@ def bake_command(request: BakeRequest) -> int:
     from ..base.atomic import check_writable
     from ..base.progress import ProgressReporter
     from ..edit.parameters import Stage
-    from ..model.io.scene_file import load_scene
     from ..render import bake
     from ..render.notices import FrameNotices
 
@@ -42,7 +46,7 @@ def bake_command(request: BakeRequest) -> int:
     check_picture_memory(width, height, None)
     check_writable(request.output)
     check_writable(bake.placement_path(request.output))
-    scene = load_scene(options.find_scene(request.scene))
+    scene = options.open_scene(request.scene, request.opening)
     bake.check_receiver(scene, request.receiver)
     for note in scene.notes:
         print(f"note: {plain(note)}", file=sys.stderr)

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..base import files
 from ..base.errors import UserError, nearest_names, suggestion
@@ -16,6 +18,9 @@ from ..base.memory import MAX_SIDE_PX, memory_bytes
 from ..base.paths import SCENE_SUFFIXES, shipped_scenes
 from ..model.scene import Scene
 from ..model.settings import CAMERA_METHODS, METHODS
+
+if TYPE_CHECKING:
+    from ..edit.opening import Opening
 
 MAX_PHOTONS = 10**12
 MAX_SEED = 2**32 - 1
@@ -144,6 +149,42 @@ def check_layer(text: str, scene: Scene) -> str:
 def receivers_of(scene: Scene) -> list[str]:
     """Names of the diffuse objects, in the scene's order."""
     return list(dict.fromkeys(item.name for item in scene.objects if item.material.receives))
+
+
+def parse_opening(up: str | None, glass: Sequence[str] | None, environment: str | None) -> Opening | None:
+    """Which axis of a file is up, glasses as "GLASS" or "OBJECT=GLASS", and what lies behind it. An object's name may
+    hold "=": the last one counts. None where nothing is asked for."""
+    if up is None and not glass and environment is None:
+        return None
+    from ..edit.opening import SKY, STUDIO, Opening
+    from ..model.staging import UP_AXES, Staging
+
+    axis = next((each for each in UP_AXES if each == up), None)
+    if up is not None and axis is None:
+        raise UserError(f"--up '{up}' is no axis that can be up: give y or z")
+    pairs = []
+    for text in glass or ():
+        name, equals, kind = text.rpartition("=")
+        if not kind or (equals and not name):
+            raise UserError(f"--glass '{text}' names no glass: give --glass diamond, or --glass OBJECT=N-SF11")
+        pairs.append((name if equals else None, kind))
+    if environment is not None and environment not in (STUDIO, SKY):
+        path = Path(environment).expanduser()
+        if not files.is_file(path):
+            raise UserError(f"--environment '{environment}' is neither studio nor sky nor a file; check the path")
+    return Opening(Staging(axis, tuple(pairs)), environment)
+
+
+def open_scene(text: str, opening: Opening | None) -> Scene:
+    """The scene given by path or bare name, as wished."""
+    path = find_scene(text)
+    if opening is None:
+        from ..model.io.scene_file import load_scene
+
+        return load_scene(path)
+    from ..edit.opening import open_scene as opened
+
+    return opened(path, opening)
 
 
 def find_scene(text: str) -> Path:

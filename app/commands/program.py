@@ -80,6 +80,25 @@ AllowOutside = Annotated[
         expose_value=False,
     ),
 ]
+UpOption = Annotated[
+    str | None,
+    typer.Option("--up", metavar="AXIS", help="Which axis of a mesh or glTF file is up: y or z; default: guessed."),
+]
+GlassOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--glass",
+        metavar="GLASS",
+        help="Make all solids of a catalogue glass (diamond), or one (OBJECT=N-SF11); may be repeated.",
+        autocompletion=completion.glasses,
+    ),
+]
+EnvironmentOption = Annotated[
+    str | None,
+    typer.Option(
+        "--environment", metavar="FILE", help="What lies behind everything: studio, sky, or a panorama's file."
+    ),
+]
 Text = str | None
 PIPE_WIDTH = 200
 """Columns where no terminal sets a limit: tables are then not cut."""
@@ -125,7 +144,10 @@ def render(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", metavar="OUT", help="The picture: .png (to look at), .exr or .npy (linear, to work on)."
+            "-o",
+            "--output",
+            metavar="OUT",
+            help="The picture: .png, .jpg, .webp (to look at), .exr or .npy (linear, to work on).",
         ),
     ],
     size: Annotated[
@@ -134,7 +156,9 @@ def render(
     photons: Annotated[
         Text, typer.Option(metavar="N", help="Photons to emit, for example 4M; default: the scene's.")
     ] = None,
-    seconds: Annotated[Text, typer.Option(metavar="S", help="Emit photons for this long instead.")] = None,
+    seconds: Annotated[
+        Text, typer.Option(metavar="S", help="Seconds that the picture may take in all, instead.")
+    ] = None,
     seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
     method: MethodOption = None,
     camera_method: CameraMethodOption = None,
@@ -151,7 +175,7 @@ def render(
         ),
     ] = None,
     exposure: Annotated[
-        Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than automatic; .png only.")
+        Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than automatic; not of .exr and .npy.")
     ] = None,
     max_depth: Annotated[
         Text, typer.Option("--max-depth", metavar="N", help="Specular events on a light path, at most; default: 64.")
@@ -170,6 +194,9 @@ def render(
     stats: Annotated[
         bool, typer.Option("--stats", help="Print the energy balance and the times of all stages.")
     ] = False,
+    up: UpOption = None,
+    glass: GlassOption = None,
+    environment: EnvironmentOption = None,
     allow_outside: AllowOutside = False,
 ) -> None:
     """Render a scene to a picture file."""
@@ -192,6 +219,7 @@ def render(
         camera,
         batch,
         stats,
+        options.parse_opening(up, glass, environment),
     )
     raise typer.Exit(render_command(request))
 
@@ -246,6 +274,9 @@ def animate(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the frames of another animation in the folder.")
     ] = False,
+    up: UpOption = None,
+    glass: GlassOption = None,
+    environment: EnvironmentOption = None,
     allow_outside: AllowOutside = False,
 ) -> None:
     """Render an animation: a turntable, or any parameters over time."""
@@ -267,6 +298,7 @@ def animate(
         method,
         camera_method,
         overwrite,
+        options.parse_opening(up, glass, environment),
     )
     raise typer.Exit(animate_command(request))
 
@@ -289,12 +321,17 @@ def view(
     after: Annotated[
         Text, typer.Option(metavar="S", help="Seconds from the first picture until --screenshot; default: 10.")
     ] = None,
+    up: UpOption = None,
+    glass: GlassOption = None,
+    environment: EnvironmentOption = None,
     allow_outside: AllowOutside = False,
 ) -> None:
     """Open the viewer: edit dispersion and caustics on the screen."""
     from .view import ViewRequest, view_command
 
-    raise typer.Exit(view_command(ViewRequest(scene, size, theme, screenshot, after)))
+    raise typer.Exit(
+        view_command(ViewRequest(scene, size, theme, screenshot, after, options.parse_opening(up, glass, environment)))
+    )
 
 
 @app.command()
@@ -319,12 +356,19 @@ def bake(
     size: Annotated[Text, typer.Option(metavar="WxH", help="Texels; default: 1024x1024.")] = None,
     photons: Annotated[Text, typer.Option(metavar="N", help="Photons to emit; default: the scene's.")] = None,
     seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
+    up: UpOption = None,
+    glass: GlassOption = None,
+    environment: EnvironmentOption = None,
     allow_outside: AllowOutside = False,
 ) -> None:
     """Bake the caustic on an object to a texture, with its placement."""
     from .bake import BakeRequest, bake_command
 
-    raise typer.Exit(bake_command(BakeRequest(scene, receiver, output, size, photons, seed)))
+    raise typer.Exit(
+        bake_command(
+            BakeRequest(scene, receiver, output, size, photons, seed, options.parse_opening(up, glass, environment))
+        )
+    )
 
 
 @app.command()

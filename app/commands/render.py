@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..base.errors import UserError, plain
 from ..base.interrupts import interrupt_flag
@@ -15,6 +16,13 @@ from ..base.memory import check_picture_memory
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from . import options
+
+if TYPE_CHECKING:
+    from ..edit.opening import Opening
+
+
+AROUND_S = 0.5
+"""What a process takes to start, to write its picture and to end: --seconds holds that too."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +45,12 @@ class RenderRequest:
     camera: str | None = None
     batch: str | None = None
     stats: bool = False
+    opening: Opening | None = None
 
 
 def render_command(request: RenderRequest) -> int:
     """Render to a file; returns the exit code. Raises `UserError`."""
+    begun = time.perf_counter() - AROUND_S
     from ..base.atomic import check_writable
     from ..base.image_io import check_suffix, write_image
     from ..base.progress import ProgressReporter
@@ -54,9 +64,7 @@ def render_command(request: RenderRequest) -> int:
         raise UserError(f"cannot write {request.output}: it is the scene itself; choose another name")
     check_writable(request.output)
 
-    from ..model.io.scene_file import load_scene
-
-    scene = load_scene(scene_file)
+    scene = options.open_scene(request.scene, request.opening)
     settings = _complete(asked, scene, request.stats)
     # Before the work: who waits for minutes should know what was assumed, and also if it fails.
     for note in (*scene.notes, *_unused_options(request)):
@@ -66,7 +74,7 @@ def render_command(request: RenderRequest) -> int:
     from ..render.still import render
 
     with interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
-        result = render(scene, settings, progress=progress, cancelled=interrupted)
+        result = render(scene, settings, progress=progress, cancelled=interrupted, begun=begun)
         stopped = interrupted()
     if better := advice(result.stats.renderer, result.stats.is_software):
         print(f"note: {better}", file=sys.stderr)
@@ -132,12 +140,14 @@ def _complete(asked: dict[str, Any], scene: Scene, stats: bool) -> RenderSetting
 
 def _unused_options(request: RenderRequest) -> list[str]:
     """A sentence for each option that the output's format has no use for."""
+    from ..base.image_io import SHOWN_SUFFIXES
+
     suffix = request.output.suffix.lower()
     notes = []
     if request.bins is not None and suffix != ".exr":
         notes.append(f"--bins: a {suffix} picture holds no spectral channels; write an .exr to keep them")
-    if request.exposure is not None and suffix != ".png":
-        notes.append(f"--exposure does not change a {suffix} picture, which is linear; it is for .png")
+    if request.exposure is not None and suffix not in SHOWN_SUFFIXES:
+        notes.append(f"--exposure does not change a {suffix} picture, which is linear; it is for pictures to look at")
     return notes
 
 

@@ -14,6 +14,7 @@ from ..base.interrupts import Interruption, interrupt_flag
 from . import options
 
 if TYPE_CHECKING:
+    from ..edit.opening import Opening
     from ..edit.preferences import WindowPlace
     from ..edit.state import Theme
     from ..ui.session import Session
@@ -36,6 +37,7 @@ class ViewRequest:
     theme: str | None = None
     screenshot: Path | None = None
     after: str | None = None
+    opening: Opening | None = None
 
 
 def has_display() -> bool:
@@ -61,13 +63,21 @@ def view_command(request: ViewRequest) -> int:
     settings, _ = load_settings()
     place = settings.window if size is None else replace(settings.window, size=size, maximised=False)
     with Window(place) as window, interrupt_flag() as interrupted:
-        _run(window, scene, theme, None if request.screenshot is None else (request.screenshot, after), interrupted)
+        _run(
+            window,
+            scene,
+            request.opening,
+            theme,
+            None if request.screenshot is None else (request.screenshot, after),
+            interrupted,
+        )
     return interrupted.exit_code
 
 
 def _run(
     window: Window,
     scene: Path | None,
+    opening: Opening | None,
     theme: Theme | None,
     screenshot: tuple[Path, float] | None,
     interrupted: Interruption,
@@ -76,7 +86,7 @@ def _run(
     from ..ui.session import Session
     from ..ui.viewer import Viewer
 
-    session = Session(window.context, scene)
+    session = Session(window.context, scene, opening=opening)
     if theme is not None:
         preferences = replace(session.state.preferences, theme=theme)
         session.state = replace(session.state, preferences=preferences)

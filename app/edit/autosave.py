@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO
 
@@ -57,6 +58,12 @@ class Recovery:
     def original(self) -> Path | None:
         """The file it was made from."""
         return None if self.note.original is None else Path(self.note.original)
+
+    @property
+    def written(self) -> str:
+        """When, by the clock on the wall: "22 November 2026, 14:05"."""
+        at = datetime.fromtimestamp(self.note.saved_at, UTC).astimezone()
+        return f"{at.day} {at:%B %Y, %H:%M}"
 
     def load(self) -> Scene:
         """The scene, which needs none of the autosave's files any more. Raises UserError when it cannot be read."""

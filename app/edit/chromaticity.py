@@ -61,7 +61,9 @@ def colour_info(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> ColourInfo 
     at = np.asarray(wavelengths_nm, float)
     density = np.asarray(spectrum, float)
     width = float(at[1] - at[0]) if at.size > 1 else 1.0
-    weights = np.stack([np.interp(at, VISIBLE_NM, cmf_xyz()[:, channel]) for channel in range(3)], axis=-1)
+    # Means over each bin: in wide ones the middle says too little.
+    within = np.abs(VISIBLE_NM[None] - at[:, None]) <= 0.5 * width
+    weights = within @ cmf_xyz() / np.maximum(within.sum(axis=1, keepdims=True), 1)
     xyz = density @ weights * width
     total = float(xyz.sum())
     if not np.isfinite(total) or total <= 0.0 or xyz[1] <= 0.0:

@@ -10,14 +10,20 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from ..base import files
 from ..base.errors import UserError
 from ..base.paths import assets_dir
+from ..model.io.gltf import CAMERA_ADDED
 from ..model.io.gltf_write import save_gltf
 from ..model.io.scene_file import GLTF_SUFFIXES, load_scene
 from ..model.io.scene_save import save_scene
 from ..model.scene import Scene
+from ..model.scene_objects import MESH_SUFFIXES
+from ..model.staging import UpAxis
 from .history import History
+from .opening import AS_FOUND, Opening, open_scene
 
 SAVE_SUFFIXES = (".toml", ".glb", ".gltf")
 DEFAULT_SCENE = "default"
@@ -26,8 +32,12 @@ DEFAULT_SCENE = "default"
 class Document:
     """A scene with its history and its file."""
 
-    def __init__(self, scene: Scene, source: Path | None = None, path: Path | None = None) -> None:
+    def __init__(
+        self, scene: Scene, source: Path | None = None, path: Path | None = None, opening: Opening = AS_FOUND
+    ) -> None:
         self.history = History(scene)
+        self.opening = opening
+        """What was asked for when it was opened."""
         self.path = path
         """Where saving without a name goes; None asks for one."""
         self.source = source
@@ -41,14 +51,14 @@ class Document:
         return Document(replace(scene, name="untitled"))
 
     @staticmethod
-    def open(path: Path) -> Document:
-        """The scene in a file: .toml, .glb, .gltf, or a mesh that gets a glass, a light and a table.
+    def open(path: Path, opening: Opening = AS_FOUND) -> Document:
+        """The scene in a file: .toml, .glb, .gltf, or a mesh that gets a glass, lights and a table.
 
         Raises UserError, in one sentence, for what cannot be opened.
         """
         path = Path(path).expanduser().absolute()
-        scene = load_scene(path)
-        return Document(scene, path, path if _is_own_file(path) else None)
+        scene = open_scene(path, opening)
+        return Document(scene, path, path if _is_own_file(path) else None, opening)
 
     @staticmethod
     def recovered(scene: Scene, original: Path | None) -> Document:
@@ -61,6 +71,25 @@ class Document:
     def scene(self) -> Scene:
         """The scene now."""
         return self.history.present
+
+    @property
+    def up(self) -> UpAxis | None:
+        """The axis of its file that was taken to be up, as long as the scene is the one that was opened; None for a
+        file that says so itself."""
+        source = self.source
+        if source is None or self.unsaved or source.suffix.lower() not in (*MESH_SUFFIXES, *GLTF_SUFFIXES):
+            return None
+        if source.suffix.lower() in GLTF_SUFFIXES:
+            return (self.opening.staging.up or "y") if CAMERA_ADDED in self.scene.notes else None
+        turned = not np.allclose(self.scene.objects[0].object_to_world[:3, :3], np.eye(3))
+        return "y" if turned else "z"
+
+    def stood_up(self, up: UpAxis) -> Document:
+        """The same file anew, with another axis up. Raises UserError where that would lose work."""
+        if self.source is None or self.up is None:
+            raise UserError("only a mesh or a glTF file that was not edited yet can be stood up anew; open it again")
+        staging = replace(self.opening.staging, up=up)
+        return Document.open(self.source, replace(self.opening, staging=staging))
 
     @property
     def title(self) -> str:

@@ -16,10 +16,13 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..model.environment import from_map, gradient, sky, up_and_rotation, world_to_local
+from ..model.lights.directional import DirectionalLight
 from ..model.scene import Diffuse, Light, Scene, Vec3
 from ..model.scene_defaults import environment_of
 from ..model.scene_textures import TextureReader
 from ..model.texture import Environment, Texture
+from ..model.vectors import vec3
+from .adding import up_frame
 
 ENVIRONMENT_SUFFIXES = (".hdr", ".exr", ".pic", ".npy", ".png", ".jpg", ".jpeg")
 TEXTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".npy")
@@ -27,6 +30,8 @@ _SKY_SHARE = 0.3
 """Of the radiance of a white surface in the scene's light: a first sky is seen and outshines nothing."""
 _ABSOLUTE = 10.0
 """A panorama within this factor of what suits the lights is taken to be in absolute units."""
+_SUN_DEG = 10.0
+"""Apparent size beyond which a directional light is no sun."""
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 """Of linear Rec.709."""
 _ZENITH, _HORIZON, _NADIR = (0.25, 0.45, 0.9), (0.9, 0.95, 1.0), (0.2, 0.18, 0.16)
@@ -52,10 +57,11 @@ def set_environment_kind(scene: Scene, kind: str) -> Scene:
             f"'{kind}' is no kind of environment that can be made without a file; choose constant, gradient or sky"
         )
     level = _usual_radiance(scene)
+    up = vec3(up_frame(scene)[:, 2])
     made = (
-        gradient(_ZENITH, _HORIZON, _NADIR, intensity=level)
+        gradient(_ZENITH, _HORIZON, _NADIR, up, level)
         if kind == "gradient"
-        else sky(**_sun_of(scene), luminance=level)
+        else sky(**_sun_of(scene, up), luminance=level, up=up)
     )
     return replace(scene, environment=made)
 
@@ -84,7 +90,7 @@ def set_environment_map(scene: Scene, path: Path) -> Scene:
         up, rotation_deg = up_and_rotation(now)
         made = from_map(path, map_intensity(now) or 1.0, rotation_deg, up, notes)
         return replace(scene, environment=made, notes=tuple(notes))
-    made = from_map(path, notes=notes)
+    made = from_map(path, up=vec3(up_frame(scene)[:, 2]), notes=notes)
     changed = replace(scene, environment=made, notes=tuple(notes))
     # Few panoramas are in absolute units; those that seem to be are left alone.
     factor = _usual_radiance(scene) / max(_mean_luminance(made), 1e-30)
@@ -235,12 +241,16 @@ def _illuminance(light: Light, scene: Scene) -> float:
     return light.spectral_power.luminous() / light.reach(math.sqrt(distance2))
 
 
-def _sun_of(scene: Scene) -> dict[str, Any]:
-    """Where the scene's first directional light comes from, for a sky that fits it."""
-    sun = next((light for light in scene.lights if not light.has_place), None)
-    if sun is None:
+def _sun_of(scene: Scene, up: Vec3) -> dict[str, Any]:
+    """Where the sun, or else the strongest light that has a direction, comes from, for a sky that fits it."""
+    directed = [light for light in scene.lights if light.has_direction]
+    suns = [
+        light for light in directed if isinstance(light, DirectionalLight) and light.angular_diameter_deg < _SUN_DEG
+    ]
+    if not directed:
         return {}
-    x, y, z = -np.asarray(sun.direction, float) / np.linalg.norm(sun.direction)
+    sun = max(suns or directed, key=lambda light: _illuminance(light, scene))
+    x, y, z = world_to_local(up) @ (-np.asarray(sun.direction, float) / np.linalg.norm(sun.direction))
     if z < 0.0:
         return {}
     return {

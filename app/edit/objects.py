@@ -14,8 +14,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.errors import UserError
+from ..model.optics import catalogue
 from ..model.scene import (
     Dab,
+    Dielectric,
     Diffuse,
     Material,
     Mirror,
@@ -26,7 +28,7 @@ from ..model.scene import (
 from ..model.scene_checks import check_lines, check_outside, check_scene
 from ..model.scene_dabs import MAX_DAB_LOG2
 from . import matrices
-from .adding import beside
+from .adding import add_object, beside
 from .names import checked_name, free_name
 
 MAX_LENGTH = 1e30
@@ -96,6 +98,16 @@ def set_material(scene: Scene, index: int, material: Material) -> Scene:
         )
     check_scene(changed, scene.name)
     return changed
+
+
+def make_glass(scene: Scene, index: int, glass: str) -> Scene:
+    """Object `index` of a catalogue glass, with a plane below where nothing else would receive the light. Raises
+    UserError for a glass that is not known."""
+    material = Dielectric(catalogue.find(glass))
+    others = [o for i, o in enumerate(scene.objects) if i != index]
+    if scene.environment is None and not any(o.material.receives for o in others):
+        scene = add_object(scene, "plane")
+    return set_material(scene, index, material)
 
 
 def set_diffuse_colour(scene: Scene, index: int, rgb: Vec3) -> Scene:

@@ -18,10 +18,13 @@ import platformdirs
 from ..base import files
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
+from ..model.staging import UpAxis
 from .state import Preferences
 
 ENVIRONMENT = "SPECTRASPLAT_CONFIG"
 MAX_RECENT = 10
+MAX_UP = 100
+"""Files whose axis is remembered."""
 _FILE = "settings.json"
 _SCALES = (0.5, 4.0)
 _PHOTONS = (10_000, 10**12)
@@ -44,12 +47,24 @@ class Settings:
     recent: tuple[Path, ...] = ()
     """Files opened or saved, the last one first; some may be gone."""
     window: WindowPlace = field(default_factory=WindowPlace)
+    up: dict[str, UpAxis] = field(default_factory=dict)
+    """File -> the axis that its user said is up; the last one said is the last."""
 
     def opened(self, path: Path) -> Settings:
         """With `path` the most recent file."""
         path = Path(os.path.abspath(path))
         others = tuple(p for p in self.recent if p != path)
         return replace(self, recent=(path, *others)[:MAX_RECENT])
+
+    def said_up(self, path: Path, up: UpAxis) -> Settings:
+        """With `up` remembered for the file at `path`."""
+        key = os.path.abspath(path)
+        kept = [(k, v) for k, v in self.up.items() if k != key][1 - MAX_UP :]
+        return replace(self, up=dict([*kept, (key, up)]))
+
+    def up_of(self, path: Path) -> UpAxis | None:
+        """What was said of the file at `path`."""
+        return self.up.get(os.path.abspath(path))
 
     def existing_recent(self) -> tuple[Path, ...]:
         """Recent files that are still there."""
@@ -100,7 +115,8 @@ def save_settings(settings: Settings) -> None:
     """Remember `settings`, whole or not at all. Raises UserError when the folder is not writable."""
     # A file's name need not be text; such a one is not remembered.
     recent = tuple(path for path in settings.recent if _is_text(path))
-    content = msgspec.json.format(msgspec.json.encode(replace(settings, recent=recent), enc_hook=os.fspath))
+    up = {name: axis for name, axis in settings.up.items() if _is_text(Path(name))}
+    content = msgspec.json.format(msgspec.json.encode(replace(settings, recent=recent, up=up), enc_hook=os.fspath))
     with atomic_output(config_dir() / _FILE) as temporary:
         temporary.write_bytes(content)
 

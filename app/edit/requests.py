@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 from ..model.scene import Vec3
+from ..model.staging import UpAxis
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,13 @@ class Open:
     """Load a scene, a GLB or a bare mesh (which gets a glass, a light and a table)."""
 
     path: Path
+
+
+@dataclass(frozen=True)
+class StandUp:
+    """Take another axis of the opened mesh or glTF file to be up, and remember it for that file."""
+
+    up: UpAxis
 
 
 @dataclass(frozen=True)
@@ -177,6 +185,7 @@ class DismissMessage:
 Request = (
     NewScene
     | Open
+    | StandUp
     | Save
     | Undo
     | Redo

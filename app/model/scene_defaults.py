@@ -1,23 +1,53 @@
-"""What a scene gets where its file is silent: a camera, a sun, a table, fitted to the objects.
+"""What a scene gets where its file is silent: a camera, lights, a table, a quiet studio, fitted to the objects.
 
-The world is z-up. The sun stands behind the object on the left, so that the caustic falls
-towards the viewer on the right, and the camera looks at the middle between the two.
+The world is z-up. The light stands behind the object on the left, so that the caustic falls towards the viewer on the
+right, and the camera frames both. A file that says nothing of light or camera gets the whole studio: a lamp whose pool
+fades into the dark of the table, a wide weak light from above without which shadows would be holes, and a dark room
+with bright windows, which is what glass mirrors.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
+from .environment import from_map
 from .geometry.mesh_recipes import note_recipe
 from .geometry.primitives import plane
 from .lights.directional import SUN_DIAMETER_DEG, DirectionalLight
 from .lights.light import DEFAULT_ILLUMINANCE
+from .lights.spot import SpotLight
 from .optics.spectrum import illuminant
 from .placement import Surroundings, default_direction
 from .scene import Camera, Diffuse, Light, SceneObject
-from .vectors import vec3
+from .scene_environment import STUDIO_MAP
+from .texture import Environment
+from .vectors import Vec3, vec3
+
+KEY_DISTANCE = 9.0
+"""Of the studio's lamp from the objects' middle, in their radii: rays are then nearly parallel, caustics sharp."""
+_KEY_AZIMUTH_DEG, _KEY_ELEVATION_DEG = 25.0, 46.0
+_POOL = 5.0
+"""Radius of the lamp's pool of light, in radii of the objects: it fades within the picture."""
+_POOL_INNER = 0.35
+_FILL_SHARE = 0.2
+"""Of the lamp's illuminance that comes from above."""
+_FILL_DIAMETER_DEG = 60.0
+_STUDIO_INTENSITY = 0.15
+"""Of the panorama: its soft boxes are then some five times as bright as the table."""
+_TABLE_RGB = (0.46, 0.44, 0.42)
+_VIEW = np.array([0.20, -0.80, 0.57])
+"""From the objects to the camera: from the front, looking down."""
+_FOV_DEG = 32.0
+_ASPECT = 1.5
+"""Of the frame that must hold everything: a little narrower than 16:9, for windows have panels at their sides."""
+_FILLED = 0.86
+"""Share of the frame that objects and caustic fill."""
+_FRAMED_POINTS = 20_000
+_FLAT = 0.1
+"""Height over width of what may be a ground."""
 
 
 def bounds_of(objects: Sequence[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
@@ -28,9 +58,28 @@ def bounds_of(objects: Sequence[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
 
 def environment_of(objects: Sequence[SceneObject]) -> Surroundings:
     """Middle and half diagonal of what is worth looking at: everything but the receivers, if there is more."""
-    interesting = [o for o in objects if not o.material.receives] or list(objects)
-    low, high = bounds_of(interesting)
+    return surroundings_of([o for o in objects if not o.material.receives] or list(objects))
+
+
+def surroundings_of(objects: Sequence[SceneObject]) -> Surroundings:
+    """Middle and half diagonal of all of `objects`."""
+    low, high = bounds_of(objects)
     return Surroundings(0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), 1e-12))
+
+
+def parts_of(objects: Sequence[SceneObject]) -> list[SceneObject]:
+    """`objects` of a z-up world without the ground they stand on: receivers that are flat and reach beyond the rest.
+    All, where nothing else is there."""
+
+    def is_ground(item: SceneObject) -> bool:
+        others = [o for o in objects if o is not item]
+        if not (item.material.receives and others):
+            return False
+        low, high = bounds_of([item])
+        wide, rest = (high - low)[:2], np.subtract(*bounds_of(others)[::-1])[:2]
+        return bool(high[2] - low[2] <= _FLAT * wide.max() and (wide >= rest).all())
+
+    return [o for o in objects if not is_ground(o)] or list(objects)
 
 
 def default_camera(around: Surroundings) -> Camera:
@@ -42,14 +91,73 @@ def default_camera(around: Surroundings) -> Camera:
     return Camera(vec3(position), vec3(target), vertical_fov_deg=32.0)
 
 
+def framing_camera(objects: Sequence[SceneObject]) -> Camera:
+    """Sees all but the ground, and where the studio's lamp casts its shadow and caustic, as large as they fit."""
+    points = np.concatenate([_some_points(o) for o in parts_of(objects)])
+    floor = points[:, 2].min()
+    x, y, z = key_direction()
+    shadow = points - np.outer((points[:, 2] - floor) / z, (x, y, z))
+    seen = np.concatenate([points, shadow])
+    away = _VIEW / np.linalg.norm(_VIEW)
+    right = np.cross((0.0, 0.0, 1.0), away)
+    right /= np.linalg.norm(right)
+    across, up, ahead = seen @ right, seen @ np.cross(away, right), -(seen @ away)
+    tangent = math.tan(math.radians(0.5 * _FOV_DEG)) * _FILLED
+    distance, middle = 0.0, []
+    for place, slope in ((across, tangent * _ASPECT), (up, tangent)):
+        # |place − middle| <= slope (ahead + distance) for every point, with the least distance that any middle allows.
+        above, below = (place - slope * ahead).max(), (-place - slope * ahead).max()
+        distance = max(distance, (above + below) / (2.0 * slope))
+        middle.append(0.5 * (above - below))
+    at = middle[0] * right + middle[1] * np.cross(away, right)
+    position = at + distance * away
+    # The target is what orbiting turns about: the middle of the objects' depth.
+    depth = distance + float(np.mean(ahead))
+    return Camera(vec3(position), vec3(position - depth * away), vertical_fov_deg=_FOV_DEG)
+
+
+def _some_points(item: SceneObject) -> np.ndarray:
+    """Vertices in the world, float64 (n, 3), thinned out where they are very many."""
+    vertices = item.mesh.vertices[:: max(1, len(item.mesh.vertices) // _FRAMED_POINTS)]
+    return vertices @ item.object_to_world[:3, :3].T + item.object_to_world[:3, 3]
+
+
 def default_light() -> Light:
     """A white sun."""
     power = illuminant("D65").scaled_to_luminous(DEFAULT_ILLUMINANCE)
     return DirectionalLight("sun", power, default_direction(), SUN_DIAMETER_DEG)
 
 
+def key_direction() -> Vec3:
+    """In which the light of the studio's lamp travels."""
+    azimuth, elevation = math.radians(_KEY_AZIMUTH_DEG), math.radians(_KEY_ELEVATION_DEG)
+    flat = math.cos(elevation)
+    return flat * math.cos(azimuth), -flat * math.sin(azimuth), -math.sin(elevation)
+
+
+def studio_lights(around: Surroundings) -> tuple[Light, Light]:
+    """A lamp whose pool of light fades on the table, and wide weak light from above."""
+    white, distance = illuminant("D65"), KEY_DISTANCE * around.radius
+    direction = key_direction()
+    lamp = SpotLight(
+        "lamp",
+        white.scaled_to_luminous(DEFAULT_ILLUMINANCE * distance**2),
+        vec3(around.centre - distance * np.array(direction)),
+        direction,
+        math.degrees(math.atan(_POOL_INNER * _POOL / KEY_DISTANCE)),
+        math.degrees(math.atan(_POOL / KEY_DISTANCE)),
+    )
+    above = white.scaled_to_luminous(_FILL_SHARE * DEFAULT_ILLUMINANCE)
+    return lamp, DirectionalLight("from above", above, (0.0, 0.3, -math.sqrt(0.91)), _FILL_DIAMETER_DEG)
+
+
+def studio_environment(up: Vec3 = (0.0, 0.0, 1.0)) -> Environment:
+    """The dark room that is seen round a scene with `studio_lights`."""
+    return from_map(STUDIO_MAP, _STUDIO_INTENSITY, up=up)
+
+
 def default_table(objects: Sequence[SceneObject]) -> SceneObject:
-    """A wide light-grey plane just below everything."""
+    """A wide grey plane just below everything."""
     around = environment_of(objects)
     matrix = np.eye(4)
     matrix[:3, 3] = around.centre
@@ -59,4 +167,4 @@ def default_table(objects: Sequence[SceneObject]) -> SceneObject:
     size = 40.0 * around.radius
     mesh = plane(size, size, name="table")
     note_recipe(mesh, {"shape": "plane", "width": size, "height": size})
-    return SceneObject("table", mesh, Diffuse((0.8, 0.8, 0.8)), matrix)
+    return SceneObject("table", mesh, Diffuse(_TABLE_RGB), matrix)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import UserError
+from ..base.paths import assets_dir
 from .environment import (
     DEFAULT_SKY_TYPE,
     Z_UP,
@@ -23,7 +24,9 @@ from .texture import Environment
 from .vectors import Vec3
 
 KEY = "environment"
-KINDS = ("map", "gradient", "sky", "constant")
+KINDS = ("map", "studio", "gradient", "sky", "constant")
+STUDIO_MAP = assets_dir() / "environments" / "studio.hdr"
+"""The shipped panorama, which has a word of its own so that saved scenes name no file of this installation."""
 _BLACK = (0.0, 0.0, 0.0)
 
 
@@ -42,6 +45,8 @@ def read_environment(table: SceneTable, notes: list[str]) -> tuple[Vec3, Environ
         background = _read_constant(inner)
     elif kind == "map":
         environment = _read_map(inner, notes)
+    elif kind == "studio":
+        environment = from_map(STUDIO_MAP, _intensity(inner), inner.number("rotation_deg", 0.0), _up(inner))
     elif kind == "gradient":
         environment = _read_gradient(inner)
     else:
@@ -113,6 +118,8 @@ def environment_values(environment: Environment, scene_path: Path) -> dict[str, 
     A picture without a file, or without a description, is written beside the scene (`scene_pictures`).
     """
     told = dict(environment.parameters)
+    if environment.kind == "map" and told and environment.source == str(STUDIO_MAP.resolve()):
+        return {"kind": "studio"} | told
     if environment.kind == "map" and told and environment.source and Path(environment.source).is_file():
         return {"kind": "map", "file": picture_file(environment.rgb, environment.source, scene_path)} | told
     if environment.kind != "map" and told:

@@ -103,7 +103,7 @@ def _surface(scene, pictures, triangle, u, v):
 
 
 @inlined
-def _gain(scene, lights, i, triangle, side, px, py, pz, a, b, stack):
+def gain_of_light(scene, lights, i, triangle, side, px, py, pz, a, b, stack):
     """Irradiance by light i, per unit of its quantity, on a facet's front (side 0) or back (1)."""
     sign = 1.0 if side == 0 else -1.0
     # The plastic number's fractions turn the sample's place on from light to light.
@@ -136,7 +136,7 @@ def _diffuse(scene, lights, spectra, pictures, tables, atom, triangle, u, v, pla
     total = 0.0
     for i in range(lights.kind.shape[0]):
         if white or spectra.lights[i, atom] > 0.0:
-            gain = _gain(scene, lights, i, triangle, side, px, py, pz, a, b, scratch.stack)
+            gain = gain_of_light(scene, lights, i, triangle, side, px, py, pz, a, b, scratch.stack)
             if white and gain > 0.0:
                 _added(spectra.light_xyz, i, row, red, green, blue, gain / math.pi, xyz)
             elif gain > 0.0:

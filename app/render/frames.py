@@ -21,9 +21,10 @@ from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import Features
 from ..model.optics.spectral_tables import SpectralAxis
-from ..model.scene import Scene
+from ..model.scene import Camera, Scene
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
+from ..passes.caustic_maps import CausticMaps
 from ..passes.map_layout import MapLayout
 from .camera_beams import CameraBeams
 from .frame_fit import FrameFit, Survey, inputs_of, share_light, stages_to_survey
@@ -33,6 +34,7 @@ from .memory_estimate import MemoryEstimate, check_room, estimate
 from .sampling import CameraSampling, LightSampling, camera_settings, has_own_method
 from .shrinking import METHOD, PASS_PHOTONS, passes
 from .solo import scene_seen
+from .time_budget import TimeBudget
 
 FIRST_PASS_PHOTONS = 1 << 17
 """Photons of a timed rendering's first pass, which finds out how fast the scene goes."""
@@ -85,8 +87,11 @@ class FrameSeconds:
 class FrameRenderer:
     """Owns what frames share. Run `steps(stage)` to its end, then read."""
 
-    def __init__(self, context: Context, settings: RenderSettings, stages: Sequence[Stage]) -> None:
-        """`stages`: what will be asked for; maps and lattices are fitted to some of them.
+    def __init__(
+        self, context: Context, settings: RenderSettings, stages: Sequence[Stage], begun: float | None = None
+    ) -> None:
+        """`stages`: what will be asked for; maps and lattices are fitted to some of them. `begun`: the
+        `time.perf_counter()` from which `settings.seconds` count, which are those of one picture.
 
         Where light changes, `shader.keep_programs` on the context spares compiling every frame's programs."""
         self._context = context
@@ -96,6 +101,9 @@ class FrameRenderer:
         self._fit = FrameFit.of(stages, settings)
         self._unsurveyed = list(stages_to_survey(stages, settings))
         self._traced: _Traced | None = None
+        self._budget: TimeBudget | None = None
+        if settings.seconds is not None:
+            self._budget = TimeBudget(settings.seconds, time.perf_counter() if begun is None else begun)
         self.phase = _PREPARING
         """What `steps` is at."""
         self.seconds = FrameSeconds()
@@ -126,30 +134,44 @@ class FrameRenderer:
             for _ in light.preparing():
                 yield 0.0
             self.seconds.prepare = time.perf_counter() - self.seconds.started
+            sampling, budget = LightSampling.of(stage.scene, self._settings), self._budget
+            if budget is not None:
+                if not self._shows_map:
+                    self._add_camera_pass(traced)
+                    assert traced.camera_pass is not None
+                    yield from budget.measuring(traced.camera_pass, *self._view(stage), first=True)
+                sampling = replace(sampling, seconds=budget.for_light(self._settings.spp))
             self.phase = _TRACING
-            for share in traced_light(light, LightSampling.of(stage.scene, self._settings), stop):
-                yield _LIGHT_SHARE * share
+            for share in traced_light(light, sampling, stop):
+                yield _LIGHT_SHARE * share if budget is None else budget.spent
             light.finish()
             light.settle()
-            started = time.perf_counter()
-            if not self._shows_map:
-                if has_own_method(self._settings):
-                    traced.camera_buffers = scene_buffers(self._context, light.scene, camera_settings(self._settings))
-                traced.camera_pass = CameraPass(
-                    self._context,
-                    traced.camera_buffers or traced.buffers,
-                    self._settings.layer,
-                    light.reflectances,
-                    light.map_channels,
-                )
-                if traced.camera_pass.scene.features.camera_beams:
-                    traced.camera_beams = CameraBeams(traced.camera_pass, self._context.is_software)
-            self.seconds.camera = time.perf_counter() - started
+            if traced.camera_pass is None and not self._shows_map:
+                self._add_camera_pass(traced)
         except BaseException:
             traced.release()
             raise
         self._traced = traced
         self.traces += 1
+
+    def _add_camera_pass(self, traced: _Traced) -> None:
+        """The camera pass of `traced`, and beams for it."""
+        started, light = time.perf_counter(), traced.light
+        if has_own_method(self._settings):
+            traced.camera_buffers = scene_buffers(self._context, light.scene, camera_settings(self._settings))
+        traced.camera_pass = CameraPass(
+            self._context,
+            traced.camera_buffers or traced.buffers,
+            self._settings.layer,
+            light.reflectances,
+            light.map_channels,
+        )
+        if traced.camera_pass.scene.features.camera_beams:
+            traced.camera_beams = CameraBeams(traced.camera_pass, self._context.is_software)
+        self.seconds.camera = time.perf_counter() - started
+
+    def _view(self, stage: Stage) -> tuple[Camera, int, int]:
+        return stage.camera, self._settings.width, self._settings.height
 
     def _see(self, stage: Stage, stop: Stop) -> Iterator[float]:
         """The camera pass of `stage`."""
@@ -157,24 +179,52 @@ class FrameRenderer:
         started, self.phase = time.perf_counter(), _SEEING
         settings, camera_pass = self._settings, self._traced.camera_pass
         maps = self._traced.light.caustic_maps()
-        view = stage.camera, settings.width, settings.height
+        view = self._view(stage)
         # Polygons belong to one view. A stop asked for while tracing still wants a picture: only the first sample is
         # owed then.
         camera_pass.take_beams(None)
         stops_at_once, samples = stop(), 1
+        budget = None if stops_at_once or settings.spp is not None else self._budget
         if not stops_at_once:
             sampling = CameraSampling.of(settings)
+            if budget is not None:
+                sampling = replace(sampling, budget=max(budget.samples(), 1))
             if self._traced.camera_beams is not None:
                 for _ in self._traced.camera_beams.choosing(*view, sampling.budget, settings.seed):
-                    yield _LIGHT_SHARE
+                    yield self._share(_LIGHT_SHARE)
             for _ in sampling.choosing(camera_pass, *view, maps):
-                yield _LIGHT_SHARE
+                yield self._share(_LIGHT_SHARE)
             samples = sampling.samples(camera_pass)
+        if budget is not None:
+            yield from self._see_until(budget, stage, maps, stop)
+            self.seconds.camera += time.perf_counter() - started
+            return
         for share in camera_pass.samples(*view, samples, 0, maps, settings.seed):
-            yield _LIGHT_SHARE + (1.0 - _LIGHT_SHARE) * share
+            yield self._share(_LIGHT_SHARE + (1.0 - _LIGHT_SHARE) * share)
             if not stops_at_once and stop() and camera_pass.is_even:
                 break
         self.seconds.camera += time.perf_counter() - started
+
+    def _see_until(self, budget: TimeBudget, stage: Stage, maps: CausticMaps, stop: Stop) -> Iterator[float]:
+        """Whole turns of samples until the time is over, one at least."""
+        assert self._traced is not None and self._traced.camera_pass is not None
+        camera_pass, view = self._traced.camera_pass, self._view(stage)
+        yield from budget.measuring(camera_pass, *view, maps)
+        turn, taken, started = camera_pass.spectrum.bands, 0, time.perf_counter()
+        while (count := budget.samples(taken) // turn * turn) or not taken or budget.has_time_for_part(taken):
+            if taken and not count and turn > 1:
+                return  # part of a turn would lack colours
+            count = max(count, turn)
+            for _ in camera_pass.samples(*view, count, taken, maps, self._settings.seed):
+                yield budget.spent
+                if camera_pass.is_even and camera_pass.samples_taken >= turn and (budget.left <= 0.0 or stop()):
+                    return
+            taken += count
+            budget.sample_s = (time.perf_counter() - started) / taken
+
+    def _share(self, of_work: float) -> float:
+        """Progress: of the time where that is given, else of the work."""
+        return of_work if self._budget is None else self._budget.spent
 
     def run(self, stage: Stage) -> np.ndarray:
         """The whole frame at once: `rgb` of it."""

@@ -136,12 +136,15 @@ def render(
     progress: Progress = lambda fraction, text: None,
     cancelled: Cancelled = lambda: False,
     context: Context | None = None,
+    begun: float | None = None,
 ) -> RenderResult:
-    """Render `scene`. What was done when `cancelled()` turned true is kept and shown."""
+    """Render `scene`. What was done when `cancelled()` turned true is kept and shown. `begun`: the
+    `time.perf_counter()` from which `settings.seconds` count; None: now."""
+    begun = time.perf_counter() if begun is None else begun
     own = context is None
     context = context or create_context()
     stage = Stage(scene, scene.camera)
-    frames = FrameRenderer(context, settings, [stage])
+    frames = FrameRenderer(context, settings, [stage], begun)
     try:
         for share in frames.steps(stage, cancelled):
             progress(share, frames.phase)

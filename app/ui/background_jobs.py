@@ -87,6 +87,7 @@ class BackgroundJobs:
 
     def release(self) -> None:
         """End and free everything; before the engine is released."""
+        self.cursor.release()
         self.exports.release()
         self.comparison.release()
         self.overlay.release()

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..edit.state import State
+from .direct_light import DirectLightQuery
 from .live_picture import LivePicture, pixel_of
 from .view_model import CursorInfo
 
 if TYPE_CHECKING:
+    from ..model.lights import Light
     from ..passes.pick import PickHit
+    from ..render.viewer.photon_queries import CausticSpectrum
 
 SPECTRUM_S = 0.1
 """Shortest time between two spectra: each reads stored photons."""
@@ -27,6 +31,7 @@ class Cursor:
         self._hit: PickHit | None = None
         self._spectrum_s = -1e9
         self._spectrum_key: tuple[object, ...] = ()
+        self._direct = DirectLightQuery()
 
     def update(self, state: State, picture: LivePicture, now_s: float) -> None:
         """Query again under `state.hover`."""
@@ -65,9 +70,41 @@ class Cursor:
         key = (*self._key, picture.stats.photons, state.physical, state.smoothing)
         if key == self._spectrum_key or now_s - self._spectrum_s < SPECTRUM_S:
             if before is not None and before.object_index == self.view_model.object_index:
-                self.view_model = replace(self.view_model, spectrum_nm=before.spectrum_nm, spectrum=before.spectrum)
+                self.view_model = replace(self.view_model, **{name: getattr(before, name) for name in _SPECTRUM_FIELDS})
             return
-        found = picture.engine.caustic_spectrum(self._hit.object_index, np.asarray(self._hit.position, float))
-        self._spectrum_key, self._spectrum_s = key, now_s
-        if found is not None:
-            self.view_model = replace(self.view_model, spectrum_nm=found[0], spectrum=found[1])
+        place, normal = (np.asarray(v, float) for v in (self._hit.position, self._hit.normal))
+        found = picture.engine.caustic_spectrum(self._hit.object_index, place)
+        scene = state.scene if picture.engine.inputs is None else picture.engine.inputs.scene
+        gains = self._direct.gains(scene, place, normal)
+        self._spectrum_s = now_s
+        # An answer that is still awaited is asked for again.
+        self._spectrum_key = key if gains is not None or self._direct.is_hopeless else ()
+        is_awaited = gains is None and not self._direct.is_hopeless
+        if is_awaited and before is not None and before.spectrum is not None:
+            # The answer before stays until the next is whole: no flicker while the cursor moves.
+            self.view_model = replace(self.view_model, **{name: getattr(before, name) for name in _SPECTRUM_FIELDS})
+        elif found is not None:
+            self.view_model = replace(self.view_model, **_told(found, scene.lights, gains))
+
+    def release(self) -> None:
+        """End what works beside the interface."""
+        self._direct.release()
+
+
+_SPECTRUM_FIELDS = ("spectrum_nm", "spectrum", "spectrum_error", "too_few_photons", "direct_illuminance")
+
+
+def _told(caustic: CausticSpectrum, lights: Sequence[Light], gains: np.ndarray | None) -> dict[str, Any]:
+    """Fields of `CursorInfo`: a caustic with the direct light of `lights`, each `gains` times its quantity."""
+    width = caustic.resolution_nm
+    direct = np.zeros(len(caustic.wavelength_nm))
+    if gains is not None:
+        edges = np.append(caustic.wavelength_nm - 0.5 * width, caustic.wavelength_nm[-1] + 0.5 * width)
+        for light, gain in zip(lights, gains, strict=True):
+            direct += gain * light.spectral_power.binned(edges)
+    total = direct if caustic.irradiance is None else direct + caustic.irradiance
+    luminous = None
+    if gains is not None:
+        luminous = float(sum(g * light.spectral_power.luminous() for g, light in zip(gains, lights, strict=True)))
+    values = (caustic.wavelength_nm, total, caustic.error, caustic.irradiance is None, luminous)
+    return dict(zip(_SPECTRUM_FIELDS, values, strict=True))

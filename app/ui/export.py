@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.atomic import atomic_output, check_writable
 from ..base.errors import UserError
-from ..base.image_io import check_finite, check_suffix, write_image
+from ..base.image_io import SHOWN_SUFFIXES, check_finite, check_suffix, save_codes, write_image
 from ..base.memory import MAX_SIDE_PX, check_picture_memory
 from ..edit import requests
 from ..edit.parameters import Stage
@@ -187,9 +187,9 @@ class _Job:
 
 
 def save_screenshot(path: Path, shown: Shown) -> str:
-    """Write what is shown: .png as it is on the screen, .exr and .npy linear without tone curve. Returns the sentence
-    to tell."""
-    if check_suffix(path) == ".png":
+    """Write what is shown: .png, .jpg and .webp as on the screen, .exr and .npy linear without tone curve. Returns the
+    sentence to tell."""
+    if check_suffix(path) in SHOWN_SUFFIXES:
         check_finite(path.name, _texels(shown.radiance))
         write_codes(path, texture_codes(shown.codes))
     else:
@@ -198,13 +198,9 @@ def save_screenshot(path: Path, shown: Shown) -> str:
 
 
 def write_codes(path: Path, codes: np.ndarray) -> None:
-    """Write uint8 (H, W, 3) sRGB codes, row 0 on top, as a PNG; for pictures of the whole window too."""
-    from PIL import Image, PngImagePlugin
-
-    texts = PngImagePlugin.PngInfo()
-    texts.add(b"sRGB", b"\x00")  # rendering intent: perceptual
+    """Write uint8 (H, W, 3) sRGB codes, row 0 on top; for pictures of the whole window too."""
     with atomic_output(path) as temporary:
-        Image.fromarray(codes).save(temporary, format="PNG", pnginfo=texts, compress_level=6)
+        save_codes(temporary, codes)
 
 
 def texture_codes(texture: moderngl.Texture) -> np.ndarray:

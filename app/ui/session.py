@@ -16,9 +16,11 @@ from typing import TYPE_CHECKING
 from ..base.errors import UserError
 from ..edit.autosave import Autosave, Recovery, recoveries
 from ..edit.document import Document
+from ..edit.opening import Opening
 from ..edit.preferences import Settings, config_dir, load_settings, save_settings
 from ..edit.state import Selection, State
 from ..gpu.shader_watch import ShaderWatch
+from ..model.staging import Staging
 from ..render.notices import loss_notices
 from .background_jobs import BackgroundJobs
 from .crash_log import write_crash
@@ -52,10 +54,13 @@ class Session:
         path: Path | None = None,
         make_engine: Callable[[Context], LiveEngine] | None = None,
         clock: Callable[[], float] = time.monotonic,
+        opening: Opening | None = None,
     ) -> None:
         self.context = context
-        self.document = Document.new() if path is None else Document.open(path)
         self.settings, notice = load_settings()
+        self._kept_settings = self.settings
+        """As they are on the disk."""
+        self.document = Document.new() if path is None else Document.open(path, opening or self.opening_of(path))
         self.messages = MessageBox(clock)
         self._told_losses: tuple[str, ...] = ()
         self.autosave = Autosave(config_dir())
@@ -112,6 +117,7 @@ class Session:
 
     def finished(self) -> None:
         """After the frame is on the screen."""
+        self._keep_settings()
         self.frame_ms.append(1000.0 * (self.clock() - self._frame_started))
 
     def wait_s(self) -> float:
@@ -140,6 +146,10 @@ class Session:
         )
 
     # What requests use
+
+    def opening_of(self, path: Path) -> Opening:
+        """What the user said before of the file at `path`."""
+        return Opening(Staging(up=self.settings.up_of(path)))
 
     def show_scene(self, scene: Scene) -> None:
         """Another scene of the same document, as after undo; what was selected stays if it is still there."""
@@ -227,9 +237,16 @@ class Session:
     def close(self) -> None:
         """The end in good order: settings are remembered, nothing is left to recover."""
         self.autosave.close()
-        with suppress(UserError):
-            save_settings(self.settings)
+        self._keep_settings()
         self.release()
+
+    def _keep_settings(self) -> None:
+        """Write what is remembered as soon as it changes, but not while something is dragged: a crash costs none of
+        it."""
+        if self.settings != self._kept_settings and not self.state.interacting:
+            self._kept_settings = self.settings
+            with suppress(UserError):
+                save_settings(self.settings)
 
     def release(self) -> None:
         """Free what the device holds."""

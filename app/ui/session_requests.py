@@ -34,7 +34,14 @@ def _new_scene(session: Session, _request: requests.NewScene) -> None:
 
 
 def _open(session: Session, request: requests.Open) -> None:
-    session.show_document(Document.open(request.path))
+    session.show_document(Document.open(request.path, session.opening_of(request.path)))
+
+
+def _stand_up(session: Session, request: requests.StandUp) -> None:
+    document = session.document.stood_up(request.up)
+    assert document.source is not None
+    session.settings = session.settings.said_up(document.source, request.up)
+    session.show_document(document)
 
 
 def _save(session: Session, request: requests.Save) -> None:
@@ -182,6 +189,7 @@ def _dismiss(session: Session, request: requests.DismissMessage) -> None:
 _HANDLERS: dict[type, Callable] = {
     requests.NewScene: _new_scene,
     requests.Open: _open,
+    requests.StandUp: _stand_up,
     requests.Save: _save,
     requests.Undo: _undo,
     requests.Redo: _redo,

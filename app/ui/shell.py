@@ -21,6 +21,7 @@ from .panels import (
     inspector,
     menu,
     messages,
+    opened_card,
     outliner,
     spectrum,
     start_page,
@@ -87,6 +88,7 @@ def draw_interface(state: State, view_model: ViewModel) -> State:
     The host applies the theme (`theme.apply`) between frames: sizes must not change within one.
     """
     state = shortcuts.handle(state, view_model)
+    shortcuts.focused_panel["field"] = ""
     state = menu.draw_menu(state, view_model)
     if state.preferences.panels.start_page:
         state = start_page.draw_start_page(state, view_model)
@@ -111,9 +113,12 @@ def _draw_picture(state: State, view_model: ViewModel) -> State:
     imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(0, 0))
     shown, _ = imgui.begin(layout.VIEWPORT, None, flags)
     imgui.pop_style_var()
+    corner, size = imgui.get_window_pos(), imgui.get_window_size()
     if shown:
         state = draw_viewport(state, view_model)
     imgui.end()
+    if shown:
+        state = opened_card.draw_opened_card(state, view_model, corner.x + 0.5 * size.x, corner.y + size.y)
     return state
 
 
@@ -125,6 +130,8 @@ def _draw_panel(window: PanelWindow, state: State, view_model: ViewModel) -> Sta
     imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.first_use_ever, imgui.ImVec2(0.5, 0.5))
     shown, stays = imgui.begin(window.title, True)
     item_rects.note(f"Window: {window.title}")
+    if imgui.is_window_focused(imgui.FocusedFlags_.child_windows) and not imgui.is_window_docked():
+        shortcuts.focused_panel["field"] = window.field
     if shown:
         state = window.draw(state, view_model)
     imgui.end()

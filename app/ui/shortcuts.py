@@ -18,6 +18,11 @@ _REPEATING = ("Undo", "Redo", "Brighter", "Darker")
 """A held key goes on."""
 
 _ON_START_PAGE = ("File", "Help")
+_ALWAYS = ("Shortcuts", "Quit")
+"""Even while a text is typed, of which their keys are no part."""
+
+focused_panel = {"field": ""}
+"""The floating panel that had the keyboard in the last frame, of `Panels`: Esc closes it."""
 
 _NAMED = {
     "Esc": imgui.Key.escape,
@@ -70,6 +75,11 @@ def handle(state: State, view_model: ViewModel) -> State:
     them."""
     io = imgui.get_io()
     _close_menus()
+    is_modal = imgui.internal.get_top_most_popup_modal() is not None
+    if io.want_text_input and not is_modal:
+        for command in _all():
+            if command.name in _ALWAYS and _is_pressed(command):
+                return command.act(state, view_model)
     is_free = not io.want_text_input and not imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
     # The right button held means flying: its letters belong to the camera.
     if not is_free or imgui.is_mouse_down(imgui.MouseButton_.right):
@@ -77,6 +87,8 @@ def handle(state: State, view_model: ViewModel) -> State:
     on_start_page = state.preferences.panels.start_page
     if on_start_page and imgui.is_key_pressed(imgui.Key.escape):
         return state.with_panels(start_page=False)
+    if focused_panel["field"] and imgui.is_key_pressed(imgui.Key.escape):
+        return state.with_panels(**{focused_panel["field"]: False})
     for command in _all():
         # What the page hides must not be edited blindly.
         is_reachable = not on_start_page or command.group in _ON_START_PAGE

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..edit.history import HistoryEntry
 from ..model.scene import Vec3
+from ..model.staging import UpAxis
 from ..passes.ray_line import RayLine
 from ..render.viewer.stats import LiveStats
 
@@ -30,7 +31,13 @@ class CursorInfo:
     spectrum_nm: np.ndarray | None = None
     """Bin centres, when a spectrum was asked for (`Panels.spectrum`)."""
     spectrum: np.ndarray | None = None
-    """Shape of the caustic's spectrum there: irradiance of each bin over that of the brightest."""
+    """Spectral irradiance there, W/(unit² nm), mean of each bin: caustic, and direct light where that is known."""
+    spectrum_error: float = 0.0
+    """Standard error of a bin of the caustic, relative."""
+    too_few_photons: bool = False
+    """Of the caustic only that it is there is known: `spectrum` lacks it."""
+    direct_illuminance: float | None = None
+    """Of `spectrum`, lm/unit² that came straight from lights; None where that is not known, and lacks."""
     magnified: int | None = None
     """Texture id of the magnifier's picture."""
 
@@ -91,6 +98,8 @@ class ViewModel:
     title: str = "untitled"
     path: Path | None = None
     unsaved: bool = False
+    up: UpAxis | None = None
+    """The axis taken to be up of a file that was just opened and may lie on its side."""
     undo: str | None = None
     """Label of what undo would take back."""
     redo: str | None = None
@@ -101,6 +110,9 @@ class ViewModel:
     shader_error: str | None = None
     recovery: Path | None = None
     """An autosave found at the start."""
+    recovery_title: str = ""
+    recovery_time: str = ""
+    """Whose it is, and when it was written."""
     asks_to_quit: bool = False
     """Unsaved changes: the dialogue with Save, Discard and Cancel is open."""
     curves: tuple[ErrorCurve, ...] = ()

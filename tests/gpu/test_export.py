@@ -68,7 +68,7 @@ def test_a_png_is_what_is_on_the_screen_and_an_exr_what_is_behind_it(
     exports.begin(Screenshot(tmp_path / "a.exr"), state, shown)
     assert np.array_equal(read_image(tmp_path / "a.exr").rgb, linear)
     with pytest.raises(UserError, match="picture format"):
-        exports.begin(Screenshot(tmp_path / "a.jpg"), state, shown)
+        exports.begin(Screenshot(tmp_path / "a.gif"), state, shown)
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from spectrasplat.edit.stored_photons import StoredPhotons
 from spectrasplat.gpu.context import Context
 from spectrasplat.passes.pick import PickHit
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
+from spectrasplat.render.viewer.photon_queries import CausticSpectrum
 from spectrasplat.render.viewer.stats import LiveStats
 
 
@@ -59,10 +60,8 @@ class FakeEngine:
     def stored_photons(self, limit: int = 0) -> StoredPhotons:
         return self.photons or StoredPhotons.none()
 
-    def caustic_spectrum(
-        self, receiver: int, position: np.ndarray, bins: int = 40
-    ) -> tuple[np.ndarray, np.ndarray] | None:
-        return np.linspace(385, 775, bins), np.ones(bins)
+    def caustic_spectrum(self, receiver: int, position: np.ndarray) -> CausticSpectrum | None:
+        return CausticSpectrum(np.linspace(385, 775, 40), np.ones(40), 0.05)
 
     def retrace(self) -> None:
         self.retraced += 1

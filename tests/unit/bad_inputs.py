@@ -239,8 +239,8 @@ OPTIONS = {
     "unknown option": option_case("--sead 3", "--sead", "--seed", "--help"),
 }
 OUTPUTS = {
-    "suffix": Case(PLAIN, said("x.jpg", "'.jpg'", ".png, .exr, .npy"), output="x.jpg"),
-    "no suffix": Case(PLAIN, said("write x:", "no suffix", ".png, .exr, .npy"), output="x"),
+    "suffix": Case(PLAIN, said("x.gif", "'.gif'", ".png, .jpg, .jpeg, .webp, .exr, .npy"), output="x.gif"),
+    "no suffix": Case(PLAIN, said("write x:", "no suffix", ".png, .jpg, .jpeg, .webp, .exr, .npy"), output="x"),
     "no folder": Case(PLAIN, said("gone/x.png", "does not exist", "create it"), output="gone/x.png"),
     "file as folder": Case(PLAIN, said("out.png/x.png", "not a folder"), output="out.png/x.png"),
     "folder": Case(PLAIN, said("made.png", "is a folder"), output="made.png"),

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -60,7 +61,10 @@ class FakeRenderer:
         self.press_ctrl_c = False
         self.saw_cancelled: bool | None = None
 
-    def render(self, scene: Scene, settings: RenderSettings, *, progress: Any, cancelled: Any) -> FakeResult:
+    def render(
+        self, scene: Scene, settings: RenderSettings, *, progress: Any, cancelled: Any, begun: float
+    ) -> FakeResult:
+        assert 0.0 <= time.perf_counter() - begun < 60.0
         self.settings = settings
         progress(0.5, "half")
         if self.press_ctrl_c:
@@ -241,7 +245,7 @@ class TestRender:
     @pytest.mark.parametrize(
         ("output", "sentence"),
         [
-            ("out.jpg", "'.jpg' is not a picture format"),
+            ("out.gif", "'.gif' is not a picture format"),
             ("out", "no suffix"),
             ("nowhere/out.png", "does not exist"),
             ("folder.png", "is a folder"),

@@ -19,7 +19,7 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.io.scene_table import SceneTable
 from spectrasplat.model.io.toml_text import toml_text
-from spectrasplat.model.lights import LIGHT_KINDS, DirectionalLight, Light, PointLight
+from spectrasplat.model.lights import LIGHT_KINDS, Light, PointLight
 from spectrasplat.model.lights.light import made
 from spectrasplat.model.lights.light_file import light_values, read_light
 from spectrasplat.model.materials import MATERIAL_KINDS, Absorption, Dielectric, Diffuse, Grating, Material, Mirror
@@ -250,11 +250,11 @@ def test_shipped_scenes_are_saved_over_word_for_word(name: str, tmp_path: Path) 
     assert path.read_text(encoding="utf-8") == text
 
 
-def test_the_default_sun_is_left_out_again(tmp_path: Path) -> None:
+def test_the_default_lamps_are_left_out_again(tmp_path: Path) -> None:
     path = tmp_path / "bare.toml"
     path.write_text('[[objects]]\nshape = "sphere"\n', encoding="utf-8")
     scene = load_scene(path)
-    assert isinstance(scene.lights[0], DirectionalLight)
+    assert scene.lights[0].name == "lamp"
     save_scene(scene, path, over=True)
     # The table that was put below is an object now; the rest is as it was.
     assert "lights" not in path.read_text(encoding="utf-8")

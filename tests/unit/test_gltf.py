@@ -89,7 +89,7 @@ def test_hierarchy_instances_and_mirroring(tmp_path: Path) -> None:
         {"mesh": 0, "matrix": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1]},
     ]
     scene = load_gltf(builder.glb(tmp_path / "m.glb"))
-    first, second = scene.objects
+    first, second, _table = scene.objects
     assert first.mesh is second.mesh
     assert first.name != second.name
     # A quarter turn about z takes x to y; scaled by two, moved by (1, 2, 3).

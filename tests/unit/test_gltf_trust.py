@@ -112,7 +112,7 @@ def test_nodes_take_a_time_in_proportion_to_their_number(tmp_path: Path) -> None
         nodes = [{"mesh": 0, "name": "same", "translation": [2 * i, 0, 0]} for i in range(count)]
         path = written(tmp_path / "a.gltf", tetrahedron(nodes=nodes, scenes=[{"nodes": list(range(count))}]))
         begun = time.process_time()
-        assert len({item.name for item in load_gltf(path).objects}) == count
+        assert len({item.name for item in load_gltf(path).objects}) == count + 1  # and a table
         return time.process_time() - begun
 
     seconds(10)

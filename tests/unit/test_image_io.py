@@ -69,9 +69,9 @@ def test_png_row_order_exposure_and_metadata(tmp_path):
     assert np.allclose(read_image(tmp_path / "b.png").rgb[1:], 0.36, atol=0.004)
 
 
-@pytest.mark.parametrize("name", ["a.jpg", "a", "a.png.txt"])
+@pytest.mark.parametrize("name", ["a.gif", "a", "a.png.txt"])
 def test_unknown_suffix_names_the_known_ones(tmp_path, picture, name):
-    with pytest.raises(UserError, match=r"\.png, \.exr, \.npy"):
+    with pytest.raises(UserError, match=r"\.png, .*\.exr, \.npy"):
         write_image(tmp_path / name, picture)
     with pytest.raises(UserError, match=r"a"):
         check_suffix(tmp_path / name)

@@ -36,10 +36,10 @@ def test_log_gets_a_line_every_ten_seconds(clock: Clock) -> None:
     with ProgressReporter("ball", stream, clock) as reporter:
         drive(reporter, clock, 40)
     assert stream.getvalue().splitlines() == [
-        "ball: 25 % after 10 s, 10 photons",
-        "ball: 50 % after 20 s, 20 photons",
-        "ball: 75 % after 30 s, 30 photons",
-        "ball: 100 % after 40 s, 40 photons",
+        "ball: 25 % after 10 s, 10 photons, about 30 s left",
+        "ball: 50 % after 20 s, 20 photons, about 20 s left",
+        "ball: 75 % after 30 s, 30 photons, about 10 s left",
+        "ball: 100 % after 40 s, 40 photons, about 0 s left",
     ]
 
 
@@ -64,4 +64,4 @@ def test_fractions_outside_are_clamped(clock: Clock) -> None:
     reporter = ProgressReporter("ball", stream, clock)
     clock.now += 10.0
     reporter(1.7)
-    assert stream.getvalue() == "ball: 100 % after 10 s\n"
+    assert stream.getvalue() == "ball: 100 % after 10 s, about 0 s left\n"

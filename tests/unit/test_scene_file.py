@@ -25,7 +25,7 @@ def test_three_lines_make_a_scene_whose_caustic_is_in_view(tmp_path: Path) -> No
     assert isinstance(table.material, Diffuse)
     top = table.object_to_world[2, 3]
     assert -0.51 < top < -0.5
-    assert len(scene.notes) == 3
+    assert len(scene.notes) == 2
     # The light through the ball's centre meets the table inside the picture.
     direction = np.array(scene.lights[0].direction)
     spot = direction * (top / direction[2])

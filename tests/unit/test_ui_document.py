@@ -29,7 +29,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def edited(document: Document, grey: float = 0.5) -> Scene:
-    scene = replace(document.scene, background_rgb=(grey, grey, grey))
+    scene = replace(document.scene, environment=None, background_rgb=(grey, grey, grey))
     document.history.push("Background", scene)
     return scene
 

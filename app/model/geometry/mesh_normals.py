@@ -13,6 +13,10 @@ import numpy as np
 from .mesh import Mesh, cross, normalised
 from .mesh_health import weld_map
 
+FINE_TRIANGLES, FINE_BEND_DEG, FLAT_DEG = 500, 12.0, 0.05
+SMOOTH_CREASE_DEG = 30.0
+"""What bends less is taken to be smooth in a finely cut mesh without normals."""
+
 
 def angle_weighted_normals(mesh: Mesh, crease_deg: float = 180.0) -> np.ndarray:
     """Corner normals, float64 (T, 3, 3).
@@ -34,6 +38,22 @@ def angle_weighted_normals(mesh: Mesh, crease_deg: float = 180.0) -> np.ndarray:
     normals = normalised(sums)[group].reshape(-1, 3, 3)
     cancelled = (normals == 0.0).all(axis=2, keepdims=True)
     return np.where(cancelled, faces[:, None], normals)
+
+
+def is_finely_cut(mesh: Mesh) -> bool:
+    """Whether flat triangles most likely stand for a smooth surface: many of them, that bend a little from one to the
+    next. A cut stone has few, and bends more."""
+    if len(mesh.triangles) < FINE_TRIANGLES:
+        return False
+    triangles, faces = weld_map(mesh.vertices)[1][mesh.triangles], mesh.face_normals()
+    start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    key = np.minimum(start, end).astype(np.int64) * (int(triangles.max()) + 1) + np.maximum(start, end)
+    order = np.argsort(key, kind="stable")
+    same = key[order[1:]] == key[order[:-1]]
+    one, two = order[:-1][same] // 3, order[1:][same] // 3
+    bends = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", faces[one], faces[two]), -1.0, 1.0)))
+    bends = bends[(bends > FLAT_DEG) & (bends < SMOOTH_CREASE_DEG)]
+    return len(bends) > 0.2 * len(same.nonzero()[0]) and float(np.median(bends)) < FINE_BEND_DEG
 
 
 def _corner_angles(corners: np.ndarray) -> np.ndarray:

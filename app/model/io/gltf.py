@@ -30,9 +30,18 @@ from ..scene import (
     Scene,
     SceneObject,
 )
-from ..scene_defaults import default_camera, default_light, default_table, environment_of
+from ..scene_defaults import (
+    default_table,
+    environment_of,
+    framing_camera,
+    parts_of,
+    studio_environment,
+    studio_lights,
+    surroundings_of,
+)
+from ..staging import AS_FOUND, Y_UP_TO_Z_UP, Staging, opaque_note, with_glass
 from ..unique_names import Names
-from ..vectors import vec3
+from ..vectors import Vec3, vec3
 from .gltf_document import GltfDocument, open_document
 from .gltf_extras import read_node_dabs, read_scene_extras
 from .gltf_materials import (
@@ -51,7 +60,7 @@ from .scene_table import MAX_MAGNITUDE, SceneTable
 LIGHTS = "KHR_lights_punctual"
 UNDERSTOOD = frozenset({LIGHTS, TRANSMISSION, VOLUME, IOR, DISPERSION, "KHR_mesh_quantization"})
 _CAN_BE_LEFT_OUT = ("KHR_texture_", "KHR_materials_", "EXT_texture_", "KHR_xmp", "MSFT_", "EXT_lights_image_based")
-Y_UP_TO_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
+CAMERA_ADDED = "No camera in the file: one that sees the objects was added."
 _DEFAULT_DISTANCE = 1.0
 _PUNCTUAL = tuple(cls.kind for cls in (PointLight, SpotLight, DirectionalLight))
 
@@ -71,16 +80,16 @@ class Origins:
     """Content of a texture (`gltf_textures.texture_key`) -> its number."""
 
 
-def load_gltf(path: str | os.PathLike[str]) -> Scene:
-    """The scene in a glTF file. Raises UserError for files that are truncated, contradictory or need
-    extensions this program lacks."""
-    return read_scene(open_document(path))[0]
+def load_gltf(path: str | os.PathLike[str], staging: Staging = AS_FOUND) -> Scene:
+    """The scene in a glTF file, with what is asked for. Raises UserError for files that are truncated, contradictory
+    or need extensions this program lacks, and for objects and glasses that there are not."""
+    return read_scene(open_document(path), staging)[0]
 
 
-def read_scene(document: GltfDocument) -> tuple[Scene, Origins]:
+def read_scene(document: GltfDocument, staging: Staging = AS_FOUND) -> tuple[Scene, Origins]:
     """The scene and where its parts lie in the document."""
     try:
-        return _Reader(document).read()
+        return _Reader(document, staging).read()
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
         # The document breaks glTF's schema somewhere we had no sentence of its own for.
         reason = f"{type(error).__name__}: {error}".partition("\n")[0][:80]
@@ -88,8 +97,10 @@ def read_scene(document: GltfDocument) -> tuple[Scene, Origins]:
 
 
 class _Reader:
-    def __init__(self, document: GltfDocument) -> None:
+    def __init__(self, document: GltfDocument, staging: Staging) -> None:
         self.document = document
+        self.staging = staging
+        self._to_z_up = np.eye(4) if staging.up == "z" else Y_UP_TO_Z_UP
         self.notes: list[str] = []
         self.origins = Origins()
         self.objects: list[SceneObject] = []
@@ -109,28 +120,41 @@ class _Reader:
             raise self.document.fail("the file holds no triangles; check that the scene was exported")
         if self.document.items("animations") or self.document.items("skins"):
             self.notes.append("Animations and skins are not played (they are kept when saving).")
-        upright = [replace(o, object_to_world=Y_UP_TO_Z_UP @ o.object_to_world) for o in self.objects]
-        around = environment_of(upright)
+        self.objects = with_glass(self.objects, self.staging, self.document.path.name)
+        is_whole = self.camera is not None and bool(self.lights)
+        if not is_whole and (note := opaque_note(self.objects)) is not None:
+            self.notes.append(note)
         background, environment, render = read_scene_extras(self.document, self.notes)
-        receives = any(o.material.receives for o in self.objects)
+        upright = [replace(o, object_to_world=self._to_z_up @ o.object_to_world) for o in self.objects]
+        around = environment_of(upright)
+        lights = self._read_lights(Surroundings(self._to_z_up[:3, :3].T @ around.centre, around.radius))
         # An environment shows glass and mirrors without a light and without anything it falls on.
-        if environment is None and not receives:
+        receives = any(o.material.receives for o in self.objects)
+        is_bare = self.camera is None and not self.lights and environment is None and not any(background)
+        if (environment is None and not receives) or (is_bare and len(parts_of(upright)) == len(upright)):
             table = default_table(upright)
-            matrix = Y_UP_TO_Z_UP.T @ table.object_to_world
+            matrix = self._to_z_up.T @ table.object_to_world
             self.objects.append(replace(table, name=self._names.unique("table"), object_to_world=matrix))
-            self.notes.append("Nothing diffuse in the file: a light-grey table was put below the objects.")
-        lights = self._read_lights(Surroundings(Y_UP_TO_Z_UP[:3, :3].T @ around.centre, around.radius))
+            self.notes.append("Nothing in the file to stand on: a grey table was put below the objects.")
+            receives = True
         if not lights and (environment is None or receives):
-            sun = default_light()
-            lights = (sun.changed(name=self._names.unique(sun.name), direction=_turned(sun.direction)),)
-            self.notes.append("No light in the file: a white sun from behind on the left was added.")
+            lights = tuple(self._as_in_file(light) for light in studio_lights(surroundings_of(parts_of(upright))))
+            self.notes.append(
+                "No light in the file: a lamp from behind on the left and weak light from above were added."
+            )
+        if is_bare:
+            environment = studio_environment(self._turned((0.0, 0.0, 1.0)))
+            self.notes.append("A quiet studio was put round it; --environment sky, or a panorama, shows another.")
         camera = self.camera
         if camera is None:
-            fitted = default_camera(around)
+            fitted = framing_camera(upright)
             camera = replace(
-                fitted, position=_turned(fitted.position), target=_turned(fitted.target), up=(0.0, 1.0, 0.0)
+                fitted,
+                position=self._turned(fitted.position),
+                target=self._turned(fitted.target),
+                up=self._turned(fitted.up),
             )
-            self.notes.append("No camera in the file: one that sees the objects was added.")
+            self.notes.append(CAMERA_ADDED)
         name = self.document.path.stem
         notes = tuple(dict.fromkeys(self.notes))
         return Scene(name, camera, lights, tuple(self.objects), background, environment, render, notes), self.origins
@@ -329,6 +353,16 @@ class _Reader:
             lights.append(light)
         return tuple(lights)
 
+    def _turned(self, vector: Vec3) -> Vec3:
+        """A z-up vector in the file's own axes."""
+        turned = self._to_z_up[:3, :3].T @ np.array(vector)
+        return vec3(turned + 0.0)  # no −0
+
+    def _as_in_file(self, light: Light) -> Light:
+        """A light of a z-up world in the file's own axes."""
+        placed: dict[str, Any] = {"name": self._names.unique(light.name), "direction": self._turned(light.direction)}
+        return light.changed(**placed | ({"position": self._turned(light.position)} if light.has_place else {}))
+
     def _light(self, entry: dict[str, Any], label: str, world: np.ndarray, around: Surroundings) -> Light | None:
         from ..optics.colorimetry import illuminant_table, rgb709_to_xyz_matrix, rgb_partition
         from ..optics.spectrum import Spectrum
@@ -399,8 +433,3 @@ def _rotation(quaternion: Any) -> np.ndarray:
 
 def _unit(vector: np.ndarray) -> np.ndarray:
     return vector / np.linalg.norm(vector)
-
-
-def _turned(vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    """A z-up vector in glTF's y-up axes."""
-    return vec3(Y_UP_TO_Z_UP[:3, :3].T @ np.array(vector))

@@ -13,6 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...base import files
 from ...base.errors import UserError
 from ..lights.light_file import read_light
@@ -28,18 +30,28 @@ from ..scene import (
 )
 from ..scene_camera import read_camera
 from ..scene_checks import check_scene
-from ..scene_defaults import default_camera, default_light, default_table, environment_of
+from ..scene_defaults import (
+    default_camera,
+    default_light,
+    default_table,
+    environment_of,
+    framing_camera,
+    studio_environment,
+    studio_lights,
+)
 from ..scene_environment import read_environment
 from ..scene_objects import MESH_SUFFIXES, ObjectReader, load_checked_mesh
 from ..scene_render import read_render
 from ..scene_textures import TextureReader
+from ..staging import AS_FOUND, Y_UP_TO_Z_UP, Staging, guessed_up, with_glass
+from ..texture import Environment
 from .scene_table import SceneTable
 
 GLTF_SUFFIXES = (".glb", ".gltf")
 
 
-def load_scene(path: str | os.PathLike[str]) -> Scene:
-    """The scene in `path` (.toml, .glb, .gltf, or a mesh: .ply, .obj, .stl).
+def load_scene(path: str | os.PathLike[str], staging: Staging = AS_FOUND) -> Scene:
+    """The scene in `path` (.toml, .glb, .gltf, or a mesh: .ply, .obj, .stl), with what `staging` asks for.
 
     Raises UserError, in one sentence with file, key and remedy, for anything that cannot be
     rendered as it stands.
@@ -52,13 +64,15 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
         raise UserError(f"{path} {problem}; give a .toml, .glb or .gltf scene or a .ply, .obj or .stl mesh")
     suffix = path.suffix.lower()
     if suffix == ".toml":
-        scene = _scene_from_table(SceneTable(_read_toml(path), path))
+        if staging.up is not None:
+            raise UserError(f"{path.name}: --up is for meshes and glTF files; in a scene file z is up")
+        scene = _scene_from_table(SceneTable(_read_toml(path), path), staging)
     elif suffix in GLTF_SUFFIXES:
         from .gltf import load_gltf
 
-        scene = load_gltf(path)
+        scene = load_gltf(path, staging)
     elif suffix in MESH_SUFFIXES:
-        scene = _scene_around_mesh(path)
+        scene = _scene_around_mesh(path, staging)
     else:
         raise UserError(
             f"{path}: '{path.suffix}' is not a kind of scene; use .toml, {', '.join(GLTF_SUFFIXES + MESH_SUFFIXES)}"
@@ -85,7 +99,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise UserError(f"{path} cannot be read: {error.strerror}; give another scene file") from error
 
 
-def _scene_from_table(table: SceneTable) -> Scene:
+def _scene_from_table(table: SceneTable, staging: Staging) -> Scene:
     name = table.string("name", table.file.stem)
     table.string("units", "units")  # a label for people; every length is in it
     notes: list[str] = []
@@ -98,7 +112,12 @@ def _scene_from_table(table: SceneTable) -> Scene:
         table.given(("camera", "lights"))
         table.finish("a scene")  # a misspelt [[object]] is the likelier mistake
         table.fail("objects", "is missing or empty; add at least one [[objects]]")
+    objects = with_glass(objects, staging, table.file.name)
     notes += textures.notes + reader.notes
+    if environment is None and not table.given(("camera", "lights", "background")):
+        table.finish("a scene")
+        lights, camera, environment = _studio(objects, notes)
+        return Scene(name, camera, lights, tuple(objects), background, environment, render, tuple(notes))
     around = environment_of(objects)
     lights = _read_lights(table, around, notes, dark_without=environment is None or _has_diffuse(objects))
     camera = _read_camera(table, around, notes)
@@ -137,21 +156,43 @@ def _add_table(objects: list[SceneObject], notes: list[str]) -> None:
     """A receiver for a file that gives neither camera nor lights nor anything diffuse."""
     if not _has_diffuse(objects):
         objects.append(default_table(objects))
-        notes.append("Nothing diffuse given: a light-grey table was put below the objects.")
+        notes.append("Nothing diffuse given: a grey table was put below the objects.")
 
 
 def _has_diffuse(objects: list[SceneObject]) -> bool:
     return any(o.material.receives for o in objects)
 
 
-def _scene_around_mesh(path: Path) -> Scene:
-    """A bare mesh as a piece of glass on a table in the sun."""
+def _studio(objects: list[SceneObject], notes: list[str]) -> tuple[tuple[Light, ...], Camera, Environment]:
+    """For a file that says nothing of light or camera: a table where nothing receives, lamps, a camera, a room."""
+    lights, camera = studio_lights(environment_of(objects)), framing_camera(objects)
+    _add_table(objects, notes)
+    notes.append("A lamp, weak light from above, a camera and a quiet studio round it were added.")
+    return lights, camera, studio_environment()
+
+
+def _scene_around_mesh(path: Path, staging: Staging) -> Scene:
+    """A bare mesh as a piece of glass on a table in a studio."""
+    from ..geometry.mesh_normals import SMOOTH_CREASE_DEG, angle_weighted_normals, is_finely_cut
     from ..optics import catalogue
 
-    notes = [f"{path.name} is a bare mesh: it was made of {DEFAULT_GLASS}."]
+    notes: list[str] = []
     mesh = load_checked_mesh(path, None, notes)
-    objects = [SceneObject(path.stem, mesh, Dielectric(catalogue.find(DEFAULT_GLASS)))]
-    camera = default_camera(environment_of(objects))
-    _add_table(objects, notes)
-    notes.append("A white sun and a camera were added.")
-    return Scene(path.stem, camera, (default_light(),), tuple(objects), notes=tuple(notes))
+    if mesh.corner_normals is None and is_finely_cut(mesh):
+        mesh = replace(mesh, corner_normals=angle_weighted_normals(mesh, SMOOTH_CREASE_DEG))
+        notes.append(
+            f"{path.name} holds no normals: it was smoothed where it bends by less than {SMOOTH_CREASE_DEG:g}°; a "
+            "scene file with smooth = false keeps its facets."
+        )
+    if staging.up is None:
+        up, reason = guessed_up(mesh, path.suffix.lower())
+        notes.append(f"{path.name} does not say which way is up: {up} was taken, for {reason}; --up y or z says it.")
+    else:
+        up = staging.up
+    matrix = Y_UP_TO_Z_UP if up == "y" else np.eye(4)
+    made = [SceneObject(path.stem, mesh, Dielectric(catalogue.find(DEFAULT_GLASS)), matrix)]
+    objects = with_glass(made, staging, path.name)
+    if not staging.glass:
+        notes.insert(0, f"{path.name} is a bare mesh: it was made of {DEFAULT_GLASS}; --glass takes another.")
+    lights, camera, environment = _studio(objects, notes)
+    return Scene(path.stem, camera, lights, tuple(objects), environment=environment, notes=tuple(notes))

@@ -100,6 +100,20 @@ class Spectrum:
         """Integral over 380–780 nm (sum over the 1 nm cells plus lines), in the density's unit times nm."""
         return float(self.density.sum()) + sum(power for _, power in self.lines)
 
+    def binned(self, edges_nm: np.ndarray, with_lines: bool = True) -> np.ndarray:
+        """Mean density in each bin between `edges_nm` (bins + 1,), ascending; lines are spread over their bin, and the
+        first and last bin hold what lies beyond them within half a nanometre."""
+        summed = np.concatenate([[0.0], np.cumsum(self.density)])
+        cells = np.append(VISIBLE_NM - 0.5, VISIBLE_NM[-1] + 0.5)
+        ends = np.array(edges_nm, float)
+        ends[0], ends[-1] = ends[0] - 0.5, ends[-1] + 0.5
+        power = np.diff(np.interp(ends, cells, summed))
+        for wavelength, line in self.lines if with_lines else ():
+            at = int(np.searchsorted(ends, wavelength, side="right")) - 1
+            if 0 <= at < len(power):
+                power[at] += line
+        return power / np.diff(edges_nm)
+
     def xyz(self) -> np.ndarray:
         """K_m Σ S(λ) (x̄, ȳ, z̄), float64 (3,); Y is in lumens where S is in W/nm."""
         total = self.density @ cmf_xyz()

@@ -30,7 +30,7 @@ from .dirty_level import DirtyLevel
 from .invalidation import appearance_differs, dirty_level
 from .live_camera import LiveCamera
 from .live_light import LiveLight
-from .photon_queries import caustic_spectrum, reach_of, world_photons
+from .photon_queries import CausticSpectrum, caustic_spectrum, reach_of, world_photons
 from .refit import is_judged, wants_new_maps
 from .schedule import Action, CameraState, Schedule, ShowMaps
 from .stats import LiveStats
@@ -49,6 +49,9 @@ PREVIEW_GPU_S = 0.004
 """And elsewhere."""
 CAMERA_SHARE = 0.4
 """Of a frame, where photons are traced as well."""
+
+QUERIED_PHOTONS = 200_000
+"""Stored ones that are asked what lies under the cursor."""
 
 
 class LiveEngine:
@@ -463,22 +466,22 @@ class LiveEngine:
             return None
         return self._picker.pick(self._inputs.camera, self._inputs.width, self._inputs.height, x, y)
 
-    def stored_photons(self, limit: int = 200_000) -> StoredPhotons:
+    def stored_photons(self, limit: int = QUERIED_PHOTONS) -> StoredPhotons:
         """About `limit` stored photons in world space, as they are shown."""
         if self._shown is None or self._inputs is None:
             return StoredPhotons.none()
         return world_photons(self._shown.light, self._inputs, limit)
 
-    def caustic_spectrum(
-        self, receiver: int, position: np.ndarray, bins: int = 40
-    ) -> tuple[np.ndarray, np.ndarray] | None:
-        """Shape of the caustic's spectrum at a world position on object `receiver`: wavelengths (bins,) nm, relative
-        irradiance (bins,)."""
+    def caustic_spectrum(self, receiver: int, position: np.ndarray) -> CausticSpectrum | None:
+        """The caustic's spectral irradiance at a world position on object `receiver`."""
         if self._shown is None or self._inputs is None or receiver not in self._shown.light.buffers.receivers:
             return None
-        spectra = [light.spectral_power.density for light in self._inputs.scene.lights]
-        radius = reach_of(self._shown.light, receiver)
-        return caustic_spectrum(self.stored_photons(), receiver, position, radius, spectra, bins)
+        light = self._shown.light
+        traced, shown = (
+            [each.spectral_power for each in s.lights] for s in (light.light_pass.scene, self._inputs.scene)
+        )
+        photons, weight = self.stored_photons(), light.stored_weight(QUERIED_PHOTONS)
+        return caustic_spectrum(photons, weight, receiver, position, reach_of(light, receiver), traced, shown)
 
     @property
     def buffers(self) -> SceneBuffers | None:

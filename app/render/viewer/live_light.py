@@ -50,6 +50,8 @@ class LiveLight:
         self.buffers = scene_buffers(context, scene, settings)
         self.stored = StoredPasses(context.ctx, capacity_bytes)
         self._samples = PhotonStore(context.ctx, capacity_bytes)
+        self._sampled = 0
+        """Photons that those were asked for."""
         self.moving = moving or MovingBeams()
         fit = MapFit(scene.camera, settings.width, settings.height, PREVIEW_TILE_MAX, avoids_powers_of_two=True)
         self.light_pass = LightPass(
@@ -241,6 +243,7 @@ class LiveLight:
         """Trace photons that answer questions (`stored_records`) about what beams carry; nothing where there are
         some."""
         if self.light_pass.has_beams and not self._samples.photons:
+            self._sampled = photons
             yield from self.light_pass.sample_steps(photons, self._samples.keep)
 
     def stored_records(self, limit: int) -> np.ndarray:
@@ -249,6 +252,16 @@ class LiveLight:
         if self.light_pass.has_beams:
             return self._samples.read(limit, dtype)
         return self.stored.fullest.store.read(limit, dtype) if self.stored.fullest else np.zeros(0, dtype)
+
+    def stored_weight(self, limit: int) -> float:
+        """What the flux of `stored_records(limit)` is power times."""
+        if self.light_pass.has_beams:
+            store, photons = self._samples, self._sampled
+        elif self.stored.fullest:
+            store, photons = self.stored.fullest.store, self.stored.fullest.pass_photons
+        else:
+            return 0.0
+        return photons * store.first_rounds(limit) / max(store.rounds_of_pass, 1)
 
     @property
     def bytes(self) -> int:

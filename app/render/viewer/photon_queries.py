@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,9 +15,14 @@ from .invalidation import shown_glasses
 
 if TYPE_CHECKING:
     from ...edit.live_inputs import LiveInputs
+    from ...model.optics.spectrum import Spectrum
     from .live_light import LiveLight
 
 NO_OBJECT = 0xFFFF
+FINEST_BINS = 40
+"""Of 10 nm."""
+MOST_ERROR = 0.2
+"""Of a bin that is told."""
 
 
 def world_photons(light: LiveLight, inputs: LiveInputs, limit: int) -> StoredPhotons:
@@ -62,48 +69,94 @@ def world_photons(light: LiveLight, inputs: LiveInputs, limit: int) -> StoredPho
     )
 
 
+@dataclass(frozen=True)
+class CausticSpectrum:
+    """What the photons near a place say of the light there."""
+
+    wavelength_nm: np.ndarray
+    """(bins,) centres, evenly spaced."""
+    irradiance: np.ndarray | None
+    """(bins,) W/(unit² nm); None where too few photons landed to say. Zeros where next to none should have."""
+    error: float
+    """Standard error of one bin over its irradiance, the mean over the light; 0 without any."""
+
+    @property
+    def resolution_nm(self) -> float:
+        """Width of a bin."""
+        return float(self.wavelength_nm[1] - self.wavelength_nm[0])
+
+
 def caustic_spectrum(
+    photons: StoredPhotons,
+    weight: float,
+    receiver: int,
+    position: np.ndarray,
+    radius: float,
+    traced: Sequence[Spectrum],
+    shown: Sequence[Spectrum],
+) -> CausticSpectrum:
+    """The spectral irradiance of the caustic at a world `position` on object `receiver`.
+
+    Photons within `radius` count, or within up to four times as much where they are few; what is still too noisy in
+    bins of 10 nm is told in bins of 20 or 40 nm, and what is too noisy in those is not told. `weight`: what the
+    photons' `flux_w` is power times. `traced`, `shown`: each light's spectrum then and now.
+    """
+    found = None
+    flux, distance = _around(photons, receiver, position, 4.0 * radius, traced, shown)
+    for reach in (radius, 2.0 * radius, 4.0 * radius):
+        counted = flux * (distance <= reach)
+        sums = np.stack([counted.sum(axis=0), (counted**2).sum(axis=0)])
+        area = math.pi * reach**2 * max(weight, 1e-300)
+        for bins in (FINEST_BINS, FINEST_BINS // 2, FINEST_BINS // 4):
+            merged = sums.reshape(2, bins, -1).sum(axis=2)
+            edges = np.linspace(380.0, 780.0, bins + 1)
+            centres, width = 0.5 * (edges[:-1] + edges[1:]), 400.0 / bins
+            total = float(merged[0].sum())
+            error = float(np.sqrt(merged[1]).sum()) / total if total > 0.0 else 0.0
+            if total > 0.0 and error < MOST_ERROR:
+                return CausticSpectrum(centres, merged[0] / (area * width), error)
+        if total > 0.0:
+            found = CausticSpectrum(centres, None, error)
+    return found or CausticSpectrum(centres, np.zeros(len(centres)), 0.0)
+
+
+def _around(
     photons: StoredPhotons,
     receiver: int,
     position: np.ndarray,
     radius: float,
-    spectra: list[np.ndarray],
-    bins: int = 40,
+    traced: Sequence[Spectrum],
+    shown: Sequence[Spectrum],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Shape of the spectrum that lands within `radius` of a world `position` on object `receiver`.
-
-    `spectra`: each light's density (401,) on the visible grid. Returns bin centres (bins,) in nm and relative
-    irradiance (bins,), its largest 1 (all 0 where nothing lands).
-    """
-    edges = np.linspace(380.0, 780.0, bins + 1)
+    """Photons that come within `radius`: flux in each of the finest bins and how far off, (n, FINEST_BINS) each."""
+    edges = np.linspace(380.0, 780.0, FINEST_BINS + 1)
     centres = 0.5 * (edges[:-1] + edges[1:])
     mine = np.flatnonzero(photons.receiver == receiver)
-    power = np.zeros(bins)
-    if not len(mine):
-        return centres, power
     ends = np.array([380.0, 780.0])
     reach = (
         np.linalg.norm(np.diff(photons.chosen(mine).landing(ends), axis=1)[:, 0], axis=1)
-        if photons.variables
+        if photons.variables and len(mine)
         else np.zeros(len(mine))
     )
     near = mine[np.linalg.norm(photons.position[mine] - position, axis=1) <= radius + reach]
     if not len(near):
-        return centres, power
-    places = photons.chosen(near).landing(centres)
-    inside = np.linalg.norm(places - position, axis=2) <= radius
+        return np.zeros((0, FINEST_BINS)), np.zeros((0, FINEST_BINS))
+    distance = np.linalg.norm(photons.chosen(near).landing(centres) - position, axis=2)
     low, high = photons.band_nm.min(axis=1)[near, None], photons.band_nm.max(axis=1)[near, None]
     # Share of each bin that the photon's band covers; a band narrower than a bin stands for a line.
     covered = np.clip(np.minimum(high, edges[1:]) - np.maximum(low, edges[:-1]), 0.0, None) / (edges[1] - edges[0])
     lines = (high - low)[:, 0] < 1e-6
     covered[lines] = (low[lines] >= edges[:-1]) & (low[lines] < edges[1:])
-    density = np.array([np.interp(centres, np.arange(380.0, 781.0), spectrum) for spectrum in spectra])[
-        photons.light[near]
-    ]
-    in_band = np.maximum((covered * density).sum(axis=1, keepdims=True), 1e-300)
-    share = np.where(lines[:, None], covered, covered * density / in_band)
-    power = (photons.flux_w[near, None] * share * inside).sum(axis=0)
-    return centres, power / max(power.max(), 1e-300)
+    light = photons.light[near]
+    before, now = (np.array([each.binned(edges, False) for each in spectra])[light] for spectra in (traced, shown))
+    brighter = np.array([_ratio(now.power_w(), then.power_w()) for now, then in zip(shown, traced, strict=True)])
+    in_band = np.maximum((covered * before).sum(axis=1, keepdims=True), 1e-300)
+    share = np.where(lines[:, None], covered * brighter[light, None], covered * now / in_band)
+    return photons.flux_w[near, None] * share, distance
+
+
+def _ratio(now: float, then: float) -> float:
+    return now / then if then > 0.0 else 0.0
 
 
 def reach_of(light: LiveLight, receiver: int) -> float:

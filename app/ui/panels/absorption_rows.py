@@ -50,7 +50,7 @@ def _draw_colour(state: State, index: int, absorption: Absorption) -> State:
         widgets.hint("The absorption is a measured curve, which no colour describes.")
         return state
     rgb, distance = described
-    tip = "Colour of white light after the distance below, linear Rec.709 shown as sRGB."
+    tip = "Colour of white light after the distance below."
     colour_changed, rgb, colour_active = widgets.colour("Colour", rgb, tip=tip)
     tip = "How far white light travels inside the glass until it has this colour. Shorter is deeper."
     depth_changed, distance, depth_active = widgets.drag(

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
+from ...base.paths import assets_dir
 from ...edit import requests
 from ...edit.state import State
 from .. import theme
@@ -152,7 +153,10 @@ def _save_first(state: State, view_model: ViewModel) -> State:
 
 
 def _recent_folder(view_model: ViewModel) -> Path:
-    return view_model.recent[0].parent if view_model.recent else Path.home()
+    """Where the user last worked; never the folder of the scenes that come with the program."""
+    shipped = assets_dir().resolve()
+    folders = [path.parent for path in view_model.recent if not path.resolve().is_relative_to(shipped)]
+    return folders[0] if folders else Path.home()
 
 
 def _file_stem(title: str) -> str:

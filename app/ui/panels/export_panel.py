@@ -94,7 +94,13 @@ def _screenshot(view_model: ViewModel, idle: bool) -> None:
         _, _choices.with_interface = widgets.toggle(
             "With interface", _choices.with_interface, tip="The whole window as it is on the screen (PNG)."
         )
-    suffixes = (".exr",) if _choices.spectral else (".png",) if _choices.with_interface else (".png", ".exr", ".npy")
+    suffixes = (
+        (".exr",)
+        if _choices.spectral
+        else (".png",)
+        if _choices.with_interface
+        else (".png", ".jpg", ".webp", ".exr", ".npy")
+    )
     tip = "PNG: as displayed. EXR and NPY: linear Rec.709 radiance, lm/(sr unit²), without tone curve."
     if widgets.button("Save screenshot…", tip=tip, enabled=idle, width=-1):
         _ask("screenshot", "Save screenshot", suffixes, view_model, view_model.title)

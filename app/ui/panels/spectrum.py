@@ -11,6 +11,8 @@ from .. import theme
 from ..view_model import CursorInfo, ViewModel
 from . import numbers, rows, spectral_colour, widgets
 
+_TOO_FEW = "Too few photons have landed here to tell the caustic's spectrum; wait, or point where it is brighter."
+
 
 def draw_spectrum(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents."""
@@ -25,8 +27,10 @@ def draw_spectrum(state: State, view_model: ViewModel) -> State:
     if cursor.spectrum is None or cursor.spectrum_nm is None:
         widgets.hint("The surface under the cursor is no receiver: caustics are recorded on diffuse objects only.")
     elif colour is None and (is_ready or not cursor.spectrum.any()):
-        widgets.hint("No caustic light falls here.")
+        widgets.hint(_TOO_FEW if cursor.too_few_photons else "No light falls here.")
     else:
+        if cursor.too_few_photons:
+            widgets.hint(_TOO_FEW)
         _plot(cursor.spectrum_nm, cursor.spectrum)
     return state
 
@@ -40,7 +44,9 @@ def _told(state: State, cursor: CursorInfo, colour: ColourInfo | None) -> None:
             (
                 "Illuminance",
                 f"{colour.illuminance:.4g} lm/unit²",
-                "Luminous flux of the caustic per area of the receiver.",
+                "Luminous flux per area of the receiver: caustic and direct light."
+                if cursor.direct_illuminance is not None
+                else "Luminous flux of the caustic per area of the receiver; direct light is still being found.",
             ),
             ("x, y", f"{colour.x:.4f}, {colour.y:.4f}", "CIE 1931 chromaticity of the caustic's light."),
             (
@@ -55,6 +61,19 @@ def _told(state: State, cursor: CursorInfo, colour: ColourInfo | None) -> None:
                 "Correlated colour temperature: of the black body that looks most alike; none for strong colours.",
             ),
         ]
+    if cursor.direct_illuminance is not None:
+        parts.append(
+            ("Direct", f"{cursor.direct_illuminance:.4g} lm/unit²", "Of the illuminance, straight from lights.")
+        )
+    if cursor.spectrum_nm is not None and not cursor.too_few_photons and cursor.spectrum_error > 0.0:
+        width = cursor.spectrum_nm[1] - cursor.spectrum_nm[0]
+        parts.append(
+            (
+                "Resolution",
+                f"{width:.0f} nm, ±{numbers.percent(cursor.spectrum_error)}",
+                "Width of a bin, by the number of photons, and the standard error of the caustic in one.",
+            )
+        )
     if cursor.object_index is not None and cursor.object_index < len(state.scene.objects):
         parts.insert(0, ("On", state.scene.objects[cursor.object_index].name, "The first surface under the cursor."))
     room = imgui.get_content_region_avail().x
@@ -90,13 +109,16 @@ def _plot(wavelengths_nm: np.ndarray, spectrum: np.ndarray) -> None:
     implot.setup_axis_limits(implot.ImAxis_.x1, 380, 780, implot.Cond_.always)
     implot.setup_axis_limits(implot.ImAxis_.y1, 0, 1.1 * float(scaled.max()), implot.Cond_.always)
     implot.push_plot_clip_rect()
-    _fill(wavelengths_nm, scaled)
+    # Bins as they are: how wide they are says how much is known.
+    half = 0.5 * float(wavelengths_nm[1] - wavelengths_nm[0])
+    edges = np.append(wavelengths_nm - half, wavelengths_nm[-1] + half)
+    _fill(edges, scaled)
     implot.pop_plot_clip_rect()
     outline = imgui.ImVec4(*theme.palette().text[:3], 0.85)
     implot.plot_line(
         "##outline",
-        np.ascontiguousarray(wavelengths_nm, float),
-        scaled,
+        np.repeat(edges, 2)[1:-1],
+        np.repeat(scaled, 2),
         implot.Spec(line_color=outline, line_weight=1.2),
     )
     implot.end_plot()
@@ -113,11 +135,11 @@ def _scaled(spectrum: np.ndarray) -> tuple[np.ndarray, str]:
     return values * 1e12, "pW"
 
 
-def _fill(wavelengths_nm: np.ndarray, values: np.ndarray) -> None:
+def _fill(edges_nm: np.ndarray, values: np.ndarray) -> None:
     """A bar of its own colour for every nanometre, a pixel wider than that: no seam must show between them."""
     drawing = implot.get_plot_draw_list()
-    fine = np.arange(float(wavelengths_nm[0]), float(wavelengths_nm[-1]), 1.0)
-    heights = np.interp(fine + 0.5, wavelengths_nm, values)
+    fine = np.arange(float(edges_nm[0]), float(edges_nm[-1]), 1.0)
+    heights = values[np.searchsorted(edges_nm, fine + 0.5) - 1]
     for left, height in zip(fine.tolist(), heights.tolist(), strict=True):
         low, high = implot.plot_to_pixels(left, height), implot.plot_to_pixels(left + 1.0, 0.0)
         drawing.add_rect_filled(low, imgui.ImVec2(high.x + 1.0, high.y), spectral_colour.colour_of_nm(left + 0.5))

@@ -34,7 +34,7 @@ def draw_start_page(state: State, view_model: ViewModel) -> State:
     imgui.pop_style_var(3)
     _title(view_model)
     if view_model.recovery is not None:
-        state = _recovery(state)
+        state = _recovery(state, view_model)
     imgui.dummy(imgui.ImVec2(0, theme.em(0.4)))
     imgui.begin_child("##side", imgui.ImVec2(theme.em(15), 0))
     state = _side(state, view_model)
@@ -55,7 +55,7 @@ def _title(view_model: ViewModel) -> None:
         widgets.hint(f"Draws with {view_model.stats.renderer}")
 
 
-def _recovery(state: State) -> State:
+def _recovery(state: State, view_model: ViewModel) -> State:
     chosen = theme.palette()
     imgui.dummy(imgui.ImVec2(0, theme.em(0.3)))
     imgui.push_style_color(imgui.Col_.child_bg, chosen.raised)
@@ -64,7 +64,8 @@ def _recovery(state: State) -> State:
     imgui.begin_child("##recovery", imgui.ImVec2(min(theme.em(44), imgui.get_content_region_avail().x), 0), flags)
     with theme.coloured(chosen.warning), theme.heading():
         imgui.text_unformatted(f"{icons.ICON_FA_TRIANGLE_EXCLAMATION}  Unsaved work was found")
-    widgets.hint("The last session ended without saving. Recover it, or discard it for good.")
+    whose = f"{view_model.recovery_title}, as of {view_model.recovery_time}. " if view_model.recovery_title else ""
+    widgets.hint(f"{whose}That session ended without saving. Recover it, or discard it for good.")
     if widgets.button(
         "Recover", tip="Open the work as it was last written, at most 30 s before the end.", width=theme.em(7)
     ):

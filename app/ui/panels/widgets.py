@@ -220,16 +220,52 @@ def menu_button(label: str, options: Mapping[str, str], *, tip: str) -> str | No
 
 
 def colour(label: str, rgb: Vec3, *, tip: str) -> tuple[bool, Vec3, bool]:
-    """A linear Rec.709 colour, shown and edited with sRGB's encoding (what colour pickers expect)."""
+    """A linear Rec.709 colour: its numbers, linear as in scene files or with sRGB's encoding, as the button behind them
+    says, and a swatch that opens a picker."""
     begin_row(label)
-    flags = imgui.ColorEditFlags_.float.value
-    changed, encoded = imgui.color_edit3(f"##{label}", [_encode(c) for c in rgb], flags)
+    is_linear = _colour_numbers["linear"]
+    style, side = imgui.get_style(), imgui.get_frame_height()
+    word = "linear" if is_linear else "sRGB"
+    word_width = imgui.calc_text_size("linear").x + 2.0 * style.frame_padding.x
+    gap = style.item_inner_spacing.x
+    imgui.set_next_item_width(max(imgui.get_content_region_avail().x - side - word_width - 2.0 * gap, side))
+    flags = imgui.ColorEditFlags_
+    shown = list(rgb) if is_linear else [_encode(c) for c in rgb]
+    changed, numbers = imgui.color_edit3(
+        f"##{label}", shown, flags.float.value | flags.no_small_preview.value | flags.no_options.value
+    )
     active = imgui.is_item_active()
-    explain(label, tip)
-    if not changed or not all(map(math.isfinite, encoded[:3])):
+    explain(label, f"{tip} These numbers are {word}.")
+    found = tuple(numbers[:3]) if is_linear else tuple(_decode(c) for c in numbers[:3])
+    imgui.same_line(0.0, gap)
+    encoded = [_encode(min(max(c, 0.0), 1.0)) for c in rgb]
+    if imgui.color_button(
+        f"##swatch {label}",
+        imgui.ImVec4(encoded[0], encoded[1], encoded[2], 1.0),
+        flags.no_tooltip.value,
+        ImVec2(side, side),
+    ):
+        imgui.open_popup(f"picker of {label}")
+    explain(f"{label}: swatch", "Choose the colour by eye.")
+    if imgui.begin_popup(f"picker of {label}"):
+        picked, by_eye = imgui.color_picker3(f"##picker {label}", encoded, flags.no_inputs.value)
+        active = active or imgui.is_item_active()
+        item_rects.note(f"{label}: picker")
+        if picked:
+            changed, found = True, tuple(_decode(c) for c in by_eye[:3])
+        imgui.end_popup()
+    imgui.same_line(0.0, gap)
+    if imgui.button(f"{word}##{label}", ImVec2(word_width, 0.0)):
+        _colour_numbers["linear"] = not is_linear
+    explain(f"{label}: numbers", "Linear: the numbers of scene files. sRGB: encoded, as in pictures and on the web.")
+    if not changed or not all(map(math.isfinite, found)) or min(found) < 0.0:
         return False, rgb, active
-    r, g, b = (_tidy(_decode(c)) for c in encoded[:3])
+    r, g, b = (_tidy(c) for c in found)
     return True, (r, g, b), active
+
+
+_colour_numbers = {"linear": True}
+"""How colours' numbers are shown: memory of the interface, like a scroll position."""
 
 
 def text_field(label: str, value: str, *, tip: str) -> tuple[bool, str]:

@@ -1,0 +1,113 @@
+"""What is asked for of a file that is opened: which axis is up, which parts are glass of which kind.
+
+Mesh files do not say which axis is up, and few files of the world say that something is glass; so both are guessed,
+told, and may be asked for (`--up`, `--glass`, and in the window).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from ..base.errors import UserError, suggestion
+from .geometry.mesh import Mesh
+from .optics import catalogue
+from .scene import Dielectric, SceneObject
+
+UpAxis = Literal["y", "z"]
+UP_AXES: tuple[UpAxis, ...] = ("y", "z")
+Y_UP_TO_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
+Y_UP_TO_Z_UP.setflags(write=False)
+_USUAL_UP: dict[str, UpAxis] = {".obj": "y", ".stl": "z", ".ply": "z"}
+"""What most programs write: OBJ comes from modellers, STL and PLY from printers and scanners."""
+_BASE_SHARE = 0.2
+"""Of the footprint that must lie flat on the ground for a mesh to be taken to stand on it."""
+_THIN = 0.7
+"""A mesh this much lower along one axis than along the other lies on its broad side."""
+
+
+@dataclass(frozen=True)
+class Staging:
+    """Wishes for a file; empty ones leave it to the file, or to a guess."""
+
+    up: UpAxis | None = None
+    glass: tuple[tuple[str | None, str], ...] = ()
+    """Object (None: all that is no receiver below the others) and catalogue name of its glass, later ones above."""
+
+
+AS_FOUND = Staging()
+
+
+def guessed_up(mesh: Mesh, suffix: str) -> tuple[UpAxis, str]:
+    """The axis along which a mesh of a file with this `suffix` stands, and why: a few words for a note.
+
+    y or z, whichever has a flat base below it; else the one along which the mesh is much the lower; else what files
+    of this kind have most often.
+    """
+    bases = {axis: _base_share(mesh, column) for axis, column in (("y", 1), ("z", 2))}
+    low, high = mesh.bounds()
+    _, height_y, height_z = high - low
+    axis: UpAxis
+    if max(bases.values()) > _BASE_SHARE and min(bases.values()) < 0.7 * max(bases.values()):
+        axis = "y" if bases["y"] > bases["z"] else "z"
+        return axis, "it has a flat base there"
+    if min(height_y, height_z) < _THIN * max(height_y, height_z):
+        axis = "y" if height_y < height_z else "z"
+        return axis, "it is lowest that way"
+    axis = _USUAL_UP.get(suffix, "z")
+    return axis, f"most {suffix} files have it so"
+
+
+def _base_share(mesh: Mesh, column: int) -> float:
+    """Share of the footprint across an axis that lies flat at its lowest end, facing down."""
+    heights = mesh.vertices[:, column]
+    low, high = mesh.bounds()
+    extent = high - low
+    footprint = float(np.prod(np.delete(extent, column)))
+    lying = (heights[mesh.triangles] < low[column] + 1e-3 * extent[column]).all(axis=1)
+    if not lying.any() or footprint == 0.0:
+        return 0.0
+    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles[lying]], 1, 0)
+    areas = 0.5 * np.cross(b - a, c - a)[:, column]
+    return max(-float(areas.sum()), 0.0) / footprint
+
+
+def with_glass(objects: Sequence[SceneObject], staging: Staging, file_name: str) -> list[SceneObject]:
+    """`objects` with the glasses asked for. Raises UserError for an object or a glass that there is not."""
+    changed = list(objects)
+    for name, glass in staging.glass:
+        material = Dielectric(catalogue.find(glass, f"--glass {glass}" if name is None else f"--glass {name}={glass}"))
+        names = [item.name for item in objects]
+        if name is not None and name not in names:
+            hint = suggestion(name, names) or ","
+            raise UserError(f"--glass: {file_name} holds no object '{name}'{hint} it holds {_listed(names)}")
+        chosen = [names.index(name)] if name is not None else _bodies(objects)
+        for index in chosen:
+            changed[index] = replace(changed[index], material=material)
+    return changed
+
+
+def _bodies(objects: Sequence[SceneObject]) -> list[int]:
+    """All closed solids, or everything where nothing is closed: an open sheet is more likely a table than glass."""
+    closed = [index for index, item in enumerate(objects) if item.mesh.is_closed]
+    return closed or list(range(len(objects)))
+
+
+def opaque_note(objects: Sequence[SceneObject]) -> str | None:
+    """Why there is no caustic, where nothing is glass, and what to do; None where something is."""
+    if any(item.material.transmits for item in objects):
+        return None
+    names = [item.name for item in objects]
+    return (
+        "Nothing here is glass, so there is no caustic: the file's materials are opaque. Make it glass with --glass "
+        f"diamond, or one part with --glass {names[0]}=N-SF11, in the window with Make glass. "
+        f"The file holds {_listed(names)}."
+    )
+
+
+def _listed(names: Sequence[str], most: int = 6) -> str:
+    told = ", ".join(f"'{name}'" for name in names[:most])
+    return told if len(names) <= most else f"{told} and {len(names) - most} more"
