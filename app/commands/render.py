@@ -46,7 +46,7 @@ def render_command(request: RenderRequest) -> int:
     from ..base.progress import ProgressReporter
 
     # What costs nothing to check comes before the scene is read, and that before the device.
-    asked = _parse(request)
+    asked = parse_settings(request)
     check_suffix(request.output)
     scene_file = options.find_scene(request.scene)
     # os.path.exists, unlike Path.exists, is silent about a name that is too long.
@@ -57,7 +57,7 @@ def render_command(request: RenderRequest) -> int:
     from ..model.io.scene_file import load_scene
 
     scene = load_scene(scene_file)
-    settings = _complete(asked, scene, request.stats)
+    settings = complete_settings(asked, scene, request.stats)
     # Before the work: who waits for minutes should know what was assumed, and also if it fails.
     for note in (*scene.notes, *_unused_options(request)):
         print(f"note: {plain(note)}", file=sys.stderr)
@@ -82,7 +82,7 @@ def render_command(request: RenderRequest) -> int:
     return interrupted.exit_code if stopped else 0
 
 
-def _parse(request: RenderRequest) -> dict[str, Any]:
+def parse_settings(request: RenderRequest) -> dict[str, Any]:
     """The fields of `RenderSettings` that the user gave, checked as far as no scene is needed."""
     if request.photons is not None and request.seconds is not None:
         raise UserError("--photons and --seconds exclude each other: give a count or a time, not both")
@@ -106,7 +106,7 @@ def _parse(request: RenderRequest) -> dict[str, Any]:
     return asked
 
 
-def _complete(asked: dict[str, Any], scene: Scene, stats: bool) -> RenderSettings:
+def complete_settings(asked: dict[str, Any], scene: Scene, stats: bool) -> RenderSettings:
     """Settings with the scene's own wishes where the user said nothing."""
     wishes = scene.render
     settings = RenderSettings(

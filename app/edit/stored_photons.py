@@ -23,7 +23,7 @@ class StoredPhotons:
     n_anchor: np.ndarray
     """(n, groups): the variables at the anchor wavelength, by the glass that the photons were traced through."""
     flux_w: np.ndarray
-    """(n,)."""
+    """(n,) W; as the viewer stores them, times the photons of their pass."""
     source: np.ndarray
     """(n,) scene object that the photon met first; -1 for none."""
     receiver: np.ndarray

@@ -176,6 +176,19 @@ class FrameRenderer:
                 break
         self.seconds.camera += time.perf_counter() - started
 
+    def steps_of_layer(self, layer: str, stage: Stage, stop: Stop = lambda: False) -> Iterator[float]:
+        """Another layer ("beauty", "caustic") of the frame that `steps` rendered, from the same photons; `picture` is
+        it then. The last to be asked of a renderer: frames to come would show this layer too."""
+        traced = self._traced
+        assert traced is not None and traced.camera_pass is not None, "steps() comes first, and not of a map"
+        light = traced.light
+        traced.camera_pass.release()
+        traced.camera_pass = traced.camera_beams = None
+        traced.camera_pass = CameraPass(
+            self._context, traced.camera_buffers or traced.buffers, layer, light.reflectances, light.map_channels
+        )
+        yield from self._see(stage, stop)
+
     def run(self, stage: Stage) -> np.ndarray:
         """The whole frame at once: `rgb` of it."""
         for _ in self.steps(stage):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ..base.memory import peak_bytes
@@ -128,6 +128,8 @@ class RenderResult(Picture):
     """A finished picture and what was done for it."""
 
     stats: RenderStats = field(kw_only=True)
+    layers: Mapping[str, Picture] = field(default_factory=dict, kw_only=True)
+    """Those that were asked for besides the settings' own."""
 
 
 def render(
@@ -136,8 +138,11 @@ def render(
     progress: Progress = lambda fraction, text: None,
     cancelled: Cancelled = lambda: False,
     context: Context | None = None,
+    more_layers: Sequence[str] = (),
 ) -> RenderResult:
-    """Render `scene`. What was done when `cancelled()` turned true is kept and shown."""
+    """Render `scene`. What was done when `cancelled()` turned true is kept and shown.
+
+    `more_layers`: of "beauty" and "caustic", seen of the same photons."""
     own = context is None
     context = context or create_context()
     stage = Stage(scene, scene.camera)
@@ -147,7 +152,13 @@ def render(
             progress(share, frames.phase)
         picture = frames.picture
         notices = tuple(frame_notices(frames.light, scene.camera, settings, picture.rgb))
-        return RenderResult(**vars(picture), stats=replace(_stats(context, frames, settings), notices=notices))
+        stats = replace(_stats(context, frames, settings), notices=notices)
+        layers = {}
+        for layer in more_layers:
+            for share in frames.steps_of_layer(layer, stage, cancelled):
+                progress(share, frames.phase)
+            layers[layer] = frames.picture
+        return RenderResult(**vars(picture), stats=stats, layers=layers)
     finally:
         frames.release()
         if own:

@@ -1,0 +1,439 @@
+"""A scene to read and to edit, by the names of the scene file (docs/scene-format.md).
+
+What is edited are the tables of the file; after every edit the whole is read and checked as a file would be, and what
+cannot be is refused with the same sentence and left as it was. What did not change stays the same value, so that a
+`Session` knows what need not be traced again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.errors import UserError, suggestion
+from ..commands.options import find_scene
+from ..model import scene as values_of
+from ..model.geometry.mesh import Mesh
+from ..model.geometry.mesh_recipes import note_recipe, recipe_of
+from ..model.io.scene_file import Kept, load_scene, read_toml, scene_of
+from ..model.lights import Light
+from ..model.lights.light_file import light_values
+from ..model.materials.material import Material
+from ..model.scene_camera import camera_values
+from ..model.scene_defaults import environment_of
+from ..model.scene_objects import load_checked_mesh
+from ..model.scene_render import render_values
+from ..model.texture import Environment
+
+_KEPT_WHOLE = (Mesh, Material, Environment)
+"""Values that Python may give where a file names or describes them."""
+
+
+class UnknownKeyError(UserError, AttributeError):
+    """A key that a table neither has nor is told by."""
+
+
+class Table:
+    """One table of a scene: its keys are attributes. `None`, or `del`, leaves a key out."""
+
+    __slots__ = ("_scene", "_values", "_where")
+
+    def __init__(self, scene: Scene, values: dict[str, Any], where: str) -> None:
+        object.__setattr__(self, "_scene", scene)
+        object.__setattr__(self, "_values", values)
+        object.__setattr__(self, "_where", where)
+
+    def __getattr__(self, key: str) -> Any:
+        """What stands under `key`, or what it amounts to where nothing does; tables as `Table`."""
+        if key.startswith("_"):
+            raise AttributeError(key)
+        if key in self._values:
+            return self._scene._shown(self._values[key], f"{self._where}.{key}")
+        told = self._scene._told(self._values)
+        if key not in told:
+            known = list(dict.fromkeys((*self._values, *told)))
+            hint = suggestion(key, known) or f"; there are {', '.join(known)}"
+            raise UnknownKeyError(f"{self._where} has no '{key}'{hint}")
+        return told[key]
+
+    def __setattr__(self, key: str, value: Any) -> None:
+        self.update(**{key: value})
+
+    def __delattr__(self, key: str) -> None:
+        self.update(**{key: None})
+
+    def update(self, **keys: Any) -> None:
+        """Set several keys at once, for those that only go together; None leaves one out.
+
+        Raises `UserError`, with the sentence that a scene file would get, and then changes nothing.
+        """
+        plain = {key: _plain(value, f"{self._where}.{key}") for key, value in keys.items()}
+        with self._scene._editing(self._values):
+            for key, value in plain.items():
+                if value is None:
+                    self._values.pop(key, None)
+                else:
+                    self._values[key] = value
+
+    def to_dict(self) -> dict[str, Any]:
+        """What is given, as the scene file would hold it; a copy."""
+        return _copied(self._values)  # type: ignore[no-any-return]
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._values, *self._scene._told(self._values)]
+
+    def __repr__(self) -> str:
+        return f"{self._where}: " + ", ".join(f"{key} = {_words(value)}" for key, value in self._values.items())
+
+
+class Entries:
+    """The objects or the lights of a scene, by name or by number, in their order."""
+
+    def __init__(self, scene: Scene, key: str) -> None:
+        self._scene, self._key = scene, key
+
+    @property
+    def names(self) -> list[str]:
+        """Their names."""
+        return self._scene._names(self._key)
+
+    def __len__(self) -> int:
+        return len(self._list)
+
+    def __iter__(self) -> Iterator[Table]:
+        return (self[i] for i in range(len(self)))
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    def __getitem__(self, name: str | int) -> Table:
+        """Raises `UserError` naming those there are."""
+        index = self._index(name)
+        return Table(self._scene, self._list[index], f"{self._key}['{self.names[index]}']")
+
+    def __delitem__(self, name: str | int) -> None:
+        index = self._index(name)
+        with self._scene._editing(self._list):
+            del self._list[index]
+
+    def add(self, **keys: Any) -> Table:
+        """One more, by the keys of the scene file; raises `UserError` as that would."""
+        plain = {k: _plain(v, f"{self._key}.{k}") for k, v in keys.items() if v is not None}
+        with self._scene._editing(self._list):
+            self._list.append(plain)
+        return self[len(self) - 1]
+
+    @property
+    def _list(self) -> list[dict[str, Any]]:
+        return self._scene._values[self._key]  # type: ignore[no-any-return]
+
+    def _index(self, name: str | int) -> int:
+        names = self.names
+        if isinstance(name, str) and name in names:
+            return names.index(name)
+        if isinstance(name, int) and not isinstance(name, bool) and -len(names) <= name < len(names):
+            return name % len(names)
+        kind, listed = self._key[:-1], ", ".join(f"'{n}'" for n in names) or "none"
+        hint = suggestion(name, names) if isinstance(name, str) else ""
+        raise UserError(f"scene '{self._scene.name}' has no {kind} {name!r}{hint}; it has {listed}")
+
+    def __repr__(self) -> str:
+        return f"{self._key}: {', '.join(self.names)}"
+
+
+class Scene:
+    """Everything there is, editable: `scene.objects["prism"].dispersion_gain = 2`.
+
+    Lengths are in the scene's own unit, angles in degrees, as the scene file has them.
+    """
+
+    def __init__(self, values: Mapping[str, Any] | None = None, folder: str | os.PathLike[str] | None = None) -> None:
+        """A scene from its tables, as the scene file would hold them; `folder`: where the files lie that it names
+        (default: the current one). Raises `UserError` for what cannot be rendered."""
+        file = Path(folder or ".").resolve() / "scene.toml"
+        plain = _plain(values or {}, "scene")
+        if not isinstance(plain, dict):
+            raise UserError("a scene is made of a dictionary of tables, for example {'objects': [{'shape': 'sphere'}]}")
+        self._begin(plain, file)
+
+    @classmethod
+    def load(cls, source: str | os.PathLike[str]) -> Scene:
+        """See `spectrasplat.load`."""
+        path = find_scene(os.fspath(source))
+        scene = cls.__new__(cls)
+        if path.suffix.lower() == ".toml":
+            scene._begin(read_toml(path), path)
+        else:
+            loaded = load_scene(path)
+            scene._begin(_tables_of(loaded), path, loaded.notes)
+        return scene
+
+    def copy(self) -> Scene:
+        """A scene of its own with the same content; meshes and pictures are shared."""
+        scene = Scene.__new__(Scene)
+        scene._values, scene._file, scene._kept = _copied(self._values), self._file, self._kept
+        scene._notes, scene._model = dict(self._notes), self._model
+        scene._known_objects, scene._known_lights = self._known_objects, self._known_lights
+        return scene
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write it as a scene file (.toml). Raises `UserError` where it cannot be written."""
+        from ..model.io.scene_save import save_scene
+
+        if Path(path).suffix.lower() != ".toml":
+            raise UserError(f"cannot write {path}: a scene is saved as .toml")
+        save_scene(self._model, path)
+
+    # ---- what there is -----------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """Its title."""
+        return self._model.name
+
+    @name.setter
+    def name(self, name: str) -> None:
+        self._root.update(name=name)
+
+    @property
+    def background(self) -> tuple[float, float, float]:
+        """Linear Rec.709 radiance behind everything, lm/(sr unit²) for white; lights nothing."""
+        return self._model.background_rgb
+
+    @background.setter
+    def background(self, rgb: tuple[float, float, float]) -> None:
+        self._root.update(background=rgb, environment=None)
+
+    @property
+    def environment(self) -> Table | None:
+        """What is seen beyond everything; assign a dictionary, or None."""
+        found = self._values.get("environment")
+        return self._table("environment") if isinstance(found, dict) else None
+
+    @environment.setter
+    def environment(self, keys: Mapping[str, Any] | None) -> None:
+        self._root.update(environment=keys, background=None)
+
+    @property
+    def camera(self) -> Table:
+        """Where it is seen from."""
+        return self._table("camera")
+
+    @camera.setter
+    def camera(self, keys: Mapping[str, Any]) -> None:
+        self._root.update(camera=keys)
+
+    @property
+    def render(self) -> Table:
+        """Size of the picture, photons, exposure, depth: what holds where `render` is not told otherwise."""
+        return self._table("render")
+
+    @property
+    def lights(self) -> Entries:
+        """Its lights."""
+        return Entries(self, "lights")
+
+    @property
+    def objects(self) -> Entries:
+        """Its objects; those placed several times (`instances`) count once."""
+        return Entries(self, "objects")
+
+    @property
+    def materials(self) -> dict[str, Table]:
+        """The tables that objects name as their `material`."""
+        named = self._values.get("materials", {})
+        return {name: Table(self, table, f"materials['{name}']") for name, table in named.items()}
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was assumed, one sentence each."""
+        return tuple(self._notes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All tables, as the scene file would hold them; a copy."""
+        return _copied(self._values)  # type: ignore[no-any-return]
+
+    def __repr__(self) -> str:
+        return f"Scene '{self.name}' ({self.objects!r}; {self.lights!r})"
+
+    # ---- private -----------------------------------------------------------------------------
+
+    def _begin(self, values: dict[str, Any], file: Path, notes: tuple[str, ...] = ()) -> None:
+        self._values, self._file, self._kept = values, file, Kept()
+        self._notes: dict[str, None] = dict.fromkeys(notes)
+        self._known_objects: dict[str, tuple[values_of.SceneObject, ...]] = {}
+        self._known_lights: dict[str, Light] = {}
+        self._model = scene_of(values, file, self._kept)
+        self._notes |= dict.fromkeys(self._model.notes)
+        # What was filled in is from now on given: an edit of one thing must not move another.
+        listed = sum(len(entry.get("instances", (None,))) for entry in values["objects"])
+        values["objects"] += [_object_table(item) for item in self._model.objects[listed:]]
+        values.setdefault("lights", [light_values(light) for light in self._model.lights])
+        values.setdefault("camera", camera_values(self._model.camera))
+        values.setdefault("render", render_values(self._model.render))
+        self._build()
+
+    @property
+    def _root(self) -> Table:
+        return Table(self, self._values, "scene")
+
+    def _table(self, key: str) -> Table:
+        return Table(self, self._values[key], key)
+
+    @contextmanager
+    def _editing(self, container: dict[str, Any] | list[Any]) -> Iterator[None]:
+        """Edit `container`, one of the scene's; read the scene again, and take the edit back where that fails."""
+        if not _holds(self._values, container):
+            raise UserError(f"this part is no longer in scene '{self.name}': ask the scene for it again")
+        before = container.copy()
+        try:
+            yield
+            self._build()
+        except BaseException:
+            if isinstance(container, dict):
+                container.clear()
+                container.update(before)
+            else:
+                container[:] = before
+            raise
+
+    def _build(self) -> None:
+        """Read and check the tables; what is described as before stays the same value."""
+        model = scene_of(self._values, self._file, self._kept)
+        shared = json.dumps(self._values.get("materials", {}), default=id)
+        described = [json.dumps(entry, default=id) + shared for entry in self._values["objects"]]
+        lights = [json.dumps(entry, default=id) for entry in self._values["lights"]]
+        groups = list(_split(model.objects, self._values["objects"]))
+        kept = [self._known_objects.get(text, ()) for text in described]
+        groups = [
+            old if [o.name for o in old] == [o.name for o in new] else new
+            for old, new in zip(kept, groups, strict=True)
+        ]
+        known = dict(zip(described, groups, strict=True))
+        around = environment_of(model.objects)  # what lights are fitted to
+        fitted_to = f"{around.centre} {around.radius}"
+        lights = [text + fitted_to for text in lights]
+        found = [self._known_lights.get(text, light) for text, light in zip(lights, model.lights, strict=True)]
+        found = [old if old.name == new.name else new for old, new in zip(found, model.lights, strict=True)]
+        self._known_objects, self._known_lights = known, dict(zip(lights, found, strict=True))
+        self._model = replace(model, objects=tuple(o for group in groups for o in group), lights=tuple(found))
+        self._notes |= dict.fromkeys(model.notes)
+
+    def _names(self, key: str) -> list[str]:
+        if key == "lights":
+            return [light.name for light in self._model.lights]
+        entries = self._values["objects"]
+        return [
+            str(entry.get("name", placed[0].mesh.name if "instances" in entry else placed[0].name))
+            for entry, placed in zip(entries, _split(self._model.objects, entries), strict=True)
+        ]
+
+    def _shown(self, value: Any, where: str) -> Any:
+        if isinstance(value, dict):
+            return Table(self, value, where)
+        if isinstance(value, list) and value and all(isinstance(entry, dict) for entry in value):
+            return tuple(Table(self, entry, f"{where}[{i}]") for i, entry in enumerate(value))
+        return _copied(value)
+
+    def _told(self, values: dict[str, Any]) -> dict[str, Any]:
+        """What one of the scene's tables amounts to, in keys of the scene file."""
+        model, objects = self._model, self._values["objects"]
+        if values is self._values["camera"]:
+            return camera_values(model.camera)
+        if values is self._values["render"]:
+            return render_values(model.render)
+        for light, entry in zip(model.lights, self._values["lights"], strict=True):
+            if entry is values:
+                return light_values(light)
+        for entry, (item, *_) in zip(objects, _split(model.objects, objects), strict=True):
+            if entry is values:
+                material = item.material
+                glass = {"dispersion_gain": material.dispersion.gain, "priority": material.priority}
+                position = {"position": [float(v) for v in item.object_to_world[:3, 3]]}
+                return _object_table(item) | (glass if material.transmits else {}) | position
+        return {}
+
+
+def _split(
+    objects: tuple[values_of.SceneObject, ...], entries: list[dict[str, Any]]
+) -> Iterator[tuple[values_of.SceneObject, ...]]:
+    """The objects of each entry: one, or its instances."""
+    first = 0
+    for entry in entries:
+        end = first + len(entry.get("instances", (None,)))
+        yield objects[first:end]
+        first = end
+
+
+def _object_table(item: values_of.SceneObject) -> dict[str, Any]:
+    """An object as a table; mesh and material as they are where no words say them."""
+    recipe = recipe_of(item.mesh)
+    table: dict[str, Any] = {"name": item.name} | (dict(recipe) if recipe is not None else {"mesh": item.mesh})
+    return table | {"material": item.material, "matrix": [float(v) for v in item.object_to_world.ravel()]}
+
+
+def _tables_of(model: values_of.Scene) -> dict[str, Any]:
+    """The tables of a scene that came from no scene file."""
+    from ..model.scene_dabs import KEY as DABS
+    from ..model.scene_dabs import describe_dabs
+
+    behind: dict[str, Any] = {"environment": model.environment}
+    if model.environment is None:
+        behind = {"background": list(model.background_rgb)}
+    painted = ({DABS: describe_dabs(o.local_dispersion)} if o.local_dispersion else {} for o in model.objects)
+    return {
+        "name": model.name,
+        **behind,
+        "camera": camera_values(model.camera),
+        "render": render_values(model.render),
+        "lights": [light_values(light) for light in model.lights],
+        "objects": [_object_table(item) | more for item, more in zip(model.objects, painted, strict=True)],
+    }
+
+
+def _holds(values: Any, container: object) -> bool:
+    if values is container:
+        return True
+    inner = values.values() if isinstance(values, dict) else values if isinstance(values, list) else ()
+    return any(_holds(value, container) for value in inner)
+
+
+def _copied(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _copied(inner) for key, inner in value.items()}
+    return [_copied(inner) for inner in value] if isinstance(value, list) else value
+
+
+def _plain(value: Any, where: str) -> Any:
+    """`value` in the types of TOML: tuples and arrays become lists, a `Path` to a mesh that mesh."""
+    if value is None or isinstance(value, (bool, int, float, str, *_KEPT_WHOLE)):
+        return value
+    if isinstance(value, np.generic | np.ndarray):
+        return _plain(value.tolist(), where)
+    if isinstance(value, list | tuple):
+        return [_plain(inner, where) for inner in value]
+    if isinstance(value, Table):
+        return value.to_dict()
+    if isinstance(value, Mapping):
+        return {str(key): _plain(inner, f"{where}.{key}") for key, inner in value.items() if inner is not None}
+    if isinstance(value, Path):
+        return _mesh_in(value) if where.endswith(".mesh") else str(value)
+    raise UserError(f"{where} cannot be of type {type(value).__name__}: give a number, a text, a list or a dictionary")
+
+
+def _mesh_in(path: Path) -> Mesh:
+    mesh = load_checked_mesh(path, None, [])
+    note_recipe(mesh, {"mesh": str(path.resolve())})
+    return mesh
+
+
+def _words(value: Any) -> str:
+    text = f"<{type(value).__name__}>" if isinstance(value, _KEPT_WHOLE) else repr(value)
+    return text if len(text) <= 80 else text[:77] + "..."
