@@ -27,6 +27,7 @@ class Statistics:
     camera_samples: int
     """A pixel; 0 where no camera took part."""
     seconds: float
+    """From the call to the picture, without starting OpenGL."""
     renderer: str
     """OpenGL's name of the device."""
     is_software: bool
@@ -50,6 +51,7 @@ class _Image:
     bin_edges_nm: NDArray[np.float64] | None
     """float64 (bins + 1,), rising."""
     stats: Statistics
+    """What was done for it."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -112,6 +114,7 @@ class CausticMap(_Image):
     `spectral` in W/unit² per bin."""
 
     receiver: str
+    """The object's name."""
     placement: Mapping[str, object]
     """Where it lies. `kind` "rectangle": `corners_world` (`bottom_left`, `bottom_right`, `top_right`, `top_left`, three
     numbers each), `normal_world`, `size_units` and `texel_size_units` (two numbers each). `kind` "charts" (curved

@@ -45,7 +45,7 @@ class _State:
 
 
 class Session:
-    """Renders one scene again and again. `scene` is a copy of its own: edit that.
+    """Renders one scene again and again; use it with `with`. `scene` is a copy of its own: edit that.
 
     Only what an edit concerns is done again: a camera that moved traces nothing; a glass whose index at the d line
     stays (its `dispersion_gain`, another V_d, a glass of the same n_d) traces nothing either, and is followed to first
@@ -66,11 +66,16 @@ class Session:
         """`exact`: trace again after an edit that would be followed to first order only. The rest as for `render`.
         Raises `UserError`, also where there is no OpenGL."""
         self._settings = settings_of(scene, Asked(size, photons, seed=seed, method=method, spp=spp))
-        self.scene = scene.copy()
+        self._scene = scene.copy()
         self._exact = exact
         self._device: Device | None = Device()
         self._engine: LiveEngine | None = None
         self._before = _State(0, 0, 0)
+
+    @property
+    def scene(self) -> Scene:
+        """What is rendered: edit it."""
+        return self._scene
 
     # ---- work --------------------------------------------------------------------------------
 
