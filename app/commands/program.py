@@ -169,6 +169,12 @@ def render(
     stats: Annotated[
         bool, typer.Option("--stats", help="Print the energy balance and the times of all stages.")
     ] = False,
+    passes: Annotated[
+        Text,
+        typer.Option(
+            metavar="I/N", help="Trace only part I of N, to a file OUT.ssp: 'merge' makes the picture of all parts."
+        ),
+    ] = None,
     allow_outside: AllowOutside = False,
 ) -> None:
     """Render a scene to a picture file."""
@@ -191,8 +197,36 @@ def render(
         camera,
         batch,
         stats,
+        passes,
     )
     raise typer.Exit(render_command(request))
+
+
+@app.command()
+def merge(
+    parts: Annotated[list[Path], typer.Argument(metavar="PART.ssp...", help="Parts that 'render --passes' wrote.")],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="OUT", help="The picture: .png, .exr or .npy."),
+    ],
+    scene: Annotated[
+        Text, typer.Option(metavar="SCENE", help="The scene; default: the file that the parts were traced from.")
+    ] = None,
+    exposure: Annotated[
+        Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than automatic; .png only.")
+    ] = None,
+    partial: Annotated[
+        bool, typer.Option("--partial", help="Make a noisier picture of the parts there are, where some are missing.")
+    ] = False,
+    stats: Annotated[
+        bool, typer.Option("--stats", help="Print the energy balance and the times of all stages.")
+    ] = False,
+    allow_outside: AllowOutside = False,
+) -> None:
+    """Make a picture of its parts, traced one by one or on many machines."""
+    from .merge import MergeRequest, merge_command
+
+    raise typer.Exit(merge_command(MergeRequest(tuple(parts), output, scene, exposure, partial, stats)))
 
 
 @app.command()

@@ -41,6 +41,8 @@ _LIGHT_SHARE = 0.8
 _PREPARING, _TRACING, _SEEING = "preparing", "tracing photons", "taking camera samples"
 
 Stop = Callable[[], bool]
+Fill = Callable[[LightPass, LightSampling, Stop], Iterator[float]]
+"""Fills the maps of a prepared light pass, pausing with the share done."""
 
 
 @dataclass(frozen=True)
@@ -85,8 +87,11 @@ class FrameSeconds:
 class FrameRenderer:
     """Owns what frames share. Run `steps(stage)` to its end, then read."""
 
-    def __init__(self, context: Context, settings: RenderSettings, stages: Sequence[Stage]) -> None:
-        """`stages`: what will be asked for; maps and lattices are fitted to some of them.
+    def __init__(
+        self, context: Context, settings: RenderSettings, stages: Sequence[Stage], fill: Fill | None = None
+    ) -> None:
+        """`stages`: what will be asked for; maps and lattices are fitted to some of them. `fill`: where light comes
+        from, instead of `traced_light`.
 
         Where light changes, `shader.keep_programs` on the context spares compiling every frame's programs."""
         self._context = context
@@ -96,6 +101,7 @@ class FrameRenderer:
         self._fit = FrameFit.of(stages, settings)
         self._unsurveyed = list(stages_to_survey(stages, settings))
         self._traced: _Traced | None = None
+        self._fill = fill or traced_light
         self.phase = _PREPARING
         """What `steps` is at."""
         self.seconds = FrameSeconds()
@@ -127,7 +133,7 @@ class FrameRenderer:
                 yield 0.0
             self.seconds.prepare = time.perf_counter() - self.seconds.started
             self.phase = _TRACING
-            for share in traced_light(light, LightSampling.of(stage.scene, self._settings), stop):
+            for share in self._fill(light, LightSampling.of(stage.scene, self._settings), stop):
                 yield _LIGHT_SHARE * share
             light.finish()
             light.settle()

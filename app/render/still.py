@@ -14,7 +14,7 @@ from ..model.settings import RenderSettings
 from ..passes.spectrum_choice import Spectrum
 from .beam_light import BeamStats
 from .camera_beams import CameraBeamStats
-from .frames import FrameRenderer, Picture
+from .frames import Fill, FrameRenderer, Picture
 from .light_pass import LightStats
 from .notices import frame_notices
 
@@ -139,14 +139,15 @@ def render(
     cancelled: Cancelled = lambda: False,
     context: Context | None = None,
     more_layers: Sequence[str] = (),
+    fill: Fill | None = None,
 ) -> RenderResult:
     """Render `scene`. What was done when `cancelled()` turned true is kept and shown.
 
-    `more_layers`: of "beauty" and "caustic", seen of the same photons."""
+    `more_layers`: of "beauty" and "caustic", seen of the same photons. `fill`: see `FrameRenderer`."""
     own = context is None
     context = context or create_context()
     stage = Stage(scene, scene.camera)
-    frames = FrameRenderer(context, settings, [stage])
+    frames = FrameRenderer(context, settings, [stage], fill)
     try:
         for share in frames.steps(stage, cancelled):
             progress(share, frames.phase)
