@@ -260,7 +260,12 @@ def animate(
         ),
     ] = None,
     frames: Annotated[
-        Text, typer.Option(metavar="N", help="Pictures in all; default: 120, or as many as the keys last.")
+        Text,
+        typer.Option(
+            metavar="N",
+            help="Pictures in all; default: 120, or as many as the keys last. Or some of them by the numbers of their "
+            "files: 101-200, or 101-200/240 of 240 in all.",
+        ),
     ] = None,
     fps: Annotated[Text, typer.Option(metavar="F", help="Pictures a second; default: 24.")] = None,
     size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: the scene's.")] = None,
@@ -278,6 +283,14 @@ def animate(
     camera_method: CameraMethodOption = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the frames of another animation in the folder.")
+    ] = False,
+    skip_existing: Annotated[
+        bool,
+        typer.Option(
+            "--skip-existing",
+            help="Make only frames that are neither in the folder nor being made by another process; what happens "
+            "anyway, for those who like to say it.",
+        ),
     ] = False,
     allow_outside: AllowOutside = False,
 ) -> None:
@@ -300,6 +313,7 @@ def animate(
         method,
         camera_method,
         overwrite,
+        skip_existing,
     )
     raise typer.Exit(animate_command(request))
 
