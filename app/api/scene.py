@@ -275,9 +275,6 @@ class Scene:
         # What was filled in is from now on given: an edit of one thing must not move another.
         listed = sum(len(entry.get("instances", (None,))) for entry in values["objects"])
         values["objects"] += [_object_table(item) for item in self._model.objects[listed:]]
-        values.setdefault("lights", [light_values(light) for light in self._model.lights])
-        values.setdefault("camera", camera_values(self._model.camera))
-        values.setdefault("render", render_values(self._model.render))
         self._build()
 
     @property
@@ -306,7 +303,10 @@ class Scene:
 
     def _build(self) -> None:
         """Read and check the tables; what is described as before stays the same value."""
-        model = scene_of(self._values, self._file, self._kept)
+        model, values = scene_of(self._values, self._file, self._kept), self._values
+        values.setdefault("lights", [light_values(light) for light in model.lights])
+        values.setdefault("camera", camera_values(model.camera))
+        values.setdefault("render", render_values(model.render))
         shared = json.dumps(self._values.get("materials", {}), default=id)
         described = [json.dumps(entry, default=id) + shared for entry in self._values["objects"]]
         lights = [json.dumps(entry, default=id) for entry in self._values["lights"]]
@@ -354,10 +354,10 @@ class Scene:
                 return light_values(light)
         for entry, (item, *_) in zip(objects, _split(model.objects, objects), strict=True):
             if entry is values:
-                material = item.material
-                glass = {"dispersion_gain": material.dispersion.gain, "priority": material.priority}
-                position = {"position": [float(v) for v in item.object_to_world[:3, 3]]}
-                return _object_table(item) | (glass if material.transmits else {}) | position
+                told = _object_table(item) | {"position": [float(v) for v in item.object_to_world[:3, 3]]}
+                if item.material.transmits:
+                    told |= {"dispersion_gain": item.material.dispersion.gain, "priority": item.material.priority}
+                return told
         return {}
 
 

@@ -132,7 +132,7 @@ class Session:
             chosen = found.chosen(np.arange(0, len(found.flux_w), max(every, 1)))
             # A record holds its share of the light times the photons of the pass.
             share = len(found.flux_w) / max(len(chosen.flux_w), 1)
-            return replace(chosen, flux_w=chosen.flux_w * share / self._live.target_photons)
+            return replace(chosen, flux_w=chosen.flux_w * share / (self._settings.photons or 1))
 
         if limit is not None and (isinstance(limit, bool) or not isinstance(limit, int) or limit < 1):
             raise UserError(f"limit {limit!r} is no number of photons: give 1 or more")
@@ -185,7 +185,7 @@ class Session:
                 seed=settings.seed,
             )
         )
-        target, samples = engine.target_photons, engine.camera_samples
+        target, samples = settings.photons or 1, engine.camera_samples
         while not stopped():
             engine.advance(_STEP_S)
             if engine.problem is not None:
@@ -209,6 +209,7 @@ def _engine(context: Context, settings: RenderSettings, exact: bool) -> LiveEngi
     room = max(Budget.of(context).store_bytes, photons * _PER_PHOTON * _RECORD_BYTES)
     budget = replace(Budget.of(context), first_photons=photons, largest_photons=photons, store_bytes=room)
     engine = LiveEngine(context, budget)
-    engine.target_photons, engine.camera_samples = photons, settings.spp or DEFAULT_SAMPLES
+    # A pass emits a few photons more or less than it is asked for: whatever it was, one is enough.
+    engine.target_photons, engine.camera_samples = 1, settings.spp or DEFAULT_SAMPLES
     engine.refine_when_still = exact
     return engine

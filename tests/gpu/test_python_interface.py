@@ -120,6 +120,21 @@ def test_a_mistake_leaves_it_usable(live: ss.Session) -> None:
     assert live.render().stats.photons_traced == 0
 
 
+def test_one_pass_is_enough_whatever_it_emits() -> None:
+    """The lens's lattice has fewer points than it is asked for."""
+    with ss.Session(ss.load("lens"), **SMALL) as session:
+        assert 15_000 < session.render().stats.photons <= 20_000
+        session.scene.objects["lens"].dispersion_gain = 2.0
+        assert session.render().stats.photons_traced == 0
+
+
+def test_exact_traces_again_after_an_edit_of_the_dispersion() -> None:
+    with ss.Session(ss.load("prism"), exact=True, **SMALL) as session:
+        session.render()
+        session.set_glass("prism", dispersion_gain=2.0)
+        assert session.render().stats.photons_traced == 20_000
+
+
 def test_a_closed_one_says_so() -> None:
     session = ss.Session(ss.load("prism"), **SMALL)
     session.close()

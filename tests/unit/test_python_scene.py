@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import spectrasplat as ss
-from spectrasplat.base.paths import shipped_scenes
+from spectrasplat.base.paths import assets_dir, shipped_scenes
 from spectrasplat.model.io.scene_file import load_scene
 
 
@@ -46,6 +47,7 @@ def test_what_the_file_does_not_say_is_told() -> None:
     assert scene.objects["sphere"].dispersion_gain == 1.0
     assert scene.camera.kind == "pinhole" and scene.render.size == [960, 540]
     assert len(scene.notes) == 3
+    assert "dispersion_gain" in dir(scene.objects["sphere"]) and "dispersion_gain" not in dir(scene.objects["table"])
     position = scene.camera.position
     scene.objects.add(name="wall", shape="plane", material="black", position=(0.0, 9.0, 0.0))
     assert scene.camera.position == position and scene.objects.names == ["sphere", "table", "wall"]
@@ -78,6 +80,25 @@ def test_a_mesh_may_come_from_a_path_and_instances_count_once(tmp_path: Path) ->
         np.array_equal(a.mesh.vertices, b.mesh.vertices) and np.allclose(a.object_to_world, b.object_to_world)
         for a, b in zip(saved.objects, scene._model.objects, strict=True)
     )
+
+
+def test_what_is_left_out_is_fitted_again() -> None:
+    scene = ss.load("prism")
+    scene.camera = None  # type: ignore[assignment]
+    assert scene.camera.vertical_fov_deg == 32.0
+    with pytest.raises(ss.UserError, match="camera must be a table, not 5"):
+        scene.camera = 5  # type: ignore[assignment]
+
+
+def test_a_scene_of_gltf_is_edited_like_any_other() -> None:
+    scene = ss.load(assets_dir() / "meshes" / "gems.glb")
+    name = next(o.name for o in scene._model.objects if o.material.transmits)
+    before = scene._model
+    scene.objects[name].update(material=None, glass="N-SF11")
+    assert scene.objects[name].glass == "N-SF11" and len(scene._model.objects) == len(before.objects)
+    index = [o.name for o in before.objects].index(name)
+    assert scene._model.objects[index].mesh is before.objects[index].mesh
+    assert pickle.loads(pickle.dumps(scene)).objects[name].glass == "N-SF11"
 
 
 def test_a_copy_is_its_own() -> None:
