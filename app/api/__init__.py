@@ -15,8 +15,9 @@ from ..edit.stored_photons import StoredPhotons as Photons
 from .catalogue import Glass, glass, glasses
 from .picture import CausticMap, Picture, Statistics
 from .rendering import caustic, render
-from .scene import Entries, Scene, Table
+from .scene import Scene
 from .session import Session
+from .tables import Entries, Table
 from .tracing import Fan, fan, trace
 
 __all__ = [
