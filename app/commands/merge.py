@@ -60,7 +60,7 @@ def merge_command(request: MergeRequest) -> int:
         )
 
     def refuse(light: LightPass) -> None:
-        if layout_key(light) != first.layout:
+        if (layout_key(light), light.atlas.size, light.atlas.targets) != (first.layout, first.size, first.targets):
             raise UserError(
                 f"{chosen[0]} was traced by '{first.renderer}', whose maps lie elsewhere than those of "
                 f"'{light.context.renderer}': merge where the parts were traced"
@@ -106,7 +106,7 @@ def _chosen(headers: dict[Path, PartHeader], partial: bool) -> list[Path]:
                 f"{paths[0]} is one of {first.share.count} parts of {first.rounds} rounds, {path} one of "
                 f"{header.share.count} of {header.rounds}: trace all with the same --passes and --batch"
             )
-        if header.layout != first.layout:
+        if (header.layout, header.size, header.targets) != (first.layout, first.size, first.targets):
             raise UserError(
                 f"{paths[0]} ('{first.renderer}') and {path} ('{header.renderer}') have maps that lie elsewhere: trace "
                 "all parts on the same kind of device"
