@@ -1,4 +1,4 @@
-"""Compiles the search for beams, some 20 s the first time, so that nobody waits for it at a first picture:
+"""Compiles the search for beams, some 40 s the first time, so that nobody waits for it at a first picture:
 
 python -m spectrasplat.beams.compile
 """
@@ -9,12 +9,15 @@ import time
 
 import numpy as np
 
+from ..model.optics.spectral_tables import CumulativeSpectrum
 from .convert import hulls_of
 from .facets import FACET, SAMPLES, SOLID
 from .find import take_stack
 from .hand import FIRST
 from .leaves import Store
 from .lifetimes import lifetimes_of
+from .piece_lattice import PieceLattice
+from .polygons import BeamPieces
 from .rays import SOURCE, intensities
 from .search import WORK, flux_in, may_touch, power_of
 from .steps import run
@@ -36,7 +39,19 @@ def warm_up() -> float:
     ends, corner = np.zeros(1, np.int64), np.zeros((0, 2))
     hulls_of(corner, ends, np.zeros(0), corner, corner, ends.copy(), corner)
     lifetimes_of(np.zeros((0, 8)), ends, corner, ends)
+    lattice = PieceLattice(_square(), [CumulativeSpectrum(np.array([0.0, 1.0]), np.eye(2, 4))], [1.0])
+    lattice.rays(0, 1, (0, 0), 0)
     return time.perf_counter() - start
+
+
+def _square() -> BeamPieces:
+    """What photons carry on, as small as can be."""
+    one, corner = np.zeros(1, np.int32), np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    ray, starts, edges = np.ones((1, 3, 3, 3)), np.array([0, 3], np.int32), np.zeros((3, 6))
+    floats = np.zeros(1), np.ones(1), np.zeros((1, 2)), ray, ray, np.ones((1, 3))
+    return BeamPieces(
+        one, one, one, *floats, one, one, one > 0, one.astype(np.uint64), one > 0, one, starts, edges, starts, corner
+    )
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from .facets import BeamScene
 from .leaves import Leaves
 from .lifetimes import lifetimes_of
 from .polygons import BeamPieces, BeamPolygons, parabola_at
-from .search import LEAF_PIECE, LEAF_RECEIVER
+from .search import LEAF_PIECE, LEAF_RECEIVER, LEAF_TAIL
 
 
 @jit
@@ -99,9 +99,9 @@ def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float)
     )
 
 
-def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int) -> BeamPieces:
-    """What photons have to carry on."""
-    chosen = of_kind(leaves, LEAF_PIECE)
+def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int, measure: float) -> BeamPieces:
+    """What photons have to carry on. `measure`: as many units of `Emission.density` make one of `BeamPieces.weight`."""
+    chosen = of_kind(leaves, LEAF_PIECE, LEAF_TAIL)
     head = chosen.head
     edges = np.concatenate([chosen.edge[:, 0], chosen.edge[:, 2]], axis=1)
     counts = head[:, 6]
@@ -121,11 +121,12 @@ def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int) -> BeamPieces:
         chosen.centre,
         chosen.ray[:, 0],
         chosen.ray[:, 1],
-        chosen.density,
+        chosen.density * measure,
         scene.facets["triangle"][last].astype(np.int32),
         scene.facets["owner"][last].astype(np.int32),
         towards < 0.0,
         objects_of(head[:, 5], scene),
+        head[:, 0] == LEAF_TAIL,
         chosen.flux,
         np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
         edges,
@@ -134,9 +135,9 @@ def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int) -> BeamPieces:
     )
 
 
-def of_kind(leaves: list[Leaves], kind: int) -> Leaves:
-    """Leaves of one kind (`search.LEAF_…`)."""
-    return Leaves.joined([part.where(part.head[:, 0] == kind) for part in leaves])
+def of_kind(leaves: list[Leaves], *kinds: int) -> Leaves:
+    """Leaves of some kinds (`search.LEAF_…`)."""
+    return Leaves.joined([part.where(np.isin(part.head[:, 0], kinds)) for part in leaves])
 
 
 def hulls_around(corners: np.ndarray, counts: np.ndarray, grow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

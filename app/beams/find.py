@@ -70,8 +70,7 @@ class Search:
     """Power of all lights, per unit of this one's spectral power: a dim light is followed less far."""
     sees: bool = False
     faint: float = 0.0
-    """Above 0 (of what the camera sees): beams below the threshold end as `search.LEAF_TAIL`, and roulette is played
-    below this share only."""
+    """Above 0: beams below the threshold end as `search.LEAF_TAIL`, and roulette is played below this share only."""
     most: int = 1 << 40
     """Leaves of one facet that the source sees: with more, a search is given up."""
 

@@ -16,9 +16,8 @@ from ..model.scene import Scene
 from .convert import pieces_of, polygons_of
 from .facets import beam_scene, in_gpu_space, shown_as
 from .find import Emission, GoOn, Search, search
-from .leaves import Leaves
 from .polygons import BeamPieces, BeamPolygons, joined
-from .search import SUMS
+from .search import SUM_BEAMS, SUMS
 from .sources import emissions, mask_at, why_no_beams
 
 LIGHT_PARTS = 16
@@ -35,6 +34,12 @@ class LightBeams:
     pieces: BeamPieces | None = None
     sums: dict[int, np.ndarray] = field(default_factory=dict)
     """By light: flux per unit of spectral power by where it went (`search.SUM_…`)."""
+    plays: frozenset[int] = frozenset()
+    """Lights whose weak beams play roulette."""
+
+    def followed(self, light: int | None = None) -> float:
+        """Beams followed, of one light or of all."""
+        return float(sum(sums[SUM_BEAMS] for i, sums in self.sums.items() if light in (None, i)))
 
 
 class BeamFinder:
@@ -100,11 +105,14 @@ class BeamFinder:
         light_parts: int = LIGHT_PARTS,
         threads: int | None = None,
         go_on: GoOn = lambda steps: True,
+        *,
+        hands: bool = False,
     ) -> Iterator[float | LightBeams]:
         """All beams, pausing with the share that is done; what comes last is the result.
 
-        `threshold`: share of the light that meets facets below which a beam plays roulette; `depth`: most specular
-        events; `light_parts`: points of an extended light."""
+        `threshold`: share of the light that meets facets below which a beam plays roulette, or with `hands` is left to
+        photons, unless its light has both emission lines and a continuum; `depth`: most specular events; `light_parts`:
+        points of an extended light."""
         beams, scene, texel = self.scene, self._scene, self._texel
         todo: list[tuple[int, list[Emission]]] = []
         for i in self.lights:
@@ -120,11 +128,15 @@ class BeamFinder:
         watts = {i: _power(scene.lights[i]) for i, _ in todo}
         reach = {i: sum(_reach(part) for part in parts) * watts[i] for i, parts in todo}
         total, steps = sum(reach.values()), sum(len(parts) for _, parts in todo)
-        result, done = LightBeams({}), 0
+        # Pieces of a spectrum's continuum would hold what lines within their bands have, which are followed apart.
+        plays = frozenset(i for i, parts in todo if not hands or (parts[0].lines and parts[0].is_continuous))
+        result, done = LightBeams({}, plays=plays), 0
         polygons, pieces = [], []
         for i, parts in todo:
             sums, blocked = np.zeros(SUMS), set()
-            found: list[Leaves] = []
+            thrown: list[BeamPolygons] = []
+            left: list[BeamPieces] = []
+            measure = self._unit**2 if scene.lights[i].is_parallel else 1.0
             for number, part in enumerate(parts):
                 how = Search(
                     threshold,
@@ -132,18 +144,21 @@ class BeamFinder:
                     depth,
                     _TOLERANCE * texel,
                     power=total / watts[i] if watts[i] > 0.0 else None,
+                    faint=0.0 if i in plays else _HANDED * threshold,
                 )
                 leaves, part_sums, part_blocked = search(beams, part, how, threads, go_on)
-                found += leaves
+                thrown.append(polygons_of(leaves, beams, i, self._unit))
+                left.append(pieces_of(leaves, beams, i, measure))
                 sums += part_sums
                 blocked |= part_blocked
                 done += 1
                 yield done / steps
             if blocked:
                 # Photons carry what these objects throw: all of it, whichever point of the light it comes from.
-                found = [leaves.where(~np.isin(leaves.head[:, 3], list(blocked))) for leaves in found]
-            polygons.append(polygons_of(found, beams, i, self._unit))
-            pieces.append(pieces_of(found, beams, i))
+                thrown = [some.where(~np.isin(some.source, list(blocked))) for some in thrown]
+                left = [some.where(~np.isin(some.source, list(blocked))) for some in left]
+            polygons += thrown
+            pieces += left
             result.carried[i] = tuple(o for o in beams.beam_objects if o not in blocked)
             result.sums[i] = sums
         result.polygons = joined(polygons) if polygons else None
@@ -151,6 +166,8 @@ class BeamFinder:
         yield result
 
 
+_HANDED = 1.0 / 16.0
+"""Share of the threshold below which what is left to photons plays roulette. A quarter: 1.5 times the variance."""
 _TOLERANCE = 0.25
 """Texels."""
 _THINNEST = 1e-3

@@ -129,15 +129,16 @@ def rays(
     key,
     first,
     stride,
+    base,
 ):
     """Rays (n, COLUMNS) of the pieces `chosen`, their pieces and their numbers on all lattices.
 
     Piece chosen[k] has about points[k] >= 1 lattice points and is to carry boost[k] times its `content`. Of the cells
-    those of sub-lattice `first` of `stride`.
+    those of sub-lattice `first` of `stride`. `base`: the first number.
     """
     room = 1024
     found, owner, number = np.empty((room, COLUMNS)), np.empty(room, np.int64), np.empty(room, np.int64)
-    count, base = 0, 0
+    count = 0
     frame, cell = np.empty(11), np.empty(6)
     # Rows of cells are shifted against each other, so that every sub-lattice is spread over the whole.
     row_step = max(1, int(np.rint(GOLDEN * stride)))

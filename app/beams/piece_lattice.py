@@ -7,8 +7,11 @@ part of the piece holds, so no light is lost at an edge, and its footprint is as
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +20,8 @@ from ..model.optics.spectral_tables import CumulativeSpectrum
 from .polygons import BeamPieces
 
 _WORD = float(1 << 32)
+_CHUNK = 2048
+"""Pieces that a thread takes at once."""
 
 
 @dataclass(frozen=True)
@@ -72,17 +77,28 @@ class PieceLattice:
         self._bands = np.ascontiguousarray(pieces.x_lo, float), np.ascontiguousarray(pieces.x_hi, float)
         self._weight = np.ascontiguousarray(pieces.weight, float)
         self._content, self._power = np.zeros(len(pieces)), np.zeros(len(pieces))
-        piece_measure.contents(
-            *self._bands,
-            self._weight,
-            *self._edges,
-            pieces.light.astype(np.int64),
-            starts,
-            curve_x,
-            curve_w,
-            self._content,
-            self._power,
-        )
+        light = pieces.light.astype(np.int64)
+        edge_start, edges, hull_start, hulls = self._edges
+
+        def measure(first: int) -> None:
+            part, ends = slice(first, first + _CHUNK), slice(first, first + _CHUNK + 1)
+            piece_measure.contents(
+                self._bands[0][part],
+                self._bands[1][part],
+                self._weight[part],
+                edge_start[ends],
+                edges,
+                hull_start[ends],
+                hulls,
+                light[part],
+                starts,
+                curve_x,
+                curve_w,
+                self._content[part],
+                self._power[part],
+            )
+
+        _in_threads(measure, 0, len(pieces))
 
     @property
     def flux_w(self) -> np.ndarray:
@@ -92,65 +108,92 @@ class PieceLattice:
     def rays(
         self, light: int, count: int, shift: tuple[int, int], key: int, first: int = 0, stride: int = 1
     ) -> PieceRays:
-        """Sub-lattice `first` of `stride` of lattices with about `count` points over all pieces of `light`.
+        """All of `portions` at once."""
+        (rays,) = self.portions(light, count, shift, key, first, stride, most=1 << 62)
+        return rays
+
+    def portions(
+        self, light: int, count: int, shift: tuple[int, int], key: int, first: int = 0, stride: int = 1, *, most: int
+    ) -> Iterator[PieceRays]:
+        """Sub-lattice `first` of `stride` of lattices with about `count` points over all pieces of `light`, about
+        `most` rays at once.
 
         Points are shared out by flux per unit of spectral power, and by the bands' widths: no colour is coarser than
-        another, as on the emission lattices. Of pieces that would have less than one, some are drawn to stand for all.
+        another, as on the emission lattices. Tails have points by the root of that: where it is dim, the weakest are
+        all that there is. Of pieces that would have less than one, some are drawn to stand for all.
         `shift` of the lattices modulo 2³², and `key` of what is drawn: of one pass."""
+        mine, points = self._drawn(light, count, key)
+        boost = self._measures[light] / np.minimum(points, 1.0)
+        points = np.maximum(points, 1.0)
+        running = np.cumsum(points)
+        position, direction = (
+            np.ascontiguousarray(rays, float) for rays in (self.pieces.position, self.pieces.direction)
+        )
+
+        def lay(start: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            part = slice(start, start + _CHUNK)
+            return self._kernel.rays(
+                mine[part],
+                points[part],
+                boost[part],
+                *self._bands,
+                position,
+                direction,
+                self._weight,
+                *self._edges,
+                self._content,
+                *self._curves[light],
+                shift[0] / _WORD,
+                shift[1] / _WORD,
+                key,
+                first,
+                stride,
+                # Lattices have cells beside what is lit: room for them, so that numbers differ.
+                int(4.0 * running[start - 1]) if start else 0,
+            )
+
+        start = 0
+        while start == 0 or start < len(mine):
+            before = running[start - 1] if start else 0.0
+            end = int(np.searchsorted(running, before + stride * float(most)))
+            end = max(end - end % _CHUNK, start + _CHUNK) if end < len(mine) else len(mine)
+            yield _joined(_in_threads(lay, start, end), self._kernel.COLUMNS)
+            start = max(end, 1)
+
+    def _drawn(self, light: int, count: int, key: int) -> tuple[np.ndarray, np.ndarray]:
+        """Pieces that have rays, and how many points each would have by rights."""
         pieces = self.pieces
         mine = np.flatnonzero((pieces.light == light) & (self._content > 0.0))
         share = self._content[mine] / self._power[mine]
         share *= np.where(pieces.x_hi[mine] > pieces.x_lo[mine], pieces.x_hi[mine] - pieces.x_lo[mine], 1.0)
+        share = np.where(pieces.is_tail[mine], np.sqrt(share), share)
         points = count * share / share.sum() if len(mine) else share
         # Systematic sampling: as many of the small ones as they have points together.
         running = np.cumsum(np.where(points < 1.0, points, 0.0)) + (key & 0xFFFFFFFF) / _WORD
         drawn = np.floor(running) > np.floor(np.concatenate([[(key & 0xFFFFFFFF) / _WORD], running[:-1]]))
         kept = drawn | (points >= 1.0)
-        mine, points = mine[kept], points[kept]
-        boost = self._measures[light] / np.minimum(points, 1.0)
-        found, owner, number = self._kernel.rays(
-            mine,
-            np.maximum(points, 1.0),
-            boost,
-            *self._bands,
-            np.ascontiguousarray(pieces.position, float),
-            np.ascontiguousarray(pieces.direction, float),
-            self._weight,
-            *self._edges,
-            self._content,
-            *self._curves[light],
-            shift[0] / _WORD,
-            shift[1] / _WORD,
-            key,
-            first,
-            stride,
-        )
-        n = len(found)
-        columns = found[:, 6:24].reshape(n, 6, 3)
-        return PieceRays(
-            owner,
-            number,
-            found[:, 0:3],
-            found[:, 3:6],
-            columns[:, [0, 1, 4]],
-            columns[:, [2, 3, 5]],
-            found[:, 24:27],
-            found[:, 27:30],
-            found[:, 30],
-        )
+        return mine[kept], points[kept]
 
 
-def pieces_where(pieces: BeamPieces, chosen: np.ndarray) -> BeamPieces:
-    """The pieces where `chosen`, bool (M,), in order."""
-    values = {}
-    for field in fields(pieces):
-        values[field.name] = getattr(pieces, field.name)
-        if field.name in ("edges", "hulls"):
-            starts = pieces.edge_start if field.name == "edges" else pieces.hull_start
-            values[field.name] = values[field.name][np.repeat(chosen, np.diff(starts))]
-        elif field.name.endswith("_start"):
-            counts = np.diff(values[field.name])[chosen]
-            values[field.name] = np.cumsum([0, *counts]).astype(np.int32)
-        else:
-            values[field.name] = values[field.name][chosen]
-    return BeamPieces(**values)
+def _joined(parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]], columns: int) -> PieceRays:
+    """Rays as the kernel writes them."""
+    parts = parts or [(np.zeros((0, columns)), np.zeros(0, int), np.zeros(0, int))]
+    found, owner, number = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    derivatives = found[:, 6:24].reshape(len(found), 6, 3)
+    return PieceRays(
+        owner,
+        number,
+        found[:, 0:3],
+        found[:, 3:6],
+        derivatives[:, [0, 1, 4]],
+        derivatives[:, [2, 3, 5]],
+        found[:, 24:27],
+        found[:, 27:30],
+        found[:, 30],
+    )
+
+
+def _in_threads(work: Callable[[int], Any], first: int, end: int) -> list[Any]:
+    """What `work` returns for every first of `_CHUNK` rows up to `end`, in order."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(work, range(first, end, _CHUNK)))

@@ -11,12 +11,36 @@ All arrays are float64 and lengths are in GPU space (`gpu.scene_buffers.GpuSpace
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Self
 
 import numpy as np
 
 
+class _Outlines:
+    """Values a row each, with edges from `edge_start` on and corners of hulls from `hull_start` on."""
+
+    edge_start: np.ndarray
+    hull_start: np.ndarray
+
+    def where(self, chosen: np.ndarray) -> Self:
+        """Those that are `chosen`, bool (rows,), in order."""
+        if chosen.all():
+            return self
+        values = {}
+        for name in (field.name for field in fields(self)):  # type: ignore[arg-type]
+            value = getattr(self, name)
+            if name in ("edges", "hulls"):
+                starts = self.edge_start if name == "edges" else self.hull_start
+                values[name] = value[np.repeat(chosen, np.diff(starts))]
+            elif name.endswith("_start"):
+                values[name] = np.append(0, np.cumsum(np.diff(value)[chosen])).astype(np.int32)
+            else:
+                values[name] = value[chosen]
+        return type(self)(**values)
+
+
 @dataclass(frozen=True)
-class BeamPolygons:
+class BeamPolygons(_Outlines):
     """Polygons that bands of beams throw on flat receivers; N polygons, E edges, H corners of hulls.
 
     Place p on a receiver is (u, v) of its plane's frame (`PlaneFrame`, by receiver). At t in [0, 1], where
@@ -62,7 +86,7 @@ class BeamPolygons:
 
 
 @dataclass(frozen=True)
-class BeamPieces:
+class BeamPieces(_Outlines):
     """Pieces of beams that go on as photons, since what they meet is not flat; M pieces, E edges, H hull corners.
 
     A piece is a polygon in its light's emission coordinates q = (q_u, q_v) (`EmissionDomain`: GPU units across a
@@ -96,6 +120,8 @@ class BeamPieces:
     """bool (M,), whether the piece travels on the inner side of `last_object`'s facet."""
     inside: np.ndarray
     """uint64 (M,), bit per object of the solids that the piece is inside of."""
+    is_tail: np.ndarray
+    """bool (M,), whether it was merely too weak to be followed on."""
     flux: np.ndarray
     """(M,), per unit of spectral power, middle of the band."""
     edge_start: np.ndarray

@@ -29,7 +29,7 @@ from .rays import advance, at_x, edge_line, follow
 
 LEAF_RECEIVER, LEAF_PIECE, LEAF_OPEN, LEAF_TAIL = 0, 1, 2, 3
 """What lies on a receiver; what photons carry on; what leaves all facets towards what the camera sees (`sees`); what is
-too weak to be followed as a beam, and is handed to the camera's paths."""
+too weak to be followed as a beam, and is handed to photons, or to the camera's paths."""
 NARROWEST = 1.0 / 256.0
 """Bands are not halved below this."""
 _STEADY = 3.0

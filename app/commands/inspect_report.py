@@ -161,7 +161,8 @@ def _compiled(scene: Scene) -> list[RenderableType]:
     from ..model.features import Features, explain
     from ..model.settings import RenderSettings
 
-    settings = RenderSettings(width=scene.render.width, height=scene.render.height, max_depth=scene.render.max_depth)
+    wishes = scene.render
+    settings = RenderSettings(width=wishes.width, height=wishes.height, max_depth=wishes.max_depth, camera_beams=True)
     features = Features.of(scene, settings)
     costs = static_costs(scene, features)
     table = _table("Compiled into the programs", ("part", False), ("", False), ("why", False), ("costs", False))

@@ -160,7 +160,7 @@ def render(
         Text,
         typer.Option(
             metavar="HOW",
-            help="How stills show flat-faceted glass: paths (default), or beams where these should cost less.",
+            help="How stills show flat-faceted glass: beams where these should cost less (default with srd), or paths.",
         ),
     ] = None,
     batch: Annotated[

@@ -173,6 +173,8 @@ def complete_settings(asked: dict[str, Any], scene: Scene, stats: bool) -> Rende
             "exposure_ev": wishes.exposure_ev,
             "photons": None if "seconds" in asked else wishes.photons,
             "tally": stats,
+            # Who asks for photons alone compares them with what else there is.
+            "camera_beams": asked.get("method", "srd") == "srd",
             **asked,
         }
     )

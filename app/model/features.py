@@ -515,8 +515,9 @@ def _beam_words(scene: Scene, features: Features) -> str:
     if features.beams:
         carried = [scene.objects[i].name for i in beam_objects(scene)]
         others = [f"{o.name}: {why_no_beams(o)}" for o in specular if why_no_beams(o)]
-        return f"what {', '.join(carried)} throw(s) goes as polygons, unless a survey finds too many weak ones" + (
-            f"; photons for {'; '.join(others)}" if others else ""
+        return (
+            f"what {', '.join(carried)} throw(s) goes as polygons, unless a survey finds that photons are cheaper"
+            + (f"; photons for {'; '.join(others)}" if others else "")
         )
     if features.method != "srd":
         return f"method {features.method} follows photons"

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..beams.piece_lattice import PieceLattice, PieceRays, pieces_where
+from ..beams.piece_lattice import PieceLattice, PieceRays
 from ..beams.polygons import BeamPieces
 from ..gpu.records import FLAG_INSIDE
 from ..gpu.reindex import Spans
@@ -19,6 +19,8 @@ from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.schema import Struct
 
 _SAME_X = 1e-6
+_BATCHES = 8
+"""That are laid out at once: few threads wait for each other, and half a million rays would take 400 MiB."""
 
 
 class BeamEmission:
@@ -27,17 +29,19 @@ class BeamEmission:
     def __init__(self, scene: SceneBuffers, ray: Struct, pieces: BeamPieces, spans: Spans) -> None:
         """`ray`: the trace pass's records; `spans`: bands of the spectral tables that photons are splatted by.
 
-        A photon's interval may be any part of the spectrum where bands may be cut, else it is that of a table's band.
-        An emission line within a band that photons carry too is in their share, so that its own pieces are not taken.
-        Raises ValueError for a piece whose interval no table has.
+        A photon's interval may be any part of the spectrum where bands may be cut, else it is that of a table's band. A
+        line's is then all that lies nearer to it than to another. An emission line within a band that photons carry too
+        is in their share, so that its own pieces are not taken. Raises ValueError for a piece whose interval no table
+        has.
         """
         self._scene = scene
         self._ray = ray
         self._features = scene.features
         band = _bands(pieces, spans, any_interval=self._features.band_cuts)
         within = _is_line_within(pieces)
-        self.pieces = pieces_where(pieces, ~within)
+        self.pieces = pieces.where(~within)
         self._band = band[~within]
+        self._lo, self._hi = self._intervals(spans)
         missing = self._band < 0
         if missing.any():
             which = int(np.argmax(missing))
@@ -65,10 +69,10 @@ class BeamEmission:
     ) -> Iterator[np.ndarray]:
         """Ray records of sub-lattice `first` of `stride` of about `count` points over a light's pieces, at most `most`
         at once. `weight`, `shift` and `key` as of a `LatticeSlice`: its weight, shift and seed."""
-        rays = self._lattice.rays(light, count, shift, key, first, stride)
-        records = self._records(rays, light, weight, key)
-        for start in range(0, len(records), most):
-            yield records[start : start + most]
+        for rays in self._lattice.portions(light, count, shift, key, first, stride, most=_BATCHES * most):
+            records = self._records(rays, light, weight, key)
+            for start in range(0, len(records), most):
+                yield records[start : start + most]
 
     def _records(self, rays: PieceRays, light: int, weight: float, key: int) -> np.ndarray:
         pieces, own = self.pieces, rays.piece
@@ -76,6 +80,8 @@ class BeamEmission:
         records["position"], records["direction"] = rays.position, rays.direction
         records["flux_w"], records["throughput"] = weight * rays.flux_w, weight * rays.throughput
         records["x_lo"], records["x_anchor"], records["x_hi"] = rays.band.T
+        at_line = pieces.x_lo[own] == pieces.x_hi[own]
+        records["x_lo"][at_line], records["x_hi"][at_line] = self._lo[own[at_line]], self._hi[own[at_line]]
         records["footprint_scale"] = records["survival"] = 1.0
         records["photon_id"] = rays.number & 0xFFFFFFFF
         records["light_and_source"] = light | self._band[own] << 8 | pieces.source[own].astype(np.int64) << 16
@@ -98,6 +104,21 @@ class BeamEmission:
             records["ddirection"][*at, :3] = rays.ddirection[:, 2] * per_variable[:, None]
         return records
 
+    def _intervals(self, spans: Spans) -> tuple[np.ndarray, np.ndarray]:
+        """Ends of all that a line's photons stand for, (M,) each: up to half the way to the next line, unless the line
+        is a table's band by itself."""
+        lo, hi = self.pieces.x_lo.copy(), self.pieces.x_hi.copy()
+        for light, lamp in enumerate(self._scene.scene.lights):
+            mine = np.flatnonzero((self.pieces.light == light) & (lo == hi))
+            if not len(mine) or any(first == last for first, last in spans[light]):
+                continue
+            others = [float(self._scene.axis.x_of_nm(nm)) for nm, _ in lamp.spectral_power.lines]
+            lines = np.unique(np.concatenate([others, lo[mine]]))
+            ends = np.concatenate([[0.0], 0.5 * (lines[1:] + lines[:-1]), [1.0]])
+            nearest = np.searchsorted(lines, lo[mine])
+            lo[mine], hi[mine] = ends[nearest], ends[nearest + 1]
+        return lo, hi
+
     def _spectral_scale(self, band: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of each ray the group whose variable changes most over its band, and dx by that variable there."""
         table = self._scene.variables
@@ -119,8 +140,7 @@ def _bands(pieces: BeamPieces, spans: Spans, *, any_interval: bool) -> np.ndarra
         nearest = off.argmin(axis=1)
         same = off[np.arange(len(mine)), nearest] < _SAME_X
         # What is cut out of a band is drawn by the light's running integral, whichever the band.
-        cut = any_interval & (ends[:, 1] > ends[:, 0])
-        found[mine] = np.where(same | cut, nearest, -1)
+        found[mine] = np.where(same | any_interval, nearest, -1)
     return found
 
 

@@ -1,5 +1,5 @@
 """The part of a light pass that beams carry: found on the processor, drawn into the maps as polygons, and what is not
-flat handed to photons.
+flat or too weak handed to photons.
 
 Where photons are traced besides, every round of a pass has beams of its own, found as coarsely as its share of the
 photons asks and with roulette's numbers of its own, so that a pass is even whenever it is left.
@@ -20,7 +20,6 @@ from ..beams.light_beams import LIGHT_PARTS, BeamFinder, LightBeams
 from ..beams.polygons import BeamPolygons
 from ..beams.search import (
     SUM_ABSORBED,
-    SUM_BEAMS,
     SUM_DEPOSITED,
     SUM_DEPTH,
     SUM_ENTERED,
@@ -41,12 +40,13 @@ from ..passes.trace import FluxTally
 from .light_maps import LightMaps
 from .shown_spectra import ShownSpectra
 
-PHOTONS_A_BEAM = 4.0
-"""A beam is followed and drawn in about the time that so many photons take."""
+PHOTONS_A_BEAM = 8.0
+"""Photons' time that there is for a beam, half of it for what it leaves to photons."""
 COARSEST, FINEST = 1e-2, 1e-9
-"""Thresholds: the share of the light below which a beam plays roulette."""
-_GROWTH = 0.8
-"""The number of beams goes about as this power of one over the threshold, where a stone throws light to and fro."""
+"""Thresholds: the share of the light below which a beam is handed to photons, or plays roulette."""
+_GROWTH, _GROWTH_HANDED = 0.8, 1.0
+"""The number of beams goes about as this power of one over the threshold, where a stone throws light to and fro; where
+weak beams play roulette, and where they are handed over."""
 _ENOUGH = 4.0
 """A search that followed this many times fewer beams than there is time for is done again."""
 _SURVEY = 1e-3
@@ -55,10 +55,8 @@ _DEAREST = 1e8
 """Steps of a survey, each times `_STEP_FACETS` and the scene's facets, after which photons are thought cheaper: about
 four seconds of a core. Counted, not timed: the same scene must go the same way on every machine."""
 MANY = 800.0
-"""Beams of a survey above which photons carry all: the tail of a cut stone holds much of its picture, and played by
-roulette it is noisier. `brilliant`, 240×135, one seed: relMSE 7.9 by beams and 0.77 by photons after 1 s, 0.39 and 0.31
-after 19 s; `prism`, 160×90: 0.0013 and 0.0029 after 0.1 s. Surveys: brilliant 3000, default 1400, step_cut 860; amici
-620, prism 120, prism_case 14."""
+"""Beams of a survey above which photons carry all where weak beams play roulette, which is noisier: the tail of a cut
+stone holds much of its picture. Surveys: brilliant 3000, default 1400, step_cut 860; amici 620, prism 120."""
 _STEP_FACETS = 60
 """A step costs as much as it takes to look at so many facets, besides those of the scene."""
 _PAUSE_S = 0.003
@@ -189,8 +187,8 @@ class BeamLight:
         self.why_not = ""
         """Why there are none after all."""
         self.stats = BeamStats()
-        self._surveyed = 1.0
-        """Beams that are followed at `_SURVEY`."""
+        self._surveyed = self._handing = 1.0
+        """Beams that are followed at `_SURVEY`: where weak ones play roulette, and where they are handed over."""
         self._survey_polygons: BeamPolygons | None = None
         """What maps are fitted to."""
         self.found: LightBeams | None = None
@@ -213,22 +211,29 @@ class BeamLight:
             work += each * steps
             return work < _DEAREST
 
-        found = LightBeams({})
+        found = strongest = LightBeams({})
         for step in self._searched(self.finder, threshold, _MOVING_WORD, light_parts, pays, None):
             if isinstance(step, LightBeams):
                 found = step
             yield
+        if pays(0):
+            for step in self._searched(self.finder, _SURVEY, _MOVING_WORD, light_parts, pays, None, hands=True):
+                if isinstance(step, LightBeams):
+                    strongest = step
+                yield
         if not pays(0):
             self.why_not = "the strongest beams alone are so many that photons are cheaper"
             return
+        # As many as there would be at the survey's own threshold.
+        to_survey = (threshold / _SURVEY) ** _GROWTH
+        if sum(found.followed(light) for light in strongest.plays) * to_survey > MANY:
+            self.why_not = (
+                "weak beams of lights with emission lines over a continuum are so many that photons leave less noise"
+            )
+            return
         self.found, self._survey_polygons = found, found.polygons
         self.carried = {light: objects for light, objects in found.carried.items() if objects}
-        # As many as there would be at the survey's own threshold.
-        followed = max(1.0, sum(float(sums[SUM_BEAMS]) for sums in found.sums.values()))
-        self._surveyed = followed * (threshold / _SURVEY) ** _GROWTH
-        if self._surveyed > MANY:
-            self.why_not = "weak beams are so many that photons leave less noise"
-            self.found, self._survey_polygons, self.carried = None, None, {}
+        self._surveyed, self._handing = max(1.0, found.followed() * to_survey), max(1.0, strongest.followed())
 
     def show(self, scene: Scene) -> None:
         """Follow `scene` from now on: other glass and spectra, which `shown` has too."""
@@ -259,25 +264,31 @@ class BeamLight:
         for canvas in self._canvases.values():
             canvas.forget_tables()
 
-    def steps(self, photons: float, weight: float, word: int, maps: LightMaps) -> Iterator[float]:
+    def steps(
+        self, photons: float, weight: float, word: int, maps: LightMaps, *, hands: bool = True
+    ) -> Iterator[float]:
         """Find beams as fine as `photons` ask and add them to `maps` times `weight`, pausing with the share done.
-        `word`: roulette's seed."""
+        `word`: roulette's seed; without `hands` all weak beams play it, and none is left to photons, which would follow
+        the glass that is traced even where another is shown."""
         stats, started = self.stats, time.perf_counter()
-        found, surveyed = LightBeams({}), self._surveyed
+        hands = hands and self.finder is self._traced
+        found, surveyed = LightBeams({}), self._handing if hands else self._surveyed
+        growth = _GROWTH_HANDED if hands else _GROWTH
         while True:
-            threshold, followed = self._threshold(photons, surveyed), 0.0
-            for step in self._searched(self.finder, threshold, word):
+            threshold = self._threshold(photons, surveyed, growth)
+            for step in self._searched(self.finder, threshold, word, hands=hands):
                 stats.find_seconds += time.perf_counter() - started
                 if isinstance(step, LightBeams):
                     found = step
-                    followed = sum(float(sums[SUM_BEAMS]) for sums in step.sums.values())
                 else:
                     yield 0.5 * step
                 started = time.perf_counter()
             # Where light leaves for good, fewer weak beams follow than thought: such are searched for again, finer.
             # What is learnt here is forgotten: a pass must not depend on those before it.
-            surveyed = max(followed, 1.0) * (threshold / _SURVEY) ** _GROWTH
-            if _ENOUGH * followed * PHOTONS_A_BEAM >= photons or self._threshold(photons, surveyed) >= threshold:
+            followed = found.followed()
+            surveyed = max(followed, 1.0) * (threshold / _SURVEY) ** growth
+            enough = _ENOUGH * followed * PHOTONS_A_BEAM >= photons
+            if enough or self._threshold(photons, surveyed, growth) >= threshold:
                 break
         self.found = found
         self._count(found)
@@ -288,10 +299,10 @@ class BeamLight:
         yield 1.0
 
     @staticmethod
-    def _threshold(photons: float, surveyed: float) -> float:
+    def _threshold(photons: float, surveyed: float, growth: float) -> float:
         """Threshold at which beams take about as long as so many photons; `surveyed` are followed at `_SURVEY`."""
         beams = max(photons, 1.0) / PHOTONS_A_BEAM
-        return float(np.clip(_SURVEY * (surveyed / beams) ** (1.0 / _GROWTH), FINEST, COARSEST))
+        return float(np.clip(_SURVEY * (surveyed / beams) ** (1.0 / growth), FINEST, COARSEST))
 
     def draw_moving(self, maps: LightMaps, weight: float, moving: MovingBeams, seconds: float) -> None:
         """Find beams at once, as fine as `seconds` allow, and add them to `maps` of any layout times `weight`."""
@@ -314,8 +325,7 @@ class BeamLight:
         """Beams and polygons of the last search that was finished."""
         if self.found is None:
             return 0, 0
-        beams = sum(int(sums[SUM_BEAMS]) for sums in self.found.sums.values())
-        return beams, 0 if self.found.polygons is None else len(self.found.polygons)
+        return int(self.found.followed()), 0 if self.found.polygons is None else len(self.found.polygons)
 
     def draw(self, polygons: BeamPolygons, maps: LightMaps, weight: float) -> None:
         """Add polygons to `maps`."""
@@ -370,17 +380,21 @@ class BeamLight:
         light_parts: int = LIGHT_PARTS,
         go_on: GoOn = lambda steps: True,
         threads: int | None = 1,
+        *,
+        hands: bool = False,
     ) -> Iterator[float | LightBeams]:
         """`BeamFinder.find`, beside whoever draws if so asked (by `threads`); stopped where nobody waits for it any
         more."""
         if self._worker is None:
-            yield from finder.find(threshold, self._depth, word, light_parts, None, go_on)
+            yield from finder.find(threshold, self._depth, word, light_parts, None, go_on, hands=hands)
             return
         while True:
             self.pause()  # nobody waits for the one before
             stop, done = threading.Event(), [0.0]
             self._stop = stop
-            future = self._worker.submit(self._search, finder, threshold, word, light_parts, threads, go_on, stop, done)
+            future = self._worker.submit(
+                self._search, finder, threshold, word, light_parts, threads, go_on, stop, done, hands
+            )
             try:
                 while not future.done():
                     wait([future], _PAUSE_S)
@@ -401,11 +415,18 @@ class BeamLight:
         go_on: GoOn,
         stop: threading.Event,
         done: list[float],
+        hands: bool,
     ) -> LightBeams:
         """In the worker; what is stopped returns nothing of use."""
         found = LightBeams({})
         for step in finder.find(
-            threshold, self._depth, word, light_parts, threads, lambda steps: go_on(steps) and not stop.is_set()
+            threshold,
+            self._depth,
+            word,
+            light_parts,
+            threads,
+            lambda steps: go_on(steps) and not stop.is_set(),
+            hands=hands,
         ):
             if stop.is_set():
                 break
@@ -423,7 +444,7 @@ class BeamLight:
         stats = self.stats
         stats.searches += 1
         stats.polygons += 0 if found.polygons is None else len(found.polygons)
-        stats.beams += int(sum(sums[SUM_BEAMS] for sums in found.sums.values()))
+        stats.beams += int(found.followed())
         tally = self.tally(1.0)
         stats.entered_w += (tally.emitted - stats.entered_w) / stats.searches
         stats.deposited_w += (tally.ended["deposited"] - stats.deposited_w) / stats.searches

@@ -13,17 +13,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import moderngl
 import numpy as np
 
 from ..base.memory import available_bytes
-from ..base.random_words import Dimension, random_word, shift
+from ..base.random_words import Dimension, random_word
 from ..gpu import records, splat_tables
 from ..gpu.context import Context
 from ..gpu.map_channels import MapChannels
-from ..gpu.reindex import Spans
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.features import Features
 from ..model.optics.spectral_tables import SpectralAxis
@@ -39,15 +37,19 @@ from ..passes.splat import Splatter
 from ..passes.trace import RAY_ROOM, Batch, FluxTally, TracePass, queue_bytes
 from . import shrinking
 from .beam_light import BeamLight, BeamStats, MovingBeams, carries_everything
+from .handed_rays import handed_rays
 from .light_maps import LightMaps
 from .light_plan import SMALLEST_BATCH, Division, Planner
 from .map_fit import MapFit
-from .shown_spectra import PassTables, ShownSpectra, ShownTables
+from .photon_records import NoRecords, PhotonRecords, RoundOf
+from .shown_spectra import ShownSpectra, ShownTables
 from .splatting import Pace, Splatting
 
 DEFAULT_BATCH = 1 << 16
 BEAM_ROUND = 1 << 20
 """Photons' worth of beams, where they carry everything, after which a pass may be left."""
+BEAM_LEAST = 1 << 17
+"""Photons, at least, whose beams are found at once, where photons are traced besides."""
 QUEUE_BYTES = 64 << 20
 """What the queue of a batch that nobody asked for may take; more on a GPU. Less where memory is short."""
 
@@ -79,63 +81,6 @@ class PassStep:
     """Share of the pass that is done."""
     round_done: bool
     """What is summed up is an even lattice: the maps may be shown."""
-
-
-@dataclass(frozen=True)
-class RoundOf:
-    """Where a batch belongs."""
-
-    number: int
-    """Pass."""
-    index: int
-    count: int
-    """Round `index` of `count`, each an even sub-lattice."""
-    is_last_light: bool
-
-
-class PhotonRecords(Protocol):
-    """Where traced photons go besides the maps, with the spectral tables that belong to them."""
-
-    @property
-    def tables(self) -> PassTables:
-        """Of the passes that run; `begin` comes first."""
-
-    def begin(self, shown: ShownSpectra, spans: Spans, photons: int) -> None:
-        """Passes of `photons` in bands of `spans` follow."""
-
-    def keep(self, photons: moderngl.Buffer, batch: Batch, stride: int, of: RoundOf) -> None:
-        """A batch was traced; `photons` holds its records of `stride` bytes until the next."""
-
-    def release(self) -> None:
-        """Free everything."""
-
-
-class NoRecords:
-    """`PhotonRecords` for photons that are splatted and forgotten."""
-
-    def __init__(self) -> None:
-        self._tables: PassTables | None = None
-
-    @property
-    def tables(self) -> PassTables:
-        """Kept as long as the bands stay."""
-        assert self._tables is not None, "begin() comes first"
-        return self._tables
-
-    def begin(self, shown: ShownSpectra, spans: Spans, photons: int) -> None:
-        """See `PhotonRecords`."""
-        if self._tables is None or spans != self._tables.spans:
-            self.release()
-            self._tables = PassTables(shown, spans)
-
-    def keep(self, photons: moderngl.Buffer, batch: Batch, stride: int, of: RoundOf) -> None:
-        """Nothing is kept."""
-
-    def release(self) -> None:
-        """Free the tables."""
-        if self._tables is not None:
-            self._tables.forget()
-        self._tables = None
 
 
 class LightPass:
@@ -430,14 +375,12 @@ class LightPass:
                 done = fraction
                 goes_on = proceed(done)
 
-    def steps_until(
-        self, number: int, photons: int, stop: Callable[[], bool], first_round: int = 0, stride: int = 1
-    ) -> Generator[float, None, bool]:
+    def steps_until(self, number: int, photons: int, stop: Callable[[], bool]) -> Generator[float, None, bool]:
         """A pass, pausing with the share done; returns False when `stop` left part of it undone.
 
         It is traced in rounds, each an even sub-lattice of the whole, so that a pass that is stopped between rounds is
-        complete everywhere, only coarser. `first_round`, `stride`: see `pass_steps`."""
-        for step in self.pass_steps(number, photons, first_round, stride):
+        complete everywhere, only coarser."""
+        for step in self.pass_steps(number, photons):
             yield step.fraction
             if step.round_done and step.fraction < 1.0 and stop():
                 return False
@@ -449,25 +392,38 @@ class LightPass:
             return -(-photons // BEAM_ROUND) if self.has_beams else 0
         return max(-(-plan.lattice_count(photons) // (self.trace.batch // plan.lattices)) for plan in self.plans)
 
-    def pass_steps(self, number: int, photons: int, first_round: int = 0, stride: int = 1) -> Iterator[PassStep]:
+    def rounds_together(self, photons: int) -> int:
+        """How many rounds have their beams together: few photons' worth of beams are coarse ones."""
+        if not (self.plans and self.has_beams):
+            return 1
+        return max(1, -(-BEAM_LEAST * self.rounds(photons) // photons))
+
+    def pass_steps(
+        self, number: int, photons: int, first_round: int = 0, first_group: int = 0, stride: int = 1
+    ) -> Iterator[PassStep]:
         """A whole pass, pausing after every event of the rays and after every splatting: whoever draws meanwhile may
         bind what it likes.
 
-        `first_round`: where a pass goes on that was left before. `stride`: every so manieth round only, where others
-        trace the rest."""
+        `first_round`: where a pass goes on that was left before. `first_group`, `stride`: of the groups of rounds that
+        have their beams together, this one and every so manieth after it, where others trace the rest."""
         rounds = self.rounds(photons)
         if not self.plans:
-            for j in range(first_round, rounds, stride):
+            for j in range(first_round + first_group, rounds, stride):
                 for step in self._beam_steps(number, photons, RoundOf(number, j, rounds, True)):
                     yield PassStep((j + step.fraction) / rounds, False)
                 self._maps.photon_weight += photons / rounds
-                self.stats.photons += photons // rounds
+                self.stats.photons += photons * (j + 1) // rounds - photons * j // rounds
                 yield PassStep((j + 1) / rounds, True)
             return
         counts = [plan.lattice_count(photons) for plan in self.plans]
         slices = rounds * len(self.plans)
-        for j in range(first_round, rounds, stride):
-            yield from self._beam_steps(number, photons, RoundOf(number, j, rounds, False), j / rounds)
+        together = self.rounds_together(photons)
+        for j in range(first_round, rounds):
+            if (j // together - first_group) % stride:
+                continue
+            if j == first_round or j % together == 0:
+                end = min((j // together + 1) * together, rounds)
+                yield from self._beam_steps(number, photons, RoundOf(number, j, rounds, False), j / rounds, end - j)
             for i, (plan, lattice) in enumerate(zip(self.plans, counts, strict=True)):
                 done = j * len(self.plans) + i
                 points = len(range(j, lattice, rounds))
@@ -479,7 +435,7 @@ class LightPass:
                 if i + 1 < len(self.plans):
                     yield PassStep((done + 1) / slices, False)
             self._maps.photon_weight += photons / rounds
-            yield PassStep((j + 1) / rounds, True)
+            yield PassStep((j + 1) / rounds, (j + 1) % together == 0 or j + 1 == rounds)
 
     @property
     def has_work(self) -> bool:
@@ -510,12 +466,14 @@ class LightPass:
         """What beams did; None without any."""
         return self.beams.stats if self.beams is not None else None
 
-    def _beam_steps(self, number: int, photons: int, of: RoundOf, done: float = 0.0) -> Iterator[PassStep]:
-        """The beams of one round, and what they hand to photons."""
+    def _beam_steps(
+        self, number: int, photons: int, of: RoundOf, done: float = 0.0, rounds: int = 1
+    ) -> Iterator[PassStep]:
+        """The beams of so many `rounds` from one on, and what they hand to photons."""
         beams, nth = self.beams, number * of.count + of.index
         if beams is None:
             return
-        share = photons / of.count
+        share = photons * rounds / of.count
         before = beams.stats.find_seconds, beams.stats.draw_seconds
         for part in beams.steps(share, share, self._word(nth), self._maps):
             yield PassStep(done if self.plans else part, False)
@@ -523,35 +481,33 @@ class LightPass:
         self.stats.trace_seconds += after[0] - before[0]
         self.stats.splat_seconds += after[1] - before[1]
         self.stats.tally.merge(beams.tally(share))
-        found = beams.found
-        if found is None or found.pieces is None or not len(found.pieces):
+        if beams.found is None or beams.found.pieces is None:
             return
-        emission = BeamEmission(self.buffers, self.trace.ray, found.pieces, self._records.tables.spans)
-        for light in found.carried:
-            watts = emission.flux_w(light)
-            if watts <= 0.0:
+        for tails in (False, True):
+            pieces, started = beams.found.pieces, time.perf_counter()
+            pieces = pieces.where(pieces.is_tail == tails)
+            if not len(pieces):
                 continue
-            entered = max(beams.stats.entered_w, 1e-300)
-            count = max(256, int(share * min(1.0, watts / entered)))
-            lattice = shift(self.seed, light, nth, Dimension.LATTICE_U)
-            other = shift(self.seed, light, nth, Dimension.LATTICE_V)
-            key = random_word(self.seed, light, nth, Dimension.BRANCH)
-            for rays in emission.batches(light, count, share, (lattice, other), key, self.trace.batch):
-                for _ in self.batch_steps(self.trace.carry_on(rays, light), of):
+            emission = BeamEmission(self.buffers, self.trace.ray, pieces, self._records.tables.spans)
+            for light, rays in handed_rays(emission, beams.stats.entered_w, share, self.trace.batch, self.seed, nth):
+                self.stats.trace_seconds += time.perf_counter() - started
+                # Whoever shows photons again has weak beams play roulette: tails are not kept.
+                for _ in self.batch_steps(self.trace.carry_on(rays, light), of, keeps=not tails):
                     yield PassStep(done, False)
+                started = time.perf_counter()
 
     def beam_steps_again(self, photons: float) -> Iterator[None]:
         """Add what beams of a pass of so many photons throw to the maps, as they are shown now; nothing is handed to
         photons."""
         if self.beams is not None and photons > 0.0:
-            for _ in self.beams.steps(photons, photons, self._word(0), self._maps):
+            for _ in self.beams.steps(photons, photons, self._word(0), self._maps, hands=False):
                 yield
 
     def _word(self, number: int) -> int:
         """Roulette's seed in round `number` of all passes."""
         return random_word(self.seed, 0, number, Dimension.BRANCH)
 
-    def batch_steps(self, steps: Generator[None, None, Batch], of: RoundOf) -> Iterator[None]:
+    def batch_steps(self, steps: Generator[None, None, Batch], of: RoundOf, *, keeps: bool = True) -> Iterator[None]:
         """Trace a batch (`TracePass.steps`, `carry_on`), keep and splat what landed, and count it."""
         started = time.perf_counter()
         while True:
@@ -566,7 +522,8 @@ class LightPass:
             yield
             started = time.perf_counter()
         self.stats.trace_seconds += time.perf_counter() - started
-        self._records.keep(self.trace.photons, batch, self.trace.photon.stride, of)
+        if keeps:
+            self._records.keep(self.trace.photons, batch, self.trace.photon.stride, of)
         yield
         yield from self.splat_steps(
             self.trace.photons, batch.photons, shrinking.kernel_scale(of.number) if self._shrinks else 1.0

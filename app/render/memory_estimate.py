@@ -9,13 +9,15 @@ from ..base.errors import UserError
 from ..base.memory import available_bytes, picture_bytes, resident_bytes
 from ..model.settings import RenderSettings
 from ..passes.map_layout import MapLayout
-from .light_pass import LightPass
+from .light_pass import BEAM_ROUND, LightPass
 
 _MIB = 1 << 20
 _SPLAT_PROGRAMS = 130 * _MIB
 """Programs that splat, compiled on the processor, with their tables and lists: 65 to 200 MiB were measured."""
 _ALL_PROGRAMS = 170 * _MIB
 """With the camera's."""
+_BEAMS = 160 * _MIB
+"""A million photons' worth of beams, with what they leave: 140 MiB were measured in `brilliant`."""
 _TEXEL_BYTES = 16
 _SPARE = 0.02
 
@@ -56,7 +58,10 @@ def estimate(light: LightPass, layout: MapLayout, settings: RenderSettings) -> M
     # Charts are folded into textures of their own while the sums are still there.
     resolved = targets if layout.charts else 0
     maps = texture * (targets + max(scratched, resolved))
-    return MemoryEstimate(now, maps + _SPLAT_PROGRAMS, maps + (0 if shows_map else _ALL_PROGRAMS) + picture)
+    beams = 0
+    if light.has_beams:
+        beams = int(_BEAMS * min(settings.photons or BEAM_ROUND, BEAM_ROUND) / BEAM_ROUND)
+    return MemoryEstimate(now, maps + beams + _SPLAT_PROGRAMS, maps + (0 if shows_map else _ALL_PROGRAMS) + picture)
 
 
 def check_room(expected: MemoryEstimate, settings: RenderSettings) -> None:

@@ -121,19 +121,21 @@ def trace_part(
         count, photons = shrinking.passes(light.features.method, sampling.photons)
         light.begin(photons, sampling.seed)
         rounds = light.rounds(photons)
-        if count * rounds < share.count:
+        # What has its beams together belongs to one part.
+        groups = -(-rounds // light.rounds_together(photons))
+        if count * groups < share.count:
             way_out = "ask for fewer parts, more photons or a smaller --batch"
             if light.only_beams:
                 way_out = "its light goes as beams, in rounds of a million photons: --method srd-photons has more"
             raise UserError(
-                f"--passes {share.index}/{share.count}: this rendering is traced in {count * rounds} rounds, which are "
+                f"--passes {share.index}/{share.count}: this rendering is traced in {count * groups} rounds, which are "
                 f"not enough to share out; {way_out}"
             )
-        mine = len(range(share.index - 1, count * rounds, share.count))
+        mine = len(range(share.index - 1, count * groups, share.count))
         done = 0
         for number in range(count):
-            first = (share.index - 1 - number * rounds) % share.count
-            for step in light.pass_steps(number, photons, first, share.count):
+            first = (share.index - 1 - number * groups) % share.count
+            for step in light.pass_steps(number, photons, 0, first, share.count):
                 done += step.round_done
                 yield done / mine
                 if stopped():

@@ -19,8 +19,9 @@ from spectrasplat.model.optics.spectrum import constant, laser
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.beam_emission import BeamEmission
-from spectrasplat.render.light_pass import LightPass, RoundOf, spectral_axis
+from spectrasplat.render.light_pass import LightPass, spectral_axis
 from spectrasplat.render.light_plan import Division
+from spectrasplat.render.photon_records import RoundOf
 
 from tests.reference.first_events import diverging_first_event, first_events
 
@@ -266,8 +267,13 @@ def test_what_no_table_has_is_refused(gl, tmp_path: Path) -> None:
     with light_of(gl, scene_of(tmp_path), True) as light:
         pieces = first_events(light.buffers, light.domains[0], 0, np.array([0.25, 0.75]), False)
         line = replace(pieces, x_lo=pieces.x_hi)
-        with pytest.raises(ValueError, match=r"no spectral table of light 0 has the band 0\.75"):
-            BeamEmission(light.buffers, light.trace.ray, line, [[(0.0, 1.0)]])
+        # A light's only line stands for all of its spectrum, where bands may be cut.
+        alone = BeamEmission(light.buffers, light.trace.ray, line, [[(0.0, 1.0)]])
+        (rays,) = alone.batches(0, 500, 1.0, (0, 0), 5, 10_000)
+        assert not rays["x_lo"].any() and np.all(rays["x_hi"] == 1.0) and np.all(rays["x_anchor"] == 0.75)
         # A line in a band whose photons carry it has no photons of its own.
         both = BeamEmission(light.buffers, light.trace.ray, joined([pieces, line]), [[(0.0, 1.0)]])
         assert len(both.pieces) == len(pieces) and both.flux_w(0) > 0.0
+        light.buffers.features = replace(light.features, spectral_groups=0, band_cuts=False)
+        with pytest.raises(ValueError, match=r"no spectral table of light 0 has the band 0\.75"):
+            BeamEmission(light.buffers, light.trace.ray, line, [[(0.0, 1.0)]])

@@ -15,8 +15,8 @@ from spectrasplat.__main__ import main
 from spectrasplat.base.image_io import read_image
 
 ASKED = ("--size", "64x36", "--photons", "40k", "--spp", "4", "--batch", "4096")
-SCENES = {"lens": (), "prism": ("--method", "srd-photons", "--bins", "8"), "default": ()}
-"""Curved glass; photons with spectral maps; beams beside photons."""
+SCENES = {"lens": (), "prism": ("--method", "srd-photons", "--bins", "8")}
+"""Curved glass; photons with spectral maps."""
 
 
 def parts(folder: Path, scene: str, count: int, *more: str) -> list[Path]:

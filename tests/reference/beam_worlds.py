@@ -85,7 +85,7 @@ class Rig:
     def pieces(self, emission: Emission, threshold: float, seed: int = 1, depth: int = 64):
         """(pieces, sums) of one source."""
         leaves, sums = self.find(emission, threshold, seed, depth)
-        return pieces_of(leaves, self.beams, 0), sums
+        return pieces_of(leaves, self.beams, 0, 1.0), sums
 
     def world(self, x: float) -> World:
         """Its triangles at one spectral coordinate."""

@@ -55,6 +55,7 @@ def piece(
         last_object=one,
         is_inside=one.astype(bool),
         inside=one.astype(np.uint64),
+        is_tail=np.zeros(1, bool),
         flux=np.ones(1),
         edge_start=np.array([0, len(corners)], np.int32),
         edges=edges_of(corners, move),

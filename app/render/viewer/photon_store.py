@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..light_pass import RoundOf
+from ..photon_records import RoundOf
 
 if TYPE_CHECKING:
     import moderngl

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from ...gpu.reindex import Spans
     from ...passes.trace import Batch
-    from ..light_pass import RoundOf
+    from ..photon_records import RoundOf
     from ..shown_spectra import ShownSpectra
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from ...gpu import records
 from ...model.settings import RenderSettings
 from ...passes.camera import CameraPass
-from ...render.light_pass import LightPass, LightStats, NoRecords, scene_buffers
+from ...render.light_pass import LightPass, LightStats, scene_buffers
+from ...render.photon_records import NoRecords
 from ..case import Measurement
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from ...gpu.reindex import Spans
     from ...model.scene import Scene
     from ...passes.trace import Batch
-    from ...render.light_pass import RoundOf
+    from ...render.photon_records import RoundOf
     from ...render.shown_spectra import PassTables, ShownSpectra
 
 SMALL = RenderSettings(width=160, height=90, photons=32_768, spp=16, method="srd-photons")

@@ -1,0 +1,166 @@
+"""Beams too weak to be followed: photons carry them on, and nothing is lost or counted twice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import moderngl
+import numpy as np
+import pytest
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.scene import Scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes.trace import Batch
+from spectrasplat.render import light_pass as light_passes
+from spectrasplat.render.light_pass import LightPass, scene_buffers
+from spectrasplat.render.photon_records import NoRecords, RoundOf
+
+PHOTONS = 60_000
+# Seven times as large as what GPU space holds as it is.
+STONE = """
+[camera]
+position = [0.0, -30.0, 20.0]
+[render]
+max_depth = 24
+[[lights]]
+{light}
+spectrum = {spectrum}
+[[objects]]
+name = "stone"
+shape = "brilliant"
+diameter = 7.0
+glass = "diamond"
+rotation_deg = [168.0, 8.0, 11.0]
+position = [0.0, 0.0, 7.0]
+[[objects]]
+name = "table"
+shape = "plane"
+width = 80.0
+height = 80.0
+material = "diffuse"
+{more}
+"""
+BEAM = 'kind = "collimated"\nposition = [-8.4, 5.6, 35.0]\ntarget = [0.0, 0.0, 7.0]\nradius = 3.2'
+LAMP = 'kind = "spot"\nposition = [-4.2, 2.8, 21.0]\ntarget = [0.0, 0.0, 7.0]\nhalf_angle_deg = 10.0'
+LINES = "{ lines = [[435.8, 1.0], [546.1, 2.0]] }"
+BALL = '[[objects]]\nname = "ball"\nshape = "sphere"\nradius = 2.0\nglass = "N-BK7"\nposition = [25.0, 0.0, 2.0]'
+
+
+def stone(folder: Path, light: str = BEAM, spectrum: str = '"D65"', more: str = "") -> Scene:
+    file = folder / "stone.toml"
+    file.write_text(STONE.format(light=light, spectrum=spectrum, more=more))
+    return load_scene(file)
+
+
+class _Counted(NoRecords):
+    """Counts what it is asked to keep."""
+
+    kept = 0
+
+    def keep(self, photons: moderngl.Buffer, batch: Batch, stride: int, of: RoundOf) -> None:
+        self.kept += batch.photons
+
+
+@contextmanager
+def passed(gl, scene: Scene, method: str = "srd", seed: int = 1, photons: int = PHOTONS) -> Iterator[LightPass]:
+    """A light pass that has thrown about so many photons at the whole table."""
+    settings = RenderSettings(width=96, height=96, method=method, photons=photons, layer="map:table", seed=seed)
+    buffers = scene_buffers(gl, scene, settings)
+    light = LightPass(gl, scene, settings, buffers.features, buffers, photon_records=_Counted())
+    try:
+        light.prepare()
+        light.begin(photons, seed)
+        for _ in light.pass_steps(0, photons):
+            pass
+        light.finish()
+        yield light
+    finally:
+        light.release()
+        buffers.release()
+
+
+def coarse(light: LightPass) -> np.ndarray:
+    """The table's map in blocks of eight by eight texels."""
+    texels = light.resolved_map(0)[..., :3] * light.map_scale
+    height, width = (8 * (side // 8) for side in texels.shape[:2])
+    return texels[:height, :width].reshape(height // 8, 8, width // 8, 8, 3).sum(axis=(1, 3))
+
+
+@pytest.mark.parametrize("light", [BEAM, LAMP], ids=["parallel", "spot"])
+def test_photons_carry_what_beams_leave_in_a_scene_of_any_size(gl, tmp_path: Path, light: str) -> None:
+    scene = stone(tmp_path, light)
+    with passed(gl, scene, "srd-photons", photons=4 * PHOTONS) as alone:
+        flux = alone.map_flux() * alone.map_scale
+    with passed(gl, scene) as by_beams:
+        assert by_beams.only_beams and by_beams.trace.rays_traced > PHOTONS / 4
+        stats, tally = by_beams.beam_stats, by_beams.stats.tally
+        assert stats is not None and 0.01 < stats.handed_w / stats.entered_w < 0.7
+        # What beams say they left, and what photons took up.
+        assert abs(tally.handed) < 0.01 * stats.handed_w * PHOTONS
+        assert tally.roulette == pytest.approx(0.0, abs=2e-3 * tally.emitted)
+        assert by_beams.map_flux() * by_beams.map_scale == pytest.approx(flux, rel=0.01)
+
+
+def test_a_stone_is_less_noisy_than_by_photons(gl, tmp_path: Path) -> None:
+    scene, noise = stone(tmp_path), {}
+    for method in ("srd", "srd-photons"):
+        pictures = []
+        for seed in (1, 2):
+            with passed(gl, scene, method, seed) as light:
+                pictures.append(coarse(light))
+        noise[method] = np.sqrt(np.sum((pictures[0] - pictures[1]) ** 2) / np.sum(pictures[0] ** 2))
+    print(noise)
+    assert noise["srd"] < 0.6 * noise["srd-photons"]
+
+
+def test_lines_are_carried_on_one_by_one(gl, tmp_path: Path) -> None:
+    """Two lines throw what each throws alone."""
+    scene, each = stone(tmp_path, spectrum=LINES), []
+    (lamp,) = scene.lights
+    for line in lamp.spectral_power.lines:
+        only = replace(lamp, spectral_power=replace(lamp.spectral_power, lines=(line,)))
+        with passed(gl, replace(scene, lights=(only,))) as alone:
+            each.append(coarse(alone).sum(axis=(0, 1)))
+    with passed(gl, scene) as both:
+        assert both.only_beams and both.trace.rays_traced > PHOTONS / 4
+        assert coarse(both).sum(axis=(0, 1)) == pytest.approx(sum(each), rel=0.01)
+
+
+def test_lines_over_a_continuum_go_by_photons(gl, tmp_path: Path) -> None:
+    """Pieces of the continuum would hold the lines too, which are followed apart."""
+    scene = stone(tmp_path)
+    (lamp,) = scene.lights
+    mixed = replace(lamp.spectral_power, lines=((546.1, 2.0),))
+    with passed(gl, replace(scene, lights=(replace(lamp, spectral_power=mixed),))) as light:
+        assert light.beams is None and "continuum" in light._beams.why_not
+
+
+def test_what_is_kept_to_be_shown_again_holds_no_tail(gl, tmp_path: Path) -> None:
+    """Weak beams play roulette when they are drawn again: kept tails, 8 % of the light, would count twice."""
+    with passed(gl, stone(tmp_path)) as light:
+        assert light.stats.splats > 1000 and light._records.kept == 0
+        whole = light.map_flux() * light.map_scale
+        light.maps.clear()
+        for _ in light.beam_steps_again(float(PHOTONS)):
+            pass
+        light.maps.photon_weight = float(PHOTONS)
+        light.finish()
+        assert light.map_flux() * light.map_scale == pytest.approx(whole, rel=0.06)
+
+
+def test_rounds_of_photons_have_their_beams_together(gl, tmp_path: Path, monkeypatch) -> None:
+    """Beside photons, a few rounds share a search; a pass may only be left where photons have caught up with beams."""
+    monkeypatch.setattr(light_passes, "DEFAULT_BATCH", 4096)
+    monkeypatch.setattr(light_passes, "BEAM_LEAST", PHOTONS // 3)
+    scene = stone(tmp_path, more=BALL + '\n[[lights]]\nkind = "point"\nposition = [25.0, 0.0, 20.0]')
+    with passed(gl, scene) as light:
+        assert light.has_beams and not light.only_beams
+        steps = [step for step in light.pass_steps(1, PHOTONS) if step.round_done]
+        stats = light.beam_stats
+        assert stats is not None
+        searches = stats.searches / 2
+        assert searches == len(steps) and 2 <= searches <= 4 and steps[-1].fraction == 1.0
+        assert light.map_scale == pytest.approx(0.5 / PHOTONS, rel=1e-6)
