@@ -1,9 +1,71 @@
-"""SpectraSplat: dispersive caustics by spectral ray differentials and swept splats."""
+"""SpectraSplat: dispersive caustics by spectral ray differentials and swept splats.
+
+`import spectrasplat as ss`, then `ss.render(ss.load("prism"))`: see docs/python.md.
+"""
 
 __version__ = "0.1.0"
 
 import os
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 # The matrix products here are small. Shared out over threads they wait for each other, and on a software renderer for
 # its threads: a spectral table then takes ten times as long. Only counts where numpy is imported after this.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+if TYPE_CHECKING:
+    from .api import CausticMap as CausticMap
+    from .api import Entries as Entries
+    from .api import Fan as Fan
+    from .api import Glass as Glass
+    from .api import Photons as Photons
+    from .api import Picture as Picture
+    from .api import Scene as Scene
+    from .api import Session as Session
+    from .api import Statistics as Statistics
+    from .api import Table as Table
+    from .api import UserError as UserError
+    from .api import caustic as caustic
+    from .api import fan as fan
+    from .api import glass as glass
+    from .api import glasses as glasses
+    from .api import load as load
+    from .api import render as render
+    from .api import scenes as scenes
+    from .api import trace as trace
+
+_OFFERED = (
+    "CausticMap",
+    "Entries",
+    "Fan",
+    "Glass",
+    "Photons",
+    "Picture",
+    "Scene",
+    "Session",
+    "Statistics",
+    "Table",
+    "UserError",
+    "caustic",
+    "fan",
+    "glass",
+    "glasses",
+    "load",
+    "render",
+    "scenes",
+    "trace",
+)
+
+
+def __getattr__(name: str) -> object:
+    """What `api` offers, imported when it is first asked for: the command line starts without it."""
+    if name == "render":
+        return import_module(".render", __name__)  # which can be called
+    if name not in (*_OFFERED, "called_render"):
+        raise AttributeError(f"module 'spectrasplat' has no attribute '{name}'")
+    api = import_module(".api", __name__)
+    return getattr(api, name.removeprefix("called_"))
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_OFFERED})

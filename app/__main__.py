@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from contextlib import redirect_stderr, suppress
 from typing import Any, TextIO
 
-from .base.errors import UserError, plain
+from .base.errors import UserError, plain, sentence_of
 from .base.interrupts import INTERRUPTED, exit_code_of, signals_raise
 from .base.memory import waste_little
 
@@ -35,8 +35,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _printed(ended.exit_code if code == INTERRUPTED and ended() else code)
         except UserError as error:
             return _tell(str(error), error.exit_code)
-        except MemoryError:
-            return _tell("out of memory: use fewer photons, a smaller picture or a simpler mesh")
         except KeyboardInterrupt as interrupt:
             return _tell("interrupted", exit_code_of(interrupt))
         except OSError as error:
@@ -44,10 +42,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 raise
             return _lost(error)
         except Exception as error:
-            # moderngl says so where a buffer, a texture or a program cannot be made; it may not even be imported.
-            if type(error).__module__.split(".")[0] not in ("moderngl", "_moderngl", "mgl"):
+            sentence = sentence_of(error)
+            if sentence is None:
                 raise
-            return _tell(f"OpenGL failed ({error}): use a smaller picture or fewer photons, or update the driver")
+            return _tell(sentence)
 
 
 class _Patient:

@@ -28,6 +28,16 @@ class DeviceError(UserError, RuntimeError):
     """OpenGL could not do what was asked of it."""
 
 
+def sentence_of(error: BaseException) -> str | None:
+    """What running out of memory, or an error of OpenGL's, means to a user; None for anything else."""
+    if isinstance(error, MemoryError):
+        return "out of memory: use fewer photons, a smaller picture or a simpler mesh"
+    # moderngl says so where a buffer, a texture or a program cannot be made; it may not even be imported.
+    if type(error).__module__.split(".")[0] in ("moderngl", "_moderngl", "mgl"):
+        return f"OpenGL failed ({error}): use a smaller picture or fewer photons, or update the driver"
+    return None
+
+
 def visible(text: str) -> str:
     """`text` with what could command a terminal (control and direction characters) written out, but for white space.
 

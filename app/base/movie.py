@@ -6,7 +6,9 @@ import json
 import math
 import os
 import subprocess
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Protocol
 
@@ -17,6 +19,7 @@ from .atomic import atomic_output, check_writable
 from .errors import UserError
 
 MANIFEST = "animation.json"
+_CLAIM = ".claim"
 _DIGITS = 4
 _PNG_BEGIN, _PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
 
@@ -26,6 +29,9 @@ class Sink(Protocol):
 
     def has(self, index: int) -> bool:
         """Whether the frame is there already."""
+
+    def claimed(self, index: int) -> AbstractContextManager[bool]:
+        """Within the block: whether the frame is the caller's to make, being neither there nor in another's hands."""
 
     def write(self, index: int, codes: np.ndarray) -> None:
         """Take a frame, uint8 (H, W, 3) sRGB, row 0 on top."""
@@ -53,6 +59,11 @@ class Movie:
     def has(self, index: int) -> bool:
         """A movie cannot be resumed."""
         return False
+
+    @contextmanager
+    def claimed(self, index: int) -> Iterator[bool]:
+        """Nobody else writes it."""
+        yield True
 
     def write(self, index: int, codes: np.ndarray) -> None:
         """Append a frame; raises `UserError` when ffmpeg has given up."""
@@ -88,7 +99,11 @@ class Movie:
 
 
 class Frames:
-    """A folder of `0000.png`, …; frames that are there are kept when the same animation goes on."""
+    """A folder of `0000.png`, …; frames that are there are kept when the same animation goes on, and several processes
+    may fill it together: each frame is made by one of them, and all share one exposure.
+
+    Who makes a frame holds a lock on it, which ends with the process, however that ends. Where there are no locks a
+    frame may be made twice, to the same picture."""
 
     def __init__(self, folder: Path, description: Mapping[str, object], overwrite: bool = False) -> None:
         """`description` says what is drawn: a folder with frames of anything else is refused, or emptied of them by
@@ -103,6 +118,12 @@ class Frames:
         self._folder = folder
         self._manifest = folder / MANIFEST
         self.description = dict(description)
+        self.base_ev: float | None = None
+        with _lock(folder):
+            self._begin(overwrite)
+
+    def _begin(self, overwrite: bool) -> None:
+        folder = self._folder
         if overwrite:
             self._empty()
         stored = self._stored()
@@ -111,7 +132,6 @@ class Frames:
                 f"{folder} holds pictures of something else: choose another folder, or replace its frames with "
                 "--overwrite"
             )
-        self.base_ev: float | None = None
         if stored is not None:
             self.base_ev = _exposure(stored.pop("base_ev", None))
             if stored != json.loads(json.dumps(self.description)):
@@ -121,14 +141,38 @@ class Frames:
                 )
         self._save()
 
-    def fix_exposure(self, base_ev: float) -> None:
-        """Remember the exposure that all frames share, also for a later call that goes on."""
-        self.base_ev = base_ev
-        self._save()
+    def fix_exposure(self, base_ev: float) -> float:
+        """Remember the exposure that all frames share, also for a later call that goes on; returns the one that
+        another process has fixed meanwhile, where one has."""
+        with _lock(self._folder):
+            if self.exposure() is None:
+                self.base_ev = base_ev
+                self._save()
+        assert self.base_ev is not None
+        return self.base_ev
+
+    def exposure(self) -> float | None:
+        """What was fixed, by whomever; None before."""
+        if self.base_ev is None:
+            self.base_ev = _exposure((self._stored() or {}).get("base_ev"))
+        return self.base_ev
 
     def has(self, index: int) -> bool:
         """Whether the frame is there."""
-        return self.base_ev is not None and _is_whole_png(self.path(index))
+        return self.exposure() is not None and _is_whole_png(self.path(index))
+
+    @contextmanager
+    def claimed(self, index: int) -> Iterator[bool]:
+        """See `Sink`."""
+        claim = self._folder / f".{index:0{_DIGITS}}{_CLAIM}"
+        if self.has(index):
+            yield False
+            return
+        with _lock(claim, wait=False) as is_ours:
+            # Another may have finished it between the two looks.
+            yield is_ours and not self.has(index)
+            if is_ours:
+                claim.unlink(missing_ok=True)
 
     def path(self, index: int) -> Path:
         """Of a frame."""
@@ -142,7 +186,11 @@ class Frames:
             Image.fromarray(codes).save(temporary, format="PNG", compress_level=6)
 
     def close(self) -> None:
-        """Nothing is pending."""
+        """Remove the claims of processes that were killed."""
+        for claim in self._folder.glob(f".*{_CLAIM}"):
+            with suppress(OSError), _lock(claim, wait=False, make=False) as is_ours:
+                if is_ours:
+                    claim.unlink(missing_ok=True)
 
     def _stored(self) -> dict | None:
         try:
@@ -164,6 +212,30 @@ class Frames:
                 if frame.stem.isdigit():
                     frame.unlink()
         self._manifest.unlink(missing_ok=True)
+
+
+@contextmanager
+def _lock(path: Path, wait: bool = True, make: bool = True) -> Iterator[bool]:
+    """Hold a lock on a folder, or on a file that is made for it; whether it could be had. Where the system has no
+    locks, it always can."""
+    if sys.platform == "win32":
+        yield True
+        return
+    import fcntl
+
+    is_folder = path.is_dir()
+    descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR | (os.O_CREAT if make else 0), 0o666)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            is_held = True
+        except BlockingIOError:
+            is_held = False
+        except OSError:  # a file system without locks
+            is_held = True
+        yield is_held
+    finally:
+        os.close(descriptor)
 
 
 def _exposure(value: object) -> float | None:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 DEFAULT_FRAMES = 120
 DEFAULT_FPS = 24.0
 MAX_FPS = 240.0
+MAX_FRAMES = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class AnimateRequest:
     camera_method: str | None = None
     overwrite: bool = False
     opening: Opening | None = None
+    skip_existing: bool = False
 
 
 def animate_command(request: AnimateRequest) -> int:
@@ -53,13 +55,20 @@ def animate_command(request: AnimateRequest) -> int:
     from ..render.animate import description, render_animation
     from ..render.notices import FrameNotices
 
-    frames = None if request.frames is None else options.parse_integer("--frames", request.frames, 1, 1_000_000)
+    frames, only = _parse_frames(request.frames)
+    if request.skip_existing and request.overwrite:
+        raise UserError(
+            "--skip-existing and --overwrite exclude each other: keep the frames there are, or replace them"
+        )
+    if request.skip_existing and request.output.suffix.lower() == ".mp4":
+        raise UserError("--skip-existing is for a folder of frames: a movie (.mp4) is written in one go")
     fps = DEFAULT_FPS if request.fps is None else _parse_fps(request.fps)
     scene = options.open_scene(request.scene, request.opening)
     settings = _settings(request, scene)
     exposure = scene.render.exposure_ev if request.exposure is None else options.parse_exposure(request.exposure)
     animation = _animation(request, Stage(scene, scene.camera, exposure), frames, fps)
     photons = settings.photons or scene.render.photons
+    only = _checked_range(only, len(animation.times_s))
     for note in scene.notes:
         print(f"note: {plain(note)}", file=sys.stderr)
     manifest = description(animation, settings, fps, photons)
@@ -68,8 +77,8 @@ def animate_command(request: AnimateRequest) -> int:
     from ..gpu.context import create_context
     from ..gpu.shader import keep_programs
 
-    count, started, notices = len(animation.times_s), time.perf_counter(), FrameNotices()
-    there = sum(sink.has(i) for i in range(count))
+    count, started, notices = len(only), time.perf_counter(), FrameNotices()
+    there = sum(sink.has(i) for i in only)
     try:
         context = create_context()
     except BaseException:
@@ -77,7 +86,7 @@ def animate_command(request: AnimateRequest) -> int:
         raise
     with context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
         keep_programs(context.ctx)  # frames of an edited scene need the same ones
-        work, done = render_animation(context, animation, settings, sink, notices=notices), 0.0
+        work, done = render_animation(context, animation, settings, sink, notices=notices, only=only), 0.0
         try:
             for done in work:
                 progress(done, f"frame {min(int(done * count) + 1, count)} of {count}")
@@ -88,11 +97,13 @@ def animate_command(request: AnimateRequest) -> int:
             progress.close()
             for notice in notices.lines(of_frames=count > 1):
                 print(f"note: {plain(notice)}", file=sys.stderr)
-        stopped = done < 1.0
+        stopped = interrupted() and done < 1.0
     written = int(done * count + 1e-6)
     kept = f" ({there} were there)" if there else ""
     early = ", stopped early" if stopped else ""
     place = request.output.resolve()
+    if not stopped and written < count:
+        early = f"; {count - written} are in the hands of other processes (the same command again sees to them)"
     if stopped and written == 0:
         print(f"{place}: no frame was finished")
         return interrupted.exit_code
@@ -102,6 +113,33 @@ def animate_command(request: AnimateRequest) -> int:
         f"{time.perf_counter() - started:.1f} s{early}{again}"
     )
     return interrupted.exit_code if stopped else 0
+
+
+def _parse_frames(text: str | None) -> tuple[int | None, range | None]:
+    """How many frames in all, and which of them: "240", "101-200" or "101-200/240"."""
+    if text is None:
+        return None, None
+    which, slash, total = text.partition("/")
+    first, dash, last = which.partition("-")
+    if not dash and not slash:
+        return options.parse_integer("--frames", text, 1, MAX_FRAMES), None
+    if not (dash and first.strip() and last.strip()):
+        raise UserError(f"--frames '{text}' is no range: give for example 0-119, or 101-200/240 of 240 in all")
+    begin = options.parse_integer("--frames", first, 0, MAX_FRAMES - 1)
+    end = options.parse_integer("--frames", last, 0, MAX_FRAMES - 1)
+    if end < begin:
+        raise UserError(f"--frames {text} runs backwards: give the lower number first")
+    return options.parse_integer("--frames", total, 1, MAX_FRAMES) if slash else None, range(begin, end + 1)
+
+
+def _checked_range(only: range | None, count: int) -> range:
+    """`only`, where the animation has those frames; all without."""
+    if only is not None and only.stop > count:
+        raise UserError(
+            f"--frames {only.start}-{only.stop - 1} goes beyond the animation, whose {count} frames are 0 to "
+            f"{count - 1}: give fewer, or how many there are in all, as in {only.start}-{only.stop - 1}/{only.stop}"
+        )
+    return range(count) if only is None else only
 
 
 def _parse_fps(text: str) -> float:

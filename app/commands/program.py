@@ -197,6 +197,12 @@ def render(
     up: UpOption = None,
     glass: GlassOption = None,
     environment: EnvironmentOption = None,
+    passes: Annotated[
+        Text,
+        typer.Option(
+            metavar="I/N", help="Trace only part I of N, to a file OUT.ssp: 'merge' makes the picture of all parts."
+        ),
+    ] = None,
     allow_outside: AllowOutside = False,
 ) -> None:
     """Render a scene to a picture file."""
@@ -220,8 +226,36 @@ def render(
         batch,
         stats,
         options.parse_opening(up, glass, environment),
+        passes,
     )
     raise typer.Exit(render_command(request))
+
+
+@app.command()
+def merge(
+    parts: Annotated[list[Path], typer.Argument(metavar="PART.ssp...", help="Parts that 'render --passes' wrote.")],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="OUT", help="The picture: .png, .exr or .npy."),
+    ],
+    scene: Annotated[
+        Text, typer.Option(metavar="SCENE", help="The scene; default: the file that the parts were traced from.")
+    ] = None,
+    exposure: Annotated[
+        Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than automatic; .png only.")
+    ] = None,
+    partial: Annotated[
+        bool, typer.Option("--partial", help="Make a noisier picture of the parts there are, where some are missing.")
+    ] = False,
+    stats: Annotated[
+        bool, typer.Option("--stats", help="Print the energy balance and the times of all stages.")
+    ] = False,
+    allow_outside: AllowOutside = False,
+) -> None:
+    """Make a picture of its parts, traced one by one or on many machines."""
+    from .merge import MergeRequest, merge_command
+
+    raise typer.Exit(merge_command(MergeRequest(tuple(parts), output, scene, exposure, partial, stats)))
 
 
 @app.command()
@@ -255,7 +289,12 @@ def animate(
         ),
     ] = None,
     frames: Annotated[
-        Text, typer.Option(metavar="N", help="Pictures in all; default: 120, or as many as the keys last.")
+        Text,
+        typer.Option(
+            metavar="N",
+            help="Pictures in all; default: 120, or as many as the keys last. Or some of them by the numbers of their "
+            "files: 101-200, or 101-200/240 of 240 in all.",
+        ),
     ] = None,
     fps: Annotated[Text, typer.Option(metavar="F", help="Pictures a second; default: 24.")] = None,
     size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: the scene's.")] = None,
@@ -277,6 +316,14 @@ def animate(
     up: UpOption = None,
     glass: GlassOption = None,
     environment: EnvironmentOption = None,
+    skip_existing: Annotated[
+        bool,
+        typer.Option(
+            "--skip-existing",
+            help="Make only frames that are neither in the folder nor being made by another process; what happens "
+            "anyway, for those who like to say it.",
+        ),
+    ] = False,
     allow_outside: AllowOutside = False,
 ) -> None:
     """Render an animation: a turntable, or any parameters over time."""
@@ -299,6 +346,7 @@ def animate(
         camera_method,
         overwrite,
         options.parse_opening(up, glass, environment),
+        skip_existing,
     )
     raise typer.Exit(animate_command(request))
 

@@ -46,6 +46,7 @@ class RenderRequest:
     batch: str | None = None
     stats: bool = False
     opening: Opening | None = None
+    passes: str | None = None
 
 
 def render_command(request: RenderRequest) -> int:
@@ -56,8 +57,10 @@ def render_command(request: RenderRequest) -> int:
     from ..base.progress import ProgressReporter
 
     # What costs nothing to check comes before the scene is read, and that before the device.
-    asked = _parse(request)
-    check_suffix(request.output)
+    asked = parse_settings(request)
+    share = _parse_passes(request)
+    if share is None:
+        check_suffix(request.output)
     scene_file = options.find_scene(request.scene)
     # os.path.exists, unlike Path.exists, is silent about a name that is too long.
     if os.path.exists(request.output) and request.output.samefile(scene_file):
@@ -65,10 +68,13 @@ def render_command(request: RenderRequest) -> int:
     check_writable(request.output)
 
     scene = options.open_scene(request.scene, request.opening)
-    settings = _complete(asked, scene, request.stats)
+    settings = complete_settings(asked, scene, request.stats)
     # Before the work: who waits for minutes should know what was assumed, and also if it fails.
     for note in (*scene.notes, *_unused_options(request)):
         print(f"note: {plain(note)}", file=sys.stderr)
+
+    if share is not None:
+        return _render_part(request, scene, settings, share, scene_file)
 
     from ..gpu.better_device import advice
     from ..render.still import render
@@ -93,7 +99,57 @@ def render_command(request: RenderRequest) -> int:
     return interrupted.exit_code if stopped else 0
 
 
-def _parse(request: RenderRequest) -> dict[str, Any]:
+def _parse_passes(request: RenderRequest) -> tuple[int, int] | None:
+    """(index, count) of the part that is asked for; None for a whole picture."""
+    is_part = request.output.suffix.lower() == ".ssp"
+    if request.passes is None:
+        if is_part:
+            raise UserError(
+                f"{request.output} is a part of a rendering: say which by --passes, for example --passes 1/8"
+            )
+        return None
+    words = request.passes.split("/")
+    if len(words) != 2 or not all(word.isascii() and word.isdigit() and len(word) < 8 for word in words):
+        raise UserError(f"--passes '{request.passes}' is no part: give which of how many, for example 1/8")
+    index, count = map(int, words)
+    if not 1 <= index <= count <= options.MAX_PARTS:
+        raise UserError(f"--passes {request.passes} is out of range: give 1/N to N/N, N at most {options.MAX_PARTS}")
+    if not is_part:
+        raise UserError(f"--passes makes a part, not a picture: name the output .ssp, not '{request.output.name}'")
+    if request.seconds is not None:
+        raise UserError("--passes and --seconds exclude each other: parts share out a number of photons")
+    return index, count
+
+
+def _render_part(
+    request: RenderRequest, scene: Scene, settings: RenderSettings, share: tuple[int, int], scene_file: Path
+) -> int:
+    """Trace a part and write it; returns the exit code. Raises `UserError`."""
+    import time
+
+    from ..base.progress import ProgressReporter
+    from ..gpu.context import create_context
+    from ..render.parts import Share, trace_part
+    from .part_file import write_part
+
+    started = time.perf_counter()
+    place = str(scene_file.resolve())
+    with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
+        part = trace_part(
+            context, scene, settings, Share(*share), place, lambda done: progress(done, "tracing photons"), interrupted
+        )
+    if part is None:
+        print("spectrasplat: nothing was written: a part is whole or not at all", file=sys.stderr)
+        return interrupted.exit_code
+    write_part(request.output, part)
+    print(
+        f"{request.output.resolve()}: part {share[0]} of {share[1]}, {part.header.stats['photons']:,} photons in "
+        f"{time.perf_counter() - started:.1f} s, {request.output.stat().st_size / 1e6:.1f} MB"
+    )
+    return 0
+
+
+def parse_settings(request: RenderRequest) -> dict[str, Any]:
     """The fields of `RenderSettings` that the user gave, checked as far as no scene is needed."""
     if request.photons is not None and request.seconds is not None:
         raise UserError("--photons and --seconds exclude each other: give a count or a time, not both")
@@ -117,7 +173,7 @@ def _parse(request: RenderRequest) -> dict[str, Any]:
     return asked
 
 
-def _complete(asked: dict[str, Any], scene: Scene, stats: bool) -> RenderSettings:
+def complete_settings(asked: dict[str, Any], scene: Scene, stats: bool) -> RenderSettings:
     """Settings with the scene's own wishes where the user said nothing."""
     wishes = scene.render
     settings = RenderSettings(
@@ -144,9 +200,11 @@ def _unused_options(request: RenderRequest) -> list[str]:
 
     suffix = request.output.suffix.lower()
     notes = []
-    if request.bins is not None and suffix != ".exr":
+    if request.bins is not None and suffix not in (".exr", ".ssp"):
         notes.append(f"--bins: a {suffix} picture holds no spectral channels; write an .exr to keep them")
-    if request.exposure is not None and suffix not in SHOWN_SUFFIXES:
+    if request.exposure is not None and suffix == ".ssp":
+        notes.append("--exposure does not change a part; give it to 'merge'")
+    elif request.exposure is not None and suffix not in SHOWN_SUFFIXES:
         notes.append(f"--exposure does not change a {suffix} picture, which is linear; it is for pictures to look at")
     return notes
 

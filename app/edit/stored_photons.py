@@ -14,7 +14,8 @@ _BY_PHOTON = ("position", "dposition_dn", "n_anchor", "flux_w", "source", "recei
 
 @dataclass(frozen=True)
 class StoredPhotons:
-    """The first axis of every array counts photons."""
+    """What landed where, from where, and where other colours of it land; the first axis of every array counts photons,
+    places are in the scene's units, and objects and lights are numbers in the scene's order (instances one by one)."""
 
     position: np.ndarray
     """(n, 3) world, where the anchor wavelength lands."""
@@ -23,7 +24,7 @@ class StoredPhotons:
     n_anchor: np.ndarray
     """(n, groups): the variables at the anchor wavelength, by the glass that the photons were traced through."""
     flux_w: np.ndarray
-    """(n,)."""
+    """(n,) W; as the viewer stores them, times the photons of their pass."""
     source: np.ndarray
     """(n,) scene object that the photon met first; -1 for none."""
     receiver: np.ndarray

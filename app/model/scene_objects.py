@@ -34,10 +34,13 @@ INLINE = "inline"
 class ObjectReader:
     """Reads [[objects]] one by one; equal descriptions share one `Mesh`."""
 
-    def __init__(self, materials: dict[str, Material], textures: TextureReader) -> None:
+    def __init__(
+        self, materials: dict[str, Material], textures: TextureReader, meshes: dict[str, Mesh] | None = None
+    ) -> None:
+        """`meshes`: by description, what an earlier reading of the same file made; kept up."""
         self._materials = materials
         self._textures = textures
-        self._meshes: dict[str, Mesh] = {}
+        self._meshes = {} if meshes is None else meshes
         self._names = Names()
         self.notes: list[str] = []
 
@@ -80,6 +83,8 @@ class ObjectReader:
         key = table.one_of(("mesh", "shape"), "the geometry")
         if key is None:
             table.raw("shape")  # blames a misspelt key, or says that this one is missing
+        if key == "mesh" and isinstance(table.raw("mesh"), Mesh):
+            return table.raw("mesh")  # from Python, which may give the triangles themselves
         recipe = _file_recipe(table) if key == "mesh" else _shape_recipe(table)
         identity = json.dumps(recipe, sort_keys=True)
         if identity not in self._meshes:

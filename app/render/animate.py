@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import deque
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import astuple
 
@@ -31,36 +32,59 @@ def render_animation(
     base_ev: float | None = None,
     develop: Develop = tone_map_8bit,
     notices: FrameNotices | None = None,
+    only: range | None = None,
 ) -> Generator[float]:
-    """Render all frames that `sink` lacks, pausing with the share done; the sink is closed however it ends.
+    """Render all frames that `sink` lacks (`only` those numbers), pausing with the share done; the sink is closed
+    however it ends. Frames that another process is making are left to it, and made where it gives them up.
     What frames say of themselves goes to `notices`. Raises `BrokenPictureError` at a frame that is not finite.
 
     All frames share one exposure: `base_ev` plus the stage's own; `base_ev` None takes the automatic one of the first
     frame. Leaving the iteration early (`close()`) keeps the frames that are done.
     """
     stages = [animation.frame(i) for i in range(len(animation.times_s))]
-    base_ev = sink.base_ev if isinstance(sink, Frames) and sink.base_ev is not None else base_ev
+    frames = range(len(stages)) if only is None else only
+    shared = sink if isinstance(sink, Frames) else None
     renderer = FrameRenderer(context, settings, stages)
     try:
-        if base_ev is not None and isinstance(sink, Frames):
-            sink.fix_exposure(base_ev)
-        for index, stage in enumerate(stages):
-            if not sink.has(index):
-                for share in renderer.steps(stage):
-                    yield (index + 0.99 * share) / len(stages)  # the rest is developing and writing
-                rgb = renderer.picture.rgb
-                check_finite(f"frame {index + 1} of {len(stages)}", rgb)
-                if notices is not None:
-                    notices.take(frame_notices(renderer.light, stage.camera, settings, rgb), index + 1)
-                if base_ev is None:
-                    base_ev = auto_exposure(rgb)
-                    if isinstance(sink, Frames):
-                        sink.fix_exposure(base_ev)
-                sink.write(index, develop(rgb, base_ev + stage.exposure_ev))
-            yield (index + 1) / len(stages)
+        if shared is not None:
+            fixed = shared.exposure() if base_ev is None else shared.fix_exposure(base_ev)
+            base_ev = base_ev if fixed is None else fixed
+        done, due, came = 0, deque(frames), 0
+        while due and came < len(due):  # as long as somebody else's frame may be given up
+            index = due.popleft()
+            with sink.claimed(index) as is_ours:
+                if is_ours:
+                    if base_ev is None and shared is not None:
+                        base_ev = shared.exposure()
+                    if base_ev is None and index > 0:
+                        # All share the first frame's exposure, whoever makes that.
+                        for _ in renderer.steps(stages[0]):
+                            yield done / len(frames)
+                        base_ev = _agreed(shared, auto_exposure(renderer.picture.rgb))
+                    stage = stages[index]
+                    for share in renderer.steps(stage):
+                        yield (done + 0.99 * share) / len(frames)  # the rest is developing and writing
+                    rgb = renderer.picture.rgb
+                    check_finite(f"frame {index + 1} of {len(stages)}", rgb)
+                    if notices is not None:
+                        notices.take(frame_notices(renderer.light, stage.camera, settings, rgb), index + 1)
+                    if base_ev is None:
+                        base_ev = _agreed(shared, auto_exposure(rgb))
+                    sink.write(index, develop(rgb, base_ev + stage.exposure_ev))
+            if is_ours or sink.has(index):
+                done, came = done + 1, 0
+                yield done / len(frames)
+            else:
+                due.append(index)
+                came += 1
     finally:
         renderer.release()
         sink.close()
+
+
+def _agreed(shared: Frames | None, base_ev: float) -> float:
+    """The exposure of all frames, where several processes may have worked it out."""
+    return base_ev if shared is None else shared.fix_exposure(base_ev)
 
 
 def description(animation: Animation, settings: RenderSettings, fps: float, photons: int) -> Mapping[str, object]:

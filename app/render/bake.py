@@ -8,8 +8,8 @@ charts, with the texture coordinates of every triangle.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Generator, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,7 @@ from ..model.geometry.charts import ChartAtlas
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.map_layout import plane_frame
-from .frames import FrameRenderer
+from .frames import FrameRenderer, Picture, Stop
 from .light_pass import LightPass
 from .notices import FrameNotices, light_notices
 
@@ -57,6 +57,39 @@ def check_output(path: Path) -> Path:
     return path
 
 
+@dataclass(frozen=True)
+class BakedMap:
+    """A receiver's map before it is written."""
+
+    picture: Picture
+    """Irradiance, see `UNITS`; row 0 on top."""
+    placement: Mapping[str, object]
+    photons: int
+    notices: list[str]
+
+
+def bake_map(
+    context: Context,
+    stage: Stage,
+    settings: RenderSettings,
+    receiver: str,
+    stop: Stop = lambda: False,
+) -> Generator[float, None, BakedMap]:
+    """Bake in steps, pausing with the share done. What was done when `stop()` turned true is a map too.
+
+    `settings.width`, `height`: texels. Raises `UserError`.
+    """
+    check_receiver(stage.scene, receiver)
+    renderer = FrameRenderer(context, replace(settings, layer=f"map:{receiver}"), [stage])
+    try:
+        for share in renderer.steps(stage, stop):
+            yield 0.98 * share
+        light = renderer.light
+        return BakedMap(renderer.picture, placement(light), light.stats.photons, light_notices(light))
+    finally:
+        renderer.release()
+
+
 def bake(
     context: Context,
     stage: Stage,
@@ -70,17 +103,11 @@ def bake(
 
     `settings.width`, `height`: texels. What the light pass says of itself goes to `notices`. Raises `UserError`.
     """
-    check_receiver(stage.scene, receiver)
     check_output(path)
-    renderer = FrameRenderer(context, replace(settings, layer=f"map:{receiver}"), [stage])
-    try:
-        for share in renderer.steps(stage):
-            yield 0.98 * share
-        rgb, where = renderer.picture.rgb, placement(renderer.light)
-        if notices is not None:
-            notices.take(light_notices(renderer.light))
-    finally:
-        renderer.release()
+    baked = yield from bake_map(context, stage, settings, receiver)
+    rgb, where = baked.picture.rgb, baked.placement
+    if notices is not None:
+        notices.take(baked.notices)
     check_finite(path.name, rgb)
     told = {**where, "receiver": receiver, "scene": stage.scene.name, "file": path.name, "units": UNITS}
     if path.suffix.lower() == ".png":

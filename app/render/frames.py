@@ -43,6 +43,8 @@ _LIGHT_SHARE = 0.8
 _PREPARING, _TRACING, _SEEING = "preparing", "tracing photons", "taking camera samples"
 
 Stop = Callable[[], bool]
+Fill = Callable[[LightPass, LightSampling, Stop], Iterator[float]]
+"""Fills the maps of a prepared light pass, pausing with the share done."""
 
 
 @dataclass(frozen=True)
@@ -88,10 +90,16 @@ class FrameRenderer:
     """Owns what frames share. Run `steps(stage)` to its end, then read."""
 
     def __init__(
-        self, context: Context, settings: RenderSettings, stages: Sequence[Stage], begun: float | None = None
+        self,
+        context: Context,
+        settings: RenderSettings,
+        stages: Sequence[Stage],
+        begun: float | None = None,
+        fill: Fill | None = None,
     ) -> None:
         """`stages`: what will be asked for; maps and lattices are fitted to some of them. `begun`: the
-        `time.perf_counter()` from which `settings.seconds` count, which are those of one picture.
+        `time.perf_counter()` from which `settings.seconds` count, which are those of one picture. `fill`: where light
+        comes from, instead of `traced_light`.
 
         Where light changes, `shader.keep_programs` on the context spares compiling every frame's programs."""
         self._context = context
@@ -104,6 +112,7 @@ class FrameRenderer:
         self._budget: TimeBudget | None = None
         if settings.seconds is not None:
             self._budget = TimeBudget(settings.seconds, time.perf_counter() if begun is None else begun)
+        self._fill = fill or traced_light
         self.phase = _PREPARING
         """What `steps` is at."""
         self.seconds = FrameSeconds()
@@ -142,7 +151,7 @@ class FrameRenderer:
                     yield from budget.measuring(traced.camera_pass, *self._view(stage), first=True)
                 sampling = replace(sampling, seconds=budget.for_light(self._settings.spp))
             self.phase = _TRACING
-            for share in traced_light(light, sampling, stop):
+            for share in self._fill(light, sampling, stop):
                 yield _LIGHT_SHARE * share if budget is None else budget.spent
             light.finish()
             light.settle()
@@ -225,6 +234,19 @@ class FrameRenderer:
     def _share(self, of_work: float) -> float:
         """Progress: of the time where that is given, else of the work."""
         return of_work if self._budget is None else self._budget.spent
+
+    def steps_of_layer(self, layer: str, stage: Stage, stop: Stop = lambda: False) -> Iterator[float]:
+        """Another layer ("beauty", "caustic") of the frame that `steps` rendered, from the same photons; `picture` is
+        it then. The last to be asked of a renderer: frames to come would show this layer too."""
+        traced = self._traced
+        assert traced is not None and traced.camera_pass is not None, "steps() comes first, and not of a map"
+        light = traced.light
+        traced.camera_pass.release()
+        traced.camera_pass = traced.camera_beams = None
+        traced.camera_pass = CameraPass(
+            self._context, traced.camera_buffers or traced.buffers, layer, light.reflectances, light.map_channels
+        )
+        yield from self._see(stage, stop)
 
     def run(self, stage: Stage) -> np.ndarray:
         """The whole frame at once: `rgb` of it."""

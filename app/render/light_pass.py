@@ -11,7 +11,7 @@ lattices are divided (`Division`), where photons are kept (`PhotonRecords`), how
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import moderngl
@@ -111,6 +111,8 @@ class LightPass:
         self.fit = fit or MapFit(scene.camera, settings.width, settings.height)
         """What `maps` are fitted to."""
         self.stats = LightStats()
+        self._elsewhere = LightStats()
+        """Of `take`."""
         self._division = division or Division()
         self._records = photon_records or NoRecords()
         self._pace = pace or Pace.of(context)
@@ -306,7 +308,7 @@ class LightPass:
 
         Afterwards `plans` and `tables` exist. Pilots and maps stay, so a rendering may be begun again and again."""
         self.seed = seed
-        self.stats = LightStats()
+        self.stats, self._elsewhere = LightStats(), LightStats()
         self._maps.clear()
         # Without pilots beams carry everything.
         self.plans = self._planner(self.pilots).plans(photons, self._texel_size()) if self.pilots else []
@@ -384,14 +386,29 @@ class LightPass:
                 return False
         return True
 
-    def pass_steps(self, number: int, photons: int, first_round: int = 0) -> Iterator[PassStep]:
+    def rounds(self, photons: int) -> int:
+        """Into how many rounds a pass is divided."""
+        if not self.plans:
+            return -(-photons // BEAM_ROUND) if self.has_beams else 0
+        return max(-(-plan.lattice_count(photons) // (self.trace.batch // plan.lattices)) for plan in self.plans)
+
+    def rounds_together(self, photons: int) -> int:
+        """How many rounds have their beams together: few photons' worth of beams are coarse ones."""
+        if not (self.plans and self.has_beams):
+            return 1
+        return max(1, -(-BEAM_LEAST * self.rounds(photons) // photons))
+
+    def pass_steps(
+        self, number: int, photons: int, first_round: int = 0, first_group: int = 0, stride: int = 1
+    ) -> Iterator[PassStep]:
         """A whole pass, pausing after every event of the rays and after every splatting: whoever draws meanwhile may
         bind what it likes.
 
-        `first_round`: where a pass goes on that was left before."""
+        `first_round`: where a pass goes on that was left before. `first_group`, `stride`: of the groups of rounds that
+        have their beams together, this one and every so manieth after it, where others trace the rest."""
+        rounds = self.rounds(photons)
         if not self.plans:
-            rounds = -(-photons // BEAM_ROUND) if self.has_beams else 0
-            for j in range(first_round, rounds):
+            for j in range(first_round + first_group, rounds, stride):
                 for step in self._beam_steps(number, photons, RoundOf(number, j, rounds, True)):
                     yield PassStep((j + step.fraction) / rounds, False)
                 self._maps.photon_weight += photons / rounds
@@ -399,11 +416,11 @@ class LightPass:
                 yield PassStep((j + 1) / rounds, True)
             return
         counts = [plan.lattice_count(photons) for plan in self.plans]
-        rounds = max(-(-n // (self.trace.batch // plan.lattices)) for n, plan in zip(counts, self.plans, strict=True))
         slices = rounds * len(self.plans)
-        # Few photons' worth of beams are coarse ones: some rounds have theirs together.
-        together = max(1, -(-BEAM_LEAST * rounds // photons)) if self.has_beams else 1
+        together = self.rounds_together(photons)
         for j in range(first_round, rounds):
+            if (j // together - first_group) % stride:
+                continue
             if j == first_round or j % together == 0:
                 end = min((j // together + 1) * together, rounds)
                 yield from self._beam_steps(number, photons, RoundOf(number, j, rounds, False), j / rounds, end - j)
@@ -580,9 +597,25 @@ class LightPass:
             "map scratch": 16 * len(self.atlas.scratch_textures) * self.atlas.size[0] * self.atlas.size[1],
         }
         counts = self.splatter.counts()
-        self.stats.outside_map_w = counts["outside_map_w"]
-        self.stats.footprints_dropped = int(counts["footprints_dropped"])
-        self.stats.dropped_w = counts["dropped_w"]
+        elsewhere = self._elsewhere
+        self.stats.outside_map_w = counts["outside_map_w"] + elsewhere.outside_map_w
+        self.stats.footprints_dropped = int(counts["footprints_dropped"]) + elsewhere.footprints_dropped
+        self.stats.dropped_w = counts["dropped_w"] + elsewhere.dropped_w
+
+    def take(self, sums: Iterable[np.ndarray], photon_weight: float, stats: LightStats) -> None:
+        """After `begin`, instead of passes: what others traced for these maps.
+
+        `sums`: for every texture of the atlas in turn, float32 (height, width, 4); `stats`: what they counted."""
+        for texture, values in zip(self.atlas.total_textures, sums, strict=True):
+            texture.write(np.ascontiguousarray(values, np.float32))
+        self._maps.photon_weight = photon_weight
+        self._elsewhere = stats
+        self.stats = replace(stats, bands=self.stats.bands, light_points=self.stats.light_points)
+
+    @property
+    def photon_weight(self) -> float:
+        """What was deposited is energy times this."""
+        return self._maps.photon_weight
 
     def settle(self) -> None:
         """After `finish`, where nothing is traced any more: what remains is what is read."""

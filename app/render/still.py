@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ..base.memory import peak_bytes
@@ -14,7 +14,7 @@ from ..model.settings import RenderSettings
 from ..passes.spectrum_choice import Spectrum
 from .beam_light import BeamStats
 from .camera_beams import CameraBeamStats
-from .frames import FrameRenderer, Picture
+from .frames import Fill, FrameRenderer, Picture
 from .light_pass import LightStats
 from .notices import frame_notices
 
@@ -128,6 +128,8 @@ class RenderResult(Picture):
     """A finished picture and what was done for it."""
 
     stats: RenderStats = field(kw_only=True)
+    layers: Mapping[str, Picture] = field(default_factory=dict, kw_only=True)
+    """Those that were asked for besides the settings' own."""
 
 
 def render(
@@ -137,20 +139,30 @@ def render(
     cancelled: Cancelled = lambda: False,
     context: Context | None = None,
     begun: float | None = None,
+    more_layers: Sequence[str] = (),
+    fill: Fill | None = None,
 ) -> RenderResult:
     """Render `scene`. What was done when `cancelled()` turned true is kept and shown. `begun`: the
-    `time.perf_counter()` from which `settings.seconds` count; None: now."""
+    `time.perf_counter()` from which `settings.seconds` count; None: now.
+
+    `more_layers`: of "beauty" and "caustic", seen of the same photons. `fill`: see `FrameRenderer`."""
     begun = time.perf_counter() if begun is None else begun
     own = context is None
     context = context or create_context()
     stage = Stage(scene, scene.camera)
-    frames = FrameRenderer(context, settings, [stage], begun)
+    frames = FrameRenderer(context, settings, [stage], begun, fill)
     try:
         for share in frames.steps(stage, cancelled):
             progress(share, frames.phase)
         picture = frames.picture
         notices = tuple(frame_notices(frames.light, scene.camera, settings, picture.rgb))
-        return RenderResult(**vars(picture), stats=replace(_stats(context, frames, settings), notices=notices))
+        stats = replace(_stats(context, frames, settings), notices=notices)
+        layers = {}
+        for layer in more_layers:
+            for share in frames.steps_of_layer(layer, stage, cancelled):
+                progress(share, frames.phase)
+            layers[layer] = frames.picture
+        return RenderResult(**vars(picture), stats=stats, layers=layers)
     finally:
         frames.release()
         if own:

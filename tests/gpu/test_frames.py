@@ -4,6 +4,7 @@ what chooses the sampling is the same for all."""
 from __future__ import annotations
 
 import time
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,6 +50,9 @@ class First:
 
     def has(self, index: int) -> bool:
         return False
+
+    def claimed(self, index: int) -> AbstractContextManager[bool]:
+        return nullcontext(True)
 
     def develop(self, rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
         self.rgb = rgb if self.rgb is None else self.rgb

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import python_reference
 import typer
 from command_reference import MARK, PAGE, commands, reference
 from spectrasplat.commands import program
@@ -136,6 +137,11 @@ def test_every_page_is_in_the_index() -> None:
 def test_the_command_line_page_is_what_the_program_says() -> None:
     written = PAGE.read_text(encoding="utf-8").partition(MARK)[2]
     assert written == reference(), "run 'python tests/unit/command_reference.py'"
+
+
+def test_the_python_reference_is_up_to_date() -> None:
+    written = python_reference.PAGE.read_text(encoding="utf-8")
+    assert written == python_reference.reference(), "run 'python tests/unit/python_reference.py'"
 
 
 def test_every_scene_is_described() -> None:

@@ -1,6 +1,6 @@
 """The rooms of app/ stand in layers: a file imports from its own or from lower ones, and no files import in a circle.
 
-    base < model < gpu, edit, beams < passes < render < ui, reference < bench < stress < commands
+    base < model < gpu, edit, beams < passes < render < ui, reference < bench < stress < commands < api
 
 Rooms of one layer do not import each other, but for `ui`, whose compare panel shows the reference.
 """
@@ -25,10 +25,11 @@ LAYERS = (
     ("bench",),
     ("stress",),
     ("commands",),
+    ("api",),
 )
 BESIDE = {("ui", "reference")}
 """Arrows within a layer."""
-FACE = {"__init__", "__main__", "api"}
+FACE = {"__init__", "__main__"}
 """Files that stand before the rooms."""
 
 

@@ -45,7 +45,7 @@ def test_every_folder_is_a_package() -> None:
 def test_only_python_lies_in_the_packages() -> None:
     """Data has its own folders; a stray file in app/ would not be installed."""
     files = (file for file in (ROOT / "app").rglob("*") if file.is_file() and "__pycache__" not in file.parts)
-    assert [file for file in files if file.suffix != ".py"] == []
+    assert [file.name for file in files if file.suffix != ".py"] == ["py.typed"]
 
 
 def test_the_program_finds_its_files_in_the_checkout() -> None:
@@ -82,7 +82,9 @@ def test_the_wheel_holds_the_package_its_data_and_nothing_else(wheel: Path) -> N
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"spectrasplat"}
     python = (file.relative_to(ROOT / "app").as_posix() for file in (ROOT / "app").rglob("*.py"))
     wanted = {f"spectrasplat/{name}" for name in python}
-    wanted |= {f"spectrasplat/{folder}/{name}" for folder in ("assets", "shaders") for name in data_files(folder)}
+    wanted |= {"spectrasplat/py.typed"} | {
+        f"spectrasplat/{folder}/{name}" for folder in ("assets", "shaders") for name in data_files(folder)
+    }
     assert {name for name in names if ".dist-info" not in name} == wanted
 
 

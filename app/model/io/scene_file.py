@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 
 from ...base import files
 from ...base.errors import UserError
+from ..geometry.mesh import Mesh
 from ..lights.light_file import read_light
 from ..materials.dielectric import DEFAULT_GLASS
 from ..materials.material_file import read_materials
@@ -45,6 +46,7 @@ from ..scene_render import read_render
 from ..scene_textures import TextureReader
 from ..staging import AS_FOUND, Y_UP_TO_Z_UP, Staging, guessed_up, with_glass
 from ..texture import Environment
+from ..vectors import Vec3
 from .scene_table import SceneTable
 
 GLTF_SUFFIXES = (".glb", ".gltf")
@@ -66,7 +68,7 @@ def load_scene(path: str | os.PathLike[str], staging: Staging = AS_FOUND) -> Sce
     if suffix == ".toml":
         if staging.up is not None:
             raise UserError(f"{path.name}: --up is for meshes and glTF files; in a scene file z is up")
-        scene = _scene_from_table(SceneTable(_read_toml(path), path), staging)
+        scene = _scene_from_table(SceneTable(read_toml(path), path), Kept(), staging)
     elif suffix in GLTF_SUFFIXES:
         from .gltf import load_gltf
 
@@ -77,12 +79,35 @@ def load_scene(path: str | os.PathLike[str], staging: Staging = AS_FOUND) -> Sce
         raise UserError(
             f"{path}: '{path.suffix}' is not a kind of scene; use .toml, {', '.join(GLTF_SUFFIXES + MESH_SUFFIXES)}"
         )
+    return _checked(scene, path)
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What one reading of a scene's tables leaves for the next, so that what did not change is the same value."""
+
+    meshes: dict[str, Mesh] = field(default_factory=dict)
+    textures: TextureReader = field(default_factory=TextureReader)
+    environments: dict[str, tuple[Vec3, Environment | None]] = field(default_factory=dict)
+
+
+def scene_of(values: dict[str, Any], path: Path, kept: Kept | None = None) -> Scene:
+    """The scene of the tables of a scene file that stands, or would stand, at `path`.
+
+    From Python, `mesh` may be a `Mesh`, `material` a `Material` and `environment` an `Environment`. Raises UserError
+    as `load_scene`.
+    """
+    return _checked(_scene_from_table(SceneTable(values, path), kept or Kept(), AS_FOUND), path)
+
+
+def _checked(scene: Scene, path: Path) -> Scene:
     told = set(scene.notes)
     notes = [note for note in check_scene(scene, path.name) if note not in told]
     return replace(scene, notes=scene.notes + tuple(notes))
 
 
-def _read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a scene file. Raises UserError where it is no TOML."""
     try:
         return tomllib.loads(files.read_text(path, files.SCENE_BYTES))
     except tomllib.TOMLDecodeError as error:
@@ -99,14 +124,14 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise UserError(f"{path} cannot be read: {error.strerror}; give another scene file") from error
 
 
-def _scene_from_table(table: SceneTable, staging: Staging) -> Scene:
+def _scene_from_table(table: SceneTable, kept: Kept, staging: Staging) -> Scene:
     name = table.string("name", table.file.stem)
     table.string("units", "units")  # a label for people; every length is in it
     notes: list[str] = []
-    background, environment = read_environment(table, notes)
+    background, environment = _read_environment(table, kept, notes)
     render = read_render(table.table("render"))
-    textures = TextureReader()
-    reader = ObjectReader(read_materials(table, textures), textures)
+    textures = kept.textures
+    reader = ObjectReader(read_materials(table, textures), textures, kept.meshes)
     objects = [item for entry in table.tables("objects") for item in reader.read(entry)]
     if not objects:
         table.given(("camera", "lights"))
@@ -125,6 +150,16 @@ def _scene_from_table(table: SceneTable, staging: Staging) -> Scene:
     if environment is None and not (table.has("camera") or table.has("lights")):
         _add_table(objects, notes)
     return Scene(name, camera, lights, tuple(objects), background, environment, render, tuple(notes))
+
+
+def _read_environment(table: SceneTable, kept: Kept, notes: list[str]) -> tuple[Vec3, Environment | None]:
+    given = table.given(("background", "environment"))
+    if given == ["environment"] and isinstance(table.raw("environment"), Environment):
+        return (0.0, 0.0, 0.0), table.raw("environment")
+    identity = repr([(key, table.raw(key)) for key in given])
+    if identity not in kept.environments:
+        kept.environments[identity] = read_environment(table, notes)
+    return kept.environments[identity]
 
 
 def _read_lights(table: SceneTable, around: Surroundings, notes: list[str], dark_without: bool) -> tuple[Light, ...]:

@@ -33,6 +33,8 @@ def read_object_material(
         if name not in known:
             table.fail(key, f"names '{name}', which is not defined under [materials]" + suggestion(name, known))
         material = known[name]
+    elif key == "material" and isinstance(table.raw(key), Material):
+        material = table.raw(key)  # from Python: one that was read before
     elif key == "material":
         inner = table.table(key)
         assert inner is not None

@@ -1,0 +1,61 @@
+"""The Python interface: what `import spectrasplat as ss` offers (docs/python.md).
+
+`spectrasplat/__init__.py` imports this room when something of it is first asked for.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from ..base.errors import UserError
+from ..base.paths import shipped_scenes
+from ..edit.stored_photons import StoredPhotons as Photons
+from .catalogue import Glass, glass, glasses
+from .picture import CausticMap, Picture, Statistics
+from .rendering import caustic, render
+from .scene import Scene
+from .session import Session
+from .tables import Entries, Table
+from .tracing import Fan, fan, trace
+
+__all__ = [
+    "CausticMap",
+    "Entries",
+    "Fan",
+    "Glass",
+    "Photons",
+    "Picture",
+    "Scene",
+    "Session",
+    "Statistics",
+    "Table",
+    "UserError",
+    "caustic",
+    "fan",
+    "glass",
+    "glasses",
+    "load",
+    "render",
+    "scenes",
+    "trace",
+]
+
+
+def load(source: str | os.PathLike[str] | Mapping[str, Any]) -> Scene:
+    """The scene in a file (.toml, .glb, .gltf, or a mesh: .ply, .obj, .stl), a shipped one by its name ("prism"), or
+    one from its tables in a dictionary.
+
+    Raises `UserError`, in one sentence with file, key and remedy, for anything that cannot be rendered as it stands.
+    """
+    if isinstance(source, Mapping):
+        return Scene(source)
+    if not isinstance(source, str | os.PathLike):
+        raise UserError(f"{type(source).__name__} is no scene: give a file, a shipped scene's name or a dictionary")
+    return Scene.load(source)
+
+
+def scenes() -> list[str]:
+    """Names of the scenes that come with the program."""
+    return list(shipped_scenes())

@@ -1,0 +1,68 @@
+"""What a caller asks for, checked as the command line checks it and with its sentences."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..base.errors import UserError
+from ..commands.render import RenderRequest, complete_settings, parse_settings
+from ..model.settings import RenderSettings
+from .scene import Scene
+
+Size = tuple[int, int] | str
+"""Width and height in pixels, or text such as "960x540"."""
+Count = int | float | str
+"""A whole number; "4M" is understood as well."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Arguments of a rendering; None where nothing was said."""
+
+    size: Size | None = None
+    photons: Count | None = None
+    seconds: float | None = None
+    seed: int | None = None
+    method: str | None = None
+    camera_method: str | None = None
+    layer: str | None = None
+    bins: int | None = None
+    exposure: float | None = None
+    max_depth: int | None = None
+    spp: int | None = None
+    batch: Count | None = None
+
+
+def settings_of(scene: Scene, asked: Asked) -> RenderSettings:
+    """The settings of a rendering of `scene`. Raises `UserError`."""
+    check_scene(scene)
+    texts = {name: _text(name, value) for name, value in vars(asked).items() if value is not None}
+    try:
+        parsed = parse_settings(RenderRequest(scene.name, Path(), **texts))  # type: ignore[arg-type]
+        return complete_settings(parsed, scene._model, True)
+    except UserError as error:
+        raise UserError(in_python(str(error))) from None
+
+
+def check_scene(scene: object) -> None:
+    """Raise `UserError` where it is none: the likeliest mistake is a file's name."""
+    if not isinstance(scene, Scene):
+        raise UserError(f"{type(scene).__name__} is no scene: open one with spectrasplat.load, for example")
+
+
+def in_python(sentence: str) -> str:
+    """A sentence about options of the command line, about arguments of the same name."""
+    return re.sub(r"--([a-z]+(?:-[a-z]+)*)", lambda found: found[1].replace("-", "_"), sentence)
+
+
+def _text(name: str, value: object) -> str:
+    if name == "size" and not isinstance(value, str):
+        try:
+            return "x".join(str(side) for side in value)  # type: ignore[attr-defined]
+        except TypeError:
+            return str(value)
+    if isinstance(value, float) and value.is_integer() and name != "seconds":
+        return str(int(value))
+    return str(value)

@@ -1,0 +1,215 @@
+"""A scene that stays on the device: photons are kept, and an edit redoes only what it asks for.
+
+This is the viewer's engine without its window: the same store of photons, the same decision what an edit costs.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from ..base.errors import UserError
+from ..edit.live_inputs import LiveInputs
+from ..edit.stored_photons import StoredPhotons
+from ..model.settings import RenderSettings
+from .asking import Asked, Count, Size, settings_of
+from .device import Cancel, Device, Progress
+from .picture import Picture, Statistics
+from .scene import Scene
+
+if TYPE_CHECKING:
+    from ..gpu.context import Context
+    from ..render.viewer.engine import LiveEngine
+
+DEFAULT_SAMPLES = 32
+_ALL = 10**12
+_STEP_S = 0.25
+_RECORD_BYTES = 256
+"""A photon record with several spectral columns, rounded up."""
+_PER_PHOTON = 4
+"""Landings that one emitted photon leaves at most, nearly."""
+
+
+@dataclass(frozen=True)
+class _State:
+    """What the engine has shown last."""
+
+    photons: int
+    rays: int
+    samples: int
+
+
+class Session:
+    """Renders one scene again and again; use it with `with`. `scene` is a copy of its own: edit that.
+
+    Only what an edit concerns is done again: a camera that moved traces nothing; a glass whose index at the d line
+    stays (its `dispersion_gain`, another V_d, a glass of the same n_d) traces nothing either, and is followed to first
+    order in the change of its index, as in the viewer; anything else traces its photons anew.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        size: Size | None = None,
+        photons: Count | None = None,
+        spp: int = DEFAULT_SAMPLES,
+        seed: int | None = None,
+        method: str | None = None,
+        exact: bool = False,
+    ) -> None:
+        """`exact`: trace again after an edit that would be followed to first order only. The rest as for `render`.
+        Raises `UserError`, also where there is no OpenGL."""
+        self._settings = settings_of(scene, Asked(size, photons, seed=seed, method=method, spp=spp))
+        self._scene = scene.copy()
+        self._exact = exact
+        self._device: Device | None = Device()
+        self._engine: LiveEngine | None = None
+        self._before = _State(0, 0, 0)
+
+    @property
+    def scene(self) -> Scene:
+        """What is rendered: edit it."""
+        return self._scene
+
+    # ---- work --------------------------------------------------------------------------------
+
+    def render(self, *, progress: Progress | None = None, cancel: Cancel | None = None) -> Picture:
+        """The scene as it is now. Raises `UserError`.
+
+        `stats.photons_traced` says whether photons were traced for it. Callbacks as for `spectrasplat.render`; the next
+        call goes on where `cancel` stopped."""
+        started = time.perf_counter()
+
+        def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Picture:
+            rays = self._before.rays
+            self._follow(context, report, stopped)
+            engine, stats = self._live, self._live.stats
+            texture = engine.picture
+            if texture is None:
+                raise UserError("the rendering was stopped before there was a picture: let it go on for longer")
+            rgb = np.frombuffer(texture.read(), np.float32).reshape(texture.height, texture.width, 4)[..., :3].copy()
+            self._before = _State(stats.photons, stats.rays_traced, int(stats.camera_samples))
+            told = Statistics(
+                stats.photons,
+                stats.photons if stats.rays_traced > rays else 0,
+                int(stats.camera_samples),
+                time.perf_counter() - started,
+                stats.renderer,
+                stats.is_software,
+                not engine.is_idle,
+                (engine.problem,) if engine.problem else (),
+            )
+            return Picture(rgb, None, None, told, {"beauty": rgb}, self._settings.exposure_ev or 0.0)
+
+        return self._running.run(work, progress, cancel)
+
+    def set_glass(self, name: str, glass: str | None = None, **keys: Any) -> None:
+        """Make object `name` of another catalogue glass, or change keys of its table (`dispersion_gain`, `priority`).
+
+        The same as `session.scene.objects[name].update(…)`; raises `UserError`."""
+        if glass is not None:
+            keys = {"material": None, "glass": glass} | keys
+        self.scene.objects[name].update(**keys)
+
+    def photons(
+        self, limit: int | None = None, *, progress: Progress | None = None, cancel: Cancel | None = None
+    ) -> StoredPhotons:
+        """The photons that the picture is made of, as arrays in world space; see `Photons`.
+
+        `limit`: about so many, evenly chosen and each standing for more light. Raises `UserError`."""
+
+        def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> StoredPhotons:
+            self._follow(context, report, stopped)
+            found = self._live.stored_photons(_ALL)
+            every = 1 if limit is None else -(-len(found.flux_w) // limit)
+            # Records follow a space-filling curve over the lattice: every so manieth is nearly a lattice again.
+            chosen = found.chosen(np.arange(0, len(found.flux_w), max(every, 1)))
+            # A record holds its share of the light times the photons of the pass.
+            share = len(found.flux_w) / max(len(chosen.flux_w), 1)
+            return replace(chosen, flux_w=chosen.flux_w * share / (self._settings.photons or 1))
+
+        if limit is not None and (isinstance(limit, bool) or not isinstance(limit, int) or limit < 1):
+            raise UserError(f"limit {limit!r} is no number of photons: give 1 or more")
+        return self._running.run(work, progress, cancel)
+
+    def close(self) -> None:
+        """Free the device. A session that is closed renders nothing more."""
+        device, self._device = self._device, None
+        if device is None:
+            return
+        if self._engine is not None:
+            device.run(lambda context, report, stopped: self._live.release())
+            self._engine = None
+        device.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # ---- private -----------------------------------------------------------------------------
+
+    @property
+    def _running(self) -> Device:
+        if self._device is None:
+            raise UserError("this session is closed: open another one with Session(scene)")
+        return self._device
+
+    @property
+    def _live(self) -> LiveEngine:
+        assert self._engine is not None
+        return self._engine
+
+    def _follow(self, context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> None:
+        """Work, in the device's thread, until what is wanted is shown."""
+        if self._engine is None:
+            self._engine = _engine(context, self._settings, self._exact)
+        engine, settings, model = self._engine, self._settings, self.scene._model
+        engine.set(
+            LiveInputs(
+                model,
+                model.camera,
+                settings.width,
+                settings.height,
+                settings.method,
+                settings.smoothing,
+                seed=settings.seed,
+            )
+        )
+        target, samples = settings.photons or 1, engine.camera_samples
+        while not stopped():
+            engine.advance(_STEP_S)
+            if engine.problem is not None:
+                raise UserError(engine.problem)
+            if engine.is_idle:
+                break
+            stats = engine.stats
+            report(
+                min(0.8 * stats.photons / target + 0.2 * stats.camera_samples / samples, 0.99),
+                "taking camera samples" if stats.photons >= target else "tracing photons",
+            )
+        report(1.0, "done")
+
+
+def _engine(context: Context, settings: RenderSettings, exact: bool) -> LiveEngine:
+    """One that traces all photons in one pass and keeps them."""
+    from ..render.viewer.building import Budget
+    from ..render.viewer.engine import LiveEngine
+
+    photons = settings.photons or 1
+    room = max(Budget.of(context).store_bytes, photons * _PER_PHOTON * _RECORD_BYTES)
+    budget = replace(Budget.of(context), first_photons=photons, largest_photons=photons, store_bytes=room)
+    engine = LiveEngine(context, budget)
+    # A pass emits a few photons more or less than it is asked for: whatever it was, one is enough.
+    engine.target_photons, engine.camera_samples = 1, settings.spp or DEFAULT_SAMPLES
+    engine.refine_when_still = exact
+    return engine

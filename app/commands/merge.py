@@ -1,0 +1,128 @@
+"""The merge command: parts of one rendering, traced by `render --passes`, become its picture."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..base.errors import UserError, plain
+from ..base.interrupts import interrupt_flag
+from . import options
+
+if TYPE_CHECKING:
+    from ..render.parts import PartHeader
+
+
+@dataclass(frozen=True)
+class MergeRequest:
+    """The merge command's options as typed; None where the user said nothing."""
+
+    parts: tuple[Path, ...]
+    output: Path
+    scene: str | None = None
+    exposure: str | None = None
+    partial: bool = False
+    stats: bool = False
+
+
+def merge_command(request: MergeRequest) -> int:
+    """Merge to a picture file; returns the exit code. Raises `UserError`."""
+    from ..base.atomic import check_writable
+    from ..base.image_io import check_suffix, write_image
+    from ..base.progress import ProgressReporter
+
+    check_suffix(request.output)
+    exposure = None if request.exposure is None else options.parse_exposure(request.exposure)
+    check_writable(request.output)
+
+    from ..model.io.scene_file import load_scene
+    from ..render.light_pass import LightPass
+    from ..render.parts import layout_key, merged_light, rendering_key, settings_of
+    from ..render.still import render
+    from .part_file import merged_sums, read_header
+
+    for path, times in Counter(request.parts).items():
+        if times > 1:
+            print(f"note: {plain(str(path))} is given {times} times: counted once", file=sys.stderr)
+    headers = {path: read_header(path) for path in request.parts}
+    chosen = _chosen(headers, request.partial)
+    first = headers[chosen[0]]
+    settings = settings_of(first)
+    scene = load_scene(options.find_scene(request.scene or first.scene))
+    if rendering_key(scene, settings) != first.key:
+        raise UserError(
+            f"{request.scene or first.scene} is not as it was when {chosen[0]} was traced (or this is another version "
+            "of the program): give the scene that was rendered with --scene, or trace all parts again"
+        )
+
+    def refuse(light: LightPass) -> None:
+        if (layout_key(light), light.atlas.size, light.atlas.targets) != (first.layout, first.size, first.targets):
+            raise UserError(
+                f"{chosen[0]} was traced by '{first.renderer}', whose maps lie elsewhere than those of "
+                f"'{light.context.renderer}': merge where the parts were traced"
+            )
+
+    started = time.perf_counter()
+    fill = merged_light([headers[path] for path in chosen], merged_sums(chosen, first), refuse)
+    with interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
+        result = render(scene, settings, progress, interrupted, fill=fill)
+        stopped = interrupted()
+    for notice in result.stats.notices:
+        print(f"note: {plain(notice)}", file=sys.stderr)
+    write_image(
+        request.output,
+        result.rgb,
+        exposure_ev=scene.render.exposure_ev if exposure is None else exposure,
+        spectral=result.spectral,
+        bin_edges_nm=result.bin_edges_nm,
+    )
+    print(
+        f"{request.output.resolve()}: {settings.width}×{settings.height}, {len(chosen)} of {first.share.count} parts, "
+        f"{result.stats.photons:,} photons in {time.perf_counter() - started:.1f} s"
+        + (", stopped early" if stopped else "")
+    )
+    if request.stats:
+        print("\n".join(result.stats.lines()))
+    return interrupted.exit_code if stopped else 0
+
+
+def _chosen(headers: dict[Path, PartHeader], partial: bool) -> list[Path]:
+    """One file of each part, in their order. Raises `UserError` where they are not of one rendering, or some are
+    missing and that was not asked for."""
+    paths = list(headers)
+    first = headers[paths[0]]
+    found: dict[int, Path] = {}
+    for path in paths:
+        header = headers[path]
+        if header.key != first.key:
+            told = "scenes or settings" if header.name == first.name else f"scenes, '{first.name}' and '{header.name}'"
+            raise UserError(f"{paths[0]} and {path} are parts of different {told}: merge parts of one rendering")
+        if (header.share.count, header.rounds) != (first.share.count, first.rounds):
+            raise UserError(
+                f"{paths[0]} is one of {first.share.count} parts of {first.rounds} rounds, {path} one of "
+                f"{header.share.count} of {header.rounds}: trace all with the same --passes and --batch"
+            )
+        if (header.layout, header.size, header.targets) != (first.layout, first.size, first.targets):
+            raise UserError(
+                f"{paths[0]} ('{first.renderer}') and {path} ('{header.renderer}') have maps that lie elsewhere: trace "
+                "all parts on the same kind of device"
+            )
+        if header.share.index in found:
+            other = found[header.share.index]
+            print(
+                f"note: {plain(f'{path} is part {header.share.index} again, as {other}')}: counted once",
+                file=sys.stderr,
+            )
+        found.setdefault(header.share.index, path)
+    missing = [str(i) for i in range(1, first.share.count + 1) if i not in found]
+    if missing:
+        listed = ", ".join(missing[:20]) + (f" and {len(missing) - 20} more" if len(missing) > 20 else "")
+        words = f"of {first.share.count} parts {len(missing)} are missing: {listed}"
+        if not partial:
+            raise UserError(f"{words}; trace them, or merge what there is with --partial, which is noisier")
+        print(f"note: {words}", file=sys.stderr)
+    return [found[i] for i in sorted(found)]

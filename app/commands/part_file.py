@@ -1,0 +1,85 @@
+"""A part of a rendering as a file (.ssp): a zip archive with what it says of itself and the sums of its maps."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from ..base import files
+from ..base.atomic import atomic_output
+from ..base.errors import UserError
+from ..render.parts import Part, PartHeader, Share
+
+SUFFIX = ".ssp"
+FORMAT = 1
+_HEADER = "part.json"
+_HEADER_BYTES = 1 << 20
+_MAX_SIDE = 1 << 15
+_MAX_TARGETS = 64
+
+
+def write_part(path: Path, part: Part) -> None:
+    """Write a part, whole or not at all. Raises `UserError` where it cannot be written."""
+    told = {"format": FORMAT} | asdict(part.header)
+    with atomic_output(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as to:
+        to.writestr(_HEADER, json.dumps(told))
+        for number, texels in enumerate(part.sums):
+            to.writestr(f"sums{number}", texels.tobytes())
+
+
+def read_header(path: Path) -> PartHeader:
+    """What a part says of itself. Raises `UserError` where it is none, or not whole."""
+    try:
+        files.check_regular(path, files.DATA_BYTES)
+        with zipfile.ZipFile(path) as archive:
+            if archive.getinfo(_HEADER).file_size > _HEADER_BYTES:
+                raise ValueError("what it says of itself is too long")
+            told = json.loads(archive.read(_HEADER))
+            if told.pop("format") != FORMAT:
+                raise ValueError("it is of another version of this program")
+            share = Share(**told.pop("share"))
+            header = PartHeader(**told | {"share": share, "size": tuple(told["size"])})
+            width, height = header.size
+            if not (0 < width <= _MAX_SIDE and 0 < height <= _MAX_SIDE and 0 < header.targets <= _MAX_TARGETS):
+                raise ValueError("its maps are of impossible size")
+            if not 1 <= share.index <= share.count:
+                raise ValueError("it is no part of anything")
+            header.light_stats()
+            for number in range(header.targets):
+                if archive.getinfo(f"sums{number}").file_size != 16 * width * height:
+                    raise ValueError("its maps are not whole")
+        return header
+    except _BAD as error:
+        raise _refusal(path, error) from error
+
+
+def merged_sums(paths: Sequence[Path], header: PartHeader) -> Iterator[np.ndarray]:
+    """For each texture the sum over all parts, added in float64: float32 (height, width, 4). Raises `UserError`."""
+    width, height = header.size
+    for number in range(header.targets):
+        total = np.zeros((height, width, 4))
+        for path in paths:
+            try:
+                with zipfile.ZipFile(path) as archive:
+                    texels = np.frombuffer(archive.read(f"sums{number}"), np.float32)
+                total += texels.reshape(height, width, 4)
+            except _BAD as error:
+                raise _refusal(path, error) from error
+        yield total.astype(np.float32)
+
+
+_BAD = (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, NotImplementedError, RuntimeError,
+        RecursionError, zipfile.BadZipFile, zlib.error)  # fmt: skip
+
+
+def _refusal(path: Path, error: Exception) -> UserError:
+    reason = files.reason_of(error) if isinstance(error, OSError) else "it is cut short, damaged, or something else"
+    if isinstance(error, ValueError) and not isinstance(error, UnicodeDecodeError | json.JSONDecodeError):
+        reason = str(error)
+    return UserError(f"{path} is no whole part of a rendering ({reason}): render that part again")

@@ -1,0 +1,220 @@
+"""One picture on many machines: each traces a share of the rounds, and the sums of all are the picture's maps.
+
+Random numbers are counters, so a share is exactly what one process would have traced in its rounds: nothing has to be
+agreed upon but the number of rounds. Only light is divided; the camera sees the merged maps once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..base.errors import UserError
+from ..edit.parameters import Stage
+from ..gpu.context import Context
+from ..model.scene import Scene
+from ..model.scene_key import picture_key
+from ..model.settings import RenderSettings
+from ..passes.trace import FluxTally
+from . import shrinking
+from .frames import FrameRenderer, Stop
+from .light_pass import LightPass, LightStats
+from .sampling import LightSampling
+
+_SETTINGS = (
+    "width",
+    "height",
+    "photons",
+    "seed",
+    "method",
+    "camera_method",
+    "layer",
+    "bins",
+    "max_depth",
+    "spp",
+    "smoothing",
+    "local_gain",
+    "camera_beams",
+)
+"""What decides the picture besides the scene."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """Which part of a rendering: `index` of `count`, from 1 on."""
+
+    index: int
+    count: int
+
+
+@dataclass(frozen=True)
+class PartHeader:
+    """What a part says of itself; plain values."""
+
+    name: str
+    """The scene's."""
+    scene: str
+    """Its file."""
+    key: str
+    """Of everything that decides the picture."""
+    settings: Mapping[str, Any]
+    share: Share
+    rounds: int
+    """Of the whole rendering, over all parts."""
+    layout: str
+    """Of where the maps lie."""
+    size: tuple[int, int]
+    targets: int
+    """Textures, each float32 (height, width, 4)."""
+    photon_weight: float
+    stats: Mapping[str, Any]
+    renderer: str
+
+    def light_stats(self) -> LightStats:
+        """What was counted."""
+        values = dict(self.stats)
+        return LightStats(**values | {"tally": FluxTally(**values["tally"])})
+
+
+@dataclass
+class Part:
+    """A part as it was traced."""
+
+    header: PartHeader
+    sums: list[np.ndarray] = field(default_factory=list)
+    """Float32 (height, width, 4) for every texture of the maps."""
+
+
+def rendering_key(scene: Scene, settings: RenderSettings) -> str:
+    """Key of everything that decides a picture of `scene`: only equal ones are parts of one picture."""
+    dabs = [item.local_dispersion for item in scene.objects]
+    return picture_key(scene, __version__, repr(dabs), *(getattr(settings, name) for name in _SETTINGS))
+
+
+def settings_of(header: PartHeader) -> RenderSettings:
+    """The settings of the rendering that a part belongs to."""
+    return RenderSettings(**{name: header.settings[name] for name in _SETTINGS})
+
+
+def trace_part(
+    context: Context,
+    scene: Scene,
+    settings: RenderSettings,
+    share: Share,
+    scene_file: str,
+    progress: Callable[[float], None] = lambda done: None,
+    stop: Stop = lambda: False,
+) -> Part | None:
+    """Trace one share of a rendering; None where `stop()` turned true before it was whole.
+
+    Raises `UserError` where the rendering has fewer rounds than parts.
+    """
+    settings = replace(settings, photons=settings.photons or scene.render.photons)
+    made: list[Part] = []
+
+    def fill(light: LightPass, sampling: LightSampling, stopped: Stop) -> Iterator[float]:
+        count, photons = shrinking.passes(light.features.method, sampling.photons)
+        light.begin(photons, sampling.seed)
+        rounds = light.rounds(photons)
+        # What has its beams together belongs to one part.
+        groups = -(-rounds // light.rounds_together(photons))
+        if count * groups < share.count:
+            way_out = "ask for fewer parts, more photons or a smaller --batch"
+            if light.only_beams:
+                way_out = "its light goes as beams, in rounds of a million photons: --method srd-photons has more"
+            raise UserError(
+                f"--passes {share.index}/{share.count}: this rendering is traced in {count * groups} rounds, which are "
+                f"not enough to share out; {way_out}"
+            )
+        mine = len(range(share.index - 1, count * groups, share.count))
+        done = 0
+        for number in range(count):
+            first = (share.index - 1 - number * groups) % share.count
+            for step in light.pass_steps(number, photons, 0, first, share.count):
+                done += step.round_done
+                yield done / mine
+                if stopped():
+                    return
+        light.finish()
+        header = PartHeader(
+            scene.name,
+            scene_file,
+            rendering_key(scene, settings),
+            {name: getattr(settings, name) for name in _SETTINGS},
+            share,
+            count * rounds,
+            layout_key(light),
+            light.atlas.size,
+            light.atlas.targets,
+            light.photon_weight,
+            _plain(light.stats),
+            context.renderer,
+        )
+        made.append(Part(header, [_texels(light, target) for target in range(light.atlas.targets)]))
+        yield 1.0
+
+    stage = Stage(scene, scene.camera)
+    renderer = FrameRenderer(context, settings, [stage], fill=fill)
+    steps = renderer.steps(stage, stop)
+    try:
+        for done in steps:
+            progress(done)
+            if made or stop():
+                break
+    finally:
+        steps.close()  # type: ignore[attr-defined]
+        renderer.release()
+    return made[0] if made else None
+
+
+def layout_key(light: LightPass) -> str:
+    """Where the maps lie, and what their channels are."""
+    digest = hashlib.sha256(repr((light.layout.size, light.atlas.targets, light.bin_edges_nm)).encode())
+    digest.update(np.ascontiguousarray(light.layout.placements).tobytes())
+    return digest.hexdigest()
+
+
+def merged_stats(stats: Iterable[LightStats]) -> LightStats:
+    """What all counted together."""
+    merged = LightStats()
+    for part in stats:
+        merged.tally.merge(part.tally)
+        for name in ("photons", "splats", "trace_seconds", "splat_seconds", "outside_map_w", "footprints_dropped",
+                     "dropped_w"):  # fmt: skip
+            setattr(merged, name, getattr(merged, name) + getattr(part, name))
+    return merged
+
+
+def merged_light(
+    headers: list[PartHeader], sums: Iterable[np.ndarray], refuse: Callable[[LightPass], None]
+) -> Callable[[LightPass, LightSampling, Stop], Iterator[float]]:
+    """What fills the maps of a rendering with parts; `sums` of all, texture by texture. `refuse` may raise where the
+    light pass is another than the parts'."""
+
+    def fill(light: LightPass, sampling: LightSampling, stopped: Stop) -> Iterator[float]:
+        light.begin(shrinking.passes(light.features.method, sampling.photons)[1], sampling.seed)
+        refuse(light)
+        weight = sum(header.photon_weight for header in headers)
+        light.take(sums, weight, merged_stats(header.light_stats() for header in headers))
+        yield 1.0
+
+    return fill
+
+
+def _texels(light: LightPass, target: int) -> np.ndarray:
+    width, height = light.atlas.size
+    texels = np.empty((height, width, 4), np.float32)
+    light.context.ctx.memory_barrier()
+    light.atlas.total_textures[target].read_into(texels)
+    return texels
+
+
+def _plain(stats: LightStats) -> dict[str, Any]:
+    """Counts only: bands and buffers are the same in all parts."""
+    told = asdict(stats)
+    return {name: value for name, value in told.items() if name not in ("bands", "light_points", "buffers")}
