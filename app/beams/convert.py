@@ -126,6 +126,7 @@ def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int, measure: float
         scene.facets["owner"][last].astype(np.int32),
         towards < 0.0,
         objects_of(head[:, 5], scene),
+        head[:, 8],
         head[:, 0] == LEAF_TAIL,
         chosen.flux,
         np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),

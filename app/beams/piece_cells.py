@@ -16,6 +16,8 @@ from .piece_measure import keep_lit, moments_of, parabola, power_between, weight
 
 CELL_STEPS = 2
 """Places of each of three parts of the time that a cell is lit at which it is measured, where an edge crosses it."""
+_LEAST_HELD = 1e-12
+"""Share of a light's power below which a ray stands for nothing."""
 COLUMNS = 31
 """Of a ray: position, direction, their derivatives by the cell's two axes (dp dp dd dd) and by x (dp dd), x_lo,
 x_anchor, x_hi, throughput there, flux."""
@@ -183,7 +185,7 @@ def ray_of(position, direction, weight, x_lo, x_hi, curve_x, curve_w, body, cont
         held = 0.5 * (w_lo + w_mid) * below + 0.5 * (w_mid + w_hi) * above
     else:
         held = w_mid * power_between(curve_x, curve_w, start, end)
-    if not held > 0.0:
+    if not held > _LEAST_HELD * curve_w[-1]:
         return False
     ray[27], ray[28], ray[29] = w_lo * content / held, w_mid * content / held, w_hi * content / held
     ray[30] = content

@@ -112,6 +112,7 @@ def rays(
     chosen,
     points,
     boost,
+    path,
     x_lo,
     x_hi,
     position,
@@ -129,12 +130,11 @@ def rays(
     key,
     first,
     stride,
-    base,
 ):
-    """Rays (n, COLUMNS) of the pieces `chosen`, their pieces and their numbers on all lattices.
+    """Rays (n, COLUMNS) of the pieces `chosen`, their pieces and their numbers on each piece's lattice.
 
     Piece chosen[k] has about points[k] >= 1 lattice points and is to carry boost[k] times its `content`. Of the cells
-    those of sub-lattice `first` of `stride`. `base`: the first number.
+    those of sub-lattice `first` of `stride`. `path`: hashes by piece.
     """
     room = 1024
     found, owner, number = np.empty((room, COLUMNS)), np.empty(room, np.int64), np.empty(room, np.int64)
@@ -152,8 +152,8 @@ def rays(
         along_it, across_it = _divide(frame, points[k])
         length, width = (frame[7] - frame[6]) / along_it, (frame[9] - frame[8]) / across_it
         columns, rows = int(np.ceil((frame[3] - frame[2]) / length)) + 1, int(np.ceil((frame[5] - frame[4]) / width))
-        u0 = frame[2] - length * ((_random(0, i, 0) + shift_u) % 1.0)
-        v0 = frame[4] - width * ((_random(0, i, 1) + shift_v) % 1.0)
+        u0 = frame[2] - length * ((_random(0, path[i], 0) + shift_u) % 1.0)
+        v0 = frame[4] - width * ((_random(0, path[i], 1) + shift_v) % 1.0)
         cell[2], cell[3] = 0.5 * length * frame[0], 0.5 * length * frame[1]
         cell[4], cell[5] = -0.5 * width * frame[1], 0.5 * width * frame[0]
         band_content = 0.0
@@ -170,7 +170,7 @@ def rays(
         # Lit cells that hold less than `least` are chosen by chance, in order along the lattice.
         least = content[i] / points[k] / min(across_it, 4.0)
         lit, small = 0, 0.0
-        offset = int(_random(key, i, 2) * stride)
+        offset = int(_random(key, path[i], 2) * stride)
         for row in range(rows + 1):
             column = (first + offset + row * row_step) % stride
             while column <= columns:
@@ -190,21 +190,19 @@ def rays(
                     scratch,
                     bodies[lit],
                 ):
-                    bodies[lit, 10] = base + row * (columns + 1) + column
+                    bodies[lit, 10] = row * (columns + 1) + column
                     if bodies[lit, 0] < least:
                         small += bodies[lit, 0]
                     lit += 1
                     if lit == len(bodies):
                         bodies = np.concatenate((bodies, np.empty_like(bodies)))
                 column += stride
-        base += (rows + 1) * (columns + 1)
-
         # All that the small ones hold, in equal parts; where it is less than one part, a sub-lattice has it by chance.
         parts = max(1.0, np.rint(small / least))
         part = small / parts
         if stride > 1 and small < least:
-            parts, part = (1.0 if _random(key, i, 3 + first) * least < small else 0.0), least
-        running, at = 0.0, _random(key, i, 3 + stride + first)
+            parts, part = (1.0 if _random(key, path[i], 3 + first) * least < small else 0.0), least
+        running, at = 0.0, _random(key, path[i], 3 + stride + first)
         for body in range(lit):
             carried = bodies[body, 0]
             if carried < least:

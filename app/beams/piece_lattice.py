@@ -31,7 +31,7 @@ class PieceRays:
     piece: np.ndarray
     """int (n,), which of the pieces."""
     number: np.ndarray
-    """int (n,), on all the pieces' lattices."""
+    """int (n,), on its piece's lattice."""
     position: np.ndarray
     """(n, 3), on the surface left last."""
     direction: np.ndarray
@@ -119,13 +119,14 @@ class PieceLattice:
         `most` rays at once.
 
         Points are shared out by flux per unit of spectral power, and by the bands' widths: no colour is coarser than
-        another, as on the emission lattices. Tails have points by the root of that: where it is dim, the weakest are
-        all that there is. Of pieces that would have less than one, some are drawn to stand for all.
-        `shift` of the lattices modulo 2³², and `key` of what is drawn: of one pass."""
+        another, as on the emission lattices. Where all are tails, points go by the root of that (where it is dim, the
+        weakest are all that there is), and `count` is met within the fourth root of two. Of pieces that would have less
+        than one, some are drawn to stand for all. `shift` of the lattices modulo 2³², and `key` of what is drawn: of
+        one pass."""
         mine, points = self._drawn(light, count, key)
         boost = self._measures[light] / np.minimum(points, 1.0)
         points = np.maximum(points, 1.0)
-        running = np.cumsum(points)
+        running, path = np.cumsum(points), np.ascontiguousarray(self.pieces.key, np.int64)
         position, direction = (
             np.ascontiguousarray(rays, float) for rays in (self.pieces.position, self.pieces.direction)
         )
@@ -136,6 +137,7 @@ class PieceLattice:
                 mine[part],
                 points[part],
                 boost[part],
+                path,
                 *self._bands,
                 position,
                 direction,
@@ -148,8 +150,6 @@ class PieceLattice:
                 key,
                 first,
                 stride,
-                # Lattices have cells beside what is lit: room for them, so that numbers differ.
-                int(4.0 * running[start - 1]) if start else 0,
             )
 
         start = 0
@@ -166,13 +166,27 @@ class PieceLattice:
         mine = np.flatnonzero((pieces.light == light) & (self._content > 0.0))
         share = self._content[mine] / self._power[mine]
         share *= np.where(pieces.x_hi[mine] > pieces.x_lo[mine], pieces.x_hi[mine] - pieces.x_lo[mine], 1.0)
-        share = np.where(pieces.is_tail[mine], np.sqrt(share), share)
+        if len(mine) and pieces.is_tail[mine].all():
+            # What does not change from frame to frame shall keep its rays while other pieces do: each piece for itself,
+            # by a density that takes steps.
+            share = np.sqrt(share)
+            points = share * 2.0 ** (np.round(2.0 * np.log2(count / share.sum())) / 2.0)
+            kept = _units(pieces.key[mine], key) < points
+            return mine[kept], points[kept]
         points = count * share / share.sum() if len(mine) else share
         # Systematic sampling: as many of the small ones as they have points together.
         running = np.cumsum(np.where(points < 1.0, points, 0.0)) + (key & 0xFFFFFFFF) / _WORD
         drawn = np.floor(running) > np.floor(np.concatenate([[(key & 0xFFFFFFFF) / _WORD], running[:-1]]))
         kept = drawn | (points >= 1.0)
         return mine[kept], points[kept]
+
+
+def _units(keys: np.ndarray, key: int) -> np.ndarray:
+    """Numbers in [0, 1) from hashes of paths, int64 (n,), and a pass's `key` [SplitMix64]."""
+    state = keys.astype(np.uint64) + np.uint64((key * 0x9E3779B97F4A7C15) & 0xFFFFFFFFFFFFFFFF)
+    for turn, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        state = (state ^ (state >> np.uint64(turn))) * np.uint64(factor)
+    return ((state ^ (state >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
 
 
 def _joined(parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]], columns: int) -> PieceRays:

@@ -24,18 +24,22 @@ class _Outlines:
 
     def where(self, chosen: np.ndarray) -> Self:
         """Those that are `chosen`, bool (rows,), in order."""
-        if chosen.all():
-            return self
+        return self if chosen.all() else self.take(np.flatnonzero(chosen))
+
+    def take(self, rows: np.ndarray) -> Self:
+        """Some rows, int (n,), in that order; the same may come several times."""
         values = {}
         for name in (field.name for field in fields(self)):  # type: ignore[arg-type]
             value = getattr(self, name)
             if name in ("edges", "hulls"):
                 starts = self.edge_start if name == "edges" else self.hull_start
-                values[name] = value[np.repeat(chosen, np.diff(starts))]
+                counts = np.diff(starts)[rows]
+                ahead = np.repeat(starts[rows] - np.cumsum(counts) + counts, counts)
+                values[name] = value[ahead + np.arange(len(ahead))]
             elif name.endswith("_start"):
-                values[name] = np.append(0, np.cumsum(np.diff(value)[chosen])).astype(np.int32)
+                values[name] = np.append(0, np.cumsum(np.diff(value)[rows])).astype(np.int32)
             else:
-                values[name] = value[chosen]
+                values[name] = value[rows]
         return type(self)(**values)
 
 
@@ -120,6 +124,8 @@ class BeamPieces(_Outlines):
     """bool (M,), whether the piece travels on the inner side of `last_object`'s facet."""
     inside: np.ndarray
     """uint64 (M,), bit per object of the solids that the piece is inside of."""
+    key: np.ndarray
+    """int64 (M,), hash of the facets met: the same from frame to frame of an animation."""
     is_tail: np.ndarray
     """bool (M,), whether it was merely too weak to be followed on."""
     flux: np.ndarray

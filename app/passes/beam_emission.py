@@ -8,11 +8,12 @@ the medium and the derivatives that a photon of the emission lattice would have 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from ..beams.piece_lattice import PieceLattice, PieceRays
-from ..beams.polygons import BeamPieces
+from ..beams.polygons import BeamPieces, parabola_at
 from ..gpu.records import FLAG_INSIDE
 from ..gpu.reindex import Spans
 from ..gpu.scene_buffers import SceneBuffers
@@ -37,6 +38,8 @@ class BeamEmission:
         self._scene = scene
         self._ray = ray
         self._features = scene.features
+        if not self._features.band_cuts:
+            pieces = _by_bands(pieces, spans)
         band = _bands(pieces, spans, any_interval=self._features.band_cuts)
         within = _is_line_within(pieces)
         self.pieces = pieces.where(~within)
@@ -85,7 +88,7 @@ class BeamEmission:
         records["footprint_scale"] = records["survival"] = 1.0
         records["photon_id"] = rays.number & 0xFFFFFFFF
         records["light_and_source"] = light | self._band[own] << 8 | pieces.source[own].astype(np.int64) << 16
-        records["branch_key"] = _hashed(key ^ _hashed(own.astype(np.uint32)))
+        records["branch_key"] = _hashed(key ^ _hashed(pieces.key[own].astype(np.uint32)))
         records["flags"] = np.where(pieces.is_inside[own], FLAG_INSIDE, 0)
         records["depth"] = pieces.depth[own]
         records["last_primitive"], records["last_object"] = self._primitive[own], pieces.last_object[own]
@@ -142,6 +145,25 @@ def _bands(pieces: BeamPieces, spans: Spans, *, any_interval: bool) -> np.ndarra
         # What is cut out of a band is drawn by the light's running integral, whichever the band.
         found[mine] = np.where(same | any_interval, nearest, -1)
     return found
+
+
+def _by_bands(pieces: BeamPieces, spans: Spans) -> BeamPieces:
+    """Each piece once for every table's band within its interval, if they fill that. What nothing disperses looks the
+    same at all wavelengths, but for its weight."""
+    rows, bands = [], []
+    for row, (light, lo, hi) in enumerate(zip(pieces.light, pieces.x_lo, pieces.x_hi, strict=True)):
+        within = [band for band in spans[light] if lo - _SAME_X <= band[0] < band[1] <= hi + _SAME_X]
+        filled = within and abs(within[0][0] - lo) + abs(within[-1][1] - hi) < _SAME_X
+        for band in within if filled else [(lo, hi)]:
+            rows.append(row)
+            bands.append(band)
+    parts = pieces.take(np.array(rows, int))
+    ends = np.array(bands, float).reshape(-1, 2)
+    width = np.maximum(parts.x_hi - parts.x_lo, 1e-300)[:, None]
+    places = (np.stack([ends[:, 0], ends.mean(axis=1), ends[:, 1]], axis=1) - parts.x_lo[:, None]) / width
+    weight = np.stack([parabola_at(parts.weight, places[:, k]) for k in range(3)], axis=1)
+    key = parts.key ^ (ends[:, 0] * (1 << 20)).astype(np.int64)
+    return replace(parts, x_lo=ends[:, 0], x_hi=ends[:, 1], weight=np.maximum(weight, 0.0), key=key)
 
 
 def _is_line_within(pieces: BeamPieces) -> np.ndarray:

@@ -46,7 +46,7 @@ from .shown_spectra import ShownSpectra, ShownTables
 from .splatting import Pace, Splatting
 
 DEFAULT_BATCH = 1 << 16
-BEAM_ROUND = 1 << 20
+BEAM_ROUND = 1 << 19
 """Photons' worth of beams, where they carry everything, after which a pass may be left."""
 BEAM_LEAST = 1 << 17
 """Photons, at least, whose beams are found at once, where photons are traced besides."""
@@ -491,8 +491,7 @@ class LightPass:
             emission = BeamEmission(self.buffers, self.trace.ray, pieces, self._records.tables.spans)
             for light, rays in handed_rays(emission, beams.stats.entered_w, share, self.trace.batch, self.seed, nth):
                 self.stats.trace_seconds += time.perf_counter() - started
-                # Whoever shows photons again has weak beams play roulette: tails are not kept.
-                for _ in self.batch_steps(self.trace.carry_on(rays, light), of, keeps=not tails):
+                for _ in self.batch_steps(self.trace.carry_on(rays, light), of, of_tails=tails):
                     yield PassStep(done, False)
                 started = time.perf_counter()
 
@@ -507,8 +506,11 @@ class LightPass:
         """Roulette's seed in round `number` of all passes."""
         return random_word(self.seed, 0, number, Dimension.BRANCH)
 
-    def batch_steps(self, steps: Generator[None, None, Batch], of: RoundOf, *, keeps: bool = True) -> Iterator[None]:
-        """Trace a batch (`TracePass.steps`, `carry_on`), keep and splat what landed, and count it."""
+    def batch_steps(
+        self, steps: Generator[None, None, Batch], of: RoundOf, *, of_tails: bool = False
+    ) -> Iterator[None]:
+        """Trace a batch (`TracePass.steps`, `carry_on`), keep and splat what landed, and count it. `of_tails`: photons
+        that carry on weak beams, for which a pass has photons besides."""
         started = time.perf_counter()
         while True:
             try:
@@ -522,13 +524,13 @@ class LightPass:
             yield
             started = time.perf_counter()
         self.stats.trace_seconds += time.perf_counter() - started
-        if keeps:
+        if self._records.takes_tails or not of_tails:
             self._records.keep(self.trace.photons, batch, self.trace.photon.stride, of)
         yield
         yield from self.splat_steps(
             self.trace.photons, batch.photons, shrinking.kernel_scale(of.number) if self._shrinks else 1.0
         )
-        self.stats.photons += batch.emitted_photons
+        self.stats.photons += 0 if of_tails else batch.emitted_photons
         self.stats.splats += batch.photons
         self.stats.tally.merge(batch.tally.without_beams)
 

@@ -16,8 +16,8 @@ _SPLAT_PROGRAMS = 130 * _MIB
 """Programs that splat, compiled on the processor, with their tables and lists: 65 to 200 MiB were measured."""
 _ALL_PROGRAMS = 170 * _MIB
 """With the camera's."""
-_BEAMS = 160 * _MIB
-"""A million photons' worth of beams, with what they leave: 140 MiB were measured in `brilliant`."""
+_BEAMS = 80 * _MIB
+"""Half a million photons' worth of beams, with what they leave: 70 MiB were measured in `brilliant`."""
 _TEXEL_BYTES = 16
 _SPARE = 0.02
 

@@ -27,6 +27,9 @@ class RoundOf:
 class PhotonRecords(Protocol):
     """Where traced photons go besides the maps, with the spectral tables that belong to them."""
 
+    takes_tails: bool
+    """Photons that carry on weak beams are kept too. Whoever shows photons again has such beams play roulette."""
+
     @property
     def tables(self) -> PassTables:
         """Of the passes that run; `begin` comes first."""
@@ -43,6 +46,8 @@ class PhotonRecords(Protocol):
 
 class NoRecords:
     """`PhotonRecords` for photons that are splatted and forgotten."""
+
+    takes_tails = False
 
     def __init__(self) -> None:
         self._tables: PassTables | None = None

@@ -77,11 +77,11 @@ def test_what_stands_still_stands_still(gl, stage: Stage) -> None:
     assert np.array_equal(first, again)
     moved = np.abs(second - first).max(axis=-1)
     assert 0.05 < (moved > 1e-3 * first.max()).mean() < 0.4
-    # The right of the picture: sparks of the diamond, and table. What changes there is a few times rounding, how much
-    # is the seed's chance: of twelve the worst had 2e-6 and 5e-8 of the brightest.
+    # The right of the picture: sparks of the diamond, and table. The room's light meets both: what its weak beams leave
+    # to photons there changes by 1.4e-4 of the brightest.
     assert np.ptp(first[18:30, 72:]) > 0.1 * first.max()
-    assert moved[18:30, 72:].max() <= 4e-6 * first.max()
-    assert moved[24:30, 80:].max() <= 1e-7 * first.max()
+    assert moved[18:30, 72:].max() <= 4e-4 * first.max()
+    assert moved[18:30, 72:].mean() <= 2e-5 * first.max()
 
 
 def test_a_frame_is_a_function_of_its_stage_alone(gl, stage: Stage) -> None:

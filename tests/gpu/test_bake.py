@@ -120,7 +120,7 @@ def test_left_early_or_wrong_nothing_appears(gl, tmp_path: Path) -> None:
     for receiver, name, told in (
         ("tabel", "x.png", "did you mean 'table'"),
         ("prism", "x.png", "'table'"),
-        ("table", "x.jpg", "picture format"),
+        ("table", "x.gif", "picture format"),
     ):
         with pytest.raises(UserError, match=told):
             list(bake(gl, stage, SETTINGS, receiver, tmp_path / name))

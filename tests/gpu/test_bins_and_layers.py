@@ -325,7 +325,7 @@ def test_a_bare_mesh_is_glass_on_a_table(render: Render) -> None:
 
 def test_three_lines_are_a_scene(render: Render) -> None:
     picture = render('[[objects]]\nshape = "sphere"\nglass = "N-SF11"\n', "--layer caustic --stats")
-    assert render.notes.count("note: ") == 3  # type: ignore[attr-defined]
+    assert render.notes.count("note: ") == 2  # type: ignore[attr-defined]
     bright = luminance(picture)
     assert bright.max() > 5.0 * bright.mean()  # the heart of the ball's caustic is in view
     assert share(render, "deposited") > 0.3

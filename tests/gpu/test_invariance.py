@@ -183,7 +183,10 @@ def through_ball(gl) -> tuple[Scene, np.ndarray]:
 
 @pytest.mark.parametrize("scale", [2.0**10, pytest.param(2.0**-10, marks=SLOW)])
 def test_units_of_length_by_powers_of_two_change_nothing(gl, original: np.ndarray, scale: float) -> None:
-    assert difference(picture(gl, moved(scene(), placed(scale))), original) < EXACT
+    # Of slivers of beams that are left to photons, rounding decides how their lattices lie.
+    assert difference(picture(gl, moved(scene(), placed(scale))), original) < 2e-4
+    by_photons = [picture(gl, s, method="srd-photons") for s in (moved(scene(), placed(scale)), scene())]
+    assert difference(*by_photons) < EXACT
 
 
 @pytest.mark.slow

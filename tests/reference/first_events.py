@@ -6,6 +6,7 @@ transmitted and reflected at the second surface. All of the light is in them, no
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -14,6 +15,8 @@ from spectrasplat.beams.polygons import BeamPieces, joined
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.passes.emission_domain import EmissionDomain, azimuthal_plane
 from spectrasplat.reference.optics import fresnel_reflectance, reflect, refract
+
+_KEYS = itertools.count(1)
 
 
 def half_planes(corners: np.ndarray) -> np.ndarray:
@@ -169,6 +172,7 @@ def _piece(lo, hi, centre, hull, positions, directions, weight, edges, triangle,
         last_object=item * one,
         is_inside=np.array([inside]),
         inside=np.array([1 << item if inside else 0], np.uint64),
+        key=np.array([next(_KEYS)]),
         is_tail=np.zeros(1, bool),
         flux=np.ones(1),
         edge_start=np.array([0, len(edges)], np.int32),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,9 @@ EVEN = CumulativeSpectrum(np.array([0.0, 1.0]), np.outer([0.0, 2.0], [1.0, 1.0, 
 LINE = CumulativeSpectrum(np.array([0.0, 0.4, 0.4, 1.0]), np.outer([0.0, 0.0, 3.0, 3.0], np.ones(4)))
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 KEY = 12345
+
+
+_KEYS = itertools.count(1)
 
 
 def edges_of(corners: np.ndarray, move: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
@@ -55,6 +59,7 @@ def piece(
         last_object=one,
         is_inside=one.astype(bool),
         inside=one.astype(np.uint64),
+        key=np.array([next(_KEYS)]),
         is_tail=np.zeros(1, bool),
         flux=np.ones(1),
         edge_start=np.array([0, len(corners)], np.int32),
@@ -151,8 +156,8 @@ def test_sub_lattices_are_even_and_make_the_whole() -> None:
     flux = np.array([part.flux_w.sum() for part in parts])
     assert flux.sum() == pytest.approx(whole.flux_w.sum(), rel=0.01)
     assert flux == pytest.approx(flux.mean(), rel=0.05)
-    numbers = np.concatenate([part.number for part in parts])
-    assert len(np.unique(numbers)) == len(numbers)
+    numbers = np.concatenate([np.stack([part.piece, part.number]) for part in parts], axis=1)
+    assert len(np.unique(numbers, axis=1).T) == len(numbers.T)
     middle = np.array([part.flux_w @ part.position[:, :2] / part.flux_w.sum() for part in parts])
     assert np.ptp(middle, axis=0).max() < 0.05
 

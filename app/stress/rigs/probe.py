@@ -40,6 +40,8 @@ LOST_TO_NUMERICS = 1e-3
 class WatchedRecords:
     """`PhotonRecords` that are read after every batch."""
 
+    takes_tails = True
+
     def __init__(self, groups: int) -> None:
         self._dtype = records.photon_record(groups).dtype
         self._forgotten = NoRecords()
