@@ -242,7 +242,11 @@ class BeamLight:
 
     def show(self, scene: Scene) -> None:
         """Follow `scene` from now on: other glass and spectra, which `shown` has too."""
-        self.finder = self._traced.shown_as(scene)
+        traced = self._traced.shown
+        same = all(a.material is b.material for a, b in zip(traced.objects, scene.objects, strict=True)) and all(
+            a.spectral_power is b.spectral_power for a, b in zip(traced.lights, scene.lights, strict=True)
+        )
+        self.finder = self._traced if same else self._traced.shown_as(scene)
         self._coarse = None
         self._forget_tables()
 

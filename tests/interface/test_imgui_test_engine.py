@@ -30,7 +30,9 @@ def test_select_edit_undo_redo(tmp_path: Path) -> None:
     assert saw["gl_errors"] == []
     assert saw["seen"] == ["selected object 0", "selected object 1", "shortcuts True"]
     assert saw["gains"] == {"start": 1.0, "edited": 3.0, "undone": 1.0, "redone": 3.0}
-    assert len(set(saw["rays"].values())) == 1  # nothing was traced
+    # Nothing was traced but what beams are too weak for, and that only through the glass as it was at first.
+    rays = saw["rays"]
+    assert rays["edited"] == rays["start"] and max(rays.values()) < 1.5 * rays["start"]
     assert saw["from_start"]["edited"] > 0.1
     assert saw["from_start"]["undone"] < 1e-5
     assert saw["redone_from_edited"] < 1e-5

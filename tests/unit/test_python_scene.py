@@ -43,10 +43,10 @@ def test_an_edit_uses_the_names_of_the_file_and_keeps_what_it_does_not_touch() -
 
 def test_what_the_file_does_not_say_is_told() -> None:
     scene = ss.load({"objects": [{"shape": "sphere", "glass": "N-SF11"}]})
-    assert scene.objects.names == ["sphere", "table"] and scene.lights.names == ["sun"]
+    assert scene.objects.names == ["sphere", "table"] and scene.lights.names == ["lamp", "from above"]
     assert scene.objects["sphere"].dispersion_gain == 1.0
     assert scene.camera.kind == "pinhole" and scene.render.size == [960, 540]
-    assert len(scene.notes) == 3
+    assert len(scene.notes) == 2
     assert "dispersion_gain" in dir(scene.objects["sphere"]) and "dispersion_gain" not in dir(scene.objects["table"])
     position = scene.camera.position
     scene.objects.add(name="wall", shape="plane", material="black", position=(0.0, 9.0, 0.0))
