@@ -34,6 +34,21 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         pass
 
 
+def make_output_folder(folder: Path, *names: str) -> None:
+    """Make a folder, and refuse now that any of the files `names` in it could not be written in minutes.
+
+    Raises `UserError` naming what cannot be made or written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(
+            f"cannot make the folder {folder}: {error.strerror or error}; give another one with -o"
+        ) from error
+    for name in names:
+        check_writable(folder / name)
+
+
 @contextmanager
 def atomic_output(path: str | os.PathLike[str], lasting: bool = True) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` when the block succeeds.

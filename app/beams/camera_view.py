@@ -79,7 +79,7 @@ class CameraView:
         self.covered = float(sums[SUM_ENTERED]) / footprint**2
         shown[[o for o in self.scene.beam_objects if o not in blocked]] = True
         polygons = _screen_polygons(leaves, self.scene, 0.5 * np.array(size, float), footprint)
-        return polygons.of(np.flatnonzero(shown[polygons.source])), shown
+        return polygons.where(shown[polygons.source]), shown
 
     def _search(
         self, emission: Emission, how: Search, threads: int | None, go_on: GoOn, footprint: float

@@ -16,7 +16,7 @@ from typing import Self
 import numpy as np
 
 
-class _Outlines:
+class Outlines:
     """Values a row each, with edges from `edge_start` on and corners of hulls from `hull_start` on."""
 
     edge_start: np.ndarray
@@ -44,7 +44,7 @@ class _Outlines:
 
 
 @dataclass(frozen=True)
-class BeamPolygons(_Outlines):
+class BeamPolygons(Outlines):
     """Polygons that bands of beams throw on flat receivers; N polygons, E edges, H corners of hulls.
 
     Place p on a receiver is (u, v) of its plane's frame (`PlaneFrame`, by receiver). At t in [0, 1], where
@@ -90,7 +90,7 @@ class BeamPolygons(_Outlines):
 
 
 @dataclass(frozen=True)
-class BeamPieces(_Outlines):
+class BeamPieces(Outlines):
     """Pieces of beams that go on as photons, since what they meet is not flat; M pieces, E edges, H hull corners.
 
     A piece is a polygon in its light's emission coordinates q = (q_u, q_v) (`EmissionDomain`: GPU units across a

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .polygons import Outlines
+
 
 @dataclass(frozen=True)
-class ScreenPolygons:
+class ScreenPolygons(Outlines):
     """N polygons, E edges, H corners of hulls.
 
     Places are pixel coordinates (x, y): x to the right, y downwards, pixel (i, j) of column i and row j covers
@@ -65,22 +67,6 @@ class ScreenPolygons:
 
     def __len__(self) -> int:
         return len(self.x_lo)
-
-    def of(self, numbers: np.ndarray) -> ScreenPolygons:
-        """Those of these numbers, in this order."""
-        values = {}
-        for name in self.__dataclass_fields__:
-            array = getattr(self, name)
-            if name.endswith("_start"):
-                values[name] = np.concatenate([[0], np.cumsum(np.diff(array)[numbers])]).astype(np.int32)
-            elif name in ("edges", "hulls"):
-                starts = getattr(self, f"{name[:-1]}_start")
-                counts = np.diff(starts)[numbers]
-                offsets = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-                values[name] = array[np.repeat(starts[:-1][numbers], counts) + offsets]
-            else:
-                values[name] = array[numbers]
-        return ScreenPolygons(**values)
 
     def scaled(self, factor: float) -> ScreenPolygons:
         """The same for a picture `factor` times as wide and high."""

@@ -168,7 +168,7 @@ def plot(costs: list[BeamCost], stem: Path) -> None:
         plt.close(figure)
 
 
-def lines(cost: BeamCost) -> str:
+def line(cost: BeamCost) -> str:
     """One line of the table."""
     return (
         f"{cost.facets:7,d}  {cost.threshold:9.0e}  {cost.seconds:8.3f}  {cost.beams:9,d}  {cost.polygons:9,d}  "

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from ..base import files
-from ..base.atomic import atomic_output, check_writable
+from ..base.atomic import atomic_output, make_output_folder
 from ..base.errors import UserError
 from ..reference.metrics import ReferencePicture
 from .results import BenchResult, BenchSettings, SceneResult
@@ -36,12 +36,7 @@ class Store:
         Raises `UserError` where it cannot be written or holds results that cannot be gone on from.
         """
         self.directory = directory
-        try:
-            directory.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            reason = error.strerror or str(error)
-            raise UserError(f"cannot make the folder {directory}: {reason}; give another one with -o") from error
-        check_writable(self.path)
+        make_output_folder(directory, RESULTS)
         self.result = fresh_result
         if not os.path.exists(self.path):
             return

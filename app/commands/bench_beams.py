@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..base.atomic import atomic_output, check_writable
-from ..base.errors import UserError
+from ..base.atomic import atomic_output, make_output_folder
 
 
 def bench_beams_command(output: Path) -> int:
@@ -15,19 +14,13 @@ def bench_beams_command(output: Path) -> int:
     from ..bench import beam_costs
     from ..gpu.context import create_context
 
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(
-            f"cannot make the folder {output}: {error.strerror or error}; give another one with -o"
-        ) from error
-    check_writable(output / "beam_costs.json")
+    make_output_folder(output, "beam_costs.json")
     costs = []
     print(beam_costs.HEAD, flush=True)
     with create_context() as context:
         for cost in beam_costs.measure(context):
             costs.append(cost)
-            print(beam_costs.lines(cost), flush=True)
+            print(beam_costs.line(cost), flush=True)
             # Whoever stops it keeps what is measured.
             with atomic_output(output / "beam_costs.json") as temporary:
                 temporary.write_bytes(msgspec.json.format(msgspec.json.encode(costs)))

@@ -23,6 +23,7 @@ import msgspec
 import typer
 
 from .. import __version__
+from ..base.atomic import make_output_folder
 from ..base.errors import UserError, plain
 from .proof_steps import PARTS, Finding, Part
 
@@ -99,7 +100,7 @@ def prove_gpu(
     from ..base.progress import ProgressReporter
 
     chosen = chosen_parts(parts)
-    _prepare(output)
+    make_output_folder(output, JSON, HTML)
     started = time.monotonic()
     proof = Proof(
         __version__,
@@ -266,20 +267,6 @@ def _end(process: subprocess.Popen) -> None:
 
 
 # -- what is kept -------------------------------------------------------------------------
-
-
-def _prepare(folder: Path) -> None:
-    """Make the folder, and refuse now what could not be written in minutes."""
-    from ..base.atomic import check_writable
-
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(
-            f"cannot make the folder {folder}: {error.strerror or error}; give another one with -o"
-        ) from error
-    for name in (JSON, HTML):
-        check_writable(folder / name)
 
 
 def _keep(proof: Proof, folder: Path) -> None:

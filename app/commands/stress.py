@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .. import __version__
+from ..base.atomic import make_output_folder
 from ..base.errors import UserError
 from . import options
 
@@ -41,7 +42,7 @@ def stress_command(request: StressRequest, show: Callable[[object], None]) -> in
 
     files = [options.find_scene(name) for name in request.scenes]
     if request.output is not None and not request.list_cases:
-        _prepare(request.output)
+        make_output_folder(request.output, JSON, HTML)
     cases = choose(_cases(files), request.cases)
     if request.list_cases:
         show("\n".join(f"{case.name:<24} {case.steps:>3}  {case.title}" for case in cases))
@@ -94,20 +95,6 @@ def _cases(files: Sequence[Path]) -> tuple[Case, ...]:
             )
         scenes[file.stem] = load_scene(file)
     return sweeps(list(scenes.items()))
-
-
-def _prepare(folder: Path) -> None:
-    """Make the output folder, and refuse now what could not be written in minutes."""
-    from ..base.atomic import check_writable
-
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(
-            f"cannot make the folder {folder}: {error.strerror or error}; give another one with -o"
-        ) from error
-    for name in (JSON, HTML):
-        check_writable(folder / name)
 
 
 def _keep(result: StressResult, folder: Path | None) -> None:

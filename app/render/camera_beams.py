@@ -135,8 +135,8 @@ class CameraBeams:
         polygons, shown = self._view.find_screen_polygons(
             camera, size, times * THRESHOLD / samples, seed, faint=_FAINT * share
         )
-        handed = polygons.of(np.flatnonzero(polygons.is_handed))
-        polygons = polygons.of(np.flatnonzero(~polygons.is_handed))
+        handed = polygons.where(polygons.is_handed)
+        polygons = polygons.where(~polygons.is_handed)
         brightness = self._pass.brightness
         assert brightness is not None
         starts = screen_starts(handed, size, brightness, share, seed)

@@ -25,7 +25,7 @@ def test_finer_searches_leave_less(gl) -> None:
     assert [cost.threshold for cost in boxes] == list(beam_costs.THRESHOLDS) and all(cost.by_beams for cost in boxes)
     for coarse, fine in pairwise(boxes):
         assert fine.beams > coarse.beams and fine.handed < coarse.handed
-    assert not dense.by_beams and "10000 triangles" in dense.why_not and "10000 triangles" in beam_costs.lines(dense)
+    assert not dense.by_beams and "10000 triangles" in dense.why_not and "10000 triangles" in beam_costs.line(dense)
 
 
 def test_the_command_writes_what_it_measured(tmp_path: Path, monkeypatch, capsys) -> None:

@@ -138,7 +138,7 @@ def test_the_order_of_polygons_and_repeats(prism_pass):
     polygons = polygons_of(prism_pass)
     first, again = by_beams(prism_pass, polygons), by_beams(prism_pass, polygons)
     assert np.array_equal(first, again)
-    turned = by_beams(prism_pass, polygons.of(np.arange(len(polygons))[::-1]))
+    turned = by_beams(prism_pass, polygons.take(np.arange(len(polygons))[::-1]))
     np.testing.assert_allclose(turned, first, rtol=1e-5, atol=1e-6)
 
 

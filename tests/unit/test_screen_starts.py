@@ -102,4 +102,4 @@ def test_few_paths_stand_for_many_weak_polygons():
 
 
 def test_nothing_handed_is_nothing():
-    assert len(screen_starts(triangles(3).of(np.zeros(0, int)), SIZE, BRIGHTNESS, 0.1, 1)) == 0
+    assert len(screen_starts(triangles(3).take(np.zeros(0, int)), SIZE, BRIGHTNESS, 0.1, 1)) == 0
