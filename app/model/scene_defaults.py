@@ -52,8 +52,14 @@ _FLAT = 0.1
 
 def bounds_of(objects: Sequence[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest corner of all `objects` in the world, float64 (3,) each."""
+    low, high = _bounds_of_each(objects)
+    return low.min(axis=0), high.max(axis=0)
+
+
+def _bounds_of_each(objects: Sequence[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest corners in the world, float64 (n, 3) each."""
     points = [o.mesh.vertices @ o.object_to_world[:3, :3].T + o.object_to_world[:3, 3] for o in objects]
-    return np.min([p.min(axis=0) for p in points], axis=0), np.max([p.max(axis=0) for p in points], axis=0)
+    return np.array([p.min(axis=0) for p in points]), np.array([p.max(axis=0) for p in points])
 
 
 def environment_of(objects: Sequence[SceneObject]) -> Surroundings:
@@ -71,15 +77,17 @@ def parts_of(objects: Sequence[SceneObject]) -> list[SceneObject]:
     """`objects` of a z-up world without the ground they stand on: receivers that are flat and reach beyond the rest.
     All, where nothing else is there."""
 
-    def is_ground(item: SceneObject) -> bool:
-        others = [o for o in objects if o is not item]
-        if not (item.material.receives and others):
-            return False
-        low, high = bounds_of([item])
-        wide, rest = (high - low)[:2], np.subtract(*bounds_of(others)[::-1])[:2]
-        return bool(high[2] - low[2] <= _FLAT * wide.max() and (wide >= rest).all())
-
-    return [o for o in objects if not is_ground(o)] or list(objects)
+    if len(objects) < 2:
+        return list(objects)
+    low, high = _bounds_of_each(objects)
+    # Of all others, for each: the lowest, but the second lowest for the lowest itself. A file may have many thousands.
+    lowest, highest = np.partition(low, 1, axis=0)[:2], -np.partition(-high, 1, axis=0)[:2]
+    others_low = np.where(low == lowest[0], lowest[1], lowest[0])
+    others_high = np.where(high == highest[0], highest[1], highest[0])
+    size, rest = high - low, others_high - others_low
+    is_ground = (size[:, 2] <= _FLAT * size[:, :2].max(axis=1)) & (size[:, :2] >= rest[:, :2]).all(axis=1)
+    parts = [o for o, ground in zip(objects, is_ground, strict=True) if not (ground and o.material.receives)]
+    return parts or list(objects)
 
 
 def default_camera(around: Surroundings) -> Camera:

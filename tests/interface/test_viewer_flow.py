@@ -95,7 +95,8 @@ def test_undo_and_redo_bring_the_pictures_back(hands: Hands) -> None:
     hands.interface.key(imgui.Key.y, CTRL)
     assert difference(hands.settle(), edited) < SAME
     assert difference(edited, before) > 0.1
-    assert hands.rays_traced == traced
+    # Only what beams are too weak for is traced again, and only through the glass as it was at first.
+    assert traced <= hands.rays_traced < 1.1 * traced
 
 
 def test_brushing_widens_the_colours_where_it_paints(hands: Hands) -> None:
