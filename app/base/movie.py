@@ -6,7 +6,6 @@ import json
 import math
 import os
 import subprocess
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
@@ -17,6 +16,7 @@ import numpy as np
 from . import files
 from .atomic import atomic_output, check_writable
 from .errors import UserError
+from .locks import locked
 
 MANIFEST = "animation.json"
 _CLAIM = ".claim"
@@ -119,7 +119,7 @@ class Frames:
         self._manifest = folder / MANIFEST
         self.description = dict(description)
         self.base_ev: float | None = None
-        with _lock(folder):
+        with locked(folder):
             self._begin(overwrite)
 
     def _begin(self, overwrite: bool) -> None:
@@ -144,7 +144,7 @@ class Frames:
     def fix_exposure(self, base_ev: float) -> float:
         """Remember the exposure that all frames share, also for a later call that goes on; returns the one that
         another process has fixed meanwhile, where one has."""
-        with _lock(self._folder):
+        with locked(self._folder):
             if self.exposure() is None:
                 self.base_ev = base_ev
                 self._save()
@@ -168,7 +168,7 @@ class Frames:
         if self.has(index):
             yield False
             return
-        with _lock(claim, wait=False) as is_ours:
+        with locked(claim, wait=False) as is_ours:
             # Another may have finished it between the two looks.
             yield is_ours and not self.has(index)
             if is_ours:
@@ -188,7 +188,7 @@ class Frames:
     def close(self) -> None:
         """Remove the claims of processes that were killed."""
         for claim in self._folder.glob(f".*{_CLAIM}"):
-            with suppress(OSError), _lock(claim, wait=False, make=False) as is_ours:
+            with suppress(OSError), locked(claim, wait=False, make=False) as is_ours:
                 if is_ours:
                     claim.unlink(missing_ok=True)
 
@@ -212,30 +212,6 @@ class Frames:
                 if frame.stem.isdigit():
                     frame.unlink()
         self._manifest.unlink(missing_ok=True)
-
-
-@contextmanager
-def _lock(path: Path, wait: bool = True, make: bool = True) -> Iterator[bool]:
-    """Hold a lock on a folder, or on a file that is made for it; whether it could be had. Where the system has no
-    locks, it always can."""
-    if sys.platform == "win32":
-        yield True
-        return
-    import fcntl
-
-    is_folder = path.is_dir()
-    descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR | (os.O_CREAT if make else 0), 0o666)
-    try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-            is_held = True
-        except BlockingIOError:
-            is_held = False
-        except OSError:  # a file system without locks
-            is_held = True
-        yield is_held
-    finally:
-        os.close(descriptor)
 
 
 def _exposure(value: object) -> float | None:

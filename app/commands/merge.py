@@ -35,20 +35,19 @@ def merge_command(request: MergeRequest) -> int:
     from ..base.image_io import check_suffix, write_image
     from ..base.progress import ProgressReporter
 
+    if request.output.suffix.lower() == ".ssp":
+        return _merge_to_part(request)
     check_suffix(request.output)
     exposure = None if request.exposure is None else options.parse_exposure(request.exposure)
     check_writable(request.output)
 
     from ..model.io.scene_file import load_scene
     from ..render.light_pass import LightPass
+    from ..render.part_file import merged_sums
     from ..render.parts import layout_key, merged_light, rendering_key, settings_of
     from ..render.still import render
-    from .part_file import merged_sums, read_header
 
-    for path, times in Counter(request.parts).items():
-        if times > 1:
-            print(f"note: {plain(str(path))} is given {times} times: counted once", file=sys.stderr)
-    headers = {path: read_header(path) for path in request.parts}
+    headers = _headers(request)
     chosen = _chosen(headers, request.partial)
     first = headers[chosen[0]]
     settings = settings_of(first)
@@ -81,7 +80,8 @@ def merge_command(request: MergeRequest) -> int:
         bin_edges_nm=result.bin_edges_nm,
     )
     print(
-        f"{request.output.resolve()}: {settings.width}×{settings.height}, {len(chosen)} of {first.share.count} parts, "
+        f"{request.output.resolve()}: {settings.width}×{settings.height}, "
+        f"{sum(len(headers[path].indices) for path in chosen)} of {first.share.count} parts, "
         f"{result.stats.photons:,} photons in {time.perf_counter() - started:.1f} s"
         + (", stopped early" if stopped else "")
     )
@@ -90,10 +90,42 @@ def merge_command(request: MergeRequest) -> int:
     return interrupted.exit_code if stopped else 0
 
 
-def _chosen(headers: dict[Path, PartHeader], partial: bool) -> list[Path]:
-    """One file of each part, in their order. Raises `UserError` where they are not of one rendering, or some are
-    missing and that was not asked for."""
-    paths = list(headers)
+def _merge_to_part(request: MergeRequest) -> int:
+    """Merge to one part that holds them all: what many machines trace is then merged in a tree."""
+    from ..base.atomic import check_writable
+    from ..render.part_file import merged_sums, write_part
+    from ..render.parts import Part, merged_header
+
+    for option, value in (("--exposure", request.exposure), ("--scene", request.scene)):
+        if value is not None:
+            print(f"note: {option} does not change a part; give it when the picture is made", file=sys.stderr)
+    check_writable(request.output)
+    started, headers = time.perf_counter(), _headers(request)
+    chosen = _chosen(headers, partial=None)
+    header = merged_header([headers[path] for path in chosen])
+    write_part(request.output, Part(header, list(merged_sums(chosen, header))))
+    print(
+        f"{request.output.resolve()}: {len(header.indices)} of {header.share.count} parts in one, in "
+        f"{time.perf_counter() - started:.1f} s, {request.output.stat().st_size / 1e6:.1f} MB"
+    )
+    return 0
+
+
+def _headers(request: MergeRequest) -> dict[Path, PartHeader]:
+    """Of all files that are given, each once. Raises `UserError`."""
+    from ..render.part_file import read_header
+
+    for path, times in Counter(request.parts).items():
+        if times > 1:
+            print(f"note: {plain(str(path))} is given {times} times: counted once", file=sys.stderr)
+    return {path: read_header(path) for path in request.parts}
+
+
+def _chosen(headers: dict[Path, PartHeader], partial: bool | None) -> list[Path]:
+    """Files that hold each part once, in their order. Raises `UserError` where they are not of one rendering, or some
+    are missing and that was not asked for; `partial` None: which are missing is not asked."""
+    # What holds many parts first: others may only repeat it.
+    paths = sorted(headers, key=lambda path: -len(headers[path].indices))
     first = headers[paths[0]]
     found: dict[int, Path] = {}
     for path in paths:
@@ -111,18 +143,26 @@ def _chosen(headers: dict[Path, PartHeader], partial: bool) -> list[Path]:
                 f"{paths[0]} ('{first.renderer}') and {path} ('{header.renderer}') have maps that lie elsewhere: trace "
                 "all parts on the same kind of device"
             )
-        if header.share.index in found:
-            other = found[header.share.index]
-            print(
-                f"note: {plain(f'{path} is part {header.share.index} again, as {other}')}: counted once",
-                file=sys.stderr,
+        again = [index for index in header.indices if index in found]
+        if not again:
+            found |= dict.fromkeys(header.indices, path)
+        elif len(again) == len(header.indices):
+            told = f"{path} is part {_listed(again)} again, as {found[again[0]]}"
+            print(f"note: {plain(told)}: counted once", file=sys.stderr)
+        else:
+            raise UserError(
+                f"{path} holds part {_listed(again)}, as {found[again[0]]} does, and others besides: it cannot be "
+                "taken apart, so merge from parts of which each is in one file only"
             )
-        found.setdefault(header.share.index, path)
-    missing = [str(i) for i in range(1, first.share.count + 1) if i not in found]
-    if missing:
-        listed = ", ".join(missing[:20]) + (f" and {len(missing) - 20} more" if len(missing) > 20 else "")
-        words = f"of {first.share.count} parts {len(missing)} are missing: {listed}"
+    missing = [index for index in range(1, first.share.count + 1) if index not in found]
+    if missing and partial is not None:
+        words = f"of {first.share.count} parts {len(missing)} are missing: {_listed(missing)}"
         if not partial:
             raise UserError(f"{words}; trace them, or merge what there is with --partial, which is noisier")
         print(f"note: {words}", file=sys.stderr)
-    return [found[i] for i in sorted(found)]
+    return list(dict.fromkeys(found[index] for index in sorted(found)))
+
+
+def _listed(indices: list[int]) -> str:
+    """The first twenty by their numbers."""
+    return ", ".join(map(str, indices[:20])) + (f" and {len(indices) - 20} more" if len(indices) > 20 else "")

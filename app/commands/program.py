@@ -236,7 +236,12 @@ def merge(
     parts: Annotated[list[Path], typer.Argument(metavar="PART.ssp...", help="Parts that 'render --passes' wrote.")],
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", metavar="OUT", help="The picture: .png, .exr or .npy."),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="OUT",
+            help="The picture: .png, .exr or .npy; or .ssp, a part that holds them all.",
+        ),
     ],
     scene: Annotated[
         Text, typer.Option(metavar="SCENE", help="The scene; default: the file that the parts were traced from.")

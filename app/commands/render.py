@@ -129,8 +129,8 @@ def _render_part(
 
     from ..base.progress import ProgressReporter
     from ..gpu.context import create_context
+    from ..render.part_file import write_part
     from ..render.parts import Share, trace_part
-    from .part_file import write_part
 
     started = time.perf_counter()
     place = str(scene_file.resolve())

@@ -7,7 +7,7 @@ agreed upon but the number of rounds. Only light is divided; the camera sees the
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -74,6 +74,13 @@ class PartHeader:
     photon_weight: float
     stats: Mapping[str, Any]
     renderer: str
+    others: tuple[int, ...] = ()
+    """Parts that were merged into this one, besides `share`."""
+
+    @property
+    def indices(self) -> tuple[int, ...]:
+        """All parts that it holds."""
+        return (self.share.index, *self.others)
 
     def light_stats(self) -> LightStats:
         """What was counted."""
@@ -120,9 +127,7 @@ def trace_part(
     def fill(light: LightPass, sampling: LightSampling, stopped: Stop) -> Iterator[float]:
         count, photons = shrinking.passes(light.features.method, sampling.photons)
         light.begin(photons, sampling.seed)
-        rounds = light.rounds(photons)
-        # What has its beams together belongs to one part.
-        groups = -(-rounds // light.rounds_together(photons))
+        rounds, groups = light.rounds(photons), _groups(light, photons)
         if count * groups < share.count:
             way_out = "ask for fewer parts, more photons or a smaller --batch"
             if light.only_beams:
@@ -172,11 +177,49 @@ def trace_part(
     return made[0] if made else None
 
 
+def parts_at_most(context: Context, scene: Scene, settings: RenderSettings) -> int:
+    """Into how many parts a rendering can be divided; traces nothing but its pilots."""
+    settings = replace(settings, photons=settings.photons or scene.render.photons)
+    found: list[int] = []
+
+    def fill(light: LightPass, sampling: LightSampling, stopped: Stop) -> Iterator[float]:
+        count, photons = shrinking.passes(light.features.method, sampling.photons)
+        light.begin(photons, sampling.seed)
+        found.append(count * _groups(light, photons))
+        yield 1.0
+
+    stage = Stage(scene, scene.camera)
+    renderer = FrameRenderer(context, settings, [stage], fill=fill)
+    steps = renderer.steps(stage)
+    try:
+        for _ in steps:
+            if found:
+                break
+    finally:
+        steps.close()  # type: ignore[attr-defined]
+        renderer.release()
+    return max(found[0], 1)
+
+
+def _groups(light: LightPass, photons: int) -> int:
+    """Rounds of a pass that may be traced apart: what has its beams together belongs to one part."""
+    return -(-light.rounds(photons) // light.rounds_together(photons))
+
+
 def layout_key(light: LightPass) -> str:
     """Where the maps lie, and what their channels are."""
     digest = hashlib.sha256(repr((light.layout.size, light.atlas.targets, light.bin_edges_nm)).encode())
     digest.update(np.ascontiguousarray(light.layout.placements).tobytes())
     return digest.hexdigest()
+
+
+def merged_header(headers: Sequence[PartHeader]) -> PartHeader:
+    """Of parts of one rendering, none of which holds what another does, merged into one."""
+    first, *others = sorted(index for header in headers for index in header.indices)
+    stats = merged_stats(header.light_stats() for header in headers)
+    weight = sum(header.photon_weight for header in headers)
+    share = replace(headers[0].share, index=first)
+    return replace(headers[0], share=share, others=tuple(others), photon_weight=weight, stats=_plain(stats))
 
 
 def merged_stats(stats: Iterable[LightStats]) -> LightStats:

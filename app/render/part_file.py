@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import zipfile
 import zlib
@@ -14,10 +15,10 @@ import numpy as np
 from ..base import files
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
-from ..render.parts import Part, PartHeader, Share
+from .parts import Part, PartHeader, Share
 
 SUFFIX = ".ssp"
-FORMAT = 1
+FORMAT = 2
 _HEADER = "part.json"
 _HEADER_BYTES = 1 << 20
 _MAX_SIDE = 1 << 15
@@ -26,11 +27,28 @@ _MAX_TARGETS = 64
 
 def write_part(path: Path, part: Part) -> None:
     """Write a part, whole or not at all. Raises `UserError` where it cannot be written."""
-    told = {"format": FORMAT} | asdict(part.header)
-    with atomic_output(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as to:
-        to.writestr(_HEADER, json.dumps(told))
+    with atomic_output(path) as temporary:
+        _write(temporary, part)
+
+
+def part_bytes(part: Part) -> bytes:
+    """What `write_part` would write, for another process to write."""
+    into = io.BytesIO()
+    _write(into, part)
+    return into.getvalue()
+
+
+def write_part_bytes(path: Path, data: bytes) -> None:
+    """Write what `part_bytes` gave elsewhere, whole or not at all. Raises `UserError` where it cannot be written."""
+    with atomic_output(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def _write(into: Path | io.BytesIO, part: Part) -> None:
+    with zipfile.ZipFile(into, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        archive.writestr(_HEADER, json.dumps({"format": FORMAT} | asdict(part.header)))
         for number, texels in enumerate(part.sums):
-            to.writestr(f"sums{number}", texels.tobytes())
+            archive.writestr(f"sums{number}", texels.tobytes())
 
 
 def read_header(path: Path) -> PartHeader:
@@ -44,12 +62,15 @@ def read_header(path: Path) -> PartHeader:
             if told.pop("format") != FORMAT:
                 raise ValueError("it is of another version of this program")
             share = Share(**told.pop("share"))
-            header = PartHeader(**told | {"share": share, "size": tuple(told["size"])})
+            lists = {"share": share, "size": tuple(told["size"]), "others": tuple(told["others"])}
+            header = PartHeader(**told | lists)
             width, height = header.size
             if not (0 < width <= _MAX_SIDE and 0 < height <= _MAX_SIDE and 0 < header.targets <= _MAX_TARGETS):
                 raise ValueError("its maps are of impossible size")
-            if not 1 <= share.index <= share.count:
+            if not all(isinstance(index, int) and 1 <= index <= share.count for index in header.indices):
                 raise ValueError("it is no part of anything")
+            if len(set(header.indices)) < len(header.indices):
+                raise ValueError("it counts a part twice")
             header.light_stats()
             for number in range(header.targets):
                 if archive.getinfo(f"sums{number}").file_size != 16 * width * height:

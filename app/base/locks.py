@@ -1,0 +1,34 @@
+"""Locks between processes, on one machine or on many that share a file system; each ends with its process, however that
+ends."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def locked(path: Path, wait: bool = True, make: bool = True) -> Iterator[bool]:
+    """Hold a lock on a folder, or on a file that is made for it; whether it could be had. Where the system has no
+    locks, it always can."""
+    if sys.platform == "win32":
+        yield True
+        return
+    import fcntl
+
+    is_folder = path.is_dir()
+    descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR | (os.O_CREAT if make else 0), 0o666)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            is_held = True
+        except BlockingIOError:
+            is_held = False
+        except OSError:  # a file system without locks
+            is_held = True
+        yield is_held
+    finally:
+        os.close(descriptor)
