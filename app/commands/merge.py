@@ -42,9 +42,8 @@ def merge_command(request: MergeRequest) -> int:
     check_writable(request.output)
 
     from ..model.io.scene_file import load_scene
-    from ..render.light_pass import LightPass
     from ..render.part_file import merged_sums
-    from ..render.parts import layout_key, merged_light, rendering_key, settings_of
+    from ..render.parts import check_maps, merged_light, rendering_key, settings_of
     from ..render.still import render
 
     headers = _headers(request)
@@ -58,15 +57,12 @@ def merge_command(request: MergeRequest) -> int:
             "of the program): give the scene that was rendered with --scene, or trace all parts again"
         )
 
-    def refuse(light: LightPass) -> None:
-        if (layout_key(light), light.atlas.size, light.atlas.targets) != (first.layout, first.size, first.targets):
-            raise UserError(
-                f"{chosen[0]} was traced by '{first.renderer}', whose maps lie elsewhere than those of "
-                f"'{light.context.renderer}': merge where the parts were traced"
-            )
-
     started = time.perf_counter()
-    fill = merged_light([headers[path] for path in chosen], merged_sums(chosen, first), refuse)
+    fill = merged_light(
+        [headers[path] for path in chosen],
+        merged_sums(chosen, first),
+        lambda light: check_maps(light, first, str(chosen[0])),
+    )
     with interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
         result = render(scene, settings, progress, interrupted, fill=fill)
         stopped = interrupted()

@@ -18,6 +18,7 @@ from ..base.errors import UserError, visible
 from ..base.files import allow_outside
 from ..model.settings import CAMERA_METHODS, METHODS
 from . import completion, options
+from .farm_program import add_farm
 from .prove_gpu import prove_gpu
 
 if TYPE_CHECKING:
@@ -615,6 +616,7 @@ def bench_view(
 
 
 app.command("prove-gpu")(prove_gpu)
+add_farm(app, render)
 
 
 def _print(content: object) -> None:

@@ -86,13 +86,18 @@ def merged_sums(paths: Sequence[Path], header: PartHeader) -> Iterator[np.ndarra
     for number in range(header.targets):
         total = np.zeros((height, width, 4))
         for path in paths:
-            try:
-                with zipfile.ZipFile(path) as archive:
-                    texels = np.frombuffer(archive.read(f"sums{number}"), np.float32)
-                total += texels.reshape(height, width, 4)
-            except _BAD as error:
-                raise _refusal(path, error) from error
+            total += read_sums(path, header, number)
         yield total.astype(np.float32)
+
+
+def read_sums(path: Path, header: PartHeader, number: int) -> np.ndarray:
+    """A part's sums in texture `number`: float32 (height, width, 4). Raises `UserError` where they are damaged."""
+    width, height = header.size
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return np.frombuffer(archive.read(f"sums{number}"), np.float32).reshape(height, width, 4)
+    except _BAD as error:
+        raise _refusal(path, error) from error
 
 
 _BAD = (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, NotImplementedError, RuntimeError,

@@ -213,6 +213,15 @@ def layout_key(light: LightPass) -> str:
     return digest.hexdigest()
 
 
+def check_maps(light: LightPass, header: PartHeader, name: str) -> None:
+    """Raise `UserError` where a part, called `name`, was traced for other maps than those of `light`."""
+    if (layout_key(light), light.atlas.size, light.atlas.targets) != (header.layout, header.size, header.targets):
+        raise UserError(
+            f"{name} was traced by '{header.renderer}', whose maps lie elsewhere than those of "
+            f"'{light.context.renderer}': merge where the parts were traced"
+        )
+
+
 def merged_header(headers: Sequence[PartHeader]) -> PartHeader:
     """Of parts of one rendering, none of which holds what another does, merged into one."""
     first, *others = sorted(index for header in headers for index in header.indices)

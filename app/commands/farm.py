@@ -1,0 +1,125 @@
+"""The farm commands: what render, animate and bench do, by many workers; Ctrl-C keeps what is done."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..base.errors import UserError, plain
+from ..base.interrupts import interrupt_flag
+from . import options
+from .render import RenderRequest, complete_settings, parse_settings
+
+if TYPE_CHECKING:
+    from ..farm.cluster import DaskCrew
+
+MAX_WORKERS = 1024
+FOLDER_SUFFIX = ".parts"
+
+
+@dataclass(frozen=True)
+class FarmRequest:
+    """Options of every farm command as typed; None where the user said nothing."""
+
+    workers: str | None = None
+    scheduler: str | None = None
+    parts: str | None = None
+    keep_parts: bool = False
+
+
+def note(sentence: str) -> None:
+    """Tell what was assumed or met."""
+    print(f"note: {plain(sentence)}", file=sys.stderr)
+
+
+@contextmanager
+def crew(farm: FarmRequest) -> Iterator[DaskCrew]:
+    """Those who work. Raises `UserError`."""
+    from ..farm.cluster import open_crew
+
+    with open_crew(workers_of(farm), farm.scheduler) as found:
+        yield found
+
+
+def workers_of(farm: FarmRequest) -> int | None:
+    """How many of this machine; None where a scheduler has its own. Raises `UserError`, also where Dask is missing."""
+    from ..farm.cluster import check_installed
+
+    if farm.workers is not None and farm.scheduler is not None:
+        raise UserError("--workers and --scheduler exclude each other: a running cluster has its own workers")
+    workers = None
+    if farm.scheduler is None:
+        workers = os.cpu_count() or 1
+        if farm.workers is not None:
+            workers = options.parse_integer("--workers", farm.workers, 1, MAX_WORKERS)
+    check_installed()
+    return workers
+
+
+def farm_render_command(request: RenderRequest, farm: FarmRequest) -> int:
+    """Render to a picture file; returns the exit code. Raises `UserError`."""
+    from ..base.atomic import check_writable
+    from ..base.image_io import check_suffix, write_image
+    from ..base.progress import ProgressReporter
+
+    asked = parse_settings(request)
+    if request.seconds is not None:
+        raise UserError("--seconds is for one process: parts share out a number of photons, given by --photons")
+    check_suffix(request.output)
+    parts = None if farm.parts is None else options.parse_integer("--parts", farm.parts, 1, options.MAX_PARTS)
+    workers_of(farm)
+    scene_file = options.find_scene(request.scene)
+    if os.path.exists(request.output) and request.output.samefile(scene_file):
+        raise UserError(f"cannot write {request.output}: it is the scene itself; choose another name")
+    check_writable(request.output)
+    scene = options.open_scene(request.scene, request.opening)
+    settings = complete_settings(asked, scene, request.stats)
+    for told in scene.notes:
+        note(told)
+
+    from ..farm.part_folder import PREVIEW, held
+    from ..farm.render import FarmRender
+
+    started = time.perf_counter()
+    folder = request.output.with_name(request.output.name + FOLDER_SUFFIX)
+    with held(folder, request.output), interrupt_flag() as interrupted, crew(farm) as workers:
+        note(f"{folder / PREVIEW} shows now and then what there is")
+        work = FarmRender(workers, scene, settings, scene_file, folder, parts, note)
+        try:
+            with ProgressReporter(scene.name) as progress:
+                result = work.run(progress, interrupted)
+        except UserError as error:
+            raise UserError(f"{error} ({work.kept.leave()})") from error
+        except BaseException:
+            work.kept.leave()
+            raise
+        if result is None:
+            print(f"spectrasplat: stopped; {work.kept.leave()}: the same command goes on", file=sys.stderr)
+            return interrupted.exit_code
+        for told in result.picture.stats.notices:
+            note(told)
+        write_image(
+            request.output,
+            result.picture.rgb,
+            exposure_ev=settings.exposure_ev,
+            spectral=result.picture.spectral,
+            bin_edges_nm=result.picture.bin_edges_nm,
+        )
+        if not farm.keep_parts:
+            work.kept.remove()
+    stats, tally = result.picture.stats, result.tally
+    again = f", {result.taken_up} of them from before" if result.taken_up else ""
+    copied = f", {tally.copied} begun a second time" if tally.copied else ""
+    print(
+        f"{request.output.resolve()}: {settings.width}×{settings.height}, {result.parts} parts{again}{copied}, "
+        f"{stats.photons:,} photons in {time.perf_counter() - started:.1f} s, of which merging "
+        f"{result.part_bytes / 1e6:.1f} MB took {result.merge_seconds:.1f} s ({stats.renderer})"
+    )
+    if request.stats:
+        print("\n".join(stats.lines()))
+    return 0
