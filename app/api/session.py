@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from ..base.errors import UserError
-from ..edit.live_inputs import LiveInputs
 from ..edit.stored_photons import StoredPhotons
-from ..model.settings import RenderSettings
 from .asking import Asked, Count, Size, settings_of
 from .device import Cancel, Device, Progress
 from .picture import Picture, Statistics
@@ -28,11 +26,6 @@ if TYPE_CHECKING:
 
 DEFAULT_SAMPLES = 32
 _ALL = 10**12
-_STEP_S = 0.25
-_RECORD_BYTES = 256
-"""A photon record with several spectral columns, rounded up."""
-_PER_PHOTON = 4
-"""Landings that one emitted photon leaves at most, nearly."""
 
 
 @dataclass(frozen=True)
@@ -84,16 +77,17 @@ class Session:
 
         `stats.photons_traced` says whether photons were traced for it. Callbacks as for `spectrasplat.render`; the next
         call goes on where `cancel` stopped."""
+        from ..render.viewer.still_engine import picture_of
+
         started = time.perf_counter()
 
         def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Picture:
             rays = self._before.rays
             self._follow(context, report, stopped)
             engine, stats = self._live, self._live.stats
-            texture = engine.picture
-            if texture is None:
+            rgb = picture_of(engine)
+            if rgb is None:
                 raise UserError("the rendering was stopped before there was a picture: let it go on for longer")
-            rgb = np.frombuffer(texture.read(), np.float32).reshape(texture.height, texture.width, 4)[..., :3].copy()
             self._before = _State(stats.photons, stats.rays_traced, int(stats.camera_samples))
             told = Statistics(
                 stats.photons,
@@ -171,45 +165,12 @@ class Session:
 
     def _follow(self, context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> None:
         """Work, in the device's thread, until what is wanted is shown."""
+        from ..edit.parameters import Stage
+        from ..render.frame_fit import inputs_of
+        from ..render.viewer.still_engine import follow, still_engine
+
+        settings, model = self._settings, self.scene._model
         if self._engine is None:
-            self._engine = _engine(context, self._settings, self._exact)
-        engine, settings, model = self._engine, self._settings, self.scene._model
-        engine.set(
-            LiveInputs(
-                model,
-                model.camera,
-                settings.width,
-                settings.height,
-                settings.method,
-                settings.smoothing,
-                seed=settings.seed,
-            )
-        )
-        target, samples = settings.photons or 1, engine.camera_samples
-        while not stopped():
-            engine.advance(_STEP_S)
-            if engine.problem is not None:
-                raise UserError(engine.problem)
-            if engine.is_idle:
-                break
-            stats = engine.stats
-            report(
-                min(0.8 * stats.photons / target + 0.2 * stats.camera_samples / samples, 0.99),
-                "taking camera samples" if stats.photons >= target else "tracing photons",
-            )
-        report(1.0, "done")
-
-
-def _engine(context: Context, settings: RenderSettings, exact: bool) -> LiveEngine:
-    """One that traces all photons in one pass and keeps them."""
-    from ..render.viewer.building import Budget
-    from ..render.viewer.engine import LiveEngine
-
-    photons = settings.photons or 1
-    room = max(Budget.of(context).store_bytes, photons * _PER_PHOTON * _RECORD_BYTES)
-    budget = replace(Budget.of(context), first_photons=photons, largest_photons=photons, store_bytes=room)
-    engine = LiveEngine(context, budget)
-    # A pass emits a few photons more or less than it is asked for: whatever it was, one is enough.
-    engine.target_photons, engine.camera_samples = 1, settings.spp or DEFAULT_SAMPLES
-    engine.refine_when_still = exact
-    return engine
+            self._engine = still_engine(context, settings, self._exact)
+        wanted = inputs_of(Stage(model, model.camera), settings)
+        follow(self._engine, wanted, settings.photons or 1, report, stopped)

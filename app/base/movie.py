@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import os
@@ -180,10 +181,22 @@ class Frames:
 
     def write(self, index: int, codes: np.ndarray) -> None:
         """Write a frame, whole or not at all."""
+        self.write_png(index, frame_bytes(codes))
+
+    def write_png(self, index: int, png: bytes) -> None:
+        """The same of a frame that `frame_bytes` has made elsewhere."""
+        with atomic_output(self.path(index)) as temporary:
+            temporary.write_bytes(png)
+
+    def read(self, index: int) -> np.ndarray:
+        """A frame that is there: uint8 (H, W, 3). Raises `UserError` where it is damaged."""
         from PIL import Image
 
-        with atomic_output(self.path(index)) as temporary:
-            Image.fromarray(codes).save(temporary, format="PNG", compress_level=6)
+        try:
+            with Image.open(self.path(index)) as image:
+                return np.asarray(image.convert("RGB"))
+        except (OSError, ValueError, SyntaxError) as error:
+            raise UserError(f"{self.path(index)} is damaged ({error}): remove it, and it is made again") from error
 
     def close(self) -> None:
         """Remove the claims of processes that were killed."""
@@ -212,6 +225,15 @@ class Frames:
                 if frame.stem.isdigit():
                     frame.unlink()
         self._manifest.unlink(missing_ok=True)
+
+
+def frame_bytes(codes: np.ndarray) -> bytes:
+    """A frame, uint8 (H, W, 3), as the PNG that `Frames` keeps."""
+    from PIL import Image
+
+    into = io.BytesIO()
+    Image.fromarray(codes).save(into, format="PNG", compress_level=6)
+    return into.getvalue()
 
 
 def _exposure(value: object) -> float | None:
@@ -293,8 +315,13 @@ def open_sink(
     """The sink that `path` asks for: a `.mp4`, or a folder (a name without a suffix). Raises `UserError`."""
     if path.suffix.lower() == ".mp4":
         return Movie(path, size, fps)
+    check_folder(path)
+    return Frames(path, description, overwrite)
+
+
+def check_folder(path: Path) -> None:
+    """Raise `UserError` where `path` looks like a file's name."""
     if path.suffix and not os.path.isdir(path):
         raise UserError(
             f"cannot write {path}: the suffix '{path.suffix}' is not an animation; use .mp4, or a folder for PNGs"
         )
-    return Frames(path, description, overwrite)

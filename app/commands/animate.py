@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from ..model.settings import RenderSettings
 from . import options
 
 if TYPE_CHECKING:
+    from ..edit.animation import Animation
     from ..edit.opening import Opening
 
 DEFAULT_FRAMES = 120
@@ -47,13 +49,22 @@ class AnimateRequest:
     skip_existing: bool = False
 
 
-def animate_command(request: AnimateRequest) -> int:
-    """Render an animation; returns the exit code. Raises `UserError`."""
-    from ..base.movie import MANIFEST, open_sink
-    from ..base.progress import ProgressReporter
+@dataclass(frozen=True)
+class Plan:
+    """What a request amounts to."""
+
+    animation: Animation
+    settings: RenderSettings
+    fps: float
+    only: range
+    """Numbers of the frames that are asked for."""
+    manifest: Mapping[str, object]
+
+
+def plan_of(request: AnimateRequest) -> Plan:
+    """Everything checked; what was assumed is told. Raises `UserError`."""
     from ..edit.parameters import Stage
-    from ..render.animate import description, render_animation
-    from ..render.notices import FrameNotices
+    from ..render.animate import description
 
     frames, only = _parse_frames(request.frames)
     if request.skip_existing and request.overwrite:
@@ -71,8 +82,20 @@ def animate_command(request: AnimateRequest) -> int:
     only = _checked_range(only, len(animation.times_s))
     for note in scene.notes:
         print(f"note: {plain(note)}", file=sys.stderr)
-    manifest = description(animation, settings, fps, photons)
-    sink = open_sink(request.output, (settings.width, settings.height), fps, manifest, request.overwrite)
+    return Plan(animation, settings, fps, only, description(animation, settings, fps, photons))
+
+
+def animate_command(request: AnimateRequest) -> int:
+    """Render an animation; returns the exit code. Raises `UserError`."""
+    from ..base.movie import MANIFEST, open_sink
+    from ..base.progress import ProgressReporter
+    from ..render.animate import render_animation
+    from ..render.notices import FrameNotices
+
+    plan = plan_of(request)
+    animation, settings, fps, only = plan.animation, plan.settings, plan.fps, plan.only
+    scene = animation.start.scene
+    sink = open_sink(request.output, (settings.width, settings.height), fps, plan.manifest, request.overwrite)
 
     from ..gpu.context import create_context
     from ..gpu.shader import keep_programs

@@ -98,7 +98,7 @@ def bench_command(request: BenchRequest, show: Callable[[object], None]) -> int:
         except KeyboardInterrupt as interrupt:
             stopped = exit_code_of(interrupt)
             print(f"spectrasplat: stopped; {kept_text(store.result)}", file=sys.stderr)
-    _report(store.result, request.output, show)
+    write_and_show(store.result, request.output, show)
     return stopped
 
 
@@ -226,7 +226,7 @@ def _features(request: BenchRequest) -> int:
     return features_cost.command(next(iter(scene.values())), request.output)
 
 
-def _report(result: BenchResult, directory: Path, show: Callable[[object], None]) -> None:
+def write_and_show(result: BenchResult, directory: Path, show: Callable[[object], None]) -> None:
     """Tables on the screen, then plots and pages in the folder."""
     from ..bench.report.report import write_report
     from ..bench.screen import scene_lines, scene_table

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
+from .. import __version__
 from ..base.errors import UserError, plain
 from ..base.interrupts import interrupt_flag
 from . import options
+from .animate import AnimateRequest, plan_of
+from .bench import CAMERA_SCENES, BenchRequest, kept_text, load_scenes, repeat_command, write_and_show
+from .bench import parse_settings as parse_bench_settings
 from .render import RenderRequest, complete_settings, parse_settings
 
 if TYPE_CHECKING:
+    from ..bench.store import Store
     from ..farm.cluster import DaskCrew
 
 MAX_WORKERS = 1024
@@ -123,3 +130,99 @@ def farm_render_command(request: RenderRequest, farm: FarmRequest) -> int:
     if request.stats:
         print("\n".join(stats.lines()))
     return 0
+
+
+def farm_animate_command(request: AnimateRequest, farm: FarmRequest) -> int:
+    """Render an animation; returns the exit code. Raises `UserError`."""
+    from ..base.atomic import check_writable
+    from ..base.movie import Frames, Movie, check_folder
+    from ..base.progress import ProgressReporter
+
+    workers_of(farm)
+    plan = plan_of(request)
+    settings, count = plan.settings, len(plan.only)
+    size = settings.width, settings.height
+
+    from ..farm.animate import FarmFrames
+    from ..farm.part_folder import held
+
+    is_movie, started = request.output.suffix.lower() == ".mp4", time.perf_counter()
+    folder = request.output.with_name(request.output.name + ".frames") if is_movie else request.output
+    if is_movie:
+        check_writable(request.output)
+    else:
+        check_folder(folder)
+    with held(folder, request.output), interrupt_flag() as interrupted, crew(farm) as workers:
+        sink = Frames(folder, plan.manifest, request.overwrite)
+        there = sum(sink.has(index) for index in plan.only)
+        work = FarmFrames(workers, plan.animation, settings, sink, plan.only)
+        try:
+            with ProgressReporter(plan.animation.start.scene.name) as progress:
+                tally = work.run(progress, interrupted)
+        except UserError as error:
+            made = sum(sink.has(index) for index in plan.only)
+            raise UserError(f"{error} ({made} of {count} frames are in {folder})") from error
+        finally:
+            for told in work.notices.lines(of_frames=count > 1):
+                note(told)
+    made = sum(sink.has(index) for index in plan.only)
+    if tally is None:
+        print(
+            f"spectrasplat: stopped; {made} of {count} frames are in {folder}: the same command goes on",
+            file=sys.stderr,
+        )
+        return interrupted.exit_code
+    if is_movie:
+        movie = Movie(request.output, size, plan.fps)
+        try:
+            for index in plan.only:
+                movie.write(index, sink.read(index))
+        finally:
+            movie.close()
+        if not farm.keep_parts:
+            shutil.rmtree(folder, ignore_errors=True)
+    kept = f" ({there} were there)" if there else ""
+    copied = f", {tally.copied} begun a second time" if tally.copied else ""
+    print(
+        f"{request.output.resolve()}: {made} of {count} frames{kept}{copied}, {size[0]}×{size[1]} at {plan.fps:g} a "
+        f"second, in {time.perf_counter() - started:.1f} s"
+    )
+    return 0
+
+
+def farm_bench_command(request: BenchRequest, farm: FarmRequest, show: Callable[[object], None]) -> int:
+    """Measure scenes side by side; returns the exit code. Raises `UserError`."""
+    if request.output is None:
+        raise UserError("bench needs a folder for what it finds: give one with -o DIR")
+    settings, count = parse_bench_settings(request), workers_of(farm)
+    start_s, started = time.process_time(), time.perf_counter()
+    scenes = load_scenes(request.scenes or (CAMERA_SCENES if request.camera_pass else ()))
+    start_s += (time.perf_counter() - started) / len(scenes)
+    if count is not None and count > 1:
+        note("workers of one machine slow each other: times compare within this run only")
+        if len(scenes) < count:
+            note(f"a scene is measured by one worker, so {len(scenes)} of {count} have something to do")
+
+    from ..base.progress import ProgressReporter
+    from ..bench.results import BenchResult
+    from ..farm.bench import FarmBench
+    from ..farm.part_folder import held
+
+    output = request.output
+
+    def open_store(where: dict[str, str]) -> Store:
+        from ..bench.store import Store
+
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        command = repeat_command([*scenes], request)
+        return Store(output, BenchResult(__version__, now, command, where, [], settings), request.fresh)
+
+    with held(output, output), interrupt_flag() as interrupted, crew(farm) as workers:
+        work = FarmBench(workers, scenes, settings, open_store, start_s, note)
+        with ProgressReporter("bench") as progress:
+            is_done = work.run(progress, interrupted)
+        if work.store is not None:
+            if not is_done:
+                print(f"spectrasplat: stopped; {kept_text(work.store.result)}", file=sys.stderr)
+            write_and_show(work.store.result, output, show)
+    return 0 if is_done else interrupted.exit_code

@@ -5,32 +5,35 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import fields
+from functools import partial
 from typing import Annotated, Any
 
 import typer
 
 from . import options
-from .farm import FarmRequest, farm_render_command
+from .animate import AnimateRequest
+from .bench import BenchRequest
+from .farm import FarmRequest, farm_animate_command, farm_bench_command, farm_render_command
 from .render import RenderRequest
 
 _OPENING = ("up", "glass", "environment")
 """Options that together say how a scene is opened."""
 
 
-def farm_options(
-    workers: Annotated[
-        str | None,
-        typer.Option(
-            metavar="N",
-            help="Workers on this machine, each with its share of the cores, or a GPU of its own where there are "
-            "several; default: one a core.",
-        ),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="A Dask scheduler that runs already, for example tcp://10.0.0.1:8786."),
-    ] = None,
-) -> None:
+WorkersOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="N",
+        help="Workers on this machine, each with its share of the cores, or a GPU of its own where there are several.",
+    ),
+]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="A Dask scheduler that runs already, for example tcp://10.0.0.1:8786."),
+]
+
+
+def farm_options(workers: WorkersOption = None, scheduler: SchedulerOption = None) -> None:
     """What every farm command takes."""
 
 
@@ -46,11 +49,20 @@ def part_options(
     """What `farm render` takes besides."""
 
 
-def add_farm(app: typer.Typer, render: Callable[..., None]) -> None:
+def add_farm(
+    app: typer.Typer,
+    render: Callable[..., None],
+    animate: Callable[..., None],
+    bench: Callable[..., None],
+    show: Callable[[object], None],
+) -> None:
     """Add `farm` and its commands to the program; the functions are the commands that they spread."""
     farm = typer.Typer(help="Render on many workers, here or on a Dask cluster; needs the extra 'farm'.")
     app.add_typer(farm, name="farm")
     _add(farm, "render", render, RenderRequest, farm_render_command, ("passes", "seconds"), part_options)
+    _add(farm, "animate", animate, AnimateRequest, farm_animate_command, ("skip_existing",))
+    run_bench = partial(farm_bench_command, show=show)
+    _add(farm, "bench", bench, BenchRequest, run_bench, ("features",))
 
 
 def _add(

@@ -18,7 +18,8 @@ from ..base.errors import UserError, visible
 from ..base.files import allow_outside
 from ..model.settings import CAMERA_METHODS, METHODS
 from . import completion, options
-from .farm_program import add_farm
+from .farm import FarmRequest
+from .farm_program import SchedulerOption, WorkersOption, add_farm
 from .prove_gpu import prove_gpu
 
 if TYPE_CHECKING:
@@ -358,6 +359,68 @@ def animate(
 
 
 @app.command()
+def sweep(
+    scene: SceneArgument,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="A folder for pictures and sweep.json, their values.")
+    ],
+    ranges: Annotated[
+        list[str],
+        typer.Option(
+            "--set",
+            metavar="P=A:B:N",
+            help="A parameter's values: N from A to B, or a list A,B,C; may be repeated for all combinations.",
+        ),
+    ],
+    picture_format: Annotated[
+        Text, typer.Option("--format", metavar="NAME", help="png (default), jpg, webp, exr or npy.")
+    ] = None,
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Pixels; default: the scene's.")] = None,
+    photons: Annotated[Text, typer.Option(metavar="N", help="Photons of each tracing; default: the scene's.")] = None,
+    spp: Annotated[Text, typer.Option(metavar="N", help="Camera samples a pixel; default: 32.")] = None,
+    bins: Annotated[
+        Text, typer.Option(metavar="N", help="Keep spectral bins (written to .exr); every point is then traced.")
+    ] = None,
+    exposure: Annotated[
+        Text, typer.Option(metavar="EV", help="Stops brighter (or darker) than is automatic in the first picture.")
+    ] = None,
+    seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
+    method: MethodOption = None,
+    exact: Annotated[
+        bool, typer.Option("--exact", help="Trace every point, also where kept photons follow to first order.")
+    ] = False,
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace another sweep in the folder.")] = False,
+    up: UpOption = None,
+    glass: GlassOption = None,
+    environment: EnvironmentOption = None,
+    allow_outside: AllowOutside = False,
+) -> None:
+    """Render a picture for every combination of parameters' values."""
+    from .sweep import SweepRequest, sweep_command
+
+    request = SweepRequest(
+        scene,
+        output,
+        tuple(ranges),
+        picture_format,
+        size,
+        photons,
+        spp,
+        bins,
+        exposure,
+        seed,
+        method,
+        exact,
+        overwrite,
+        FarmRequest(workers, scheduler),
+        options.parse_opening(up, glass, environment),
+    )
+    raise typer.Exit(sweep_command(request))
+
+
+@app.command()
 def view(
     scene: Annotated[
         Text,
@@ -616,7 +679,6 @@ def bench_view(
 
 
 app.command("prove-gpu")(prove_gpu)
-add_farm(app, render)
 
 
 def _print(content: object) -> None:
@@ -636,3 +698,6 @@ def _print(content: object) -> None:
     if not console.is_terminal:
         console.width = PIPE_WIDTH
     console.print(content)
+
+
+add_farm(app, render, animate, bench, _print)

@@ -22,8 +22,9 @@ _own = threading.local()
 class Desk:
     """One thread's; `kept` holds what jobs on the same shared value leave for each other."""
 
-    def __init__(self) -> None:
-        self._context: Context | None = None
+    def __init__(self, context: Context | None = None) -> None:
+        """`context`: the caller's, which is not released; None: one of its own."""
+        self._lent, self._context = context, context
         self._of = b""
         self._value: Any = None
         self.kept: dict[str, Any] = {}
@@ -48,10 +49,10 @@ class Desk:
         """Forget all, the context too."""
         for thing in self.kept.values():
             thing.release()
-        if self._context is not None:
+        if self._context is not None and self._lent is None:
             shader.forget_programs(self._context.ctx)
             self._context.release()
-        self._context, self._value, self._of, self.kept = None, None, b"", {}
+        self._context, self._value, self._of, self.kept = self._lent, None, b"", {}
 
 
 class Report:

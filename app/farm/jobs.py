@@ -22,6 +22,8 @@ LATE = 2.0
 """A job is late that has run so many times as long as half of its kind did."""
 ENOUGH = 3
 """Jobs of a kind that must be done before one is called late."""
+_WORTH_S = 3.0
+"""What is left of a job, at least, that is begun a second time."""
 _WAIT_S = 0.2
 
 
@@ -171,7 +173,7 @@ class Foreman:
                 continue
             usual, spent = statistics.median(of_kind), now - only.began_s
             left = spent * (1.0 - only.share) / only.share if only.share > 0.0 else float("inf")
-            if spent > LATE * usual and left > usual:
+            if spent > LATE * usual and left > max(usual, _WORTH_S):
                 found.append((left, job))
         return [job for _, job in sorted(found, key=lambda pair: -pair[0])]
 

@@ -38,6 +38,8 @@ def held(folder: Path, output: Path) -> Iterator[None]:
             with suppress(OSError):  # a disk that is full is told of when a part is written
                 lock.write_text(f"process {os.getpid()} on {socket.gethostname()} since {now}", encoding="utf-8")
             yield
+            with suppress(OSError):
+                lock.unlink(missing_ok=True)
     except OSError as error:
         raise UserError(f"cannot write in {folder}: {error.strerror}; choose another place") from error
 

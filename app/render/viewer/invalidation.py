@@ -35,7 +35,8 @@ def dirty_level(traced: LiveInputs, shown: LiveInputs, new: LiveInputs, beams: b
     paths = max(_inputs(traced, new), _scene(traced.scene, new.scene))
     if paths >= DirtyLevel.TRACE:
         return paths
-    return max(_inputs(shown, new), _scene(shown.scene, new.scene))
+    # Whatever is shown, the photons that there are serve: a glass that is shown without dispersion was traced with it.
+    return min(max(_inputs(shown, new), _scene(shown.scene, new.scene)), DirtyLevel.SPLAT)
 
 
 def _inputs(old: LiveInputs, new: LiveInputs) -> DirtyLevel:

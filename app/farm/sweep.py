@@ -1,0 +1,145 @@
+"""A sweep: a picture for every combination of parameters' values, and which of them one set of photons serves.
+
+The viewer knows what an edit costs (`render/viewer/invalidation.py`): photons that were traced through one glass follow
+another of the same n_d to first order in the change of index. Points that do are made by one process from one store of
+photons; all others are traced, and spread over workers.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.errors import UserError
+from ..edit.parameters import Stage, apply_all, check_value
+from ..model.settings import RenderSettings
+from ..render.frame_fit import inputs_of, share_light
+from ..render.viewer.dirty_level import DirtyLevel
+from ..render.viewer.invalidation import dirty_level
+
+MAX_POINTS = 100_000
+_BLUE_NM, _RED_NM = 486.13, 656.27
+Grid = Mapping[str, Sequence[float]]
+"""Values of each parameter, by its path."""
+
+
+def parse_set(text: str, stage: Stage) -> tuple[str, tuple[float, ...]]:
+    """ "objects.prism.dispersion_gain=0:3:31" (31 values from 0 to 3) or "…=0,0.5,2" as a path with its values. Raises
+    `UserError`."""
+    path, equals, numbers = text.partition("=")
+    path = path.strip()
+    refusal = UserError(
+        f"--set '{text}' is no sweep: give PARAMETER=FROM:TO:COUNT, for example objects.prism.dispersion_gain=0:3:31, "
+        "or PARAMETER=A,B,C"
+    )
+    try:
+        if ":" in numbers:
+            first, last, count = numbers.split(":")
+            if not 2 <= int(count) <= MAX_POINTS:
+                raise UserError(f"--set '{text}' asks for {count} values: give 2 to {MAX_POINTS}")
+            values = tuple(np.linspace(float(first), float(last), int(count)).tolist())
+        else:
+            values = tuple(float(number) for number in numbers.split(","))
+    except ValueError:
+        raise refusal from None
+    if not equals or not path:
+        raise refusal
+    check_values(path, values, stage, "--set ")
+    return path, values
+
+
+def check_values(path: str, values: Sequence[float], stage: Stage, where: str = "") -> None:
+    """Raise `UserError` where a parameter is none, or cannot take one of its values, or gets one twice."""
+    for value in values:
+        check_value(stage, path, value, where)
+    if not values or len(set(values)) < len(values):
+        raise UserError(f"{where}{path} gets {'a value twice' if values else 'no value'}: give each once")
+
+
+@dataclass(frozen=True)
+class Point:
+    """One picture of a sweep."""
+
+    number: int
+    values: Mapping[str, float]
+    stage: Stage
+
+
+def points_of(start: Stage, grid: Grid) -> tuple[Point, ...]:
+    """All combinations, the last parameter running fastest. Raises `UserError` where one cannot be drawn."""
+    if not grid:
+        raise UserError("a sweep needs a parameter: give --set, for example objects.prism.dispersion_gain=0:3:31")
+    count = int(np.prod([len(values) for values in grid.values()], dtype=float))
+    if count > MAX_POINTS:
+        raise UserError(f"this sweep has {count} pictures: give at most {MAX_POINTS}")
+    found = []
+    for number, values in enumerate(itertools.product(*grid.values())):
+        named = dict(zip(grid, values, strict=True))
+        found.append(Point(number, named, apply_all(start, named)))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Points that one set of photons serves."""
+
+    anchor: Stage
+    """What photons are traced through: of these the one with about half of the strongest dispersion, from which the
+    change of index is never more than that half. Without any, photons would carry no columns."""
+    points: tuple[Point, ...]
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """What a sweep comes to."""
+
+    points: tuple[Point, ...]
+    groups: tuple[Group, ...]
+    keeps_photons: bool
+    """Whether photons are kept for the points of a group, which follow to first order."""
+
+    @staticmethod
+    def of(points: Sequence[Point], settings: RenderSettings, exact: bool) -> SweepPlan:
+        """`exact`: every point is traced, but for those that differ by the camera alone."""
+        is_exact = exact or settings.bins is not None
+        groups: list[tuple[Stage, list[Point]]] = []
+        keeps = False
+        spreads = {point.number: _dispersion(point.stage) for point in points}
+        middle = 0.5 * max(spreads.values())
+        for point in sorted(points, key=lambda p: (not spreads[p.number], abs(spreads[p.number] - middle))):
+            new = inputs_of(point.stage, settings)
+            for anchor, members in groups:
+                old = inputs_of(anchor, settings)
+                same_light = share_light(old, new)
+                if same_light or (not is_exact and dirty_level(old, old, new) <= DirtyLevel.SPLAT):
+                    members.append(point)
+                    keeps = keeps or not same_light
+                    break
+            else:
+                groups.append((point.stage, [point]))
+        made = (Group(anchor, tuple(sorted(found, key=lambda point: point.number))) for anchor, found in groups)
+        return SweepPlan(tuple(points), tuple(sorted(made, key=lambda group: group.points[0].number)), keeps)
+
+    def told(self, workers: int | None) -> str:
+        """Which points are spread, and why, in a sentence; `workers` None: those of a cluster."""
+        points, groups = len(self.points), len(self.groups)
+        who = "the cluster's workers" if workers is None else f"{workers} workers"
+        spread = "" if workers == 1 else f", spread over {who}"
+        if not self.keeps_photons:
+            if groups == points:
+                return f"{points} points, each traced anew{spread}"
+            return f"{points} points that differ by the camera but for {groups}, which are traced{spread}"
+        followed = "follows the glass to first order in the change of its index (--exact traces every point)"
+        if groups == 1:
+            alone = "" if workers == 1 else ", so that there is nothing to spread over workers"
+            return f"{points} points from one store of photons{alone}; light {followed}"
+        return f"{points} points from {groups} stores of photons{spread}; from one store light {followed}"
+
+
+def _dispersion(stage: Stage) -> float:
+    """How much its glasses disperse, all together."""
+    glasses = [item.material.dispersion for item in stage.scene.objects if item.material.transmits]
+    return sum(abs(float(g.index(_BLUE_NM) - g.index(_RED_NM))) for g in glasses)

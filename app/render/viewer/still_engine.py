@@ -1,0 +1,67 @@
+"""The viewer's engine without its window: photons of one pass are kept, every picture is waited for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ...base.errors import UserError
+from ...edit.live_inputs import LiveInputs
+from ...gpu.context import Context
+from ...model.settings import RenderSettings
+from .building import Budget
+from .engine import LiveEngine
+
+DEFAULT_SAMPLES = 32
+_STEP_S = 0.25
+_RECORD_BYTES = 256
+"""A photon record with several spectral columns, rounded up."""
+_PER_PHOTON = 4
+"""Landings that one emitted photon leaves at most, nearly."""
+
+
+def still_engine(context: Context, settings: RenderSettings, exact: bool) -> LiveEngine:
+    """One that traces all photons in one pass and keeps them. `exact`: trace again where an edit would be followed to
+    first order only."""
+    photons = settings.photons or 1
+    room = max(Budget.of(context).store_bytes, photons * _PER_PHOTON * _RECORD_BYTES)
+    budget = replace(Budget.of(context), first_photons=photons, largest_photons=photons, store_bytes=room)
+    engine = LiveEngine(context, budget)
+    # A pass emits a few photons more or less than it is asked for: whatever it was, one is enough.
+    engine.target_photons, engine.camera_samples = 1, settings.spp or DEFAULT_SAMPLES
+    engine.refine_when_still = exact
+    return engine
+
+
+def follow(
+    engine: LiveEngine,
+    wanted: LiveInputs,
+    photons: int,
+    report: Callable[[float, str], None] = lambda share, text: None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> None:
+    """Work until `wanted` is shown, or `stopped()`. Raises `UserError` where it cannot be."""
+    engine.set(wanted)
+    samples = engine.camera_samples
+    while not stopped():
+        engine.advance(_STEP_S)
+        if engine.problem is not None:
+            raise UserError(engine.problem)
+        if engine.is_idle:
+            break
+        stats = engine.stats
+        report(
+            min(0.8 * stats.photons / photons + 0.2 * stats.camera_samples / samples, 0.99),
+            "taking camera samples" if stats.photons >= photons else "tracing photons",
+        )
+    report(1.0, "done")
+
+
+def picture_of(engine: LiveEngine) -> np.ndarray | None:
+    """What is shown: float32 (H, W, 3), linear Rec.709, top row first; None before there is anything."""
+    texture = engine.picture
+    if texture is None:
+        return None
+    return np.frombuffer(texture.read(), np.float32).reshape(texture.height, texture.width, 4)[..., :3].copy()

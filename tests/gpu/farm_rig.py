@@ -1,0 +1,45 @@
+"""Farms of the tests: workers of this machine that can be killed at chosen moments."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+from spectrasplat.farm.cluster import open_crew
+from spectrasplat.farm.render import FarmRender, FarmResult
+from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.commands.options import find_scene
+
+SETTINGS = RenderSettings(width=64, height=36, photons=400_000, spp=4, batch=4096, camera_beams=True)
+SCENE = "lens"
+
+
+def farmed(
+    folder: Path,
+    workers: int,
+    parts: int,
+    meddle: Callable[[FarmRender, list[int]], None] = lambda work, process_ids: None,
+    notes: list[str] | None = None,
+    settings: RenderSettings = SETTINGS,
+) -> FarmResult | None:
+    """A picture by so many workers; `meddle` is called again and again with the work and the workers' processes."""
+    folder.mkdir(exist_ok=True)
+    scene = load_scene(find_scene(SCENE))
+    with open_crew(workers, None) as crew:
+        told = [] if notes is None else notes
+        work = FarmRender(crew, scene, settings, Path(SCENE), folder, parts, told.append)
+        assert crew.workers is not None
+        local = crew.workers
+
+        def tell(share: float, text: str) -> None:
+            meddle(work, local.process_ids)
+
+        return work.run(tell, lambda: False)
+
+
+def kill(process_id: int) -> None:
+    """As the kernel does where memory is short."""
+    os.kill(process_id, signal.SIGKILL)
