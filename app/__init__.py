@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .api import Scene as Scene
     from .api import Session as Session
     from .api import Statistics as Statistics
+    from .api import SweepPoint as SweepPoint
     from .api import Table as Table
     from .api import UserError as UserError
     from .api import caustic as caustic
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from .api import load as load
     from .api import render as render
     from .api import scenes as scenes
+    from .api import sweep as sweep
     from .api import trace as trace
 
 _OFFERED = (
@@ -44,6 +46,7 @@ _OFFERED = (
     "Scene",
     "Session",
     "Statistics",
+    "SweepPoint",
     "Table",
     "UserError",
     "caustic",
@@ -53,6 +56,7 @@ _OFFERED = (
     "load",
     "render",
     "scenes",
+    "sweep",
     "trace",
 )
 

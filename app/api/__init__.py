@@ -17,6 +17,7 @@ from .picture import CausticMap, Picture, Statistics
 from .rendering import caustic, render
 from .scene import Scene
 from .session import Session
+from .sweeping import SweepPoint, sweep
 from .tables import Entries, Table
 from .tracing import Fan, fan, trace
 
@@ -30,6 +31,7 @@ __all__ = [
     "Scene",
     "Session",
     "Statistics",
+    "SweepPoint",
     "Table",
     "UserError",
     "caustic",
@@ -39,6 +41,7 @@ __all__ = [
     "load",
     "render",
     "scenes",
+    "sweep",
     "trace",
 ]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,7 +44,7 @@ class SweepRequest:
     method: str | None = None
     exact: bool = False
     overwrite: bool = False
-    farm: FarmRequest = FarmRequest()
+    farm: FarmRequest = field(default_factory=FarmRequest)
     opening: Opening | None = None
 
 
@@ -81,7 +81,7 @@ def sweep_command(request: SweepRequest) -> int:
     note(plan.told(workers))
     started, drawn_by = (
         time.perf_counter(),
-        _here if is_here or len(plan.groups) == 1 and plan.keeps_photons else _by_crew,
+        _here if is_here or (len(plan.groups) == 1 and plan.keeps_photons) else _by_crew,
     )
     with held(request.output, request.output), interrupt_flag() as interrupted:
         folder = SweepFolder(

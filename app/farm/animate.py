@@ -35,14 +35,18 @@ class FarmFrames:
         self._foreman = Foreman(self._crew, Weighing({_FIRST: 1.0, "frame": 1.0}), stop)
         if self._sink.exposure() is None:
             self._foreman.add([Job(_FIRST, 0, (frame_tasks.draw, 0, None))])
+            self._foreman.weighing.add("frame", len(self._due()) - (0 in self._only))
         else:
             self._hand_out()
         return self._foreman.tally if self._foreman.run(self._take, tell) else None
 
     def _hand_out(self) -> None:
         base_ev = self._sink.exposure()
-        due = (index for index in self._only if not self._sink.has(index))
-        self._foreman.add(Job("frame", index, (frame_tasks.draw, index, base_ev)) for index in due)
+        jobs = [Job("frame", index, (frame_tasks.draw, index, base_ev)) for index in self._due()]
+        self._foreman.add(jobs, expected=self._foreman.tally.done > 0)
+
+    def _due(self) -> list[int]:
+        return [index for index in self._only if not self._sink.has(index)]
 
     def _take(self, job: Job, result: Any) -> None:
         self.notices.take(list(result.notices), job.number + 1)

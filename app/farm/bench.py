@@ -96,17 +96,20 @@ class FarmBench:
         self._crew.share(self._settings)
         self._foreman = Foreman(self._crew, Weighing({_MACHINE: 0.01, "scene": 1.0}), stop)
         self._foreman.add([Job(_MACHINE, 1, (look,))])
+        self._foreman.weighing.add("scene", len(self._scenes))
         return self._foreman.run(self._take, tell)
 
     def _take(self, job: Job, result: Any) -> None:
         if job.kind == _MACHINE:
             self.store = store = self._open_store(result)
             done = {scene.scene for scene in store.result.scenes if scene.complete}
-            self._foreman.add(
+            jobs = [
                 Job("scene", number, (measure, name, scene, self._start_s))
                 for number, (name, scene) in enumerate(self._scenes.items(), 1)
                 if name not in done
-            )
+            ]
+            self._foreman.weighing.add("scene", len(jobs) - len(self._scenes))
+            self._foreman.add(jobs, expected=True)
             return
         assert self.store is not None
         name, measured, store = job.call[1], result, self.store

@@ -112,10 +112,11 @@ class Foreman:
         self._tried: dict[Job, int] = {}
         self._attempts = 0
 
-    def add(self, jobs: Iterable[Job]) -> None:
-        """More to do; may be called while results are taken."""
+    def add(self, jobs: Iterable[Job], *, expected: bool = False) -> None:
+        """More to do; may be called while results are taken. `expected`: the weighing counts them already."""
         for job in jobs:
-            self.weighing.add(job.kind)
+            if not expected:
+                self.weighing.add(job.kind)
             if job.urgent:
                 self._due.appendleft(job)
             else:

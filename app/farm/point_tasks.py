@@ -110,8 +110,8 @@ def draw_kept(desk: Desk, of: Sweep, report: Told, group: int, numbers: tuple[in
     if kept is None:
         kept = desk.kept["engine"] = _Kept(still_engine(desk.context, of.settings, exact=False))
     engine, samples = kept.engine, kept.engine.camera_samples
-    work = len(numbers) + (kept.group != group)
-    done = 0
+    is_new = kept.group != group
+    work, done = len(numbers) + is_new, 0
     found: list[Drawn] = []
 
     def show(stage: Stage, samples: int) -> None:
@@ -122,8 +122,7 @@ def draw_kept(desk: Desk, of: Sweep, report: Told, group: int, numbers: tuple[in
 
         follow(engine, inputs_of(stage, of.settings), of.settings.photons or 1, told, report.unwanted)
 
-    before = engine.stats.rays_traced
-    if kept.group != group:
+    if is_new:
         try:
             show(of.anchors[group], 1)
         finally:
@@ -139,7 +138,6 @@ def draw_kept(desk: Desk, of: Sweep, report: Told, group: int, numbers: tuple[in
         if rgb is None:
             raise UserError("there is no picture of this point: does it have any light?")
         check_finite(f"picture {number}", rgb)
-        traced, before = stats.rays_traced > before, stats.rays_traced
         done += 1
         found.append(
             Drawn(
@@ -148,7 +146,7 @@ def draw_kept(desk: Desk, of: Sweep, report: Told, group: int, numbers: tuple[in
                 None,
                 None,
                 stats.photons,
-                traced,
+                is_new and number == numbers[0],
                 int(stats.camera_samples),
                 stats.renderer,
                 stats.is_software,

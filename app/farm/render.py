@@ -79,6 +79,7 @@ class FarmRender:
             )
         self._crew.share(self._picture)
         self._foreman = Foreman(self._crew, Weighing(_GUESSES), stop)
+        self._foreman.weighing.add("the picture")
         self._wait_for_workers(stop)
         if kept.count or self._parts:
             self._hand_out(kept.count or self._parts or 1)
@@ -104,7 +105,7 @@ class FarmRender:
             self._see()
 
     def _see(self) -> None:
-        self._foreman.add([Job("the picture", 1, (part_tasks.see, *self.kept.merged(), None))])
+        self._foreman.add([Job("the picture", 1, (part_tasks.see, *self.kept.merged(), None))], expected=True)
 
     def _take(self, job: Job, result: Any) -> None:
         match job.kind:

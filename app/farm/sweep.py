@@ -15,6 +15,7 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..edit.parameters import Stage, apply_all, check_value
+from ..model.optics.glass import Dispersion
 from ..model.settings import RenderSettings
 from ..render.frame_fit import inputs_of, share_light
 from ..render.viewer.dirty_level import DirtyLevel
@@ -99,7 +100,9 @@ class SweepPlan:
     points: tuple[Point, ...]
     groups: tuple[Group, ...]
     keeps_photons: bool
-    """Whether photons are kept for the points of a group, which follow to first order."""
+    """Whether photons are kept for the points of a group."""
+    first_order: bool = False
+    """Whether some points' glass is another than that of their photons, which follow to first order."""
 
     @staticmethod
     def of(points: Sequence[Point], settings: RenderSettings, exact: bool) -> SweepPlan:
@@ -121,7 +124,9 @@ class SweepPlan:
             else:
                 groups.append((point.stage, [point]))
         made = (Group(anchor, tuple(sorted(found, key=lambda point: point.number))) for anchor, found in groups)
-        return SweepPlan(tuple(points), tuple(sorted(made, key=lambda group: group.points[0].number)), keeps)
+        found = tuple(sorted(made, key=lambda group: group.points[0].number))
+        follows = any(_glasses(group.anchor) != _glasses(p.stage) for group in found for p in group.points)
+        return SweepPlan(tuple(points), found, keeps, keeps and follows)
 
     def told(self, workers: int | None) -> str:
         """Which points are spread, and why, in a sentence; `workers` None: those of a cluster."""
@@ -131,15 +136,21 @@ class SweepPlan:
         if not self.keeps_photons:
             if groups == points:
                 return f"{points} points, each traced anew{spread}"
-            return f"{points} points that differ by the camera but for {groups}, which are traced{spread}"
-        followed = "follows the glass to first order in the change of its index (--exact traces every point)"
+            which = "points that differ" if groups == 1 else f"points in {groups} groups, each of which differ"
+            return f"{points} {which} by the camera alone, on which light does not depend{spread}"
+        followed = ""
+        if self.first_order:
+            followed = "; it follows the glass to first order in the change of its index (--exact traces every point)"
         if groups == 1:
             alone = "" if workers == 1 else ", so that there is nothing to spread over workers"
-            return f"{points} points from one store of photons{alone}; light {followed}"
-        return f"{points} points from {groups} stores of photons{spread}; from one store light {followed}"
+            return f"{points} points from one store of photons: light is traced once{alone}{followed}"
+        return f"{points} points from {groups} stores of photons{spread}{followed}"
 
 
 def _dispersion(stage: Stage) -> float:
     """How much its glasses disperse, all together."""
-    glasses = [item.material.dispersion for item in stage.scene.objects if item.material.transmits]
-    return sum(abs(float(g.index(_BLUE_NM) - g.index(_RED_NM))) for g in glasses)
+    return sum(abs(float(g.index(_BLUE_NM) - g.index(_RED_NM))) for g in _glasses(stage))
+
+
+def _glasses(stage: Stage) -> list[Dispersion]:
+    return [item.material.dispersion for item in stage.scene.objects if item.material.transmits]

@@ -69,8 +69,9 @@ class FarmSweep:
         lead = [job for job in jobs if self._first in job.call[-1]]
         self._rest = [job for job in jobs if job not in lead]
         self._foreman.add(lead or self._rest)
-        if not lead:
-            self._rest = []
+        self._rest = self._rest if lead else []
+        for job in self._rest:
+            self._foreman.weighing.add(job.kind)
         return self._foreman.tally if self._foreman.run(self._take, tell) else None
 
     def _jobs(self) -> list[Job]:
@@ -90,4 +91,4 @@ class FarmSweep:
         for drawn in result:
             self._take_point(drawn)
         rest, self._rest = self._rest, []
-        self._foreman.add(rest)
+        self._foreman.add(rest, expected=True)

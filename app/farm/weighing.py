@@ -20,9 +20,9 @@ class Weighing:
         """Of all jobs so far."""
         return sum(self._waiting.values()) + sum(map(len, self._done.values()))
 
-    def add(self, kind: str) -> None:
-        """A job more."""
-        self._waiting[kind] = self._waiting.get(kind, 0) + 1
+    def add(self, kind: str, count: int = 1) -> None:
+        """So many jobs more."""
+        self._waiting[kind] = self._waiting.get(kind, 0) + count
 
     def finish(self, kind: str, seconds: float) -> None:
         """A job less; `seconds` that it took."""
