@@ -7,13 +7,14 @@ import json
 import logging
 import os
 import pickle
+import re
 import subprocess
 import sys
 import tempfile
 import time
 import uuid
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from types import TracebackType
@@ -30,9 +31,8 @@ if TYPE_CHECKING:
 
 PIP_LINE = "pip install 'spectrasplat[farm]'"
 DEVICE_VARIABLE = "GLCONTEXT_DEVICE_INDEX"
+_ADDRESS = re.compile(r"([a-z]+://)?[^/\s]+:\d{1,5}")
 _CONNECT_S = 10.0
-_LOST_AFTER_S = 15.0
-"""A scheduler that is silent for so long is lost."""
 _EARLY_S = 15.0
 _EARLY_DEATHS = 3
 """A worker that dies so often, each time so soon after it began, will not live."""
@@ -167,7 +167,6 @@ class DaskCrew:
     """By the attempt, whose numbers are never used twice."""
     _news: SimpleQueue[News] = field(default_factory=SimpleQueue)
     _size: tuple[float, int] = (-1.0, 0)
-    _silent_since: float | None = None
 
     def share(self, value: Any) -> None:
         """What all jobs from now on are about."""
@@ -209,8 +208,9 @@ class DaskCrew:
         """See `Crew`."""
         self._jobs.pop(attempt, None)
         future = self._futures.pop((job, attempt), None)
-        if future is not None:
-            future.cancel()
+        if future is not None and self.client.status == "running":
+            with suppress(Exception):  # the scheduler may go at any moment, and takes it along
+                future.cancel()
 
     def news(self, timeout_s: float) -> list[News]:
         """See `Crew`."""
@@ -258,13 +258,9 @@ class DaskCrew:
         return News(job, attempt, is_done=True, error=failed)
 
     def _check_scheduler(self) -> None:
-        """Raise `UserError` once the scheduler has been away for long."""
-        if self.client.status == "running":
-            self._silent_since = None
-            return
-        now = time.monotonic()
-        self._silent_since = self._silent_since or now
-        if self.client.status == "closed" or now - self._silent_since > _LOST_AFTER_S:
+        """Raise `UserError` where the scheduler is gone, or was for a moment: it has forgotten all then."""
+        lost = any(future.status in ("lost", "cancelled") for future in self._futures.values())
+        if lost or self.client.status != "running":
             raise UserError(f"the scheduler at {self.address} is gone: start it again and give the same command")
 
     def __enter__(self) -> Self:
@@ -273,7 +269,8 @@ class DaskCrew:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._futures.clear()
+        for job, attempt in [*self._futures]:
+            self.drop(job, attempt)
         self.client.close(timeout=2)
         if self.workers is not None:
             self.workers.close()
@@ -286,8 +283,9 @@ def open_crew(workers: int | None, scheduler: str | None) -> Iterator[DaskCrew]:
     import dask
     from distributed import Client
 
-    for name in ("distributed", "distributed.scheduler", "distributed.worker", "asyncio", "tornado"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what a user must know is told in sentences
+    for name in ("", ".client", ".scheduler", ".core", ".comm", ".batched"):
+        # What a user must know is told in sentences.
+        logging.getLogger(f"distributed{name}").setLevel(logging.CRITICAL)
     settings = {
         "distributed.scheduler.allowed-failures": _DEATHS,
         "distributed.scheduler.worker-ttl": "1 hour",  # a compiler may hold a worker's only thread for minutes
@@ -304,11 +302,13 @@ def open_crew(workers: int | None, scheduler: str | None) -> Iterator[DaskCrew]:
                 raise
             yield stack.enter_context(DaskCrew(client, "this machine", local))
             return
+        refusal = (
+            "check the address, which looks like tcp://10.0.0.1:8786, or start a scheduler there with 'dask scheduler'"
+        )
+        if not _ADDRESS.fullmatch(scheduler):
+            raise UserError(f"--scheduler '{scheduler}' is no address: {refusal}")
         try:
             client = Client(scheduler, timeout=_CONNECT_S, set_as_default=False)
-        except (OSError, ValueError, TimeoutError, ImportError) as error:
-            raise UserError(
-                f"no scheduler answers at '{scheduler}' ({type(error).__name__}): check the address, which looks like "
-                "tcp://10.0.0.1:8786, or start one with 'dask scheduler'"
-            ) from error
+        except (OSError, ValueError, ImportError) as error:
+            raise UserError(f"no scheduler answers at '{scheduler}' ({type(error).__name__}): {refusal}") from error
         yield stack.enter_context(DaskCrew(client, scheduler))

@@ -37,9 +37,12 @@ def held(folder: Path, output: Path) -> Iterator[None]:
             now = time.strftime("%H:%M", time.localtime())
             with suppress(OSError):  # a disk that is full is told of when a part is written
                 lock.write_text(f"process {os.getpid()} on {socket.gethostname()} since {now}", encoding="utf-8")
-            yield
-            with suppress(OSError):
-                lock.unlink(missing_ok=True)
+            try:
+                yield
+            finally:
+                with suppress(OSError):
+                    lock.unlink(missing_ok=True)
+                    folder.rmdir()  # where nothing was kept in it
     except OSError as error:
         raise UserError(f"cannot write in {folder}: {error.strerror}; choose another place") from error
 
@@ -137,11 +140,9 @@ class PartFolder:
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def leave(self) -> str:
-        """What is kept, in words; an empty folder is not."""
+        """What is kept, in words."""
         if self.headers:
             return f"{len(self.indices)} of {self.count} parts are kept in {self.folder}"
         with suppress(OSError):
             (self.folder / PREVIEW).unlink(missing_ok=True)
-            (self.folder / _LOCK).unlink(missing_ok=True)
-            self.folder.rmdir()
         return "no part was done yet"
