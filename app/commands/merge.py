@@ -109,12 +109,20 @@ def _merge_to_part(request: MergeRequest) -> int:
 
 def _headers(request: MergeRequest) -> dict[Path, PartHeader]:
     """Of all files that are given, each once. Raises `UserError`."""
-    from ..render.part_file import read_header
+    from ..render.part_file import SUFFIX, read_header
 
-    for path, times in Counter(request.parts).items():
+    paths: list[Path] = []
+    for path in request.parts:
+        inside = sorted(path.glob(f"*{SUFFIX}")) if path.is_dir() else [path]
+        if not inside:
+            raise UserError(
+                f"folder {path} holds no part: give one that 'render --passes' has written {SUFFIX} files in"
+            )
+        paths += inside
+    for path, times in Counter(paths).items():
         if times > 1:
             print(f"note: {plain(str(path))} is given {times} times: counted once", file=sys.stderr)
-    return {path: read_header(path) for path in request.parts}
+    return {path: read_header(path) for path in paths}
 
 
 def _chosen(headers: dict[Path, PartHeader], partial: bool | None) -> list[Path]:

@@ -235,7 +235,10 @@ def render(
 
 @app.command()
 def merge(
-    parts: Annotated[list[Path], typer.Argument(metavar="PART.ssp...", help="Parts that 'render --passes' wrote.")],
+    parts: Annotated[
+        list[Path],
+        typer.Argument(metavar="PART.ssp...", help="Parts that 'render --passes' wrote, or folders of them."),
+    ],
     output: Annotated[
         Path,
         typer.Option(

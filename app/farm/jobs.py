@@ -2,7 +2,7 @@
 time, and every result is taken once.
 
 The rule for stragglers is that of backup tasks (Dean and Ghemawat, MapReduce, OSDI 2004, section 3.6): once nothing
-waits any more and a worker is free, the job that is latest gets a second copy, and the first result counts.
+waits any more and a worker is free, the job that is latest gets another copy, and the first result counts.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ TRIES = 3
 """Of a job that fails with what is no sentence to the user."""
 LATE = 2.0
 """A job is late that has run so many times as long as half of its kind did."""
+COPIES = 3
+"""Of one job at once, at most: a copy may be late too."""
 ENOUGH = 3
 """Jobs of a kind that must be done before one is called late."""
 _WORTH_S = 3.0
@@ -92,7 +94,7 @@ class Tally:
 
     done: int = 0
     copied: int = 0
-    """Second copies that were begun."""
+    """Further copies that were begun."""
     failed: int = 0
     """Attempts that ended in an error."""
     taken_s: float = 0.0
@@ -165,16 +167,16 @@ class Foreman:
         self.crew.submit(job, self._attempts)
 
     def _late(self) -> list[Job]:
-        """Jobs that a second copy would end earlier, the latest first."""
+        """Jobs that one copy more would end earlier, the latest first."""
         now, found = self.crew.clock(), []
+        usual = {kind: statistics.median(of) for kind, of in self.tally.seconds.items() if len(of) >= ENOUGH}
         for job, attempts in self._running.items():
-            (only, *more) = attempts.values()
-            of_kind = self.tally.seconds.get(job.kind, [])
-            if more or only.began_s is None or len(of_kind) < ENOUGH:
+            begun = [(now - a.began_s, a.share) for a in attempts.values() if a.began_s is not None]
+            if job.kind not in usual or len(begun) < len(attempts) or len(begun) == COPIES:
                 continue
-            usual, spent = statistics.median(of_kind), now - only.began_s
-            left = spent * (1.0 - only.share) / only.share if only.share > 0.0 else float("inf")
-            if spent > LATE * usual and left > max(usual, _WORTH_S):
+            spent = min(spent for spent, _ in begun)
+            left = min(spent * (1.0 - share) / share if share > 0.0 else float("inf") for spent, share in begun)
+            if spent > LATE * usual[job.kind] and left > max(usual[job.kind], _WORTH_S):
                 found.append((left, job))
         return [job for _, job in sorted(found, key=lambda pair: -pair[0])]
 

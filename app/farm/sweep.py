@@ -8,6 +8,7 @@ photons; all others are traced, and spread over workers.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -54,7 +55,8 @@ def parse_set(text: str, stage: Stage) -> tuple[str, tuple[float, ...]]:
 
 def check_values(path: str, values: Sequence[float], stage: Stage, where: str = "") -> None:
     """Raise `UserError` where a parameter is none, or cannot take one of its values, or gets one twice."""
-    for value in values:
+    extremes = [value for value in values if not math.isfinite(value)] or [*values and (min(values), max(values))]
+    for value in extremes:
         check_value(stage, path, value, where)
     if not values or len(set(values)) < len(values):
         raise UserError(f"{where}{path} gets {'a value twice' if values else 'no value'}: give each once")

@@ -7,11 +7,11 @@ import signal
 from collections.abc import Callable
 from pathlib import Path
 
+from spectrasplat.commands.options import find_scene
 from spectrasplat.farm.cluster import open_crew
 from spectrasplat.farm.render import FarmRender, FarmResult
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.commands.options import find_scene
 
 SETTINGS = RenderSettings(width=64, height=36, photons=400_000, spp=4, batch=4096, camera_beams=True)
 SCENE = "lens"

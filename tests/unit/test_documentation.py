@@ -64,11 +64,11 @@ def complaint(command: str) -> str:
     if words[0].startswith("-"):
         options = {o for p in typer.main.get_command(program.app).params for o in p.opts}
         return "" if words[0] in options else f"no option {words[0]}"
-    if words[0] not in known:
+    name = next((name for name in (" ".join(words[:2]), words[0]) if name in known), None)
+    if name is None:
         return f"no command {words[0]}"
-    command_ = known[words[0]]
     try:
-        command_.make_context(words[0], words[1:], resilient_parsing=False)
+        known[name].make_context(name, words[len(name.split()) :], resilient_parsing=False)
     except Exception as error:  # noqa: BLE001 - click's usage errors, which typer has moved
         needs_more = {"Missing argument", "Missing option"}
         message = getattr(error, "format_message", error.__str__)()
