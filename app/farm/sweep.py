@@ -55,11 +55,13 @@ def parse_set(text: str, stage: Stage) -> tuple[str, tuple[float, ...]]:
 
 def check_values(path: str, values: Sequence[float], stage: Stage, where: str = "") -> None:
     """Raise `UserError` where a parameter is none, or cannot take one of its values, or gets one twice."""
-    extremes = [value for value in values if not math.isfinite(value)] or [*values and (min(values), max(values))]
-    for value in extremes:
+    if not values:
+        raise UserError(f"{where}{path} gets no value: give one or more")
+    # Of thousands the extremes say whether all can be taken.
+    for value in [value for value in values if not math.isfinite(value)] or (min(values), max(values)):
         check_value(stage, path, value, where)
-    if not values or len(set(values)) < len(values):
-        raise UserError(f"{where}{path} gets {'a value twice' if values else 'no value'}: give each once")
+    if len(set(values)) < len(values):
+        raise UserError(f"{where}{path} gets a value twice: give each once")
 
 
 @dataclass(frozen=True)
