@@ -30,7 +30,7 @@ def farmed(
     scene = load_scene(find_scene(SCENE))
     with open_crew(workers, None) as crew:
         told = [] if notes is None else notes
-        work = FarmRender(crew, scene, settings, Path(SCENE), folder, parts, told.append)
+        work = FarmRender(crew, scene, settings, find_scene(SCENE), folder, parts, told.append)
         assert crew.workers is not None
         local = crew.workers
 

@@ -78,28 +78,28 @@ def test_what_is_stopped_is_gone_on_from_and_what_is_cut_short_done_again(
     folder, notes = tmp_path / "parts", list[str]()
 
     def fill_the_disk(work: FarmRender, process_ids: list[int]) -> None:
-        if len(work.kept.indices) >= 2:
+        if work.kept.indices:
             raise UserError("cannot write: the disk is full")
 
     with pytest.raises(UserError, match="the disk is full"):
-        farmed(folder, 2, 5, fill_the_disk, settings=SMALL)
+        farmed(folder, 2, 3, fill_the_disk, settings=SMALL)
     there = sorted(folder.glob("*.ssp"))
-    assert 2 <= len(there) < 5
+    assert 1 <= len(there) < 3
     there[0].write_bytes(there[0].read_bytes()[:1000])
-    result = farmed(folder, 2, 5, notes=notes, settings=SMALL)
+    result = farmed(folder, 2, 3, notes=notes, settings=SMALL)
     assert result is not None and result.taken_up == len(there) - 1
     assert len(notes) == 1 and "cut short" in notes[0] and str(there[0]) in notes[0]
     one = whole(SMALL)
     assert np.abs(result.picture.rgb - one).max() <= 1e-6 * one.max()
     # All is there: a farm that begins again only looks at the parts.
-    again = farmed(folder, 1, 5, settings=SMALL)
-    assert again is not None and again.taken_up == 5 and again.tally.done == 1
+    again = farmed(folder, 1, 3, settings=SMALL)
+    assert again is not None and again.taken_up == 3 and again.tally.done == 1
     # Parts of another rendering are not touched.
     with pytest.raises(UserError, match="holds parts of another rendering"):
-        farmed(folder, 1, 5, settings=RenderSettings(48, 27, photons=50_000, batch=4096))
-    with pytest.raises(UserError, match="holds parts of 5, not of 4"):
-        farmed(folder, 1, 4, settings=SMALL)
-    assert len(list(folder.glob("*.ssp"))) == 5
+        farmed(folder, 1, 3, settings=RenderSettings(48, 27, photons=50_000, batch=4096))
+    with pytest.raises(UserError, match="holds parts of 3, not of 2"):
+        farmed(folder, 1, 2, settings=SMALL)
+    assert len(list(folder.glob("*.ssp"))) == 3
 
 
 @pytest.mark.slow
