@@ -133,8 +133,8 @@ def trace_part(
             if light.only_beams:
                 way_out = "its light goes as beams, in rounds of a million photons: --method srd-photons has more"
             raise UserError(
-                f"{share.count} parts: this rendering is traced in {count * groups} rounds, which are not enough to share "
-                f"out; {way_out}"
+                f"{share.count} parts: this rendering is traced in {count * groups} rounds, which are not enough to "
+                f"share out; {way_out}"
             )
         mine = len(range(share.index - 1, count * groups, share.count))
         done = 0
