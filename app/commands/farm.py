@@ -56,14 +56,16 @@ def crew(farm: FarmRequest) -> Iterator[DaskCrew]:
 def workers_of(farm: FarmRequest) -> int | None:
     """How many of this machine; None where a scheduler has its own. Raises `UserError`, also where Dask is missing."""
     from ..farm.cluster import check_installed
+    from ..farm.gpus import count_gpus
 
     if farm.workers is not None and farm.scheduler is not None:
         raise UserError("--workers and --scheduler exclude each other: a running cluster has its own workers")
     workers = None
     if farm.scheduler is None:
-        workers = os.cpu_count() or 1
         if farm.workers is not None:
             workers = options.parse_integer("--workers", farm.workers, 1, MAX_WORKERS)
+        else:
+            workers = count_gpus() or os.cpu_count() or 1
     check_installed()
     return workers
 

@@ -1,6 +1,6 @@
 """The rooms of app/ stand in layers: a file imports from its own or from lower ones, and no files import in a circle.
 
-    base < model < gpu, edit, beams < passes < render < ui, reference < bench < stress < commands < api
+    base < model < gpu, edit, beams < passes < render < ui, reference < bench < stress < farm < commands < api
 
 Rooms of one layer do not import each other, but for `ui`, whose compare panel shows the reference.
 """
@@ -24,6 +24,7 @@ LAYERS = (
     ("ui", "reference"),
     ("bench",),
     ("stress",),
+    ("farm",),
     ("commands",),
     ("api",),
 )
