@@ -67,7 +67,13 @@ PRIMARY_SAMPLES = LOOKS
 """Of one sample at what is seen directly: outlines and textures there cost a tenth of what glass costs …"""
 PRIMARY_SAMPLES_UNTIL = 16
 """… and with more samples than these they are smooth as they are."""
+SURVEY_SAMPLES = 2
+"""Samples of so many looks each that tell, before a still's first sample, which pixels are even …"""
+SURVEY_FROM = 4
+"""… where as many samples or more follow: fewer would cost no more than the survey itself."""
 
+_SURVEY_GRID = (4, 2)
+"""Columns and rows of a survey's looks in a pixel: SURVEY_SAMPLES · LOOKS together."""
 _TARGET_SECONDS = 0.15
 """What one dispatch may take; rows are divided to fit."""
 _GROUP = 8
@@ -266,6 +272,8 @@ class CameraPass:
         looks = np.zeros((samples, LOOKS, 2))
         if parameters["primary_samples"][0] > 1:
             looks = looks_lattice(samples, sample_offset)
+            if self._listed is not None and sample_offset == 0 and samples >= SURVEY_FROM and self._sums.is_single:
+                yield from self._survey(parameters, width, height, maps)
         for index, place in enumerate(pixel_lattice(samples, sample_offset)):
             parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
             parameters["within_pixel"] = place
@@ -455,6 +463,32 @@ class CameraPass:
             self._sums.samples_of_row[row : row + rows] += 1
             row += rows
             yield row / height
+
+    def _survey(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
+        """Find the pixels in which, and round which, nothing but one surface in the same light is seen directly, and
+        what that looks like: the samples then look at the others only. Pauses after every dispatch with 0.0."""
+        assert self._listed is not None
+        taken = parameters.copy()
+        taken["survey"], taken["survey_gain"] = 1, 1.0 / SURVEY_SAMPLES
+        taken["survey_at"] = self._listed.survey_at(width * height)
+        # The looks tile the pixel: what they are averaged over is then all of it, and nothing twice.
+        columns, rows = _SURVEY_GRID
+        taken["sample_side"] = SURVEY_SAMPLES**-0.5
+        taken["pixel_width"], taken["pixel_height"] = np.sqrt(rows / columns), np.sqrt(columns / rows)
+        tiles = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2)
+        looks = ((tiles + 0.5) / _SURVEY_GRID).reshape(SURVEY_SAMPLES, -1, 4)
+        for index, places in enumerate(looks):
+            taken["sample_index"] = taken["draw_index"] = index
+            taken["looks"] = places
+            row = 0
+            while row < height:
+                rows = min(self._rows.units, height - row)
+                taken["first_row"] = row
+                took = self._dispatch(self._program_direct(), taken, maps, -(-width // _GROUP), -(-rows // _GROUP))
+                self._rows.learn(rows, took, self.dispatch_seconds)
+                row += rows
+                yield 0.0
+        parameters["survey"], parameters["survey_at"] = 2, taken["survey_at"]
 
     def _follow_listed(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
         """Follow what the listed pixels of a band of rows see, yielding the share done."""
