@@ -72,6 +72,8 @@ SURVEY_SAMPLES = 2
 SURVEY_FROM = 4
 """… where as many samples or more follow: fewer would cost no more than the survey itself."""
 
+_BEAMS_PROGRESS = 0.7
+"""Of a frame's time, about, that drawing its beams takes."""
 _SURVEY_GRID = (4, 2)
 """Columns and rows of a survey's looks in a pixel: SURVEY_SAMPLES · LOOKS together."""
 _TARGET_SECONDS = 0.15
@@ -267,19 +269,22 @@ class CameraPass:
             if samples + sample_offset > PRIMARY_SAMPLES_UNTIL or (self.spectrum.single and not self.shows_beams)
             else max(self.primary_samples, PRIMARY_SAMPLES if self.shows_beams else 1)
         )
-        if self.shows_beams and sample_offset == 0:
-            yield from self._draw_beams(parameters, samples, maps)
+        before = _BEAMS_PROGRESS if self.shows_beams and sample_offset == 0 else 0.0
+        if before:
+            for share in self._draw_beams(parameters, samples, maps):
+                yield before * share
         looks = np.zeros((samples, LOOKS, 2))
         if parameters["primary_samples"][0] > 1:
             looks = looks_lattice(samples, sample_offset)
             if self._listed is not None and sample_offset == 0 and samples >= SURVEY_FROM and self._sums.is_single:
-                yield from self._survey(parameters, width, height, maps)
+                for _ in self._survey(parameters, width, height, maps):
+                    yield before
         for index, place in enumerate(pixel_lattice(samples, sample_offset)):
             parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
             parameters["within_pixel"] = place
             parameters["looks"] = looks[index].reshape(-1, 4)
             for share in self._add_sample(parameters, width, height, maps):
-                yield (index + share) / samples
+                yield before + (1.0 - before) * (index + share) / samples
         self.context.check("the camera pass")
 
     @property
@@ -521,7 +526,7 @@ class CameraPass:
         return self._beside
 
     def _draw_beams(self, parameters: np.ndarray, samples: int, maps: CausticMaps) -> Iterator[float]:
-        """Draw what is seen by beams, yielding 0.0 after every portion."""
+        """Draw what is seen by beams, yielding the share done after every portion."""
         assert self._beams is not None
         parameters["sample_index"] = parameters["draw_index"] = 0
 
@@ -531,8 +536,9 @@ class CameraPass:
 
         places = shared_places(samples, int(parameters["primary_samples"][0]))
         as_image = self.scene.texels.as_image
-        for _ in self._beams.draw(self._sums.size, places, as_image, bind, self.dispatch_seconds):
-            yield 0.0
+        drawn = 1.0 if self._starts is None else 0.5
+        for share in self._beams.draw(self._sums.size, places, as_image, bind, self.dispatch_seconds):
+            yield drawn * share
         if self._starts is not None:
             assert self._listed is not None
             found, gather = self._beams.found, self._beams.gather
@@ -541,8 +547,8 @@ class CameraPass:
             def dispatch(program: moderngl.ComputeShader, count: int) -> float:
                 return self._dispatch(program, parameters, maps, -(-count // GROUP), 1)
 
-            for _ in self._starts.follow(self._listed, parameters, dispatch, found, gather, self.dispatch_seconds):
-                yield 0.0
+            for share in self._starts.follow(self._listed, parameters, dispatch, found, gather, self.dispatch_seconds):
+                yield drawn + (1.0 - drawn) * share
 
     def _program_beyond(self) -> moderngl.ComputeShader:
         """What follows rays beyond glass and mirrors."""
