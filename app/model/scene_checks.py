@@ -25,9 +25,9 @@ MIN_SIZE = 1e-12
 def check_scene(scene: Scene, file_name: str) -> list[str]:
     """Notes about `scene`; raises UserError for one that cannot give a picture.
 
-    Errors: no objects, or more of them or of lights than a photon can tell apart, no light and no receiver unless
-    there is an environment to see by, a texture without texture coordinates, objects of absurdly different size, a light inside glass, a laser line outside a
-    glass's data. Notes: glasses whose data are clamped, or unusual.
+    Errors: no objects, or more of them or of lights than a photon can tell apart, no light and no receiver unless there
+    is an environment to see by, a texture without texture coordinates, objects of absurdly different size, a light
+    inside glass, a laser line outside a glass's data. Notes: glasses whose data are clamped, or unusual.
     """
     if not scene.objects:
         raise UserError(f"{file_name}: the scene holds no objects; add one with [[objects]]")
