@@ -142,6 +142,7 @@ def trace_part(
             first = (share.index - 1 - number * groups) % share.count
             for step in light.pass_steps(number, photons, 0, first, share.count):
                 done += step.round_done
+                progress(done / mine)
                 yield done / mine
                 if stopped():
                     return
@@ -167,8 +168,7 @@ def trace_part(
     renderer = FrameRenderer(context, settings, [stage], fill=fill)
     steps = renderer.steps(stage, stop)
     try:
-        for done in steps:
-            progress(done)
+        for _ in steps:
             if made or stop():
                 break
     finally:
