@@ -29,14 +29,15 @@ SMALL = RenderSettings(width=48, height=27, photons=30_000, spp=2, batch=4096, c
 
 
 class Killer:
-    """Kills a worker that is at work, so often, once `after` more parts are done each time."""
+    """Kills one of the workers so often, each time once `after` more parts are done."""
 
     def __init__(self, times: int, after: int) -> None:
         self.times, self.after = times, after
         self.killed: list[int] = []
 
     def __call__(self, work: FarmRender, process_ids: list[int]) -> None:
-        if len(self.killed) < self.times and len(work.kept.indices) >= self.after * (1 + len(self.killed)):
+        is_time = len(self.killed) < self.times and len(work.kept.indices) >= self.after * (1 + len(self.killed))
+        if is_time and process_ids[0] not in self.killed:  # the same worker, begun again
             self.killed.append(process_ids[0])
             kill(process_ids[0])
 
@@ -58,7 +59,7 @@ def test_a_killed_worker_loses_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_eight_parts_on_four_workers_of_which_one_is_killed_twice(tmp_path: Path) -> None:
-    killer = Killer(2, after=2)
+    killer = Killer(2, after=1)
     result = farmed(tmp_path / "parts", 4, 8, killer, settings=SETTINGS)
     assert result is not None and len(set(killer.killed)) == 2
     one = whole(SETTINGS)
