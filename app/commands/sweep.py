@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..base.errors import UserError, plain
+from ..base.errors import UserError
 from ..base.interrupts import interrupt_flag
 from ..base.memory import check_picture_memory
 from ..model.settings import RenderSettings
@@ -19,6 +18,7 @@ from .farm import FarmRequest, crew, note, workers_of
 if TYPE_CHECKING:
     from ..edit.opening import Opening
     from ..edit.parameters import Stage
+    from ..farm.point_tasks import Drawn
     from ..farm.sweep import SweepPlan
     from ..farm.sweep_folder import SweepFolder
     from ..model.scene import Scene
@@ -126,21 +126,30 @@ def _here(
 
     due = list(by_group(plan.groups, lambda number: not folder.has(number)))
     desk, shared, told = Desk(), shared_of(plan, settings), _Told(tell, stop)
-    told.count = len(due)
-    said: set[str] = set()
+    told.count, take = len(due), _taker(folder)
     try:
         for place, (group, number) in enumerate(due):
             told.begin = place
             drawn = draw_point(desk, plan, shared, group, number, told)
             if drawn is None:
                 return
-            folder.put(drawn)
-            for sentence in drawn.notices:
-                if sentence not in said:
-                    said.add(sentence)
-                    print(f"note: picture {number}: {plain(sentence)}", file=sys.stderr)
+            take(drawn)
     finally:
         desk.clear()
+
+
+def _taker(folder: SweepFolder) -> Callable[[Drawn], None]:
+    """Writes pictures, and tells what they say of themselves, each sentence once."""
+    said: set[str] = set()
+
+    def take(drawn: Drawn) -> None:
+        folder.put(drawn)
+        for sentence in drawn.notices:
+            if sentence not in said:
+                said.add(sentence)
+                note(f"picture {drawn.number}: {sentence}")
+
+    return take
 
 
 def _by_crew(
@@ -154,9 +163,9 @@ def _by_crew(
     from ..farm.sweep_run import FarmSweep
 
     with crew(farm) as workers:
-        FarmSweep(workers, plan, settings, folder.put, lambda number: not folder.has(number), first=folder.first).run(
-            tell, stop
-        )
+        FarmSweep(
+            workers, plan, settings, _taker(folder), lambda number: not folder.has(number), first=folder.first
+        ).run(tell, stop)
 
 
 def _suffix(name: str | None) -> str:
