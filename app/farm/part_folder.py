@@ -7,7 +7,7 @@ import shutil
 import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -28,23 +28,22 @@ def held(folder: Path, output: Path) -> Iterator[None]:
     """Make the folder and hold it. Raises `UserError` where another process does, or it cannot be made."""
     make_output_folder(folder)
     lock = folder / _LOCK
-    try:
-        with locked(lock, wait=False) as is_ours:
-            if not is_ours:
-                raise UserError(
-                    f"another farm is at work on {output} ({_who(lock)}): wait for it, or choose another -o"
-                )
-            now = time.strftime("%H:%M", time.localtime())
-            with suppress(OSError):  # a disk that is full is told of when a part is written
-                lock.write_text(f"process {os.getpid()} on {socket.gethostname()} since {now}", encoding="utf-8")
-            try:
-                yield
-            finally:
-                with suppress(OSError):
-                    lock.unlink(missing_ok=True)
-                    folder.rmdir()  # where nothing was kept in it
-    except OSError as error:
-        raise UserError(f"cannot write in {folder}: {error.strerror}; choose another place") from error
+    with ExitStack() as stack:
+        try:
+            is_ours = stack.enter_context(locked(lock, wait=False))
+        except OSError as error:
+            raise UserError(f"cannot write in {folder}: {error.strerror}; choose another place") from error
+        if not is_ours:
+            raise UserError(f"another farm is at work on {output} ({_who(lock)}): wait for it, or choose another -o")
+        now = time.strftime("%H:%M", time.localtime())
+        with suppress(OSError):  # a disk that is full is told of when a part is written
+            lock.write_text(f"process {os.getpid()} on {socket.gethostname()} since {now}", encoding="utf-8")
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                lock.unlink(missing_ok=True)
+                folder.rmdir()  # where nothing was kept in it
 
 
 def _who(lock: Path) -> str:
