@@ -93,7 +93,7 @@ class View:
         self._answered: tuple[object, ...] = ()
         self._light: dict[str, Any] = {}
         if self._why is None:
-            self._front = (front or Front)(self.handle, session._size)
+            self._front = (front or Front)(self._handle, session._size)
             self._front.glasses(self._glasses())
             self._thread = threading.Thread(target=self._live, name="spectrasplat view", daemon=True)
             self._thread.start()
@@ -105,7 +105,7 @@ class View:
 
     # ---- messages from the browser -----------------------------------------------------------
 
-    def handle(self, message: dict[str, Any]) -> None:
+    def _handle(self, message: dict[str, Any]) -> None:
         """Do what a message of the widget asks for; a mistake becomes a sentence below the picture."""
         kind = message.get("kind")
         try:

@@ -124,7 +124,7 @@ def add_area_lights(document, lights):
         entry = {"name": light["name"], "type": "spot", "intensity": light["light"]["flux_lm"] / math.pi}
         entry["color"] = light["colour"]
         entry["spot"] = {"innerConeAngle": 0.0, "outerConeAngle": 0.5 * math.pi}
-        entry["extras"] = {"spectrasplat": {"light": light["light"]}}
+        entry["extras"] = {"spectrasplat": {"light": {"name": light["name"], **light["light"]}}}
         listed.append(entry)
         nodes.append(
             {"name": light["name"], "matrix": light["matrix"], "extensions": {link: {"light": len(listed) - 1}}}
@@ -425,6 +425,9 @@ class SPECTRASPLAT_OT_bake(bpy.types.Operator):
         scene = Path(self._folder.name) / "scene.glb"
         if not export_scene(context, scene):
             raise RuntimeError("Nothing visible is glass: raise Transmission of a Principled BSDF, or use a Glass BSDF")
+        for item in context.scene.objects:
+            if item.visible_get() and item.type == "LIGHT" and item.data.type == "AREA" and min(item.data.color) < 0.99:
+                self.report({"WARNING"}, f"The area lamp '{item.name}' is taken as white")
         output = Path(self._folder.name) / "caustic.exr"
         name, texels = settings.receiver.name, settings.texels
         self._job = Job(program, scene, name, output, texels, settings.photons, settings.seed)
