@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ..base.atomic import atomic_output, atomic_outputs
+from ..base.atomic import atomic_outputs
 from ..base.errors import UserError
 from ..base.image_io import check_finite, save_codes, write_into
 from ..base.tone_map import srgb_oetf
-from ..model.io.lit_gltf import save_lit_gltf
-from ..model.io.lit_usd import check_usd, save_lit_usd, texture_path
+from ..model.io.lit_gltf import write_lit_gltf
+from ..model.io.lit_usd import check_usd, texture_path, write_lit_usd
 from ..model.scene import Scene
 from .bake import placement_path
 from .cookie import cookie
@@ -71,13 +71,14 @@ def write_export(
         "largest_emission": lit.strength,
         "placement": dict(placement),
     }
-    if path.suffix.lower() in GLTF_SUFFIXES:
-        told["texture"] = "8-bit sRGB; white is largest_emission (KHR_materials_emissive_strength)"
-        save_lit_gltf(lit, path)
-    else:
-        told["texture"] = f"{texture_path(path).name}, linear (raw)"
-        save_lit_usd(lit, path)
-    with atomic_output(placement_path(path)) as note:
+    is_gltf = path.suffix.lower() in GLTF_SUFFIXES
+    white = "8-bit sRGB; white is largest_emission (KHR_materials_emissive_strength)"
+    told["texture"] = white if is_gltf else f"{texture_path(path).name}, linear (raw)"
+    with atomic_outputs(*check_export(path, plane, source)) as (file, *texture, note):
+        if is_gltf:
+            write_lit_gltf(lit, path, file)
+        else:
+            write_lit_usd(lit, path, file, *texture)
         note.write_text(_text(told), encoding="utf-8")
 
 

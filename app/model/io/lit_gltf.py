@@ -10,7 +10,7 @@ import numpy as np
 
 from ...base.tone_map import srgb_oetf
 from ..staging import Y_UP_TO_Z_UP
-from .gltf_document import GltfDocument, save_document
+from .gltf_document import GltfDocument, write_document
 from .lit_mesh import LitMesh
 from .scene_pictures import png_bytes
 
@@ -20,8 +20,8 @@ _ARRAY_BUFFER, _ELEMENT_BUFFER = 34962, 34963
 _FLOAT, _UINT = 5126, 5125
 
 
-def save_lit_gltf(lit: LitMesh, path: Path) -> None:
-    """Write it, self-contained; glTF's y is up, so what stands along z is turned. Raises `UserError`."""
+def write_lit_gltf(lit: LitMesh, path: Path, into: Path) -> None:
+    """Write it, self-contained, into a file that becomes `path`; glTF's y is up, so what stands along z is turned."""
     data, views, accessors = bytearray(), [], []
 
     def view(content: bytes, **more: int) -> int:
@@ -78,4 +78,4 @@ def save_lit_gltf(lit: LitMesh, path: Path) -> None:
     }
     document = GltfDocument(path, json, bytes(data))
     document.set_buffer(0, bytes(data))
-    save_document(document, path)
+    write_document(document, path, into)

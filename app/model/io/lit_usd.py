@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ...base.atomic import atomic_output
 from ...base.errors import UserError
-from ...base.image_io import write_image
+from ...base.image_io import write_into
 from .lit_mesh import LitMesh
 
 
@@ -27,40 +26,39 @@ def texture_path(path: Path) -> Path:
     return path.with_suffix(".exr")
 
 
-def save_lit_usd(lit: LitMesh, path: Path) -> None:
-    """Write it, the texture first. Raises `UserError`."""
+def write_lit_usd(lit: LitMesh, path: Path, into: Path, texture_into: Path) -> None:
+    """Write it and its texture into files that become `path` and `texture_path(path)`. Raises `UserError`."""
     check_usd()
     from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
-    write_image(texture_path(path), lit.emission)
-    with atomic_output(path) as part:
-        # A layer of no file: USD keeps those of files open by their names. "usd" is binary.
-        layer = Sdf.Layer.CreateAnonymous(".usda" if path.suffix.lower() == ".usda" else ".usdc")
-        stage = Usd.Stage.Open(layer)
-        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z if lit.up == "z" else UsdGeom.Tokens.y)
-        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-        root = UsdGeom.Xform.Define(stage, "/SpectraSplat")
-        stage.SetDefaultPrim(root.GetPrim())
-        place = f"/SpectraSplat/{_identifier(lit.name)}"
-        mesh = UsdGeom.Mesh.Define(stage, place)
-        mesh.GetPrim().SetDisplayName(lit.name)
-        positions, uv, normals, triangles = lit.welded()
-        mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(positions))
-        mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([positions.min(axis=0), positions.max(axis=0)])))
-        mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(triangles), 3, np.int32)))
-        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel().astype(np.int32)))
-        mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-        mesh.CreateDoubleSidedAttr(True)
-        if normals is not None:
-            mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals))
-            mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
-        st = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex)
-        st.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(np.stack([uv[:, 0], 1.0 - uv[:, 1]], axis=1))))
-        material = UsdShade.Material.Define(stage, f"{place}_lit")
-        _shade(stage, material, lit, f"./{texture_path(path).name}", Gf, Sdf, UsdShade)
-        UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
-        if not layer.Export(str(part), args={"format": "usda" if path.suffix.lower() == ".usda" else "usdc"}):
-            raise UserError(f"cannot write {path}: is the disk full?")
+    write_into(texture_into, lit.emission)
+    # A layer of no file: USD keeps those of files open by their names. "usd" is binary.
+    layer = Sdf.Layer.CreateAnonymous(".usda" if path.suffix.lower() == ".usda" else ".usdc")
+    stage = Usd.Stage.Open(layer)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z if lit.up == "z" else UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    root = UsdGeom.Xform.Define(stage, "/SpectraSplat")
+    stage.SetDefaultPrim(root.GetPrim())
+    place = f"/SpectraSplat/{_identifier(lit.name)}"
+    mesh = UsdGeom.Mesh.Define(stage, place)
+    mesh.GetPrim().SetDisplayName(lit.name)
+    positions, uv, normals, triangles = lit.welded()
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(positions))
+    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([positions.min(axis=0), positions.max(axis=0)])))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(triangles), 3, np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel().astype(np.int32)))
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateDoubleSidedAttr(True)
+    if normals is not None:
+        mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals))
+        mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    st = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex)
+    st.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(np.stack([uv[:, 0], 1.0 - uv[:, 1]], axis=1))))
+    material = UsdShade.Material.Define(stage, f"{place}_lit")
+    _shade(stage, material, lit, f"./{texture_path(path).name}", Gf, Sdf, UsdShade)
+    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+    if not layer.Export(str(into), args={"format": "usda" if path.suffix.lower() == ".usda" else "usdc"}):
+        raise UserError(f"cannot write {path}: is the disk full?")
 
 
 def _shade(stage: Any, material: Any, lit: LitMesh, texture: str, Gf: Any, Sdf: Any, UsdShade: Any) -> None:
