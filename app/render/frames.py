@@ -38,8 +38,8 @@ from .time_budget import TimeBudget
 
 FIRST_PASS_PHOTONS = 1 << 17
 """Photons of a timed rendering's first pass, which finds out how fast the scene goes."""
-_LIGHT_SHARE = 0.8
-"""Of a frame's progress, where its light is traced."""
+_PHOTON_S, _SAMPLE_S = 10e-6, 3e-6
+"""What a photon and a camera sample of a pixel take, one to the other: progress is weighted by them."""
 _PREPARING, _TRACING, _SEEING = "preparing", "tracing photons", "taking camera samples"
 
 Stop = Callable[[], bool]
@@ -117,6 +117,8 @@ class FrameRenderer:
         """What `steps` is at."""
         self.seconds = FrameSeconds()
         """Of the last frame."""
+        self._light_share = 0.0
+        """Of the last frame's progress, where its light was traced."""
         self.memory: MemoryEstimate | None = None
         """Expected of the last frame that was traced."""
         self.traces = 0
@@ -144,6 +146,7 @@ class FrameRenderer:
                 yield 0.0
             self.seconds.prepare = time.perf_counter() - self.seconds.started
             sampling, budget = LightSampling.of(stage.scene, self._settings), self._budget
+            self._light_share = self._share_of_light(light, sampling)
             if budget is not None:
                 if not self._shows_map:
                     self._add_camera_pass(traced)
@@ -152,7 +155,7 @@ class FrameRenderer:
                 sampling = replace(sampling, seconds=budget.for_light(self._settings.spp))
             self.phase = _TRACING
             for share in self._fill(light, sampling, stop):
-                yield _LIGHT_SHARE * share if budget is None else budget.spent
+                yield self._light_share * share if budget is None else budget.spent
             light.finish()
             light.settle()
             if traced.camera_pass is None and not self._shows_map:
@@ -200,16 +203,16 @@ class FrameRenderer:
                 sampling = replace(sampling, budget=max(budget.samples(), 1))
             if self._traced.camera_beams is not None:
                 for _ in self._traced.camera_beams.choosing(*view, sampling.budget, settings.seed):
-                    yield self._share(_LIGHT_SHARE)
+                    yield self._share(self._light_share)
             for _ in sampling.choosing(camera_pass, *view, maps):
-                yield self._share(_LIGHT_SHARE)
+                yield self._share(self._light_share)
             samples = sampling.samples(camera_pass)
         if budget is not None:
             yield from self._see_until(budget, stage, maps, stop)
             self.seconds.camera += time.perf_counter() - started
             return
         for share in camera_pass.samples(*view, samples, 0, maps, settings.seed):
-            yield self._share(_LIGHT_SHARE + (1.0 - _LIGHT_SHARE) * share)
+            yield self._share(self._light_share + (1.0 - self._light_share) * share)
             if not stops_at_once and stop() and camera_pass.is_even:
                 break
         self.seconds.camera += time.perf_counter() - started
@@ -230,6 +233,14 @@ class FrameRenderer:
                     return
             taken += count
             budget.sample_s = (time.perf_counter() - started) / taken
+
+    def _share_of_light(self, light: LightPass, sampling: LightSampling) -> float:
+        """Of the frame's time, about."""
+        settings = self._settings
+        if self._shows_map or not light.domains:
+            return float(self._shows_map)
+        camera_s = settings.width * settings.height * CameraSampling.of(settings).budget * _SAMPLE_S
+        return sampling.photons * _PHOTON_S / (sampling.photons * _PHOTON_S + camera_s)
 
     def _share(self, of_work: float) -> float:
         """Progress: of the time where that is given, else of the work."""
