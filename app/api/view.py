@@ -200,6 +200,8 @@ class View:
         self._version, self._picture, self._sent_s = version, frame.data, now
         self._sent += 1
         front.send({"kind": "picture", "number": self._sent} | frame.told, frame.data)
+        if frame.told["done"] or not self._shown.is_set():
+            front.keep(frame.data)
         self._shown.set()
         return not self._frames.is_settling
 

@@ -37,6 +37,7 @@ class Front:
             "size": traitlets.List().tag(sync=True),
             "glasses": traitlets.List().tag(sync=True),
             "told": traitlets.Unicode("").tag(sync=True),
+            "still": traitlets.Bytes(b"").tag(sync=True),
         }
         # Made here, so that nothing of Jupyter is imported before somebody asks for a view.
         kind = type("SpectraSplatView", (anywidget.AnyWidget,), kept)
@@ -56,6 +57,10 @@ class Front:
         """A sentence below the picture; "" for none."""
         if self.widget.told != text:
             self.widget.told = text
+
+    def keep(self, picture: bytes) -> None:
+        """A JPEG file that stays in saved notebooks and pages, for readers without a kernel."""
+        self.widget.still = picture
 
     def mimebundle(self) -> dict[str, Any]:
         """For a cell's output."""

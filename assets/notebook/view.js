@@ -52,7 +52,7 @@ function drawSpectrum(canvas, light) {
   pen.fillStyle = pen.strokeStyle = ink;
   pen.font = "11px sans-serif";
   pen.textAlign = "center";
-  for (const nm of [400, 500, 600, 700]) pen.fillText(`${nm} nm`, x(nm), height - 3);
+  for (const nm of [400, 500, 600, 700]) pen.fillText(nm === 700 ? "700 nm" : nm, x(nm), height - 3);
   pen.beginPath();
   pen.moveTo(0, floor + 0.5);
   pen.lineTo(width, floor + 0.5);
@@ -123,20 +123,29 @@ function render({ model, el }) {
   // ---- what comes from Python
 
   let shown = 0;
+  const bytesOf = (raw) =>
+    raw.buffer ? new Uint8Array(raw.buffer, raw.byteOffset, raw.byteLength) : new Uint8Array(raw);
+  const decoded = (raw) => createImageBitmap(new Blob([bytesOf(raw)], { type: "image/jpeg" }));
+  const draw = (picture) => (brush.drawImage(picture, 0, 0, width, height), picture.close());
+  async function onStill() {
+    const still = model.get("still");
+    if (shown || !still || !still.byteLength) return;
+    const picture = await decoded(still);
+    if (shown) return;
+    draw(picture);
+    status.textContent = "A picture from when it ran; run the cell to walk round.";
+  }
   async function onMessage(message, buffers) {
     if (message.kind === "light") {
       drawSpectrum(spectrum, message);
       words.textContent = wordsOf(message);
       spectrum.setAttribute("aria-label", words.textContent);
     } else if (message.kind === "picture") {
-      const raw = buffers[0];
-      const bytes = raw.buffer ? new Uint8Array(raw.buffer, raw.byteOffset, raw.byteLength) : new Uint8Array(raw);
-      const picture = await createImageBitmap(new Blob([bytes], { type: "image/jpeg" }));
+      const picture = await decoded(buffers[0]);
       send({ kind: "seen", number: message.number });
       if (message.number < shown) return;
       shown = message.number;
-      brush.drawImage(picture, 0, 0, width, height);
-      picture.close();
+      draw(picture);
       status.textContent = statusOf(message);
       canvas.dataset.number = String(message.number);
     }
@@ -183,6 +192,7 @@ function render({ model, el }) {
   model.on("change:told", onTold);
   onGlasses();
   onTold();
+  onStill();
 
   // ---- mouse
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 import shutil
@@ -32,7 +33,7 @@ class Browser:
         self.pictures: list[tuple[dict[str, Any], np.ndarray]] = []
         self.lights: list[dict[str, Any]] = []
         self.listed: list[dict[str, Any]] = []
-        self.told = ""
+        self.told, self.kept = "", b""
 
     def send(self, message: dict[str, Any], data: bytes | None = None) -> None:
         json.dumps(message, allow_nan=False)
@@ -47,6 +48,9 @@ class Browser:
 
     def glasses(self, listed: list[dict[str, Any]]) -> None:
         self.listed = listed
+
+    def keep(self, picture: bytes) -> None:
+        self.kept = picture
 
     def tell(self, text: str) -> None:
         self.told = text or self.told
@@ -222,15 +226,18 @@ def test_the_widget_carries_messages_both_ways(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(front.widget, "_send", lambda message, buffers=None: sent.append((message, buffers)))
     front.send({"kind": "picture"}, b"jpeg")
     assert sent == [({"method": "custom", "content": {"kind": "picture"}}, [b"jpeg"])]
+    front.keep(b"still")
+    assert front.widget.get_state()["still"] == b"still"
     front.glasses([{"object": "a", "gain": 1.0, "most": 10.0}])
     assert front.widget.glasses[0]["object"] == "a"
 
 
 def test_a_displayed_view_keeps_a_picture_for_readers_without_a_kernel(live: tuple[ss.Session, Browser]) -> None:
     session, _ = live
-    view, _ = viewed(session)
+    view, browser = viewed(session)
     bundle = view._repr_mimebundle_()
-    assert "application/vnd.jupyter.widget-view+json" in bundle and bundle["image/jpeg"]
+    assert "application/vnd.jupyter.widget-view+json" in bundle
+    assert base64.b64decode(bundle["image/jpeg"])[:2] == browser.kept[:2] == b"\xff\xd8"
     view.close()
     assert not view.is_live and repr(view).endswith(", closed")
 
