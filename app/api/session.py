@@ -32,6 +32,8 @@ _ALL = 10**12
 _STEP_S = 0.25
 _RECORD_BYTES = 256
 """A photon record with several spectral columns, rounded up."""
+_COARSER = 16
+"""Of the first of several passes; what answers for the light of beams (spectra) is as many photons."""
 _PER_PHOTON = 4
 """Landings that one emitted photon leaves at most, nearly."""
 
@@ -239,7 +241,7 @@ def _engine(context: Context, settings: RenderSettings, exact: bool, coarse_firs
 
     photons = settings.photons or 1
     room = max(Budget.of(context).store_bytes, photons * _PER_PHOTON * _RECORD_BYTES)
-    first = min(photons, Budget.of(context).first_photons) if coarse_first else photons
+    first = min(photons, max(Budget.of(context).first_photons, photons // _COARSER)) if coarse_first else photons
     budget = replace(
         Budget.of(context), first_photons=first, largest_photons=photons, finest_photons=photons, store_bytes=room
     )
