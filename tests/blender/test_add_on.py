@@ -133,6 +133,7 @@ def test_places_turn_as_blenders_own_exporter_turns_them(add_on: Any) -> None:
     assert np.array_equal(Y_UP_TO_Z_UP @ matrix, [[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]])
 
 
+@pytest.mark.slow
 def test_the_program_bakes_and_is_stopped(add_on: Any, exported: Path, program: list[str], tmp_path: Path) -> None:
     job = add_on.Job(program, exported, "table", tmp_path / "map.exr", 48, 3_000, 1)
     placement = job.result()

@@ -20,9 +20,10 @@ from spectrasplat.api import view as view_module
 from spectrasplat.api import widget
 from spectrasplat.api.view import View
 from spectrasplat.base.paths import assets_dir
+from spectrasplat.edit.camera_controls import orbit
 
 PATIENCE_S = 60.0
-SIZE = (400, 225)
+SIZE = (320, 180)
 
 
 class Browser:
@@ -123,16 +124,21 @@ def test_a_slider_stretches_the_spectrum_and_traces_nothing(live: tuple[ss.Sessi
 def test_pictures_are_coarse_while_the_mouse_moves_and_whole_afterwards(live: tuple[ss.Session, Browser]) -> None:
     session, browser = live
     place, count = np.array(session.scene.camera.position), len(browser.pictures)
+    wanted = session.scene._model.camera
+    for _ in range(4):
+        wanted = orbit(wanted, 0.02, 0.01)
     for _ in range(4):
         browser.say({"kind": "orbit", "dx": 0.02, "dy": 0.01})
         time.sleep(0.1)
     last, _ = browser.rest()
     moving = [told for told, _ in browser.pictures[count:] if told["moving"]]
-    assert moving and min(told["width"] for told in moving) < SIZE[0]
+    assert moving
+    if session.render().stats.is_software:  # a GPU may be quick enough
+        assert min(told["width"] for told in moving) < SIZE[0]
     assert (last["width"], last["height"]) == SIZE and last["samples"] >= 2
     now = np.array(session.scene.camera.position)
     target = np.array(session.scene.camera.target)
-    assert np.linalg.norm(now - place) > 0.1
+    assert now == pytest.approx(np.array(wanted.position)) and np.linalg.norm(now - place) > 0.1
     assert np.linalg.norm(now - target) == pytest.approx(np.linalg.norm(place - target))
     browser.say({"kind": "zoom", "amount": 2.0, "x": 0.5, "y": 0.5})
     assert np.linalg.norm(np.array(session.scene.camera.position) - target) < 0.8 * np.linalg.norm(now - target)
