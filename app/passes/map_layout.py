@@ -29,6 +29,9 @@ LEVEL_STEPS = (1, 2, 4, 8, 16, 32, 64)
 """Texel widths in which every window is kept: broad splats go to the wider ones (footprint.comp)."""
 _MIN_SIDE = 1e-4
 """Least side of a window as a share of its coordinates: float32 places have some texels in it."""
+_GRID, _SEEN_QUANTILE = 17, 0.9
+"""Points of a window along a side, at which pixels are measured; the share of them whose pixels have all the texels
+that they should."""
 _QUANTILE = 0.01
 _MARGIN = 0.06
 
@@ -369,7 +372,7 @@ def _tile_size(
     texels_per_pixel: float,
 ) -> tuple[int, int]:
     """Texels of a window: as many a pixel where the camera sees it, within `largest`."""
-    count = np.ceil(window.size * texels_per_pixel / pixel_side(camera, buffers, frame, window, picture))
+    count = np.ceil(window.size * texels_per_pixel * pixels_per_length(camera, buffers, frame, window, picture))
     count *= min(1.0, largest / count.max())
     # Only a receiver of few pixels has a window so small.
     least = np.clip(2.0 * count, 4, MIN_TILE)
@@ -388,6 +391,26 @@ def project(camera: Camera, picture: tuple[int, int], points: np.ndarray) -> np.
     depth = np.where(depth > 0.0, depth, np.nan)
     x, y = offset @ right / (half * depth), offset @ up / (half * depth)
     return np.stack([0.5 * (picture[0] + x * picture[1]), 0.5 * picture[1] * (1.0 - y)], axis=-1)
+
+
+def pixels_per_length(
+    camera: Camera, buffers: SceneBuffers, frame: PlaneFrame, window: Window, picture: tuple[int, int]
+) -> np.ndarray:
+    """How many pixels a GPU unit along either axis of the frame is long in the picture (2,), in most of what is seen of
+    the window: a plane seen aslant needs fewer texels along the slope."""
+    u, v = np.meshgrid(*(np.linspace(*ends, _GRID) for ends in zip(window.low, window.high, strict=True)))
+    points = frame.origin + np.stack([u.ravel(), v.ravel()], axis=-1) @ frame.axes
+    step = 1e-3 * window.size
+    here = project(camera, picture, buffers.space.to_world(points))
+    ends = [
+        project(camera, picture, buffers.space.to_world(points + s * a)) for s, a in zip(step, frame.axes, strict=True)
+    ]
+    seen = ((here >= 0.0) & (here <= np.array(picture))).all(axis=1)
+    lengths = np.stack([np.linalg.norm(end - here, axis=1) for end in ends], axis=1)[seen] / step
+    lengths = lengths[np.isfinite(lengths).all(axis=1)]
+    if not len(lengths):
+        return np.full(2, 1.0 / pixel_side(camera, buffers, frame, window, picture))
+    return np.maximum(np.quantile(lengths, _SEEN_QUANTILE, axis=0), 1e-2 * lengths.max())
 
 
 def pixel_side(
