@@ -185,7 +185,7 @@ def test_a_round_trip_of_a_glass_and_a_table(program: list[str], tmp_path: Path)
     assert BPY is not None and shutil.which(BPY) is not None
     around = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     command = [BPY, str(Path(__file__).with_name("round_trip.py")), str(ADD_ON), program[0], str(tmp_path)]
-    done = subprocess.run(command, env=around, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, env=around, capture_output=True, text=True, check=False, timeout=900)
     assert done.returncode == 0, done.stdout + done.stderr
     told = json.loads((tmp_path / "told.json").read_text())
     assert "Choose a receiver first" in told["without a receiver"]
