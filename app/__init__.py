@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .api import SweepPoint as SweepPoint
     from .api import Table as Table
     from .api import UserError as UserError
+    from .api import View as View
     from .api import caustic as caustic
     from .api import fan as fan
     from .api import glass as glass
@@ -49,6 +50,7 @@ _OFFERED = (
     "SweepPoint",
     "Table",
     "UserError",
+    "View",
     "caustic",
     "fan",
     "glass",

@@ -20,6 +20,7 @@ from .session import Session
 from .sweeping import SweepPoint, sweep
 from .tables import Entries, Table
 from .tracing import Fan, fan, trace
+from .view import View
 
 __all__ = [
     "CausticMap",
@@ -34,6 +35,7 @@ __all__ = [
     "SweepPoint",
     "Table",
     "UserError",
+    "View",
     "caustic",
     "fan",
     "glass",

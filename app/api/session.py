@@ -19,6 +19,7 @@ from .asking import Asked, Count, Size, settings_of
 from .device import Cancel, Device, Progress
 from .picture import Picture, Statistics
 from .scene import Scene
+from .view import View
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
@@ -64,6 +65,7 @@ class Session:
         self._device: Device | None = Device()
         self._engine: LiveEngine | None = None
         self._before = _State(0, 0, 0)
+        self._view: View | None = None
 
     @property
     def scene(self) -> Scene:
@@ -132,8 +134,19 @@ class Session:
             raise UserError(f"limit {limit!r} is no number of photons: give 1 or more")
         return self._running.run(work, progress, cancel)
 
+    def view(self) -> View:
+        """The session live in a notebook, to walk round and to stretch its dispersion; needs the extra `notebook`, and
+        is a picture without it. Needs no `render` before. Raises `UserError`."""
+        self._running  # noqa: B018 - a closed one says so
+        if self._view is None or not self._view.is_live:
+            self._view = View(self)
+        return self._view
+
     def close(self) -> None:
         """Free the device. A session that is closed renders nothing more."""
+        if self._view is not None:
+            self._view.close()
+            self._view = None
         device, self._device = self._device, None
         if device is None:
             return
@@ -165,12 +178,31 @@ class Session:
 
     def _follow(self, context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> None:
         """Work, in the device's thread, until what is wanted is shown."""
+        from ..render.viewer.still_engine import finish
+
+        finish(self._wanting(context), self._settings.photons or 1, report, stopped)
+
+    @property
+    def _size(self) -> tuple[int, int]:
+        return self._settings.width, self._settings.height
+
+    def _advance(self, context: Context, budget_s: float, is_moving: bool) -> LiveEngine:
+        """For a view: work for a while, in the device's thread; coarse pictures come first."""
+        engine = self._wanting(context, coarse_first=True)
+        engine.preview_seconds = budget_s
+        engine.advance(budget_s, is_moving)
+        stats = engine.stats
+        self._before = _State(stats.photons, stats.rays_traced, int(stats.camera_samples))
+        return engine
+
+    def _wanting(self, context: Context, coarse_first: bool = False) -> LiveEngine:
+        """The engine, told what the scene is now."""
         from ..edit.parameters import Stage
         from ..render.frame_fit import inputs_of
-        from ..render.viewer.still_engine import follow, still_engine
+        from ..render.viewer.still_engine import still_engine
 
         settings, model = self._settings, self.scene._model
         if self._engine is None:
-            self._engine = still_engine(context, settings, self._exact)
-        wanted = inputs_of(Stage(model, model.camera), settings)
-        follow(self._engine, wanted, settings.photons or 1, report, stopped)
+            self._engine = still_engine(context, settings, self._exact, coarse_first)
+        self._engine.set(inputs_of(Stage(model, model.camera), settings))
+        return self._engine

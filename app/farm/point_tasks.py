@@ -15,7 +15,7 @@ from ..render.frame_fit import inputs_of
 from ..render.frames import FrameRenderer
 from ..render.notices import frame_notices
 from ..render.viewer.engine import LiveEngine
-from ..render.viewer.still_engine import follow, picture_of, still_engine
+from ..render.viewer.still_engine import finish, picture_of, still_engine
 from .desk import Desk
 
 
@@ -120,7 +120,8 @@ def draw_kept(desk: Desk, of: Sweep, report: Told, group: int, numbers: tuple[in
         def told(share: float, text: str) -> None:
             report((done + share) / work, text)
 
-        follow(engine, inputs_of(stage, of.settings), of.settings.photons or 1, told, report.unwanted)
+        engine.set(inputs_of(stage, of.settings))
+        finish(engine, of.settings.photons or 1, told, report.unwanted)
 
     if is_new:
         try:

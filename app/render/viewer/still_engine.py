@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from ...base.errors import UserError
-from ...edit.live_inputs import LiveInputs
 from ...gpu.context import Context
 from ...model.settings import RenderSettings
 from .building import Budget
@@ -18,16 +17,21 @@ DEFAULT_SAMPLES = 32
 _STEP_S = 0.25
 _RECORD_BYTES = 256
 """A photon record with several spectral columns, rounded up."""
+_COARSER = 16
+"""Of the first of several passes; what answers for the light of beams (spectra) is as many photons."""
 _PER_PHOTON = 4
 """Landings that one emitted photon leaves at most, nearly."""
 
 
-def still_engine(context: Context, settings: RenderSettings, exact: bool) -> LiveEngine:
-    """One that traces all photons in one pass and keeps them. `exact`: trace again where an edit would be followed to
-    first order only."""
+def still_engine(context: Context, settings: RenderSettings, exact: bool, coarse_first: bool = False) -> LiveEngine:
+    """One that traces all photons in one pass and keeps them; `coarse_first`: after coarser passes, to be seen sooner.
+    `exact`: trace again where an edit would be followed to first order only."""
     photons = settings.photons or 1
     room = max(Budget.of(context).store_bytes, photons * _PER_PHOTON * _RECORD_BYTES)
-    budget = replace(Budget.of(context), first_photons=photons, largest_photons=photons, store_bytes=room)
+    first = min(photons, max(Budget.of(context).first_photons, photons // _COARSER)) if coarse_first else photons
+    budget = replace(
+        Budget.of(context), first_photons=first, largest_photons=photons, finest_photons=photons, store_bytes=room
+    )
     engine = LiveEngine(context, budget)
     # A pass emits a few photons more or less than it is asked for: whatever it was, one is enough.
     engine.target_photons, engine.camera_samples = 1, settings.spp or DEFAULT_SAMPLES
@@ -35,15 +39,8 @@ def still_engine(context: Context, settings: RenderSettings, exact: bool) -> Liv
     return engine
 
 
-def follow(
-    engine: LiveEngine,
-    wanted: LiveInputs,
-    photons: int,
-    report: Callable[[float, str], None] = lambda share, text: None,
-    stopped: Callable[[], bool] = lambda: False,
-) -> None:
-    """Work until `wanted` is shown, or `stopped()`. Raises `UserError` where it cannot be."""
-    engine.set(wanted)
+def finish(engine: LiveEngine, photons: int, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> None:
+    """Work until what is wanted is shown, or `stopped()`. Raises `UserError` where it cannot be."""
     samples = engine.camera_samples
     while not stopped():
         engine.advance(_STEP_S)
