@@ -56,7 +56,7 @@ TINT_STEPS = 48
     BIND_BEAM_ORDER,
     BIND_BEAM_FOUND,
 ) = range(8, 22)
-UNIT_EMISSION, UNIT_PICTURES, UNIT_POLYGONS = 10, 11, 13
+UNIT_ENVIRONMENT_LIGHT, UNIT_EMISSION, UNIT_PICTURES, UNIT_POLYGONS = 9, 10, 11, 13
 BIND_BEAM_VIEW = 9
 """Of uniform blocks."""
 IMAGE_POLYGONS = 0
@@ -218,6 +218,7 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
         "BIND_LISTED": BIND_LISTED,
         "BIND_RECEIVERS": BIND_RECEIVERS,
         "BIND_PLACEMENTS": BIND_PLACEMENTS,
+        "UNIT_ENVIRONMENT_LIGHT": UNIT_ENVIRONMENT_LIGHT,
         "UNIT_EMISSION": UNIT_EMISSION,
         "EMISSION_CELLS": EMISSION_CELLS,
         "TINT_STEPS": TINT_STEPS,
@@ -238,6 +239,7 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
     switches = {
         "LAYER_BEAUTY": beauty,
         "CAMERA_SPECULAR": specular,
+        "ENVIRONMENT_LIGHTS": beauty and features.environment_lights,
         "HAS_DISPERSION": disperses,
         "SPECTRAL_SWEEP": groups > 0,
         "RANDOM_WAVELENGTH": features.random_wavelength,

@@ -25,6 +25,7 @@ from ..model.scene import Camera, Scene
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
 from ..passes.caustic_maps import CausticMaps
+from ..passes.environment_light import EnvironmentLightPass
 from ..passes.map_layout import MapLayout
 from .camera_beams import CameraBeams
 from .frame_fit import FrameFit, Survey, inputs_of, share_light, stages_to_survey
@@ -65,14 +66,22 @@ class _Traced:
     inputs: LiveInputs
     buffers: SceneBuffers
     light: LightPass
+    environment: EnvironmentLightPass | None = None
+    """Where its scene's features have it."""
     camera_buffers: SceneBuffers | None = None
     """The camera's own, where it has a method of its own."""
     camera_pass: CameraPass | None = None
     camera_beams: CameraBeams | None = None
     """Where its scene's features have them."""
 
+    @property
+    def maps(self) -> CausticMaps:
+        """All light that surfaces get by way of maps."""
+        lit = None if self.environment is None else self.environment.texture
+        return replace(self.light.caustic_maps(), environment=lit)
+
     def release(self) -> None:
-        for owned in (self.camera_pass, self.camera_buffers, self.light, self.buffers):
+        for owned in (self.camera_pass, self.environment, self.camera_buffers, self.light, self.buffers):
             if owned is not None:
                 owned.release()
 
@@ -142,6 +151,7 @@ class FrameRenderer:
             light = traced.light
             for _ in light.preparing():
                 yield 0.0
+            self._light_by_environment(traced)
             self.seconds.prepare = time.perf_counter() - self.seconds.started
             sampling, budget = LightSampling.of(stage.scene, self._settings), self._budget
             if budget is not None:
@@ -154,6 +164,10 @@ class FrameRenderer:
             for share in self._fill(light, sampling, stop):
                 yield _LIGHT_SHARE * share if budget is None else budget.spent
             light.finish()
+            if traced.environment is not None:
+                for _ in traced.environment.steps():
+                    yield _LIGHT_SHARE if budget is None else budget.spent
+                traced.environment.show()
             light.settle()
             if traced.camera_pass is None and not self._shows_map:
                 self._add_camera_pass(traced)
@@ -187,7 +201,7 @@ class FrameRenderer:
         assert self._traced is not None and self._traced.camera_pass is not None
         started, self.phase = time.perf_counter(), _SEEING
         settings, camera_pass = self._settings, self._traced.camera_pass
-        maps = self._traced.light.caustic_maps()
+        maps = self._traced.maps
         view = self._view(stage)
         # Polygons belong to one view. A stop asked for while tracing still wants a picture: only the first sample is
         # owed then.
@@ -321,6 +335,10 @@ class FrameRenderer:
 
         light.before_maps = look_at_memory
         return _Traced(inputs, buffers, light)
+
+    def _light_by_environment(self, traced: _Traced) -> None:
+        if traced.buffers.features.environment_lights:
+            traced.environment = EnvironmentLightPass(self._context, traced.buffers, self._settings.seed)
 
     def _axis(self, scene: Scene, features: Features) -> SpectralAxis:
         """One axis for all frames: bands of equal places on it are then the same wavelengths in all."""
