@@ -1,7 +1,7 @@
 """What lies beyond everything as a light: which scenes it lights, and the directions it is asked in.
 
-Directions are drawn by brightness: a low-discrepancy sequence over the running sums of the picture's rows and columns,
-each with the weight that makes their mean the environment's integral [Pharr, Jakob and Humphreys 2023, section 12.5.2].
+Directions are drawn by brightness: a Sobol sequence over the running sums of the picture's rows and columns, each with
+the weight that makes their mean the environment's integral [Pharr, Jakob and Humphreys 2023, section 12.5.2].
 All places of all receivers ask the same directions, so a map has no grain: what few directions leave are steps in soft
 shadows, and every round adds others between them.
 """
@@ -22,8 +22,10 @@ WIDTH, HEIGHT = 512, 256
 """Largest picture that light is drawn from; larger ones are averaged down."""
 _DIMENSION = 64
 """First of the words that shift the sequence; after those of photons (`random_words.Dimension`)."""
-_GENERATORS = 0.8566748838545029, 0.7338918566271260, 0.6287067210378087, 0.5385972572236101
-"""Powers of 1/ϕ₄, ϕ₄⁵ = ϕ₄ + 1: the Kronecker sequence of four dimensions."""
+_PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])
+"""Powers of the plastic number's reciprocal: a Kronecker sequence of two dimensions, for places within texels."""
+_LEAST_HEIGHT = 128
+"""Of the picture that is drawn from: smaller ones are interpolated, as the camera does."""
 
 
 def lighting_environment(scene: Scene) -> Environment | None:
@@ -71,6 +73,8 @@ class EnvironmentLight:
     def rgb(self) -> np.ndarray:
         """float64 (H, W, 3): the picture, averaged down to at most WIDTH × HEIGHT."""
         rgb = np.asarray(self.environment.rgb, np.float32)
+        if rgb.shape[0] < _LEAST_HEIGHT or rgb.shape[1] < 2 * _LEAST_HEIGHT:
+            rgb = _interpolated(rgb, max(rgb.shape[0], _LEAST_HEIGHT), max(rgb.shape[1], 2 * _LEAST_HEIGHT))
         if rgb.shape[0] > HEIGHT:
             rgb = averaged_rows(rgb, HEIGHT)
         if rgb.shape[1] > WIDTH:
@@ -95,9 +99,7 @@ class EnvironmentLight:
 
     def directions(self, first: int, count: int) -> Directions:
         """Numbers `first` to `first + count` of the sequence."""
-        shifts = [random_word(self.seed, 0, 0, _DIMENSION + d) * 2.0**-32 for d in range(4)]
-        number = np.arange(first, first + count)[:, None] + 1.0
-        a, b, c, d = ((number * np.array(_GENERATORS) + shifts) % 1.0).T
+        a, b, c, d = even_points(np.arange(first, first + count), self.seed, _DIMENSION).T
         by_row, by_column, brightness = self._tables
         height, width = brightness.shape
         row = np.clip(np.searchsorted(by_row, a, side="right") - 1, 0, height - 1)
@@ -119,7 +121,7 @@ class EnvironmentLight:
         """Irradiance, float64 (n, 3), lm/unit², of surfaces with these unit world `normals` (n, 3) that see all of
         their half of the environment."""
         rgb, solid = self.rgb, np.broadcast_to(self._solid_angles, self.rgb.shape[:2])
-        step = max(1, rgb.shape[0] // 128)
+        step = max(1, rgb.shape[0] // 64)
         if step > 1 and rgb.shape[0] % step == 0 and rgb.shape[1] % step == 0:
             power = _blocks(rgb * solid[..., None], step)
             solid = _blocks(np.array(solid)[..., None], step)[..., 0]
@@ -137,10 +139,11 @@ class EnvironmentLight:
         )
         world = (local @ self.environment.world_to_local).reshape(-1, 3)
         power = (rgb * solid[..., None]).reshape(-1, 3)
-        found = np.empty((len(normals), 3))
-        for at in range(0, len(normals), 512):
-            found[at : at + 512] = np.maximum(normals[at : at + 512] @ world.T, 0.0) @ power
-        return found
+        distinct, which = np.unique(np.round(normals, 6), axis=0, return_inverse=True)
+        found = np.empty((len(distinct), 3))
+        for at in range(0, len(distinct), 512):
+            found[at : at + 512] = np.maximum(distinct[at : at + 512] @ world.T, 0.0) @ power
+        return found[which.reshape(-1)]
 
     def levels(self) -> tuple[np.ndarray, list[tuple[int, int, int]]]:
         """The picture and coarser and coarser ones below it: float32 (rows, W, 3), and of each (first row, width,
@@ -158,6 +161,35 @@ class EnvironmentLight:
             places.append((rows, picture.shape[1], picture.shape[0]))
             rows += picture.shape[0]
         return packed, places
+
+
+def even_points(numbers: np.ndarray, seed: int, dimension: int) -> np.ndarray:
+    """Points `numbers` (n,) of a sequence in four dimensions, float64 (n, 4): the first two are Sobol's, whose first
+    2ᵏ lie one in each of 2ᵏ equal boxes however these are cut, scrambled by `seed`; `dimension` names the first of the
+    words."""
+    words = [random_word(seed, 0, 0, dimension + d) for d in range(4)]
+    digits = np.zeros((2, len(numbers)), np.uint64)
+    steps = [np.uint64(1 << 31), np.uint64(1 << 31)]
+    for bit in range(32):
+        taken = (numbers.astype(np.uint64) >> np.uint64(bit)) & np.uint64(1) != 0
+        for d in range(2):
+            digits[d, taken] ^= steps[d]
+        steps = [steps[0] >> np.uint64(1), steps[1] ^ (steps[1] >> np.uint64(1))]
+    sobol = [((d ^ np.uint64(word)).astype(float) + 0.5) * 2.0**-32 for d, word in zip(digits, words, strict=False)]
+    within = (numbers[:, None] * _PLASTIC + np.array(words[2:]) * 2.0**-32) % 1.0
+    return np.stack([*sobol, *within.T], axis=-1)
+
+
+def _interpolated(rgb: np.ndarray, height: int, width: int) -> np.ndarray:
+    """Between texels, columns joined and rows ended as `Environment` has them."""
+    for axis, size in ((0, height), (1, width)):
+        old = rgb.shape[axis]
+        at = (np.arange(size) + 0.5) * old / size - 0.5
+        low, share = np.floor(at).astype(int), (at - np.floor(at)).astype(np.float32)
+        ends = [low % old, (low + 1) % old] if axis else [np.clip(low + i, 0, old - 1) for i in range(2)]
+        share = share.reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
+        rgb = (1.0 - share) * rgb.take(ends[0], axis) + share * rgb.take(ends[1], axis)
+    return rgb
 
 
 def _running(values: np.ndarray) -> np.ndarray:

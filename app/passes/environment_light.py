@@ -25,13 +25,15 @@ from ..gpu.context import Context
 from ..gpu.dispatch_budget import DispatchBudget
 from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
 from ..gpu.schema import Field, Struct
-from ..model.environment_light import EnvironmentLight, lighting_environment
+from ..model.environment_light import EnvironmentLight, even_points, lighting_environment
 from ..model.materials import Grating
 from ..model.scene import Scene
 from .environment_places import PLACE, EnvironmentPlaces, environment_places
 
-DIRECTIONS = 1024
-"""Asked in all, straight; half as many are followed through glass."""
+DIRECTIONS = 512
+"""Asked in all, straight."""
+PER_FOLLOWED = 4
+"""Straight ones for each that is followed through glass and over mirrors, which takes as long as many of them."""
 FIRST_DIRECTIONS = 64
 """After which the light is worth showing."""
 MAX_EVENTS = 40
@@ -46,7 +48,7 @@ TARGET_SECONDS = 0.1
 _GROUP = 64
 _BIND_PLACES, _BIND_ASKED, _BIND_SUMS, _UNIT_ENVIRONMENT = 8, 9, 10, 0
 _KEY = 70
-"""Of the words that decide at surfaces of glass."""
+"""Of the words that decide at surfaces of glass; those after it place directions towards glass."""
 
 PARAMETERS = Struct(
     "EnvironmentParameters",
@@ -113,7 +115,7 @@ class EnvironmentLightPass:
         self._parameters = self._ctx.buffer(reserve=PARAMETERS.stride)
         self._levels: moderngl.Texture | None = None
         self._sphere = _specular_sphere(buffers)
-        self._budget = DispatchBudget(2, 2, MOST_ASKED * 2 // 3)
+        self._budget = DispatchBudget(PER_FOLLOWED, PER_FOLLOWED, MOST_ASKED * PER_FOLLOWED // (PER_FOLLOWED + 1))
         defines = buffers.features.defines() | bindings.SCENE_DEFINES | buffers.defines
         defines |= {
             "BIND_PLACES": _BIND_PLACES,
@@ -178,7 +180,7 @@ class EnvironmentLightPass:
         assert self._light is not None and self._levels is not None
         started = time.perf_counter()
         follows = self._sphere is not None
-        first_followed, end_followed = (self.asked // 2, (self.asked + count) // 2) if follows else (0, 0)
+        first_followed, end_followed = (self.asked // PER_FOLLOWED, (self.asked + count) // PER_FOLLOWED) if follows else (0, 0)
         asked = ASKED.zeros(MOST_ASKED)
         drawn = self._light.directions(self.asked, count)
         asked["toward"][:count], asked["weight"][:count] = drawn.toward, drawn.weight
@@ -186,7 +188,7 @@ class EnvironmentLightPass:
         followed = end_followed - first_followed
         if followed:
             numbers = np.arange(first_followed, end_followed)
-            places = _even(numbers, [random_word(self._seed, 0, d, _KEY) for d in range(4)])
+            places = even_points(numbers, self._seed, _KEY + 1)
             asked["toward"][count : count + followed, :2] = places[:, :2]
             asked["within"][count : count + followed] = places[:, 2:]
             asked["key"][count : count + followed] = [random_word(self._seed, 1, int(n), _KEY) for n in numbers]
@@ -198,7 +200,7 @@ class EnvironmentLightPass:
             parameters["specular"] = self._sphere
         nm = np.array([*RGB_NM, ANCHOR_NM])
         parameters["x_of_rgb"] = self._buffers.axis.x_of_nm(nm)
-        wide = 2.0 * np.pi / (0.5 * self.total)
+        wide = 2.0 * np.pi * PER_FOLLOWED / self.total
         parameters["level_wide"][0, :3] = self._level(wide)
         parameters["level_narrow"][0, :3] = self._level(0.25 * wide)
         parameters["count"], parameters["straight"], parameters["followed"] = len(self.places.places), count, followed
@@ -232,17 +234,17 @@ class EnvironmentLightPass:
         sums = np.frombuffer(self._sums.read(count * SUM.stride), SUM.dtype) if count else SUM.zeros(0)
         asked_for, straight = sums["all"].astype(float), sums["straight"].astype(float)
         share = np.divide(straight, asked_for, out=np.zeros_like(straight), where=asked_for > 0.0)
-        followed = self.asked // 2
+        followed = self.asked // PER_FOLLOWED
         return share * self._unshadowed + sums["specular"].astype(float) / max(followed, 1)
 
     @property
     def lost(self) -> float:
         """Share of followed paths that were given up after `MAX_EVENTS`."""
         count = len(self.places.places)
-        if not count or self.asked < 2:
+        if not count or self.asked < PER_FOLLOWED:
             return 0.0
         sums = np.frombuffer(self._sums.read(count * SUM.stride), SUM.dtype)
-        return float(sums["lost"].mean(dtype=float) / (self.asked // 2))
+        return float(sums["lost"].mean(dtype=float) / (self.asked // PER_FOLLOWED))
 
     def show(self) -> None:
         """What was found becomes what the camera looks up."""
@@ -287,9 +289,3 @@ def _specular_sphere(buffers: SceneBuffers) -> tuple[float, float, float, float]
     points = np.concatenate(corners)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return (*map(float, centre), 1.0001 * float(np.linalg.norm(points - centre, axis=1).max()))
-
-
-def _even(numbers: np.ndarray, words: list[int]) -> np.ndarray:
-    """Kronecker sequence of four dimensions, float64 (n, 4)."""
-    generators = np.array([0.8566748838545029, 0.7338918566271260, 0.6287067210378087, 0.5385972572236101])
-    return ((numbers[:, None] + 1.0) * generators + np.array(words) * 2.0**-32) % 1.0

@@ -19,7 +19,7 @@ from ..model.features import is_flat
 from ..model.geometry.charts import ChartAtlas, build_charts
 from .map_layout import PlaneFrame, Window, plane_frame
 
-FINE_TEXELS, COARSE_TEXELS, CHART_TEXELS = 128 * 128, 56 * 56, 112 * 112
+FINE_TEXELS, COARSE_TEXELS, CHART_TEXELS = 104 * 104, 40 * 40, 88 * 88
 """Of a flat receiver's windows, each side, and of a curved one."""
 MOST_TEXELS = 1 << 17
 """Of all together: many receivers share them."""

@@ -31,6 +31,12 @@ vec3 environment_at(vec3 direction, uvec4 level)
     return mix(above, below, share.y);
 }
 
+// A spectral table's row for red, green and blue.
+vec3 at_rgb(uint row)
+{
+    return vec3(spectral_row(row, p.x_of_rgb.x), spectral_row(row, p.x_of_rgb.y), spectral_row(row, p.x_of_rgb.z));
+}
+
 // What comes along a ray whose first surface is glass or a mirror; nothing where it meets another one first, or none.
 vec3 by_specular(vec3 position, vec3 direction, RayOrigin origin, uvec4 level, uint key, inout float lost)
 {
@@ -52,12 +58,12 @@ vec3 by_specular(vec3 position, vec3 direction, RayOrigin origin, uvec4 level, u
             // A place in a liquid learns so where it leaves it.
             if (event == 0u && kind == KIND_DIELECTRIC && !entering && !is_inside(medium)) medium.object = hit.object;
             uint row = medium_weight_row(medium);
-            if (row != NONE) weight *= exp(-hit.distance * spectral_row(uint(WEIGHT_ROW) + row, p.x_of_rgb.xyz));
+            if (row != NONE) weight *= exp(-hit.distance * at_rgb(uint(WEIGHT_ROW) + row));
 #endif
             Deflection turned = reflect_at(frame, direction);
             bool passes = false;
 #ifdef HAS_MIRROR
-            if (kind == KIND_MIRROR) weight *= spectral_row(uint(WEIGHT_ROW) + object_at(hit.object).weight_row, p.x_of_rgb.xyz);
+            if (kind == KIND_MIRROR) weight *= at_rgb(uint(WEIGHT_ROW) + object_at(hit.object).weight_row);
 #endif
 #ifdef HAS_DIELECTRIC
             if (kind == KIND_DIELECTRIC) {
