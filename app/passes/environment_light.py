@@ -34,7 +34,7 @@ DIRECTIONS = 512
 """Asked in all, straight."""
 PER_FOLLOWED = 4
 """Straight ones for each that is followed through glass and over mirrors, which takes as long as many of them."""
-FIRST_DIRECTIONS = 64
+FIRST_DIRECTIONS = 32
 """After which the light is worth showing."""
 MAX_EVENTS = 40
 """Surfaces of glass and mirrors on one path; what goes on is lost and counted."""
@@ -131,13 +131,13 @@ class EnvironmentLightPass:
         structs = (*SCENE_STRUCTS, PLACE, PARAMETERS, ASKED, SUM)
         self._program = shader.compute(self._ctx, "light/environment.comp", defines, structs)
         self._light: EnvironmentLight | None = None
+        self._write(np.zeros((len(self.places.places), 3)))
         self.take(buffers.scene)
 
     def take(self, scene: Scene) -> None:
         """Another environment or other colours of the same things: what was found is forgotten where it must be. A
         scene that nothing lights keeps what there is: its camera does not ask."""
         environment = lighting_environment(scene)
-        self._scene = scene
         if environment is None or (self._light is not None and self._light.environment is environment):
             return
         self._light = EnvironmentLight(environment, self._seed)
@@ -149,9 +149,9 @@ class EnvironmentLightPass:
         texels[..., :3] = packed
         self._levels = self._ctx.texture(packed.shape[1::-1], 4, texels, dtype="f4")
         self._levels.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self.asked = 0
+        # What is shown stays until something is known of the new one.
+        self.asked = self.shown = 0
         self._sums.clear()
-        self._write(np.zeros((len(self.places.places), 3)))
 
     @property
     def is_done(self) -> bool:
@@ -262,7 +262,12 @@ class EnvironmentLightPass:
         x, y = self.places.filled_xy.T
         image[y, x, :3] = irradiance[self.places.source]
         self.texture.write(image.tobytes())
-        self.shown = 0
+
+    @property
+    def bytes(self) -> int:
+        """Device memory held."""
+        textures = [t for t in (self.texture, self._levels) if t is not None]
+        return self._places.size + self._sums.size + sum(16 * t.width * t.height for t in textures)
 
     def release(self) -> None:
         """Free everything."""

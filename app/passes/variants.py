@@ -15,6 +15,7 @@ from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.splat_tables import DENSITY_CELLS
 from ..gpu.texture_store import place_defines
+from ..model.environment_light import lighting_environment
 from ..model.features import Features
 from .camera_tables import EMISSION_CELLS
 from .picture_channels import Channels
@@ -239,7 +240,7 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
     switches = {
         "LAYER_BEAUTY": beauty,
         "CAMERA_SPECULAR": specular,
-        "ENVIRONMENT_LIGHTS": beauty and features.environment_lights,
+        "ENVIRONMENT_LIGHTS": beauty and features.environment_lights and lighting_environment(scene.scene) is not None,
         "HAS_DISPERSION": disperses,
         "SPECTRAL_SWEEP": groups > 0,
         "RANDOM_WAVELENGTH": features.random_wavelength,
