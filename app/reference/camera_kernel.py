@@ -3,7 +3,8 @@
 Reflection or refraction is drawn with Fresnel's probability, so that a path's weight changes by
 absorption and mirrors only; lights are seen along the way, the environment at its end. At a diffuse surface one
 random point of every light is asked for (anything between hides it, glass too: what comes through glass is the
-caustic's), and the spectral caustic is looked up. Numbers: a scrambled Sobol sequence a part, shifted from pixel to
+caustic's), and the spectral caustic is looked up. Where the environment lights it the path goes on from there, in a
+direction drawn by the cosine, until it leaves the scene or meets something else than glass and mirrors. Numbers: a scrambled Sobol sequence a part, shifted from pixel to
 pixel.
 """
 
@@ -165,6 +166,23 @@ def _wavelength(spectra, chance):
 
 
 @inlined
+def _above(normal, sign, a, b):
+    """Unit direction (3) on one side of a surface, drawn by its cosine with two numbers in [0, 1)."""
+    nx, ny, nz = sign * normal[0], sign * normal[1], sign * normal[2]
+    # Any two directions across it.
+    if abs(nz) < 0.9:
+        ux, uy, uz = ny, -nx, 0.0
+    else:
+        ux, uy, uz = 0.0, nz, -ny
+    length = math.sqrt(ux * ux + uy * uy + uz * uz)
+    ux, uy, uz = ux / length, uy / length, uz / length
+    vx, vy, vz = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
+    radius, angle = math.sqrt(a), 2.0 * math.pi * b
+    s, t, height = radius * math.cos(angle), radius * math.sin(angle), math.sqrt(1.0 - a)
+    return s * ux + t * vx + height * nx, s * uy + t * vy + height * ny, s * uz + t * vz + height * nz
+
+
+@inlined
 def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_depth, tally, scratch):
     """Add what a camera ray sees to `scratch.xyz`.
 
@@ -174,7 +192,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
     px, py, pz, dx, dy, dz = ray
     state, shift, xyz = scratch.state, scratch.shift, scratch.xyz
     last, last_object, within, mask, alone, events = -1, -1, False, start.mask, start.alone, 0
-    atom, nm, found, weight = -1, 0.0, 0.0, 1.0
+    atom, nm, found, weight, lit = -1, 0.0, 0.0, 1.0, False
     if mask != np.uint64(0) or alone != AIR:  # in glass wavelengths part at once
         atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
     while True:
@@ -182,7 +200,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
             scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, scratch.stack, scratch.stack_distance
         )
         far = t if triangle >= 0 else np.inf
-        for i in range(lights.kind.shape[0]):
+        for i in range(0 if lit else lights.kind.shape[0]):
             seen = light_seen(lights, i, px, py, pz, dx, dy, dz, far)
             if seen > 0.0 and atom < 0:
                 _added(spectra.light_xyz, i, 0, 1.0, 1.0, 1.0, seen, xyz)
@@ -204,7 +222,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
         px, py, pz = px + t * dx, py + t * dy, pz + t * dz
         thing = scene.owner[triangle]
         kind = scene.kind[thing]
-        if kind == BLACK or weight <= 0.0:
+        if kind == BLACK or weight <= 0.0 or (lit and kind == DIFFUSE):
             break
         if kind == DIFFUSE:
             a, b = unit(state[3] ^ shift[3]), unit(state[4] ^ shift[4])
@@ -213,7 +231,16 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
             found += weight * _diffuse(
                 scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, a, b, scratch
             )
-            break
+            if not pictures.lights:
+                break
+            if atom < 0:
+                atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
+            row, red, green, blue = _surface(scene, pictures, triangle, u, v)
+            basis = spectra.basis[atom]
+            weight *= spectra.classes[row, atom] if row > 0 else red * basis[0] + green * basis[1] + blue * basis[2]
+            dx, dy, dz = _above(scene.normals[triangle], 1.0 if side == 0 else -1.0, a, b)
+            last, last_object, within, lit = triangle, thing, side == 1, True
+            continue
         if events >= max_depth:
             tally[LOST_DEPTH] += 1.0
             break

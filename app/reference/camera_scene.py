@@ -74,6 +74,8 @@ class Pictures(NamedTuple):
     """float64 (U, 6): u, v at each corner."""
     to_local: np.ndarray
     """float64 (3, 3): the environment's frame."""
+    lights: bool
+    """Whether the environment lights what is diffuse."""
 
 
 def sees_beyond(scene: Scene) -> bool:
@@ -185,6 +187,7 @@ def pictures(scene: Scene, photons: PhotonScene, centre: np.ndarray) -> Pictures
         uv_row,
         uv,
         np.array(beyond.world_to_local, float) if beyond else np.eye(3),
+        beyond is not None and beyond.lights,
     )
 
 
