@@ -4,7 +4,7 @@ Reflection or refraction is drawn with Fresnel's probability, so that a path's w
 absorption and mirrors only; lights are seen along the way, the environment at its end. At a diffuse surface one
 random point of every light is asked for (anything between hides it, glass too: what comes through glass is the
 caustic's), and the spectral caustic is looked up. Where the environment lights it the path goes on from there, in a
-direction drawn by the cosine, until it leaves the scene or meets something else than glass and mirrors. Numbers: a scrambled Sobol sequence a part, shifted from pixel to
+direction towards what is bright, until it leaves the scene or meets something else than glass and mirrors. Numbers: a scrambled Sobol sequence a part, shifted from pixel to
 pixel.
 """
 
@@ -19,6 +19,7 @@ from .camera_lights import light_seen, sample_light
 from .camera_rays import camera_ray
 from .camera_scene import beyond, picture_at
 from .compiling import compiled, inlined
+from .environment_draw import draw_direction
 from .photon_emit import search
 from .photon_intersect import blocked, nearest
 from .photon_scene import BLACK, DIFFUSE
@@ -166,23 +167,6 @@ def _wavelength(spectra, chance):
 
 
 @inlined
-def _above(normal, sign, a, b):
-    """Unit direction (3) on one side of a surface, drawn by its cosine with two numbers in [0, 1)."""
-    nx, ny, nz = sign * normal[0], sign * normal[1], sign * normal[2]
-    # Any two directions across it.
-    if abs(nz) < 0.9:
-        ux, uy, uz = ny, -nx, 0.0
-    else:
-        ux, uy, uz = 0.0, nz, -ny
-    length = math.sqrt(ux * ux + uy * uy + uz * uz)
-    ux, uy, uz = ux / length, uy / length, uz / length
-    vx, vy, vz = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
-    radius, angle = math.sqrt(a), 2.0 * math.pi * b
-    s, t, height = radius * math.cos(angle), radius * math.sin(angle), math.sqrt(1.0 - a)
-    return s * ux + t * vx + height * nx, s * uy + t * vy + height * ny, s * uz + t * vz + height * nz
-
-
-@inlined
 def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_depth, tally, scratch):
     """Add what a camera ray sees to `scratch.xyz`.
 
@@ -231,14 +215,18 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
             found += weight * _diffuse(
                 scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, a, b, scratch
             )
-            if not pictures.lights:
+            if not pictures.draw.lights:
                 break
             if atom < 0:
                 atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
             row, red, green, blue = _surface(scene, pictures, triangle, u, v)
             basis = spectra.basis[atom]
             weight *= spectra.classes[row, atom] if row > 0 else red * basis[0] + green * basis[1] + blue * basis[2]
-            dx, dy, dz = _above(scene.normals[triangle], 1.0 if side == 0 else -1.0, a, b)
+            sign, normal = 1.0 if side == 0 else -1.0, scene.normals[triangle]
+            dx, dy, dz, share = draw_direction(
+                pictures.draw, sign * normal[0], sign * normal[1], sign * normal[2], a, b
+            )
+            weight *= share
             last, last_object, within, lit = triangle, thing, side == 1, True
             continue
         if events >= max_depth:
