@@ -19,6 +19,7 @@ from ..edit.live_inputs import LiveInputs
 from ..edit.parameters import Stage
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
+from ..model.environment_sun import with_sun
 from ..model.features import Features
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Camera, Scene
@@ -112,6 +113,7 @@ class FrameRenderer:
 
         Where light changes, `shader.keep_programs` on the context spares compiling every frame's programs."""
         self._context = context
+        stages = [_with_sun(s) for s in stages]
         moves = any(s.camera != stages[0].camera for s in stages)
         # Light is traced once for all views, so no single one may decide what the programs leave out.
         self._settings = settings = replace(settings, any_view=settings.any_view or moves)
@@ -137,6 +139,7 @@ class FrameRenderer:
         """Render a frame, pausing with the share done. What was done when `stop()` turned true is a picture too."""
         self.seconds, self.phase = FrameSeconds(), _PREPARING
         yield from self._survey()
+        stage = _with_sun(stage)
         inputs = inputs_of(stage, self._settings)
         if self._traced is None or not share_light(self._traced.inputs, inputs):
             yield from self._trace(stage, inputs, stop)
@@ -260,7 +263,7 @@ class FrameRenderer:
         traced.camera_pass = CameraPass(
             self._context, traced.camera_buffers or traced.buffers, layer, light.reflectances, light.map_channels
         )
-        yield from self._see(stage, stop)
+        yield from self._see(_with_sun(stage), stop)
 
     def run(self, stage: Stage) -> np.ndarray:
         """The whole frame at once: `rgb` of it."""
@@ -345,6 +348,11 @@ class FrameRenderer:
         own = spectral_axis(scene, features)
         glasses = self._fit.glasses
         return SpectralAxis.build(glasses) if own.glasses and glasses else own
+
+
+def _with_sun(stage: Stage) -> Stage:
+    scene = with_sun(stage.scene)
+    return stage if scene is stage.scene else replace(stage, scene=scene)
 
 
 def traced_light(light: LightPass, sampling: LightSampling, stop: Stop) -> Iterator[float]:

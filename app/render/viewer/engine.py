@@ -19,6 +19,7 @@ from ...base.errors import UserError
 from ...edit.live_inputs import LiveInputs
 from ...edit.stored_photons import StoredPhotons
 from ...gpu import shader
+from ...model.environment_sun import with_sun
 from ...passes.caustic_maps import CausticMaps
 from ...passes.pick import Picker, PickHit
 from ..beam_light import MovingBeams
@@ -128,6 +129,8 @@ class LiveEngine:
 
     def set(self, inputs: LiveInputs) -> DirtyLevel:
         """Want `inputs` from now on; returns what that asks for. The work is done by `advance`."""
+        if (scene := with_sun(inputs.scene)) is not inputs.scene:
+            inputs = replace(inputs, scene=scene)
         before, self._wanted = self._wanted, inputs
         if before is not None and dirty_level(before, before, inputs) == DirtyLevel.NOTHING:
             return DirtyLevel.NOTHING
