@@ -45,7 +45,7 @@ def read_environment(table: SceneTable, notes: list[str]) -> tuple[Vec3, Environ
     background, environment = _BLACK, None
     if kind == "constant":
         background = _read_constant(inner)
-        environment = constant(background, lights) if lights and any(background) else None
+        environment = constant(background, lights)
     elif kind == "map":
         environment = _read_map(inner, notes, lights)
     elif kind == "studio":

@@ -93,13 +93,21 @@ SUM = Struct(
 class EnvironmentLightPass:
     """Owns the program, the places, the sums and the texture of one scene's receivers."""
 
-    def __init__(self, context: Context, buffers: SceneBuffers, seed: int = 1, directions: int = DIRECTIONS) -> None:
-        """Of a scene that an environment lights (`Features.environment_lights`)."""
+    def __init__(
+        self,
+        context: Context,
+        buffers: SceneBuffers,
+        seed: int = 1,
+        directions: int = DIRECTIONS,
+        finer: float = 1.0,
+    ) -> None:
+        """Of a scene that an environment lights (`Features.environment_lights`); `finer`: factor on the number of
+        texels."""
         environment = lighting_environment(buffers.scene)
         assert environment is not None
         self._context, self._ctx, self._buffers = context, context.ctx, buffers
         self._seed, self.total = seed, directions
-        self.places: EnvironmentPlaces = environment_places(buffers)
+        self.places: EnvironmentPlaces = environment_places(buffers, finer)
         self.texture = self._ctx.texture(self.places.size, 4, dtype="f4")
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self.asked = 0
