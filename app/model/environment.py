@@ -57,7 +57,9 @@ def from_map(
             "stretched."
         )
     if width > MAX_WIDTH or height > MAX_HEIGHT:
-        rgb = averaged_rows(averaged_rows(rgb, min(height, MAX_HEIGHT)).swapaxes(0, 1), min(width, MAX_WIDTH)).swapaxes(0, 1)
+        rgb = averaged_rows(averaged_rows(rgb, min(height, MAX_HEIGHT)).swapaxes(0, 1), min(width, MAX_WIDTH)).swapaxes(
+            0, 1
+        )
         told.append(f"{path.name} is {width} × {height}; it was averaged down to {rgb.shape[1]} × {rgb.shape[0]}.")
     with np.errstate(over="ignore"):
         rgb = np.ascontiguousarray(rgb) * np.float32(intensity)
@@ -66,7 +68,9 @@ def from_map(
     if notes is not None:
         notes += told
     parameters = {"intensity": float(intensity), "rotation_deg": float(rotation_deg), "up": _listed(up)}
-    return Environment(_frozen(rgb), world_to_local(up, rotation_deg), "map", _told(parameters, lights), str(path), lights)
+    return Environment(
+        _frozen(rgb), world_to_local(up, rotation_deg), "map", _told(parameters, lights), str(path), lights
+    )
 
 
 def gradient(

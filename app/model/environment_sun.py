@@ -1,9 +1,9 @@
 """The sun of a panorama: a small, very bright spot becomes a directional light, and the rest of the picture lights
 without it.
 
-Directions drawn by brightness would find it, but a shadow's edge would be as coarse as a map of the environment's light,
-and its caustics, which are as sharp as it is small, are a matter for photons. So what renders asks for `with_sun` first;
-the scene that people edit and save keeps its picture as it is.
+Directions drawn by brightness would find it, but a shadow's edge would be as coarse as a map of the environment's
+light, and its caustics, which are as sharp as it is small, are a matter for photons. So what renders asks for
+`with_sun` first; the scene that people edit and save keeps its picture as it is.
 """
 
 from __future__ import annotations

@@ -188,7 +188,9 @@ class EnvironmentLightPass:
         assert self._light is not None and self._levels is not None
         started = time.perf_counter()
         follows = self._sphere is not None
-        first_followed, end_followed = (self.asked // PER_FOLLOWED, (self.asked + count) // PER_FOLLOWED) if follows else (0, 0)
+        first_followed, end_followed = (
+            (self.asked // PER_FOLLOWED, (self.asked + count) // PER_FOLLOWED) if follows else (0, 0)
+        )
         asked = ASKED.zeros(MOST_ASKED)
         drawn = self._light.directions(self.asked, count)
         asked["toward"][:count], asked["weight"][:count] = drawn.toward, drawn.weight
@@ -290,8 +292,8 @@ def without_light(ctx: moderngl.Context, receivers: int) -> moderngl.Texture:
     return ctx.texture((max(1, receivers), 1), 4, bytes(16 * max(1, receivers)), dtype="f4")
 
 
-def _specular_sphere(buffers: SceneBuffers) -> tuple[float, float, float, float] | None:
-    """What holds all glass and mirrors, GPU space; None where there are none."""
+def _specular_sphere(buffers: SceneBuffers) -> np.ndarray | None:
+    """What holds all glass and mirrors: centre and radius, float64 (4,), GPU space; None where there are none."""
     corners = [
         buffers.space.to_gpu(mesh.vertices)
         for mesh, item in zip(buffers.world_meshes, buffers.scene.objects, strict=True)
@@ -301,4 +303,4 @@ def _specular_sphere(buffers: SceneBuffers) -> tuple[float, float, float, float]
         return None
     points = np.concatenate(corners)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    return (*map(float, centre), 1.0001 * float(np.linalg.norm(points - centre, axis=1).max()))
+    return np.append(centre, 1.0001 * np.linalg.norm(points - centre, axis=1).max())

@@ -113,7 +113,7 @@ def _windows(buffers: SceneBuffers, index: int, frame: PlaneFrame) -> list[Windo
     for other, item in enumerate(buffers.scene.objects):
         if other == index:
             continue
-        box = buffers.space.to_gpu(np.stack(world_bounds(item)))
+        box = buffers.space.to_gpu(world_bounds(item))
         corners = np.array(np.meshgrid(*box.T, indexing="ij")).reshape(3, 8).T
         flat, height = frame.project(corners), np.abs((corners - frame.origin) @ normal)
         # A shadow under a uniform sky has faded as far beside a thing as that is high.

@@ -4,7 +4,9 @@ Reflection or refraction is drawn with Fresnel's probability, so that a path's w
 absorption and mirrors only; lights are seen along the way, the environment at its end. At a diffuse surface one
 random point of every light is asked for (anything between hides it, glass too: what comes through glass is the
 caustic's), and the spectral caustic is looked up. Where the environment lights it the path goes on from there, in a
-direction towards what is bright, until it leaves the scene or meets something else than glass and mirrors. Numbers: a scrambled Sobol sequence a part, shifted from pixel to
+direction towards what is bright, until it leaves the scene or meets something else than glass and mirrors.
+
+Numbers: a scrambled Sobol sequence a part, shifted from pixel to
 pixel.
 """
 

@@ -1,6 +1,7 @@
-"""Directions towards what is bright of the environment, for paths that go on from a diffuse surface: half of them by the
-cosine, half by the environment's brightness, each weighed by the density of both together (balance heuristic: Veach and
-Guibas 1995)."""
+"""Directions towards what is bright of the environment, for paths that go on from a diffuse surface.
+
+Half of them are drawn by the cosine, half by the environment's brightness, each weighed by the density of both together
+(balance heuristic: Veach and Guibas 1995)."""
 
 from __future__ import annotations
 
@@ -35,8 +36,11 @@ def environment_draw(scene: Scene) -> EnvironmentDraw:
     lights = environment is not None and environment.lights and bool(environment.rgb.any())
     rgb = np.ones((1, 1, 3)) if environment is None or not lights else np.asarray(environment.rgb, float)
     height, width = rgb.shape[:2]
-    # A little everywhere: what lies between a bright texel and a dark one is not dark.
-    bright = rgb.sum(axis=2) + 0.01 * rgb.sum(axis=2).mean()
+    # What lies between a bright texel and a dark one is not dark.
+    bright = rgb.sum(axis=2)
+    bright = np.maximum(np.maximum(np.roll(bright, 1, axis=1), np.roll(bright, -1, axis=1)), bright)
+    above, below = bright[np.maximum(np.arange(height) - 1, 0)], bright[np.minimum(np.arange(height) + 1, height - 1)]
+    bright = np.maximum(np.maximum(above, below), bright) + 0.01 * bright.mean()
     polar = np.linspace(0.0, math.pi, height + 1)
     solid = (np.cos(polar[:-1]) - np.cos(polar[1:])) * 2.0 * math.pi / width
     power = bright * solid[:, None]

@@ -1,5 +1,5 @@
-"""Surfaces in the light of an environment against float64 paths, which know neither maps nor shaders: block means of
-pictures of four scenes. What is bounded is the error of a block of 6 × 6 pixels; the reference's own noise is a part."""
+"""Surfaces in the light of an environment against float64 paths, which know neither maps nor shaders, in four scenes.
+What is bounded is the error of the mean of 6 × 6 pixels; the reference's own noise is a part of it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,10 @@ BALL = primitives.sphere(0.5, 5000)
 
 def uniform() -> Scene:
     """A coloured ball and one of glass under a white sky."""
-    things = thing("ball", BALL, Diffuse((0.8, 0.2, 0.2)), (-0.6, 0.0, 0.5)), thing("glass", BALL, Dielectric(CROWN), (0.6, 0.0, 0.55))
+    things = (
+        thing("ball", BALL, Diffuse((0.8, 0.2, 0.2)), (-0.6, 0.0, 0.5)),
+        thing("glass", BALL, Dielectric(CROWN), (0.6, 0.0, 0.55)),
+    )
     return Scene("uniform", CAMERA, (), (*things, FLOOR), environment=constant((1.0, 1.0, 1.0)))
 
 
@@ -50,7 +53,13 @@ def coloured() -> Scene:
         thing("box", primitives.box((0.7, 0.7, 0.7)), Diffuse((0.6, 0.6, 0.6)), (-0.7, 0.2, 0.36), 25.0),
         thing("tinted", primitives.box((0.8, 0.8, 0.5)), Dielectric(CROWN, tint), (0.6, 0.0, 0.3), 40.0),
     )
-    return Scene("coloured", CAMERA, (), (*things, FLOOR), environment=gradient((0.1, 0.3, 2.0), (2.0, 1.0, 0.3), (0.1, 0.1, 0.1)))
+    return Scene(
+        "coloured",
+        CAMERA,
+        (),
+        (*things, FLOOR),
+        environment=gradient((0.1, 0.3, 2.0), (2.0, 1.0, 0.3), (0.1, 0.1, 0.1)),
+    )
 
 
 def studio() -> Scene:
@@ -64,16 +73,16 @@ def studio() -> Scene:
 
 
 def sun() -> Scene:
-    """A panorama with a sun, 1° across, whose light goes as a light of its own; the reference finds it in the picture."""
+    """A panorama with a sun, whose light goes as a light of its own; the reference finds it in the picture."""
     height, width = 256, 512
     u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     rgb = np.ones((height, width, 3)) * np.array([0.3, 0.4, 0.6])
     rgb[(np.abs(u - 0.2) < 0.004) & (np.abs(v - 0.3) < 0.008)] = 2500.0
-    things = thing("ball", BALL, Diffuse((0.8, 0.6, 0.2)), (-0.3, 0.0, 0.55)),
+    things = (thing("ball", BALL, Diffuse((0.8, 0.6, 0.2)), (-0.3, 0.0, 0.55)),)
     return Scene("sun", CAMERA, (), (*things, FLOOR), environment=Environment(rgb.astype(np.float32), lights=True))
 
 
-BOUNDS = {uniform: (0.01, 0.05), coloured: (0.015, 0.06), studio: (0.035, 0.2), sun: (0.03, 0.15)}
+BOUNDS = {uniform: (0.006, 0.03), coloured: (0.006, 0.04), studio: (0.018, 0.09), sun: (0.006, 0.03)}
 """Root mean square and largest error of a block's luminance, relative."""
 
 

@@ -61,7 +61,9 @@ def sunny(elevation_deg: float, azimuth_deg: float, radius_deg: float = 1.0, sun
     toward = np.array(
         [math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation)]
     )
-    spot = direction_of(Environment(np.zeros((1, 1, 3), np.float32)), u, v) @ toward > math.cos(math.radians(radius_deg))
+    spot = direction_of(Environment(np.zeros((1, 1, 3), np.float32)), u, v) @ toward > math.cos(
+        math.radians(radius_deg)
+    )
     rgb[spot] = np.array([1.0, 0.8, 0.5]) * sun
     return Environment(rgb.astype(np.float32), lights=True)
 
