@@ -6,8 +6,7 @@ random point of every light is asked for (anything between hides it, glass too: 
 caustic's), and the spectral caustic is looked up. Where the environment lights it the path goes on from there, in a
 direction towards what is bright, until it leaves the scene or meets something else than glass and mirrors.
 
-Numbers: a scrambled Sobol sequence a part, shifted from pixel to
-pixel.
+Numbers: a scrambled Sobol sequence a part, shifted from pixel to pixel.
 """
 
 from __future__ import annotations
