@@ -13,6 +13,7 @@ import numpy as np
 from .camera_rays import camera_frame
 from .contacts import contacts, overlapping_solids, world_bounds
 from .environment_light import why_no_environment_light
+from .environment_sun import with_sun
 from .scene import (
     Camera,
     Scene,
@@ -487,6 +488,7 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             "environment light",
             features.environment_lights,
             "every diffuse surface is lit by it, with visibility, also through glass and over mirrors"
+            + ("; its sun is a light of its own" if with_sun(scene) is not scene else "")
             if features.environment_lights
             else why_no_environment_light(scene) or "the picture shows caustics only",
         ),

@@ -32,9 +32,11 @@ from .environment_places import PLACE, EnvironmentPlaces, environment_places
 
 DIRECTIONS = 512
 """Asked in all, straight."""
+LEAST_DIRECTIONS = 64
+"""That a still asks, however little time it has."""
 PER_FOLLOWED = 4
 """Straight ones for each that is followed through glass and over mirrors, which takes as long as many of them."""
-FIRST_DIRECTIONS = 32
+FIRST_DIRECTIONS = 16
 """After which the light is worth showing."""
 MAX_EVENTS = 40
 """Surfaces of glass and mirrors on one path; what goes on is lost and counted."""

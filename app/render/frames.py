@@ -26,7 +26,7 @@ from ..model.scene import Camera, Scene
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
 from ..passes.caustic_maps import CausticMaps
-from ..passes.environment_light import EnvironmentLightPass
+from ..passes.environment_light import LEAST_DIRECTIONS, EnvironmentLightPass
 from ..passes.map_layout import MapLayout
 from .camera_beams import CameraBeams
 from .frame_fit import FrameFit, Survey, inputs_of, share_light, stages_to_survey
@@ -42,7 +42,10 @@ FIRST_PASS_PHOTONS = 1 << 17
 """Photons of a timed rendering's first pass, which finds out how fast the scene goes."""
 _LIGHT_SHARE = 0.8
 """Of a frame's progress, where its light is traced."""
+_ENVIRONMENT_SHARE = 0.25
+"""Of a timed rendering, at most, for the light of the environment."""
 _PREPARING, _TRACING, _SEEING = "preparing", "tracing photons", "taking camera samples"
+_ASKING = "asking for the environment's light"
 
 Stop = Callable[[], bool]
 Fill = Callable[[LightPass, LightSampling, Stop], Iterator[float]]
@@ -154,9 +157,9 @@ class FrameRenderer:
             light = traced.light
             for _ in light.preparing():
                 yield 0.0
-            self._light_by_environment(traced)
             self.seconds.prepare = time.perf_counter() - self.seconds.started
             sampling, budget = LightSampling.of(stage.scene, self._settings), self._budget
+            yield from self._ask_environment(traced, stop)
             if budget is not None:
                 if not self._shows_map:
                     self._add_camera_pass(traced)
@@ -165,12 +168,9 @@ class FrameRenderer:
                 sampling = replace(sampling, seconds=budget.for_light(self._settings.spp))
             self.phase = _TRACING
             for share in self._fill(light, sampling, stop):
-                yield _LIGHT_SHARE * share if budget is None else budget.spent
+                begun = 0.0 if traced.environment is None else 0.1
+                yield _LIGHT_SHARE * (begun + (1.0 - begun) * share) if budget is None else budget.spent
             light.finish()
-            if traced.environment is not None:
-                for _ in traced.environment.steps():
-                    yield _LIGHT_SHARE if budget is None else budget.spent
-                traced.environment.show()
             light.settle()
             if traced.camera_pass is None and not self._shows_map:
                 self._add_camera_pass(traced)
@@ -280,6 +280,11 @@ class FrameRenderer:
         return self._traced.light
 
     @property
+    def environment(self) -> EnvironmentLightPass | None:
+        """Of the last frame; None where nothing beyond it lights it."""
+        return self._traced.environment if self._traced is not None else None
+
+    @property
     def camera_pass(self) -> CameraPass | None:
         """Of the last frame; None for a map."""
         return self._traced.camera_pass if self._traced is not None else None
@@ -339,9 +344,18 @@ class FrameRenderer:
         light.before_maps = look_at_memory
         return _Traced(inputs, buffers, light)
 
-    def _light_by_environment(self, traced: _Traced) -> None:
-        if traced.buffers.features.environment_lights:
-            traced.environment = EnvironmentLightPass(self._context, traced.buffers, self._settings.seed)
+    def _ask_environment(self, traced: _Traced, stop: Stop) -> Iterator[float]:
+        """Light of what lies beyond everything; a timed rendering and one that is stopped ask fewer directions."""
+        if not traced.buffers.features.environment_lights:
+            return
+        self.phase = _ASKING
+        traced.environment = light = EnvironmentLightPass(self._context, traced.buffers, self._settings.seed)
+        longest = float("inf") if self._settings.seconds is None else _ENVIRONMENT_SHARE * self._settings.seconds
+        for share in light.steps():
+            yield 0.1 * _LIGHT_SHARE * share if self._budget is None else self._budget.spent
+            if light.asked >= LEAST_DIRECTIONS and (light.seconds >= longest or stop()):
+                break
+        light.show()
 
     def _axis(self, scene: Scene, features: Features) -> SpectralAxis:
         """One axis for all frames: bands of equal places on it are then the same wavelengths in all."""
