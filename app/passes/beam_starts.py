@@ -62,9 +62,9 @@ class BeamStarts:
         found: moderngl.Buffer,
         gather: Callable[[np.ndarray], None],
         seconds: float,
-    ) -> Iterator[None]:
-        """Follow all paths, pausing after every portion. What each finds is in `found`, where `gather` adds it to the
-        pixels given."""
+    ) -> Iterator[float]:
+        """Follow all paths, pausing with the share done after every portion. What each finds is in `found`, where
+        `gather` adds it to the pixels given."""
         room = min(self._room, listed.room)
         for first in range(0, len(self._records), room):
             part = self._records[first : first + room]
@@ -77,10 +77,10 @@ class BeamStarts:
                 return dispatch(self._program, count)
 
             follow: Dispatch = dispatched
-            for _ in listed.follow(parameters, follow, seconds):
-                yield
+            for share in listed.follow(parameters, follow, seconds):
+                yield (first + share * len(part)) / len(self._records)
             gather(part["pixel"])
-            yield
+            yield (first + len(part)) / len(self._records)
 
     def release(self) -> None:
         """Free everything."""

@@ -69,7 +69,15 @@ PRIMARY_SAMPLES = LOOKS
 """Of one sample at what is seen directly: outlines and textures there cost a tenth of what glass costs …"""
 PRIMARY_SAMPLES_UNTIL = 16
 """… and with more samples than these they are smooth as they are."""
+SURVEY_SAMPLES = 2
+"""Samples of so many looks each that tell, before a still's first sample, which pixels are even …"""
+SURVEY_FROM = 4
+"""… where as many samples or more follow: fewer would cost no more than the survey itself."""
 
+_BEAMS_PROGRESS = 0.7
+"""Of a frame's time, about, that drawing its beams takes."""
+_SURVEY_GRID = (4, 2)
+"""Columns and rows of a survey's looks in a pixel: SURVEY_SAMPLES · LOOKS together."""
 _TARGET_SECONDS = 0.15
 """What one dispatch may take; rows are divided to fit."""
 _GROUP = 8
@@ -267,17 +275,22 @@ class CameraPass:
             if samples + sample_offset > PRIMARY_SAMPLES_UNTIL or (self.spectrum.single and not self.shows_beams)
             else max(self.primary_samples, PRIMARY_SAMPLES if self.shows_beams else 1)
         )
-        if self.shows_beams and sample_offset == 0:
-            yield from self._draw_beams(parameters, samples, maps)
+        before = _BEAMS_PROGRESS if self.shows_beams and sample_offset == 0 else 0.0
+        if before:
+            for share in self._draw_beams(parameters, samples, maps):
+                yield before * share
         looks = np.zeros((samples, LOOKS, 2))
         if parameters["primary_samples"][0] > 1:
             looks = looks_lattice(samples, sample_offset)
+            if self._listed is not None and sample_offset == 0 and samples >= SURVEY_FROM and self._sums.is_single:
+                for _ in self._survey(parameters, width, height, maps):
+                    yield before
         for index, place in enumerate(pixel_lattice(samples, sample_offset)):
             parameters["sample_index"] = parameters["draw_index"] = sample_offset + index
             parameters["within_pixel"] = place
             parameters["looks"] = looks[index].reshape(-1, 4)
             for share in self._add_sample(parameters, width, height, maps):
-                yield (index + share) / samples
+                yield before + (1.0 - before) * (index + share) / samples
         self.context.check("the camera pass")
 
     @property
@@ -466,6 +479,32 @@ class CameraPass:
             row += rows
             yield row / height
 
+    def _survey(self, parameters: np.ndarray, width: int, height: int, maps: CausticMaps) -> Iterator[float]:
+        """Find the pixels in which, and round which, nothing but one surface in the same light is seen directly, and
+        what that looks like: the samples then look at the others only. Pauses after every dispatch with 0.0."""
+        assert self._listed is not None
+        taken = parameters.copy()
+        taken["survey"], taken["survey_gain"] = 1, 1.0 / SURVEY_SAMPLES
+        taken["survey_at"] = self._listed.survey_at(width * height)
+        # The looks tile the pixel: what they are averaged over is then all of it, and nothing twice.
+        columns, rows = _SURVEY_GRID
+        taken["sample_side"] = SURVEY_SAMPLES**-0.5
+        taken["pixel_width"], taken["pixel_height"] = np.sqrt(rows / columns), np.sqrt(columns / rows)
+        tiles = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2)
+        looks = ((tiles + 0.5) / _SURVEY_GRID).reshape(SURVEY_SAMPLES, -1, 4)
+        for index, places in enumerate(looks):
+            taken["sample_index"] = taken["draw_index"] = index
+            taken["looks"] = places
+            row = 0
+            while row < height:
+                rows = min(self._rows.units, height - row)
+                taken["first_row"] = row
+                took = self._dispatch(self._program_direct(), taken, maps, -(-width // _GROUP), -(-rows // _GROUP))
+                self._rows.learn(rows, took, self.dispatch_seconds)
+                row += rows
+                yield 0.0
+        parameters["survey"], parameters["survey_at"] = 2, taken["survey_at"]
+
     def _follow_listed(self, parameters: np.ndarray, maps: CausticMaps) -> Iterator[float]:
         """Follow what the listed pixels of a band of rows see, yielding the share done."""
         if self._listed is None:
@@ -497,7 +536,7 @@ class CameraPass:
         return self._beside
 
     def _draw_beams(self, parameters: np.ndarray, samples: int, maps: CausticMaps) -> Iterator[float]:
-        """Draw what is seen by beams, yielding 0.0 after every portion."""
+        """Draw what is seen by beams, yielding the share done after every portion."""
         assert self._beams is not None
         parameters["sample_index"] = parameters["draw_index"] = 0
 
@@ -507,8 +546,9 @@ class CameraPass:
 
         places = shared_places(samples, int(parameters["primary_samples"][0]))
         as_image = self.scene.texels.as_image
-        for _ in self._beams.draw(self._sums.size, places, as_image, bind, self.dispatch_seconds):
-            yield 0.0
+        drawn = 1.0 if self._starts is None else 0.5
+        for share in self._beams.draw(self._sums.size, places, as_image, bind, self.dispatch_seconds):
+            yield drawn * share
         if self._starts is not None:
             assert self._listed is not None
             found, gather = self._beams.found, self._beams.gather
@@ -517,8 +557,8 @@ class CameraPass:
             def dispatch(program: moderngl.ComputeShader, count: int) -> float:
                 return self._dispatch(program, parameters, maps, -(-count // GROUP), 1)
 
-            for _ in self._starts.follow(self._listed, parameters, dispatch, found, gather, self.dispatch_seconds):
-                yield 0.0
+            for share in self._starts.follow(self._listed, parameters, dispatch, found, gather, self.dispatch_seconds):
+                yield drawn + (1.0 - drawn) * share
 
     def _program_beyond(self) -> moderngl.ComputeShader:
         """What follows rays beyond glass and mirrors."""

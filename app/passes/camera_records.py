@@ -69,8 +69,9 @@ CAMERA_PARAMETERS = Struct(
         Field("first_place", "uint", "where the first of them waits; NONE where this dispatch takes up halted ones"),
         Field("queue", "uint", "of the two, the one that samples which halt are put on"),
         Field("start_share", "float", "of a sample, that a path which carries a beam on stands for"),
-        Field("reserved", "float", ""),
-        Field("reserved_too", "vec2", ""),
+        Field("survey", "uint", "0: none; 1: this sample is one of a survey; 2: even pixels keep what a survey found"),
+        Field("survey_at", "uint", "where the survey's pixels begin, words of the list"),
+        Field("survey_gain", "float", "share of a survey that one of its samples is"),
     ),
 )
 

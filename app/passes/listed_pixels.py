@@ -21,6 +21,8 @@ _FIRST = 1024
 _PLACES = 8192
 """Samples that may be under way, where they halt."""
 _LISTED_AT, _HALTED_AT = 0, 4
+SURVEYED_BYTES = 16
+"""What a survey keeps of a pixel (shaders/camera/survey.glsl)."""
 
 Dispatch = Callable[[int], float]
 """Follows so many pixels, as `first_listed` and its neighbours in the parameters say; seconds it took."""
@@ -36,17 +38,24 @@ class ListedPixels:
         self._list: moderngl.Buffer | None = None
         self.room = 0
         """What the list holds."""
+        self._surveyed = 0
+        """Pixels of a survey, which lie behind the list."""
         self.budget = self.resumed = DispatchBudget(1, 1, 1)
         """How many pixels, and how many halted samples, a dispatch is given."""
 
     def resize(self, pixels: int, room: int) -> None:
         """For pictures of so many pixels, up to `room` of them on the list at a time."""
-        if self._list is not None:
-            self._list.release()
-        self._list = self._ctx.buffer(reserve=8 + 4 * room)
-        self.room = room
+        self.room, self._surveyed = room, 0
+        self._reserve()
         self.budget = DispatchBudget(_FIRST, GROUP, max(pixels, GROUP))
         self.resumed = DispatchBudget(_FIRST, GROUP, _PLACES)
+
+    def survey_at(self, pixels: int) -> int:
+        """Make room for a survey of so many pixels behind the list; where it begins, in words behind the counts."""
+        if self._surveyed != pixels:
+            self._surveyed = pixels
+            self._reserve()
+        return self.room
 
     def clear(self) -> None:
         """Nothing is listed and nothing has halted."""
@@ -101,6 +110,11 @@ class ListedPixels:
     def _count(self, at: int) -> int:
         assert self._list is not None
         return int(np.frombuffer(self._list.read(4, offset=at), "u4")[0])
+
+    def _reserve(self) -> None:
+        if self._list is not None:
+            self._list.release()
+        self._list = self._ctx.buffer(reserve=8 + 4 * self.room + SURVEYED_BYTES * self._surveyed)
 
     def release(self) -> None:
         """Free both."""

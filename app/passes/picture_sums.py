@@ -18,6 +18,11 @@ class PictureSums:
         """(H,); in a row all pixels have as many."""
 
     @property
+    def is_single(self) -> bool:
+        """One texture holds all channels."""
+        return self._targets == 1
+
+    @property
     def size(self) -> tuple[int, int]:
         """Width and height; (0, 0) before there are any."""
         return self.textures[0].size if self.textures else (0, 0)

@@ -116,8 +116,8 @@ class ScreenBeams:
 
     def draw(
         self, size: tuple[int, int], places: np.ndarray, as_image: bool, bind: Callable[[], None], seconds: float
-    ) -> Iterator[None]:
-        """Draw all polygons into the beams' own picture, pausing after every portion.
+    ) -> Iterator[float]:
+        """Draw all polygons into the beams' own picture, pausing with the share done after every portion.
 
         `places`: (points, 2) of a pixel, 0 to 1, at which its edges are told; `bind`: binds what the camera's programs
         read; `seconds`: what a portion should take."""
@@ -126,14 +126,16 @@ class ScreenBeams:
         places = ordered(places)
         view = self._view_of(size, places)
         parts = self._records["parts"].astype(np.int64)
-        for which in portions(self._polygons, size, parts, MOST_LISTED):
+        listed = portions(self._polygons, size, parts, MOST_LISTED)
+        for number, which in enumerate(listed):
             entries = pixel_parts(self._polygons, size, float(view["reach"][0]), parts, which)
-            yield from self._draw_listed(entries, view, as_image, bind, seconds)
+            for share in self._draw_listed(entries, view, as_image, bind, seconds):
+                yield (number + share) / len(listed)
 
     def _draw_listed(
         self, entries: np.ndarray, view: np.ndarray, as_image: bool, bind: Callable[[], None], seconds: float
-    ) -> Iterator[None]:
-        """Draw these entries, pausing after every portion."""
+    ) -> Iterator[float]:
+        """Draw these entries, pausing with the share done after every portion."""
         done = 0
         while done < len(entries):
             part = entries[done : done + self._budget.units]
@@ -155,7 +157,7 @@ class ScreenBeams:
             self.gather(part[:, 1] & ((1 << PIXEL_BITS) - 1))
             self._budget.learn(len(part), time.perf_counter() - start, seconds)
             done += len(part)
-            yield
+            yield done / len(entries)
 
     @property
     def found(self) -> moderngl.Buffer:

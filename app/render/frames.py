@@ -40,10 +40,12 @@ from .time_budget import TimeBudget
 
 FIRST_PASS_PHOTONS = 1 << 17
 """Photons of a timed rendering's first pass, which finds out how fast the scene goes."""
-_LIGHT_SHARE = 0.8
-"""Of a frame's progress, where its light is traced."""
 _ENVIRONMENT_SHARE = 0.25
 """Of a timed rendering, at most, for the light of the environment."""
+_ENVIRONMENT_PROGRESS = 0.1
+"""Of the progress where light is traced, where it is not timed."""
+_PHOTON_S, _SAMPLE_S = 10e-6, 3e-6
+"""What a photon and a camera sample of a pixel take, one to the other: progress is weighted by them."""
 _PREPARING, _TRACING, _SEEING = "preparing", "tracing photons", "taking camera samples"
 _ASKING = "asking for the environment's light"
 
@@ -131,6 +133,8 @@ class FrameRenderer:
         """What `steps` is at."""
         self.seconds = FrameSeconds()
         """Of the last frame."""
+        self._light_share = 0.0
+        """Of the last frame's progress, where its light was traced."""
         self.memory: MemoryEstimate | None = None
         """Expected of the last frame that was traced."""
         self.traces = 0
@@ -159,6 +163,7 @@ class FrameRenderer:
                 yield 0.0
             self.seconds.prepare = time.perf_counter() - self.seconds.started
             sampling, budget = LightSampling.of(stage.scene, self._settings), self._budget
+            self._light_share = self._share_of_light(light, sampling)
             yield from self._ask_environment(traced, stop)
             if budget is not None:
                 if not self._shows_map:
@@ -168,8 +173,9 @@ class FrameRenderer:
                 sampling = replace(sampling, seconds=budget.for_light(self._settings.spp))
             self.phase = _TRACING
             for share in self._fill(light, sampling, stop):
-                begun = 0.0 if traced.environment is None else 0.1
-                yield _LIGHT_SHARE * (begun + (1.0 - begun) * share) if budget is None else budget.spent
+                begun = 0.0 if traced.environment is None else _ENVIRONMENT_PROGRESS
+                done = self._light_share * (begun + (1.0 - begun) * share)
+                yield done if budget is None else budget.spent
             light.finish()
             light.settle()
             if traced.camera_pass is None and not self._shows_map:
@@ -217,16 +223,16 @@ class FrameRenderer:
                 sampling = replace(sampling, budget=max(budget.samples(), 1))
             if self._traced.camera_beams is not None:
                 for _ in self._traced.camera_beams.choosing(*view, sampling.budget, settings.seed):
-                    yield self._share(_LIGHT_SHARE)
+                    yield self._share(self._light_share)
             for _ in sampling.choosing(camera_pass, *view, maps):
-                yield self._share(_LIGHT_SHARE)
+                yield self._share(self._light_share)
             samples = sampling.samples(camera_pass)
         if budget is not None:
             yield from self._see_until(budget, stage, maps, stop)
             self.seconds.camera += time.perf_counter() - started
             return
         for share in camera_pass.samples(*view, samples, 0, maps, settings.seed):
-            yield self._share(_LIGHT_SHARE + (1.0 - _LIGHT_SHARE) * share)
+            yield self._share(self._light_share + (1.0 - self._light_share) * share)
             if not stops_at_once and stop() and camera_pass.is_even:
                 break
         self.seconds.camera += time.perf_counter() - started
@@ -247,6 +253,14 @@ class FrameRenderer:
                     return
             taken += count
             budget.sample_s = (time.perf_counter() - started) / taken
+
+    def _share_of_light(self, light: LightPass, sampling: LightSampling) -> float:
+        """Of the frame's time, about."""
+        settings = self._settings
+        if self._shows_map or not light.domains:
+            return float(self._shows_map)
+        camera_s = settings.width * settings.height * CameraSampling.of(settings).budget * _SAMPLE_S
+        return sampling.photons * _PHOTON_S / (sampling.photons * _PHOTON_S + camera_s)
 
     def _share(self, of_work: float) -> float:
         """Progress: of the time where that is given, else of the work."""
@@ -352,7 +366,8 @@ class FrameRenderer:
         traced.environment = light = EnvironmentLightPass(self._context, traced.buffers, self._settings.seed)
         longest = float("inf") if self._settings.seconds is None else _ENVIRONMENT_SHARE * self._settings.seconds
         for share in light.steps():
-            yield 0.1 * _LIGHT_SHARE * share if self._budget is None else self._budget.spent
+            done = _ENVIRONMENT_PROGRESS * self._light_share * share
+            yield done if self._budget is None else self._budget.spent
             if light.asked >= LEAST_DIRECTIONS and (light.seconds >= longest or stop()):
                 break
         light.show()

@@ -79,6 +79,10 @@ vec2 primary_sample_place(uint primary_sample)
     return (primary_sample & 1u) == 0u ? two.xy : two.zw;
 }
 
+#ifdef LISTS_SPECULAR
+#include "camera/survey.glsl"
+#endif
+
 // A listed pixel: its number, the primary sample that goes on, and of how many it is one.
 const uint LISTED_BITS = 27u;
 uint listed_entry(uint number, uint primary_sample, uint count)
@@ -363,8 +367,19 @@ void main()
     stack_size = 0;
 #endif
 #ifdef LISTS_SPECULAR
+    uint number = pixel.y * p.size.x + pixel.x;
+    WHEN(p.survey == SURVEY_KEPT) {
+        uint key = even_key(pixel), sees = key & KIND_BITS;
+        if (sees == SEES_DIRECTLY) imageStore(picture[0], ivec2(pixel), imageLoad(picture[0], ivec2(pixel)) + vec4(surveyed_mean(pixel), 0.0));
+        if (sees == SEES_SPECULAR) listed[atomicAdd(listed_count, 1u)] = listed_entry(number, THE_SAMPLE, p.primary_samples);
+        if (key != 0u) return;
+    }
+    Survey survey = Survey(0u, vec3(0.0));
     uint specular_samples = 0u, chosen = THE_SAMPLE, draw = hash_combine(pixel_key, p.draw_index);
     for (uint k = 0u; k < p.primary_samples; ++k) {
+        look_index = p.draw_index * p.primary_samples + k;
+        lights_seen = 0u;
+        saw_light = false;
         CameraPath path = camera_path(pixel, p.primary_samples == 1u ? THE_SAMPLE : k, 1.0 / float(p.primary_samples));
         Hit hit;
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
@@ -377,6 +392,7 @@ void main()
 #else
         const bool by_beams = false;
 #endif
+        uint sees = by_beams ? SEES_BEAMS : (is_specular(kind) ? SEES_SPECULAR : SEES_DIRECTLY);
         if (by_beams) {
             // The polygons of the picture show it.
         } else if (is_specular(kind)) {
@@ -387,9 +403,14 @@ void main()
         } else {
             see_directly(path, met, hit, kind, pixel_key);
         }
+        WHEN(p.survey == SURVEY_TAKES) survey_look(survey, k, sees, met, hit, lights_seen);
+    }
+    if (p.survey == SURVEY_TAKES) {
+        keep_survey(pixel, survey.key, p.survey_gain * radiance[0].rgb);
+        return;
     }
     WHEN(specular_samples > 0u) {
-        listed[atomicAdd(listed_count, 1u)] = listed_entry(pixel.y * p.size.x + pixel.x, specular_samples == p.primary_samples ? THE_SAMPLE : chosen, specular_samples);
+        listed[atomicAdd(listed_count, 1u)] = listed_entry(number, specular_samples == p.primary_samples ? THE_SAMPLE : chosen, specular_samples);
     }
 #elif defined(CAMERA_SPECULAR)
     int events = 0;

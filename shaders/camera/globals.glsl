@@ -49,6 +49,12 @@ layout(std430, binding = BIND_COUNTERS) restrict buffer Counters { uint fallback
 uint turn = 0u;
 bool took_turn = false;
 
+#ifdef LISTS_SPECULAR
+// What a look has met: a mark of the lights that shine on the surface there, and whether it saw one itself.
+uint lights_seen = 0u;
+bool saw_light = false;
+#endif
+
 #include "camera/path.glsl"
 
 // What a sample has found so far. Global: an array handed from function to function is copied there and back by some drivers.

@@ -89,6 +89,10 @@ void ray_at(CameraPath path, float x, out vec3 position, out vec3 direction)
 float beam_side;
 uint beam_draw;
 #define DRAW_INDEX beam_draw
+#elif defined(LISTS_SPECULAR)
+// Counts the looks of a pixel: each sees another point of a light.
+uint look_index;
+#define DRAW_INDEX look_index
 #else
 #define DRAW_INDEX p.draw_index
 #endif

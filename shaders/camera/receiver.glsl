@@ -72,10 +72,20 @@ vec2 light_point(uint light, uint pixel_key)
     return vec2(kronecker(DRAW_INDEX, PLASTIC_1, key), kronecker(DRAW_INDEX, PLASTIC_2, hash_pcg(key)));
 }
 
-// Irradiance from one light, as a factor on its own quantity, before anything is in the way.
-float unshadowed(uint light, SurfaceInteraction seen, uint pixel_key, out LightSample s)
+#ifdef LISTS_SPECULAR
+// The same for a survey's eight looks at a light that nothing hides: symmetric, and of the second moments of a square and, by the concentric
+// mapping, of a disc. Their mean is exact up to squares, and the same in every pixel: no grain.
+vec2 even_light_point()
 {
-    s = sample_light(lights[light], seen.position, light_point(light, pixel_key));
+    vec2 corner = (look_index & 4u) == 0u ? vec2(0.70710678, 0.40824829) : vec2(0.40824829, 0.70710678);
+    return 0.5 + 0.5 * vec2((look_index & 1u) == 0u ? corner.x : -corner.x, (look_index & 2u) == 0u ? corner.y : -corner.y);
+}
+#endif
+
+// Irradiance from one point of a light, as a factor on its own quantity, before anything is in the way.
+float unshadowed(uint light, SurfaceInteraction seen, vec2 unit, out LightSample s)
+{
+    s = sample_light(lights[light], seen.position, unit);
     vec3 normal = dot(seen.direction, seen.normal_g) < 0.0 ? seen.normal_g : -seen.normal_g;
     return s.gain * max(dot(s.toward, normal), 0.0);
 }
@@ -111,8 +121,14 @@ void add_direct(CameraPath path, SurfaceInteraction seen, WavelengthInterval int
         if (known) gain = mix(steady.gains[2u * i], steady.gains[2u * i + 1u], share);
         WHEN(!known) {
             LightSample s;
-            gain = unshadowed(i, seen, pixel_key, s);
+            gain = unshadowed(i, seen, light_point(i, pixel_key), s);
             WHEN(gain > 0.0) gain = hidden_from(s, seen) ? 0.0 : gain;
+#ifdef LISTS_SPECULAR
+            WHEN(gain > 0.0) {
+                lights_seen ^= hash_pcg(i + 1u);
+                if (p.survey == 1u) gain = unshadowed(i, seen, even_light_point(), s);
+            }
+#endif
         }
         uint row = uint(LIGHT_ROW) + i * uint(ROWS_PER_LIGHT);
         // Other classes than 0 have their reflectance in the light's own row.
@@ -142,10 +158,10 @@ Steady steady_lights(SurfaceInteraction seen, vec3 lo, vec3 hi, uint pixel_key)
         float gains[3];
         uint hidden[2];
         LightSample s;
-        gains[2] = unshadowed(i, seen, pixel_key, s);
+        gains[2] = unshadowed(i, seen, light_point(i, pixel_key), s);
         for (int end = 0; end < 2; ++end) {
             seen.position = end == 0 ? lo : hi;
-            gains[end] = unshadowed(i, seen, pixel_key, s);
+            gains[end] = unshadowed(i, seen, light_point(i, pixel_key), s);
             hidden[end] = 0u;
             WHEN(gains[end] > 0.0) hidden[end] = uint(hidden_from(s, seen));
         }

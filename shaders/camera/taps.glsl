@@ -87,6 +87,9 @@ void add_lights(CameraPath path, float far)
     bool near = false;
     for (uint i = 0u; i < uint(LIGHT_COUNT); ++i)
         near = near || (lights[i].measure > 0.0 && light_seen(lights[i], path.position, path.direction, far, 2.0 * (width + sweep)) > 0.0);
+#ifdef LISTS_SPECULAR
+    saw_light = saw_light || near;
+#endif
     for (int tap = 0; tap < taps && near; ++tap) {
         vec3 position = path.position, direction = path.direction;
         float lo = path.band.x, hi = path.band.z, part = 1.0;

@@ -88,6 +88,11 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def test_25_random_actions(gl: Context, own_folder: Path) -> None:
+    soak(gl, own_folder, 25, seed=1)
+
+
+@pytest.mark.slow
 def test_80_random_actions(gl: Context, own_folder: Path) -> None:
     soak(gl, own_folder, 80, seed=1)
 
