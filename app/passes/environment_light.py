@@ -46,6 +46,8 @@ ANCHOR_NM = 587.56
 """Wavelength whose index bends what is followed: the environment's light through glass does not part into colours."""
 RGB_NM = (612.0, 549.0, 465.0)
 """Wavelengths at which glass and mirrors tint linear red, green and blue."""
+SMOOTHING = 1.5
+"""Texels over which what came by glass and mirrors is averaged: neighbours follow other paths."""
 TARGET_SECONDS = 0.1
 _GROUP = 64
 _BIND_PLACES, _BIND_ASKED, _BIND_SUMS, _UNIT_ENVIRONMENT = 8, 9, 10, 0
@@ -247,7 +249,10 @@ class EnvironmentLightPass:
         asked_for, straight = sums["all"].astype(float), sums["straight"].astype(float)
         share = np.divide(straight, asked_for, out=np.zeros_like(straight), where=asked_for > 0.0)
         followed = self.asked // PER_FOLLOWED
-        return share * self._unshadowed + sums["specular"].astype(float) / max(followed, 1)
+        specular = sums["specular"].astype(float)
+        if specular.any():
+            specular = self.places.smoothed(specular, SMOOTHING)
+        return share * self._unshadowed + specular / max(followed, 1)
 
     @property
     def lost(self) -> float:

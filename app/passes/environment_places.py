@@ -55,10 +55,27 @@ class EnvironmentPlaces:
     """PLACE (n,)."""
     texel_xy: np.ndarray
     """int (n, 2): where each belongs."""
+    tiles: tuple[tuple[int, int], ...]
+    """First place of each tile, and the one after its last."""
     filled_xy: np.ndarray
     """int (m, 2): texels beside charts that are looked up too …"""
     source: np.ndarray
     """int (m,): … and the place whose light they show."""
+
+    def smoothed(self, values: np.ndarray, texels: float) -> np.ndarray:
+        """`values` (n, 3) averaged over neighbours by a Gaussian of so many texels, within each tile."""
+        from scipy.ndimage import gaussian_filter
+
+        found = np.array(values, float)
+        for first, end in self.tiles:
+            x, y = (self.texel_xy[first:end] - self.texel_xy[first:end].min(axis=0, initial=1 << 30)).T
+            if end - first < 2:
+                continue
+            image = np.zeros((y.max() + 1, x.max() + 1, 4))
+            image[y, x, :3], image[y, x, 3] = values[first:end], 1.0
+            mean = gaussian_filter(image, (texels, texels, 0.0), mode="constant", truncate=2.5)
+            found[first:end] = mean[y, x, :3] / mean[y, x, 3:]
+        return found
 
     @property
     def normals(self) -> np.ndarray:
@@ -166,11 +183,13 @@ def _packed(buffers: SceneBuffers, tiles: list[_Side], placed, size: tuple[int, 
     image = np.zeros((rows * size[0], 4), np.float32)
     image[: len(texels)] = texels
     none = np.zeros((0, 2), int)
+    ends = np.cumsum([len(places) for places, _ in parts]).tolist()
     return EnvironmentPlaces(
         (size[0], size[1] + rows),
         image.reshape(rows, size[0], 4),
         np.concatenate([p for p, _ in parts]) if parts else PLACE.zeros(0),
         np.concatenate([xy for _, xy in parts]) if parts else none,
+        tuple((end - len(places), end) for (places, _), end in zip(parts, ends, strict=True)),
         np.concatenate([none, *filled]),
         np.concatenate([np.zeros(0, int), *sources]),
     )

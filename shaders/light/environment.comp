@@ -127,10 +127,13 @@ void main()
         vec3 position = place.position + (asked[i].within.x - 0.5) * place.step_u + (asked[i].within.y - 0.5) * place.step_v;
         float weight, lost = 0.0;
         bool narrow;
-        vec3 toward = toward_specular(position, place.normal, asked[i].toward.xy, weight, narrow);
+        // Neighbours ask in other directions: their mean, which is what is shown, knows many more than each.
+        uint own = hash_combine(asked[i].key, id);
+        vec2 shift = vec2(unit_float(hash_pcg(id)), unit_float(hash_pcg(id ^ 0x9e3779b9u)));
+        vec3 toward = toward_specular(position, place.normal, fract(asked[i].toward.xy + shift), weight, narrow);
         uvec4 level = narrow ? p.level_narrow : p.level_wide;
         for (bool wanted = weight > 0.0; wanted; wanted = false)
-            sum.specular += weight * by_specular(position, toward, origin, level, asked[i].key, lost);
+            sum.specular += weight * by_specular(position, toward, origin, level, own, lost);
         sum.lost += lost;
     }
 #endif
