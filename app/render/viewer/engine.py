@@ -395,8 +395,8 @@ class LiveEngine:
         self._history.append((time.perf_counter(), max(stats.photons - before[2], 0), traced + splatted))
 
     def _work_on_environment(self, deadline: float, budget_s: float) -> None:
-        """A part of a frame or what is left of it."""
-        if self._shown is None or self.schedule.building:
+        """A part of a frame or what is left of it, while the camera has a picture to show."""
+        if self._shown is None or self.schedule.building or self._camera.owes_picture:
             return
         end = max(deadline - CAMERA_SHARE * budget_s, time.perf_counter() + ENVIRONMENT_SHARE * budget_s)
         if self._shown.light.ask_environment(end, 0.5 * ENVIRONMENT_SHARE * budget_s, self.schedule.interacting):
