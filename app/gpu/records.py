@@ -8,6 +8,7 @@ Flux stays in watts of the scene; only lengths are scaled.
 
 from __future__ import annotations
 
+from ..model.scene_checks import MAX_OBJECTS
 from .schema import Field, Struct
 
 NONE = 0xFFFFFFFF
@@ -246,9 +247,6 @@ EMIT_PARAMETERS = Struct(
         ),
     ),
 )
-MAX_OBJECTS = 0xFFFF
-"""A photon remembers the object it met first in 16 bits, all of them set for none."""
-
 TRACE_PARAMETERS = Struct(
     "TraceParameters",
     (

@@ -11,6 +11,9 @@ from ..base.errors import UserError
 from .geometry.mesh import Mesh
 from .scene import Light, Scene, SceneObject
 
+MAX_LIGHTS, MAX_OBJECTS = 256, 0xFFFF
+"""A photon remembers the light that it comes from in 8 bits, and the object it met first in 16, all of them set for
+none."""
 MAX_SIZE_RATIO = 1e12
 """Largest to smallest object; also to the side of an area light."""
 MAX_FAR_RATIO = 1e9
@@ -22,12 +25,15 @@ MIN_SIZE = 1e-12
 def check_scene(scene: Scene, file_name: str) -> list[str]:
     """Notes about `scene`; raises UserError for one that cannot give a picture.
 
-    Errors: no objects, no light and no receiver unless there is an environment to see by, a texture without
-    texture coordinates, objects of absurdly different size, a light inside glass, a laser line outside a
-    glass's data. Notes: glasses whose data are clamped, or unusual.
+    Errors: no objects, or more of them or of lights than a photon can tell apart, no light and no receiver unless there
+    is an environment to see by, a texture without texture coordinates, objects of absurdly different size, a light
+    inside glass, a laser line outside a glass's data. Notes: glasses whose data are clamped, or unusual.
     """
     if not scene.objects:
         raise UserError(f"{file_name}: the scene holds no objects; add one with [[objects]]")
+    for kind, count, most in (("lights", len(scene.lights), MAX_LIGHTS), ("objects", len(scene.objects), MAX_OBJECTS)):
+        if count > most:
+            raise UserError(f"{file_name}: {count} {kind}, and at most {most} may be: take some away, or join them")
     if not scene.lights and scene.environment is None:
         raise UserError(f"{file_name}: the scene holds no light; add one with [[lights]]")
     if scene.environment is None and not any(o.material.receives for o in scene.objects):

@@ -208,7 +208,7 @@ class LightPass:
             (fit.width, fit.height),
             self.reflectance_class,
             self.map_receiver,
-            tile_max=fit.tile_max,
+            fineness=fit.fineness_for(self.features.targets),
         )
         if not fit.avoids_powers_of_two:
             return layout

@@ -9,13 +9,14 @@ import numpy as np
 
 from ..gpu.scene_buffers import GpuSpace
 from ..model.scene import Camera
-from ..passes.map_layout import COARSE_TILE_MAX, FINE_TILE_MAX
+from ..passes.map_layout import STILL, Fineness
 from ..passes.pilot import Pilot
 
 PREVIEW = 8
 """Pixels to a texel's side in the maps of a preview."""
-PREVIEW_TILE_MAX = (288, 144)
-"""Longest sides of their windows, texels."""
+FINE_MAX = ((1, 3072), (4, 2560), (99, 2048))
+"""Up to so many textures of the maps, and the longest side of their fine windows, texels."""
+PREVIEW_FINENESS = Fineness(2.0, 288, 144)
 
 
 @dataclass(frozen=True)
@@ -26,8 +27,7 @@ class MapFit:
     width: int
     height: int
     """Pixels of the picture that `view` is seen in."""
-    tile_max: tuple[int, int] = (FINE_TILE_MAX, COARSE_TILE_MAX)
-    """Longest sides of fine and coarse windows, texels."""
+    fineness: Fineness = STILL
     others: tuple[tuple[GpuSpace, Pilot], ...] = ()
     """Where light lands in other frames that the maps must serve as well, each in its own GPU space."""
     avoids_powers_of_two: bool = False
@@ -38,7 +38,11 @@ class MapFit:
     def preview(self) -> MapFit:
         """Small maps of the same, to be filled at once."""
         width, height = preview_size(self.width, self.height)
-        return replace(self, width=width, height=height, tile_max=PREVIEW_TILE_MAX)
+        return replace(self, width=width, height=height, fineness=PREVIEW_FINENESS)
+
+    def fineness_for(self, targets: int) -> Fineness:
+        """Of maps with so many textures: memory bounds the finest."""
+        return replace(self.fineness, fine=min(self.fineness.fine, next(most for n, most in FINE_MAX if targets <= n)))
 
     def landings(self, own: Sequence[Pilot], space: GpuSpace) -> Sequence[Pilot]:
         """The pilots to fit to: `own` alone, or with the others' landings in `space`."""

@@ -34,6 +34,18 @@ def test_three_lines_make_a_scene_whose_caustic_is_in_view(tmp_path: Path) -> No
     assert math.degrees(angle) < 0.4 * scene.camera.vertical_fov_deg
 
 
+@pytest.mark.parametrize(("kind", "most"), [("lights", 256), ("objects", 65_535)])
+def test_more_than_a_photon_can_tell_apart_is_refused(tmp_path: Path, kind: str, most: int) -> None:
+    from dataclasses import replace
+
+    from spectrasplat.model.scene_checks import check_scene
+
+    scene = load(tmp_path, THREE_LINES)
+    some = getattr(scene, kind)
+    with pytest.raises(UserError, match=f"{most + 1} {kind}, and at most {most} may be"):
+        check_scene(replace(scene, **{kind: some + some[:1] * (most + 1 - len(some))}), "much.toml")
+
+
 def test_a_bare_mesh_becomes_glass_on_a_table(tmp_path: Path) -> None:
     from spectrasplat.model.geometry.primitives import box
     from spectrasplat.model.io.mesh_io import save_ply

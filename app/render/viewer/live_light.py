@@ -12,10 +12,11 @@ import numpy as np
 
 from ...model.features import Features
 from ...passes.environment_light import EnvironmentLightPass
+from ...passes.map_layout import LIVE
 from ..beam_light import MovingBeams
 from ..light_maps import LightMaps
 from ..light_pass import LightPass, scene_buffers
-from ..map_fit import PREVIEW_TILE_MAX, MapFit
+from ..map_fit import PREVIEW_FINENESS, MapFit
 from ..solo import solo, solo_scene
 from ..splatting import Pace
 from .invalidation import shown_glasses
@@ -54,7 +55,7 @@ class LiveLight:
         self._sampled = 0
         """Photons that those were asked for."""
         self.moving = moving or MovingBeams()
-        fit = MapFit(scene.camera, settings.width, settings.height, PREVIEW_TILE_MAX, avoids_powers_of_two=True)
+        fit = MapFit(scene.camera, settings.width, settings.height, PREVIEW_FINENESS, avoids_powers_of_two=True)
         self.light_pass = LightPass(
             context,
             scene,
@@ -156,7 +157,7 @@ class LiveLight:
     @staticmethod
     def fit_of(inputs: LiveInputs) -> MapFit:
         """Proper maps for what `inputs` shows."""
-        return MapFit(inputs.camera, inputs.width, inputs.height, avoids_powers_of_two=True)
+        return MapFit(inputs.camera, inputs.width, inputs.height, LIVE, avoids_powers_of_two=True)
 
     # ---- stored photons ----------------------------------------------------------------------
 
