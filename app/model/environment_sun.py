@@ -18,6 +18,7 @@ from .lights.directional import SUN_DIAMETER_DEG, DirectionalLight
 from .optics.colorimetry import daylight_per_lumen, rgb_basis
 from .optics.spectrum import Spectrum
 from .scene import Scene
+from .scene_checks import MAX_LIGHTS
 from .texture import Environment
 
 NAME = "sun of the panorama"
@@ -51,6 +52,8 @@ def with_sun(scene: Scene) -> Scene:
 def _with_sun(scene: Scene) -> Scene:
     environment = scene.environment
     if environment is None or not environment.lights or environment.kind != "map":
+        return scene
+    if len(scene.lights) >= MAX_LIGHTS:  # no photon could name one more
         return scene
     if environment not in _found:
         _found[environment] = sun_of(environment)
