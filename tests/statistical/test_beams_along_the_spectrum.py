@@ -58,6 +58,23 @@ def test_swept_polygons_are_the_sum_of_400_indices(name: str) -> None:
     assert total == pytest.approx(total_summed, rel=1e-3)
 
 
+def test_colours_move_along_the_sweep_and_not_back() -> None:
+    """A prism's light at one index near either end of a band: a sweep that ran backwards would have the band's mean
+    right, and its ends exchanged."""
+    rig = Rig(scene_of(SWEPT["prism"]))
+    swept, _ = rig.polygons(rig.emissions()[0], 1e-6)
+    strongest = np.argmax(swept.flux * (swept.x_hi - swept.x_lo < 0.9))
+    lo, hi = swept.x_lo[strongest], swept.x_hi[strongest]
+    places = lo + np.array([0.02, 0.98]) * (hi - lo)
+    single, _ = rig.polygons(at_index(rig.emissions()[0], *places), 1e-6)
+    grid = grid_about(rig, single, 240)
+    first, last = (cells(single, 0, grid, x)[0] for x in places)
+    assert np.abs(first - last).max() > 0.002 * first.max()
+    for x, expected in zip(places, (first, last), strict=True):
+        cell, _, _ = cells(swept, 0, grid, x, from_hulls=True)
+        assert np.abs(cell - expected).max() < 0.3 * np.abs(first - last).max()
+
+
 def test_a_band_across_the_onset_of_total_reflection_is_cut_there() -> None:
     swept, summed, total, total_summed, _ = swept_and_summed(ONSET)
     assert np.abs(swept - summed).max() < BOUND["onset"] * summed.max()

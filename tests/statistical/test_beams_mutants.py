@@ -27,7 +27,7 @@ MUTANTS = {
         "edges[:, 0:3], edges[:, 4:7] = chosen.edge[:, 0], chosen.edge[:, 2]",
         "edges[:, 0:3], edges[:, 4:7] = chosen.edge[:, 2], chosen.edge[:, 0]",
         SPECTRUM,
-        "single_indices and prism",
+        "move_along",
     ),
     "a child counts twice": (
         "at_facet.py",
