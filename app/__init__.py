@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .api import Statistics as Statistics
     from .api import Table as Table
     from .api import UserError as UserError
+    from .api import View as View
     from .api import caustic as caustic
     from .api import fan as fan
     from .api import glass as glass
@@ -46,6 +47,7 @@ _OFFERED = (
     "Statistics",
     "Table",
     "UserError",
+    "View",
     "caustic",
     "fan",
     "glass",

@@ -19,6 +19,7 @@ from .scene import Scene
 from .session import Session
 from .tables import Entries, Table
 from .tracing import Fan, fan, trace
+from .view import View
 
 __all__ = [
     "CausticMap",
@@ -32,6 +33,7 @@ __all__ = [
     "Statistics",
     "Table",
     "UserError",
+    "View",
     "caustic",
     "fan",
     "glass",

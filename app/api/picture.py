@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from ..base.errors import UserError, suggestion
 from ..base.image_io import png_bytes, write_image
+from ..model.scene import Scene
+from .asking import in_python
 
 Floats = NDArray[np.float32]
 
@@ -119,6 +121,25 @@ class CausticMap(_Image):
     """Where it lies. `kind` "rectangle": `corners_world` (`bottom_left`, `bottom_right`, `top_right`, `top_left`, three
     numbers each), `normal_world`, `size_units` and `texel_size_units` (two numbers each). `kind` "charts" (curved
     receivers): `triangle_uv`, texture coordinates (0, 0 upper left) of the corners of every triangle of `mesh`."""
+    _scene: Scene = field(repr=False, kw_only=True)
+
+    def export(
+        self, path: str | os.PathLike[str], *, plane: bool = False, source: Sequence[float] | None = None
+    ) -> Path:
+        """Write it for other programs, as `spectrasplat export` does: the receiver glowing with its caustic (.glb,
+        .gltf; .usda, .usdc, .usd), or a spot light's cookie (.png, .exr), and their numbers to a .json beside it.
+
+        `plane`: only the rectangle that is lit, as bright as on a white receiver. `source`: where the cookie's spot
+        stands (three numbers). Raises `UserError`.
+        """
+        from ..render.export_caustic import write_export
+
+        target = Path(path)
+        try:
+            write_export(self._scene, self.receiver, self.rgb, self.placement, target, plane, source)
+        except UserError as error:
+            raise UserError(in_python(str(error))) from error
+        return target
 
     def to_png(self, path: str | os.PathLike[str], exposure_ev: float = 0.0) -> Path:
         """Write it as the eye sees it. Raises `UserError` where it cannot be written."""

@@ -107,7 +107,9 @@ def caustic(
         notices = tuple(baked.notices)
         stats = Statistics(count, count, 0, took, context.renderer, context.is_software, stopped(), notices)
         picture = baked.picture
-        return CausticMap(picture.rgb, picture.spectral, picture.bin_edges_nm, stats, receiver, baked.placement)
+        return CausticMap(
+            picture.rgb, picture.spectral, picture.bin_edges_nm, stats, receiver, baked.placement, _scene=model
+        )
 
     check_receiver(scene, receiver)
     with Device() as device:

@@ -21,6 +21,7 @@ from .asking import Asked, Count, Size, settings_of
 from .device import Cancel, Device, Progress
 from .picture import Picture, Statistics
 from .scene import Scene
+from .view import View
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
@@ -31,6 +32,8 @@ _ALL = 10**12
 _STEP_S = 0.25
 _RECORD_BYTES = 256
 """A photon record with several spectral columns, rounded up."""
+_COARSER = 16
+"""Of the first of several passes; what answers for the light of beams (spectra) is as many photons."""
 _PER_PHOTON = 4
 """Landings that one emitted photon leaves at most, nearly."""
 
@@ -71,6 +74,7 @@ class Session:
         self._device: Device | None = Device()
         self._engine: LiveEngine | None = None
         self._before = _State(0, 0, 0)
+        self._view: View | None = None
 
     @property
     def scene(self) -> Scene:
@@ -138,8 +142,19 @@ class Session:
             raise UserError(f"limit {limit!r} is no number of photons: give 1 or more")
         return self._running.run(work, progress, cancel)
 
+    def view(self) -> View:
+        """The session live in a notebook, to walk round and to stretch its dispersion; needs the extra `notebook`, and
+        is a picture without it. Needs no `render` before. Raises `UserError`."""
+        self._running  # noqa: B018 - a closed one says so
+        if self._view is None or not self._view.is_live:
+            self._view = View(self)
+        return self._view
+
     def close(self) -> None:
         """Free the device. A session that is closed renders nothing more."""
+        if self._view is not None:
+            self._view.close()
+            self._view = None
         device, self._device = self._device, None
         if device is None:
             return
@@ -171,20 +186,7 @@ class Session:
 
     def _follow(self, context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> None:
         """Work, in the device's thread, until what is wanted is shown."""
-        if self._engine is None:
-            self._engine = _engine(context, self._settings, self._exact)
-        engine, settings, model = self._engine, self._settings, self.scene._model
-        engine.set(
-            LiveInputs(
-                model,
-                model.camera,
-                settings.width,
-                settings.height,
-                settings.method,
-                settings.smoothing,
-                seed=settings.seed,
-            )
-        )
+        settings, engine = self._settings, self._wanting(context)
         target, samples = settings.photons or 1, engine.camera_samples
         while not stopped():
             engine.advance(_STEP_S)
@@ -199,15 +201,50 @@ class Session:
             )
         report(1.0, "done")
 
+    @property
+    def _size(self) -> tuple[int, int]:
+        return self._settings.width, self._settings.height
 
-def _engine(context: Context, settings: RenderSettings, exact: bool) -> LiveEngine:
-    """One that traces all photons in one pass and keeps them."""
+    def _advance(self, context: Context, budget_s: float, is_moving: bool) -> LiveEngine:
+        """For a view: work for a while, in the device's thread; coarse pictures come first."""
+        engine = self._wanting(context, coarse_first=True)
+        engine.preview_seconds = budget_s
+        engine.advance(budget_s, is_moving)
+        stats = engine.stats
+        self._before = _State(stats.photons, stats.rays_traced, int(stats.camera_samples))
+        return engine
+
+    def _wanting(self, context: Context, coarse_first: bool = False) -> LiveEngine:
+        """The engine, told what the scene is now."""
+        if self._engine is None:
+            self._engine = _engine(context, self._settings, self._exact, coarse_first)
+        settings, model = self._settings, self.scene._model
+        self._engine.set(
+            LiveInputs(
+                model,
+                model.camera,
+                settings.width,
+                settings.height,
+                settings.method,
+                settings.smoothing,
+                seed=settings.seed,
+            )
+        )
+        return self._engine
+
+
+def _engine(context: Context, settings: RenderSettings, exact: bool, coarse_first: bool) -> LiveEngine:
+    """One that traces all photons in one pass and keeps them; `coarse_first`: after coarser passes, to be seen
+    sooner."""
     from ..render.viewer.building import Budget
     from ..render.viewer.engine import LiveEngine
 
     photons = settings.photons or 1
     room = max(Budget.of(context).store_bytes, photons * _PER_PHOTON * _RECORD_BYTES)
-    budget = replace(Budget.of(context), first_photons=photons, largest_photons=photons, store_bytes=room)
+    first = min(photons, max(Budget.of(context).first_photons, photons // _COARSER)) if coarse_first else photons
+    budget = replace(
+        Budget.of(context), first_photons=first, largest_photons=photons, finest_photons=photons, store_bytes=room
+    )
     engine = LiveEngine(context, budget)
     # A pass emits a few photons more or less than it is asked for: whatever it was, one is enough.
     engine.target_photons, engine.camera_samples = 1, settings.spp or DEFAULT_SAMPLES

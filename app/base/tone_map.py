@@ -73,7 +73,7 @@ def to_display(rgb: np.ndarray, exposure_ev: float) -> np.ndarray:
     exposed = np.where(finite[..., None], np.clip(scene, -limit, limit), np.float32(0))
     gain = np.float32(np.clip(2.0 ** float(np.clip(exposure_ev, -60, 60)), 1e-18, 1e18))
     exposed = np.clip(exposed * gain, -limit, limit)
-    display = _roll_off(_into_gamut(exposed))
+    display = _roll_off(into_gamut(exposed))
     display[~finite] = NOT_FINITE_RGB
     return display
 
@@ -107,7 +107,7 @@ def _p_norm(channels: np.ndarray) -> np.ndarray:
     return largest * (share**CORNER_POWER).sum(axis=-1, keepdims=True) ** np.float32(1 / CORNER_POWER)
 
 
-def _into_gamut(rgb: np.ndarray) -> np.ndarray:
+def into_gamut(rgb: np.ndarray) -> np.ndarray:
     """Move colours towards the grey of their luminance until no channel is negative."""
     grey = np.maximum(luminance(rgb), np.float32(1e-30))[..., None]
     # How far the colour lies from grey; the gamut's border is at 1, its corners just beyond.

@@ -420,6 +420,55 @@ def bake(
 
 
 @app.command()
+def export(
+    scene: SceneArgument,
+    receiver: Annotated[
+        str,
+        typer.Argument(
+            metavar="RECEIVER",
+            help="The diffuse object whose caustic is exported.",
+            autocompletion=completion.receivers,
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="OUT",
+            help="The receiver with its caustic as emission: .glb, .gltf, .usda, .usdc, .usd; or a spot light's "
+            "cookie: .png, .exr. Numbers are written to a .json beside it.",
+        ),
+    ],
+    plane: Annotated[
+        bool, typer.Option("--plane", help="Only the rectangle that is lit, as bright as on a white receiver.")
+    ] = False,
+    source: Annotated[
+        Text,
+        typer.Option(
+            "--source",
+            metavar="X,Y,Z",
+            help="Where the cookie's spot stands; default: at the scene's only lamp, or straight above.",
+        ),
+    ] = None,
+    size: Annotated[Text, typer.Option(metavar="WxH", help="Texels; default: 1024x1024.")] = None,
+    photons: Annotated[Text, typer.Option(metavar="N", help="Photons to emit; default: the scene's.")] = None,
+    seed: Annotated[Text, typer.Option(metavar="K", help="Seed of the random numbers; default: 1.")] = None,
+    up: UpOption = None,
+    glass: GlassOption = None,
+    environment: EnvironmentOption = None,
+    allow_outside: AllowOutside = False,
+) -> None:
+    """Export the caustic on an object to glTF or USD, or as a cookie for game engines."""
+    from .export import ExportRequest, export_command
+
+    opening = options.parse_opening(up, glass, environment)
+    raise typer.Exit(
+        export_command(ExportRequest(scene, receiver, output, plane, source, size, photons, seed, opening))
+    )
+
+
+@app.command()
 def inspect(
     scene: SceneArgument,
     programs: Annotated[

@@ -21,7 +21,9 @@ def test_every_example_runs(
     assert len(blocks) >= 8
     for block in blocks:
         exec(compile(block, "docs/python.md", "exec"), names)
-    assert {path.name for path in tmp_path.iterdir()} == {"prism.png", "prism.exr", "edited.toml"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        *("prism.png", "prism.exr", "edited.toml", "table.glb", "table.json", "cookie.png", "cookie.json")
+    }
     told = capsys.readouterr().out
     assert "unknown glass 'N-SF111', did you mean" in told
     assert "A lamp" in told

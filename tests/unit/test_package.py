@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import os
 import shutil
 import subprocess
 import sys
@@ -111,3 +112,47 @@ def test_the_unpacked_wheel_runs_and_finds_its_files(wheel: Path, tmp_path: Path
     )
     assert done.returncode == 0, done.stderr
     assert Path(done.stdout.strip()).is_relative_to(tmp_path / "site")
+
+
+EXAMPLES = r"""
+import json, re, sys
+from pathlib import Path
+import matplotlib
+matplotlib.use("Agg")
+import spectrasplat
+assert Path(spectrasplat.__file__).is_relative_to(sys.prefix), spectrasplat.__file__
+for page in map(Path, sys.argv[1:]):
+    text = page.read_text(encoding="utf-8")
+    if page.suffix == ".ipynb":
+        code = ["".join(c["source"]) for c in json.loads(text)["cells"] if c["cell_type"] == "code"]
+    else:
+        code = re.findall(r"^```python\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+    assert code, page
+    names = {}
+    for part in code:
+        exec(compile(part, page.name, "exec"), names)
+    print("ran", page.name)
+"""
+"""Every example of a page, or every cell of a notebook, as a reader would run them."""
+
+
+@pytest.mark.slow
+def test_notebooks_and_examples_run_from_the_wheel_alone(wheel: Path, tmp_path: Path) -> None:
+    """In an environment that holds the wheel and what it asks for, with the checkout out of reach; two minutes of
+    processor time."""
+    subprocess.run([sys.executable, "-m", "venv", str(tmp_path / "venv")], check=True)
+    python = tmp_path / "venv" / "bin" / "python"
+    around = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    install = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", str(wheel)]
+    done = subprocess.run(install, env=around, capture_output=True, text=True, check=False)
+    if "No matching distribution found" in done.stderr:
+        pytest.skip(f"what the wheel needs is not to be had from a package index: {done.stderr[-200:]}")
+    assert done.returncode == 0, done.stderr
+    pages = [ROOT / "docs" / "python.md", *sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))]
+    copies = [Path(shutil.copy(page, tmp_path)) for page in pages]
+    here = tmp_path / "here"
+    here.mkdir()
+    command = [str(python), "-W", "error::SyntaxWarning", "-c", EXAMPLES, *map(str, copies)]
+    done = subprocess.run(command, cwd=here, env=around, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert [line for line in done.stdout.splitlines() if line.startswith("ran ")] == [f"ran {c.name}" for c in copies]

@@ -238,7 +238,12 @@ def save_document(document: GltfDocument, path: str | os.PathLike[str]) -> None:
     """
     from ...base.atomic import atomic_output
 
-    path = Path(path)
+    with atomic_output(path) as temporary:
+        write_document(document, Path(path), temporary)
+
+
+def write_document(document: GltfDocument, path: Path, into: Path) -> None:
+    """As `save_document`, into a file that the caller got from `atomic_outputs` and that becomes `path`."""
     as_glb = path.suffix.lower() == ".glb"
     content = dict(document.json)
     content["buffers"] = buffers = []
@@ -262,8 +267,7 @@ def save_document(document: GltfDocument, path: str | os.PathLike[str]) -> None:
     text = json.dumps(
         content, ensure_ascii=False, separators=(",", ":") if as_glb else None, indent=None if as_glb else 1
     )
-    with atomic_output(path) as temporary:
-        temporary.write_bytes(_glb(text.encode(), binary, document.other_chunks) if as_glb else text.encode())
+    into.write_bytes(_glb(text.encode(), binary, document.other_chunks) if as_glb else text.encode())
 
 
 def is_file_name(uri: Any) -> bool:

@@ -31,6 +31,8 @@ class Budget:
     first_photons: int
     largest_photons: int
     store_bytes: int
+    finest_photons: int = 0
+    """Of the finest pass at least, however few are wanted in all."""
 
     @staticmethod
     def of(context: Context) -> Budget:

@@ -68,6 +68,8 @@ class LiveEngine:
         """What is under way and what is due; only `_tell` changes it."""
         self.problem: str | None = None
         """Why the last change could not be shown (bad shader, maps too large); the picture before it stays."""
+        self.preview_seconds = PREVIEW_S if context.is_software else PREVIEW_GPU_S
+        """What a coarse picture should take."""
         self._target_photons = 32_000_000
         shader.keep_programs(context.ctx)
         self._camera_pass = LiveCamera(context)
@@ -125,7 +127,8 @@ class LiveEngine:
 
     @property
     def _largest(self) -> int:
-        return min(self.budget.largest_photons, max(self._target_photons, self.budget.first_photons))
+        least = max(self.budget.first_photons, self.budget.finest_photons)
+        return min(self.budget.largest_photons, max(self._target_photons, least))
 
     def set(self, inputs: LiveInputs) -> DirtyLevel:
         """Want `inputs` from now on; returns what that asks for. The work is done by `advance`."""
@@ -321,8 +324,8 @@ class LiveEngine:
             return
         # One coarse picture now; the schedule asks again in full size when things are still. Where photons are splatted
         # again, they want time too.
-        software = 0.6 * PREVIEW_S if self.schedule.shows_preview else PREVIEW_S
-        seconds = None if same_view else software if self.context.is_software else PREVIEW_GPU_S
+        shared = self.context.is_software and self.schedule.shows_preview
+        seconds = None if same_view else (0.6 if shared else 1.0) * self.preview_seconds
         view = self._inputs.camera, self._inputs.width, self._inputs.height
         self._camera_pass.restart(*view, self._maps, seconds=seconds, same_view=same_view, finer_maps=finer_maps)
 

@@ -1,0 +1,95 @@
+"""The export command: a receiver's caustic for the programs in which scenes are modelled and played."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..base.errors import UserError, plain
+from ..base.interrupts import interrupt_flag
+from ..base.memory import check_picture_memory
+from ..model.settings import RenderSettings
+from . import options
+
+if TYPE_CHECKING:
+    from ..edit.opening import Opening
+
+
+@dataclass(frozen=True)
+class ExportRequest:
+    """The export command's options as typed; None where the user said nothing."""
+
+    scene: str
+    receiver: str
+    output: Path
+    plane: bool = False
+    source: str | None = None
+    size: str | None = None
+    photons: str | None = None
+    seed: str | None = None
+    opening: Opening | None = None
+
+
+def export_command(request: ExportRequest) -> int:
+    """Bake and write; returns the exit code. Raises `UserError`."""
+    from ..base.atomic import check_writable
+    from ..base.progress import ProgressReporter
+    from ..edit.parameters import Stage
+    from ..render import bake
+    from ..render.export_caustic import check_export, write_export
+    from ..render.notices import FrameNotices
+
+    source = None if request.source is None else parse_place(request.source)
+    outputs = check_export(request.output, request.plane, source)
+    width, height = bake.DEFAULT_SIZE if request.size is None else options.parse_size(request.size)
+    photons = None if request.photons is None else options.parse_photons(request.photons)
+    seed = 1 if request.seed is None else options.parse_integer("--seed", request.seed, 0, options.MAX_SEED)
+    check_picture_memory(width, height, None)
+    for path in outputs:
+        check_writable(path)
+    scene = options.open_scene(request.scene, request.opening)
+    bake.check_receiver(scene, request.receiver)
+    for note in scene.notes:
+        print(f"note: {plain(note)}", file=sys.stderr)
+    settings = RenderSettings(width=width, height=height, photons=photons, seed=seed, max_depth=scene.render.max_depth)
+
+    from ..gpu.context import create_context
+
+    started, notices = time.perf_counter(), FrameNotices()
+    with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
+        steps = bake.bake_map(context, Stage(scene, scene.camera), settings, request.receiver)
+        while True:
+            try:
+                progress(next(steps), "baking")
+            except StopIteration as finished:
+                baked: bake.BakedMap = finished.value
+                break
+            if interrupted():
+                print("spectrasplat: nothing was written: a map is whole or not at all", file=sys.stderr)
+                return interrupted.exit_code
+    notices.take(baked.notices)
+    for notice in notices.lines():
+        print(f"note: {plain(notice)}", file=sys.stderr)
+    rgb, where = baked.picture.rgb, baked.placement
+    write_export(scene, request.receiver, rgb, where, request.output, request.plane, source)
+    names = ", ".join(path.name for path in outputs[1:])
+    print(
+        f"{request.output.resolve()}: the caustic on '{request.receiver}' in {time.perf_counter() - started:.1f} s; "
+        f"beside it {names}"
+    )
+    return 0
+
+
+def parse_place(text: str) -> tuple[float, float, float]:
+    """ "1,2,3" as a place. Raises `UserError`."""
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise UserError(f"--source '{text}' is no place: give three numbers, for example --source 0,-2,5") from None
+    if not all(map(math.isfinite, (x, y, z))):
+        raise UserError(f"--source '{text}' is no place: its numbers must be finite")
+    return x, y, z
