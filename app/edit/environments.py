@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..base.errors import UserError
-from ..model.environment import from_map, gradient, sky, up_and_rotation, world_to_local
+from ..model.environment import constant, from_map, gradient, sky, up_and_rotation, world_to_local
 from ..model.lights.directional import DirectionalLight
 from ..model.scene import Diffuse, Light, Scene, Vec3
 from ..model.scene_defaults import environment_of
@@ -88,7 +88,7 @@ def set_environment_map(scene: Scene, path: Path) -> Scene:
     now, notes = scene.environment, list(scene.notes)
     if now is not None and now.kind == "map":
         up, rotation_deg = up_and_rotation(now)
-        made = from_map(path, map_intensity(now) or 1.0, rotation_deg, up, notes)
+        made = from_map(path, map_intensity(now) or 1.0, rotation_deg, up, notes, now.lights)
         return replace(scene, environment=made, notes=tuple(notes))
     made = from_map(path, up=vec3(up_frame(scene)[:, 2]), notes=notes)
     changed = replace(scene, environment=made, notes=tuple(notes))
@@ -121,7 +121,7 @@ def set_map_intensity(scene: Scene, intensity: float) -> Scene:
     if before == 0.0:
         if now.source is None:
             raise UserError("the environment was dimmed to nothing and has no file to be read again; choose its file")
-        return replace(scene, environment=from_map(now.source, intensity, rotation_deg, up))
+        return replace(scene, environment=from_map(now.source, intensity, rotation_deg, up, lights=now.lights))
     with np.errstate(over="ignore"):
         rgb = now.rgb * np.float32(intensity / before)
     if not np.isfinite(rgb).all():
@@ -131,6 +131,22 @@ def set_map_intensity(scene: Scene, intensity: float) -> Scene:
     rgb.setflags(write=False)
     told = {"rotation_deg": rotation_deg, "up": list(up)} | dict(now.parameters) | {"intensity": float(intensity)}
     return replace(scene, environment=replace(now, rgb=rgb, parameters=told))
+
+
+def set_constant(scene: Scene, radiance: Vec3) -> Scene:
+    """Another radiance from everywhere. Raises UserError for one that is negative or not finite."""
+    now = _of_kind(scene, "constant")
+    return replace(scene, environment=constant(radiance, now.lights), background_rgb=radiance)
+
+
+def set_environment_lights(scene: Scene, lights: bool) -> Scene:
+    """Whether what lies beyond lights what is diffuse. Raises UserError where there is only a background."""
+    now = scene.environment
+    if now is None:
+        raise UserError("a plain background lights nothing; choose a gradient, a sky or a picture")
+    told = {key: value for key, value in now.parameters.items() if key != "lights"}
+    told |= {} if lights else {"lights": False}
+    return replace(scene, environment=replace(now, lights=lights, parameters=told))
 
 
 def map_intensity(environment: Environment) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,7 @@ def from_map(
     rotation_deg: float = 0.0,
     up: Vec3 = Z_UP,
     notes: list[str] | None = None,
+    lights: bool = True,
 ) -> Environment:
     """The latitude-longitude picture in `path`, its values times `intensity` taken as lm/(sr unit²).
 
@@ -55,7 +57,9 @@ def from_map(
             "stretched."
         )
     if width > MAX_WIDTH or height > MAX_HEIGHT:
-        rgb = _averaged(_averaged(rgb, min(height, MAX_HEIGHT)).swapaxes(0, 1), min(width, MAX_WIDTH)).swapaxes(0, 1)
+        rgb = averaged_rows(averaged_rows(rgb, min(height, MAX_HEIGHT)).swapaxes(0, 1), min(width, MAX_WIDTH)).swapaxes(
+            0, 1
+        )
         told.append(f"{path.name} is {width} × {height}; it was averaged down to {rgb.shape[1]} × {rgb.shape[0]}.")
     with np.errstate(over="ignore"):
         rgb = np.ascontiguousarray(rgb) * np.float32(intensity)
@@ -64,10 +68,14 @@ def from_map(
     if notes is not None:
         notes += told
     parameters = {"intensity": float(intensity), "rotation_deg": float(rotation_deg), "up": _listed(up)}
-    return Environment(_frozen(rgb), world_to_local(up, rotation_deg), "map", parameters, str(path))
+    return Environment(
+        _frozen(rgb), world_to_local(up, rotation_deg), "map", _told(parameters, lights), str(path), lights
+    )
 
 
-def gradient(zenith: Vec3, horizon: Vec3, nadir: Vec3, up: Vec3 = Z_UP, intensity: float = 1.0) -> Environment:
+def gradient(
+    zenith: Vec3, horizon: Vec3, nadir: Vec3, up: Vec3 = Z_UP, intensity: float = 1.0, lights: bool = True
+) -> Environment:
     """Radiances, linear Rec.709 in lm/(sr unit²), straight up, all round and straight down, and smoothly between.
 
     With s the sine of the elevation, the blend is s²(3 − 2|s|): level at the horizon as at the poles.
@@ -86,7 +94,7 @@ def gradient(zenith: Vec3, horizon: Vec3, nadir: Vec3, up: Vec3 = Z_UP, intensit
         "intensity": float(intensity),
         "up": _listed(up),
     }
-    return Environment(_frozen(rgb), world_to_local(up), "gradient", parameters)
+    return Environment(_frozen(rgb), world_to_local(up), "gradient", _told(parameters, lights), lights=lights)
 
 
 def sky(
@@ -96,6 +104,7 @@ def sky(
     sky_type: int = DEFAULT_SKY_TYPE,
     ground: Vec3 = (0.2, 0.2, 0.2),
     up: Vec3 = Z_UP,
+    lights: bool = True,
 ) -> Environment:
     """A CIE standard general sky of the colour of D65, without the sun's disc (a directional light shows that).
 
@@ -136,7 +145,19 @@ def sky(
         "ground": _listed(ground),
         "up": _listed(up),
     }
-    return Environment(_frozen(rgb), world_to_local(up), "sky", parameters)
+    return Environment(_frozen(rgb), world_to_local(up), "sky", _told(parameters, lights), lights=lights)
+
+
+def constant(radiance: Vec3, lights: bool = True) -> Environment:
+    """The same radiance, linear Rec.709 in lm/(sr unit²), from everywhere. Raises UserError for one that is negative or
+    not finite."""
+    colour = np.array(radiance, dtype=np.float64)
+    if not (np.isfinite(colour).all() and (colour >= 0.0).all()):
+        raise UserError("constant: radiance must be three numbers of 0 or more; correct it")
+    rgb = np.broadcast_to(colour, (8, 16, 3))
+    return Environment(
+        _frozen(rgb), kind="constant", parameters=_told({"radiance": _listed(radiance)}, lights), lights=lights
+    )
 
 
 def horizontal_illuminance(upper: np.ndarray) -> float:
@@ -195,7 +216,7 @@ def _baked_directions() -> np.ndarray:
     )
 
 
-def _averaged(rgb: np.ndarray, rows: int) -> np.ndarray:
+def averaged_rows(rgb: np.ndarray, rows: int) -> np.ndarray:
     """Area-weighted means over the first axis, float32 (rows, …)."""
     from scipy.sparse import csr_matrix
 
@@ -208,6 +229,11 @@ def _averaged(rgb: np.ndarray, rows: int) -> np.ndarray:
     target = np.minimum((middles * rows / source).astype(np.int64), rows - 1)
     weights = csr_matrix((shares, (target, middles.astype(np.int64))), shape=(rows, source))
     return (weights @ rgb.reshape(source, -1)).astype(np.float32).reshape(rows, *rgb.shape[1:])
+
+
+def _told(parameters: dict[str, Any], lights: bool) -> dict[str, Any]:
+    """What a scene file says: `lights` only where it is not as usual."""
+    return parameters if lights else parameters | {"lights": False}
 
 
 def _listed(vector: Vec3) -> list[float]:

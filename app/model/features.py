@@ -12,6 +12,8 @@ import numpy as np
 
 from .camera_rays import camera_frame
 from .contacts import contacts, overlapping_solids, world_bounds
+from .environment_light import why_no_environment_light
+from .environment_sun import with_sun
 from .scene import (
     Camera,
     Scene,
@@ -100,6 +102,8 @@ class Features:
     """Fresnel weights are those at the band's anchor, so that an edited dispersion leaves the photons as they are."""
     draws_by_power: bool = False
     """Random wavelengths are drawn by radiant power instead of brightness: for maps of spectral bins."""
+    environment_lights: bool = False
+    """What lies beyond everything lights receivers: camera rays look up how much."""
     hero: bool = False
     """Three more wavelengths share the path of the one that is followed, as long as it is theirs too."""
 
@@ -194,6 +198,7 @@ class Features:
             camera_beams=settings.camera_beams and why_no_camera_beams(scene, settings) is None,
             light_profiles=any(light.profile is not None for light in scene.lights),
             draws_by_power=random and settings.bins is not None,
+            environment_lights=why_no_environment_light(scene) is None and settings.layer == "beauty",
             hero=settings.method == "hero",
         )
 
@@ -478,6 +483,14 @@ def explain(scene: Scene, features: Features) -> list[tuple[str, bool, str]]:
             "environment map",
             scene.environment is not None,
             f"a {scene.environment.kind} lies beyond" if scene.environment is not None else "one colour lies beyond",
+        ),
+        (
+            "environment light",
+            features.environment_lights,
+            "every diffuse surface is lit by it, with visibility, also through glass and over mirrors"
+            + ("; its sun is a light of its own" if with_sun(scene) is not scene else "")
+            if features.environment_lights
+            else why_no_environment_light(scene) or "the picture shows caustics only",
         ),
         (
             "light profiles",

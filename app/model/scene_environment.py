@@ -12,6 +12,7 @@ from ..base.paths import assets_dir
 from .environment import (
     DEFAULT_SKY_TYPE,
     Z_UP,
+    constant,
     from_map,
     gradient,
     sky,
@@ -40,17 +41,20 @@ def read_environment(table: SceneTable, notes: list[str]) -> tuple[Vec3, Environ
     inner = table.table(KEY)
     assert inner is not None
     kind = inner.choice("kind", KINDS)
+    lights = inner.boolean("lights", True)
     background, environment = _BLACK, None
     if kind == "constant":
         background = _read_constant(inner)
+        environment = constant(background, lights)
     elif kind == "map":
-        environment = _read_map(inner, notes)
+        environment = _read_map(inner, notes, lights)
     elif kind == "studio":
-        environment = from_map(STUDIO_MAP, _intensity(inner), inner.number("rotation_deg", 0.0), _up(inner))
+        rotation_deg = inner.number("rotation_deg", 0.0)
+        environment = from_map(STUDIO_MAP, _intensity(inner), rotation_deg, _up(inner), lights=lights)
     elif kind == "gradient":
-        environment = _read_gradient(inner)
+        environment = _read_gradient(inner, lights)
     else:
-        environment = _read_sky(inner)
+        environment = _read_sky(inner, lights)
     inner.finish(f"an environment of kind '{kind}'")
     return background, environment
 
@@ -65,22 +69,22 @@ def _read_constant(table: SceneTable) -> Vec3:
     return intensity * r, intensity * g, intensity * b
 
 
-def _read_map(table: SceneTable, notes: list[str]) -> Environment:
+def _read_map(table: SceneTable, notes: list[str], lights: bool) -> Environment:
     path = table.existing_file("file")
     rotation_deg = table.number("rotation_deg", 0.0)
     try:
-        return from_map(path, _intensity(table), rotation_deg, _up(table), notes)
+        return from_map(path, _intensity(table), rotation_deg, _up(table), notes, lights)
     except UserError as error:
         table.fail("file", f"cannot be used: {error}")
 
 
-def _read_gradient(table: SceneTable) -> Environment:
+def _read_gradient(table: SceneTable, lights: bool) -> Environment:
     zenith, horizon = _radiance(table, "zenith"), _radiance(table, "horizon")
     nadir = _radiance(table, "nadir") if table.has("nadir") else horizon
-    return gradient(zenith, horizon, nadir, _up(table), _intensity(table))
+    return gradient(zenith, horizon, nadir, _up(table), _intensity(table), lights)
 
 
-def _read_sky(table: SceneTable) -> Environment:
+def _read_sky(table: SceneTable, lights: bool) -> Environment:
     return sky(
         sun_elevation_deg=table.number("sun_elevation_deg", 45.0, at_least=0.0, at_most=90.0),
         sun_azimuth_deg=table.number("sun_azimuth_deg", 0.0),
@@ -88,6 +92,7 @@ def _read_sky(table: SceneTable) -> Environment:
         sky_type=table.integer("type", DEFAULT_SKY_TYPE, at_least=1, at_most=15),
         ground=table.colour("ground", (0.2, 0.2, 0.2)),
         up=_up(table),
+        lights=lights,
     )
 
 
@@ -127,4 +132,5 @@ def environment_values(environment: Environment, scene_path: Path) -> dict[str, 
     # The values stand as they are: an intensity was multiplied in already.
     up, rotation_deg = up_and_rotation(environment)
     name = picture_file(np.asarray(environment.rgb), None, scene_path)
-    return {"kind": "map", "file": name, "rotation_deg": rotation_deg, "up": list(up)}
+    lights = {} if environment.lights else {"lights": False}
+    return {"kind": "map", "file": name, "rotation_deg": rotation_deg, "up": list(up)} | lights

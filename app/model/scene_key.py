@@ -37,7 +37,8 @@ def picture_key(scene: Scene, *more: object) -> str:
     if scene.environment is None:
         key.add("background", *(float(v) for v in scene.background_rgb))
     else:
-        key.add("environment", scene.environment.rgb, np.asarray(scene.environment.world_to_local, float))
+        lights = ("lights",) if scene.environment.lights else ()
+        key.add("environment", scene.environment.rgb, np.asarray(scene.environment.world_to_local, float), *lights)
     for index, item in enumerate(scene.objects):
         if item.material.texture is not None:
             key.add("texture", index, item.material.texture.rgb, item.material.texture.wrap, item.mesh.uv)

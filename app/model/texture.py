@@ -26,7 +26,7 @@ class Texture:
 
 @dataclass(frozen=True, eq=False)
 class Environment:
-    """Radiance from infinitely far away, seen by the camera (it lights nothing); compared by identity.
+    """Radiance from infinitely far away, compared by identity.
 
     `rgb` is a latitude-longitude picture: rows run from straight up (row 0) to straight down, and with
     local = world_to_local @ direction a direction is seen at u = ½ − atan2(local_y, local_x) / 2π
@@ -37,8 +37,10 @@ class Environment:
     """float32 (H, W, 3), linear Rec.709, lm/(sr unit²), finite and not negative."""
     world_to_local: np.ndarray = field(default_factory=lambda: np.eye(3))
     """float64 (3, 3), a rotation."""
-    kind: Literal["map", "gradient", "sky"] = "map"
+    kind: Literal["map", "gradient", "sky", "constant"] = "map"
     parameters: Mapping[str, Any] = field(default_factory=dict)
     """What the scene file said under [environment], so that it can be saved again."""
     source: str | None = None
     """Path of the file it came from, for a map."""
+    lights: bool = False
+    """Whether it lights what is diffuse, besides being seen: scene files say yes, a bare picture does not."""

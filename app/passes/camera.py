@@ -28,6 +28,7 @@ from .beam_starts import BeamStarts
 from .camera_records import CAMERA_LIGHT, CAMERA_PARAMETERS, camera_parameters, light_record
 from .camera_tables import CameraTables
 from .caustic_maps import CausticMaps
+from .environment_light import without_light
 from .listed_pixels import GROUP, ListedPixels
 from .picture_channels import Channels
 from .picture_sums import PictureSums
@@ -44,6 +45,7 @@ from .variants import (
     BIND_PLACEMENTS,
     BIND_RECEIVERS,
     UNIT_EMISSION,
+    UNIT_ENVIRONMENT_LIGHT,
     UNIT_PICTURES,
     beside_defines,
     camera_defines,
@@ -123,6 +125,8 @@ class CameraPass:
         self._counters = self._ctx.buffer(bytes(4 * len(FALLBACKS)))
         self._parameters_buffer = self._ctx.buffer(reserve=CAMERA_PARAMETERS.stride)
         self._empty: CausticMaps | None = None
+        self._dark: moderngl.Texture | None = None
+        """Light of an environment of which nothing is known."""
         self._sums = PictureSums(self._ctx, self.channels.targets)
         self._rows = DispatchBudget(1, 1, 1)
         self._within_rows = False
@@ -168,6 +172,8 @@ class CameraPass:
             halts = context.traits.loops_may_end
             self._listed = ListedPixels(self._ctx, halted_bytes(shown) if halts else None)
             shown = halting_defines(shown) if halts else shown
+        if "ENVIRONMENT_LIGHTS" in shown:
+            self._dark = without_light(self._ctx, len(scene.receivers))
         self._source = (shown, structs)
         self._beams: ScreenBeams | None = None
         self._starts: BeamStarts | None = None
@@ -374,6 +380,8 @@ class CameraPass:
         self._parameters_buffer.bind_to_uniform_block(bindings.PARAMETERS)
         for unit, texture in enumerate(maps.textures):
             texture.use(location=unit)
+        if self._dark is not None:
+            (maps.environment or self._dark).use(location=UNIT_ENVIRONMENT_LIGHT)
         self._sums.bind()
 
     @property
@@ -421,6 +429,8 @@ class CameraPass:
             self._listed.release()
         if self._owns_pictures:
             self.pictures.release()
+        if self._dark is not None:
+            self._dark.release()
         if self._empty is not None:
             self._empty.release()
         self._empty = None

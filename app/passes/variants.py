@@ -15,6 +15,7 @@ from ..gpu.map_channels import MapChannels
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.splat_tables import DENSITY_CELLS
 from ..gpu.texture_store import place_defines
+from ..model.environment_light import lighting_environment
 from ..model.features import Features
 from .camera_tables import EMISSION_CELLS
 from .picture_channels import Channels
@@ -56,7 +57,7 @@ TINT_STEPS = 48
     BIND_BEAM_ORDER,
     BIND_BEAM_FOUND,
 ) = range(8, 22)
-UNIT_EMISSION, UNIT_PICTURES, UNIT_POLYGONS = 10, 11, 13
+UNIT_ENVIRONMENT_LIGHT, UNIT_EMISSION, UNIT_PICTURES, UNIT_POLYGONS = 9, 10, 11, 13
 BIND_BEAM_VIEW = 9
 """Of uniform blocks."""
 IMAGE_POLYGONS = 0
@@ -218,6 +219,7 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
         "BIND_LISTED": BIND_LISTED,
         "BIND_RECEIVERS": BIND_RECEIVERS,
         "BIND_PLACEMENTS": BIND_PLACEMENTS,
+        "UNIT_ENVIRONMENT_LIGHT": UNIT_ENVIRONMENT_LIGHT,
         "UNIT_EMISSION": UNIT_EMISSION,
         "EMISSION_CELLS": EMISSION_CELLS,
         "TINT_STEPS": TINT_STEPS,
@@ -238,6 +240,7 @@ def camera_defines(scene: SceneBuffers, channels: Channels, layer: str, maps: Ma
     switches = {
         "LAYER_BEAUTY": beauty,
         "CAMERA_SPECULAR": specular,
+        "ENVIRONMENT_LIGHTS": beauty and features.environment_lights and lighting_environment(scene.scene) is not None,
         "HAS_DISPERSION": disperses,
         "SPECTRAL_SWEEP": groups > 0,
         "RANDOM_WAVELENGTH": features.random_wavelength,

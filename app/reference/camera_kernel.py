@@ -3,8 +3,10 @@
 Reflection or refraction is drawn with Fresnel's probability, so that a path's weight changes by
 absorption and mirrors only; lights are seen along the way, the environment at its end. At a diffuse surface one
 random point of every light is asked for (anything between hides it, glass too: what comes through glass is the
-caustic's), and the spectral caustic is looked up. Numbers: a scrambled Sobol sequence a part, shifted from pixel to
-pixel.
+caustic's), and the spectral caustic is looked up. Where the environment lights it the path goes on from there, in a
+direction towards what is bright, until it leaves the scene or meets something else than glass and mirrors.
+
+Numbers: a scrambled Sobol sequence a part, shifted from pixel to pixel.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from .camera_lights import light_seen, sample_light
 from .camera_rays import camera_ray
 from .camera_scene import beyond, picture_at
 from .compiling import compiled, inlined
+from .environment_draw import draw_direction
 from .photon_emit import search
 from .photon_intersect import blocked, nearest
 from .photon_scene import BLACK, DIFFUSE
@@ -174,7 +177,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
     px, py, pz, dx, dy, dz = ray
     state, shift, xyz = scratch.state, scratch.shift, scratch.xyz
     last, last_object, within, mask, alone, events = -1, -1, False, start.mask, start.alone, 0
-    atom, nm, found, weight = -1, 0.0, 0.0, 1.0
+    atom, nm, found, weight, lit = -1, 0.0, 0.0, 1.0, False
     if mask != np.uint64(0) or alone != AIR:  # in glass wavelengths part at once
         atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
     while True:
@@ -182,7 +185,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
             scene, px, py, pz, dx, dy, dz, last, last_object, within, mask, scratch.stack, scratch.stack_distance
         )
         far = t if triangle >= 0 else np.inf
-        for i in range(lights.kind.shape[0]):
+        for i in range(0 if lit else lights.kind.shape[0]):
             seen = light_seen(lights, i, px, py, pz, dx, dy, dz, far)
             if seen > 0.0 and atom < 0:
                 _added(spectra.light_xyz, i, 0, 1.0, 1.0, 1.0, seen, xyz)
@@ -204,7 +207,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
         px, py, pz = px + t * dx, py + t * dy, pz + t * dz
         thing = scene.owner[triangle]
         kind = scene.kind[thing]
-        if kind == BLACK or weight <= 0.0:
+        if kind == BLACK or weight <= 0.0 or (lit and kind == DIFFUSE):
             break
         if kind == DIFFUSE:
             a, b = unit(state[3] ^ shift[3]), unit(state[4] ^ shift[4])
@@ -213,7 +216,20 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
             found += weight * _diffuse(
                 scene, lights, spectra, pictures, tables, atom, triangle, u, v, place, side, a, b, scratch
             )
-            break
+            if not pictures.draw.lights:
+                break
+            if atom < 0:
+                atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
+            row, red, green, blue = _surface(scene, pictures, triangle, u, v)
+            basis = spectra.basis[atom]
+            weight *= spectra.classes[row, atom] if row > 0 else red * basis[0] + green * basis[1] + blue * basis[2]
+            sign, normal = 1.0 if side == 0 else -1.0, scene.normals[triangle]
+            dx, dy, dz, share = draw_direction(
+                pictures.draw, sign * normal[0], sign * normal[1], sign * normal[2], a, b
+            )
+            weight *= share
+            last, last_object, within, lit = triangle, thing, side == 1, True
+            continue
         if events >= max_depth:
             tally[LOST_DEPTH] += 1.0
             break

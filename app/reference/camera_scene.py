@@ -19,6 +19,7 @@ from ..model.optics.spectrum import cmf_at
 from ..model.scene import Scene
 from ..model.texture import Texture
 from .compiling import inlined
+from .environment_draw import EnvironmentDraw, environment_draw
 from .photon_scene import TABLE_NM, PhotonScene, reflectance_classes
 
 _EVEN_SHARE = 0.2
@@ -74,6 +75,8 @@ class Pictures(NamedTuple):
     """float64 (U, 6): u, v at each corner."""
     to_local: np.ndarray
     """float64 (3, 3): the environment's frame."""
+    draw: EnvironmentDraw
+    """How paths go on towards it from what it lights."""
 
 
 def sees_beyond(scene: Scene) -> bool:
@@ -185,6 +188,7 @@ def pictures(scene: Scene, photons: PhotonScene, centre: np.ndarray) -> Pictures
         uv_row,
         uv,
         np.array(beyond.world_to_local, float) if beyond else np.eye(3),
+        environment_draw(scene),
     )
 
 

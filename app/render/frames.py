@@ -19,12 +19,14 @@ from ..edit.live_inputs import LiveInputs
 from ..edit.parameters import Stage
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
+from ..model.environment_sun import with_sun
 from ..model.features import Features
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Camera, Scene
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
 from ..passes.caustic_maps import CausticMaps
+from ..passes.environment_light import LEAST_DIRECTIONS, EnvironmentLightPass
 from ..passes.map_layout import MapLayout
 from .camera_beams import CameraBeams
 from .frame_fit import FrameFit, Survey, inputs_of, share_light, stages_to_survey
@@ -38,9 +40,14 @@ from .time_budget import TimeBudget
 
 FIRST_PASS_PHOTONS = 1 << 17
 """Photons of a timed rendering's first pass, which finds out how fast the scene goes."""
+_ENVIRONMENT_SHARE = 0.25
+"""Of a timed rendering, at most, for the light of the environment."""
+_ENVIRONMENT_PROGRESS = 0.1
+"""Of the progress where light is traced, where it is not timed."""
 _PHOTON_S, _SAMPLE_S = 10e-6, 3e-6
 """What a photon and a camera sample of a pixel take, one to the other: progress is weighted by them."""
 _PREPARING, _TRACING, _SEEING = "preparing", "tracing photons", "taking camera samples"
+_ASKING = "asking for the environment's light"
 
 Stop = Callable[[], bool]
 Fill = Callable[[LightPass, LightSampling, Stop], Iterator[float]]
@@ -65,14 +72,22 @@ class _Traced:
     inputs: LiveInputs
     buffers: SceneBuffers
     light: LightPass
+    environment: EnvironmentLightPass | None = None
+    """Where its scene's features have it."""
     camera_buffers: SceneBuffers | None = None
     """The camera's own, where it has a method of its own."""
     camera_pass: CameraPass | None = None
     camera_beams: CameraBeams | None = None
     """Where its scene's features have them."""
 
+    @property
+    def maps(self) -> CausticMaps:
+        """All light that surfaces get by way of maps."""
+        lit = None if self.environment is None else self.environment.texture
+        return replace(self.light.caustic_maps(), environment=lit)
+
     def release(self) -> None:
-        for owned in (self.camera_pass, self.camera_buffers, self.light, self.buffers):
+        for owned in (self.camera_pass, self.environment, self.camera_buffers, self.light, self.buffers):
             if owned is not None:
                 owned.release()
 
@@ -103,6 +118,7 @@ class FrameRenderer:
 
         Where light changes, `shader.keep_programs` on the context spares compiling every frame's programs."""
         self._context = context
+        stages = [_with_sun(s) for s in stages]
         moves = any(s.camera != stages[0].camera for s in stages)
         # Light is traced once for all views, so no single one may decide what the programs leave out.
         self._settings = settings = replace(settings, any_view=settings.any_view or moves)
@@ -130,6 +146,7 @@ class FrameRenderer:
         """Render a frame, pausing with the share done. What was done when `stop()` turned true is a picture too."""
         self.seconds, self.phase = FrameSeconds(), _PREPARING
         yield from self._survey()
+        stage = _with_sun(stage)
         inputs = inputs_of(stage, self._settings)
         if self._traced is None or not share_light(self._traced.inputs, inputs):
             yield from self._trace(stage, inputs, stop)
@@ -147,6 +164,7 @@ class FrameRenderer:
             self.seconds.prepare = time.perf_counter() - self.seconds.started
             sampling, budget = LightSampling.of(stage.scene, self._settings), self._budget
             self._light_share = self._share_of_light(light, sampling)
+            yield from self._ask_environment(traced, stop)
             if budget is not None:
                 if not self._shows_map:
                     self._add_camera_pass(traced)
@@ -155,7 +173,9 @@ class FrameRenderer:
                 sampling = replace(sampling, seconds=budget.for_light(self._settings.spp))
             self.phase = _TRACING
             for share in self._fill(light, sampling, stop):
-                yield self._light_share * share if budget is None else budget.spent
+                begun = 0.0 if traced.environment is None else _ENVIRONMENT_PROGRESS
+                done = self._light_share * (begun + (1.0 - begun) * share)
+                yield done if budget is None else budget.spent
             light.finish()
             light.settle()
             if traced.camera_pass is None and not self._shows_map:
@@ -190,7 +210,7 @@ class FrameRenderer:
         assert self._traced is not None and self._traced.camera_pass is not None
         started, self.phase = time.perf_counter(), _SEEING
         settings, camera_pass = self._settings, self._traced.camera_pass
-        maps = self._traced.light.caustic_maps()
+        maps = self._traced.maps
         view = self._view(stage)
         # Polygons belong to one view. A stop asked for while tracing still wants a picture: only the first sample is
         # owed then.
@@ -257,7 +277,7 @@ class FrameRenderer:
         traced.camera_pass = CameraPass(
             self._context, traced.camera_buffers or traced.buffers, layer, light.reflectances, light.map_channels
         )
-        yield from self._see(stage, stop)
+        yield from self._see(_with_sun(stage), stop)
 
     def run(self, stage: Stage) -> np.ndarray:
         """The whole frame at once: `rgb` of it."""
@@ -272,6 +292,11 @@ class FrameRenderer:
         """Of the last frame."""
         assert self._traced is not None, "steps() comes first"
         return self._traced.light
+
+    @property
+    def environment(self) -> EnvironmentLightPass | None:
+        """Of the last frame; None where nothing beyond it lights it."""
+        return self._traced.environment if self._traced is not None else None
 
     @property
     def camera_pass(self) -> CameraPass | None:
@@ -333,11 +358,30 @@ class FrameRenderer:
         light.before_maps = look_at_memory
         return _Traced(inputs, buffers, light)
 
+    def _ask_environment(self, traced: _Traced, stop: Stop) -> Iterator[float]:
+        """Light of what lies beyond everything; a timed rendering and one that is stopped ask fewer directions."""
+        if not traced.buffers.features.environment_lights:
+            return
+        self.phase = _ASKING
+        traced.environment = light = EnvironmentLightPass(self._context, traced.buffers, self._settings.seed)
+        longest = float("inf") if self._settings.seconds is None else _ENVIRONMENT_SHARE * self._settings.seconds
+        for share in light.steps():
+            done = _ENVIRONMENT_PROGRESS * self._light_share * share
+            yield done if self._budget is None else self._budget.spent
+            if light.asked >= LEAST_DIRECTIONS and (light.seconds >= longest or stop()):
+                break
+        light.show()
+
     def _axis(self, scene: Scene, features: Features) -> SpectralAxis:
         """One axis for all frames: bands of equal places on it are then the same wavelengths in all."""
         own = spectral_axis(scene, features)
         glasses = self._fit.glasses
         return SpectralAxis.build(glasses) if own.glasses and glasses else own
+
+
+def _with_sun(stage: Stage) -> Stage:
+    scene = with_sun(stage.scene)
+    return stage if scene is stage.scene else replace(stage, scene=scene)
 
 
 def traced_light(light: LightPass, sampling: LightSampling, stop: Stop) -> Iterator[float]:

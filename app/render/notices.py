@@ -13,6 +13,7 @@ from ..model.contacts import world_bounds
 from ..model.optics.colorimetry import rgb709_to_xyz_matrix
 from ..model.scene import Camera
 from ..model.settings import RenderSettings
+from ..passes.environment_light import MAX_EVENTS, EnvironmentLightPass
 from ..passes.map_layout import plane_frame, project
 from .light_pass import LightPass, LightStats
 
@@ -65,6 +66,15 @@ def loss_notices(lost: dict[str, float], max_depth: int | None = None) -> list[s
         for fate, told in words.items()
         if lost.get(fate, 0.0) > LOST_SHARE
     ]
+
+
+def environment_notices(environment: EnvironmentLightPass | None) -> list[str]:
+    """What the environment's light on receivers lacks."""
+    if environment is None or environment.lost <= LOST_SHARE:
+        return []
+    share = 100.0 * environment.lost
+    told = f"{share:.1f} % of what glass and mirrors bring of the environment's light was given up"
+    return [f"{told} after {MAX_EVENTS} surfaces: it lacks on what is diffuse"]
 
 
 def shares(stats: LightStats) -> dict[str, float]:

@@ -16,7 +16,7 @@ from .beam_light import BeamStats
 from .camera_beams import CameraBeamStats
 from .frames import Fill, FrameRenderer, Picture
 from .light_pass import LightStats
-from .notices import frame_notices
+from .notices import environment_notices, frame_notices
 
 Progress = Callable[[float, str], None]
 Cancelled = Callable[[], bool]
@@ -156,6 +156,7 @@ def render(
             progress(share, frames.phase)
         picture = frames.picture
         notices = tuple(frame_notices(frames.light, scene.camera, settings, picture.rgb))
+        notices += tuple(environment_notices(frames.environment))
         stats = replace(_stats(context, frames, settings), notices=notices)
         layers = {}
         for layer in more_layers:

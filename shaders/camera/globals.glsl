@@ -69,6 +69,9 @@ vec4 radiance[TARGETS];
 #include "camera/emission.glsl"
 #include "camera/footprint.glsl"
 #include "camera/receiver.glsl"
+#ifdef ENVIRONMENT_LIGHTS
+#include "camera/environment_light.glsl"
+#endif
 #include "camera/taps.glsl"
 
 #endif

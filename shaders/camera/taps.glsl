@@ -260,6 +260,9 @@ void add_end(CameraPath path, bool met, Hit hit, bool same_hit, uint pixel_key)
             add_caustic(path, seen, interval);
 #ifdef LAYER_BEAUTY
             add_direct(path, seen, interval, pixel_key, steady);
+#ifdef ENVIRONMENT_LIGHTS
+            add_environment_light(path, seen, interval);
+#endif
 #endif
         }
 #endif

@@ -56,12 +56,14 @@ EVERYTHING = Features(
     camera_disperses=True,
     map_tents=8,
     beams=True,
+    environment_lights=True,
 )
 PLAIN_CAMERA = {"camera_disperses": False, "map_tents": 0}
 """What the camera sees disperses nothing: the camera carries the spectrum in the same way as the light pass."""
 WITHOUT = {
     "beams": {"beams": False},
     "light profiles": {"light_profiles": False},
+    "environment light": {"environment_lights": False},
     "spectral columns": {
         "spectral_groups": 0,
         "merged_groups": False,
@@ -197,6 +199,7 @@ def camera_sources(
         "MAP_BINS": features.map_tents > 0,
         "CAMERA_SPECULAR": features.camera_specular,
         "HAS_DISPERSION": features.camera_disperses,
+        "ENVIRONMENT_LIGHTS": features.environment_lights,
         "SPECTRAL_SWEEP": single > 0,
         "ABSORPTION": features.absorption and features.camera_specular,
         "NORMAL_DERIVATIVES": features.smooth_normals,

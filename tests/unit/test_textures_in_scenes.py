@@ -166,7 +166,8 @@ def test_each_kind_of_environment_is_read(folder: Path) -> None:
     np.testing.assert_allclose(scene.environment.rgb, 3.0, rtol=1e-6)
     for line, expected in (("radiance = [5, 6, 0]", (5.0, 6.0, 0.0)), ("colour = 0.5\nintensity = 4", (2.0, 2.0, 2.0))):
         scene = load(folder, LIGHT + BALL + TABLE + f'material = "diffuse"\n[environment]\nkind = "constant"\n{line}\n')
-        assert scene.environment is None and scene.background_rgb == expected
+        assert scene.environment.kind == "constant" and scene.background_rgb == expected
+        np.testing.assert_allclose(scene.environment.rgb, np.broadcast_to(expected, (8, 16, 3)))
 
 
 def test_notes_on_a_map_reach_the_scene(folder: Path) -> None:

@@ -109,6 +109,10 @@ def static_costs(scene: Scene, features: Features) -> dict[str, str]:
             beyond is not None,
             f"about {size_words(picture_bytes(beyond))}" if beyond is not None else "",
         ),
+        "environment light": (
+            features.environment_lights,
+            "up to six lookups a diffuse surface; a texture of some thousand texels a receiver",
+        ),
         "beams": (features.beams, f"{len(beam_objects(scene))} object(s) searched on the processor; one bit an object"),
         "spectral bins": (features.targets > 1, f"{sizes.texel} B a texel instead of {_TEXEL}"),
     }

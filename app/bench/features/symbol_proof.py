@@ -77,6 +77,7 @@ FEATURE_SYMBOLS: dict[str, tuple[str, ...]] = {
     "camera spectral taps": (r"restrict_to_band\(path, pixel_key\)", "taps_of", "onset_of"),
     "spectral maps": ("BIN_ROW", "BIN_SPECTRUM_ROW", "BIN_TARGET"),
     "beams": ("is_beam_object",),
+    "environment light": ("environment_irradiance", "add_environment_light"),
     "light profiles": ("profile_intensity", "profile_stretch"),
     "spectral bins": ("define TARGETS [2-9]", "define TARGETS 1[0-9]"),
 }

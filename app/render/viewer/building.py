@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from ...gpu.context import Context
 
 
+_ENVIRONMENT_S = 0.006
+"""What one dispatch that asks for the environment's light should take."""
+
+
 @dataclass(frozen=True)
 class Budget:
     """Sizes that depend on the device."""
@@ -85,6 +89,13 @@ def build(
         for _ in light.light_pass.preparing():
             yield None
         light.show(wanted)
+        if light.environment is not None:
+            # The first picture is not a dark one.
+            for _ in light.environment.steps(_ENVIRONMENT_S):
+                yield None
+                if light.environment.is_worth_showing:
+                    break
+            light.environment.show()
         published: list[bool] = []
         first = min(budget.first_photons, largest)
         accumulation = Accumulation(light, first, largest, target, wanted.seed, lambda: published.append(True))

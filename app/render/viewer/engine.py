@@ -19,6 +19,7 @@ from ...base.errors import UserError
 from ...edit.live_inputs import LiveInputs
 from ...edit.stored_photons import StoredPhotons
 from ...gpu import shader
+from ...model.environment_sun import with_sun
 from ...passes.caustic_maps import CausticMaps
 from ...passes.pick import Picker, PickHit
 from ..beam_light import MovingBeams
@@ -49,6 +50,9 @@ PREVIEW_GPU_S = 0.004
 """And elsewhere."""
 CAMERA_SHARE = 0.4
 """Of a frame, where photons are traced as well."""
+
+ENVIRONMENT_SHARE = 0.3
+"""Of a frame, at least, for the environment's light until all of it is known."""
 
 QUERIED_PHOTONS = 200_000
 """Stored ones that are asked what lies under the cursor."""
@@ -128,6 +132,8 @@ class LiveEngine:
 
     def set(self, inputs: LiveInputs) -> DirtyLevel:
         """Want `inputs` from now on; returns what that asks for. The work is done by `advance`."""
+        if (scene := with_sun(inputs.scene)) is not inputs.scene:
+            inputs = replace(inputs, scene=scene)
         before, self._wanted = self._wanted, inputs
         if before is not None and dirty_level(before, before, inputs) == DirtyLevel.NOTHING:
             return DirtyLevel.NOTHING
@@ -200,6 +206,7 @@ class LiveEngine:
             self._build(deadline - (reserved if sees and camera.owes_picture else 0.0))
         elif self.schedule.has_photon_work and not self.schedule.yields_to_camera(camera):
             self._work_on_photons(deadline - (0.0 if camera.is_done else reserved))
+        self._work_on_environment(deadline, budget_s)
         if self._maps is None or self._inputs is None:
             return
         # A coarse picture that is owed is finished in this frame: what was moved must be seen to move.
@@ -330,6 +337,8 @@ class LiveEngine:
     def _take_scene(self, inputs: LiveInputs, light: LiveLight) -> None:
         scene = scene_seen(inputs.scene, inputs.camera, inputs.solo_nm)
         light_pass = light.light_pass
+        if light.environment is not None:
+            light.environment.take(scene)
         self._camera_pass.take_scene(light.buffers, scene, light_pass.reflectances, light_pass.map_channels)
 
     # ---- building ----------------------------------------------------------------------------
@@ -387,6 +396,14 @@ class LiveEngine:
         self._times["splat"] += splatted
         self._history = [h for h in self._history if h[0] > time.perf_counter() - 1.0]
         self._history.append((time.perf_counter(), max(stats.photons - before[2], 0), traced + splatted))
+
+    def _work_on_environment(self, deadline: float, budget_s: float) -> None:
+        """A part of a frame or what is left of it, while the camera has a picture to show."""
+        if self._shown is None or self.schedule.building or self._camera.owes_picture:
+            return
+        end = max(deadline - CAMERA_SHARE * budget_s, time.perf_counter() + ENVIRONMENT_SHARE * budget_s)
+        if self._shown.light.ask_environment(end, 0.5 * ENVIRONMENT_SHARE * budget_s, self.schedule.interacting):
+            self._restart_camera(same_view=not self.schedule.interacting)
 
     # ---- what there is -----------------------------------------------------------------------
 
@@ -456,12 +473,16 @@ class LiveEngine:
         )
 
     @property
+    def _knows_environment(self) -> bool:
+        return self._shown is None or self._shown.light.environment is None or self._shown.light.environment.is_done
+
+    @property
     def is_idle(self) -> bool:
         """Nothing is left to do until an input changes."""
         if self._wanted is None:
             return True
         judged = self._shown is None or is_judged(self._shown.light, self._wanted)
-        return judged and self.schedule.is_idle(self._camera)
+        return judged and self._knows_environment and self.schedule.is_idle(self._camera)
 
     def pick(self, x: float, y: float) -> PickHit | None:
         """First surface at (x, y) of the picture, 0 to 1 from its top left corner; None beyond everything."""

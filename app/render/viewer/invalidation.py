@@ -13,6 +13,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from ...edit.live_inputs import LiveInputs
+from ...model.environment_light import lighting_environment
 from ...model.features import is_painted
 from ...model.optics.glass import Dispersion
 from ...model.scene import (
@@ -74,8 +75,10 @@ def _scene(old: Scene, new: Scene) -> DirtyLevel:
         elif item.name == "lights":
             cost = max(cost, _lights(a, b))
         elif item.name in ("background_rgb", "environment"):
-            # They light nothing. Environments are compared by identity: a new one is another one.
+            # No photon comes from them. Environments are compared by identity: a new one is another one.
             cost = max(cost, DirtyLevel.CAMERA if a != b else DirtyLevel.NOTHING)
+            if (lighting_environment(old) is None) != (lighting_environment(new) is None):
+                cost = DirtyLevel.BUILD
         elif item.name == "render":
             cost = max(cost, DirtyLevel.BUILD if a.max_depth != b.max_depth else DirtyLevel.NOTHING)
         else:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model.features import Features
+from ...passes.environment_light import EnvironmentLightPass
 from ...passes.map_layout import LIVE
 from ..beam_light import MovingBeams
 from ..light_maps import LightMaps
@@ -66,6 +67,10 @@ class LiveLight:
             pace=Pace.within_frames(context),
             moving=self.moving,
         )
+        self.environment: EnvironmentLightPass | None = None
+        """Light of what lies beyond everything, where the scene has it."""
+        if self.buffers.features.environment_lights:
+            self.environment = EnvironmentLightPass(context, self.buffers, settings.seed)
         self.may_have_beams = Features.of(scene, replace(settings, local_gain=False)).beams
         """Light goes as beams while nothing is painted."""
         self.beam_seconds = 0.0
@@ -91,7 +96,8 @@ class LiveLight:
                 self._guess = SpectrumGuess(self._context.ctx, channels, lights, maps.atlas.size)
             self._guess.run(textures[0])
             textures = [*textures, *self._guess.textures]
-        return maps.caustic_maps(textures)
+        lit = None if self.environment is None else self.environment.texture
+        return replace(maps.caustic_maps(textures), environment=lit)
 
     # ---- what is shown -----------------------------------------------------------------------
 
@@ -227,6 +233,23 @@ class LiveLight:
                 pass
         maps.photon_weight = kept.pass_photons * share
 
+    # ---- the environment ---------------------------------------------------------------------
+
+    def ask_environment(self, end: float, seconds: float, interacting: bool) -> bool:
+        """Ask for more of the environment's light until `end` (`time.perf_counter`), in dispatches of so many
+        `seconds`; whether so much more is known that it is shown. While something is dragged only the first of another
+        environment is asked for."""
+        environment = self.environment
+        if environment is None or environment.is_done or (interacting and environment.shown):
+            return False
+        for _ in environment.steps(seconds):
+            if time.perf_counter() >= end or (interacting and environment.is_worth_showing):
+                break
+        if not environment.is_worth_showing:
+            return False
+        environment.show()
+        return True
+
     # ---- beams -------------------------------------------------------------------------------
 
     @property
@@ -268,11 +291,12 @@ class LiveLight:
     def bytes(self) -> int:
         """Device memory of photons, queues, maps and scene."""
         maps = sum(maps.bytes for maps in (self.light_pass.maps, self._preview) if maps is not None)
+        maps += self.environment.bytes if self.environment is not None else 0
         return self.stored.bytes + self._samples.bytes + self.light_pass.trace.bytes + self.buffers.bytes + maps
 
     def release(self) -> None:
         """Free everything, the stored photons and the scene's buffers too."""
         self._samples.clear()
-        for owned in (self._preview, self._guess, self.light_pass, self.buffers):
+        for owned in (self._preview, self._guess, self.environment, self.light_pass, self.buffers):
             if owned is not None:
                 owned.release()

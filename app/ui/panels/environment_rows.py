@@ -36,9 +36,9 @@ _SKIES = {
 
 
 def draw_environment(state: State, view_model: ViewModel) -> State:
-    """Draw the rows. Whatever is chosen lights nothing: it is seen directly, in mirrors and through glass."""
+    """Draw the rows."""
     scene = state.scene
-    tip = "What is seen behind everything, in mirrors and through glass. It lights nothing."
+    tip = "What is seen behind everything, in mirrors and through glass. All but a plain colour lights what is diffuse."
     changed, kind = widgets.combo("Kind##environment", _KINDS, environments.environment_kind(scene), tip=tip)
     if changed and kind == "map":
         picture_choice.ask_environment(state, view_model)
@@ -47,7 +47,11 @@ def draw_environment(state: State, view_model: ViewModel) -> State:
         return edits.attempt(state, f"Environment: {_KINDS[kind].lower()}", environments.set_environment_kind, kind)
     if scene.environment is None:
         return _constant(state)
-    rows = {"gradient": _gradient, "sky": _sky}
+    tip = "Whether it lights what is diffuse, besides being seen."
+    changed, lights = widgets.toggle("Lights surfaces", scene.environment.lights, tip=tip)
+    if changed:
+        return edits.attempt(state, "Light of the environment", environments.set_environment_lights, lights)
+    rows = {"gradient": _gradient, "sky": _sky, "constant": _radiance}
     if scene.environment.kind == "map":
         return _map(state, view_model, scene.environment)
     return rows[scene.environment.kind](state, scene.environment)
@@ -59,6 +63,14 @@ def _constant(state: State) -> State:
     )
     if changed:
         state = edits.attempt(state, "Background", edits.set_background, rgb)
+    return widgets.holding(state, active)
+
+
+def _radiance(state: State, environment: Environment) -> State:
+    rgb = _vector(environment.parameters["radiance"])
+    changed, rgb, active = widgets.colour("Radiance", rgb, tip=f"From everywhere, {_RADIANCE}.")
+    if changed:
+        state = edits.attempt(state, "Radiance", environments.set_constant, tuple(max(c, 0.0) for c in rgb))
     return widgets.holding(state, active)
 
 

@@ -1,0 +1,313 @@
+"""The environment's light on every receiver: a small program that asks how much of it reaches each texel, and the
+texture that the camera looks up.
+
+E(x) = ∫ L(ω) V(x, ω) cos θ dω is shared out by what a direction meets first. Nothing: it counts straight, in directions
+drawn by brightness (`model.environment_light`), as the ratio of what arrives to what was asked for, times the integral
+without anything in the way, which is known: where nothing hides anything, and where all is hidden, it is exact. Glass
+or a mirror: that path is followed backwards to the environment, with Fresnel's reflectance by chance and Beer's law,
+and finds there the mean of as wide a patch as it stands for. So what glass transmits of the environment's light, its
+focus included, is here, and photons carry none of it. Anything else: nothing, receivers do not light each other.
+
+Every directions' number is a counter: the picture depends neither on how many are asked at once nor on timing.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import moderngl
+import numpy as np
+
+from ..base.random_words import random_word
+from ..gpu import bindings, shader
+from ..gpu.context import Context
+from ..gpu.dispatch_budget import DispatchBudget
+from ..gpu.scene_buffers import SCENE_STRUCTS, SceneBuffers
+from ..gpu.schema import Field, Struct
+from ..model.environment_light import EnvironmentLight, even_points, lighting_environment
+from ..model.materials import Grating
+from ..model.scene import Scene
+from .environment_places import PLACE, EnvironmentPlaces, environment_places
+
+DIRECTIONS = 512
+"""Asked in all, straight."""
+LEAST_DIRECTIONS = 64
+"""That a still asks, however little time it has."""
+PER_FOLLOWED = 4
+"""Straight ones for each that is followed through glass and over mirrors, which takes as long as many of them."""
+FIRST_DIRECTIONS = 16
+"""After which the light is worth showing."""
+MAX_EVENTS = 40
+"""Surfaces of glass and mirrors on one path; what goes on is lost and counted."""
+MOST_ASKED = 24
+"""Directions of one dispatch at most: Mesa's software renderer ends loops that run long."""
+ANCHOR_NM = 587.56
+"""Wavelength whose index bends what is followed: the environment's light through glass does not part into colours."""
+RGB_NM = (612.0, 549.0, 465.0)
+"""Wavelengths at which glass and mirrors tint linear red, green and blue."""
+SMOOTHING = 1.5
+"""Texels over which what came by glass and mirrors is averaged: neighbours follow other paths."""
+TARGET_SECONDS = 0.1
+_GROUP = 64
+_BIND_PLACES, _BIND_ASKED, _BIND_SUMS, _UNIT_ENVIRONMENT = 8, 9, 10, 0
+_KEY = 70
+"""Of the words that decide at surfaces of glass; those after it place directions towards glass."""
+
+PARAMETERS = Struct(
+    "EnvironmentParameters",
+    (
+        Field("sky_x", "vec4", "column of the rotation from the world to the environment's frame"),
+        Field("sky_y", "vec4"),
+        Field("sky_z", "vec4"),
+        Field("specular", "vec4", "sphere that holds all glass and mirrors: centre and radius, GPU space"),
+        Field("x_of_rgb", "vec4", "spectral coordinates at which glass tints red, green, blue; of the index"),
+        Field("level_narrow", "uvec4", "level that is read: first row, width, height; for directions to the sphere"),
+        Field("level_wide", "uvec4", "for directions anywhere"),
+        Field("count", "uint", "places"),
+        Field("straight", "uint", "of the directions asked, how many are straight"),
+        Field("followed", "uint", "and how many after them are followed"),
+        Field("reserved", "uint", ""),
+    ),
+)
+ASKED = Struct(
+    "EnvironmentAsked",
+    (
+        Field("toward", "vec3", "unit; of one that is followed two numbers for its place"),
+        Field("key", "uint", "of one that is followed: of its choices"),
+        Field("weight", "vec3", "radiance over probability"),
+        Field("reserved", "uint", ""),
+        Field("within", "vec2", "place within a texel"),
+        Field("reserved_too", "vec2", ""),
+    ),
+)
+SUM = Struct(
+    "EnvironmentSum",
+    (
+        Field("all", "vec3", "asked for"),
+        Field("lost", "float", "paths given up"),
+        Field("straight", "vec3", "of it what arrived"),
+        Field("reserved", "float", ""),
+        Field("specular", "vec3", "by way of glass and mirrors"),
+        Field("reserved_too", "float", ""),
+    ),
+)
+
+
+class EnvironmentLightPass:
+    """Owns the program, the places, the sums and the texture of one scene's receivers."""
+
+    def __init__(
+        self,
+        context: Context,
+        buffers: SceneBuffers,
+        seed: int = 1,
+        directions: int = DIRECTIONS,
+        finer: float = 1.0,
+    ) -> None:
+        """Of a scene that an environment lights (`Features.environment_lights`); `finer`: factor on the number of
+        texels."""
+        environment = lighting_environment(buffers.scene)
+        assert environment is not None
+        self._context, self._ctx, self._buffers = context, context.ctx, buffers
+        self._seed, self.total = seed, directions
+        self.places: EnvironmentPlaces = environment_places(buffers, finer)
+        self.texture = self._ctx.texture(self.places.size, 4, dtype="f4")
+        self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self.asked = 0
+        """Straight directions asked so far."""
+        self.shown = 0
+        """Those that the texture holds."""
+        self.seconds = 0.0
+        """Spent on it."""
+        count = max(1, len(self.places.places))
+        self._places = self._ctx.buffer(self.places.places.tobytes() or bytes(PLACE.stride))
+        self._sums = self._ctx.buffer(reserve=count * SUM.stride)
+        self._asked_buffer = self._ctx.buffer(reserve=MOST_ASKED * ASKED.stride)
+        self._parameters = self._ctx.buffer(reserve=PARAMETERS.stride)
+        self._levels: moderngl.Texture | None = None
+        self._sphere = _specular_sphere(buffers)
+        self._budget = DispatchBudget(PER_FOLLOWED, PER_FOLLOWED, MOST_ASKED * PER_FOLLOWED // (PER_FOLLOWED + 1))
+        defines = buffers.features.defines() | bindings.SCENE_DEFINES | buffers.defines
+        defines |= {
+            "BIND_PLACES": _BIND_PLACES,
+            "BIND_ASKED": _BIND_ASKED,
+            "BIND_SUMS": _BIND_SUMS,
+            "UNIT_ENVIRONMENT": _UNIT_ENVIRONMENT,
+            "MOST_ASKED": MOST_ASKED,
+            "MAX_EVENTS": MAX_EVENTS,
+        }
+        defines.pop("NORMAL_DERIVATIVES", None)
+        if self._sphere is not None:
+            defines["FOLLOWS_SPECULAR"] = 1
+        structs = (*SCENE_STRUCTS, PLACE, PARAMETERS, ASKED, SUM)
+        self._program = shader.compute(self._ctx, "light/environment.comp", defines, structs)
+        self._light: EnvironmentLight | None = None
+        self._write(np.zeros((len(self.places.places), 3)))
+        self.take(buffers.scene)
+
+    def take(self, scene: Scene) -> None:
+        """Another environment or other colours of the same things: what was found is forgotten where it must be. A
+        scene that nothing lights keeps what there is: its camera does not ask."""
+        environment = lighting_environment(scene)
+        if environment is None or (self._light is not None and self._light.environment is environment):
+            return
+        self._light = EnvironmentLight(environment, self._seed)
+        self._unshadowed = self._light.unshadowed(self.places.normals) if len(self.places.places) else np.zeros((0, 3))
+        packed, self._level_places = self._light.levels()
+        if self._levels is not None:
+            self._levels.release()
+        texels = np.zeros((*packed.shape[:2], 4), np.float32)
+        texels[..., :3] = packed
+        self._levels = self._ctx.texture(packed.shape[1::-1], 4, texels, dtype="f4")
+        self._levels.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        # What is shown stays until something is known of the new one.
+        self.asked = self.shown = 0
+        self._sums.clear()
+
+    @property
+    def is_done(self) -> bool:
+        """All directions were asked."""
+        return self.asked >= self.total or not len(self.places.places)
+
+    @property
+    def is_worth_showing(self) -> bool:
+        """Much more is known than the texture holds."""
+        wanted = max(FIRST_DIRECTIONS, 4 * self.shown)
+        return self.asked > self.shown and (self.asked >= min(wanted, self.total) or self.is_done)
+
+    def steps(self, seconds: float = TARGET_SECONDS) -> Iterator[float]:
+        """Ask all that is left, pausing after every dispatch of about so many seconds with the share done."""
+        while not self.is_done:
+            self._ask(min(self._budget.units, self.total - self.asked), seconds)
+            yield self.asked / self.total
+
+    def run(self) -> None:
+        """All at once."""
+        for _ in self.steps():
+            pass
+        self.show()
+
+    def _ask(self, count: int, seconds: float) -> None:
+        assert self._light is not None and self._levels is not None
+        started = time.perf_counter()
+        follows = self._sphere is not None
+        first_followed, end_followed = (
+            (self.asked // PER_FOLLOWED, (self.asked + count) // PER_FOLLOWED) if follows else (0, 0)
+        )
+        asked = ASKED.zeros(MOST_ASKED)
+        drawn = self._light.directions(self.asked, count)
+        asked["toward"][:count], asked["weight"][:count] = drawn.toward, drawn.weight
+        asked["within"][:count] = drawn.within
+        followed = end_followed - first_followed
+        if followed:
+            numbers = np.arange(first_followed, end_followed)
+            places = even_points(numbers, self._seed, _KEY + 1)
+            asked["toward"][count : count + followed, :2] = places[:, :2]
+            asked["within"][count : count + followed] = places[:, 2:]
+            asked["key"][count : count + followed] = [random_word(self._seed, 1, int(n), _KEY) for n in numbers]
+        parameters = PARAMETERS.zeros(1)
+        columns = np.asarray(self._light.environment.world_to_local, float).T
+        for name, column in zip(("sky_x", "sky_y", "sky_z"), columns, strict=True):
+            parameters[name][0, :3] = column
+        if self._sphere is not None:
+            parameters["specular"] = self._sphere
+        nm = np.array([*RGB_NM, ANCHOR_NM])
+        parameters["x_of_rgb"] = self._buffers.axis.x_of_nm(nm)
+        wide = 2.0 * np.pi * PER_FOLLOWED / self.total
+        parameters["level_wide"][0, :3] = self._level(wide)
+        parameters["level_narrow"][0, :3] = self._level(0.25 * wide)
+        parameters["count"], parameters["straight"], parameters["followed"] = len(self.places.places), count, followed
+        self._parameters.write(parameters.tobytes())
+        self._asked_buffer.write(asked.tobytes())
+        self._buffers.bind()
+        self._parameters.bind_to_uniform_block(bindings.PARAMETERS)
+        self._asked_buffer.bind_to_uniform_block(_BIND_ASKED)
+        self._places.bind_to_storage_buffer(_BIND_PLACES)
+        self._sums.bind_to_storage_buffer(_BIND_SUMS)
+        self._levels.use(_UNIT_ENVIRONMENT)
+        self._program.run(-(-len(self.places.places) // _GROUP))
+        self._ctx.memory_barrier()
+        self._ctx.finish()
+        self.asked += count
+        took = time.perf_counter() - started
+        self.seconds += took
+        self._budget.learn(count, took, seconds)
+
+    def _level(self, solid_angle: float) -> tuple[int, int, int]:
+        """The level whose texels are about as large as a patch of so many steradians."""
+        height = self._level_places[0][2]
+        level = int(np.floor(max(0.0, np.log2(np.sqrt(solid_angle) * height / np.pi))))
+        return self._level_places[min(level, len(self._level_places) - 1)]
+
+    # ---- what was found ----------------------------------------------------------------------
+
+    def irradiance(self) -> np.ndarray:
+        """Of every place, float64 (n, 3), linear Rec.709, lm/unit²: as far as it is known."""
+        count = len(self.places.places)
+        sums = np.frombuffer(self._sums.read(count * SUM.stride), SUM.dtype) if count else SUM.zeros(0)
+        asked_for, straight = sums["all"].astype(float), sums["straight"].astype(float)
+        share = np.divide(straight, asked_for, out=np.zeros_like(straight), where=asked_for > 0.0)
+        followed = self.asked // PER_FOLLOWED
+        specular = sums["specular"].astype(float)
+        if specular.any():
+            specular = self.places.smoothed(specular, SMOOTHING)
+        return share * self._unshadowed + specular / max(followed, 1)
+
+    @property
+    def lost(self) -> float:
+        """Share of followed paths that were given up after `MAX_EVENTS`."""
+        count = len(self.places.places)
+        if not count or self.asked < PER_FOLLOWED:
+            return 0.0
+        sums = np.frombuffer(self._sums.read(count * SUM.stride), SUM.dtype)
+        return float(sums["lost"].mean(dtype=float) / (self.asked // PER_FOLLOWED))
+
+    def show(self) -> None:
+        """What was found becomes what the camera looks up."""
+        if self.shown == self.asked:
+            return
+        self._write(self.irradiance())
+        self.shown = self.asked
+
+    def _write(self, irradiance: np.ndarray) -> None:
+        width, height = self.places.size
+        image = np.zeros((height, width, 4), np.float32)
+        image[: len(self.places.records)] = self.places.records
+        x, y = self.places.texel_xy.T
+        image[y, x, :3] = irradiance
+        x, y = self.places.filled_xy.T
+        image[y, x, :3] = irradiance[self.places.source]
+        self.texture.write(image.tobytes())
+
+    @property
+    def bytes(self) -> int:
+        """Device memory held."""
+        textures = [t for t in (self.texture, self._levels) if t is not None]
+        return self._places.size + self._sums.size + sum(16 * t.width * t.height for t in textures)
+
+    def release(self) -> None:
+        """Free everything."""
+        owned = (self._places, self._sums, self._asked_buffer, self._parameters, self._program, self.texture)
+        shader.release(*owned)
+        if self._levels is not None:
+            self._levels.release()
+
+
+def without_light(ctx: moderngl.Context, receivers: int) -> moderngl.Texture:
+    """The texture of a scene whose so many receivers are lit by nothing."""
+    return ctx.texture((max(1, receivers), 1), 4, bytes(16 * max(1, receivers)), dtype="f4")
+
+
+def _specular_sphere(buffers: SceneBuffers) -> np.ndarray | None:
+    """What holds all glass and mirrors: centre and radius, float64 (4,), GPU space; None where there are none."""
+    corners = [
+        buffers.space.to_gpu(mesh.vertices)
+        for mesh, item in zip(buffers.world_meshes, buffers.scene.objects, strict=True)
+        if item.material.is_specular and not isinstance(item.material, Grating)
+    ]
+    if not corners:
+        return None
+    points = np.concatenate(corners)
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return np.append(centre, 1.0001 * np.linalg.norm(points - centre, axis=1).max())

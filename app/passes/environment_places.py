@@ -1,0 +1,279 @@
+"""Where on the receivers the environment's light is found: texels of few windows and charts, coarser than caustic maps.
+
+A flat receiver has a coarse window over all of it and, where other things stand on or near a part of it, a fine one
+round those, since only there shadows are sharp; of an open sheet both sides. A curved receiver has charts. Positions,
+normals and facets of all texels are worked out here, so that the program that asks knows nothing of windows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.schema import Field, Struct
+from ..gpu.tiles import pack
+from ..model.contacts import world_bounds
+from ..model.features import is_flat
+from ..model.geometry.charts import ChartAtlas, build_charts
+from .map_layout import PlaneFrame, Window, plane_frame
+
+FINE_TEXELS, COARSE_TEXELS, CHART_TEXELS = 104 * 104, 40 * 40, 88 * 88
+"""Of a flat receiver's windows, each side, and of a curved one."""
+MOST_TEXELS = 1 << 17
+"""Of all together: many receivers share them."""
+RECORD_TEXELS = 3
+"""Of a window or a chart's triangle: both rows, then the rectangle."""
+_FULL_SHARE = 0.5
+"""Of a receiver's area, from which on one window serves all."""
+
+PLACE = Struct(
+    "EnvironmentPlace",
+    (
+        Field("position", "vec3", "GPU space"),
+        Field("primitive", "uint", "facet it lies on"),
+        Field("normal", "vec3", "unit, of the side that is lit"),
+        Field("object", "uint", "scene object index"),
+        Field("step_u", "vec3", "to the next texel, GPU space; zero on charts"),
+        Field("inside", "uint", "1: the facet's back is lit"),
+        Field("step_v", "vec3", "likewise"),
+        Field("reserved", "uint", ""),
+    ),
+)
+
+
+@dataclass(frozen=True)
+class EnvironmentPlaces:
+    """Texels of all receivers, in one texture after the records that say where they lie."""
+
+    size: tuple[int, int]
+    records: np.ndarray
+    """float32 (rows, width, 4): for every receiver (first record's texel, records a side, charts' first triangle + 1 or
+    0, sides), then the records."""
+    places: np.ndarray
+    """PLACE (n,)."""
+    texel_xy: np.ndarray
+    """int (n, 2): where each belongs."""
+    tiles: tuple[tuple[int, int], ...]
+    """First place of each tile, and the one after its last."""
+    filled_xy: np.ndarray
+    """int (m, 2): texels beside charts that are looked up too …"""
+    source: np.ndarray
+    """int (m,): … and the place whose light they show."""
+
+    def smoothed(self, values: np.ndarray, texels: float) -> np.ndarray:
+        """`values` (n, 3) averaged over neighbours by a Gaussian of so many texels, within each tile."""
+        from scipy.ndimage import gaussian_filter
+
+        found = np.array(values, float)
+        for first, end in self.tiles:
+            x, y = (self.texel_xy[first:end] - self.texel_xy[first:end].min(axis=0, initial=1 << 30)).T
+            if end - first < 2:
+                continue
+            image = np.zeros((y.max() + 1, x.max() + 1, 4))
+            image[y, x, :3], image[y, x, 3] = values[first:end], 1.0
+            mean = gaussian_filter(image, (texels, texels, 0.0), mode="constant", truncate=2.5)
+            found[first:end] = mean[y, x, :3] / mean[y, x, 3:]
+        return found
+
+    @property
+    def normals(self) -> np.ndarray:
+        """float64 (n, 3)."""
+        return self.places["normal"].astype(float)
+
+
+@dataclass(frozen=True)
+class _Side:
+    """A tile: of one window on one side, or of charts."""
+
+    receiver: int
+    size: tuple[int, int]
+    frame: PlaneFrame | None = None
+    window: Window | None = None
+    back: bool = False
+    atlas: ChartAtlas | None = None
+
+
+def environment_places(buffers: SceneBuffers, finer: float = 1.0) -> EnvironmentPlaces:
+    """All texels of the scene's receivers; `finer`: factor on their number."""
+    scene, receivers = buffers.scene, buffers.receivers
+    tiles: list[_Side] = []
+    share = finer * min(1.0, MOST_TEXELS / (max(len(receivers), 1) * (FINE_TEXELS + COARSE_TEXELS)))
+    for receiver, index in enumerate(receivers):
+        item, mesh = scene.objects[index], buffers.world_meshes[index]
+        if not is_flat(item):
+            atlas = build_charts(mesh, total_texels=max(256, int(share * CHART_TEXELS)))
+            sides = (False,) if mesh.is_closed else (False, True)
+            tiles += [_Side(receiver, (atlas.width, atlas.height), back=back, atlas=atlas) for back in sides]
+            continue
+        frame = plane_frame(buffers.space.to_gpu(mesh.vertices))
+        windows = _windows(buffers, index, frame)
+        for back in (False, True):
+            for number, window in enumerate(windows):
+                texels = COARSE_TEXELS if number and len(windows) > 1 else FINE_TEXELS
+                size = _size(window, share * texels * (0.25 if back else 1.0))
+                tiles.append(_Side(receiver, size, frame, window, back))
+    placed, size = pack([tile.size for tile in tiles], 4096)
+    # Mesa compiles its programs once more for sides that are powers of two.
+    width = max(size[0], 64)
+    width += 1 if width & (width - 1) == 0 else 0
+    return _packed(buffers, tiles, placed, (width, size[1]))
+
+
+def _windows(buffers: SceneBuffers, index: int, frame: PlaneFrame) -> list[Window]:
+    """Fine (where it pays) and coarse window on a flat receiver, finest first."""
+    points = frame.project(buffers.space.to_gpu(buffers.world_meshes[index].vertices))
+    extent = Window(points.min(axis=0), points.max(axis=0))
+    normal = np.cross(frame.axes[0], frame.axes[1])
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for other, item in enumerate(buffers.scene.objects):
+        if other == index:
+            continue
+        box = buffers.space.to_gpu(world_bounds(item))
+        corners = np.array(np.meshgrid(*box.T, indexing="ij")).reshape(3, 8).T
+        flat, height = frame.project(corners), np.abs((corners - frame.origin) @ normal)
+        # A shadow under a uniform sky has faded as far beside a thing as that is high.
+        reach = min(float(height.max()), float(np.linalg.norm(box[1] - box[0])))
+        least, most = flat.min(axis=0) - reach, flat.max(axis=0) + reach
+        if (least < extent.high).all() and (most > extent.low).all() and height.min() < 3.0 * reach:
+            low, high = np.minimum(low, least), np.maximum(high, most)
+    fine = Window(np.maximum(low, extent.low), np.minimum(high, extent.high))
+    if not (fine.size > 1e-9).all() or np.prod(fine.size) > _FULL_SHARE * np.prod(extent.size):
+        return [extent]
+    return [fine, extent]
+
+
+def _size(window: Window, texels: float) -> tuple[int, int]:
+    """Square texels, as nearly as whole ones fit."""
+    side = np.sqrt(np.prod(window.size) / max(texels, 16.0))
+    width, height = np.clip(np.round(window.size / side), 4, 1024).astype(int)
+    return int(width), int(height)
+
+
+def _packed(buffers: SceneBuffers, tiles: list[_Side], placed, size: tuple[int, int]) -> EnvironmentPlaces:
+    count = len(buffers.receivers)
+    heads = np.zeros((count, 4), np.float32)
+    records: list[np.ndarray] = []
+    parts: list[tuple[np.ndarray, np.ndarray]] = []
+    filled: list[np.ndarray] = []
+    sources: list[np.ndarray] = []
+    rows = _record_rows(buffers, tiles, size[0])
+    for tile, at in zip(tiles, placed, strict=True):
+        offset = np.array([at.x, at.y + rows])
+        head = heads[tile.receiver]
+        if not head[3]:
+            head[0] = count + sum(len(r) for r in records)
+        first = sum(len(places) for places, _ in parts)
+        if tile.atlas is None:
+            assert tile.window is not None and tile.frame is not None
+            head[1] += not tile.back
+            head[3] = 2 if tile.back else 1
+            records.append(_window_record(tile, offset))
+            parts.append(_window_places(buffers, tile, offset))
+        else:
+            index = buffers.receivers[tile.receiver]
+            head[1:] = len(tile.atlas.rows), 1 + buffers.first_triangle[index], 2 if tile.back else 1
+            records.append(_chart_records(buffers, tile.atlas, offset))
+            places, texel_xy, beside, nearest = _chart_places(buffers, tile, index, offset)
+            parts.append((places, texel_xy))
+            filled.append(beside)
+            sources.append(first + nearest)
+    texels = np.concatenate([heads, *records]) if records else heads
+    image = np.zeros((rows * size[0], 4), np.float32)
+    image[: len(texels)] = texels
+    none = np.zeros((0, 2), int)
+    ends = np.cumsum([len(places) for places, _ in parts]).tolist()
+    return EnvironmentPlaces(
+        (size[0], size[1] + rows),
+        image.reshape(rows, size[0], 4),
+        np.concatenate([p for p, _ in parts]) if parts else PLACE.zeros(0),
+        np.concatenate([xy for _, xy in parts]) if parts else none,
+        tuple((end - len(places), end) for (places, _), end in zip(parts, ends, strict=True)),
+        np.concatenate([none, *filled]),
+        np.concatenate([np.zeros(0, int), *sources]),
+    )
+
+
+def _record_rows(buffers: SceneBuffers, tiles: list[_Side], width: int) -> int:
+    texels = len(buffers.receivers)
+    for tile in tiles:
+        texels += RECORD_TEXELS * (1 if tile.atlas is None else len(tile.atlas.rows))
+    return -(-texels // width)
+
+
+def _window_record(tile: _Side, offset: np.ndarray) -> np.ndarray:
+    assert tile.frame is not None and tile.window is not None
+    scale = np.array(tile.size) / tile.window.size
+    axes = tile.frame.axes
+    rows = np.concatenate([axes, (-(axes @ tile.frame.origin) - tile.window.low)[:, None]], axis=1) * scale[:, None]
+    rows[:, 3] += offset
+    return np.array([rows[0], rows[1], [*offset, *(offset + tile.size)]], np.float32)
+
+
+def _window_places(buffers: SceneBuffers, tile: _Side, offset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    assert tile.frame is not None and tile.window is not None
+    index = buffers.receivers[tile.receiver]
+    mesh = buffers.world_meshes[index]
+    width, height = tile.size
+    x, y = (g.ravel() for g in np.meshgrid(np.arange(width), np.arange(height)))
+    step = tile.window.size / np.array(tile.size)
+    flat = tile.window.low + (np.stack([x, y], axis=-1) + 0.5) * step
+    found = PLACE.zeros(len(x))
+    found["position"] = tile.frame.origin + flat @ tile.frame.axes
+    found["step_u"], found["step_v"] = step[0] * tile.frame.axes[0], step[1] * tile.frame.axes[1]
+    outward = mesh.face_normals()[int(np.argmax(mesh.areas()))]
+    found["normal"] = -outward if tile.back else outward
+    found["inside"] = tile.back
+    found["object"] = index
+    found["primitive"] = buffers.primitives[buffers.first_triangle[index]]
+    return found, np.stack([x, y], axis=-1) + offset
+
+
+def _chart_records(buffers: SceneBuffers, atlas: ChartAtlas, offset: np.ndarray) -> np.ndarray:
+    rows = atlas.rows.copy()
+    rows[..., 3] += rows[..., :3] @ buffers.space.centre
+    rows[..., :3] /= buffers.space.scale
+    rows[..., 3] += offset
+    found = np.concatenate([rows, (atlas.triangle_rects + np.tile(offset, 2))[:, None]], axis=1)
+    return found.reshape(-1, 4).astype(np.float32)
+
+
+def _chart_places(
+    buffers: SceneBuffers, tile: _Side, index: int, offset: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Places and texels that triangles own, texels beside them, and of each of those the nearest place."""
+    from scipy.ndimage import distance_transform_edt
+
+    mesh, atlas = buffers.world_meshes[index], tile.atlas
+    assert atlas is not None
+    y, x = np.nonzero(atlas.owner >= 0)
+    triangle = atlas.owner[y, x]
+    corners = mesh.corners()[triangle]
+    ends = np.einsum("nij,nkj->nki", atlas.rows[triangle][..., :3], corners) + atlas.rows[triangle][:, None, :, 3]
+    middle = np.stack([x, y], axis=-1) + 0.5
+    sides = np.stack([ends[:, 1] - ends[:, 0], ends[:, 2] - ends[:, 0]], axis=-1)
+    solid = np.abs(np.linalg.det(sides)) > 1e-12
+    sides[~solid] = np.eye(2)
+    shares = np.linalg.solve(sides, (middle - ends[:, 0])[..., None])[..., 0]
+    shares[~solid] = 1.0 / 3.0
+    world = corners[:, 0] + np.einsum("nk,nkj->nj", shares, corners[:, 1:] - corners[:, :1])
+    found = PLACE.zeros(len(x))
+    found["position"] = buffers.space.to_gpu(world)
+    found["normal"] = mesh.face_normals()[triangle] * (-1.0 if tile.back else 1.0)
+    found["inside"] = tile.back
+    found["object"] = index
+    found["primitive"] = buffers.primitives[buffers.first_triangle[index] + triangle]
+    if not len(x):
+        return found, np.zeros((0, 2), int), np.zeros((0, 2), int), np.zeros(0, int)
+    number = np.full(atlas.owner.shape, -1)
+    number[y, x] = np.arange(len(x))
+    distance, (near_y, near_x) = distance_transform_edt(atlas.owner < 0, return_indices=True)
+    beside_y, beside_x = np.nonzero((distance > 0.0) & (distance < 4.0))
+    nearest = number[near_y[beside_y, beside_x], near_x[beside_y, beside_x]]
+    return (
+        found,
+        np.stack([x, y], axis=-1) + offset,
+        np.stack([beside_x, beside_y], axis=-1) + offset,
+        nearest,
+    )
