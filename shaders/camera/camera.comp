@@ -379,7 +379,7 @@ void main()
     for (uint k = 0u; k < p.primary_samples; ++k) {
         look_index = p.draw_index * p.primary_samples + k;
         lights_seen = 0u;
-        saw_light = false;
+        saw_light = skipped_texels = false;
         CameraPath path = camera_path(pixel, p.primary_samples == 1u ? THE_SAMPLE : k, 1.0 / float(p.primary_samples));
         Hit hit;
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);

@@ -50,9 +50,9 @@ uint turn = 0u;
 bool took_turn = false;
 
 #ifdef LISTS_SPECULAR
-// What a look has met: a mark of the lights that shine on the surface there, and whether it saw one itself.
+// What a look has met: a mark of the lights that shine on the surface there, whether it saw one itself, and whether it stepped over texels of a map.
 uint lights_seen = 0u;
-bool saw_light = false;
+bool saw_light = false, skipped_texels = false;
 #endif
 
 #include "camera/path.glsl"

@@ -195,6 +195,9 @@ void caustic_values(uint placement, vec2 texel, vec2 box, out vec4 values[MAP_TA
     ivec2 lookups = clamp(ivec2(ceil(box)), ivec2(1), ivec2(MAX_TEXELS));
     lookups = min(lookups, max(ivec2(8), MAX_LOOKUPS / lookups.yx));
     vec2 part = box / vec2(lookups), corner = texel - 0.5 * (box - part);
+#ifdef LISTS_SPECULAR
+    skipped_texels = skipped_texels || any(greaterThan(part, vec2(1.001)));
+#endif
     COUNT_ROUNDS(lookups.x * lookups.y);
     float share = 1.0 / float(lookups.x * lookups.y);
     for (int t = 0; t < MAP_TARGETS; ++t) values[t] = vec4(0.0);

@@ -26,7 +26,7 @@ void survey_look(inout Survey survey, uint look, uint sees, bool met, Hit hit, u
 {
     uint key = (hash_combine(met ? hit.object : NONE, lights_met) & ~KIND_BITS) | sees;
     if (look == 0u) survey = Survey(key, hit.normal_g);
-    bool even = key == survey.key && !saw_light && (sees != SEES_DIRECTLY || !met || dot(hit.normal_g, survey.normal) >= EVEN_NORMALS);
+    bool even = key == survey.key && !saw_light && !skipped_texels && (sees != SEES_DIRECTLY || !met || dot(hit.normal_g, survey.normal) >= EVEN_NORMALS);
     if (!even) survey.key = 0u;
 }
 

@@ -78,9 +78,9 @@ def test_what_stands_still_stands_still(gl, stage: Stage) -> None:
     moved = np.abs(second - first).max(axis=-1)
     assert 0.05 < (moved > 1e-3 * first.max()).mean() < 0.4
     # The right of the picture: sparks of the diamond, and table. The room's light meets both: what its weak beams leave
-    # to photons there changes by 1.4e-4 of the brightest.
+    # to photons there changes by 8e-4 of the brightest, in maps of four texels a pixel.
     assert np.ptp(first[18:30, 72:]) > 0.1 * first.max()
-    assert moved[18:30, 72:].max() <= 4e-4 * first.max()
+    assert moved[18:30, 72:].max() <= 1.5e-3 * first.max()
     assert moved[18:30, 72:].mean() <= 2e-5 * first.max()
 
 

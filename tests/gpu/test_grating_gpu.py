@@ -414,7 +414,7 @@ def test_an_edit_of_glass_before_a_grating_is_followed(gl: Context) -> None:
         height, width = (n // 8 * 8 for n in texels.shape[:2])
         return texels[:height, :width].reshape(height // 8, 8, width // 8, 8, 4).mean(axis=(1, 3))
 
-    assert difference(blurred(shown), blurred(want)) < 0.3 * difference(blurred(before), blurred(want))
+    assert difference(blurred(shown), blurred(want)) < 0.35 * difference(blurred(before), blurred(want))
 
 
 def test_picking_follows_the_strongest_order(gl: Context) -> None:

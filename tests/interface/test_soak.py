@@ -50,7 +50,8 @@ def soak(gl: Context, folder: Path, actions: int, seed: int) -> None:
             if number == int(WARM * actions):
                 resident = resident_bytes()
         # It did work: scenes were edited, and the host was asked for things.
-        assert guard.answered > 5 and len(guard.labels) > 3, (guard.answered, guard.labels)
+        least = min(5, actions // 30), min(3, actions // 25)
+        assert guard.answered > least[0] and len(guard.labels) >= least[1], (guard.answered, guard.labels)
         grown = resident_bytes() - resident
         back = undo_everything(hands, start)
         assert hands.session.state.scene is start.scene
