@@ -111,10 +111,11 @@ class FrameRenderer:
         stages: Sequence[Stage],
         begun: float | None = None,
         fill: Fill | None = None,
+        only_light: bool = False,
     ) -> None:
         """`stages`: what will be asked for; maps and lattices are fitted to some of them. `begun`: the
         `time.perf_counter()` from which `settings.seconds` count, which are those of one picture. `fill`: where light
-        comes from, instead of `traced_light`.
+        comes from, instead of `traced_light`. `only_light`: nothing looks at it, so the environment is not asked.
 
         Where light changes, `shader.keep_programs` on the context spares compiling every frame's programs."""
         self._context = context
@@ -129,6 +130,7 @@ class FrameRenderer:
         if settings.seconds is not None:
             self._budget = TimeBudget(settings.seconds, time.perf_counter() if begun is None else begun)
         self._fill = fill or traced_light
+        self._only_light = only_light
         self.phase = _PREPARING
         """What `steps` is at."""
         self.seconds = FrameSeconds()
@@ -360,7 +362,7 @@ class FrameRenderer:
 
     def _ask_environment(self, traced: _Traced, stop: Stop) -> Iterator[float]:
         """Light of what lies beyond everything; a timed rendering and one that is stopped ask fewer directions."""
-        if not traced.buffers.features.environment_lights:
+        if self._only_light or not traced.buffers.features.environment_lights:
             return
         self.phase = _ASKING
         traced.environment = light = EnvironmentLightPass(self._context, traced.buffers, self._settings.seed)

@@ -165,7 +165,7 @@ def trace_part(
         yield 1.0
 
     stage = Stage(scene, scene.camera)
-    renderer = FrameRenderer(context, settings, [stage], fill=fill)
+    renderer = FrameRenderer(context, settings, [stage], fill=fill, only_light=True)
     steps = renderer.steps(stage, stop)
     try:
         for _ in steps:
@@ -189,7 +189,7 @@ def parts_at_most(context: Context, scene: Scene, settings: RenderSettings) -> i
         yield 1.0
 
     stage = Stage(scene, scene.camera)
-    renderer = FrameRenderer(context, settings, [stage], fill=fill)
+    renderer = FrameRenderer(context, settings, [stage], fill=fill, only_light=True)
     steps = renderer.steps(stage)
     try:
         for _ in steps:
